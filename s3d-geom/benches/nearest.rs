@@ -1,0 +1,46 @@
+//! How many annotated points a second find the face to vote for, 5 mm off a mesh, as the mesh grows, when points come in
+//! the order of a scan and when they come shuffled? The aim is a million a second and core.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use s3d_geom::glam::vec3;
+use s3d_geom::{Density, Nearest, NearestFaces, PointCloud, SurfaceSampler, TriMesh};
+
+/// A bumpy square of 2·n² faces, each about 10 cm large.
+fn ground(n: u32) -> TriMesh {
+    let at = |i: u32, j: u32| i * (n + 1) + j;
+    let positions = (0..=n).flat_map(|i| (0..=n).map(move |j| (i as f32, j as f32)));
+    let faces = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).flat_map(|(i, j)| {
+        [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+    });
+    let bumpy = |(x, y): (f32, f32)| vec3(x * 0.1, y * 0.1, ((x * 7.0 + y * 3.0) % 5.0) * 0.02);
+    TriMesh::from_faces(positions.map(bumpy).collect(), faces.collect()).expect("a valid mesh")
+}
+
+fn vote(c: &mut Criterion) {
+    let points = 100_000;
+    let mut group = c.benchmark_group("nearest");
+    group.throughput(Throughput::Elements(points)).sample_size(10);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
+    for n in [40, 125, 400] {
+        let mesh = ground(n);
+        let faces = NearestFaces::new(&mesh);
+        let mut cloud = PointCloud::default();
+        SurfaceSampler::new(&mesh, Density::Total(points), 1).sample(0..points, &mut cloud);
+        let mut scan = cloud.positions;
+        for (p, &face) in scan.iter_mut().zip(&cloud.faces) {
+            *p += mesh.normal(face) * 0.005;
+        }
+        // 7919 is prime and no divisor: every point once, each far from the one before.
+        let shuffled = (0..scan.len()).map(|i| scan[i * 7919 % scan.len()]).collect();
+        for (order, points) in [("in order", scan), ("shuffled", shuffled)] {
+            let mut out: Vec<Nearest> = Vec::new();
+            group.bench_with_input(BenchmarkId::new(order, mesh.faces().len()), &points, |b, points| {
+                b.iter(|| pool.install(|| faces.nearest_many(points, &mut out)));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, vote);
+criterion_main!(benches);

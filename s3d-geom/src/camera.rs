@@ -1,0 +1,278 @@
+//! Cameras: from pixels to rays and back.
+//!
+//! Pixel coordinates: x to the right, y down, the centre of pixel (i, j) at (i + ½, j + ½). Source: formats.md,
+//! "Cameras".
+
+use crate::Pose;
+use glam::{DMat3, DVec2, DVec3, dvec2, dvec3};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// How a camera maps directions to pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// A pinhole with square pixels and its centre in the middle.
+    Perspective {
+        /// The full horizontal angle of view, in (0, π).
+        fov_rad: f64,
+    },
+    /// A panorama: columns are longitudes, growing to the right, rows are latitudes, from +90° at the top to −90°. Its
+    /// centre column looks along the pose's forward axis projected to the horizon; up is the world's +Z whatever the
+    /// pose's tilt.
+    Equirectangular,
+}
+
+/// A pose, a projection and an image size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where the camera is and how it is turned.
+    pub pose: Pose,
+    /// How directions become pixels.
+    pub projection: Projection,
+    /// Image width in pixels, at least 1.
+    pub width: u32,
+    /// Image height in pixels, at least 1.
+    pub height: u32,
+}
+
+impl Camera {
+    /// A pinhole camera of `width` × `height` pixels with the horizontal angle of view `fov_rad`.
+    ///
+    /// # Panics
+    /// If a size is 0 or the angle is not between 0 and π.
+    pub fn perspective(pose: Pose, fov_rad: f64, width: u32, height: u32) -> Self {
+        assert!(width > 0 && height > 0, "an image needs pixels");
+        assert!(fov_rad > 0.0 && fov_rad < PI, "an angle of view of {fov_rad} rad");
+        Self { pose, projection: Projection::Perspective { fov_rad }, width, height }
+    }
+
+    /// A panorama of `width` × `width / 2` pixels.
+    ///
+    /// # Panics
+    /// If `width` is odd or 0.
+    pub fn equirectangular(pose: Pose, width: u32) -> Self {
+        assert!(width >= 2 && width.is_multiple_of(2), "a panorama is twice as wide as high: {width} wide");
+        Self { pose, projection: Projection::Equirectangular, width, height: width / 2 }
+    }
+
+    /// The horizontal angle of view that the pose file states: a panorama's is π/2, as in the published files.
+    pub fn fov_rad(&self) -> f64 {
+        match self.projection {
+            Projection::Perspective { fov_rad } => fov_rad,
+            Projection::Equirectangular => FRAC_PI_2,
+        }
+    }
+
+    /// Focal length in pixels: (W/2) / tan(fov/2).
+    pub fn focal_px(&self) -> f64 {
+        0.5 * f64::from(self.width) / libm::tan(0.5 * self.fov_rad())
+    }
+
+    /// `camera_k_matrix`, row by row: focal lengths and the principal point, in the middle of the image.
+    pub fn k_matrix(&self) -> [[f64; 3]; 3] {
+        let f = self.focal_px();
+        [[f, 0.0, 0.5 * f64::from(self.width)], [0.0, f, 0.5 * f64::from(self.height)], [0.0, 0.0, 1.0]]
+    }
+
+    /// The directions of the camera's rays, precomputed. Cheap enough to make once an image.
+    pub fn rays(&self) -> Rays {
+        let (w, h) = (f64::from(self.width), f64::from(self.height));
+        match self.projection {
+            Projection::Perspective { .. } => {
+                let f = self.focal_px();
+                let (right, down, forward) = (self.pose.right(), -self.pose.up(), self.pose.forward());
+                Rays::Perspective {
+                    x_step: right / f,
+                    y_step: down / f,
+                    origin: forward - right * (0.5 * w / f) - down * (0.5 * h / f),
+                }
+            }
+            Projection::Equirectangular => {
+                let azimuth = self.pose.azimuth_rad();
+                // Longitude grows to the right, azimuth to the left.
+                let columns = (0..self.width)
+                    .map(|u| {
+                        let (sin, cos) = libm::sincos(azimuth - ((f64::from(u) + 0.5) / w - 0.5) * 2.0 * PI);
+                        dvec2(cos, sin)
+                    })
+                    .collect();
+                let rows = (0..self.height)
+                    .map(|v| {
+                        let (sin, cos) = libm::sincos((0.5 - (f64::from(v) + 0.5) / h) * PI);
+                        dvec2(cos, sin)
+                    })
+                    .collect();
+                Rays::Equirectangular { columns, rows }
+            }
+        }
+    }
+
+    /// The direction through the point (x, y) of the image, in the world. Perspective: its component along the optical
+    /// axis is 1, so that a multiple of it is a z-depth. Panorama: a unit vector.
+    pub fn direction(&self, x: f64, y: f64) -> DVec3 {
+        match self.projection {
+            Projection::Perspective { .. } => {
+                let f = self.focal_px();
+                let (a, b) = ((x - 0.5 * f64::from(self.width)) / f, (y - 0.5 * f64::from(self.height)) / f);
+                self.pose.right() * a - self.pose.up() * b + self.pose.forward()
+            }
+            Projection::Equirectangular => {
+                let azimuth = self.pose.azimuth_rad() - (x / f64::from(self.width) - 0.5) * 2.0 * PI;
+                let latitude = (0.5 - y / f64::from(self.height)) * PI;
+                let ((sin_a, cos_a), (sin_l, cos_l)) = (libm::sincos(azimuth), libm::sincos(latitude));
+                dvec3(cos_l * cos_a, cos_l * sin_a, sin_l)
+            }
+        }
+    }
+
+    /// Where `point` (world) appears in the image, and its depth: z along the optical axis in a perspective view, the
+    /// distance in a panorama. `None` for what lies behind a perspective camera, or in the camera's centre.
+    pub fn project(&self, point: DVec3) -> Option<(DVec2, f64)> {
+        let (w, h) = (f64::from(self.width), f64::from(self.height));
+        let d = point - self.pose.location;
+        match self.projection {
+            Projection::Perspective { .. } => {
+                let c: DVec3 = self.pose.opencv_from_world() * d;
+                let f = self.focal_px();
+                (c.z > 0.0).then(|| (dvec2(0.5 * w + f * c.x / c.z, 0.5 * h + f * c.y / c.z), c.z))
+            }
+            Projection::Equirectangular => {
+                let distance = d.length();
+                let turn = (self.pose.azimuth_rad() - libm::atan2(d.y, d.x)) / (2.0 * PI) + 0.5;
+                let latitude = libm::asin((d.z / distance).clamp(-1.0, 1.0));
+                (distance > 0.0)
+                    .then(|| (dvec2(turn.rem_euclid(1.0) * w, (0.5 - latitude / PI) * h), distance))
+            }
+        }
+    }
+
+    /// World → the axes in which normals of this camera's images are written (formats.md, "Images"): the channels
+    /// R G B are right, down and towards the camera in a perspective view, and X, −Z, Y of the world in a panorama.
+    pub fn normal_image_from_world(&self) -> DMat3 {
+        match self.projection {
+            Projection::Perspective { .. } => {
+                DMat3::from_cols(self.pose.right(), -self.pose.up(), -self.pose.forward()).transpose()
+            }
+            Projection::Equirectangular => DMat3::from_cols(DVec3::X, -DVec3::Z, DVec3::Y).transpose(),
+        }
+    }
+}
+
+/// The ray directions of a camera, by pixel; see [`Camera::rays`].
+#[derive(Clone, Debug)]
+pub enum Rays {
+    /// direction = origin + x_step·(i + ½) + y_step·(j + ½); its component along the optical axis is 1.
+    Perspective {
+        /// What one pixel to the right adds.
+        x_step: DVec3,
+        /// What one pixel down adds.
+        y_step: DVec3,
+        /// The direction through the image's top left corner.
+        origin: DVec3,
+    },
+    /// direction = (cos lat · column, sin lat); a unit vector.
+    Equirectangular {
+        /// Cosine and sine of each column's azimuth.
+        columns: Vec<DVec2>,
+        /// Cosine and sine of each row's latitude.
+        rows: Vec<DVec2>,
+    },
+}
+
+impl Rays {
+    /// The direction through the centre of pixel (i, j); see [`Camera::direction`] for its length.
+    ///
+    /// # Panics
+    /// In a panorama, if the pixel is outside the image.
+    #[inline]
+    pub fn at(&self, i: u32, j: u32) -> DVec3 {
+        match self {
+            Rays::Perspective { x_step, y_step, origin } => {
+                *origin + *x_step * (f64::from(i) + 0.5) + *y_step * (f64::from(j) + 0.5)
+            }
+            Rays::Equirectangular { columns, rows } => {
+                let (c, r) = (columns[i as usize], rows[j as usize]);
+                dvec3(r.x * c.x, r.x * c.y, r.y)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DQuat;
+    use proptest::prelude::*;
+
+    fn pose() -> Pose {
+        Pose::from_scanner(dvec3(1.0, 2.0, 1.5), DQuat::from_rotation_z(0.8)).turned(0.4, -0.3)
+    }
+
+    proptest! {
+        #[test]
+        fn pixels_come_back(i in 0u32..64, j in 0u32..32, t in 0.1..50.0f64, pano in any::<bool>()) {
+            let c = if pano { Camera::equirectangular(pose(), 64) } else { Camera::perspective(pose(), 1.2, 64, 32) };
+            let d = c.rays().at(i, j);
+            prop_assert!(d.abs_diff_eq(c.direction(f64::from(i) + 0.5, f64::from(j) + 0.5), 1e-12));
+            let (px, depth) = c.project(c.pose.location + d * t).unwrap();
+            prop_assert!(px.abs_diff_eq(dvec2(f64::from(i) + 0.5, f64::from(j) + 0.5), 1e-6), "{px}");
+            prop_assert!((depth - t).abs() < 1e-9 * t);
+        }
+    }
+
+    #[test]
+    fn perspective_directions_have_unit_depth() {
+        let c = Camera::perspective(pose(), 1.0, 1080, 1080);
+        for (x, y) in [(0.5, 0.5), (540.0, 540.0), (1079.5, 3.5)] {
+            assert!((c.direction(x, y).dot(c.pose.forward()) - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(c.k_matrix()[0][2], 540.0);
+        assert!(c.project(c.pose.location - c.pose.forward()).is_none());
+    }
+
+    #[test]
+    fn panorama_looks_forward_in_the_middle_and_right_to_the_right() {
+        let p = Pose::level(DVec3::ZERO, 0.3);
+        let c = Camera::equirectangular(p.turned(0.0, 0.4), 4096);
+        assert!(c.direction(2048.0, 1024.0).abs_diff_eq(p.forward(), 1e-12));
+        assert!(c.direction(3072.0, 1024.0).abs_diff_eq(p.right(), 1e-12));
+        assert!(c.direction(100.0, 0.0).abs_diff_eq(DVec3::Z, 1e-12));
+    }
+
+    #[test]
+    fn a_wall_that_faces_the_camera_is_written_128_128_255() {
+        let p = Pose::level(DVec3::ZERO, 0.3);
+        let n = Camera::perspective(p, 1.0, 8, 8).normal_image_from_world() * -p.forward();
+        assert!(n.abs_diff_eq(DVec3::Z, 1e-12));
+        let floor = Camera::equirectangular(p, 8).normal_image_from_world() * DVec3::Z;
+        assert!(floor.abs_diff_eq(-DVec3::Y, 1e-12));
+    }
+
+    /// A genuine pose of the published data set (Area 3): K, original rotation and final rotation agree with the rest.
+    #[test]
+    fn a_genuine_pose_is_reproduced() {
+        let original = dvec3(1.57489812374115, 0.0024619516916573048, 0.7112205624580383);
+        let last = dvec3(1.2404561042785645, -0.002153967274352908, -2.3568427562713623);
+        let between = dvec3(-0.2545155882835388, -0.21941225230693817, -3.0398263931274414);
+        let location = dvec3(21.554668, -2.93087, 1.374648);
+        let from = Pose { location, world_from_camera: crate::rotation_from_euler(original) };
+        let genuine = Pose { location, world_from_camera: crate::rotation_from_euler(last) };
+        let (yaw, pitch) = from.yaw_pitch_to(&genuine);
+        let view = from.turned(yaw, pitch);
+        assert!(crate::euler_from_rotation(view.world_from_camera).abs_diff_eq(last, 1e-6));
+        let turn = view.world_from_camera * from.world_from_camera.transpose();
+        assert!(crate::euler_from_rotation(turn).abs_diff_eq(between, 1e-6));
+        let rt = view.rt_matrix();
+        let expected = [
+            [-0.7075634002685547, -0.7066466212272644, 0.0021539656445384026, 13.17724323272705],
+            [-0.2306535392999649, 0.22806943953037262, -0.9459298253059387, 6.940423011779785],
+            [0.6679468750953674, -0.6698021292686462, -0.3243641257286072, -15.914589881896973],
+        ];
+        for (row, genuine) in rt.iter().zip(expected) {
+            for (a, b) in row.iter().zip(genuine) {
+                assert!((a - b).abs() < 2e-6, "{a} {b}");
+            }
+        }
+        let camera = Camera::perspective(view, 1.1030245194845198, 1080, 1080);
+        assert!((camera.focal_px() - 877.7806396484375).abs() < 3e-5);
+    }
+}

@@ -1,0 +1,434 @@
+//! The floor outline of a room, from its points.
+//!
+//! An alpha shape (Edelsbrunner, Kirkpatrick and Seidel, "On the shape of a set of points in the plane", 1983): the
+//! triangles of a Delaunay triangulation whose circumscribed circle is small, so that the outline follows corners and
+//! pillars and still spans the gaps under furniture.
+
+use crate::Polygon;
+use crate::polygon::{edges, signed_area};
+use glam::{DVec2, Vec2, Vec3, dvec2};
+use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
+use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
+use std::collections::HashMap;
+
+/// How a footprint is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FootprintOptions {
+    /// Points are thinned to a few in each cell of a square grid this wide, in metres.
+    pub cell_m: f64,
+    /// Triangles whose circumscribed circle has at most this radius, in metres, belong to the floor: gaps up to twice as
+    /// wide are closed, and a corner that juts into the room is cut off where the circle touches its sides (half the
+    /// radius's square at a right angle).
+    pub alpha_m: f64,
+}
+
+impl Default for FootprintOptions {
+    /// Cells of 5 cm and a radius of half a metre.
+    fn default() -> Self {
+        Self { cell_m: 0.05, alpha_m: 0.5 }
+    }
+}
+
+/// Collects the points of a room, any number of them, and draws its footprint.
+///
+/// Memory grows with the floor and not with the points. The order of the points does not matter.
+///
+/// ```
+/// use s3d_geom::{FootprintBuilder, FootprintOptions, glam::vec3};
+///
+/// let mut builder = FootprintBuilder::new(FootprintOptions::default());
+/// for i in 0..=40 {
+///     for j in 0..=50 {
+///         builder.add(vec3(i as f32 * 0.1, j as f32 * 0.1, 0.0));
+///     }
+/// }
+/// let footprint = builder.finish();
+/// assert!((footprint.area_m2 - 20.0).abs() < 1e-3);
+/// assert!(footprint.contains(1.0, 1.0) && !footprint.contains(5.0, 1.0));
+/// ```
+#[derive(Clone, Debug)]
+pub struct FootprintBuilder {
+    options: FootprintOptions,
+    /// Where in `cells` a grid cell is.
+    index: HashMap<[i64; 2], usize>,
+    cells: Vec<Cell>,
+    /// The cell of the last point: the next one is often in it.
+    last: Option<([i64; 2], usize)>,
+}
+
+/// The points of a grid cell that are farthest out: left, right, down and up.
+#[derive(Clone, Copy, Debug)]
+struct Cell([Vec2; 4]);
+
+impl Cell {
+    fn add(&mut self, p: Vec2) {
+        // Equals go by the other coordinate, so that the order of points does not matter.
+        let by_x = (p.x, p.y);
+        let by_y = (p.y, p.x);
+        let [left, right, down, up] = &mut self.0;
+        if by_x < (left.x, left.y) {
+            *left = p;
+        }
+        if by_x > (right.x, right.y) {
+            *right = p;
+        }
+        if by_y < (down.y, down.x) {
+            *down = p;
+        }
+        if by_y > (up.y, up.x) {
+            *up = p;
+        }
+    }
+}
+
+impl FootprintBuilder {
+    /// Starts without a point.
+    ///
+    /// # Panics
+    /// If an option is not a positive, finite length.
+    pub fn new(options: FootprintOptions) -> Self {
+        for length in [options.cell_m, options.alpha_m] {
+            assert!(length > 0.0 && length.is_finite(), "a length of {length} m");
+        }
+        Self { options, index: HashMap::new(), cells: Vec::new(), last: None }
+    }
+
+    /// Takes a point of the room, world metres, at any height. A point that is not finite is left out.
+    pub fn add(&mut self, point: Vec3) {
+        if !point.is_finite() {
+            return;
+        }
+        // Adding 0 takes −0 to 0.
+        let p = point.truncate() + Vec2::ZERO;
+        let key = [p.x, p.y].map(|c| (f64::from(c) / self.options.cell_m).floor() as i64);
+        let cell = match self.last {
+            Some((last, cell)) if last == key => cell,
+            _ => *self.index.entry(key).or_insert_with(|| {
+                self.cells.push(Cell([p; 4]));
+                self.cells.len() - 1
+            }),
+        };
+        self.last = Some((key, cell));
+        self.cells[cell].add(p);
+    }
+
+    /// Draws the footprint of the points so far.
+    pub fn finish(&self) -> Footprint {
+        let mut points: Vec<Vec2> = Vec::with_capacity(2 * self.cells.len());
+        for (&[i, j], &cell) in &self.index {
+            let outermost = self.cells[cell].0;
+            // The outline runs through cells that have a free neighbour; for the others one point is enough.
+            let is_surrounded = (-1..=1)
+                .flat_map(|di| (-1..=1).map(move |dj| [i.saturating_add(di), j.saturating_add(dj)]))
+                .all(|neighbor| self.index.contains_key(&neighbor));
+            points.extend(&outermost[..if is_surrounded { 1 } else { 4 }]);
+        }
+        points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+        points.dedup();
+        alpha_shape(&points, self.options.alpha_m)
+    }
+}
+
+/// The floor of a room, seen from above.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Footprint {
+    /// Its connected parts in world x and y, metres. Outer rings run counter-clockwise, holes clockwise; each starts with
+    /// its smallest corner by (x, y), by which rings and parts are sorted as well.
+    pub polygons: Vec<Polygon>,
+    /// The area in m².
+    pub area_m2: f64,
+}
+
+impl Footprint {
+    /// Whether the place (x, y) is on the floor.
+    pub fn contains(&self, x: f64, y: f64) -> bool {
+        self.polygons.iter().any(|p| p.contains(dvec2(x, y)))
+    }
+
+    /// How far the place (x, y) is from the floor, in metres: 0 on it, infinite if there is none.
+    pub fn distance(&self, x: f64, y: f64) -> f64 {
+        self.polygons.iter().map(|p| p.distance(dvec2(x, y))).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// A point that remembers its place as `f64`.
+#[derive(Clone, Copy, Debug)]
+struct Site(DVec2);
+
+impl HasPosition for Site {
+    type Scalar = f64;
+    fn position(&self) -> Point2<f64> {
+        spade::mitigate_underflow(Point2::new(self.0.x, self.0.y))
+    }
+}
+
+type Edge<'a> = DirectedEdgeHandle<'a, Site, (), (), ()>;
+type Face<'a> = FaceHandle<'a, InnerTag, Site, (), (), ()>;
+
+/// The alpha shape of finite points without duplicates.
+fn alpha_shape(points: &[Vec2], alpha: f64) -> Footprint {
+    let sites = points.iter().map(|p| Site(p.as_dvec2())).collect();
+    // Finite `f32` coordinates, none between 0 and spade's smallest: there is nothing that could fail.
+    let Ok(delaunay) = DelaunayTriangulation::<Site>::bulk_load(sites) else {
+        return Footprint::default();
+    };
+    let mut part_of: Vec<Option<usize>> = vec![None; delaunay.num_all_faces()];
+    let is_floor: Vec<bool> =
+        delaunay.all_faces().map(|f| f.as_inner().is_some_and(|f| circumradius(f) <= alpha)).collect();
+
+    let mut parts = 0;
+    for start in delaunay.inner_faces() {
+        if !is_floor[start.index()] || part_of[start.index()].is_some() {
+            continue;
+        }
+        let mut todo = vec![start];
+        while let Some(face) = todo.pop() {
+            if part_of[face.index()].replace(parts).is_none() {
+                let neighbors = face.adjacent_edges().map(|edge| edge.rev().face());
+                let on_floor = neighbors.into_iter().filter(|f| is_floor[f.index()]);
+                todo.extend(on_floor.filter_map(|f| f.as_inner()).filter(|f| part_of[f.index()].is_none()));
+            }
+        }
+        parts += 1;
+    }
+
+    let mut polygons = vec![Polygon::default(); parts];
+    let is_border = |edge: Edge<'_>| is_floor[edge.face().index()] && !is_floor[edge.rev().face().index()];
+    let mut is_traced = vec![false; delaunay.num_directed_edges()];
+    for start in delaunay.directed_edges().filter(|&edge| is_border(edge)) {
+        let Some(part) = part_of[start.face().index()].filter(|_| !is_traced[start.fix().index()]) else {
+            continue;
+        };
+        let mut walk = Vec::new();
+        let mut edge = start;
+        while !std::mem::replace(&mut is_traced[edge.fix().index()], true) {
+            walk.push(edge.from().data().0);
+            // Around the end of the edge, across the floor to its left, to where the floor ends.
+            edge = edge.next();
+            while !is_border(edge) {
+                edge = edge.rev().next();
+            }
+        }
+        for ring in simple_rings(walk) {
+            // A connected part has one outline around it; the others are around holes.
+            if signed_area(&ring) > 0.0 {
+                polygons[part].outer = ring;
+            } else {
+                polygons[part].holes.push(ring);
+            }
+        }
+    }
+    for polygon in &mut polygons {
+        polygon.holes.sort_unstable_by(|a, b| by_place(a[0], b[0]));
+    }
+    polygons.sort_unstable_by(|a, b| by_place(a.outer[0], b.outer[0]));
+    // From 0 on: the sum of nothing is −0.
+    let area_m2 = polygons.iter().map(Polygon::area).fold(0.0, |sum, area| sum + area);
+    Footprint { polygons, area_m2 }
+}
+
+/// Cuts a closed walk that passes a place more than once there, and starts each ring with its smallest corner.
+fn simple_rings(walk: Vec<DVec2>) -> Vec<Vec<DVec2>> {
+    let mut rings = Vec::new();
+    let mut open: Vec<DVec2> = Vec::with_capacity(walk.len());
+    let mut place_of: HashMap<[u64; 2], usize> = HashMap::with_capacity(walk.len());
+    let key = |p: DVec2| [p.x.to_bits(), p.y.to_bits()];
+    for p in walk {
+        if let Some(&place) = place_of.get(&key(p)) {
+            let ring = open.split_off(place);
+            for &q in &ring {
+                place_of.remove(&key(q));
+            }
+            rings.push(ring);
+        }
+        place_of.insert(key(p), open.len());
+        open.push(p);
+    }
+    rings.push(open);
+    for ring in &mut rings {
+        let smallest = (0..ring.len()).min_by(|&i, &j| by_place(ring[i], ring[j])).unwrap_or(0);
+        ring.rotate_left(smallest);
+    }
+    rings
+}
+
+fn by_place(a: DVec2, b: DVec2) -> std::cmp::Ordering {
+    a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y))
+}
+
+fn circumradius(face: Face<'_>) -> f64 {
+    let corners = face.vertices().map(|v| v.data().0);
+    let lengths: f64 = edges(&corners).map(|(a, b)| a.distance(b)).product();
+    lengths / (4.0 * signed_area(&corners).abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec3;
+    use proptest::prelude::*;
+
+    /// Numbers in [0, 1) that look random.
+    fn random(seed: u64) -> impl Iterator<Item = f64> {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        std::iter::repeat_with(move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        })
+    }
+
+    /// Points at random over [0, size]², those that `keep` takes, as dense as a scan (2,500 a square metre).
+    fn scan(size: f64, keep: impl Fn(f64, f64) -> bool) -> Vec<Vec3> {
+        let n = (size * size * 2500.0) as usize;
+        let mut numbers = random(7);
+        let mut number = || numbers.next().unwrap();
+        (0..n)
+            .map(|_| (number() * size, number() * size, number() * 3.0))
+            .filter(|&(x, y, _)| keep(x, y))
+            .map(|(x, y, z)| vec3(x as f32, y as f32, z as f32))
+            .collect()
+    }
+
+    fn footprint(points: &[Vec3]) -> Footprint {
+        let mut builder = FootprintBuilder::new(FootprintOptions::default());
+        points.iter().for_each(|&p| builder.add(p));
+        builder.finish()
+    }
+
+    /// What every footprint keeps to.
+    fn check_form(f: &Footprint) {
+        assert!((f.polygons.iter().map(Polygon::area).sum::<f64>() - f.area_m2).abs() < 1e-12);
+        for polygon in &f.polygons {
+            assert!(signed_area(&polygon.outer) > 0.0);
+            assert!(polygon.holes.iter().all(|hole| signed_area(hole) < 0.0));
+            for ring in std::iter::once(&polygon.outer).chain(&polygon.holes) {
+                assert!(ring.iter().all(|&p| by_place(ring[0], p).is_le()));
+                assert!(f.distance(ring[0].x, ring[0].y) == 0.0);
+            }
+            assert!(polygon.holes.is_sorted_by(|a, b| by_place(a[0], b[0]).is_le()));
+            let covered = polygon.triangulate().expect("rings that are simple and nested");
+            assert!(covered.len() >= polygon.outer.len() - 2);
+        }
+        assert!(f.polygons.is_sorted_by(|a, b| by_place(a.outer[0], b.outer[0]).is_le()));
+    }
+
+    #[test]
+    fn a_rectangle_of_20_square_metres() {
+        let f = footprint(&scan(5.0, |x, _| x <= 4.0));
+        check_form(&f);
+        assert_eq!((f.polygons.len(), f.polygons[0].holes.len()), (1, 0));
+        assert!((f.area_m2 - 20.0).abs() < 0.2, "{}", f.area_m2);
+        assert!(f.contains(2.0, 2.5) && !f.contains(4.2, 2.5));
+        assert!((f.distance(4.5, 2.5) - 0.5).abs() < 0.03);
+    }
+
+    #[test]
+    fn a_turned_rectangle_far_from_the_origin() {
+        let (s, c) = libm::sincosf(0.6);
+        let turned: Vec<Vec3> = scan(5.0, |x, _| x <= 4.0)
+            .iter()
+            .map(|p| vec3(c * p.x - s * p.y - 80.0, s * p.x + c * p.y + 120.0, p.z))
+            .collect();
+        let f = footprint(&turned);
+        check_form(&f);
+        assert!((f.area_m2 - 20.0).abs() < 0.2, "{}", f.area_m2);
+    }
+
+    #[test]
+    fn an_l_keeps_its_inner_corner() {
+        let f = footprint(&scan(6.0, |x, y| x <= 2.0 || y <= 2.0));
+        check_form(&f);
+        // The inner corner is cut off: α²/2 = 0.125 m².
+        assert!((f.area_m2 - 20.0).abs() < 0.2, "{}", f.area_m2);
+        assert!(!f.contains(2.5, 2.5) && f.contains(1.9, 5.0));
+    }
+
+    #[test]
+    fn a_corridor_around_a_block_has_a_hole() {
+        let f = footprint(&scan(6.0, |x, y| !(2.0..4.0).contains(&x) || !(1.5..4.5).contains(&y)));
+        check_form(&f);
+        assert_eq!((f.polygons.len(), f.polygons[0].holes.len()), (1, 1));
+        // Four corners of the block are cut off.
+        assert!((f.area_m2 - 30.5).abs() < 0.15, "{}", f.area_m2);
+        assert!(!f.contains(3.0, 3.0) && (f.distance(3.0, 3.0) - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn gaps_narrower_than_the_circle_are_closed() {
+        let f = footprint(&scan(4.0, |x, y| (x - 2.0).abs() > 0.3 || (y - 2.0).abs() > 0.3));
+        assert_eq!(f.polygons[0].holes.len(), 0);
+        assert!((f.area_m2 - 16.0).abs() < 0.16, "{}", f.area_m2);
+    }
+
+    #[test]
+    fn two_patches() {
+        let f = footprint(&scan(6.0, |x, y| y < 3.0 && !(2.0..4.0).contains(&x)));
+        check_form(&f);
+        assert_eq!(f.polygons.len(), 2);
+        assert!(f.polygons[0].outer[0].x < 0.1 && f.polygons[1].outer[0].x > 3.9);
+        assert!((f.area_m2 - 12.0).abs() < 0.12, "{}", f.area_m2);
+        assert!((f.distance(3.0, 1.0) - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn too_little_for_an_area() {
+        let line: Vec<Vec3> = (0..100).map(|i| vec3(i as f32 * 0.1, i as f32 * 0.1, 1.0)).collect();
+        for points in [&[][..], &[Vec3::ONE], &[Vec3::ONE; 9], &[Vec3::ZERO, Vec3::X * 0.2], &line] {
+            let f = footprint(points);
+            assert_eq!(f, Footprint::default());
+            assert!(!f.contains(1.0, 1.0) && f.distance(1.0, 1.0) == f64::INFINITY);
+        }
+        let odd = [vec3(f32::NAN, 0.0, 0.0), vec3(0.0, f32::INFINITY, 0.0)];
+        assert_eq!(footprint(&odd), Footprint::default());
+    }
+
+    #[test]
+    fn coordinates_as_large_and_small_as_they_go() {
+        let far = [vec3(3e38, 3e38, 0.0), vec3(-3e38, 3e38, 0.0), vec3(0.0, -3e38, 0.0)];
+        assert_eq!(footprint(&far), Footprint::default());
+        let tiny =
+            [vec3(1e-45, 1e-42, 0.0), vec3(-1e-44, 1e-45, 0.0), vec3(0.2, 0.0, 0.0), vec3(0.0, 0.2, 0.0)];
+        assert!((footprint(&tiny).area_m2 - 0.02).abs() < 1e-6);
+    }
+
+    #[test]
+    fn rings_that_touch_are_parted() {
+        let at = |points: &[[f64; 2]]| points.iter().map(|&[x, y]| dvec2(x, y)).collect::<Vec<_>>();
+        // Around a square, and around a hole in its corner (1, 1), in one go.
+        let walk = at(&[[1.0, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.6, 0.2], [0.2, 0.6]]);
+        assert_eq!(
+            simple_rings(walk),
+            [
+                at(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
+                at(&[[0.2, 0.6], [1.0, 1.0], [0.6, 0.2]]),
+            ]
+        );
+    }
+
+    #[test]
+    #[should_panic(expected = "a length of 0 m")]
+    fn cells_without_width_are_a_callers_mistake() {
+        let _ = FootprintBuilder::new(FootprintOptions { cell_m: 0.0, ..FootprintOptions::default() });
+    }
+
+    proptest! {
+        /// On a coarse lattice, where shapes touch in corners and circles pass through many points.
+        #[test]
+        fn any_points_make_sound_polygons(places in prop::collection::vec((0..14u8, 0..14u8), 0..120)) {
+            let points: Vec<Vec3> =
+                places.iter().map(|&(x, y)| vec3(f32::from(x) * 0.25, f32::from(y) * 0.25, 0.0)).collect();
+            let mut builder = FootprintBuilder::new(FootprintOptions { cell_m: 0.05, alpha_m: 0.2 });
+            points.iter().for_each(|&p| builder.add(p));
+            check_form(&builder.finish());
+        }
+
+        #[test]
+        fn the_order_of_points_does_not_matter(
+            points in Just(scan(1.5, |x, y| x + y < 2.0)).prop_shuffle(),
+        ) {
+            prop_assert_eq!(footprint(&points), footprint(&scan(1.5, |x, y| x + y < 2.0)));
+        }
+    }
+}

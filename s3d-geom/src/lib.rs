@@ -1,0 +1,54 @@
+//! Vocabulary and plain geometry of indoor scans.
+//!
+//! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Pose`], [`Raster`] —
+//! and the geometry that needs nothing else: a surface's points ([`SurfaceSampler`]), a point's nearest face
+//! ([`NearestFaces`]), polygons and their triangles ([`Polygon`], [`triangulate_face`]), a room's floor
+//! ([`FootprintBuilder`]) and the voxels of an instance ([`Voxels`]). World frame everywhere: metres, Z-up, right-handed.
+//!
+//! ```
+//! use s3d_geom::{Camera, Pose, glam::dvec3};
+//!
+//! // A camera 1.5 m above the floor that looks along +Y, and the pixel in which it sees a point ahead of it.
+//! let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 75f64.to_radians(), 1080, 1080);
+//! let (pixel, depth) = camera.project(dvec3(0.0, 4.0, 1.5)).unwrap();
+//! assert!((pixel.x - 540.0).abs() < 1e-9 && (depth - 4.0).abs() < 1e-9);
+//! ```
+
+mod aabb;
+mod camera;
+mod cloud;
+mod footprint;
+mod merge;
+mod mesh;
+mod nearest;
+mod polygon;
+mod pose;
+mod primitives;
+mod raster;
+mod repeated;
+mod surface;
+mod texture;
+mod triangle;
+mod voxel;
+mod wall_direction;
+
+pub use aabb::Aabb;
+pub use camera::{Camera, Projection, Rays};
+pub use cloud::PointCloud;
+pub use footprint::{Footprint, FootprintBuilder, FootprintOptions};
+pub use glam;
+pub use mesh::{DEFAULT_COLOR, FaceColor, Material, MeshError, MeshParts, MeshReport, NO_INDEX, TriMesh};
+pub use nearest::{Nearest, NearestFaces, nearest_brute_force};
+pub use polygon::{Polygon, PolygonError, triangulate_face};
+pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
+pub use primitives::{cuboid, cylinder, furnished_room, grid, quad, room, scan_like};
+pub use raster::Raster;
+pub use surface::{Density, SurfaceSampler};
+pub use texture::{Texture, Wrap, sample_bilinear};
+pub use voxel::{VoxelGrid, Voxels};
+pub use wall_direction::dominant_wall_direction_deg;
+
+/// The example of the README, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

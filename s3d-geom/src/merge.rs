@@ -1,0 +1,133 @@
+//! Meshes put together from parts.
+
+use crate::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX};
+
+impl MeshParts {
+    /// Adds the vertices, faces, materials and textures of `other` after its own. Every face keeps its attributes; a
+    /// column that only one of the two has is filled up with [`NO_INDEX`], and a missing vertex colour with the colour
+    /// of the vertex's material (of its last face, if they differ) or [`DEFAULT_COLOR`].
+    pub fn append(&mut self, mut other: MeshParts) {
+        if self.colors.is_empty() != other.colors.is_empty() {
+            self.fill_colors();
+            other.fill_colors();
+        }
+        let (vertices, uvs, normals) = (self.positions.len(), self.uvs.len(), self.normals.len());
+        let (materials, textures) = (self.materials.len(), self.textures.len());
+        let faces = [self.faces.len(), other.faces.len()];
+
+        self.positions.append(&mut other.positions);
+        self.colors.append(&mut other.colors);
+        self.uvs.append(&mut other.uvs);
+        self.normals.append(&mut other.normals);
+        self.textures.append(&mut other.textures);
+        self.materials.extend(
+            other
+                .materials
+                .into_iter()
+                .map(|m| Material { texture: m.texture.map(|t| shifted(t, textures)), ..m }),
+        );
+        self.faces.extend(other.faces.into_iter().map(|f| f.map(|v| shifted(v, vertices))));
+        let corners = |offset| move |f: [u32; 3]| f.map(|i| shifted(i, offset));
+        append_column(&mut self.face_uvs, other.face_uvs, faces, [NO_INDEX; 3], corners(uvs));
+        append_column(&mut self.face_normals, other.face_normals, faces, [NO_INDEX; 3], corners(normals));
+        append_column(&mut self.face_materials, other.face_materials, faces, NO_INDEX, |m| {
+            shifted(m, materials)
+        });
+    }
+
+    /// All `parts` as one, in order; see [`MeshParts::append`].
+    pub fn merge(parts: impl IntoIterator<Item = MeshParts>) -> Self {
+        let mut all = Self::default();
+        for part in parts {
+            all.append(part);
+        }
+        all
+    }
+
+    /// Turns every face around, so that its front becomes its back. Corner normals stay as they are.
+    pub fn flip(&mut self) {
+        let columns = [&mut self.faces, &mut self.face_uvs, &mut self.face_normals];
+        columns.into_iter().flatten().for_each(|corners| corners.swap(1, 2));
+    }
+
+    fn fill_colors(&mut self) {
+        if !self.colors.is_empty() {
+            return;
+        }
+        self.colors = vec![DEFAULT_COLOR; self.positions.len()];
+        for (corners, &m) in self.faces.iter().zip(&self.face_materials) {
+            if let Some(material) = self.materials.get(m as usize) {
+                corners.iter().for_each(|&v| self.colors[v as usize] = material.color);
+            }
+        }
+    }
+}
+
+fn shifted(index: u32, offset: usize) -> u32 {
+    if index == NO_INDEX { NO_INDEX } else { index + offset as u32 }
+}
+
+fn append_column<T: Clone>(
+    own: &mut Vec<T>,
+    other: Vec<T>,
+    faces: [usize; 2],
+    missing: T,
+    f: impl Fn(T) -> T,
+) {
+    if own.is_empty() && other.is_empty() {
+        return;
+    }
+    own.resize(faces[0], missing.clone());
+    own.extend(other.into_iter().map(f));
+    own.resize(faces[0] + faces[1], missing);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FaceColor, TriMesh, cuboid, furnished_room, quad};
+    use glam::Vec3;
+
+    #[test]
+    fn parts_keep_their_attributes_when_they_are_merged() {
+        let textured = furnished_room(7).into_parts();
+        let mut colored = quad([Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y]);
+        colored.colors = vec![[1; 3], [2; 3], [3; 3], [4; 3]];
+        (colored.face_uvs, colored.uvs) = (vec![], vec![]);
+        colored.normals = vec![Vec3::Z];
+        colored.face_normals = vec![[0; 3]; 2];
+        let plain = cuboid(Vec3::ZERO, Vec3::ONE);
+        let [n, m] = [textured.faces.len() as u32, colored.faces.len() as u32];
+        let all = MeshParts::merge([textured.clone(), colored.clone(), plain, textured.clone()]);
+        let all = TriMesh::new(all).unwrap();
+        assert_eq!(all.faces().len() as u32, 2 * n + m + 12);
+
+        let first = TriMesh::new(textured).unwrap();
+        for f in 0..n {
+            for g in [f, n + m + 12 + f] {
+                assert_eq!(all.triangle(g), first.triangle(f));
+                match (first.color_of(f), all.color_of(g)) {
+                    (FaceColor::Texture(_, a, uvs), FaceColor::Texture(_, b, same)) => {
+                        assert_eq!((a, uvs), (b, same));
+                    }
+                    (FaceColor::Flat(a), FaceColor::Corners(b)) => assert_eq!([a; 3], b),
+                    other => panic!("{other:?}"),
+                }
+            }
+        }
+        assert!(matches!(all.color_of(n + 1), FaceColor::Corners([[1, ..], [3, ..], [4, ..]])));
+        assert_eq!(all.corner_normals(n), Some([Vec3::Z; 3]));
+        assert_eq!(all.corner_normals(n + m), None);
+        // The box's own material: the first of three, its floor's colour on no face but its own.
+        assert!(all.material_of(n).is_none() && all.material_of(n + m).is_some());
+    }
+
+    #[test]
+    fn a_flipped_box_looks_inwards() {
+        let mut parts = cuboid(Vec3::ZERO, Vec3::ONE);
+        let outside = TriMesh::new(parts.clone()).unwrap();
+        parts.flip();
+        let inside = TriMesh::new(parts).unwrap();
+        assert!((0..12).all(|f| inside.normal(f) == -outside.normal(f)));
+    }
+}

@@ -1,0 +1,175 @@
+//! Where a camera stands and how it is turned, in the convention of the published data set.
+//!
+//! Camera axes here are Blender's: x right, y up, looking along −z. Angles are Blender's XYZ Euler angles,
+//! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "Cameras" (settled on genuine pose files).
+
+use glam::{DMat3, DQuat, DVec3, dvec3};
+use std::f64::consts::FRAC_PI_2;
+
+/// The rotation Rz·Ry·Rx of three angles in radians.
+pub fn rotation_from_euler(angles_rad: DVec3) -> DMat3 {
+    DMat3::from_rotation_z(angles_rad.z)
+        * DMat3::from_rotation_y(angles_rad.y)
+        * DMat3::from_rotation_x(angles_rad.x)
+}
+
+/// Three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in [−π/2, π/2]. Where the
+/// two outer axes coincide (y = ±π/2) z is 0.
+pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
+    let m = |row: usize, col: usize| rotation.col(col)[row];
+    let cos_y = libm::hypot(m(0, 0), m(1, 0));
+    let y = libm::atan2(-m(2, 0), cos_y);
+    if cos_y > 1e-9 {
+        dvec3(libm::atan2(m(2, 1), m(2, 2)), y, libm::atan2(m(1, 0), m(0, 0)))
+    } else {
+        dvec3(libm::atan2(-m(1, 2), m(1, 1)), y, 0.0)
+    }
+}
+
+/// The place and direction of a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Where the camera is, world metres, Z-up.
+    pub location: DVec3,
+    /// Camera (x right, y up, z backwards) → world: E(final) of the pose files. Orthonormal.
+    pub world_from_camera: DMat3,
+}
+
+impl Pose {
+    /// The pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°), so that the identity
+    /// looks along +Y with +Z up.
+    pub fn from_scanner(location: DVec3, world_from_scanner: DQuat) -> Self {
+        let turn = DMat3::from_quat(world_from_scanner.normalize());
+        Self { location, world_from_camera: turn * DMat3::from_rotation_x(FRAC_PI_2) }
+    }
+
+    /// A level camera (+Z up) that looks along the heading `yaw_rad`, 0 along +Y, growing to the left (towards −X).
+    pub fn level(location: DVec3, yaw_rad: f64) -> Self {
+        Self::from_scanner(location, DQuat::from_rotation_z(yaw_rad))
+    }
+
+    /// The view at `yaw_rad` to the left of this pose and `pitch_rad` above it, without roll:
+    /// E(final) = E(original)·Ry(yaw)·Rx(pitch).
+    #[must_use]
+    pub fn turned(&self, yaw_rad: f64, pitch_rad: f64) -> Self {
+        let turn = DMat3::from_rotation_y(yaw_rad) * DMat3::from_rotation_x(pitch_rad);
+        Self { location: self.location, world_from_camera: self.world_from_camera * turn }
+    }
+
+    /// Yaw and pitch, in radians, that [`Pose::turned`] takes from this pose to `view`, as far as one without roll can.
+    pub fn yaw_pitch_to(&self, view: &Pose) -> (f64, f64) {
+        let turn = self.world_from_camera.transpose() * view.world_from_camera;
+        // Ry(yaw)·Rx(pitch) has the columns (cos y, 0, −sin y), … and the middle row (0, cos p, −sin p).
+        (libm::atan2(-turn.x_axis.z, turn.x_axis.x), libm::atan2(-turn.z_axis.y, turn.y_axis.y))
+    }
+
+    /// The direction of the image's right, in the world; a unit vector.
+    pub fn right(&self) -> DVec3 {
+        self.world_from_camera.x_axis
+    }
+
+    /// The direction of the image's top, in the world; a unit vector.
+    pub fn up(&self) -> DVec3 {
+        self.world_from_camera.y_axis
+    }
+
+    /// The viewing direction in the world; a unit vector.
+    pub fn forward(&self) -> DVec3 {
+        -self.world_from_camera.z_axis
+    }
+
+    /// World → camera in OpenCV's axes (x right, y down, z forward), without the translation: D·E(final)ᵀ.
+    pub fn opencv_from_world(&self) -> DMat3 {
+        DMat3::from_cols(self.right(), -self.up(), self.forward()).transpose()
+    }
+
+    /// `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C], world → camera, 3 × 4.
+    pub fn rt_matrix(&self) -> [[f64; 4]; 3] {
+        let r = self.opencv_from_world();
+        let t = -(r * self.location);
+        std::array::from_fn(|i| [r.x_axis[i], r.y_axis[i], r.z_axis[i], t[i]])
+    }
+
+    /// The heading of the viewing direction in the horizontal plane: radians from +X towards +Y. A camera that looks
+    /// straight up or down has the heading of its image's lower or upper edge.
+    pub fn azimuth_rad(&self) -> f64 {
+        let f = self.forward();
+        if libm::hypot(f.x, f.y) > 1e-9 {
+            libm::atan2(f.y, f.x)
+        } else {
+            let edge = if f.z > 0.0 { -self.up() } else { self.up() };
+            libm::atan2(edge.y, edge.x)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn close(a: DMat3, b: DMat3) -> bool {
+        a.abs_diff_eq(b, 1e-12)
+    }
+
+    proptest! {
+        #[test]
+        fn euler_angles_come_back(x in -3.1..3.1f64, y in -1.5..1.5f64, z in -3.1..3.1f64) {
+            let e = dvec3(x, y, z);
+            prop_assert!(euler_from_rotation(rotation_from_euler(e)).abs_diff_eq(e, 1e-9));
+        }
+
+        #[test]
+        fn yaw_and_pitch_come_back(yaw in -3.1..3.1f64, pitch in -1.5..1.5f64, q in -3.0..3.0f64) {
+            let original = Pose::from_scanner(DVec3::ONE, DQuat::from_rotation_z(q) * DQuat::from_rotation_x(0.1));
+            let (y, p) = original.yaw_pitch_to(&original.turned(yaw, pitch));
+            prop_assert!((y - yaw).abs() < 1e-9 && (p - pitch).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn euler_angles_of_a_locked_gimbal_give_the_same_rotation() {
+        for (x, y, z) in [(0.3, FRAC_PI_2, 0.7), (1.2, -FRAC_PI_2, -0.4)] {
+            let r = rotation_from_euler(dvec3(x, y, z));
+            assert!(rotation_from_euler(euler_from_rotation(r)).abs_diff_eq(r, 1e-7));
+        }
+    }
+
+    #[test]
+    fn the_identity_looks_along_y_with_z_up() {
+        let p = Pose::from_scanner(DVec3::ZERO, DQuat::IDENTITY);
+        assert!(p.forward().abs_diff_eq(DVec3::Y, 1e-15));
+        assert!(p.up().abs_diff_eq(DVec3::Z, 1e-15));
+        assert!(p.right().abs_diff_eq(DVec3::X, 1e-15));
+    }
+
+    #[test]
+    fn yaw_turns_left_and_pitch_looks_up() {
+        let p = Pose::level(DVec3::ZERO, 0.0);
+        assert!(p.turned(FRAC_PI_2, 0.0).forward().abs_diff_eq(-DVec3::X, 1e-12));
+        assert!(p.turned(0.0, FRAC_PI_2).forward().abs_diff_eq(DVec3::Z, 1e-12));
+        assert!(close(Pose::level(DVec3::ZERO, 0.4).world_from_camera, p.turned(0.4, 0.0).world_from_camera));
+    }
+
+    #[test]
+    fn rt_matrix_takes_the_camera_to_the_origin_and_forward_to_z() {
+        let p = Pose::from_scanner(dvec3(3.0, -2.0, 1.5), DQuat::from_rotation_z(0.7)).turned(0.3, -0.2);
+        let apply = |w: DVec3| {
+            let m = p.rt_matrix();
+            let row = |i: usize| m[i][0] * w.x + m[i][1] * w.y + m[i][2] * w.z + m[i][3];
+            dvec3(row(0), row(1), row(2))
+        };
+        assert!(apply(p.location).abs_diff_eq(DVec3::ZERO, 1e-12));
+        assert!(apply(p.location + 2.0 * p.forward()).abs_diff_eq(dvec3(0.0, 0.0, 2.0), 1e-12));
+        assert!(apply(p.location + p.up()).abs_diff_eq(dvec3(0.0, -1.0, 0.0), 1e-12));
+    }
+
+    #[test]
+    fn heading_of_a_camera_that_looks_at_the_ceiling() {
+        let level = Pose::level(DVec3::ZERO, 0.5);
+        let heading = level.azimuth_rad();
+        for pitch in [FRAC_PI_2, -FRAC_PI_2] {
+            assert!((level.turned(0.0, pitch).azimuth_rad() - heading).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Faces that lie in a mesh more than once.
+
+use crate::mesh::keep_where;
+use crate::{MeshParts, TriMesh};
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+impl TriMesh {
+    /// The mesh without the faces that repeat an earlier one — the same three corners in space, in any order — and how
+    /// many there were. Scans and two-sided models hold such faces. A repeated face is never the first that a ray or a
+    /// point meets, and it would be sampled twice as densely as the rest.
+    #[must_use]
+    pub fn without_repeated_faces(self) -> (Self, usize) {
+        let count = self.faces().len();
+        let mut by_hash: Vec<(u64, u32)> = (0..count as u32).map(|f| (hash(corners(&self, f)), f)).collect();
+        by_hash.sort_unstable();
+        let mut keep = vec![true; count];
+        for group in by_hash.chunk_by(|a, b| a.0 == b.0) {
+            // Almost always one face. Others are repeated if their corners are, whatever their hashes say.
+            for (i, &(_, face)) in group.iter().enumerate() {
+                keep[face as usize] =
+                    !group[..i].iter().any(|&(_, first)| corners(&self, first) == corners(&self, face));
+            }
+        }
+        let repeated = keep.iter().filter(|k| !**k).count();
+        if repeated == 0 {
+            return (self, 0);
+        }
+        let report = self.report();
+        let mut parts: MeshParts = self.into_parts();
+        keep_where(&mut parts.faces, &keep);
+        keep_where(&mut parts.face_uvs, &keep);
+        keep_where(&mut parts.face_normals, &keep);
+        keep_where(&mut parts.face_materials, &keep);
+        (Self::from_checked(parts, report), repeated)
+    }
+}
+
+/// The corners of a face as bits, sorted: equal for faces with the same corners. Zeros of either sign are one.
+fn corners(mesh: &TriMesh, face: u32) -> [[u32; 3]; 3] {
+    let mut corners = mesh.triangle(face).map(|p| p.to_array().map(|c| (c + 0.0).to_bits()));
+    corners.sort_unstable();
+    corners
+}
+
+fn hash(corners: [[u32; 3]; 3]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    corners.hash(&mut hasher);
+    hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Vec3, vec3};
+
+    #[test]
+    fn the_first_of_equal_faces_stays() {
+        // Face 1 is face 0 turned over, face 3 is face 2 on vertices of its own, face 4 shares an edge only.
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, vec3(-0.0, 0.0, 0.0), Vec3::X, Vec3::Z];
+        let faces = vec![[0, 1, 2], [2, 1, 0], [0, 1, 3], [5, 6, 4], [1, 2, 3]];
+        let mut parts = MeshParts { positions, faces, ..MeshParts::default() };
+        parts.face_materials = vec![0, 1, 2, 3, 4];
+        parts.materials =
+            (0..5).map(|i| crate::Material { name: i.to_string(), color: [i; 3], texture: None }).collect();
+        let (mesh, repeated) = TriMesh::new(parts).unwrap().without_repeated_faces();
+        assert_eq!(repeated, 2);
+        assert_eq!(mesh.faces(), [[0, 1, 2], [0, 1, 3], [1, 2, 3]]);
+        assert_eq!((0..3).map(|f| mesh.material_of(f).unwrap()).collect::<Vec<_>>(), [0, 2, 4]);
+    }
+
+    #[test]
+    fn a_mesh_without_such_faces_is_as_it_was() {
+        let mesh = crate::furnished_room(1);
+        let before = mesh.faces().to_vec();
+        let (mesh, repeated) = mesh.without_repeated_faces();
+        assert_eq!((repeated, mesh.faces()), (0, &before[..]));
+    }
+}

@@ -1,0 +1,128 @@
+//! Textures: an image, how it repeats, and its value at a texture coordinate.
+
+use crate::Raster;
+use glam::Vec2;
+
+/// What a texture shows beyond its edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Wrap {
+    /// The image again.
+    #[default]
+    Repeat,
+    /// The image mirrored, then the image again.
+    Mirror,
+    /// The edge's pixel.
+    Clamp,
+}
+
+impl Wrap {
+    /// The column (or row) in `0..size` that stands for column `i` of the endless texture.
+    #[inline]
+    pub fn index(self, i: i64, size: u32) -> u32 {
+        let n = i64::from(size);
+        let j = match self {
+            Wrap::Repeat => i.rem_euclid(n),
+            Wrap::Mirror => {
+                let m = i.rem_euclid(2 * n);
+                if m < n { m } else { 2 * n - 1 - m }
+            }
+            Wrap::Clamp => i.clamp(0, n - 1),
+        };
+        j as u32
+    }
+}
+
+/// An 8-bit colour image laid over faces by texture coordinates.
+///
+/// Coordinates are OBJ's: (0, 0) is the **bottom** left corner of the image, (1, 1) the top right. Colours are
+/// interpolated as they are encoded (sRGB), as the viewers of the field do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Texture {
+    /// A name for messages and files, such as the source file's.
+    pub name: String,
+    /// The image, top row first, R G B. At least 1 × 1.
+    pub image: Raster<[u8; 3]>,
+    /// How the image repeats along u (to the right) and v (upwards).
+    pub wrap: [Wrap; 2],
+}
+
+impl Texture {
+    /// The colour at `uv`, bilinear between the four nearest pixels, 0 to 255 a channel. A coordinate that is not
+    /// finite gives the corner pixel's colour.
+    pub fn sample(&self, uv: Vec2) -> [f32; 3] {
+        sample_bilinear(&self.image, self.wrap, uv)
+    }
+}
+
+/// The colour of `image` at `uv`, bilinear between the four nearest pixels, 0 to 255 a channel; conventions as in
+/// [`Texture`]. An image without pixels is black.
+#[inline]
+pub fn sample_bilinear(image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: Vec2) -> [f32; 3] {
+    let (w, h) = (image.width(), image.height());
+    if w == 0 || h == 0 {
+        return [0.0; 3];
+    }
+    // f64 keeps the fraction of a pixel when a coordinate repeats many times; `as i64` saturates and takes NaN to 0.
+    let x = f64::from(uv.x) * f64::from(w) - 0.5;
+    let y = (1.0 - f64::from(uv.y)) * f64::from(h) - 0.5;
+    let (x, y) = (if x.is_finite() { x } else { 0.0 }, if y.is_finite() { y } else { 0.0 });
+    let (xf, yf) = (x.floor(), y.floor());
+    let (fx, fy) = ((x - xf) as f32, (y - yf) as f32);
+    let (xi, yi) = (xf.clamp(-1e15, 1e15) as i64, yf.clamp(-1e15, 1e15) as i64);
+    let (x0, x1) = (wrap[0].index(xi, w), wrap[0].index(xi + 1, w));
+    // v grows upwards and rows downwards: mirroring and repeating are the same seen from either side.
+    let (y0, y1) = (wrap[1].index(yi, h), wrap[1].index(yi + 1, h));
+    let (a, b, c, d) = (image.at(x0, y0), image.at(x1, y0), image.at(x0, y1), image.at(x1, y1));
+    std::array::from_fn(|k| {
+        let top = f32::from(a[k]) + (f32::from(b[k]) - f32::from(a[k])) * fx;
+        let bottom = f32::from(c[k]) + (f32::from(d[k]) - f32::from(c[k])) * fx;
+        top + (bottom - top) * fy
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec2;
+
+    fn two_by_two(wrap: Wrap) -> Texture {
+        // Top row: 0, 100; bottom row: 200, 40.
+        let image = Raster::from_vec(2, 2, vec![[0; 3], [100; 3], [200; 3], [40; 3]]);
+        Texture { name: "t".into(), image, wrap: [wrap; 2] }
+    }
+
+    #[test]
+    fn pixel_centres_are_exact_and_v_points_up() {
+        let t = two_by_two(Wrap::Clamp);
+        assert_eq!(t.sample(vec2(0.25, 0.75))[0], 0.0);
+        assert_eq!(t.sample(vec2(0.75, 0.75))[0], 100.0);
+        assert_eq!(t.sample(vec2(0.25, 0.25))[0], 200.0);
+        assert_eq!(t.sample(vec2(0.5, 0.75))[0], 50.0);
+        assert_eq!(t.sample(vec2(0.5, 0.5))[0], 85.0);
+    }
+
+    #[test]
+    fn wrap_modes_differ_beyond_the_edge() {
+        // Half a pixel left of the left edge: repeat blends with the right column, the others see the edge twice.
+        let at = vec2(0.0, 0.75);
+        assert_eq!(two_by_two(Wrap::Repeat).sample(at)[0], 50.0);
+        assert_eq!(two_by_two(Wrap::Mirror).sample(at)[0], 0.0);
+        assert_eq!(two_by_two(Wrap::Clamp).sample(at)[0], 0.0);
+        let beyond = vec2(1.25, 0.75);
+        assert_eq!(two_by_two(Wrap::Repeat).sample(beyond)[0], 0.0);
+        assert_eq!(two_by_two(Wrap::Mirror).sample(beyond)[0], 100.0);
+        assert_eq!(two_by_two(Wrap::Clamp).sample(beyond)[0], 100.0);
+    }
+
+    #[test]
+    fn wild_coordinates_give_a_colour() {
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            for uv in [vec2(f32::NAN, 0.5), vec2(f32::INFINITY, -f32::INFINITY), vec2(1e30, -1e30)] {
+                assert!(
+                    two_by_two(wrap).sample(uv).iter().all(|c| (0.0..=255.0).contains(c)),
+                    "{wrap:?} {uv}"
+                );
+            }
+        }
+    }
+}

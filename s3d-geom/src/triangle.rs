@@ -1,0 +1,203 @@
+//! The point of a triangle nearest to another, so that triangles that share an edge or a corner agree on it.
+
+use glam::{DVec3, Vec3, Vec3A};
+
+/// Triangles thinner than this, relative to their longest edge, have no normal to speak of: they are measured by their
+/// edges, which is off by less than the rounding of `f32` coordinates.
+const THINNEST: f64 = 1e-8;
+
+/// A triangle with its corners in ascending order of (x, y, z).
+///
+/// The same positions give the same arithmetic, whatever a face's winding and first corner; and an edge runs in the same
+/// direction in all its triangles.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SortedTriangle([Vec3A; 3]);
+
+impl SortedTriangle {
+    /// Sorts finite corners.
+    pub(crate) fn new(corners: [Vec3; 3]) -> Self {
+        // Adding 0 takes −0 to 0, so that equal positions are equal bits.
+        let mut corners = corners.map(|p| p + Vec3::ZERO);
+        corners
+            .sort_unstable_by(|p, q| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z)));
+        Self(corners.map(Vec3A::from))
+    }
+
+    /// A lower bound of the squared distance to `point`, up to `f32` rounding: that to the bounding box.
+    #[inline]
+    pub(crate) fn box_distance_squared(&self, point: Vec3A) -> f32 {
+        let [a, b, c] = self.0;
+        let outside = (a.min(b).min(c) - point).max(point - a.max(b).max(c)).max(Vec3A::ZERO);
+        outside.length_squared()
+    }
+
+    /// The squared distance to `point` and the nearest point. The distance is never below that to the bounding box.
+    pub(crate) fn closest(&self, point: DVec3) -> (f64, DVec3) {
+        let [a, b, c] = self.0.map(|p| p.as_dvec3());
+        let (ab, ac, bc) = (b - a, c - a, c - b);
+        let normal = ab.cross(ac);
+        let normal_squared = normal.length_squared();
+        let longest = ab.length_squared().max(ac.length_squared()).max(bc.length_squared());
+        let thin = normal_squared <= THINNEST * THINNEST * longest * longest;
+
+        // Barycentric coordinates of the foot on the plane, times the normal's square; the signs tell on which side of
+        // each edge it is. (C. Ericson, "Real-Time Collision Detection", 5.1.5, has the derivation.)
+        let (ap, bp, cp) = (point - a, point - b, point - c);
+        let (ab_a, ac_a) = (ab.dot(ap), ac.dot(ap));
+        let (ab_b, ac_b) = (ab.dot(bp), ac.dot(bp));
+        let (ab_c, ac_c) = (ab.dot(cp), ac.dot(cp));
+        let weight_a = difference_of_products(ab_b, ac_c, ab_c, ac_b);
+        let weight_b = difference_of_products(ab_c, ac_a, ab_a, ac_c);
+        let weight_c = difference_of_products(ab_a, ac_b, ab_b, ac_a);
+
+        if !thin && weight_a > 0.0 && weight_b > 0.0 && weight_c > 0.0 {
+            let height = normal.dot(ap);
+            let low = a.min(b).min(c);
+            let high = a.max(b).max(c);
+            let distance_squared = (height * height / normal_squared).max(to_box(point, low, high));
+            let foot = (a * weight_a + b * weight_b + c * weight_c) / (weight_a + weight_b + weight_c);
+            return (distance_squared, foot);
+        }
+        let mut best = (f64::INFINITY, point);
+        for (weight, from, to) in [(weight_c, a, b), (weight_b, a, c), (weight_a, b, c)] {
+            if thin || weight <= 0.0 {
+                let candidate = closest_on_edge(point, from, to);
+                if candidate.0 < best.0 {
+                    best = candidate;
+                }
+            }
+        }
+        best
+    }
+}
+
+/// The squared distance from `point` to the edge, whose ends are in ascending order, and the nearest point.
+fn closest_on_edge(point: DVec3, from: DVec3, to: DVec3) -> (f64, DVec3) {
+    let edge = to - from;
+    let along = edge.dot(point - from);
+    // At its ends the distance is that to the corner, the same for every edge that ends there.
+    if along <= 0.0 {
+        return ((point - from).length_squared(), from);
+    }
+    let length_squared = edge.length_squared();
+    if along >= length_squared {
+        return ((point - to).length_squared(), to);
+    }
+    let t = along / length_squared;
+    let aside = (point - from) - edge * t;
+    (aside.length_squared().max(to_box(point, from.min(to), from.max(to))), from + edge * t)
+}
+
+/// The squared distance from `point` to a box.
+fn to_box(point: DVec3, low: DVec3, high: DVec3) -> f64 {
+    (low - point).max(point - high).max(DVec3::ZERO).length_squared()
+}
+
+/// a·b − c·d with the right sign, zero exactly where the products are equal.
+fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
+    let (ab, cd) = (a * b, c * d);
+    let difference = ab - cd;
+    if difference.abs() > 1e-15 * (ab.abs() + cd.abs()) {
+        difference
+    } else {
+        difference + (rounding_of_product(a, b, ab) - rounding_of_product(c, d, cd))
+    }
+}
+
+/// a·b − `product`, exactly, where `product` is the rounded a·b (Dekker's product).
+fn rounding_of_product(a: f64, b: f64, product: f64) -> f64 {
+    let split = |x: f64| {
+        let scaled = 134_217_729.0 * x;
+        let high = scaled - (scaled - x);
+        (high, x - high)
+    };
+    let ((ah, al), (bh, bl)) = (split(a), split(b));
+    ((ah * bh - product) + ah * bl + al * bh) + al * bl
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{dvec3, vec3};
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_rounding_of_a_product_is_exact() {
+        let (a, b) = (1.0 + f64::EPSILON, 1.0 - f64::EPSILON);
+        // (1 + ε)(1 − ε) = 1 − ε².
+        assert_eq!(rounding_of_product(a, b, a * b), -f64::EPSILON * f64::EPSILON);
+        assert_eq!(difference_of_products(a, b, 1.0, 1.0), -f64::EPSILON * f64::EPSILON);
+        assert_eq!(difference_of_products(3.0, 0.1, 0.1, 3.0), 0.0);
+    }
+
+    #[test]
+    fn every_region_of_a_triangle() {
+        let t = SortedTriangle::new([Vec3::ZERO, vec3(4.0, 0.0, 0.0), vec3(0.0, 4.0, 0.0)]);
+        for (point, distance_squared, nearest) in [
+            (dvec3(1.0, 1.0, 3.0), 9.0, dvec3(1.0, 1.0, 0.0)),
+            (dvec3(1.0, 1.0, 0.0), 0.0, dvec3(1.0, 1.0, 0.0)),
+            (dvec3(-1.0, -2.0, 2.0), 9.0, dvec3(0.0, 0.0, 0.0)),
+            (dvec3(6.0, -1.0, 0.0), 5.0, dvec3(4.0, 0.0, 0.0)),
+            (dvec3(0.0, 5.0, 1.0), 2.0, dvec3(0.0, 4.0, 0.0)),
+            (dvec3(1.0, -3.0, 4.0), 25.0, dvec3(1.0, 0.0, 0.0)),
+            (dvec3(-3.0, 2.0, 4.0), 25.0, dvec3(0.0, 2.0, 0.0)),
+            (dvec3(4.0, 4.0, 0.0), 8.0, dvec3(2.0, 2.0, 0.0)),
+        ] {
+            assert_eq!(t.closest(point), (distance_squared, nearest));
+        }
+    }
+
+    /// The smallest distance to a fine grid of points of the triangle: an upper bound, and not far above.
+    fn by_grid([a, b, c]: [Vec3; 3], point: DVec3) -> f64 {
+        let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
+        let n = 60;
+        let points = (0..=n).flat_map(|i| (0..=n - i).map(move |j| (i, j)));
+        points
+            .map(|(i, j)| {
+                (a + ((b - a) * f64::from(i) + (c - a) * f64::from(j)) / f64::from(n)).distance(point)
+            })
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    fn corner() -> impl Strategy<Value = Vec3> {
+        (-4.0..4.0f32, -4.0..4.0f32, -4.0..4.0f32).prop_map(|(x, y, z)| vec3(x, y, z))
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_on_the_triangle_is_nearer(corners in [corner(), corner(), corner()], point in corner()) {
+            let point = point.as_dvec3();
+            let (d2, q) = SortedTriangle::new(corners).closest(point);
+            let grid = by_grid(corners, point);
+            prop_assert!(d2.sqrt() <= grid + 1e-9 && d2.sqrt() > grid - 0.3, "{} or {}", d2.sqrt(), grid);
+            prop_assert!((point.distance(q) - d2.sqrt()).abs() < 1e-7);
+            let low = SortedTriangle::new(corners).box_distance_squared(point.as_vec3().into());
+            prop_assert!(f64::from(low) <= d2 * (1.0 + 1e-6) + 1e-37);
+        }
+
+        #[test]
+        fn the_order_of_corners_does_not_matter([a, b, c] in [corner(), corner(), corner()], point in corner()) {
+            let point = point.as_dvec3();
+            let d2 = SortedTriangle::new([a, b, c]).closest(point);
+            for turned in [[b, c, a], [c, a, b], [c, b, a]] {
+                prop_assert_eq!(SortedTriangle::new(turned).closest(point), d2);
+            }
+        }
+
+        #[test]
+        fn triangles_agree_on_a_shared_edge(
+            [a, b, c, d] in [corner(), corner(), corner(), corner()],
+            t in 0.0..1.0f64,
+        ) {
+            // Nearest to the edge, or an end of it, from both: opposite to the inner bisector of the two triangles.
+            let [ad, bd, cd, dd] = [a, b, c, d].map(|p| p.as_dvec3());
+            let away = |p: DVec3| (p - ad).reject_from(bd - ad).normalize();
+            prop_assume!(away(cd).is_finite() && away(dd).is_finite());
+            let point = (ad + (bd - ad) * t - (away(cd) + away(dd))).as_vec3().as_dvec3();
+            let on = SortedTriangle::new([a, b, c]).closest(point);
+            let edge = SortedTriangle::new([b, a, d]).closest(point);
+            prop_assume!(away(cd).dot(away(dd)) > -0.99);
+            prop_assert_eq!(on, edge);
+        }
+    }
+}

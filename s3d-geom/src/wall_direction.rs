@@ -1,0 +1,128 @@
+//! The direction in which the walls of a room run.
+
+use glam::Vec3;
+
+/// Faces whose unit normal has a smaller |z| are walls.
+const STEEPEST: f32 = 0.3;
+
+/// The dominant horizontal direction of the walls among faces given by unit normal and area: degrees in [0, 90) from +X
+/// towards +Y, by which a room is turned about Z to have its walls parallel to the axes. `None` without a near-vertical
+/// face.
+///
+/// Walls that meet at a right angle count as one direction. The peak of a histogram keeps clutter out; around the peak
+/// the mean by area refines it. Faces whose normal is not finite or whose area is not positive are left out. Source:
+/// formats.md, "S3DIS tree" (the alignment angle).
+pub fn dominant_wall_direction_deg(walls: impl Iterator<Item = (Vec3, f64)>) -> Option<f64> {
+    let walls: Vec<(f64, f64)> = walls
+        .filter(|(n, area)| n.is_finite() && n.z.abs() < STEEPEST && area.is_finite() && *area > 0.0)
+        .filter(|(n, _)| n.x != 0.0 || n.y != 0.0)
+        .map(|(n, area)| (libm::atan2(n.y.into(), n.x.into()).to_degrees().rem_euclid(90.0), area))
+        .collect();
+    if walls.is_empty() {
+        return None;
+    }
+    let mut area_at = [0.0; 90];
+    for &(angle, area) in &walls {
+        area_at[angle as usize % 90] += area;
+    }
+    // A wall's noise spreads over a few degrees: the peak is that of five of them together.
+    let area_around = |degree: usize| (88..93).map(|off| area_at[(degree + off) % 90]).sum::<f64>();
+    let peak = (1..90).fold(0, |best, d| if area_around(d) > area_around(best) { d } else { best });
+
+    let mut direction = peak as f64 + 0.5;
+    for reach in [4.0, 3.0, 3.0] {
+        let (mut moment, mut total) = (0.0, 0.0);
+        for &(angle, area) in &walls {
+            let off = (angle - direction + 45.0).rem_euclid(90.0) - 45.0;
+            if off.abs() <= reach {
+                moment += off * area;
+                total += area;
+            }
+        }
+        if total > 0.0 {
+            direction += moment / total;
+        }
+    }
+    // The remainder of a tiny negative number is 90.
+    let direction = direction.rem_euclid(90.0);
+    Some(if direction < 90.0 { direction } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec3;
+    use proptest::prelude::*;
+
+    fn wall(angle_deg: f64, area: f64) -> (Vec3, f64) {
+        let (s, c) = libm::sincos(angle_deg.to_radians());
+        (vec3(c as f32, s as f32, 0.0), area)
+    }
+
+    /// A number in [−1, 1) that looks random.
+    fn noise(i: u32) -> f64 {
+        f64::from(i.wrapping_mul(2_654_435_761) >> 8) / f64::from(1u32 << 23) - 1.0
+    }
+
+    /// How far apart two directions are, modulo 90.
+    fn apart(a: f64, b: f64) -> f64 {
+        ((a - b + 45.0).rem_euclid(90.0) - 45.0).abs()
+    }
+
+    #[test]
+    fn no_wall_no_direction() {
+        assert_eq!(dominant_wall_direction_deg(std::iter::empty()), None);
+        let floor_and_slope = [(Vec3::Z, 20.0), (vec3(0.8, 0.0, 0.6), 5.0)];
+        assert_eq!(dominant_wall_direction_deg(floor_and_slope.into_iter()), None);
+        let odd = [(Vec3::NAN, 1.0), (Vec3::X, f64::NAN), (Vec3::X, 0.0), (Vec3::X, -1.0), (Vec3::ZERO, 1.0)];
+        assert_eq!(dominant_wall_direction_deg(odd.into_iter()), None);
+    }
+
+    #[test]
+    fn opposite_and_perpendicular_walls_are_one_direction() {
+        let room = [30.0, 120.0, 210.0, 300.0].map(|a| wall(a, 10.0));
+        assert!(apart(dominant_wall_direction_deg(room.into_iter()).unwrap(), 30.0) < 1e-4);
+        let square = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y].map(|n| (n, 1.0));
+        assert_eq!(dominant_wall_direction_deg(square.into_iter()), Some(0.0));
+    }
+
+    #[test]
+    fn noise_and_clutter_do_not_move_it() {
+        for truth in [0.0, 0.4, 12.7, 45.0, 60.2, 89.6] {
+            let walls = (0..2000).map(|i| wall(truth + 90.0 * f64::from(i % 4) + 1.5 * noise(i), 0.01));
+            // As much again in every direction, and a leaning wall cabinet.
+            let clutter = (0..2000).map(|i| wall(180.0 * noise(i + 5000), 0.01));
+            let cabinet = [wall(truth + 20.0, 5.0)];
+            let angle = dominant_wall_direction_deg(walls.chain(clutter).chain(cabinet)).unwrap();
+            assert!(apart(angle, truth) < 0.15, "{angle} for {truth}");
+            assert!((0.0..90.0).contains(&angle));
+        }
+    }
+
+    #[test]
+    fn directions_on_both_sides_of_the_right_angle_are_neighbours() {
+        let angle = dominant_wall_direction_deg([wall(89.6, 1.0), wall(0.4, 1.0)].into_iter()).unwrap();
+        assert!(apart(angle, 0.0) < 1e-4 && (0.0..90.0).contains(&angle), "{angle}");
+        let angle = dominant_wall_direction_deg([wall(89.6, 3.0), wall(0.4, 1.0)].into_iter()).unwrap();
+        assert!((angle - 89.8).abs() < 1e-4, "{angle}");
+    }
+
+    #[test]
+    fn the_larger_walls_win() {
+        let walls = [wall(10.0, 2.0), wall(10.0, 2.0), wall(55.0, 3.0)];
+        assert!(apart(dominant_wall_direction_deg(walls.into_iter()).unwrap(), 10.0) < 1e-4);
+    }
+
+    proptest! {
+        #[test]
+        fn turning_a_room_turns_its_direction(turn in -360.0..360.0f64, tilt in -0.29..0.29f32) {
+            let room = [0.0, 90.0, 180.0].map(|a| {
+                let (n, area) = wall(a + turn, 4.0);
+                (n * (1.0 - tilt * tilt).sqrt() + Vec3::Z * tilt, area)
+            });
+            let angle = dominant_wall_direction_deg(room.into_iter()).unwrap();
+            prop_assert!((0.0..90.0).contains(&angle));
+            prop_assert!(apart(angle, turn) < 1e-4, "{} for {}", angle, turn);
+        }
+    }
+}
