@@ -1,0 +1,99 @@
+//! Annotated instances: what is known of one without its points.
+
+use crate::{Class, LabelId, LabelTable, Room};
+use glam::Vec3;
+use s3d_geom::Aabb;
+
+/// One annotated instance, summed up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InstanceSummary {
+    /// Its index in the label table.
+    pub label: LabelId,
+    /// The room that it is in.
+    pub room: Room,
+    /// What it is.
+    pub class: Class,
+    /// How many points it has, at least 1.
+    pub points: u64,
+    /// The tightest axis-aligned box around them, world metres: `[xmin, ymin, zmin, xmax, ymax, zmax]`.
+    pub bbox: [f32; 6],
+}
+
+impl InstanceSummary {
+    /// The summary of `points` (world metres) with the label at `id`; `None` if there is no point.
+    ///
+    /// # Panics
+    /// If the table has no label at `id`.
+    pub fn from_points(
+        table: &LabelTable,
+        id: LabelId,
+        points: impl IntoIterator<Item = Vec3>,
+    ) -> Option<Self> {
+        let label = table.get(id).unwrap_or_else(|| panic!("label {id} of a table of {}", table.len()));
+        let mut count = 0;
+        let bbox = Aabb::from_points(points.into_iter().inspect(|_| count += 1));
+        (count > 0).then(|| Self {
+            label: id,
+            room: label.room,
+            class: label.class,
+            points: count,
+            bbox: bbox.to_array(),
+        })
+    }
+
+    /// The summary of this instance's points and more of them; of a scan that comes in pieces.
+    ///
+    /// # Panics
+    /// If `other` is another instance.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        assert_eq!(self.label, other.label, "two different instances");
+        let side = |i: usize| {
+            let (a, b) = (self.bbox[i], other.bbox[i]);
+            if i < 3 { a.min(b) } else { a.max(b) }
+        };
+        Self { points: self.points + other.points, bbox: std::array::from_fn(side), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec3;
+    use proptest::prelude::*;
+
+    fn table() -> LabelTable {
+        let names = ["chair_1_office_2_1", "wall_1_WC_1_2"];
+        LabelTable::from_labels(names.map(|name| name.parse().unwrap())).unwrap()
+    }
+
+    #[test]
+    fn a_summary_knows_its_label() {
+        let points = [vec3(1.0, 5.0, -1.0), vec3(0.0, 7.0, 2.0)];
+        let summary = InstanceSummary::from_points(&table(), LabelId(2), points).unwrap();
+        assert_eq!(summary.class, Class::Wall);
+        assert_eq!(summary.room, "WC_1".parse().unwrap());
+        assert_eq!((summary.points, summary.bbox), (2, [0.0, 5.0, -1.0, 1.0, 7.0, 2.0]));
+        assert_eq!(InstanceSummary::from_points(&table(), LabelId(1), []), None);
+    }
+
+    #[test]
+    #[should_panic(expected = "label 0 of a table of 3")]
+    fn the_null_label_has_no_instance() {
+        let _ = InstanceSummary::from_points(&table(), LabelId::NULL, [Vec3::ZERO]);
+    }
+
+    proptest! {
+        #[test]
+        fn pieces_sum_to_the_whole(
+            points in prop::collection::vec((-9f32..9.0, -9f32..9.0, -9f32..9.0), 2..50),
+            cut in 1usize..49,
+        ) {
+            let points: Vec<Vec3> = points.into_iter().map(Vec3::from).collect();
+            let table = table();
+            let of = |p: &[Vec3]| InstanceSummary::from_points(&table, LabelId(1), p.iter().copied()).unwrap();
+            let (front, back) = points.split_at(cut.min(points.len() - 1));
+            prop_assert_eq!(of(front).union(of(back)), of(&points));
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Labels of instances and their names.
+
+use crate::room::number_from_digits;
+use crate::{Class, Room, RoomType, UnknownClass, UnknownRoomType};
+use std::cmp::Ordering;
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// The name of the null label: of what has no class. Index 0 of every label table.
+pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
+
+/// One instance of a class in an area, written `class_instanceNum_roomType_roomNum_areaNum`, as in
+/// `board_3_hallway_4_6`. Source: formats.md, "Labels".
+///
+/// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, the underscore included, so that
+/// `beam_10_…` stands before `beam_1_…`; then by room, which only matters between two labels of the same instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Label {
+    /// What it is.
+    pub class: Class,
+    /// Its number among the instances of its class in the area, from 1.
+    pub instance: u32,
+    /// The room that it is in.
+    pub room: Room,
+    /// The area, from 1. Areas 5a and 5b are both 5.
+    pub area: u32,
+}
+
+/// Why a word is no label.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LabelError {
+    /// It has not five fields.
+    #[error(
+        "{name:?} is no label: it has {count} fields between underscores, not the five of class_instance_roomType_room_area"
+    )]
+    Fields {
+        /// The word.
+        name: String,
+        /// How many fields it has.
+        count: usize,
+    },
+    /// Its first field is no class.
+    #[error("{name:?} is no label: {source}")]
+    Class {
+        /// The word.
+        name: String,
+        /// What is wrong with the field.
+        source: UnknownClass,
+    },
+    /// Its third field is no type of room.
+    #[error("{name:?} is no label: {source}")]
+    RoomType {
+        /// The word.
+        name: String,
+        /// What is wrong with the field.
+        source: UnknownRoomType,
+    },
+    /// A field that should be a number is none.
+    #[error("{name:?} is no label: its {field} {word:?} is no number from 1 without leading zeros")]
+    Number {
+        /// The word.
+        name: String,
+        /// Which field: "instance", "room" or "area".
+        field: &'static str,
+        /// What stands there.
+        word: String,
+    },
+    /// It is the null label, where only the label of an instance will do.
+    #[error("{NULL_NAME:?} is the null label: it names no instance")]
+    Null,
+}
+
+/// The label that `name` spells, `None` for the null label ([`NULL_NAME`]).
+///
+/// # Errors
+/// [`LabelError`] says which field is wrong.
+///
+/// ```
+/// use s3d_label::{Class, NULL_NAME, parse_name};
+/// assert_eq!(parse_name("chair_3_office_5_1").unwrap().unwrap().class, Class::Chair);
+/// assert_eq!(parse_name(NULL_NAME), Ok(None));
+/// assert!(parse_name("chair_3_office_5").is_err());
+/// ```
+pub fn parse_name(name: &str) -> Result<Option<Label>, LabelError> {
+    if name == NULL_NAME {
+        return Ok(None);
+    }
+    let fields: Vec<&str> = name.split('_').collect();
+    let &[class, instance, room_type, room, area] = fields.as_slice() else {
+        return Err(LabelError::Fields { name: name.to_owned(), count: fields.len() });
+    };
+    let number = |field, word: &str| {
+        number_from_digits(word).ok_or_else(|| LabelError::Number {
+            name: name.to_owned(),
+            field,
+            word: word.to_owned(),
+        })
+    };
+    let class: Class = class.parse().map_err(|source| LabelError::Class { name: name.to_owned(), source })?;
+    let instance = number("instance", instance)?;
+    let room_type: RoomType =
+        room_type.parse().map_err(|source| LabelError::RoomType { name: name.to_owned(), source })?;
+    let room = Room { room_type, number: number("room", room)? };
+    Ok(Some(Label { class, instance, room, area: number("area", area)? }))
+}
+
+impl Label {
+    /// How the published order compares two instances; equal if they are the same instance, whatever their rooms.
+    pub(crate) fn cmp_key(&self, other: &Self) -> Ordering {
+        let instance = |label: &Self| Digits::new(label.instance, Some(b'_'));
+        let area = |label: &Self| Digits::new(label.area, None);
+        // No class name is the start of another, so that their order decides before the underscore is reached.
+        (self.class.name().cmp(other.class.name()))
+            .then_with(|| instance(self).as_bytes().cmp(instance(other).as_bytes()))
+            .then_with(|| area(self).as_bytes().cmp(area(other).as_bytes()))
+    }
+}
+
+impl Ord for Label {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.cmp_key(other).then_with(|| self.room.cmp(&other.room))
+    }
+}
+
+impl PartialOrd for Label {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl fmt::Display for Label {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}_{}_{}_{}", self.class, self.instance, self.room, self.area)
+    }
+}
+
+impl FromStr for Label {
+    type Err = LabelError;
+
+    /// As [`parse_name`], but the null label is an error.
+    fn from_str(name: &str) -> Result<Self, LabelError> {
+        parse_name(name)?.ok_or(LabelError::Null)
+    }
+}
+
+/// A number's decimal digits without an allocation: labels are compared as strings, and often.
+struct Digits {
+    bytes: [u8; 11],
+    start: usize,
+}
+
+impl Digits {
+    /// The digits of `number`, then `last`.
+    fn new(mut number: u32, last: Option<u8>) -> Self {
+        let mut bytes = [0; 11];
+        let mut start = bytes.len();
+        let mut put = |byte| {
+            start -= 1;
+            bytes[start] = byte;
+        };
+        if let Some(byte) = last {
+            put(byte);
+        }
+        loop {
+            put(b'0' + (number % 10) as u8);
+            number /= 10;
+            if number == 0 {
+                break;
+            }
+        }
+        Self { bytes, start }
+    }
+
+    fn as_bytes(&self) -> &[u8] {
+        &self.bytes[self.start..]
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Mostly small numbers, so that strings share their starts and instances meet again.
+    fn any_number() -> impl Strategy<Value = u32> {
+        prop_oneof![4 => 1u32..130, 1 => 1u32..]
+    }
+
+    pub(crate) fn any_label() -> impl Strategy<Value = Label> {
+        (0usize..13, any_number(), 0usize..11, any_number(), any_number()).prop_map(
+            |(class, instance, room_type, number, area)| {
+                let room = Room { room_type: RoomType::ALL[room_type], number };
+                Label { class: Class::ALL[class], instance, room, area }
+            },
+        )
+    }
+
+    #[test]
+    fn a_name_goes_both_ways() {
+        let label = parse_name("board_3_hallway_4_6").unwrap().unwrap();
+        let room = Room { room_type: RoomType::Hallway, number: 4 };
+        assert_eq!(label, Label { class: Class::Board, instance: 3, room, area: 6 });
+        assert_eq!(label.to_string(), "board_3_hallway_4_6");
+    }
+
+    #[test]
+    fn the_null_label_is_no_instance() {
+        assert_eq!(parse_name(NULL_NAME), Ok(None));
+        assert_eq!(NULL_NAME.parse::<Label>(), Err(LabelError::Null));
+    }
+
+    #[test]
+    fn each_field_can_be_wrong() {
+        for (name, part) in [
+            ("board_3_hallway_4", "4 fields"),
+            ("board_3_conference_room_4_6", "6 fields"),
+            ("", "1 fields"),
+            ("stairs_3_hallway_4_6", "\"stairs\" is no class"),
+            ("board_0_hallway_4_6", "instance \"0\""),
+            ("board_03_hallway_4_6", "instance \"03\""),
+            ("board_3_corridor_4_6", "\"corridor\" is no type of room"),
+            ("board_3_hallway_x_6", "room \"x\""),
+            ("board_3_hallway_4_5a", "area \"5a\""),
+            ("board_3_hallway_4_", "area \"\""),
+            ("<UNK>_1_<UNK>_0_0", "\"<UNK>\" is no class"),
+        ] {
+            let message = parse_name(name).unwrap_err().to_string();
+            assert!(message.contains(part) && message.starts_with(&format!("{name:?}")), "{message}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn every_label_survives_its_name(label in any_label()) {
+            prop_assert_eq!(parse_name(&label.to_string()), Ok(Some(label)));
+        }
+
+        #[test]
+        fn any_text_gives_a_label_or_an_error(text in "[a-z<>UNKW_0-9]{0,30}") {
+            if let Ok(Some(label)) = parse_name(&text) {
+                prop_assert_eq!(label.to_string(), text);
+            }
+        }
+
+        #[test]
+        fn order_is_that_of_the_strings(a in any_label(), b in any_label(), same in 0..3) {
+            let b = if same > 0 { Label { class: a.class, ..b } } else { b };
+            let b = if same > 1 { Label { instance: a.instance, ..b } } else { b };
+            let key = |l: &Label| (format!("{}_{}_", l.class, l.instance), l.area.to_string(), l.room);
+            prop_assert_eq!(a.cmp(&b), key(&a).cmp(&key(&b)));
+        }
+    }
+}

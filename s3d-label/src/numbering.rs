@@ -1,0 +1,141 @@
+//! From the numbers of an annotated tree, which run per room, to the instance numbers of labels, which run per area.
+
+use crate::{Class, Label, Room};
+use thiserror::Error;
+
+/// An annotated instance with the label that it gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct NumberedInstance {
+    /// The room that it is in.
+    pub room: Room,
+    /// What it is.
+    pub class: Class,
+    /// Its number among the instances of its class in the room: the 3 of `chair_3.txt`.
+    pub number_in_room: u32,
+    /// Its label, with its number among the instances of its class in the area.
+    pub label: Label,
+}
+
+/// Why instances cannot be numbered.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NumberingError {
+    /// Two instances of a room have the same class and number.
+    #[error("area {area}, room {room}: {class}_{number_in_room} is there twice")]
+    Duplicate {
+        /// The area.
+        area: u32,
+        /// The room.
+        room: Room,
+        /// The class of both.
+        class: Class,
+        /// The number of both.
+        number_in_room: u32,
+    },
+}
+
+/// Gives each instance of an area, known by its room, class and number in that room, its label.
+///
+/// Instance numbers run per class over the area, from 1 without gaps: through the rooms in their order (by type, then
+/// by number; see [`RoomType`](crate::RoomType)), and in a room by the number there. Areas 1 to 4 of the published
+/// table are numbered just so; in area 5, which was joined from 5a and 5b, and in area 6 a few rooms stand elsewhere.
+/// The result is in that order too — room, class, number in the room — whatever the order of the input. Source: formats.md, "Labels" and "S3DIS
+/// tree".
+///
+/// # Errors
+/// [`NumberingError::Duplicate`] if an instance is there twice.
+pub fn number_area(
+    area: u32,
+    instances: impl IntoIterator<Item = (Room, Class, u32)>,
+) -> Result<Vec<NumberedInstance>, NumberingError> {
+    let mut instances: Vec<(Room, Class, u32)> = instances.into_iter().collect();
+    instances.sort_unstable();
+    if let Some(pair) = instances.windows(2).find(|pair| pair[0] == pair[1]) {
+        let (room, class, number_in_room) = pair[0];
+        return Err(NumberingError::Duplicate { area, room, class, number_in_room });
+    }
+    let mut last = [0; Class::ALL.len()];
+    Ok(instances
+        .into_iter()
+        .map(|(room, class, number_in_room)| {
+            let instance = &mut last[class.index()];
+            *instance += 1;
+            let label = Label { class, instance: *instance, room, area };
+            NumberedInstance { room, class, number_in_room, label }
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RoomType;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    fn room(name: &str) -> Room {
+        name.parse().unwrap()
+    }
+
+    #[test]
+    fn numbers_run_through_the_rooms() {
+        let found = number_area(
+            3,
+            [
+                (room("WC_1"), Class::Wall, 1),
+                (room("office_10"), Class::Wall, 2),
+                (room("office_10"), Class::Chair, 7),
+                (room("office_2"), Class::Wall, 12),
+                (room("office_2"), Class::Wall, 4),
+            ],
+        )
+        .unwrap();
+        let names: Vec<(u32, String)> =
+            found.iter().map(|i| (i.number_in_room, i.label.to_string())).collect();
+        let expected = [
+            (4, "wall_1_office_2_3"),
+            (12, "wall_2_office_2_3"),
+            (2, "wall_3_office_10_3"),
+            (7, "chair_1_office_10_3"),
+            (1, "wall_4_WC_1_3"),
+        ];
+        assert_eq!(names, expected.map(|(number, name)| (number, name.to_owned())));
+    }
+
+    #[test]
+    fn an_instance_twice_is_an_error() {
+        let chair = (room("office_2"), Class::Chair, 3);
+        let message = number_area(6, [chair, (room("office_2"), Class::Wall, 3), chair]).unwrap_err();
+        assert_eq!(message.to_string(), "area 6, room office_2: chair_3 is there twice");
+        assert_eq!(number_area(6, []), Ok(vec![]));
+    }
+
+    proptest! {
+        #[test]
+        fn no_gaps_and_no_dependence_on_order(
+            raw in prop::collection::btree_set((0usize..11, 1u32..4, 0usize..13, 1u32..20), 0..60),
+            turn in 0usize..60,
+        ) {
+            let mut input: Vec<(Room, Class, u32)> = raw
+                .into_iter()
+                .map(|(t, number, c, n)| (Room { room_type: RoomType::ALL[t], number }, Class::ALL[c], n))
+                .collect();
+            let found = number_area(1, input.iter().copied()).unwrap();
+            let turn = turn % input.len().max(1);
+            input.rotate_left(turn);
+            input.reverse();
+            prop_assert_eq!(&number_area(1, input.iter().copied()).unwrap(), &found);
+
+            prop_assert_eq!(found.len(), input.len());
+            let mut by_class: BTreeMap<Class, Vec<u32>> = BTreeMap::new();
+            for i in &found {
+                prop_assert!(input.contains(&(i.room, i.class, i.number_in_room)));
+                prop_assert_eq!((i.label.room, i.label.class, i.label.area), (i.room, i.class, 1));
+                by_class.entry(i.class).or_default().push(i.label.instance);
+            }
+            for numbers in by_class.values() {
+                prop_assert!(numbers.iter().copied().eq(1..=numbers.len() as u32));
+            }
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! How well the points of a scan vote for the faces of its mesh.
+
+use crate::{Class, LabelTable, Room, Votes};
+use std::collections::BTreeMap;
+
+/// A row of a [`VoteReport`]: the votes of one room, one class, or all.
+///
+/// A point belongs to the room and class of its own label, a face to those of the label that won it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VoteRow {
+    /// Points that voted.
+    pub points: u64,
+    /// Of these, those farther from every face than [`VoteOptions::far_m`](crate::VoteOptions::far_m).
+    pub far_points: u64,
+    /// Faces with at least one vote.
+    pub faces: u64,
+    /// The votes that these faces got, for whatever label.
+    pub face_votes: u64,
+    /// Faces with votes for more than one label: the winner's share is below 1. Those of the next two columns too.
+    pub contested: u64,
+    /// Faces whose winner's share is below ¾.
+    pub contested_below_three_quarters: u64,
+    /// Faces whose winner's share is below ½.
+    pub contested_below_half: u64,
+}
+
+impl VoteRow {
+    /// Votes a face, over the faces with a vote; 0 if there is none.
+    pub fn mean_votes_per_face(&self) -> f64 {
+        if self.faces == 0 { 0.0 } else { self.face_votes as f64 / self.faces as f64 }
+    }
+
+    fn add_face(&mut self, winner: u64, votes: u64) {
+        self.faces += 1;
+        self.face_votes += votes;
+        // u128: a share is compared without rounding, and no product overflows.
+        let (winner, votes) = (u128::from(winner), u128::from(votes));
+        self.contested += u64::from(winner < votes);
+        self.contested_below_three_quarters += u64::from(4 * winner < 3 * votes);
+        self.contested_below_half += u64::from(2 * winner < votes);
+    }
+}
+
+/// A summary of [`Votes`], by room and by class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VoteReport {
+    /// The distance beyond which a point is far, in metres.
+    pub far_m: f32,
+    /// Faces of the mesh.
+    pub face_count: u64,
+    /// Faces that no point voted for. They have no label, so that they belong to no room and no class.
+    pub faces_without_vote: u64,
+    /// Points that had no label and so did not vote.
+    pub unlabeled_points: u64,
+    /// All rooms together.
+    pub total: VoteRow,
+    /// Every room of the table with its area, in the order of (area, room).
+    pub rooms: Vec<(u32, Room, VoteRow)>,
+    /// Every class, each at its [`Class::index`].
+    pub classes: [(Class, VoteRow); 13],
+}
+
+impl VoteReport {
+    /// Sums up `votes` for labels of `table`.
+    ///
+    /// # Panics
+    /// If there are votes for a label that is not in the table.
+    pub fn new(votes: &Votes, table: &LabelTable) -> Self {
+        let largest = votes.largest_label();
+        assert!(largest.index() < table.len(), "votes for label {largest} of a table of {}", table.len());
+
+        let mut total = VoteRow::default();
+        let mut rooms: BTreeMap<(u32, Room), VoteRow> = BTreeMap::new();
+        let mut classes = Class::ALL.map(|class| (class, VoteRow::default()));
+        for (id, label) in table.iter() {
+            let tally = votes.points_of(id);
+            let room = rooms.entry((label.area, label.room)).or_default();
+            for row in [&mut total, room, &mut classes[label.class.index()].1] {
+                row.points += tally.points;
+                row.far_points += tally.far;
+            }
+        }
+        let mut faces_without_vote = 0;
+        for face in 0..votes.face_count() as u32 {
+            let Some(winner) = votes.winner(face) else {
+                faces_without_vote += 1;
+                continue;
+            };
+            let label = table.get(winner.label).expect("no larger label was voted for");
+            let room = rooms.entry((label.area, label.room)).or_default();
+            for row in [&mut total, room, &mut classes[label.class.index()].1] {
+                row.add_face(winner.votes, winner.face_votes);
+            }
+        }
+        Self {
+            far_m: votes.options().far_m,
+            face_count: votes.face_count() as u64,
+            faces_without_vote,
+            unlabeled_points: votes.unlabeled_points(),
+            total,
+            rooms: rooms.into_iter().map(|((area, room), row)| (area, room, row)).collect(),
+            classes,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::LabelId;
+    use proptest::prelude::*;
+
+    fn table() -> LabelTable {
+        // 1: chair of office_2, 2: chair of office_1, 3: table of office_1, 4: wall of WC_1 in area 2.
+        let names = ["chair_1_office_2_1", "chair_2_office_1_1", "table_1_office_1_1", "wall_1_WC_1_2"];
+        LabelTable::from_labels(names.map(|name| name.parse().unwrap())).unwrap()
+    }
+
+    #[test]
+    fn rows_hold_what_was_added() {
+        let mut votes = Votes::new(7);
+        let mut add = |face, label, count, distance_m| {
+            for _ in 0..count {
+                votes.add(face, LabelId(label), distance_m);
+            }
+        };
+        add(0, 3, 4, 0.01); // all agree
+        add(1, 3, 3, 0.01); // exactly three quarters
+        add(1, 1, 1, 0.06);
+        add(2, 3, 2, 0.01); // exactly half, and the chair has the smaller index
+        add(2, 1, 2, 0.01);
+        add(3, 1, 2, 0.01); // two fifths
+        add(3, 2, 2, 0.01);
+        add(3, 3, 1, 0.01);
+        add(4, 2, 5, 0.01); // five sevenths
+        add(4, 3, 2, 0.2);
+        add(5, 0, 9, 0.01); // no label, no vote
+        let report = VoteReport::new(&votes, &table());
+
+        assert_eq!((report.face_count, report.faces_without_vote, report.unlabeled_points), (7, 2, 9));
+        let total = VoteRow {
+            points: 24,
+            far_points: 3,
+            faces: 5,
+            face_votes: 24,
+            contested: 4,
+            contested_below_three_quarters: 3,
+            contested_below_half: 1,
+        };
+        assert_eq!(report.total, total);
+        assert_eq!(report.total.mean_votes_per_face(), 4.8);
+        assert_eq!(
+            report.rooms.iter().map(|(area, room, _)| format!("{area} {room}")).collect::<Vec<_>>(),
+            ["1 office_1", "1 office_2", "2 WC_1"]
+        );
+        // Faces 0, 1 (table) and 4 (chair) lie in office_1; the points of its three labels voted anywhere.
+        let office_1 = VoteRow {
+            points: 19,
+            far_points: 2,
+            faces: 3,
+            face_votes: 15,
+            contested: 2,
+            contested_below_three_quarters: 1,
+            contested_below_half: 0,
+        };
+        assert_eq!(report.rooms[0].2, office_1);
+        assert_eq!(report.rooms[2].2, VoteRow::default());
+        assert_eq!(report.rooms[2].2.mean_votes_per_face(), 0.0);
+        let (class, chairs) = report.classes[Class::Chair.index()];
+        assert_eq!((class, chairs.points, chairs.far_points, chairs.faces), (Class::Chair, 12, 1, 3));
+    }
+
+    #[test]
+    #[should_panic(expected = "label 5 of a table of 5")]
+    fn a_vote_for_a_label_outside_the_table_is_a_callers_mistake() {
+        let mut votes = Votes::new(1);
+        votes.add(0, LabelId(5), 0.0);
+        let _ = VoteReport::new(&votes, &table());
+    }
+
+    proptest! {
+        #[test]
+        fn rooms_and_classes_sum_to_the_total(
+            points in prop::collection::vec((0u32..20, 0u32..5, 0f32..0.1), 0..300),
+        ) {
+            let mut votes = Votes::new(20);
+            for &(face, label, distance_m) in &points {
+                votes.add(face, LabelId(label), distance_m);
+            }
+            let report = VoteReport::new(&votes, &table());
+            let columns = |r: &VoteRow| {
+                [r.points, r.far_points, r.faces, r.face_votes, r.contested,
+                 r.contested_below_three_quarters, r.contested_below_half]
+            };
+            let sum = |rows: Vec<VoteRow>| {
+                rows.iter().map(columns).fold([0; 7], |a, b| std::array::from_fn(|i| a[i] + b[i]))
+            };
+            let total = columns(&report.total);
+            prop_assert_eq!(sum(report.rooms.iter().map(|r| r.2).collect()), total);
+            prop_assert_eq!(sum(report.classes.iter().map(|r| r.1).collect()), total);
+            prop_assert_eq!(report.total.points, report.total.face_votes);
+            prop_assert_eq!(report.total.points + report.unlabeled_points, points.len() as u64);
+            prop_assert_eq!(report.total.faces + report.faces_without_vote, 20);
+            prop_assert!(report.total.contested_below_half <= report.total.contested_below_three_quarters);
+            prop_assert!(report.total.contested_below_three_quarters <= report.total.contested);
+        }
+    }
+}

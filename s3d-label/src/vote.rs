@@ -1,0 +1,309 @@
+//! Votes of annotated points for the labels of faces.
+
+use crate::LabelId;
+
+/// In place of an index into the entries: the list ends here.
+const END: u32 = u32::MAX;
+
+/// What is counted beside the votes themselves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoteOptions {
+    /// A point farther from its nearest face than this, in metres, is counted as far. It votes all the same.
+    pub far_m: f32,
+}
+
+impl Default for VoteOptions {
+    /// 5 cm: more than a scanner's noise, less than the depth of a shelf.
+    fn default() -> Self {
+        Self { far_m: 0.05 }
+    }
+}
+
+/// The points of one label, wherever they voted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PointTally {
+    /// How many there are.
+    pub points: u64,
+    /// How many are farther from their face than [`VoteOptions::far_m`].
+    pub far: u64,
+}
+
+/// A face's most frequent label, and how clearly it won.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Winner {
+    /// The label.
+    pub label: LabelId,
+    /// Its votes, at least 1.
+    pub votes: u64,
+    /// The votes for any label of the face.
+    pub face_votes: u64,
+}
+
+/// Counts, for each face of a mesh, the labels of the points to which it is the nearest.
+///
+/// Points stream through [`Votes::add`], one at a time and in any order; nothing of them is kept but counts. Several
+/// counts over the same faces [`merge`](Votes::merge) into one. Every result is the same for any order of points and
+/// merges. Memory: 4 bytes a face, and 16 bytes for each pair of a face and a label that occurs. Source: formats.md,
+/// "Labels": voting.
+#[derive(Clone, Debug)]
+pub struct Votes {
+    options: VoteOptions,
+    /// Where each face's list of entries starts, or [`END`].
+    heads: Vec<u32>,
+    entries: Vec<Entry>,
+    /// By label index; as long as the largest index that occurred asks for.
+    tallies: Vec<PointTally>,
+    unlabeled: u64,
+}
+
+/// The votes for one label of one face, and where the next of that face is.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    votes: u64,
+    label: LabelId,
+    next: u32,
+}
+
+impl Votes {
+    /// No votes yet, for a mesh of `face_count` faces.
+    pub fn new(face_count: usize) -> Self {
+        Self::with_options(face_count, VoteOptions::default())
+    }
+
+    /// No votes yet, for a mesh of `face_count` faces.
+    ///
+    /// # Panics
+    /// If `far_m` is not a number.
+    pub fn with_options(face_count: usize, options: VoteOptions) -> Self {
+        assert!(!options.far_m.is_nan(), "no distance is farther than {} m", options.far_m);
+        Self { options, heads: vec![END; face_count], entries: Vec::new(), tallies: Vec::new(), unlabeled: 0 }
+    }
+
+    /// A point with `label` votes for `face`, which is `distance_m` away (a distance that is not a number is far).
+    /// A point without a label ([`LabelId::NULL`]) does not vote: it is only counted, in [`Votes::unlabeled_points`].
+    ///
+    /// # Panics
+    /// If there is no face `face`, or above 2³² − 1 pairs of a face and a label.
+    #[inline]
+    pub fn add(&mut self, face: u32, label: LabelId, distance_m: f32) {
+        assert!((face as usize) < self.heads.len(), "face {face} of {}", self.heads.len());
+        if label.is_null() {
+            self.unlabeled += 1;
+            return;
+        }
+        let far = u64::from(distance_m > self.options.far_m || distance_m.is_nan());
+        self.tally(label, PointTally { points: 1, far });
+        self.count(face, label, 1);
+    }
+
+    /// Takes over the votes of `other`, as if its points had been added here.
+    ///
+    /// # Panics
+    /// If `other` has another number of faces or other options.
+    pub fn merge(&mut self, other: &Self) {
+        assert_eq!(self.heads.len(), other.heads.len(), "votes for meshes of different size");
+        assert_eq!(self.options, other.options, "votes counted under different options");
+        self.unlabeled += other.unlabeled;
+        for (label, &tally) in other.tallies.iter().enumerate() {
+            self.tally(LabelId(label as u32), tally);
+        }
+        for face in 0..other.heads.len() as u32 {
+            for entry in other.entries_of(face) {
+                self.count(face, entry.label, entry.votes);
+            }
+        }
+    }
+
+    fn tally(&mut self, label: LabelId, tally: PointTally) {
+        if tally.points == 0 {
+            return;
+        }
+        if self.tallies.len() <= label.index() {
+            self.tallies.resize(label.index() + 1, PointTally::default());
+        }
+        let sum = &mut self.tallies[label.index()];
+        sum.points += tally.points;
+        sum.far += tally.far;
+    }
+
+    fn count(&mut self, face: u32, label: LabelId, votes: u64) {
+        let head = self.heads[face as usize];
+        let (mut before, mut at) = (END, head);
+        while at != END {
+            let entry = self.entries[at as usize];
+            if entry.label == label {
+                self.entries[at as usize].votes += votes;
+                if before != END {
+                    // To the front: points come instance by instance, so that the next one probably has this label.
+                    self.entries[before as usize].next = entry.next;
+                    self.entries[at as usize].next = head;
+                    self.heads[face as usize] = at;
+                }
+                return;
+            }
+            (before, at) = (at, entry.next);
+        }
+        let new = u32::try_from(self.entries.len()).ok().filter(|&i| i != END);
+        self.heads[face as usize] = new.expect("too many pairs of a face and a label");
+        self.entries.push(Entry { votes, label, next: head });
+    }
+
+    fn entries_of(&self, face: u32) -> impl Iterator<Item = Entry> {
+        let entry = |i: u32| (i != END).then(|| self.entries[i as usize]);
+        std::iter::successors(entry(self.heads[face as usize]), move |e| entry(e.next))
+    }
+
+    /// Number of faces, those without a vote included.
+    pub fn face_count(&self) -> usize {
+        self.heads.len()
+    }
+
+    /// The options that the votes are counted under.
+    pub fn options(&self) -> VoteOptions {
+        self.options
+    }
+
+    /// The points of `label`, over all faces.
+    pub fn points_of(&self, label: LabelId) -> PointTally {
+        self.tallies.get(label.index()).copied().unwrap_or_default()
+    }
+
+    /// The largest label that any point voted for, [`LabelId::NULL`] if there is no vote.
+    pub fn largest_label(&self) -> LabelId {
+        LabelId(self.tallies.len().saturating_sub(1) as u32)
+    }
+
+    /// Points that came without a label.
+    pub fn unlabeled_points(&self) -> u64 {
+        self.unlabeled
+    }
+
+    /// The labels that a face was voted, by index, each with its votes.
+    ///
+    /// # Panics
+    /// If there is no face `face`.
+    pub fn votes_of(&self, face: u32) -> Vec<(LabelId, u64)> {
+        let mut votes: Vec<(LabelId, u64)> = self.entries_of(face).map(|e| (e.label, e.votes)).collect();
+        votes.sort_unstable();
+        votes
+    }
+
+    /// A face's most frequent label, the smallest of equally frequent ones; `None` if nobody voted for the face.
+    ///
+    /// # Panics
+    /// If there is no face `face`.
+    pub fn winner(&self, face: u32) -> Option<Winner> {
+        let mut winner: Option<Winner> = None;
+        let mut face_votes = 0;
+        for Entry { votes, label, .. } in self.entries_of(face) {
+            face_votes += votes;
+            if winner.is_none_or(|w| votes > w.votes || (votes == w.votes && label < w.label)) {
+                winner = Some(Winner { label, votes, face_votes: 0 });
+            }
+        }
+        winner.map(|w| Winner { face_votes, ..w })
+    }
+
+    /// Each face's label: the most frequent among its votes, the smallest of equally frequent ones, and
+    /// [`LabelId::NULL`] without a vote.
+    pub fn face_labels(&self) -> Vec<LabelId> {
+        (0..self.heads.len() as u32)
+            .map(|face| self.winner(face).map_or(LabelId::NULL, |winner| winner.label))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    /// The plain way: every vote in a map, every face's labels looked through.
+    fn reference(face_count: usize, points: &[(u32, u32)]) -> Vec<LabelId> {
+        let mut counts: Vec<BTreeMap<u32, u64>> = vec![BTreeMap::new(); face_count];
+        for &(face, label) in points.iter().filter(|(_, label)| *label != 0) {
+            *counts[face as usize].entry(label).or_default() += 1;
+        }
+        let most = |labels: &BTreeMap<u32, u64>| {
+            let most = labels.values().copied().max()?;
+            labels.iter().find(|(_, count)| **count == most).map(|(label, _)| *label)
+        };
+        counts.iter().map(|labels| LabelId(most(labels).unwrap_or(0))).collect()
+    }
+
+    fn votes(face_count: usize, points: &[(u32, u32)]) -> Votes {
+        let mut votes = Votes::new(face_count);
+        for &(face, label) in points {
+            votes.add(face, LabelId(label), 0.0);
+        }
+        votes
+    }
+
+    #[test]
+    fn the_most_frequent_label_wins_and_the_smaller_of_two() {
+        let votes = votes(5, &[(0, 9), (0, 4), (0, 9), (1, 7), (1, 3), (3, 2), (3, 0), (3, 0), (4, 0)]);
+        assert_eq!(votes.face_labels(), [9, 3, 0, 2, 0].map(LabelId));
+        assert_eq!(votes.winner(0), Some(Winner { label: LabelId(9), votes: 2, face_votes: 3 }));
+        assert_eq!(votes.winner(2), None);
+        assert_eq!(votes.votes_of(1), [(LabelId(3), 1), (LabelId(7), 1)]);
+        assert_eq!(votes.unlabeled_points(), 3);
+        assert_eq!(votes.largest_label(), LabelId(9));
+    }
+
+    #[test]
+    fn far_points_are_counted_by_their_label_and_vote() {
+        let mut votes = Votes::with_options(1, VoteOptions { far_m: 0.1 });
+        for distance_m in [0.0, 0.1, 0.100001, f32::INFINITY, f32::NAN] {
+            votes.add(0, LabelId(2), distance_m);
+        }
+        votes.add(0, LabelId(1), 0.05);
+        assert_eq!(votes.points_of(LabelId(2)), PointTally { points: 5, far: 3 });
+        assert_eq!(votes.points_of(LabelId(1)), PointTally { points: 1, far: 0 });
+        assert_eq!(votes.points_of(LabelId(7)), PointTally::default());
+        assert_eq!(votes.face_labels(), [LabelId(2)]);
+    }
+
+    #[test]
+    #[should_panic(expected = "face 3 of 3")]
+    fn a_face_out_of_range_is_a_callers_mistake() {
+        Votes::new(3).add(3, LabelId(1), 0.0);
+    }
+
+    #[test]
+    #[should_panic(expected = "different size")]
+    fn votes_for_different_meshes_do_not_merge() {
+        Votes::new(3).merge(&Votes::new(2));
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_the_reference_in_any_order_and_split(
+            points in prop::collection::vec((0u32..6, 0u32..5), 0..200),
+            turn in 0usize..200,
+            cut in 0usize..200,
+        ) {
+            let expected = reference(6, &points);
+            let whole = votes(6, &points);
+            prop_assert_eq!(whole.face_labels(), expected.clone());
+
+            let mut other = points.clone();
+            other.rotate_left(turn % points.len().max(1));
+            other.reverse();
+            let (front, back) = other.split_at(cut.min(other.len()));
+            let mut merged = votes(6, front);
+            merged.merge(&votes(6, back));
+            prop_assert_eq!(merged.face_labels(), expected);
+            prop_assert_eq!(merged.unlabeled_points(), whole.unlabeled_points());
+            prop_assert_eq!(merged.largest_label(), whole.largest_label());
+            for label in (0..5).map(LabelId) {
+                prop_assert_eq!(merged.points_of(label), whole.points_of(label));
+            }
+            for face in 0..6 {
+                prop_assert_eq!(merged.votes_of(face), whole.votes_of(face));
+                prop_assert_eq!(merged.winner(face), whole.winner(face));
+            }
+            prop_assert!(merged.entries.len() <= 6 * 4);
+        }
+    }
+}
