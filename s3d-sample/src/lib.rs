@@ -1,0 +1,44 @@
+//! The choice of camera views for a registered data set of an indoor scan, as 2D-3D-S (Armeni et al. 2017) made it.
+//!
+//! At every scan location, candidate [`View`]s are drawn ([`draw_view`]); a renderer counts the classes that each sees;
+//! the [`entropy`] of the counts is its score; and [`select_pooled`] keeps the better ones of a [`Pool`]. [`folds`]
+//! splits areas for cross-validation. This crate sees numbers only: it knows no renderer and no labels.
+//!
+//! Everything random follows from one seed and from the name of what it is drawn for, never from threads or order.
+//!
+//! ```
+//! use s3d_sample::{Pool, PoolItem, Selection, ViewDistribution, draw_view, entropy, select_pooled};
+//!
+//! let (seed, camera) = (42, "8eb9955b866b4b5f74abb1071416c628");
+//! let views: Vec<_> = (0..72).map(|i| draw_view(&ViewDistribution::default(), seed, camera, i)).collect();
+//! assert!(views.iter().all(|view| (10.0..=75.0).contains(&view.fov_rad.to_degrees().round())));
+//!
+//! // Say that the wider views see more classes.
+//! let items: Vec<_> = (0u32..72)
+//!     .map(|view| {
+//!         let classes = (views[view as usize].fov_rad * 10.0) as usize;
+//!         let histogram = std::array::from_fn(|class| u64::from(class < classes) * 1000);
+//!         PoolItem { area: 1, location: camera, view, score: entropy(&histogram) }
+//!     })
+//!     .collect();
+//! let stays = select_pooled(&items, Pool::Location, &Selection::default(), seed);
+//! assert_eq!(stays.iter().filter(|&&stays| stays).count(), 52);
+//! ```
+
+mod entropy;
+mod fold;
+mod pool;
+mod select;
+mod stream;
+mod view;
+
+pub use entropy::entropy;
+pub use fold::{Fold, folds};
+pub use pool::{Pool, PoolItem, UnknownPool, select_pooled};
+pub use select::{Selection, SelectionError, select};
+pub use view::{CANDIDATES_PER_LOCATION, DistributionError, View, ViewDistribution, draw_view};
+
+/// The README's example, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

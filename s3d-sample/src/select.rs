@@ -1,0 +1,298 @@
+//! Which of a pool of scored views to keep.
+
+use crate::stream::{stream, uniform_above_zero};
+use thiserror::Error;
+
+/// What shares of a pool to keep. Source: formats.md, "Sampling of views".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Selection {
+    /// The share with the lowest scores, which goes.
+    pub discard: f64,
+    /// The share with the highest scores, which stays.
+    pub keep: f64,
+    /// The share of the rest that stays, drawn at random, higher scores rather than lower ones.
+    pub half_of_rest: f64,
+}
+
+impl Default for Selection {
+    /// The paper's: 15 % go, 60 % stay, and half of the 25 % between: 72.5 % in all.
+    fn default() -> Self {
+        Self { discard: 0.15, keep: 0.60, half_of_rest: 0.5 }
+    }
+}
+
+/// Shares that no [`Selection`] can have.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error(
+    "shares {discard} to discard, {keep} to keep and {half_of_rest} of the rest: each is 0 to 1, the first two at most 1 together"
+)]
+pub struct SelectionError {
+    /// `discard`.
+    pub discard: f64,
+    /// `keep`.
+    pub keep: f64,
+    /// `half_of_rest`.
+    pub half_of_rest: f64,
+}
+
+/// How many views of a pool go, stay, and are drawn from the rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Counts {
+    discard: usize,
+    keep: usize,
+    draw: usize,
+}
+
+impl Selection {
+    /// Whether views can be selected by it.
+    ///
+    /// # Errors
+    /// [`SelectionError`] if a share is not 0 to 1, or the first two are more than all.
+    pub fn check(&self) -> Result<(), SelectionError> {
+        let &Self { discard, keep, half_of_rest } = self;
+        let shares = [discard, keep, half_of_rest, discard + keep];
+        // Shares such as 0.15 and 0.85 may sum to a little more than 1.
+        let ok = shares.iter().all(|share| (0.0..=1.0 + SLACK).contains(share));
+        if ok { Ok(()) } else { Err(SelectionError { discard, keep, half_of_rest }) }
+    }
+
+    /// The share of a pool that stays in all: 0.725 by default.
+    pub fn share(&self) -> f64 {
+        self.keep + self.half_of_rest * (1.0 - self.discard - self.keep).max(0.0)
+    }
+
+    fn counts(&self, n: usize) -> Counts {
+        let of = |share: f64| share * n as f64 + SLACK;
+        let discard = (of(self.discard).floor() as usize).min(n);
+        let keep = ((of(self.keep) + 0.5).floor() as usize).min(n - discard);
+        let stay = ((of(self.share()) + 0.5).floor() as usize).clamp(keep, n - discard);
+        Counts { discard, keep, draw: stay - keep }
+    }
+}
+
+/// What a share of a count may miss by rounding: 0.15 · 20 counts as 3.
+const SLACK: f64 = 1e-9;
+
+/// The deviation of the half-normal weight of the middle scores.
+const WEIGHT_SIGMA: f64 = 0.5;
+
+/// Selects from one pool of views: whether each of `scores` stays.
+///
+/// Of n views, the `discard`·n with the lowest scores go (rounded down) and the `keep`·n with the highest stay (rounded
+/// to the nearest, halves up). From the rest so many are drawn that [`Selection::share`]·n stay in all (rounded
+/// likewise): 72.5 % of any pool, to half a view. Of two equal scores the one with the smaller index counts as the
+/// higher.
+///
+/// The draw is without replacement. "Half-normal with mean 1 and deviation ½ on the entropy scaled to \[0, 1\]" is read
+/// as the lower half of that normal distribution: a view of score e has the weight exp(−(s − 1)² / (2·½²)), with
+/// s = e / (the pool's highest score), 1 at the top and e⁻² = 0.135 at s = 0. (If all scores are 0, all weights are
+/// equal.) By the method of Efraimidis and Spirakis (2006), view i gets the key ln(uᵢ) / weightᵢ, and the largest keys
+/// stay; uᵢ, in (0, 1], is from the i-th 64 bits of a ChaCha8 stream keyed by `seed`. So the draw has one result,
+/// in whatever order keys are computed, but it knows a view by its index: see
+/// [`select_pooled`](crate::select_pooled) for views that are known by name.
+///
+/// # Panics
+/// If a score is negative or not finite, or [`Selection::check`] fails.
+pub fn select(scores: &[f64], options: &Selection, seed: u64) -> Vec<bool> {
+    if let Err(error) = options.check() {
+        panic!("{error}");
+    }
+    if let Some(i) = scores.iter().position(|s| !(s.is_finite() && *s >= 0.0)) {
+        panic!("score {i} is {}: scores are finite and not negative", scores[i]);
+    }
+    let counts = options.counts(scores.len());
+    let mut ranked: Vec<usize> = (0..scores.len()).collect();
+    ranked.sort_unstable_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
+
+    let mut stays = vec![false; scores.len()];
+    let (top, rest) = ranked.split_at(counts.keep);
+    let middle = &rest[..rest.len() - counts.discard];
+    top.iter().for_each(|&i| stays[i] = true);
+
+    let highest = ranked.first().map_or(0.0, |&i| scores[i]);
+    let mut rng = stream(*b"pick", seed, "", 0);
+    let uniforms: Vec<f64> = scores.iter().map(|_| uniform_above_zero(&mut rng)).collect();
+    let key = |i: usize| libm::log(uniforms[i]) / weight(scores[i], highest);
+    let mut drawn: Vec<(f64, usize)> = middle.iter().map(|&i| (key(i), i)).collect();
+    drawn.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    drawn[..counts.draw].iter().for_each(|&(_, i)| stays[i] = true);
+    stays
+}
+
+fn weight(score: f64, highest: f64) -> f64 {
+    let scaled = if highest > 0.0 { score / highest } else { 0.0 };
+    let deviations = (scaled - 1.0) / WEIGHT_SIGMA;
+    libm::exp(-0.5 * deviations * deviations)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn kept(stays: &[bool]) -> usize {
+        stays.iter().filter(|&&s| s).count()
+    }
+
+    #[test]
+    fn counts_of_small_and_usual_pools() {
+        let of = |n| {
+            let c = Selection::default().counts(n);
+            (c.discard, c.keep, c.draw)
+        };
+        let small = [(0, 0, 0), (0, 1, 0), (0, 1, 0), (0, 2, 0), (0, 2, 1), (0, 3, 1), (0, 4, 0), (1, 4, 1)];
+        assert_eq!((0..8).map(of).collect::<Vec<_>>(), small);
+        assert_eq!(of(20), (3, 12, 3));
+        assert_eq!(of(72), (10, 43, 9));
+        assert_eq!(of(100), (15, 60, 13));
+        assert_eq!(of(1413 * 72), (15_260, 61_042, 12_717));
+    }
+
+    #[test]
+    fn shares_hold_for_every_pool_size() {
+        for n in 0..600 {
+            let scores: Vec<f64> = (0..n).map(|i| ((i * 7919) % 601) as f64 / 300.0).collect();
+            let stays = select(&scores, &Selection::default(), 5);
+            assert_eq!(stays.len(), n);
+            assert!((kept(&stays) as f64 - 0.725 * n as f64).abs() <= 0.5 + 1e-6, "{n}");
+            let mut ranked: Vec<usize> = (0..n).collect();
+            ranked.sort_by(|&a, &b| scores[b].partial_cmp(&scores[a]).unwrap().then(a.cmp(&b)));
+            let (top, bottom) =
+                ((0.6 * n as f64 + 0.5 + 1e-9) as usize, n - (0.15 * n as f64 + 1e-9) as usize);
+            assert!(ranked[..top].iter().all(|&i| stays[i]), "{n}");
+            assert!(!ranked[bottom..].iter().any(|&i| stays[i]), "{n}");
+        }
+    }
+
+    #[test]
+    fn equal_scores_go_by_index() {
+        for score in [0.0, 1.5] {
+            let stays = select(&[score; 100], &Selection::default(), 1);
+            assert!(stays[..60].iter().all(|&s| s) && !stays[85..].iter().any(|&s| s));
+            assert_eq!(kept(&stays[60..85]), 13);
+        }
+        assert_eq!(select(&[], &Selection::default(), 1), []);
+        assert_eq!(select(&[0.0], &Selection::default(), 1), [true]);
+        assert_eq!(select(&[0.0, 2.0], &Selection::default(), 1), [false, true]);
+        assert_eq!(select(&[0.0, 2.0, 1.0], &Selection::default(), 1), [false, true, true]);
+    }
+
+    /// The plain way: the probability that each item is among `draw` that are drawn one after the other, each time
+    /// in proportion to the weights of those left.
+    fn inclusion(weights: &[f64], draw: usize) -> Vec<f64> {
+        fn go(weights: &[f64], taken: &mut Vec<usize>, draw: usize, p: f64, out: &mut [f64]) {
+            if draw == 0 {
+                return taken.iter().for_each(|&i| out[i] += p);
+            }
+            let left: f64 = (0..weights.len()).filter(|i| !taken.contains(i)).map(|i| weights[i]).sum();
+            for i in 0..weights.len() {
+                if !taken.contains(&i) {
+                    taken.push(i);
+                    go(weights, taken, draw - 1, p * weights[i] / left, out);
+                    taken.pop();
+                }
+            }
+        }
+        let mut out = vec![0.0; weights.len()];
+        go(weights, &mut Vec::new(), draw, 1.0, &mut out);
+        out
+    }
+
+    #[test]
+    fn the_middle_is_drawn_as_one_after_the_other() {
+        // 20 views: ranks 12 to 16 are the middle, 3 of its 5 stay.
+        let mut scores = vec![2.0; 12];
+        scores.extend([1.9, 1.4, 0.9, 0.4, 0.1]);
+        scores.extend([0.0; 3]);
+        let weights: Vec<f64> =
+            scores[12..17].iter().map(|e| f64::exp(-(e / 2.0 - 1.0f64).powi(2) / 0.5)).collect();
+        let expected = inclusion(&weights, 3);
+        let seeds = 20_000;
+        let mut counts = [0u32; 5];
+        for seed in 0..seeds {
+            let stays = select(&scores, &Selection::default(), seed);
+            assert_eq!(kept(&stays), 15);
+            (0..5).for_each(|i| counts[i] += u32::from(stays[12 + i]));
+        }
+        for (&count, &p) in counts.iter().zip(&expected) {
+            let deviation = (p * (1.0 - p) * seeds as f64).sqrt();
+            let off = (f64::from(count) - p * seeds as f64) / deviation;
+            assert!(off.abs() < 4.0, "{count} of {seeds}, expected {p}");
+        }
+        assert!(counts.is_sorted_by(|a, b| a > b), "{counts:?}");
+    }
+
+    #[test]
+    fn higher_scores_of_the_middle_stay_more_often() {
+        let scores: Vec<f64> = (0..1000).map(f64::from).collect();
+        let (mut lower, mut upper) = (0, 0);
+        for seed in 0..50 {
+            let stays = select(&scores, &Selection::default(), seed);
+            lower += kept(&stays[150..275]);
+            upper += kept(&stays[275..400]);
+        }
+        assert_eq!(lower + upper, 50 * 125);
+        // By chance alone, each is 3125 with a deviation below 40.
+        assert!(upper > 3125 + 160, "{upper}");
+    }
+
+    #[test]
+    fn other_shares_are_possible() {
+        let all = Selection { discard: 0.0, keep: 1.0, half_of_rest: 0.0 };
+        assert_eq!(kept(&select(&[1.0; 33], &all, 0)), 33);
+        let none = Selection { discard: 1.0, keep: 0.0, half_of_rest: 1.0 };
+        assert_eq!(kept(&select(&[1.0; 33], &none, 0)), 0);
+        let edge = Selection { discard: 0.15, keep: 0.85, half_of_rest: 0.5 };
+        assert_eq!((edge.check(), kept(&select(&[1.0; 40], &edge, 0))), (Ok(()), 34));
+        for wrong in [
+            Selection { discard: 0.5, keep: 0.6, half_of_rest: 0.5 },
+            Selection { discard: -0.1, keep: 0.6, half_of_rest: 0.5 },
+            Selection { discard: 0.1, keep: f64::NAN, half_of_rest: 0.5 },
+            Selection { discard: 0.1, keep: 0.1, half_of_rest: 1.5 },
+        ] {
+            let message = wrong.check().unwrap_err().to_string();
+            assert!(message.contains(&format!("{} to keep", wrong.keep)), "{message}");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "score 1 is NaN")]
+    fn a_score_that_is_no_number_is_a_callers_mistake() {
+        select(&[1.0, f64::NAN], &Selection::default(), 0);
+    }
+
+    #[test]
+    fn a_draw_is_the_same_for_ever() {
+        let scores: Vec<f64> = (0..72).map(|i| f64::from(i * 29 % 72) / 30.0).collect();
+        let stays = select(&scores, &Selection::default(), 42);
+        let drawn: Vec<i32> = (0..72).filter(|&i| stays[i as usize] && i * 29 % 72 < 29).collect();
+        // Computed by a second program from the description at select.
+        assert_eq!(drawn, [8, 13, 28, 53, 55, 58, 63, 68, 70]);
+        assert_ne!(select(&scores, &Selection::default(), 43), stays);
+    }
+
+    proptest! {
+        #[test]
+        fn any_pool_keeps_its_shares(
+            scores in prop::collection::vec(prop_oneof![Just(0.0), 0f64..2.6], 0..200),
+            discard in 0f64..=1.0, keep in 0f64..=1.0, half in 0f64..=1.0, seed: u64,
+        ) {
+            let options = Selection { discard, keep: keep * (1.0 - discard), half_of_rest: half };
+            let stays = select(&scores, &options, seed);
+            let counts = options.counts(scores.len());
+            prop_assert_eq!(kept(&stays), counts.keep + counts.draw);
+            prop_assert_eq!(&select(&scores, &options, seed), &stays);
+            // None of the lowest stays, and none of the highest goes.
+            let mut sorted = scores.clone();
+            sorted.sort_by(f64::total_cmp);
+            for (score, stays) in scores.iter().zip(&stays) {
+                if *stays && counts.discard > 0 {
+                    prop_assert!(*score >= sorted[counts.discard - 1]);
+                }
+                if !*stays && counts.keep > 0 {
+                    prop_assert!(*score <= sorted[scores.len() - counts.keep]);
+                }
+            }
+        }
+    }
+}
