@@ -1,0 +1,159 @@
+//! A face as its origin sees it: the cone of directions that hit it, with exact signs.
+//!
+//! Put the origin of a ray at zero. Then the direction d hits the triangle (a, b, c), with det(a, b, c) > 0, exactly if
+//! it lies in the cone that a, b and c span: det(d, b, c) ≥ 0, det(d, c, a) ≥ 0 and det(d, a, b) ≥ 0. The corners
+//! relative to the origin are rounded once, in `f64`, the same for every face that has them; the signs of the
+//! determinants are exact (Shewchuk's adaptive predicates). So the test decides on true cones, and these leave no gap
+//! between faces that share an edge or a corner.
+
+use glam::DVec3;
+use robust::{Coord3D, orient3d};
+use s3d_geom::TriMesh;
+
+/// A face in front of an origin, wound so that det(a, b, c) > 0 for its corners a, b, c relative to the origin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cone {
+    pub(crate) corners: [DVec3; 3],
+    pub(crate) plane: Plane,
+}
+
+/// The points x with normal · x = offset, relative to the origin; offset > 0 up to rounding. `normal` is twice as long
+/// as the face's area.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plane {
+    pub(crate) normal: DVec3,
+    pub(crate) offset: f64,
+}
+
+impl Cone {
+    /// `None` if the origin lies exactly in the plane of the face, which then has no width from there: what a ray
+    /// meets at its rim are its neighbours.
+    pub(crate) fn new(mesh: &TriMesh, face: u32, origin: DVec3) -> Option<Self> {
+        let world = mesh.triangle(face).map(|p| p.as_dvec3());
+        let [a, b, c] = world.map(|p| p - origin);
+        // Differences of `f32` positions are all but exact in `f64`: the normal of a sliver is as good as any.
+        let normal = (world[1] - world[0]).cross(world[2] - world[0]);
+        let turn = side(a, b, c);
+        if turn > 0.0 {
+            Some(Self { corners: [a, b, c], plane: Plane { normal, offset: normal.dot(a) } })
+        } else if turn < 0.0 {
+            Some(Self { corners: [a, c, b], plane: Plane { normal: -normal, offset: -normal.dot(a) } })
+        } else {
+            None
+        }
+    }
+
+    /// Whether a ray along `d` hits the face; its rim belongs to it.
+    pub(crate) fn contains(&self, d: DVec3) -> bool {
+        let [a, b, c] = self.corners;
+        side(d, b, c) >= 0.0 && side(d, c, a) >= 0.0 && side(d, a, b) >= 0.0
+    }
+
+    /// The multiple of `d`, which the cone contains, that lies on the face: above 0.
+    pub(crate) fn distance(&self, d: DVec3) -> f64 {
+        self.plane.distance(d).unwrap_or_else(|| self.distance_between_corners(d))
+    }
+
+    /// The face seen edge-on: the plane says little there, so weigh the corners' distances.
+    fn distance_between_corners(&self, d: DVec3) -> f64 {
+        let [a, b, c] = self.corners;
+        let weights = [side(d, b, c), side(d, c, a), side(d, a, b)].map(|w| w.max(0.0));
+        let sum: f64 = weights.iter().sum();
+        let along = weights[0] * a.dot(d) + weights[1] * b.dot(d) + weights[2] * c.dot(d);
+        let t = along / sum / d.length_squared();
+        if t > 0.0 { t } else { f64::MIN_POSITIVE }
+    }
+}
+
+impl Plane {
+    /// The multiple of `d` that lies in the plane, to 1e-8 of itself; `None` where the plane is seen too edge-on.
+    #[inline(always)]
+    pub(crate) fn distance(&self, d: DVec3) -> Option<f64> {
+        let slope = self.normal.dot(d);
+        let t = self.offset / slope;
+        let clear = slope * slope > 1e-16 * self.normal.length_squared() * d.length_squared();
+        (clear && t > 0.0).then_some(t)
+    }
+}
+
+/// det(a, b, c) with the right sign, 0 included.
+pub(crate) fn side(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    let quick = a.dot(b.cross(c));
+    // Six products of three factors: the rounding error is below 24 · 2⁻⁵³ times the largest.
+    let bound = 3e-15 * a.abs().max_element() * b.abs().max_element() * c.abs().max_element();
+    if quick.abs() > bound { quick } else { exact_side(a, b, c) }
+}
+
+#[cold]
+fn exact_side(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    let [a, b, c, zero] = [a, b, c, DVec3::ZERO].map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
+    orient3d(a, b, c, zero)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Vec3, dvec3, vec3};
+    use proptest::prelude::*;
+
+    /// det(a, b, c) of small integers, exactly.
+    fn integer_side(a: [i64; 3], b: [i64; 3], c: [i64; 3]) -> i64 {
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+            + a[1] * (b[2] * c[0] - b[0] * c[2])
+            + a[2] * (b[0] * c[1] - b[1] * c[0])
+    }
+
+    fn point() -> impl Strategy<Value = [i64; 3]> {
+        prop::array::uniform3(-20i64..=20)
+    }
+
+    proptest! {
+        #[test]
+        fn signs_are_exact(a in point(), b in point(), c in point(), scale in -1e-3..1e-3f64) {
+            // Scaling each point by a factor that rounds keeps a zero only if it was exact: use powers of two.
+            let s = if scale > 0.0 { 1.0 / 1024.0 } else { 4096.0 };
+            let p = |q: [i64; 3]| dvec3(q[0] as f64, q[1] as f64, q[2] as f64) * s;
+            let expected = integer_side(a, b, c).signum() as f64;
+            let got = side(p(a), p(b), p(c));
+            prop_assert_eq!(if got == 0.0 { 0.0 } else { got.signum() }, expected);
+        }
+
+        #[test]
+        fn swapping_negates_even_when_it_is_close(
+            a in prop::array::uniform3(-1.0..1.0f64), b in prop::array::uniform3(-1.0..1.0f64),
+            s in -1.0..1.0f64, t in -1.0..1.0f64,
+        ) {
+            let (a, b) = (DVec3::from(a), DVec3::from(b));
+            let d = a * s + b * t; // In the plane of a and b, but for rounding.
+            let (one, other) = (side(d, a, b), side(d, b, a));
+            prop_assert!((one > 0.0) == (other < 0.0) && (one < 0.0) == (other > 0.0), "{one} {other}");
+        }
+    }
+
+    #[test]
+    fn a_face_is_seen_from_both_sides_and_not_from_its_plane() {
+        let mesh =
+            TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, vec3(0.0, 1.0, 0.0)], vec![[0, 1, 2]]).unwrap();
+        let d = dvec3(0.0, 0.0, 1.0);
+        for z in [-2.0, 2.0] {
+            let cone = Cone::new(&mesh, 0, dvec3(0.25, 0.25, z)).unwrap();
+            assert!(cone.contains(-d * z) && !cone.contains(d * z));
+            assert_eq!(cone.distance(-d * z), 1.0);
+        }
+        assert!(Cone::new(&mesh, 0, dvec3(0.25, 0.25, 0.0)).is_none());
+        assert!(Cone::new(&mesh, 0, dvec3(9.0, 3.0, 0.0)).is_none());
+    }
+
+    #[test]
+    fn an_edge_on_face_gives_a_distance_between_its_corners() {
+        let mesh = TriMesh::from_faces(
+            vec![vec3(1.0, 1.0, 0.0), vec3(5.0, 0.0, 0.0), vec3(1.0, -1.0, 0.0)],
+            vec![[0, 1, 2]],
+        )
+        .unwrap();
+        let cone = Cone::new(&mesh, 0, dvec3(0.0, 0.0, 1e-12)).unwrap();
+        let d = dvec3(1.0, 0.0, -5e-13);
+        assert!(cone.contains(d) && cone.plane.distance(d).is_none());
+        assert!((cone.distance(d) - 2.0).abs() < 1e-4, "{}", cone.distance(d));
+    }
+}

@@ -1,0 +1,333 @@
+//! Scenes whose images are known in closed form: depth, normals, coordinates and colours of pixels.
+
+use s3d_geom::glam::{DVec3, Vec2, Vec3, dvec3, vec2, vec3};
+use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, TriMesh, Wrap};
+use s3d_render::{Hits, NO_FACE, Normals, Pyramids, Scene};
+
+/// A room of 4 × 4 × 3 m around (0, 0, 1.5); two faces a wall, whose index / 2 is: 0 floor, 1 ceiling, 2 wall at +Y,
+/// 3 at −Y, 4 at +X, 5 at −X. Wound to face inwards, textured with (0, 0) to (1, 1) a wall.
+fn room_parts() -> MeshParts {
+    let corner = |x: f32, y: f32, z: f32| vec3(2.0 * x, 2.0 * y, 1.5 + 1.5 * z);
+    let walls = [
+        [corner(-1., -1., -1.), corner(1., -1., -1.), corner(1., 1., -1.), corner(-1., 1., -1.)],
+        [corner(-1., 1., 1.), corner(1., 1., 1.), corner(1., -1., 1.), corner(-1., -1., 1.)],
+        [corner(-1., 1., -1.), corner(1., 1., -1.), corner(1., 1., 1.), corner(-1., 1., 1.)],
+        [corner(1., -1., -1.), corner(-1., -1., -1.), corner(-1., -1., 1.), corner(1., -1., 1.)],
+        [corner(1., 1., -1.), corner(1., -1., -1.), corner(1., -1., 1.), corner(1., 1., 1.)],
+        [corner(-1., -1., -1.), corner(-1., 1., -1.), corner(-1., 1., 1.), corner(-1., -1., 1.)],
+    ];
+    let quad = |w: u32| [[4 * w, 4 * w + 1, 4 * w + 2], [4 * w, 4 * w + 2, 4 * w + 3]];
+    MeshParts {
+        positions: walls.concat(),
+        faces: (0..6).flat_map(quad).collect(),
+        uvs: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
+        face_uvs: (0..6).flat_map(|_| [[0, 1, 2], [0, 2, 3]]).collect(),
+        ..MeshParts::default()
+    }
+}
+
+fn textured(image: Raster<[u8; 3]>, wrap: Wrap) -> TriMesh {
+    let parts = room_parts();
+    let materials = vec![Material { name: "paper".into(), color: [9; 3], texture: Some(0) }];
+    let textures = vec![Texture { name: "paper".into(), image, wrap: [wrap; 2] }];
+    TriMesh::new(MeshParts { face_materials: vec![0; 12], materials, textures, ..parts }).unwrap()
+}
+
+fn room() -> TriMesh {
+    TriMesh::new(room_parts()).unwrap()
+}
+
+const EYE: DVec3 = DVec3::new(0.25, -0.5, 1.5);
+
+fn view(yaw: f64, pitch: f64) -> Camera {
+    Camera::perspective(Pose::level(EYE, 0.0).turned(yaw, pitch), 90f64.to_radians(), 100, 80)
+}
+
+fn rgb(mesh: &TriMesh, camera: &Camera) -> Raster<[u8; 3]> {
+    let scene = Scene::new(mesh);
+    let hits = s3d_render::cast(&scene, camera);
+    s3d_render::rgb_image(&scene, &Pyramids::new(mesh), &hits, camera)
+}
+
+#[test]
+fn a_wall_ahead_has_one_depth_and_the_papers_normal() {
+    let (mesh, camera) = (room(), view(0.0, 0.0));
+    let scene = Scene::new(&mesh);
+    let hits = s3d_render::cast(&scene, &camera);
+    let depth = s3d_render::depth_image(&hits);
+    let normal = s3d_render::normal_image(&scene, &hits, &camera, Normals::Flat);
+    let wall = |w: u32| move |f: u32| f / 2 == w;
+    // The wall at +Y is 2.5 m ahead: z-depth does not depend on the pixel.
+    for (k, &face) in hits.face.pixels().iter().enumerate().filter(|(_, f)| wall(2)(**f)) {
+        assert_eq!(hits.depth.pixels()[k], 2.5, "{face}");
+        assert_eq!(depth.pixels()[k], 1280);
+        assert_eq!(normal.pixels()[k], [128, 128, 255]);
+    }
+    // Right and left walls face left and right; the floor faces up (green is down), the ceiling down.
+    for (w, expected) in [(4, [0, 128, 128]), (5, [255, 128, 128]), (0, [128, 0, 128]), (1, [128, 255, 128])]
+    {
+        let k = hits.face.pixels().iter().position(|&f| wall(w)(f)).expect("every wall but one is in sight");
+        assert_eq!(normal.pixels()[k], expected, "wall {w}");
+    }
+    assert!(!hits.face.pixels().iter().any(|&f| wall(3)(f)), "what lies behind is not seen");
+    // +X is to the right, +Z is up.
+    assert!(wall(4)(hits.face.at(99, 40)) && wall(5)(hits.face.at(0, 40)));
+    assert_eq!(s3d_render::coverage(&hits), 1.0);
+}
+
+#[test]
+fn a_panorama_is_not_mirrored_and_holds_distances() {
+    let mesh = room();
+    let scene = Scene::new(&mesh);
+    let camera = Camera::equirectangular(Pose::level(EYE, 0.0).turned(0.0, 0.3), 256);
+    let hits = s3d_render::cast(&scene, &camera);
+    let wall = |x: u32, y: u32| hits.face.at(x, y) / 2;
+    assert_eq!([wall(128, 64), wall(192, 64), wall(64, 64), wall(0, 64), wall(255, 64)], [2, 4, 5, 3, 3]);
+    assert_eq!([wall(10, 0), wall(200, 127)], [1, 0]);
+    let normal = s3d_render::normal_image(&scene, &hits, &camera, Normals::Flat);
+    // (R, G, B) = (X, −Z, Y) of the world, towards the camera.
+    assert_eq!(normal.at(128, 64), [128, 128, 0]);
+    assert_eq!(normal.at(192, 64), [0, 128, 128]);
+    assert_eq!(normal.at(0, 127), [128, 0, 128]);
+    for (x, y) in [(128, 64), (192, 60), (20, 3), (99, 111)] {
+        let d = camera.rays().at(x, y);
+        let t = [
+            (2.0 - EYE.x) / d.x,
+            (-2.0 - EYE.x) / d.x,
+            (2.0 - EYE.y) / d.y,
+            (-2.0 - EYE.y) / d.y,
+            1.5 / d.z.abs(),
+        ]
+        .into_iter()
+        .filter(|t| *t > 0.0)
+        .fold(f64::MAX, f64::min);
+        assert!((f64::from(hits.depth.at(x, y)) - t).abs() < 1e-6 * t);
+    }
+}
+
+#[test]
+fn coordinates_project_back_to_their_pixels() {
+    let mesh = room();
+    let scene = Scene::new(&mesh);
+    for camera in [view(0.7, -0.3), Camera::equirectangular(Pose::level(EYE, 1.0), 128)] {
+        let hits = s3d_render::cast(&scene, &camera);
+        let xyz = s3d_render::xyz_image(&hits, &camera);
+        let half = s3d_render::xyz_image_half(&hits, &camera);
+        for y in 0..camera.height {
+            for x in 0..camera.width {
+                let p = Vec3::from(xyz.at(x, y)).as_dvec3();
+                let (pixel, depth) = camera.project(p).unwrap();
+                let off = (pixel.x - f64::from(x) - 0.5).abs().max((pixel.y - f64::from(y) - 0.5).abs());
+                assert!(off < 1e-3, "{pixel} for ({x}, {y})");
+                assert!((depth - f64::from(hits.depth.at(x, y))).abs() < 1e-5);
+                // On a wall, to the rounding of f32; to that of half floats.
+                let wall = [2.0 - p.x.abs(), 2.0 - p.y.abs(), 1.5 - (p.z - 1.5).abs()];
+                assert!(wall.iter().any(|w| w.abs() < 1e-6), "{p}");
+                for k in 0..3 {
+                    assert!(
+                        (f64::from(half.at(x, y)[k].to_f32()) - p[k]).abs() <= p[k].abs() / 2048.0 + 1e-7
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_missing_is_missing_everywhere() {
+    // One wall, looked at past its edge.
+    let parts = room_parts();
+    let mut mesh = MeshParts { faces: parts.faces[4..6].to_vec(), face_uvs: vec![], ..parts };
+    mesh.colors = vec![[0; 3]; mesh.positions.len()];
+    let mesh = TriMesh::new(mesh).unwrap();
+    let scene = Scene::new(&mesh);
+    let camera = view(0.9, 0.2);
+    let hits = s3d_render::cast(&scene, &camera);
+    let share = s3d_render::coverage(&hits);
+    assert!(share > 0.05 && share < 0.95);
+    let rgb = s3d_render::rgb_image(&scene, &Pyramids::new(&mesh), &hits, &camera);
+    let depth = s3d_render::depth_image(&hits);
+    let [flat, smooth] =
+        [Normals::Flat, Normals::Smooth].map(|n| s3d_render::normal_image(&scene, &hits, &camera, n));
+    let index = s3d_render::index_image(&hits, &[0, 0x01_02_03]);
+    let pretty = s3d_render::color_per_face_image(&hits, &[[7, 8, 9], [0, 0, 1]]);
+    let (xyz, half) = (s3d_render::xyz_image(&hits, &camera), s3d_render::xyz_image_half(&hits, &camera));
+    for (k, &face) in hits.face.pixels().iter().enumerate() {
+        let missing = face == NO_FACE;
+        assert_eq!(hits.depth.pixels()[k].is_infinite(), missing);
+        assert_eq!(
+            rgb.pixels()[k],
+            if missing { [0, 0, 0] } else { [1, 1, 1] },
+            "black paint is nearly black"
+        );
+        assert_eq!(depth.pixels()[k] == 65_535, missing);
+        assert_eq!(flat.pixels()[k] == [128; 3], missing);
+        assert_eq!(smooth.pixels()[k], flat.pixels()[k], "without corner normals faces are flat");
+        let expected = [[13, 13, 13], [0, 0, 0], [1, 2, 3]][face.wrapping_add(1) as usize];
+        assert_eq!(index.pixels()[k], expected);
+        assert_eq!(pretty.pixels()[k], [[0, 0, 0], [7, 8, 9], [0, 0, 1]][face.wrapping_add(1) as usize]);
+        assert_eq!(xyz.pixels()[k] == [0.0; 3], missing);
+        assert_eq!(half.pixels()[k].map(f32::from) == [0.0; 3], missing);
+    }
+}
+
+#[test]
+fn depth_is_rounded_half_up_and_saturates() {
+    let depths = [0.0f32, 0.000_976_562_5, 0.000_976, 1.0, 127.998, 127.999_02, 128.5, 1e9, f32::INFINITY];
+    let hits = Hits { face: Raster::filled(9, 1, 0), depth: Raster::from_vec(9, 1, depths.to_vec()) };
+    let expected = [0, 1, 0, 512, 65_535, 65_535, 65_535, 65_535, 65_535];
+    assert_eq!(s3d_render::depth_image(&hits).pixels(), expected);
+    let hits = Hits { face: Raster::filled(1, 1, 0), depth: Raster::filled(1, 1, 127.996) };
+    assert_eq!(s3d_render::depth_image(&hits).pixels(), [65_534]);
+}
+
+#[test]
+fn normals_face_the_camera_from_either_side() {
+    let flipped: Vec<[u32; 3]> = room_parts().faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    let other = TriMesh::new(MeshParts { faces: flipped, ..room_parts() }).unwrap();
+    for camera in [view(0.4, 0.1), Camera::equirectangular(Pose::level(EYE, 0.0), 64)] {
+        let [one, two] = [&room(), &other].map(|mesh| {
+            let scene = Scene::new(mesh);
+            let hits = s3d_render::cast(&scene, &camera);
+            s3d_render::normal_image(&scene, &hits, &camera, Normals::Flat)
+        });
+        assert_eq!(one, two);
+    }
+}
+
+#[test]
+fn smooth_normals_are_interpolated_and_never_point_away() {
+    // The wall at +Y bulges: its corner normals lean outwards, the second time beyond what the camera can see.
+    for lean in [0.5, 2.0] {
+        let mut parts = room_parts();
+        parts.normals = vec![vec3(-lean, -1.0, 0.0).normalize(), vec3(lean, -1.0, 0.0).normalize()];
+        parts.face_normals = vec![[NO_INDEX; 3]; 12];
+        (parts.face_normals[4], parts.face_normals[5]) = ([0, 1, 1], [0, 1, 0]);
+        let mesh = TriMesh::new(parts).unwrap();
+        let scene = Scene::new(&mesh);
+        let camera = view(0.0, 0.0);
+        let hits = s3d_render::cast(&scene, &camera);
+        let image = s3d_render::normal_image(&scene, &hits, &camera, Normals::Smooth);
+        let mut reds = Vec::new();
+        for y in 0..camera.height {
+            for x in 0..camera.width {
+                let channels = DVec3::from(image.at(x, y).map(f64::from)) / 127.5 - 1.0;
+                let d = camera.pose.opencv_from_world() * camera.rays().at(x, y);
+                let towards = channels.dot(dvec3(d.x, d.y, -d.z).normalize());
+                assert!(towards < 0.01, "({x}, {y}): {towards}");
+                if y == 40 && hits.face.at(x, y) / 2 == 2 {
+                    reds.push(image.at(x, y)[0]);
+                }
+            }
+        }
+        assert!(reds.len() > 30 && reds[0] < 90 && reds[reds.len() - 1] > 160, "{reds:?}");
+        assert!(lean > 1.0 || reds.is_sorted(), "{reds:?}");
+    }
+}
+
+/// Red grows to the right, green upwards, blue marks the lower left.
+fn chart(size: u32) -> Raster<[u8; 3]> {
+    let step = 256 / size;
+    let pixel = |k: u32| {
+        let (x, y) = (k % size, size - 1 - k / size);
+        [(x * step) as u8, (y * step) as u8, if x < size / 4 && y < size / 4 { 200 } else { 20 }]
+    };
+    Raster::from_vec(size, size, (0..size * size).map(pixel).collect())
+}
+
+#[test]
+fn a_magnified_texture_is_bilinear() {
+    let mesh = textured(chart(16), Wrap::Clamp);
+    let camera = Camera::perspective(Pose::level(EYE, 0.0), 60f64.to_radians(), 300, 200);
+    let image = rgb(&mesh, &camera);
+    let scene = Scene::new(&mesh);
+    let hits = s3d_render::cast(&scene, &camera);
+    let xyz = s3d_render::xyz_image(&hits, &camera);
+    for (x, y) in [(150, 100), (3, 190), (299, 0), (0, 0), (77, 13), (200, 150)] {
+        assert_eq!(hits.face.at(x, y) / 2, 2);
+        let [px, _, pz] = xyz.at(x, y);
+        let expected = mesh.textures()[0].sample(vec2((px + 2.0) / 4.0, pz / 3.0));
+        for k in 0..3 {
+            assert!((f32::from(image.at(x, y)[k]) - expected[k]).abs() < 0.51, "({x}, {y}): {expected:?}");
+        }
+    }
+    // Red grows to the right, green upwards.
+    assert!(image.at(250, 100)[0] > image.at(50, 100)[0] && image.at(150, 20)[1] > image.at(150, 180)[1]);
+}
+
+fn checker(size: u32) -> Raster<[u8; 3]> {
+    let pixel = |k: u32| if (k % size + k / size).is_multiple_of(2) { [255; 3] } else { [0; 3] };
+    Raster::from_vec(size, size, (0..size * size).map(pixel).collect())
+}
+
+#[test]
+fn a_distant_checkerboard_is_grey() {
+    for (size, wrap) in [(1024, Wrap::Repeat), (1023, Wrap::Mirror), (777, Wrap::Clamp)] {
+        let mesh = textured(checker(size), wrap);
+        // Less than one pixel for 16 of the texture's.
+        for camera in [
+            Camera::perspective(Pose::level(EYE, 0.3), 75f64.to_radians(), 32, 32),
+            Camera::equirectangular(Pose::level(EYE, 0.3), 64),
+        ] {
+            for pixel in rgb(&mesh, &camera).pixels() {
+                assert!(pixel.iter().all(|c| (108..=148).contains(c)), "{pixel:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_floor_seen_at_an_angle_keeps_what_runs_along_it() {
+    // Stripes that run away from the camera, 4 pixels of the texture each: at a grazing angle plain mipmaps blur them.
+    let pixel = |k: u32| if (k % 512 / 4).is_multiple_of(2) { [250; 3] } else { [10; 3] };
+    let mesh = textured(Raster::from_vec(512, 512, (0..512 * 512).map(pixel).collect()), Wrap::Clamp);
+    let pose = Pose::level(dvec3(0.0, -1.9, 0.25), 0.0);
+    let camera = Camera::perspective(pose, 50f64.to_radians(), 400, 400);
+    let scene = Scene::new(&mesh);
+    let hits = s3d_render::cast(&scene, &camera);
+    let pyramids = Pyramids::new(&mesh);
+    let contrast = |max_taps: u32| {
+        let filter = s3d_render::TextureFilter { max_taps };
+        let image = s3d_render::rgb_image_with(&scene, &pyramids, &hits, &camera, &filter);
+        let row: Vec<u8> =
+            (120..280).filter(|&x| hits.face.at(x, 235) < 2).map(|x| image.at(x, 235)[0]).collect();
+        assert!(row.len() > 100);
+        row.iter().max().unwrap() - row.iter().min().unwrap()
+    };
+    let (sharp, blurred) = (contrast(8), contrast(1));
+    assert!(sharp > 150 && blurred < sharp / 2, "{sharp} {blurred}");
+}
+
+#[test]
+fn colours_without_a_texture() {
+    let mut parts = room_parts();
+    parts.materials = vec![Material { name: "red".into(), color: [200, 10, 0], texture: None }];
+    parts.face_materials = vec![0; 12];
+    let flat = TriMesh::new(parts.clone()).unwrap();
+    assert!(rgb(&flat, &view(0.2, 0.0)).pixels().iter().all(|p| *p == [200, 10, 0]));
+    // Each wall's corners: black to white from its bottom to its top.
+    parts.colors = (0..24).map(|k| if k % 4 < 2 { [0; 3] } else { [255; 3] }).collect();
+    let camera = view(0.0, 0.0);
+    let image = rgb(&TriMesh::new(parts).unwrap(), &camera);
+    for y in 20..60 {
+        let z = 1.5 - 2.5 * (f64::from(y) + 0.5 - 40.0) / 50.0;
+        let expected = z / 3.0 * 255.0;
+        assert!((f64::from(image.at(50, y)[0]) - expected).abs() <= 0.51, "row {y}");
+    }
+}
+
+#[test]
+#[should_panic(expected = "hits of 100×80 pixels for a camera of 64×32")]
+fn hits_of_another_camera_are_a_callers_mistake() {
+    let mesh = room();
+    let hits = s3d_render::cast(&Scene::new(&mesh), &view(0.0, 0.0));
+    let _ = s3d_render::xyz_image(&hits, &Camera::equirectangular(Pose::level(EYE, 0.0), 64));
+}
+
+#[test]
+#[should_panic(expected = "does not fit into 24 bits")]
+fn an_index_beyond_24_bits_is_a_callers_mistake() {
+    let mesh = room();
+    let hits = s3d_render::cast(&Scene::new(&mesh), &view(0.0, 0.0));
+    let _ = s3d_render::index_image(&hits, &[1 << 24; 12]);
+}
