@@ -1,0 +1,109 @@
+//! Meshes with their textures, from any format that is read.
+
+use crate::quote::count;
+use crate::texture_file::TextureFile;
+use crate::{Error, Result, gltf, obj};
+use s3d_geom::glam::{Vec3, vec3};
+use s3d_geom::{MeshError, MeshParts, TriMesh};
+use std::path::Path;
+
+/// The axis of a file that points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum UpAxis {
+    /// +Y, as in glTF and in the published OBJ files: (x, y, z) of the file is (x, −z, y) of the world.
+    Y,
+    /// +Z, as in the world.
+    Z,
+}
+
+impl UpAxis {
+    /// A point or direction of the file in the world's axes (Z-up).
+    pub fn world_from_file(self, v: Vec3) -> Vec3 {
+        match self {
+            Self::Y => vec3(v.x, -v.z, v.y),
+            Self::Z => v,
+        }
+    }
+}
+
+/// A mesh as it was read, in world metres, Z-up.
+#[derive(Clone, Debug)]
+pub struct MeshFile {
+    /// The mesh. Its faces stand in the order of the file.
+    pub mesh: TriMesh,
+    /// For each texture of the mesh its encoded image, or `None` if the decoded one was altered.
+    pub texture_files: Vec<Option<TextureFile>>,
+    /// What was mended, left out or replaced: a sentence each, for the user.
+    pub warnings: Vec<String>,
+    /// How many faces of the file had more than three corners.
+    pub polygons_triangulated: usize,
+    /// How many faces were left out because an earlier one has the same corners.
+    pub repeated_faces: usize,
+}
+
+/// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf` or `.glb`, in any case.
+///
+/// A texture that is missing or cannot be decoded, a face without area, of fewer than three corners or with the corners
+/// of an earlier one and the like do not stop it: they become [`MeshFile::warnings`].
+///
+/// # Errors
+/// [`Error::Unsupported`] for any other ending and for features of a format that are not read, [`Error::Io`],
+/// [`Error::Format`] with the place, and [`Error::Mesh`] if no face is left.
+pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let mut file = match ending.as_str() {
+        "obj" => obj::read(path, up),
+        "gltf" | "glb" => gltf::read(path, up),
+        "" => Err(Error::unsupported(path, "has no ending; meshes are read from .obj, .gltf and .glb")),
+        _ => Err(Error::unsupported(path, format!(".{ending} is not read; meshes are .obj, .gltf or .glb"))),
+    }?;
+    let (mesh, repeated) = file.mesh.without_repeated_faces();
+    file.mesh = mesh;
+    file.repeated_faces = repeated;
+    if repeated > 0 {
+        file.warnings
+            .push(format!("{} left out: earlier faces have the same corners", count(repeated, "face")));
+    }
+    Ok(file)
+}
+
+/// Makes the mesh, and tells in `warnings` what was mended.
+pub(crate) fn checked_mesh(
+    parts: MeshParts,
+    warnings: &mut Vec<String>,
+) -> std::result::Result<TriMesh, MeshError> {
+    let mesh = TriMesh::new(parts)?;
+    let report = mesh.report();
+    if report.zero_area_faces > 0 {
+        warnings.push(format!("{} of zero area left out", count(report.zero_area_faces, "face")));
+    }
+    if report.non_finite_attributes > 0 {
+        let faces = count(report.non_finite_attributes, "face");
+        warnings.push(format!(
+            "normals or texture coordinates of {faces} left out: not finite, or without length"
+        ));
+    }
+    Ok(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn y_up_files_are_turned() {
+        assert_eq!(UpAxis::Y.world_from_file(vec3(1.0, 2.0, 3.0)), vec3(1.0, -3.0, 2.0));
+        assert_eq!(UpAxis::Y.world_from_file(Vec3::Y), Vec3::Z);
+        assert_eq!(UpAxis::Z.world_from_file(vec3(1.0, 2.0, 3.0)), vec3(1.0, 2.0, 3.0));
+    }
+
+    #[test]
+    fn other_formats_are_refused_by_name() {
+        for (name, word) in [("scan.fbx", ".fbx"), ("scan", "no ending"), ("a.b/scan.PLY", ".ply")] {
+            let message = read_mesh(Path::new(name), UpAxis::Y).unwrap_err().to_string();
+            assert!(message.contains(word) && message.contains(".obj, .gltf"), "{message}");
+        }
+        assert!(matches!(read_mesh(Path::new("gone.OBJ"), UpAxis::Y), Err(Error::Io { .. })));
+    }
+}

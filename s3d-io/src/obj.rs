@@ -1,0 +1,381 @@
+//! Wavefront OBJ with its material libraries.
+//!
+//! [`PlainObj`] understands the dialects, tobj reads the numbers, [`crate::obj_diagnose`] finds the line of a bad one,
+//! [`ObjLooks`] the libraries and images; here the parts become a mesh.
+
+use crate::mesh_file::{MeshFile, UpAxis, checked_mesh};
+use crate::obj_diagnose::{number_error, vertex_error};
+use crate::obj_looks::ObjLooks;
+use crate::obj_plain::PlainObj;
+use crate::quote::count;
+use crate::texture_file::read_file;
+use crate::{Error, Result};
+use s3d_geom::glam::{Vec2, Vec3, vec2, vec3};
+use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
+use std::path::Path;
+
+/// Reads an OBJ file, the libraries that it names and their `map_Kd` images.
+///
+/// Vertices keep the file's order and number; faces its order.
+///
+/// # Errors
+/// As [`crate::read_mesh`].
+pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
+    let bytes = read_file(path)?;
+    let plain = PlainObj::parse(path, &bytes)?;
+    if plain.faces.is_empty() {
+        return Err(Error::format(path, no_faces(&plain)));
+    }
+    let mut warnings = Vec::new();
+    let columns = tobj_columns(&plain).map_err(|said| number_error(path, &bytes, said))?;
+    let faces = Triangles::new(&plain, &columns)
+        .map_err(|vertex| vertex_error(path, &bytes, vertex, columns.positions[vertex as usize]))?;
+    let polygons_triangulated = faces.polygons;
+    if faces.triangles.is_empty() {
+        let reason =
+            faces.refused.map_or_else(String::new, |(line, why, _)| format!(", as on line {line}: {why}"));
+        return Err(Error::format(path, format!("has no face that can be used{reason}")));
+    }
+    if let Some((line, why, n)) = &faces.refused {
+        warnings.push(format!("{} left out: the first, on line {line}, {why}", count(*n, "polygon")));
+    }
+    if let Some(first) = plain.short_faces.first() {
+        let n = count(plain.short_faces.len(), "face");
+        warnings.push(format!("{n} with fewer than three corners left out, the first on line {first}"));
+    }
+    let colors = vertex_colors(&plain, &mut warnings);
+    let looks = ObjLooks::load(path, &plain, &mut warnings);
+    let parts = MeshParts {
+        positions: columns.positions.into_iter().map(|p| up.world_from_file(p)).collect(),
+        faces: faces.triangles,
+        colors,
+        uvs: columns.uvs,
+        face_uvs: faces.uvs,
+        normals: columns.normals.into_iter().map(|n| up.world_from_file(n)).collect(),
+        face_normals: faces.normals,
+        materials: looks.materials,
+        face_materials: faces.materials,
+        textures: looks.textures,
+    };
+    let mesh = checked_mesh(parts, &mut warnings).map_err(|e| match e {
+        MeshError::NonFinite { vertex, position } => vertex_error(path, &bytes, vertex, position),
+        source => Error::Mesh { path: path.to_owned(), source },
+    })?;
+    Ok(MeshFile { mesh, texture_files: looks.files, warnings, polygons_triangulated, repeated_faces: 0 })
+}
+
+fn no_faces(plain: &PlainObj) -> String {
+    let mut message = format!("has no face, only {}", count(plain.vertices, "vertex"));
+    if plain.points_and_lines > 0 {
+        message += &format!(" and {}", count(plain.points_and_lines, "point and line element"));
+    }
+    if let Some(line) = plain.short_faces.first() {
+        message += &format!("; faces need three corners, the first that has fewer is on line {line}");
+    }
+    message + "; a mesh is needed"
+}
+
+/// The columns of the file as tobj reads them, in the axes of the file.
+struct Columns {
+    positions: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    /// Unit normals; not finite where the file's has no length.
+    normals: Vec<Vec3>,
+    /// Three columns of indices, one entry a corner of a face of [`PlainObj::faces`]; texture coordinates and normals
+    /// are empty if the file has none.
+    corners: [Vec<u32>; 3],
+}
+
+fn tobj_columns(plain: &PlainObj) -> std::result::Result<Columns, tobj::LoadError> {
+    let options = tobj::LoadOptions::default();
+    let no_library = |_: &Path| Err(tobj::LoadError::GenericFailure);
+    let (mut models, _) = tobj::load_obj_buf(&mut plain.reader(), &options, no_library)?;
+    let mut mesh = models.pop().ok_or(tobj::LoadError::GenericFailure)?.mesh;
+    // The first face holds all vertices in order, see `PlainObj::reader`.
+    let corners = [&mut mesh.indices, &mut mesh.texcoord_indices, &mut mesh.normal_indices]
+        .map(|indices| indices.split_off(indices.len().min(plain.vertices)));
+    let expected: usize = plain.faces.iter().map(|f| f.corners as usize).sum();
+    let complete =
+        corners[0].len() == expected && corners[1..].iter().all(|c| c.is_empty() || c.len() == expected);
+    if !complete || mesh.positions.len() != 3 * plain.vertices {
+        return Err(tobj::LoadError::GenericFailure);
+    }
+    let triples =
+        |flat: &[f32]| -> Vec<Vec3> { flat.as_chunks().0.iter().map(|&[x, y, z]| vec3(x, y, z)).collect() };
+    Ok(Columns {
+        positions: triples(&mesh.positions),
+        uvs: mesh.texcoords.as_chunks().0.iter().map(|&[u, v]| vec2(u, v)).collect(),
+        normals: triples(&mesh.normals).into_iter().map(|n| n / n.length()).collect(),
+        corners,
+    })
+}
+
+/// The faces of a file, polygons cut into triangles.
+#[derive(Default)]
+struct Triangles {
+    triangles: Vec<[u32; 3]>,
+    uvs: Vec<[u32; 3]>,
+    normals: Vec<[u32; 3]>,
+    materials: Vec<u32>,
+    /// Polygons that were cut.
+    polygons: usize,
+    /// Polygons that cannot be cut: line and reason of the first, and their number.
+    refused: Option<(u64, String, usize)>,
+}
+
+impl Triangles {
+    /// A vertex of a polygon that is not finite is the error.
+    fn new(plain: &PlainObj, columns: &Columns) -> std::result::Result<Self, u32> {
+        let mut out = Self::default();
+        let mut start = 0;
+        let [vertices, uvs, normals] = &columns.corners;
+        for face in &plain.faces {
+            let n = face.corners as usize;
+            let corners = start..start + n;
+            start += n;
+            let polygon = &vertices[corners.clone()];
+            let cut = if n == 3 {
+                vec![[0, 1, 2]]
+            } else {
+                let points: Vec<Vec3> = polygon.iter().map(|&v| columns.positions[v as usize]).collect();
+                if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
+                    return Err(polygon[bad]);
+                }
+                match triangulate_face(&points) {
+                    Ok(cut) => {
+                        out.polygons += 1;
+                        cut
+                    }
+                    Err(e) => {
+                        out.refused.get_or_insert_with(|| (face.line, e.to_string(), 0)).2 += 1;
+                        continue;
+                    }
+                }
+            };
+            let uvs = (face.has_uv && !uvs.is_empty()).then(|| &uvs[corners.clone()]);
+            let normals = (face.has_normal && !normals.is_empty()).then(|| &normals[corners]);
+            for triangle in cut {
+                let pick = |column: &[u32]| triangle.map(|c| column[c as usize]);
+                out.triangles.push(pick(polygon));
+                out.uvs.push(uvs.map_or([NO_INDEX; 3], pick));
+                out.normals.push(normals.map_or([NO_INDEX; 3], pick));
+                out.materials.push(face.material);
+            }
+        }
+        for column in [&mut out.uvs, &mut out.normals] {
+            if column.iter().all(|c| *c == [NO_INDEX; 3]) {
+                column.clear();
+            }
+        }
+        if plain.materials.is_empty() {
+            out.materials.clear();
+        }
+        Ok(out)
+    }
+}
+
+/// One colour a vertex if any has one. Files write them from 0 to 1, some from 0 to 255: the largest tells, with room for
+/// what is a little too bright.
+fn vertex_colors(plain: &PlainObj, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
+    if plain.colors.is_empty() {
+        return Vec::new();
+    }
+    let largest = plain.colors.iter().flat_map(|(_, c)| c).fold(0.0f32, |a, &b| a.max(b));
+    let scale = if largest > 2.0 { 1.0 } else { 255.0 };
+    let mut colors = vec![DEFAULT_COLOR; plain.vertices];
+    for (vertex, color) in &plain.colors {
+        colors[*vertex as usize] = color.map(|c| (c * scale).round().clamp(0.0, 255.0) as u8);
+    }
+    let without = plain.vertices - plain.colors.len();
+    if without > 0 {
+        warnings.push(format!("{without} of {} vertices have no colour and are made gray", plain.vertices));
+    }
+    colors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::fs;
+
+    /// Reads `obj`, Z up.
+    fn read_obj(obj: &str) -> Result<MeshFile> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.obj");
+        fs::write(&path, obj).unwrap();
+        read(&path, UpAxis::Z)
+    }
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n";
+
+    #[test]
+    fn vertices_and_faces_keep_the_files_order() {
+        let obj = format!("v 9 9 9\n{SQUARE}v 1 0 0\no x\nf 5 4 3\ng y\nf 4 2 3\nf 2 6 5\n");
+        let file = read_obj(&obj).unwrap();
+        // The first vertex is in no face, the last has the place of the third: both stay.
+        assert_eq!(file.mesh.positions().len(), 6);
+        assert_eq!(file.mesh.positions()[0], vec3(9.0, 9.0, 9.0));
+        assert_eq!(file.mesh.faces(), [[4, 3, 2], [3, 1, 2], [1, 5, 4]]);
+        assert!(file.warnings.is_empty() && file.mesh.parts().face_uvs.is_empty());
+    }
+
+    #[test]
+    fn files_of_one_two_and_three_vertices_are_no_special_case() {
+        for (n, obj) in [(1, "v 0 0 0\nf 1 1 1\n"), (2, "v 0 0 0\nv 1 0 0\nf 1 2 2\n")] {
+            let message = read_obj(obj).unwrap_err().to_string();
+            assert!(message.contains("no face with an area (1 faces"), "{n}: {message}");
+        }
+        assert_eq!(read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 3 1 2\n").unwrap().mesh.faces(), [[2, 0, 1]]);
+    }
+
+    #[test]
+    fn axes_turn_positions_and_normals() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.obj");
+        fs::write(&path, "v 0 0 0\nv 0 0 1\nv 1 0 0\nvn 0 3 0\nf 1//1 2//1 3//1\n").unwrap();
+        let mesh = read(&path, UpAxis::Y).unwrap().mesh;
+        assert_eq!(mesh.positions()[1], vec3(0.0, -1.0, 0.0));
+        assert_eq!(mesh.normal(0), Vec3::Z);
+        assert_eq!(mesh.corner_normals(0), Some([Vec3::Z; 3]));
+    }
+
+    #[test]
+    fn polygons_are_cut_with_their_attributes() {
+        // An L, concave at its fourth corner, then a square that repeats its outline, then a triangle.
+        let obj = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nvt 0 0\nvt 2 0\nvt 2 1\nvt 1 1\nvt 1 2\nvt 0 2\n\
+            usemtl l\nf 1/1 2/2 3/3 4/4 5/5 6/6\nusemtl bad\nf 1 4 2 3 1 4\nusemtl t\nf 1/1 2/2 3/3\n";
+        let file = read_obj(obj).unwrap();
+        assert_eq!((file.polygons_triangulated, file.mesh.faces().len()), (1, 5));
+        assert_eq!(file.mesh.total_area(), 3.0 + 1.0);
+        for face in 0..5 {
+            let corners = file.mesh.triangle(face).map(|p| p.truncate());
+            assert_eq!(
+                file.mesh.parts().face_uvs[face as usize].map(|i| file.mesh.parts().uvs[i as usize]),
+                corners
+            );
+            assert_eq!(file.mesh.normal(face), Vec3::Z);
+            assert_eq!(file.mesh.material_of(face), Some(if face < 4 { 0 } else { 2 }));
+        }
+        assert!(
+            file.warnings[0].starts_with("1 polygon left out: the first, on line 16, "),
+            "{:?}",
+            file.warnings
+        );
+    }
+
+    #[test]
+    fn what_is_left_out_is_told() {
+        let file =
+            read_obj(&format!("{SQUARE}f 1 2 3\nf 1 2\nf 1 1 2\nf\nl 1 2 3\nvn 0 0 0\nf 1//1 3//1 4//1\n"))
+                .unwrap();
+        assert_eq!(file.mesh.faces(), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(file.mesh.corner_normals(1), None);
+        let told = file.warnings.join("\n");
+        for words in [
+            "2 faces with fewer than three corners left out, the first on line 9",
+            "1 face of zero area",
+            "1 face left out: not finite",
+        ] {
+            assert!(told.contains(words), "{told}");
+        }
+    }
+
+    #[test]
+    fn vertex_colours_of_both_scales_and_of_some_vertices() {
+        let colors = |obj: &str| {
+            let file = read_obj(obj).unwrap();
+            (file.mesh.parts().colors.clone(), file.warnings.len())
+        };
+        let all = "v 0 0 0 1 0.5 0\nv 1 0 0 0 0 0\nv 0 1 0 0 0 1\nf 1 2 3\n";
+        assert_eq!(colors(all), (vec![[255, 128, 0], [0; 3], [0, 0, 255]], 0));
+        let bytes = "v 0 0 0 255 128 0\nv 1 0 0 0 0 1\nv 0 1 0 0 0 300\nf 1 2 3\n";
+        assert_eq!(colors(bytes), (vec![[255, 128, 0], [0, 0, 1], [0, 0, 255]], 0));
+        let some = "v 0 0 0\nv 1 0 0 0 0 1\nv 0 1 0\nf 1 2 3\n";
+        assert_eq!(colors(some), (vec![DEFAULT_COLOR, [0, 0, 255], DEFAULT_COLOR], 1));
+    }
+
+    #[test]
+    fn bad_numbers_are_named_with_their_line() {
+        for (obj, words) in [
+            ("v 0 0 0\nv 1 x 0\nv 0 1 0\nf 1 2 3\n", "a.obj, line 2: `x` is no number: `v 1 x 0`"),
+            (
+                "v 0 0 0\nv 1 inf 0\nv 0 1 0\nf 1 2 3\n",
+                "a.obj, line 2: a face uses a vertex that is not finite",
+            ),
+            ("v 0 0 0\nv 1 0 0\nv 0 1e40 0\nv 0 1 1\nf 1 2 3 4\n", "a.obj, line 3: a face uses a vertex"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 1 2", "a.obj, line 5: a vertex has three"),
+        ] {
+            let message = read_obj(obj).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+        // A vertex that no face uses may be anything but malformed.
+        assert!(read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan nan nan\nf 1 2 3\n").is_ok());
+        assert!(
+            read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan 0\nf 1/1 2/1 3/1\n").unwrap().mesh.parts().face_uvs
+                [0]
+                == [NO_INDEX; 3]
+        );
+    }
+
+    #[test]
+    fn files_without_faces_say_what_they_hold() {
+        for (obj, words) in [
+            ("", "a.obj: has no face, only 0 vertices; a mesh"),
+            ("v 0 0 0\np 1\n", "only 1 vertex and 1 point and line element"),
+            ("v 0 0 0\nf 1 1\n", "the first that has fewer is on line 2"),
+            ("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nf 1 2 3 4\n", "no face that can be used, as on line 5: "),
+        ] {
+            let message = read_obj(obj).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_line_of_many_megabytes_is_read() {
+        let n = 40_000;
+        let mut obj = String::from("# ");
+        obj.extend(std::iter::repeat_n('x', 5_000_000));
+        obj.push('\n');
+        for i in 0..n {
+            // A saw of n corners along a line, closed by its first and last corner.
+            obj += &format!("v {i} {} 0\n", if i % (n - 1) == 0 { 0 } else { 1 + i % 2 });
+        }
+        obj.push('f');
+        (1..=n).rev().for_each(|i| obj += &format!(" {i}"));
+        let file = read_obj(&obj).unwrap();
+        assert_eq!((file.polygons_triangulated, file.mesh.faces().len()), (1, n - 2));
+    }
+
+    proptest! {
+        #[test]
+        fn any_words_load_or_are_refused(words in proptest::collection::vec(proptest::sample::select(vec![
+            "v", "vt", "vn", "f", "l", "usemtl", "mtllib", "#", "\\", "\n", "\n", "\nf", "\nv", "\nv 1 2 3\n", "\nf 1 2 3\n",
+            "\nvt 0 0\n", "0", "1", "2", "3", "-1", "-2", "1/1", "-1/-1/-1", "2//1", "1/", "//", "1.5", "nan", "inf", "1e99",
+            "-9223372036854775808", "9223372036854775807", "4294967296", "x", "\u{e4}", "0.5", "\r",
+        ]), 0..60)) {
+            let _ = read_obj(&words.join(" "));
+        }
+
+        #[test]
+        fn triangles_come_back(positions in proptest::collection::vec(any::<[i16; 3]>(), 3..20), picks in
+            proptest::collection::vec(any::<[proptest::sample::Index; 3]>(), 1..30)) {
+            let faces: Vec<[usize; 3]> = picks.iter().map(|f| f.map(|i| i.index(positions.len()))).collect();
+            let mut obj = String::new();
+            positions.iter().for_each(|p| obj += &format!("v {} {} {}\n", p[0], p[1], p[2]));
+            faces.iter().for_each(|f| obj += &format!("f {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1));
+            let expected = s3d_geom::TriMesh::from_faces(
+                positions.iter().map(|p| Vec3::from_array(p.map(f32::from))).collect(),
+                faces.iter().map(|f| f.map(|i| i as u32)).collect(),
+            );
+            match (read_obj(&obj), expected) {
+                (Ok(file), Ok(mesh)) => {
+                    prop_assert_eq!(file.mesh.positions(), mesh.positions());
+                    prop_assert_eq!(file.mesh.faces(), mesh.faces());
+                }
+                (Err(Error::Mesh { source, .. }), Err(e)) => prop_assert_eq!(source, e),
+                (found, expected) => prop_assert!(false, "{:?} {:?}", found.map(|_| ()), expected.map(|_| ())),
+            }
+        }
+    }
+}

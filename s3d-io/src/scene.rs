@@ -1,0 +1,148 @@
+//! `scene.toml`: one area's mesh, annotations and scan locations.
+
+use crate::mesh_file::UpAxis;
+use crate::texture_file::read_file;
+use crate::{Error, Result};
+use serde::Deserialize;
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+
+/// The parts of a scan of one area. Paths are resolved: relative ones start at the folder of the file that names them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SceneFile {
+    /// The `scene.toml` itself.
+    pub path: PathBuf,
+    /// The number of the area, from 1.
+    pub area: u32,
+    /// The textured mesh.
+    pub mesh: PathBuf,
+    /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published OBJ files.
+    pub up: UpAxis,
+    /// The area's folder of the S3DIS tree: ROOM/Annotations/CLASS_N.txt.
+    pub annotations: PathBuf,
+    /// The table of scan locations.
+    pub cameras: PathBuf,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    area: NonZeroU32,
+    mesh: MeshTable,
+    annotations: PathTable,
+    cameras: PathTable,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MeshTable {
+    path: PathBuf,
+    up: Option<UpAxis>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathTable {
+    path: PathBuf,
+}
+
+/// Reads a `scene.toml`:
+///
+/// ```toml
+/// area = 1
+/// [mesh]
+/// path = "rgb.obj"
+/// up   = "y"          # or "z"; "y" if it is left out
+/// [annotations]
+/// path = "Area_1"
+/// [cameras]
+/// path = "cameras.csv"
+/// ```
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value; without
+/// one if a file or folder that it names is not there.
+pub fn read_scene(path: &Path) -> Result<SceneFile> {
+    let text = String::from_utf8(read_file(path)?).map_err(|_| Error::format(path, "is no text in UTF-8"))?;
+    let document: Document = toml::from_str(&text).map_err(|e| {
+        let message = e.message().replace('\n', "; ");
+        match e.span() {
+            // An error at the very start is about the file as a whole: a table that is missing.
+            Some(span) if span.end > 0 => {
+                let line = text[..span.start.min(text.len())].matches('\n').count() + 1;
+                Error::line(path, line as u64, message)
+            }
+            _ => Error::format(path, message),
+        }
+    })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let existing = |key: &str, written: &Path, is_folder: bool| {
+        let full = folder.join(written);
+        let (what, fits) = if is_folder { ("folder", full.is_dir()) } else { ("file", full.is_file()) };
+        if fits {
+            return Ok(full);
+        }
+        let state = if full.exists() { "is no" } else { "is not there; it should be a" };
+        Err(Error::format(path, format!("{key} = {written:?}: {} {state} {what}", full.display())))
+    };
+    Ok(SceneFile {
+        path: path.to_owned(),
+        area: document.area.get(),
+        up: document.mesh.up.unwrap_or(UpAxis::Y),
+        mesh: existing("mesh.path", &document.mesh.path, false)?,
+        annotations: existing("annotations.path", &document.annotations.path, true)?,
+        cameras: existing("cameras.path", &document.cameras.path, false)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    const GOOD: &str = "area = 2\n[mesh]\npath = \"a.obj\"\nup = \"z\"\n[annotations]\npath = \"Area_2\"\n[cameras]\npath = \"c.csv\"\n";
+
+    fn read(text: &str) -> Result<SceneFile> {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("a.obj"), "").unwrap();
+        fs::write(dir.path().join("c.csv"), "").unwrap();
+        fs::create_dir(dir.path().join("Area_2")).unwrap();
+        let path = dir.path().join("scene.toml");
+        fs::write(&path, text).unwrap();
+        let scene = read_scene(&path)?;
+        assert_eq!(scene.mesh, dir.path().join("a.obj"));
+        assert_eq!(scene.annotations, dir.path().join("Area_2"));
+        assert_eq!(scene.cameras, dir.path().join("c.csv"));
+        Ok(scene)
+    }
+
+    #[test]
+    fn paths_are_resolved_and_up_is_y_unless_said() {
+        let scene = read(GOOD).unwrap();
+        assert_eq!((scene.area, scene.up), (2, UpAxis::Z));
+        assert_eq!(read(&GOOD.replace("up = \"z\"\n", "")).unwrap().up, UpAxis::Y);
+    }
+
+    #[test]
+    fn every_fault_is_named() {
+        for (from, to, words) in [
+            ("area = 2", "area = 0", "line 1: "),
+            ("area = 2", "area = \"2\"", "line 1: invalid type"),
+            ("area = 2", "", "missing field `area`"),
+            ("up = \"z\"", "up = \"x\"", "line 4: unknown variant `x`, expected `y` or `z`"),
+            ("up = \"z\"", "upp = \"z\"", "line 4: unknown field `upp`, expected `path` or `up`"),
+            ("area = 2", "area = 2\nareas = 3", "line 2: unknown field `areas`"),
+            ("path = \"c.csv\"", "", "line 7: missing field `path`"),
+            ("[cameras]", "[cameras", "line 7"),
+            ("a.obj", "b.obj", "mesh.path = \"b.obj\""),
+            ("a.obj", "Area_2", "is no file"),
+            ("Area_2", "Area_9", "annotations.path = \"Area_9\""),
+            ("Area_2", "c.csv", "is no folder"),
+            ("c.csv", "gone.csv", "cameras.path = \"gone.csv\""),
+        ] {
+            let message = read(&GOOD.replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(message.contains(words) && message.contains("scene.toml"), "{to}: {message}");
+        }
+        assert!(matches!(read_scene(Path::new("gone.toml")), Err(Error::Io { .. })));
+    }
+}

@@ -1,0 +1,61 @@
+//! `splits.json`: which areas to train on and which to test on. Source: formats.md, "Folds".
+
+use crate::{Result, read_json, write_json};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// One fold of the cross-validation. The fields bear the file's names.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Split {
+    /// Its number, from 1.
+    pub fold: u32,
+    /// Numbers of the areas to train on.
+    pub train_areas: Vec<u32>,
+    /// Numbers of the areas to test on.
+    pub test_areas: Vec<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Splits {
+    folds: Vec<Split>,
+}
+
+/// Writes the folds, `{"folds": [{"fold": 1, "train_areas": [1, …], "test_areas": [5]}, …]}`, and returns the file's size
+/// in bytes.
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io).
+pub fn write_splits(path: &Path, folds: &[Split]) -> Result<u64> {
+    write_json(path, &Splits { folds: folds.to_vec() })
+}
+
+/// Reads the folds.
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io); [`Error::Format`](crate::Error::Format) if the file holds something else.
+pub fn read_splits(path: &Path) -> Result<Vec<Split>> {
+    let Splits { folds } = read_json(path)?;
+    Ok(folds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::write_bytes;
+
+    #[test]
+    fn folds_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("splits.json");
+        let folds = [
+            Split { fold: 1, train_areas: vec![1, 2, 3, 4, 6], test_areas: vec![5] },
+            Split { fold: 2, train_areas: vec![1, 3, 5, 6], test_areas: vec![2, 4] },
+        ];
+        write_splits(&path, &folds).unwrap();
+        assert_eq!(read_splits(&path).unwrap(), folds);
+        let json: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        assert_eq!(json["folds"][1]["test_areas"], serde_json::json!([2, 4]));
+        write_bytes(&path, b"{\"folds\": [{\"fold\": 1}]}").unwrap();
+        assert!(read_splits(&path).unwrap_err().to_string().contains("missing field `train_areas`"));
+    }
+}
