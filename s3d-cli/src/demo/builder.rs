@@ -1,0 +1,277 @@
+//! Puts surfaces together: places them, cuts them into cells, notes whose they are and bakes a light into their looks.
+
+use super::DemoInstance;
+use super::light::Light;
+use super::materials::Look;
+use super::textures::{Pattern, scaled};
+use glam::{Vec2, Vec3};
+use s3d_geom::{Aabb, Material, MeshParts, Texture, TriMesh, Wrap, glam, grid};
+use std::collections::BTreeMap;
+
+/// A side of a body in its own frame: x to the right, y away from who looks at its front, z up.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    Front,
+    Right,
+    Back,
+    Left,
+    Top,
+    Bottom,
+}
+
+/// Where something stands: its origin, and the direction of its x axis in the plan.
+#[derive(Clone, Copy)]
+struct Frame {
+    origin: Vec3,
+    x_axis: Vec2,
+}
+
+impl Frame {
+    fn apply(self, p: Vec3) -> Vec3 {
+        self.origin + (self.x_axis * p.x + self.x_axis.perp() * p.y).extend(p.z)
+    }
+
+    fn then(self, origin: Vec3, yaw_deg: f32) -> Self {
+        let turn = match yaw_deg.rem_euclid(360.0) {
+            // Exact, so that what touches a wall touches it.
+            0.0 => Vec2::X,
+            90.0 => Vec2::Y,
+            180.0 => Vec2::NEG_X,
+            270.0 => Vec2::NEG_Y,
+            other => Vec2::from_angle(other.to_radians()),
+        };
+        Self { origin: self.apply(origin), x_axis: self.x_axis.rotate(turn) }
+    }
+}
+
+/// The scene under construction. Coordinates are the building's own, metres; [`Builder::finish`] moves it.
+pub(super) struct Builder {
+    parts: MeshParts,
+    face_instances: Vec<Option<u32>>,
+    instances: Vec<DemoInstance>,
+    room: &'static str,
+    light: Light,
+    frame: Frame,
+    materials: BTreeMap<(Look, u32), u32>,
+    images: BTreeMap<Pattern, s3d_geom::Raster<[u8; 3]>>,
+}
+
+impl Builder {
+    pub(super) fn new() -> Self {
+        Self {
+            parts: MeshParts::default(),
+            face_instances: Vec::new(),
+            instances: Vec::new(),
+            room: "",
+            light: Light::default(),
+            frame: Frame { origin: Vec3::ZERO, x_axis: Vec2::X },
+            materials: BTreeMap::new(),
+            images: BTreeMap::new(),
+        }
+    }
+
+    /// From here on everything belongs to `room`, lit by `light`.
+    pub(super) fn enter(&mut self, room: &'static str, light: Light) {
+        (self.room, self.light) = (room, light);
+    }
+
+    /// The light of the room, with all that was built in it since as obstacles.
+    pub(super) fn light(&self) -> &Light {
+        &self.light
+    }
+
+    /// From here on every face belongs to a new instance of `class` in this room.
+    pub(super) fn begin(&mut self, class: &'static str) {
+        let number = 1 + self.instances.iter().filter(|i| i.class == class && i.room == self.room).count();
+        self.instances.push(DemoInstance { class, number: number as u32, room: self.room });
+    }
+
+    /// Runs `build` in a frame with its origin at `origin`, turned by `yaw_deg` counter-clockwise seen from above.
+    pub(super) fn place(&mut self, origin: Vec3, yaw_deg: f32, build: impl FnOnce(&mut Self)) {
+        let outer = self.frame;
+        self.frame = outer.then(origin, yaw_deg);
+        build(self);
+        self.frame = outer;
+    }
+
+    /// The box between two corners, without the sides `omit`: those that lie on something else.
+    pub(super) fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], look: Look, omit: &[Side]) {
+        let ([x0, y0, z0], [x1, y1, z1]) = (low, high);
+        let plan = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+        let corner = |i: usize| Vec3::new(plan[i % 4][0], plan[i % 4][1], if i < 4 { z0 } else { z1 });
+        self.hexahedron(std::array::from_fn(corner), look, omit);
+    }
+
+    /// A body of six sides: the corners of its bottom counter-clockwise seen from above, from the front left one, then
+    /// those of its top.
+    pub(super) fn hexahedron(&mut self, corners: [Vec3; 8], look: Look, omit: &[Side]) {
+        let sides = [
+            (Side::Front, [0, 1, 5, 4]),
+            (Side::Right, [1, 2, 6, 5]),
+            (Side::Back, [2, 3, 7, 6]),
+            (Side::Left, [3, 0, 4, 7]),
+            (Side::Top, [4, 5, 6, 7]),
+            (Side::Bottom, [3, 2, 1, 0]),
+        ];
+        for (side, indices) in sides {
+            if !omit.contains(&side) {
+                self.panel(indices.map(|i| corners[i]), look);
+            }
+        }
+        self.light.block(Aabb::from_points(corners.map(|p| self.frame.apply(p))));
+    }
+
+    /// A four-sided surface, its corners counter-clockwise seen from the front, from the texture's bottom left.
+    pub(super) fn panel(&mut self, corners: [Vec3; 4], look: Look) {
+        self.shifted_panel(corners, look, 0.0);
+    }
+
+    /// As [`Builder::panel`], its texture starting at `shift` of its width.
+    pub(super) fn shifted_panel(&mut self, corners: [Vec3; 4], look: Look, shift: f32) {
+        let [a, b, c, d] = corners.map(|p| self.frame.apply(p));
+        let (width, height) = (a.distance(b).max(d.distance(c)), a.distance(d).max(b.distance(c)));
+        let cells = [width, height].map(|m| ((m / look.cell_m() - 0.01).ceil() as u32).max(1));
+        let mut parts = grid(Vec3::ZERO, Vec3::X, Vec3::Y, cells);
+        for p in &mut parts.positions {
+            *p = a.lerp(b, p.x).lerp(d.lerp(c, p.x), p.y);
+        }
+        // Grain runs along the longer side.
+        let size = if look.has_grain() && height > width {
+            parts.uvs.iter_mut().for_each(|uv| *uv = Vec2::new(uv.y, uv.x));
+            Vec2::new(height, width)
+        } else {
+            Vec2::new(width, height)
+        };
+        let scale = look.uv_scale(size);
+        parts.uvs.iter_mut().for_each(|uv| *uv = *uv * scale + Vec2::X * shift);
+        let normal = (b - a).cross(d - a).normalize();
+        let lit = self.light.open(0.25 * (a + b + c + d), normal);
+        self.add(parts, look, lit);
+    }
+
+    /// Triangles from `apex` to each edge of `ring`, which runs counter-clockwise seen from the front.
+    fn fan(&mut self, apex: Vec3, ring: &[Vec3], look: Look) {
+        let apex = self.frame.apply(apex);
+        let low = ring.iter().fold(apex, |low, &p| low.min(self.frame.apply(p)));
+        for i in 0..ring.len() {
+            let [a, b] = [i, (i + 1) % ring.len()].map(|k| self.frame.apply(ring[k]));
+            let corner = |p: Vec3| (p - low).truncate() * look.uv_scale(Vec2::ONE);
+            let parts = MeshParts {
+                positions: vec![apex, a, b],
+                faces: vec![[0, 1, 2]],
+                uvs: vec![corner(apex), corner(a), corner(b)],
+                face_uvs: vec![[0, 1, 2]],
+                ..MeshParts::default()
+            };
+            let lit = self.light.open((apex + a + b) / 3.0, (a - apex).cross(b - apex).normalize());
+            self.add(parts, look, lit);
+        }
+    }
+
+    /// An upright cone stump of `sides` sides from radius `radii[0]` at `foot` to `radii[1]` at `foot` + `height`, with
+    /// lids unless `omit` has its top or bottom.
+    pub(super) fn stump(
+        &mut self,
+        foot: [f32; 3],
+        radii: [f32; 2],
+        height: f32,
+        sides: u32,
+        look: Look,
+        omit: &[Side],
+    ) {
+        let foot = Vec3::from_array(foot);
+        let (low, high) = (ring(foot, radii[0], sides), ring(foot + Vec3::Z * height, radii[1], sides));
+        for i in 0..sides as usize {
+            let j = (i + 1) % sides as usize;
+            self.panel([low[i], low[j], high[j], high[i]], look);
+        }
+        if !omit.contains(&Side::Top) {
+            self.fan(foot + Vec3::Z * height, &high, look);
+        }
+        if !omit.contains(&Side::Bottom) {
+            self.fan(foot, &low.iter().rev().copied().collect::<Vec<_>>(), look);
+        }
+        let r = radii[0].max(radii[1]) * 0.8;
+        let (a, b) = (foot - Vec3::new(r, r, 0.0), foot + Vec3::new(r, r, height));
+        self.light.block(Aabb::from_points([a, b].map(|p| self.frame.apply(p))));
+    }
+
+    /// A round surface that looks up: the lid of a stump that is of something else.
+    pub(super) fn disc(&mut self, center: [f32; 3], radius: f32, sides: u32, look: Look) {
+        let center = Vec3::from_array(center);
+        self.fan(center, &ring(center, radius, sides), look);
+    }
+
+    /// A leaf: a flat spindle from `base` to `tip`, `width` metres wide.
+    pub(super) fn leaf(&mut self, base: Vec3, tip: Vec3, width: f32, look: Look) {
+        let along = tip - base;
+        let across = along.cross(Vec3::Z).normalize() * 0.5 * width;
+        let over = across.cross(along).normalize() * 0.1 * width;
+        let middle = base + along * 0.45;
+        let ring = [middle + across, middle - over, middle - across, middle + over];
+        self.fan(tip, &ring, look);
+        self.fan(base, &ring.into_iter().rev().collect::<Vec<_>>(), look);
+    }
+
+    /// Adds what comes in building coordinates with coordinates of its own into a texture of its own.
+    pub(super) fn baked(&mut self, parts: MeshParts, texture: u32) {
+        let first = self.parts.materials.iter().position(|m| m.texture == Some(texture));
+        let material = first.unwrap_or_else(|| {
+            let name = self.parts.textures[texture as usize].name.clone();
+            self.parts.materials.push(Material { name, color: [255; 3], texture: Some(texture) });
+            self.parts.materials.len() - 1
+        });
+        self.push(parts, material as u32);
+    }
+
+    /// Adds a texture to be used once, and returns its index.
+    pub(super) fn texture(&mut self, name: String, image: s3d_geom::Raster<[u8; 3]>, wrap: Wrap) -> u32 {
+        self.parts.textures.push(Texture { name, image, wrap: [wrap; 2] });
+        (self.parts.textures.len() - 1) as u32
+    }
+
+    fn add(&mut self, parts: MeshParts, look: Look, lit: f32) {
+        let level = look.level(lit);
+        let material = match self.materials.get(&(look, level)) {
+            Some(&known) => known,
+            None => {
+                let name = format!("{}_{level:02}", look.name());
+                let factor = look.factor(level);
+                let texture = look.pattern().map(|pattern| {
+                    let image = scaled(self.images.entry(pattern).or_insert_with(|| pattern.image()), factor);
+                    self.texture(name.clone(), image, look.wrap())
+                });
+                let color = scaled(&s3d_geom::Raster::filled(1, 1, look.color()), factor).at(0, 0);
+                self.parts.materials.push(Material { name, color, texture });
+                let new = (self.parts.materials.len() - 1) as u32;
+                self.materials.insert((look, level), new);
+                new
+            }
+        };
+        self.push(parts, material);
+    }
+
+    fn push(&mut self, mut parts: MeshParts, material: u32) {
+        // Onto a lattice of 61 µm: what touches by design then touches in the last bit, also after `finish`.
+        parts.positions.iter_mut().for_each(|p| *p = (*p * 16384.0).round() / 16384.0);
+        self.parts.append(parts);
+        let n = self.parts.faces.len();
+        self.parts.face_materials.resize(self.face_instances.len(), material);
+        self.parts.face_materials.resize(n, material);
+        self.face_instances.resize(n, self.instances.len().checked_sub(1).map(|i| i as u32));
+    }
+
+    /// The mesh, moved by `offset`, and whose its faces are.
+    pub(super) fn finish(mut self, offset: Vec3) -> (TriMesh, Vec<Option<u32>>, Vec<DemoInstance>) {
+        self.parts.positions.iter_mut().for_each(|p| *p += offset);
+        let mesh = TriMesh::new(self.parts).expect("the demo scene is a mesh");
+        assert_eq!(mesh.report().zero_area_faces, 0, "every face of the demo scene has an area");
+        (mesh, self.face_instances, self.instances)
+    }
+}
+
+/// The corners of a level polygon around `center`, counter-clockwise seen from above.
+fn ring(center: Vec3, radius: f32, sides: u32) -> Vec<Vec3> {
+    let step = std::f32::consts::TAU / sides as f32;
+    (0..sides).map(|i| center + (Vec2::from_angle(i as f32 * step) * radius).extend(0.0)).collect()
+}

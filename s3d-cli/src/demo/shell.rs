@@ -1,0 +1,394 @@
+//! The shell of a room: floor, walls with openings, ceiling; and what fills the openings.
+
+use super::builder::Builder;
+use super::finishes::{Ceiling, Floor, Paint};
+use super::light::{Lamp, Light};
+use super::materials::{LAMP, Look};
+use super::openings::{doorway, handle, leaf, window};
+use super::textures::{Pattern, to_bytes};
+use s3d_geom::{
+    MeshParts, NO_INDEX, Raster, Wrap,
+    glam::{Vec2, Vec3, vec2, vec3},
+};
+
+/// A wall of a room, by where it stands; in the order in which they pass when one turns right.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wall {
+    South,
+    West,
+    North,
+    East,
+}
+
+const WALLS: [Wall; 4] = [Wall::South, Wall::West, Wall::North, Wall::East];
+
+impl Wall {
+    /// To the right for who looks at it, in the plan.
+    fn right(self) -> Vec2 {
+        match self {
+            Wall::South => Vec2::NEG_X,
+            Wall::West => Vec2::Y,
+            Wall::North => Vec2::X,
+            Wall::East => Vec2::NEG_Y,
+        }
+    }
+
+    /// Into the room.
+    fn normal(self) -> Vec3 {
+        -self.right().perp().extend(0.0)
+    }
+
+    /// Turns a frame so that it looks at the wall.
+    pub(super) fn yaw_deg(self) -> f32 {
+        match self {
+            Wall::South => 180.0,
+            Wall::West => 90.0,
+            Wall::North => 0.0,
+            Wall::East => 270.0,
+        }
+    }
+
+    fn along_x(self) -> bool {
+        matches!(self, Wall::South | Wall::North)
+    }
+}
+
+/// What fills an opening.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Filling {
+    Window,
+    /// A doorway through a wall so thick; its leaf hangs on the left or right and stands open.
+    Door {
+        thickness: f32,
+        hinge_left: bool,
+        open_deg: f32,
+    },
+    /// A door that is shut.
+    ShutDoor,
+    /// Nothing: the room on the other side has the door.
+    Nothing,
+}
+
+/// A rectangle cut out of a wall: coordinates along x or y of the building, and heights.
+#[derive(Clone, Copy)]
+pub(super) struct Opening {
+    pub(super) wall: Wall,
+    pub(super) span: [f32; 2],
+    pub(super) heights: [f32; 2],
+    pub(super) filling: Filling,
+}
+
+/// A room's floor plan and surfaces. Building coordinates, metres.
+pub(super) struct Shell {
+    pub(super) low: Vec2,
+    pub(super) high: Vec2,
+    /// Height of the ceiling at the smallest and the largest y.
+    pub(super) heights: [f32; 2],
+    pub(super) openings: Vec<Opening>,
+    /// A rectangle of the ceiling that is not there.
+    pub(super) hole: Option<[Vec2; 2]>,
+    /// Middles and lengths along x and y of the lamps under the ceiling.
+    pub(super) lamps: Vec<[f32; 4]>,
+    pub(super) paint: Paint,
+    /// One wall may be painted otherwise.
+    pub(super) accent: Option<(Wall, Paint)>,
+    pub(super) floor: Floor,
+    pub(super) ceiling: Ceiling,
+}
+
+/// Below it walls are upright and openings end; above it a slanted ceiling squeezes them.
+const KNEE_M: f32 = 2.1;
+/// Edge of the cells, metres.
+const CELL_M: f32 = 0.25;
+
+impl Shell {
+    /// The light of its windows, doorways and lamps.
+    pub(super) fn light(&self) -> Light {
+        let windows = self.openings.iter().map(|o| {
+            let ([a, b], [z0, z1]) = (o.span, o.heights);
+            let brightness = if o.filling == Filling::Window { 1.5 } else { 0.25 };
+            let center = self.on_wall(o.wall, 0.5 * (a + b)).extend(0.5 * (z0 + z1));
+            Lamp { center, normal: o.wall.normal(), power: brightness * (b - a) * (z1 - z0) }
+        });
+        let lamps = self.lamps.iter().map(|&[x, y, length, width]| {
+            let center = vec3(x, y, self.height(y) - 0.06);
+            Lamp { center, normal: -Vec3::Z, power: 2.6 * length * width + 0.5 }
+        });
+        Light::new(windows.chain(lamps).collect(), self.heights[0].max(self.heights[1]))
+    }
+
+    fn height(&self, y: f32) -> f32 {
+        let t = (y - self.low.y) / (self.high.y - self.low.y);
+        self.heights[0] + (self.heights[1] - self.heights[0]) * t
+    }
+
+    /// The height of the ceiling at y: where a beam goes.
+    pub(super) fn ceiling_at(&self, y: f32) -> f32 {
+        self.height(y)
+    }
+
+    fn on_wall(&self, wall: Wall, along: f32) -> Vec2 {
+        match wall {
+            Wall::South => vec2(along, self.low.y),
+            Wall::West => vec2(self.low.x, along),
+            Wall::North => vec2(along, self.high.y),
+            Wall::East => vec2(self.high.x, along),
+        }
+    }
+
+    /// Runs `build` in a frame on `wall`: x to the right for who looks at it, y into the wall, the origin at its foot,
+    /// at `along` (x or y of the building).
+    pub(super) fn at_wall(&self, b: &mut Builder, wall: Wall, along: f32, build: impl FnOnce(&mut Builder)) {
+        b.place(self.on_wall(wall, along).extend(0.0), wall.yaw_deg(), build);
+    }
+
+    /// Fills the openings and hangs the lamps. Before the furniture or after it.
+    pub(super) fn fill(&self, b: &mut Builder) {
+        for o in &self.openings {
+            let [a, c] = o.span;
+            let left = if matches!(o.wall, Wall::South | Wall::East) { c } else { a };
+            let width = c - a;
+            self.at_wall(b, o.wall, left, |b| match o.filling {
+                Filling::Window => window(b, width, o.heights),
+                Filling::Door { thickness, hinge_left, open_deg } => {
+                    doorway(b, width, o.heights[1], thickness);
+                    // The leaf opens into the room; its thickness lies on the side away from the opening.
+                    let (x, yaw, y) =
+                        if hinge_left { (0.0, -open_deg, 0.0) } else { (width, 180.0 + open_deg, 0.04) };
+                    b.place(vec3(x, -0.03, 0.0), yaw, |b| {
+                        b.place(vec3(0.0, y, 0.0), 0.0, |b| leaf(b, width, o.heights[1]));
+                    });
+                }
+                Filling::ShutDoor => {
+                    doorway(b, width, o.heights[1], 0.08);
+                    b.place(vec3(0.0, 0.12, 0.0), 0.0, |b| {
+                        let h = o.heights[1];
+                        b.panel(
+                            [[0.0, 0.0], [width, 0.0], [width, h], [0.0, h]].map(|[x, z]| vec3(x, -0.04, z)),
+                            Look::Fitted(Pattern::Door),
+                        );
+                        handle(b, width - 0.1, -0.04);
+                    });
+                }
+                Filling::Nothing => {}
+            });
+        }
+        for &[x, y, length, width] in &self.lamps {
+            b.begin("clutter");
+            let z = self.height(y) - 0.02;
+            let (l, w) = (0.5 * length, 0.5 * width);
+            b.cuboid([x - l, y - w, z - 0.05], [x + l, y + w, z], LAMP, &[]);
+        }
+    }
+
+    /// Floor, walls and ceiling, lit and shaded by all that the builder holds of this room.
+    pub(super) fn build(&self, b: &mut Builder, name: &str) {
+        let top = self.heights[0].max(self.heights[1]);
+        let mut cuts: [Vec<f32>; 3] =
+            [vec![self.low.x, self.high.x], vec![self.low.y, self.high.y], vec![0.0, top]];
+        for o in &self.openings {
+            cuts[usize::from(!o.wall.along_x())].extend(o.span);
+            cuts[2].extend(o.heights);
+        }
+        if self.heights[0] != self.heights[1] {
+            cuts[2].push(KNEE_M);
+        }
+        for corner in self.hole.iter().flatten() {
+            cuts[0].push(corner.x);
+            cuts[1].push(corner.y);
+        }
+        let [xs, ys, zs] = cuts.map(subdivided);
+
+        let inside = |p: Vec2| (p - self.low) / (self.high - self.low);
+        b.begin("floor");
+        let floor =
+            self.bake_level(b.light(), |p| p.extend(0.0), Vec3::Z, 100.0, |p| self.floor.at(p.x, p.y));
+        let floor = b.texture(format!("{name}_floor"), floor, Wrap::Clamp);
+        b.baked(lattice(&xs, &ys, |x, y| (vec3(x, y, 0.0), inside(vec2(x, y))), |_| true), floor);
+
+        b.begin("ceiling");
+        let slope = (self.heights[1] - self.heights[0]) / (self.high.y - self.low.y);
+        let normal = vec3(0.0, slope, -1.0).normalize();
+        let height = |p: Vec2| p.extend(self.height(p.y));
+        let ceiling = self.bake_level(b.light(), height, normal, 60.0, |p| {
+            self.ceiling.at(p.x - self.low.x, p.y - self.low.y)
+        });
+        let ceiling = b.texture(format!("{name}_ceiling"), ceiling, Wrap::Clamp);
+        let there = |p: Vec2| !self.hole.is_some_and(|[a, c]| p.cmpgt(a).all() && p.cmplt(c).all());
+        // Rows from large to small y, so that the front is below.
+        let rows: Vec<f32> = ys.iter().rev().copied().collect();
+        let place = |x, y| (vec3(x, y, self.squeezed(y, top)), inside(vec2(x, y)));
+        b.baked(lattice(&xs, &rows, place, there), ceiling);
+
+        self.build_walls(b, name, [&xs, &ys, &zs]);
+    }
+
+    fn build_walls(&self, b: &mut Builder, name: &str, [xs, ys, zs]: [&[f32]; 3]) {
+        const PER_M: f32 = 72.0;
+        let top = self.heights[0].max(self.heights[1]);
+        let rows = (top * PER_M) as u32;
+        let length =
+            |wall: Wall| if wall.along_x() { self.high.x - self.low.x } else { self.high.y - self.low.y };
+        let columns = WALLS.map(|wall| (length(wall) * PER_M) as u32);
+        let all: u32 = columns.iter().sum();
+        let mut image = Raster::filled(all, rows, [0; 3]);
+        let mut first = 0;
+        let mut offsets = [0; 4];
+        for (k, wall) in WALLS.into_iter().enumerate() {
+            offsets[k] = first;
+            let start = self
+                .on_wall(wall, if matches!(wall, Wall::South | Wall::East) { f32::MAX } else { f32::MIN });
+            let start = start.clamp(self.low, self.high);
+            let paint = self.accent.filter(|(w, _)| *w == wall).map_or(self.paint, |(_, paint)| paint);
+            let band = bake(b.light(), [columns[k], rows], |u, v| {
+                let (along, up) = (u * length(wall), (1.0 - v) * top);
+                let p = (start + wall.right() * along).extend(up);
+                (p, wall.normal(), paint.at(along, up))
+            });
+            for y in 0..rows {
+                let row = (y * all + first) as usize;
+                image.pixels_mut()[row..row + columns[k] as usize].copy_from_slice(band.row(y));
+            }
+            first += columns[k];
+        }
+        let texture = b.texture(format!("{name}_walls"), image, Wrap::Clamp);
+        for (k, wall) in WALLS.into_iter().enumerate() {
+            let mut along = if wall.along_x() { xs.to_vec() } else { ys.to_vec() };
+            if matches!(wall, Wall::South | Wall::East) {
+                along.reverse();
+            }
+            let start = along[0];
+            let place = |s: f32, z: f32| {
+                let foot = self.on_wall(wall, s);
+                let z = self.squeezed(foot.y, z);
+                let u = offsets[k] as f32 + (s - start).abs() / length(wall) * columns[k] as f32;
+                (foot.extend(z), vec2(u / all as f32, z / top))
+            };
+            let open = |o: &Opening, p: Vec2| {
+                let (s, z) = (o.span, o.heights);
+                o.wall == wall && p.x > s[0] && p.x < s[1] && p.y > z[0] && p.y < z[1]
+            };
+            b.begin("wall");
+            b.baked(lattice(&along, zs, place, |p| !self.openings.iter().any(|o| open(o, p))), texture);
+        }
+    }
+
+    /// Where the height `z` of the unslanted room comes to lie at `y`.
+    fn squeezed(&self, y: f32, z: f32) -> f32 {
+        let top = self.heights[0].max(self.heights[1]);
+        if z <= KNEE_M || self.heights[0] == self.heights[1] {
+            z
+        } else {
+            KNEE_M + (z - KNEE_M) * (self.height(y) - KNEE_M) / (top - KNEE_M)
+        }
+    }
+
+    fn bake_level(
+        &self,
+        light: &Light,
+        place: impl Fn(Vec2) -> Vec3,
+        normal: Vec3,
+        per_m: f32,
+        color: impl Fn(Vec2) -> [f32; 3],
+    ) -> Raster<[u8; 3]> {
+        let size = self.high - self.low;
+        bake(light, [(size.x * per_m) as u32, (size.y * per_m) as u32], |u, v| {
+            let p = self.low + size * vec2(u, 1.0 - v);
+            (place(p), normal, color(p))
+        })
+    }
+}
+
+/// An image of a surface: `surface` gives place, normal and unlit colour for (u, v) in 0..1, v downwards.
+fn bake(
+    light: &Light,
+    size: [u32; 2],
+    surface: impl Fn(f32, f32) -> (Vec3, Vec3, [f32; 3]),
+) -> Raster<[u8; 3]> {
+    // Light changes slowly: it is taken on every fourth pixel and blended.
+    const STEP: u32 = 4;
+    let [w, h] = size;
+    let at = |x: f32, y: f32| surface((x + 0.5) / w as f32, (y + 0.5) / h as f32);
+    let (nx, ny) = (w / STEP + 2, h / STEP + 2);
+    let lit: Vec<f32> = (0..nx * ny)
+        .map(|i| {
+            let (p, n, _) = at((i % nx * STEP) as f32, (i / nx * STEP) as f32);
+            light.at(p, n)
+        })
+        .collect();
+    let pixels = (0..w * h).map(|i| {
+        let (x, y) = (i % w, i / w);
+        let (fx, fy) = ((x % STEP) as f32 / STEP as f32, (y % STEP) as f32 / STEP as f32);
+        let k = (y / STEP * nx + x / STEP) as usize;
+        let row = |k: usize| lit[k] + (lit[k + 1] - lit[k]) * fx;
+        let lit = row(k) + (row(k + nx as usize) - row(k)) * fy;
+        to_bytes(at(x as f32, y as f32).2.map(|c| c * lit))
+    });
+    Raster::from_vec(w, h, pixels.collect())
+}
+
+/// The quads between the lines `us` and `vs` whose middle `keep` wants: `place` gives a corner and its coordinate in the
+/// texture. Fronts are on the side of u × v.
+fn lattice(
+    us: &[f32],
+    vs: &[f32],
+    place: impl Fn(f32, f32) -> (Vec3, Vec2),
+    keep: impl Fn(Vec2) -> bool,
+) -> MeshParts {
+    let mut parts = MeshParts::default();
+    let mut known = vec![NO_INDEX; us.len() * vs.len()];
+    for (j, v) in vs.windows(2).enumerate() {
+        for (i, u) in us.windows(2).enumerate() {
+            if !keep(0.5 * vec2(u[0] + u[1], v[0] + v[1])) {
+                continue;
+            }
+            let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| {
+                let slot = &mut known[j * us.len() + i];
+                if *slot == NO_INDEX {
+                    *slot = parts.positions.len() as u32;
+                    let (position, uv) = place(us[i], vs[j]);
+                    parts.positions.push(position);
+                    parts.uvs.push(uv);
+                }
+                *slot
+            });
+            parts.faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    parts.face_uvs = parts.faces.clone();
+    parts
+}
+
+/// Sorted `cuts` with more between them, so that no step is longer than a cell.
+fn subdivided(mut cuts: Vec<f32>) -> Vec<f32> {
+    cuts.sort_by(f32::total_cmp);
+    cuts.dedup();
+    let mut all = vec![cuts[0]];
+    for pair in cuts.windows(2) {
+        let n = ((pair[1] - pair[0]) / CELL_M).ceil().max(1.0);
+        all.extend((1..n as u32).map(|i| pair[0] + (pair[1] - pair[0]) * i as f32 / n));
+        all.push(pair[1]);
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cuts_are_kept_and_steps_are_short() {
+        let all = subdivided(vec![4.5, 0.0, 1.3, 0.0, 1.5]);
+        assert!([0.0, 1.3, 1.5, 4.5].iter().all(|c| all.contains(c)));
+        assert!(all.windows(2).all(|p| p[1] > p[0] && p[1] - p[0] <= CELL_M + 1e-6));
+    }
+
+    #[test]
+    fn the_frame_of_a_wall_looks_at_it() {
+        for wall in WALLS {
+            let turn = Vec2::from_angle(wall.yaw_deg().to_radians());
+            assert!(turn.distance(wall.right()) < 1e-6);
+            assert!((turn.perp().extend(0.0) + wall.normal()).length() < 1e-6);
+        }
+    }
+}

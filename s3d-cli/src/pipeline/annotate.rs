@@ -1,0 +1,181 @@
+//! From annotated points to labelled faces: votes, instances, floor outlines, wall directions.
+
+use super::inputs::AreaInput;
+use crate::console::Progress;
+use crate::failure::{Failure, Outcome};
+use glam::Vec3;
+use s3d_geom::{
+    Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh, Voxels,
+    dominant_wall_direction_deg,
+};
+use s3d_label::{Class, Label, LabelId, LabelTable, Room, VoteReport, Votes};
+use std::collections::{BTreeMap, HashSet};
+
+/// A share of points far from every face above which it is told.
+const MANY_FAR: f64 = 0.05;
+
+/// A share of labelled faces below which it is told.
+const FEW_LABELLED: f64 = 0.5;
+
+/// An annotated area.
+pub(crate) struct Annotated {
+    /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted.
+    pub(crate) face_labels: Vec<LabelId>,
+    pub(crate) report: VoteReport,
+    /// The rooms, in the order of their names.
+    pub(crate) rooms: Vec<SurveyedRoom>,
+    /// Annotated points.
+    pub(crate) points: u64,
+}
+
+/// What is known of a room from its points and faces.
+pub(crate) struct SurveyedRoom {
+    pub(crate) room: Room,
+    pub(crate) points: u64,
+    pub(crate) footprint: Footprint,
+    /// The box of its points.
+    pub(crate) bbox: Aabb,
+    /// The dominant horizontal direction of its walls, whole degrees in [0, 90).
+    pub(crate) wall_direction_deg: u32,
+}
+
+/// One instance with its points, as [`annotate`] hands it out.
+pub(crate) struct AnnotatedInstance<'a> {
+    pub(crate) label: Label,
+    pub(crate) id: LabelId,
+    /// Its box, and the voxel of each of its points.
+    pub(crate) voxels: &'a Voxels,
+}
+
+/// Reads an area's annotated points, one instance at a time, and lets each vote for its nearest face. `each` gets every
+/// instance with its box and voxels, in the order of rooms and of numbers in the room.
+pub(crate) fn annotate(
+    area: &AreaInput,
+    mesh: &TriMesh,
+    table: &LabelTable,
+    mut each: impl FnMut(&AnnotatedInstance<'_>) -> Outcome<()>,
+) -> Outcome<Annotated> {
+    let nearest_faces = NearestFaces::new(mesh);
+    let mut votes = Votes::new(mesh.faces().len());
+    let mut rooms = Vec::new();
+    let mut total = 0u64;
+    let files = area.rooms.iter().map(|r| r.instances.len()).sum::<usize>();
+    let progress = Progress::new("labelling", "instances", files as u64);
+    let mut cloud = PointCloud::default();
+    let mut nearest: Vec<Nearest> = Vec::new();
+    for room in &area.rooms {
+        let mut builder = FootprintBuilder::new(FootprintOptions::default());
+        let (mut points, mut bbox) = (0u64, Aabb::EMPTY);
+        for instance in &room.instances {
+            let id = table.id_of(&instance.label).unwrap_or(LabelId::NULL);
+            cloud.clear();
+            s3d_io::read_points(&instance.path, &mut cloud)?;
+            let Some(voxels) = Voxels::from_points(&cloud.positions) else {
+                return Err(s3d_io::Error::format(
+                    &instance.path,
+                    "no point in it: remove the file, or annotate the instance",
+                )
+                .into());
+            };
+            nearest_faces.nearest_many(&cloud.positions, &mut nearest);
+            for n in &nearest {
+                votes.add(n.face, id, n.distance_m);
+            }
+            cloud.positions.iter().for_each(|p| builder.add(*p));
+            each(&AnnotatedInstance { label: instance.label, id, voxels: &voxels })?;
+            points += cloud.len() as u64;
+            bbox = bbox.union(voxels.grid.bbox);
+            progress.add(1);
+        }
+        total += points;
+        rooms.push(SurveyedRoom {
+            room: room.room,
+            points,
+            footprint: builder.finish(),
+            bbox,
+            wall_direction_deg: 0,
+        });
+    }
+    let face_labels = votes.face_labels();
+    let mut upright = upright_faces(mesh, table, &face_labels);
+    for room in &mut rooms {
+        room.wall_direction_deg = upright.remove(&room.room).map_or(0, |faces| faces.direction_deg());
+    }
+    if rooms.is_empty() {
+        return Err(Failure::Input(format!("{}: no room in it", area.scene.annotations.display())));
+    }
+    let report = VoteReport::new(&votes, table);
+    Ok(Annotated { face_labels, report, rooms, points: total })
+}
+
+/// What looks wrong between mesh and annotations, as a sentence each.
+pub(crate) fn label_doubts(report: &VoteReport) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let far = report.total.far_points as f64 / report.total.points.max(1) as f64;
+    if far > MANY_FAR {
+        doubts.push(format!(
+            "{:.0} % of the annotated points are farther than 5 cm from every face: do mesh and annotations share a \
+             frame? see `up` in the scene file",
+            100.0 * far
+        ));
+    }
+    let labelled = report.total.faces as f64 / report.face_count.max(1) as f64;
+    if labelled < FEW_LABELLED {
+        doubts.push(format!(
+            "only {:.0} % of the faces get a label: the others are written as {}",
+            100.0 * labelled,
+            s3d_label::NULL_NAME
+        ));
+    }
+    doubts
+}
+
+/// A sentence on the instances that no face is labelled with, if there are some: they are in the label table, but in no
+/// image and no sampled point.
+pub(crate) fn hidden_instances(
+    area: &AreaInput,
+    face_labels: &[LabelId],
+    table: &LabelTable,
+) -> Option<String> {
+    let seen: HashSet<LabelId> = face_labels.iter().copied().collect();
+    let instances = area.rooms.iter().flat_map(|r| &r.instances);
+    let mut hidden = instances.filter(|i| table.id_of(&i.label).is_none_or(|id| !seen.contains(&id)));
+    let first = hidden.next()?;
+    Some(format!(
+        "{} annotated instances win no face of the mesh, the first {}: they are in no image and no sampled point",
+        1 + hidden.count(),
+        first.path.display()
+    ))
+}
+
+/// The faces of a room that tell how its walls run: normals and areas.
+#[derive(Default)]
+struct UprightFaces {
+    walls: Vec<(Vec3, f64)>,
+    others: Vec<(Vec3, f64)>,
+}
+
+impl UprightFaces {
+    /// The dominant direction of the walls, or of all faces if no wall is annotated; 0 if none stands upright.
+    fn direction_deg(self) -> u32 {
+        let of = |faces: Vec<(Vec3, f64)>| dominant_wall_direction_deg(faces.into_iter());
+        of(self.walls).or_else(|| of(self.others)).map_or(0, |deg| deg.round() as u32 % 90)
+    }
+}
+
+/// The normals and areas of each room's faces.
+fn upright_faces(
+    mesh: &TriMesh,
+    table: &LabelTable,
+    face_labels: &[LabelId],
+) -> BTreeMap<Room, UprightFaces> {
+    let mut rooms: BTreeMap<Room, UprightFaces> = BTreeMap::new();
+    for (face, label) in (0u32..).zip(face_labels) {
+        if let Some(label) = table.get(*label) {
+            let room = rooms.entry(label.room).or_default();
+            let faces = if label.class == Class::Wall { &mut room.walls } else { &mut room.others };
+            faces.push((mesh.normal(face), mesh.area(face)));
+        }
+    }
+    rooms
+}

@@ -1,0 +1,95 @@
+//! The images of an area: each view cast once, every modality from the same hits, each file written whole.
+
+use super::modality::{Image, Look};
+use super::views::Candidate;
+use super::work::for_each_in_order;
+use crate::console::Progress;
+use crate::failure::Outcome;
+use s3d_geom::Camera;
+use s3d_io::{Domain, Frame, Layout, PoseFile, ScanLocation, create_dir, write_bytes};
+use s3d_label::Room;
+use s3d_render::cast;
+use std::cell::LazyCell;
+
+/// What is rendered, and where it goes.
+pub(crate) struct ImageJob<'a> {
+    pub(crate) layout: &'a Layout,
+    pub(crate) area: u32,
+    pub(crate) look: Look<'a>,
+    pub(crate) locations: &'a [ScanLocation],
+    /// The room of each location.
+    pub(crate) rooms: &'a [Room],
+    /// Whether a location's images are asked for.
+    pub(crate) chosen: &'a [bool],
+    pub(crate) modalities: &'a [Domain],
+    pub(crate) size: u32,
+    pub(crate) pano_width: u32,
+}
+
+/// How many images were written.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ImageCount {
+    pub(crate) panoramas: u64,
+    pub(crate) views: u64,
+}
+
+/// One image in all its modalities.
+struct Shot {
+    location: usize,
+    frame: Frame,
+    camera: Camera,
+}
+
+/// Renders and writes the panoramas of the chosen locations and their kept views.
+pub(crate) fn write_images(job: &ImageJob<'_>, candidates: &[Candidate]) -> Outcome<ImageCount> {
+    let shots = shots(job, candidates);
+    for domain in job.modalities {
+        for frame in [Frame::Panorama, Frame::View(0)] {
+            create_dir(&job.layout.image_dir(job.area, frame, *domain))?;
+        }
+    }
+    let progress = Progress::new("rendering", "images", shots.len() as u64);
+    for_each_in_order(&shots, |shot| {
+        write_shot(job, shot)?;
+        progress.add(1);
+        Ok(())
+    })?;
+    let panoramas = shots.iter().filter(|s| s.frame == Frame::Panorama).count() as u64;
+    Ok(ImageCount { panoramas, views: shots.len() as u64 - panoramas })
+}
+
+/// The images to take: of each location its panorama, which takes longest, and then its views.
+fn shots(job: &ImageJob<'_>, candidates: &[Candidate]) -> Vec<Shot> {
+    let mut shots = Vec::new();
+    let mut views = candidates.iter().filter(|c| c.area == job.area).peekable();
+    for (location, scan) in job.locations.iter().enumerate() {
+        if job.chosen[location] {
+            let camera = Camera::equirectangular(scan.pose, job.pano_width);
+            shots.push(Shot { location, frame: Frame::Panorama, camera });
+        }
+        while let Some(c) = views.next_if(|c| c.location == location) {
+            if let (true, Some(number)) = (job.chosen[location], c.frame_num) {
+                shots.push(Shot { location, frame: Frame::View(number), camera: c.camera(scan, job.size) });
+            }
+        }
+    }
+    shots
+}
+
+fn write_shot(job: &ImageJob<'_>, shot: &Shot) -> Outcome<()> {
+    let scan = &job.locations[shot.location];
+    let room = job.rooms[shot.location].to_string();
+    // Poses alone need no rays.
+    let hits = LazyCell::new(|| cast(job.look.scene, &shot.camera));
+    for &domain in job.modalities {
+        let bytes = match Image::of(domain) {
+            Some(image) => job.look.encode(image, &hits, &shot.camera),
+            None => {
+                let room = format!("{room}_{}", job.area);
+                PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame).to_json()
+            }
+        };
+        write_bytes(&job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain), &bytes)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,161 @@
+//! The tables beside the images: rooms, votes, instance numbers, views, splits. Each is a JSON file that says what its
+//! keys mean by their names.
+
+use super::annotate::Annotated;
+use super::inputs::AreaInput;
+use super::views::Candidate;
+use crate::failure::Outcome;
+use s3d_io::{Layout, Split, write_json};
+use s3d_label::{VoteReport, VoteRow};
+use s3d_sample::Fold;
+use serde::{Deserialize, Serialize};
+
+/// A room of `rooms.json`.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct RoomRecord {
+    /// Such as `office_3`.
+    pub(crate) room: String,
+    /// Annotated points.
+    pub(crate) points: u64,
+    pub(crate) floor_m2: f64,
+    /// The dominant horizontal direction of the walls, whole degrees in [0, 90).
+    pub(crate) wall_direction_deg: u32,
+    /// The floor outline: polygons, each a ring around it (counter-clockwise) and rings around its holes (clockwise), of
+    /// world x and y in metres.
+    pub(crate) outline: Vec<OutlineRecord>,
+}
+
+/// One polygon of an outline.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct OutlineRecord {
+    outer: Vec<[f64; 2]>,
+    holes: Vec<Vec<[f64; 2]>>,
+}
+
+/// Writes `area_N/3d/rooms.json`.
+pub(crate) fn write_rooms(layout: &Layout, area: u32, annotated: &Annotated) -> Outcome<()> {
+    let ring = |points: &[glam::DVec2]| points.iter().map(|p| p.to_array()).collect::<Vec<_>>();
+    let rooms: Vec<RoomRecord> = annotated
+        .rooms
+        .iter()
+        .map(|r| RoomRecord {
+            room: r.room.to_string(),
+            points: r.points,
+            floor_m2: r.footprint.area_m2,
+            wall_direction_deg: r.wall_direction_deg,
+            outline: r
+                .footprint
+                .polygons
+                .iter()
+                .map(|p| OutlineRecord {
+                    outer: ring(&p.outer),
+                    holes: p.holes.iter().map(|h| ring(h)).collect(),
+                })
+                .collect(),
+        })
+        .collect();
+    write_json(&layout.rooms_json(area), &rooms)?;
+    Ok(())
+}
+
+#[derive(Serialize)]
+struct VoteRecord {
+    points: u64,
+    points_farther_than_5_cm: u64,
+    faces_voted: u64,
+    votes_per_voted_face: f64,
+    faces_contested: u64,
+    faces_won_with_less_than_three_quarters: u64,
+    faces_won_with_less_than_half: u64,
+}
+
+impl From<&VoteRow> for VoteRecord {
+    fn from(row: &VoteRow) -> Self {
+        Self {
+            points: row.points,
+            points_farther_than_5_cm: row.far_points,
+            faces_voted: row.faces,
+            votes_per_voted_face: row.mean_votes_per_face(),
+            faces_contested: row.contested,
+            faces_won_with_less_than_three_quarters: row.contested_below_three_quarters,
+            faces_won_with_less_than_half: row.contested_below_half,
+        }
+    }
+}
+
+/// Writes `area_N/3d/votes.json`: the report on the voting, in all, per room and per class.
+pub(crate) fn write_votes(layout: &Layout, area: u32, report: &VoteReport) -> Outcome<()> {
+    #[derive(Serialize)]
+    struct Named {
+        name: String,
+        #[serde(flatten)]
+        row: VoteRecord,
+    }
+    #[derive(Serialize)]
+    struct Votes {
+        faces: u64,
+        faces_without_votes: u64,
+        total: VoteRecord,
+        rooms: Vec<Named>,
+        classes: Vec<Named>,
+    }
+    let votes = Votes {
+        faces: report.face_count,
+        faces_without_votes: report.faces_without_vote,
+        total: (&report.total).into(),
+        rooms: report
+            .rooms
+            .iter()
+            .map(|(_, r, row)| Named { name: r.to_string(), row: row.into() })
+            .collect(),
+        classes: report
+            .classes
+            .iter()
+            .map(|(c, row)| Named { name: c.to_string(), row: row.into() })
+            .collect(),
+    };
+    write_json(&layout.votes_json(area), &votes)?;
+    Ok(())
+}
+
+/// Writes `area_N/3d/instance_numbers.json`: which label each instance of the annotation tree, whose numbers run per
+/// room, has in the area.
+pub(crate) fn write_instance_numbers(layout: &Layout, area: &AreaInput) -> Outcome<()> {
+    #[derive(Serialize)]
+    struct Mapping {
+        room: String,
+        class: &'static str,
+        number_in_room: u32,
+        label: String,
+    }
+    let mappings: Vec<Mapping> = area
+        .rooms
+        .iter()
+        .flat_map(|r| &r.instances)
+        .map(|i| Mapping {
+            room: i.label.room.to_string(),
+            class: i.label.class.name(),
+            number_in_room: i.number_in_room,
+            label: i.label.to_string(),
+        })
+        .collect();
+    write_json(&layout.instance_numbers_json(area.scene.area), &mappings)?;
+    Ok(())
+}
+
+/// Writes `area_N/views.json`: every candidate view with its draw, its entropy and, if it was kept, its frame number.
+pub(crate) fn write_views(layout: &Layout, area: u32, candidates: &[Candidate]) -> Outcome<()> {
+    let of_area: Vec<&Candidate> = candidates.iter().filter(|c| c.area == area).collect();
+    write_json(&layout.views_json(area), &of_area)?;
+    Ok(())
+}
+
+/// Writes `splits.json`: the folds that the present areas allow.
+pub(crate) fn write_splits(layout: &Layout, folds: &[Fold]) -> Outcome<()> {
+    let splits: Vec<Split> = folds
+        .iter()
+        .map(|f| Split { fold: f.number, train_areas: f.train.clone(), test_areas: f.test.clone() })
+        .collect();
+    s3d_io::write_splits(&layout.splits(), &splits)?;
+    Ok(())
+}
