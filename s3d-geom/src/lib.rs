@@ -17,6 +17,8 @@
 mod aabb;
 mod camera;
 mod cloud;
+mod curve;
+mod face_tree;
 mod footprint;
 mod merge;
 mod mesh;
@@ -29,8 +31,10 @@ mod repeated;
 mod surface;
 mod texture;
 mod triangle;
+mod triangle8;
 mod voxel;
 mod wall_direction;
+mod wide;
 
 pub use aabb::Aabb;
 pub use camera::{Camera, Projection, Rays};
@@ -41,7 +45,7 @@ pub use mesh::{DEFAULT_COLOR, FaceColor, Material, MeshError, MeshParts, MeshRep
 pub use nearest::{Nearest, NearestFaces, nearest_brute_force};
 pub use polygon::{Polygon, PolygonError, triangulate_face};
 pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
-pub use primitives::{cuboid, cylinder, furnished_room, grid, quad, room, scan_like};
+pub use primitives::{cuboid, cylinder, furnished_room, grid, quad, room, scan_like, scan_like_rooms};
 pub use raster::Raster;
 pub use surface::{Density, SurfaceSampler};
 pub use texture::{Texture, Wrap, sample_bilinear};

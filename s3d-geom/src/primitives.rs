@@ -138,16 +138,27 @@ pub fn furnished_room(seed: u64) -> TriMesh {
     checked(parts)
 }
 
+/// A mesh of exactly `faces` or `faces` − 1 triangles that looks like a scan: [`scan_like_rooms`], with 3 rooms and one
+/// more for every 25,000 faces, 24 at most.
+///
+/// # Panics
+/// If `faces` is below 2,000.
+pub fn scan_like(faces: usize, seed: u64) -> TriMesh {
+    scan_like_rooms((3 + faces / 25_000).min(24) as u32, faces, seed)
+}
+
 /// A mesh of exactly `faces` or `faces` − 1 triangles that looks like a scan: rooms behind each other along +Y, joined
 /// by doorways, with furniture in them; jittered vertices, 4 % of faces split, half of them into slivers, and small
 /// holes. From (0, 0, 0) on, 6 m wide; a point 1.5 m above (3, 2.5) stands free in the first room. Same `seed`, same
 /// mesh.
 ///
 /// # Panics
-/// If `faces` is below 2,000.
-pub fn scan_like(faces: usize, seed: u64) -> TriMesh {
-    assert!(faces >= 2000, "a scan of {faces} faces");
-    let rooms = (3 + faces / 25_000).min(24) as u32;
+/// If there is no room, or fewer than 600 faces a room or 2,000 in all.
+pub fn scan_like_rooms(rooms: u32, faces: usize, seed: u64) -> TriMesh {
+    assert!(
+        rooms > 0 && faces >= 2000.max(600 * rooms as usize),
+        "a scan of {faces} faces and {rooms} rooms"
+    );
     // As many faces as that on about 190 m² a room, then coarser until there is room for the splits.
     let mut cell = (2.0 * 190.0 * rooms as f32 / faces as f32).sqrt();
     let mut parts = loop {
@@ -164,13 +175,17 @@ pub fn scan_like(faces: usize, seed: u64) -> TriMesh {
         *p += vec3(jitter(&mut rng, amplitude), jitter(&mut rng, amplitude), jitter(&mut rng, amplitude));
     }
     // Neighbours in the list are neighbours on the surface, so a run of faces is a strip that the scanner missed.
+    let mut missed = vec![false; parts.faces.len()];
     for _ in 0..faces / 2000 {
         let start = rng.random_range(0..parts.faces.len() - 8);
-        for column in [&mut parts.faces, &mut parts.face_uvs] {
-            column.drain(start..start + 8);
-        }
-        parts.face_materials.drain(start..start + 8);
+        missed[start..start + 8].fill(true);
     }
+    for column in [&mut parts.faces, &mut parts.face_uvs] {
+        let mut at = missed.iter();
+        column.retain(|_| at.next() != Some(&true));
+    }
+    let mut at = missed.iter();
+    parts.face_materials.retain(|_| at.next() != Some(&true));
     while parts.faces.len() + 2 <= faces {
         let face = rng.random_range(0..parts.faces.len());
         // Weights of the new vertex; one of nearly nothing makes a sliver along the edge opposite to that corner.

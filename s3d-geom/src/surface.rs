@@ -2,6 +2,7 @@
 //!
 //! The published clouds are made like this: densely and uniformly from the textured mesh.
 
+use crate::wide::{self, Work};
 use crate::{FaceColor, PointCloud, TriMesh};
 use glam::{DVec3, Vec3};
 use rand::{Rng, SeedableRng};
@@ -151,46 +152,63 @@ impl<'m> SurfaceSampler<'m> {
             .enumerate()
             .for_each(|(chunk, ((positions, colors), faces))| {
                 let first = range.start + (chunk * CHUNK) as u64;
-                self.fill(first, positions, colors, faces);
+                wide::run(Draw { sampler: self, first, positions, colors, faces });
             });
     }
+}
 
-    /// Draws the points from `first` on, as many as the slices hold.
-    fn fill(&self, first: u64, positions: &mut [Vec3], colors: &mut [[u8; 3]], faces: &mut [u32]) {
-        let mut rng = self.rng.clone();
+/// Draws the points from `first` on, as many as the slices hold.
+struct Draw<'a> {
+    sampler: &'a SurfaceSampler<'a>,
+    first: u64,
+    positions: &'a mut [Vec3],
+    colors: &'a mut [[u8; 3]],
+    faces: &'a mut [u32],
+}
+
+impl Work for Draw<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Draw { sampler, first, positions, colors, faces } = self;
+        let mut rng = sampler.rng.clone();
         rng.set_word_pos(u128::from(first) * WORDS);
         let mut position = usize::MAX;
         let mut patch = None;
         for (k, ((point, color), face)) in positions.iter_mut().zip(colors).zip(faces).enumerate() {
             let place = place(&mut rng, first + k as u64);
             if position == usize::MAX {
-                position = self.ends.partition_point(|&end| end <= place);
+                position = sampler.ends.partition_point(|&end| end <= place);
             }
-            while self.ends[position] <= place {
+            while sampler.ends[position] <= place {
                 position += 1;
                 patch = None;
             }
-            let patch = patch.get_or_insert_with(|| Patch::new(self.mesh, self.faces[position]));
+            let patch = patch.get_or_insert_with(|| Patch::new(sampler.mesh, sampler.faces[position]));
             let weights = barycentric(unit(&mut rng), unit(&mut rng));
             *point = patch.point(weights);
             *color = patch.color(weights);
-            *face = self.faces[position];
+            *face = sampler.faces[position];
         }
     }
 }
 
 /// Uniform in [0, 1).
+#[inline(always)]
 fn unit(rng: &mut ChaCha8Rng) -> f64 {
     f64::from(rng.next_u32()) * (1.0 / 4_294_967_296.0)
 }
 
 /// Where point `i` lies along the cumulative area, counted in points: in [i, i + 1], ascending with i. `rng` stands at
 /// the point's first word.
+#[inline(always)]
 fn place(rng: &mut ChaCha8Rng, i: u64) -> f64 {
     i as f64 + unit(rng)
 }
 
 /// Takes the unit square to a triangle, uniformly: the upper half of the square is folded onto the lower.
+#[inline(always)]
 fn barycentric(u: f64, v: f64) -> [f64; 3] {
     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
     [1.0 - u - v, u, v]
@@ -208,11 +226,13 @@ impl<'m> Patch<'m> {
     }
 
     /// In `f64`, so that a point is off its face by the rounding of its coordinates only.
+    #[inline(always)]
     fn point(&self, [wa, wb, wc]: [f64; 3]) -> Vec3 {
         let [a, b, c] = self.corners;
         (a * wa + b * wb + c * wc).as_vec3()
     }
 
+    #[inline(always)]
     fn color(&self, [wa, wb, wc]: [f64; 3]) -> [u8; 3] {
         match self.color {
             FaceColor::Texture(_, texture, uvs) => {

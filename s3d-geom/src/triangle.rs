@@ -23,12 +23,22 @@ impl SortedTriangle {
         Self(corners.map(Vec3A::from))
     }
 
-    /// A lower bound of the squared distance to `point`, up to `f32` rounding: that to the bounding box.
-    #[inline]
-    pub(crate) fn box_distance_squared(&self, point: Vec3A) -> f32 {
-        let [a, b, c] = self.0;
-        let outside = (a.min(b).min(c) - point).max(point - a.max(b).max(c)).max(Vec3A::ZERO);
-        outside.length_squared()
+    /// Takes corners that [`SortedTriangle::corners`] gave.
+    #[inline(always)]
+    pub(crate) fn from_sorted(corners: [Vec3A; 3]) -> Self {
+        Self(corners)
+    }
+
+    /// The corners in ascending order.
+    pub(crate) fn corners(&self) -> [Vec3A; 3] {
+        self.0
+    }
+
+    /// The length of the longest edge, and the square of the normal, which is as long as twice the area.
+    pub(crate) fn longest_and_normal_squared(&self) -> (f64, f64) {
+        let [a, b, c] = self.0.map(|p| p.as_dvec3());
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        (longest, (b - a).cross(c - a).length_squared())
     }
 
     /// The squared distance to `point` and the nearest point. The distance is never below that to the bounding box.
@@ -171,8 +181,6 @@ mod tests {
             let grid = by_grid(corners, point);
             prop_assert!(d2.sqrt() <= grid + 1e-9 && d2.sqrt() > grid - 0.3, "{} or {}", d2.sqrt(), grid);
             prop_assert!((point.distance(q) - d2.sqrt()).abs() < 1e-7);
-            let low = SortedTriangle::new(corners).box_distance_squared(point.as_vec3().into());
-            prop_assert!(f64::from(low) <= d2 * (1.0 + 1e-6) + 1e-37);
         }
 
         #[test]

@@ -1,0 +1,365 @@
+//! A bounding volume hierarchy over the faces of a mesh, eight boxes or triangles at a time.
+
+use crate::triangle::SortedTriangle;
+use crate::triangle8::Triangles8;
+use crate::wide::{at_most, least, max, min};
+use crate::{Aabb, NO_INDEX, TriMesh};
+use glam::{DVec3, Vec3, Vec3A};
+use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris, node::Bvh2Node};
+use obvhs::{BvhBuildParams, triangle::Triangle};
+use std::time::Duration;
+
+/// The hierarchy.
+pub(crate) struct FaceTree {
+    /// The root first.
+    nodes: Vec<Node8>,
+    leaves: Vec<Triangles8>,
+}
+
+/// Up to eight boxes and what is in them.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+struct Node8 {
+    low: [[f32; 8]; 3],
+    high: [[f32; 8]; 3],
+    /// Below [`LEAF`] a node, else that plus a leaf.
+    children: [u32; 8],
+    count: u32,
+}
+
+const LEAF: u32 = 1 << 31;
+
+/// Triangles that a leaf holds at most.
+const LEAF_SIZE: usize = 8;
+
+/// The nearest triangle.
+#[derive(Clone, Copy)]
+pub(crate) struct Best {
+    /// The leaf that it is in: a good guess for a point near this one.
+    pub(crate) leaf: u32,
+    pub(crate) face: u32,
+    pub(crate) distance_squared: f64,
+    pub(crate) point: DVec3,
+}
+
+/// A search, and memory for it.
+pub(crate) struct Search<'t> {
+    tree: &'t FaceTree,
+    near: [f32; 3],
+    exact: DVec3,
+    best: Best,
+    /// What is farther than this (squared) is not the nearest: the distance to something and more than the rounding of the
+    /// bounds, which is below 1e-6 of them, or 1e-44 where numbers get that small.
+    prune_beyond: f32,
+    /// Boxes to look into, with their squared distance.
+    open: Vec<(f32, u32)>,
+    /// Triangles that may be the nearest: the least squared distance, leaf and lane.
+    candidates: Vec<(f32, u32, u32)>,
+}
+
+impl FaceTree {
+    pub(crate) fn new(mesh: &TriMesh) -> Self {
+        let bvh = build_bvh(mesh);
+        let sizes = faces_below(&bvh);
+        let mut tree = Self { nodes: vec![Node8::new()], leaves: Vec::new() };
+        // A node of ours, and the one of theirs that it opens.
+        let mut open = vec![(0, 0)];
+        while let Some((own, theirs)) = open.pop() {
+            for child in eight_below(&bvh, &sizes, theirs) {
+                let id = if sizes[child] <= LEAF_SIZE {
+                    let triangle = |face: u32| (face, SortedTriangle::new(mesh.triangle(face)));
+                    let members: Vec<_> = faces_of(&bvh, child).map(triangle).collect();
+                    tree.leaves.push(Triangles8::new(&members));
+                    LEAF + (tree.leaves.len() - 1) as u32
+                } else {
+                    tree.nodes.push(Node8::new());
+                    open.push((tree.nodes.len() - 1, child));
+                    (tree.nodes.len() - 1) as u32
+                };
+                tree.nodes[own].push(bvh.nodes[child].aabb(), id);
+            }
+        }
+        tree
+    }
+
+    /// Where a search for points of `around` may start that finds nothing farther than the root of `reach_squared`: leaves,
+    /// or nodes above them if these get many.
+    #[inline(always)]
+    pub(crate) fn starts_near(&self, around: Aabb, reach_squared: f32, starts: &mut Starts) {
+        let (low, high) = (around.min.to_array(), around.max.to_array());
+        starts.nodes.clear();
+        starts.open.clear();
+        starts.open.push(0);
+        let mut next = 0;
+        while next < starts.open.len() {
+            let node = &self.nodes[starts.open[next] as usize];
+            next += 1;
+            let squares = node.distances_squared(low, high);
+            let mut within = at_most(&squares, reach_squared * ENOUGH) & node.lanes();
+            while within != 0 {
+                let lane = within.trailing_zeros() as usize;
+                within &= within - 1;
+                let child = node.children[lane];
+                if child < LEAF && starts.open.len() < MOST_OPENED {
+                    starts.open.push(child);
+                } else {
+                    if starts.nodes.last().is_none_or(|last| last.count == 8) {
+                        starts.nodes.push(Node8::new());
+                    }
+                    if let Some(last) = starts.nodes.last_mut() {
+                        last.copy(node, lane);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// More than rounding takes from a squared distance.
+const ENOUGH: f32 = 1.00001;
+
+/// Nodes that are opened for a group of points.
+const MOST_OPENED: usize = 24;
+
+/// Where searches start: [`FaceTree::starts_near`].
+#[derive(Default)]
+pub(crate) struct Starts {
+    nodes: Vec<Node8>,
+    open: Vec<u32>,
+}
+
+impl<'t> Search<'t> {
+    pub(crate) fn new(tree: &'t FaceTree) -> Self {
+        let best = Best { leaf: 0, face: NO_INDEX, distance_squared: f64::INFINITY, point: DVec3::ZERO };
+        let (open, candidates) = (Vec::with_capacity(64), Vec::with_capacity(64));
+        Self { tree, near: [0.0; 3], exact: DVec3::ZERO, best, prune_beyond: f32::INFINITY, open, candidates }
+    }
+
+    /// Finds the triangle nearest to `point`, the smallest face among equally near ones. The search begins in the leaf
+    /// `guess`, which costs or saves time and changes nothing else: what is pruned is farther than the best, not as far.
+    #[inline(always)]
+    pub(crate) fn nearest(&mut self, point: Vec3, guess: u32) -> Best {
+        self.nearest_below(&self.tree.nodes[..1], point, guess);
+        self.best
+    }
+
+    /// The same for a point of the box and starts of [`FaceTree::starts_near`], if it is no farther than what they reach.
+    #[inline(always)]
+    pub(crate) fn nearest_from(
+        &mut self,
+        starts: &Starts,
+        reach_squared: f32,
+        point: Vec3,
+        guess: u32,
+    ) -> Option<Best> {
+        self.nearest_below(&starts.nodes, point, guess);
+        (self.prune_beyond <= reach_squared).then_some(self.best)
+    }
+
+    #[inline(always)]
+    fn nearest_below(&mut self, starts: &[Node8], point: Vec3, guess: u32) {
+        self.near = point.to_array();
+        self.exact = point.as_dvec3();
+        self.best.distance_squared = f64::INFINITY;
+        self.best.face = NO_INDEX;
+        self.prune_beyond = f32::INFINITY;
+        self.open.clear();
+        self.candidates.clear();
+        self.visit(guess);
+        for start in starts {
+            self.enter(start);
+        }
+        while let Some((bound, child)) = self.open.pop() {
+            if bound > self.prune_beyond || child == LEAF + guess {
+                continue;
+            }
+            if child >= LEAF {
+                self.visit(child - LEAF);
+            } else {
+                self.enter(&self.tree.nodes[child as usize]);
+            }
+        }
+        for i in 0..self.candidates.len() {
+            let (bound, leaf, lane) = self.candidates[i];
+            if bound <= self.prune_beyond {
+                self.measure(leaf, lane as usize);
+            }
+        }
+    }
+
+    /// Opens the boxes of a node within reach, the nearest on top.
+    #[inline(always)]
+    fn enter(&mut self, node: &Node8) {
+        let squares = node.distances_squared(self.near, self.near);
+        let mut within = at_most(&squares, self.prune_beyond) & node.lanes();
+        let bottom = self.open.len();
+        while within != 0 {
+            let lane = within.trailing_zeros() as usize;
+            within &= within - 1;
+            self.open.push((squares[lane], node.children[lane]));
+            let mut at = self.open.len() - 1;
+            while at > bottom && self.open[at - 1].0 < self.open[at].0 {
+                self.open.swap(at - 1, at);
+                at -= 1;
+            }
+        }
+    }
+
+    /// Looks at the triangles of a leaf.
+    #[inline(always)]
+    fn visit(&mut self, leaf: u32) {
+        let triangles = &self.tree.leaves[leaf as usize];
+        let bounds = triangles.bounds(self.near);
+        let most = least(&bounds.most);
+        self.prune_beyond = min(most, self.prune_beyond);
+        let mut within = at_most(&bounds.least, self.prune_beyond) & triangles.lanes();
+        while within != 0 {
+            let lane = within.trailing_zeros();
+            within &= within - 1;
+            if most < f32::INFINITY {
+                self.candidates.push((bounds.least[lane as usize], leaf, lane));
+            } else {
+                // Nothing is known of these, and something has to be.
+                self.measure(leaf, lane as usize);
+            }
+        }
+    }
+
+    /// The exact distance of a triangle.
+    #[inline(always)]
+    fn measure(&mut self, leaf: u32, lane: usize) {
+        let triangles = &self.tree.leaves[leaf as usize];
+        let (distance_squared, point) = triangles.triangle(lane).closest(self.exact);
+        let face = triangles.face(lane);
+        let best = &self.best;
+        if distance_squared < best.distance_squared
+            || distance_squared == best.distance_squared && face < best.face
+        {
+            self.best = Best { leaf, face, distance_squared, point };
+            self.prune_beyond = min((distance_squared * (1.0 + 2e-6) + 1e-37) as f32, self.prune_beyond);
+        }
+    }
+}
+
+impl Node8 {
+    fn new() -> Self {
+        Self { low: [[0.0; 8]; 3], high: [[0.0; 8]; 3], children: [0; 8], count: 0 }
+    }
+
+    fn push(&mut self, aabb: &obvhs::aabb::Aabb, child: u32) {
+        let lane = self.count as usize;
+        for axis in 0..3 {
+            self.low[axis][lane] = aabb.min[axis];
+            self.high[axis][lane] = aabb.max[axis];
+        }
+        self.children[lane] = child;
+        self.count += 1;
+    }
+
+    /// The lanes that hold a box, as bits.
+    #[inline(always)]
+    fn lanes(&self) -> u32 {
+        (1 << self.count) - 1
+    }
+
+    /// Takes over a child of another node.
+    #[inline(always)]
+    fn copy(&mut self, node: &Node8, lane: usize) {
+        let own = self.count as usize;
+        for axis in 0..3 {
+            self.low[axis][own] = node.low[axis][lane];
+            self.high[axis][own] = node.high[axis][lane];
+        }
+        self.children[own] = node.children[lane];
+        self.count += 1;
+    }
+
+    /// The squared distances from the boxes to that between `low` and `high`, up to rounding.
+    #[inline(always)]
+    fn distances_squared(&self, low: [f32; 3], high: [f32; 3]) -> [f32; 8] {
+        let mut squares = [0.0; 8];
+        for (lane, square) in squares.iter_mut().enumerate() {
+            let outside = |axis: usize| {
+                max(max(self.low[axis][lane] - high[axis], low[axis] - self.high[axis][lane]), 0.0)
+            };
+            let (x, y, z) = (outside(0), outside(1), outside(2));
+            *square = x * x + y * y + z * z;
+        }
+        squares
+    }
+}
+
+/// The nodes below `node`, or it alone if it is to be a leaf: its children, of which the largest are opened as long as there
+/// are no more than eight.
+fn eight_below(bvh: &Bvh2, sizes: &[usize], node: usize) -> Vec<usize> {
+    let mut below = vec![node];
+    while below.len() < 8 {
+        let area = |&at: &usize| bvh.nodes[below[at]].aabb().half_area();
+        let inner = (0..below.len()).filter(|&at| sizes[below[at]] > LEAF_SIZE);
+        let Some(largest) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+        let first = bvh.nodes[below[largest]].first_index as usize;
+        below[largest] = first;
+        below.push(first + 1);
+    }
+    below
+}
+
+/// The nodes at and below `node`, each before those below it.
+fn nodes_from(bvh: &Bvh2, node: usize) -> impl Iterator<Item = (usize, &Bvh2Node)> {
+    let mut open = vec![node];
+    std::iter::from_fn(move || {
+        let at = open.pop()?;
+        let node = &bvh.nodes[at];
+        if !node.is_leaf() {
+            open.extend([node.first_index as usize + 1, node.first_index as usize]);
+        }
+        Some((at, node))
+    })
+}
+
+fn faces_of(bvh: &Bvh2, node: usize) -> impl Iterator<Item = u32> {
+    nodes_from(bvh, node).filter(|(_, node)| node.is_leaf()).flat_map(|(_, leaf)| {
+        let first = leaf.first_index as usize;
+        bvh.primitive_indices[first..first + leaf.prim_count as usize].iter().copied()
+    })
+}
+
+/// How many faces are below each node.
+fn faces_below(bvh: &Bvh2) -> Vec<usize> {
+    let mut sizes = vec![0; bvh.nodes.len()];
+    let order: Vec<usize> = nodes_from(bvh, 0).map(|(at, _)| at).collect();
+    for at in order.into_iter().rev() {
+        let node = &bvh.nodes[at];
+        let first = node.first_index as usize;
+        sizes[at] = if node.is_leaf() { node.prim_count as usize } else { sizes[first] + sizes[first + 1] };
+    }
+    sizes
+}
+
+/// Beyond this the builder's surface areas would overflow.
+const LARGEST_COORDINATE: f32 = 1e15;
+
+/// The hierarchy of two boxes a node that ours is made from. Its leaves hold no more than [`LEAF_SIZE`] faces.
+fn build_bvh(mesh: &TriMesh) -> Bvh2 {
+    let bounds = mesh.aabb();
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let scale = if largest > LARGEST_COORDINATE { LARGEST_COORDINATE / largest } else { 1.0 };
+    let triangles: Vec<Triangle> = (0..mesh.faces().len() as u32)
+        .map(|face| {
+            let [v0, v1, v2] = mesh.triangle(face).map(|p| Vec3A::from(p * scale));
+            Triangle { v0, v1, v2 }
+        })
+        .collect();
+    let params = BvhBuildParams { max_prims_per_leaf: LEAF_SIZE as u32, ..BvhBuildParams::medium_build() };
+    let mut bvh = build_bvh2_from_tris(&triangles, params, &mut Duration::default());
+    if scale != 1.0 {
+        for node in bvh.nodes.iter_mut().filter(|node| node.is_leaf()) {
+            let members = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+            let corners = bvh.primitive_indices[members].iter().flat_map(|&face| mesh.triangle(face));
+            let bounds = Aabb::from_points(corners);
+            node.set_aabb(obvhs::aabb::Aabb::new(bounds.min.into(), bounds.max.into()));
+        }
+        bvh.refit_all();
+    }
+    bvh
+}

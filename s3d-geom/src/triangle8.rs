@@ -1,0 +1,261 @@
+//! Eight triangles at once: a lower bound of their distances, so that few need the exact one.
+//!
+//! **The bound.** Seen from the point, let the corners of a triangle T be a, b and c. For every direction q, all of T
+//! lies at least min(q·a, q·b, q·c)/|q| along it, so T is no nearer than that; for q the nearest point of T, it is the
+//! distance itself. A good q is found with plain `f32` arithmetic, region by region; wherever rounding takes it, the
+//! bound holds, and only the arithmetic of the bound has to be accounted for:
+//! - Corners seen from the point are rounded by 2⁻²⁴ of their length, three-term dot products by 3·2⁻²⁴ |q||v|. With
+//!   R ≥ |v| for all corners v, that is below 3e-7 R of the distance; 1e-6 R is taken off.
+//! - The reference is not the distance but [`SortedTriangle::closest`], in `f64`. Where it takes the foot on the plane, it
+//!   may have taken a foot outside of a thin triangle for one inside: its weights, the areas of three small triangles
+//!   times the triangle's own, are off by at most 32·2⁻⁵³ L²R², L being the longest edge, and n², their sum, is all the
+//!   smaller for it. Barycentric coordinates that are off by η move the foot by up to 4 η L, so the reference may be
+//!   below the distance by 128·2⁻⁵³ L³R²/n². That is taken off, too: `thinness` is 2⁻⁴⁵ L³/n².
+//! - Other roundings of the reference are below 1e-7 R (see [`SortedTriangle`]: thinner triangles than 1e-8 are measured
+//!   by their edges).
+//!
+//! Where numbers get so large or small that they overflow or lose digits, the bound is 0.
+
+use crate::triangle::SortedTriangle;
+use crate::wide::{max, min};
+use glam::Vec3A;
+
+/// Edges shorter than this give no bound, as their squares have few digits left.
+const SMALLEST: f64 = 1e-12;
+
+/// Up to eight triangles, lane by lane.
+#[derive(Clone, Debug)]
+#[repr(C, align(32))]
+pub(crate) struct Triangles8 {
+    /// Corners a, b and c, each x, y and z; the last triangle fills lanes that are left.
+    corners: [[[f32; 8]; 3]; 3],
+    /// Twice the longest edge.
+    reach: [f32; 8],
+    /// See above.
+    thinness: [f32; 8],
+    faces: [u32; 8],
+    count: u32,
+}
+
+/// What the squared distances are at least and at most, but for a rounding of 1e-6 of them.
+pub(crate) struct Bounds {
+    pub(crate) least: [f32; 8],
+    /// Infinite where nothing is known.
+    pub(crate) most: [f32; 8],
+}
+
+impl Triangles8 {
+    /// Takes one to eight triangles with their faces.
+    pub(crate) fn new(triangles: &[(u32, SortedTriangle)]) -> Self {
+        let mut out = Self {
+            corners: [[[0.0; 8]; 3]; 3],
+            reach: [0.0; 8],
+            thinness: [0.0; 8],
+            faces: [0; 8],
+            count: triangles.len() as u32,
+        };
+        for lane in 0..8 {
+            let (face, triangle) = triangles[lane.min(triangles.len() - 1)];
+            for (rows, corner) in out.corners.iter_mut().zip(triangle.corners()) {
+                for (row, value) in rows.iter_mut().zip(corner.to_array()) {
+                    row[lane] = value;
+                }
+            }
+            let (longest, normal_squared) = triangle.longest_and_normal_squared();
+            out.reach[lane] = (2.0001 * longest) as f32;
+            let thinness = (longest.powi(3) / normal_squared * 2f64.powi(-45)) as f32;
+            out.thinness[lane] = if longest < SMALLEST { f32::INFINITY } else { thinness };
+            out.faces[lane] = face;
+        }
+        out
+    }
+
+    /// The lanes that hold a triangle of their own, as bits.
+    #[inline(always)]
+    pub(crate) fn lanes(&self) -> u32 {
+        (1 << self.count) - 1
+    }
+
+    /// The face of a lane.
+    #[inline(always)]
+    pub(crate) fn face(&self, lane: usize) -> u32 {
+        self.faces[lane]
+    }
+
+    /// The triangle of a lane.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, lane: usize) -> SortedTriangle {
+        SortedTriangle::from_sorted(
+            self.corners.each_ref().map(|[x, y, z]| Vec3A::new(x[lane], y[lane], z[lane])),
+        )
+    }
+
+    /// Bounds of the squared distances that [`SortedTriangle::closest`] gives.
+    #[inline(always)]
+    pub(crate) fn bounds(&self, [px, py, pz]: [f32; 3]) -> Bounds {
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = &self.corners;
+        let mut bounds = Bounds { least: [0.0; 8], most: [0.0; 8] };
+        for i in 0..8 {
+            let a = [ax[i] - px, ay[i] - py, az[i] - pz];
+            let b = [bx[i] - px, by[i] - py, bz[i] - pz];
+            let c = [cx[i] - px, cy[i] - py, cz[i] - pz];
+            let ab = sub(b, a);
+            let ac = sub(c, a);
+            let (a_ab, a_ac) = (dot(a, ab), dot(a, ac));
+            let (ab_ab, ab_ac, ac_ac) = (dot(ab, ab), dot(ab, ac), dot(ac, ac));
+
+            // The nearest points of the edges, as a + s ab + t ac; of the best the weights are kept.
+            let on_ab = clamp01(-a_ab / ab_ab);
+            let mut least = on_ab * (2.0 * a_ab + on_ab * ab_ab);
+            let (mut s, mut t) = (on_ab, 0.0);
+            let on_ac = clamp01(-a_ac / ac_ac);
+            let to_ac = on_ac * (2.0 * a_ac + on_ac * ac_ac);
+            let nearer = to_ac < least;
+            least = if nearer { to_ac } else { least };
+            s = if nearer { 0.0 } else { s };
+            t = if nearer { on_ac } else { t };
+            let bc_bc = ab_ab + ac_ac - 2.0 * ab_ac;
+            let b_bc = a_ac - a_ab + ab_ac - ab_ab;
+            let on_bc = clamp01(-b_bc / bc_bc);
+            let to_bc = 2.0 * a_ab + ab_ab + on_bc * (2.0 * b_bc + on_bc * bc_bc);
+            let nearer = to_bc < least;
+            s = if nearer { 1.0 - on_bc } else { s };
+            t = if nearer { on_bc } else { t };
+            // The foot on the plane, if it is inside.
+            let area = ab_ab * ac_ac - ab_ac * ab_ac;
+            let foot_s = ab_ac * a_ac - ac_ac * a_ab;
+            let foot_t = ab_ac * a_ab - ab_ab * a_ac;
+            let inside = (foot_s > 0.0) & (foot_t > 0.0) & (foot_s + foot_t < area);
+            let inverse = 1.0 / area;
+            s = if inside { foot_s * inverse } else { s };
+            t = if inside { foot_t * inverse } else { t };
+
+            let q =
+                [a[0] + s * ab[0] + t * ac[0], a[1] + s * ab[1] + t * ac[1], a[2] + s * ab[2] + t * ac[2]];
+            let q_q = dot(q, q);
+            let along = min(dot(q, a), min(dot(q, b), dot(q, c)));
+            // No corner is farther than that, as q is on the triangle or within half an edge of it.
+            let length = q[0].abs() + q[1].abs() + q[2].abs();
+            let radius = length + self.reach[i];
+            let off = radius * (1e-6 + self.thinness[i] * radius);
+            let safe = along - length * off;
+            let bound = safe * (safe / q_q);
+            let trusted = (safe > 0.0) & (q_q > 1e-30) & (radius < 1e15);
+            bounds.least[i] = if trusted { bound } else { 0.0 };
+            let most = q_q.sqrt() + 2.0 * off;
+            bounds.most[i] = if radius < 1e15 { most * most } else { f32::INFINITY };
+        }
+        bounds
+    }
+}
+
+#[inline(always)]
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// Between 0 and 1; 0 for NaN.
+#[inline(always)]
+fn clamp01(x: f32) -> f32 {
+    min(max(x, 0.0), 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Vec3, vec3};
+    use proptest::prelude::*;
+
+    /// The bounds of one triangle, and its exact squared distance.
+    fn of(corners: [Vec3; 3], point: Vec3) -> (f32, f64, f32) {
+        let triangle = SortedTriangle::new(corners);
+        let bounds = Triangles8::new(&[(0, triangle)]).bounds(point.to_array());
+        assert!(bounds.least.iter().all(|b| *b == bounds.least[0]) && bounds.most[7] == bounds.most[0]);
+        (bounds.least[0], triangle.closest(point.as_dvec3()).0, bounds.most[0])
+    }
+
+    fn check(corners: [Vec3; 3], point: Vec3) -> Result<(), TestCaseError> {
+        let (least, exact, most) = of(corners, point);
+        prop_assert!(f64::from(least) <= exact * (1.0 + 1e-6), "{least} > {exact}: {corners:?} {point}");
+        prop_assert!(f64::from(most) >= exact * (1.0 - 1e-6), "{most} < {exact}: {corners:?} {point}");
+        Ok(())
+    }
+
+    fn anywhere() -> impl Strategy<Value = Vec3> {
+        (-1.0..1.0f32, -1.0..1.0f32, -1.0..1.0f32).prop_map(|(x, y, z)| vec3(x, y, z))
+    }
+
+    #[test]
+    fn bounds_are_close() {
+        let corners = [Vec3::ZERO, vec3(0.1, 0.0, 0.0), vec3(0.0, 0.1, 0.02)];
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+        // Above the inside, off an edge, off a corner; 5 mm and 1 m away.
+        let edge_off = vec3(0.0, -1.0, 0.0);
+        for (foot, off) in [
+            ((corners[0] + corners[1] + corners[2]) / 3.0, normal),
+            (vec3(0.05, 0.0, 0.0), edge_off),
+            (corners[1], vec3(1.0, -1.0, 0.0).normalize()),
+        ] {
+            for (distance, share) in [(0.005, 1e-3), (1.0, 1e-4)] {
+                let (least, exact, most) = of(corners, foot + off * distance);
+                assert!(f64::from(least) > exact * (1.0 - share), "{least} {exact}");
+                assert!(f64::from(most) < exact * (1.0 + share), "{most} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_hold_their_own_triangles() {
+        let at = |x: f32| SortedTriangle::new([vec3(x, 0.0, 0.0), vec3(x, 1.0, 0.0), vec3(x, 0.0, 1.0)]);
+        let three = Triangles8::new(&[(7, at(1.0)), (5, at(2.0)), (9, at(4.0))]);
+        assert_eq!((three.lanes(), three.face(0), three.face(1), three.face(2)), (0b111, 7, 5, 9));
+        let bounds = three.bounds([0.0, 0.2, 0.2]);
+        for (lane, square) in [(0, 1.0), (1, 4.0), (2, 16.0)] {
+            assert!((bounds.least[lane] - square).abs() < 1e-3 * square && bounds.most[lane] >= square);
+            assert_eq!(three.triangle(lane).closest(glam::dvec3(0.0, 0.2, 0.2)).0, f64::from(square));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        #[test]
+        fn bounds_hold(corners in [anywhere(), anywhere(), anywhere()], point in anywhere(), scale in -24..24i32) {
+            let scale = 10f32.powi(scale);
+            check(corners.map(|c| c * scale), point * scale)?;
+            check(corners.map(|c| c * 0.01), point)?;
+            check(corners, point * 1e4)?;
+        }
+
+        #[test]
+        fn bounds_hold_far_from_the_origin(corners in [anywhere(), anywhere(), anywhere()], point in anywhere(), away in anywhere()) {
+            let away = away * 2000.0;
+            check(corners.map(|c| c * 0.1 + away), point * 0.1 + away)?;
+        }
+
+        #[test]
+        fn bounds_hold_for_slivers(
+            a in anywhere(),
+            b in anywhere(),
+            (along, aside, thinness) in (-0.2..1.2f32, anywhere(), -10..-1i32),
+            (near, off, distance) in (-0.5..1.5f32, anywhere(), -9..1i32),
+        ) {
+            let corners = [a, b, a.lerp(b, along) + aside * 10f32.powi(thinness)];
+            prop_assume!(corners[0] != corners[1] && SortedTriangle::new(corners).longest_and_normal_squared().1 > 0.0);
+            check(corners, a.lerp(b, near) + off * 10f32.powi(distance))?;
+        }
+
+        #[test]
+        fn bounds_hold_on_the_triangle(corners in [anywhere(), anywhere(), anywhere()], s in 0.0..1.0f32, t in 0.0..1.0f32) {
+            let [a, b, c] = corners;
+            for point in [a, a.lerp(b, s), c.lerp(a, t), a.lerp(b, s).lerp(c, t)] {
+                check(corners, point)?;
+            }
+        }
+    }
+}
