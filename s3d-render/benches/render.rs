@@ -1,19 +1,22 @@
 //! How many rays and pixels a second does one core render: visibility, then each modality made from it? And what does
-//! walking the tree a tile at a time buy over single rays?
+//! the visibility pass buy over single rays?
 //!
-//! A generated room of 250,000 faces, and the real scan beside the project if it is there; `S3D_BENCH_MESH` names
+//! A generated room of 250,000 faces, a scan-like mesh of 300,000 in several rooms, and the real scan beside the project if it is there; `S3D_BENCH_MESH` names
 //! another OBJ file (Y up), looked at from the middle of its box.
 
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use s3d_geom::{Camera, Pose, TriMesh, glam::DVec3};
-use s3d_render::{Normals, Pyramids, Scene};
-use std::hint::black_box;
+use s3d_geom::glam::{DVec3, dvec3};
+use s3d_geom::{Camera, Pose, TriMesh, scan_like};
+use s3d_render::{Caster, Hits, Normals, Pyramids, Scene};
 use std::path::Path;
 
 fn meshes() -> Vec<(String, TriMesh, DVec3)> {
-    let mut meshes = vec![("room".to_owned(), common::furnished_room(250_000), common::room_location())];
+    let mut meshes = vec![
+        ("room".to_owned(), common::furnished_room(250_000), common::room_location()),
+        ("scan-like".to_owned(), scan_like(300_000, 1), dvec3(3.0, 2.5, 1.5)),
+    ];
     if let Some((path, location)) = common::real_scan() {
         meshes.push(("copyroom".to_owned(), common::read_obj(&path), location));
     }
@@ -30,23 +33,24 @@ fn rays(c: &mut Criterion) {
     group.sample_size(10);
     for (name, mesh, location) in &meshes() {
         let scene = Scene::new(mesh);
+        let (mut caster, mut hits) = (Caster::new(&scene), Hits::default());
         let views = common::views(*location, 1080);
         group.throughput(Throughput::Elements(views.len() as u64 * 1080 * 1080));
         group.bench_function(BenchmarkId::new("perspective, 9 views", name), |b| {
-            b.iter(|| views.iter().for_each(|v| drop(black_box(s3d_render::cast(&scene, v)))));
+            b.iter(|| views.iter().for_each(|v| caster.cast_into(v, 1, &mut hits)));
         });
         group.throughput(Throughput::Elements(1080 * 1080 / 36));
         group.bench_function(BenchmarkId::new("perspective, one ray at a time, every 6th", name), |b| {
             b.iter(|| s3d_render::cast_ray_by_ray(&scene, &views[0], 6));
         });
-        group.throughput(Throughput::Elements(1080 * 1080 / 64));
-        group.bench_function(BenchmarkId::new("perspective, every 8th", name), |b| {
-            b.iter(|| s3d_render::cast_strided(&scene, &views[0], 8));
+        group.throughput(Throughput::Elements(views.len() as u64 * 1080 * 1080 / 16));
+        group.bench_function(BenchmarkId::new("perspective, 9 views, every 4th", name), |b| {
+            b.iter(|| views.iter().for_each(|v| caster.cast_into(v, 4, &mut hits)));
         });
         let panorama = Camera::equirectangular(Pose::level(*location, 0.4), 4096);
         group.throughput(Throughput::Elements(4096 * 2048));
         group.bench_function(BenchmarkId::new("panorama", name), |b| {
-            b.iter(|| s3d_render::cast(&scene, &panorama));
+            b.iter(|| caster.cast_into(&panorama, 1, &mut hits));
         });
         group.throughput(Throughput::Elements(mesh.faces().len() as u64));
         group.bench_function(BenchmarkId::new("build the scene (faces)", name), |b| {

@@ -3,12 +3,12 @@
 //! Every image has the size of the hits. Those that depend on the rays' directions take the camera that the hits were
 //! cast with, one ray a pixel.
 
+use crate::lanes::{self, LANES, LaneWork, Lanes, run_starts};
 use crate::{
     Hits, NO_FACE, Scene,
     patch::{FaceCache, Patch},
 };
-use glam::{DVec3, Vec3};
-use half::{f16, slice::HalfFloatSliceExt};
+use glam::{DMat3, DVec3, Vec3};
 use s3d_geom::{Camera, Raster};
 
 /// Depth that is missing, or too far to be written.
@@ -31,10 +31,44 @@ pub enum Normals {
 /// Depth in 512ths of a metre, rounded half up: z-depth in a perspective view, distance in a panorama.
 /// [`MISSING_DEPTH`] where nothing is seen and beyond 65,534 units (128 m).
 pub fn depth_image(hits: &Hits) -> Raster<u16> {
-    hits.depth.map(|depth| {
-        // In f64 the sum is exact. What does not fit (infinity too) is the missing value; the cast saturates there.
-        (f64::from(depth) * 512.0 + 0.5) as u16
-    })
+    let mut out = Raster::filled(hits.depth.width(), hits.depth.height(), 0);
+    depth_image_into(hits, &mut out);
+    out
+}
+
+/// As [`depth_image`], into an image that is used again.
+pub fn depth_image_into(hits: &Hits, out: &mut Raster<u16>) {
+    fit(out, &hits.depth, 0);
+    lanes::run(Depths { depths: hits.depth.pixels(), out: out.pixels_mut() });
+}
+
+struct Depths<'a> {
+    depths: &'a [f32],
+    out: &'a mut [u16],
+}
+
+impl LaneWork for Depths<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, lanes: impl Lanes) {
+        let (eights, rest) = self.depths.as_chunks::<LANES>();
+        let (out, last) = self.out.as_chunks_mut::<LANES>();
+        for (depths, out) in eights.iter().zip(out) {
+            lanes.depths(depths, out);
+        }
+        let (mut depths, mut rounded) = ([0.0; LANES], [0; LANES]);
+        depths[..rest.len()].copy_from_slice(rest);
+        lanes.depths(&depths, &mut rounded);
+        last.copy_from_slice(&rounded[..rest.len()]);
+    }
+}
+
+/// Gives `out` the size of `like`.
+pub(crate) fn fit<T: Copy, U>(out: &mut Raster<T>, like: &Raster<U>, value: T) {
+    if (out.width(), out.height()) != (like.width(), like.height()) {
+        *out = Raster::filled(like.width(), like.height(), value);
+    }
 }
 
 /// Surface normals in the axes of [`Camera::normal_image_from_world`], a channel = ⌊127.5 + 127.5 n + ½⌋; a normal never
@@ -43,27 +77,46 @@ pub fn depth_image(hits: &Hits) -> Raster<u16> {
 /// # Panics
 /// If the hits are not of the camera's size.
 pub fn normal_image(scene: &Scene<'_>, hits: &Hits, camera: &Camera, normals: Normals) -> Raster<[u8; 3]> {
+    let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
+    normal_image_into(scene, hits, camera, normals, &mut out);
+    out
+}
+
+/// As [`normal_image`], into an image that is used again.
+///
+/// # Panics
+/// As [`normal_image`].
+pub fn normal_image_into(
+    scene: &Scene<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    normals: Normals,
+    out: &mut Raster<[u8; 3]>,
+) {
+    assert_size(hits, camera);
     match normals {
-        Normals::Flat => flat_normals(scene, hits, camera),
-        Normals::Smooth => smooth_normals(scene, hits, camera),
+        Normals::Flat => flat_normals(scene, hits, camera, out),
+        Normals::Smooth => *out = smooth_normals(scene, hits, camera),
     }
 }
 
-fn flat_normals(scene: &Scene<'_>, hits: &Hits, camera: &Camera) -> Raster<[u8; 3]> {
-    assert_size(hits, camera);
+fn flat_normals(scene: &Scene<'_>, hits: &Hits, camera: &Camera, out: &mut Raster<[u8; 3]>) {
     let image_from_world = camera.normal_image_from_world();
-    let mesh = scene.mesh();
-    // All rays start at one point, which sees one side of a face.
-    by_face(hits, MISSING_NORMAL, |face| {
-        let [a, b, c] = mesh.triangle(face).map(|p| p.as_dvec3());
-        let normal = (b - a).cross(c - a).normalize();
-        let away = normal.dot(a - camera.pose.location) > 0.0;
-        quantized(image_from_world * if away { -normal } else { normal })
-    })
+    let mut normals = FaceCache::new();
+    by_face(hits, MISSING_NORMAL, out, |face| {
+        *normals.get(face, || flat_normal(scene, face, camera.pose.location, image_from_world))
+    });
+}
+
+/// The colour of a face's normal, on the side that `origin` sees: all rays start there, and see the same side.
+fn flat_normal(scene: &Scene<'_>, face: u32, origin: DVec3, image_from_world: DMat3) -> [u8; 3] {
+    let [a, b, c] = scene.mesh().triangle(face).map(|p| p.as_dvec3());
+    let normal = (b - a).cross(c - a).normalize();
+    let away = normal.dot(a - origin) > 0.0;
+    quantized(image_from_world * if away { -normal } else { normal })
 }
 
 fn smooth_normals(scene: &Scene<'_>, hits: &Hits, camera: &Camera) -> Raster<[u8; 3]> {
-    assert_size(hits, camera);
     let image_from_world = camera.normal_image_from_world();
     let mesh = scene.mesh();
     let mut patches = FaceCache::new();
@@ -102,60 +155,30 @@ fn quantized(n: DVec3) -> [u8; 3] {
     (n * 127.5 + (128.0 + 1e-9)).to_array().map(|channel| channel as u8)
 }
 
-/// The points that are seen, in world metres; (0, 0, 0) where nothing is. A point seen exactly at the world's origin
-/// cannot be told from a missing one: that is the format's, not ours.
-///
-/// # Panics
-/// If the hits are not of the camera's size.
-pub fn xyz_image(hits: &Hits, camera: &Camera) -> Raster<[f32; 3]> {
-    let mut out = Vec::with_capacity(hits.depth.len());
-    xyz_rows(hits, camera, |row| out.extend_from_slice(row));
-    Raster::from_vec(hits.depth.width(), hits.depth.height(), out)
-}
-
-/// The points that are seen, row by row.
-fn xyz_rows(hits: &Hits, camera: &Camera, mut each: impl FnMut(&[[f32; 3]])) {
-    assert_size(hits, camera);
-    let rays = camera.rays();
-    let mut points = Vec::with_capacity(hits.depth.width() as usize);
-    for (j, row) in hits.depth.rows().enumerate() {
-        points.clear();
-        points.extend(row.iter().enumerate().map(|(i, &depth)| {
-            let p = camera.pose.location + rays.at(i as u32, j as u32) * f64::from(depth);
-            if depth.is_finite() { p.as_vec3().to_array() } else { [0.0; 3] }
-        }));
-        each(&points);
-    }
-}
-
-/// As [`xyz_image`], rounded to half floats as the data set has them: steps of 1.6 cm at 20 m from the world's origin, 6.3 cm at
-/// 100 m. A point within 3e-8 m of the origin looks like a missing one.
-///
-/// # Panics
-/// If the hits are not of the camera's size.
-pub fn xyz_image_half(hits: &Hits, camera: &Camera) -> Raster<[f16; 3]> {
-    let mut out = Raster::filled(hits.depth.width(), hits.depth.height(), [f16::ZERO; 3]);
-    let mut rows = out.pixels_mut().chunks_exact_mut(hits.depth.width().max(1) as usize);
-    xyz_rows(hits, camera, |points| {
-        if let Some(row) = rows.next() {
-            row.as_flattened_mut().convert_from_f32_slice(points.as_flattened());
-        }
-    });
-    out
-}
-
 /// An index a face, as the colour R·65536 + G·256 + B = index; [`MISSING_INDEX`] where nothing is seen. With each face's
 /// index into the label table it is the semantic image.
 ///
 /// # Panics
 /// If there is not an index for each face that is seen, or one does not fit into 24 bits.
 pub fn index_image(hits: &Hits, per_face: &[u32]) -> Raster<[u8; 3]> {
-    by_face(hits, MISSING_INDEX, |face| {
-        let index = per_face[face as usize];
-        let [high, r, g, b] = index.to_be_bytes();
-        assert!(high == 0, "the index {index} of face {face} does not fit into 24 bits");
-        [r, g, b]
-    })
+    let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
+    index_image_into(hits, per_face, &mut out);
+    out
+}
+
+/// As [`index_image`], into an image that is used again.
+///
+/// # Panics
+/// As [`index_image`].
+pub fn index_image_into(hits: &Hits, per_face: &[u32], out: &mut Raster<[u8; 3]>) {
+    by_face(hits, MISSING_INDEX, out, |face| index_color(per_face, face));
+}
+
+fn index_color(per_face: &[u32], face: u32) -> [u8; 3] {
+    let index = per_face[face as usize];
+    let [high, r, g, b] = index.to_be_bytes();
+    assert!(high == 0, "the index {index} of face {face} does not fit into 24 bits");
+    [r, g, b]
 }
 
 /// A colour a face, black where nothing is seen.
@@ -163,7 +186,66 @@ pub fn index_image(hits: &Hits, per_face: &[u32]) -> Raster<[u8; 3]> {
 /// # Panics
 /// If there is not a colour for each face that is seen.
 pub fn color_per_face_image(hits: &Hits, per_face_colors: &[[u8; 3]]) -> Raster<[u8; 3]> {
-    by_face(hits, [0; 3], |face| per_face_colors[face as usize])
+    let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
+    color_per_face_image_into(hits, per_face_colors, &mut out);
+    out
+}
+
+/// As [`color_per_face_image`], into an image that is used again.
+///
+/// # Panics
+/// As [`color_per_face_image`].
+pub fn color_per_face_image_into(hits: &Hits, per_face_colors: &[[u8; 3]], out: &mut Raster<[u8; 3]>) {
+    by_face(hits, [0; 3], out, |face| per_face_colors[face as usize]);
+}
+
+/// The images that have one value all over a face; see [`face_images_into`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FaceImages {
+    /// [`normal_image`] with [`Normals::Flat`].
+    pub normal: Raster<[u8; 3]>,
+    /// [`index_image`].
+    pub index: Raster<[u8; 3]>,
+    /// [`color_per_face_image`].
+    pub color: Raster<[u8; 3]>,
+}
+
+impl Default for FaceImages {
+    /// Without pixels.
+    fn default() -> Self {
+        let empty = || Raster::filled(0, 0, [0; 3]);
+        Self { normal: empty(), index: empty(), color: empty() }
+    }
+}
+
+/// The flat normals, indices and colours of faces in one walk over the hits, in little more than half the time of three.
+///
+/// # Panics
+/// As [`normal_image`], [`index_image`] and [`color_per_face_image`].
+pub fn face_images_into(
+    scene: &Scene<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    per_face: &[u32],
+    per_face_colors: &[[u8; 3]],
+    out: &mut FaceImages,
+) {
+    assert_size(hits, camera);
+    let image_from_world = camera.normal_image_from_world();
+    let FaceImages { normal, index, color } = out;
+    let mut faces = FaceCache::new();
+    let value = |face| {
+        *faces.get(face, || {
+            let normal = flat_normal(scene, face, camera.pose.location, image_from_world);
+            [normal, index_color(per_face, face), per_face_colors[face as usize]]
+        })
+    };
+    let missing = [MISSING_NORMAL, MISSING_INDEX, [0; 3]];
+    let out = [normal, index, color].map(|image| {
+        fit(image, &hits.face, [0; 3]);
+        image.pixels_mut()
+    });
+    lanes::run(ByFace { faces: hits.face.pixels(), missing, value, out });
 }
 
 /// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.
@@ -173,14 +255,60 @@ pub fn coverage(hits: &Hits) -> f64 {
 }
 
 /// An image from a value a face: `value` is asked once a run of pixels.
-fn by_face(hits: &Hits, missing: [u8; 3], mut value: impl FnMut(u32) -> [u8; 3]) -> Raster<[u8; 3]> {
-    let mut last = (NO_FACE, missing);
-    hits.face.map(|face| {
-        if face != last.0 {
-            last = (face, if face == NO_FACE { missing } else { value(face) });
+fn by_face(hits: &Hits, missing: [u8; 3], out: &mut Raster<[u8; 3]>, mut value: impl FnMut(u32) -> [u8; 3]) {
+    fit(out, &hits.face, [0; 3]);
+    let (value, out) = (|face| [value(face)], [out.pixels_mut()]);
+    lanes::run(ByFace { faces: hits.face.pixels(), missing: [missing], value, out });
+}
+
+/// `N` images at once.
+struct ByFace<'a, V, const N: usize> {
+    faces: &'a [u32],
+    missing: [[u8; 3]; N],
+    value: V,
+    out: [&'a mut [[u8; 3]]; N],
+}
+
+impl<V: FnMut(u32) -> [[u8; 3]; N], const N: usize> LaneWork for ByFace<'_, V, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self, lanes: impl Lanes) {
+        /// Pixels whose runs are looked for at a time.
+        const BLOCK: usize = 4096;
+        let mut starts = Vec::with_capacity(BLOCK + 1);
+        for (block, faces) in self.faces.chunks(BLOCK).enumerate() {
+            run_starts(lanes, faces, &mut starts);
+            starts.push(faces.len() as u32);
+            for run in starts.windows(2) {
+                let (start, end) = (run[0] as usize, run[1] as usize);
+                let face = faces[start];
+                let colors = if face == NO_FACE { self.missing } else { (self.value)(face) };
+                for (out, color) in self.out.iter_mut().zip(colors) {
+                    paint(out, block * BLOCK + start, block * BLOCK + end, color);
+                }
+            }
         }
-        last.1
-    })
+    }
+}
+
+/// Gives the pixels from `start` to `end` a colour, and perhaps some of those that follow.
+#[inline(always)]
+pub(crate) fn paint(out: &mut [[u8; 3]], start: usize, end: usize, color: [u8; 3]) {
+    let [r, g, b] = color.map(u64::from);
+    let p = r | g << 8 | b << 16;
+    // Eight pixels are three words.
+    let words = [p | p << 24 | p << 48, p >> 16 | p << 8 | p << 32 | p << 56, p >> 8 | p << 16 | p << 40];
+    let mut at = start;
+    while at < end {
+        let Some(eight) = out.get_mut(at..at + LANES) else {
+            return out[at..end].fill(color);
+        };
+        for (bytes, word) in eight.as_flattened_mut().as_chunks_mut::<8>().0.iter_mut().zip(words) {
+            *bytes = word.to_le_bytes();
+        }
+        at += LANES;
+    }
 }
 
 pub(crate) fn assert_size(hits: &Hits, camera: &Camera) {

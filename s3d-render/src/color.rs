@@ -1,12 +1,20 @@
 //! The RGB image.
+//!
+//! A row is coloured in two passes. The first walks its runs of equal faces: [`crate::anchor`] gives the texture
+//! coordinates of eight pixels at a time and their change from pixel to pixel, hence each pixel's footprint. The second
+//! walks the row regardless of runs and fetches the textures, again eight pixels at a time ([`crate::filter`]). What a
+//! pixel gets depends on no other pixel but through the anchor, whose rounding it takes over.
 
-use crate::channels::assert_size;
-use crate::patch::{FaceCache, Patch, UvPatch};
-use crate::texture::{Pyramid, Pyramids, TextureFilter};
-use crate::wide::{self, Work};
+use crate::anchor::{Anchor, Attributes, Fold, Grid};
+use crate::channels::{assert_size, fit, paint};
+use crate::filter::{Footprints, Sizes};
+use crate::lanes::{self, LANES, LaneWork, Lanes, run_starts};
+use crate::patch::{FaceCache, Patch};
+use crate::pixel_color::PixelByPixel;
+use crate::texture::{Pyramids, TextureFilter};
 use crate::{Hits, NO_FACE, Scene};
 use glam::DVec3;
-use s3d_geom::{Camera, FaceColor, Projection, Raster, Rays};
+use s3d_geom::{Camera, FaceColor, Raster};
 
 /// The colours that the pixels see: textures filtered over each pixel's footprint, corners' colours interpolated,
 /// materials flat. Black is for what is missing alone: a dark pixel that is seen is at least (1, 1, 1).
@@ -30,7 +38,26 @@ pub fn rgb_image_with(
     camera: &Camera,
     filter: &TextureFilter,
 ) -> Raster<[u8; 3]> {
-    wide::run(Rgb { scene, pyramids, hits, camera, filter })
+    let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
+    rgb_image_into(scene, pyramids, hits, camera, filter, &mut out);
+    out
+}
+
+/// As [`rgb_image_with`], into an image that is used again.
+///
+/// # Panics
+/// As [`rgb_image`].
+pub fn rgb_image_into(
+    scene: &Scene<'_>,
+    pyramids: &Pyramids,
+    hits: &Hits,
+    camera: &Camera,
+    filter: &TextureFilter,
+    out: &mut Raster<[u8; 3]>,
+) {
+    assert_size(hits, camera);
+    fit(out, &hits.face, [0; 3]);
+    lanes::run(Rgb { scene, pyramids, hits, camera, filter, out });
 }
 
 struct Rgb<'a> {
@@ -39,115 +66,280 @@ struct Rgb<'a> {
     hits: &'a Hits,
     camera: &'a Camera,
     filter: &'a TextureFilter,
+    out: &'a mut Raster<[u8; 3]>,
 }
 
-impl Work for Rgb<'_> {
-    type Output = Raster<[u8; 3]>;
+impl LaneWork for Rgb<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run(self) -> Raster<[u8; 3]> {
-        let Self { scene, pyramids, hits, camera, filter } = self;
-        assert_size(hits, camera);
-        let (steps, rays) = (Steps::new(camera), camera.rays());
-        let mut paints = FaceCache::new();
-        let mut out = Vec::with_capacity(hits.face.len());
-        for (j, faces) in hits.face.rows().enumerate() {
-            for (i, &face) in faces.iter().enumerate() {
-                if face == NO_FACE {
-                    out.push([0; 3]);
-                    continue;
-                }
-                let paint = paints.get(face, || Paint::new(scene, pyramids, face, camera.pose.location));
-                let d = rays.at(i as u32, j as u32);
-                out.push(seen_color(paint.at(d, j, &steps, filter)));
-            }
+    fn run(self, lanes: impl Lanes) {
+        let Self { scene, pyramids, hits, camera, filter, out } = self;
+        let grid = Grid::new(camera);
+        let painter = Painter {
+            lanes,
+            scene,
+            sizes: scene.mesh().textures().iter().enumerate().map(|(k, t)| pyramids.sizes(k, t)).collect(),
+            origin: camera.pose.location,
+            max_taps: filter.max_taps,
+            faces: FaceCache::new(),
+            singly: PixelByPixel::new(scene, pyramids, camera, filter),
+            row: Row::new(hits.face.width() as usize),
+        };
+        if grid.is_turn() {
+            painter.image::<true>(&grid, hits, out);
+        } else {
+            painter.image::<false>(&grid, hits, out);
         }
-        Raster::from_vec(hits.face.width(), hits.face.height(), out)
     }
 }
 
-/// Rounded to 8 bits, and never black.
-#[inline(always)]
-fn seen_color(color: [f32; 3]) -> [u8; 3] {
-    match color.map(|channel| (channel + 0.5) as u8) {
-        [0, 0, 0] => [1, 1, 1],
-        rgb => rgb,
-    }
+/// A face, prepared.
+struct Face {
+    look: Look,
+    anchor: Anchor,
+    attributes: Attributes,
 }
 
-/// How a face is coloured, prepared for the origin.
-enum Paint<'a> {
-    Texture(Pyramid<'a>, UvPatch),
-    Corners(Patch, [[u8; 3]; 3]),
+/// Where a face has its colour from.
+#[derive(Clone, Copy)]
+enum Look {
+    Texture(u32),
+    Corners,
     Flat([u8; 3]),
+    /// From [`PixelByPixel`] alone.
+    Singly,
 }
 
-impl<'a> Paint<'a> {
-    fn new(scene: &Scene<'a>, pyramids: &'a Pyramids, face: u32, origin: DVec3) -> Self {
-        let patch = || Patch::new(scene.mesh(), face, origin);
-        match scene.mesh().color_of(face) {
+impl Face {
+    fn new(scene: &Scene<'_>, sizes: &[Sizes<'_>], face: u32, origin: DVec3) -> Self {
+        let mesh = scene.mesh();
+        let patch = Patch::new(mesh, face, origin);
+        let (look, values) = match mesh.color_of(face) {
             FaceColor::Texture(index, texture, uvs) => {
-                Self::Texture(pyramids.pyramid(index, texture), UvPatch::new(&patch(), uvs))
+                let [w, h] = [texture.image.width(), texture.image.height()].map(f64::from);
+                // In pixels of the full size, to the right and downwards.
+                let x = uvs.map(|uv| f64::from(uv.x) * w);
+                let y = uvs.map(|uv| (1.0 - f64::from(uv.y)) * h);
+                let usable = sizes[index as usize].is_usable();
+                (if usable { Look::Texture(index) } else { Look::Singly }, [x, y, [0.0; 3]])
             }
-            FaceColor::Corners(corners) => Self::Corners(patch(), corners),
-            FaceColor::Flat(color) => Self::Flat(color),
+            FaceColor::Corners(colors) => {
+                let channel = |k: usize| colors.map(|c| f64::from(c[k]));
+                (Look::Corners, [channel(0), channel(1), channel(2)])
+            }
+            FaceColor::Flat([0, 0, 0]) => (Look::Flat([1; 3]), [[0.0; 3]; 3]),
+            FaceColor::Flat(color) => (Look::Flat(color), [[0.0; 3]; 3]),
+        };
+        Self { look, anchor: Anchor::default(), attributes: Attributes::new(&patch, values) }
+    }
+
+    /// An anchor that serves pixel (i, j).
+    #[inline(always)]
+    fn anchor(&mut self, grid: &Grid, sizes: &[Sizes<'_>], i: usize, j: usize) -> Option<&Anchor> {
+        if !self.anchor.reaches(i, j) {
+            let folds = match self.look {
+                Look::Texture(index) => sizes[index as usize].folds(),
+                Look::Corners => [Fold::Not; 3],
+                Look::Flat(_) | Look::Singly => return None,
+            };
+            if !self.anchor.set(&self.attributes, folds, grid, i, j) {
+                return None;
+            }
+        }
+        Some(&self.anchor)
+    }
+}
+
+/// A row between its two passes. Values are stored eight at a time, beyond the end of their run: the next run's go over
+/// them.
+struct Row {
+    footprints: Footprints,
+    /// By pixel: a texture, perhaps with [`WIDE`]; or [`DONE`].
+    tags: Vec<u32>,
+    colors: Vec<[u8; 3]>,
+}
+
+/// The colour stands already.
+const DONE: u32 = u32::MAX;
+/// The footprint is wider than a pixel of the texture.
+const WIDE: u32 = 1 << 31;
+
+impl Row {
+    fn new(width: usize) -> Self {
+        let padded = width + 2 * LANES;
+        Self { footprints: Footprints::new(padded), tags: vec![DONE; padded], colors: vec![[0; 3]; padded] }
+    }
+}
+
+struct Painter<'a, L> {
+    lanes: L,
+    scene: &'a Scene<'a>,
+    /// By texture.
+    sizes: Vec<Sizes<'a>>,
+    origin: DVec3,
+    max_taps: u32,
+    faces: FaceCache<Face>,
+    singly: PixelByPixel<'a>,
+    row: Row,
+}
+
+impl<L: Lanes> Painter<'_, L> {
+    #[inline(always)]
+    fn image<const TURN: bool>(mut self, grid: &Grid, hits: &Hits, out: &mut Raster<[u8; 3]>) {
+        let width = hits.face.width() as usize;
+        let mut starts = Vec::new();
+        let rows = out.pixels_mut().chunks_exact_mut(width.max(1));
+        for (j, (faces, out)) in hits.face.rows().zip(rows).enumerate() {
+            run_starts(self.lanes, faces, &mut starts);
+            starts.push(width as u32);
+            for run in starts.windows(2) {
+                let (start, end) = (run[0] as usize, run[1] as usize);
+                match faces[start] {
+                    NO_FACE => self.flat(start, end, [0; 3]),
+                    face => self.lay_out::<TURN>(grid, face, j, start, end),
+                }
+            }
+            self.fetch(width);
+            out.copy_from_slice(&self.row.colors[..width]);
         }
     }
 
-    /// The colour that the ray along `d`, in row `j` of the image, sees: 0 to 255 a channel.
     #[inline(always)]
-    fn at(&self, d: DVec3, j: usize, steps: &Steps, filter: &TextureFilter) -> [f32; 3] {
-        match self {
-            Self::Texture(pyramid, uv) => {
-                let (x, y) = steps.at(d, j);
-                let (uv, x, y) = uv.at(d, x, y);
-                pyramid.sample(uv, x, y, filter)
+    fn flat(&mut self, start: usize, end: usize, color: [u8; 3]) {
+        self.row.tags[start..end].fill(DONE);
+        paint(&mut self.row.colors, start, end, color);
+    }
+
+    /// The first pass over the pixels `start` to `end` of row `j`, which all see `face`.
+    #[inline(always)]
+    fn lay_out<const TURN: bool>(&mut self, grid: &Grid, face: u32, j: usize, start: usize, end: usize) {
+        let Self { lanes, scene, sizes, origin, faces, row, singly, max_taps, .. } = self;
+        let prepared = faces.get(face, || Face::new(scene, sizes, face, *origin));
+        let look = prepared.look;
+        if let Look::Flat(color) = look {
+            return self.flat(start, end, color);
+        }
+        let mut i = start;
+        while i < end {
+            let Some(anchor) = prepared.anchor(grid, sizes, i, j) else {
+                row.tags[i] = DONE;
+                row.colors[i] = singly.color(face, i, j);
+                i += 1;
+                continue;
+            };
+            let line = anchor.line::<TURN>(grid, j);
+            let until = end.min((anchor.column + crate::anchor::REACH) as usize);
+            while i < until {
+                let some = LANES.min(until - i);
+                let mut doubtful;
+                if let Look::Texture(texture) = look {
+                    let seen = line.at::<TURN, 2, L>(*lanes, i);
+                    doubtful = seen.doubtful;
+                    let limits = (*max_taps, sizes[texture as usize].last());
+                    let wide = row.footprints.store(*lanes, i, &seen, limits, some);
+                    let tags = &mut row.tags[i..i + LANES];
+                    tags.fill(texture);
+                    if wide != 0 {
+                        for (k, tag) in tags.iter_mut().enumerate() {
+                            *tag |= (wide >> k) << 31;
+                        }
+                    }
+                } else {
+                    let seen = line.at::<TURN, 3, L>(*lanes, i);
+                    doubtful = seen.doubtful;
+                    let mut channels = [[0; LANES]; 3];
+                    for (value, channel) in seen.values.into_iter().zip(&mut channels) {
+                        lanes.store_int(lanes.add(value, lanes.splat(0.5)), channel);
+                    }
+                    for k in 0..some {
+                        row.tags[i + k] = DONE;
+                        let color = channels.map(|c| c[k] as u8);
+                        row.colors[i + k] = if color == [0; 3] { [1; 3] } else { color };
+                    }
+                }
+                doubtful &= (1 << some) - 1;
+                while doubtful != 0 {
+                    let at = i + doubtful.trailing_zeros() as usize;
+                    row.tags[at] = DONE;
+                    row.colors[at] = singly.color(face, at, j);
+                    doubtful &= doubtful - 1;
+                }
+                i += some;
             }
-            Self::Corners(patch, corners) => {
-                let weights = patch.weights(d).map(|w| w as f32);
-                std::array::from_fn(|k| (0..3).map(|i| f32::from(corners[i][k]) * weights[i]).sum())
+        }
+    }
+
+    /// The second pass.
+    #[inline(always)]
+    fn fetch(&mut self, width: usize) {
+        let Self { lanes, sizes, row, .. } = self;
+        row.tags[width..].fill(DONE);
+        for i in (0..width).step_by(LANES) {
+            let Some(tags) = row.tags[i..].first_chunk::<LANES>() else { return };
+            let first = tags[0];
+            if first < WIDE && lanes.equal(tags, first) == 0xFF {
+                let colors = sizes[first as usize].magnified(*lanes, &row.footprints, i);
+                if let Some(to) = row.colors[i..].as_flattened_mut().first_chunk_mut() {
+                    lanes.store_pixels(&colors, to);
+                }
+                continue;
             }
-            Self::Flat(color) => color.map(f32::from),
+            // Mostly one texture, once; the others' pixels are left alone.
+            let mut left = !lanes.equal(tags, DONE) & 0xFF;
+            while left != 0 {
+                let texture = tags[left.trailing_zeros() as usize % LANES] & !WIDE;
+                let wide = lanes.equal(tags, texture | WIDE);
+                let these = wide | lanes.equal(tags, texture);
+                let colors = sizes[texture as usize].filtered(*lanes, &row.footprints, i, these, wide);
+                let to = row.colors[i..].as_flattened_mut().first_chunk_mut();
+                if let (0xFF, Some(to)) = (these, to) {
+                    lanes.store_pixels(&colors, to);
+                    break;
+                }
+                for (k, color) in colors.iter().enumerate() {
+                    if these >> k & 1 == 1 {
+                        let [r, g, b, _] = color.to_le_bytes();
+                        row.colors[i + k] = [r, g, b];
+                    }
+                }
+                left &= !these;
+            }
         }
     }
 }
 
-/// What a pixel to the right and a pixel down add to a direction.
-enum Steps {
-    Same(DVec3, DVec3),
-    /// Radians a pixel: a panorama's pixels are squares on the sphere's map.
-    Turn {
-        rad_per_pixel: f64,
-        rows: Vec<(f64, f64)>,
-    },
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::Plain;
+    use s3d_geom::{Pose, scan_like};
 
-impl Steps {
-    fn new(camera: &Camera) -> Self {
-        match camera.rays() {
-            Rays::Perspective { x_step, y_step, .. } => Self::Same(x_step, y_step),
-            Rays::Equirectangular { rows, .. } => {
-                debug_assert_eq!(camera.projection, Projection::Equirectangular);
-                let rad_per_pixel = std::f64::consts::TAU / f64::from(camera.width);
-                Self::Turn { rad_per_pixel, rows: rows.into_iter().map(Into::into).collect() }
-            }
-        }
-    }
-
-    /// The derivatives of the direction `d`, in row `j`, by column and row.
-    #[inline(always)]
-    fn at(&self, d: DVec3, j: usize) -> (DVec3, DVec3) {
-        match self {
-            Self::Same(x, y) => (*x, *y),
-            Self::Turn { rad_per_pixel, rows } => {
-                // Azimuth falls to the right and latitude falls downwards. d = (cos lat · a, sin lat), |a| = 1; rows
-                // are never at a pole, so cos lat > 0.
-                let (cos, sin) = rows[j];
-                let x = DVec3::new(d.y, -d.x, 0.0) * *rad_per_pixel;
-                let up = sin / cos;
-                let y = DVec3::new(d.x * up, d.y * up, -cos) * *rad_per_pixel;
-                (x, y)
-            }
+    #[test]
+    fn every_set_of_instructions_gives_the_same_bytes() {
+        let mesh = scan_like(6_000, 3);
+        let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+        let pose = Pose::level(glam::dvec3(3.0, 2.5, 1.5), 0.3);
+        for camera in [
+            Camera::perspective(pose.turned(0.3, -0.4), 1.2, 301, 203),
+            // Textures that are far too fine for the image.
+            Camera::perspective(pose, 1.6, 33, 21),
+            Camera::equirectangular(pose, 256),
+        ] {
+            let hits = crate::cast(&scene, &camera);
+            let filter = TextureFilter::default();
+            let fast = rgb_image_with(&scene, &pyramids, &hits, &camera, &filter);
+            let mut plain = Raster::filled(camera.width, camera.height, [0; 3]);
+            let work = Rgb {
+                scene: &scene,
+                pyramids: &pyramids,
+                hits: &hits,
+                camera: &camera,
+                filter: &filter,
+                out: &mut plain,
+            };
+            work.run(Plain);
+            assert_eq!(fast, plain);
         }
     }
 }

@@ -30,27 +30,40 @@
 //! # Ok::<(), s3d_geom::MeshError>(())
 //! ```
 
+mod anchor;
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod canvas;
 mod channels;
+mod clusters;
 mod color;
 mod cone;
-mod fan;
+mod filter;
+mod lanes;
+mod lens;
+mod panorama;
 mod patch;
+mod pinhole;
+mod pixel_color;
+mod points;
 mod ray;
+mod registers;
 mod scene;
 mod texture;
-mod tiles;
 mod visibility;
-mod wide;
 
 pub use channels::{
-    MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, color_per_face_image, coverage, depth_image,
-    index_image, normal_image, xyz_image, xyz_image_half,
+    FaceImages, MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, color_per_face_image,
+    color_per_face_image_into, coverage, depth_image, depth_image_into, face_images_into, index_image,
+    index_image_into, normal_image, normal_image_into,
 };
-pub use color::{rgb_image, rgb_image_with};
+pub use color::{rgb_image, rgb_image_into, rgb_image_with};
+pub use pixel_color::rgb_image_pixel_by_pixel;
+pub use points::{xyz_image, xyz_image_half, xyz_image_half_into};
 pub use ray::{Hit, cast_ray, cast_ray_brute_force};
 pub use scene::Scene;
 pub use texture::{Pyramids, TextureFilter};
-pub use visibility::{Hits, NO_FACE, cast, cast_ray_by_ray, cast_strided};
+pub use visibility::{Caster, Hits, NO_FACE, cast, cast_ray_by_ray, cast_strided};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,5 +1,6 @@
 //! A face as a function of the ray's direction: where on it a ray arrives, and how fast that changes from ray to ray.
 
+use crate::NO_FACE;
 use glam::{DVec2, DVec3, Vec2};
 use s3d_geom::TriMesh;
 
@@ -20,6 +21,16 @@ impl Patch {
         // The sum itself would lose a sliver's normal.
         let whole = (world[1] - world[0]).cross(world[2] - world[0]);
         Self { weights: [b.cross(c), c.cross(a), a.cross(b)], whole }
+    }
+
+    /// The functions w(k) of the three corners.
+    pub(crate) fn weights_of_corners(&self) -> [DVec3; 3] {
+        self.weights
+    }
+
+    /// The denominator, in place of the weights' sum.
+    pub(crate) fn whole(&self) -> DVec3 {
+        self.whole
     }
 
     /// The face's unit normal on the side that the origin sees, and whether that is its back.
@@ -80,23 +91,32 @@ impl UvPatch {
 /// Things prepared once a face, as long as no other face takes their place: the pixels of a face lie together, in one
 /// row after another.
 pub(crate) struct FaceCache<T> {
-    entries: Vec<Option<(u32, T)>>,
+    /// By place, which a face's index gives: the face, and where its thing is.
+    places: Vec<(u32, u32)>,
+    things: Vec<T>,
 }
 
 impl<T> FaceCache<T> {
-    /// More than the faces across a panorama, a power of two.
-    const SIZE: usize = 2048;
+    /// Far more than the faces across a panorama, a power of two.
+    const SIZE: usize = 8192;
 
     pub(crate) fn new() -> Self {
-        Self { entries: std::iter::repeat_with(|| None).take(Self::SIZE).collect() }
+        Self { places: vec![(NO_FACE, u32::MAX); Self::SIZE], things: Vec::new() }
     }
 
     #[inline(always)]
-    pub(crate) fn get(&mut self, face: u32, make: impl FnOnce() -> T) -> &T {
-        let entry = &mut self.entries[face as usize % Self::SIZE];
-        if entry.as_ref().is_none_or(|(of, _)| *of != face) {
-            *entry = None;
+    pub(crate) fn get(&mut self, face: u32, make: impl FnOnce() -> T) -> &mut T {
+        let (of, at) = &mut self.places[face as usize % Self::SIZE];
+        if *of != face {
+            *of = face;
+            match self.things.get_mut(*at as usize) {
+                Some(thing) => *thing = make(),
+                None => {
+                    *at = self.things.len() as u32;
+                    self.things.push(make());
+                }
+            }
         }
-        &entry.get_or_insert_with(|| (face, make())).1
+        &mut self.things[*at as usize]
     }
 }

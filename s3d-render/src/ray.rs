@@ -52,13 +52,13 @@ fn is_ray(origin: DVec3, direction: DVec3) -> bool {
 
 /// The hits that may still be the nearest.
 #[derive(Default)]
-struct Nearest {
+pub(crate) struct Nearest {
     t_min: Option<f64>,
     candidates: Vec<Hit>,
 }
 
 impl Nearest {
-    fn meet(&mut self, mesh: &TriMesh, face: u32, origin: DVec3, direction: DVec3) {
+    pub(crate) fn meet(&mut self, mesh: &TriMesh, face: u32, origin: DVec3, direction: DVec3) {
         let Some(cone) = Cone::new(mesh, face, origin).filter(|c| c.contains(direction)) else { return };
         let t = cone.distance(direction);
         if t <= self.reach() {
@@ -72,7 +72,7 @@ impl Nearest {
         self.t_min.map_or(f64::INFINITY, |t| t * (1.0 + TIE))
     }
 
-    fn hit(&self) -> Option<Hit> {
+    pub(crate) fn hit(&self) -> Option<Hit> {
         self.candidates.iter().filter(|h| h.t <= self.reach()).min_by_key(|h| h.face).copied()
     }
 }

@@ -1,5 +1,6 @@
 //! A mesh and the tree over its faces.
 
+use crate::clusters::Clusters;
 use glam::DVec3;
 use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
 use s3d_geom::TriMesh;
@@ -10,6 +11,7 @@ pub struct Scene<'m> {
     mesh: &'m TriMesh,
     /// Boxes are exact unions of `f32` corners; every test against them allows for its own rounding.
     bvh: Bvh2,
+    clusters: Clusters,
     /// The largest absolute coordinate of a corner.
     extent: f64,
 }
@@ -29,11 +31,12 @@ impl<'m> Scene<'m> {
             .map(|face| FaceBox(Aabb::from_points(&mesh.triangle(face).map(Into::into))))
             .collect();
         // Small leaves: a face costs more than a box here.
-        let params = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::medium_build() };
+        let params = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::fast_build() };
         let bvh = build_bvh2(&boxes, params, &mut Duration::default());
         let b = mesh.aabb();
         let extent = f64::from(b.min.abs().max(b.max.abs()).max_element());
-        Self { mesh, bvh, extent }
+        let clusters = Clusters::new(mesh, &bvh);
+        Self { mesh, bvh, clusters, extent }
     }
 
     /// The mesh.
@@ -43,6 +46,10 @@ impl<'m> Scene<'m> {
 
     pub(crate) fn bvh(&self) -> &Bvh2 {
         &self.bvh
+    }
+
+    pub(crate) fn clusters(&self) -> &Clusters {
+        &self.clusters
     }
 
     /// A bound on the coordinates in play, seen from `origin`: rounding errors are small multiples of it.

@@ -1,5 +1,6 @@
 //! Textures at every size that a pixel may need.
 
+use crate::filter::Sizes;
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 use s3d_geom::{Raster, Texture, TriMesh, Wrap, sample_bilinear};
@@ -40,6 +41,11 @@ impl Pyramids {
     /// The number of bytes of the reductions of all textures.
     pub fn bytes(&self) -> usize {
         self.reductions.iter().flatten().map(|level| 3 * level.len()).sum()
+    }
+
+    /// All sizes of texture `texture` of the mesh, for the fast filter.
+    pub(crate) fn sizes<'a>(&'a self, texture: usize, full: &'a Texture) -> Sizes<'a> {
+        Sizes::new(full, &self.reductions[texture])
     }
 
     /// The sizes of texture `texture`, each half of the one before.
@@ -199,8 +205,9 @@ impl Sum {
     #[inline(always)]
     fn add_bilinear(&mut self, image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: DVec2, weight: f32) {
         let (w, h) = (image.width(), image.height());
-        let x = wrapped(uv.x, wrap[0]) * f64::from(w) - 0.5;
-        let y = (1.0 - wrapped(uv.y, wrap[1])) * f64::from(h) - 0.5;
+        let uv = DVec2::new(wrapped(uv.x, wrap[0]), wrapped(uv.y, wrap[1]));
+        let x = uv.x * f64::from(w) - 0.5;
+        let y = (1.0 - uv.y) * f64::from(h) - 0.5;
         let (xi, yi) = (x as u32, y as u32);
         let at = 3 * (yi as usize * w as usize + xi as usize);
         let bytes = image.pixels().as_flattened();

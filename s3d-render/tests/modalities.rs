@@ -1,5 +1,8 @@
 //! Scenes whose images are known in closed form: depth, normals, coordinates and colours of pixels.
 
+#[path = "../benches/common/mod.rs"]
+mod common;
+
 use s3d_geom::glam::{DVec3, Vec2, Vec3, dvec3, vec2, vec3};
 use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, TriMesh, Wrap};
 use s3d_render::{Hits, NO_FACE, Normals, Pyramids, Scene};
@@ -330,4 +333,161 @@ fn an_index_beyond_24_bits_is_a_callers_mistake() {
     let mesh = room();
     let hits = s3d_render::cast(&Scene::new(&mesh), &view(0.0, 0.0));
     let _ = s3d_render::index_image(&hits, &[1 << 24; 12]);
+}
+
+/// The fast image against the one of single pixels: no channel may differ by more than 1, but in a few pixels where
+/// rounding decides how many samples are taken.
+fn close(mesh: &TriMesh, camera: &Camera, max_taps: u32) {
+    let (scene, pyramids) = (Scene::new(mesh), Pyramids::new(mesh));
+    let hits = s3d_render::cast(&scene, camera);
+    let filter = s3d_render::TextureFilter { max_taps };
+    let fast = s3d_render::rgb_image_with(&scene, &pyramids, &hits, camera, &filter);
+    let exact = s3d_render::rgb_image_pixel_by_pixel(&scene, &pyramids, &hits, camera, &filter);
+    let (mut differ, mut samples_differ) = (0, 0);
+    for (k, (f, e)) in fast.pixels().iter().zip(exact.pixels()).enumerate() {
+        let most = (0..3).map(|c| f[c].abs_diff(e[c])).max().unwrap_or(0);
+        assert!(most <= 20, "pixel {k} of {camera:?}: {f:?} for {e:?}");
+        samples_differ += usize::from(most > 1);
+        differ += usize::from(most > 0);
+        assert_eq!(*f == [0; 3], hits.face.pixels()[k] == NO_FACE);
+    }
+    assert!(samples_differ <= 1 + fast.len() / 20_000, "{samples_differ} pixels of {camera:?}");
+    // A colour is off by 0.1 at most, and so seldom rounded otherwise.
+    assert!(differ * 10 <= fast.len(), "{differ} of {} pixels are rounded otherwise", fast.len());
+}
+
+fn all_kinds(location: DVec3) -> Vec<Camera> {
+    let pose = Pose::level(location, 0.4);
+    vec![
+        Camera::perspective(pose.turned(0.3, 0.1), 75f64.to_radians(), 333, 250),
+        Camera::perspective(pose.turned(2.0, -0.9), 40f64.to_radians(), 97, 61),
+        Camera::perspective(pose.turned(-1.0, 0.3), 170f64.to_radians(), 200, 120),
+        Camera::perspective(pose, 1.0, 3, 2),
+        Camera::equirectangular(pose, 500),
+        Camera::equirectangular(pose, 38),
+    ]
+}
+
+#[test]
+fn rgb_is_what_single_pixels_give() {
+    let noise = |size: u32| {
+        let pixel = |k: u32| k.wrapping_mul(0x9E37_79B1).rotate_left(k % 23).to_le_bytes();
+        Raster::from_vec(size, size, (0..size * size).map(|k| std::array::from_fn(|c| pixel(k)[c])).collect())
+    };
+    for (size, wrap) in [
+        (512, Wrap::Repeat),
+        (301, Wrap::Mirror),
+        (64, Wrap::Clamp),
+        (5, Wrap::Repeat),
+        (2, Wrap::Mirror),
+        (1, Wrap::Clamp),
+    ] {
+        // As it is; several times over each wall and off to one side; far out.
+        for (scale, shift) in [(1.0, vec2(0.0, 0.0)), (3.7, vec2(-1.3, 0.6)), (0.9, vec2(1000.25, -77.5))] {
+            let mut parts = textured(noise(size), wrap).into_parts();
+            parts.uvs.iter_mut().for_each(|uv| *uv = *uv * scale + shift);
+            let mesh = TriMesh::new(parts).unwrap();
+            for camera in all_kinds(EYE) {
+                close(&mesh, &camera, 8);
+            }
+            close(&mesh, &all_kinds(EYE)[0], 1);
+            // With the eye nearly on the floor.
+            close(&mesh, &all_kinds(dvec3(-1.5, 1.0, 0.004))[0], 8);
+        }
+    }
+}
+
+#[test]
+fn colours_of_corners_are_what_single_pixels_give() {
+    let mut parts = room_parts();
+    parts.colors = (0..24u32).map(|k| (k * 0x35_79_13).to_le_bytes()).map(|[r, g, b, _]| [r, g, b]).collect();
+    let mesh = TriMesh::new(parts).unwrap();
+    for camera in all_kinds(EYE) {
+        close(&mesh, &camera, 8);
+    }
+}
+
+#[test]
+fn rgb_of_scans_is_what_single_pixels_give() {
+    let mesh = s3d_geom::scan_like(20_000, 5);
+    for camera in all_kinds(dvec3(3.0, 2.5, 1.5)) {
+        close(&mesh, &camera, 8);
+    }
+    #[allow(clippy::print_stderr)]
+    let Some((path, location)) = common::real_scan() else {
+        eprintln!("skipped: no real scan beside the project");
+        return;
+    };
+    let mesh = common::read_obj(&path);
+    for camera in all_kinds(location) {
+        close(&mesh, &camera, 8);
+    }
+}
+
+/// What formats.md says of the other images, a pixel at a time.
+#[test]
+fn images_are_what_single_pixels_give() {
+    let mesh = s3d_geom::scan_like(20_000, 5);
+    let scene = Scene::new(&mesh);
+    let faces = mesh.faces().len() as u32;
+    let index: Vec<u32> = (0..faces).map(|f| f * 631 % (1 << 24)).collect();
+    let color: Vec<[u8; 3]> = (0..faces).map(|f| [f as u8, (f >> 8) as u8, 7]).collect();
+    let mut all = s3d_render::FaceImages::default();
+    let mut again = s3d_render::xyz_image_half(&s3d_render::cast(&scene, &view(0.0, 0.0)), &view(0.0, 0.0));
+    for camera in all_kinds(dvec3(3.0, 2.5, 1.5)) {
+        let hits = s3d_render::cast(&scene, &camera);
+        let depth = s3d_render::depth_image(&hits);
+        let normal = s3d_render::normal_image(&scene, &hits, &camera, Normals::Flat);
+        let indices = s3d_render::index_image(&hits, &index);
+        let colors = s3d_render::color_per_face_image(&hits, &color);
+        let (xyz, half) = (s3d_render::xyz_image(&hits, &camera), s3d_render::xyz_image_half(&hits, &camera));
+        let rays = camera.rays();
+        for k in 0..hits.face.len() {
+            let (i, j) = (k as u32 % camera.width, k as u32 / camera.width);
+            let (face, t) = (hits.face.pixels()[k], f64::from(hits.depth.pixels()[k]));
+            assert_eq!(depth.pixels()[k], (t * 512.0 + 0.5) as u16);
+            let p = camera.pose.location + rays.at(i, j) * t;
+            let p = if t.is_finite() { p.as_vec3().to_array() } else { [0.0; 3] };
+            assert_eq!(xyz.pixels()[k], p, "({i}, {j})");
+            assert_eq!(half.pixels()[k], p.map(half::f16::from_f32), "({i}, {j})");
+            if face == NO_FACE {
+                assert_eq!(
+                    (normal.pixels()[k], indices.pixels()[k], colors.pixels()[k]),
+                    ([128; 3], [13; 3], [0; 3])
+                );
+                continue;
+            }
+            let [a, b, c] = mesh.triangle(face).map(|p| p.as_dvec3());
+            let n = (b - a).cross(c - a).normalize();
+            let n = if n.dot(a - camera.pose.location) > 0.0 { -n } else { n };
+            let n = (camera.normal_image_from_world() * n * 127.5 + (128.0 + 1e-9)).to_array();
+            assert_eq!(normal.pixels()[k], n.map(|c| c as u8));
+            let [_, r, g, b] = index[face as usize].to_be_bytes();
+            assert_eq!((indices.pixels()[k], colors.pixels()[k]), ([r, g, b], color[face as usize]));
+        }
+        // Into what holds the images of another camera.
+        s3d_render::face_images_into(&scene, &hits, &camera, &index, &color, &mut all);
+        assert_eq!((&all.normal, &all.index, &all.color), (&normal, &indices, &colors));
+        s3d_render::xyz_image_half_into(&hits, &camera, &mut again);
+        assert_eq!(again, half);
+        let mut other = depth.map(|_| 7);
+        s3d_render::depth_image_into(&hits, &mut other);
+        assert_eq!(other, depth);
+    }
+}
+
+#[test]
+fn an_image_that_is_used_again_is_as_a_new_one() {
+    let mesh = textured(chart(64), Wrap::Clamp);
+    let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+    let filter = s3d_render::TextureFilter::default();
+    let mut again = Raster::filled(5, 5, [9; 3]);
+    for camera in all_kinds(EYE) {
+        // The second time it holds the image of the turned camera.
+        for camera in [camera, Camera { pose: camera.pose.turned(1.0, 0.0), ..camera }] {
+            let hits = s3d_render::cast(&scene, &camera);
+            s3d_render::rgb_image_into(&scene, &pyramids, &hits, &camera, &filter, &mut again);
+            assert_eq!(again, s3d_render::rgb_image(&scene, &pyramids, &hits, &camera));
+        }
+    }
 }

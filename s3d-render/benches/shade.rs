@@ -1,0 +1,90 @@
+//! How long do the images of a view take, once its hits are known: each modality alone, and all six?
+//!
+//! Nine views of 1080² and a panorama of 4096 × 2048 from one place, in the scan-like mesh of 300,000 faces, the real scan
+//! beside the project if it is there, and the OBJ file (Z up) that `S3D_BENCH_OFFICE` names, seen from (4.03, 3.07, 1.5).
+
+mod common;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use s3d_geom::glam::{DVec3, dvec3, vec3};
+use s3d_geom::{Camera, Pose, Raster, TriMesh, scan_like};
+use s3d_render::{FaceImages, Hits, Normals, Pyramids, Scene, TextureFilter};
+use std::hint::black_box;
+use std::path::Path;
+
+fn meshes() -> Vec<(&'static str, TriMesh, DVec3)> {
+    let mut meshes = vec![("scan-like", scan_like(300_000, 1), dvec3(3.0, 2.5, 1.5))];
+    if let Some((path, location)) = common::real_scan() {
+        meshes.push(("copyroom", common::read_obj(&path), location));
+    }
+    if let Ok(path) = std::env::var("S3D_BENCH_OFFICE") {
+        // The reader turns Y up to Z up: back again.
+        let mut parts = common::read_obj(Path::new(&path)).into_parts();
+        parts.positions.iter_mut().for_each(|p| *p = vec3(p.x, p.z, -p.y));
+        meshes.push(("office", TriMesh::new(parts).expect("it was a mesh"), dvec3(4.03, 3.07, 1.5)));
+    }
+    // Textures with about three pixels for one of the image's: the filter has work to do.
+    meshes.push(("fine textures", common::furnished_room(285_000), common::room_location()));
+    meshes
+}
+
+fn shade(c: &mut Criterion) {
+    let mut group = c.benchmark_group("shade");
+    group.sample_size(10);
+    for (name, mesh, location) in &meshes() {
+        let scene = Scene::new(mesh);
+        let pyramids = Pyramids::new(mesh);
+        let index: Vec<u32> = (0..mesh.faces().len() as u32).collect();
+        let pretty: Vec<[u8; 3]> = index.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
+        let panorama = Camera::equirectangular(Pose::level(*location, 0.4), 4096);
+        for (what, cameras) in [("9 views", common::views(*location, 1080)), ("panorama", vec![panorama])] {
+            let shots: Vec<(Camera, Hits)> =
+                cameras.into_iter().map(|camera| (camera, s3d_render::cast(&scene, &camera))).collect();
+            group
+                .throughput(Throughput::Elements(shots.iter().map(|(_, hits)| hits.face.len() as u64).sum()));
+            let mut bench = |channel: &str, shade: &mut dyn FnMut(&Camera, &Hits)| {
+                group.bench_function(BenchmarkId::new(format!("{channel}, {what}"), name), |b| {
+                    b.iter(|| shots.iter().for_each(|(camera, hits)| shade(camera, hits)));
+                });
+            };
+            // Into images that are used again: the pages of new ones take the system longer than some take to be made.
+            let filter = TextureFilter::default();
+            let (mut rgb, mut normal) = (Raster::filled(1, 1, [0; 3]), Raster::filled(1, 1, [0; 3]));
+            let (mut semantic, mut colored) = (normal.clone(), normal.clone());
+            let mut depth = Raster::filled(1, 1, 0);
+            let mut xyz = s3d_render::xyz_image_half(&shots[0].1, &shots[0].0);
+            let mut faces = FaceImages::default();
+            bench("rgb", &mut |c, h| {
+                s3d_render::rgb_image_into(&scene, &pyramids, h, c, &filter, &mut rgb);
+            });
+            bench("depth", &mut |_, h| s3d_render::depth_image_into(h, &mut depth));
+            bench("normal", &mut |c, h| {
+                s3d_render::normal_image_into(&scene, h, c, Normals::Flat, &mut normal);
+            });
+            bench("semantic", &mut |_, h| s3d_render::index_image_into(h, &index, &mut semantic));
+            bench("pretty", &mut |_, h| s3d_render::color_per_face_image_into(h, &pretty, &mut colored));
+            bench("normal, semantic and pretty at once", &mut |c, h| {
+                s3d_render::face_images_into(&scene, h, c, &index, &pretty, &mut faces);
+            });
+            bench("xyz half", &mut |c, h| s3d_render::xyz_image_half_into(h, c, &mut xyz));
+            bench("all six", &mut |c, h| {
+                s3d_render::rgb_image_into(&scene, &pyramids, h, c, &filter, &mut rgb);
+                s3d_render::depth_image_into(h, &mut depth);
+                s3d_render::face_images_into(&scene, h, c, &index, &pretty, &mut faces);
+                s3d_render::xyz_image_half_into(h, c, &mut xyz);
+            });
+            bench("all six, new images", &mut |c, h| {
+                drop(black_box(s3d_render::rgb_image(&scene, &pyramids, h, c)));
+                drop(black_box(s3d_render::depth_image(h)));
+                drop(black_box(s3d_render::normal_image(&scene, h, c, Normals::Flat)));
+                drop(black_box(s3d_render::index_image(h, &index)));
+                drop(black_box(s3d_render::color_per_face_image(h, &pretty)));
+                drop(black_box(s3d_render::xyz_image_half(h, c)));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, shade);
+criterion_main!(benches);

@@ -1,0 +1,217 @@
+//! How fast the visibility pass is, and what it saw, for a comparison with other ray casters:
+//!
+//! ```text
+//! cargo run --release -p s3d-render --example visibility -- MESH X Y Z [--up y|z] [--rounds N] [--threads N] [--dump DIR]
+//! ```
+//!
+//! MESH is an OBJ file (Y up unless said otherwise) or `scan-like:FACES`, a generated scan. From (X, Y, Z) in the Z-up
+//! world it casts 72 views of 1080² (24 yaws at the pitches 0°, −15° and 15°, 75° wide) and a panorama of 4096 × 2048,
+//! face and depth of every pixel written, and prints the rays per second of user time and of wall time: the median of
+//! the rounds. The location is rounded to `f32` first, so that ray casters of `f32` start at the very same point.
+//!
+//! With `--dump` it also writes what `docs/performance/embree_cast.cpp` needs to cast the same rays and compare, all
+//! little-endian:
+//!
+//! | file | holds |
+//! |---|---|
+//! | `dump.txt` | vertices, faces, views, their width and height, the panorama's width and height, the origin |
+//! | `positions.f32`, `faces.u32` | three numbers a vertex or face |
+//! | `views.f64` | a view in nine numbers: `corner`, `x_step`, `y_step`: the direction of pixel (i, j) is corner + x_step·(i + ½) + y_step·(j + ½) |
+//! | `columns.f64`, `rows.f64` | the panorama's: cosine and sine of each column's azimuth c and row's latitude r; the direction is (r.cos·c.cos, r.cos·c.sin, r.sin) |
+//! | `view_00.face`, `view_00.depth`, …, `pano.face`, `pano.depth` | `u32` and `f32` by row; 4,294,967,295 and infinity where nothing is hit |
+
+#[path = "../benches/common/mod.rs"]
+mod common;
+
+use s3d_geom::glam::{DVec2, DVec3, Vec3, dvec3, vec3};
+use s3d_geom::{Camera, Pose, Rays, TriMesh, scan_like};
+use s3d_render::{Caster, Hits, Scene};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+const USAGE: &str =
+    "usage: visibility MESH.obj|scan-like:FACES X Y Z [--up y|z] [--rounds N] [--threads N] [--dump DIR]";
+
+/// So many panoramas a round, so that the kernel's clock of 10 ms is fine enough.
+const PANORAMAS: usize = 8;
+
+struct Options {
+    mesh: String,
+    origin: DVec3,
+    z_up: bool,
+    rounds: usize,
+    threads: usize,
+    dump: Option<PathBuf>,
+}
+
+#[allow(clippy::print_stdout)]
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = options()?;
+    let mesh = match options.mesh.strip_prefix("scan-like:") {
+        Some(faces) => scan_like(faces.parse()?, 1),
+        None => read_obj(Path::new(&options.mesh), options.z_up)?,
+    };
+    let started = Instant::now();
+    let scene = Scene::new(&mesh);
+    println!(
+        "{}: {} faces, scene in {:.2} s",
+        options.mesh,
+        mesh.faces().len(),
+        started.elapsed().as_secs_f64()
+    );
+
+    let views = views(options.origin);
+    let panorama = Camera::equirectangular(Pose::level(options.origin, 0.0), 4096);
+    if let Some(folder) = &options.dump {
+        dump(folder, &scene, &views, &panorama)?;
+    }
+    let panoramas = vec![panorama; PANORAMAS];
+    let (mut of_views, mut of_panoramas) = (Vec::new(), Vec::new());
+    for _ in 0..options.rounds {
+        of_views.push(round(&scene, &views, options.threads)?);
+        of_panoramas.push(round(&scene, &panoramas, options.threads)?);
+    }
+    for (what, mut rates) in [("views", of_views), ("panorama", of_panoramas)] {
+        let mut median = |which: fn(&Rates) -> f64| {
+            rates.sort_by(|a, b| which(a).total_cmp(&which(b)));
+            which(&rates[rates.len() / 2])
+        };
+        let (core, wall) = (median(|r| r.core), median(|r| r.wall));
+        println!("{what}: {core:.2} Mray/s a core, {wall:.2} Mray/s on {} thread(s)", options.threads);
+    }
+    Ok(())
+}
+
+fn options() -> Result<Options, Box<dyn Error>> {
+    let (mut plain, mut z_up, mut rounds, mut threads, mut dump) = (Vec::new(), false, 3, 1, None);
+    let mut args = std::env::args().skip(1);
+    while let Some(arg) = args.next() {
+        if !arg.starts_with("--") {
+            plain.push(arg);
+            continue;
+        }
+        let value = args.next().ok_or(USAGE)?;
+        match (arg.as_str(), value.as_str()) {
+            ("--up", up @ ("y" | "z")) => z_up = up == "z",
+            ("--rounds", n) => rounds = n.parse()?,
+            ("--threads", n) => threads = n.parse()?,
+            ("--dump", folder) => dump = Some(PathBuf::from(folder)),
+            _ => return Err(USAGE.into()),
+        }
+    }
+    let [mesh, x, y, z] = <[String; 4]>::try_from(plain).map_err(|_| USAGE)?;
+    if rounds == 0 || threads == 0 {
+        return Err(USAGE.into());
+    }
+    let coordinate = |text: &str| text.parse::<f32>().map(f64::from);
+    let origin = dvec3(coordinate(&x)?, coordinate(&y)?, coordinate(&z)?);
+    Ok(Options { mesh, origin, z_up, rounds, threads, dump })
+}
+
+fn read_obj(path: &Path, z_up: bool) -> Result<TriMesh, Box<dyn Error>> {
+    let mesh = common::read_obj(path);
+    // That reader takes Y for up.
+    let turn = |p: &Vec3| if z_up { vec3(p.x, p.z, -p.y) } else { *p };
+    let positions = mesh.positions().iter().map(turn).collect();
+    Ok(TriMesh::from_faces(positions, mesh.faces().to_vec())?)
+}
+
+fn views(origin: DVec3) -> Vec<Camera> {
+    let level = Pose::level(origin, 0.0);
+    let view = |k: usize| {
+        let (from_x, pitch) = (7.3 + 15.0 * (k % 24) as f64, [0f64, -15.0, 15.0][k / 24]);
+        let pose = level.turned((from_x - 90.0).to_radians(), pitch.to_radians());
+        Camera::perspective(pose, 75f64.to_radians(), 1080, 1080)
+    };
+    (0..72).map(view).collect()
+}
+
+/// Millions of rays a second.
+struct Rates {
+    core: f64,
+    wall: f64,
+}
+
+/// Casts all images on some threads, each with memory of its own that it keeps from image to image.
+fn round(scene: &Scene<'_>, cameras: &[Camera], threads: usize) -> Result<Rates, Box<dyn Error>> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let (mut caster, mut hits) = (Caster::new(scene), Hits::default());
+        while let Some(camera) = cameras.get(next.fetch_add(1, Ordering::Relaxed)) {
+            caster.cast_into(camera, 1, &mut hits);
+            std::hint::black_box(&hits);
+        }
+    };
+    let (wall, user) = (Instant::now(), user_seconds()?);
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(work);
+        }
+        work();
+    });
+    let (wall, user) = (wall.elapsed().as_secs_f64(), user_seconds()? - user);
+    let rays: f64 = cameras.iter().map(|c| f64::from(c.width) * f64::from(c.height) * 1e-6).sum();
+    Ok(Rates { core: rays / user, wall: rays / wall })
+}
+
+/// User time of this process, from Linux's accounts of it.
+fn user_seconds() -> Result<f64, Box<dyn Error>> {
+    let stat = std::fs::read_to_string("/proc/self/stat")?;
+    // After the name in parentheses, utime is field 14 of the line, in ticks of 10 ms.
+    let fields = stat.rsplit_once(')').ok_or("no name in /proc/self/stat")?.1;
+    let ticks: u64 = fields.split_whitespace().nth(11).ok_or("no utime in /proc/self/stat")?.parse()?;
+    Ok(ticks as f64 / 100.0)
+}
+
+fn dump(folder: &Path, scene: &Scene<'_>, views: &[Camera], panorama: &Camera) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(folder)?;
+    let mesh = scene.mesh();
+    let origin = panorama.pose.location;
+    let numbers = format!(
+        "{} {}\n{} {} {}\n{} {}\n{} {} {}\n",
+        mesh.positions().len(),
+        mesh.faces().len(),
+        views.len(),
+        views[0].width,
+        views[0].height,
+        panorama.width,
+        panorama.height,
+        origin.x,
+        origin.y,
+        origin.z
+    );
+    std::fs::write(folder.join("dump.txt"), numbers)?;
+    let write = |name: &str, bytes: Vec<u8>| std::fs::write(folder.join(name), bytes);
+    let doubles = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let corners = mesh.positions().iter().flat_map(Vec3::to_array);
+    write("positions.f32", corners.flat_map(f32::to_le_bytes).collect())?;
+    write("faces.u32", mesh.faces().iter().flatten().flat_map(|i| i.to_le_bytes()).collect())?;
+
+    let mut parameters = Vec::new();
+    for camera in views.iter().chain([panorama]) {
+        match camera.rays() {
+            Rays::Perspective { x_step, y_step, origin } => {
+                parameters.extend([origin, x_step, y_step].iter().flat_map(|v| v.to_array()));
+            }
+            Rays::Equirectangular { columns, rows } => {
+                let flat = |pairs: &[DVec2]| pairs.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>();
+                write("columns.f64", doubles(&flat(&columns)))?;
+                write("rows.f64", doubles(&flat(&rows)))?;
+            }
+        }
+    }
+    write("views.f64", doubles(&parameters))?;
+
+    let mut caster = Caster::new(scene);
+    for (k, camera) in views.iter().chain([panorama]).enumerate() {
+        let name = if k < views.len() { format!("view_{k:02}") } else { "pano".to_owned() };
+        let hits = caster.cast(camera);
+        let faces = hits.face.pixels().iter().flat_map(|f| f.to_le_bytes());
+        let depths = hits.depth.pixels().iter().flat_map(|d| d.to_le_bytes());
+        write(&format!("{name}.face"), faces.collect())?;
+        write(&format!("{name}.depth"), depths.collect())?;
+    }
+    Ok(())
+}

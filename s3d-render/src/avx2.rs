@@ -1,0 +1,508 @@
+//! [`Lanes`] by AVX2, without fused multiplications: their rounding is not every processor's.
+//!
+//! All that is unsafe here is to use these instructions, which [`Avx2::detect`] asks for, and to load from and store to
+//! references of the right size.
+#![allow(unsafe_code)]
+
+use crate::lanes::{LANES, LaneWork, Lanes};
+use half::f16;
+use std::arch::x86_64::*;
+
+/// Proof that the processor has AVX2, F16C and the bit instructions that come with them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Avx2(());
+
+impl Avx2 {
+    pub(crate) fn detect() -> Option<Self> {
+        (is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("f16c")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("popcnt"))
+        .then_some(Self(()))
+    }
+
+    /// Does `work`, compiled for these instructions throughout.
+    pub(crate) fn run<W: LaneWork>(self, work: W) -> W::Output {
+        #[target_feature(enable = "avx2,f16c,bmi1,bmi2,popcnt")]
+        fn with_avx2<W: LaneWork>(work: W, lanes: Avx2) -> W::Output {
+            work.run(lanes)
+        }
+        // SAFETY: the processor has these instructions, or there were no `self`.
+        unsafe { with_avx2(work, self) }
+    }
+}
+
+// SAFETY of all blocks below: an `Avx2` exists only where the processor has the instructions; pointers are to references
+// as large as what is loaded or stored, and nothing asks for more than bytes' alignment.
+impl Lanes for Avx2 {
+    type F = __m256;
+    /// To the right, then downwards.
+    type Parts = __m256i;
+    /// The upper pixels of places k and k + 4, then the lower ones.
+    type Quads = [__m128i; 8];
+    /// Two pixels each, k and k + 4: R G B at the beginning of each 128 bits count.
+    type Mix = [__m256i; 4];
+    /// The weights of pixels k and k + 4, throughout 128 bits each.
+    type Weights = [__m256i; 4];
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> __m256 {
+        unsafe { _mm256_set1_ps(value) }
+    }
+    #[inline(always)]
+    fn load(self, from: &[f32; LANES]) -> __m256 {
+        unsafe { _mm256_loadu_ps(from.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store(self, values: __m256, to: &mut [f32; LANES]) {
+        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), values) }
+    }
+    #[inline(always)]
+    fn add(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_add_ps(a, b) }
+    }
+    #[inline(always)]
+    fn sub(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_sub_ps(a, b) }
+    }
+    #[inline(always)]
+    fn mul(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_mul_ps(a, b) }
+    }
+    #[inline(always)]
+    fn div(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_div_ps(a, b) }
+    }
+    #[inline(always)]
+    fn sqrt(self, a: __m256) -> __m256 {
+        unsafe { _mm256_sqrt_ps(a) }
+    }
+    #[inline(always)]
+    fn min(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_min_ps(a, b) }
+    }
+    #[inline(always)]
+    fn max(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_max_ps(a, b) }
+    }
+    #[inline(always)]
+    fn by_sign(self, of: __m256, negative: __m256, positive: __m256) -> __m256 {
+        unsafe { _mm256_blendv_ps(positive, negative, of) }
+    }
+    #[inline(always)]
+    fn greater(self, a: __m256, b: __m256) -> u32 {
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(a, b)) as u32 }
+    }
+    #[inline(always)]
+    fn store_int(self, values: __m256, to: &mut [i32; LANES]) {
+        unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_cvttps_epi32(values)) }
+    }
+
+    #[inline(always)]
+    fn log2(self, values: __m256) -> (__m256, __m256) {
+        unsafe {
+            let bits = _mm256_castps_si256(values);
+            let whole = _mm256_sub_epi32(_mm256_srli_epi32::<23>(bits), _mm256_set1_epi32(127));
+            let digits = _mm256_and_si256(bits, _mm256_set1_epi32(0x007F_FFFF));
+            let mantissa = _mm256_castsi256_ps(_mm256_or_si256(digits, _mm256_set1_epi32(0x3F80_0000)));
+            let third = _mm256_mul_ps(mantissa, _mm256_set1_ps(1.0 / 3.0));
+            let parabola = _mm256_mul_ps(_mm256_sub_ps(_mm256_set1_ps(2.0), third), mantissa);
+            let fraction = _mm256_sub_ps(parabola, _mm256_set1_ps(5.0 / 3.0));
+            (_mm256_cvtepi32_ps(whole), _mm256_max_ps(fraction, _mm256_setzero_ps()))
+        }
+    }
+    #[inline(always)]
+    fn place(self, x: __m256, y: __m256, stride: i32, these: u32) -> ([i32; LANES], __m256i) {
+        unsafe {
+            let one = _mm256_set1_ps(32768.0);
+            let columns = _mm256_cvttps_epi32(_mm256_mul_ps(x, one));
+            let rows = _mm256_cvttps_epi32(_mm256_mul_ps(y, one));
+            let rest = _mm256_set1_epi32(0x7FFF);
+            // x of pixels 0 to 3, y of 0 to 3, then of 4 to 7.
+            let parts = _mm256_packus_epi32(_mm256_and_si256(columns, rest), _mm256_and_si256(rows, rest));
+            let columns = _mm256_srai_epi32::<15>(columns);
+            let columns = _mm256_add_epi32(columns, _mm256_add_epi32(columns, columns));
+            let rows = _mm256_mullo_epi32(_mm256_srai_epi32::<15>(rows), _mm256_set1_epi32(stride));
+            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let these = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(these as i32), bits), bits);
+            let mut at = [0; LANES];
+            let all = _mm256_and_si256(_mm256_add_epi32(rows, columns), these);
+            _mm256_storeu_si256(at.as_mut_ptr().cast(), all);
+            (at, _mm256_permute4x64_epi64::<0b11_01_10_00>(parts))
+        }
+    }
+    #[inline(always)]
+    fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> __m256i {
+        unsafe { _mm256_set_m128i(_mm_loadu_si128(y.as_ptr().cast()), _mm_loadu_si128(x.as_ptr().cast())) }
+    }
+    #[inline(always)]
+    fn store_parts(self, parts: __m256i, x: &mut [i16; LANES], y: &mut [i16; LANES]) {
+        unsafe {
+            _mm_storeu_si128(x.as_mut_ptr().cast(), _mm256_castsi256_si128(parts));
+            _mm_storeu_si128(y.as_mut_ptr().cast(), _mm256_extracti128_si256::<1>(parts));
+        }
+    }
+    #[inline(always)]
+    fn quads(self, bytes: &[u8], at: &[i32; LANES], stride: i32) -> Option<Self::Quads> {
+        let limit = i32::try_from(bytes.len()).ok()?.checked_sub(stride.checked_add(8)?)?;
+        unsafe {
+            let all = _mm256_loadu_si256(at.as_ptr().cast());
+            let beyond = _mm256_or_si256(all, _mm256_cmpgt_epi32(all, _mm256_set1_epi32(limit)));
+            if stride < 0 || _mm256_movemask_ps(_mm256_castsi256_ps(beyond)) != 0 {
+                return None;
+            }
+            let mut quads = [_mm_setzero_si128(); 8];
+            for k in 0..4 {
+                // SAFETY: 0 ≤ at ≤ limit, and so at + stride + 8 is within the bytes.
+                let (a, b) = (bytes.as_ptr().add(at[k] as usize), bytes.as_ptr().add(at[k + 4] as usize));
+                let two = |a: *const u8, b: *const u8| {
+                    _mm_set_epi64x(b.cast::<i64>().read_unaligned(), a.cast::<i64>().read_unaligned())
+                };
+                quads[k] = two(a, b);
+                quads[k + 4] = two(a.add(stride as usize), b.add(stride as usize));
+            }
+            Some(quads)
+        }
+    }
+    #[inline(always)]
+    fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
+        unsafe {
+            let mut quads = [_mm_setzero_si128(); 8];
+            for k in 0..4 {
+                quads[k] = _mm_set_epi64x(upper[k + 4] as i64, upper[k] as i64);
+                quads[k + 4] = _mm_set_epi64x(lower[k + 4] as i64, lower[k] as i64);
+            }
+            quads
+        }
+    }
+    #[inline(always)]
+    fn bilinear(self, quads: Self::Quads, parts: __m256i) -> Self::Mix {
+        unsafe { bilinear(quads, parts) }
+    }
+    #[inline(always)]
+    fn weights(self, weights: __m256, these: u32) -> Self::Weights {
+        unsafe {
+            let whole = _mm256_cvttps_epi32(weights);
+            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let these = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(these as i32), bits), bits);
+            let whole = _mm256_and_si256(whole, these);
+            spread(_mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256::<1>(whole)))
+        }
+    }
+    #[inline(always)]
+    fn no_mix(self) -> Self::Mix {
+        unsafe { [_mm256_setzero_si256(); 4] }
+    }
+    #[inline(always)]
+    fn add_weighted(self, sum: Self::Mix, colors: Self::Mix, weights: Self::Weights) -> Self::Mix {
+        unsafe {
+            let mut sum = sum;
+            for k in 0..4 {
+                sum[k] = _mm256_sub_epi16(sum[k], _mm256_mulhrs_epi16(colors[k], weights[k]));
+            }
+            sum
+        }
+    }
+    #[inline(always)]
+    fn pixels(self, mix: Self::Mix) -> [u32; LANES] {
+        unsafe {
+            let half = _mm256_set1_epi16(64);
+            let mut bytes = mix;
+            for pair in &mut bytes {
+                *pair = _mm256_srai_epi16::<7>(_mm256_add_epi16(*pair, half));
+            }
+            // Eight bytes a pixel: 0 1 | 4 5, and 2 3 | 6 7.
+            let a = _mm256_packus_epi16(bytes[0], bytes[1]);
+            let b = _mm256_packus_epi16(bytes[2], bytes[3]);
+            let all = _mm256_castps_si256(_mm256_shuffle_ps::<0b10_00_10_00>(
+                _mm256_castsi256_ps(a),
+                _mm256_castsi256_ps(b),
+            ));
+            let colors = _mm256_and_si256(all, _mm256_set1_epi32(0xFF_FF_FF));
+            let black = _mm256_cmpeq_epi32(colors, _mm256_setzero_si256());
+            let colors = _mm256_or_si256(colors, _mm256_and_si256(black, _mm256_set1_epi32(0x01_01_01)));
+            let mut pixels = [0; LANES];
+            _mm256_storeu_si256(pixels.as_mut_ptr().cast(), colors);
+            pixels
+        }
+    }
+    #[inline(always)]
+    fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]) {
+        unsafe {
+            let packed = _mm256_loadu_si256(packed.as_ptr().cast());
+            let three = _mm_setr_epi8(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1);
+            let close = _mm256_shuffle_epi8(packed, _mm256_broadcastsi128_si256(three));
+            let close = _mm256_permutevar8x32_epi32(close, _mm256_setr_epi32(0, 1, 2, 4, 5, 6, 3, 7));
+            _mm_storeu_si128(to.as_mut_ptr().cast(), _mm256_castsi256_si128(close));
+            _mm_storel_epi64(to.as_mut_ptr().add(16).cast(), _mm256_extracti128_si256::<1>(close));
+        }
+    }
+
+    #[inline(always)]
+    fn equal(self, values: &[u32; LANES], value: u32) -> u32 {
+        unsafe {
+            let values = _mm256_loadu_si256(values.as_ptr().cast());
+            let same = _mm256_cmpeq_epi32(values, _mm256_set1_epi32(value as i32));
+            _mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32
+        }
+    }
+    #[inline(always)]
+    fn changes(self, values: &[u32; LANES + 1]) -> u32 {
+        unsafe {
+            let before = _mm256_loadu_si256(values.as_ptr().cast());
+            let after = _mm256_loadu_si256(values.as_ptr().add(1).cast());
+            let same = _mm256_cmpeq_epi32(before, after);
+            !(_mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32) & 0xFF
+        }
+    }
+    #[inline(always)]
+    fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]) {
+        unsafe {
+            let twice = _mm256_mul_ps(_mm256_loadu_ps(depths.as_ptr()), _mm256_set1_ps(1024.0));
+            // `max` gives its second value where the first is not a number.
+            let twice = _mm256_max_ps(twice, _mm256_setzero_ps());
+            let twice = _mm256_cvttps_epi32(_mm256_min_ps(twice, _mm256_set1_ps(131_070.0)));
+            let rounded = _mm256_srli_epi32::<1>(_mm256_add_epi32(twice, _mm256_set1_epi32(1)));
+            let (low, high) = (_mm256_castsi256_si128(rounded), _mm256_extracti128_si256::<1>(rounded));
+            _mm_storeu_si128(to.as_mut_ptr().cast(), _mm_packus_epi32(low, high));
+        }
+    }
+    #[inline(always)]
+    fn points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &[f32; LANES],
+        place: &[f64; 12],
+        to: &mut [f32; 3 * LANES],
+    ) {
+        unsafe {
+            let points = points::<TURN>(column, row, depths, place);
+            for (k, four) in points.iter().enumerate() {
+                _mm_storeu_ps(to.as_mut_ptr().add(4 * k), *four);
+            }
+        }
+    }
+    #[inline(always)]
+    fn half_points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &[f32; LANES],
+        place: &[f64; 12],
+        to: &mut [f16; 3 * LANES],
+    ) {
+        unsafe {
+            let points = points::<TURN>(column, row, depths, place);
+            for k in 0..3 {
+                let eight = _mm256_set_m128(points[2 * k + 1], points[2 * k]);
+                let eight = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(eight);
+                _mm_storeu_si128(to.as_mut_ptr().add(8 * k).cast(), eight);
+            }
+        }
+    }
+}
+
+/// For each k the value of pixel k throughout the lower 128 bits and that of pixel k + 4 throughout the upper.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn spread(values: __m128i) -> [__m256i; 4] {
+    let both = _mm256_broadcastsi128_si256(values);
+    // The two bytes of value k, and of value k + 4.
+    const fn bytes(k: i64) -> (i64, i64) {
+        let pattern = 0x0001_0001_0001_0001;
+        let two = [2 * k, 2 * k + 8];
+        ((two[0] + ((two[0] + 1) << 8)) * pattern, (two[1] + ((two[1] + 1) << 8)) * pattern)
+    }
+    let of = |(low, high)| _mm256_shuffle_epi8(both, _mm256_setr_epi64x(low, low, high, high));
+    [of(bytes(0)), of(bytes(1)), of(bytes(2)), of(bytes(3))]
+}
+
+/// See [`Lanes::bilinear`].
+#[inline]
+#[target_feature(enable = "avx2")]
+fn bilinear(quads: [__m128i; 8], parts: __m256i) -> [__m256i; 4] {
+    let x = spread(_mm256_castsi256_si128(parts));
+    let y = spread(_mm256_extracti128_si256::<1>(parts));
+    let mut colors = x;
+    for k in 0..4 {
+        let upper = _mm256_slli_epi16::<7>(_mm256_cvtepu8_epi16(quads[k]));
+        let lower = _mm256_slli_epi16::<7>(_mm256_cvtepu8_epi16(quads[k + 4]));
+        let left = _mm256_add_epi16(upper, _mm256_mulhrs_epi16(_mm256_sub_epi16(lower, upper), y[k]));
+        let right = _mm256_srli_si256::<6>(left);
+        colors[k] = _mm256_add_epi16(left, _mm256_mulhrs_epi16(_mm256_sub_epi16(right, left), x[k]));
+    }
+    colors
+}
+
+/// See [`Lanes::points`]; four numbers each.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn points<const TURN: bool>(
+    column: &[f64; 3 * LANES],
+    row: &[f64; 12],
+    depths: &[f32; LANES],
+    place: &[f64; 12],
+) -> [__m128; 6] {
+    // SAFETY: loads from references, of no more than they hold.
+    let load = |from: &[f64], k: usize| unsafe { _mm256_loadu_pd(from[4 * k..4 * k + 4].as_ptr()) };
+    let all = unsafe { _mm256_loadu_ps(depths.as_ptr()) };
+    let seen = _mm256_cmp_ps::<_CMP_LT_OQ>(
+        _mm256_andnot_ps(_mm256_set1_ps(-0.0), all),
+        _mm256_set1_ps(f32::INFINITY),
+    );
+    let mut out = [_mm_setzero_ps(); 6];
+    for half in 0..2 {
+        let (four, seen) = if half == 0 {
+            (_mm256_castps256_ps128(all), _mm256_castps256_ps128(seen))
+        } else {
+            (_mm256_extractf128_ps::<1>(all), _mm256_extractf128_ps::<1>(seen))
+        };
+        let depths = _mm256_cvtps_pd(four);
+        let times = [
+            _mm256_permute4x64_pd::<0b01_00_00_00>(depths),
+            _mm256_permute4x64_pd::<0b10_10_01_01>(depths),
+            _mm256_permute4x64_pd::<0b11_11_11_10>(depths),
+        ];
+        let masks = [
+            _mm_permute_ps::<0b01_00_00_00>(seen),
+            _mm_permute_ps::<0b10_10_01_01>(seen),
+            _mm_permute_ps::<0b11_11_11_10>(seen),
+        ];
+        for k in 0..3 {
+            let (column, row) = (load(column, 3 * half + k), load(row, k));
+            let direction = if TURN { _mm256_mul_pd(column, row) } else { _mm256_add_pd(column, row) };
+            let point = _mm256_add_pd(load(place, k), _mm256_mul_pd(direction, times[k]));
+            out[3 * half + k] = _mm_and_ps(_mm256_cvtpd_ps(point), masks[k]);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::Plain;
+    use proptest::prelude::*;
+
+    fn eight() -> impl Strategy<Value = [f32; LANES]> {
+        let number = prop_oneof![
+            4 => -200.0..200.0f32,
+            1 => any::<f32>(),
+            1 => prop::sample::select(vec![0.0, -0.0, f32::INFINITY, f32::NAN, 1.0, 127.998, 1.0 / 1024.0]),
+        ];
+        prop::array::uniform8(number)
+    }
+
+    fn bits(a: [f32; LANES]) -> [u32; LANES] {
+        // One bit pattern for all that is not a number.
+        a.map(|v| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() })
+    }
+
+    proptest! {
+        #[test]
+        fn numbers_are_those_of_plain_rust(a in eight(), b in eight(), c in eight()) {
+            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            let (x, y, z) = (avx2.load(&a), avx2.load(&b), avx2.load(&c));
+            let mut got = [0.0; LANES];
+            macro_rules! same {
+                ($op:ident, $($avx2:expr, $plain:expr);*) => {
+                    avx2.store(avx2.$op($($avx2),*), &mut got);
+                    prop_assert_eq!(bits(got), bits(Plain.$op($($plain),*)), "{}", stringify!($op));
+                };
+            }
+            same!(add, x, a; y, b);
+            same!(sub, x, a; y, b);
+            same!(mul, x, a; y, b);
+            same!(div, x, a; y, b);
+            same!(min, x, a; y, b);
+            same!(max, x, a; y, b);
+            same!(sqrt, x, a);
+            same!(by_sign, x, a; y, b; z, c);
+            let above_one = a.map(|v| if v.abs() >= 1.0 { v.abs() } else { 1.0 });
+            let (whole, rest) = avx2.log2(avx2.load(&above_one));
+            let (plain_whole, plain_rest) = Plain.log2(above_one);
+            avx2.store(whole, &mut got);
+            prop_assert_eq!(bits(got), bits(plain_whole));
+            avx2.store(rest, &mut got);
+            prop_assert_eq!(bits(got), bits(plain_rest));
+            prop_assert_eq!(avx2.greater(avx2.load(&a), avx2.load(&b)), Plain.greater(a, b));
+            let (mut got, mut want) = ([0; LANES], [0; LANES]);
+            avx2.depths(&a, &mut got);
+            Plain.depths(&a, &mut want);
+            prop_assert_eq!(got, want);
+        }
+
+        #[test]
+        fn colors_are_those_of_plain_rust(
+            upper: [u64; LANES], lower: [u64; LANES],
+            x in prop::array::uniform8(0i16..), y in prop::array::uniform8(0i16..),
+            weights in prop::array::uniform8(-16384.0..=0.0f32), full in prop::bool::ANY, these in 0u32..256,
+        ) {
+            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            let (quads, parts) = (avx2.quads_from(&upper, &lower), avx2.parts(&x, &y));
+            let got = avx2.bilinear(quads, parts);
+            let want = Plain.bilinear(Plain.quads_from(&upper, &lower), Plain.parts(&x, &y));
+            prop_assert_eq!(avx2.pixels(got), Plain.pixels(want));
+            let weights = if full { [-32768.0; LANES] } else { weights };
+            let (w, v) = (avx2.weights(avx2.load(&weights), these), Plain.weights(weights, these));
+            let (sum, plain) = (avx2.add_weighted(avx2.no_mix(), got, w), Plain.add_weighted(Plain.no_mix(), want, v));
+            prop_assert_eq!(avx2.pixels(sum), Plain.pixels(plain));
+            if !full {
+                let (sum, plain) = (avx2.add_weighted(sum, got, w), Plain.add_weighted(plain, want, v));
+                prop_assert_eq!(avx2.pixels(sum), Plain.pixels(plain));
+            }
+            let packed = upper.map(|v| v as u32);
+            let (mut got, mut want) = ([0; 3 * LANES], [0; 3 * LANES]);
+            avx2.store_pixels(&packed, &mut got);
+            Plain.store_pixels(&packed, &mut want);
+            prop_assert_eq!(got, want);
+        }
+
+        #[test]
+        fn places_and_what_is_there_are_those_of_plain_rust(
+            x in prop::array::uniform8(-2.0..12.0f32), y in prop::array::uniform8(-2.0..9.0f32),
+            these in 0u32..256, bytes in prop::collection::vec(any::<u8>(), 0..400),
+        ) {
+            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            let (at, parts) = avx2.place(avx2.load(&x), avx2.load(&y), 36, these);
+            let (plain_at, plain_parts) = Plain.place(x, y, 36, these);
+            let (mut got_x, mut got_y) = ([0; LANES], [0; LANES]);
+            avx2.store_parts(parts, &mut got_x, &mut got_y);
+            prop_assert_eq!((at, (got_x, got_y)), (plain_at, plain_parts));
+            let (quads, plain) = (avx2.quads(&bytes, &at, 36), Plain.quads(&bytes, &at, 36));
+            prop_assert_eq!(quads.is_some(), plain.is_some());
+            if let (Some(quads), Some(plain)) = (quads, plain) {
+                let (got, want) = (avx2.bilinear(quads, parts), Plain.bilinear(plain, plain_parts));
+                prop_assert_eq!(avx2.pixels(got), Plain.pixels(want));
+            }
+        }
+
+        #[test]
+        fn changes_are_those_of_plain_rust(values in prop::array::uniform9(0u32..3)) {
+            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            prop_assert_eq!(avx2.changes(&values), Plain.changes(&values));
+            let eight = std::array::from_fn(|k| values[k] << 30);
+            prop_assert_eq!(avx2.equal(&eight, 1 << 30), Plain.equal(&eight, 1 << 30));
+        }
+
+        #[test]
+        fn points_are_those_of_plain_rust(
+            column in prop::array::uniform24(-2.0..2.0f64), row in prop::array::uniform3(-2.0..2.0f64),
+            place in prop::array::uniform3(-100.0..100.0f64), depths in eight(),
+        ) {
+            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            let four = |a: [f64; 3]| std::array::from_fn(|k| a[k % 3]);
+            let (row, place): ([f64; 12], [f64; 12]) = (four(row), four(place));
+            let (mut got, mut want) = ([0.0; 24], [0.0; 24]);
+            avx2.points::<false>(&column, &row, &depths, &place, &mut got);
+            Plain.points::<false>(&column, &row, &depths, &place, &mut want);
+            prop_assert_eq!(got.map(f32::to_bits), want.map(f32::to_bits));
+            let (mut got, mut want) = ([f16::ZERO; 24], [f16::ZERO; 24]);
+            avx2.half_points::<true>(&column, &row, &depths, &place, &mut got);
+            Plain.half_points::<true>(&column, &row, &depths, &place, &mut want);
+            prop_assert_eq!(got.map(f16::to_bits), want.map(f16::to_bits));
+        }
+    }
+}

@@ -1,0 +1,421 @@
+//! What the rays of a window see so far: the heart of the visibility pass.
+//!
+//! # The special case
+//!
+//! All rays of an image start at one point. Put it at zero: a face (a, b, c) is hit along the direction d exactly if d
+//! lies inside the three planes through the origin and an edge, N₁ = b × c, N₂ = c × a, N₃ = a × b (turned so that they
+//! look inwards), and 1/t = n · d / n · a, where n is the face's normal. So four dot products with d decide everything,
+//! and each is a simple function of the pixel: linear in a perspective view; in a row of a panorama, divided by the
+//! cosine of the latitude, x cos θ + y sin θ + z tan φ. Faces are drawn one after another, as a rasteriser does, the
+//! nearest first where that is known; what lies behind a tile of pixels that all see something nearer is not looked at.
+//!
+//! # Why it is exact
+//!
+//! The four functions are set up in `f64`, moved to a pixel at the face (the *anchor* of a chunk of 16 × up to
+//! [`MOST_ROWS`] pixels), rounded to `f32` there, and evaluated with one multiplication and one addition a row. Take an
+//! edge function e(i, j) = c + a·i + b·j with |a| + |b| = 1, so that e is about a distance in pixels, and |i| ≤ 15,
+//! |j| ≤ 31. Near its zero |c| ≤ 46, so the roundings of a, b, c, two products and two sums are at most
+//! 2⁻²⁴·(46 + 46 + 46 + 92) < 1.4e-5; `f64` before it adds less than 1e-8 (lenses say why). [`EDGE_ERROR`] is twice
+//! that. A pixel where the smallest of the three exceeds its error is *certainly* in the face; where it is below minus
+//! the error, certainly not.
+//!
+//! 1/t is off by at most 2⁻²²·(|c| + |a|·15 + |b|·31), which is held against what it is worth: where that is more than
+//! [`TRUSTED`] of the value, the pixel is not certain. Values that differ by more than [`CLOSE`] steps of the last place
+//! (2.5e-5 of themselves at least: two errors, and some) are in order.
+//!
+//! Whatever is not certain — a pixel too near an edge, two faces almost equally far — goes to a list of *doubts*: this
+//! face may be what this pixel sees. In the end each pixel on the list is decided among its candidates by the exact
+//! [`Cone`](crate::cone::Cone), as single rays are: the face that was certain of it, and all doubts that are not clearly behind. A face
+//! that is in neither place is certainly missed, or certainly behind a face that is certainly hit. So the face of every
+//! pixel is that of the exact ray, and no seam, sliver or duplicate is lost.
+//!
+//! Depth is computed at the end from the `f64` functions of the face that is seen, and rounded once: within one step of
+//! the last place of `f32` of what a single ray gives.
+
+use crate::NO_FACE;
+use crate::registers::{LANES, Registers};
+
+/// Rows of a chunk at most.
+pub(crate) const MOST_ROWS: usize = 32;
+
+/// Pixels whose edge function, about a distance in pixels, is nearer to zero are not certain.
+pub(crate) const EDGE_ERROR: f32 = 3e-5;
+
+/// A pixel trusts 1/t only if it is known to this part of itself.
+pub(crate) const TRUSTED: f32 = 1e-5;
+
+/// The rounding of 1/t in a chunk: this part of the sum of its terms' sizes.
+pub(crate) const INVERSE_T_ROUNDING: f32 = 3e-7;
+
+/// Values of 1/t that differ by no more steps of the last place are for exact arithmetic to order.
+const CLOSE: i32 = 424;
+
+/// What is behind a tile must be so by this factor: ten times [`CLOSE`].
+const BEHIND: f32 = 1.0 + 5e-4;
+
+/// Tiles of so many pixels, both ways, know the farthest that they see.
+pub(crate) const TILE: usize = LANES;
+
+/// A linear function of the pixel in a chunk.
+///
+/// Its value in column i and row j from the anchor is at + across·u(i) + bend·v(i) + down·r(j): see [`Chunk`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Linear {
+    pub(crate) at: f32,
+    pub(crate) across: f32,
+    /// 0 in perspective views.
+    pub(crate) bend: f32,
+    pub(crate) down: f32,
+}
+
+/// Part of a face, about to be drawn on 16 columns and some rows.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Chunk {
+    /// Column and row of the anchor.
+    pub(crate) column: usize,
+    pub(crate) row: usize,
+    pub(crate) edges: [Linear; 3],
+    /// No edge function is farther off than this.
+    pub(crate) edge_error: f32,
+    pub(crate) inverse_t: Linear,
+    /// No value of `inverse_t` is farther off than this. Only where the chunk is drawn with care.
+    pub(crate) inverse_t_error: f32,
+    /// From this value on, `inverse_t` is known to [`TRUSTED`]. Likewise.
+    pub(crate) trusted: f32,
+    /// The face, as it was entered by [`Canvas::enter`].
+    pub(crate) slot: u32,
+}
+
+/// The functions u, v and r of a chunk's columns and rows, and by what 1/t is multiplied in a row.
+#[derive(Clone, Copy)]
+pub(crate) struct Grid<'a> {
+    pub(crate) u: &'a [f32; LANES],
+    pub(crate) v: &'a [f32; LANES],
+    pub(crate) rows: &'a [f32],
+    /// As long as `rows`; nothing in perspective views.
+    pub(crate) scale: &'a [f32],
+}
+
+/// A face that was drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drawn {
+    /// 1/t as a function of the pixel, in the lens's own terms.
+    pub(crate) inverse_t: [f64; 3],
+    pub(crate) face: u32,
+    /// Whether `inverse_t` is too poor for a depth: single rays give it then.
+    pub(crate) poor: bool,
+}
+
+/// A pixel that may see a face.
+#[derive(Clone, Copy, Debug)]
+struct Doubt {
+    pixel: u32,
+    slot: u32,
+    /// A bound on 1/t from above.
+    inverse_t: f32,
+}
+
+/// What a box may cover of a window.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cover {
+    /// First and last column and row of pixels.
+    pub(crate) columns: (u16, u16),
+    pub(crate) rows: (u16, u16),
+    /// 1/t is nowhere greater; infinite if that is not known.
+    pub(crate) inverse_t: f32,
+}
+
+impl Cover {
+    /// The part of a window of `width` × `height` pixels between the given columns and rows; `None` if there is none.
+    #[inline(always)]
+    pub(crate) fn new(
+        (left, right): (f32, f32),
+        (top, bottom): (f32, f32),
+        (width, height): (usize, usize),
+        inverse_t: f32,
+    ) -> Option<Self> {
+        let (last_column, last_row) = ((width - 1) as f32, (height - 1) as f32);
+        if right < 0.0 || bottom < 0.0 || left > last_column || top > last_row {
+            return None;
+        }
+        let pixel = |v: f32, last: f32| v.clamp(0.0, last) as u16;
+        Some(Self {
+            columns: (pixel(left, last_column), pixel(right.ceil(), last_column)),
+            rows: (pixel(top, last_row), pixel(bottom.ceil(), last_row)),
+            inverse_t,
+        })
+    }
+}
+
+/// The visibility buffer of a window of an image; its memory serves one window after another.
+#[derive(Default)]
+pub(crate) struct Canvas {
+    width: usize,
+    height: usize,
+    /// Pixels from row to row: some more than the width, so that chunks may reach over the edge.
+    pitch: usize,
+    /// 1/t of the nearest face that is certainly hit; 0 for none. Infinite beyond the edges.
+    inverse_t: Vec<f32>,
+    /// That face's slot; 0 for none.
+    slots: Vec<u32>,
+    /// By tile: a bound from below on `inverse_t`.
+    farthest: Vec<f32>,
+    /// By tile: whether that may have grown.
+    stale: Vec<bool>,
+    tile_columns: usize,
+    /// By slot; the first stands for no face.
+    drawn: Vec<Drawn>,
+    doubts: Vec<Doubt>,
+    /// The pixels that see a face whose function is too poor: none but doubtful ones do.
+    poor: Vec<u32>,
+}
+
+const NOTHING: Drawn = Drawn { inverse_t: [0.0; 3], face: NO_FACE, poor: false };
+
+impl Canvas {
+    /// Makes an empty window of a size.
+    pub(crate) fn begin(&mut self, width: usize, height: usize) {
+        if (self.width, self.height) != (width, height) {
+            (self.width, self.height) = (width, height);
+            self.pitch = (width + LANES).next_multiple_of(LANES);
+            let rows = height.next_multiple_of(TILE);
+            self.inverse_t.clear();
+            self.inverse_t.resize(self.pitch * rows, f32::INFINITY);
+            for row in self.inverse_t.chunks_exact_mut(self.pitch).take(height) {
+                row[..width].fill(0.0);
+            }
+            self.slots.clear();
+            self.slots.resize(self.pitch * rows, 0);
+            self.tile_columns = width.div_ceil(TILE);
+        }
+        self.farthest.clear();
+        self.farthest.resize(self.tile_columns * height.div_ceil(TILE), 0.0);
+        self.stale.clear();
+        self.stale.resize(self.farthest.len(), false);
+        self.drawn.clear();
+        self.drawn.push(NOTHING);
+        self.doubts.clear();
+        self.poor.clear();
+    }
+
+    pub(crate) fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Enters a face and says under which number.
+    #[inline(always)]
+    pub(crate) fn enter(&mut self, drawn: Drawn) -> u32 {
+        self.drawn.push(drawn);
+        self.drawn.len() as u32 - 1
+    }
+
+    /// Whether all that `cover` may show is behind what is seen already.
+    #[inline(always)]
+    pub(crate) fn hides(&mut self, cover: &Cover) -> bool {
+        let bound = cover.inverse_t * BEHIND;
+        let [left, right, top, bottom] =
+            [cover.columns.0, cover.columns.1, cover.rows.0, cover.rows.1].map(usize::from);
+        for row in top / TILE..=bottom / TILE {
+            for column in left / TILE..=right / TILE {
+                let tile = row * self.tile_columns + column;
+                if self.farthest[tile] >= bound || self.stale[tile] && self.look_again(tile) >= bound {
+                    continue;
+                }
+                // Some pixel of the tile sees farther; one of the cover's?
+                let (x, y) = (column * TILE, row * TILE);
+                let lanes = left.saturating_sub(x)..=(right - x).min(TILE - 1);
+                for row in y.max(top)..=(y + TILE - 1).min(bottom) {
+                    let at = row * self.pitch + x;
+                    let pixels: &[f32; TILE] = self.inverse_t[at..at + TILE].try_into().unwrap();
+                    let mut open = false;
+                    for (k, pixel) in pixels.iter().enumerate() {
+                        open |= (*pixel < bound) & (k >= *lanes.start()) & (k <= *lanes.end());
+                    }
+                    if open {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// Whether all of a tile is nearer than `inverse_t`, as far as is known.
+    #[inline(always)]
+    pub(crate) fn tile_hides(&mut self, column: usize, row: usize, inverse_t: f32) -> bool {
+        self.farthest[row * self.tile_columns + column] >= inverse_t * BEHIND
+    }
+
+    #[inline(always)]
+    fn look_again(&mut self, tile: usize) -> f32 {
+        self.stale[tile] = false;
+        let (x, y) = (tile % self.tile_columns * TILE, tile / self.tile_columns * TILE);
+        let mut lanes = [f32::INFINITY; LANES];
+        for row in y..y + TILE {
+            let at = row * self.pitch + x;
+            let pixels: &[f32; LANES] = self.inverse_t[at..at + LANES].try_into().unwrap();
+            for k in 0..LANES {
+                lanes[k] = if pixels[k] < lanes[k] { pixels[k] } else { lanes[k] };
+            }
+        }
+        let farthest = lanes.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a });
+        self.farthest[tile] = farthest;
+        farthest
+    }
+
+    /// Says that something was drawn in the cover.
+    #[inline(always)]
+    pub(crate) fn touch(&mut self, cover: &Cover) {
+        let tile = |pixel: u16| usize::from(pixel) / TILE;
+        for row in tile(cover.rows.0)..=tile(cover.rows.1) {
+            let first = row * self.tile_columns;
+            self.stale[first + tile(cover.columns.0)..=first + tile(cover.columns.1)].fill(true);
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn touch_tile(&mut self, column: usize, row: usize) {
+        self.stale[row * self.tile_columns + column] = true;
+    }
+
+    /// Draws a chunk; with `CARE` where 1/t is not trusted all over it; `TURN` in panoramas.
+    #[inline(always)]
+    pub(crate) fn draw<L: Registers, const TURN: bool, const CARE: bool>(
+        &mut self,
+        l: L,
+        grid: &Grid<'_>,
+        chunk: &Chunk,
+    ) {
+        let (u, v) = (l.load(grid.u), l.load(grid.v));
+        let along = |f: &Linear| {
+            let sum = l.add(l.mul(l.splat(f.across), u), l.splat(f.at));
+            if TURN { l.add(l.mul(l.splat(f.bend), v), sum) } else { sum }
+        };
+        let [e0, e1, e2] = chunk.edges;
+        let (a0, a1, a2, aq) = (along(&e0), along(&e1), along(&e2), along(&chunk.inverse_t));
+        let (d0, d1, d2) = (l.splat(e0.down), l.splat(e1.down), l.splat(e2.down));
+        let dq = l.splat(chunk.inverse_t.down);
+        let (error, minus_error) = (l.splat(chunk.edge_error), l.splat(-chunk.edge_error));
+        let (trusted, off) = (l.splat(chunk.trusted), l.splat(chunk.inverse_t_error));
+        let value = |start: L::F, step: L::F, row: L::F| l.add(start, l.mul(step, row));
+        let mut at = chunk.row * self.pitch + chunk.column;
+        for (k, &row) in grid.rows.iter().enumerate() {
+            let r = l.splat(row);
+            let inside = l.min(value(a0, d0, r), l.min(value(a1, d1, r), value(a2, d2, r)));
+            let mut q = value(aq, dq, r);
+            if TURN {
+                q = l.mul(q, l.splat(grid.scale[k]));
+            }
+            let best = &mut self.inverse_t[at..at + L::N];
+            let old = l.load(best);
+            let mut wins = l.and(l.above(inside, error), l.steps_above(q, old, CLOSE));
+            let mut rivals = l.above(inside, minus_error);
+            if CARE {
+                wins = l.and(wins, l.above(q, trusted));
+                rivals = l.and(rivals, l.steps_above(l.add(q, off), old, -CLOSE));
+            } else {
+                rivals = l.and(rivals, l.steps_above(q, old, -CLOSE));
+            }
+            l.store_f32(best, wins, q);
+            l.store_u32(&mut self.slots[at..at + L::N], wins, chunk.slot);
+            let doubts = l.bits(rivals) & !l.bits(wins);
+            if doubts != 0 {
+                let mut bound = [0.0; LANES];
+                let all = l.steps_above(l.splat(1.0), l.splat(0.0), 0);
+                l.store_f32(&mut bound, all, if CARE { l.add(q, off) } else { q });
+                self.doubt(doubts, at, chunk.slot, &bound);
+            }
+            at += self.pitch;
+        }
+    }
+
+    #[cold]
+    fn doubt(&mut self, mut lanes: u16, at: usize, slot: u32, bound: &[f32; LANES]) {
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            if at % self.pitch + lane < self.width {
+                self.doubts.push(Doubt { pixel: (at + lane) as u32, slot, inverse_t: bound[lane] });
+            }
+        }
+    }
+
+    /// Decides the doubtful pixels. `decide` is given a column, a row and what was drawn there and may be seen, and
+    /// says which of these it is (its place in the list), and whether its function is too poor to give a depth there.
+    #[inline(always)]
+    pub(crate) fn settle(&mut self, mut decide: impl FnMut(usize, usize, &[Drawn]) -> Option<(usize, bool)>) {
+        let mut doubts = std::mem::take(&mut self.doubts);
+        doubts.sort_unstable_by_key(|d| (d.pixel, d.slot));
+        let (mut slots, mut candidates) = (Vec::new(), Vec::new());
+        for group in doubts.chunk_by(|a, b| a.pixel == b.pixel) {
+            let pixel = group[0].pixel as usize;
+            let best = self.inverse_t[pixel];
+            let reach = best.to_bits() as i32 - CLOSE;
+            slots.clear();
+            slots.extend(group.iter().filter(|d| d.inverse_t.to_bits() as i32 > reach).map(|d| d.slot));
+            if slots.is_empty() {
+                continue;
+            }
+            if best > 0.0 {
+                slots.push(self.slots[pixel]);
+            }
+            candidates.clear();
+            candidates.extend(slots.iter().map(|&s| self.drawn[s as usize]));
+            let decision = decide(pixel % self.pitch, pixel / self.pitch, &candidates);
+            self.slots[pixel] = decision.map_or(0, |(which, _)| slots[which]);
+            if decision.is_some_and(|(which, poor)| poor || candidates[which].poor) {
+                self.poor.push(pixel as u32);
+            }
+        }
+        doubts.clear();
+        self.doubts = doubts;
+    }
+
+    /// Writes faces and depths into `out`, whose first pixels are the window's and whose rows are `out_pitch` apart,
+    /// and empties the window.
+    ///
+    /// A row's 1/t is at + across·u(i) + bend·v(i), which `function` makes from what is drawn; `u` and `v` come in groups. `single` casts the ray of
+    /// a pixel (column, row) to a face whose function is too poor.
+    #[inline(always)]
+    pub(crate) fn finish<L: Registers, const TURN: bool>(
+        &mut self,
+        l: L,
+        out: (&mut [u32], &mut [f32]),
+        out_pitch: usize,
+        (u, v): (&[[f64; LANES]], &[[f64; LANES]]),
+        function: impl Fn(&Drawn, usize) -> [f64; 3],
+        single: impl Fn(u32, usize, usize) -> f64,
+    ) {
+        let width = self.width;
+        for row in 0..self.height {
+            let start = row * self.pitch;
+            let slots = &mut self.slots[start..start + width.next_multiple_of(LANES)];
+            let faces = &mut out.0[row * out_pitch..][..width];
+            let depths = &mut out.1[row * out_pitch..][..width];
+            let drawn = |slot: u32| {
+                let drawn = &self.drawn[slot as usize];
+                (function(drawn, row), drawn.face)
+            };
+            let (faces, last_faces) = faces.as_chunks_mut::<LANES>();
+            let (depths, last_depths) = depths.as_chunks_mut::<LANES>();
+            let mut groups = slots.as_chunks::<LANES>().0.iter().zip(u.iter().zip(v));
+            for ((faces, depths), (slots, (u, v))) in faces.iter_mut().zip(depths).zip(groups.by_ref()) {
+                l.resolve::<TURN>(slots, (u, v), drawn, faces, depths);
+            }
+            // A last group that is not full.
+            if let Some((slots, (u, v))) = groups.next() {
+                let (mut faces, mut depths) = ([NO_FACE; LANES], [0.0; LANES]);
+                l.resolve::<TURN>(slots, (u, v), drawn, &mut faces, &mut depths);
+                last_faces.copy_from_slice(&faces[..last_faces.len()]);
+                last_depths.copy_from_slice(&depths[..last_depths.len()]);
+            }
+            slots.fill(0);
+            self.inverse_t[start..start + width].fill(0.0);
+        }
+        for &pixel in &self.poor {
+            let (column, row) = (pixel as usize % self.pitch, pixel as usize / self.pitch);
+            let at = row * out_pitch + column;
+            out.1[at] = single(out.0[at], column, row) as f32;
+        }
+    }
+}

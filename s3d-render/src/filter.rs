@@ -1,0 +1,302 @@
+//! Textures fetched for eight pixels at a time.
+//!
+//! Gives what [`crate::texture::Pyramid::sample`] gives, in integers: places between a texture's pixels are kept in
+//! 32768ths of a pixel and colours in 128ths of a step of 8 bits. Before it is rounded to 8 bits a colour is off by less
+//! than 0.02 where one bilinear sample makes it, and less than 0.1 where sixteen do.
+
+use crate::anchor::{Fold, Seen};
+use crate::lanes::{LANES, Lanes, eight, put};
+use s3d_geom::{Raster, Texture, Wrap};
+
+/// Where the pixels of a row are in their textures, and what to fetch there; in pixels of the full size. By column, and
+/// two more groups.
+#[derive(Debug, Default)]
+pub(crate) struct Footprints {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    /// The size to sample: how often the full one is halved. This and the rest only where the footprint is wide.
+    level: Vec<f32>,
+    /// The weight of each sample there, and of each in the next size, in −32768ths.
+    weight: Vec<f32>,
+    next_weight: Vec<f32>,
+    /// How many samples.
+    count: Vec<f32>,
+    /// From one sample to the next.
+    step_x: Vec<f32>,
+    step_y: Vec<f32>,
+}
+
+impl Footprints {
+    pub(crate) fn new(len: usize) -> Self {
+        let zeros = || vec![0.0; len];
+        Self {
+            x: zeros(),
+            y: zeros(),
+            level: zeros(),
+            weight: zeros(),
+            next_weight: zeros(),
+            count: zeros(),
+            step_x: zeros(),
+            step_y: zeros(),
+        }
+    }
+
+    /// The eight pixels from column `i` on, in a texture that can be halved `last` times; at most `most` samples. Bit k
+    /// of what comes back: whether the footprint of pixel k is wide, one of the first `some`.
+    #[inline(always)]
+    pub(crate) fn store<L: Lanes>(
+        &mut self,
+        l: L,
+        i: usize,
+        seen: &Seen<L::F, 2>,
+        (most, last): (u32, f32),
+        some: usize,
+    ) -> u32 {
+        put(l, &mut self.x, i, seen.values[0]);
+        put(l, &mut self.y, i, seen.values[1]);
+        // The sides x and y of the footprint; see `taps` and `axes` of texture.rs for what follows.
+        let ([xx, xy], [yx, yy]) = (seen.x, seen.y);
+        let a = l.add(l.mul(xx, xx), l.mul(yx, yx));
+        let c = l.add(l.mul(xy, xy), l.mul(yy, yy));
+        let sum = l.add(a, c);
+        let one = l.splat(1.0);
+        let maybe = l.greater(sum, one) & l.greater(l.splat(f32::INFINITY), sum) & ((1 << some) - 1);
+        if maybe == 0 {
+            return 0;
+        }
+        let half_of = l.splat(0.5);
+        let b = l.add(l.mul(xx, xy), l.mul(yx, yy));
+        let (mean, half) = (l.mul(half_of, sum), l.mul(half_of, l.sub(a, c)));
+        let root = l.sqrt(l.add(l.mul(half, half), l.mul(b, b)));
+        let long = l.sqrt(l.add(mean, root));
+        let axis_x = l.by_sign(half, b, l.add(root, half));
+        let axis_y = l.by_sign(half, l.sub(root, half), b);
+        // What makes the axis as long as that. A round footprint has no axis, and one sample.
+        let length_2 = l.add(l.mul(axis_x, axis_x), l.mul(axis_y, axis_y));
+        let stretch = l.sqrt(l.div(l.add(mean, root), l.max(length_2, l.splat(1e-30))));
+        let cross = l.sub(l.mul(xx, yy), l.mul(xy, yx));
+        let minor = l.div(l.max(cross, l.sub(l.splat(0.0), cross)), long);
+        let most = most.max(1) as f32;
+        let width = l.max(l.max(minor, l.mul(long, l.splat(1.0 / most))), one);
+        let most = l.splat(most);
+        let count = l.min(l.max(l.add(l.div(long, width), half_of), one), most);
+        let mut whole = [0; LANES];
+        l.store_int(count, &mut whole);
+        let mut counts = [0.0; LANES];
+        for k in 0..LANES {
+            counts[k] = whole[k] as f32;
+        }
+        let count = l.load(&counts);
+        let part = l.div(one, count);
+        let step = l.mul(stretch, part);
+        let (level, fraction) = l.log2(width);
+        // Beyond the last size there is the last.
+        let past = l.sub(level, l.splat(last));
+        let fraction = l.by_sign(past, fraction, l.splat(0.0));
+        let level = l.min(level, l.splat(last));
+        let share = l.mul(l.splat(-32768.0), part);
+        let next_weight = l.mul(share, fraction);
+        let wide = maybe & (l.greater(width, one) | l.greater(count, one));
+        if wide == 0 {
+            return 0;
+        }
+        put(l, &mut self.level, i, level);
+        put(l, &mut self.weight, i, l.sub(share, next_weight));
+        put(l, &mut self.next_weight, i, next_weight);
+        put(l, &mut self.count, i, count);
+        put(l, &mut self.step_x, i, l.mul(axis_x, step));
+        put(l, &mut self.step_y, i, l.mul(axis_y, step));
+        wide
+    }
+}
+
+/// A texture at one size.
+#[derive(Clone, Copy)]
+struct Size<'a> {
+    image: &'a Raster<[u8; 3]>,
+    bytes: &'a [u8],
+    /// Bytes a row.
+    stride: i32,
+    /// The last column and row.
+    right: f32,
+    bottom: f32,
+    /// Pixels of this size a pixel of the full one.
+    x: f32,
+    y: f32,
+}
+
+/// A texture at all its sizes.
+pub(crate) struct Sizes<'a> {
+    wrap: [Wrap; 2],
+    sizes: Vec<Size<'a>>,
+}
+
+impl<'a> Sizes<'a> {
+    pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
+        let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)) as f32;
+        let size = |image: &'a Raster<[u8; 3]>| Size {
+            image,
+            bytes: image.pixels().as_flattened(),
+            stride: image.width() as i32 * 3,
+            right: image.width().saturating_sub(1) as f32,
+            bottom: image.height().saturating_sub(1) as f32,
+            x: ratio(image.width(), full.image.width()),
+            y: ratio(image.height(), full.image.height()),
+        };
+        Self { wrap: full.wrap, sizes: std::iter::once(&full.image).chain(reductions).map(size).collect() }
+    }
+
+    /// Whether places in it fit the numbers here.
+    pub(crate) fn is_usable(&self) -> bool {
+        let image = self.sizes[0].image;
+        !image.is_empty()
+            && image.width().max(image.height()) < 1 << 15
+            && 3 * image.len() < i32::MAX as usize
+    }
+
+    /// How coordinates in pixels of the full size repeat.
+    pub(crate) fn folds(&self) -> [Fold; 3] {
+        let image = self.sizes[0].image;
+        let fold = |wrap, size: u32| match wrap {
+            Wrap::Repeat => Fold::Repeat(f64::from(size)),
+            Wrap::Mirror => Fold::Mirror(f64::from(size)),
+            Wrap::Clamp => Fold::Not,
+        };
+        [fold(self.wrap[0], image.width()), fold(self.wrap[1], image.height()), Fold::Not]
+    }
+
+    /// How many times the full size is halved.
+    pub(crate) fn last(&self) -> f32 {
+        (self.sizes.len() - 1) as f32
+    }
+
+    /// The colours of the eight pixels from `i` on, whose footprints are no wider than a pixel of the texture.
+    #[inline(always)]
+    pub(crate) fn magnified<L: Lanes>(&self, l: L, footprints: &Footprints, i: usize) -> [u32; LANES] {
+        let half = l.splat(0.5);
+        let x = l.sub(eight(l, &footprints.x, i), half);
+        let y = l.sub(eight(l, &footprints.y, i), half);
+        l.pixels(self.bilinear(l, &self.sizes[0], x, y, 0xFF))
+    }
+
+    /// The colours of those of the eight pixels from `i` on that are among `these`; all that have a wide footprint are
+    /// among `wide`.
+    #[inline(always)]
+    pub(crate) fn filtered<L: Lanes>(
+        &self,
+        l: L,
+        footprints: &Footprints,
+        i: usize,
+        these: u32,
+        wide: u32,
+    ) -> [u32; LANES] {
+        let (x, y) = (eight(l, &footprints.x, i), eight(l, &footprints.y, i));
+        let (mut level, mut count) = (eight(l, &footprints.level, i), eight(l, &footprints.count, i));
+        let (mut weight, mut next) = (eight(l, &footprints.weight, i), eight(l, &footprints.next_weight, i));
+        let (mut step_x, mut step_y) = (eight(l, &footprints.step_x, i), eight(l, &footprints.step_y, i));
+        let (zero, half, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
+        if wide != 0xFF {
+            let mut sign = [0.0; LANES];
+            for (k, sign) in sign.iter_mut().enumerate() {
+                *sign = if wide >> k & 1 == 1 { 0.0 } else { -0.0 };
+            }
+            let sign = l.load(&sign);
+            level = l.by_sign(sign, zero, level);
+            count = l.by_sign(sign, one, count);
+            weight = l.by_sign(sign, l.splat(-32768.0), weight);
+            next = l.by_sign(sign, zero, next);
+            step_x = l.by_sign(sign, zero, step_x);
+            step_y = l.by_sign(sign, zero, step_y);
+        }
+        let middle = l.mul(half, l.sub(count, one));
+        let (first_x, first_y) = (l.sub(x, l.mul(middle, step_x)), l.sub(y, l.mul(middle, step_y)));
+
+        let mut mix = l.no_mix();
+        // Size after size, each for the pixels that need it: neighbours mostly need the same two.
+        let mut left = these;
+        let mut at = zero;
+        for of in &self.sizes {
+            let here = left & !l.greater(level, at);
+            // Weights of less than one part are none.
+            let weights = l.by_sign(l.sub(level, at), next, weight);
+            let mut active = here & l.greater(l.splat(-1.0), weights);
+            let (scale_x, scale_y) = (l.splat(of.x), l.splat(of.y));
+            let mut tap = zero;
+            while active != 0 {
+                let x = l.sub(l.mul(l.add(first_x, l.mul(tap, step_x)), scale_x), half);
+                let y = l.sub(l.mul(l.add(first_y, l.mul(tap, step_y)), scale_y), half);
+                let colors = self.bilinear(l, of, x, y, active);
+                mix = l.add_weighted(mix, colors, l.weights(weights, active));
+                tap = l.add(tap, one);
+                active &= l.greater(count, tap);
+            }
+            left &= !l.greater(at, level);
+            if left == 0 {
+                break;
+            }
+            at = l.add(at, one);
+        }
+        l.pixels(mix)
+    }
+
+    /// The bilinear colours at those of the places that are among `these` (0 is the middle of the first pixel).
+    #[inline(always)]
+    fn bilinear<L: Lanes>(&self, l: L, size: &Size<'a>, x: L::F, y: L::F, these: u32) -> L::Mix {
+        let zero = l.splat(0.0);
+        let outside = l.greater(zero, x) | l.greater(zero, y);
+        let inside = l.greater(l.splat(size.right), x) & l.greater(l.splat(size.bottom), y) & !outside;
+        let (at, parts) = l.place(x, y, size.stride, these);
+        if inside & these == these
+            && let Some(quads) = l.quads(size.bytes, &at, size.stride)
+        {
+            return l.bilinear(quads, parts);
+        }
+        let (mut xs, mut ys) = ([0.0; LANES], [0.0; LANES]);
+        l.store(x, &mut xs);
+        l.store(y, &mut ys);
+        let (mut upper, mut lower) = ([0; LANES], [0; LANES]);
+        let (mut parts_x, mut parts_y) = ([0; LANES], [0; LANES]);
+        l.store_parts(parts, &mut parts_x, &mut parts_y);
+        for k in 0..LANES {
+            if these >> k & 1 == 0 {
+                continue;
+            }
+            let begin = at[k] as usize;
+            let below = begin.wrapping_add(size.stride as usize);
+            match (word(size.bytes, begin), word(size.bytes, below)) {
+                (Some(a), Some(b)) if inside >> k & 1 == 1 => (upper[k], lower[k]) = (a, b),
+                _ => {
+                    let quad = self.at_the_edge(size, xs[k], ys[k]);
+                    ((upper[k], lower[k]), (parts_x[k], parts_y[k])) = quad;
+                }
+            }
+        }
+        l.bilinear(l.quads_from(&upper, &lower), l.parts(&parts_x, &parts_y))
+    }
+
+    /// The 2 × 2 pixels around a place of which some are not side by side, and the place's parts.
+    #[cold]
+    #[inline(never)]
+    fn at_the_edge(&self, size: &Size<'a>, x: f32, y: f32) -> ((u64, u64), (i16, i16)) {
+        let image = size.image;
+        let split = |v: f32| {
+            let v = if v.is_finite() { f64::from(v) } else { 0.0 };
+            (v.floor() as i64, ((v - v.floor()) * 32768.0) as i16)
+        };
+        let ((column, x), (row, y)) = (split(x), split(y));
+        let columns = [column, column + 1].map(|i| self.wrap[0].index(i, image.width()));
+        // v grows upwards and rows downwards: mirroring and repeating are the same seen from either side.
+        let rows = [row, row + 1].map(|j| self.wrap[1].index(j, image.height()));
+        let pair = |j: u32| {
+            let ([a, b, c], [d, e, f]) = (image.at(columns[0], j), image.at(columns[1], j));
+            u64::from_le_bytes([a, b, c, d, e, f, 0, 0])
+        };
+        ((pair(rows[0]), pair(rows[1])), (x, y))
+    }
+}
+
+/// Eight bytes, if there are as many.
+#[inline(always)]
+fn word(bytes: &[u8], at: usize) -> Option<u64> {
+    bytes.get(at..)?.first_chunk().map(|b| u64::from_le_bytes(*b))
+}

@@ -1,0 +1,363 @@
+//! Eight pixels at a time, with the same bits on every processor.
+//!
+//! [`Lanes`] names the few operations on eight values that images need. [`Plain`] has them in ordinary Rust, which defines
+//! what they give; `Avx2` (in `avx2.rs`) gives the same faster. Every operation is on integers or rounds once, as
+//! IEEE 754 says it must, so that no result depends on which of the two ran.
+
+use half::f16;
+
+/// How many pixels go together.
+pub(crate) const LANES: usize = 8;
+
+/// Operations on eight values.
+pub(crate) trait Lanes: Copy {
+    /// Eight `f32`.
+    type F: Copy;
+    /// Eight numbers from 0 to 1 to the right and eight downwards, in 32768ths.
+    type Parts: Copy;
+    /// The 2 × 2 pixels of a texture around each of eight places.
+    type Quads: Copy;
+    /// Colours of eight pixels in 128ths.
+    type Mix: Copy;
+    /// Weights of eight pixels in −32768ths: negative, so that 1 fits into 16 bits.
+    type Weights: Copy;
+
+    fn splat(self, value: f32) -> Self::F;
+    fn load(self, from: &[f32; LANES]) -> Self::F;
+    fn store(self, values: Self::F, to: &mut [f32; LANES]);
+    fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sqrt(self, a: Self::F) -> Self::F;
+    /// The smaller; `b` if one is not a number.
+    fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    /// The larger; `b` if one is not a number.
+    fn max(self, a: Self::F, b: Self::F) -> Self::F;
+    /// `negative` where the sign bit of `of` is set, else `positive`.
+    fn by_sign(self, of: Self::F, negative: Self::F, positive: Self::F) -> Self::F;
+    /// Bit k: whether a > b in lane k.
+    fn greater(self, a: Self::F, b: Self::F) -> u32;
+    /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
+    fn store_int(self, values: Self::F, to: &mut [i32; LANES]);
+
+    /// ⌊log2⌋ of values of at least 1, and what is left of the logarithm to 0.01.
+    fn log2(self, values: Self::F) -> (Self::F, Self::F);
+    /// Of the places (x, y) of an image whose rows are `stride` bytes: where the upper left pixel begins, and how far
+    /// beyond it the places are. The beginning of the image in lanes that are not among `these`; anything for places that
+    /// are not in an image of less than 2^15 columns, rows and 2^31 bytes.
+    fn place(self, x: Self::F, y: Self::F, stride: i32, these: u32) -> ([i32; LANES], Self::Parts);
+    /// What [`Lanes::place`] gives, from the 32768ths.
+    fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> Self::Parts;
+    /// The 32768ths.
+    fn store_parts(self, parts: Self::Parts, x: &mut [i16; LANES], y: &mut [i16; LANES]);
+    /// The 2 × 2 pixels whose upper left ones begin at `at`; `None` if one is too near the end of `bytes`.
+    fn quads(self, bytes: &[u8], at: &[i32; LANES], stride: i32) -> Option<Self::Quads>;
+    /// R G B of two neighbours in the lowest six bytes of each: upper ones, lower ones.
+    fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
+    /// The bilinear colours: two steps of [`part`], off by less than 0.02 of the exact ones.
+    fn bilinear(self, quads: Self::Quads, parts: Self::Parts) -> Self::Mix;
+    /// Weights from −1 (0) to −32768 (1), rounded towards 0; none in lanes that are not among `these`.
+    fn weights(self, weights: Self::F, these: u32) -> Self::Weights;
+    /// No colour.
+    fn no_mix(self) -> Self::Mix;
+    /// `sum` and weighted colours.
+    fn add_weighted(self, sum: Self::Mix, colors: Self::Mix, weights: Self::Weights) -> Self::Mix;
+    /// Rounded to bytes, R G B in the lowest three of each value; never black.
+    fn pixels(self, mix: Self::Mix) -> [u32; LANES];
+    /// The lowest three bytes of each value, one after another.
+    fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]);
+
+    /// Bit k: whether `values[k]` is `value`.
+    fn equal(self, values: &[u32; LANES], value: u32) -> u32;
+    /// Bit k: whether `values[k]` differs from `values[k − 1]`, for k from 1 on.
+    fn changes(self, values: &[u32; LANES + 1]) -> u32;
+    /// Depths in 512ths, rounded half up, at most 65,535.
+    fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]);
+    /// Points place + direction × depth, rounded to `f32`: `column` and `row` are [`DirectionPart`]s, and what belongs to
+    /// an axis repeats x y z x y z…
+    fn points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &[f32; LANES],
+        place: &[f64; 12],
+        to: &mut [f32; 3 * LANES],
+    );
+    /// As [`Lanes::points`], rounded once more to half floats.
+    fn half_points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &[f32; LANES],
+        place: &[f64; 12],
+        to: &mut [f16; 3 * LANES],
+    );
+}
+
+/// a · b / 32768, rounded half up.
+#[inline(always)]
+pub(crate) fn part(a: i16, b: i16) -> i16 {
+    ((i32::from(a) * i32::from(b) + 0x4000) >> 15) as i16
+}
+
+/// Work that is compiled once for every set of instructions. `run` and what it calls in its loops are
+/// `#[inline(always)]`.
+pub(crate) trait LaneWork {
+    type Output;
+    fn run(self, lanes: impl Lanes) -> Self::Output;
+}
+
+/// Does `work` with the widest registers of the processor.
+pub(crate) fn run<W: LaneWork>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx2) = crate::avx2::Avx2::detect() {
+        return avx2.run(work);
+    }
+    work.run(Plain)
+}
+
+/// Ordinary Rust.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plain;
+
+type Eight = [f32; LANES];
+
+#[inline(always)]
+fn each(f: impl FnMut(usize) -> f32) -> Eight {
+    std::array::from_fn(f)
+}
+
+impl Lanes for Plain {
+    type F = Eight;
+    type Parts = ([i16; LANES], [i16; LANES]);
+    type Quads = [[u64; LANES]; 2];
+    type Mix = [[i16; 3]; LANES];
+    type Weights = [i16; LANES];
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Eight {
+        [value; LANES]
+    }
+    #[inline(always)]
+    fn load(self, from: &Eight) -> Eight {
+        *from
+    }
+    #[inline(always)]
+    fn store(self, values: Eight, to: &mut Eight) {
+        *to = values;
+    }
+    #[inline(always)]
+    fn add(self, a: Eight, b: Eight) -> Eight {
+        each(|k| a[k] + b[k])
+    }
+    #[inline(always)]
+    fn sub(self, a: Eight, b: Eight) -> Eight {
+        each(|k| a[k] - b[k])
+    }
+    #[inline(always)]
+    fn mul(self, a: Eight, b: Eight) -> Eight {
+        each(|k| a[k] * b[k])
+    }
+    #[inline(always)]
+    fn div(self, a: Eight, b: Eight) -> Eight {
+        each(|k| a[k] / b[k])
+    }
+    #[inline(always)]
+    fn sqrt(self, a: Eight) -> Eight {
+        a.map(f32::sqrt)
+    }
+    #[inline(always)]
+    fn min(self, a: Eight, b: Eight) -> Eight {
+        each(|k| if a[k] < b[k] { a[k] } else { b[k] })
+    }
+    #[inline(always)]
+    fn max(self, a: Eight, b: Eight) -> Eight {
+        each(|k| if a[k] > b[k] { a[k] } else { b[k] })
+    }
+    #[inline(always)]
+    fn by_sign(self, of: Eight, negative: Eight, positive: Eight) -> Eight {
+        each(|k| if of[k].is_sign_negative() { negative[k] } else { positive[k] })
+    }
+    #[inline(always)]
+    fn greater(self, a: Eight, b: Eight) -> u32 {
+        (0..LANES).map(|k| u32::from(a[k] > b[k]) << k).sum()
+    }
+    #[inline(always)]
+    fn store_int(self, values: Eight, to: &mut [i32; LANES]) {
+        *to = values.map(|v| v as i32);
+    }
+
+    #[inline(always)]
+    fn log2(self, values: Eight) -> (Eight, Eight) {
+        let whole = values.map(|v| ((v.to_bits() >> 23) as i32 - 127) as f32);
+        // A parabola through both ends.
+        let fraction = values.map(|v| {
+            let mantissa = f32::from_bits((v.to_bits() & 0x007F_FFFF) | 0x3F80_0000);
+            let fraction = (2.0 - mantissa * (1.0 / 3.0)) * mantissa - 5.0 / 3.0;
+            if fraction > 0.0 { fraction } else { 0.0 }
+        });
+        (whole, fraction)
+    }
+    #[inline(always)]
+    fn place(self, x: Eight, y: Eight, stride: i32, these: u32) -> ([i32; LANES], Self::Parts) {
+        let (columns, rows) = (x.map(|v| (v * 32768.0) as i32), y.map(|v| (v * 32768.0) as i32));
+        let rest = |v: i32| (v & 0x7FFF) as i16;
+        let at = |k: usize| (rows[k] >> 15).wrapping_mul(stride).wrapping_add((columns[k] >> 15) * 3);
+        (
+            std::array::from_fn(|k| if these >> k & 1 == 1 { at(k) } else { 0 }),
+            (columns.map(rest), rows.map(rest)),
+        )
+    }
+    #[inline(always)]
+    fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> Self::Parts {
+        (*x, *y)
+    }
+    #[inline(always)]
+    fn store_parts(self, parts: Self::Parts, x: &mut [i16; LANES], y: &mut [i16; LANES]) {
+        (*x, *y) = parts;
+    }
+    #[inline(always)]
+    fn quads(self, bytes: &[u8], at: &[i32; LANES], stride: i32) -> Option<Self::Quads> {
+        let mut quads = [[0; LANES]; 2];
+        for (quads, below) in quads.iter_mut().zip([0, stride as usize]) {
+            for (quad, &at) in quads.iter_mut().zip(at) {
+                let bytes = bytes.get(usize::try_from(at).ok()? + below..)?.first_chunk()?;
+                *quad = u64::from_le_bytes(*bytes);
+            }
+        }
+        Some(quads)
+    }
+    #[inline(always)]
+    fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
+        [*upper, *lower]
+    }
+    #[inline(always)]
+    fn bilinear(self, quads: Self::Quads, (x, y): Self::Parts) -> Self::Mix {
+        std::array::from_fn(|k| {
+            let [upper, lower] = quads.map(|of| of[k].to_le_bytes());
+            let column = |c: usize| {
+                let (a, b) = (i16::from(upper[c]) << 7, i16::from(lower[c]) << 7);
+                a + part(b - a, y[k])
+            };
+            std::array::from_fn(|c| {
+                let (left, right) = (column(c), column(c + 3));
+                left + part(right - left, x[k])
+            })
+        })
+    }
+    #[inline(always)]
+    fn weights(self, weights: Eight, these: u32) -> [i16; LANES] {
+        std::array::from_fn(|k| if these >> k & 1 == 1 { weights[k] as i16 } else { 0 })
+    }
+    #[inline(always)]
+    fn no_mix(self) -> Self::Mix {
+        [[0; 3]; LANES]
+    }
+    #[inline(always)]
+    fn add_weighted(self, sum: Self::Mix, colors: Self::Mix, weights: [i16; LANES]) -> Self::Mix {
+        std::array::from_fn(|k| std::array::from_fn(|c| sum[k][c] - part(colors[k][c], weights[k])))
+    }
+    #[inline(always)]
+    fn pixels(self, mix: Self::Mix) -> [u32; LANES] {
+        mix.map(|color| {
+            let [r, g, b] = color.map(|c| ((c + 64) >> 7).clamp(0, 255) as u8);
+            match u32::from_le_bytes([r, g, b, 0]) {
+                0 => 0x01_01_01,
+                color => color,
+            }
+        })
+    }
+    #[inline(always)]
+    fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]) {
+        for (pixel, value) in to.as_chunks_mut::<3>().0.iter_mut().zip(packed) {
+            let [r, g, b, _] = value.to_le_bytes();
+            *pixel = [r, g, b];
+        }
+    }
+
+    #[inline(always)]
+    fn equal(self, values: &[u32; LANES], value: u32) -> u32 {
+        (0..LANES).map(|k| u32::from(values[k] == value) << k).sum()
+    }
+    #[inline(always)]
+    fn changes(self, values: &[u32; LANES + 1]) -> u32 {
+        (0..LANES).map(|k| u32::from(values[k] != values[k + 1]) << k).sum()
+    }
+    #[inline(always)]
+    fn depths(self, depths: &Eight, to: &mut [u16; LANES]) {
+        // ⌊x + ½⌋ = ⌊(⌊2x⌋ + 1) / 2⌋, and 2x is exact. The cast takes what is not a number to 0.
+        *to = depths.map(|depth| (((depth * 1024.0).clamp(0.0, 131_070.0) as i32 + 1) >> 1) as u16);
+    }
+    #[inline(always)]
+    fn points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &Eight,
+        place: &[f64; 12],
+        to: &mut [f32; 3 * LANES],
+    ) {
+        *to = std::array::from_fn(|k| {
+            let (axis, depth) = (k % 3, depths[k / 3]);
+            let direction = if TURN { column[k] * row[axis] } else { column[k] + row[axis] };
+            if depth.is_finite() { (place[axis] + direction * f64::from(depth)) as f32 } else { 0.0 }
+        });
+    }
+    #[inline(always)]
+    fn half_points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &Eight,
+        place: &[f64; 12],
+        to: &mut [f16; 3 * LANES],
+    ) {
+        let mut points = [0.0; 3 * LANES];
+        self.points::<TURN>(column, row, depths, place, &mut points);
+        *to = points.map(f16::from_f32);
+    }
+}
+
+/// The eight values from the `at`th on; 0 if there are not as many.
+#[inline(always)]
+pub(crate) fn eight<L: Lanes>(lanes: L, of: &[f32], at: usize) -> L::F {
+    match of[at..].first_chunk() {
+        Some(values) => lanes.load(values),
+        None => lanes.splat(0.0),
+    }
+}
+
+/// Stores eight values from the `at`th on, if there are as many.
+#[inline(always)]
+pub(crate) fn put<L: Lanes>(lanes: L, to: &mut [f32], at: usize, values: L::F) {
+    if let Some(to) = to[at..].first_chunk_mut() {
+        lanes.store(values, to);
+    }
+}
+
+/// Where each run of equal values starts, ascending; 0 is one.
+#[inline(always)]
+pub(crate) fn run_starts(lanes: impl Lanes, values: &[u32], starts: &mut Vec<u32>) {
+    starts.clear();
+    if values.is_empty() {
+        return;
+    }
+    starts.push(0);
+    let mut at = 1;
+    // Four times as many values at a time: mostly there is nothing.
+    while let Some(window) = values.get(at - 1..).and_then(<[u32]>::first_chunk::<{ 4 * LANES + 1 }>) {
+        let mut changes = 0;
+        for k in 0..4 {
+            if let Some(part) = window[k * LANES..].first_chunk() {
+                changes |= lanes.changes(part) << (k * LANES);
+            }
+        }
+        while changes != 0 {
+            starts.push(at as u32 + changes.trailing_zeros());
+            changes &= changes - 1;
+        }
+        at += 4 * LANES;
+    }
+    starts.extend((at..values.len()).filter(|&k| values[k] != values[k - 1]).map(|k| k as u32));
+}
