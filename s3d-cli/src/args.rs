@@ -3,7 +3,7 @@
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, value_parser};
 use glam::DVec3;
-use s3d_io::{Domain, UpAxis};
+use s3d_io::{Compression, Domain, UpAxis};
 use s3d_sample::Pool;
 use std::path::PathBuf;
 
@@ -88,6 +88,10 @@ pub(crate) struct DemoOptions {
     /// Density of the point cloud.
     #[arg(long, value_name = "N", default_value_t = 2500.0, value_parser = positive)]
     pub(crate) points_per_m2: f64,
+    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make them) or small
+    /// (slowest). The pixels are the same.
+    #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
+    pub(crate) compression: Compression,
 }
 
 #[derive(Debug, Args)]
@@ -145,6 +149,10 @@ pub(crate) struct ExportOptions {
     /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
     #[arg(long)]
     pub(crate) smooth_normals: bool,
+    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make them) or small
+    /// (slowest). The pixels are the same.
+    #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
+    pub(crate) compression: Compression,
 }
 
 impl ExportOptions {
@@ -230,6 +238,10 @@ pub(crate) struct RenderArgs {
     /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
     #[arg(long)]
     pub(crate) smooth_normals: bool,
+    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make them) or small
+    /// (slowest). The pixels are the same.
+    #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
+    pub(crate) compression: Compression,
     /// The folder for the images.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
@@ -319,6 +331,7 @@ mod tests {
         assert_eq!((o.views, o.size, o.pano_width, o.seed, o.entropy_stride), (72, 1080, 4096, 0, 4));
         assert_eq!(o.modalities, Domain::ALL);
         assert_eq!(o.pool, Pool::Dataset);
+        assert_eq!(o.compression, Compression::Balanced);
     }
 
     #[test]
@@ -343,6 +356,7 @@ mod tests {
             &["s3d", "export", "a.toml", "--pano-width", "4095"],
             &["s3d", "export", "a.toml", "--modalities", "rgb,smell"],
             &["s3d", "export", "a.toml", "--pool", "sea"],
+            &["s3d", "export", "a.toml", "--compression", "9"],
             &["s3d", "export", "--only", "00112233445566778899aabbccddeeff", "a.toml"],
             &["s3d", "export", "a.toml", "--points-per-m2", "nan"],
             &["s3d", "render", "a.obj", "--at", "1,2", "-o", "x"],

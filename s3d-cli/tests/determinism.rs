@@ -78,3 +78,41 @@ fn another_seed_gives_other_views_and_only_keeps_the_selection() {
     assert_eq!(images(&zero), images(&only));
     assert!(!only.keys().any(|p| text(p).contains(common::UUID_A)));
 }
+
+#[test]
+fn compression_changes_sizes_and_nothing_that_is_read_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = write_scan(&dir.path().join("scan"), 1);
+    let outs = ["fast", "balanced", "small"].map(|name| {
+        let out = dir.path().join(name);
+        export(&[text(&scene)], &out, &["--compression", name]);
+        out
+    });
+    let [_, balanced, _] = &outs;
+    let default = dir.path().join("default");
+    export(&[text(&scene)], &default, &[]);
+    assert_same(balanced, &default);
+    let mut sizes = [0; 3];
+    for path in files(balanced).keys() {
+        let there = |i: usize| outs[i].join(path);
+        let same = |i: usize| match path.extension().and_then(|e| e.to_str()) {
+            Some("png") if text(path).contains("domain_depth") => {
+                s3d_io::read_gray16(&there(i)).unwrap() == s3d_io::read_gray16(&there(1)).unwrap()
+            }
+            Some("png") => s3d_io::read_rgb8(&there(i)).unwrap() == s3d_io::read_rgb8(&there(1)).unwrap(),
+            Some("exr") => s3d_io::read_xyz(&there(i)).unwrap() == s3d_io::read_xyz(&there(1)).unwrap(),
+            // It names the option.
+            _ if path.ends_with("manifest.json") => {
+                let manifest = std::fs::read_to_string(there(i)).unwrap();
+                let name = ["fast", "balanced", "small"][i];
+                manifest.contains(&format!("\"compression\": \"{name}\""))
+            }
+            _ => std::fs::read(there(i)).unwrap() == std::fs::read(there(1)).unwrap(),
+        };
+        for (i, size) in sizes.iter_mut().enumerate() {
+            assert!(same(i), "{}", there(i).display());
+            *size += std::fs::metadata(there(i)).unwrap().len();
+        }
+    }
+    assert!(sizes[0] > sizes[1] && sizes[1] > sizes[2], "{sizes:?}");
+}

@@ -1,16 +1,16 @@
 //! OpenEXR images of world coordinates.
 //!
 //! The `exr` crate writes the header and the table of blocks. Blocks are prepared and compressed here, since its own way
-//! takes three times as long: same format (ZIP, 16 lines a block), same size.
+//! takes several times as long: same format (ZIP, 16 lines a block), and no larger than OpenEXR makes it.
 
-use crate::{Error, Result, write_bytes};
+use crate::deflate::{Candidates, Deflater, Search};
+use crate::{Compression, Error, Result, write_bytes};
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::block::writer::ChunksWriter;
-use exr::compression::Compression;
+use exr::compression::Compression as Method;
 use exr::meta::BlockDescription;
 use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType};
 use exr::meta::header::{Header, LayerAttributes};
-use flate2::{Compress, FlushCompress, Status};
 use half::f16;
 use s3d_geom::Raster;
 use std::io::Cursor;
@@ -18,9 +18,6 @@ use std::path::Path;
 
 /// Lines in a block of the compression "ZIP". It is the format's number.
 const BLOCK_LINES: u32 = 16;
-
-/// zlib's level: 4 takes no longer than OpenEXR does and makes files of the same size.
-const LEVEL: u32 = 4;
 
 /// Images with more pixels than this are not read.
 const MAX_PIXELS: usize = 1 << 30;
@@ -30,8 +27,8 @@ const MAX_PIXELS: usize = 1 << 30;
 ///
 /// # Panics
 /// If the image has no pixel.
-pub fn encode_xyz_half(image: &Raster<[f16; 3]>) -> Vec<u8> {
-    encode(image, SampleType::F16, f16::to_le_bytes)
+pub fn encode_xyz_half(image: &Raster<[f16; 3]>, compression: Compression) -> Vec<u8> {
+    encode(image, SampleType::F16, f16::to_le_bytes, compression)
 }
 
 /// As [`encode_xyz_half`], but of 32-bit floats: exact, and some twenty times as large on surfaces that halves turn into
@@ -39,8 +36,8 @@ pub fn encode_xyz_half(image: &Raster<[f16; 3]>) -> Vec<u8> {
 ///
 /// # Panics
 /// If the image has no pixel.
-pub fn encode_xyz_float(image: &Raster<[f32; 3]>) -> Vec<u8> {
-    encode(image, SampleType::F32, f32::to_le_bytes)
+pub fn encode_xyz_float(image: &Raster<[f32; 3]>, compression: Compression) -> Vec<u8> {
+    encode(image, SampleType::F32, f32::to_le_bytes, compression)
 }
 
 /// Writes an OpenEXR file of half floats, whole or not at all, and returns its size in bytes; see [`encode_xyz_half`].
@@ -50,8 +47,8 @@ pub fn encode_xyz_float(image: &Raster<[f32; 3]>) -> Vec<u8> {
 ///
 /// # Panics
 /// If the image has no pixel.
-pub fn write_xyz_half(path: &Path, image: &Raster<[f16; 3]>) -> Result<u64> {
-    write_bytes(path, &encode_xyz_half(image))
+pub fn write_xyz_half(path: &Path, image: &Raster<[f16; 3]>, compression: Compression) -> Result<u64> {
+    write_bytes(path, &encode_xyz_half(image, compression))
 }
 
 /// Writes an OpenEXR file of 32-bit floats, whole or not at all, and returns its size in bytes; see
@@ -62,14 +59,15 @@ pub fn write_xyz_half(path: &Path, image: &Raster<[f16; 3]>) -> Result<u64> {
 ///
 /// # Panics
 /// If the image has no pixel.
-pub fn write_xyz_float(path: &Path, image: &Raster<[f32; 3]>) -> Result<u64> {
-    write_bytes(path, &encode_xyz_float(image))
+pub fn write_xyz_float(path: &Path, image: &Raster<[f32; 3]>, compression: Compression) -> Result<u64> {
+    write_bytes(path, &encode_xyz_float(image, compression))
 }
 
 fn encode<T: Copy, const N: usize>(
     image: &Raster<[T; 3]>,
     sample_type: SampleType,
     to_le_bytes: impl Fn(T) -> [u8; N],
+    compression: Compression,
 ) -> Vec<u8> {
     assert!(!image.is_empty(), "an OpenEXR image needs pixels: {} × {}", image.width(), image.height());
     let size = (image.width() as usize, image.height() as usize);
@@ -77,15 +75,16 @@ fn encode<T: Copy, const N: usize>(
     let channels = ["B", "G", "R"].map(|name| ChannelDescription::named(name, sample_type));
     let header = Header::new("".into(), size, channels.into_iter().collect())
         .with_attributes(LayerAttributes::default())
-        .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing);
+        .with_encoding(Method::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing);
 
     let mut file = Cursor::new(Vec::with_capacity(image.len() * 2));
     let written =
         exr::block::writer::write_chunks_with(&mut file, [header].into_iter().collect(), true, |_, out| {
-            let mut block = Block::new(image.width() as usize * BLOCK_LINES as usize * 3 * N);
-            for (index, y) in (0..image.height()).step_by(BLOCK_LINES as usize).enumerate() {
-                let rows = y..(y + BLOCK_LINES).min(image.height());
-                let compressed_pixels_le = block.compress(rows.map(|y| image.row(y)), &to_le_bytes);
+            let mut block = Block::new(image.width() as usize, N, compression);
+            let width = image.width() as usize;
+            for (index, pixels) in image.pixels().chunks(width * BLOCK_LINES as usize).enumerate() {
+                let y = index as u32 * BLOCK_LINES;
+                let compressed_pixels_le = block.compress(pixels, width, &to_le_bytes);
                 let line = CompressedScanLineBlock { y_coordinate: y as i32, compressed_pixels_le };
                 out.write_chunk(
                     index,
@@ -100,55 +99,84 @@ fn encode<T: Copy, const N: usize>(
 
 /// Buffers for one block of lines, reused for all of an image.
 struct Block {
-    /// The samples of the block as the format has them without compression: line by line, channel by channel.
-    samples: Vec<u8>,
-    /// The bytes at even places, then those at odd places, each but the first as a difference.
+    /// The samples' bytes, line by line and channel by channel: those at even places, then those at odd places.
+    sorted: Vec<u8>,
+    /// The same, each but the first as the difference to the one before.
     prepared: Vec<u8>,
-    zlib: Compress,
+    compressed: Vec<u8>,
+    deflater: Deflater,
 }
 
 impl Block {
-    fn new(bytes: usize) -> Self {
+    /// For lines of `width` pixels with three samples of `sample` bytes.
+    fn new(width: usize, sample: usize, compression: Compression) -> Self {
+        let line = 3 * sample * width;
+        let bytes = line * BLOCK_LINES as usize;
+        let balanced = Search {
+            candidates: Candidates::Steps,
+            // Even and odd bytes are apart, so a line comes back after half its bytes.
+            line: line / 2,
+            sample: sample / 2,
+            hash_bytes: 4,
+            lazy: 6,
+            nice: 32,
+            remember: 32,
+            patience: 8,
+        };
+        let search = match compression {
+            Compression::Fast => {
+                Search { candidates: Candidates::Quick, hash_bytes: 5, lazy: 0, patience: 5, ..balanced }
+            }
+            Compression::Balanced => balanced,
+            Compression::Small => {
+                Search { candidates: Candidates::Many, lazy: 258, nice: 258, remember: 258, ..balanced }
+            }
+        };
         Self {
-            samples: Vec::with_capacity(bytes),
+            sorted: vec![0; bytes],
             prepared: vec![0; bytes],
-            zlib: Compress::new(flate2::Compression::new(LEVEL), true),
+            compressed: Vec::new(),
+            deflater: Deflater::new(search),
         }
     }
 
-    /// The contents of the block of `rows` (R G B), compressed unless that makes it longer.
-    fn compress<'a, T: Copy + 'a, const N: usize>(
+    /// The contents of the block of whole rows of `width` pixels (R G B), compressed unless that makes it longer.
+    fn compress<T: Copy, const N: usize>(
         &mut self,
-        rows: impl Iterator<Item = &'a [[T; 3]]>,
+        pixels: &[[T; 3]],
+        width: usize,
         to_le_bytes: impl Fn(T) -> [u8; N],
     ) -> Vec<u8> {
-        self.samples.clear();
-        for row in rows {
-            for channel in [2, 1, 0] {
-                self.samples.extend(row.iter().flat_map(|pixel| to_le_bytes(pixel[channel])));
+        let n = 3 * N * pixels.len();
+        let sorted = &mut self.sorted[..n];
+        let (even, odd) = sorted.split_at_mut(n / 2);
+        let half = N / 2 * width;
+        let mut lines = even.chunks_exact_mut(half).zip(odd.chunks_exact_mut(half));
+        for row in pixels.chunks_exact(width) {
+            for (channel, (even, odd)) in [2, 1, 0].into_iter().zip(&mut lines) {
+                let places = even.chunks_exact_mut(N / 2).zip(odd.chunks_exact_mut(N / 2));
+                for (pixel, (even, odd)) in row.iter().zip(places) {
+                    for (i, [low, high]) in to_le_bytes(pixel[channel]).as_chunks().0.iter().enumerate() {
+                        (even[i], odd[i]) = (*low, *high);
+                    }
+                }
             }
         }
-        let n = self.samples.len();
         let prepared = &mut self.prepared[..n];
-        let (even, odd) = prepared.split_at_mut(n.div_ceil(2));
-        for ((pair, even), odd) in self.samples.as_chunks::<2>().0.iter().zip(even).zip(odd) {
-            [*even, *odd] = *pair;
-        }
-        // Backwards, so that each byte still has its neighbour to be subtracted; 128 stands for no difference.
-        let mut last = prepared[n - 1];
-        for i in (1..n).rev() {
-            let before = prepared[i - 1];
-            prepared[i] = last.wrapping_sub(before).wrapping_add(128);
-            last = before;
+        prepared[0] = sorted[0];
+        for ((difference, byte), before) in prepared[1..].iter_mut().zip(&sorted[1..]).zip(&sorted[..n - 1]) {
+            // 128 stands for no difference.
+            *difference = byte.wrapping_sub(*before).wrapping_add(128);
         }
 
-        // Room for one byte less than the samples have: a block that is not shorter is stored as it is.
-        let mut compressed = Vec::with_capacity(n - 1);
-        self.zlib.reset();
-        match self.zlib.compress_vec(prepared, &mut compressed, FlushCompress::Finish) {
-            Ok(Status::StreamEnd) => compressed,
-            _ => self.samples.clone(),
+        self.compressed.clear();
+        self.deflater.zlib(prepared, n / 2, &mut self.compressed);
+        if self.compressed.len() < n {
+            return self.compressed.clone();
         }
+        // A block that is not shorter is stored as it is.
+        let (even, odd) = sorted.split_at(n / 2);
+        even.iter().zip(odd).flat_map(|(even, odd)| [*even, *odd]).collect()
     }
 }
 
@@ -209,7 +237,7 @@ mod tests {
             (r, g, b)
         };
         let encoding = Encoding {
-            compression: Compression::ZIP16,
+            compression: Method::ZIP16,
             blocks: Blocks::ScanLines,
             line_order: LineOrder::Increasing,
         };
@@ -231,12 +259,14 @@ mod tests {
 
     #[test]
     fn halves_and_floats_come_back_exactly() {
-        for (w, h) in [(1, 1), (3, 16), (5, 17), (64, 40), (31, 33)] {
+        for (w, h) in [(1, 1), (3, 16), (5, 17), (64, 40), (31, 33), (9000, 18)] {
             let floats = room(w, h);
-            assert_eq!(in_file(&encode_xyz_float(&floats), read_xyz).unwrap(), floats);
             let halves = floats.map(|p| p.map(f16::from_f32));
-            let read = in_file(&encode_xyz_half(&halves), read_xyz).unwrap();
-            assert_eq!(read, halves.map(|p| p.map(f16::to_f32)));
+            for compression in Compression::ALL {
+                assert_eq!(in_file(&encode_xyz_float(&floats, compression), read_xyz).unwrap(), floats);
+                let read = in_file(&encode_xyz_half(&halves, compression), read_xyz).unwrap();
+                assert_eq!(read, halves.map(|p| p.map(f16::to_f32)));
+            }
         }
     }
 
@@ -249,15 +279,17 @@ mod tests {
         })) {
             let number = |bits| Some(f16::from_bits(bits)).filter(|v| !v.is_nan()).unwrap_or(f16::ONE);
             let image = Raster::from_vec(w, h, data.into_iter().map(|p| p.map(number)).collect());
-            let read = in_file(&encode_xyz_half(&image), read_xyz).unwrap();
-            prop_assert_eq!(read, image.map(|p| p.map(f16::to_f32)));
+            for compression in Compression::ALL {
+                let read = in_file(&encode_xyz_half(&image, compression), read_xyz).unwrap();
+                prop_assert_eq!(read, image.map(|p| p.map(f16::to_f32)));
+            }
         }
     }
 
     #[test]
     fn the_header_is_what_the_plain_writer_makes() {
         let image = room(100, 50).map(|p| p.map(f16::from_f32));
-        let (ours, plain) = (encode_xyz_half(&image), reference_half(&image));
+        let (ours, plain) = (encode_xyz_half(&image, Compression::Balanced), reference_half(&image));
         let header = |bytes: &[u8]| {
             let meta = exr::meta::MetaData::read_from_buffered(bytes, true).unwrap();
             let [header] = meta.headers.as_slice() else { panic!("one layer") };
@@ -270,17 +302,20 @@ mod tests {
         assert_eq!((a.layer_size, a.chunk_count), (b.layer_size, b.chunk_count));
         assert_eq!(a.shared_attributes.display_window, b.shared_attributes.display_window);
         assert_eq!(in_file(&plain, read_xyz).unwrap(), in_file(&ours, read_xyz).unwrap());
-        assert!(
-            ours.len() * 10 < plain.len() * 11,
-            "{} bytes, the plain writer makes {}",
-            ours.len(),
-            plain.len()
-        );
+    }
+
+    #[test]
+    fn more_time_makes_smaller_files_no_larger_than_the_plain_writers() {
+        let image = room(700, 300).map(|p| p.map(f16::from_f32));
+        let [fast, balanced, small] = Compression::ALL.map(|c| encode_xyz_half(&image, c).len());
+        let plain = reference_half(&image).len();
+        assert!(fast >= balanced && balanced >= small, "{fast}, {balanced}, {small}");
+        assert!(balanced <= plain, "{balanced}, the plain writer makes {plain}");
     }
 
     #[test]
     fn broken_files_are_format_errors() {
-        let whole = encode_xyz_half(&room(20, 20).map(|p| p.map(f16::from_f32)));
+        let whole = encode_xyz_half(&room(20, 20).map(|p| p.map(f16::from_f32)), Compression::Balanced);
         for bytes in [&b"not an image"[..], b"", &whole[..30], &whole[..whole.len() / 2]] {
             let e = in_file(bytes, read_xyz).unwrap_err();
             assert!(matches!(e, Error::Format { .. }), "{e}");

@@ -6,8 +6,8 @@
 //!
 //! - names: [`Layout`] knows where everything lies, [`ImageName`] takes a file name apart, [`Domain`] and [`Frame`] are
 //!   its parts;
-//! - images: [`encode_rgb8`] and [`encode_gray16`] (PNG), [`encode_xyz_half`] and [`encode_xyz_float`] (OpenEXR), and their
-//!   readers;
+//! - images: [`encode_rgb8`] and [`encode_gray16`] (PNG), [`encode_xyz_half`] and [`encode_xyz_float`] (OpenEXR), with a
+//!   [`Compression`] to choose, and their readers;
 //! - cameras: [`PoseFile`];
 //! - meshes: [`read_mesh`] (OBJ, glTF), [`write_rgb_obj`], [`write_semantic_obj`];
 //! - scans: [`read_scene`], [`read_cameras`], [`AnnotationTree`], [`PointReader`];
@@ -18,7 +18,7 @@
 //!
 //! ```
 //! use s3d_geom::Raster;
-//! use s3d_io::{Domain, Frame, ImageName, Layout, create_dir, read_gray16, write_gray16};
+//! use s3d_io::{Compression, Domain, Frame, ImageName, Layout, create_dir, read_gray16, write_gray16};
 //!
 //! # fn main() -> s3d_io::Result<()> {
 //! # let folder = tempfile::tempdir().unwrap();
@@ -28,7 +28,7 @@
 //!
 //! // A wall 2 m away: 512 units a metre.
 //! let path = layout.image_path(3, "5c2959c3089c4ac5a7c5c913cc0df78d", "office_5", frame, Domain::Depth);
-//! write_gray16(&path, &Raster::filled(64, 64, 1024u16))?;
+//! write_gray16(&path, &Raster::filled(64, 64, 1024u16), Compression::Balanced)?;
 //!
 //! assert!(path.ends_with(
 //!     "area_3/data/depth/camera_5c2959c3089c4ac5a7c5c913cc0df78d_office_5_frame_41_domain_depth.png"
@@ -42,6 +42,8 @@
 
 mod atomic;
 mod cameras;
+mod compression;
+mod deflate;
 mod error;
 mod exr;
 mod gltf;
@@ -63,6 +65,7 @@ mod obj_plain;
 mod obj_write;
 mod ply;
 mod png;
+mod png_filter;
 mod pose;
 mod pretty;
 mod quote;
@@ -75,6 +78,7 @@ mod texture_file;
 
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
 pub use cameras::{ScanLocation, read_cameras};
+pub use compression::{Compression, UnknownCompression};
 pub use error::{Error, Place, Result};
 pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
 pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};

@@ -1,6 +1,6 @@
 //! Wavefront OBJ with its material libraries.
 //!
-//! [`PlainObj`] understands the dialects, tobj reads the numbers, [`crate::obj_diagnose`] finds the line of a bad one,
+//! [`PlainObj`] understands the dialects and reads the numbers, [`crate::obj_diagnose`] finds the line of a bad one,
 //! [`ObjLooks`] the libraries and images; here the parts become a mesh.
 
 use crate::mesh_file::{MeshFile, UpAxis, checked_mesh};
@@ -10,7 +10,7 @@ use crate::obj_plain::PlainObj;
 use crate::quote::count;
 use crate::texture_file::read_file;
 use crate::{Error, Result};
-use s3d_geom::glam::{Vec2, Vec3, vec2, vec3};
+use s3d_geom::glam::{Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
 use std::path::Path;
 
@@ -27,9 +27,20 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         return Err(Error::format(path, no_faces(&plain)));
     }
     let mut warnings = Vec::new();
-    let columns = tobj_columns(&plain).map_err(|said| number_error(path, &bytes, said))?;
-    let faces = Triangles::new(&plain, &columns)
-        .map_err(|vertex| vertex_error(path, &bytes, vertex, columns.positions[vertex as usize]))?;
+    if plain.has_bad_number {
+        return Err(number_error(path, &bytes));
+    }
+    // Decoding images takes as long as all else, and needs nothing of it.
+    let mut remarks = Vec::new();
+    let (geometry, looks) = rayon::join(
+        || {
+            let columns = Columns::new(&plain);
+            Triangles::new(&plain, &columns).map(|faces| (columns, faces))
+        },
+        || ObjLooks::load(path, &plain, &mut remarks),
+    );
+    let (columns, faces) =
+        geometry.map_err(|vertex| vertex_error(path, &bytes, vertex, plain.positions[vertex as usize]))?;
     let polygons_triangulated = faces.polygons;
     if faces.triangles.is_empty() {
         let reason =
@@ -44,9 +55,9 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         warnings.push(format!("{n} with fewer than three corners left out, the first on line {first}"));
     }
     let colors = vertex_colors(&plain, &mut warnings);
-    let looks = ObjLooks::load(path, &plain, &mut warnings);
+    warnings.append(&mut remarks);
     let parts = MeshParts {
-        positions: columns.positions.into_iter().map(|p| up.world_from_file(p)).collect(),
+        positions: plain.positions.iter().map(|&p| up.world_from_file(p)).collect(),
         faces: faces.triangles,
         colors,
         uvs: columns.uvs,
@@ -65,7 +76,7 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
 }
 
 fn no_faces(plain: &PlainObj) -> String {
-    let mut message = format!("has no face, only {}", count(plain.vertices, "vertex"));
+    let mut message = format!("has no face, only {}", count(plain.positions.len(), "vertex"));
     if plain.points_and_lines > 0 {
         message += &format!(" and {}", count(plain.points_and_lines, "point and line element"));
     }
@@ -75,39 +86,45 @@ fn no_faces(plain: &PlainObj) -> String {
     message + "; a mesh is needed"
 }
 
-/// The columns of the file as tobj reads them, in the axes of the file.
+/// Texture coordinates and normals that corners use, the first of the file and then in the order of their first use, and
+/// the corners' indices into them, both empty if the file has none.
 struct Columns {
-    positions: Vec<Vec3>,
     uvs: Vec<Vec2>,
+    face_uvs: Vec<u32>,
     /// Unit normals; not finite where the file's has no length.
     normals: Vec<Vec3>,
-    /// Three columns of indices, one entry a corner of a face of [`PlainObj::faces`]; texture coordinates and normals
-    /// are empty if the file has none.
-    corners: [Vec<u32>; 3],
+    face_normals: Vec<u32>,
 }
 
-fn tobj_columns(plain: &PlainObj) -> std::result::Result<Columns, tobj::LoadError> {
-    let options = tobj::LoadOptions::default();
-    let no_library = |_: &Path| Err(tobj::LoadError::GenericFailure);
-    let (mut models, _) = tobj::load_obj_buf(&mut plain.reader(), &options, no_library)?;
-    let mut mesh = models.pop().ok_or(tobj::LoadError::GenericFailure)?.mesh;
-    // The first face holds all vertices in order, see `PlainObj::reader`.
-    let corners = [&mut mesh.indices, &mut mesh.texcoord_indices, &mut mesh.normal_indices]
-        .map(|indices| indices.split_off(indices.len().min(plain.vertices)));
-    let expected: usize = plain.faces.iter().map(|f| f.corners as usize).sum();
-    let complete =
-        corners[0].len() == expected && corners[1..].iter().all(|c| c.is_empty() || c.len() == expected);
-    if !complete || mesh.positions.len() != 3 * plain.vertices {
-        return Err(tobj::LoadError::GenericFailure);
+impl Columns {
+    fn new(plain: &PlainObj) -> Self {
+        let (uvs, face_uvs) = used(&plain.uvs, &plain.corners[1]);
+        let (normals, face_normals) = used(&plain.normals, &plain.corners[2]);
+        let normals = normals.into_iter().map(|n| n / n.length()).collect();
+        Self { uvs, face_uvs, normals, face_normals }
     }
-    let triples =
-        |flat: &[f32]| -> Vec<Vec3> { flat.as_chunks().0.iter().map(|&[x, y, z]| vec3(x, y, z)).collect() };
-    Ok(Columns {
-        positions: triples(&mesh.positions),
-        uvs: mesh.texcoords.as_chunks().0.iter().map(|&[u, v]| vec2(u, v)).collect(),
-        normals: triples(&mesh.normals).into_iter().map(|n| n / n.length()).collect(),
-        corners,
-    })
+}
+
+/// The first entry of a column and those that `corners` name, in the order of their first use, and `corners` with indices
+/// into them.
+fn used<T: Copy>(column: &[T], corners: &[u32]) -> (Vec<T>, Vec<u32>) {
+    let Some(&first) = column.first() else { return Default::default() };
+    let mut out = vec![first];
+    let mut new_index = vec![NO_INDEX; column.len()];
+    new_index[0] = 0;
+    let corners = corners.iter().map(|&corner| {
+        if corner == NO_INDEX {
+            return NO_INDEX;
+        }
+        let new = &mut new_index[corner as usize];
+        if *new == NO_INDEX {
+            *new = out.len() as u32;
+            out.push(column[corner as usize]);
+        }
+        *new
+    });
+    let corners = corners.collect();
+    (out, corners)
 }
 
 /// The faces of a file, polygons cut into triangles.
@@ -128,7 +145,7 @@ impl Triangles {
     fn new(plain: &PlainObj, columns: &Columns) -> std::result::Result<Self, u32> {
         let mut out = Self::default();
         let mut start = 0;
-        let [vertices, uvs, normals] = &columns.corners;
+        let (vertices, uvs, normals) = (&plain.corners[0], &columns.face_uvs, &columns.face_normals);
         for face in &plain.faces {
             let n = face.corners as usize;
             let corners = start..start + n;
@@ -137,7 +154,7 @@ impl Triangles {
             let cut = if n == 3 {
                 vec![[0, 1, 2]]
             } else {
-                let points: Vec<Vec3> = polygon.iter().map(|&v| columns.positions[v as usize]).collect();
+                let points: Vec<Vec3> = polygon.iter().map(|&v| plain.positions[v as usize]).collect();
                 if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
                     return Err(polygon[bad]);
                 }
@@ -182,13 +199,16 @@ fn vertex_colors(plain: &PlainObj, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
     }
     let largest = plain.colors.iter().flat_map(|(_, c)| c).fold(0.0f32, |a, &b| a.max(b));
     let scale = if largest > 2.0 { 1.0 } else { 255.0 };
-    let mut colors = vec![DEFAULT_COLOR; plain.vertices];
+    let mut colors = vec![DEFAULT_COLOR; plain.positions.len()];
     for (vertex, color) in &plain.colors {
         colors[*vertex as usize] = color.map(|c| (c * scale).round().clamp(0.0, 255.0) as u8);
     }
-    let without = plain.vertices - plain.colors.len();
+    let without = plain.positions.len() - plain.colors.len();
     if without > 0 {
-        warnings.push(format!("{without} of {} vertices have no colour and are made gray", plain.vertices));
+        warnings.push(format!(
+            "{without} of {} vertices have no colour and are made gray",
+            plain.positions.len()
+        ));
     }
     colors
 }
@@ -197,6 +217,7 @@ fn vertex_colors(plain: &PlainObj, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use s3d_geom::glam::vec3;
     use std::fs;
 
     /// Reads `obj`, Z up.
@@ -332,6 +353,14 @@ mod tests {
     }
 
     #[test]
+    fn columns_keep_what_is_used_in_the_order_of_its_use() {
+        let corners = [3, NO_INDEX, 1, 3, 1];
+        assert_eq!(used(&['a', 'b', 'c', 'd'], &corners), (vec!['a', 'd', 'b'], vec![1, NO_INDEX, 2, 1, 2]));
+        assert_eq!(used(&['a', 'b'], &[NO_INDEX, 0]), (vec!['a'], vec![NO_INDEX, 0]));
+        assert_eq!(used::<char>(&[], &[NO_INDEX]), (vec![], vec![]));
+    }
+
+    #[test]
     fn a_line_of_many_megabytes_is_read() {
         let n = 40_000;
         let mut obj = String::from("# ");
@@ -355,6 +384,42 @@ mod tests {
             "-9223372036854775808", "9223372036854775807", "4294967296", "x", "\u{e4}", "0.5", "\r",
         ]), 0..60)) {
             let _ = read_obj(&words.join(" "));
+        }
+
+        #[test]
+        fn corners_are_what_tobj_reads(
+            numbers in proptest::collection::vec((-1000.0..1000.0f32, 0usize..9, any::<bool>()), 30..90),
+            picks in proptest::collection::vec(any::<[[proptest::sample::Index; 3]; 3]>(), 1..20),
+        ) {
+            let word = |i: usize| {
+                let (value, decimals, e) = numbers[i];
+                if e { format!("{value:.decimals$e}") } else { format!("{value:.decimals$}") }
+            };
+            let n = numbers.len() / 3;
+            let mut obj = String::new();
+            for i in 0..n {
+                let [x, y, z] = std::array::from_fn(|k| word(3 * i + k));
+                obj += &format!("v {x} {y} {z}\nvt {z} {x}\nvn {y} {x} 1\n");
+            }
+            for face in &picks {
+                let corner = |c: usize| face[c].map(|i| (i.index(n) + 1).to_string()).join("/");
+                obj += &format!("f {} {} {}\n", corner(0), corner(1), corner(2));
+            }
+            let options = tobj::LoadOptions::default();
+            let (models, _) = tobj::load_obj_buf(&mut obj.as_bytes(), &options, |_| Err(tobj::LoadError::GenericFailure)).unwrap();
+            let theirs = &models[0].mesh;
+            let plain = PlainObj::parse(Path::new("a.obj"), obj.as_bytes()).unwrap();
+            let columns = Columns::new(&plain);
+            for corner in 0..3 * picks.len() {
+                let [v, t, n] = [&theirs.indices, &theirs.texcoord_indices, &theirs.normal_indices].map(|i| i[corner] as usize);
+                let position = plain.positions[plain.corners[0][corner] as usize];
+                prop_assert_eq!(&position.to_array()[..], &theirs.positions[3 * v..3 * v + 3]);
+                let uv = columns.uvs[columns.face_uvs[corner] as usize];
+                prop_assert_eq!(&uv.to_array()[..], &theirs.texcoords[2 * t..2 * t + 2]);
+                let normal = columns.normals[columns.face_normals[corner] as usize];
+                let expected = Vec3::from_slice(&theirs.normals[3 * n..3 * n + 3]);
+                prop_assert_eq!(normal, expected / expected.length());
+            }
         }
 
         #[test]

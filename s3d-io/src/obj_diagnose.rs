@@ -1,4 +1,4 @@
-//! Where in an OBJ file a number is bad: a plain scan of its lines, for when tobj or the mesh's check says only that.
+//! Where in an OBJ file a number is bad: a plain scan of its lines, for when it is known only that one is.
 
 use crate::Error;
 use crate::obj_lines::{logical_lines, parse_f32, without_comment, words};
@@ -6,8 +6,8 @@ use crate::quote::quote;
 use s3d_geom::glam::Vec3;
 use std::path::Path;
 
-/// The error for the first number that tobj cannot read; `said` is what it said.
-pub(crate) fn number_error(path: &Path, bytes: &[u8], said: tobj::LoadError) -> Error {
+/// The error for the first number that cannot be read.
+pub(crate) fn number_error(path: &Path, bytes: &[u8]) -> Error {
     for (number, line) in logical_lines(bytes) {
         let mut words = words(without_comment(&line));
         let most = match words.next() {
@@ -26,7 +26,7 @@ pub(crate) fn number_error(path: &Path, bytes: &[u8], said: tobj::LoadError) -> 
             return Error::line(path, number, format!("the vertex has the weight 0: {}", quote(&line)));
         }
     }
-    Error::format(path, format!("tobj cannot read it: {said}"))
+    Error::format(path, "has a number that cannot be read")
 }
 
 /// The error for the vertex `vertex`, from 0, whose position is not finite.
@@ -48,13 +48,12 @@ mod tests {
     #[test]
     fn the_first_bad_number_is_found() {
         let text = b"v 0 0 0\nvt 0.5 # x\n# v 0 0 x\nvn 0 0 1\nv 1 3.1+e2 0\nv x 0 0\n";
-        let said = tobj::LoadError::PositionParseError;
-        let message = number_error(Path::new("a.obj"), text, said).to_string();
+        let message = number_error(Path::new("a.obj"), text).to_string();
         assert_eq!(message, "a.obj, line 5: `3.1+e2` is no number: `v 1 3.1+e2 0`");
-        let message = number_error(Path::new("a.obj"), b"v 0 0 0 0\n", said).to_string();
+        let message = number_error(Path::new("a.obj"), b"v 0 0 0 0\n").to_string();
         assert!(message.contains("line 1: the vertex has the weight 0"), "{message}");
-        let message = number_error(Path::new("a.obj"), b"v 0 0 0\n", said).to_string();
-        assert_eq!(message, "a.obj: tobj cannot read it: position parse error");
+        let message = number_error(Path::new("a.obj"), b"v 0 0 0\n").to_string();
+        assert_eq!(message, "a.obj: has a number that cannot be read");
     }
 
     #[test]

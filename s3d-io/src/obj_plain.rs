@@ -1,17 +1,14 @@
-//! OBJ as it is found, brought to the plain dialect that tobj reads without surprises.
+//! The statements of an OBJ file, in all dialects in which they are found.
 //!
-//! tobj 4 silently takes `l` elements of three and more points for faces, gives a corner without a texture coordinate
-//! the one of the corner before, lets the colours of a file that colours only some vertices slip to others, counts the
-//! index 0 as none, wraps a relative index that points before the start, and stops at a byte that is not UTF-8 even
-//! in a comment. Its errors name no line. So everything but the numbers of `v`, `vt` and `vn` is understood here: what
-//! reaches tobj are those lines and faces whose indices are known to be in range, as one object without materials.
+//! Faces may count their corners from the end; a line may go on on the next; only some vertices may have a colour, and only
+//! some corners a texture coordinate. Elements that are no faces are left out. Indices are known to be in range.
 
-use crate::obj_lines::{logical_lines, parse_f32, text, without_comment, words};
+use crate::obj_lines::{logical_lines, next_word, number, parse_f32, text, words};
 use crate::quote::quote;
 use crate::{Error, Result};
 use s3d_geom::NO_INDEX;
+use s3d_geom::glam::{Vec2, Vec3, vec2};
 use std::collections::HashMap;
-use std::io::{BufRead, Read};
 use std::path::Path;
 
 /// What a face is beyond its indices.
@@ -28,16 +25,18 @@ pub(crate) struct PlainFace {
     pub(crate) has_normal: bool,
 }
 
-/// A plain OBJ file and what was taken out of it.
+/// An OBJ file, understood.
 #[derive(Debug, Default)]
 pub(crate) struct PlainObj {
-    /// The `v`, `vt` and `vn` lines.
-    columns: Vec<u8>,
-    /// One `f` line a face, relative indices made absolute.
-    face_lines: Vec<u8>,
-    /// Number of `v` lines.
-    pub(crate) vertices: usize,
+    /// The columns of `v`, `vt` and `vn`, as written but for a vertex's weight, by which it is divided.
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) uvs: Vec<Vec2>,
+    pub(crate) normals: Vec<Vec3>,
+    /// Whether one of these is no number, or a weight 0. Which one is for [`crate::obj_diagnose`] to find.
+    pub(crate) has_bad_number: bool,
     pub(crate) faces: Vec<PlainFace>,
+    /// The indices of all faces' corners into the three columns, from 0, [`NO_INDEX`] for none.
+    pub(crate) corners: [Vec<u32>; 3],
     /// Vertex, from 0, and colour as written, of the vertices that have one.
     pub(crate) colors: Vec<(u32, [f32; 3])>,
     /// The names that `usemtl` gives, in the order of their first use.
@@ -82,7 +81,6 @@ impl PlainObj {
                 "has more vertices than 32 bits count; cut the scan into parts",
             ));
         }
-        plain.vertices = counts[0] as usize;
         Ok(plain)
     }
 
@@ -93,7 +91,8 @@ impl PlainObj {
         let (mut counts, mut furthest) = ([0u64; 3], [0u64; 3]);
         for (number, line) in logical_lines(bytes) {
             let fail = |message: String| Error::line(path, number, format!("{message}: {}", quote(&line)));
-            let keyword = words(&line).next().unwrap_or_default();
+            // A line starts with its keyword.
+            let keyword = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
             let rest = &line[keyword.len()..];
             match keyword {
                 b"v" => {
@@ -102,23 +101,26 @@ impl PlainObj {
                 }
                 b"vt" => {
                     // A texture of one dimension has no second coordinate.
-                    let mut numbers = words(without_comment(rest));
-                    let u =
-                        numbers.next().ok_or_else(|| fail("a texture coordinate without a number".into()))?;
-                    self.add_column(b"vt", &[u, numbers.next().unwrap_or(b"0")]);
+                    let mut rest = rest;
+                    let u = next_word(&mut rest)
+                        .ok_or_else(|| fail("a texture coordinate without a number".into()))?;
+                    let uv = [u, next_word(&mut rest).unwrap_or(b"0")].map(|word| self.number(word));
+                    self.uvs.push(vec2(uv[0], uv[1]));
                     counts[1] += 1;
                 }
                 b"vn" => {
-                    let numbers: Vec<&[u8]> = words(without_comment(rest)).take(3).collect();
-                    if numbers.len() < 3 {
-                        return Err(fail("a normal needs three numbers".into()));
+                    let mut rest = rest;
+                    let mut normal = [0.0; 3];
+                    for value in &mut normal {
+                        let word = next_word(&mut rest)
+                            .ok_or_else(|| fail("a normal needs three numbers".into()))?;
+                        *value = self.number(word);
                     }
-                    self.add_column(b"vn", &numbers);
+                    self.normals.push(Vec3::from_array(normal));
                     counts[2] += 1;
                 }
                 b"f" => {
-                    let beyond =
-                        self.add_face(number, material, counts, without_comment(rest)).map_err(fail)?;
+                    let beyond = self.add_face(number, material, counts, rest).map_err(fail)?;
                     for (column, index) in beyond {
                         if index > furthest[column] {
                             furthest[column] = index;
@@ -149,36 +151,46 @@ impl PlainObj {
         Some(Error::line(path, line, format!("{message}: {}", text.unwrap_or_default())))
     }
 
-    fn add_column(&mut self, keyword: &[u8], numbers: &[&[u8]]) {
-        self.columns.extend_from_slice(keyword);
-        for number in numbers {
-            self.columns.push(b' ');
-            self.columns.extend_from_slice(number);
-        }
-        self.columns.push(b'\n');
+    /// Reads a number of a column.
+    #[inline]
+    fn number(&mut self, word: &[u8]) -> f32 {
+        number(word).unwrap_or_else(|| {
+            self.has_bad_number = true;
+            0.0
+        })
     }
 
-    fn add_vertex(&mut self, vertex: u64, rest: &[u8]) -> std::result::Result<(), String> {
-        let numbers: Vec<&[u8]> = words(without_comment(rest)).take(8).collect();
-        match numbers.len() {
-            // The fourth is a weight, which tobj divides by.
-            3 | 4 => self.add_column(b"v", &numbers),
-            // A seventh is the colour's alpha.
-            6 | 7 => {
-                self.add_column(b"v", &numbers[..3]);
-                let mut color = [0.0; 3];
-                for (value, word) in color.iter_mut().zip(&numbers[3..]) {
-                    *value = parse_f32(word)
-                        .ok_or_else(|| format!("the colour {} is no finite number", quote(word)))?;
-                }
-                // More vertices than u32 counts are refused at the end.
-                self.colors.push((vertex as u32, color));
+    fn add_vertex(&mut self, vertex: u64, mut rest: &[u8]) -> std::result::Result<(), String> {
+        let mut numbers = [&b""[..]; 8];
+        let mut n = 0;
+        while n < 8
+            && let Some(word) = next_word(&mut rest)
+        {
+            numbers[n] = word;
+            n += 1;
+        }
+        if !matches!(n, 3 | 4 | 6 | 7) {
+            return Err(format!(
+                "a vertex has three coordinates, and a colour has three numbers; here are {n}"
+            ));
+        }
+        let mut position =
+            Vec3::from_array([numbers[0], numbers[1], numbers[2]].map(|word| self.number(word)));
+        if n == 4 {
+            let weight = self.number(numbers[3]);
+            self.has_bad_number |= weight == 0.0;
+            position /= weight;
+        }
+        self.positions.push(position);
+        // A seventh is the colour's alpha.
+        if n >= 6 {
+            let mut color = [0.0; 3];
+            for (value, word) in color.iter_mut().zip(&numbers[3..]) {
+                *value = parse_f32(word)
+                    .ok_or_else(|| format!("the colour {} is no finite number", quote(word)))?;
             }
-            n => {
-                return Err(format!(
-                    "a vertex has three coordinates, and a colour has three numbers; here are {n}"
-                ));
-            }
+            // More vertices than u32 counts are refused at the end.
+            self.colors.push((vertex as u32, color));
         }
         Ok(())
     }
@@ -189,27 +201,21 @@ impl PlainObj {
         line: u64,
         material: u32,
         counts: [u64; 3],
-        rest: &[u8],
+        mut rest: &[u8],
     ) -> std::result::Result<Vec<(usize, u64)>, String> {
         let mut beyond = Vec::new();
-        let (start, mut corners) = (self.face_lines.len(), 0);
+        let (start, mut corners) = (self.corners[0].len(), 0);
         let mut has = [true; 3];
-        self.face_lines.push(b'f');
-        for corner in words(rest) {
-            self.face_lines.push(b' ');
+        while let Some(corner) = next_word(&mut rest) {
             let mut parts = corner.split(|&b| b == b'/');
             for column in 0..3 {
                 let part = parts.next().unwrap_or_default();
-                if column > 0 {
-                    self.face_lines.push(b'/');
-                }
                 if part.is_empty() {
                     has[column] = false;
+                    self.corners[column].push(NO_INDEX);
                     continue;
                 }
-                let index: i64 = std::str::from_utf8(part)
-                    .ok()
-                    .and_then(|p| p.parse().ok())
+                let index = whole_number(part)
                     .ok_or_else(|| format!("the index {} is no whole number", quote(part)))?;
                 let count = counts[column];
                 let absolute = if index < 0 { count as i64 + index + 1 } else { index };
@@ -219,11 +225,8 @@ impl PlainObj {
                 if absolute as u64 > count {
                     beyond.push((column, absolute as u64));
                 }
-                if index > 0 {
-                    self.face_lines.extend_from_slice(part);
-                } else {
-                    self.face_lines.extend_from_slice(absolute.to_string().as_bytes());
-                }
+                // What u32 does not hold is beyond every column that is not refused for its length.
+                self.corners[column].push((absolute - 1).min(i64::from(NO_INDEX - 1)) as u32);
             }
             if parts.next().is_some() {
                 return Err(format!("the corner {} has more than three indices", quote(corner)));
@@ -234,26 +237,23 @@ impl PlainObj {
             corners += 1;
         }
         if corners < 3 {
-            self.face_lines.truncate(start);
+            self.corners.iter_mut().for_each(|column| column.truncate(start));
             self.short_faces.push(line);
         } else {
-            self.face_lines.push(b'\n');
             self.faces.push(PlainFace { line, material, corners, has_uv: has[1], has_normal: has[2] });
         }
         Ok(beyond)
     }
+}
 
-    /// The plain file. Its first face has every vertex for a corner, in order: so tobj, which numbers vertices by their
-    /// first use, keeps all of them and the file's numbers.
-    pub(crate) fn reader(&self) -> impl BufRead {
-        let mut all_vertices = vec![b'f'];
-        for vertex in 1..=self.vertices {
-            all_vertices.push(b' ');
-            all_vertices.extend_from_slice(vertex.to_string().as_bytes());
-        }
-        all_vertices.push(b'\n');
-        self.columns.as_slice().chain(std::io::Cursor::new(all_vertices)).chain(self.face_lines.as_slice())
+/// The whole number that a word spells, if 64 bits hold it.
+#[inline]
+fn whole_number(word: &[u8]) -> Option<i64> {
+    // Up to 18 digits cannot overflow.
+    if word.len() <= 18 && word.iter().all(u8::is_ascii_digit) {
+        return Some(word.iter().fold(0, |n, b| n * 10 + i64::from(b - b'0')));
     }
+    std::str::from_utf8(word).ok()?.parse().ok()
 }
 
 fn count_columns(bytes: &[u8]) -> [u64; 3] {
@@ -297,12 +297,6 @@ mod tests {
         PlainObj::parse(Path::new("a.obj"), text.as_bytes())
     }
 
-    fn plain_text(plain: &PlainObj) -> String {
-        let mut text = String::new();
-        plain.reader().read_to_string(&mut text).unwrap();
-        text
-    }
-
     const THREE: &str = "v 0 0 0\nv 1 0 0 # x\nv\t0 1 0\n";
 
     #[test]
@@ -311,10 +305,12 @@ mod tests {
             "{THREE}vt 0.5\nvn 0 0 1 7\nusemtl a b \nf 1/1/1 2/1/1 \\\n 3/1/1 # c\nusemtl c\nf -3//-1 -2//-1 -1//-1\nusemtl a b\nl 1 2 3\np 1\nf 1 2\nf\nf 1/1 2 3"
         ))
         .unwrap();
-        assert_eq!(
-            plain_text(&plain),
-            "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0\nvn 0 0 1\nf 1 2 3\nf 1/1/1 2/1/1 3/1/1\nf 1//1 2//1 3//1\nf 1/1/ 2// 3//\n"
-        );
+        assert_eq!(plain.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
+        assert_eq!((plain.uvs, plain.normals), (vec![vec2(0.5, 0.0)], vec![Vec3::Z]));
+        let none = NO_INDEX;
+        assert_eq!(plain.corners[0], [0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        assert_eq!(plain.corners[1], [0, 0, 0, none, none, none, 0, none, none]);
+        assert_eq!(plain.corners[2], [0, 0, 0, 0, 0, 0, none, none, none]);
         assert_eq!(plain.materials, ["a b", "c"]);
         let face =
             |line, material, has_uv, has_normal| PlainFace { line, material, corners: 3, has_uv, has_normal };
@@ -326,6 +322,17 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_read_or_remembered_as_bad() {
+        let plain = parse("v 1 2 4 2\nv 1 nan 3\nvt -0.25\nvn 0 0 2 x").unwrap();
+        assert_eq!(plain.positions[0], Vec3::new(0.5, 1.0, 2.0));
+        assert!(plain.positions[1].y.is_nan() && !plain.has_bad_number);
+        assert_eq!((plain.uvs[0], plain.normals[0]), (vec2(-0.25, 0.0), Vec3::Z * 2.0));
+        for text in ["v 1 2 x", "v 1 2 3 0", "v 1 2 3 z", "vt 0 x", "vn 0 0 1-"] {
+            assert!(parse(text).unwrap().has_bad_number, "{text}");
+        }
+    }
+
+    #[test]
     fn a_face_may_come_before_its_vertices() {
         assert_eq!(parse(&format!("f 1 2 3\n{THREE}")).unwrap().faces.len(), 1);
     }
@@ -334,7 +341,7 @@ mod tests {
     fn colours_stay_with_their_vertices() {
         let plain = parse("v 0 0 0\nv 1 0 0 0.5 1 0\nv 0 1 0 1 1 1 1\n").unwrap();
         assert_eq!(plain.colors, [(1, [0.5, 1.0, 0.0]), (2, [1.0; 3])]);
-        assert!(plain_text(&plain).starts_with("v 0 0 0\nv 1 0 0\nv 0 1 0\n"));
+        assert_eq!(plain.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
     }
 
     #[test]

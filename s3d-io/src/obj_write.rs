@@ -5,7 +5,7 @@
 //! changes. Numbers are written so that they are read back bit by bit. Source: formats.md, "World and meshes".
 
 use crate::pretty::pretty_color;
-use crate::{Content, Result, create_dir, encode_rgb8, write_bytes, write_whole};
+use crate::{Compression, Content, Result, create_dir, encode_rgb8, write_bytes, write_whole};
 use s3d_geom::glam::{Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, NO_INDEX, TriMesh, Wrap};
 use std::collections::HashSet;
@@ -57,7 +57,7 @@ pub fn write_rgb_obj(dir: &Path, mesh: &TriMesh, textures: &[TextureOut<'_>]) ->
             None => {
                 let name =
                     Path::new(&texture.name).file_stem().map_or("texture".into(), |s| s.to_string_lossy());
-                let png = encode_rgb8(&texture.image, Content::Photo);
+                let png = encode_rgb8(&texture.image, Content::Photo, Compression::default());
                 let file = files.add(&format!("{}.png", clean_file_name(&name)));
                 bytes += write_bytes(&dir.join(TEXTURE_FOLDER).join(&file), &png)?;
                 texture_files.push(file);

@@ -1,7 +1,7 @@
 //! Texture images: PNG and JPEG files to 8-bit colour.
 
 use crate::{Error, Result};
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 use s3d_geom::Raster;
 use std::fs;
@@ -55,12 +55,17 @@ pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTextur
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(pixels * 16 + (64 << 20));
     reader.limits(limits);
-    let rgb = match reader.decode().map_err(undecodable)? {
-        DynamicImage::ImageRgb8(rgb) => rgb,
-        other => other.into_rgb8(),
+    let decoder = reader.into_decoder().map_err(undecodable)?;
+    let rgb = if decoder.color_type() == ColorType::Rgb8 {
+        // Most are: they are decoded to where they stay.
+        let mut rgb = vec![[0; 3]; pixels as usize];
+        decoder.read_image(rgb.as_flattened_mut()).map_err(undecodable)?;
+        rgb
+    } else {
+        let rgb = DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgb8();
+        rgb.into_raw().as_chunks().0.to_vec()
     };
-    let (width, height) = rgb.dimensions();
-    let image = Raster::from_vec(width, height, rgb.into_raw().as_chunks::<3>().0.to_vec());
+    let image = Raster::from_vec(width, height, rgb);
     Ok(LoadedTexture { image, file: TextureFile { extension, bytes } })
 }
 
@@ -72,6 +77,8 @@ fn name_of(format: ImageFormat) -> &'static str {
 pub(crate) fn read_textures(paths: &[PathBuf]) -> Vec<std::result::Result<LoadedTexture, String>> {
     paths
         .par_iter()
+        // One at a time: sizes differ, and a thread that is done takes the next.
+        .with_max_len(1)
         .map(|path| {
             let bytes = read_file(path).map_err(|e| match e {
                 Error::Io { source, .. } => format!("cannot be read: {source}"),

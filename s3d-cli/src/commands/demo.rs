@@ -28,6 +28,7 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         keep_all: false,
         only: Vec::new(),
         smooth_normals: false,
+        compression: o.compression,
     };
     let scan = args.output.join(SCAN);
     if scan.exists() && !is_demo_scan(&scan) {

@@ -3,9 +3,9 @@
 use super::{on_threads, refuse_existing};
 use crate::args::RenderArgs;
 use crate::failure::{Failure, Outcome};
-use crate::pipeline::modality::{Image, Look};
+use crate::pipeline::modality::{Image, Look, Prints};
 use s3d_geom::{Camera, Pose};
-use s3d_io::{Content, create_dir, encode_rgb8, write_bytes, write_json};
+use s3d_io::{Compression, Content, create_dir, encode_rgb8, write_bytes, write_json};
 use s3d_render::{Hits, NO_FACE, Normals, Pyramids, Scene, cast, coverage};
 use serde::Serialize;
 use std::time::Instant;
@@ -76,13 +76,16 @@ fn render(args: &RenderArgs) -> Outcome<()> {
         normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
         label_per_face: &[],
         pretty_per_face: &[],
+        compression: args.compression,
     };
     create_dir(&args.output)?;
-    for (image, name) in images {
-        write_bytes(&args.output.join(name), &look.encode(image, &hits, &camera))?;
-    }
+    let kinds = images.map(|(image, _)| image);
+    look.encode(&kinds, &hits, &camera, &mut Prints::default(), |image, file| {
+        let name = images.iter().find(|(other, _)| *other == image).map_or("image", |(_, name)| name);
+        write_bytes(&args.output.join(name), &file).map(drop)
+    })?;
     if file.mesh.faces().len() < FACES_IN_COLORS {
-        write_bytes(&args.output.join("faces.png"), &face_image(&hits))?;
+        write_bytes(&args.output.join("faces.png"), &face_image(&hits, args.compression))?;
     } else {
         warn!("no faces.png: {} faces are more than 24 bits can tell apart", file.mesh.faces().len());
     }
@@ -108,10 +111,10 @@ fn render(args: &RenderArgs) -> Outcome<()> {
 }
 
 /// Face indices as colours, R·65536 + G·256 + B; (255, 255, 255) where nothing is seen.
-fn face_image(hits: &Hits) -> Vec<u8> {
+fn face_image(hits: &Hits, compression: Compression) -> Vec<u8> {
     let image = hits.face.map(|face| {
         let [_, r, g, b] = if face == NO_FACE { [255; 4] } else { face.to_be_bytes() };
         [r, g, b]
     });
-    encode_rgb8(&image, Content::Labels)
+    encode_rgb8(&image, Content::Labels, compression)
 }

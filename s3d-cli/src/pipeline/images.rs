@@ -1,6 +1,6 @@
 //! The images of an area: each view cast once, every modality from the same hits, each file written whole.
 
-use super::modality::{Image, Look};
+use super::modality::{Image, Look, Prints};
 use super::views::Candidate;
 use super::work::for_each_in_order;
 use crate::console::Progress;
@@ -8,8 +8,7 @@ use crate::failure::Outcome;
 use s3d_geom::Camera;
 use s3d_io::{Domain, Frame, Layout, PoseFile, ScanLocation, create_dir, write_bytes};
 use s3d_label::Room;
-use s3d_render::cast;
-use std::cell::LazyCell;
+use s3d_render::{Caster, Hits};
 
 /// What is rendered, and where it goes.
 pub(crate) struct ImageJob<'a> {
@@ -49,8 +48,10 @@ pub(crate) fn write_images(job: &ImageJob<'_>, candidates: &[Candidate]) -> Outc
         }
     }
     let progress = Progress::new("rendering", "images", shots.len() as u64);
-    for_each_in_order(&shots, |shot| {
-        write_shot(job, shot)?;
+    let memory =
+        || Memory { caster: Caster::new(job.look.scene), hits: Hits::default(), prints: Prints::default() };
+    for_each_in_order(&shots, memory, |memory, shot| {
+        write_shot(job, shot, memory)?;
         progress.add(1);
         Ok(())
     })?;
@@ -76,20 +77,31 @@ fn shots(job: &ImageJob<'_>, candidates: &[Candidate]) -> Vec<Shot> {
     shots
 }
 
-fn write_shot(job: &ImageJob<'_>, shot: &Shot) -> Outcome<()> {
+/// What a thread keeps from image to image.
+struct Memory<'s> {
+    caster: Caster<'s, 's>,
+    hits: Hits,
+    prints: Prints,
+}
+
+fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Outcome<()> {
+    let Memory { caster, hits, prints } = memory;
     let scan = &job.locations[shot.location];
     let room = job.rooms[shot.location].to_string();
+    let write = |domain: Domain, bytes: &[u8]| -> Outcome<()> {
+        let path = job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain);
+        Ok(write_bytes(&path, bytes).map(drop)?)
+    };
+    let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
     // Poses alone need no rays.
-    let hits = LazyCell::new(|| cast(job.look.scene, &shot.camera));
-    for &domain in job.modalities {
-        let bytes = match Image::of(domain) {
-            Some(image) => job.look.encode(image, &hits, &shot.camera),
-            None => {
-                let room = format!("{room}_{}", job.area);
-                PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame).to_json()
-            }
-        };
-        write_bytes(&job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain), &bytes)?;
+    if !images.is_empty() {
+        caster.cast_into(&shot.camera, 1, hits);
+        job.look.encode(&images, hits, &shot.camera, prints, |image, file| write(image.domain(), &file))?;
+    }
+    if job.modalities.contains(&Domain::Pose) {
+        let room = format!("{room}_{}", job.area);
+        let pose = PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame);
+        write(Domain::Pose, &pose.to_json())?;
     }
     Ok(())
 }

@@ -40,6 +40,7 @@ struct Options {
     keep_all: bool,
     only: Vec<String>,
     normals: &'static str,
+    compression: &'static str,
 }
 
 /// What the manifest tells of an area.
@@ -105,6 +106,7 @@ impl Manifest {
                 keep_all: options.keep_all,
                 only: options.only.clone(),
                 normals: if options.smooth_normals { "smooth" } else { "flat" },
+                compression: options.compression.name(),
             },
             area_numbers: areas.to_vec(),
             areas: Vec::new(),

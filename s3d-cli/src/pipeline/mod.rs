@@ -24,7 +24,8 @@ use modality::Look;
 use points::{check_density, write_points};
 use s3d_geom::Density;
 use s3d_io::{
-    Content, InstanceRecord, InstanceWriter, Layout, MeshFile, TextureOut, create_dir, encode_rgb8,
+    Compression, Content, InstanceRecord, InstanceWriter, Layout, MeshFile, TextureOut, create_dir,
+    encode_rgb8,
 };
 use s3d_label::{LabelId, LabelTable, Room};
 use s3d_render::{Normals, Pyramids, Scene};
@@ -170,7 +171,7 @@ fn label_area(
 
     let names = table.names();
     let per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
-    write_colored_mesh(&mesh_dir, &file)?;
+    write_colored_mesh(&mesh_dir, &file, options.compression)?;
     s3d_io::write_semantic_obj(&mesh_dir, mesh, &per_face, &names)?;
     let density = Density::PerM2(options.points_per_m2);
     let started = Instant::now();
@@ -216,7 +217,7 @@ fn label_area(
 }
 
 /// Writes the mesh with its textures: their files as they were found, where they were used as they are.
-fn write_colored_mesh(dir: &Path, file: &MeshFile) -> Outcome<()> {
+fn write_colored_mesh(dir: &Path, file: &MeshFile, compression: Compression) -> Outcome<()> {
     let files: Vec<(String, Cow<'_, [u8]>)> = file
         .mesh
         .textures()
@@ -226,7 +227,10 @@ fn write_colored_mesh(dir: &Path, file: &MeshFile) -> Outcome<()> {
             let stem = Path::new(&texture.name).file_stem().unwrap_or_default().to_string_lossy();
             match found {
                 Some(f) => (format!("{stem}.{}", f.extension), Cow::Borrowed(&f.bytes[..])),
-                None => (format!("{stem}.png"), Cow::Owned(encode_rgb8(&texture.image, Content::Photo))),
+                None => {
+                    let png = encode_rgb8(&texture.image, Content::Photo, compression);
+                    (format!("{stem}.png"), Cow::Owned(png))
+                }
             }
         })
         .collect();
@@ -278,6 +282,7 @@ fn render_area(
             normals: if options.smooth_normals { Normals::Smooth } else { Normals::Flat },
             label_per_face: &label_per_face,
             pretty_per_face: &pretty_per_face,
+            compression: options.compression,
         },
         locations: &area.locations,
         rooms: &labelled.location_rooms,

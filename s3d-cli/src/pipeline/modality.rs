@@ -1,10 +1,11 @@
 //! Hits to the bytes of an image file, one function for every modality.
 
-use s3d_geom::Camera;
-use s3d_io::{Content, Domain, encode_gray16, encode_rgb8, encode_xyz_half};
+use half::f16;
+use s3d_geom::{Camera, Raster};
+use s3d_io::{Compression, Content, Domain, encode_gray16, encode_rgb8, encode_xyz_half};
 use s3d_render::{
-    Hits, Normals, Pyramids, Scene, color_per_face_image, depth_image, index_image, normal_image, rgb_image,
-    xyz_image_half,
+    FaceImages, Hits, Normals, Pyramids, Scene, TextureFilter, color_per_face_image_into, depth_image_into,
+    face_images_into, index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into,
 };
 
 /// What images of a mesh are made from.
@@ -16,6 +17,8 @@ pub(crate) struct Look<'a> {
     pub(crate) label_per_face: &'a [u32],
     /// The colour of each face in pretty images; may be empty likewise.
     pub(crate) pretty_per_face: &'a [[u8; 3]],
+    /// How much time their files may take.
+    pub(crate) compression: Compression,
 }
 
 /// A domain that is an image: all but the pose.
@@ -42,22 +45,112 @@ impl Image {
             Domain::Pose => return None,
         })
     }
+
+    /// The domain that it is.
+    pub(crate) fn domain(self) -> Domain {
+        match self {
+            Self::Rgb => Domain::Rgb,
+            Self::Depth => Domain::Depth,
+            Self::Normal => Domain::Normal,
+            Self::Semantic => Domain::Semantic,
+            Self::SemanticPretty => Domain::SemanticPretty,
+            Self::GlobalXyz => Domain::GlobalXyz,
+        }
+    }
+}
+
+/// Memory of the images of a view, for one view after another.
+pub(crate) struct Prints {
+    rgb: Raster<[u8; 3]>,
+    depth: Raster<u16>,
+    xyz: Raster<[f16; 3]>,
+    faces: FaceImages,
+    /// Whether `faces` holds all of its images of the view at hand.
+    faces_made: bool,
+}
+
+impl Prints {
+    /// A view's memory may stay. A panorama's, eight times as large and rarer, should not.
+    const MOST_PIXELS: usize = 1 << 22;
+}
+
+impl Default for Prints {
+    fn default() -> Self {
+        Self {
+            rgb: Raster::filled(0, 0, [0; 3]),
+            depth: Raster::filled(0, 0, 0),
+            xyz: Raster::filled(0, 0, [f16::ZERO; 3]),
+            faces: FaceImages::default(),
+            faces_made: false,
+        }
+    }
 }
 
 impl Look<'_> {
-    /// The file of one image of a view, from the view's hits.
-    pub(crate) fn encode(&self, image: Image, hits: &Hits, camera: &Camera) -> Vec<u8> {
+    /// The files of some images of a view, from the view's hits, one after another. Nothing but time depends on what
+    /// `prints` were used for before.
+    ///
+    /// # Errors
+    /// That of `each`, which is given every file.
+    pub(crate) fn encode<E>(
+        &self,
+        images: &[Image],
+        hits: &Hits,
+        camera: &Camera,
+        prints: &mut Prints,
+        mut each: impl FnMut(Image, Vec<u8>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let large = hits.face.len() > Prints::MOST_PIXELS;
+        prints.faces_made = false;
+        let together = [Image::Normal, Image::Semantic, Image::SemanticPretty];
+        if !large && self.normals == Normals::Flat && together.iter().all(|image| images.contains(image)) {
+            let (labels, colors) = (self.label_per_face, self.pretty_per_face);
+            face_images_into(self.scene, hits, camera, labels, colors, &mut prints.faces);
+            prints.faces_made = true;
+        }
+        for &image in images {
+            each(image, self.file(image, hits, camera, prints))?;
+            if large {
+                *prints = Prints::default();
+            }
+        }
+        Ok(())
+    }
+
+    fn file(&self, image: Image, hits: &Hits, camera: &Camera, prints: &mut Prints) -> Vec<u8> {
+        let compression = self.compression;
+        let Prints { rgb, depth, xyz, faces, faces_made } = prints;
         match image {
-            Image::Rgb => encode_rgb8(&rgb_image(self.scene, self.textures, hits, camera), Content::Photo),
-            Image::Depth => encode_gray16(&depth_image(hits)),
+            Image::Rgb => {
+                rgb_image_into(self.scene, self.textures, hits, camera, &TextureFilter::default(), rgb);
+                encode_rgb8(rgb, Content::Photo, compression)
+            }
+            Image::Depth => {
+                depth_image_into(hits, depth);
+                encode_gray16(depth, compression)
+            }
             Image::Normal => {
-                encode_rgb8(&normal_image(self.scene, hits, camera, self.normals), Content::Normals)
+                if !*faces_made {
+                    normal_image_into(self.scene, hits, camera, self.normals, &mut faces.normal);
+                }
+                encode_rgb8(&faces.normal, Content::Normals, compression)
             }
-            Image::Semantic => encode_rgb8(&index_image(hits, self.label_per_face), Content::Labels),
+            Image::Semantic => {
+                if !*faces_made {
+                    index_image_into(hits, self.label_per_face, &mut faces.index);
+                }
+                encode_rgb8(&faces.index, Content::Labels, compression)
+            }
             Image::SemanticPretty => {
-                encode_rgb8(&color_per_face_image(hits, self.pretty_per_face), Content::Labels)
+                if !*faces_made {
+                    color_per_face_image_into(hits, self.pretty_per_face, &mut faces.color);
+                }
+                encode_rgb8(&faces.color, Content::Labels, compression)
             }
-            Image::GlobalXyz => encode_xyz_half(&xyz_image_half(hits, camera)),
+            Image::GlobalXyz => {
+                xyz_image_half_into(hits, camera, xyz);
+                encode_xyz_half(xyz, compression)
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::failure::Outcome;
 use s3d_geom::Camera;
 use s3d_io::ScanLocation;
 use s3d_label::{Class, LabelId, LabelTable};
-use s3d_render::{NO_FACE, Scene, cast_strided};
+use s3d_render::{Caster, Hits, NO_FACE, Scene};
 use s3d_sample::{Pool, PoolItem, Selection, View, ViewDistribution, draw_view, entropy, select_pooled};
 use serde::Serialize;
 use std::sync::OnceLock;
@@ -85,10 +85,11 @@ pub(crate) fn score_area(
     let progress = Progress::new("scoring", "views", candidates.len() as u64);
     let scores: Vec<OnceLock<f64>> = candidates.iter().map(|_| OnceLock::new()).collect();
     let items: Vec<usize> = (0..candidates.len()).collect();
-    for_each_in_order(&items, |&i| {
+    let memory = || (Caster::new(scene), Hits::default());
+    for_each_in_order(&items, memory, |(caster, hits), &i| {
         let c = &candidates[i];
         let camera = c.camera(&locations[c.location], scoring.size);
-        let hits = cast_strided(scene, &camera, scoring.stride);
+        caster.cast_into(&camera, scoring.stride, hits);
         let mut histogram = [0u64; 13];
         for &face in hits.face.pixels() {
             if face != NO_FACE

@@ -6,10 +6,12 @@ use std::sync::{Mutex, PoisonError};
 
 /// Does `work` on every item, on every thread of the current pool. Items are handed out one at a time and in order, so
 /// that a slow one delays nobody else; at most one an item a thread is under way. After a failure no further item is
-/// begun, and the failure of the first item (by order) that failed is returned.
-pub(crate) fn for_each_in_order<T: Sync>(
+/// begun, and the failure of the first item (by order) that failed is returned. Each thread works with a state of its
+/// own, which `state` makes: memory to be used again, nothing that a result depends on.
+pub(crate) fn for_each_in_order<T: Sync, S>(
     items: &[T],
-    work: impl Fn(&T) -> Outcome<()> + Sync,
+    state: impl Fn() -> S + Sync,
+    work: impl Fn(&mut S, &T) -> Outcome<()> + Sync,
 ) -> Outcome<()> {
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
@@ -17,10 +19,11 @@ pub(crate) fn for_each_in_order<T: Sync>(
     rayon::scope(|scope| {
         for _ in 0..rayon::current_num_threads().min(items.len()) {
             scope.spawn(|_| {
+                let mut state = state();
                 while !stop.load(Ordering::Relaxed) {
                     let i = next.fetch_add(1, Ordering::Relaxed);
                     let Some(item) = items.get(i) else { break };
-                    if let Err(e) = work(item) {
+                    if let Err(e) = work(&mut state, item) {
                         stop.store(true, Ordering::Relaxed);
                         let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
                         if first.as_ref().is_none_or(|(j, _)| i < *j) {
@@ -46,10 +49,14 @@ mod tests {
     fn every_item_is_done_once() {
         let items: Vec<u64> = (0..1000).collect();
         let sum = AtomicU64::new(0);
-        for_each_in_order(&items, |i| {
-            sum.fetch_add(*i, Ordering::Relaxed);
-            Ok(())
-        })
+        for_each_in_order(
+            &items,
+            || (),
+            |(), i| {
+                sum.fetch_add(*i, Ordering::Relaxed);
+                Ok(())
+            },
+        )
         .unwrap();
         assert_eq!(sum.into_inner(), 499_500);
     }
@@ -57,9 +64,13 @@ mod tests {
     #[test]
     fn the_first_failure_is_told() {
         let items: Vec<u64> = (0..1000).collect();
-        let e = for_each_in_order(&items, |i| {
-            if *i == 7 { Err(Failure::Input(format!("item {i}"))) } else { Ok(()) }
-        });
+        let e = for_each_in_order(
+            &items,
+            || (),
+            |(), i| {
+                if *i == 7 { Err(Failure::Input(format!("item {i}"))) } else { Ok(()) }
+            },
+        );
         assert_eq!(e.unwrap_err().to_string(), "item 7");
     }
 }

@@ -1,0 +1,70 @@
+//! How much time compression may take.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// How much time the compression of images may take. What is read back is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Compression {
+    /// As fast as possible at a reasonable size.
+    Fast,
+    /// About as small as libpng's level 6 and OpenEXR's ZIP, several times faster than they are.
+    #[default]
+    Balanced,
+    /// Smaller than libpng's level 9, and some five times slower than [`Balanced`](Self::Balanced).
+    Small,
+}
+
+impl Compression {
+    /// All of them, the fastest first.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Balanced, Self::Small];
+
+    /// Its name: `fast`, `balanced` or `small`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Balanced => "balanced",
+            Self::Small => "small",
+        }
+    }
+}
+
+impl fmt::Display for Compression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A word that names no compression.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no compression is called {word:?}; there are fast, balanced and small")]
+pub struct UnknownCompression {
+    /// The word.
+    pub word: String,
+}
+
+impl FromStr for Compression {
+    type Err = UnknownCompression;
+
+    fn from_str(word: &str) -> Result<Self, UnknownCompression> {
+        let found = Self::ALL.into_iter().find(|c| c.name() == word);
+        found.ok_or_else(|| UnknownCompression { word: word.to_owned() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back() {
+        for compression in Compression::ALL {
+            assert_eq!(compression.to_string().parse(), Ok(compression));
+        }
+        let error = "best".parse::<Compression>().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "no compression is called \"best\"; there are fast, balanced and small"
+        );
+    }
+}

@@ -1,0 +1,362 @@
+//! Blocks: what was found becomes bits, in whichever of the three forms of RFC 1951 is shortest.
+
+use super::bits::BitWriter;
+use super::huffman::{canonical_codes, code_lengths};
+use std::array::from_fn;
+
+/// The longest repetition.
+pub(super) const LONGEST: usize = 258;
+
+/// Bytes as they are, and then a repetition.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sequence {
+    /// Number of bytes as they are.
+    pub(super) literals: u32,
+    /// Length of the repetition, 3 to 258; 0 if there is none.
+    pub(super) length: u16,
+    /// How far back it is, 1 to 32,768 (as 0 if there is none).
+    pub(super) distance: u16,
+}
+
+const END_OF_BLOCK: usize = 256;
+const LITERALS_AND_LENGTHS: usize = 286;
+const DISTANCES: usize = 30;
+/// The order in which the lengths of the code for code lengths are written.
+const LENGTHS_ORDER: [usize; 19] = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
+/// The longest code of a symbol, in bits.
+const LONGEST_CODE: u8 = 15;
+/// What a symbol that has not occurred is taken to cost, in bits; a distance's symbol costs no more than the second.
+const RARE: u8 = 13;
+const FAR: u8 = 9;
+
+/// The symbol of a length of 3 to 258, counted from 257, and its number of extra bits.
+const fn length_symbol(length: usize) -> (usize, u32) {
+    if length == 258 {
+        return (28, 0);
+    }
+    let l = length - 3;
+    if l < 8 {
+        return (l, 0);
+    }
+    let extra = l.ilog2() - 2;
+    (4 * extra as usize + (l >> extra), extra)
+}
+
+/// The symbol of a distance of 1 to 32,768 and its number of extra bits.
+#[inline(always)]
+const fn distance_symbol(distance: usize) -> (usize, u32) {
+    let d = distance - 1;
+    // The first four have symbols of their own, as if they had a bit more.
+    let extra = (d | 2).ilog2() - 1;
+    (2 * extra as usize + (d >> extra), extra)
+}
+
+/// Symbol and number of extra bits by length − 3.
+const LENGTH_SYMBOLS: [(u8, u8); 256] = {
+    let mut table = [(0, 0); 256];
+    let mut i = 0;
+    while i < 256 {
+        let (symbol, extra) = length_symbol(i + 3);
+        table[i] = (symbol as u8, extra as u8);
+        i += 1;
+    }
+    table
+};
+
+/// What things cost in bits, as far as is known when they are chosen: by the code of the block before.
+pub(super) struct Prices {
+    literals: [u8; 256],
+    /// By length − 3, with its extra bits.
+    lengths: [u8; 256],
+    /// By the distance's logarithm, rounded down, with its extra bits.
+    distances: [u8; 16],
+}
+
+impl Prices {
+    /// Before there was a block: literals as they are distributed in `data`.
+    pub(super) fn guess(data: &[u8]) -> Self {
+        let mut codes = Codes { litlen: [0; 288], distance: [5; 32] };
+        let mut counts = [0; 256];
+        count_bytes(data, &mut counts);
+        code_lengths(&counts, LONGEST_CODE, &mut codes.litlen[..256]);
+        codes.litlen[257..].fill(7);
+        Self::of(&codes)
+    }
+
+    fn of(codes: &Codes) -> Self {
+        let price = |length: u8| if length == 0 { RARE } else { length };
+        Self {
+            literals: from_fn(|byte| price(codes.litlen[byte])),
+            lengths: LENGTH_SYMBOLS
+                .map(|(symbol, extra)| price(codes.litlen[257 + usize::from(symbol)]) + extra),
+            distances: from_fn(|log| {
+                // Two symbols have that logarithm, nearly.
+                let shorter = codes.distance[2 * log].min(codes.distance[(2 * log + 1).min(DISTANCES - 1)]);
+                price(shorter).min(FAR) + (log as u8).saturating_sub(1)
+            }),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn literal(&self, byte: u8) -> u32 {
+        self.literals[usize::from(byte)].into()
+    }
+
+    #[inline(always)]
+    pub(super) fn repetition(&self, length: usize, distance: usize) -> u32 {
+        u32::from(self.lengths[length - 3]) + u32::from(self.distances[distance.ilog2() as usize & 15])
+    }
+}
+
+/// Adds how often each byte occurs.
+fn count_bytes(data: &[u8], counts: &mut [u32]) {
+    // Four tables: equal bytes in a row would wait for each other.
+    let mut tables = [[0u32; 256]; 4];
+    let (fours, rest) = data.as_chunks::<4>();
+    for four in fours {
+        for (table, &byte) in tables.iter_mut().zip(four) {
+            table[usize::from(byte)] += 1;
+        }
+    }
+    rest.iter().for_each(|&byte| tables[0][usize::from(byte)] += 1);
+    for (i, count) in counts[..256].iter_mut().enumerate() {
+        *count += tables.iter().map(|t| t[i]).sum::<u32>();
+    }
+}
+
+struct Codes {
+    litlen: [u8; 288],
+    distance: [u8; 32],
+}
+
+impl Codes {
+    /// The codes of fixed blocks.
+    const FIXED: Self = {
+        let mut litlen = [8; 288];
+        let mut i = 144;
+        while i < 280 {
+            litlen[i] = if i < 256 { 9 } else { 7 };
+            i += 1;
+        }
+        Self { litlen, distance: [5; 32] }
+    };
+
+    fn cost(&self, counts: &Counts) -> u64 {
+        let sum = |counts: &[u32], lengths: &[u8]| -> u64 {
+            counts.iter().zip(lengths).map(|(&n, &l)| u64::from(n) * u64::from(l)).sum()
+        };
+        sum(&counts.litlen, &self.litlen) + sum(&counts.distance, &self.distance)
+    }
+}
+
+struct Counts {
+    litlen: [u32; 288],
+    distance: [u32; 32],
+    /// Extra bits of lengths and distances.
+    extra: u64,
+}
+
+/// The lengths of both codes, themselves coded.
+struct Description {
+    /// Symbol and value of its extra bits.
+    items: Vec<(u8, u8)>,
+    lengths: [u8; 19],
+    codes: [u16; 19],
+    /// Number of lengths of literals and lengths, of distances, and of those in `lengths`, in the order of the format.
+    counts: [usize; 3],
+    bits: u64,
+}
+
+const DESCRIPTION_EXTRA: [u32; 19] = {
+    let mut extra = [0; 19];
+    (extra[16], extra[17], extra[18]) = (2, 3, 7);
+    extra
+};
+
+impl Description {
+    fn new(codes: &Codes) -> Self {
+        let used = |lengths: &[u8], least: usize| {
+            lengths.iter().rposition(|&l| l > 0).map_or(least, |i| least.max(i + 1))
+        };
+        let (litlens, distances) = (used(&codes.litlen, 257), used(&codes.distance, 1));
+        let mut all = [0; LITERALS_AND_LENGTHS + DISTANCES];
+        all[..litlens].copy_from_slice(&codes.litlen[..litlens]);
+        all[litlens..][..distances].copy_from_slice(&codes.distance[..distances]);
+
+        let mut items = Vec::with_capacity(litlens + distances);
+        for same in all[..litlens + distances].chunk_by(|a, b| a == b) {
+            let (length, mut n) = (same[0], same.len());
+            if length > 0 {
+                items.push((length, 0));
+                n -= 1;
+            }
+            while n >= 3 {
+                let (symbol, least, most) = match (length, n) {
+                    (0, 11..) => (18, 11, 138),
+                    (0, _) => (17, 3, 10),
+                    _ => (16, 3, 6),
+                };
+                let take = n.min(most);
+                items.push((symbol, (take - least) as u8));
+                n -= take;
+            }
+            items.extend((0..n).map(|_| (length, 0)));
+        }
+        let mut counts = [0; 19];
+        items.iter().for_each(|&(symbol, _)| counts[usize::from(symbol)] += 1);
+        let (mut lengths, mut code_values) = ([0; 19], [0; 19]);
+        code_lengths(&counts, 7, &mut lengths);
+        canonical_codes(&lengths, &mut code_values);
+        let written = LENGTHS_ORDER.iter().rposition(|&i| lengths[i] > 0).map_or(4, |i| 4.max(i + 1));
+        let bits =
+            (0..19).map(|i| u64::from(counts[i]) * (u64::from(lengths[i]) + u64::from(DESCRIPTION_EXTRA[i])));
+        let bits = 14 + 3 * written as u64 + bits.sum::<u64>();
+        Self { items, lengths, codes: code_values, counts: [litlens, distances, written], bits }
+    }
+
+    fn write(&self, out: &mut BitWriter<'_>) {
+        let [litlens, distances, written] = self.counts;
+        out.add(litlens as u64 - 257, 5);
+        out.add(distances as u64 - 1, 5);
+        out.add(written as u64 - 4, 4);
+        for i in &LENGTHS_ORDER[..written] {
+            out.flush();
+            out.add(u64::from(self.lengths[*i]), 3);
+        }
+        for &(symbol, value) in &self.items {
+            let s = usize::from(symbol);
+            out.flush();
+            out.add(u64::from(self.codes[s]), self.lengths[s].into());
+            out.add(value.into(), DESCRIPTION_EXTRA[s]);
+        }
+        out.flush();
+    }
+}
+
+/// Bytes that are done without asking how many literals there are: mostly there are few.
+const FEW: usize = 3;
+/// Bytes from which on it pays to count in several tables.
+const MANY: usize = 1000;
+
+/// Writes `data` as one block, as `sequences` take it apart, and learns what things cost.
+#[inline(always)]
+pub(super) fn write_block(
+    data: &[u8],
+    sequences: &[Sequence],
+    last: bool,
+    prices: &mut Prices,
+    out: &mut BitWriter<'_>,
+) {
+    let mut counts = Counts { litlen: [0; 288], distance: [0; 32], extra: 0 };
+    let mut at = 0;
+    for s in sequences {
+        let literals = s.literals as usize;
+        let rest = match data[at..].first_chunk::<FEW>() {
+            Some(few) => {
+                for (i, &byte) in few.iter().enumerate() {
+                    counts.litlen[usize::from(byte)] += u32::from(i < literals);
+                }
+                FEW.min(literals)
+            }
+            None => 0,
+        };
+        let rest = &data[at + rest..at + literals];
+        if rest.len() < MANY {
+            rest.iter().for_each(|&byte| counts.litlen[usize::from(byte)] += 1);
+        } else {
+            count_bytes(rest, &mut counts.litlen);
+        }
+        at += literals + usize::from(s.length);
+        if s.length > 0 {
+            let (symbol, extra) = LENGTH_SYMBOLS[usize::from(s.length) - 3];
+            let (d, distance_extra) = distance_symbol(usize::from(s.distance));
+            counts.litlen[257 + usize::from(symbol)] += 1;
+            counts.distance[d] += 1;
+            counts.extra += u64::from(extra) + u64::from(distance_extra);
+        }
+    }
+    counts.litlen[END_OF_BLOCK] = 1;
+
+    let mut codes = Codes { litlen: [0; 288], distance: [0; 32] };
+    code_lengths(&counts.litlen, LONGEST_CODE, &mut codes.litlen);
+    code_lengths(&counts.distance, LONGEST_CODE, &mut codes.distance);
+    *prices = Prices::of(&codes);
+    let description = Description::new(&codes);
+    let dynamic = description.bits + codes.cost(&counts) + counts.extra;
+    let fixed = Codes::FIXED.cost(&counts) + counts.extra;
+    let stored = 8 * data.len() as u64 + 40 * data.len().div_ceil(0xffff).max(1) as u64;
+    let first = u64::from(last);
+    if stored < dynamic.min(fixed) {
+        write_stored(data, last, out);
+    } else if fixed <= dynamic {
+        out.reserve(fixed + 3);
+        out.add(first | 1 << 1, 3);
+        write_sequences(data, sequences, &Codes::FIXED, out);
+    } else {
+        out.reserve(dynamic + 3);
+        out.add(first | 2 << 1, 3);
+        description.write(out);
+        write_sequences(data, sequences, &codes, out);
+    }
+}
+
+fn write_stored(data: &[u8], last: bool, out: &mut BitWriter<'_>) {
+    let mut pieces = data.chunks(0xffff).peekable();
+    while let Some(piece) = pieces.next() {
+        out.reserve(8 * piece.len() as u64 + 64);
+        out.add(u64::from(last && pieces.peek().is_none()), 3);
+        out.align();
+        out.add(piece.len() as u64 | (piece.len() as u64 ^ 0xffff) << 16, 32);
+        out.flush();
+        out.bytes(piece);
+    }
+}
+
+#[inline(always)]
+fn write_sequences(data: &[u8], sequences: &[Sequence], codes: &Codes, out: &mut BitWriter<'_>) {
+    let (mut litlens, mut distances) = ([0; 288], [0; 32]);
+    canonical_codes(&codes.litlen, &mut litlens);
+    canonical_codes(&codes.distance, &mut distances);
+    // Bits and their number, in one word.
+    let literals: [u32; 256] = from_fn(|i| u32::from(litlens[i]) | u32::from(codes.litlen[i]) << 16);
+    let lengths: [u32; 256] = from_fn(|i| {
+        let (symbol, extra) = LENGTH_SYMBOLS[i];
+        let s = 257 + usize::from(symbol);
+        let value = if extra == 0 { 0 } else { i as u32 & ((1 << extra) - 1) };
+        let n = u32::from(codes.litlen[s]);
+        u32::from(litlens[s]) | value << n | (n + u32::from(extra)) << 24
+    });
+    let mut at = 0;
+    for s in sequences {
+        let n = s.literals as usize;
+        let mut done = 0;
+        if let Some(few) = data[at..].first_chunk::<FEW>() {
+            for (i, &byte) in few.iter().enumerate() {
+                let entry = if i < n { literals[usize::from(byte)] } else { 0 };
+                out.add(u64::from(entry & 0xffff), entry >> 16);
+            }
+            done = FEW.min(n);
+            out.flush();
+        }
+        for bytes in data[at + done..at + n].chunks(FEW) {
+            for &byte in bytes {
+                let entry = literals[usize::from(byte)];
+                out.add(u64::from(entry & 0xffff), entry >> 16);
+            }
+            out.flush();
+        }
+        at += s.literals as usize + usize::from(s.length);
+        if s.length > 0 {
+            let entry = lengths[usize::from(s.length) - 3];
+            out.add(u64::from(entry & 0xff_ffff), entry >> 24);
+            let d = usize::from(s.distance);
+            let (symbol, extra) = distance_symbol(d);
+            let n = u32::from(codes.distance[symbol]);
+            let value = (d as u64 - 1) & ((1 << extra) - 1);
+            out.add(u64::from(distances[symbol]) | value << n, n + extra);
+            out.flush();
+        }
+    }
+    out.add(litlens[END_OF_BLOCK].into(), codes.litlen[END_OF_BLOCK].into());
+    out.flush();
+}

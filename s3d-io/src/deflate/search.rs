@@ -1,0 +1,192 @@
+//! Data to sequences: which bytes are written as they are, and which as repetitions.
+
+use super::bits::BitWriter;
+use super::block::{LONGEST, Prices, Sequence, write_block};
+use super::finder::{Finder, WINDOW};
+
+/// How hard and where repetitions are looked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Search {
+    pub(crate) candidates: Candidates,
+    /// Bytes from one line to the next.
+    pub(crate) line: usize,
+    /// Bytes from one sample of a line to the next.
+    pub(crate) sample: usize,
+    /// Bytes, 4 to 8, of which a repetition consists at least, but those a line back.
+    pub(crate) hash_bytes: u32,
+    /// A repetition shorter than this is dropped if the next place has a better one.
+    pub(crate) lazy: usize,
+    /// A repetition as long as this is taken at once.
+    pub(crate) nice: usize,
+    /// Every place in a repetition as long as this is remembered; of longer ones, and of runs, a few at the end.
+    pub(crate) remember: usize,
+    /// After 2ⁿ bytes without a repetition, places are passed over, more and more.
+    pub(crate) patience: u32,
+}
+
+/// Which earlier places a place is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Candidates {
+    /// The last of its hash, at every third byte: for noisy pixels of three bytes.
+    Noise,
+    /// The two last of its hash and that a line back, at every third byte: for pixels of three bytes in patches.
+    Patches,
+    /// The last of its hash and that a line back, at every second byte.
+    Quick,
+    /// The four last of its hash and those around a line back, at every second byte: for steps along lines.
+    Steps,
+    /// The sixteen last of its hash and those around a line back.
+    Many,
+}
+
+/// Symbols in a block.
+const BLOCK: usize = 16_000;
+/// Places passed over at most.
+const LONGEST_STEP: usize = 32;
+/// Bytes at the end in which nothing is looked for.
+const TAIL: usize = LONGEST + 8;
+
+/// One pass over data.
+pub(super) struct Parser<'a> {
+    pub(super) finder: &'a mut Finder,
+    pub(super) sequences: &'a mut Vec<Sequence>,
+    pub(super) prices: &'a mut Prices,
+    pub(super) search: Search,
+    /// A place where a block ends, as the data is of another kind after it.
+    pub(super) boundary: usize,
+}
+
+impl Parser<'_> {
+    /// Writes `data` as blocks.
+    pub(super) fn run(self, data: &[u8], out: &mut BitWriter<'_>) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2")
+            && std::arch::is_x86_feature_detected!("bmi1")
+            && std::arch::is_x86_feature_detected!("bmi2")
+            && std::arch::is_x86_feature_detected!("lzcnt")
+        {
+            // SAFETY: the processor has what was just asked for.
+            #[allow(unsafe_code)]
+            return unsafe { self.run_x86_64_v3(data, out) };
+        }
+        self.run_anywhere(data, out);
+    }
+
+    /// The same, compiled for counting zeros and for shifts in one instruction; integers give the same bits anywhere.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+    fn run_x86_64_v3(self, data: &[u8], out: &mut BitWriter<'_>) {
+        self.run_anywhere(data, out);
+    }
+
+    /// The same, compiled for any processor of the kind.
+    #[inline(always)]
+    pub(super) fn run_anywhere(self, data: &[u8], out: &mut BitWriter<'_>) {
+        let line = self.search.line;
+        // Lines seen at an angle are shifted against each other by a sample or two.
+        let s = self.search.sample;
+        let around = [line, line.saturating_sub(s), line + s, line.saturating_sub(2 * s), line + 2 * s];
+        // Very short and very long lines: any other distance will do.
+        let around = around.map(|distance| distance.clamp(1, WINDOW));
+        let above = [around[0]];
+        match self.search.candidates {
+            Candidates::Noise => self.parse::<1, 1, 0, 3, 3>(data, [], out),
+            Candidates::Patches => self.parse::<1, 2, 1, 3, 3>(data, above, out),
+            Candidates::Quick => self.parse::<1, 1, 1, 1, 2>(data, above, out),
+            Candidates::Steps => self.parse::<1, 4, 5, 1, 2>(data, around, out),
+            Candidates::Many => self.parse::<4, 16, 5, 1, 1>(data, around, out),
+        }
+    }
+
+    /// `PIXEL` bytes belong together, after one byte at the start of each line if there is more than one. Every
+    /// `STEP` bytes a repetition is looked for.
+    #[inline(always)]
+    fn parse<
+        const WORDS: usize,
+        const WAYS: usize,
+        const ROWS: usize,
+        const PIXEL: usize,
+        const STEP: usize,
+    >(
+        self,
+        data: &[u8],
+        rows: [usize; ROWS],
+        out: &mut BitWriter<'_>,
+    ) {
+        let Self { finder, sequences, prices, search, boundary } = self;
+        finder.begin::<WORDS>();
+        sequences.clear();
+        let end = data.len().saturating_sub(TAIL);
+        let mut at = 1;
+        // The block's first byte, its symbols so far, and the first byte that is in no sequence.
+        let (mut block, mut symbols, mut pending) = (0, 0, 0);
+        let mut line_end = search.line;
+        while at < end {
+            if PIXEL > 1 {
+                while at >= line_end {
+                    line_end += search.line;
+                }
+                let phase = (line_end - at) % PIXEL;
+                if phase != 0 || line_end - at == search.line {
+                    at += phase.max(1);
+                    continue;
+                }
+            }
+            let places = finder.insert::<WORDS>(data, at);
+            let mut found = finder.best::<WORDS, WAYS, ROWS>(data, at, places, rows, prices);
+            if found.gain <= 0 {
+                if STEP > PIXEL {
+                    finder.insert::<WORDS>(data, at + PIXEL);
+                }
+                at += STEP + PIXEL * ((at - pending) >> search.patience).min(LONGEST_STEP);
+            } else {
+                let mut known = at + PIXEL;
+                while found.length < search.lazy && at + PIXEL < end {
+                    let places = finder.insert::<WORDS>(data, at + PIXEL);
+                    let next = finder.best::<WORDS, WAYS, ROWS>(data, at + PIXEL, places, rows, prices);
+                    known = at + 2 * PIXEL;
+                    if next.gain <= found.gain {
+                        break;
+                    }
+                    at += PIXEL;
+                    found = next;
+                }
+                // It may have begun before, at a place passed over.
+                while at > pending.max(found.distance)
+                    && found.length < LONGEST
+                    && data[at - 1] == data[at - 1 - found.distance]
+                {
+                    at -= 1;
+                    found.length += 1;
+                }
+                sequences.push(Sequence {
+                    literals: (at - pending) as u32,
+                    length: found.length as u16,
+                    distance: found.distance as u16,
+                });
+                symbols += at - pending + 1;
+                at += found.length;
+                pending = at;
+                let until = at.min(end);
+                // The places in a run are all alike.
+                let run = found.distance <= 8 && found.distance < found.length;
+                if run || found.length > search.remember {
+                    known += (until.saturating_sub(known) / PIXEL).saturating_sub(4) * PIXEL;
+                }
+                while known < until {
+                    finder.insert::<WORDS>(data, known);
+                    known += PIXEL;
+                }
+            }
+            let full = symbols + (at - pending) >= BLOCK || block < boundary && at >= boundary;
+            if full && at < end {
+                sequences.push(Sequence { literals: (at - pending) as u32, length: 0, distance: 0 });
+                write_block(&data[block..at], sequences, false, prices, out);
+                sequences.clear();
+                (block, symbols, pending) = (at, 0, at);
+            }
+        }
+        sequences.push(Sequence { literals: (data.len() - pending) as u32, length: 0, distance: 0 });
+        write_block(&data[block..], sequences, true, prices, out);
+    }
+}
