@@ -31,8 +31,8 @@ pub struct Caster<'s, 'm> {
 /// The most pixels of a window that is cast at once: what a second-level cache and some of the third hold.
 const WINDOW: usize = 1 << 17;
 
-/// The most columns of a window: their numbers fit into 16 bits.
-const MOST_COLUMNS: usize = 1 << 14;
+/// The most columns of a window, and rows: their numbers fit into 16 bits.
+const MOST_SIDE: usize = 1 << 14;
 
 impl<'s, 'm> Caster<'s, 'm> {
     /// A caster for a scene.
@@ -85,12 +85,12 @@ impl<'s, 'm> Caster<'s, 'm> {
         }
         // A panorama is cast in sectors: what is opposite to a sector's middle is far from it.
         let most_columns = match camera.projection {
-            Projection::Perspective { .. } => columns.min(MOST_COLUMNS),
-            Projection::Equirectangular => columns.div_ceil(4).min(MOST_COLUMNS),
+            Projection::Perspective { .. } => columns.min(MOST_SIDE),
+            Projection::Equirectangular => columns.div_ceil(4).min(MOST_SIDE),
         };
         // As many windows as it takes, of one height but for the last.
         let windows = (rows * most_columns).div_ceil(WINDOW);
-        let most_rows = rows.div_ceil(windows);
+        let most_rows = rows.div_ceil(windows).min(MOST_SIDE);
         for row in (0..rows).step_by(most_rows) {
             for column in (0..columns).step_by(most_columns) {
                 let (width, height) = (most_columns.min(columns - column), most_rows.min(rows - row));

@@ -216,3 +216,24 @@ fn memory_that_was_used_changes_nothing() {
     caster.cast_into(&cameras[0], 999, &mut hits);
     assert!(hits.face.is_empty());
 }
+
+#[test]
+fn an_image_may_be_as_thin_as_it_likes() {
+    // Two rows of faces, the nearer around row 65,535 of 70,000 and the farther below it, in groups of their own.
+    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    for (y, top, bottom) in [(0.1, -3.0, -3.1), (0.2, -6.4, -6.8)] {
+        for k in -50i32..50 {
+            let (x, first) = (k as f32 * 0.01, positions.len() as u32);
+            positions.extend([vec3(x - 0.02, y, top), vec3(x + 0.02, y, top), vec3(x, y, bottom)]);
+            faces.push([first, first + 1, first + 2]);
+        }
+    }
+    let mesh = TriMesh::from_faces(positions, faces).unwrap();
+    let thin = Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 1e-3, 1, 70_000);
+    assert_eq!(check(&mesh, &thin, 1), Ok(()));
+    assert!(
+        Caster::new(&Scene::new(&mesh)).cast(&thin).face.pixels()[67_100..68_900].iter().all(|&f| f >= 100)
+    );
+    let wide = Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 2.0, 70_000, 1);
+    assert_eq!(check(&scan_like(2000, 5), &wide, 1), Ok(()));
+}
