@@ -1,0 +1,39 @@
+"""Fixtures of the tests that hold `s3d` against other people's readers and writers.
+
+S3D_BIN names the binary; without it `cargo build` makes one. Run all of them with
+
+    python3 -m venv target/python && target/python/bin/pip install -r s3d-cli/tests/python/requirements.txt
+    target/python/bin/pytest s3d-cli/tests/python
+"""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture(scope="session")
+def s3d():
+    """Runs the binary: `s3d("info", path)` gives its CompletedProcess and fails the test unless it ends with `code`."""
+    binary = os.environ.get("S3D_BIN")
+    if binary is None:
+        subprocess.run(["cargo", "build", "-q", "-p", "s3d-cli"], cwd=ROOT, check=True)
+        binary = ROOT / "target" / "debug" / "s3d"
+
+    def run(*arguments, code=0):
+        done = subprocess.run([str(binary), *map(str, arguments)], capture_output=True, text=True)
+        assert done.returncode == code, f"{arguments}: exit {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def demo(s3d, tmp_path_factory):
+    """The built-in scene, exported small: the data set's folder. Its own input files are in `scan`. Only to be read."""
+    out = tmp_path_factory.mktemp("demo") / "dataset"
+    s3d("demo", "-o", out, "--views", "6", "--size", "96", "--pano-width", "256", "--points-per-m2", "400")
+    return out
