@@ -1,18 +1,29 @@
 """Fixtures of the tests that hold `s3d` against other people's readers and writers.
 
-S3D_BIN names the binary; without it `cargo build` makes one. Run all of them with
-
-    python3 -m venv target/python && target/python/bin/pip install -r s3d-cli/tests/python/requirements.txt
-    target/python/bin/pytest s3d-cli/tests/python
+S3D_BIN names the binary; without it `cargo build` makes one. `s3d-cli/tests/python/run` installs what the tests need in
+target/python and runs them all; its arguments go to pytest.
 """
 
+import importlib
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
+
+# Packages that need libraries of the system fail to load with an OSError where these are missing, which
+# pytest.importorskip does not take for a missing package.
+for name in ["open3d", "pye57"]:
+    try:
+        importlib.import_module(name)
+    except OSError as e:
+        print(f"{name} cannot be loaded: {e}", file=sys.stderr)
+        sys.modules[name] = None
+    except ImportError:
+        pass
 
 
 @pytest.fixture(scope="session")
