@@ -63,6 +63,12 @@ impl Pose {
         (libm::atan2(-turn.x_axis.z, turn.x_axis.x), libm::atan2(-turn.z_axis.y, turn.y_axis.y))
     }
 
+    /// The level camera (+Z up) at the same place with the same heading ([`Pose::azimuth_rad`]).
+    #[must_use]
+    pub fn leveled(&self) -> Self {
+        Self::level(self.location, self.azimuth_rad() - FRAC_PI_2)
+    }
+
     /// The direction of the image's right, in the world; a unit vector.
     pub fn right(&self) -> DVec3 {
         self.world_from_camera.x_axis
@@ -162,6 +168,19 @@ mod tests {
         assert!(apply(p.location).abs_diff_eq(DVec3::ZERO, 1e-12));
         assert!(apply(p.location + 2.0 * p.forward()).abs_diff_eq(dvec3(0.0, 0.0, 2.0), 1e-12));
         assert!(apply(p.location + p.up()).abs_diff_eq(dvec3(0.0, -1.0, 0.0), 1e-12));
+    }
+
+    #[test]
+    fn leveling_keeps_place_and_heading() {
+        let tilted = Pose::from_scanner(dvec3(1.0, 2.0, 3.0), DQuat::from_rotation_z(2.1)).turned(0.0, 0.6);
+        let rolled = Pose { world_from_camera: tilted.world_from_camera * DMat3::from_rotation_z(0.4), ..tilted };
+        for pose in [tilted, rolled] {
+            let level = pose.leveled();
+            assert!(level.up().abs_diff_eq(DVec3::Z, 1e-12));
+            assert!((level.azimuth_rad() - pose.azimuth_rad()).abs() < 1e-12);
+            assert_eq!(level.location, pose.location);
+        }
+        assert!(close(tilted.leveled().world_from_camera, Pose::level(DVec3::ZERO, 2.1).world_from_camera));
     }
 
     #[test]

@@ -4,6 +4,8 @@
 //! the [`entropy`] of the counts is its score; and [`select_pooled`] keeps the better ones of a [`Pool`]. [`folds`]
 //! splits areas for cross-validation. This crate sees numbers only: it knows no renderer and no labels.
 //!
+//! Where there are no scan locations, [`poisson_disk`] spreads some.
+//!
 //! Everything random follows from one seed and from the name of what it is drawn for, never from threads or order.
 //!
 //! ```
@@ -27,6 +29,7 @@
 
 mod entropy;
 mod fold;
+mod poisson_disk;
 mod pool;
 mod select;
 mod stream;
@@ -34,6 +37,7 @@ mod view;
 
 pub use entropy::entropy;
 pub use fold::{Fold, folds};
+pub use poisson_disk::poisson_disk;
 pub use pool::{Pool, PoolItem, UnknownPool, select_pooled};
 pub use select::{Selection, SelectionError, select};
 pub use view::{CANDIDATES_PER_LOCATION, DistributionError, View, ViewDistribution, draw_view};

@@ -1,0 +1,100 @@
+//! Poisson-disk patterns: points that keep their distance, and leave no place for another.
+
+use crate::stream::stream;
+use rand::Rng;
+use std::collections::HashMap;
+
+/// Chooses among `points` (metres) some of which no two are nearer than `distance_m`, so that every other point is nearer
+/// than that to a chosen one. Returns their indices, in the order in which they were chosen.
+///
+/// The points are offered in a random order that `seed` and `name` decide alone. Dense points give the pattern of dart
+/// throwing (Cook 1986) on what they cover. Takes time and memory in proportion to their number.
+///
+/// # Panics
+/// If `distance_m` is not above 0, or a point is not finite.
+///
+/// ```
+/// let line: Vec<[f64; 3]> = (0..100).map(|i| [0.1 * f64::from(i), 0.0, 0.0]).collect();
+/// let chosen = s3d_sample::poisson_disk(&line, 2.0, 7, "line");
+/// assert!((3..=5).contains(&chosen.len()));
+/// ```
+pub fn poisson_disk(points: &[[f64; 3]], distance_m: f64, seed: u64, name: &str) -> Vec<usize> {
+    assert!(distance_m > 0.0, "a distance of {distance_m} m");
+    assert!(points.iter().flatten().all(|c| c.is_finite()), "a point that is not finite");
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    let mut rng = stream(*b"disk", seed, name, 0);
+    // Fisher and Yates, from the end; the bias of the remainder is 2⁻³² at most.
+    for last in (1..order.len()).rev() {
+        order.swap(last, (rng.next_u64() % (last as u64 + 1)) as usize);
+    }
+    // A cell is as wide as the distance, so that whoever is too near is in one of 27 cells.
+    let cell = |p: &[f64; 3]| p.map(|c| (c / distance_m).floor() as i64);
+    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    let mut chosen = Vec::new();
+    for index in order {
+        let point = &points[index];
+        let at = cell(point);
+        let is_near = |other: &usize| {
+            let d2: f64 = (0..3).map(|k| (points[*other][k] - point[k]).powi(2)).sum();
+            d2 < distance_m * distance_m
+        };
+        let near = (-1..=1).any(|x| {
+            (-1..=1).any(|y| {
+                (-1..=1).any(|z| {
+                    let neighbour =
+                        [at[0].saturating_add(x), at[1].saturating_add(y), at[2].saturating_add(z)];
+                    cells.get(&neighbour).is_some_and(|c| c.iter().any(is_near))
+                })
+            })
+        });
+        if !near {
+            cells.entry(at).or_default().push(index);
+            chosen.push(index);
+        }
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+        (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+    }
+
+    proptest! {
+        #[test]
+        fn chosen_points_keep_apart_and_leave_no_place(
+            points in prop::collection::vec(prop::array::uniform3(-5.0..5.0f64), 0..200),
+            distance_m in 0.05..4.0f64,
+            seed in 0u64..5,
+        ) {
+            let chosen = poisson_disk(&points, distance_m, seed, "room");
+            for (i, a) in chosen.iter().enumerate() {
+                for b in &chosen[..i] {
+                    prop_assert!(distance(&points[*a], &points[*b]) >= distance_m);
+                }
+            }
+            for p in &points {
+                prop_assert!(chosen.iter().any(|c| distance(&points[*c], p) < distance_m));
+            }
+            prop_assert_eq!(&chosen, &poisson_disk(&points, distance_m, seed, "room"));
+        }
+    }
+
+    #[test]
+    fn seed_and_name_decide() {
+        let points: Vec<[f64; 3]> = (0..400).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
+        let a = poisson_disk(&points, 3.0, 1, "a");
+        assert_ne!(a, poisson_disk(&points, 3.0, 2, "a"));
+        assert_ne!(a, poisson_disk(&points, 3.0, 1, "b"));
+    }
+
+    #[test]
+    fn equal_points_are_chosen_once_and_far_ones_do_not_overflow() {
+        assert_eq!(poisson_disk(&[[1.0; 3]; 9], 0.1, 0, "").len(), 1);
+        assert_eq!(poisson_disk(&[[1e300; 3], [-1e300; 3]], 1.0, 0, "").len(), 2);
+    }
+}
