@@ -50,8 +50,8 @@ fn pose(rows: &[Vec<f64>]) -> std::result::Result<Pose, String> {
     let length = x.length();
     let skew =
         [y.length() - length, z.length() - length, x.dot(y) / length, y.dot(z) / length, z.dot(x) / length];
-    let is_skew = skew.iter().any(|s| !(s.abs() <= MOST_SKEW * length));
-    if is_skew || x.cross(y).dot(z) <= 0.0 {
+    let is_straight = length > 0.0 && skew.iter().all(|s| s.abs() <= MOST_SKEW * length);
+    if !is_straight || x.cross(y).dot(z) <= 0.0 {
         return Err("is no rotation with a translation".into());
     }
     // Perpendicular to the last digit, keeping the viewing direction.

@@ -7,6 +7,7 @@ pub(crate) mod location;
 pub(crate) mod manifest;
 pub(crate) mod modality;
 pub(crate) mod output;
+pub(crate) mod place;
 pub(crate) mod points;
 pub(crate) mod records;
 pub(crate) mod statistics;
