@@ -6,7 +6,7 @@ use crate::failure::Outcome;
 use crate::pipeline::annotate::{Annotated, annotate, hidden_instances, label_doubts};
 use crate::pipeline::inputs::{Inputs, mesh_doubts};
 use crate::pipeline::location::{Outlook, room_of};
-use s3d_geom::TriMesh;
+use s3d_geom::{NearestFaces, TriMesh};
 use s3d_label::Class;
 use s3d_render::Scene;
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ fn report(args: &InfoArgs) -> Outcome<String> {
     let file = s3d_io::read_mesh(&area.scene.mesh, area.scene.up)?;
     let mut wrong: Vec<String> = area.warnings.iter().chain(&file.warnings).cloned().collect();
     let mesh = &file.mesh;
-    let annotated = annotate(area, mesh, &inputs.table, |_| Ok(()))?;
+    let annotated = annotate(area, &NearestFaces::new(mesh), &inputs.table, |_| Ok(()))?;
     let scene = Scene::new(mesh);
 
     let mut text = String::new();

@@ -51,11 +51,11 @@ pub(crate) struct AnnotatedInstance<'a> {
 /// instance with its box and voxels, in the order of rooms and of numbers in the room.
 pub(crate) fn annotate(
     area: &AreaInput,
-    mesh: &TriMesh,
+    nearest_faces: &NearestFaces<'_>,
     table: &LabelTable,
     mut each: impl FnMut(&AnnotatedInstance<'_>) -> Outcome<()>,
 ) -> Outcome<Annotated> {
-    let nearest_faces = NearestFaces::new(mesh);
+    let mesh = nearest_faces.mesh();
     let mut votes = Votes::new(mesh.faces().len());
     let mut rooms = Vec::new();
     let mut total = 0u64;

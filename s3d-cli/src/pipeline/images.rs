@@ -39,8 +39,20 @@ struct Shot {
     camera: Camera,
 }
 
-/// Renders and writes the panoramas of the chosen locations and their kept views.
-pub(crate) fn write_images(job: &ImageJob<'_>, candidates: &[Candidate]) -> Outcome<ImageCount> {
+/// One piece of an area's work.
+enum Work {
+    /// What is no image: one thread's work, which the others need not wait for.
+    Rest,
+    Shot(Shot),
+}
+
+/// Renders and writes the panoramas of the chosen locations and their kept views. `rest` is done once, by one of the
+/// threads: what else is to be written of the area.
+pub(crate) fn write_images(
+    job: &ImageJob<'_>,
+    candidates: &[Candidate],
+    rest: impl Fn() -> Outcome<()> + Sync,
+) -> Outcome<ImageCount> {
     let shots = shots(job, candidates);
     for domain in job.modalities {
         for frame in [Frame::Panorama, Frame::View(0)] {
@@ -50,13 +62,18 @@ pub(crate) fn write_images(job: &ImageJob<'_>, candidates: &[Candidate]) -> Outc
     let progress = Progress::new("rendering", "images", shots.len() as u64);
     let memory =
         || Memory { caster: Caster::new(job.look.scene), hits: Hits::default(), prints: Prints::default() };
-    for_each_in_order(&shots, memory, |memory, shot| {
-        write_shot(job, shot, memory)?;
-        progress.add(1);
-        Ok(())
-    })?;
     let panoramas = shots.iter().filter(|s| s.frame == Frame::Panorama).count() as u64;
-    Ok(ImageCount { panoramas, views: shots.len() as u64 - panoramas })
+    let count = ImageCount { panoramas, views: shots.len() as u64 - panoramas };
+    let works: Vec<Work> = std::iter::once(Work::Rest).chain(shots.into_iter().map(Work::Shot)).collect();
+    for_each_in_order(&works, memory, |memory, work| match work {
+        Work::Rest => rest(),
+        Work::Shot(shot) => {
+            write_shot(job, shot, memory)?;
+            progress.add(1);
+            Ok(())
+        }
+    })?;
+    Ok(count)
 }
 
 /// The images to take: of each location its panorama, which takes longest, and then its views.

@@ -23,17 +23,18 @@ use location::{Outlook, room_of};
 use manifest::{AreaEntry, Manifest, XyzLoss};
 use modality::Look;
 use points::{check_density, write_points};
-use s3d_geom::Density;
+use s3d_geom::{Density, NearestFaces};
 use s3d_io::{
     Compression, Content, InstanceRecord, InstanceWriter, Layout, MeshFile, TextureOut, create_dir,
     encode_rgb8,
 };
-use s3d_label::{LabelId, LabelTable, Room};
+use s3d_label::{LabelTable, Room};
 use s3d_render::{Normals, Pyramids, Scene};
 use s3d_sample::folds;
 use statistics::Statistics;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::Instant;
 use tracing::{debug, info, warn};
 use views::{Candidate, Scoring, score_area, select};
@@ -49,12 +50,29 @@ pub(crate) struct Target<'a> {
 
 /// An area between its labelling and its rendering.
 struct LabelledArea {
-    face_labels: Vec<LabelId>,
+    annotated: Annotated,
     /// The room of each location.
     location_rooms: Vec<Room>,
     entry: AreaEntry,
-    /// Its mesh and textures: kept if it is the only area, else read again for the images.
-    file: Option<MeshFile>,
+}
+
+/// A mesh that is ready for rays.
+struct Stage<'m> {
+    file: &'m MeshFile,
+    scene: Scene<'m>,
+}
+
+impl<'m> Stage<'m> {
+    /// Prepares the mesh, and at the same time its nearest faces, which are needed for its labels only.
+    fn new(file: &'m MeshFile) -> (Self, NearestFaces<'m>) {
+        let (scene, nearest) = rayon::join(|| Scene::new(&file.mesh), || NearestFaces::new(&file.mesh));
+        (Self { file, scene }, nearest)
+    }
+
+    /// Prepares the mesh for rays alone.
+    fn for_rays(file: &'m MeshFile) -> Self {
+        Self { file, scene: Scene::new(&file.mesh) }
+    }
 }
 
 /// Turns scenes into a data set.
@@ -67,14 +85,16 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     check_only(&inputs, &options.only)?;
     output::check_inputs(layout, &inputs)?;
     let areas = inputs.numbers();
-    // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there.
-    let mut files: Vec<Option<MeshFile>> = Vec::new();
+    // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a single area is
+    // kept from then on; several are read again where they are needed, so that they never share memory.
+    let mut single: Option<MeshFile> = None;
     for area in &inputs.areas {
         let file = area.read_mesh()?;
         area.tell_mesh(&file);
         check_density(&file.mesh, options.points_per_m2)?;
-        files.push((inputs.areas.len() == 1).then_some(file));
+        single = (inputs.areas.len() == 1).then_some(file);
     }
+    let (single, mut nearest) = single.as_ref().map(Stage::new).unzip();
 
     let previous = output::prepare(layout, &areas)?;
     let manifest = Manifest::begin(options, &areas, inputs.table.len());
@@ -84,8 +104,18 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
 
     let mut labelled = Vec::new();
     let mut candidates = Vec::new();
-    for (area, file) in inputs.areas.iter().zip(&mut files) {
-        labelled.push(label_area(area, file.take(), &inputs.table, layout, options, &mut candidates)?);
+    for area in &inputs.areas {
+        let mut label = |stage: &Stage<'_>, nearest: NearestFaces<'_>| {
+            label_area(area, stage, nearest, &inputs.table, layout, options, &mut candidates)
+        };
+        labelled.push(match (&single, nearest.take()) {
+            (Some(stage), Some(nearest)) => label(stage, nearest)?,
+            _ => {
+                let file = area.read_mesh()?;
+                let (stage, nearest) = Stage::new(&file);
+                label(&stage, nearest)?
+            }
+        });
     }
     select(&mut candidates, options.pool, options.keep_all, options.seed);
     let kept = candidates.iter().filter(|c| c.frame_num.is_some()).count();
@@ -95,7 +125,13 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     let mut images = ImageCount::default();
     for (area, labelled) in inputs.areas.iter().zip(labelled) {
         records::write_views(layout, area.scene.area, &candidates)?;
-        let (entry, count) = render_area(area, labelled, layout, options, &candidates)?;
+        let render = |stage: &Stage<'_>| {
+            render_area(area, stage, labelled, &inputs.table, layout, options, &candidates)
+        };
+        let (entry, count) = match &single {
+            Some(stage) => render(stage)?,
+            None => render(&Stage::for_rays(&area.read_mesh()?))?,
+        };
         images.panoramas += count.panoramas;
         images.views += count.views;
         entries.push(entry);
@@ -126,30 +162,25 @@ fn check_only(inputs: &Inputs, only: &[String]) -> Outcome<()> {
     Ok(())
 }
 
-/// Labels an area, writes everything of it but the images, and adds its scored candidates to `candidates`.
+/// Labels an area, writes what is known of it then, and adds its scored candidates to `candidates`.
 fn label_area(
     area: &AreaInput,
-    file: Option<MeshFile>,
+    stage: &Stage<'_>,
+    nearest: NearestFaces<'_>,
     table: &LabelTable,
     layout: &Layout,
     options: &ExportOptions,
     candidates: &mut Vec<Candidate>,
 ) -> Outcome<LabelledArea> {
     let number = area.scene.area;
-    // A mesh that was kept is handed on; one of several areas is read anew for each stage, so that they never share memory.
-    let keep = file.is_some();
-    let file = match file {
-        Some(file) => file,
-        None => area.read_mesh()?,
-    };
+    let Stage { file, scene } = stage;
     let mesh = &file.mesh;
-    let mesh_dir = layout.mesh_dir(number);
-    create_dir(&mesh_dir)?;
+    create_dir(&layout.mesh_dir(number))?;
 
     let started = Instant::now();
     let mut instances =
         InstanceWriter::create(&layout.instances_json(number), &layout.instances_npz(number))?;
-    let annotated = annotate(area, mesh, table, |i| {
+    let annotated = annotate(area, &nearest, table, |i| {
         instances.push(&InstanceRecord {
             label: &i.label.to_string(),
             label_index: i.id.0,
@@ -162,6 +193,7 @@ fn label_area(
         Ok(())
     })?;
     instances.finish()?;
+    drop(nearest);
     tell_labels(&annotated, started);
     if let Some(w) = hidden_instances(area, &annotated.face_labels, table) {
         warn!("{w}");
@@ -170,20 +202,9 @@ fn label_area(
     records::write_votes(layout, number, &annotated.report)?;
     records::write_instance_numbers(layout, area)?;
 
-    let names = table.names();
-    let per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
-    write_colored_mesh(&mesh_dir, &file, options.compression)?;
-    s3d_io::write_semantic_obj(&mesh_dir, mesh, &per_face, &names)?;
-    let density = Density::PerM2(options.points_per_m2);
-    let started = Instant::now();
-    let points = write_points(layout, area, mesh, &annotated, table, density, options.seed)?;
-
-    debug!("{points} points sampled ({:.1} s)", started.elapsed().as_secs_f64());
-
-    let scene = Scene::new(mesh);
     let mut location_rooms = Vec::new();
     for location in &area.locations {
-        Outlook::of(&scene, location).warnings(location).iter().for_each(|w| warn!("{w}"));
+        Outlook::of(scene, location).warnings(location).iter().for_each(|w| warn!("{w}"));
         location_rooms.push(room_of(&annotated.rooms, location.pose.location));
     }
     let scoring = Scoring {
@@ -193,19 +214,18 @@ fn label_area(
         seed: options.seed,
     };
     let started = Instant::now();
-    candidates.extend(score_area(number, &area.locations, &scene, &annotated.face_labels, table, scoring)?);
+    candidates.extend(score_area(number, &area.locations, scene, &annotated.face_labels, table, scoring)?);
     debug!(
         "area {number}: {} candidates scored ({:.1} s)",
         candidates.len(),
         started.elapsed().as_secs_f64()
     );
-    drop(scene);
 
     let entry = AreaEntry {
         area: number,
         faces: mesh.faces().len(),
         faces_left_out: mesh.report().zero_area_faces + file.repeated_faces,
-        points,
+        points: 0,
         annotated_points: annotated.points,
         rooms: annotated.rooms.len(),
         locations: area.locations.len(),
@@ -213,8 +233,27 @@ fn label_area(
         views: 0,
         xyz: XyzLoss::of(mesh.aabb()),
     };
-    let file = keep.then_some(file);
-    Ok(LabelledArea { face_labels: annotated.face_labels, location_rooms, entry, file })
+    Ok(LabelledArea { annotated, location_rooms, entry })
+}
+
+/// Writes an area's meshes and points, all but its images. Returns how many points there are.
+fn write_area(
+    area: &AreaInput,
+    file: &MeshFile,
+    annotated: &Annotated,
+    table: &LabelTable,
+    layout: &Layout,
+    options: &ExportOptions,
+) -> Outcome<u64> {
+    let mesh_dir = layout.mesh_dir(area.scene.area);
+    let per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
+    write_colored_mesh(&mesh_dir, file, options.compression)?;
+    s3d_io::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
+    let density = Density::PerM2(options.points_per_m2);
+    let started = Instant::now();
+    let points = write_points(layout, area, &file.mesh, annotated, table, density, options.seed)?;
+    debug!("{points} points sampled ({:.1} s)", started.elapsed().as_secs_f64());
+    Ok(points)
 }
 
 /// Writes the mesh with its textures: their files as they were found, where they were used as they are.
@@ -256,21 +295,20 @@ fn tell_labels(annotated: &Annotated, started: Instant) {
     label_doubts(&annotated.report).iter().for_each(|w| warn!("{w}"));
 }
 
-/// Renders the images of an area.
+/// Renders the images of an area, and beside them writes its meshes and points.
 fn render_area(
     area: &AreaInput,
+    stage: &Stage<'_>,
     labelled: LabelledArea,
+    table: &LabelTable,
     layout: &Layout,
     options: &ExportOptions,
     candidates: &[Candidate],
 ) -> Outcome<(AreaEntry, ImageCount)> {
-    let mesh = match labelled.file {
-        Some(file) => file.mesh,
-        None => area.read_mesh()?.mesh,
-    };
-    let scene = Scene::new(&mesh);
-    let textures = Pyramids::new(&mesh);
-    let label_per_face: Vec<u32> = labelled.face_labels.iter().map(|l| l.0).collect();
+    let LabelledArea { annotated, location_rooms, mut entry } = labelled;
+    let Stage { file, scene } = stage;
+    let textures = Pyramids::new(&file.mesh);
+    let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
     let pretty_per_face: Vec<[u8; 3]> = label_per_face.iter().map(|l| s3d_io::pretty_color(*l)).collect();
     let chosen: Vec<bool> =
         area.locations.iter().map(|l| options.only.is_empty() || options.only.contains(&l.uuid)).collect();
@@ -278,7 +316,7 @@ fn render_area(
         layout,
         area: area.scene.area,
         look: Look {
-            scene: &scene,
+            scene,
             textures: &textures,
             normals: if options.smooth_normals { Normals::Smooth } else { Normals::Flat },
             label_per_face: &label_per_face,
@@ -286,14 +324,18 @@ fn render_area(
             compression: options.compression,
         },
         locations: &area.locations,
-        rooms: &labelled.location_rooms,
+        rooms: &location_rooms,
         chosen: &chosen,
         modalities: &options.modalities,
         size: options.size,
         pano_width: options.pano_width,
     };
     let started = Instant::now();
-    let count = write_images(&job, candidates)?;
+    let points = OnceLock::new();
+    let count = write_images(&job, candidates, || {
+        let _ = points.set(write_area(area, file, &annotated, table, layout, options)?);
+        Ok(())
+    })?;
     debug!(
         "area {}: {} panoramas and {} views rendered ({:.1} s)",
         area.scene.area,
@@ -301,5 +343,6 @@ fn render_area(
         count.views,
         started.elapsed().as_secs_f64()
     );
-    Ok((labelled.entry.with_images(count), count))
+    entry.points = points.into_inner().unwrap_or_default();
+    Ok((entry.with_images(count), count))
 }
