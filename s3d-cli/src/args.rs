@@ -125,6 +125,10 @@ pub(crate) struct ExportOptions {
     /// Everything random comes from it: the same input and seed give the same bytes.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
+    /// Put scan locations on the floor of every room instead of reading some: no two of a room nearer than this, 1.5 m high,
+    /// clear of walls and things.
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub(crate) place_cameras: Option<f64>,
     /// Among which candidates views are selected: of the whole data set, of an area, or of a location.
     #[arg(long, default_value = "dataset", value_parser = parsed::<Pool>, value_name = "dataset|area|location")]
     pub(crate) pool: Pool,
@@ -257,6 +261,12 @@ pub(crate) struct InfoArgs {
     /// The scene file.
     #[arg(value_name = "SCENE.toml")]
     pub(crate) scene: PathBuf,
+    /// Show the scan locations that export would put on the floor with this option.
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub(crate) place_cameras: Option<f64>,
+    /// The seed by which they would be placed.
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
     #[command(flatten)]
     pub(crate) threads: Threads,
 }

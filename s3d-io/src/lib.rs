@@ -100,7 +100,7 @@ pub use s3dis::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
 pub use s3dis_points::{PointReader, read_points};
 pub use s3dis_write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};
 pub use scan_locations::read_scan_locations;
-pub use scene::{SceneFile, read_scene};
+pub use scene::{CameraSource, SceneFile, read_scene};
 pub use splits::{Split, read_splits, write_splits};
 pub use texture_file::TextureFile;
 

@@ -3,7 +3,7 @@
 
 use s3d_geom::glam::{DVec3, Vec3};
 use s3d_geom::{FaceColor, PointCloud};
-use s3d_io::{AnnotationTree, UpAxis, read_cameras, read_mesh, read_points, read_scene};
+use s3d_io::{AnnotationTree, CameraSource, UpAxis, read_mesh, read_points, read_scan_locations, read_scene};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -35,7 +35,10 @@ fn the_parts_of_the_scan_fit_together() {
     assert_eq!(texture.bytes, std::fs::read(scene.mesh.with_file_name("copyroom_0.jpg")).unwrap());
     assert_eq!(file.polygons_triangulated, 0);
 
-    let locations = read_cameras(&scene.cameras).unwrap();
+    let Some(CameraSource::Listed { path, world_from_file }) = &scene.cameras else {
+        panic!("{:?}", scene.cameras)
+    };
+    let locations = read_scan_locations(path, world_from_file).unwrap();
     assert_eq!(locations.len(), 3);
     let room = mesh.aabb();
     assert!(room.contains(locations[0].pose.location.as_vec3()), "{room:?}");

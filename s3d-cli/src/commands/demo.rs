@@ -23,6 +23,7 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         seed: o.seed,
         pool: Pool::Dataset,
         points_per_m2: o.points_per_m2,
+        place_cameras: None,
         entropy_stride: 4,
         modalities: Domain::ALL.to_vec(),
         keep_all: false,

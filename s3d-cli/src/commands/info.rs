@@ -5,7 +5,8 @@ use crate::args::InfoArgs;
 use crate::failure::Outcome;
 use crate::pipeline::annotate::{Annotated, annotate, hidden_instances, label_doubts};
 use crate::pipeline::inputs::{Inputs, mesh_doubts};
-use crate::pipeline::location::{Outlook, room_of};
+use crate::pipeline::locate;
+use crate::pipeline::location::Outlook;
 use s3d_geom::{NearestFaces, TriMesh};
 use s3d_label::Class;
 use s3d_render::Scene;
@@ -18,12 +19,13 @@ pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
 }
 
 fn report(args: &InfoArgs) -> Outcome<String> {
-    let inputs = Inputs::open(std::slice::from_ref(&args.scene))?;
+    let inputs = Inputs::open(std::slice::from_ref(&args.scene), args.place_cameras)?;
     let area = &inputs.areas[0];
     let file = s3d_io::read_mesh(&area.scene.mesh, area.scene.up)?;
     let mut wrong: Vec<String> = area.warnings.iter().chain(&file.warnings).cloned().collect();
     let mesh = &file.mesh;
-    let annotated = annotate(area, &NearestFaces::new(mesh), &inputs.table, |_| Ok(()))?;
+    let nearest = NearestFaces::new(mesh);
+    let annotated = annotate(area, &nearest, &inputs.table, |_| Ok(()))?;
     let scene = Scene::new(mesh);
 
     let mut text = String::new();
@@ -31,8 +33,9 @@ fn report(args: &InfoArgs) -> Outcome<String> {
     tell_mesh(&mut text, mesh);
     tell_annotations(&mut text, &annotated, &inputs);
 
-    let _ = writeln!(text, "\nscan locations: {}", area.locations.len());
-    for location in &area.locations {
+    let located = locate(area, &scene, &nearest, &annotated, &inputs.table, args.seed)?;
+    let _ = writeln!(text, "\nscan locations: {}", located.len());
+    for (location, room) in &located {
         let outlook = Outlook::of(&scene, location);
         let at = location.pose.location;
         let _ = writeln!(
@@ -42,7 +45,7 @@ fn report(args: &InfoArgs) -> Outcome<String> {
             at.x,
             at.y,
             at.z,
-            room_of(&annotated.rooms, at),
+            room,
             100.0 * outlook.coverage,
             outlook.nearest_m
         );

@@ -3,7 +3,7 @@
 use super::manifest::half_step;
 use crate::failure::{Failure, Outcome};
 use s3d_geom::TriMesh;
-use s3d_io::{AnnotationTree, Error, InstanceFile, MeshFile, ScanLocation, SceneFile};
+use s3d_io::{AnnotationTree, CameraSource, Error, InstanceFile, MeshFile, ScanLocation, SceneFile};
 use s3d_label::{Label, LabelTable, NumberedInstance, Room, number_area};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -17,10 +17,28 @@ pub(crate) struct AreaInput {
     pub(crate) scene: SceneFile,
     /// The rooms, in the order of their names, each with its annotation files.
     pub(crate) rooms: Vec<RoomInput>,
-    /// The scan locations, in the order of the camera table.
-    pub(crate) locations: Vec<ScanLocation>,
+    /// The scan locations.
+    pub(crate) cameras: Cameras,
     /// What was odd in the annotation tree, as a sentence each.
     pub(crate) warnings: Vec<String>,
+}
+
+/// Where an area is looked at from.
+pub(crate) enum Cameras {
+    /// At these scan locations, in the order of their list.
+    Listed(Vec<ScanLocation>),
+    /// At places that are chosen once its rooms are known, no two of a room nearer than this, metres.
+    Placed(f64),
+}
+
+impl Cameras {
+    /// The locations that are known before the area is labelled.
+    pub(crate) fn listed(&self) -> &[ScanLocation] {
+        match self {
+            Self::Listed(locations) => locations,
+            Self::Placed(_) => &[],
+        }
+    }
 }
 
 /// One room of an area.
@@ -43,8 +61,9 @@ pub(crate) struct Inputs {
 }
 
 impl Inputs {
-    /// Reads the scene files, the names in their annotation trees and their camera tables.
-    pub(crate) fn open(scenes: &[PathBuf]) -> Outcome<Self> {
+    /// Reads the scene files, the names in their annotation trees and their lists of scan locations, instead of which
+    /// locations are placed if `place_m` says how far apart.
+    pub(crate) fn open(scenes: &[PathBuf], place_m: Option<f64>) -> Outcome<Self> {
         let mut areas = Vec::new();
         let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
@@ -58,14 +77,15 @@ impl Inputs {
                     scene.area
                 )));
             }
-            let area = AreaInput::open(scene)?;
-            for location in &area.locations {
-                if let Some(other) = location_of.insert(location.uuid.clone(), area.scene.cameras.clone()) {
-                    return Err(Error::line(
-                        &area.scene.cameras,
-                        location.line,
-                        format!("uuid {} is also in {}", location.uuid, other.display()),
-                    )
+            let area = AreaInput::open(scene, place_m)?;
+            let list = area.cameras_path().unwrap_or(path);
+            for location in area.cameras.listed() {
+                if let Some(other) = location_of.insert(location.uuid.clone(), list.to_owned()) {
+                    let message = format!("uuid {} is also in {}", location.uuid, other.display());
+                    return Err(match location.line {
+                        0 => Error::format(list, message),
+                        line => Error::line(list, line, message),
+                    }
                     .into());
                 }
             }
@@ -84,12 +104,33 @@ impl Inputs {
 }
 
 impl AreaInput {
-    fn open(scene: SceneFile) -> Outcome<Self> {
+    fn open(scene: SceneFile, place_m: Option<f64>) -> Outcome<Self> {
         let tree = AnnotationTree::open(&scene.annotations)?;
         let warnings = tree.warnings.clone();
         let rooms = number(scene.area, &scene, tree)?;
-        let locations = s3d_io::read_cameras(&scene.cameras)?;
-        Ok(Self { scene, rooms, locations, warnings })
+        let cameras = match (place_m, &scene.cameras) {
+            (Some(distance_m), _) => Cameras::Placed(distance_m),
+            (None, Some(CameraSource::Placed { distance_m })) => Cameras::Placed(*distance_m),
+            (None, Some(CameraSource::Listed { path, world_from_file })) => {
+                Cameras::Listed(s3d_io::read_scan_locations(path, world_from_file)?)
+            }
+            (None, None) => {
+                return Err(Error::format(
+                    &scene.path,
+                    "has no scan locations: add [cameras] with a path, or place some with --place-cameras 2 (metres)",
+                )
+                .into());
+            }
+        };
+        Ok(Self { scene, rooms, cameras, warnings })
+    }
+
+    /// The list of scan locations, if the scene names one.
+    pub(crate) fn cameras_path(&self) -> Option<&PathBuf> {
+        match &self.scene.cameras {
+            Some(CameraSource::Listed { path, .. }) => Some(path),
+            _ => None,
+        }
     }
 
     /// Reads the mesh.

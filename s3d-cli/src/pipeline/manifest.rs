@@ -35,6 +35,8 @@ struct Options {
     pano_width: u32,
     pool: String,
     points_per_m2: f64,
+    /// How far apart scan locations were placed, metres; null where the scenes have their own.
+    place_cameras: Option<f64>,
     entropy_stride: u32,
     modalities: Vec<String>,
     keep_all: bool,
@@ -101,6 +103,7 @@ impl Manifest {
                 pano_width: options.pano_width,
                 pool: options.pool.to_string(),
                 points_per_m2: options.points_per_m2,
+                place_cameras: options.place_cameras,
                 entropy_stride: options.entropy_stride,
                 modalities: options.modalities.iter().map(Domain::to_string).collect(),
                 keep_all: options.keep_all,

@@ -18,21 +18,23 @@ use crate::args::ExportOptions;
 use crate::failure::{Failure, Outcome};
 use annotate::{Annotated, annotate, hidden_instances, label_doubts};
 use images::{ImageCount, ImageJob, write_images};
-use inputs::{AreaInput, Inputs};
+use inputs::{AreaInput, Cameras, Inputs};
 use location::{Outlook, room_of};
 use manifest::{AreaEntry, Manifest, XyzLoss};
 use modality::Look;
+use place::{Ground, Placement, place_locations};
 use points::{check_density, write_points};
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::{
-    Compression, Content, InstanceRecord, InstanceWriter, Layout, MeshFile, TextureOut, create_dir,
-    encode_rgb8,
+    Compression, Content, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation, TextureOut,
+    create_dir, encode_rgb8,
 };
 use s3d_label::{LabelTable, Room};
 use s3d_render::{Normals, Pyramids, Scene};
 use s3d_sample::folds;
 use statistics::Statistics;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -51,6 +53,7 @@ pub(crate) struct Target<'a> {
 /// An area between its labelling and its rendering.
 struct LabelledArea {
     annotated: Annotated,
+    locations: Vec<ScanLocation>,
     /// The room of each location.
     location_rooms: Vec<Room>,
     entry: AreaEntry,
@@ -81,7 +84,7 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     let layout = &target.layout;
     output::check(layout, target.overwrite, target.allowed)?;
     debug!("{options:?}");
-    let inputs = Inputs::open(scenes)?;
+    let inputs = Inputs::open(scenes, options.place_cameras)?;
     check_only(&inputs, &options.only)?;
     output::check_inputs(layout, &inputs)?;
     let areas = inputs.numbers();
@@ -117,6 +120,8 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
             }
         });
     }
+    check_only_placed(&labelled, &options.only)?;
+    let locations: usize = labelled.iter().map(|l| l.locations.len()).sum();
     select(&mut candidates, options.pool, options.keep_all, options.seed);
     let kept = candidates.iter().filter(|c| c.frame_num.is_some()).count();
     info!("selected {kept} of {} candidate views", candidates.len());
@@ -146,20 +151,61 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
         layout.root().display(),
         images.panoramas,
         images.views,
-        inputs.areas.iter().map(|a| a.locations.len()).sum::<usize>(),
+        locations,
         started.elapsed().as_secs_f64()
     );
     Ok(())
 }
 
-/// Refuses a `--only` that names no location.
+/// Refuses a `--only` that names no location, as far as they are known before the areas are labelled.
 fn check_only(inputs: &Inputs, only: &[String]) -> Outcome<()> {
-    for uuid in only {
-        if !inputs.areas.iter().flat_map(|a| &a.locations).any(|l| l.uuid == *uuid) {
-            return Err(Failure::Call(format!("--only {uuid}: no scan location has this uuid")));
+    if inputs.areas.iter().any(|a| matches!(a.cameras, Cameras::Placed(_))) {
+        return Ok(());
+    }
+    only_known(inputs.areas.iter().flat_map(|a| a.cameras.listed()), only)
+}
+
+/// The same for all locations.
+fn check_only_placed(areas: &[LabelledArea], only: &[String]) -> Outcome<()> {
+    only_known(areas.iter().flat_map(|a| &a.locations), only)
+}
+
+fn only_known<'a>(locations: impl Iterator<Item = &'a ScanLocation>, only: &[String]) -> Outcome<()> {
+    let known: BTreeSet<&str> = locations.map(|l| l.uuid.as_str()).collect();
+    match only.iter().find(|uuid| !known.contains(uuid.as_str())) {
+        Some(uuid) => Err(Failure::Call(format!("--only {uuid}: no scan location has this uuid"))),
+        None => Ok(()),
+    }
+}
+
+/// An area's scan locations, each with its room: those that are listed, or some that are placed.
+pub(crate) fn locate(
+    area: &AreaInput,
+    scene: &Scene<'_>,
+    nearest: &NearestFaces<'_>,
+    annotated: &Annotated,
+    table: &LabelTable,
+    seed: u64,
+) -> Outcome<Vec<(ScanLocation, Room)>> {
+    match &area.cameras {
+        Cameras::Listed(locations) => {
+            Ok(locations.iter().map(|l| (l.clone(), room_of(&annotated.rooms, l.pose.location))).collect())
+        }
+        Cameras::Placed(distance_m) => {
+            let ground = Ground {
+                area: area.scene.area,
+                scene,
+                nearest,
+                face_labels: &annotated.face_labels,
+                table,
+                rooms: &annotated.rooms,
+            };
+            let (placed, warnings) = place_locations(&ground, Placement { distance_m: *distance_m, seed })?;
+            warnings.iter().for_each(|w| warn!("{w}"));
+            info!("area {}: {} scan locations placed", area.scene.area, placed.len());
+            Ok(placed)
         }
     }
-    Ok(())
 }
 
 /// Labels an area, writes what is known of it then, and adds its scored candidates to `candidates`.
@@ -193,7 +239,6 @@ fn label_area(
         Ok(())
     })?;
     instances.finish()?;
-    drop(nearest);
     tell_labels(&annotated, started);
     if let Some(w) = hidden_instances(area, &annotated.face_labels, table) {
         warn!("{w}");
@@ -202,10 +247,11 @@ fn label_area(
     records::write_votes(layout, number, &annotated.report)?;
     records::write_instance_numbers(layout, area)?;
 
-    let mut location_rooms = Vec::new();
-    for location in &area.locations {
+    let located = locate(area, scene, &nearest, &annotated, table, options.seed)?;
+    drop(nearest);
+    let (locations, location_rooms): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();
+    for location in &locations {
         Outlook::of(scene, location).warnings(location).iter().for_each(|w| warn!("{w}"));
-        location_rooms.push(room_of(&annotated.rooms, location.pose.location));
     }
     let scoring = Scoring {
         views: options.views,
@@ -214,7 +260,7 @@ fn label_area(
         seed: options.seed,
     };
     let started = Instant::now();
-    candidates.extend(score_area(number, &area.locations, scene, &annotated.face_labels, table, scoring)?);
+    candidates.extend(score_area(number, &locations, scene, &annotated.face_labels, table, scoring)?);
     debug!(
         "area {number}: {} candidates scored ({:.1} s)",
         candidates.len(),
@@ -228,12 +274,12 @@ fn label_area(
         points: 0,
         annotated_points: annotated.points,
         rooms: annotated.rooms.len(),
-        locations: area.locations.len(),
+        locations: locations.len(),
         panoramas: 0,
         views: 0,
         xyz: XyzLoss::of(mesh.aabb()),
     };
-    Ok(LabelledArea { annotated, location_rooms, entry })
+    Ok(LabelledArea { annotated, locations, location_rooms, entry })
 }
 
 /// Writes an area's meshes and points, all but its images. Returns how many points there are.
@@ -305,13 +351,13 @@ fn render_area(
     options: &ExportOptions,
     candidates: &[Candidate],
 ) -> Outcome<(AreaEntry, ImageCount)> {
-    let LabelledArea { annotated, location_rooms, mut entry } = labelled;
+    let LabelledArea { annotated, locations, location_rooms, mut entry } = labelled;
     let Stage { file, scene } = stage;
     let textures = Pyramids::new(&file.mesh);
     let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
     let pretty_per_face: Vec<[u8; 3]> = label_per_face.iter().map(|l| s3d_io::pretty_color(*l)).collect();
     let chosen: Vec<bool> =
-        area.locations.iter().map(|l| options.only.is_empty() || options.only.contains(&l.uuid)).collect();
+        locations.iter().map(|l| options.only.is_empty() || options.only.contains(&l.uuid)).collect();
     let job = ImageJob {
         layout,
         area: area.scene.area,
@@ -323,7 +369,7 @@ fn render_area(
             pretty_per_face: &pretty_per_face,
             compression: options.compression,
         },
-        locations: &area.locations,
+        locations: &locations,
         rooms: &location_rooms,
         chosen: &chosen,
         modalities: &options.modalities,

@@ -37,8 +37,8 @@ pub(crate) struct Placement {
 #[derive(Clone, Copy)]
 pub(crate) struct Ground<'a> {
     pub(crate) area: u32,
-    pub(crate) mesh: &'a TriMesh,
     pub(crate) scene: &'a Scene<'a>,
+    pub(crate) nearest: &'a NearestFaces<'a>,
     pub(crate) face_labels: &'a [LabelId],
     pub(crate) table: &'a LabelTable,
     pub(crate) rooms: &'a [SurveyedRoom],
@@ -56,7 +56,6 @@ pub(crate) fn place_locations(
     placement: Placement,
 ) -> Outcome<(Vec<(ScanLocation, Room)>, Vec<String>)> {
     let (mut placed, mut warnings) = (Vec::new(), Vec::new());
-    let nearest = NearestFaces::new(ground.mesh);
     let mut floors = floor_faces(ground);
     let floor_m2: f64 = ground.rooms.iter().map(|r| r.footprint.area_m2).sum();
     // A hundred or so places for each location that may be put, and as many as make 10 cm steps in small rooms.
@@ -66,10 +65,10 @@ pub(crate) fn place_locations(
     for room in ground.rooms {
         let name = format!("{}_{}", room.room, ground.area);
         let feet = match floors.remove(&room.room) {
-            Some(faces) => on_faces(ground.mesh, faces, per_m2, placement.seed),
+            Some(faces) => on_faces(ground.scene.mesh(), faces, per_m2, placement.seed),
             None => on_outline(room, per_m2),
         };
-        let free = free_places(ground.scene, &nearest, &feet);
+        let free = free_places(ground.scene, ground.nearest, &feet);
         if free.is_empty() {
             warnings.push(format!(
                 "{name}: no place for a scan location, since none of its floor is free up to {HEIGHT_M} m with {} m around",
@@ -100,7 +99,7 @@ fn floor_faces(ground: &Ground<'_>) -> BTreeMap<Room, Vec<u32>> {
     for (face, label) in (0u32..).zip(ground.face_labels) {
         if let Some(label) = ground.table.get(*label)
             && label.class == Class::Floor
-            && ground.mesh.normal(face).z.abs() > LEVEL
+            && ground.scene.mesh().normal(face).z.abs() > LEVEL
         {
             floors.entry(label.room).or_default().push(face);
         }
@@ -205,11 +204,11 @@ mod tests {
             bbox: mesh.aabb(),
             wall_direction_deg: 0,
         }];
-        let scene = Scene::new(&mesh);
+        let (scene, nearest) = (Scene::new(&mesh), NearestFaces::new(&mesh));
         let ground = Ground {
             area: 1,
-            mesh: &mesh,
             scene: &scene,
+            nearest: &nearest,
             face_labels: &face_labels,
             table: &table,
             rooms: &rooms,
