@@ -173,7 +173,8 @@ mod tests {
     #[test]
     fn leveling_keeps_place_and_heading() {
         let tilted = Pose::from_scanner(dvec3(1.0, 2.0, 3.0), DQuat::from_rotation_z(2.1)).turned(0.0, 0.6);
-        let rolled = Pose { world_from_camera: tilted.world_from_camera * DMat3::from_rotation_z(0.4), ..tilted };
+        let rolled =
+            Pose { world_from_camera: tilted.world_from_camera * DMat3::from_rotation_z(0.4), ..tilted };
         for pose in [tilted, rolled] {
             let level = pose.leveled();
             assert!(level.up().abs_diff_eq(DVec3::Z, 1e-12));

@@ -22,7 +22,7 @@ use inputs::{AreaInput, Cameras, Inputs};
 use location::{Outlook, room_of};
 use manifest::{AreaEntry, Manifest, XyzLoss};
 use modality::Look;
-use place::{Ground, Placement, place_locations};
+use place::{Ground, Located, Placement, place_locations};
 use points::{check_density, write_points};
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::{
@@ -186,7 +186,7 @@ pub(crate) fn locate(
     annotated: &Annotated,
     table: &LabelTable,
     seed: u64,
-) -> Outcome<Vec<(ScanLocation, Room)>> {
+) -> Outcome<Located> {
     match &area.cameras {
         Cameras::Listed(locations) => {
             Ok(locations.iter().map(|l| (l.clone(), room_of(&annotated.rooms, l.pose.location))).collect())

@@ -44,6 +44,12 @@ pub(crate) struct Ground<'a> {
     pub(crate) rooms: &'a [SurveyedRoom],
 }
 
+/// The scan locations of an area, each with its room.
+pub(crate) type Located = Vec<(ScanLocation, Room)>;
+
+/// Placed locations, and a sentence on each room that has none.
+pub(crate) type Placed = (Located, Vec<String>);
+
 /// Puts scan locations into the rooms of an area, 1.5 m above their floors, on a Poisson-disk pattern: no two of a room are
 /// nearer than the distance asked for, and every place that is free is nearer than that to one. The way up from the floor
 /// is free, and so are 0.5 m around, or less in rooms that are narrower. All look along +Y. Returns the locations with
@@ -51,10 +57,7 @@ pub(crate) struct Ground<'a> {
 ///
 /// A room's floor is the faces labelled so; a room without any has the floor outline of its points instead, at the
 /// height of the lowest.
-pub(crate) fn place_locations(
-    ground: &Ground<'_>,
-    placement: Placement,
-) -> Outcome<(Vec<(ScanLocation, Room)>, Vec<String>)> {
+pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Outcome<Placed> {
     let (mut placed, mut warnings) = (Vec::new(), Vec::new());
     let mut floors = floor_faces(ground);
     let floor_m2: f64 = ground.rooms.iter().map(|r| r.footprint.area_m2).sum();
