@@ -81,9 +81,8 @@ impl Columns {
             })
         };
         let three = |sets: &[[&str; 3]], arrays: &[&str]| {
-            let of_set = |set: &[&str; 3]| {
-                Some([find(names, set[0])?, find(names, set[1])?, find(names, set[2])?])
-            };
+            let of_set =
+                |set: &[&str; 3]| Some([find(names, set[0])?, find(names, set[1])?, find(names, set[2])?]);
             let of_array = |array: &&str| {
                 let at = |i: usize| find(names, &format!("{array}[{i}]"));
                 Some([at(0)?, at(1)?, at(2)?])
@@ -154,7 +153,10 @@ mod tests {
         let found = choose("x y z label instance kind part place", &options).unwrap();
         assert_eq!((found.class, found.instance, found.room), (5, Some(6), Some(7)));
         for (names, words) in [
-            ("x y z label instance part place", "no column \"kind\" (class in [annotations]); its columns are x y"),
+            (
+                "x y z label instance part place",
+                "no column \"kind\" (class in [annotations]); its columns are x y",
+            ),
             ("x y z kind place", "no column \"part\" (instance"),
             ("x y z kind part", "no column \"place\" (rooms"),
             ("x y kind", "no columns of coordinates, such as x y z; its columns are x y kind"),

@@ -55,7 +55,9 @@ fn name_of(name: &RecordName, bare: bool) -> String {
         RecordName::ColorRed => "red".to_owned(),
         RecordName::ColorGreen => "green".to_owned(),
         RecordName::ColorBlue => "blue".to_owned(),
-        RecordName::Unknown { namespace, name } if !bare && !namespace.is_empty() => format!("{namespace}:{name}"),
+        RecordName::Unknown { namespace, name } if !bare && !namespace.is_empty() => {
+            format!("{namespace}:{name}")
+        }
         RecordName::Unknown { name, .. } => name.clone(),
         RecordName::Intensity => "intensity".to_owned(),
         RecordName::RowIndex => "rowIndex".to_owned(),
@@ -225,15 +227,15 @@ impl Cloud for E57Cloud<'_> {
             let scan = Scan::new(path, self.options, cloud)?;
             let bits: u64 = cloud.prototype.iter().map(|r| bits_of(&r.data_type)).sum();
             if bits > 0 && u128::from(cloud.records) * u128::from(bits) > u128::from(size) * 8 {
-                let message = format!("claims {} points in {size} bytes: the file is cut short", cloud.records);
+                let message =
+                    format!("claims {} points in {size} bytes: the file is cut short", cloud.records);
                 return Err(Error::format(path, message));
             }
             let mut points = guarded(path, || reader.pointcloud_raw(cloud))?.map_err(|e| self.error(&e))?;
             let c = scan.columns;
             while let Some(values) = guarded(path, || points.next())? {
-                let values = values.map_err(|e| {
-                    Error::format(path, format!("cannot be read after point {number}: {e}"))
-                })?;
+                let values = values
+                    .map_err(|e| Error::format(path, format!("cannot be read after point {number}: {e}")))?;
                 number += 1;
                 if scan.is_invalid(&values) {
                     invalid += 1;

@@ -48,6 +48,11 @@ pub(crate) trait Cloud {
         None
     }
 
+    /// Whether its points are the vertices of a mesh; known once it is read.
+    fn are_vertices(&self) -> bool {
+        false
+    }
+
     /// Reads all rows. `false`: colours go beyond the narrow range, and the rows must be read again with the wide one.
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool>;
 }
@@ -85,14 +90,8 @@ pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> R
         let (mut classes, mut rooms) = (Tags::new(), Tags::new());
         let mut gathered = Gathered::default();
         let mut warnings = Vec::new();
-        let wide = gather(
-            clouds,
-            &colors,
-            options,
-            &mut gathered,
-            (&mut classes, &mut rooms),
-            &mut warnings,
-        )?;
+        let wide =
+            gather(clouds, &colors, options, &mut gathered, (&mut classes, &mut rooms), &mut warnings)?;
         match wide {
             Some(file) => colors[file] = ColorRange::Wide,
             None => break (gathered, classes, rooms, warnings),
@@ -114,6 +113,7 @@ pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> R
             start,
             count: instance.points,
             path: clouds[instance.file].path().to_owned(),
+            are_vertices: clouds[instance.file].are_vertices(),
             part: instance.part,
         };
         start += instance.points;
@@ -282,6 +282,7 @@ struct FlatPoints {
     count: u64,
     path: PathBuf,
     part: String,
+    are_vertices: bool,
 }
 
 impl InstancePoints for FlatPoints {
@@ -296,5 +297,9 @@ impl InstancePoints for FlatPoints {
 
     fn part(&self) -> String {
         self.part.clone()
+    }
+
+    fn are_vertices(&self) -> bool {
+        self.are_vertices
     }
 }

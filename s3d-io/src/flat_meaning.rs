@@ -186,7 +186,8 @@ impl Unknown {
                 path,
                 format!(
                     "classes that are none of the 13: {list}. Say what they are in [annotations.classes], as in \
-                     {first:?} = \"chair\", or \"\" for points without a label"
+                     {first:?} = \"chair\", or \"\" for points without a label; or take all of them for clutter with \
+                     unknown_as_clutter = true"
                 ),
             ));
         }

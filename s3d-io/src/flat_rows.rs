@@ -85,10 +85,6 @@ impl Tags {
     pub(crate) fn get(&self, index: u32) -> Option<&Tag> {
         self.list.get(index as usize)
     }
-
-    pub(crate) fn list(&self) -> &[Tag] {
-        &self.list
-    }
 }
 
 /// Some rows. Every column has an entry a row.

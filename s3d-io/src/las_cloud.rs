@@ -92,9 +92,12 @@ impl<'a> LasCloud<'a> {
             let mut record = [0; 60];
             let read = source.seek(SeekFrom::Start(start)).and_then(|_| source.read_exact(&mut record));
             let length = u64::from_le_bytes([
-                record[20], record[21], record[22], record[23], record[24], record[25], record[26], record[27],
+                record[20], record[21], record[22], record[23], record[24], record[25], record[26],
+                record[27],
             ]);
-            if read.is_err() || start.checked_add(60).and_then(|n| n.checked_add(length)).is_none_or(|n| n > size) {
+            if read.is_err()
+                || start.checked_add(60).and_then(|n| n.checked_add(length)).is_none_or(|n| n > size)
+            {
                 return cut("extended records beyond its end");
             }
         }
@@ -143,7 +146,15 @@ impl<'a> LasCloud<'a> {
                     f64::from_le_bytes(bytes)
                 };
                 let kinds = [
-                    Kind::U8, Kind::I8, Kind::U16, Kind::I16, Kind::U32, Kind::I32, Kind::U64, Kind::I64, Kind::F32,
+                    Kind::U8,
+                    Kind::I8,
+                    Kind::U16,
+                    Kind::I16,
+                    Kind::U32,
+                    Kind::I32,
+                    Kind::U64,
+                    Kind::I64,
+                    Kind::F32,
                     Kind::F64,
                 ];
                 // 11 to 30 are arrays of two or three, no longer used; 0 is a number of bytes that only its writer knows.
@@ -185,10 +196,7 @@ impl<'a> LasCloud<'a> {
                 let names: Vec<&str> = all.iter().map(|(n, _)| n.as_str()).collect();
                 Err(Error::format(
                     &self.path,
-                    format!(
-                        "has no dimension {name:?} ({key} in [annotations]); it has {}",
-                        names.join(" ")
-                    ),
+                    format!("has no dimension {name:?} ({key} in [annotations]); it has {}", names.join(" ")),
                 ))
             }
         }
@@ -263,7 +271,10 @@ impl Cloud for LasCloud<'_> {
             let n = BATCH.min(count - done);
             let read = guarded(|| reader.fill_points(n, &mut data)).map_err(damaged)?;
             if read.map_err(|e| self.error(done, &e))? == 0 {
-                return Err(Error::format(path, format!("ends after point {done} of {count}: it is cut short")));
+                return Err(Error::format(
+                    path,
+                    format!("ends after point {done} of {count}: it is cut short"),
+                ));
             }
             for record in data.raw_bytes().chunks_exact(data.record_len()) {
                 done += 1;
@@ -295,7 +306,9 @@ impl Cloud for LasCloud<'_> {
             }
         }
         if withheld > 0 {
-            reading.notes.push(format!("{}: {withheld} points are withheld (deleted), left out", path.display()));
+            reading
+                .notes
+                .push(format!("{}: {withheld} points are withheld (deleted), left out", path.display()));
         }
         Ok(true)
     }

@@ -104,7 +104,12 @@ impl<'a> NpyCloud<'a> {
         };
         let names: Vec<String> = {
             let archive = ZipArchive::new(self.file()?).map_err(zipped)?;
-            archive.file_names().flatten().filter(|n| n.ends_with(".npy")).map(std::borrow::Cow::into_owned).collect()
+            archive
+                .file_names()
+                .flatten()
+                .filter(|n| n.ends_with(".npy"))
+                .map(std::borrow::Cow::into_owned)
+                .collect()
         };
         // An archive lends one member at a time: each array has one of its own. Few have more than a dozen.
         if names.is_empty() || names.len() > 64 {
@@ -155,7 +160,8 @@ impl<'a> NpyCloud<'a> {
             for (_, header, member) in &mut arrays {
                 column.resize(n * header.stride, 0);
                 fill(&self.path, member, &mut column, done, rows, header.stride)?;
-                for (record, piece) in block.chunks_exact_mut(stride).zip(column.chunks_exact(header.stride)) {
+                for (record, piece) in block.chunks_exact_mut(stride).zip(column.chunks_exact(header.stride))
+                {
                     record[at..at + header.stride].copy_from_slice(piece);
                 }
                 at += header.stride;
@@ -189,4 +195,3 @@ impl Cloud for NpyCloud<'_> {
         if self.is_npz() { self.read_npz(colors, reading) } else { self.read_npy(colors, reading) }
     }
 }
-

@@ -32,7 +32,9 @@ impl NpyHeader {
     pub(crate) fn read(path: &Path, source: &mut impl Read) -> Result<Self> {
         let mut start = [0; 8];
         let short = |e: std::io::Error| match e.kind() {
-            std::io::ErrorKind::UnexpectedEof => Error::format(path, "is no NPY array: it ends in its header"),
+            std::io::ErrorKind::UnexpectedEof => {
+                Error::format(path, "is no NPY array: it ends in its header")
+            }
             std::io::ErrorKind::InvalidData => Error::format(path, format!("cannot be unpacked: {e}")),
             _ => Error::io(path, "read", e),
         };
@@ -335,7 +337,10 @@ mod tests {
             ("{'a': ((((((((((((((((((((1))))))))))))))))))))}", "deep"),
         ] {
             let message = format!("{:?}", header(text).unwrap_err());
-            assert!(message.contains(words) || message.replace('\\', "").contains(words), "{text}: {message}");
+            assert!(
+                message.contains(words) || message.replace('\\', "").contains(words),
+                "{text}: {message}"
+            );
         }
     }
 
