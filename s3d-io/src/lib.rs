@@ -10,7 +10,7 @@
 //!   [`Compression`] to choose, and their readers;
 //! - cameras: [`PoseFile`];
 //! - meshes: [`read_mesh`] (OBJ, glTF), [`write_rgb_obj`], [`write_semantic_obj`];
-//! - scans: [`read_scene`], [`read_cameras`], [`AnnotationTree`], [`PointReader`];
+//! - scans: [`read_scene`], [`read_cameras`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
 //! - lists: [`write_labels`], [`write_splits`].
 //!
@@ -40,13 +40,21 @@
 //! # }
 //! ```
 
+mod annotations;
 mod atomic;
 mod cameras;
+mod cloud_columns;
+mod cloud_records;
 mod colmap_images;
 mod compression;
 mod deflate;
+mod e57_cloud;
 mod error;
 mod exr;
+mod flat;
+mod flat_meaning;
+mod flat_rows;
+mod flat_store;
 mod gltf;
 mod gltf_accessor;
 mod gltf_builder;
@@ -55,11 +63,14 @@ mod gltf_material;
 mod instances;
 mod json;
 mod labels;
+mod las_cloud;
 mod layout;
 mod located_picture;
 mod mesh_file;
 mod mtl;
 mod nerfstudio_frames;
+mod npy_cloud;
+mod npy_header;
 mod obj;
 mod obj_diagnose;
 mod obj_lines;
@@ -67,6 +78,11 @@ mod obj_looks;
 mod obj_plain;
 mod obj_write;
 mod ply;
+mod ply_batch;
+mod ply_cloud;
+mod ply_elements;
+mod ply_header;
+mod ply_source;
 mod png;
 mod png_filter;
 mod pose;
@@ -76,10 +92,12 @@ mod s3dis;
 mod s3dis_points;
 mod s3dis_write;
 mod scan_locations;
+mod scannet_cloud;
 mod scene;
 mod splits;
 mod texture_file;
 
+pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, Skipped};
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
 pub use cameras::{ScanLocation, read_cameras};
 pub use compression::{Compression, UnknownCompression};

@@ -53,8 +53,8 @@ pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Outcome<()> {
     let entries = Layout::new(&root).entries(&inputs.numbers());
     for area in &inputs.areas {
         let scene = &area.scene;
-        let inputs = [Some(&scene.path), Some(&scene.mesh), Some(&scene.annotations), area.cameras_path()];
-        for path in inputs.into_iter().flatten() {
+        let others = [Some(&scene.path), Some(&scene.mesh), area.cameras_path()];
+        for path in others.into_iter().flatten().chain(&scene.annotations) {
             let Ok(input) = fs::canonicalize(path) else { continue };
             if entries.iter().any(|entry| input.starts_with(entry))
                 || input.is_dir() && root.starts_with(&input)
