@@ -1,6 +1,6 @@
 //! Meshes put together from parts.
 
-use crate::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX};
+use crate::{DEFAULT_COLOR, Material, MeshParts, MeshReport, NO_INDEX, TriMesh};
 
 impl MeshParts {
     /// Adds the vertices, faces, materials and textures of `other` after its own. Every face keeps its attributes; a
@@ -64,6 +64,28 @@ impl MeshParts {
     }
 }
 
+impl TriMesh {
+    /// Both meshes as one; see [`MeshParts::append`]. Their reports are added up.
+    ///
+    /// # Panics
+    /// If they have more vertices, texture coordinates or normals together than 32 bits count.
+    #[must_use]
+    pub fn join(self, other: Self) -> Self {
+        let [a, b] = [self.report(), other.report()];
+        let lengths = |p: &MeshParts| [p.positions.len(), p.uvs.len(), p.normals.len(), p.faces.len()];
+        for (n, more) in lengths(self.parts()).into_iter().zip(lengths(other.parts())) {
+            assert!(n + more < NO_INDEX as usize, "{n} and {more} are more than 32 bits count");
+        }
+        let mut parts = self.into_parts();
+        parts.append(other.into_parts());
+        let report = MeshReport {
+            zero_area_faces: a.zero_area_faces + b.zero_area_faces,
+            non_finite_attributes: a.non_finite_attributes + b.non_finite_attributes,
+        };
+        Self::from_checked(parts, report)
+    }
+}
+
 fn shifted(index: u32, offset: usize) -> u32 {
     if index == NO_INDEX { NO_INDEX } else { index + offset as u32 }
 }
@@ -86,7 +108,7 @@ fn append_column<T: Clone>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FaceColor, TriMesh, cuboid, furnished_room, quad};
+    use crate::{FaceColor, cuboid, furnished_room, quad};
     use glam::Vec3;
 
     #[test]
@@ -124,6 +146,21 @@ mod tests {
         assert_eq!(all.corner_normals(n + m), None);
         // The box's own material: the first of three, its floor's colour on no face but its own.
         assert!(all.material_of(n).is_none() && all.material_of(n + m).is_some());
+    }
+
+    #[test]
+    fn joined_meshes_keep_what_was_mended() {
+        let with_sliver = |x: f32| {
+            let mut parts = quad([Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y].map(|p| p + Vec3::X * x));
+            parts.faces.push([0, 0, 1]);
+            parts.face_uvs.push([NO_INDEX; 3]);
+            TriMesh::new(parts).unwrap()
+        };
+        let (a, b) = (with_sliver(0.0), with_sliver(5.0));
+        let all = a.clone().join(b.clone());
+        assert_eq!((all.faces().len(), all.report().zero_area_faces), (4, 2));
+        assert_eq!([all.triangle(1), all.triangle(2)], [a.triangle(1), b.triangle(0)]);
+        TriMesh::new(all.into_parts()).unwrap();
     }
 
     #[test]

@@ -234,6 +234,18 @@ impl TriMesh {
         self.parts
     }
 
+    /// The mesh with other tags.
+    ///
+    /// # Panics
+    /// If `tags` is neither empty nor has one entry a face.
+    #[must_use]
+    pub fn with_face_tags(mut self, tags: Vec<u32>) -> Self {
+        let faces = self.parts.faces.len();
+        assert!(tags.is_empty() || tags.len() == faces, "{} tags for {faces} faces", tags.len());
+        self.parts.face_tags = tags;
+        self
+    }
+
     /// The column [`MeshParts::face_tags`], which the mesh has no more after that.
     #[must_use]
     pub fn take_face_tags(&mut self) -> Vec<u32> {

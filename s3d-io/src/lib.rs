@@ -9,8 +9,8 @@
 //! - images: [`encode_rgb8`] and [`encode_gray16`] (PNG), [`encode_xyz_half`] and [`encode_xyz_float`] (OpenEXR), with a
 //!   [`Compression`] to choose, and their readers;
 //! - cameras: [`PoseFile`];
-//! - meshes: [`read_mesh`] (OBJ, glTF), [`write_rgb_obj`], [`write_semantic_obj`];
-//! - scans: [`read_scene`], [`read_cameras`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
+//! - meshes: [`read_mesh`] and [`read_meshes`] (OBJ, glTF, PLY), with [`MeshLabels`]; [`write_rgb_obj`], [`write_semantic_obj`];
+//! - scans: [`read_scene`], [`read_scan_locations`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
 //! - lists: [`write_labels`], [`write_splits`].
 //!
@@ -67,6 +67,8 @@ mod las_cloud;
 mod layout;
 mod located_picture;
 mod mesh_file;
+mod mesh_join;
+mod mesh_labels;
 mod mtl;
 mod nerfstudio_frames;
 mod npy_cloud;
@@ -81,8 +83,12 @@ mod ply;
 mod ply_batch;
 mod ply_cloud;
 mod ply_elements;
+mod ply_faces;
 mod ply_header;
+mod ply_labels;
+mod ply_mesh;
 mod ply_source;
+mod ply_vertices;
 mod png;
 mod png_filter;
 mod pose;
@@ -108,7 +114,9 @@ pub use json::{read_json, write_json};
 pub use labels::{read_labels, write_labels};
 pub use layout::{Domain, Frame, ImageName, Layout, UnknownDomain, image_stem, is_valid_room, is_valid_uuid};
 pub use located_picture::uuid_from_name;
-pub use mesh_file::{MeshFile, UpAxis, read_mesh};
+pub use mesh_file::{MeshFile, MeshOptions, UpAxis, read_mesh, read_mesh_with};
+pub use mesh_join::{MeshSource, read_meshes, read_meshes_with};
+pub use mesh_labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
 pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
 pub use ply::{PlyPointWriter, read_ply_point_count};
 pub use png::{Content, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};

@@ -2,7 +2,7 @@
 
 use crate::quote::count;
 use crate::texture_file::TextureFile;
-use crate::{Error, Result, gltf, obj};
+use crate::{Error, MeshLabels, MeshSource, Result, gltf, obj, ply_mesh};
 use s3d_geom::glam::{Vec3, vec3};
 use s3d_geom::{MeshError, MeshParts, TriMesh};
 use std::path::Path;
@@ -36,13 +36,53 @@ pub struct MeshFile {
     pub texture_files: Vec<Option<TextureFile>>,
     /// What was mended, left out or replaced: a sentence each, for the user.
     pub warnings: Vec<String>,
+    /// Labels that the file gives its faces or vertices, if it does; aligned with those of `mesh`.
+    pub labels: Option<MeshLabels>,
+    /// The files that the mesh comes from, and where in it each begins.
+    pub sources: Vec<MeshSource>,
     /// How many faces of the file had more than three corners.
     pub polygons_triangulated: usize,
     /// How many faces were left out because an earlier one has the same corners.
     pub repeated_faces: usize,
 }
 
-/// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf` or `.glb`, in any case.
+impl MeshFile {
+    /// A mesh of the file `path`, with nothing else to say about it.
+    pub(crate) fn new(path: &Path, mesh: TriMesh) -> Self {
+        let (texture_files, warnings, labels) = Default::default();
+        let sources = vec![MeshSource { path: path.to_owned(), first_face: 0, first_vertex: 0 }];
+        Self { mesh, texture_files, warnings, labels, sources, polygons_triangulated: 0, repeated_faces: 0 }
+    }
+
+    /// Leaves out the faces that repeat an earlier one; labels follow the tags of the mesh, which are returned.
+    pub(crate) fn tidy(mut self) -> (Self, Vec<u32>) {
+        let (mut mesh, repeated) = self.mesh.without_repeated_faces();
+        let tags = mesh.take_face_tags();
+        if let Some(labels) = self.labels.as_mut().filter(|_| !tags.is_empty()) {
+            labels.pick_faces(&tags);
+        }
+        self.mesh = mesh;
+        self.repeated_faces += repeated;
+        if repeated > 0 {
+            let n = count(repeated, "face");
+            self.warnings.push(format!("{n} left out: earlier faces have the same corners"));
+        }
+        (self, tags)
+    }
+}
+
+/// How a mesh is read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MeshOptions {
+    /// The property of a PLY file's faces or vertices that tells what they are; by default one of the names that
+    /// scanners and data sets use, such as `label`, `class` and `category_id`, if it is there.
+    pub class_column: Option<String>,
+    /// The property that tells which object they belong to; by default one such as `object_id` and `instance`, if it is
+    /// there.
+    pub instance_column: Option<String>,
+}
+
+/// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf`, `.glb` or `.ply`, in any case.
 ///
 /// A texture that is missing or cannot be decoded, a face without area, of fewer than three corners or with the corners
 /// of an earlier one and the like do not stop it: they become [`MeshFile::warnings`].
@@ -51,21 +91,27 @@ pub struct MeshFile {
 /// [`Error::Unsupported`] for any other ending and for features of a format that are not read, [`Error::Io`],
 /// [`Error::Format`] with the place, and [`Error::Mesh`] if no face is left.
 pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
+    read_mesh_with(path, up, &MeshOptions::default())
+}
+
+/// As [`read_mesh`], with the names of the columns of labels. Only PLY files have such columns.
+///
+/// # Errors
+/// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that is not
+/// whole.
+pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let mut file = match ending.as_str() {
+    let file = match ending.as_str() {
         "obj" => obj::read(path, up),
         "gltf" | "glb" => gltf::read(path, up),
-        "" => Err(Error::unsupported(path, "has no ending; meshes are read from .obj, .gltf and .glb")),
-        _ => Err(Error::unsupported(path, format!(".{ending} is not read; meshes are .obj, .gltf or .glb"))),
+        "ply" => ply_mesh::read(path, up, options),
+        "" => Err(Error::unsupported(path, "has no ending; meshes are read from .obj, .gltf, .glb and .ply")),
+        _ => {
+            let message = format!(".{ending} is not read; meshes are .obj, .gltf, .glb or .ply");
+            Err(Error::unsupported(path, message))
+        }
     }?;
-    let (mesh, repeated) = file.mesh.without_repeated_faces();
-    file.mesh = mesh;
-    file.repeated_faces = repeated;
-    if repeated > 0 {
-        file.warnings
-            .push(format!("{} left out: earlier faces have the same corners", count(repeated, "face")));
-    }
-    Ok(file)
+    Ok(file.tidy().0)
 }
 
 /// Makes the mesh, and tells in `warnings` what was mended.
@@ -100,7 +146,7 @@ mod tests {
 
     #[test]
     fn other_formats_are_refused_by_name() {
-        for (name, word) in [("scan.fbx", ".fbx"), ("scan", "no ending"), ("a.b/scan.PLY", ".ply")] {
+        for (name, word) in [("scan.fbx", ".fbx"), ("scan", "no ending"), ("a.b/scan.PLYX", ".ply")] {
             let message = read_mesh(Path::new(name), UpAxis::Y).unwrap_err().to_string();
             assert!(message.contains(word) && message.contains(".obj, .gltf"), "{message}");
         }

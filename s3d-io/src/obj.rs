@@ -73,7 +73,8 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         MeshError::NonFinite { vertex, position } => vertex_error(path, &bytes, vertex, position),
         source => Error::Mesh { path: path.to_owned(), source },
     })?;
-    Ok(MeshFile { mesh, texture_files: looks.files, warnings, polygons_triangulated, repeated_faces: 0 })
+    let texture_files = looks.files;
+    Ok(MeshFile { texture_files, warnings, polygons_triangulated, ..MeshFile::new(path, mesh) })
 }
 
 fn no_faces(plain: &PlainObj) -> String {

@@ -162,7 +162,7 @@ fn resolve(folder: &Path, name: &str) -> PathBuf {
 
 /// Where the image `name` is: below the library's folder, below the OBJ file's, or, as other machines' paths are
 /// worth nothing here, by its last part beside either. `true` if it is where `name` says.
-fn find_image(name: &str, library: &Path, folder: &Path) -> Option<(PathBuf, bool)> {
+pub(crate) fn find_image(name: &str, library: &Path, folder: &Path) -> Option<(PathBuf, bool)> {
     let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
     [(name, library, true), (name, folder, true), (last, library, false), (last, folder, false)]
         .into_iter()

@@ -1,0 +1,299 @@
+//! Labels that came with a mesh: numbers of its faces or vertices, or the names of its materials.
+
+use crate::quote::{count, quote};
+use s3d_geom::{NO_INDEX, TriMesh};
+use s3d_label::{Label, parse_name};
+use std::collections::HashMap;
+
+/// In place of a number: this face or vertex has none.
+pub const NO_LABEL: i64 = i64::MIN;
+
+/// What of a mesh has labels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LabelElement {
+    /// Its faces.
+    Face,
+    /// Its vertices.
+    Vertex,
+}
+
+/// A column of numbers, and what the file calls it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LabelColumn {
+    /// The property's name as the file writes it, such as `category_id`.
+    pub name: String,
+    /// One a face or vertex of the mesh; [`NO_LABEL`] where there is none.
+    pub values: Vec<i64>,
+}
+
+/// Labels that came with a mesh, aligned with its faces or vertices as they are after all checks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MeshLabels {
+    /// Numbers, whose meaning is told elsewhere: by a table of classes. At least one of the columns is there.
+    Numbers {
+        /// What they belong to.
+        element: LabelElement,
+        /// What a face or vertex is.
+        class: Option<LabelColumn>,
+        /// Which object it belongs to.
+        instance: Option<LabelColumn>,
+    },
+    /// Labels of the data set for each face, as the published `semantic.obj` has them. Made by
+    /// [`MeshLabels::from_materials`].
+    Names {
+        /// The different labels, in the order in which the mesh's materials name them.
+        labels: Vec<Label>,
+        /// One a face: its place in `labels`, or [`NO_INDEX`] for the null label.
+        faces: Vec<u32>,
+    },
+}
+
+impl MeshLabels {
+    /// Labels of faces from the names of their materials (`usemtl chair_3_office_5_1`), and a warning for names that are
+    /// none; `None` if fewer than half of the faces have such a name, or none of them. The null label
+    /// `<UNK>_0_<UNK>_0_0` is a name too. Source: formats.md, "World and meshes".
+    ///
+    /// ```
+    /// use s3d_geom::{Material, MeshParts, TriMesh, glam::Vec3};
+    /// use s3d_io::MeshLabels;
+    /// let mesh = TriMesh::new(MeshParts {
+    ///     positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+    ///     faces: vec![[0, 1, 2]],
+    ///     materials: vec![Material { name: "chair_3_office_5_1".into(), color: [0; 3], texture: None }],
+    ///     face_materials: vec![0],
+    ///     ..MeshParts::default()
+    /// })?;
+    /// let Some((MeshLabels::Names { labels, faces }, warnings)) = MeshLabels::from_materials(&mesh) else { panic!() };
+    /// assert_eq!((labels[faces[0] as usize].instance, warnings.len()), (3, 0));
+    /// # Ok::<(), s3d_geom::MeshError>(())
+    /// ```
+    pub fn from_materials(mesh: &TriMesh) -> Option<(Self, Vec<String>)> {
+        let mut labels = Vec::new();
+        let mut known: HashMap<Label, u32> = HashMap::new();
+        let mut is_name = Vec::new();
+        let places: Vec<u32> = mesh
+            .materials()
+            .iter()
+            .map(|material| {
+                let parsed = parse_name(&material.name);
+                is_name.push(parsed.is_ok());
+                let Ok(Some(label)) = parsed else { return NO_INDEX };
+                *known.entry(label).or_insert_with(|| {
+                    labels.push(label);
+                    labels.len() as u32 - 1
+                })
+            })
+            .collect();
+        let mut named = 0;
+        let mut others = vec![0usize; places.len()];
+        let mut without = 0;
+        let faces: Vec<u32> = (0..mesh.faces().len() as u32)
+            .map(|face| match mesh.material_of(face).map(|m| m as usize) {
+                Some(m) if is_name[m] => {
+                    named += 1;
+                    places[m]
+                }
+                Some(m) => {
+                    others[m] += 1;
+                    NO_INDEX
+                }
+                None => {
+                    without += 1;
+                    NO_INDEX
+                }
+            })
+            .collect();
+        if labels.is_empty() || 2 * named < faces.len() {
+            return None;
+        }
+        let mut warnings = Vec::new();
+        if let Some(first) = others.iter().position(|&n| n > 0) {
+            let name = quote(mesh.materials()[first].name.as_bytes());
+            let n = count(others.iter().sum(), "face");
+            warnings.push(format!(
+                "{n} without a label: the names of their materials are none, the first is {name}"
+            ));
+        }
+        if without > 0 {
+            warnings.push(format!("{} without a label: no material", count(without, "face")));
+        }
+        Some((Self::Names { labels, faces }, warnings))
+    }
+
+    /// What the labels belong to.
+    pub fn element(&self) -> LabelElement {
+        match self {
+            Self::Numbers { element, .. } => *element,
+            Self::Names { .. } => LabelElement::Face,
+        }
+    }
+
+    /// The same as labels of faces: a face has the number that two or three of its corners have, and that of its first
+    /// corner if all differ. [`NO_LABEL`] counts as a number.
+    ///
+    /// # Panics
+    /// If the labels are not those of `mesh`.
+    #[must_use]
+    pub fn into_faces(self, mesh: &TriMesh) -> Self {
+        match self {
+            Self::Numbers { element: LabelElement::Vertex, class, instance } => {
+                let of_faces = |column: LabelColumn| LabelColumn {
+                    values: mesh
+                        .faces()
+                        .iter()
+                        .map(|corners| {
+                            let [a, b, c] = corners.map(|v| column.values[v as usize]);
+                            if b == c { b } else { a }
+                        })
+                        .collect(),
+                    name: column.name,
+                };
+                Self::Numbers {
+                    element: LabelElement::Face,
+                    class: class.map(of_faces),
+                    instance: instance.map(of_faces),
+                }
+            }
+            faces => faces,
+        }
+    }
+
+    /// Makes columns of faces of those of other faces, such as the polygons of a file: `tags` tells for each face its
+    /// place among them, or [`NO_INDEX`] for a face without a label.
+    pub(crate) fn pick_faces(&mut self, tags: &[u32]) {
+        match self {
+            Self::Numbers { element: LabelElement::Face, class, instance } => {
+                for column in [class, instance].into_iter().flatten() {
+                    column.values = picked(&column.values, tags, NO_LABEL);
+                }
+            }
+            Self::Numbers { .. } => {}
+            Self::Names { faces, .. } => *faces = picked(faces, tags, NO_INDEX),
+        }
+    }
+}
+
+fn picked<T: Copy>(values: &[T], tags: &[u32], missing: T) -> Vec<T> {
+    tags.iter().map(|&tag| values.get(tag as usize).copied().unwrap_or(missing)).collect()
+}
+
+/// Names of properties that hold classes, in the order in which they are looked for; case is no matter. Matterport3D
+/// (`category_id`), ScanNet and SceneNN (`label`), 3RScan (`globalId`, `NYU40`), CloudCompare (`scalar_…`) and what people
+/// write by hand.
+pub(crate) const CLASS_NAMES: [&str; 22] = [
+    "label",
+    "class",
+    "category_id",
+    "category",
+    "class_id",
+    "classification",
+    "semantic",
+    "semantic_id",
+    "semantic_label",
+    "semantic_class",
+    "sem_label",
+    "label_id",
+    "class_label",
+    "globalId",
+    "nyu40",
+    "nyu40id",
+    "labels",
+    "semseg",
+    "scalar_label",
+    "scalar_class",
+    "scalar_classification",
+    "scalar_semantic",
+];
+
+/// Names of properties that hold objects. Replica and Habitat (`object_id` of faces), 3RScan and MultiScan (`objectId`).
+/// Matterport3D's `segment_id` and `material_id` are none: an object has many segments.
+pub(crate) const INSTANCE_NAMES: [&str; 14] = [
+    "instance",
+    "instance_id",
+    "instance_label",
+    "ins_label",
+    "object_id",
+    "objectId",
+    "object",
+    "inst",
+    "inst_id",
+    "instances",
+    "instance_num",
+    "scalar_instance",
+    "scalar_instance_id",
+    "scalar_object_id",
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::Vec3;
+    use s3d_geom::{Material, MeshParts};
+
+    fn mesh(names: &[&str], face_materials: Vec<u32>) -> TriMesh {
+        TriMesh::new(MeshParts {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
+            faces: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]][..face_materials.len()].to_vec(),
+            materials: names
+                .iter()
+                .map(|name| Material { name: (*name).into(), color: [0; 3], texture: None })
+                .collect(),
+            face_materials,
+            ..MeshParts::default()
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn materials_named_as_labels_are_labels() {
+        let names = ["chair_3_office_5_1", "<UNK>_0_<UNK>_0_0", "wall_1_office_5_1", "default"];
+        let (labels, warnings) = MeshLabels::from_materials(&mesh(&names, vec![2, 1, 0, 3])).unwrap();
+        let MeshLabels::Names { labels, faces } = labels else { panic!("{labels:?}") };
+        assert_eq!(
+            labels.iter().map(Label::to_string).collect::<Vec<_>>(),
+            ["chair_3_office_5_1", "wall_1_office_5_1"]
+        );
+        assert_eq!(faces, [1, NO_INDEX, 0, NO_INDEX]);
+        assert_eq!(
+            warnings,
+            ["1 face without a label: the names of their materials are none, the first is `default`"]
+        );
+        let (_, warnings) = MeshLabels::from_materials(&mesh(&names, vec![2, 1, 0, NO_INDEX])).unwrap();
+        assert_eq!(warnings, ["1 face without a label: no material"]);
+    }
+
+    #[test]
+    fn ordinary_materials_are_no_labels() {
+        let names = ["chair_3_office_5_1", "wood", "<UNK>_0_<UNK>_0_0"];
+        assert_eq!(MeshLabels::from_materials(&mesh(&names, vec![0, 1, 1])), None);
+        assert_eq!(MeshLabels::from_materials(&mesh(&names[1..], vec![0, 0])), None);
+        // The null label alone labels nothing.
+        assert_eq!(MeshLabels::from_materials(&mesh(&names[2..], vec![0, 0])), None);
+    }
+
+    #[test]
+    fn faces_take_what_most_of_their_corners_have() {
+        let mesh = mesh(&["m"], vec![0; 4]);
+        let column =
+            |name: &str, values: &[i64]| Some(LabelColumn { name: name.into(), values: values.to_vec() });
+        let labels = MeshLabels::Numbers {
+            element: LabelElement::Vertex,
+            class: column("label", &[1, 2, 2, NO_LABEL]),
+            instance: column("object", &[5, 6, 7, 8]),
+        };
+        let mut faces = labels.into_faces(&mesh);
+        assert_eq!(
+            faces,
+            MeshLabels::Numbers {
+                element: LabelElement::Face,
+                class: column("label", &[2, 1, 1, 2]),
+                instance: column("object", &[5, 5, 5, 6]),
+            }
+        );
+        assert_eq!(faces.clone().into_faces(&mesh), faces);
+        faces.pick_faces(&[3, 0, NO_INDEX]);
+        let MeshLabels::Numbers { class, instance, .. } = faces else { panic!() };
+        assert_eq!(class.unwrap().values, [2, 2, NO_LABEL]);
+        assert_eq!(instance.unwrap().values, [6, 5, NO_LABEL]);
+    }
+}
