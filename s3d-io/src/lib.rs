@@ -10,7 +10,7 @@
 //!   [`Compression`] to choose, and their readers;
 //! - cameras: [`PoseFile`];
 //! - meshes: [`read_mesh`] (OBJ, glTF), [`write_rgb_obj`], [`write_semantic_obj`];
-//! - scans: [`read_scene`], [`read_cameras`], [`AnnotationTree`], [`PointReader`];
+//! - scans: [`read_scene`], [`read_cameras`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
 //! - lists: [`write_labels`], [`write_splits`].
 //!
@@ -40,6 +40,7 @@
 //! # }
 //! ```
 
+mod annotations;
 mod atomic;
 mod cameras;
 mod compression;
@@ -79,6 +80,7 @@ mod scene;
 mod splits;
 mod texture_file;
 
+pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, Skipped};
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
 pub use cameras::{ScanLocation, read_cameras};
 pub use compression::{Compression, UnknownCompression};

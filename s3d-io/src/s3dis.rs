@@ -19,13 +19,16 @@ pub enum OnFault {
 }
 
 /// How [`AnnotationTree::open_with`] takes what it finds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TreeOptions {
     /// At a folder that names no room, a room without annotations, or a file that names no instance.
     pub on_fault: OnFault,
     /// Whether an unknown class (`stairs_1.txt` in the published area) is taken for clutter, as its loaders do: its
     /// instances get the numbers after those of the room's clutter.
     pub unknown_as_clutter: bool,
+    /// Which class a word of a file's name means that is none of the 13; `None`: such files are left out without a word.
+    /// Its instances get the numbers after those of the room's own, as with clutter.
+    pub classes: BTreeMap<String, Option<Class>>,
 }
 
 /// The annotated instances of an area, by room.
@@ -114,19 +117,20 @@ impl AnnotationTree {
             return Err(Error::format(path, "is a room without a folder Annotations"));
         }
         let mut instances: BTreeMap<(Class, u32), PathBuf> = BTreeMap::new();
-        let mut unknown: Vec<(String, PathBuf)> = Vec::new();
+        let mut others: Vec<(Class, PathBuf)> = Vec::new();
         for path in entries(&annotations)? {
             let is_text = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("txt"));
             if !is_text || path.is_dir() {
                 self.warnings.push(format!("{}: not a file of points, left out", path.display()));
                 continue;
             }
-            let found = match instance_of(&path, options.unknown_as_clutter) {
-                Ok(Some(found)) => found,
-                Ok(None) => {
-                    unknown.push((name_of(&path), path));
+            let found = match instance_of(&path, options) {
+                Ok(Named::Instance(class, number)) => (class, number),
+                Ok(Named::Other(class)) => {
+                    others.push((class, path));
                     continue;
                 }
+                Ok(Named::Unlabelled) => continue,
                 Err(e) => {
                     self.fault(e, options)?;
                     continue;
@@ -140,16 +144,12 @@ impl AnnotationTree {
                 None => drop(instances.insert(found, path)),
             }
         }
-        for (name, path) in unknown {
-            let last = instances.range(..=(Class::Clutter, u32::MAX)).next_back();
-            let number =
-                last.filter(|((class, _), _)| *class == Class::Clutter).map_or(0, |((_, n), _)| *n) + 1;
-            self.warnings.push(format!(
-                "{}: {} is taken for clutter_{number}",
-                path.display(),
-                quote(name.as_bytes())
-            ));
-            instances.insert((Class::Clutter, number), path);
+        for (class, path) in others {
+            let last = instances.range((class, 0)..=(class, u32::MAX)).next_back();
+            let number = last.map_or(0, |((_, n), _)| *n) + 1;
+            let name = quote(name_of(&path).as_bytes());
+            self.warnings.push(format!("{}: {name} is taken for {class}_{number}", path.display()));
+            instances.insert((class, number), path);
         }
         if instances.is_empty() {
             return Err(Error::format(&annotations, "holds no CLASS_N.txt"));
@@ -162,8 +162,16 @@ impl AnnotationTree {
     }
 }
 
-/// Class and number that a file's name says; `None` if the class is unknown and `unknown_as_clutter`.
-fn instance_of(path: &Path, unknown_as_clutter: bool) -> Result<Option<(Class, u32)>> {
+/// What a file's name says.
+enum Named {
+    Instance(Class, u32),
+    /// A word that is no class, but is taken for one.
+    Other(Class),
+    /// A word whose points do not count.
+    Unlabelled,
+}
+
+fn instance_of(path: &Path, options: &TreeOptions) -> Result<Named> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let digits =
         stem.rsplit_once('_').filter(|(_, n)| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
@@ -179,9 +187,13 @@ fn instance_of(path: &Path, unknown_as_clutter: bool) -> Result<Option<(Class, u
         return Err(Error::format(path, message));
     };
     match word.parse() {
-        Ok(class) => Ok(Some((class, number))),
-        Err(_) if unknown_as_clutter => Ok(None),
-        Err(e) => Err(Error::format(path, format!("{e}"))),
+        Ok(class) => Ok(Named::Instance(class, number)),
+        Err(e) => match options.classes.get(word) {
+            Some(Some(class)) => Ok(Named::Other(*class)),
+            Some(None) => Ok(Named::Unlabelled),
+            None if options.unknown_as_clutter => Ok(Named::Other(Class::Clutter)),
+            None => Err(Error::format(path, format!("{e}"))),
+        },
     }
 }
 

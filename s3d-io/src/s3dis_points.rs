@@ -1,5 +1,6 @@
 //! The points of the S3DIS tree: `x y z r g b` a line.
 
+use crate::annotations::Skipped;
 use crate::obj_lines::words;
 use crate::quote::quote;
 use crate::s3dis::OnFault;
@@ -89,6 +90,11 @@ impl PointReader {
     /// What was wrong with the first line that was left out, with its number.
     pub fn first_skipped(&self) -> Option<&Error> {
         self.first_skipped.as_ref()
+    }
+
+    /// What was left out, once the file is read.
+    pub(crate) fn into_skipped(self) -> Skipped {
+        Skipped { count: self.skipped, first: self.first_skipped }
     }
 
     /// Appends the next points, at most `max_points`, to `out`, and gives their number: 0 at the end of the file.
