@@ -147,6 +147,7 @@ impl Annotations {
     /// | path | annotations |
     /// |---|---|
     /// | a folder | the S3DIS tree of an area, as [`AnnotationTree`] takes it |
+    /// | `….mat` | the `pointcloud.mat` of a published area, as [`MatArea`](crate::MatArea) takes it |
     ///
     /// The points of a tree are read when they are asked for, an instance at a time.
     ///
@@ -163,6 +164,8 @@ impl Annotations {
         for path in paths {
             let found = if path.is_dir() {
                 Self::from_tree(path, options)?
+            } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) {
+                Self::from_mat(path, options)?
             } else {
                 std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
                 return Err(Error::format(path, "is no kind of annotations that is read"));

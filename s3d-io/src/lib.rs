@@ -57,6 +57,7 @@ mod instances;
 mod json;
 mod labels;
 mod layout;
+mod mat_annotations;
 mod mat_read;
 mod mat_write;
 mod mesh_file;
@@ -90,6 +91,7 @@ pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instance
 pub use json::{read_json, write_json};
 pub use labels::{read_labels, write_labels};
 pub use layout::{Domain, Frame, ImageName, Layout, UnknownDomain, image_stem, is_valid_room, is_valid_uuid};
+
 pub use mat_read::{MatArea, MatObject, MatRoom};
 pub use mat_write::MatWriter;
 pub use mesh_file::{MeshFile, UpAxis, read_mesh};
