@@ -149,6 +149,10 @@ pub(crate) struct ExportOptions {
     /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
     #[arg(long)]
     pub(crate) smooth_normals: bool,
+    /// Skip and count what is not as it should be in the annotations — odd names, lines that are no points, unknown
+    /// classes — instead of stopping at it.
+    #[arg(long)]
+    pub(crate) lenient: bool,
     /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make them) or small
     /// (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
@@ -257,6 +261,9 @@ pub(crate) struct InfoArgs {
     /// The scene file.
     #[arg(value_name = "SCENE.toml")]
     pub(crate) scene: PathBuf,
+    /// Skip and count what is not as it should be in the annotations, as in an export with --lenient.
+    #[arg(long)]
+    pub(crate) lenient: bool,
     #[command(flatten)]
     pub(crate) threads: Threads,
 }

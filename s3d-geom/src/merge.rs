@@ -33,6 +33,7 @@ impl MeshParts {
         append_column(&mut self.face_materials, other.face_materials, faces, NO_INDEX, |m| {
             shifted(m, materials)
         });
+        append_column(&mut self.face_tags, other.face_tags, faces, NO_INDEX, |tag| tag);
     }
 
     /// All `parts` as one, in order; see [`MeshParts::append`].
@@ -96,9 +97,12 @@ mod tests {
         (colored.face_uvs, colored.uvs) = (vec![], vec![]);
         colored.normals = vec![Vec3::Z];
         colored.face_normals = vec![[0; 3]; 2];
+        colored.face_tags = vec![4; 2];
         let plain = cuboid(Vec3::ZERO, Vec3::ONE);
         let [n, m] = [textured.faces.len() as u32, colored.faces.len() as u32];
         let all = MeshParts::merge([textured.clone(), colored.clone(), plain, textured.clone()]);
+        let tag = |f: u32| all.face_tags[f as usize];
+        assert_eq!([tag(n - 1), tag(n), tag(n + 1), tag(n + m)], [NO_INDEX, 4, 4, NO_INDEX]);
         let all = TriMesh::new(all).unwrap();
         assert_eq!(all.faces().len() as u32, 2 * n + m + 12);
 

@@ -46,6 +46,9 @@ pub struct MeshParts {
     pub face_materials: Vec<u32>,
     /// The textures.
     pub textures: Vec<Texture>,
+    /// A number of the caller's for each face, such as its place in a file, by which columns of the caller's own can follow
+    /// when faces are dropped; none, or one a face.
+    pub face_tags: Vec<u32>,
 }
 
 /// What [`TriMesh::new`] mended.
@@ -138,6 +141,7 @@ impl TriMesh {
         length("texture coordinates of faces", parts.face_uvs.len(), n)?;
         length("normals of faces", parts.face_normals.len(), n)?;
         length("materials of faces", parts.face_materials.len(), n)?;
+        length("tags of faces", parts.face_tags.len(), n)?;
 
         let in_range = |face, what, index: u32, count: usize| {
             if (index as usize) < count {
@@ -202,6 +206,7 @@ impl TriMesh {
             keep_where(&mut parts.face_uvs, &has_area);
             keep_where(&mut parts.face_normals, &has_area);
             keep_where(&mut parts.face_materials, &has_area);
+            keep_where(&mut parts.face_tags, &has_area);
         }
         Ok(Self { parts, report })
     }
@@ -227,6 +232,12 @@ impl TriMesh {
     /// The columns, to make another mesh from.
     pub fn into_parts(self) -> MeshParts {
         self.parts
+    }
+
+    /// The column [`MeshParts::face_tags`], which the mesh has no more after that.
+    #[must_use]
+    pub fn take_face_tags(&mut self) -> Vec<u32> {
+        std::mem::take(&mut self.parts.face_tags)
     }
 
     /// The columns.
@@ -353,9 +364,11 @@ mod tests {
         let mut parts = square();
         parts.faces = vec![[0, 1, 2], [1, 1, 2], [0, 2, 3]];
         parts.face_materials = vec![0, 1, 2];
+        parts.face_tags = vec![7, 8, 9];
         parts.materials =
             ["a", "b", "c"].map(|name| Material { name: name.into(), color: [9; 3], texture: None }).to_vec();
-        let m = TriMesh::new(parts).unwrap();
+        let mut m = TriMesh::new(parts).unwrap();
+        assert_eq!((m.take_face_tags(), m.take_face_tags()), (vec![7, 9], vec![]));
         assert_eq!(m.report().zero_area_faces, 1);
         assert_eq!(m.faces(), [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(m.material_of(1), Some(2));
@@ -382,6 +395,10 @@ mod tests {
         let mut p = square();
         p.colors = vec![[0; 3]; 3];
         assert!(matches!(TriMesh::new(p), Err(MeshError::Length { count: 3, expected: 4, .. })));
+
+        let mut p = square();
+        p.face_tags = vec![1];
+        assert!(matches!(TriMesh::new(p), Err(MeshError::Length { count: 1, expected: 2, .. })));
 
         let mut p = square();
         p.faces = vec![[0, 0, 0]];

@@ -31,6 +31,7 @@ impl TriMesh {
         keep_where(&mut parts.face_uvs, &keep);
         keep_where(&mut parts.face_normals, &keep);
         keep_where(&mut parts.face_materials, &keep);
+        keep_where(&mut parts.face_tags, &keep);
         (Self::from_checked(parts, report), repeated)
     }
 }
@@ -60,11 +61,13 @@ mod tests {
         let faces = vec![[0, 1, 2], [2, 1, 0], [0, 1, 3], [5, 6, 4], [1, 2, 3]];
         let mut parts = MeshParts { positions, faces, ..MeshParts::default() };
         parts.face_materials = vec![0, 1, 2, 3, 4];
+        parts.face_tags = vec![10, 11, 12, 13, 14];
         parts.materials =
             (0..5).map(|i| crate::Material { name: i.to_string(), color: [i; 3], texture: None }).collect();
-        let (mesh, repeated) = TriMesh::new(parts).unwrap().without_repeated_faces();
+        let (mut mesh, repeated) = TriMesh::new(parts).unwrap().without_repeated_faces();
         assert_eq!(repeated, 2);
         assert_eq!(mesh.faces(), [[0, 1, 2], [0, 1, 3], [1, 2, 3]]);
+        assert_eq!(mesh.take_face_tags(), [10, 12, 14]);
         assert_eq!((0..3).map(|f| mesh.material_of(f).unwrap()).collect::<Vec<_>>(), [0, 2, 4]);
     }
 

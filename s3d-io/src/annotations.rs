@@ -1,7 +1,13 @@
 //! Annotated points of any source: rooms, their instances, and the points of one instance at a time.
 
+use crate::e57_cloud::E57Cloud;
+use crate::flat::{Cloud, read_flat};
+use crate::las_cloud::LasCloud;
+use crate::npy_cloud::NpyCloud;
+use crate::ply_cloud::PlyCloud;
 use crate::s3dis::{AnnotationTree, OnFault, TreeOptions};
 use crate::s3dis_points::PointReader;
+use crate::scannet_cloud::{ScannetCloud, is_scannet};
 use crate::{Error, Result};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
@@ -108,6 +114,11 @@ pub(crate) trait InstancePoints: Debug + Send + Sync {
 
     /// Which instance of that file they are, for messages; empty if it holds no other.
     fn part(&self) -> String;
+
+    /// Whether they are the vertices of a mesh.
+    fn are_vertices(&self) -> bool {
+        false
+    }
 }
 
 impl AnnotatedInstance {
@@ -129,6 +140,12 @@ impl AnnotatedInstance {
         self.points.read(out)
     }
 
+    /// Whether its points are the vertices of a mesh. Where that is the scene's own, a vertex is equally near to all faces
+    /// around it, and should vote for each of them.
+    pub fn are_vertices(&self) -> bool {
+        self.points.are_vertices()
+    }
+
     /// The file that its points are in.
     pub fn path(&self) -> &Path {
         self.points.path()
@@ -148,8 +165,29 @@ impl Annotations {
     /// |---|---|
     /// | a folder | the S3DIS tree of an area, as [`AnnotationTree`] takes it |
     /// | `….mat` | the `pointcloud.mat` of a published area, as [`MatArea`](crate::MatArea) takes it |
+    /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh, by object |
+    /// | `.ply` | vertices with properties for class and instance; ASCII or binary |
+    /// | `.npy` | a structured array, or a plain one of rows and columns, see [`AnnotationOptions::columns`] |
+    /// | `.npz` | one such array, or an array a column (`xyz`, `rgb`, `label`…), or a few |
+    /// | `.las`, `.laz` | `classification`, and `point_source_id` as instance; extra dimensions by name |
+    /// | `.e57` | several scans with their poses; attributes of extensions for classes and instances |
     ///
-    /// The points of a tree are read when they are asked for, an instance at a time.
+    /// The points of a tree are read when they are asked for, an instance at a time. All other files hold *clouds*: rows of
+    /// points, each of which says what it belongs to. All clouds of an area are read as one, and grouped:
+    ///
+    /// - **class**: [`AnnotationOptions::classes`] tells what a number or a name means; names of the 13 classes mean
+    ///   themselves, and the usual words of ScanNet's annotators the nearest of the 13. The numbers of a plain NPY array are
+    ///   S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes are named. A class without a meaning stops with a
+    ///   list of them.
+    /// - **instance**: points of one room and class with one number are one. Two classes of the file that mean the same are
+    ///   kept apart, since many files number per class. Points without a number, or with a negative one, are one instance a
+    ///   class and room. Instances are numbered per class and room from 1 in the order of their numbers in the file.
+    /// - **room**: what the column says (a name, or the number of a room of [`AnnotationOptions::room`]'s type), or else
+    ///   [`AnnotationOptions::room`], or else the room that a file is named after: `office_3.ply`, `Area_1_office_3.npy`, or
+    ///   an E57 scan.
+    ///
+    /// Colours of 16 bits or as floats become 8 bits: 16-bit numbers count as 8-bit ones if no number in the file is above
+    /// 255, floats from 0 to 1 if none is above 1.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for a path of another kind, for what the kind's reader finds wrong, for a room that
@@ -161,30 +199,34 @@ impl Annotations {
     pub fn open(paths: &[PathBuf], options: &AnnotationOptions) -> Result<Self> {
         assert!(!paths.is_empty(), "no path of annotations");
         let mut all = Self { rooms: Vec::new(), warnings: Vec::new() };
+        let mut clouds: Vec<Box<dyn Cloud + '_>> = Vec::new();
         for path in paths {
-            let found = if path.is_dir() {
-                Self::from_tree(path, options)?
+            if path.is_dir() && !is_scannet(path) {
+                all.join(Self::from_tree(path, options)?)?;
             } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) {
-                Self::from_mat(path, options)?
+                all.join(Self::from_mat(path, options)?)?;
             } else {
-                std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
-                return Err(Error::format(path, "is no kind of annotations that is read"));
-            };
-            all.join(found, path)?;
+                clouds.push(open_cloud(path, options)?);
+            }
+        }
+        if !clouds.is_empty() {
+            let clouds: Vec<&dyn Cloud> = clouds.iter().map(|c| &**c).collect();
+            all.join(read_flat(&clouds, options)?)?;
         }
         Ok(all)
     }
 
     /// Adds the rooms of another source.
-    fn join(&mut self, other: Self, path: &Path) -> Result<()> {
+    fn join(&mut self, other: Self) -> Result<()> {
         for room in other.rooms {
             match self.rooms.binary_search_by_key(&room.room, |r| r.room) {
                 Ok(i) => {
-                    let first = self.rooms[i].instances.first().map(AnnotatedInstance::source);
-                    return Err(Error::format(
-                        path,
-                        format!("{} is also in {}", room.room, first.unwrap_or_default()),
-                    ));
+                    let sources =
+                        [&room, &self.rooms[i]].map(|r| r.instances.first().map(AnnotatedInstance::source));
+                    let [second, first] = sources.map(Option::unwrap_or_default);
+                    let path = room.instances.first().map_or(Path::new(""), AnnotatedInstance::path);
+                    let message = format!("{} is in two sources, {first} and {second}", room.room);
+                    return Err(Error::format(path, message));
                 }
                 Err(i) => self.rooms.insert(i, room),
             }
@@ -224,6 +266,31 @@ impl Annotations {
         });
         Ok(Self { rooms: rooms.collect(), warnings: tree.warnings })
     }
+}
+
+/// The reader of a cloud, by the file's name.
+fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn Cloud + 'a>> {
+    let what = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    if what.is_dir() || name.ends_with(".aggregation.json") {
+        return Ok(Box::new(ScannetCloud::open(path)?));
+    }
+    if !what.is_file() {
+        return Err(Error::format(path, "is no file"));
+    }
+    Ok(match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
+        "ply" => Box::new(PlyCloud::new(path, options)),
+        "npy" | "npz" => Box::new(NpyCloud::new(path, options)),
+        "las" | "laz" => Box::new(LasCloud::new(path, options)),
+        "e57" => Box::new(E57Cloud::new(path, options)),
+        _ => {
+            return Err(Error::unsupported(
+                path,
+                "is no kind of annotations that is read: an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, or \
+                 ScanNet's .aggregation.json",
+            ));
+        }
+    })
 }
 
 /// A file of the S3DIS tree.
@@ -296,7 +363,7 @@ mod tests {
         assert_eq!(wall.source(), wall.path().display().to_string());
         let message = open(&[&a, &a], &AnnotationOptions::default()).unwrap_err().to_string();
         assert!(
-            message.contains("office_2 is also in ") && message.ends_with("Annotations/wall_1.txt"),
+            message.contains("office_2 is in two sources") && message.ends_with("Annotations/wall_1.txt"),
             "{message}"
         );
     }

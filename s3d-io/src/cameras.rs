@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// A location farther than this from the origin is no place in a building.
-const FARTHEST_M: f64 = 1e7;
+pub(crate) const FARTHEST_M: f64 = 1e7;
 
 /// The columns of the table, in the order that they have without a header.
 const COLUMNS: [&str; 8] = ["uuid", "x", "y", "z", "qx", "qy", "qz", "qw"];

@@ -67,6 +67,7 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         materials: looks.materials,
         face_materials: faces.materials,
         textures: looks.textures,
+        ..MeshParts::default()
     };
     let mesh = checked_mesh(parts, &mut warnings).map_err(|e| match e {
         MeshError::NonFinite { vertex, position } => vertex_error(path, &bytes, vertex, position),

@@ -26,8 +26,8 @@ pub struct TreeOptions {
     /// Whether an unknown class (`stairs_1.txt` in the published area) is taken for clutter, as its loaders do: its
     /// instances get the numbers after those of the room's clutter.
     pub unknown_as_clutter: bool,
-    /// Which class a word of a file's name means that is none of the 13; `None`: such files are left out without a word.
-    /// Its instances get the numbers after those of the room's own, as with clutter.
+    /// Which class a word of a file's name means, even if it is one of the 13; `None`: such files are left out without a
+    /// warning. Instances of another class than the word's get the numbers after those of the room's own, as with clutter.
     pub classes: BTreeMap<String, Option<Class>>,
 }
 
@@ -186,14 +186,13 @@ fn instance_of(path: &Path, options: &TreeOptions) -> Result<Named> {
         }
         return Err(Error::format(path, message));
     };
-    match word.parse() {
-        Ok(class) => Ok(Named::Instance(class, number)),
-        Err(e) => match options.classes.get(word) {
-            Some(Some(class)) => Ok(Named::Other(*class)),
-            Some(None) => Ok(Named::Unlabelled),
-            None if options.unknown_as_clutter => Ok(Named::Other(Class::Clutter)),
-            None => Err(Error::format(path, format!("{e}"))),
-        },
+    let class = word.parse::<Class>();
+    match (options.classes.get(word), class) {
+        (Some(Some(meant)), class) if class != Ok(*meant) => Ok(Named::Other(*meant)),
+        (Some(None), _) => Ok(Named::Unlabelled),
+        (_, Ok(class)) => Ok(Named::Instance(class, number)),
+        (_, Err(_)) if options.unknown_as_clutter => Ok(Named::Other(Class::Clutter)),
+        (_, Err(e)) => Err(Error::format(path, format!("{e}"))),
     }
 }
 

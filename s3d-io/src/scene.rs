@@ -1,14 +1,18 @@
 //! `scene.toml`: one area's mesh, annotations and scan locations.
 
+use crate::annotations::AnnotationOptions;
 use crate::mesh_file::UpAxis;
 use crate::texture_file::read_file;
 use crate::{Error, Result};
+use s3d_geom::glam::DVec3;
+use s3d_label::{Class, Room};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 /// The parts of a scan of one area. Paths are resolved: relative ones start at the folder of the file that names them.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
     /// The `scene.toml` itself.
     pub path: PathBuf,
@@ -18,8 +22,10 @@ pub struct SceneFile {
     pub mesh: PathBuf,
     /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published OBJ files.
     pub up: UpAxis,
-    /// The area's folder of the S3DIS tree: ROOM/Annotations/CLASS_N.txt.
-    pub annotations: PathBuf,
+    /// The annotated points: files and folders, see [`Annotations::open`](crate::Annotations::open). At least one.
+    pub annotations: Vec<PathBuf>,
+    /// How they are read. Faults stop.
+    pub annotation_options: AnnotationOptions,
     /// The table of scan locations.
     pub cameras: PathBuf,
 }
@@ -29,8 +35,58 @@ pub struct SceneFile {
 struct Document {
     area: NonZeroU32,
     mesh: MeshTable,
-    annotations: PathTable,
+    annotations: AnnotationTable,
     cameras: PathTable,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AnnotationTable {
+    path: Option<PathBuf>,
+    paths: Option<Vec<PathBuf>>,
+    class: Option<String>,
+    instance: Option<String>,
+    room: Option<String>,
+    rooms: Option<String>,
+    #[serde(default)]
+    columns: Vec<String>,
+    #[serde(default)]
+    offset_m: [f64; 3],
+    #[serde(default)]
+    unknown_as_clutter: bool,
+    #[serde(default)]
+    classes: BTreeMap<String, String>,
+}
+
+impl AnnotationTable {
+    fn options(&self) -> std::result::Result<AnnotationOptions, String> {
+        let room: Option<Room> = match &self.room {
+            Some(name) => Some(name.parse().map_err(|e| format!("annotations.room: {e}"))?),
+            None => None,
+        };
+        let mut classes = BTreeMap::new();
+        for (key, word) in &self.classes {
+            let class: Option<Class> = match word.as_str() {
+                "" => None,
+                word => Some(word.parse().map_err(|e| format!("annotations.classes.{key:?}: {e}"))?),
+            };
+            classes.insert(key.clone(), class);
+        }
+        if !self.offset_m.iter().all(|v| v.is_finite()) {
+            return Err(format!("annotations.offset_m = {:?} is not finite", self.offset_m));
+        }
+        Ok(AnnotationOptions {
+            unknown_as_clutter: self.unknown_as_clutter,
+            classes,
+            room,
+            class_column: self.class.clone(),
+            instance_column: self.instance.clone(),
+            room_column: self.rooms.clone(),
+            columns: self.columns.clone(),
+            offset_m: DVec3::from_array(self.offset_m),
+            ..AnnotationOptions::default()
+        })
+    }
 }
 
 #[derive(Deserialize)]
@@ -59,6 +115,23 @@ struct PathTable {
 /// path = "cameras.csv"
 /// ```
 ///
+/// Annotations of other kinds, and how they are read (see [`AnnotationOptions`]); every key but the path may be left out:
+///
+/// ```toml
+/// [annotations]
+/// path       = "cloud.laz"            # or paths = ["office_1.ply", "office_2.ply"]
+/// class      = "classification"       # the column of classes
+/// instance   = "point_source_id"      # the column of instance numbers
+/// room       = "office_1"             # the room of points that name none
+/// rooms      = "room"                 # the column of rooms
+/// columns    = ["x", "y", "z", "class"]         # of a plain NPY array
+/// offset_m   = [500000.0, 4000000.0, 0.0]       # subtracted from coordinates
+/// unknown_as_clutter = true           # classes without a meaning; else they stop
+/// [annotations.classes]
+/// "2" = "floor"
+/// "7" = ""                            # unlabelled
+/// ```
+///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value; without
 /// one if a file or folder that it names is not there.
@@ -76,22 +149,40 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
         }
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let existing = |key: &str, written: &Path, is_folder: bool| {
+    let existing = |key: &str, written: &Path| {
         let full = folder.join(written);
-        let (what, fits) = if is_folder { ("folder", full.is_dir()) } else { ("file", full.is_file()) };
-        if fits {
+        if full.is_file() {
             return Ok(full);
         }
         let state = if full.exists() { "is no" } else { "is not there; it should be a" };
-        Err(Error::format(path, format!("{key} = {written:?}: {} {state} {what}", full.display())))
+        Err(Error::format(path, format!("{key} = {written:?}: {} {state} file", full.display())))
     };
+    let table = &document.annotations;
+    let (key, written) = match (&table.path, &table.paths) {
+        (Some(path), None) => ("annotations.path", std::slice::from_ref(path)),
+        (None, Some(paths)) if !paths.is_empty() => ("annotations.paths", &paths[..]),
+        _ => {
+            return Err(Error::format(path, "annotations needs either path or paths, a list of at least one"));
+        }
+    };
+    let mut annotations = Vec::new();
+    for written in written {
+        let full = folder.join(written);
+        if !full.exists() {
+            let message = format!("{key} = {written:?}: {} is not there", full.display());
+            return Err(Error::format(path, message));
+        }
+        annotations.push(full);
+    }
+    let annotation_options = table.options().map_err(|why| Error::format(path, why))?;
     Ok(SceneFile {
         path: path.to_owned(),
         area: document.area.get(),
         up: document.mesh.up.unwrap_or(UpAxis::Y),
-        mesh: existing("mesh.path", &document.mesh.path, false)?,
-        annotations: existing("annotations.path", &document.annotations.path, true)?,
-        cameras: existing("cameras.path", &document.cameras.path, false)?,
+        mesh: existing("mesh.path", &document.mesh.path)?,
+        annotations,
+        annotation_options,
+        cameras: existing("cameras.path", &document.cameras.path)?,
     })
 }
 
@@ -111,7 +202,7 @@ mod tests {
         fs::write(&path, text).unwrap();
         let scene = read_scene(&path)?;
         assert_eq!(scene.mesh, dir.path().join("a.obj"));
-        assert_eq!(scene.annotations, dir.path().join("Area_2"));
+        assert_eq!(scene.annotations[0], dir.path().join("Area_2"));
         assert_eq!(scene.cameras, dir.path().join("c.csv"));
         Ok(scene)
     }
@@ -121,6 +212,29 @@ mod tests {
         let scene = read(GOOD).unwrap();
         assert_eq!((scene.area, scene.up), (2, UpAxis::Z));
         assert_eq!(read(&GOOD.replace("up = \"z\"\n", "")).unwrap().up, UpAxis::Y);
+    }
+
+    #[test]
+    fn clouds_and_how_they_are_read() {
+        let scene = read(GOOD).unwrap();
+        assert_eq!(scene.annotation_options, AnnotationOptions::default());
+        let table = "paths = [\"Area_2\", \"c.csv\"]\nclass = \"classification\"\ninstance = \"point_source_id\"\n\
+                     room = \"office_1\"\nrooms = \"room\"\ncolumns = [\"x\", \"y\"]\noffset_m = [5e5, -1, 0.5]\n\
+                     unknown_as_clutter = true\n[annotations.classes]\n\"2\" = \"floor\"\n7 = \"\"";
+        let scene = read(&GOOD.replace("path = \"Area_2\"", table)).unwrap();
+        assert!(scene.annotations[1].ends_with("c.csv"));
+        let expected = AnnotationOptions {
+            class_column: Some("classification".into()),
+            instance_column: Some("point_source_id".into()),
+            room: Some("office_1".parse().unwrap()),
+            room_column: Some("room".into()),
+            columns: vec!["x".into(), "y".into()],
+            offset_m: DVec3::new(5e5, -1.0, 0.5),
+            unknown_as_clutter: true,
+            classes: BTreeMap::from([("2".into(), Some(Class::Floor)), ("7".into(), None)]),
+            ..AnnotationOptions::default()
+        };
+        assert_eq!(scene.annotation_options, expected);
     }
 
     #[test]
@@ -137,7 +251,18 @@ mod tests {
             ("a.obj", "b.obj", "mesh.path = \"b.obj\""),
             ("a.obj", "Area_2", "is no file"),
             ("Area_2", "Area_9", "annotations.path = \"Area_9\""),
-            ("Area_2", "c.csv", "is no folder"),
+            ("path = \"Area_2\"", "", "either path or paths"),
+            ("path = \"Area_2\"", "paths = []", "either path or paths"),
+            ("path = \"Area_2\"", "path = \"Area_2\"\npaths = [\"c.csv\"]", "either path or paths"),
+            ("path = \"Area_2\"", "paths = [\"Area_2\", \"gone.las\"]", "annotations.paths = \"gone.las\""),
+            ("\"Area_2\"", "\"Area_2\"\nroom = \"kitchen_1\"", "annotations.room: \"kitchen_1\""),
+            ("\"Area_2\"", "\"Area_2\"\nroms = \"a\"", "line 7: unknown field `roms`"),
+            (
+                "\"Area_2\"",
+                "\"Area_2\"\nclasses = { 2 = \"sky\" }",
+                "annotations.classes.\"2\": \"sky\" is no class",
+            ),
+            ("\"Area_2\"", "\"Area_2\"\noffset_m = [1, inf, 0]", "not finite"),
             ("c.csv", "gone.csv", "cameras.path = \"gone.csv\""),
         ] {
             let message = read(&GOOD.replacen(from, to, 1)).unwrap_err().to_string();

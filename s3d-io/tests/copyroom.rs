@@ -40,7 +40,7 @@ fn the_parts_of_the_scan_fit_together() {
     let room = mesh.aabb();
     assert!(room.contains(locations[0].pose.location.as_vec3()), "{room:?}");
 
-    let tree = AnnotationTree::open(&scene.annotations).unwrap();
+    let tree = AnnotationTree::open(&scene.annotations[0]).unwrap();
     assert!(tree.warnings.is_empty(), "{:?}", tree.warnings);
     assert_eq!(tree.rooms.len(), 1);
     assert_eq!(tree.rooms[0].room.to_string(), "copyRoom_1");

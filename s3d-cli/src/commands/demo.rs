@@ -28,6 +28,7 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         keep_all: false,
         only: Vec::new(),
         smooth_normals: false,
+        lenient: false,
         compression: o.compression,
     };
     let scan = args.output.join(SCAN);

@@ -18,7 +18,7 @@ pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
 }
 
 fn report(args: &InfoArgs) -> Outcome<String> {
-    let inputs = Inputs::open(std::slice::from_ref(&args.scene))?;
+    let inputs = Inputs::open(std::slice::from_ref(&args.scene), args.lenient)?;
     let area = &inputs.areas[0];
     let file = s3d_io::read_mesh(&area.scene.mesh, area.scene.up)?;
     let mut wrong: Vec<String> = area.warnings.iter().chain(&file.warnings).cloned().collect();
@@ -49,6 +49,7 @@ fn report(args: &InfoArgs) -> Outcome<String> {
         wrong.extend(outlook.warnings(location));
     }
 
+    wrong.extend(annotated.skipped.sentence());
     wrong.extend(mesh_doubts(mesh));
     wrong.extend(label_doubts(&annotated.report));
     wrong.extend(hidden_instances(area, &annotated.face_labels, &inputs.table));

@@ -8,6 +8,7 @@ use s3d_geom::{
     Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh, Voxels,
     dominant_wall_direction_deg,
 };
+use s3d_io::{Error, OnFault};
 use s3d_label::{Class, Label, LabelId, LabelTable, Room, VoteReport, Votes};
 use std::collections::{BTreeMap, HashSet};
 
@@ -26,6 +27,27 @@ pub(crate) struct Annotated {
     pub(crate) rooms: Vec<SurveyedRoom>,
     /// Annotated points.
     pub(crate) points: u64,
+    pub(crate) skipped: SkippedLines,
+}
+
+/// What a lenient reading left out of the files of instances.
+#[derive(Default)]
+pub(crate) struct SkippedLines {
+    lines: u64,
+    empty_instances: u64,
+    /// The first place.
+    first: Option<String>,
+}
+
+impl SkippedLines {
+    /// A sentence on it, if there is something.
+    pub(crate) fn sentence(&self) -> Option<String> {
+        let first = self.first.as_ref()?;
+        Some(format!(
+            "{} lines of annotations and {} instances without points left out, the first: {first}",
+            self.lines, self.empty_instances
+        ))
+    }
 }
 
 /// What is known of a room from its points and faces.
@@ -59,6 +81,9 @@ pub(crate) fn annotate(
     let mut votes = Votes::new(mesh.faces().len());
     let mut rooms = Vec::new();
     let mut total = 0u64;
+    let mut skipped = SkippedLines::default();
+    let lenient = area.scene.annotation_options.on_fault == OnFault::Skip;
+    let mut corners: Option<Corners> = None;
     let files = area.rooms.iter().map(|r| r.instances.len()).sum::<usize>();
     let progress = Progress::new("labelling", "instances", files as u64);
     let mut cloud = PointCloud::default();
@@ -69,17 +94,39 @@ pub(crate) fn annotate(
         for instance in &room.instances {
             let id = table.id_of(&instance.label).unwrap_or(LabelId::NULL);
             cloud.clear();
-            s3d_io::read_points(&instance.path, &mut cloud)?;
+            let left_out = instance.points.read(&mut cloud)?;
+            skipped.lines += left_out.count;
+            if let Some(first) = left_out.first {
+                skipped.first.get_or_insert(first.to_string());
+            }
             let Some(voxels) = Voxels::from_points(&cloud.positions) else {
-                return Err(s3d_io::Error::format(
-                    &instance.path,
-                    "no point in it: remove the file, or annotate the instance",
-                )
-                .into());
+                let source = instance.points.source();
+                if lenient {
+                    skipped.empty_instances += 1;
+                    skipped.first.get_or_insert(format!("{source}: no point in it"));
+                    progress.add(1);
+                    continue;
+                }
+                let message = "no point in it: remove the file, or annotate the instance";
+                return Err(Error::format(instance.points.path(), message).into());
             };
-            nearest_faces.nearest_many(&cloud.positions, &mut nearest);
-            for n in &nearest {
-                votes.add(n.face, id, n.distance_m);
+            if instance.points.are_vertices() {
+                let corners = corners.get_or_insert_with(|| Corners::new(mesh));
+                corners.vote(&cloud.positions, id, &mut votes, &nearest_faces, &mut nearest);
+            } else if cloud.faces.len() == cloud.len() {
+                for face in &cloud.faces {
+                    if *face as usize >= mesh.faces().len() {
+                        let message =
+                            format!("a point is of face {face}; the mesh has {}", mesh.faces().len());
+                        return Err(Error::format(instance.points.path(), message).into());
+                    }
+                    votes.add(*face, id, 0.0);
+                }
+            } else {
+                nearest_faces.nearest_many(&cloud.positions, &mut nearest);
+                for n in &nearest {
+                    votes.add(n.face, id, n.distance_m);
+                }
             }
             cloud.positions.iter().for_each(|p| builder.add(*p));
             each(&AnnotatedInstance { label: instance.label, id, voxels: &voxels })?;
@@ -102,10 +149,10 @@ pub(crate) fn annotate(
         room.wall_direction_deg = upright.remove(&room.room).map_or(0, |faces| faces.direction_deg());
     }
     if rooms.is_empty() {
-        return Err(Failure::Input(format!("{}: no room in it", area.scene.annotations.display())));
+        return Err(Failure::Input(format!("{}: no room in it", area.scene.annotations[0].display())));
     }
     let report = VoteReport::new(&votes, table);
-    Ok(Annotated { face_labels, report, rooms, points: total })
+    Ok(Annotated { face_labels, report, rooms, points: total, skipped })
 }
 
 /// What looks wrong between mesh and annotations, as a sentence each.
@@ -144,8 +191,65 @@ pub(crate) fn hidden_instances(
     Some(format!(
         "{} annotated instances win no face of the mesh, the first {}: they are in no image and no sampled point",
         1 + hidden.count(),
-        first.path.display()
+        first.points.source()
     ))
+}
+
+/// The faces around each place where the mesh has a corner, for annotations that are its own vertices: such a point is
+/// equally near to all of them, and the nearest face by index alone would leave every other face without a vote.
+struct Corners {
+    /// The bits of a corner's place, and a face; sorted.
+    faces: Vec<([u32; 3], u32)>,
+}
+
+impl Corners {
+    fn new(mesh: &TriMesh) -> Self {
+        let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(3 * mesh.faces().len());
+        for (face, corners) in (0u32..).zip(mesh.faces()) {
+            faces.extend(corners.iter().map(|v| (Self::key(mesh.positions()[*v as usize]), face)));
+        }
+        faces.sort_unstable();
+        faces.dedup();
+        Self { faces }
+    }
+
+    /// The place to the bit, whatever the sign of a zero.
+    fn key(position: Vec3) -> [u32; 3] {
+        (position + 0.0).to_array().map(f32::to_bits)
+    }
+
+    /// The faces that have a corner there.
+    fn around(&self, position: Vec3) -> impl Iterator<Item = u32> {
+        let key = Self::key(position);
+        let start = self.faces.partition_point(|(k, _)| *k < key);
+        self.faces[start..].iter().take_while(move |(k, _)| *k == key).map(|(_, face)| *face)
+    }
+
+    /// Lets each point vote for all faces around it, or for the nearest if it is no corner of the mesh.
+    fn vote(
+        &self,
+        positions: &[Vec3],
+        id: LabelId,
+        votes: &mut Votes,
+        nearest_faces: &NearestFaces<'_>,
+        nearest: &mut Vec<Nearest>,
+    ) {
+        let mut others = Vec::new();
+        for position in positions {
+            let mut is_corner = false;
+            for face in self.around(*position) {
+                votes.add(face, id, 0.0);
+                is_corner = true;
+            }
+            if !is_corner {
+                others.push(*position);
+            }
+        }
+        nearest_faces.nearest_many(&others, nearest);
+        for n in nearest.iter() {
+            votes.add(n.face, id, n.distance_m);
+        }
+    }
 }
 
 /// The faces of a room that tell how its walls run: normals and areas.

@@ -3,7 +3,7 @@
 use super::manifest::half_step;
 use crate::failure::{Failure, Outcome};
 use s3d_geom::TriMesh;
-use s3d_io::{AnnotationTree, Error, InstanceFile, MeshFile, ScanLocation, SceneFile};
+use s3d_io::{AnnotatedInstance, Annotations, Error, MeshFile, OnFault, ScanLocation, SceneFile};
 use s3d_label::{Label, LabelTable, NumberedInstance, Room, number_area};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub(crate) struct AreaInput {
     pub(crate) rooms: Vec<RoomInput>,
     /// The scan locations, in the order of the camera table.
     pub(crate) locations: Vec<ScanLocation>,
-    /// What was odd in the annotation tree, as a sentence each.
+    /// What was odd in the annotations, as a sentence each.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -29,11 +29,11 @@ pub(crate) struct RoomInput {
     pub(crate) instances: Vec<InstanceInput>,
 }
 
-/// One annotated instance: its points' file and the name that the data set gives it.
+/// One annotated instance: its points and the name that the data set gives it.
 pub(crate) struct InstanceInput {
     pub(crate) label: Label,
     pub(crate) number_in_room: u32,
-    pub(crate) path: PathBuf,
+    pub(crate) points: AnnotatedInstance,
 }
 
 /// All areas, and the table of all their labels.
@@ -43,13 +43,17 @@ pub(crate) struct Inputs {
 }
 
 impl Inputs {
-    /// Reads the scene files, the names in their annotation trees and their camera tables.
-    pub(crate) fn open(scenes: &[PathBuf]) -> Outcome<Self> {
+    /// Reads the scene files, the names in their annotations (of clouds, all points) and their camera tables.
+    pub(crate) fn open(scenes: &[PathBuf], lenient: bool) -> Outcome<Self> {
         let mut areas = Vec::new();
         let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
         for path in scenes {
-            let scene = s3d_io::read_scene(path)?;
+            let mut scene = s3d_io::read_scene(path)?;
+            let options = &mut scene.annotation_options;
+            options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
+            // Areas wait beside one another.
+            options.points_in_memory /= scenes.len() as u64;
             if let Some(other) = area_of.insert(scene.area, path.clone()) {
                 return Err(Failure::Input(format!(
                     "{} and {} are both area {}: give each scene an area of its own",
@@ -85,9 +89,9 @@ impl Inputs {
 
 impl AreaInput {
     fn open(scene: SceneFile) -> Outcome<Self> {
-        let tree = AnnotationTree::open(&scene.annotations)?;
-        let warnings = tree.warnings.clone();
-        let rooms = number(scene.area, &scene, tree)?;
+        let mut annotations = Annotations::open(&scene.annotations, &scene.annotation_options)?;
+        let warnings = std::mem::take(&mut annotations.warnings);
+        let rooms = number(&scene, annotations)?;
         let locations = s3d_io::read_cameras(&scene.cameras)?;
         Ok(Self { scene, rooms, locations, warnings })
     }
@@ -138,22 +142,22 @@ pub(crate) fn mesh_doubts(mesh: &TriMesh) -> Vec<String> {
     doubts
 }
 
-/// Gives every instance of a tree, whose numbers run per room, its number in the area.
-fn number(area: u32, scene: &SceneFile, tree: AnnotationTree) -> Outcome<Vec<RoomInput>> {
-    let mut files: BTreeMap<(Room, usize, u32), InstanceFile> = BTreeMap::new();
+/// Gives every instance, whose numbers run per room, its number in the area.
+fn number(scene: &SceneFile, annotations: Annotations) -> Outcome<Vec<RoomInput>> {
+    let mut found: BTreeMap<(Room, usize, u32), AnnotatedInstance> = BTreeMap::new();
     let mut keys = Vec::new();
-    for room in tree.rooms {
-        for file in room.instances {
-            keys.push((room.room, file.class, file.number));
-            files.insert((room.room, file.class.index(), file.number), file);
+    for room in annotations.rooms {
+        for instance in room.instances {
+            keys.push((room.room, instance.class, instance.number));
+            found.insert((room.room, instance.class.index(), instance.number), instance);
         }
     }
-    let numbered = number_area(area, keys)
-        .map_err(|e| Failure::Input(format!("{}: {e}", scene.annotations.display())))?;
+    let numbered = number_area(scene.area, keys)
+        .map_err(|e| Failure::Input(format!("{}: {e}", scene.annotations[0].display())))?;
     let mut rooms: Vec<RoomInput> = Vec::new();
     for NumberedInstance { room, class, number_in_room, label } in numbered {
-        let Some(file) = files.remove(&(room, class.index(), number_in_room)) else { continue };
-        let instance = InstanceInput { label, number_in_room, path: file.path };
+        let Some(points) = found.remove(&(room, class.index(), number_in_room)) else { continue };
+        let instance = InstanceInput { label, number_in_room, points };
         match rooms.iter_mut().find(|r| r.room == room) {
             Some(r) => r.instances.push(instance),
             None => rooms.push(RoomInput { room, instances: vec![instance] }),

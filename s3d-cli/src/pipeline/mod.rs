@@ -62,7 +62,7 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     let layout = &target.layout;
     output::check(layout, target.overwrite, target.allowed)?;
     debug!("{options:?}");
-    let inputs = Inputs::open(scenes)?;
+    let inputs = Inputs::open(scenes, options.lenient)?;
     check_only(&inputs, &options.only)?;
     output::check_inputs(layout, &inputs)?;
     let areas = inputs.numbers();
@@ -162,6 +162,9 @@ fn label_area(
     })?;
     instances.finish()?;
     tell_labels(&annotated, started);
+    if let Some(w) = annotated.skipped.sentence() {
+        warn!("{w}");
+    }
     if let Some(w) = hidden_instances(area, &annotated.face_labels, table) {
         warn!("{w}");
     }

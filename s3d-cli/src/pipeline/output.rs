@@ -52,7 +52,8 @@ pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Outcome<()> {
     let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
     let entries = Layout::new(&root).entries(&inputs.numbers());
     for area in &inputs.areas {
-        for path in [&area.scene.path, &area.scene.mesh, &area.scene.annotations, &area.scene.cameras] {
+        let others = [&area.scene.path, &area.scene.mesh, &area.scene.cameras];
+        for path in others.into_iter().chain(&area.scene.annotations) {
             let Ok(input) = fs::canonicalize(path) else { continue };
             if entries.iter().any(|entry| input.starts_with(entry))
                 || input.is_dir() && root.starts_with(&input)

@@ -70,7 +70,6 @@ pub(crate) enum Filter {
 /// An object, found by its address.
 #[derive(Debug)]
 pub(crate) struct Object {
-    pub(crate) address: u64,
     pub(crate) header: Header,
 }
 
@@ -157,7 +156,7 @@ impl Hdf5File {
 
     /// The object at an address.
     pub(crate) fn object(&self, address: u64) -> Result<Object> {
-        Ok(Object { address, header: Header::read(self, address)? })
+        Ok(Object { header: Header::read(self, address)? })
     }
 
     /// The members of a group, by name; `None` if it is no group.
@@ -166,8 +165,6 @@ impl Hdf5File {
     }
 
     /// All of an array's data, as they are in the file: in C order, each element as its [`Kind`] says.
-    ///
-    /// With `limit` it is an error to have more than so many bytes.
     pub(crate) fn data(&self, dataset: &Dataset) -> Result<Vec<u8>> {
         let element = dataset.kind.size() as u64;
         let bytes = dataset.dims.iter().try_fold(element, |n, d| n.checked_mul(*d));

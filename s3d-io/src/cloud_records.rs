@@ -1,0 +1,299 @@
+//! Records of fixed size, as binary PLY, NPY and LAS hold points: fields at fixed places.
+
+use crate::annotations::AnnotationOptions;
+use crate::cloud_columns::Columns;
+use crate::flat::ColorRange;
+use crate::flat_rows::{Reading, Row, Value};
+use crate::{Error, Result};
+use s3d_geom::glam::dvec3;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+/// Bytes that are read at a time.
+const BLOCK: usize = 1 << 20;
+/// The longest record.
+const LONGEST_RECORD: usize = 1 << 16;
+
+/// How a number, or a text, is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F16,
+    F32,
+    F64,
+    /// One byte a character, ended by a zero byte if shorter.
+    Bytes(usize),
+    /// Four bytes a character, ended by a zero if shorter.
+    Utf32(usize),
+}
+
+impl Kind {
+    pub(crate) fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 | Self::F16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+            Self::Bytes(n) => n,
+            Self::Utf32(n) => 4 * n,
+        }
+    }
+
+    fn is_float(self) -> bool {
+        matches!(self, Self::F16 | Self::F32 | Self::F64)
+    }
+
+    fn is_text(self) -> bool {
+        matches!(self, Self::Bytes(_) | Self::Utf32(_))
+    }
+}
+
+/// A field of a record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Field {
+    pub(crate) name: String,
+    /// Where in the record it starts, in bytes.
+    pub(crate) at: usize,
+    pub(crate) kind: Kind,
+    pub(crate) big_endian: bool,
+}
+
+/// A number as a field holds it.
+enum Number {
+    Whole(i64),
+    Float(f64),
+}
+
+impl Field {
+    /// # Panics
+    /// If it is a text, or reaches beyond the record.
+    fn number(&self, record: &[u8]) -> Number {
+        macro_rules! number {
+            ($t:ty, $form:path, $to:ty) => {{
+                let mut bytes = [0; size_of::<$t>()];
+                bytes.copy_from_slice(&record[self.at..self.at + size_of::<$t>()]);
+                let v = if self.big_endian { <$t>::from_be_bytes(bytes) } else { <$t>::from_le_bytes(bytes) };
+                $form(<$to>::from(v))
+            }};
+        }
+        match self.kind {
+            Kind::I8 => number!(i8, Number::Whole, i64),
+            Kind::U8 => number!(u8, Number::Whole, i64),
+            Kind::I16 => number!(i16, Number::Whole, i64),
+            Kind::U16 => number!(u16, Number::Whole, i64),
+            Kind::I32 => number!(i32, Number::Whole, i64),
+            Kind::U32 => number!(u32, Number::Whole, i64),
+            Kind::I64 => number!(i64, Number::Whole, i64),
+            Kind::U64 => {
+                let mut bytes = [0; 8];
+                bytes.copy_from_slice(&record[self.at..self.at + 8]);
+                let v = if self.big_endian { u64::from_be_bytes(bytes) } else { u64::from_le_bytes(bytes) };
+                // Beyond, it is no number of anything: as a float it will be refused.
+                i64::try_from(v).map_or(Number::Float(v as f64), Number::Whole)
+            }
+            Kind::F16 => number!(half::f16, Number::Float, f64),
+            Kind::F32 => number!(f32, Number::Float, f64),
+            Kind::F64 => number!(f64, Number::Float, f64),
+            Kind::Bytes(_) | Kind::Utf32(_) => panic!("{} is a text", self.name),
+        }
+    }
+
+    pub(crate) fn float(&self, record: &[u8]) -> f64 {
+        match self.number(record) {
+            Number::Whole(n) => n as f64,
+            Number::Float(v) => v,
+        }
+    }
+
+    /// Its value; a text is put into `text`.
+    pub(crate) fn value<'a>(&self, record: &[u8], text: &'a mut String) -> Value<'a> {
+        text.clear();
+        match self.kind {
+            Kind::Bytes(n) => {
+                let bytes = &record[self.at..self.at + n];
+                let end = bytes.iter().position(|b| *b == 0).unwrap_or(n);
+                text.push_str(String::from_utf8_lossy(&bytes[..end]).trim());
+                Value::Name(text)
+            }
+            Kind::Utf32(n) => {
+                for c in record[self.at..self.at + 4 * n].as_chunks::<4>().0 {
+                    let code = if self.big_endian { u32::from_be_bytes(*c) } else { u32::from_le_bytes(*c) };
+                    if code == 0 {
+                        break;
+                    }
+                    text.push(char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER));
+                }
+                Value::Name(text)
+            }
+            _ => match self.number(record) {
+                Number::Whole(n) => Value::Whole(n),
+                Number::Float(v) => Value::Float(v),
+            },
+        }
+    }
+}
+
+/// What became of a colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Color {
+    Rgb([u8; 3]),
+    /// It does not fit the narrow range.
+    Wider,
+    /// It fits none: this channel.
+    Beyond(usize),
+}
+
+/// Turns three numbers into 8 bits each.
+pub(crate) fn color(channels: [f64; 3], is_float: bool, range: ColorRange) -> Color {
+    // What the narrow range ends at, and what a number of 8 bits is multiplied by.
+    let (most, scale) = match (is_float, range) {
+        (false, ColorRange::Narrow) => (255.0, 1.0),
+        (false, ColorRange::Wide) => (65_535.0, 1.0 / 257.0),
+        (true, ColorRange::Narrow) => (1.0, 255.0),
+        (true, ColorRange::Wide) => (255.0, 1.0),
+    };
+    let mut rgb = [0; 3];
+    for (i, v) in channels.into_iter().enumerate() {
+        if !(0.0..=most).contains(&v) {
+            let may_be_wider = range == ColorRange::Narrow && v > most;
+            return if may_be_wider { Color::Wider } else { Color::Beyond(i) };
+        }
+        rgb[i] = (v * scale).round() as u8;
+    }
+    Color::Rgb(rgb)
+}
+
+/// A table of records: fields, and which of them are what.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    pub(crate) fields: Vec<Field>,
+    pub(crate) columns: Columns,
+    /// Bytes of a record.
+    pub(crate) stride: usize,
+}
+
+impl Table {
+    /// # Errors
+    /// [`Error::Format`] if columns are missing, a coordinate or colour is a text, or records are too long.
+    pub(crate) fn new(
+        path: &Path,
+        fields: Vec<Field>,
+        stride: usize,
+        options: &AnnotationOptions,
+    ) -> Result<Self> {
+        let names: Vec<String> = fields.iter().map(|f| f.name.clone()).collect();
+        let columns = Columns::choose(path, &names, options)?;
+        let numbers = columns.position.into_iter().chain(columns.color.into_iter().flatten());
+        if let Some(text) = numbers.map(|i| &fields[i]).find(|f| f.kind.is_text()) {
+            return Err(Error::format(path, format!("the column {} holds texts, no numbers", text.name)));
+        }
+        if stride == 0 || stride > LONGEST_RECORD {
+            return Err(Error::format(path, format!("records of {stride} bytes are none of points")));
+        }
+        Ok(Self { fields, columns, stride })
+    }
+
+    /// Hands on record `number` (from 1). `false`: its colour is beyond the narrow range.
+    pub(crate) fn push(
+        &self,
+        number: u64,
+        record: &[u8],
+        colors: ColorRange,
+        texts: &mut [String; 3],
+        path: &Path,
+        reading: &mut Reading<'_>,
+    ) -> Result<bool> {
+        let c = &self.columns;
+        let [x, y, z] = c.position.map(|i| self.fields[i].float(record));
+        let mut rgb = [0; 3];
+        if let Some(channels) = c.color {
+            let first = &self.fields[channels[0]];
+            match color(channels.map(|i| self.fields[i].float(record)), first.kind.is_float(), colors) {
+                Color::Rgb(found) => rgb = found,
+                Color::Wider => return Ok(false),
+                Color::Beyond(i) => {
+                    let v = self.fields[channels[i]].float(record);
+                    let name = &self.fields[channels[i]].name;
+                    let why = format!("record {number}: {v} is no colour ({name})");
+                    reading.fault(Error::format(path, why))?;
+                    return Ok(true);
+                }
+            }
+        }
+        let [class, instance, room] = texts;
+        let row = Row {
+            position: dvec3(x, y, z),
+            color: rgb,
+            class: self.fields[c.class].value(record, class),
+            instance: c.instance.map_or(Value::None, |i| self.fields[i].value(record, instance)),
+            room: c.room.map_or(Value::None, |i| self.fields[i].value(record, room)),
+        };
+        reading.push(number, &row)?;
+        Ok(true)
+    }
+
+    /// Hands on `count` records. `false`: a colour is beyond the narrow range.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if there are fewer; what [`Table::push`] says.
+    pub(crate) fn read(
+        &self,
+        path: &Path,
+        mut source: impl Read,
+        count: u64,
+        colors: ColorRange,
+        reading: &mut Reading<'_>,
+    ) -> Result<bool> {
+        let mut texts = Default::default();
+        let at_once = (BLOCK / self.stride).max(1) as u64;
+        let mut block = vec![0; self.stride * at_once.min(count) as usize];
+        let mut done = 0;
+        while done < count {
+            let n = at_once.min(count - done);
+            let block = &mut block[..self.stride * n as usize];
+            fill(path, &mut source, block, done, count, self.stride)?;
+            for record in block.chunks_exact(self.stride) {
+                done += 1;
+                if !self.push(done, record, colors, &mut texts, path, reading)? {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// Fills a block of records after the `done`th.
+pub(crate) fn fill(
+    path: &Path,
+    source: &mut impl Read,
+    block: &mut [u8],
+    done: u64,
+    count: u64,
+    stride: usize,
+) -> Result<()> {
+    let mut at = 0;
+    while at < block.len() {
+        match source.read(&mut block[at..]) {
+            Ok(0) => {
+                let record = done + (at / stride) as u64 + 1;
+                let message = format!("ends in record {record} of {count}: the file is cut short");
+                return Err(Error::format(path, message));
+            }
+            Ok(n) => at += n,
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(e) if e.kind() == ErrorKind::InvalidData || e.kind() == ErrorKind::InvalidInput => {
+                return Err(Error::format(path, format!("cannot be unpacked: {e}")));
+            }
+            Err(e) => return Err(Error::io(path, "read", e)),
+        }
+    }
+    Ok(())
+}

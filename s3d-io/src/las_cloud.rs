@@ -1,0 +1,315 @@
+//! Annotated points of LAS and LAZ files, 1.0 to 1.4. Source: "LAS Specification 1.4 - R15", ASPRS.
+
+use crate::annotations::AnnotationOptions;
+use crate::cloud_columns::{CLASSES, INSTANCES};
+use crate::cloud_records::{Color, Field, Kind, color};
+use crate::flat::{Cloud, ColorRange};
+use crate::flat_rows::{Reading, Row, Value};
+use crate::{Error, Result};
+use las::point::Format;
+use s3d_geom::glam::dvec3;
+use std::fs::File;
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// Points that are unpacked at a time.
+const BATCH: u64 = 65_536;
+/// The bit of a point that was deleted: "withheld".
+const WITHHELD: u8 = 0b100;
+
+/// A `.las` or `.laz` file.
+pub(crate) struct LasCloud<'a> {
+    path: PathBuf,
+    options: &'a AnnotationOptions,
+}
+
+/// What a dimension of a point is.
+#[derive(Clone, Debug)]
+enum Dimension {
+    /// Bits of a byte that other flags share.
+    Classification { at: usize, mask: u8 },
+    /// A number of its own, times a scale, plus an offset.
+    Plain { field: Field, scale: f64, offset: f64 },
+}
+
+impl Dimension {
+    fn plain(name: &str, at: usize, kind: Kind) -> (String, Self) {
+        let field = Field { name: name.to_owned(), at, kind, big_endian: false };
+        (name.to_owned(), Self::Plain { field, scale: 1.0, offset: 0.0 })
+    }
+
+    fn value(&self, record: &[u8]) -> Value<'static> {
+        match self {
+            Self::Classification { at, mask } => Value::Whole(i64::from(record[*at] & mask)),
+            Self::Plain { field, scale, offset } => {
+                let mut text = String::new();
+                match field.value(record, &mut text) {
+                    Value::Whole(n) if (*scale, *offset) == (1.0, 0.0) => Value::Whole(n),
+                    Value::Whole(n) => Value::Float(n as f64 * scale + offset),
+                    Value::Float(v) => Value::Float(v * scale + offset),
+                    Value::Name(_) | Value::None => Value::None,
+                }
+            }
+        }
+    }
+}
+
+impl<'a> LasCloud<'a> {
+    pub(crate) fn new(path: &Path, options: &'a AnnotationOptions) -> Self {
+        Self { path: path.to_owned(), options }
+    }
+
+    /// Looks at what the header claims before anything believes it.
+    fn preflight(&self) -> Result<()> {
+        let path = &self.path;
+        let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
+        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+        let mut source = BufReader::new(file);
+        let mut head = Vec::new();
+        source.by_ref().take(375).read_to_end(&mut head).map_err(|e| Error::io(path, "read", e))?;
+        if head.len() < 227 || &head[..4] != b"LASF" {
+            return Err(Error::format(path, "is no LAS file: it does not begin with LASF and a header"));
+        }
+        let u16_at = |at: usize| u64::from(u16::from_le_bytes([head[at], head[at + 1]]));
+        let u32_at = |at: usize| u16_at(at) | u16_at(at + 2) << 16;
+        let u64_at = |at: usize| u32_at(at) | u32_at(at + 4) << 32;
+        let is_1_4 = head[25] >= 4 && head.len() >= 375;
+        let (offset, length, is_compressed) = (u32_at(96), u16_at(105), head[104] & 0x80 != 0);
+        let points = match u32_at(107) {
+            0 if is_1_4 => u64_at(247),
+            n if !is_1_4 => n,
+            n => u64_at(247).max(n),
+        };
+        let cut = |what: &str| Err(Error::format(path, format!("claims {what}: the file is cut short")));
+        let end = points.checked_mul(length).and_then(|n| n.checked_add(offset));
+        if offset > size || end.is_none_or(|end| !is_compressed && end > size) {
+            return cut(&format!("{points} points of {length} bytes in a file of {size} bytes"));
+        }
+        // The 1.4 header's extended records, whose lengths are numbers of 64 bits.
+        if is_1_4 && u32_at(243) > 0 {
+            let start = u64_at(235);
+            let mut record = [0; 60];
+            let read = source.seek(SeekFrom::Start(start)).and_then(|_| source.read_exact(&mut record));
+            let length = u64::from_le_bytes([
+                record[20], record[21], record[22], record[23], record[24], record[25], record[26],
+                record[27],
+            ]);
+            if read.is_err()
+                || start.checked_add(60).and_then(|n| n.checked_add(length)).is_none_or(|n| n > size)
+            {
+                return cut("extended records beyond its end");
+            }
+        }
+        if is_compressed {
+            let number = |source: &mut BufReader<File>, at: u64| -> std::io::Result<u64> {
+                let mut bytes = [0; 8];
+                source.seek(SeekFrom::Start(at))?;
+                source.read_exact(&mut bytes)?;
+                Ok(u64::from_le_bytes(bytes))
+            };
+            let mut table = number(&mut source, offset);
+            if table.as_ref().is_ok_and(|t| *t as i64 <= offset as i64) {
+                // A writer that could not go back puts it at the end.
+                table = number(&mut source, size.saturating_sub(8));
+            }
+            // A chunk has a byte at least.
+            match table.and_then(|at| number(&mut source, at)) {
+                Ok(entry) if entry >> 32 <= size => {}
+                _ => return cut("a table of chunks that is not there"),
+            }
+        }
+        Ok(())
+    }
+
+    /// The dimensions that can hold classes, instances or rooms, by their usual names.
+    fn dimensions(&self, header: &las::Header) -> Vec<(String, Dimension)> {
+        let format = header.point_format();
+        let (class_at, user_at, source_at) = if format.is_extended { (16, 17, 20) } else { (15, 17, 18) };
+        let mask = if format.is_extended { 0xff } else { 0x1f };
+        let mut all = vec![
+            ("classification".to_owned(), Dimension::Classification { at: class_at, mask }),
+            Dimension::plain("user_data", user_at, Kind::U8),
+            Dimension::plain("point_source_id", source_at, Kind::U16),
+            Dimension::plain("intensity", 12, Kind::U16),
+        ];
+        let mut at = usize::from(format.len() - format.extra_bytes);
+        let end = usize::from(format.len());
+        for vlr in header.all_vlrs().filter(|v| v.user_id.starts_with("LASF_Spec") && v.record_id == 4) {
+            for extra in vlr.data.as_chunks::<192>().0 {
+                let name = &extra[4..36];
+                let name = &name[..name.iter().position(|b| *b == 0).unwrap_or(32)];
+                let name = String::from_utf8_lossy(name).into_owned();
+                let double = |at: usize| {
+                    let mut bytes = [0; 8];
+                    bytes.copy_from_slice(&extra[at..at + 8]);
+                    f64::from_le_bytes(bytes)
+                };
+                let kinds = [
+                    Kind::U8,
+                    Kind::I8,
+                    Kind::U16,
+                    Kind::I16,
+                    Kind::U32,
+                    Kind::I32,
+                    Kind::U64,
+                    Kind::I64,
+                    Kind::F32,
+                    Kind::F64,
+                ];
+                // 11 to 30 are arrays of two or three, no longer used; 0 is a number of bytes that only its writer knows.
+                let (kind, bytes) = match usize::from(extra[2]) {
+                    0 => (None, usize::from(extra[3])),
+                    n @ 1..=10 => (Some(kinds[n - 1]), kinds[n - 1].size()),
+                    n @ 11..=30 => (None, kinds[(n - 1) % 10].size() * (1 + (n - 1) / 10)),
+                    _ => break,
+                };
+                if at + bytes > end {
+                    break;
+                }
+                if let Some(kind) = kind {
+                    let scale = if extra[3] & 8 != 0 { double(112) } else { 1.0 };
+                    let offset = if extra[3] & 16 != 0 { double(136) } else { 0.0 };
+                    let field = Field { name: name.clone(), at, kind, big_endian: false };
+                    all.push((name, Dimension::Plain { field, scale, offset }));
+                }
+                at += bytes;
+            }
+        }
+        all
+    }
+
+    fn named(
+        &self,
+        all: &[(String, Dimension)],
+        key: &str,
+        asked: Option<&String>,
+        usual: &[&str],
+    ) -> Result<Option<Dimension>> {
+        let Some(name) = asked else {
+            let found = usual.iter().find_map(|u| all.iter().find(|(n, _)| n.eq_ignore_ascii_case(u)));
+            return Ok(found.map(|(_, d)| d.clone()));
+        };
+        match all.iter().find(|(n, _)| n == name) {
+            Some((_, dimension)) => Ok(Some(dimension.clone())),
+            None => {
+                let names: Vec<&str> = all.iter().map(|(n, _)| n.as_str()).collect();
+                Err(Error::format(
+                    &self.path,
+                    format!("has no dimension {name:?} ({key} in [annotations]); it has {}", names.join(" ")),
+                ))
+            }
+        }
+    }
+
+    fn error(&self, done: u64, error: &las::Error) -> Error {
+        let path = &self.path;
+        let io = match error {
+            las::Error::Io(e) => Some(e),
+            _ => None,
+        };
+        match io {
+            Some(e) if e.kind() == ErrorKind::UnexpectedEof => {
+                Error::format(path, format!("ends after point {done}: the file is cut short"))
+            }
+            _ => Error::format(path, format!("cannot be read after point {done}: {error}")),
+        }
+    }
+}
+
+/// Where a record of this format has its colour, three numbers of 16 bits.
+fn color_at(format: &Format) -> Option<usize> {
+    let base = if format.is_extended { 30 } else { 20 + if format.has_gps_time { 8 } else { 0 } };
+    format.has_color.then_some(base)
+}
+
+/// What `f` gives, or a sentence if it panicked: the decoder is not ours, and a damaged file must not end the program.
+fn guarded<T>(f: impl FnOnce() -> las::Result<T>) -> std::result::Result<las::Result<T>, &'static str> {
+    catch_unwind(AssertUnwindSafe(f)).map_err(|_| "its compressed points are damaged")
+}
+
+impl Cloud for LasCloud<'_> {
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+        let path = &self.path;
+        self.preflight()?;
+        let damaged = |why: &str| Error::format(path, why);
+        let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
+        let file = BufReader::with_capacity(1 << 18, file);
+        let reader = guarded(|| las::Reader::new(file)).map_err(damaged)?;
+        let mut reader = reader.map_err(|e| self.error(0, &e))?;
+        let header = reader.header().clone();
+        let format = *header.point_format();
+        let all = self.dimensions(&header);
+        let o = self.options;
+        // Extra dimensions made for labels come before the standard's.
+        let class = self.named(&all, "class", o.class_column.as_ref(), &CLASSES)?;
+        let class = class.unwrap_or(all[0].1.clone());
+        let usual: Vec<&str> = INSTANCES.into_iter().chain(["point_source_id"]).collect();
+        let instance = self.named(&all, "instance", o.instance_column.as_ref(), &usual)?;
+        let room = self.named(&all, "rooms", o.room_column.as_ref(), &[])?;
+        let rgb = color_at(&format);
+        let channels: Vec<Field> = rgb
+            .into_iter()
+            .flat_map(|at| [at, at + 2, at + 4])
+            .map(|at| Field { name: "colour".to_owned(), at, kind: Kind::U16, big_endian: false })
+            .collect();
+        let [x, y, z] = [0, 4, 8].map(|at| Field {
+            name: "coordinate".to_owned(),
+            at,
+            kind: Kind::I32,
+            big_endian: false,
+        });
+        let t = header.transforms();
+        let count = header.number_of_points();
+        let mut data = las::PointDataBuilder::new().for_header(&header).build();
+        let (mut done, mut withheld) = (0, 0u64);
+        while done < count {
+            let n = BATCH.min(count - done);
+            let read = guarded(|| reader.fill_points(n, &mut data)).map_err(damaged)?;
+            if read.map_err(|e| self.error(done, &e))? == 0 {
+                return Err(Error::format(
+                    path,
+                    format!("ends after point {done} of {count}: it is cut short"),
+                ));
+            }
+            for record in data.raw_bytes().chunks_exact(data.record_len()) {
+                done += 1;
+                let flags = if format.is_extended { record[15] } else { record[15] >> 5 };
+                if flags & WITHHELD != 0 {
+                    withheld += 1;
+                    continue;
+                }
+                let mut found = [0; 3];
+                if let [r, g, b] = &channels[..] {
+                    match color([r, g, b].map(|f| f.float(record)), false, colors) {
+                        Color::Rgb(rgb) => found = rgb,
+                        _ => return Ok(false),
+                    }
+                }
+                let position = dvec3(
+                    x.float(record) * t.x.scale + t.x.offset,
+                    y.float(record) * t.y.scale + t.y.offset,
+                    z.float(record) * t.z.scale + t.z.offset,
+                );
+                let row = Row {
+                    position,
+                    color: found,
+                    class: class.value(record),
+                    instance: instance.as_ref().map_or(Value::None, |d| d.value(record)),
+                    room: room.as_ref().map_or(Value::None, |d| d.value(record)),
+                };
+                reading.push(done, &row)?;
+            }
+        }
+        if withheld > 0 {
+            reading
+                .notes
+                .push(format!("{}: {withheld} points are withheld (deleted), left out", path.display()));
+        }
+        Ok(true)
+    }
+}
