@@ -164,6 +164,7 @@ impl Annotations {
     /// | path | annotations |
     /// |---|---|
     /// | a folder | the S3DIS tree of an area, as [`AnnotationTree`] takes it |
+    /// | `….mat` | the `pointcloud.mat` of a published area, as [`MatArea`](crate::MatArea) takes it |
     /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh, by object |
     /// | `.ply` | vertices with properties for class and instance; ASCII or binary |
     /// | `.npy` | a structured array, or a plain one of rows and columns, see [`AnnotationOptions::columns`] |
@@ -202,6 +203,8 @@ impl Annotations {
         for path in paths {
             if path.is_dir() && !is_scannet(path) {
                 all.join(Self::from_tree(path, options)?)?;
+            } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) {
+                all.join(Self::from_mat(path, options)?)?;
             } else {
                 clouds.push(open_cloud(path, options)?);
             }

@@ -308,6 +308,11 @@ impl Layout {
         self.mesh_dir(area).join("pointcloud.ply")
     }
 
+    /// `area_1/3d/pointcloud.mat`: the labelled points by room and object, for MATLAB.
+    pub fn point_cloud_mat(&self, area: u32) -> PathBuf {
+        self.mesh_dir(area).join("pointcloud.mat")
+    }
+
     /// `area_1/3d/instances.json`: box and voxels of each instance.
     pub fn instances_json(&self, area: u32) -> PathBuf {
         self.mesh_dir(area).join("instances.json")
@@ -463,6 +468,7 @@ mod tests {
             layout.mesh_dir(1),
             layout.semantic_obj(1),
             layout.point_cloud(1),
+            layout.point_cloud_mat(1),
             layout.instances_json(1),
             layout.instances_npz(1),
             layout.s3dis_area_dir(1),

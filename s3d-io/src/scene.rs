@@ -115,12 +115,6 @@ struct MeshTable {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct PathTable {
-    path: PathBuf,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
 struct CamerasTable {
     path: Option<PathBuf>,
     place: Option<f64>,

@@ -1,11 +1,12 @@
-//! The dense labelled point cloud: a PLY file, and the S3DIS tree that loaders read.
+//! The dense labelled point cloud: a PLY file, and by room and instance the S3DIS tree that loaders read and
+//! `pointcloud.mat`.
 
 use super::annotate::Annotated;
 use super::inputs::AreaInput;
 use crate::console::Progress;
 use crate::failure::{Failure, Outcome};
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
-use s3d_io::{Layout, PlyPointWriter, S3disAreaWriter};
+use s3d_io::{Layout, MatWriter, PlyPointWriter, S3disAreaWriter};
 use s3d_label::{LabelId, LabelTable, Room};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -68,14 +69,25 @@ pub(crate) fn write_points(
         cloud: PointCloud::default(),
     };
     let tree = S3disAreaWriter::create(&layout.s3dis_area_dir(number))?;
+    let mut mat = MatWriter::create(&layout.point_cloud_mat(number), &format!("Area_{number}"))?;
+    let angle_of: BTreeMap<Room, u32> =
+        annotated.rooms.iter().map(|r| (r.room, r.wall_direction_deg)).collect();
     for (room, runs) in rooms {
         let mut files = room.map(|room| tree.room(&room.to_string())).transpose()?;
+        if let Some(room) = room {
+            mat.room(&room.to_string(), angle_of.get(&room).copied().unwrap_or(0))?;
+        }
         for run in runs {
             let points = sampler.points_before(run.faces.start)..sampler.points_before(run.faces.end);
             match (&mut files, table.get(run.label)) {
                 (Some(files), Some(label)) if !points.is_empty() => {
-                    let mut instance = files.instance(label.class.name(), run.number_in_room)?;
-                    sink.write(points, run.label, |cloud| instance.append(&cloud.positions, &cloud.colors))?;
+                    let (class, number) = (label.class.name(), run.number_in_room);
+                    let mut instance = files.instance(class, number)?;
+                    mat.object(&format!("{class}_{number}"), &label.to_string())?;
+                    sink.write(points, run.label, |cloud| {
+                        instance.append(&cloud.positions, &cloud.colors)?;
+                        mat.append(&cloud.positions, &cloud.colors)
+                    })?;
                     instance.finish()?;
                 }
                 _ => sink.write(points, run.label, |_| Ok(()))?,
@@ -86,6 +98,7 @@ pub(crate) fn write_points(
         }
     }
     sink.ply.finish()?;
+    mat.finish()?;
     let angles: Vec<(String, u32)> =
         annotated.rooms.iter().map(|r| (r.room.to_string(), r.wall_direction_deg)).collect();
     tree.alignment(&angles)?;

@@ -1,0 +1,151 @@
+//! The messages of object headers, each from its bytes; `None` where they are damaged.
+
+use super::UNDEFINED;
+use super::read::{Cursor, Filter, Kind, Layout};
+
+/// Axes of an array: the library's own limit.
+const MAX_AXES: usize = 32;
+
+/// The value of an attribute.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum AttributeValue {
+    Text(String),
+    Number(u64),
+}
+
+/// The extents of an array.
+pub(super) fn dataspace(m: &mut Cursor<'_>) -> Option<Vec<u64>> {
+    let (version, axes, _flags) = (m.byte()?, usize::from(m.byte()?), m.byte()?);
+    let reserved = match version {
+        1 => 5,
+        2 => 1,
+        _ => return None,
+    };
+    m.take(reserved)?;
+    if axes > MAX_AXES {
+        return None;
+    }
+    (0..axes).map(|_| m.number(8)).collect()
+}
+
+/// The type of an array's elements.
+pub(super) fn datatype(m: &mut Cursor<'_>) -> Option<Kind> {
+    let class = m.byte()? & 0x0f;
+    let bits = m.number(3)?;
+    let size = usize::try_from(m.number(4)?).ok()?;
+    let big_endian = bits & 1 != 0;
+    let other = Kind::Other { size };
+    // All bits of the element count: else it is of no type that MATLAB writes.
+    let is_whole = |m: &mut Cursor<'_>| Some(m.number(2)? == 0 && m.number(2)? == 8 * size as u64);
+    Some(match class {
+        0 if is_whole(m)? && (1..=8).contains(&size) => {
+            Kind::Integer { size, signed: bits & 8 != 0, big_endian }
+        }
+        1 if is_whole(m)? && bits & 0x40 == 0 => match (size, m.number(4)?) {
+            (4, 0x1700_0817) | (8, 0x3400_0b34) => Kind::Float { size, big_endian },
+            _ => other,
+        },
+        3 => Kind::Text { size },
+        7 if size == 8 && bits & 0x0f == 0 => Kind::Reference,
+        _ if size > 0 => other,
+        _ => return None,
+    })
+}
+
+/// Where an array's data are.
+pub(super) fn layout(body: &[u8]) -> Option<Layout> {
+    let mut m = Cursor::new(body);
+    let version = m.byte()?;
+    if !(3..=4).contains(&version) {
+        return Some(Layout::Unsupported("a data layout of version 1 or 2, of before HDF5 1.6.3"));
+    }
+    Some(match m.byte()? {
+        0 => {
+            let size = m.number(2)? as usize;
+            Layout::Compact(m.take(size)?.to_vec())
+        }
+        1 => Layout::Contiguous { address: m.number(8)?, size: m.number(8)? },
+        2 if version == 3 => {
+            let axes = usize::from(m.byte()?).checked_sub(1).filter(|n| *n <= MAX_AXES)?;
+            let tree = m.number(8)?;
+            let dims = (0..axes).map(|_| m.number(4)).collect::<Option<Vec<u64>>>()?;
+            Layout::Chunked { tree, dims }
+        }
+        2 => Layout::Unsupported("an array whose chunks have an index of the newer form (HDF5 1.10)"),
+        _ => Layout::Unsupported("a virtual array"),
+    })
+}
+
+/// What was done to chunks, in the order in which it was done.
+pub(super) fn filters(body: &[u8]) -> Option<Vec<Filter>> {
+    let mut m = Cursor::new(body);
+    let (version, count) = (m.byte()?, m.byte()?);
+    if version == 1 {
+        m.take(6)?;
+    }
+    let mut filters = Vec::new();
+    for _ in 0..count {
+        let id = m.number(2)? as u16;
+        let name = if version == 1 || id >= 256 { m.number(2)? as usize } else { 0 };
+        let (_flags, values) = (m.number(2)?, m.number(2)? as usize);
+        m.take(if version == 1 { name.next_multiple_of(8) } else { name })?;
+        m.take(4 * (values + if version == 1 { values % 2 } else { 0 }))?;
+        filters.push(match id {
+            1 => Filter::Deflate,
+            2 => Filter::Shuffle,
+            3 => Filter::Fletcher32,
+            other => Filter::Other(other),
+        });
+    }
+    Some(filters)
+}
+
+/// A member of a group in the new form, as far as it is in this file.
+pub(super) fn link(body: &[u8]) -> Option<Option<(String, u64)>> {
+    let mut m = Cursor::new(body);
+    let (_version, flags) = (m.byte()?, m.byte()?);
+    let is_hard = if flags & 8 != 0 { m.byte()? == 0 } else { true };
+    m.take(if flags & 4 != 0 { 8 } else { 0 } + if flags & 0x10 != 0 { 1 } else { 0 })?;
+    let length = usize::try_from(m.number(1 << (flags & 3))?).ok()?;
+    let name = String::from_utf8_lossy(m.take(length)?).into_owned();
+    if is_hard { Some(Some((name, m.number(8)?))) } else { Some(None) }
+}
+
+/// Whether a group in the new form has its members in a heap.
+pub(super) fn link_info_is_dense(body: &[u8]) -> Option<bool> {
+    let mut m = Cursor::new(body);
+    let (_version, flags) = (m.byte()?, m.byte()?);
+    m.take(if flags & 1 != 0 { 8 } else { 0 })?;
+    Some(m.number(8)? != UNDEFINED)
+}
+
+/// An attribute, if its value is one text or one integer. Others are left out, and so are damaged ones: none is needed.
+pub(super) fn attribute(body: &[u8]) -> Option<(String, AttributeValue)> {
+    let mut m = Cursor::new(body);
+    let (version, flags) = (m.byte()?, m.byte()?);
+    let sizes = [m.number(2)? as usize, m.number(2)? as usize, m.number(2)? as usize];
+    if !(1..=3).contains(&version) || version > 1 && flags & 3 != 0 {
+        return None;
+    }
+    m.take(usize::from(version == 3))?;
+    let mut part = |size: usize| m.take(if version == 1 { size.next_multiple_of(8) } else { size });
+    let (name, kind, space) = (part(sizes[0])?, part(sizes[1])?, part(sizes[2])?);
+    let name = String::from_utf8_lossy(until_zero(&name[..sizes[0]])).into_owned();
+    let kind = datatype(&mut Cursor::new(kind))?;
+    if dataspace(&mut Cursor::new(space))?.iter().any(|d| *d != 1) {
+        return None;
+    }
+    let value = match kind {
+        Kind::Text { size } => {
+            AttributeValue::Text(String::from_utf8_lossy(until_zero(m.take(size)?)).into_owned())
+        }
+        Kind::Integer { size, .. } => AttributeValue::Number(m.number(size)?),
+        _ => return None,
+    };
+    Some((name, value))
+}
+
+/// The bytes before the first zero.
+pub(super) fn until_zero(bytes: &[u8]) -> &[u8] {
+    bytes.split(|b| *b == 0).next().unwrap_or_default()
+}
