@@ -297,3 +297,56 @@ pub(crate) fn fill(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn field(kind: Kind, big_endian: bool) -> Field {
+        Field { name: "a".to_owned(), at: 1, kind, big_endian }
+    }
+
+    #[test]
+    fn numbers_and_texts_of_every_kind() {
+        let record = [0, 0xfe, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f];
+        let mut text = String::new();
+        for (kind, big_endian, value) in [
+            (Kind::I8, false, Value::Whole(-2)),
+            (Kind::U8, false, Value::Whole(254)),
+            (Kind::I16, false, Value::Whole(-2)),
+            (Kind::U16, true, Value::Whole(0xfeff)),
+            (Kind::I32, true, Value::Whole(-0x0100_0001)),
+            (Kind::U32, false, Value::Whole(0xffff_fffe)),
+            (Kind::I64, false, Value::Whole(i64::MAX - 1)),
+            (Kind::U64, true, Value::Float(0xfeff_ffff_ffff_ff7fu64 as f64)),
+        ] {
+            assert_eq!(field(kind, big_endian).value(&record, &mut text), value, "{kind:?}");
+        }
+        let one = [0, 0, 0x3c];
+        assert_eq!(field(Kind::F16, false).float(&one), 1.0);
+        assert_eq!(field(Kind::F32, true).float(&[0, 0x3f, 0x80, 0, 0]), 1.0);
+        assert_eq!(field(Kind::F64, true).float(&[0, 0x3f, 0xf0, 0, 0, 0, 0, 0, 0]), 1.0);
+        assert_eq!(field(Kind::Bytes(4), false).value(b"-wall", &mut text), Value::Name("wall"));
+        assert_eq!(field(Kind::Bytes(4), false).value(b"-wa\0x", &mut text), Value::Name("wa"));
+        let utf32 = [0, 0, 0, 0, b'w', 0, 0, 0, 0xfc, 0, 0, 0, 0];
+        assert_eq!(field(Kind::Utf32(3), true).value(&utf32, &mut text), Value::Name("wü"));
+    }
+
+    #[test]
+    fn colours_of_either_range() {
+        use ColorRange::{Narrow, Wide};
+        for (channels, is_float, range, expected) in [
+            ([0.0, 128.0, 255.0], false, Narrow, Color::Rgb([0, 128, 255])),
+            ([0.0, 128.0, 256.0], false, Narrow, Color::Wider),
+            ([0.0, 128.0 * 257.0, 65_535.0], false, Wide, Color::Rgb([0, 128, 255])),
+            ([0.0, 65_536.0, 0.0], false, Wide, Color::Beyond(1)),
+            ([-1.0, 0.0, 0.0], false, Narrow, Color::Beyond(0)),
+            ([0.0, 0.5, 1.0], true, Narrow, Color::Rgb([0, 128, 255])),
+            ([0.0, 0.5, 1.5], true, Narrow, Color::Wider),
+            ([0.0, 41.0, 254.6], true, Wide, Color::Rgb([0, 41, 255])),
+            ([0.0, 0.0, f64::NAN], true, Narrow, Color::Beyond(2)),
+        ] {
+            assert_eq!(color(channels, is_float, range), expected, "{channels:?}");
+        }
+    }
+}

@@ -303,3 +303,243 @@ impl InstancePoints for FlatPoints {
         self.are_vertices
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flat_rows::{Row, Value};
+    use crate::s3dis::OnFault;
+    use proptest::prelude::*;
+    use s3d_geom::glam::DVec3;
+    use std::collections::BTreeMap;
+
+    /// A row: class, instance, room (0: none). Its place in the list is its x coordinate and its colour.
+    type TestRow = (i64, i64, i64);
+
+    /// Rows in place of a file.
+    struct TestCloud {
+        path: PathBuf,
+        rows: Vec<TestRow>,
+        /// The first row whose colour is beyond the narrow range.
+        wide_from: usize,
+    }
+
+    impl TestCloud {
+        fn new(name: &str, rows: &[TestRow]) -> Self {
+            Self { path: PathBuf::from(name), rows: rows.to_vec(), wide_from: usize::MAX }
+        }
+    }
+
+    impl Cloud for TestCloud {
+        fn path(&self) -> &Path {
+            &self.path
+        }
+
+        fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+            for (i, (class, instance, room)) in self.rows.iter().enumerate() {
+                if i >= self.wide_from && colors == ColorRange::Narrow {
+                    return Ok(false);
+                }
+                let scale = if colors == ColorRange::Wide { 2 } else { 1 };
+                let row = Row {
+                    position: DVec3::new(i as f64, 0.0, 0.0),
+                    color: [(i % 100) as u8 * scale; 3],
+                    class: Value::Whole(*class),
+                    instance: Value::Float(*instance as f64),
+                    room: if *room == 0 { Value::None } else { Value::Whole(*room) },
+                };
+                reading.push(i as u64 + 1, &row)?;
+            }
+            Ok(true)
+        }
+    }
+
+    fn options() -> AnnotationOptions {
+        let classes =
+            [("0", None), ("1", Some(Class::Wall)), ("2", Some(Class::Chair)), ("3", Some(Class::Chair))];
+        AnnotationOptions {
+            room: Some("office_7".parse().unwrap()),
+            classes: classes.into_iter().map(|(k, c)| (k.to_owned(), c)).collect(),
+            ..AnnotationOptions::default()
+        }
+    }
+
+    fn read(clouds: &[TestCloud], options: &AnnotationOptions) -> Result<Annotations> {
+        let clouds: Vec<&dyn Cloud> = clouds.iter().map(|c| c as &dyn Cloud).collect();
+        read_flat(&clouds, options)
+    }
+
+    /// Every instance's name, and the x coordinates and colours of its points.
+    fn contents(annotations: &Annotations) -> Vec<(String, Vec<f32>, Vec<u8>)> {
+        let mut all = Vec::new();
+        for room in &annotations.rooms {
+            for i in &room.instances {
+                let mut cloud = PointCloud::default();
+                i.read(&mut cloud).unwrap();
+                let x = cloud.positions.iter().map(|p| p.x).collect();
+                let name = format!("{} {}_{}", room.room, i.class, i.number);
+                all.push((name, x, cloud.colors.iter().map(|c| c[0]).collect()));
+            }
+        }
+        all
+    }
+
+    fn names(annotations: &Annotations) -> Vec<(String, Vec<f32>)> {
+        contents(annotations).into_iter().map(|(name, x, _)| (name, x)).collect()
+    }
+
+    #[test]
+    fn rows_are_grouped_and_numbered() {
+        let cloud = TestCloud::new(
+            "a.las",
+            &[
+                (1, 40, 0),
+                (2, 9, 0),
+                (3, 9, 0),
+                (1, 7, 0),
+                (1, -1, 0),
+                (1, -5, 0),
+                (0, 3, 0),
+                (2, 9, 2),
+                (1, 40, 0),
+            ],
+        );
+        let found = read(&[cloud], &options()).unwrap();
+        let expected = [
+            ("office_2 chair_1", vec![7.0]),
+            // Without a number: one instance, before the numbered.
+            ("office_7 wall_1", vec![4.0, 5.0]),
+            ("office_7 wall_2", vec![3.0]),
+            ("office_7 wall_3", vec![0.0, 8.0]),
+            // Two of the file's classes are kept apart, though both are chairs.
+            ("office_7 chair_1", vec![1.0]),
+            ("office_7 chair_2", vec![2.0]),
+        ];
+        assert_eq!(names(&found), expected.map(|(name, x)| (name.to_owned(), x)));
+        let sources: Vec<String> = found.rooms[1].instances.iter().map(AnnotatedInstance::source).collect();
+        assert_eq!(sources[0], "a.las, the wall of office_7");
+        assert_eq!(sources[4], "a.las, instance 9 of class 3 in office_7");
+    }
+
+    #[test]
+    fn files_are_one_cloud_and_may_name_their_rooms() {
+        let a = TestCloud::new("x/Area_12_WC_1.npy", &[(1, 1, 0), (2, 1, 0)]);
+        let b = TestCloud::new("office_2.ply", &[(1, 1, 0)]);
+        let c = TestCloud::new("rest.ply", &[(1, 1, 0)]);
+        let unnamed = AnnotationOptions { room: None, ..options() };
+        let found = read(&[a, b], &unnamed).unwrap();
+        let expected = ["office_2 wall_1", "WC_1 wall_1", "WC_1 chair_1"];
+        assert_eq!(names(&found).into_iter().map(|n| n.0).collect::<Vec<_>>(), expected);
+        let message = read(&[c], &unnamed).unwrap_err().to_string();
+        assert!(message.contains("rest.ply: 1 points are in no room"), "{message}");
+        // What is said goes before a file's name; and the same number in two files is the same instance.
+        let twice = [TestCloud::new("office_2.ply", &[(1, 1, 0)]), TestCloud::new("b.ply", &[(1, 1, 0)])];
+        assert_eq!(
+            names(&read(&twice, &options()).unwrap()),
+            [("office_7 wall_1".to_owned(), vec![0.0, 0.0])]
+        );
+    }
+
+    #[test]
+    fn a_wide_colour_reads_the_file_again_from_the_start() {
+        let mut wide = TestCloud::new("a.las", &[(1, 1, 0); 5]);
+        wide.wide_from = 3;
+        let narrow = TestCloud::new("b.las", &[(1, 2, 0); 3]);
+        let found = read(&[narrow, wide], &options()).unwrap();
+        let colors: Vec<Vec<u8>> = contents(&found).into_iter().map(|c| c.2).collect();
+        assert_eq!(colors, [vec![0, 2, 4, 6, 8], vec![0, 1, 2]]);
+    }
+
+    #[test]
+    fn rows_that_are_none_stop_or_are_counted() {
+        struct Bad;
+        impl Cloud for Bad {
+            fn path(&self) -> &Path {
+                Path::new("bad.npy")
+            }
+            fn read(&self, _: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+                let good = Row {
+                    position: DVec3::ZERO,
+                    color: [0; 3],
+                    class: Value::Whole(1),
+                    instance: Value::None,
+                    room: Value::None,
+                };
+                reading.push(1, &good)?;
+                reading.push(2, &Row { position: DVec3::new(0.0, f64::NAN, 0.0), ..good })?;
+                reading.push(3, &Row { class: Value::Float(1.5), ..good })?;
+                reading.push_line(9, &Row { instance: Value::Name("x"), ..good })?;
+                reading.push(5, &Row { position: DVec3::splat(1e60), ..good })?;
+                reading.push(6, &Row { class: Value::Float(f64::INFINITY), ..good })?;
+                Ok(true)
+            }
+        }
+        let strict = read_flat(&[&Bad], &options()).unwrap_err().to_string();
+        assert_eq!(strict, "bad.npy: record 2: the coordinates 0 NaN 0 are not finite");
+        let lenient = AnnotationOptions { on_fault: OnFault::Skip, ..options() };
+        let found = read_flat(&[&Bad], &lenient).unwrap();
+        assert_eq!(names(&found), [("office_7 wall_1".to_owned(), vec![0.0])]);
+        assert!(
+            found.warnings[0].starts_with("bad.npy: 5 records left out; bad.npy: record 2: "),
+            "{:?}",
+            found.warnings
+        );
+    }
+
+    #[test]
+    fn a_column_of_something_else_is_noticed() {
+        let rows: Vec<TestRow> = (0..10_001).map(|i| (i, 0, 0)).collect();
+        let message = read(&[TestCloud::new("a.las", &rows)], &options()).unwrap_err().to_string();
+        assert!(message.contains("more than 10000 different classes"), "{message}");
+        let message = read(&[TestCloud::new("a.las", &[(0, 0, 0)])], &options()).unwrap_err().to_string();
+        assert!(message.contains("no annotated point"), "{message}");
+    }
+
+    /// The plain version: every point to the list of its key.
+    fn reference(clouds: &[Vec<TestRow>]) -> Vec<(String, Vec<f32>)> {
+        let mut lists: BTreeMap<(Room, Class, i64, i64), Vec<f32>> = BTreeMap::new();
+        for rows in clouds {
+            for (i, (class, instance, room)) in rows.iter().enumerate() {
+                let number = if *room == 0 { 7 } else { *room as u32 };
+                let room = Room { number, room_type: s3d_label::RoomType::Office };
+                let Some(meant) =
+                    [None, Some(Class::Wall), Some(Class::Chair), Some(Class::Chair)][*class as usize]
+                else {
+                    continue;
+                };
+                let of = if *instance < 0 { -1 } else { *class };
+                lists.entry((room, meant, (*instance).max(-1), of)).or_default().push(i as f32);
+            }
+        }
+        let mut numbers: BTreeMap<(Room, Class), u32> = BTreeMap::new();
+        let name = |((room, class, ..), x): ((Room, Class, i64, i64), Vec<f32>)| {
+            let number = numbers.entry((room, class)).or_default();
+            *number += 1;
+            (format!("{room} {class}_{number}"), x)
+        };
+        lists.into_iter().map(name).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn memory_and_temporary_file_give_what_the_plain_version_gives(
+            clouds in prop::collection::vec(prop::collection::vec((0i64..4, -2i64..5, 0i64..3), 0..200), 1..4),
+            in_memory in 0u64..300,
+        ) {
+            let files: Vec<TestCloud> = clouds.iter().map(|rows| TestCloud::new("a.las", rows)).collect();
+            let spooled = AnnotationOptions { points_in_memory: in_memory, ..options() };
+            match (read(&files, &options()), read(&files, &spooled)) {
+                (Ok(memory), Ok(file)) => {
+                    prop_assert_eq!(names(&memory), reference(&clouds));
+                    prop_assert_eq!(contents(&memory), contents(&file));
+                }
+                (Err(memory), Err(file)) => {
+                    prop_assert!(reference(&clouds).is_empty());
+                    prop_assert_eq!(memory.to_string(), file.to_string());
+                }
+                other => prop_assert!(false, "{:?}", other),
+            }
+        }
+    }
+}

@@ -134,3 +134,36 @@ impl SpoolWriter {
         Ok(complete.then(|| FlatStore::Spool(Spool { file: Mutex::new(self.file), dir: self.dir })))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn buffers_that_overflow_are_written_where_they_belong() {
+        // More than the 16,384 points that wait, of two instances by turns.
+        let counts = [40_000, 0, 20_000];
+        let mut writer = SpoolWriter::create(None, &counts).unwrap();
+        for i in 0..60_000u32 {
+            let instance = if i % 3 == 2 { 2 } else { 0 };
+            assert!(writer.push(instance, Vec3::splat(i as f32), [i as u8; 3]).unwrap());
+        }
+        assert!(!writer.push(1, Vec3::ZERO, [0; 3]).unwrap());
+        assert!(!writer.push(2, Vec3::ZERO, [0; 3]).unwrap());
+        let store = writer.finish().unwrap().unwrap();
+        let mut cloud = PointCloud::default();
+        store.read(40_000, 20_000, &mut cloud).unwrap();
+        assert!(cloud.positions.iter().enumerate().all(|(k, p)| *p == Vec3::splat((3 * k + 2) as f32)));
+        assert!(cloud.colors.iter().enumerate().all(|(k, c)| *c == [(3 * k + 2) as u8; 3]));
+        cloud.clear();
+        store.read(0, 40_000, &mut cloud).unwrap();
+        assert_eq!(cloud.positions[39_999], Vec3::splat(59_998.0));
+    }
+
+    #[test]
+    fn points_that_did_not_come_are_noticed() {
+        let mut writer = SpoolWriter::create(None, &[2]).unwrap();
+        assert!(writer.push(0, Vec3::ONE, [1; 3]).unwrap());
+        assert!(writer.finish().unwrap().is_none());
+    }
+}

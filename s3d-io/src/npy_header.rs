@@ -148,6 +148,10 @@ fn push_fields(
         ">" => true,
         _ => return Err(bad(&format!("the type {kind:?}"))),
     };
+    if letter == "O" {
+        let why = "holds pickled Python objects: save an array of numbers or texts";
+        return Err(Refused::Unsupported(why.to_owned()));
+    }
     // A time has its unit behind its size.
     let digits: String = size.chars().take_while(char::is_ascii_digit).collect();
     let size: usize = match digits.parse() {
@@ -169,10 +173,6 @@ fn push_fields(
         ("S", n) => (Some(Kind::Bytes(n)), n),
         ("U", n) => (Some(Kind::Utf32(n)), 4 * n),
         ("V" | "m" | "M" | "c" | "f", n) => (None, n),
-        ("O", _) => {
-            let why = "holds pickled Python objects: save an array of numbers or texts";
-            return Err(Refused::Unsupported(why.to_owned()));
-        }
         _ => return Err(bad(&format!("the type {kind:?}"))),
     };
     for name in names {
