@@ -53,7 +53,7 @@ struct Gltf {
 
 impl Gltf {
     fn view(&mut self, bytes: &[u8]) -> usize {
-        while self.data.len() % 4 != 0 {
+        while !self.data.len().is_multiple_of(4) {
             self.data.push(0);
         }
         let (at, length) = (self.data.len(), bytes.len());
@@ -238,7 +238,7 @@ fn buffers_beside_the_file_and_in_it() {
         assert_eq!(triangles(&file.mesh), square());
     }
     let mut json = f.json("", &rest);
-    while json.len() % 4 != 0 {
+    while !json.len().is_multiple_of(4) {
         json.push(' ');
     }
     let mut glb = b"glTF".to_vec();
@@ -432,7 +432,8 @@ fn ply_files_of_other_libraries_with_the_columns_of_data_sets() {
     let faces: Vec<i64> = (0..12).collect();
     let halves = |f: fn(i64) -> i64| faces.iter().map(|&i| f(i / 2)).collect::<Vec<i64>>();
     let of_faces = LabelElement::Face;
-    let expected: [(&str, Option<(LabelElement, [Option<(&str, Vec<i64>)>; 2])>); 6] = [
+    type Column = Option<(&'static str, Vec<i64>)>;
+    let expected: [(&str, Option<(LabelElement, [Column; 2])>); 6] = [
         ("matterport_region.ply", Some((of_faces, [Some(("category_id", halves(|i| i - 1))), None]))),
         ("replica_semantic.ply", Some((of_faces, [None, Some(("object_id", halves(|i| i * 10)))]))),
         (
