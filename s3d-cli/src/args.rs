@@ -184,7 +184,7 @@ pub(crate) struct Threads {
 
 #[derive(Debug, Args)]
 pub(crate) struct MeshArgs {
-    /// The mesh: OBJ, glTF or GLB.
+    /// The mesh: OBJ, glTF, GLB or PLY.
     #[arg(value_name = "MESH")]
     pub(crate) mesh: PathBuf,
     /// Which axis of the file points up.

@@ -1,4 +1,5 @@
-//! How fast are scans read, in bytes of their files a second: OBJ with its texture, glTF, points of the S3DIS tree?
+//! How fast are scans read, in bytes of their files a second (PLY meshes in faces a second too): OBJ with its texture,
+//! glTF, PLY in all encodings, with and without labels, points of the S3DIS tree?
 //!
 //! The inputs are made here, with fixed seeds, so that figures compare between machines; `S3D_BENCH_MESH=rgb.obj` adds a
 //! real mesh. Files lie in a temporary folder and are warm in the system's cache.
@@ -96,6 +97,57 @@ fn write_glb(dir: &Path, n: usize) -> PathBuf {
     path
 }
 
+/// The same floor as a `.ply` with colours; `encoding` as the header names it, `labels` a class and an object a face.
+fn write_ply(dir: &Path, n: usize, encoding: &str, labels: bool) -> PathBuf {
+    let mut random = Numbers(7);
+    let columns = if labels { "property int category_id\nproperty int object_id\n" } else { "" };
+    let mut file = format!(
+        "ply\nformat {encoding} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\nelement face {}\n\
+         property list uchar int vertex_indices\n{columns}end_header\n",
+        (n + 1) * (n + 1),
+        2 * n * n
+    )
+    .into_bytes();
+    let bytes = |bytes: [u8; 4]| match encoding {
+        "binary_big_endian" => [bytes[3], bytes[2], bytes[1], bytes[0]],
+        _ => bytes,
+    };
+    let ascii = encoding == "ascii";
+    for i in 0..=n {
+        for j in 0..=n {
+            let position = [i as f32 * 0.02, random.next() as f32 * 0.01, j as f32 * 0.02];
+            let color = [i as u8, j as u8, 128];
+            if ascii {
+                let ([x, y, z], [r, g, b]) = (position, color);
+                file.extend(format!("{x:.6} {y:.6} {z:.6} {r} {g} {b}\n").bytes());
+            } else {
+                file.extend(position.iter().flat_map(|v| bytes(v.to_le_bytes())));
+                file.extend(color);
+            }
+        }
+    }
+    for i in 0..n {
+        for j in 0..n {
+            let a = (i * (n + 1) + j) as u32;
+            let (b, c, d) = (a + 1, a + n as u32 + 1, a + n as u32 + 2);
+            for [p, q, r] in [[a, b, d], [a, d, c]] {
+                let label: &[u32] = if labels { &[i as u32 % 40, j as u32] } else { &[] };
+                if ascii {
+                    let label: String = label.iter().map(|l| format!(" {l}")).collect();
+                    file.extend(format!("3 {p} {q} {r}{label}\n").bytes());
+                } else {
+                    file.push(3);
+                    file.extend([&[p, q, r], label].concat().iter().flat_map(|v| bytes(v.to_le_bytes())));
+                }
+            }
+        }
+    }
+    let path = dir.join(format!("floor_{n}_{encoding}{}.ply", if labels { "_labels" } else { "" }));
+    fs::write(&path, file).unwrap();
+    path
+}
+
 /// `n` points as the published tree writes them.
 fn write_points(dir: &Path, n: usize) -> PathBuf {
     let mut random = Numbers(7);
@@ -129,6 +181,27 @@ fn meshes(c: &mut Criterion) {
     }
 }
 
+fn ply(c: &mut Criterion) {
+    let dir = tempfile::tempdir().unwrap();
+    let mut group = c.benchmark_group("read_ply_mesh");
+    group.sample_size(10);
+    let n = 400;
+    for encoding in ["binary_little_endian", "binary_big_endian", "ascii"] {
+        for labels in [false, true] {
+            let path = write_ply(dir.path(), n, encoding, labels);
+            let name = format!("{encoding}{}", if labels { "_labels" } else { "" });
+            for (unit, throughput) in
+                [("bytes", size(&path)), ("faces", Throughput::Elements(2 * (n * n) as u64))]
+            {
+                group.throughput(throughput);
+                group.bench_function(format!("{name}/{unit}"), |b| {
+                    b.iter(|| read_mesh(black_box(&path), UpAxis::Y).unwrap());
+                });
+            }
+        }
+    }
+}
+
 fn points(c: &mut Criterion) {
     let dir = tempfile::tempdir().unwrap();
     let mut group = c.benchmark_group("points");
@@ -154,5 +227,5 @@ fn points(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, meshes, points);
+criterion_group!(benches, meshes, ply, points);
 criterion_main!(benches);

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::gltf::Instance;
-use crate::gltf_document::GltfDocument;
+use crate::gltf_document::{GltfDocument, way_out};
 use crate::gltf_material::{GltfLooks, default_linear, srgb_from_linear};
 use crate::mesh_file::UpAxis;
 use crate::quote::{count, quote};
@@ -137,7 +137,10 @@ impl<'a> Builder<'a> {
         }
         let extension = p.extensions.iter().flat_map(|e| e.others.keys()).next();
         Err(self.document.fail(match extension {
-            Some(name) => format!("{who}: its vertices are in the extension {name}, which is not read"),
+            Some(name) => {
+                let way_out = way_out(name);
+                format!("{who}: its vertices are in the extension {name}, which is not read; {way_out}")
+            }
             None => format!("{who}: accessor {positions} of its vertices has no data"),
         }))
     }

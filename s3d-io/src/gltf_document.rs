@@ -31,8 +31,14 @@ const WAYS_OUT: [(&str, &str); 6] = [
         "EXT_meshopt_compression",
         "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
     ),
-    ("KHR_meshopt_compression", "export without meshopt compression"),
-    ("KHR_texture_basisu", "export PNG or JPEG textures instead of KTX2"),
+    (
+        "KHR_meshopt_compression",
+        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "KHR_texture_basisu",
+        "export PNG or JPEG textures instead of KTX2, or run `gltf-transform ktxdecompress in.glb out.glb`",
+    ),
     ("EXT_texture_webp", "export PNG or JPEG textures, or run `gltf-transform png in.glb out.glb`"),
     ("EXT_mesh_gpu_instancing", "export instances as nodes of their own"),
 ];
@@ -143,7 +149,13 @@ impl GltfDocument {
                 })?,
                 (None, Some(blob)) if i == 0 => blob.to_vec(),
                 (None, _) => {
-                    return Err(self.fail(format!("buffer {i} has neither a URI nor a chunk of a .glb")));
+                    // What an extension compresses may have a buffer that is not there.
+                    let meshopt =
+                        self.root.extensions_used.iter().find(|e| e.ends_with("_meshopt_compression"));
+                    let why = meshopt.map_or_else(String::new, |e| {
+                        format!(": its data are in the extension {e}, which is not read; {}", way_out(e))
+                    });
+                    return Err(self.fail(format!("buffer {i} has neither a URI nor a chunk of a .glb{why}")));
                 }
             };
             if (bytes.len() as u64) < json.byte_length.0 {
@@ -246,9 +258,13 @@ fn old_version(path: &Path, version: &str) -> Error {
 fn check_extensions(path: &Path, required: &[String]) -> Result<()> {
     let known = |e: &str| HARMLESS.contains(&e) || e.starts_with("KHR_materials_");
     let Some(extension) = required.iter().find(|e| !known(e)) else { return Ok(()) };
-    let way_out =
-        WAYS_OUT.iter().find(|(name, _)| name == extension).map_or("export without it", |(_, way)| *way);
+    let way_out = way_out(extension);
     Err(Error::unsupported(path, format!("requires the extension {extension}, which is not read; {way_out}")))
+}
+
+/// What to do about an extension that is not read.
+pub(crate) fn way_out(extension: &str) -> &'static str {
+    WAYS_OUT.iter().find(|(name, _)| *name == extension).map_or("export without it", |(_, way)| *way)
 }
 
 /// `text` with `%20` and the like replaced. What is not an escape stays.

@@ -1,6 +1,6 @@
 //! Materials and textures of glTF files: the base colour, which is all that a data set keeps of them.
 
-use crate::gltf_document::GltfDocument;
+use crate::gltf_document::{GltfDocument, way_out};
 use crate::quote::quote;
 use crate::texture_file::{LoadedTexture, TextureFile, decode_texture};
 use gltf::json::validation::Checked;
@@ -149,7 +149,9 @@ fn texture_key(
     let texture = document.root.get(index).ok_or_else(|| format!("texture {index} is not there"))?;
     if texture.source.value() == u32::MAX as usize {
         let only = texture.extensions.iter().flat_map(|e| e.others.keys()).next();
-        let only = only.map_or_else(String::new, |name| format!(", only one for the extension {name}"));
+        let only = only.map_or_else(String::new, |name| {
+            format!(", only one for the extension {name}; {}", way_out(name))
+        });
         return Err(format!("texture {index} has no PNG or JPEG image{only}"));
     }
     let sampler = match texture.sampler {
