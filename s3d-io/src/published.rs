@@ -3,7 +3,7 @@
 use crate::cameras::FARTHEST_M;
 use crate::mesh_file::{MeshFile, UpAxis, read_mesh};
 use crate::{Annotations, Error, ImageName, Result, ScanLocation, is_valid_uuid, read_json};
-use s3d_geom::glam::{DAffine3, DMat3, DVec3, Vec3};
+use s3d_geom::glam::{DAffine3, DVec3, Vec3};
 use s3d_geom::{NO_INDEX, Pose, TriMesh, rotation_from_euler};
 use s3d_label::{Label, Room, parse_name};
 use serde::Deserialize;
@@ -257,7 +257,7 @@ impl PublishedArea {
 impl PublishedMesh {
     fn turn(&mut self, world_from_area: &DAffine3) -> std::result::Result<(), s3d_geom::MeshError> {
         let mut parts = self.file.mesh.parts().clone();
-        let normal_from = DMat3::from_mat3(world_from_area.matrix3.as_mat3()).inverse().transpose();
+        let normal_from = world_from_area.matrix3.inverse().transpose();
         for p in &mut parts.positions {
             *p = world_from_area.transform_point3(p.as_dvec3()).as_vec3();
         }
