@@ -12,7 +12,9 @@
 //! - meshes: [`read_mesh`] (OBJ, glTF), [`write_rgb_obj`], [`write_semantic_obj`];
 //! - scans: [`read_scene`], [`read_cameras`], [`AnnotationTree`], [`PointReader`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
-//! - lists: [`write_labels`], [`write_splits`].
+//! - lists: [`write_labels`], [`write_splits`];
+//! - packages for loaders, from the images of a data set ([`dataset_images`]): [`TarWriter`] (WebDataset),
+//!   [`write_colmap_text`], [`write_nerfstudio`], [`write_coco`], [`write_image_index`] (Parquet).
 //!
 //! What a file holds is decided by formats.md; the docs here name its section.
 //!
@@ -42,7 +44,10 @@
 
 mod atomic;
 mod cameras;
+mod coco;
+mod colmap_write;
 mod compression;
+mod dataset;
 mod deflate;
 mod error;
 mod exr;
@@ -57,15 +62,18 @@ mod labels;
 mod layout;
 mod mesh_file;
 mod mtl;
+mod nerfstudio_write;
 mod obj;
 mod obj_diagnose;
 mod obj_lines;
 mod obj_looks;
 mod obj_plain;
 mod obj_write;
+mod parquet_index;
 mod ply;
 mod png;
 mod png_filter;
+mod point_sample;
 mod pose;
 mod pretty;
 mod quote;
@@ -74,11 +82,21 @@ mod s3dis_points;
 mod s3dis_write;
 mod scene;
 mod splits;
+mod tar;
 mod texture_file;
+mod webdataset;
 
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
 pub use cameras::{ScanLocation, read_cameras};
+pub use coco::{
+    CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_category_id,
+    coco_panoptic, write_coco,
+};
+pub use colmap_write::{ColmapImage, write_colmap_binary, write_colmap_text};
 pub use compression::{Compression, UnknownCompression};
+pub use dataset::{
+    DatasetImage, ViewRecord, check_images_complete, dataset_images, read_png_size, read_views,
+};
 pub use error::{Error, Place, Result};
 pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
 pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};
@@ -86,9 +104,12 @@ pub use json::{read_json, write_json};
 pub use labels::{read_labels, write_labels};
 pub use layout::{Domain, Frame, ImageName, Layout, UnknownDomain, image_stem, is_valid_room, is_valid_uuid};
 pub use mesh_file::{MeshFile, UpAxis, read_mesh};
+pub use nerfstudio_write::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
+pub use parquet_index::{ImageRow, SemanticRow, write_image_index};
 pub use ply::{PlyPointWriter, read_ply_point_count};
 pub use png::{Content, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
+pub use point_sample::read_point_sample;
 pub use pose::{PoseFile, read_pose};
 pub use pretty::pretty_color;
 pub use s3dis::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
@@ -96,7 +117,9 @@ pub use s3dis_points::{PointReader, read_points};
 pub use s3dis_write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};
 pub use scene::{SceneFile, read_scene};
 pub use splits::{Split, read_splits, write_splits};
+pub use tar::TarWriter;
 pub use texture_file::TextureFile;
+pub use webdataset::{ShardEntry, ShardLimits, plan_shards, sample_key, sample_member, write_shard_index};
 
 /// The README's example is compiled and run with the tests.
 #[cfg(doctest)]
