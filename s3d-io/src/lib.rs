@@ -109,7 +109,7 @@ pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
 pub use parquet_index::{ImageRow, SemanticRow, write_image_index};
 pub use ply::{PlyPointWriter, read_ply_point_count};
 pub use png::{Content, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
-pub use point_sample::read_point_sample;
+pub use point_sample::{read_point_sample, write_colored_points};
 pub use pose::{PoseFile, read_pose};
 pub use pretty::pretty_color;
 pub use s3dis::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
