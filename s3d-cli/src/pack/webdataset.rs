@@ -82,6 +82,11 @@ pub(super) fn pack(
          the number of samples of each shard is in shards.json"
             .into(),
     );
+    notes.push(
+        "decode(\"pil\") makes 8-bit RGB of every image: give depth.png (16 bits) and global_xyz.exr decoders of their own, \
+         before it, with webdataset.autodecode.handle_extension"
+            .into(),
+    );
     Ok(notes)
 }
 
