@@ -296,6 +296,27 @@ fn a_damaged_data_set_is_told_by_the_file() {
 }
 
 #[test]
+fn units_of_depth_are_those_of_the_manifest() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = damaged(dir.path(), |_| {});
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let place = dir.path().join("package");
+    let write = |units: &str| {
+        let mut json: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+        json["options"]["depth_units"] = units.into();
+        fs::write(out.join("manifest.json"), json.to_string()).unwrap();
+    };
+    let args =
+        ["pack", text(&out), "--to", "nerfstudio", "--depth", "original", "--overwrite", "-o", text(&place)];
+    write("512");
+    assert!(s3d_ok(&args).contains("--depth-unit-scale-factor 0.001953125;"));
+    write("mm");
+    assert!(s3d_ok(&args).contains("--depth-unit-scale-factor 0.001;"));
+    write("ell");
+    s3d_fails(&args, 1, &["manifest.json", "\"ell\""]);
+}
+
+#[test]
 fn a_data_set_without_a_modality_says_what_is_needed() {
     let dir = tempfile::tempdir().unwrap();
     let scene = write_scan(&dir.path().join("scan"), 1);

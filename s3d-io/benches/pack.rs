@@ -61,7 +61,7 @@ fn semantic() -> (Raster<[u8; 3]>, LabelTable) {
 fn shards(c: &mut Criterion) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.tar");
-    let file: Vec<u8> = (0..200_000u32).map(|i| (i * i) as u8).collect();
+    let file: Vec<u8> = (0..200_000u32).map(|i| i.wrapping_mul(i) as u8).collect();
     let mut group = c.benchmark_group("pack");
     group.throughput(Throughput::Bytes(200 * file.len() as u64));
     group.bench_function("tar", |b| {

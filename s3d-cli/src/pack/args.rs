@@ -30,9 +30,9 @@ pub(crate) struct PackArgs {
     #[arg(long, value_name = "views|panoramas|all", value_parser = parsed::<Which>)]
     pub(crate) images: Option<Which>,
     #[command(flatten)]
-    pub(crate) options: PackOptions,
-    #[command(flatten)]
     pub(crate) threads: Threads,
+    #[command(flatten, next_help_heading = "Options of single packages")]
+    pub(crate) options: PackOptions,
 }
 
 /// What belongs to some packages only; `None` (or false) where it was not said.
@@ -63,8 +63,8 @@ pub(crate) struct PackOptions {
     #[arg(long)]
     pub(crate) copy_images: bool,
     /// nerfstudio: depth written anew in millimetres with 0 for missing, as it is read by default; OUT's own files, for
-    /// which --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels seem to be 128 m away; or none
-    /// [default: millimetres]
+    /// which ns-train's --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels seem to be 128 m away; or
+    /// none [default: millimetres]
     #[arg(long, value_name = "millimetres|original|none", value_parser = parsed::<DepthFiles>)]
     pub(crate) depth: Option<DepthFiles>,
     /// coco: classes of which all instances in an image are one segment, or none [default: ceiling,floor,wall]

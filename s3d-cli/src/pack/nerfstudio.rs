@@ -2,7 +2,7 @@
 
 use super::args::{DepthFiles, PackOptions};
 use super::destination::{Destination, relative_path, resolved};
-use super::source::{DEPTH_MISSING, DEPTH_UNITS_PER_M, Source};
+use super::source::{DEPTH_MISSING, Source};
 use super::{area_points, copy, map_in_order};
 use crate::console::Progress;
 use crate::failure::Outcome;
@@ -67,16 +67,17 @@ pub(super) fn pack(
             notes.push(format!("ns-train … --data {below}/{name}"));
         }
     }
-    notes.extend(
-        match depth {
-            DepthFiles::Millimetres => Some("depth is in millimetres, 0 where missing: nerfstudio's default"),
-            DepthFiles::Original => Some(
-                "depth needs --depth-unit-scale-factor 0.001953125 (1/512); missing pixels seem to be 128 m away",
-            ),
-            DepthFiles::None => None,
+    match depth {
+        DepthFiles::Millimetres => {
+            notes.push("depth is in millimetres, 0 where missing: nerfstudio's default".into());
         }
-        .map(str::to_owned),
-    );
+        DepthFiles::Original => notes.push(format!(
+            "depth needs --depth-unit-scale-factor {}; missing pixels seem to be {:.0} m away",
+            1.0 / source.depth_units_per_m,
+            f64::from(DEPTH_MISSING) / source.depth_units_per_m
+        )),
+        DepthFiles::None => {}
+    }
     Ok(notes)
 }
 
@@ -132,7 +133,10 @@ impl<'a> Job<'a> {
             DepthFiles::Original => Some(self.file(image, Domain::Depth, "depths")?),
             DepthFiles::Millimetres => {
                 let depth = read_gray16(&image.path(&self.source.layout, Domain::Depth))?;
-                let file = encode_gray16(&millimetres(&depth), self.options.compression.unwrap_or_default());
+                let file = encode_gray16(
+                    &millimetres(&depth, self.source.depth_units_per_m),
+                    self.options.compression.unwrap_or_default(),
+                );
                 let name = format!("depths/{}_depth.png", image.stem());
                 write_bytes(&self.folder.join(&name), &file)?;
                 Some(name)
@@ -153,9 +157,9 @@ impl<'a> Job<'a> {
 }
 
 /// Depth in millimetres, rounded; 0 where there is none or where it is beyond 65.535 m.
-fn millimetres(depth: &Raster<u16>) -> Raster<u16> {
+fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
     let convert = |v: &u16| {
-        let mm = (f64::from(*v) * (1000.0 / DEPTH_UNITS_PER_M)).round();
+        let mm = (f64::from(*v) * (1000.0 / units_per_m)).round();
         if *v == DEPTH_MISSING || mm > f64::from(u16::MAX) { 0 } else { mm as u16 }
     };
     Raster::from_vec(depth.width(), depth.height(), depth.pixels().iter().map(convert).collect())
@@ -168,6 +172,7 @@ mod tests {
     #[test]
     fn depth_in_millimetres() {
         let depth = Raster::from_vec(3, 2, vec![0, 512, 1, 65_535, 33_553, 33_555]);
-        assert_eq!(millimetres(&depth).pixels(), [0, 1000, 2, 0, 65_533, 0]);
+        assert_eq!(millimetres(&depth, 512.0).pixels(), [0, 1000, 2, 0, 65_533, 0]);
+        assert_eq!(millimetres(&depth, 1000.0).pixels(), [0, 512, 1, 0, 33_553, 33_555]);
     }
 }

@@ -1,7 +1,7 @@
 //! `s3d pack --to parquet`: a table of all images, with what their pixels show.
 
 use super::map_in_order;
-use super::source::{DEPTH_MISSING, DEPTH_UNITS_PER_M, Source};
+use super::source::{DEPTH_MISSING, Source};
 use crate::console::Progress;
 use crate::failure::Outcome;
 use s3d_geom::Raster;
@@ -92,7 +92,7 @@ fn row(
         row.selection_entropy = Some(view.entropy);
     }
     if image.has(Domain::Depth) {
-        let (coverage, depth_m) = depth_row(&read_gray16(&path(Domain::Depth))?);
+        let (coverage, depth_m) = depth_row(&read_gray16(&path(Domain::Depth))?, source.depth_units_per_m);
         (row.coverage, row.depth_m) = (Some(coverage), depth_m);
     } else if image.has(Domain::Rgb) && !image.has(Domain::Semantic) {
         row.coverage = Some(share(&read_rgb8(&path(Domain::Rgb))?, |p| *p != [0; 3]));
@@ -122,14 +122,14 @@ fn share<T: Copy>(image: &Raster<T>, is: impl Fn(&T) -> bool) -> f64 {
 }
 
 /// The share of pixels with a depth, and the least, mean and greatest of them in metres.
-fn depth_row(depth: &Raster<u16>) -> (f64, Option<[f64; 3]>) {
+fn depth_row(depth: &Raster<u16>, units_per_m: f64) -> (f64, Option<[f64; 3]>) {
     let (mut least, mut most, mut sum, mut count) = (u16::MAX, 0, 0u64, 0u64);
     for &v in depth.pixels().iter().filter(|v| **v != DEPTH_MISSING) {
         (least, most) = (least.min(v), most.max(v));
         sum += u64::from(v);
         count += 1;
     }
-    let metres = |units: f64| units / DEPTH_UNITS_PER_M;
+    let metres = |units: f64| units / units_per_m;
     let depth_m =
         (count > 0).then(|| [f64::from(least), sum as f64 / count as f64, f64::from(most)].map(metres));
     (count as f64 / depth.len() as f64, depth_m)
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn depths_are_in_metres() {
         let depth = Raster::from_vec(2, 2, vec![512, DEPTH_MISSING, 1024, 0]);
-        assert_eq!(depth_row(&depth), (0.75, Some([0.0, 1.0, 2.0])));
-        assert_eq!(depth_row(&Raster::filled(2, 2, DEPTH_MISSING)), (0.0, None));
+        assert_eq!(depth_row(&depth, 512.0), (0.75, Some([0.0, 1.0, 2.0])));
+        assert_eq!(depth_row(&Raster::filled(2, 2, DEPTH_MISSING), 1000.0), (0.0, None));
     }
 }

@@ -4,14 +4,12 @@ use super::args::Which;
 use crate::failure::{Failure, Outcome};
 use crate::pipeline::manifest::Head;
 use s3d_io::{
-    DatasetImage, Domain, Error, Frame, Layout, PoseFile, check_images_complete, dataset_images, read_labels,
-    read_pose,
+    DatasetImage, Domain, Error, Frame, Layout, PoseFile, check_images_complete, dataset_images, read_json,
+    read_labels, read_pose,
 };
 use s3d_label::LabelTable;
+use serde::Deserialize;
 use std::path::Path;
-
-/// Units a metre of depth images. Source: formats.md, "Images".
-pub(crate) const DEPTH_UNITS_PER_M: f64 = 512.0;
 
 /// The depth of a pixel that shows nothing, or something farther than can be said.
 pub(crate) const DEPTH_MISSING: u16 = u16::MAX;
@@ -22,6 +20,8 @@ pub(crate) struct Source {
     /// The areas that are packed, and all of their images that are.
     pub(crate) areas: Vec<u32>,
     pub(crate) images: Vec<DatasetImage>,
+    /// Units a metre of depth images.
+    pub(crate) depth_units_per_m: f64,
 }
 
 impl Source {
@@ -55,7 +55,8 @@ impl Source {
             let what = if which == Which::All { "images".to_owned() } else { which.to_string() };
             return Err(Failure::Input(format!("{}: the data set has no {what} to pack", root.display())));
         }
-        Ok(Self { layout, areas, images })
+        let depth_units_per_m = depth_units_per_m(&layout)?;
+        Ok(Self { layout, areas, images, depth_units_per_m })
     }
 
     /// The images of an area.
@@ -98,5 +99,28 @@ impl Source {
     pub(crate) fn labels(&self) -> Outcome<LabelTable> {
         let path = self.layout.labels_json();
         LabelTable::from_names(&read_labels(&path)?).map_err(|e| Error::format(&path, e.to_string()).into())
+    }
+}
+
+/// Units a metre of depth images, as the manifest has them: 512, as published, where it tells of none. Source: formats.md,
+/// "Images".
+fn depth_units_per_m(layout: &Layout) -> Outcome<f64> {
+    #[derive(Deserialize)]
+    struct Manifest {
+        options: Options,
+    }
+    #[derive(Deserialize)]
+    struct Options {
+        depth_units: Option<String>,
+    }
+    let path = layout.manifest();
+    let manifest: Manifest = read_json(&path)?;
+    match manifest.options.depth_units.as_deref() {
+        None | Some("512") => Ok(512.0),
+        Some("mm") => Ok(1000.0),
+        Some(other) => {
+            Err(Error::format(&path, format!("options.depth_units is \"{other}\", neither 512 nor mm"))
+                .into())
+        }
     }
 }

@@ -27,7 +27,7 @@ pub(super) fn pack(
 ) -> Outcome<Vec<String>> {
     let domains = match &options.modalities {
         Some(asked) => {
-            asked.iter().try_for_each(|d| source.require(*d, "--modalities"))?;
+            asked.iter().try_for_each(|d| source.require(*d, "the package"))?;
             Domain::ALL.into_iter().filter(|d| asked.contains(d)).collect()
         }
         None => Domain::ALL.to_vec(),

@@ -55,17 +55,6 @@ def depth_of(demo, stem):
     return np.where(depth == 65535, np.nan, depth / 512)
 
 
-def view_points(demo, stem, k, camera_to_world, columns=slice(None, None, 5)):
-    """World points of some pixels of a view, by a pinhole with OpenCV's axes and pixel centres at a half."""
-    depth = depth_of(demo, stem)
-    v, u = np.mgrid[: depth.shape[0], : depth.shape[1]]
-    u, v, z = (a[::7, columns].ravel() for a in (u, v, depth))
-    keep = np.isfinite(z)
-    u, v, z = u[keep], v[keep], z[keep]
-    camera = np.stack([(u + 0.5 - k[0, 2]) / k[0, 0] * z, (v + 0.5 - k[1, 2]) / k[1, 1] * z, z])
-    return (camera_to_world[:3, :3] @ camera).T + camera_to_world[:3, 3], u, v
-
-
 def pose_of(demo, stem):
     pose = json.loads(image_path(demo, stem, "pose").read_text())
     return np.array(pose["camera_k_matrix"]), np.array(pose["camera_rt_matrix"]), pose
