@@ -1,5 +1,6 @@
 //! The command line: subcommands, options, defaults, help texts.
 
+use crate::pack::args::PackArgs;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, value_parser};
 use glam::DVec3;
@@ -51,6 +52,11 @@ pub(crate) enum Command {
     /// Tell what a scene holds, and what looks wrong in it.
     #[command(after_help = "Example:\n  s3d info scan/scene.toml")]
     Info(InfoArgs),
+    /// Package a data set for a trainer: WebDataset, COLMAP, nerfstudio, COCO panoptic, or a Parquet table of its images.
+    #[command(
+        after_help = "Examples:\n  s3d pack dataset --to webdataset --images views --shuffle 1\n  s3d pack dataset --to colmap -o colmap --areas 1 --copy-images\n  s3d pack dataset --to nerfstudio\n  s3d pack dataset --to coco --areas 1,2,3,4,6 -o coco_train\n  s3d pack dataset --to parquet -o images.parquet"
+    )]
+    Pack(PackArgs),
     /// Print the tables of statistics of a data set, counted from its files.
     #[command(after_help = "Example:\n  s3d stats dataset")]
     Stats(StatsArgs),
@@ -285,7 +291,7 @@ pub(crate) struct StatsArgs {
     pub(crate) output: PathBuf,
 }
 
-fn parsed<T: std::str::FromStr>(text: &str) -> Result<T, String>
+pub(crate) fn parsed<T: std::str::FromStr>(text: &str) -> Result<T, String>
 where
     T::Err: std::fmt::Display,
 {

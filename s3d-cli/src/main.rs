@@ -5,6 +5,7 @@ mod commands;
 mod console;
 mod demo;
 mod failure;
+mod pack;
 mod pipeline;
 
 use args::{Cli, Command};
@@ -22,6 +23,7 @@ fn main() -> ExitCode {
         Command::Sample(args) => commands::sample::run(args),
         Command::Render(args) => commands::render::run(args),
         Command::Info(args) => commands::info::run(args),
+        Command::Pack(args) => commands::pack::run(&args),
         Command::Stats(args) => commands::stats::run(&args),
     };
     match outcome {

@@ -12,7 +12,9 @@
 //! - meshes: [`read_mesh`] and [`read_meshes`] (OBJ, glTF, PLY), with [`MeshLabels`]; [`write_rgb_obj`], [`write_semantic_obj`];
 //! - scans: [`read_scene`], [`read_scan_locations`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
-//! - lists: [`write_labels`], [`write_splits`].
+//! - lists: [`write_labels`], [`write_splits`];
+//! - packages for loaders, from the images of a data set ([`dataset_images`]): [`TarWriter`] (WebDataset),
+//!   [`write_colmap_text`], [`write_nerfstudio`], [`write_coco`], [`write_image_index`] (Parquet).
 //!
 //! What a file holds is decided by formats.md; the docs here name its section.
 //!
@@ -45,8 +47,11 @@ mod atomic;
 mod cameras;
 mod cloud_columns;
 mod cloud_records;
+mod coco;
 mod colmap_images;
+mod colmap_write;
 mod compression;
+mod dataset;
 mod deflate;
 mod e57_cloud;
 mod error;
@@ -76,6 +81,7 @@ mod mesh_join;
 mod mesh_labels;
 mod mtl;
 mod nerfstudio_frames;
+mod nerfstudio_write;
 mod npy_cloud;
 mod npy_header;
 mod obj;
@@ -84,6 +90,7 @@ mod obj_lines;
 mod obj_looks;
 mod obj_plain;
 mod obj_write;
+mod parquet_index;
 mod ply;
 mod ply_batch;
 mod ply_cloud;
@@ -96,6 +103,7 @@ mod ply_source;
 mod ply_vertices;
 mod png;
 mod png_filter;
+mod point_sample;
 mod pose;
 mod pretty;
 mod published;
@@ -107,12 +115,22 @@ mod scan_locations;
 mod scannet_cloud;
 mod scene;
 mod splits;
+mod tar;
 mod texture_file;
+mod webdataset;
 
 pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, Skipped};
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
 pub use cameras::{ScanLocation, read_cameras};
+pub use coco::{
+    CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_category_id,
+    coco_panoptic, write_coco,
+};
+pub use colmap_write::{ColmapImage, write_colmap_binary, write_colmap_text};
 pub use compression::{Compression, UnknownCompression};
+pub use dataset::{
+    DatasetImage, ViewRecord, check_images_complete, dataset_images, read_png_size, read_views,
+};
 pub use error::{Error, Place, Result};
 pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
 pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};
@@ -125,9 +143,12 @@ pub use mat_write::MatWriter;
 pub use mesh_file::{MeshFile, MeshOptions, UpAxis, read_mesh, read_mesh_with};
 pub use mesh_join::{MeshSource, read_meshes, read_meshes_with};
 pub use mesh_labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
+pub use nerfstudio_write::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
+pub use parquet_index::{ImageRow, SemanticRow, write_image_index};
 pub use ply::{PlyPointWriter, read_ply_point_count};
 pub use png::{Content, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
+pub use point_sample::{read_point_sample, write_colored_points};
 pub use pose::{PoseFile, read_pose};
 pub use pretty::pretty_color;
 pub use published::{PublishedArea, PublishedLocation, PublishedMesh, PublishedOptions};
@@ -137,7 +158,9 @@ pub use s3dis_write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};
 pub use scan_locations::read_scan_locations;
 pub use scene::{CameraSource, SceneFile, read_scene};
 pub use splits::{Split, read_splits, write_splits};
+pub use tar::TarWriter;
 pub use texture_file::TextureFile;
+pub use webdataset::{ShardEntry, ShardLimits, plan_shards, sample_key, sample_member, write_shard_index};
 
 /// The README's example is compiled and run with the tests.
 #[cfg(doctest)]

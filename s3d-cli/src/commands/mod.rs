@@ -3,6 +3,7 @@
 pub(crate) mod demo;
 pub(crate) mod export;
 pub(crate) mod info;
+pub(crate) mod pack;
 pub(crate) mod render;
 pub(crate) mod sample;
 pub(crate) mod stats;
@@ -34,7 +35,7 @@ fn print(text: &str) -> Outcome<()> {
 }
 
 /// Refuses to replace a file unless that was asked for.
-fn refuse_existing(path: &Path, overwrite: bool) -> Outcome<()> {
+pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Outcome<()> {
     match path.try_exists() {
         Ok(true) if !overwrite => {
             Err(Failure::Call(format!("{} is there already: replace it with --overwrite", path.display())))

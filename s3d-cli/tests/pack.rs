@@ -1,0 +1,344 @@
+//! `s3d pack`, run as a process on a small data set: packages are whole, the same for any number of threads, and never
+//! touch the data set; what is wrong is told with the file's name.
+
+mod common;
+
+use common::{files, s3d_fails, s3d_ok, text, write_scan};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// A data set of two areas, made once: to be read only.
+fn dataset() -> &'static Path {
+    static DATASET: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
+    let (_, out) = DATASET.get_or_init(|| {
+        let dir = tempfile::tempdir().unwrap();
+        let scenes = [1, 2].map(|area| write_scan(&dir.path().join(format!("scan_{area}")), area));
+        let out = dir.path().join("dataset");
+        s3d_ok(&[
+            "export",
+            text(&scenes[0]),
+            text(&scenes[1]),
+            "-o",
+            text(&out),
+            "--views",
+            "6",
+            "--size",
+            "48",
+            "--pano-width",
+            "64",
+            "--points-per-m2",
+            "100",
+        ]);
+        (dir, out)
+    });
+    out
+}
+
+const KINDS: [&str; 5] = ["webdataset", "colmap", "nerfstudio", "coco", "parquet"];
+
+/// Packs into `dir`, and gives all that was written, by its path.
+fn pack(dir: &Path, kind: &str, more: &[&str]) -> BTreeMap<PathBuf, Vec<u8>> {
+    let place = dir.join("package");
+    s3d_ok(&[&["pack", text(dataset()), "--to", kind, "-o", text(&place)], more].concat());
+    if kind == "parquet" {
+        BTreeMap::from([(PathBuf::new(), fs::read(&place).unwrap())])
+    } else {
+        files(&place)
+    }
+}
+
+/// Images of an area's kind, as the data set has them.
+fn image_names(area: u32, kind: &str) -> Vec<String> {
+    let folder = dataset().join(format!("area_{area}/{kind}/rgb"));
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+fn json(bytes: &[u8]) -> serde_json::Value {
+    serde_json::from_slice(bytes).unwrap()
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads_and_nothing_altered() {
+    let before = files(dataset());
+    for kind in KINDS {
+        let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let more: &[&str] = if kind == "webdataset" { &["--max-count", "3", "--shuffle", "5"] } else { &[] };
+        let one = pack(a.path(), kind, &[more, &["--threads", "1"]].concat());
+        let four = pack(b.path(), kind, &[more, &["--threads", "4"]].concat());
+        // nerfstudio's paths lead from the package to the data set; both packages are as deep.
+        assert!(one.keys().eq(four.keys()), "{kind}");
+        for (path, bytes) in &one {
+            assert!(*bytes == four[path], "{kind}: {path:?}");
+        }
+        assert_eq!(fs::read_dir(a.path()).unwrap().count(), 1, "{kind} leaves nothing beside the package");
+    }
+    assert_eq!(files(dataset()), before);
+}
+
+#[test]
+fn shards_hold_every_file_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let package = pack(dir.path(), "webdataset", &["--max-count", "3"]);
+    let index = json(&package[Path::new("shards.json")]);
+    let shards = index["shardlist"].as_array().unwrap();
+    let samples: u64 = shards.iter().map(|s| s["nsamples"].as_u64().unwrap()).sum();
+    let images: usize =
+        [1, 2].iter().map(|a| image_names(*a, "data").len() + image_names(*a, "pano").len()).sum();
+    assert_eq!(samples as usize, images);
+    let all = files(dataset());
+    let mut found = 0;
+    for shard in shards {
+        let bytes = &package[Path::new(shard["url"].as_str().unwrap())];
+        assert_eq!(bytes.len() as u64, shard["filesize"].as_u64().unwrap());
+        assert!(shard["nsamples"].as_u64().unwrap() <= 3);
+        // Every file of an image is somewhere in the shards, byte by byte.
+        for header in bytes.chunks(512).filter(|b| b.len() == 512 && b[257..262] == *b"ustar") {
+            assert!(header.starts_with(b"area_") || header.starts_with(b"camera_"), "{header:?}");
+            found += 1;
+        }
+    }
+    let in_images = |p: &&PathBuf| p.components().any(|c| c.as_os_str() == "data" || c.as_os_str() == "pano");
+    assert_eq!(found, all.keys().filter(in_images).count());
+    assert!(package.contains_key(Path::new("area_1_panoramas-000000.tar")));
+
+    let dir = tempfile::tempdir().unwrap();
+    let more = ["--prefix", "train", "--images", "views", "--modalities", "rgb,depth", "--areas", "2"];
+    let package = pack(dir.path(), "webdataset", &more);
+    let names: Vec<_> = package.keys().map(|p| p.to_str().unwrap()).collect();
+    assert_eq!(names, ["pack.json", "shards.json", "train-000000.tar"]);
+    let headers =
+        package[Path::new("train-000000.tar")].chunks(512).filter(|b| b[257..262] == *b"ustar").count();
+    assert_eq!(headers, 2 * image_names(2, "data").len());
+}
+
+#[test]
+fn colmap_models_and_copies() {
+    let dir = tempfile::tempdir().unwrap();
+    let package = pack(dir.path(), "colmap", &["--points", "50", "--copy-images"]);
+    for area in [1, 2] {
+        let names = image_names(area, "data");
+        let text = |name: &str| {
+            let path = format!("area_{area}/sparse/0/{name}");
+            String::from_utf8(package[Path::new(&path)].clone()).unwrap()
+        };
+        let listed: Vec<String> = text("images.txt")
+            .lines()
+            .filter(|l| l.ends_with(".png"))
+            .map(|l| l.split(' ').next_back().unwrap().to_owned())
+            .collect();
+        assert_eq!(
+            {
+                let mut l = listed.clone();
+                l.sort();
+                l
+            },
+            names
+        );
+        for name in names {
+            let copy = &package[Path::new(&format!("area_{area}/images/{name}"))];
+            assert_eq!(*copy, fs::read(dataset().join(format!("area_{area}/data/rgb/{name}"))).unwrap());
+        }
+        assert_eq!(text("points3D.txt").lines().filter(|l| !l.starts_with('#')).count(), 50);
+        assert_eq!(text("cameras.txt").matches(" PINHOLE 48 48 ").count(), listed.len());
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let package = pack(dir.path(), "colmap", &["--binary", "--points", "0", "--areas", "1"]);
+    assert_eq!(package[Path::new("area_1/sparse/0/points3D.bin")], [0; 8]);
+    assert!(package.keys().all(|p| p.extension().is_none_or(|e| e != "txt" && e != "png")));
+}
+
+#[test]
+fn nerfstudio_finds_its_files() {
+    let dir = tempfile::tempdir().unwrap();
+    for (more, depths) in [
+        (&[] as &[&str], true),
+        (&["--depth", "original", "--overwrite"], true),
+        (&["--depth", "none", "--copy-images", "--overwrite"], false),
+        (&["--depth", "original", "--copy-images", "--overwrite"], true),
+    ] {
+        let package = pack(dir.path(), "nerfstudio", more);
+        for (name, kind, model) in
+            [("transforms.json", "data", "OPENCV"), ("transforms_panoramas.json", "pano", "EQUIRECTANGULAR")]
+        {
+            let file = json(&package[Path::new(&format!("area_1/{name}"))]);
+            assert_eq!(file["camera_model"], model);
+            let frames = file["frames"].as_array().unwrap();
+            assert_eq!(frames.len(), image_names(1, kind).len());
+            let folder = dir.path().join("package/area_1");
+            assert!(folder.join(file["ply_file_path"].as_str().unwrap()).is_file());
+            for frame in frames {
+                assert!(folder.join(frame["file_path"].as_str().unwrap()).is_file(), "{frame}");
+                assert_eq!(frame.get("depth_file_path").is_some(), depths, "{more:?}");
+                if let Some(depth) = frame.get("depth_file_path") {
+                    assert!(folder.join(depth.as_str().unwrap()).is_file(), "{frame}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn coco_has_a_panoptic_image_for_each_image() {
+    let dir = tempfile::tempdir().unwrap();
+    let package = pack(dir.path(), "coco", &["--stuff", "none", "--images", "views"]);
+    let file = json(&package[Path::new("panoptic.json")]);
+    assert!(file["categories"].as_array().unwrap().iter().all(|c| c["isthing"] == 1));
+    let images = file["images"].as_array().unwrap();
+    assert_eq!(images.len(), image_names(1, "data").len() + image_names(2, "data").len());
+    for image in images {
+        let name = image["file_name"].as_str().unwrap();
+        assert!(dataset().join(name).is_file() && package.contains_key(&Path::new("panoptic").join(name)));
+    }
+    assert_eq!(package.len(), 2 + images.len());
+}
+
+#[test]
+fn wrong_calls_are_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let (out, place) = (text(dataset()), dir.path().join("package"));
+    let call = |more: &[&str], parts: &[&str]| {
+        s3d_fails(&[&["pack", out, "-o", text(&place)], more].concat(), 2, parts);
+        assert!(!place.exists());
+    };
+    call(&["--to", "zip"], &["webdataset", "parquet"]);
+    call(&["--to", "colmap", "--areas", "4"], &["--areas 4", "there are 1, 2"]);
+    call(
+        &["--to", "parquet", "--points", "3"],
+        &["--points is an option of --to colmap and nerfstudio only"],
+    );
+    call(&["--to", "colmap", "--images", "panoramas"], &["--to nerfstudio"]);
+    for kind in KINDS {
+        let inside = dataset().join("area_1/packed");
+        s3d_fails(&["pack", out, "--to", kind, "-o", text(&inside)], 2, &["in one another"]);
+        assert!(!inside.exists());
+    }
+    fs::create_dir(&place).unwrap();
+    fs::write(place.join("thesis.tex"), "").unwrap();
+    s3d_fails(
+        &["pack", out, "--to", "coco", "-o", text(&place), "--overwrite"],
+        2,
+        &["thesis.tex", "not written by s3d pack"],
+    );
+    s3d_fails(&["pack", text(&place), "--to", "coco"], 1, &["manifest.json", "not there"]);
+}
+
+#[test]
+fn packages_are_replaced_only_when_asked() {
+    let dir = tempfile::tempdir().unwrap();
+    for kind in ["coco", "parquet"] {
+        let place = dir.path().join(kind);
+        let args = ["pack", text(dataset()), "--to", kind, "-o", text(&place)];
+        s3d_ok(&args);
+        s3d_fails(&args, 2, &["--overwrite"]);
+        s3d_ok(&[&args[..], &["--overwrite"]].concat());
+    }
+}
+
+/// A copy of the data set with a fault.
+fn damaged(dir: &Path, damage: impl FnOnce(&Path)) -> PathBuf {
+    let out = dir.join("damaged");
+    for (path, bytes) in files(dataset()) {
+        let path = out.join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+    damage(&out);
+    out
+}
+
+#[test]
+fn a_damaged_data_set_is_told_by_the_file() {
+    let depth = image_names(1, "data")[1].replace("rgb", "depth");
+    let semantic = image_names(1, "data")[2].replace("rgb", "semantic");
+    let pose = image_names(2, "data")[0].replace("_rgb.png", "_pose.json");
+    let dir = tempfile::tempdir().unwrap();
+    let (of_depth, of_semantic) =
+        (format!("area_1/data/depth/{depth}"), format!("area_1/data/semantic/{semantic}"));
+    let of_pose = format!("area_2/data/pose/{pose}");
+    let out = damaged(dir.path(), |out| fs::remove_file(out.join(&of_depth)).unwrap());
+    let place = dir.path().join("package");
+    let fails = |kind: &str, parts: &[&str]| {
+        s3d_fails(&["pack", text(&out), "--to", kind, "-o", text(&place)], 1, parts);
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is left of a package that failed");
+    };
+    for kind in KINDS {
+        fails(kind, &[&of_depth, "missing"]);
+    }
+    fs::copy(dataset().join(&of_depth), out.join(&of_depth)).unwrap();
+
+    fs::write(out.join(&of_semantic), "no image").unwrap();
+    fails("coco", &[&of_semantic, "PNG"]);
+    fails("parquet", &[&of_semantic, "PNG"]);
+    // A label that is in no table.
+    let labels = out.join("assets/semantic_labels.json");
+    fs::copy(dataset().join(&of_semantic), out.join(&of_semantic)).unwrap();
+    fs::write(&labels, "[\"<UNK>_0_<UNK>_0_0\"]").unwrap();
+    fails("coco", &["_domain_semantic.png", "has label", "semantic_labels.json"]);
+    fails("parquet", &["_domain_semantic.png", "has label", "semantic_labels.json"]);
+    fs::copy(dataset().join("assets/semantic_labels.json"), &labels).unwrap();
+
+    fs::write(out.join(&of_pose), "{\n}").unwrap();
+    for kind in ["colmap", "nerfstudio", "parquet"] {
+        fails(kind, &[&of_pose, "missing field"]);
+    }
+    fs::copy(dataset().join(&of_pose), out.join(&of_pose)).unwrap();
+    let cloud = out.join("area_2/3d/pointcloud.ply");
+    let bytes = fs::read(&cloud).unwrap();
+    fs::write(&cloud, &bytes[..bytes.len() - 1]).unwrap();
+    fails("colmap", &["area_2/3d/pointcloud.ply", "ends too early"]);
+    fs::remove_file(&cloud).unwrap();
+    fails("nerfstudio", &["area_2/3d/pointcloud.ply", "cannot read"]);
+}
+
+#[test]
+fn units_of_depth_are_those_of_the_manifest() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = damaged(dir.path(), |_| {});
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let place = dir.path().join("package");
+    let write = |units: &str| {
+        let mut json: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+        json["options"]["depth_units"] = units.into();
+        fs::write(out.join("manifest.json"), json.to_string()).unwrap();
+    };
+    let args =
+        ["pack", text(&out), "--to", "nerfstudio", "--depth", "original", "--overwrite", "-o", text(&place)];
+    write("512");
+    assert!(s3d_ok(&args).contains("--depth-unit-scale-factor 0.001953125;"));
+    write("mm");
+    assert!(s3d_ok(&args).contains("--depth-unit-scale-factor 0.001;"));
+    write("ell");
+    s3d_fails(&args, 1, &["manifest.json", "\"ell\""]);
+}
+
+#[test]
+fn a_data_set_without_a_modality_says_what_is_needed() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = write_scan(&dir.path().join("scan"), 1);
+    let out = dir.path().join("poses");
+    s3d_ok(&[
+        "export",
+        text(&scene),
+        "-o",
+        text(&out),
+        "--views",
+        "2",
+        "--modalities",
+        "pose",
+        "--points-per-m2",
+        "50",
+    ]);
+    for (kind, modality) in [("colmap", "rgb"), ("nerfstudio", "rgb"), ("coco", "rgb")] {
+        s3d_fails(&["pack", text(&out), "--to", kind], 1, &["missing", &format!("needs {modality}")]);
+    }
+    // The others take what there is; the default lies beside the data set.
+    s3d_ok(&["pack", text(&out), "--to", "parquet"]);
+    s3d_ok(&["pack", text(&out), "--to", "webdataset"]);
+    assert!(dir.path().join("poses_images.parquet").is_file());
+    assert!(dir.path().join("poses_webdataset/area_1_views-000000.tar").is_file());
+}
