@@ -22,6 +22,8 @@ fn main() -> ExitCode {
         Command::Sample(args) => commands::sample::run(args),
         Command::Render(args) => commands::render::run(args),
         Command::Info(args) => commands::info::run(args),
+        Command::Xyz(args) => commands::xyz::run(&args),
+        Command::Profile(args) => commands::profile::run(&args),
         Command::Stats(args) => commands::stats::run(&args),
     };
     match outcome {

@@ -12,7 +12,8 @@
 //! - meshes: [`read_mesh`] (OBJ, glTF), [`write_rgb_obj`], [`write_semantic_obj`];
 //! - scans: [`read_scene`], [`read_cameras`], [`AnnotationTree`], [`PointReader`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
-//! - lists: [`write_labels`], [`write_splits`].
+//! - lists: [`write_labels`], [`write_splits`], [`write_image_list`]; arrays: [`NpyWriter`];
+//! - what the numbers of a data set mean: [`Conventions`].
 //!
 //! What a file holds is decided by formats.md; the docs here name its section.
 //!
@@ -43,6 +44,7 @@
 mod atomic;
 mod cameras;
 mod compression;
+mod conventions;
 mod deflate;
 mod error;
 mod exr;
@@ -57,6 +59,7 @@ mod labels;
 mod layout;
 mod mesh_file;
 mod mtl;
+mod npy_write;
 mod obj;
 mod obj_diagnose;
 mod obj_lines;
@@ -79,13 +82,17 @@ mod texture_file;
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
 pub use cameras::{ScanLocation, read_cameras};
 pub use compression::{Compression, UnknownCompression};
+pub use conventions::{Conventions, DepthUnits, UnknownWord, XyzType, read_conventions};
 pub use error::{Error, Place, Result};
 pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
 pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};
 pub use json::{read_json, write_json};
-pub use labels::{read_labels, write_labels};
-pub use layout::{Domain, Frame, ImageName, Layout, UnknownDomain, image_stem, is_valid_room, is_valid_uuid};
+pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};
+pub use layout::{
+    Domain, Frame, ImageName, Layout, PROFILES, UnknownDomain, image_stem, is_valid_room, is_valid_uuid,
+};
 pub use mesh_file::{MeshFile, UpAxis, read_mesh};
+pub use npy_write::NpyWriter;
 pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
 pub use ply::{PlyPointWriter, read_ply_point_count};
 pub use png::{Content, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
@@ -95,7 +102,7 @@ pub use s3dis::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
 pub use s3dis_points::{PointReader, read_points};
 pub use s3dis_write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};
 pub use scene::{SceneFile, read_scene};
-pub use splits::{Split, read_splits, write_splits};
+pub use splits::{Split, read_splits, write_image_list, write_splits};
 pub use texture_file::TextureFile;
 
 /// The README's example is compiled and run with the tests.
