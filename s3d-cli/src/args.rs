@@ -1,9 +1,9 @@
 //! The command line: subcommands, options, defaults, help texts.
 
+use crate::pipeline::profiles::Profile;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, value_parser};
 use glam::DVec3;
-use crate::pipeline::profiles::Profile;
 use s3d_geom::NormalAxes;
 use s3d_io::{Compression, Conventions, DepthUnits, Domain, PADDED_LABELS, UpAxis, XyzType};
 use s3d_sample::Pool;

@@ -333,6 +333,8 @@ mod tests {
     fn more_labels_than_sixteen_bits_are_refused() {
         assert!(check_label_count(65_535).is_ok());
         let e = check_label_count(65_536).unwrap_err();
-        assert!(matches!(e, Failure::Input(_)) && e.to_string().starts_with("65536 labels are more than 65535"));
+        assert!(
+            matches!(e, Failure::Input(_)) && e.to_string().starts_with("65536 labels are more than 65535")
+        );
     }
 }

@@ -3,12 +3,13 @@
 use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::{
-    Compression, Content, Conventions, DepthUnits, Domain, XyzType, encode_gray16, encode_rgb8, encode_xyz_float,
-    encode_xyz_half,
+    Compression, Content, Conventions, DepthUnits, Domain, XyzType, encode_gray16, encode_rgb8,
+    encode_xyz_float, encode_xyz_half,
 };
 use s3d_render::{
-    FaceImages, Hits, Normals, Pyramids, Scene, TextureFilter, color_per_face_image_into, depth_image_into, depth_image_mm_into,
-    face_images_into, index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into, xyz_image_into,
+    FaceImages, Hits, Normals, Pyramids, Scene, TextureFilter, color_per_face_image_into, depth_image_into,
+    depth_image_mm_into, face_images_into, index_image_into, normal_image_into, rgb_image_into,
+    xyz_image_half_into, xyz_image_into,
 };
 
 /// What images of a mesh are made from.

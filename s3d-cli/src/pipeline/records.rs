@@ -168,7 +168,8 @@ pub(crate) fn write_splits(layout: &Layout, folds: &[Fold]) -> Outcome<()> {
 pub(crate) fn write_lists(layout: &Layout, areas: &[u32], folds: &[Fold]) -> Outcome<()> {
     let mut pairs = Vec::new();
     for area in areas {
-        let (colors, depths) = (panoramas(layout, *area, Domain::Rgb)?, panoramas(layout, *area, Domain::Depth)?);
+        let (colors, depths) =
+            (panoramas(layout, *area, Domain::Rgb)?, panoramas(layout, *area, Domain::Depth)?);
         let both = colors.intersection(&depths).map(|name| (*area, name.clone()));
         pairs.extend(both.collect::<Vec<_>>());
     }
@@ -191,7 +192,9 @@ pub(crate) fn write_lists(layout: &Layout, areas: &[u32], folds: &[Fold]) -> Out
         }
     }
     if folds.is_empty() {
-        info!("these areas leave every fold without its training or its test areas: splits/ lists all panoramas only");
+        info!(
+            "these areas leave every fold without its training or its test areas: splits/ lists all panoramas only"
+        );
     }
     Ok(())
 }
