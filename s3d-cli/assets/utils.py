@@ -318,6 +318,7 @@ def check_image(data, image, fail):
             # Half a step of depth, stretched to the ray; half a step of the stored number; and rounding.
             step = 0.5 / data.conventions["depth"]["units_per_m"]
             allowed = step * np.linalg.norm(rays, axis=-1) / np.maximum(depth, 1e-9)
+        stored = np.where(both[..., None], stored, stored.dtype.type(0))
         allowed = allowed[..., None] + 0.5 * np.spacing(np.abs(stored)).astype(np.float64) + 1e-5
         off = np.abs(points - stored.astype(np.float64))
         if (off > allowed)[both].any():
