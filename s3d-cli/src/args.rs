@@ -1,10 +1,12 @@
 //! The command line: subcommands, options, defaults, help texts.
 
 use crate::pack::args::PackArgs;
+use crate::pipeline::profiles::Profile;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, value_parser};
 use glam::DVec3;
-use s3d_io::{Compression, Domain, UpAxis};
+use s3d_geom::NormalAxes;
+use s3d_io::{Compression, Conventions, DepthUnits, Domain, PADDED_LABELS, UpAxis, XyzType};
 use s3d_sample::Pool;
 use std::path::PathBuf;
 
@@ -57,6 +59,16 @@ pub(crate) enum Command {
         after_help = "Examples:\n  s3d pack dataset --to webdataset --images views --shuffle 1\n  s3d pack dataset --to colmap -o colmap --areas 1 --copy-images\n  s3d pack dataset --to nerfstudio\n  s3d pack dataset --to coco --areas 1,2,3,4,6 -o coco_train\n  s3d pack dataset --to parquet -o images.parquet"
     )]
     Pack(PackArgs),
+    /// Make the world coordinates of a data set's images again, from depth and pose.
+    #[command(
+        after_help = "Example:\n  s3d xyz dataset --type float --overwrite\nDepth is stored in steps of 2 mm (or 1 mm), so what comes out is off by half of that along the ray; a pixel\nbeyond the depth's range is missing. What `s3d export` writes comes from the hits themselves."
+    )]
+    Xyz(XyzArgs),
+    /// Write what a point cloud loader wants from an existing data set.
+    #[command(
+        after_help = "Example:\n  s3d profile dataset --to pointnet --to pointcept\nEach comes to dataset/profiles/NAME."
+    )]
+    Profile(ProfileArgs),
     /// Print the tables of statistics of a data set, counted from its files.
     #[command(after_help = "Example:\n  s3d stats dataset")]
     Stats(StatsArgs),
@@ -167,14 +179,81 @@ pub(crate) struct ExportOptions {
     /// (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
+    #[command(flatten)]
+    pub(crate) format: FormatOptions,
+}
+
+/// In which of several forms an export is written. The defaults are the published ones.
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct FormatOptions {
+    /// World coordinates as half floats (1.6 cm steps at 20 m from the origin), as 32-bit floats, or not at all, whatever
+    /// --modalities says: `s3d xyz` makes them later from depth and pose.
+    #[arg(long, default_value_t, value_parser = parsed::<XyzType>, value_name = "half|float|none")]
+    pub(crate) xyz: XyzType,
+    /// Axes of normals in views: the paper's (B towards the camera) or OpenCV's (B forward, as omnidata has them).
+    /// Panoramas have X, −Z, Y of the world in either.
+    #[arg(long, default_value = "paper", value_parser = normal_axes, value_name = "paper|opencv")]
+    pub(crate) normal_axes: NormalAxes,
+    /// Depth in 512ths of a metre (up to 128 m), or in millimetres (up to 65.534 m; loaders of the published data divide
+    /// by 512).
+    #[arg(long, default_value_t, value_parser = parsed::<DepthUnits>, value_name = "512|mm")]
+    pub(crate) depth_units: DepthUnits,
+    /// Fill semantic_labels.json with null labels up to N entries: loaders look missing pixels up at index 3341.
+    #[arg(long, default_value_t, value_parser = parsed::<PadLabels>, value_name = "N|off")]
+    pub(crate) pad_labels: PadLabels,
+    /// Write what a point cloud loader wants to OUT/profiles/NAME besides; may be repeated.
+    #[arg(long = "profile", value_delimiter = ',', value_parser = parsed::<Profile>,
+        value_name = "pointcept|open3d-ml|mmdet3d|pointnet")]
+    pub(crate) profiles: Vec<Profile>,
+}
+
+impl FormatOptions {
+    /// What `conventions.json` tells of them.
+    pub(crate) fn conventions(&self) -> Conventions {
+        Conventions { depth_units: self.depth_units, normal_axes: self.normal_axes, xyz: self.xyz }
+    }
+}
+
+/// How many entries the label table has at least.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PadLabels(pub(crate) usize);
+
+impl Default for PadLabels {
+    fn default() -> Self {
+        Self(PADDED_LABELS)
+    }
+}
+
+impl std::fmt::Display for PadLabels {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.0 == 0 { f.write_str("off") } else { write!(f, "{}", self.0) }
+    }
+}
+
+impl std::str::FromStr for PadLabels {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        if word == "off" {
+            return Ok(Self(0));
+        }
+        match word.parse() {
+            Ok(n @ 1..=65_536) => Ok(Self(n)),
+            _ => Err("must be off, or a number of entries from 1 to 65536".to_owned()),
+        }
+    }
 }
 
 impl ExportOptions {
     /// The same options in their one form, however they were written: modalities once each and in their own order, uuids
-    /// as in the data set and sorted.
+    /// as in the data set and sorted, profiles likewise.
     pub(crate) fn canonical(mut self) -> Self {
         let asked = std::mem::take(&mut self.modalities);
-        self.modalities = Domain::ALL.into_iter().filter(|d| asked.contains(d)).collect();
+        let no_xyz = self.format.xyz == XyzType::None;
+        let left_out = |d: &Domain| no_xyz && *d == Domain::GlobalXyz;
+        self.modalities = Domain::ALL.into_iter().filter(|d| asked.contains(d) && !left_out(d)).collect();
+        self.format.profiles.sort();
+        self.format.profiles.dedup();
         self.only.sort();
         self.only.dedup();
         self
@@ -291,6 +370,49 @@ pub(crate) struct StatsArgs {
     pub(crate) output: PathBuf,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct XyzArgs {
+    /// The data set's folder.
+    #[arg(value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Half floats or 32-bit floats.
+    #[arg(long = "type", default_value = "half", value_parser = stored_xyz, value_name = "half|float")]
+    pub(crate) xyz: XyzType,
+    /// Replace coordinates that are there, though they may be more exact.
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    /// How much time the images' files may take: fast, balanced or small.
+    #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
+    pub(crate) compression: Compression,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ProfileArgs {
+    /// The data set's folder.
+    #[arg(value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Which loader; may be repeated.
+    #[arg(long = "to", required = true, value_delimiter = ',', value_parser = parsed::<Profile>,
+        value_name = "pointcept|open3d-ml|mmdet3d|pointnet")]
+    pub(crate) profiles: Vec<Profile>,
+    /// Replace what is in OUT/profiles/NAME.
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+}
+
+fn normal_axes(word: &str) -> Result<NormalAxes, String> {
+    NormalAxes::from_name(word).ok_or_else(|| "must be paper or opencv".to_owned())
+}
+
+fn stored_xyz(word: &str) -> Result<XyzType, String> {
+    match word.parse() {
+        Ok(kind @ (XyzType::Half | XyzType::Float)) => Ok(kind),
+        _ => Err("must be half or float".to_owned()),
+    }
+}
+
 pub(crate) fn parsed<T: std::str::FromStr>(text: &str) -> Result<T, String>
 where
     T::Err: std::fmt::Display,
@@ -355,6 +477,9 @@ mod tests {
         assert_eq!(o.modalities, Domain::ALL);
         assert_eq!(o.pool, Pool::Dataset);
         assert_eq!(o.compression, Compression::Balanced);
+        let f = o.format;
+        assert_eq!((f.xyz, f.depth_units, f.normal_axes), Default::default());
+        assert_eq!((f.pad_labels, f.profiles.len()), (PadLabels(3342), 0));
     }
 
     #[test]
@@ -370,6 +495,10 @@ mod tests {
         let b = options(&["--modalities", "rgb,pose", "--only", &[x, y, x].join(",")]);
         assert_eq!((&a.modalities, &a.only), (&b.modalities, &b.only));
         assert_eq!(a.modalities, [Domain::Rgb, Domain::Pose]);
+        let none = options(&["--xyz", "none", "--profile", "pointnet,mmdet3d", "--profile", "pointnet"]);
+        assert!(none.modalities.len() == 6 && !none.modalities.contains(&Domain::GlobalXyz));
+        assert_eq!(none.format.profiles, [Profile::Mmdet3d, Profile::PointNet]);
+        assert_eq!(options(&["--pad-labels", "off"]).format.pad_labels.to_string(), "off");
     }
 
     #[test]
@@ -379,6 +508,14 @@ mod tests {
             &["s3d", "export", "a.toml", "--pano-width", "4095"],
             &["s3d", "export", "a.toml", "--modalities", "rgb,smell"],
             &["s3d", "export", "a.toml", "--pool", "sea"],
+            &["s3d", "export", "a.toml", "--xyz", "double"],
+            &["s3d", "export", "a.toml", "--normal-axes", "left"],
+            &["s3d", "export", "a.toml", "--depth-units", "inch"],
+            &["s3d", "export", "a.toml", "--pad-labels", "0"],
+            &["s3d", "export", "a.toml", "--pad-labels", "65537"],
+            &["s3d", "export", "a.toml", "--profile", "sea"],
+            &["s3d", "xyz", "out", "--type", "none"],
+            &["s3d", "profile", "out"],
             &["s3d", "export", "a.toml", "--compression", "9"],
             &["s3d", "export", "--only", "00112233445566778899aabbccddeeff", "a.toml"],
             &["s3d", "export", "a.toml", "--points-per-m2", "nan"],

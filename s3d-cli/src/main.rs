@@ -24,6 +24,8 @@ fn main() -> ExitCode {
         Command::Render(args) => commands::render::run(args),
         Command::Info(args) => commands::info::run(args),
         Command::Pack(args) => commands::pack::run(&args),
+        Command::Xyz(args) => commands::xyz::run(&args),
+        Command::Profile(args) => commands::profile::run(&args),
         Command::Stats(args) => commands::stats::run(&args),
     };
     match outcome {

@@ -37,6 +37,24 @@ fn threads_and_repetition_change_no_byte() {
 }
 
 #[test]
+fn threads_change_no_byte_of_other_forms() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = write_scan(&dir.path().join("scan"), 1);
+    let forms = ["--xyz", "float", "--normal-axes", "opencv", "--depth-units", "mm", "--pad-labels", "off"];
+    let profiles = ["--profile", "pointcept,open3d-ml,mmdet3d,pointnet"];
+    let outs = ["one", "two"].map(|name| dir.path().join(name));
+    for (out, threads) in outs.iter().zip(["1", "2"]) {
+        export(&[text(&scene)], out, &[&forms[..], &profiles, &["--threads", threads]].concat());
+    }
+    assert_same(&outs[0], &outs[1]);
+    for file in
+        ["pointnet/stanford_indoor3d/Area_1_office_1.npy", "open3d-ml/original_pkl/Area_1_office_1.pkl"]
+    {
+        assert!(outs[0].join("profiles").join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
 fn a_real_scan_too() {
     let Some(scene) = copyroom() else { return };
     let dir = tempfile::tempdir().unwrap();

@@ -361,17 +361,24 @@ fn a_killed_replacement_is_mended() {
         fs::create_dir_all(out.join(to).parent().unwrap()).unwrap();
         fs::rename(out.join(from), out.join(to)).unwrap();
     };
+    let everything = [
+        "area_1",
+        "assets",
+        "s3dis",
+        "splits",
+        "splits.json",
+        "statistics.md",
+        "statistics.json",
+        "conventions.json",
+        "manifest.json",
+    ];
     put("area_1", ".s3d-previous.part/area_1");
     bad("while it was set aside");
-    for entry in
-        ["area_1", "assets", "s3dis", "splits.json", "statistics.md", "statistics.json", "manifest.json"]
-    {
+    for entry in everything {
         put(entry, &format!(".s3d-previous.part/{entry}"));
     }
     bad("when all was set aside but the last name");
-    for entry in
-        ["area_1", "assets", "s3dis", "splits.json", "statistics.md", "statistics.json", "manifest.json"]
-    {
+    for entry in everything {
         put(entry, &format!(".s3d-previous/{entry}"));
     }
     let running = String::from_utf8(first[Path::new("manifest.json")].clone()).unwrap();

@@ -21,6 +21,32 @@ pub enum Projection {
     Equirectangular,
 }
 
+/// The axes in which normals are written. Source: formats.md, "Images".
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum NormalAxes {
+    /// As in the paper: right, down and towards the camera, so that what faces the camera is (0, 0, 1).
+    #[default]
+    Paper,
+    /// OpenCV's: right, down and forward, so that what faces the camera is (0, 0, −1). A panorama's X, −Z, Y of the world
+    /// are such axes already, those of a level camera that looks along +Y, and are the same under both.
+    OpenCv,
+}
+
+impl NormalAxes {
+    /// Its name: `paper` or `opencv`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::OpenCv => "opencv",
+        }
+    }
+
+    /// The axes that are called `word`.
+    pub fn from_name(word: &str) -> Option<Self> {
+        [Self::Paper, Self::OpenCv].into_iter().find(|axes| axes.name() == word)
+    }
+}
+
 /// A pose, a projection and an image size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -148,9 +174,16 @@ impl Camera {
     /// World → the axes in which normals of this camera's images are written (formats.md, "Images"): the channels
     /// R G B are right, down and towards the camera in a perspective view, and X, −Z, Y of the world in a panorama.
     pub fn normal_image_from_world(&self) -> DMat3 {
+        self.normal_axes_from_world(NormalAxes::Paper)
+    }
+
+    /// As [`Camera::normal_image_from_world`], with a choice of axes.
+    pub fn normal_axes_from_world(&self, axes: NormalAxes) -> DMat3 {
         match self.projection {
             Projection::Perspective { .. } => {
-                DMat3::from_cols(self.pose.right(), -self.pose.up(), -self.pose.forward()).transpose()
+                let forward = self.pose.forward();
+                let third = if axes == NormalAxes::OpenCv { forward } else { -forward };
+                DMat3::from_cols(self.pose.right(), -self.pose.up(), third).transpose()
             }
             Projection::Equirectangular => DMat3::from_cols(DVec3::X, -DVec3::Z, DVec3::Y).transpose(),
         }
@@ -243,8 +276,15 @@ mod tests {
         let p = Pose::level(DVec3::ZERO, 0.3);
         let n = Camera::perspective(p, 1.0, 8, 8).normal_image_from_world() * -p.forward();
         assert!(n.abs_diff_eq(DVec3::Z, 1e-12));
-        let floor = Camera::equirectangular(p, 8).normal_image_from_world() * DVec3::Z;
+        let panorama = Camera::equirectangular(p, 8);
+        let floor = panorama.normal_image_from_world() * DVec3::Z;
         assert!(floor.abs_diff_eq(-DVec3::Y, 1e-12));
+        let n = Camera::perspective(p, 1.0, 8, 8).normal_axes_from_world(NormalAxes::OpenCv);
+        assert!(
+            (n * -p.forward()).abs_diff_eq(-DVec3::Z, 1e-12) && (n * p.right()).abs_diff_eq(DVec3::X, 1e-12)
+        );
+        assert!((n.determinant() - 1.0).abs() < 1e-12, "right-handed");
+        assert_eq!(panorama.normal_axes_from_world(NormalAxes::OpenCv), panorama.normal_image_from_world());
     }
 
     /// A genuine pose of the published data set (Area 3): K, original rotation and final rotation agree with the rest.

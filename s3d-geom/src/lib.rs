@@ -37,7 +37,7 @@ mod wall_direction;
 mod wide;
 
 pub use aabb::Aabb;
-pub use camera::{Camera, Projection, Rays};
+pub use camera::{Camera, NormalAxes, Projection, Rays};
 pub use cloud::PointCloud;
 pub use footprint::{Footprint, FootprintBuilder, FootprintOptions};
 pub use glam;

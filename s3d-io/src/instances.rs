@@ -4,6 +4,7 @@
 //! equal voxels, each with its occupancy and its points. Voxel (ix, iy, iz), counted from the box's smallest corner, has
 //! the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "Labels".
 
+use crate::npy_write::npy_header;
 use crate::{AtomicFile, Error, Result, read_json, write_whole};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -252,19 +253,6 @@ impl Archive {
         }
         Ok(())
     }
-}
-
-/// What stands before the numbers of an `.npy` file (version 1.0 of numpy's format): magic, length, and a Python literal
-/// padded with spaces so that the numbers begin at a multiple of 64 bytes. A library for it brings 20 crates along.
-fn npy_header(kind: &str, shape: &[u64]) -> Vec<u8> {
-    const FIXED: usize = 10;
-    let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
-    let literal = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({}), }}", shape.trim_end());
-    let length = (FIXED + literal.len() + 1).next_multiple_of(64) - FIXED;
-    let mut header = b"\x93NUMPY\x01\x00".to_vec();
-    header.extend(u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes());
-    header.extend(format!("{literal:<width$}\n", width = length - 1).bytes());
-    header
 }
 
 #[cfg(test)]

@@ -1,7 +1,20 @@
 //! `semantic_labels.json`: an array of label names; the place of a name is its index.
 
 use crate::{Result, read_json, write_json};
+use s3d_label::NULL_NAME;
 use std::path::Path;
+
+/// How many entries a table must have for loaders that look a pixel up as `table[G * 256 + B]` before they find that R is
+/// not 0: the colour of missing pixels, (13, 13, 13), is such an index too.
+pub const PADDED_LABELS: usize = 13 * 256 + 13 + 1;
+
+/// The most labels of instances in a table for such loaders: they see 16 bits of an index.
+pub const MAX_LABELS_OF_LOADERS: usize = 65_535;
+
+/// Appends null labels until there are `entries` names. Whoever reads a table takes null labels at its end for padding.
+pub fn pad_labels(names: &mut Vec<String>, entries: usize) {
+    names.resize(names.len().max(entries), NULL_NAME.to_owned());
+}
 
 /// Writes the names of labels, the null label first, and returns the file's size in bytes. Source: formats.md, "Labels".
 ///
@@ -33,6 +46,17 @@ mod tests {
         assert_eq!(read_labels(&path).unwrap(), names);
         write_labels(&path, &[]).unwrap();
         assert!(read_labels(&path).unwrap().is_empty());
+    }
+
+    #[test]
+    fn padded_tables_are_the_same_table() {
+        let mut names = vec![NULL_NAME.to_owned(), "beam_10_hallway_6_1".to_owned()];
+        let table = s3d_label::LabelTable::from_names(&names).unwrap();
+        pad_labels(&mut names, PADDED_LABELS);
+        assert_eq!((names.len(), names[0x0d0d].as_str()), (3342, NULL_NAME));
+        assert_eq!(s3d_label::LabelTable::from_names(&names).unwrap(), table);
+        pad_labels(&mut names, 7);
+        assert_eq!(names.len(), 3342, "nothing is cut off");
     }
 
     #[test]

@@ -235,6 +235,9 @@ impl fmt::Display for ImageName {
     }
 }
 
+/// The loaders for which a data set may have a [profile](Layout::profile_dir).
+pub const PROFILES: [&str; 4] = ["mmdet3d", "open3d-ml", "pointcept", "pointnet"];
+
 /// Where everything of a data set lies. Makes paths only: it neither reads nor creates anything.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
@@ -263,9 +266,20 @@ impl Layout {
     pub fn entries(&self, areas: &[u32]) -> Vec<PathBuf> {
         let mut entries: Vec<PathBuf> =
             areas.iter().flat_map(|a| [self.area_dir(*a), self.s3dis_area_dir(*a)]).collect();
-        entries.extend([self.labels_json(), self.splits(), self.statistics_md(), self.statistics_json()]);
+        entries.extend([self.labels_json(), self.utils_py(), self.pose_schema(), self.manifest_schema()]);
+        entries.extend([self.splits(), self.list_of_all()]);
+        for fold in 1..=3 {
+            entries.extend([true, false].map(|train| self.list_of_fold(fold, train)));
+        }
+        entries.extend(PROFILES.map(|name| self.profile_dir(name)));
+        entries.extend([self.statistics_md(), self.statistics_json(), self.conventions()]);
         entries.push(self.manifest());
         entries
+    }
+
+    /// Folders that hold nothing but [entries](Self::entries): to be removed when they are empty.
+    pub fn shared_dirs(&self) -> Vec<PathBuf> {
+        vec![self.s3dis_dir(), self.schema_dir(), self.assets_dir(), self.lists_dir(), self.profiles_dir()]
     }
 
     /// `area_1`
@@ -361,6 +375,56 @@ impl Layout {
     /// `assets/semantic_labels.json`
     pub fn labels_json(&self) -> PathBuf {
         self.assets_dir().join("semantic_labels.json")
+    }
+
+    /// `assets/utils.py`: functions that read every file.
+    pub fn utils_py(&self) -> PathBuf {
+        self.assets_dir().join("utils.py")
+    }
+
+    /// `assets/schema`
+    pub fn schema_dir(&self) -> PathBuf {
+        self.assets_dir().join("schema")
+    }
+
+    /// `assets/schema/pose.schema.json`: the JSON Schema of pose files.
+    pub fn pose_schema(&self) -> PathBuf {
+        self.schema_dir().join("pose.schema.json")
+    }
+
+    /// `assets/schema/manifest.schema.json`: the JSON Schema of the manifest.
+    pub fn manifest_schema(&self) -> PathBuf {
+        self.schema_dir().join("manifest.schema.json")
+    }
+
+    /// `conventions.json`: what the numbers mean, for programs.
+    pub fn conventions(&self) -> PathBuf {
+        self.root.join("conventions.json")
+    }
+
+    /// `splits`: lists of panoramas.
+    pub fn lists_dir(&self) -> PathBuf {
+        self.root.join("splits")
+    }
+
+    /// `splits/fold_1_train.txt` or `splits/fold_1_test.txt`: the panoramas of one side of a fold.
+    pub fn list_of_fold(&self, fold: u32, train: bool) -> PathBuf {
+        self.lists_dir().join(format!("fold_{fold}_{}.txt", if train { "train" } else { "test" }))
+    }
+
+    /// `splits/all.txt`: all panoramas.
+    pub fn list_of_all(&self) -> PathBuf {
+        self.lists_dir().join("all.txt")
+    }
+
+    /// `profiles`: what single loaders want, a folder each.
+    pub fn profiles_dir(&self) -> PathBuf {
+        self.root.join("profiles")
+    }
+
+    /// `profiles/pointnet`: what the loader of this name wants.
+    pub fn profile_dir(&self, name: &str) -> PathBuf {
+        self.profiles_dir().join(name)
     }
 
     /// `splits.json`: which areas to train on and which to test on.
@@ -474,6 +538,13 @@ mod tests {
             layout.s3dis_area_dir(1),
             layout.labels_json(),
             layout.splits(),
+            layout.list_of_all(),
+            layout.list_of_fold(3, true),
+            layout.profile_dir(PROFILES[0]),
+            layout.conventions(),
+            layout.utils_py(),
+            layout.pose_schema(),
+            layout.manifest_schema(),
             layout.manifest(),
             layout.statistics_md(),
             layout.statistics_json(),

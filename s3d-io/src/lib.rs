@@ -12,7 +12,8 @@
 //! - meshes: [`read_mesh`] and [`read_meshes`] (OBJ, glTF, PLY), with [`MeshLabels`]; [`write_rgb_obj`], [`write_semantic_obj`];
 //! - scans: [`read_scene`], [`read_scan_locations`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
-//! - lists: [`write_labels`], [`write_splits`];
+//! - lists: [`write_labels`], [`write_splits`], [`write_image_list`]; arrays: [`NpyWriter`];
+//! - what the numbers of a data set mean: [`Conventions`];
 //! - packages for loaders, from the images of a data set ([`dataset_images`]): [`TarWriter`] (WebDataset),
 //!   [`write_colmap_text`], [`write_nerfstudio`], [`write_coco`], [`write_image_index`] (Parquet).
 //!
@@ -51,6 +52,7 @@ mod coco;
 mod colmap_images;
 mod colmap_write;
 mod compression;
+mod conventions;
 mod dataset;
 mod deflate;
 mod e57_cloud;
@@ -84,6 +86,7 @@ mod nerfstudio_frames;
 mod nerfstudio_write;
 mod npy_cloud;
 mod npy_header;
+mod npy_write;
 mod obj;
 mod obj_diagnose;
 mod obj_lines;
@@ -128,6 +131,7 @@ pub use coco::{
 };
 pub use colmap_write::{ColmapImage, write_colmap_binary, write_colmap_text};
 pub use compression::{Compression, UnknownCompression};
+pub use conventions::{Conventions, DepthUnits, UnknownWord, XyzType, read_conventions};
 pub use dataset::{
     DatasetImage, ViewRecord, check_images_complete, dataset_images, read_png_size, read_views,
 };
@@ -135,8 +139,10 @@ pub use error::{Error, Place, Result};
 pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
 pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};
 pub use json::{read_json, write_json};
-pub use labels::{read_labels, write_labels};
-pub use layout::{Domain, Frame, ImageName, Layout, UnknownDomain, image_stem, is_valid_room, is_valid_uuid};
+pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};
+pub use layout::{
+    Domain, Frame, ImageName, Layout, PROFILES, UnknownDomain, image_stem, is_valid_room, is_valid_uuid,
+};
 pub use located_picture::uuid_from_name;
 pub use mat_read::{MatArea, MatObject, MatRoom};
 pub use mat_write::MatWriter;
@@ -144,6 +150,7 @@ pub use mesh_file::{MeshFile, MeshOptions, UpAxis, read_mesh, read_mesh_with};
 pub use mesh_join::{MeshSource, read_meshes, read_meshes_with};
 pub use mesh_labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
 pub use nerfstudio_write::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
+pub use npy_write::NpyWriter;
 pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
 pub use parquet_index::{ImageRow, SemanticRow, write_image_index};
 pub use ply::{PlyPointWriter, read_ply_point_count};
@@ -157,7 +164,7 @@ pub use s3dis_points::{PointReader, read_points};
 pub use s3dis_write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};
 pub use scan_locations::read_scan_locations;
 pub use scene::{CameraSource, SceneFile, read_scene};
-pub use splits::{Split, read_splits, write_splits};
+pub use splits::{Split, read_splits, write_image_list, write_splits};
 pub use tar::TarWriter;
 pub use texture_file::TextureFile;
 pub use webdataset::{ShardEntry, ShardLimits, plan_shards, sample_key, sample_member, write_shard_index};

@@ -1,6 +1,6 @@
 //! `splits.json`: which areas to train on and which to test on. Source: formats.md, "Folds".
 
-use crate::{Result, read_json, write_json};
+use crate::{Result, read_json, write_json, write_whole};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -38,10 +38,31 @@ pub fn read_splits(path: &Path) -> Result<Vec<Split>> {
     Ok(folds)
 }
 
+/// Writes a list of images, a line each, as depth loaders such as UniFuse's read it: the colour image and the depth image,
+/// paths relative to the data set's folder with `/`, between them one space. Returns the file's size in bytes.
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io).
+pub fn write_image_list(path: &Path, pairs: &[(String, String)]) -> Result<u64> {
+    write_whole(path, |w| pairs.iter().try_for_each(|(color, depth)| writeln!(w, "{color} {depth}")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::write_bytes;
+
+    #[test]
+    fn a_list_is_two_paths_a_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("fold_1_train.txt");
+        let pair = |i: u32| (format!("area_1/pano/rgb/{i}.png"), format!("area_1/pano/depth/{i}.png"));
+        write_image_list(&path, &[pair(1), pair(2)]).unwrap();
+        assert_eq!(
+            std::fs::read_to_string(&path).unwrap(),
+            "area_1/pano/rgb/1.png area_1/pano/depth/1.png\narea_1/pano/rgb/2.png area_1/pano/depth/2.png\n"
+        );
+    }
 
     #[test]
     fn folds_come_back() {

@@ -59,18 +59,41 @@ fn shade(c: &mut Criterion) {
             });
             bench("depth", &mut |_, h| s3d_render::depth_image_into(h, &mut depth));
             bench("normal", &mut |c, h| {
-                s3d_render::normal_image_into(&scene, h, c, Normals::Flat, &mut normal);
+                s3d_render::normal_image_into(
+                    &scene,
+                    h,
+                    c,
+                    Normals::Flat,
+                    s3d_geom::NormalAxes::Paper,
+                    &mut normal,
+                );
             });
             bench("semantic", &mut |_, h| s3d_render::index_image_into(h, &index, &mut semantic));
             bench("pretty", &mut |_, h| s3d_render::color_per_face_image_into(h, &pretty, &mut colored));
             bench("normal, semantic and pretty at once", &mut |c, h| {
-                s3d_render::face_images_into(&scene, h, c, &index, &pretty, &mut faces);
+                s3d_render::face_images_into(
+                    &scene,
+                    h,
+                    c,
+                    s3d_geom::NormalAxes::Paper,
+                    &index,
+                    &pretty,
+                    &mut faces,
+                );
             });
             bench("xyz half", &mut |c, h| s3d_render::xyz_image_half_into(h, c, &mut xyz));
             bench("all six", &mut |c, h| {
                 s3d_render::rgb_image_into(&scene, &pyramids, h, c, &filter, &mut rgb);
                 s3d_render::depth_image_into(h, &mut depth);
-                s3d_render::face_images_into(&scene, h, c, &index, &pretty, &mut faces);
+                s3d_render::face_images_into(
+                    &scene,
+                    h,
+                    c,
+                    s3d_geom::NormalAxes::Paper,
+                    &index,
+                    &pretty,
+                    &mut faces,
+                );
                 s3d_render::xyz_image_half_into(h, c, &mut xyz);
             });
             bench("all six, new images", &mut |c, h| {

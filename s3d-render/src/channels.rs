@@ -9,7 +9,7 @@ use crate::{
     patch::{FaceCache, Patch},
 };
 use glam::{DMat3, DVec3, Vec3};
-use s3d_geom::{Camera, Raster};
+use s3d_geom::{Camera, NormalAxes, Raster};
 
 /// Depth that is missing, or too far to be written.
 pub const MISSING_DEPTH: u16 = 65_535;
@@ -42,6 +42,15 @@ pub fn depth_image_into(hits: &Hits, out: &mut Raster<u16>) {
     lanes::run(Depths { depths: hits.depth.pixels(), out: out.pixels_mut() });
 }
 
+/// As [`depth_image_into`], in millimetres: [`MISSING_DEPTH`] where nothing is seen and beyond 65.534 m.
+pub fn depth_image_mm_into(hits: &Hits, out: &mut Raster<u16>) {
+    fit(out, &hits.depth, 0);
+    for (depth, out) in hits.depth.pixels().iter().zip(out.pixels_mut()) {
+        // The product is exact; the cast rounds down and saturates, at infinity too.
+        *out = (f64::from(*depth) * 1000.0 + 0.5) as u16;
+    }
+}
+
 struct Depths<'a> {
     depths: &'a [f32],
     out: &'a mut [u16],
@@ -71,18 +80,18 @@ pub(crate) fn fit<T: Copy, U>(out: &mut Raster<T>, like: &Raster<U>, value: T) {
     }
 }
 
-/// Surface normals in the axes of [`Camera::normal_image_from_world`], a channel = ⌊127.5 + 127.5 n + ½⌋; a normal never
+/// Surface normals in the axes of [`Camera::normal_image_from_world`], the paper's, a channel = ⌊127.5 + 127.5 n + ½⌋; a normal never
 /// points away from the camera (its dot product with the ray is at most 0). [`MISSING_NORMAL`] where nothing is seen.
 ///
 /// # Panics
 /// If the hits are not of the camera's size.
 pub fn normal_image(scene: &Scene<'_>, hits: &Hits, camera: &Camera, normals: Normals) -> Raster<[u8; 3]> {
     let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
-    normal_image_into(scene, hits, camera, normals, &mut out);
+    normal_image_into(scene, hits, camera, normals, NormalAxes::Paper, &mut out);
     out
 }
 
-/// As [`normal_image`], into an image that is used again.
+/// As [`normal_image`], with a choice of [axes](Camera::normal_axes_from_world) and into an image that is used again.
 ///
 /// # Panics
 /// As [`normal_image`].
@@ -91,17 +100,24 @@ pub fn normal_image_into(
     hits: &Hits,
     camera: &Camera,
     normals: Normals,
+    axes: NormalAxes,
     out: &mut Raster<[u8; 3]>,
 ) {
     assert_size(hits, camera);
+    let image_from_world = camera.normal_axes_from_world(axes);
     match normals {
-        Normals::Flat => flat_normals(scene, hits, camera, out),
-        Normals::Smooth => *out = smooth_normals(scene, hits, camera),
+        Normals::Flat => flat_normals(scene, hits, camera, image_from_world, out),
+        Normals::Smooth => *out = smooth_normals(scene, hits, camera, image_from_world),
     }
 }
 
-fn flat_normals(scene: &Scene<'_>, hits: &Hits, camera: &Camera, out: &mut Raster<[u8; 3]>) {
-    let image_from_world = camera.normal_image_from_world();
+fn flat_normals(
+    scene: &Scene<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    image_from_world: DMat3,
+    out: &mut Raster<[u8; 3]>,
+) {
     let mut normals = FaceCache::new();
     by_face(hits, MISSING_NORMAL, out, |face| {
         *normals.get(face, || flat_normal(scene, face, camera.pose.location, image_from_world))
@@ -116,8 +132,12 @@ fn flat_normal(scene: &Scene<'_>, face: u32, origin: DVec3, image_from_world: DM
     quantized(image_from_world * if away { -normal } else { normal })
 }
 
-fn smooth_normals(scene: &Scene<'_>, hits: &Hits, camera: &Camera) -> Raster<[u8; 3]> {
-    let image_from_world = camera.normal_image_from_world();
+fn smooth_normals(
+    scene: &Scene<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    image_from_world: DMat3,
+) -> Raster<[u8; 3]> {
     let mesh = scene.mesh();
     let mut patches = FaceCache::new();
     let rays = camera.rays();
@@ -202,7 +222,7 @@ pub fn color_per_face_image_into(hits: &Hits, per_face_colors: &[[u8; 3]], out: 
 /// The images that have one value all over a face; see [`face_images_into`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaceImages {
-    /// [`normal_image`] with [`Normals::Flat`].
+    /// [`normal_image`] with [`Normals::Flat`], in the axes asked for.
     pub normal: Raster<[u8; 3]>,
     /// [`index_image`].
     pub index: Raster<[u8; 3]>,
@@ -218,7 +238,8 @@ impl Default for FaceImages {
     }
 }
 
-/// The flat normals, indices and colours of faces in one walk over the hits, in little more than half the time of three.
+/// The flat normals (in the given axes), indices and colours of faces in one walk over the hits, in little more than half
+/// the time of three.
 ///
 /// # Panics
 /// As [`normal_image`], [`index_image`] and [`color_per_face_image`].
@@ -226,12 +247,13 @@ pub fn face_images_into(
     scene: &Scene<'_>,
     hits: &Hits,
     camera: &Camera,
+    axes: NormalAxes,
     per_face: &[u32],
     per_face_colors: &[[u8; 3]],
     out: &mut FaceImages,
 ) {
     assert_size(hits, camera);
-    let image_from_world = camera.normal_image_from_world();
+    let image_from_world = camera.normal_axes_from_world(axes);
     let FaceImages { normal, index, color } = out;
     let mut faces = FaceCache::new();
     let value = |face| {

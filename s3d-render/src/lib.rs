@@ -54,12 +54,12 @@ mod visibility;
 
 pub use channels::{
     FaceImages, MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, color_per_face_image,
-    color_per_face_image_into, coverage, depth_image, depth_image_into, face_images_into, index_image,
-    index_image_into, normal_image, normal_image_into,
+    color_per_face_image_into, coverage, depth_image, depth_image_into, depth_image_mm_into,
+    face_images_into, index_image, index_image_into, normal_image, normal_image_into,
 };
 pub use color::{rgb_image, rgb_image_into, rgb_image_with};
 pub use pixel_color::rgb_image_pixel_by_pixel;
-pub use points::{xyz_image, xyz_image_half, xyz_image_half_into};
+pub use points::{xyz_image, xyz_image_half, xyz_image_half_into, xyz_image_into};
 pub use ray::{Hit, cast_ray, cast_ray_brute_force};
 pub use scene::Scene;
 pub use texture::{Pyramids, TextureFilter};

@@ -18,6 +18,15 @@ pub fn xyz_image(hits: &Hits, camera: &Camera) -> Raster<[f32; 3]> {
     out
 }
 
+/// As [`xyz_image`], into an image that is used again.
+///
+/// # Panics
+/// As [`xyz_image`].
+pub fn xyz_image_into(hits: &Hits, camera: &Camera, out: &mut Raster<[f32; 3]>) {
+    fit(out, &hits.depth, [0.0; 3]);
+    points(hits, camera, out);
+}
+
 /// As [`xyz_image`], rounded to half floats as the data set has them: steps of 1.6 cm at 20 m from the world's origin, 6.3 cm at
 /// 100 m. A point within 3e-8 m of the origin looks like a missing one.
 ///

@@ -185,6 +185,49 @@ fn depth_is_rounded_half_up_and_saturates() {
 }
 
 #[test]
+fn depth_in_millimetres_is_rounded_half_up_and_saturates() {
+    let depths = [0.0f32, 0.000_5, 0.000_49, 1.0, 1.062_5, 65.534, 65.535, 66.0, 1e9, f32::INFINITY];
+    let hits = Hits { face: Raster::filled(10, 1, 0), depth: Raster::from_vec(10, 1, depths.to_vec()) };
+    let mut image = Raster::filled(1, 1, 7);
+    s3d_render::depth_image_mm_into(&hits, &mut image);
+    let expected = [0, 1, 0, 1000, 1063, 65_534, 65_535, 65_535, 65_535, 65_535];
+    assert_eq!(image.pixels(), expected);
+}
+
+#[test]
+fn opencv_axes_turn_the_third_channel_of_views_and_nothing_of_panoramas() {
+    use s3d_geom::NormalAxes;
+    let mesh = TriMesh::new(room_parts()).unwrap();
+    let scene = Scene::new(&mesh);
+    let pose = Pose::level(dvec3(0.3, -0.2, 0.1), 0.7).turned(0.2, -0.3);
+    for camera in [Camera::perspective(pose, 1.2, 40, 30), Camera::equirectangular(pose, 40)] {
+        let hits = s3d_render::cast(&scene, &camera);
+        for normals in [Normals::Flat, Normals::Smooth] {
+            let [mut paper, mut opencv] = [0, 0].map(|_| Raster::filled(0, 0, [0u8; 3]));
+            s3d_render::normal_image_into(&scene, &hits, &camera, normals, NormalAxes::Paper, &mut paper);
+            s3d_render::normal_image_into(&scene, &hits, &camera, normals, NormalAxes::OpenCv, &mut opencv);
+            assert_eq!(paper, s3d_render::normal_image(&scene, &hits, &camera, normals));
+            if camera.height == 20 {
+                assert_eq!(paper, opencv);
+                continue;
+            }
+            let (mut seen, mut towards) = (0, 0);
+            for (p, o) in paper.pixels().iter().zip(opencv.pixels()) {
+                assert_eq!(p[..2], o[..2]);
+                if *p == [128; 3] {
+                    assert_eq!(o, p, "missing stays missing");
+                    continue;
+                }
+                seen += 1;
+                towards += u32::from(p[2] > o[2]);
+                assert!([255, 256].contains(&(u32::from(p[2]) + u32::from(o[2]))), "{p:?} {o:?}");
+            }
+            assert!(seen > 0 && 4 * towards > 3 * seen, "{towards} of {seen}");
+        }
+    }
+}
+
+#[test]
 fn normals_face_the_camera_from_either_side() {
     let flipped: Vec<[u32; 3]> = room_parts().faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
     let other = TriMesh::new(MeshParts { faces: flipped, ..room_parts() }).unwrap();
@@ -466,7 +509,15 @@ fn images_are_what_single_pixels_give() {
             assert_eq!((indices.pixels()[k], colors.pixels()[k]), ([r, g, b], color[face as usize]));
         }
         // Into what holds the images of another camera.
-        s3d_render::face_images_into(&scene, &hits, &camera, &index, &color, &mut all);
+        s3d_render::face_images_into(
+            &scene,
+            &hits,
+            &camera,
+            s3d_geom::NormalAxes::Paper,
+            &index,
+            &color,
+            &mut all,
+        );
         assert_eq!((&all.normal, &all.index, &all.color), (&normal, &indices, &colors));
         s3d_render::xyz_image_half_into(&hits, &camera, &mut again);
         assert_eq!(again, half);

@@ -1,7 +1,7 @@
 //! `s3d demo`: the built-in scene, written as ordinary input files and exported like any other.
 
 use super::on_threads;
-use crate::args::{DemoArgs, ExportOptions};
+use crate::args::{DemoArgs, ExportOptions, FormatOptions};
 use crate::demo::{is_demo_scan, write_scan};
 use crate::failure::{Failure, Outcome};
 use crate::pipeline::{Target, export, output};
@@ -31,6 +31,7 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         smooth_normals: false,
         lenient: false,
         compression: o.compression,
+        format: FormatOptions::default(),
     };
     let scan = args.output.join(SCAN);
     if scan.exists() && !is_demo_scan(&scan) {

@@ -4,9 +4,11 @@ pub(crate) mod demo;
 pub(crate) mod export;
 pub(crate) mod info;
 pub(crate) mod pack;
+pub(crate) mod profile;
 pub(crate) mod render;
 pub(crate) mod sample;
 pub(crate) mod stats;
+pub(crate) mod xyz;
 
 use crate::args::Threads;
 use crate::failure::{Failure, Outcome};

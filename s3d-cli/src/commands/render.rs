@@ -5,7 +5,7 @@ use crate::args::RenderArgs;
 use crate::failure::{Failure, Outcome};
 use crate::pipeline::modality::{Image, Look, Prints};
 use s3d_geom::{Camera, Pose};
-use s3d_io::{Compression, Content, create_dir, encode_rgb8, write_bytes, write_json};
+use s3d_io::{Compression, Content, Conventions, create_dir, encode_rgb8, write_bytes, write_json};
 use s3d_render::{Hits, NO_FACE, Normals, Pyramids, Scene, cast, coverage};
 use serde::Serialize;
 use std::time::Instant;
@@ -77,6 +77,7 @@ fn render(args: &RenderArgs) -> Outcome<()> {
         label_per_face: &[],
         pretty_per_face: &[],
         compression: args.compression,
+        conventions: Conventions::default(),
     };
     create_dir(&args.output)?;
     let kinds = images.map(|(image, _)| image);

@@ -4,7 +4,7 @@ use super::images::ImageCount;
 use crate::args::ExportOptions;
 use crate::failure::Outcome;
 use s3d_geom::Aabb;
-use s3d_io::{Domain, Error, Layout, write_json};
+use s3d_io::{DepthUnits, Domain, Error, Layout, XyzType, read_json, write_json};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -14,21 +14,39 @@ const COMPLETE: &str = "complete";
 
 /// The manifest. It names neither threads nor times nor folders of the machine: the same input and options give the
 /// same bytes.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Manifest {
-    generator: &'static str,
-    version: &'static str,
+    generator: String,
+    version: String,
     /// `"running"` from the first file on, `"complete"` after the last.
-    status: &'static str,
+    status: String,
     seed: u64,
     options: Options,
     /// The areas that are in the folder, or will be.
     area_numbers: Vec<u32>,
     areas: Vec<AreaEntry>,
+    /// Entries of the label table, the null label and no padding included.
     labels: usize,
+    /// Entries of `semantic_labels.json`: null labels fill it up.
+    labels_padded_to: usize,
+    /// If the world coordinates were made from depth and pose, by `s3d xyz`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    xyz_from_depth: Option<XyzFromDepth>,
 }
 
-#[derive(Debug, Serialize)]
+/// What made world coordinates from depth, and what that loses.
+#[derive(Debug, Serialize, Deserialize)]
+struct XyzFromDepth {
+    #[serde(rename = "type")]
+    kind: String,
+    /// The distance between neighbouring depths, metres: a point is off by at most half of it along its ray, or along the
+    /// optical axis in a view.
+    depth_step_m: f64,
+    /// Points beyond this depth are missing, metres.
+    largest_depth_m: f64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
 struct Options {
     views: u32,
     size: u32,
@@ -41,12 +59,17 @@ struct Options {
     modalities: Vec<String>,
     keep_all: bool,
     only: Vec<String>,
-    normals: &'static str,
-    compression: &'static str,
+    normals: String,
+    compression: String,
+    xyz: String,
+    normal_axes: String,
+    depth_units: String,
+    pad_labels: String,
+    profiles: Vec<String>,
 }
 
 /// What the manifest tells of an area.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct AreaEntry {
     pub(crate) area: u32,
     pub(crate) faces: usize,
@@ -61,23 +84,40 @@ pub(crate) struct AreaEntry {
     pub(crate) xyz: XyzLoss,
 }
 
-/// What storing world coordinates as half floats loses.
-#[derive(Debug, Serialize)]
+/// What storing world coordinates loses.
+#[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct XyzLoss {
     #[serde(rename = "type")]
-    kind: &'static str,
+    kind: String,
     /// The farthest that a coordinate of the mesh is from 0, metres.
     largest_coordinate_m: f32,
-    /// The distance between neighbouring half floats there, metres; the error is at most half of it.
-    largest_step_m: f64,
+    /// The distance between neighbouring numbers of the type there, metres; the error is at most half of it. Nothing if
+    /// there are no coordinates.
+    largest_step_m: Option<f64>,
 }
 
 impl XyzLoss {
     /// The loss in a mesh with this box.
-    pub(crate) fn of(bbox: Aabb) -> Self {
+    pub(crate) fn of(bbox: Aabb, kind: XyzType) -> Self {
         let largest = bbox.to_array().iter().fold(0.0f32, |m, c| m.max(c.abs()));
-        Self { kind: "half", largest_coordinate_m: largest, largest_step_m: half_step(largest) }
+        let mut loss = Self { kind: String::new(), largest_coordinate_m: largest, largest_step_m: None };
+        loss.store_as(kind);
+        loss
     }
+
+    fn store_as(&mut self, kind: XyzType) {
+        self.kind = kind.name().to_owned();
+        self.largest_step_m = match kind {
+            XyzType::Half => Some(half_step(self.largest_coordinate_m)),
+            XyzType::Float => Some(float_step(self.largest_coordinate_m)),
+            XyzType::None => None,
+        };
+    }
+}
+
+/// The distance between neighbouring 32-bit floats at `value`.
+fn float_step(value: f32) -> f64 {
+    f64::from(value.abs().next_up()) - f64::from(value.abs())
 }
 
 /// The distance between neighbouring half floats at `value`: they have 11 significant bits, down to 2⁻²⁴.
@@ -92,10 +132,11 @@ pub(crate) fn half_step(value: f32) -> f64 {
 impl Manifest {
     /// The manifest of an export that has begun.
     pub(crate) fn begin(options: &ExportOptions, areas: &[u32], labels: usize) -> Self {
+        let format = &options.format;
         Self {
-            generator: GENERATOR,
-            version: env!("CARGO_PKG_VERSION"),
-            status: RUNNING,
+            generator: GENERATOR.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            status: RUNNING.to_owned(),
             seed: options.seed,
             options: Options {
                 views: options.views,
@@ -108,13 +149,44 @@ impl Manifest {
                 modalities: options.modalities.iter().map(Domain::to_string).collect(),
                 keep_all: options.keep_all,
                 only: options.only.clone(),
-                normals: if options.smooth_normals { "smooth" } else { "flat" },
-                compression: options.compression.name(),
+                normals: if options.smooth_normals { "smooth" } else { "flat" }.to_owned(),
+                compression: options.compression.name().to_owned(),
+                xyz: format.xyz.name().to_owned(),
+                normal_axes: format.normal_axes.name().to_owned(),
+                depth_units: format.depth_units.name().to_owned(),
+                pad_labels: format.pad_labels.to_string(),
+                profiles: format.profiles.iter().map(|p| p.name().to_owned()).collect(),
             },
             area_numbers: areas.to_vec(),
             areas: Vec::new(),
             labels,
+            labels_padded_to: labels.max(format.pad_labels.0),
+            xyz_from_depth: None,
         }
+    }
+
+    /// The manifest of a complete data set, to be changed.
+    pub(crate) fn read(layout: &Layout) -> Outcome<Self> {
+        Head::require(layout)?;
+        Ok(read_json(&layout.manifest())?)
+    }
+
+    /// Tells that the world coordinates were made from depth.
+    pub(crate) fn xyz_from_depth(&mut self, kind: XyzType, units: DepthUnits) {
+        self.areas.iter_mut().for_each(|area| area.xyz.store_as(kind));
+        self.xyz_from_depth = Some(XyzFromDepth {
+            kind: kind.name().to_owned(),
+            depth_step_m: 1.0 / units.per_m(),
+            largest_depth_m: 65_534.0 / units.per_m(),
+        });
+    }
+
+    /// Tells that there are profiles besides those that there were.
+    pub(crate) fn add_profiles(&mut self, names: &[&str]) {
+        let profiles = &mut self.options.profiles;
+        profiles.extend(names.iter().map(|name| (*name).to_owned()));
+        profiles.sort();
+        profiles.dedup();
     }
 
     /// Writes it as it stands.
@@ -126,7 +198,7 @@ impl Manifest {
     /// Writes that the export is complete, with what it holds.
     pub(crate) fn complete(mut self, layout: &Layout, areas: Vec<AreaEntry>) -> Outcome<()> {
         self.areas = areas;
-        self.status = COMPLETE;
+        self.status = COMPLETE.to_owned();
         self.write(layout)
     }
 }
@@ -184,5 +256,14 @@ mod tests {
         assert_eq!(half_step(20.0), 1.0 / 64.0);
         assert_eq!(half_step(100.0), 1.0 / 16.0);
         assert_eq!(half_step(1.0), 1.0 / 1024.0);
+        assert_eq!((float_step(20.0), float_step(1.0)), (2f64.powi(-19), 2f64.powi(-23)));
+    }
+
+    #[test]
+    fn coordinates_that_are_not_stored_lose_nothing() {
+        let bbox = Aabb { min: glam::vec3(-100.0, 0.0, 0.0), max: glam::Vec3::ONE };
+        let loss = |kind| XyzLoss::of(bbox, kind).largest_step_m;
+        assert_eq!((loss(XyzType::Half), loss(XyzType::None)), (Some(1.0 / 16.0), None));
+        assert_eq!(loss(XyzType::Float), Some(2f64.powi(-17)));
     }
 }

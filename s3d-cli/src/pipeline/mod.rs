@@ -1,6 +1,7 @@
 //! The export: load → label → sample → score → select → render → tables. The one place that composes the stages.
 
 pub(crate) mod annotate;
+mod assets;
 pub(crate) mod images;
 pub(crate) mod inputs;
 pub(crate) mod location;
@@ -9,6 +10,7 @@ pub(crate) mod modality;
 pub(crate) mod output;
 pub(crate) mod place;
 pub(crate) mod points;
+pub(crate) mod profiles;
 pub(crate) mod records;
 pub(crate) mod statistics;
 pub(crate) mod views;
@@ -88,6 +90,7 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     check_only(&inputs, &options.only)?;
     output::check_inputs(layout, &inputs)?;
     let areas = inputs.numbers();
+    check_label_count(inputs.table.len() - 1)?;
     // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a single area is
     // kept from then on; several are read again where they are needed, so that they never share memory.
     let mut single: Option<MeshFile> = None;
@@ -103,7 +106,10 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     let manifest = Manifest::begin(options, &areas, inputs.table.len());
     manifest.write(layout)?;
     create_dir(&layout.assets_dir())?;
-    s3d_io::write_labels(&layout.labels_json(), &inputs.table.names())?;
+    let mut names = inputs.table.names();
+    s3d_io::pad_labels(&mut names, options.format.pad_labels.0);
+    s3d_io::write_labels(&layout.labels_json(), &names)?;
+    assets::write(layout, options.format.conventions())?;
 
     let mut labelled = Vec::new();
     let mut candidates = Vec::new();
@@ -142,7 +148,10 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
         entries.push(entry);
     }
 
-    records::write_splits(layout, &folds(&areas))?;
+    let folds = folds(&areas);
+    records::write_splits(layout, &folds)?;
+    records::write_lists(layout, &areas, &folds)?;
+    profiles::write(layout, &areas, &options.format.profiles)?;
     Statistics::count(layout, &areas)?.write(layout)?;
     manifest.complete(layout, entries)?;
     previous.discard()?;
@@ -155,6 +164,18 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
         started.elapsed().as_secs_f64()
     );
     Ok(())
+}
+
+/// Refuses more labels than loaders of the data set can tell apart.
+fn check_label_count(labels: usize) -> Outcome<()> {
+    if labels <= s3d_io::MAX_LABELS_OF_LOADERS {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{labels} labels are more than {}: loaders of the data set take a label's index from G and B of a pixel alone, and a \
+         pixel with an R for one without a label; export the areas in several data sets",
+        s3d_io::MAX_LABELS_OF_LOADERS
+    )))
 }
 
 /// Refuses a `--only` that names no location, as far as they are known before the areas are labelled.
@@ -280,7 +301,7 @@ fn label_area(
         locations: locations.len(),
         panoramas: 0,
         views: 0,
-        xyz: XyzLoss::of(mesh.aabb()),
+        xyz: XyzLoss::of(mesh.aabb(), options.format.xyz),
     };
     Ok(LabelledArea { annotated, locations, location_rooms, entry })
 }
@@ -371,6 +392,7 @@ fn render_area(
             label_per_face: &label_per_face,
             pretty_per_face: &pretty_per_face,
             compression: options.compression,
+            conventions: options.format.conventions(),
         },
         locations: &locations,
         rooms: &location_rooms,
@@ -394,4 +416,18 @@ fn render_area(
     );
     entry.points = points.into_inner().unwrap_or_default();
     Ok((entry.with_images(count), count))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_labels_than_sixteen_bits_are_refused() {
+        assert!(check_label_count(65_535).is_ok());
+        let e = check_label_count(65_536).unwrap_err();
+        assert!(
+            matches!(e, Failure::Input(_)) && e.to_string().starts_with("65536 labels are more than 65535")
+        );
+    }
 }

@@ -2,10 +2,14 @@
 
 use half::f16;
 use s3d_geom::{Camera, Raster};
-use s3d_io::{Compression, Content, Domain, encode_gray16, encode_rgb8, encode_xyz_half};
+use s3d_io::{
+    Compression, Content, Conventions, DepthUnits, Domain, XyzType, encode_gray16, encode_rgb8,
+    encode_xyz_float, encode_xyz_half,
+};
 use s3d_render::{
     FaceImages, Hits, Normals, Pyramids, Scene, TextureFilter, color_per_face_image_into, depth_image_into,
-    face_images_into, index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into,
+    depth_image_mm_into, face_images_into, index_image_into, normal_image_into, rgb_image_into,
+    xyz_image_half_into, xyz_image_into,
 };
 
 /// What images of a mesh are made from.
@@ -19,6 +23,8 @@ pub(crate) struct Look<'a> {
     pub(crate) pretty_per_face: &'a [[u8; 3]],
     /// How much time their files may take.
     pub(crate) compression: Compression,
+    /// Units of depth, axes of normals, type of coordinates (of which none counts as half: it is not asked for then).
+    pub(crate) conventions: Conventions,
 }
 
 /// A domain that is an image: all but the pose.
@@ -64,6 +70,7 @@ pub(crate) struct Prints {
     rgb: Raster<[u8; 3]>,
     depth: Raster<u16>,
     xyz: Raster<[f16; 3]>,
+    xyz_float: Raster<[f32; 3]>,
     faces: FaceImages,
     /// Whether `faces` holds all of its images of the view at hand.
     faces_made: bool,
@@ -80,6 +87,7 @@ impl Default for Prints {
             rgb: Raster::filled(0, 0, [0; 3]),
             depth: Raster::filled(0, 0, 0),
             xyz: Raster::filled(0, 0, [f16::ZERO; 3]),
+            xyz_float: Raster::filled(0, 0, [0.0; 3]),
             faces: FaceImages::default(),
             faces_made: false,
         }
@@ -105,7 +113,8 @@ impl Look<'_> {
         let together = [Image::Normal, Image::Semantic, Image::SemanticPretty];
         if !large && self.normals == Normals::Flat && together.iter().all(|image| images.contains(image)) {
             let (labels, colors) = (self.label_per_face, self.pretty_per_face);
-            face_images_into(self.scene, hits, camera, labels, colors, &mut prints.faces);
+            let axes = self.conventions.normal_axes;
+            face_images_into(self.scene, hits, camera, axes, labels, colors, &mut prints.faces);
             prints.faces_made = true;
         }
         for &image in images {
@@ -119,19 +128,24 @@ impl Look<'_> {
 
     fn file(&self, image: Image, hits: &Hits, camera: &Camera, prints: &mut Prints) -> Vec<u8> {
         let compression = self.compression;
-        let Prints { rgb, depth, xyz, faces, faces_made } = prints;
+        let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
+        let Prints { rgb, depth, xyz, xyz_float, faces, faces_made } = prints;
         match image {
             Image::Rgb => {
                 rgb_image_into(self.scene, self.textures, hits, camera, &TextureFilter::default(), rgb);
                 encode_rgb8(rgb, Content::Photo, compression)
             }
             Image::Depth => {
-                depth_image_into(hits, depth);
+                match depth_units {
+                    DepthUnits::Per512 => depth_image_into(hits, depth),
+                    DepthUnits::Millimetres => depth_image_mm_into(hits, depth),
+                }
                 encode_gray16(depth, compression)
             }
             Image::Normal => {
                 if !*faces_made {
-                    normal_image_into(self.scene, hits, camera, self.normals, &mut faces.normal);
+                    let out = &mut faces.normal;
+                    normal_image_into(self.scene, hits, camera, self.normals, normal_axes, out);
                 }
                 encode_rgb8(&faces.normal, Content::Normals, compression)
             }
@@ -146,6 +160,10 @@ impl Look<'_> {
                     color_per_face_image_into(hits, self.pretty_per_face, &mut faces.color);
                 }
                 encode_rgb8(&faces.color, Content::Labels, compression)
+            }
+            Image::GlobalXyz if xyz_type == XyzType::Float => {
+                xyz_image_into(hits, camera, xyz_float);
+                encode_xyz_float(xyz_float, compression)
             }
             Image::GlobalXyz => {
                 xyz_image_half_into(hits, camera, xyz);

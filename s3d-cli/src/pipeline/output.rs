@@ -174,7 +174,7 @@ fn move_entries(from: &Layout, to: &Layout, areas: &[u32]) -> Outcome<()> {
         }
     }
     // The folders that hold nothing now.
-    for folder in [from.s3dis_dir(), from.assets_dir()] {
+    for folder in from.shared_dirs() {
         let _ = fs::remove_dir(folder);
     }
     Ok(())

@@ -8,7 +8,7 @@ use crate::failure::{Failure, Outcome};
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::{Layout, MatWriter, PlyPointWriter, S3disAreaWriter};
 use s3d_label::{LabelId, LabelTable, Room};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Points drawn at a time: what is in memory of a cloud of any size.
@@ -72,7 +72,13 @@ pub(crate) fn write_points(
     let mut mat = MatWriter::create(&layout.point_cloud_mat(number), &format!("Area_{number}"))?;
     let angle_of: BTreeMap<Room, u32> =
         annotated.rooms.iter().map(|r| (r.room, r.wall_direction_deg)).collect();
+    let mut in_tree = BTreeSet::new();
     for (room, runs) in rooms {
+        // A room that no point was drawn in stands nowhere in the tree: loaders stop at one without annotations.
+        let has_points =
+            runs.iter().any(|r| sampler.points_before(r.faces.start) < sampler.points_before(r.faces.end));
+        let room = room.filter(|_| has_points);
+        in_tree.extend(room);
         let mut files = room.map(|room| tree.room(&room.to_string())).transpose()?;
         if let Some(room) = room {
             mat.room(&room.to_string(), angle_of.get(&room).copied().unwrap_or(0))?;
@@ -99,8 +105,8 @@ pub(crate) fn write_points(
     }
     sink.ply.finish()?;
     mat.finish()?;
-    let angles: Vec<(String, u32)> =
-        annotated.rooms.iter().map(|r| (r.room.to_string(), r.wall_direction_deg)).collect();
+    let surveyed = annotated.rooms.iter().filter(|r| in_tree.contains(&r.room));
+    let angles: Vec<(String, u32)> = surveyed.map(|r| (r.room.to_string(), r.wall_direction_deg)).collect();
     tree.alignment(&angles)?;
     Ok(sampler.len())
 }

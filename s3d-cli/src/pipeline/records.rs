@@ -5,10 +5,13 @@ use super::annotate::Annotated;
 use super::inputs::AreaInput;
 use super::views::Candidate;
 use crate::failure::Outcome;
-use s3d_io::{Layout, Split, write_json};
+use s3d_io::{Domain, Error, Frame, ImageName, Layout, Split, create_dir, write_json};
 use s3d_label::{VoteReport, VoteRow};
 use s3d_sample::Fold;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs;
+use tracing::info;
 
 /// A room of `rooms.json`.
 #[derive(Debug, Serialize, Deserialize)]
@@ -158,4 +161,58 @@ pub(crate) fn write_splits(layout: &Layout, folds: &[Fold]) -> Outcome<()> {
         .collect();
     s3d_io::write_splits(&layout.splits(), &splits)?;
     Ok(())
+}
+
+/// Writes the lists of panoramas that depth loaders read: of all areas, and of both sides of each fold. A data set
+/// without panoramas, or without their colour or depth, has none.
+pub(crate) fn write_lists(layout: &Layout, areas: &[u32], folds: &[Fold]) -> Outcome<()> {
+    let mut pairs = Vec::new();
+    for area in areas {
+        let (colors, depths) =
+            (panoramas(layout, *area, Domain::Rgb)?, panoramas(layout, *area, Domain::Depth)?);
+        let both = colors.intersection(&depths).map(|name| (*area, name.clone()));
+        pairs.extend(both.collect::<Vec<_>>());
+    }
+    if pairs.is_empty() {
+        return Ok(());
+    }
+    create_dir(&layout.lists_dir())?;
+    let path = |area: u32, name: &ImageName, domain: Domain| {
+        let name = ImageName { domain, ..name.clone() };
+        format!("area_{area}/{}/{}/{name}", name.frame.folder(), domain.folder())
+    };
+    let of = |areas: &[u32]| -> Vec<(String, String)> {
+        let listed = pairs.iter().filter(|(area, _)| areas.contains(area));
+        listed.map(|(a, name)| (path(*a, name, Domain::Rgb), path(*a, name, Domain::Depth))).collect()
+    };
+    s3d_io::write_image_list(&layout.list_of_all(), &of(areas))?;
+    for fold in folds {
+        for (train, areas) in [(true, &fold.train), (false, &fold.test)] {
+            s3d_io::write_image_list(&layout.list_of_fold(fold.number, train), &of(areas))?;
+        }
+    }
+    if folds.is_empty() {
+        info!(
+            "these areas leave every fold without its training or its test areas: splits/ lists all panoramas only"
+        );
+    }
+    Ok(())
+}
+
+/// The names of an area's panoramas that are there in a domain, with the domain left at colour so that they compare.
+fn panoramas(layout: &Layout, area: u32, domain: Domain) -> Outcome<BTreeSet<ImageName>> {
+    let dir = layout.image_dir(area, Frame::Panorama, domain);
+    let entries = match fs::read_dir(&dir) {
+        Ok(entries) => entries,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
+        Err(e) => return Err(Error::io(&dir, "read", e).into()),
+    };
+    let mut names = BTreeSet::new();
+    for entry in entries {
+        let entry = entry.map_err(|e| Error::io(&dir, "read", e))?;
+        if let Some(name) = entry.file_name().to_str().and_then(ImageName::parse) {
+            names.insert(ImageName { domain: Domain::Rgb, ..name });
+        }
+    }
+    Ok(names)
 }

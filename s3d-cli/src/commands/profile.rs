@@ -1,0 +1,35 @@
+//! `s3d profile`: what point cloud loaders want, from an existing data set.
+
+use crate::args::ProfileArgs;
+use crate::failure::{Failure, Outcome};
+use crate::pipeline::manifest::{Head, Manifest};
+use crate::pipeline::profiles;
+use s3d_io::{Error, Layout};
+use std::fs;
+
+pub(crate) fn run(args: &ProfileArgs) -> Outcome<()> {
+    let layout = Layout::new(args.output.clone());
+    let head = Head::require(&layout)?;
+    let mut manifest = Manifest::read(&layout)?;
+    let mut wanted = args.profiles.clone();
+    wanted.sort();
+    wanted.dedup();
+    for profile in &wanted {
+        let dir = layout.profile_dir(profile.name());
+        if dir.exists() && !args.overwrite {
+            return Err(Failure::Call(format!(
+                "{} is there already: replace it with --overwrite",
+                dir.display()
+            )));
+        }
+    }
+    for profile in &wanted {
+        let dir = layout.profile_dir(profile.name());
+        if dir.exists() {
+            fs::remove_dir_all(&dir).map_err(|e| Error::io(&dir, "remove", e))?;
+        }
+    }
+    profiles::write(&layout, &head.area_numbers, &wanted)?;
+    manifest.add_profiles(&wanted.iter().map(|p| p.name()).collect::<Vec<_>>());
+    manifest.write(&layout)
+}
