@@ -55,6 +55,7 @@ mod instances;
 mod json;
 mod labels;
 mod layout;
+mod matterport;
 mod mesh_file;
 mod mtl;
 mod obj;
@@ -85,6 +86,10 @@ pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instance
 pub use json::{read_json, write_json};
 pub use labels::{read_labels, write_labels};
 pub use layout::{Domain, Frame, ImageName, Layout, UnknownDomain, image_stem, is_valid_room, is_valid_uuid};
+pub use matterport::{
+    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, read_capture_pose, read_intrinsics, read_matterport_locations,
+    read_picture, read_picture_size,
+};
 pub use mesh_file::{MeshFile, UpAxis, read_mesh};
 pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
 pub use ply::{PlyPointWriter, read_ply_point_count};
