@@ -1,6 +1,7 @@
 //! `scene.toml`: one area's mesh, annotations and scan locations.
 
 use crate::mesh_file::UpAxis;
+use crate::rgb_source::{PictureSource, RgbEntry};
 use crate::texture_file::read_file;
 use crate::{Error, Result};
 use serde::Deserialize;
@@ -8,7 +9,7 @@ use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 /// The parts of a scan of one area. Paths are resolved: relative ones start at the folder of the file that names them.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
     /// The `scene.toml` itself.
     pub path: PathBuf,
@@ -22,6 +23,8 @@ pub struct SceneFile {
     pub annotations: PathBuf,
     /// The table of scan locations.
     pub cameras: PathBuf,
+    /// The scanner's pictures, if RGB images are made from them and not from the mesh's texture.
+    pub pictures: Option<PictureSource>,
 }
 
 #[derive(Deserialize)]
@@ -31,6 +34,7 @@ struct Document {
     mesh: MeshTable,
     annotations: PathTable,
     cameras: PathTable,
+    rgb: Option<RgbEntry>,
 }
 
 #[derive(Deserialize)]
@@ -57,7 +61,12 @@ struct PathTable {
 /// path = "Area_1"
 /// [cameras]
 /// path = "cameras.csv"
+/// [rgb]               # or, before the first table, rgb = "texture"; that, if it is left out
+/// source = "captures" # or "texture", "skybox", "panorama"
+/// path = "raw"        # the pictures' folder; named after the source if it is left out
 /// ```
+///
+/// Further keys of `[rgb]` are those of [`crate::PictureOptions`].
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value; without
@@ -85,6 +94,13 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
         let state = if full.exists() { "is no" } else { "is not there; it should be a" };
         Err(Error::format(path, format!("{key} = {written:?}: {} {state} {what}", full.display())))
     };
+    let mut pictures = None;
+    if let Some(entry) = document.rgb {
+        pictures = entry.pictures().map_err(|message| Error::format(path, message))?;
+    }
+    if let Some(source) = &mut pictures {
+        source.path = existing("rgb.path", &source.path, true)?;
+    }
     Ok(SceneFile {
         path: path.to_owned(),
         area: document.area.get(),
@@ -92,12 +108,14 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
         mesh: existing("mesh.path", &document.mesh.path, false)?,
         annotations: existing("annotations.path", &document.annotations.path, true)?,
         cameras: existing("cameras.path", &document.cameras.path, false)?,
+        pictures,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{PictureKind, PictureOptions, UnseenColor};
     use std::fs;
 
     const GOOD: &str = "area = 2\n[mesh]\npath = \"a.obj\"\nup = \"z\"\n[annotations]\npath = \"Area_2\"\n[cameras]\npath = \"c.csv\"\n";
@@ -107,6 +125,8 @@ mod tests {
         fs::write(dir.path().join("a.obj"), "").unwrap();
         fs::write(dir.path().join("c.csv"), "").unwrap();
         fs::create_dir(dir.path().join("Area_2")).unwrap();
+        fs::create_dir(dir.path().join("skybox")).unwrap();
+        fs::create_dir(dir.path().join("raw")).unwrap();
         let path = dir.path().join("scene.toml");
         fs::write(&path, text).unwrap();
         let scene = read_scene(&path)?;
@@ -121,6 +141,49 @@ mod tests {
         let scene = read(GOOD).unwrap();
         assert_eq!((scene.area, scene.up), (2, UpAxis::Z));
         assert_eq!(read(&GOOD.replace("up = \"z\"\n", "")).unwrap().up, UpAxis::Y);
+    }
+
+    #[test]
+    fn colours_come_from_the_texture_or_from_pictures() {
+        let pictures = |rgb: &str| {
+            let plain = rgb.starts_with("rgb");
+            let text = if plain { format!("{rgb}\n{GOOD}") } else { format!("{GOOD}{rgb}\n") };
+            let mut pictures = read(&text).unwrap().pictures;
+            if let Some(source) = &mut pictures {
+                source.path = source.path.file_name().unwrap().into();
+            }
+            pictures
+        };
+        let source = |kind, path: &str, options| Some(PictureSource { kind, path: path.into(), options });
+        let options = PictureOptions::default();
+        for texture in ["", "rgb = \"texture\"", "[rgb]\nsource = \"texture\""] {
+            assert_eq!(pictures(texture), None);
+        }
+        assert_eq!(pictures("rgb = \"skybox\""), source(PictureKind::SkyBox, "skybox", options.clone()));
+        let captures = pictures("[rgb]\nsource = \"captures\"\npath = \"raw\"\nparallax = false\nsize = 512");
+        let small = PictureOptions { parallax: false, size: Some(512), ..options.clone() };
+        assert_eq!(captures, source(PictureKind::Captures, "raw", small));
+        let panorama =
+            pictures("[rgb]\nsource = \"panorama\"\npath = \"raw\"\nyaw_deg = 90\nunseen = \"nearby\"");
+        let turned = PictureOptions { yaw_deg: 90.0, unseen: UnseenColor::Nearby, ..options };
+        assert_eq!(panorama, source(PictureKind::Panorama, "raw", turned));
+        for (rgb, words) in [
+            ("rgb = \"textures\"", "line 1: unknown variant `textures`, expected one of `texture`, `skybox`"),
+            ("rgb = 3", "line 1: invalid type: integer `3`, expected \"texture\""),
+            ("rgb = \"captures\"", "captures is not there; it should be a folder"),
+            ("[rgb]\npath = \"raw\"", "missing field `source`"),
+            ("[rgb]\nsource = \"skybox\"\nfolder = \"raw\"", "unknown field `folder`"),
+            ("[rgb]\nsource = \"skybox\"\npath = \"gone\"", "rgb.path = \"gone\""),
+            ("[rgb]\nsource = \"skybox\"\nyaw_deg = 1", "rgb.yaw_deg belongs to source = \"panorama\""),
+            ("[rgb]\nsource = \"skybox\"\nsize = 16", "rgb.size = 16"),
+            ("[rgb]\nsource = \"texture\"\npath = \"raw\"", "has no path"),
+            ("[rgb]\nsource = \"panorama\"\npath = \"raw\"\nyaw_deg = nan", "rgb.yaw_deg = NaN"),
+        ] {
+            let text =
+                if rgb.starts_with("rgb") { format!("{rgb}\n{GOOD}") } else { format!("{GOOD}{rgb}\n") };
+            let message = read(&text).unwrap_err().to_string();
+            assert!(message.contains(words), "{rgb}: {message}");
+        }
     }
 
     #[test]

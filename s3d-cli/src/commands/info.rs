@@ -6,6 +6,7 @@ use crate::failure::Outcome;
 use crate::pipeline::annotate::{Annotated, annotate, hidden_instances, label_doubts};
 use crate::pipeline::inputs::{Inputs, mesh_doubts};
 use crate::pipeline::location::{Outlook, room_of};
+use crate::pipeline::pictures::Pictures;
 use s3d_geom::TriMesh;
 use s3d_label::Class;
 use s3d_render::Scene;
@@ -30,6 +31,14 @@ fn report(args: &InfoArgs) -> Outcome<String> {
     let _ = writeln!(text, "area {}\n", area.scene.area);
     tell_mesh(&mut text, mesh);
     tell_annotations(&mut text, &annotated, &inputs);
+    match Pictures::open(area, |_| true) {
+        Ok(None) => {}
+        Ok(Some(pictures)) => {
+            let _ = writeln!(text, "\ncolours: {}", pictures.summary());
+            wrong.extend(pictures.warnings);
+        }
+        Err(e) => wrong.push(e.to_string()),
+    }
 
     let _ = writeln!(text, "\nscan locations: {}", area.locations.len());
     for location in &area.locations {

@@ -1,6 +1,7 @@
 //! The images of an area: each view cast once, every modality from the same hits, each file written whole.
 
 use super::modality::{Image, Look, Prints};
+use super::pictures::Pictures;
 use super::views::Candidate;
 use super::work::for_each_in_order;
 use crate::console::Progress;
@@ -11,10 +12,13 @@ use s3d_label::Room;
 use s3d_render::{Caster, Hits};
 
 /// What is rendered, and where it goes.
+#[derive(Clone, Copy)]
 pub(crate) struct ImageJob<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) area: u32,
     pub(crate) look: Look<'a>,
+    /// Where colours come from, if not from the mesh.
+    pub(crate) pictures: Option<&'a Pictures>,
     pub(crate) locations: &'a [ScanLocation],
     /// The room of each location.
     pub(crate) rooms: &'a [Room],
@@ -48,15 +52,33 @@ pub(crate) fn write_images(job: &ImageJob<'_>, candidates: &[Candidate]) -> Outc
         }
     }
     let progress = Progress::new("rendering", "images", shots.len() as u64);
+    let Some(pictures) = job.pictures else {
+        write_shots(job, &shots, &progress)?;
+        return Ok(count(&shots));
+    };
+    // A location after another: one cube map is in memory, and all threads work with it.
+    for shots in shots.chunk_by(|a, b| a.location == b.location) {
+        let location = shots[0].location;
+        let cube = pictures.cube(location, &job.locations[location], job.look.scene)?;
+        let look = Look { pictures: cube.as_ref().map(|cube| pictures.colors(cube)), ..job.look };
+        write_shots(&ImageJob { look, ..*job }, shots, &progress)?;
+    }
+    Ok(count(&shots))
+}
+
+fn write_shots(job: &ImageJob<'_>, shots: &[Shot], progress: &Progress) -> Outcome<()> {
     let memory =
         || Memory { caster: Caster::new(job.look.scene), hits: Hits::default(), prints: Prints::default() };
-    for_each_in_order(&shots, memory, |memory, shot| {
+    for_each_in_order(shots, memory, |memory, shot| {
         write_shot(job, shot, memory)?;
         progress.add(1);
         Ok(())
-    })?;
+    })
+}
+
+fn count(shots: &[Shot]) -> ImageCount {
     let panoramas = shots.iter().filter(|s| s.frame == Frame::Panorama).count() as u64;
-    Ok(ImageCount { panoramas, views: shots.len() as u64 - panoramas })
+    ImageCount { panoramas, views: shots.len() as u64 - panoramas }
 }
 
 /// The images to take: of each location its panorama, which takes longest, and then its views.

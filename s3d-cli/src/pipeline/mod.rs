@@ -7,6 +7,7 @@ pub(crate) mod location;
 pub(crate) mod manifest;
 pub(crate) mod modality;
 pub(crate) mod output;
+pub(crate) mod pictures;
 pub(crate) mod points;
 pub(crate) mod records;
 pub(crate) mod statistics;
@@ -21,10 +22,11 @@ use inputs::{AreaInput, Inputs};
 use location::{Outlook, room_of};
 use manifest::{AreaEntry, Manifest, XyzLoss};
 use modality::Look;
+use pictures::Pictures;
 use points::{check_density, write_points};
 use s3d_geom::Density;
 use s3d_io::{
-    Compression, Content, InstanceRecord, InstanceWriter, Layout, MeshFile, TextureOut, create_dir,
+    Compression, Content, Domain, InstanceRecord, InstanceWriter, Layout, MeshFile, TextureOut, create_dir,
     encode_rgb8,
 };
 use s3d_label::{LabelId, LabelTable, Room};
@@ -66,6 +68,10 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     check_only(&inputs, &options.only)?;
     output::check_inputs(layout, &inputs)?;
     let areas = inputs.numbers();
+    let mut pictures = Vec::new();
+    for area in &inputs.areas {
+        pictures.push(area_pictures(area, options)?);
+    }
     // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there.
     let mut files: Vec<Option<MeshFile>> = Vec::new();
     for area in &inputs.areas {
@@ -92,9 +98,9 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
 
     let mut entries = Vec::new();
     let mut images = ImageCount::default();
-    for (area, labelled) in inputs.areas.iter().zip(labelled) {
+    for ((area, labelled), pictures) in inputs.areas.iter().zip(labelled).zip(&pictures) {
         records::write_views(layout, area.scene.area, &candidates)?;
-        let (entry, count) = render_area(area, labelled, layout, options, &candidates)?;
+        let (entry, count) = render_area(area, labelled, pictures.as_ref(), layout, options, &candidates)?;
         images.panoramas += count.panoramas;
         images.views += count.views;
         entries.push(entry);
@@ -113,6 +119,19 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
         started.elapsed().as_secs_f64()
     );
     Ok(())
+}
+
+/// The pictures that an area's RGB images are made from, if they are.
+fn area_pictures(area: &AreaInput, options: &ExportOptions) -> Outcome<Option<Pictures>> {
+    if !options.modalities.contains(&Domain::Rgb) {
+        return Ok(None);
+    }
+    let pictures = Pictures::open(area, |l| options.only.is_empty() || options.only.contains(&l.uuid))?;
+    if let Some(pictures) = &pictures {
+        pictures.warnings.iter().for_each(|w| warn!("{w}"));
+        info!("colours from {}", pictures.summary());
+    }
+    Ok(pictures)
 }
 
 /// Refuses a `--only` that names no location.
@@ -211,6 +230,7 @@ fn label_area(
         panoramas: 0,
         views: 0,
         xyz: XyzLoss::of(mesh.aabb()),
+        rgb: area.scene.pictures.as_ref().map_or("texture", |p| p.kind.name()),
     };
     let file = keep.then_some(file);
     Ok(LabelledArea { face_labels: annotated.face_labels, location_rooms, entry, file })
@@ -259,6 +279,7 @@ fn tell_labels(annotated: &Annotated, started: Instant) {
 fn render_area(
     area: &AreaInput,
     labelled: LabelledArea,
+    pictures: Option<&Pictures>,
     layout: &Layout,
     options: &ExportOptions,
     candidates: &[Candidate],
@@ -279,11 +300,13 @@ fn render_area(
         look: Look {
             scene: &scene,
             textures: &textures,
+            pictures: None,
             normals: if options.smooth_normals { Normals::Smooth } else { Normals::Flat },
             label_per_face: &label_per_face,
             pretty_per_face: &pretty_per_face,
             compression: options.compression,
         },
+        pictures,
         locations: &area.locations,
         rooms: &labelled.location_rooms,
         chosen: &chosen,

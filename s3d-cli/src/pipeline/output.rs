@@ -52,7 +52,9 @@ pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Outcome<()> {
     let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
     let entries = Layout::new(&root).entries(&inputs.numbers());
     for area in &inputs.areas {
-        for path in [&area.scene.path, &area.scene.mesh, &area.scene.annotations, &area.scene.cameras] {
+        let pictures = area.scene.pictures.iter().map(|p| &p.path);
+        let files = [&area.scene.path, &area.scene.mesh, &area.scene.annotations, &area.scene.cameras];
+        for path in files.into_iter().chain(pictures) {
             let Ok(input) = fs::canonicalize(path) else { continue };
             if entries.iter().any(|entry| input.starts_with(entry))
                 || input.is_dir() && root.starts_with(&input)
