@@ -1,6 +1,6 @@
 //! Vocabulary and plain geometry of indoor scans.
 //!
-//! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Pose`], [`Raster`] —
+//! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Lens`], [`Pose`], [`Raster`] —
 //! and the geometry that needs nothing else: a surface's points ([`SurfaceSampler`]), a point's nearest face
 //! ([`NearestFaces`]), polygons and their triangles ([`Polygon`], [`triangulate_face`]), a room's floor
 //! ([`FootprintBuilder`]) and the voxels of an instance ([`Voxels`]). World frame everywhere: metres, Z-up, right-handed.

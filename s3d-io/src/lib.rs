@@ -11,6 +11,7 @@
 //! - cameras: [`PoseFile`];
 //! - meshes: [`read_mesh`] (OBJ, glTF), [`write_rgb_obj`], [`write_semantic_obj`];
 //! - scans: [`read_scene`], [`read_cameras`], [`AnnotationTree`], [`PointReader`];
+//! - the scanner's pictures: [`PictureFolder`], [`CaptureFile`], [`read_matterport_locations`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
 //! - lists: [`write_labels`], [`write_splits`].
 //!

@@ -87,6 +87,10 @@ pub fn read_picture(path: &Path) -> Result<Raster<[u8; 3]>> {
 /// # Errors
 /// As [`read_picture`].
 pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
+    let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
+    if !what.is_file() {
+        return Err(Error::format(path, "is no file"));
+    }
     let open = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
     let reader = open.map_err(|e| Error::io(path, "read", e))?;
     reader.into_dimensions().map_err(|e| Error::format(path, format!("is no picture that can be read: {e}")))

@@ -185,7 +185,7 @@ impl CubeMap {
         self.pose.opencv_from_world()
     }
 
-    /// What a pixel of 1/`width` the cube's width shows: sizes for the fast filter.
+    /// The stored faces at all their sizes, for the fast filter.
     pub(crate) fn sizes(&self) -> [Sizes<'_>; 6] {
         std::array::from_fn(|face| Sizes::new(&self.faces[face], &self.reductions[face]))
     }
@@ -361,7 +361,7 @@ pub(crate) mod tests {
     fn holes_are_told_and_filled() {
         let world = pose().opencv_from_world().transpose();
         // Nothing below 45°.
-        let below = |d: DVec3| (world * d).normalize().z < -0.7071;
+        let below = |d: DVec3| (world * d).normalize().z < -std::f64::consts::FRAC_1_SQRT_2;
         let cube = CubeMap::build(pose(), 64, |_, _, _, d| (!below(d)).then(|| color_of(world * d)));
         let tiny = DVec3::splat(1e-9);
         let sample = |d: DVec3| cube.sample(d, tiny, tiny, &TextureFilter::default());

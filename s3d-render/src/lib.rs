@@ -8,6 +8,8 @@
 //!   the data set (formats.md, "Images"). A semantic image is an index image: this crate stores faces and knows no
 //!   labels.
 //! - [`Pyramids`] and [`rgb_image`]: hits → colours, textures filtered over each pixel's footprint.
+//! - [`CubeMap`] and [`picture_image`]: hits → colours from the scanner's own pictures, be they a sky box, a panorama or
+//!   captures that overlap ([`stitch()`]).
 //!
 //! Everything that makes one image runs on the calling thread: callers render many images at once.
 //!
