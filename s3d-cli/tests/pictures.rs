@@ -186,6 +186,9 @@ fn export(scan: &Path, rgb: &str) -> PathBuf {
     out
 }
 
+/// A pixel of a picture that is spoilt.
+type Pixel = fn(&Raster<[u8; 3]>, u32, u32) -> [u8; 3];
+
 #[test]
 fn pictures_of_the_scene_give_its_images() {
     // Kept, to be looked at.
@@ -227,7 +230,7 @@ fn pictures_of_the_scene_give_its_images() {
     }
 
     // A face that is mirrored or turned is far off.
-    let spoil = |k: usize, pixel: &dyn Fn(&Raster<[u8; 3]>, u32, u32) -> [u8; 3]| {
+    let spoil = |k: usize, pixel: Pixel| {
         let image =
             Raster::from_vec(768, 768, (0..768 * 768).map(|i| pixel(&faces[k], i % 768, i / 768)).collect());
         write(&scan.join("skybox").join(name(k)), &image);
@@ -237,8 +240,8 @@ fn pictures_of_the_scene_give_its_images() {
         psnr
     };
     fs::remove_dir_all(dir.join("rgbskybox")).unwrap();
-    let mirrored = spoil(2, &|face, x, y| face.at(767 - x, y));
-    let turned = spoil(3, &|face, x, y| face.at(y, 767 - x));
+    let mirrored = spoil(2, |face, x, y| face.at(767 - x, y));
+    let turned = spoil(3, |face, x, y| face.at(y, 767 - x));
     assert!(mirrored < 28.0 && turned < 28.0, "{mirrored:.1} dB mirrored, {turned:.1} dB turned");
 }
 

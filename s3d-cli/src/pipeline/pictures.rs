@@ -148,9 +148,9 @@ impl Pictures {
 }
 
 /// Does `work` on every item at once; results in the items' order.
-fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
     use rayon::prelude::*;
-    items.par_iter().map(|item| work(item)).collect()
+    items.par_iter().map(work).collect()
 }
 
 fn read_all(paths: &[PathBuf]) -> Outcome<Vec<Raster<[u8; 3]>>> {
