@@ -1,6 +1,6 @@
 //! Vocabulary and plain geometry of indoor scans.
 //!
-//! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Pose`], [`Raster`] —
+//! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Lens`], [`Pose`], [`Raster`] —
 //! and the geometry that needs nothing else: a surface's points ([`SurfaceSampler`]), a point's nearest face
 //! ([`NearestFaces`]), polygons and their triangles ([`Polygon`], [`triangulate_face`]), a room's floor
 //! ([`FootprintBuilder`]) and the voxels of an instance ([`Voxels`]). World frame everywhere: metres, Z-up, right-handed.
@@ -20,6 +20,7 @@ mod cloud;
 mod curve;
 mod face_tree;
 mod footprint;
+mod lens;
 mod merge;
 mod mesh;
 mod nearest;
@@ -41,6 +42,7 @@ pub use camera::{Camera, NormalAxes, Projection, Rays};
 pub use cloud::PointCloud;
 pub use footprint::{Footprint, FootprintBuilder, FootprintOptions};
 pub use glam;
+pub use lens::Lens;
 pub use mesh::{DEFAULT_COLOR, FaceColor, Material, MeshError, MeshParts, MeshReport, NO_INDEX, TriMesh};
 pub use nearest::{Nearest, NearestFaces, nearest_brute_force};
 pub use polygon::{Polygon, PolygonError, triangulate_face};

@@ -11,6 +11,7 @@
 //! - cameras: [`PoseFile`];
 //! - meshes: [`read_mesh`] and [`read_meshes`] (OBJ, glTF, PLY), with [`MeshLabels`]; [`write_rgb_obj`], [`write_semantic_obj`];
 //! - scans: [`read_scene`], [`read_scan_locations`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
+//! - the scanner's pictures: [`PictureFolder`], [`CaptureFile`], [`read_matterport_locations`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
 //! - lists: [`write_labels`], [`write_splits`], [`write_image_list`]; arrays: [`NpyWriter`];
 //! - what the numbers of a data set mean: [`Conventions`];
@@ -78,6 +79,7 @@ mod located_picture;
 mod mat_annotations;
 mod mat_read;
 mod mat_write;
+mod matterport;
 mod mesh_file;
 mod mesh_join;
 mod mesh_labels;
@@ -111,12 +113,15 @@ mod pose;
 mod pretty;
 mod published;
 mod quote;
+mod rgb_source;
 mod s3dis;
 mod s3dis_points;
 mod s3dis_write;
 mod scan_locations;
 mod scannet_cloud;
 mod scene;
+mod scene_annotations;
+mod scene_cameras;
 mod splits;
 mod tar;
 mod texture_file;
@@ -146,6 +151,10 @@ pub use layout::{
 pub use located_picture::uuid_from_name;
 pub use mat_read::{MatArea, MatObject, MatRoom};
 pub use mat_write::MatWriter;
+pub use matterport::{
+    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, read_capture_pose, read_intrinsics,
+    read_matterport_locations, read_picture, read_picture_size,
+};
 pub use mesh_file::{MeshFile, MeshOptions, UpAxis, read_mesh, read_mesh_with};
 pub use mesh_join::{MeshSource, read_meshes, read_meshes_with};
 pub use mesh_labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
@@ -159,11 +168,13 @@ pub use point_sample::{read_point_sample, write_colored_points};
 pub use pose::{PoseFile, read_pose};
 pub use pretty::pretty_color;
 pub use published::{PublishedArea, PublishedLocation, PublishedMesh, PublishedOptions};
+pub use rgb_source::{PictureKind, PictureOptions, PictureSource, SkyBoxCaps, UnseenColor};
 pub use s3dis::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
 pub use s3dis_points::{PointReader, read_points};
 pub use s3dis_write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};
 pub use scan_locations::read_scan_locations;
-pub use scene::{CameraSource, SceneFile, read_scene};
+pub use scene::{SceneFile, read_scene};
+pub use scene_cameras::CameraSource;
 pub use splits::{Split, read_splits, write_image_list, write_splits};
 pub use tar::TarWriter;
 pub use texture_file::TextureFile;

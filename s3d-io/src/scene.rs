@@ -2,12 +2,12 @@
 
 use crate::annotations::AnnotationOptions;
 use crate::mesh_file::UpAxis;
+use crate::rgb_source::{PictureSource, RgbEntry};
+use crate::scene_annotations::AnnotationTable;
+use crate::scene_cameras::{CameraSource, CamerasTable};
 use crate::texture_file::read_file;
 use crate::{Error, Result};
-use s3d_geom::glam::{DAffine3, DMat3, DVec3};
-use s3d_label::{Class, Room};
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
@@ -18,33 +18,19 @@ pub struct SceneFile {
     pub path: PathBuf,
     /// The number of the area, from 1.
     pub area: u32,
-    /// The textured mesh.
-    pub mesh: PathBuf,
+    /// The textured mesh, in one file or several that are joined in this order. At least one.
+    pub mesh: Vec<PathBuf>,
     /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published OBJ files.
     pub up: UpAxis,
-    /// The annotated points: files and folders, see [`Annotations::open`](crate::Annotations::open). At least one.
+    /// The annotated points: files and folders, see [`Annotations::open`](crate::Annotations::open). None: the
+    /// labels that came with the mesh, see [`Annotations::of_mesh`](crate::Annotations::of_mesh).
     pub annotations: Vec<PathBuf>,
     /// How they are read. Faults stop.
     pub annotation_options: AnnotationOptions,
     /// Where the scan locations come from; `None` if the file does not say.
     pub cameras: Option<CameraSource>,
-}
-
-/// Where an area's scan locations come from.
-#[derive(Clone, Debug, PartialEq)]
-pub enum CameraSource {
-    /// A list of them: see [`read_scan_locations`](crate::read_scan_locations).
-    Listed {
-        /// The file or folder.
-        path: PathBuf,
-        /// Takes its frame to the world's (metres, Z-up): turns, shifts and scales.
-        world_from_file: DAffine3,
-    },
-    /// They are to be put on the floor, no two of a room nearer than this, metres.
-    Placed {
-        /// Above 0, finite.
-        distance_m: f64,
-    },
+    /// The scanner's pictures, if RGB images are made from them and not from the mesh's texture.
+    pub pictures: Option<PictureSource>,
 }
 
 #[derive(Deserialize)]
@@ -54,113 +40,15 @@ struct Document {
     mesh: MeshTable,
     annotations: AnnotationTable,
     cameras: Option<CamerasTable>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct AnnotationTable {
-    path: Option<PathBuf>,
-    paths: Option<Vec<PathBuf>>,
-    class: Option<String>,
-    instance: Option<String>,
-    room: Option<String>,
-    rooms: Option<String>,
-    #[serde(default)]
-    columns: Vec<String>,
-    #[serde(default)]
-    offset_m: [f64; 3],
-    #[serde(default)]
-    unknown_as_clutter: bool,
-    #[serde(default)]
-    classes: BTreeMap<String, String>,
-}
-
-impl AnnotationTable {
-    fn options(&self) -> std::result::Result<AnnotationOptions, String> {
-        let room: Option<Room> = match &self.room {
-            Some(name) => Some(name.parse().map_err(|e| format!("annotations.room: {e}"))?),
-            None => None,
-        };
-        let mut classes = BTreeMap::new();
-        for (key, word) in &self.classes {
-            let class: Option<Class> = match word.as_str() {
-                "" => None,
-                word => Some(word.parse().map_err(|e| format!("annotations.classes.{key:?}: {e}"))?),
-            };
-            classes.insert(key.clone(), class);
-        }
-        if !self.offset_m.iter().all(|v| v.is_finite()) {
-            return Err(format!("annotations.offset_m = {:?} is not finite", self.offset_m));
-        }
-        Ok(AnnotationOptions {
-            unknown_as_clutter: self.unknown_as_clutter,
-            classes,
-            room,
-            class_column: self.class.clone(),
-            instance_column: self.instance.clone(),
-            room_column: self.rooms.clone(),
-            columns: self.columns.clone(),
-            offset_m: DVec3::from_array(self.offset_m),
-            ..AnnotationOptions::default()
-        })
-    }
+    rgb: Option<RgbEntry>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MeshTable {
-    path: PathBuf,
-    up: Option<UpAxis>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CamerasTable {
     path: Option<PathBuf>,
-    place: Option<f64>,
+    paths: Option<Vec<PathBuf>>,
     up: Option<UpAxis>,
-    transform: Option<[[f64; 4]; 4]>,
-}
-
-impl CamerasTable {
-    /// What it asks for; a message if that cannot be.
-    fn source(self) -> std::result::Result<CameraSource, String> {
-        match (self.path, self.place) {
-            (Some(_), Some(_)) => Err("path and place exclude each other".into()),
-            (None, None) => Err("needs a path, or place = METRES to put scan locations on the floor".into()),
-            (None, Some(_)) if self.up.is_some() || self.transform.is_some() => {
-                Err("up and transform go with a path".into())
-            }
-            (None, Some(distance_m)) if distance_m > 0.0 && distance_m.is_finite() => {
-                Ok(CameraSource::Placed { distance_m })
-            }
-            (None, Some(distance_m)) => Err(format!("place = {distance_m} is no distance in metres")),
-            (Some(path), None) => {
-                let up = self.up.unwrap_or(UpAxis::Z);
-                let turn = DMat3::from_cols_array_2d(
-                    &[DVec3::X, DVec3::Y, DVec3::Z]
-                        .map(|axis| up.world_from_file(axis.as_vec3()).as_dvec3().to_array()),
-                );
-                let given = self.transform.map_or(Ok(DAffine3::IDENTITY), similarity)?;
-                Ok(CameraSource::Listed { path, world_from_file: given * DAffine3::from_mat3(turn) })
-            }
-        }
-    }
-}
-
-/// The rows of a 4 × 4 matrix as what it does: turn, shift and scale, nothing else.
-fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, String> {
-    const FORM: &str = "transform is no rotation with a scale and a shift: its rows are [x, y, z, shift], the last [0, 0, 0, 1]";
-    let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
-    let m = DMat3::from_cols(column(0), column(1), column(2));
-    let scale = libm::cbrt(m.determinant());
-    let is_finite = rows.iter().flatten().all(|v| v.is_finite());
-    let is_similar = (m.transpose() * m)
-        .abs_diff_eq(DMat3::from_diagonal(DVec3::splat(scale * scale)), 1e-4 * scale * scale);
-    if !is_finite || rows[3] != [0.0, 0.0, 0.0, 1.0] || scale <= 0.0 || !is_similar {
-        return Err(FORM.into());
-    }
-    Ok(DAffine3 { matrix3: m, translation: column(3) })
 }
 
 /// Reads a `scene.toml`:
@@ -168,12 +56,15 @@ fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, String> {
 /// ```toml
 /// area = 1
 /// [mesh]
-/// path = "rgb.obj"
+/// path = "rgb.obj"    # or paths = ["floor_1.ply", "floor_2.ply"]
 /// up   = "y"          # or "z"; "y" if it is left out
 /// [annotations]
-/// path = "Area_1"
+/// path = "Area_1"     # or mesh = true: the labels that came with the mesh
 /// [cameras]
 /// path = "cameras.csv"  # or place = 2.0: scan locations on the floor, two metres apart
+/// [rgb]               # or, before the first table, rgb = "texture"; that, if it is left out
+/// source = "captures" # or "texture", "skybox", "panorama"
+/// path = "raw"        # the pictures' folder; named after the source if it is left out
 /// ```
 ///
 /// Without `[cameras]` there is nowhere to stand, unless the caller places scan locations. The list's frame is the world
@@ -197,6 +88,8 @@ fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, String> {
 /// "7" = ""                            # unlabelled
 /// ```
 ///
+/// Further keys of `[rgb]` are those of [`crate::PictureOptions`].
+///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value; without
 /// one if a file or folder that it names is not there.
@@ -214,61 +107,61 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
         }
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let existing = |key: &str, written: &Path| {
+    let fault = |message: String| Error::format(path, message);
+    let found = |key: &str, written: &Path, what: &str, fits: fn(&Path) -> bool| {
         let full = folder.join(written);
-        if full.is_file() {
+        if fits(&full) {
             return Ok(full);
         }
-        let state = if full.exists() { "is no" } else { "is not there; it should be a" };
-        Err(Error::format(path, format!("{key} = {written:?}: {} {state} file", full.display())))
+        let state = match (full.exists(), what) {
+            (true, _) => format!("is no {what}"),
+            (false, "") => "is not there".to_owned(),
+            (false, _) => format!("is not there; it should be a {what}"),
+        };
+        Err(fault(format!("{key} = {written:?}: {} {state}", full.display())))
     };
-    let cameras = |table: CamerasTable| match table.source() {
-        Ok(CameraSource::Listed { path: written, world_from_file }) => {
-            let full = folder.join(&written);
-            if !full.exists() {
-                let message = format!("cameras.path = {written:?}: {} is not there", full.display());
-                return Err(Error::format(path, message));
-            }
-            Ok(CameraSource::Listed { path: full, world_from_file })
-        }
-        Ok(placed) => Ok(placed),
-        Err(message) => Err(Error::format(path, format!("[cameras]: {message}"))),
+    let mesh = match (&document.mesh.path, &document.mesh.paths) {
+        (Some(written), None) => vec![found("mesh.path", written, "file", Path::is_file)?],
+        (None, Some(paths)) if !paths.is_empty() => paths
+            .iter()
+            .map(|written| found("mesh.paths", written, "file", Path::is_file))
+            .collect::<Result<_>>()?,
+        _ => return Err(fault("mesh needs either path or paths, a list of at least one".into())),
     };
-    let table = &document.annotations;
-    let (key, written) = match (&table.path, &table.paths) {
-        (Some(path), None) => ("annotations.path", std::slice::from_ref(path)),
-        (None, Some(paths)) if !paths.is_empty() => ("annotations.paths", &paths[..]),
-        _ => {
-            return Err(Error::format(
-                path,
-                "annotations needs either path or paths, a list of at least one",
-            ));
+    let (key, written) = document.annotations.paths().map_err(fault)?;
+    let annotations =
+        written.iter().map(|written| found(key, written, "", Path::exists)).collect::<Result<_>>()?;
+    let cameras = match document.cameras.map(CamerasTable::source).transpose() {
+        Ok(Some(CameraSource::Listed { path: written, world_from_file })) => {
+            let path = found("cameras.path", &written, "", Path::exists)?;
+            Some(CameraSource::Listed { path, world_from_file })
         }
+        Ok(other) => other,
+        Err(message) => return Err(fault(format!("[cameras]: {message}"))),
     };
-    let mut annotations = Vec::new();
-    for written in written {
-        let full = folder.join(written);
-        if !full.exists() {
-            let message = format!("{key} = {written:?}: {} is not there", full.display());
-            return Err(Error::format(path, message));
-        }
-        annotations.push(full);
+    let mut pictures = document.rgb.map_or(Ok(None), |entry| entry.pictures()).map_err(fault)?;
+    if let Some(source) = &mut pictures {
+        source.path = found("rgb.path", &source.path, "folder", Path::is_dir)?;
     }
-    let annotation_options = table.options().map_err(|why| Error::format(path, why))?;
     Ok(SceneFile {
         path: path.to_owned(),
         area: document.area.get(),
         up: document.mesh.up.unwrap_or(UpAxis::Y),
-        mesh: existing("mesh.path", &document.mesh.path)?,
+        mesh,
         annotations,
-        annotation_options,
-        cameras: document.cameras.map(cameras).transpose()?,
+        annotation_options: document.annotations.options().map_err(fault)?,
+        cameras,
+        pictures,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{PictureKind, PictureOptions, UnseenColor};
+    use s3d_geom::glam::{DAffine3, DVec3};
+    use s3d_label::Class;
+    use std::collections::BTreeMap;
     use std::fs;
 
     const GOOD: &str = "area = 2\n[mesh]\npath = \"a.obj\"\nup = \"z\"\n[annotations]\npath = \"Area_2\"\n[cameras]\npath = \"c.csv\"\n";
@@ -278,10 +171,12 @@ mod tests {
         fs::write(dir.path().join("a.obj"), "").unwrap();
         fs::write(dir.path().join("c.csv"), "").unwrap();
         fs::create_dir(dir.path().join("Area_2")).unwrap();
+        fs::create_dir(dir.path().join("skybox")).unwrap();
+        fs::create_dir(dir.path().join("raw")).unwrap();
         let path = dir.path().join("scene.toml");
         fs::write(&path, text).unwrap();
         let scene = read_scene(&path)?;
-        assert_eq!(scene.mesh, dir.path().join("a.obj"));
+        assert_eq!(scene.mesh[0], dir.path().join("a.obj"));
         assert_eq!(scene.annotations[0], dir.path().join("Area_2"));
         if let Some(CameraSource::Listed { path, .. }) = &scene.cameras {
             assert_eq!(*path, dir.path().join("c.csv"));
@@ -347,6 +242,49 @@ mod tests {
     }
 
     #[test]
+    fn colours_come_from_the_texture_or_from_pictures() {
+        let pictures = |rgb: &str| {
+            let plain = rgb.starts_with("rgb");
+            let text = if plain { format!("{rgb}\n{GOOD}") } else { format!("{GOOD}{rgb}\n") };
+            let mut pictures = read(&text).unwrap().pictures;
+            if let Some(source) = &mut pictures {
+                source.path = source.path.file_name().unwrap().into();
+            }
+            pictures
+        };
+        let source = |kind, path: &str, options| Some(PictureSource { kind, path: path.into(), options });
+        let options = PictureOptions::default();
+        for texture in ["", "rgb = \"texture\"", "[rgb]\nsource = \"texture\""] {
+            assert_eq!(pictures(texture), None);
+        }
+        assert_eq!(pictures("rgb = \"skybox\""), source(PictureKind::SkyBox, "skybox", options.clone()));
+        let captures = pictures("[rgb]\nsource = \"captures\"\npath = \"raw\"\nparallax = false\nsize = 512");
+        let small = PictureOptions { parallax: false, size: Some(512), ..options.clone() };
+        assert_eq!(captures, source(PictureKind::Captures, "raw", small));
+        let panorama =
+            pictures("[rgb]\nsource = \"panorama\"\npath = \"raw\"\nyaw_deg = 90\nunseen = \"nearby\"");
+        let turned = PictureOptions { yaw_deg: 90.0, unseen: UnseenColor::Nearby, ..options };
+        assert_eq!(panorama, source(PictureKind::Panorama, "raw", turned));
+        for (rgb, words) in [
+            ("rgb = \"textures\"", "line 1: unknown variant `textures`, expected one of `texture`, `skybox`"),
+            ("rgb = 3", "line 1: invalid type: integer `3`, expected \"texture\""),
+            ("rgb = \"captures\"", "captures is not there; it should be a folder"),
+            ("[rgb]\npath = \"raw\"", "missing field `source`"),
+            ("[rgb]\nsource = \"skybox\"\nfolder = \"raw\"", "unknown field `folder`"),
+            ("[rgb]\nsource = \"skybox\"\npath = \"gone\"", "rgb.path = \"gone\""),
+            ("[rgb]\nsource = \"skybox\"\nyaw_deg = 1", "rgb.yaw_deg belongs to source = \"panorama\""),
+            ("[rgb]\nsource = \"skybox\"\nsize = 16", "rgb.size = 16"),
+            ("[rgb]\nsource = \"texture\"\npath = \"raw\"", "has no path"),
+            ("[rgb]\nsource = \"panorama\"\npath = \"raw\"\nyaw_deg = nan", "rgb.yaw_deg = NaN"),
+        ] {
+            let text =
+                if rgb.starts_with("rgb") { format!("{rgb}\n{GOOD}") } else { format!("{GOOD}{rgb}\n") };
+            let message = read(&text).unwrap_err().to_string();
+            assert!(message.contains(words), "{rgb}: {message}");
+        }
+    }
+
+    #[test]
     fn clouds_and_how_they_are_read() {
         let scene = read(GOOD).unwrap();
         assert_eq!(scene.annotation_options, AnnotationOptions::default());
@@ -367,6 +305,23 @@ mod tests {
             ..AnnotationOptions::default()
         };
         assert_eq!(scene.annotation_options, expected);
+    }
+
+    #[test]
+    fn meshes_come_in_several_files_and_with_labels() {
+        let several = GOOD.replace("path = \"a.obj\"", "paths = [\"a.obj\", \"c.csv\"]");
+        assert_eq!(read(&several).unwrap().mesh.len(), 2);
+        assert!(read(&GOOD.replace("path = \"Area_2\"", "mesh = true")).unwrap().annotations.is_empty());
+        for (from, to, words) in [
+            ("path = \"a.obj\"", "paths = []", "mesh needs either path or paths"),
+            ("path = \"a.obj\"", "", "mesh needs either path or paths"),
+            ("path = \"a.obj\"", "paths = [\"a.obj\", \"gone.obj\"]", "mesh.paths = \"gone.obj\""),
+            ("path = \"Area_2\"", "mesh = true\npath = \"Area_2\"", "annotations needs one of"),
+            ("path = \"Area_2\"", "mesh = false", "annotations needs one of"),
+        ] {
+            let message = read(&GOOD.replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(message.contains(words), "{to}: {message}");
+        }
     }
 
     #[test]

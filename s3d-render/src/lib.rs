@@ -8,6 +8,8 @@
 //!   the data set (formats.md, "Images"). A semantic image is an index image: this crate stores faces and knows no
 //!   labels.
 //! - [`Pyramids`] and [`rgb_image`]: hits → colours, textures filtered over each pixel's footprint.
+//! - [`CubeMap`] and [`picture_image`]: hits → colours from the scanner's own pictures, be they a sky box, a panorama or
+//!   captures that overlap ([`stitch()`]).
 //!
 //! Everything that makes one image runs on the calling thread: callers render many images at once.
 //!
@@ -38,17 +40,22 @@ mod channels;
 mod clusters;
 mod color;
 mod cone;
+mod cube_map;
+mod cube_sources;
+mod fill;
 mod filter;
 mod lanes;
 mod lens;
 mod panorama;
 mod patch;
+mod picture_color;
 mod pinhole;
 mod pixel_color;
 mod points;
 mod ray;
 mod registers;
 mod scene;
+mod stitch;
 mod texture;
 mod visibility;
 
@@ -58,10 +65,14 @@ pub use channels::{
     face_images_into, index_image, index_image_into, normal_image, normal_image_into,
 };
 pub use color::{rgb_image, rgb_image_into, rgb_image_with};
+pub use cube_map::CubeMap;
+pub use cube_sources::SkyBoxTurn;
+pub use picture_color::{Unseen, picture_image, picture_image_into};
 pub use pixel_color::rgb_image_pixel_by_pixel;
 pub use points::{xyz_image, xyz_image_half, xyz_image_half_into, xyz_image_into};
 pub use ray::{Hit, cast_ray, cast_ray_brute_force};
 pub use scene::Scene;
+pub use stitch::{Capture, StitchOptions, stitch};
 pub use texture::{Pyramids, TextureFilter};
 pub use visibility::{Caster, Hits, NO_FACE, cast, cast_ray_by_ray, cast_strided};
 

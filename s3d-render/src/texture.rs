@@ -56,7 +56,7 @@ impl Pyramids {
 
 /// The image at half the size, each pixel the mean of the area it covers; `None` if it is one pixel. An odd size is cut
 /// into equal parts too, so that coordinates keep their meaning: these parts take shares of pixels.
-fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
+pub(crate) fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
     let (w, h) = (image.width(), image.height());
     if w <= 1 && h <= 1 {
         return None;
@@ -108,7 +108,11 @@ pub(crate) struct Pyramid<'a> {
     reductions: &'a [Raster<[u8; 3]>],
 }
 
-impl Pyramid<'_> {
+impl<'a> Pyramid<'a> {
+    pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
+        Self { full, reductions }
+    }
+
     /// The colour at `uv`, 0 to 255 a channel, over the footprint of a pixel: the parallelogram whose sides are `x` and
     /// `y`, in texture coordinates. Where the texture is magnified, the bilinear colour of the full size; else the mean
     /// of samples along the footprint's long axis from the size at which its short axis is one pixel.

@@ -7,6 +7,7 @@ use crate::pipeline::annotate::{Annotated, annotate, hidden_instances, label_dou
 use crate::pipeline::inputs::{Inputs, mesh_doubts};
 use crate::pipeline::locate;
 use crate::pipeline::location::Outlook;
+use crate::pipeline::pictures::Pictures;
 use s3d_geom::{NearestFaces, TriMesh};
 use s3d_label::Class;
 use s3d_render::Scene;
@@ -32,6 +33,14 @@ fn report(args: &InfoArgs) -> Outcome<String> {
     let _ = writeln!(text, "area {}\n", area.scene.area);
     tell_mesh(&mut text, mesh);
     tell_annotations(&mut text, &annotated, &inputs);
+    match Pictures::open(area, |_| true) {
+        Ok(None) => {}
+        Ok(Some(pictures)) => {
+            let _ = writeln!(text, "\ncolours: {}", pictures.summary());
+            wrong.extend(pictures.warnings);
+        }
+        Err(e) => wrong.push(e.to_string()),
+    }
 
     let located = locate(area, &scene, &nearest, &annotated, &inputs.table, args.seed)?;
     let _ = writeln!(text, "\nscan locations: {}", located.len());

@@ -73,6 +73,7 @@ fn render(args: &RenderArgs) -> Outcome<()> {
     let look = Look {
         scene: &scene,
         textures: &textures,
+        pictures: None,
         normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
         label_per_face: &[],
         pretty_per_face: &[],

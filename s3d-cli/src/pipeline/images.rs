@@ -1,6 +1,7 @@
 //! The images of an area: each view cast once, every modality from the same hits, each file written whole.
 
 use super::modality::{Image, Look, Prints};
+use super::pictures::Pictures;
 use super::views::Candidate;
 use super::work::for_each_in_order;
 use crate::console::Progress;
@@ -11,10 +12,13 @@ use s3d_label::Room;
 use s3d_render::{Caster, Hits};
 
 /// What is rendered, and where it goes.
+#[derive(Clone, Copy)]
 pub(crate) struct ImageJob<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) area: u32,
     pub(crate) look: Look<'a>,
+    /// Where colours come from, if not from the mesh.
+    pub(crate) pictures: Option<&'a Pictures>,
     pub(crate) locations: &'a [ScanLocation],
     /// The room of each location.
     pub(crate) rooms: &'a [Room],
@@ -39,19 +43,21 @@ struct Shot {
     camera: Camera,
 }
 
+/// What else is to be written of an area: one thread's work, which the others need not wait for.
+type Rest<'a> = &'a (dyn Fn() -> Outcome<()> + Sync);
+
 /// One piece of an area's work.
-enum Work {
-    /// What is no image: one thread's work, which the others need not wait for.
-    Rest,
-    Shot(Shot),
+enum Work<'a> {
+    Rest(Rest<'a>),
+    Shot(&'a Shot),
 }
 
 /// Renders and writes the panoramas of the chosen locations and their kept views. `rest` is done once, by one of the
-/// threads: what else is to be written of the area.
+/// threads, meanwhile.
 pub(crate) fn write_images(
     job: &ImageJob<'_>,
     candidates: &[Candidate],
-    rest: impl Fn() -> Outcome<()> + Sync,
+    rest: Rest<'_>,
 ) -> Outcome<ImageCount> {
     let shots = shots(job, candidates);
     for domain in job.modalities {
@@ -60,20 +66,44 @@ pub(crate) fn write_images(
         }
     }
     let progress = Progress::new("rendering", "images", shots.len() as u64);
+    let Some(pictures) = job.pictures else {
+        write_shots(job, &shots, Some(rest), &progress)?;
+        return Ok(count(&shots));
+    };
+    // A location after another: one cube map is in memory, and all threads work with it.
+    let mut rest = Some(rest);
+    for shots in shots.chunk_by(|a, b| a.location == b.location) {
+        let location = shots[0].location;
+        let cube = pictures.cube(location, &job.locations[location], job.look.scene)?;
+        let look = Look { pictures: cube.as_ref().map(|cube| pictures.colors(cube)), ..job.look };
+        write_shots(&ImageJob { look, ..*job }, shots, rest.take(), &progress)?;
+    }
+    rest.map_or(Ok(()), |rest| rest())?;
+    Ok(count(&shots))
+}
+
+fn write_shots(
+    job: &ImageJob<'_>,
+    shots: &[Shot],
+    rest: Option<Rest<'_>>,
+    progress: &Progress,
+) -> Outcome<()> {
     let memory =
         || Memory { caster: Caster::new(job.look.scene), hits: Hits::default(), prints: Prints::default() };
-    let panoramas = shots.iter().filter(|s| s.frame == Frame::Panorama).count() as u64;
-    let count = ImageCount { panoramas, views: shots.len() as u64 - panoramas };
-    let works: Vec<Work> = std::iter::once(Work::Rest).chain(shots.into_iter().map(Work::Shot)).collect();
+    let works: Vec<Work<'_>> = rest.map(Work::Rest).into_iter().chain(shots.iter().map(Work::Shot)).collect();
     for_each_in_order(&works, memory, |memory, work| match work {
-        Work::Rest => rest(),
+        Work::Rest(rest) => rest(),
         Work::Shot(shot) => {
             write_shot(job, shot, memory)?;
             progress.add(1);
             Ok(())
         }
-    })?;
-    Ok(count)
+    })
+}
+
+fn count(shots: &[Shot]) -> ImageCount {
+    let panoramas = shots.iter().filter(|s| s.frame == Frame::Panorama).count() as u64;
+    ImageCount { panoramas, views: shots.len() as u64 - panoramas }
 }
 
 /// The images to take: of each location its panorama, which takes longest, and then its views.

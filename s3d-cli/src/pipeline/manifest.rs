@@ -82,6 +82,8 @@ pub(crate) struct AreaEntry {
     pub(crate) panoramas: u64,
     pub(crate) views: u64,
     pub(crate) xyz: XyzLoss,
+    /// What its RGB images are made from.
+    pub(crate) rgb: &'static str,
 }
 
 /// What storing world coordinates loses.

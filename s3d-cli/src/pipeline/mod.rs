@@ -8,6 +8,7 @@ pub(crate) mod location;
 pub(crate) mod manifest;
 pub(crate) mod modality;
 pub(crate) mod output;
+pub(crate) mod pictures;
 pub(crate) mod place;
 pub(crate) mod points;
 pub(crate) mod profiles;
@@ -24,11 +25,12 @@ use inputs::{AreaInput, Cameras, Inputs};
 use location::{Outlook, room_of};
 use manifest::{AreaEntry, Manifest, XyzLoss};
 use modality::Look;
+use pictures::Pictures;
 use place::{Ground, Located, Placement, place_locations};
 use points::{check_density, write_points};
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::{
-    Compression, Content, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation, TextureOut,
+    Compression, Content, Domain, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation, TextureOut,
     create_dir, encode_rgb8,
 };
 use s3d_label::{LabelTable, Room};
@@ -91,6 +93,10 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     output::check_inputs(layout, &inputs)?;
     let areas = inputs.numbers();
     check_label_count(inputs.table.len() - 1)?;
+    let mut pictures = Vec::new();
+    for area in &inputs.areas {
+        pictures.push(area_pictures(area, options)?);
+    }
     // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a single area is
     // kept from then on; several are read again where they are needed, so that they never share memory.
     let mut single: Option<MeshFile> = None;
@@ -134,10 +140,11 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
 
     let mut entries = Vec::new();
     let mut images = ImageCount::default();
-    for (area, labelled) in inputs.areas.iter().zip(labelled) {
+    for ((area, labelled), pictures) in inputs.areas.iter().zip(labelled).zip(&pictures) {
         records::write_views(layout, area.scene.area, &candidates)?;
         let render = |stage: &Stage<'_>| {
-            render_area(area, stage, labelled, &inputs.table, layout, options, &candidates)
+            let pictures = pictures.as_ref();
+            render_area(area, stage, labelled, pictures, &inputs.table, layout, options, &candidates)
         };
         let (entry, count) = match &single {
             Some(stage) => render(stage)?,
@@ -164,6 +171,19 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
         started.elapsed().as_secs_f64()
     );
     Ok(())
+}
+
+/// The pictures that an area's RGB images are made from, if they are.
+fn area_pictures(area: &AreaInput, options: &ExportOptions) -> Outcome<Option<Pictures>> {
+    if !options.modalities.contains(&Domain::Rgb) {
+        return Ok(None);
+    }
+    let pictures = Pictures::open(area, |l| options.only.is_empty() || options.only.contains(&l.uuid))?;
+    if let Some(pictures) = &pictures {
+        pictures.warnings.iter().for_each(|w| warn!("{w}"));
+        info!("colours from {}", pictures.summary());
+    }
+    Ok(pictures)
 }
 
 /// Refuses more labels than loaders of the data set can tell apart.
@@ -302,6 +322,7 @@ fn label_area(
         panoramas: 0,
         views: 0,
         xyz: XyzLoss::of(mesh.aabb(), options.format.xyz),
+        rgb: area.scene.pictures.as_ref().map_or("texture", |p| p.kind.name()),
     };
     Ok(LabelledArea { annotated, locations, location_rooms, entry })
 }
@@ -370,6 +391,7 @@ fn render_area(
     area: &AreaInput,
     stage: &Stage<'_>,
     labelled: LabelledArea,
+    pictures: Option<&Pictures>,
     table: &LabelTable,
     layout: &Layout,
     options: &ExportOptions,
@@ -388,12 +410,14 @@ fn render_area(
         look: Look {
             scene,
             textures: &textures,
+            pictures: None,
             normals: if options.smooth_normals { Normals::Smooth } else { Normals::Flat },
             label_per_face: &label_per_face,
             pretty_per_face: &pretty_per_face,
             compression: options.compression,
             conventions: options.format.conventions(),
         },
+        pictures,
         locations: &locations,
         rooms: &location_rooms,
         chosen: &chosen,
@@ -403,7 +427,7 @@ fn render_area(
     };
     let started = Instant::now();
     let points = OnceLock::new();
-    let count = write_images(&job, candidates, || {
+    let count = write_images(&job, candidates, &|| {
         let _ = points.set(write_area(area, file, &annotated, table, layout, options)?);
         Ok(())
     })?;

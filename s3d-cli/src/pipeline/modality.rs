@@ -1,5 +1,6 @@
 //! Hits to the bytes of an image file, one function for every modality.
 
+use super::pictures::PictureColors;
 use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::{
@@ -13,9 +14,12 @@ use s3d_render::{
 };
 
 /// What images of a mesh are made from.
+#[derive(Clone, Copy)]
 pub(crate) struct Look<'a> {
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) textures: &'a Pyramids,
+    /// Colours that are not the textures'.
+    pub(crate) pictures: Option<PictureColors<'a>>,
     pub(crate) normals: Normals,
     /// The label index of each face; may be empty if no semantic image is asked for.
     pub(crate) label_per_face: &'a [u32],
@@ -132,7 +136,13 @@ impl Look<'_> {
         let Prints { rgb, depth, xyz, xyz_float, faces, faces_made } = prints;
         match image {
             Image::Rgb => {
-                rgb_image_into(self.scene, self.textures, hits, camera, &TextureFilter::default(), rgb);
+                match &self.pictures {
+                    Some(pictures) => pictures.image_into(self, hits, camera, rgb),
+                    None => {
+                        let filter = TextureFilter::default();
+                        rgb_image_into(self.scene, self.textures, hits, camera, &filter, rgb);
+                    }
+                }
                 encode_rgb8(rgb, Content::Photo, compression)
             }
             Image::Depth => {
