@@ -432,8 +432,8 @@ fn ply_files_of_other_libraries_with_the_columns_of_data_sets() {
     let faces: Vec<i64> = (0..12).collect();
     let halves = |f: fn(i64) -> i64| faces.iter().map(|&i| f(i / 2)).collect::<Vec<i64>>();
     let of_faces = LabelElement::Face;
-    type Column = Option<(&'static str, Vec<i64>)>;
-    let expected: [(&str, Option<(LabelElement, [Column; 2])>); 6] = [
+    type Labels = Option<(LabelElement, [Option<(&'static str, Vec<i64>)>; 2])>;
+    let expected: [(&str, Labels); 6] = [
         ("matterport_region.ply", Some((of_faces, [Some(("category_id", halves(|i| i - 1))), None]))),
         ("replica_semantic.ply", Some((of_faces, [None, Some(("object_id", halves(|i| i * 10)))]))),
         (
