@@ -280,7 +280,9 @@ mod tests {
         let floor = panorama.normal_image_from_world() * DVec3::Z;
         assert!(floor.abs_diff_eq(-DVec3::Y, 1e-12));
         let n = Camera::perspective(p, 1.0, 8, 8).normal_axes_from_world(NormalAxes::OpenCv);
-        assert!((n * -p.forward()).abs_diff_eq(-DVec3::Z, 1e-12) && (n * p.right()).abs_diff_eq(DVec3::X, 1e-12));
+        assert!(
+            (n * -p.forward()).abs_diff_eq(-DVec3::Z, 1e-12) && (n * p.right()).abs_diff_eq(DVec3::X, 1e-12)
+        );
         assert!((n.determinant() - 1.0).abs() < 1e-12, "right-handed");
         assert_eq!(panorama.normal_axes_from_world(NormalAxes::OpenCv), panorama.normal_image_from_world());
     }
