@@ -113,7 +113,8 @@ mod tests {
     fn each_face_votes_for_itself() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, vec3(0.02, 0.0, 0.0), vec3(0.0, 0.02, 0.0)];
         let mesh = TriMesh::from_faces(positions, vec![[0, 1, 2], [0, 3, 4], [1, 2, 3]]).unwrap();
-        let label = |class, instance, room: &str| Label { class, instance, room: room.parse().unwrap(), area: 3 };
+        let label =
+            |class, instance, room: &str| Label { class, instance, room: room.parse().unwrap(), area: 3 };
         let labels = [
             label(Class::Wall, 9, "office_2"),
             label(Class::Wall, 4, "office_2"),

@@ -1,6 +1,8 @@
 //! `pointcloud.mat` as a source of annotations.
 
-use crate::annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, Skipped};
+use crate::annotations::{
+    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, Skipped,
+};
 use crate::mat_read::{MatArea, MatObject, MatRoom};
 use crate::quote::quote;
 use crate::s3dis::OnFault;

@@ -102,7 +102,12 @@ impl MatObject {
 
     /// As [`MatObject::read`], less `offset_m`, which is subtracted before positions become `f32`, and with a choice of
     /// what to do at a point that is none.
-    pub(crate) fn read_with(&self, offset_m: DVec3, on_fault: OnFault, out: &mut PointCloud) -> Result<Skipped> {
+    pub(crate) fn read_with(
+        &self,
+        offset_m: DVec3,
+        on_fault: OnFault,
+        out: &mut PointCloud,
+    ) -> Result<Skipped> {
         assert!(out.colors.len() == out.len() && out.faces.is_empty(), "a cloud of other columns");
         let mut skipped = Skipped::default();
         let n = self.len as usize;
@@ -115,7 +120,9 @@ impl MatObject {
         let counts = [Some(positions.len()), colors.as_ref().map(Triples::len)];
         if let Some(other) = counts.into_iter().flatten().find(|count| *count != n) {
             let part = &self.part;
-            return Err(self.fault(format!("{part}: has {n} points and {other} colours, or it changed while it was read")));
+            return Err(self.fault(format!(
+                "{part}: has {n} points and {other} colours, or it changed while it was read"
+            )));
         }
         out.positions.reserve(n);
         out.colors.reserve(n);
@@ -233,7 +240,9 @@ impl MatFile {
     fn push_structs(&self, address: u64, place: &str, depth: usize, found: &mut Vec<Fields>) -> Result<()> {
         // Every struct of a sound file has a header of its own.
         if depth == 0 || found.len() as u64 > self.hdf5.len() / 16 {
-            return Err(self.hdf5.fault(format!("{place}: refers to itself, or more often than there is place for")));
+            return Err(self
+                .hdf5
+                .fault(format!("{place}: refers to itself, or more often than there is place for")));
         }
         let object = self.hdf5.object(address)?;
         if object.header.is_set("MATLAB_empty") {
@@ -301,14 +310,20 @@ impl MatFile {
             let length = array.dims.iter().try_fold(1u64, |n, d| n.checked_mul(*d));
             let is_short = |n: u64| n <= LONGEST_NAME;
             if !length.is_some_and(is_short) || !is_short(array.kind.size() as u64) {
-                return Err(self.hdf5.fault(format!("{place}: is {}, too long for a name", size(&array.dims))));
+                return Err(self
+                    .hdf5
+                    .fault(format!("{place}: is {}, too long for a name", size(&array.dims))));
             }
             let data = self.hdf5.data(&array)?;
             let text = match array.kind {
                 Kind::Integer { size: 1, .. } | Kind::Text { .. } => String::from_utf8(data).ok(),
                 Kind::Integer { size: 2, big_endian, .. } => {
                     let unit = |b: &[u8]| {
-                        if big_endian { u16::from_be_bytes([b[0], b[1]]) } else { u16::from_le_bytes([b[0], b[1]]) }
+                        if big_endian {
+                            u16::from_be_bytes([b[0], b[1]])
+                        } else {
+                            u16::from_le_bytes([b[0], b[1]])
+                        }
                     };
                     String::from_utf16(&data.chunks_exact(2).map(unit).collect::<Vec<_>>()).ok()
                 }
@@ -327,7 +342,9 @@ impl MatFile {
     /// The number of an array of one, `None` if it is something else.
     fn number(&self, address: u64) -> Result<Option<f64>> {
         let object = self.hdf5.object(address)?;
-        let Some(array) = object.header.dataset().filter(|a| a.dims.iter().all(|d| *d == 1)) else { return Ok(None) };
+        let Some(array) = object.header.dataset().filter(|a| a.dims.iter().all(|d| *d == 1)) else {
+            return Ok(None);
+        };
         if !matches!(array.kind, Kind::Integer { .. } | Kind::Float { .. }) {
             return Ok(None);
         }

@@ -10,16 +10,8 @@ use std::path::Path;
 /// The fields of the structs, in the order in which MATLAB shows them.
 const AREA_FIELDS: [&str; 2] = ["name", "Disjoint_Space"];
 const ROOM_FIELDS: [&str; 4] = ["name", "AlignmentAngle", "color", "object"];
-const OBJECT_FIELDS: [&str; 8] = [
-    "name",
-    "points",
-    "RGB_color",
-    "global_name",
-    "Bbox",
-    "Voxels",
-    "Voxel_Occupancy",
-    "Points_per_Voxel",
-];
+const OBJECT_FIELDS: [&str; 8] =
+    ["name", "points", "RGB_color", "global_name", "Bbox", "Voxels", "Voxel_Occupancy", "Points_per_Voxel"];
 
 /// What stands before all in a MAT-file: text, which ends at byte 116, version and byte order. MATLAB writes the time
 /// too; here it is the same in every file.
@@ -154,7 +146,10 @@ impl MatWriter {
         let Some((name, _)) = &self.object else { panic!("points of no object") };
         assert_eq!(positions.len(), colors.len(), "{} points need as many colours", positions.len());
         if let Some(p) = positions.iter().find(|p| !p.is_finite()) {
-            return Err(Error::format(self.hdf5.path(), format!("a point of {name} at {p} cannot be written")));
+            return Err(Error::format(
+                self.hdf5.path(),
+                format!("a point of {name} at {p} cannot be written"),
+            ));
         }
         if u32::try_from(self.positions.len() + positions.len()).is_err() {
             let message = format!("{name} has more points than can be numbered; fewer points a m² help");
@@ -289,7 +284,8 @@ impl MatWriter {
                 for (i, (_, member)) in members.iter_mut().enumerate() {
                     self.referenced.extend(values.iter().map(|v| v[i]));
                     let addresses = values.iter().map(|v| v[i].to_le_bytes());
-                    *member = self.hdf5.dataset(Kind::Reference, &[values.len() as u64, 1], &[], addresses)?;
+                    *member =
+                        self.hdf5.dataset(Kind::Reference, &[values.len() as u64, 1], &[], addresses)?;
                 }
             }
         }

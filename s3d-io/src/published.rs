@@ -166,7 +166,10 @@ impl PublishedArea {
             let location = DVec3::from_array(pose.camera_location);
             let angles = DVec3::from_array(pose.camera_original_rotation);
             if !angles.is_finite() || location.abs().max_element() > FARTHEST_M || !location.is_finite() {
-                return Err(Error::format(&file, format!("has its camera at {location}, turned by {angles}")));
+                return Err(Error::format(
+                    &file,
+                    format!("has its camera at {location}, turned by {angles}"),
+                ));
             }
             let room = pose.room.as_deref().and_then(room_of);
             if room.is_none() {
@@ -236,7 +239,8 @@ impl PublishedArea {
         }
         let mut mesh = PublishedMesh { file, labels, face_labels };
         if self.world_from_area != DAffine3::IDENTITY {
-            mesh.turn(&self.world_from_area).map_err(|source| Error::Mesh { path: self.mesh.clone(), source })?;
+            mesh.turn(&self.world_from_area)
+                .map_err(|source| Error::Mesh { path: self.mesh.clone(), source })?;
         }
         Ok(mesh)
     }

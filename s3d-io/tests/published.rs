@@ -25,8 +25,8 @@ fn original(n: f64) -> Pose {
 fn pose(layout: &Layout, uuid: &str, n: f64, frame: Frame, room: &str) {
     let original = original(n);
     let camera = match frame {
-        Frame::Panorama => Camera::panorama(original, 64),
-        Frame::View(i) => Camera::perspective(original.turned(0.3 * f64::from(i), 0.1), 64, 1.0),
+        Frame::Panorama => Camera::equirectangular(original, 64),
+        Frame::View(i) => Camera::perspective(original.turned(0.3 * f64::from(i), 0.1), 1.0, 64, 64),
     };
     let name = room.rsplit_once('_').unwrap().0;
     let path = layout.image_path(3, uuid, name, frame, Domain::Pose);
@@ -132,7 +132,8 @@ fn what_is_missing_is_named() {
     let dir = tempfile::tempdir().unwrap();
     area(dir.path());
     let folder = dir.path().join("area_3");
-    let pose = folder.join("pano/pose").join(format!("camera_{B}_hallway_1_frame_equirectangular_domain_pose.json"));
+    let pose =
+        folder.join("pano/pose").join(format!("camera_{B}_hallway_1_frame_equirectangular_domain_pose.json"));
     fs::write(&pose, "{\"camera_uuid\": 1}").unwrap();
     let message = PublishedArea::open(&folder).unwrap_err().to_string();
     assert!(message.contains("_hallway_1_") && message.contains("line 1"), "{message}");

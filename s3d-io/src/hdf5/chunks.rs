@@ -21,7 +21,13 @@ struct Chunk {
 }
 
 /// All `bytes` of an array whose chunks of extents `chunk` are under the B-tree at `tree`.
-pub(super) fn read(file: &Hdf5File, dataset: &Dataset, tree: u64, chunk: &[u64], bytes: u64) -> Result<Vec<u8>> {
+pub(super) fn read(
+    file: &Hdf5File,
+    dataset: &Dataset,
+    tree: u64,
+    chunk: &[u64],
+    bytes: u64,
+) -> Result<Vec<u8>> {
     let damaged = || file.fault(format!("an array of {:?} in chunks of {chunk:?} is damaged", dataset.dims));
     let element = dataset.kind.size();
     let chunk_bytes = chunk.iter().try_fold(element as u64, |n, d| n.checked_mul(*d)).ok_or_else(damaged)?;
@@ -37,7 +43,11 @@ pub(super) fn read(file: &Hdf5File, dataset: &Dataset, tree: u64, chunk: &[u64],
     // Before anything is allocated: the chunks must be able to fill the array.
     let needed = dataset.dims.iter().zip(chunk).try_fold(1u64, |n, (d, c)| n.checked_mul(d.div_ceil(*c)));
     if needed.is_none_or(|n| n > chunks.len() as u64) {
-        return Err(file.fault(format!("an array of {:?} has only {} of its chunks", dataset.dims, chunks.len())));
+        return Err(file.fault(format!(
+            "an array of {:?} has only {} of its chunks",
+            dataset.dims,
+            chunks.len()
+        )));
     }
     // Chunks share no bytes. Thus the array is not larger than the whole file could be deflated from.
     let stored: u64 = chunks.iter().map(|c| u64::from(c.stored)).sum();
@@ -48,7 +58,8 @@ pub(super) fn read(file: &Hdf5File, dataset: &Dataset, tree: u64, chunk: &[u64],
     if chunks.iter().any(|c| chunk_bytes > most.saturating_mul(u64::from(c.stored)).saturating_add(64)) {
         return Err(damaged());
     }
-    let size = usize::try_from(bytes).ok().filter(|_| bytes <= chunk_bytes.saturating_mul(chunks.len() as u64));
+    let size =
+        usize::try_from(bytes).ok().filter(|_| bytes <= chunk_bytes.saturating_mul(chunks.len() as u64));
     let mut data = vec![0; size.ok_or_else(damaged)?];
     for piece in &chunks {
         let stored = file.bytes(piece.address, u64::from(piece.stored))?;
@@ -93,7 +104,13 @@ fn list(file: &Hdf5File, tree: u64, axes: usize) -> Result<Vec<Chunk>> {
 }
 
 /// A chunk's bytes as they were before the filters, which are undone from the last to the first.
-fn unfilter(mut data: Vec<u8>, skipped: u32, filters: &[Filter], element: usize, size: usize) -> Option<Vec<u8>> {
+fn unfilter(
+    mut data: Vec<u8>,
+    skipped: u32,
+    filters: &[Filter],
+    element: usize,
+    size: usize,
+) -> Option<Vec<u8>> {
     for (i, filter) in filters.iter().enumerate().rev() {
         if skipped >> i.min(31) & 1 != 0 {
             continue;
@@ -124,8 +141,7 @@ fn place(data: &mut [u8], dims: &[u64], chunk: &[u8], extents: &[u64], offset: &
     }
     let Some(last) = dims.len().checked_sub(1) else { return data.copy_from_slice(&chunk[..data.len()]) };
     // How many of the chunk's elements are in the array, along each axis.
-    let inside: Vec<u64> =
-        (0..dims.len()).map(|axis| extents[axis].min(dims[axis] - offset[axis])).collect();
+    let inside: Vec<u64> = (0..dims.len()).map(|axis| extents[axis].min(dims[axis] - offset[axis])).collect();
     let run = inside[last] as usize * element;
     let mut at = vec![0u64; dims.len()];
     loop {

@@ -41,7 +41,9 @@ pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(St
             let entries = file.bytes(address + 8, 40 * count)?;
             for entry in entries.chunks_exact(40) {
                 let mut entry = Cursor::new(entry);
-                let (Some(name), Some(object)) = (entry.number(8), entry.number(8)) else { return Err(damaged()) };
+                let (Some(name), Some(object)) = (entry.number(8), entry.number(8)) else {
+                    return Err(damaged());
+                };
                 let name = usize::try_from(name).ok().and_then(|at| names.get(at..)).ok_or_else(damaged)?;
                 found.push((String::from_utf8_lossy(until_zero(name)).into_owned(), object));
                 left = left.checked_sub(1).ok_or_else(damaged)?;

@@ -64,10 +64,19 @@ impl Header {
             let mut bytes = &file.bytes(at, size)?[..];
             if new && read > 1 {
                 // A signature before the messages and a checksum behind them.
-                bytes = bytes.strip_prefix(b"OCHK").and_then(|b| b.get(..b.len().checked_sub(4)?)).ok_or_else(damaged)?;
+                bytes = bytes
+                    .strip_prefix(b"OCHK")
+                    .and_then(|b| b.get(..b.len().checked_sub(4)?))
+                    .ok_or_else(damaged)?;
             }
             let mut cursor = Cursor::new(bytes);
-            let prefix = if !new { 8 } else if has_order { 6 } else { 4 };
+            let prefix = if !new {
+                8
+            } else if has_order {
+                6
+            } else {
+                4
+            };
             while cursor.rest().len() >= prefix {
                 let (kind, size, flags) = if new {
                     let (kind, size, flags) = (cursor.number(1), cursor.number(2), cursor.byte());
@@ -78,11 +87,15 @@ impl Header {
                     cursor.take(3);
                     (kind, size, flags)
                 };
-                let (Some(kind), Some(size), Some(flags)) = (kind, size, flags) else { return Err(damaged()) };
+                let (Some(kind), Some(size), Some(flags)) = (kind, size, flags) else {
+                    return Err(damaged());
+                };
                 let body = cursor.take(size as usize).ok_or_else(damaged)?;
                 if kind == 0x10 {
                     let mut body = Cursor::new(body);
-                    let (Some(at), Some(size)) = (body.number(8), body.number(8)) else { return Err(damaged()) };
+                    let (Some(at), Some(size)) = (body.number(8), body.number(8)) else {
+                        return Err(damaged());
+                    };
                     blocks.push((at, size));
                 } else {
                     this.take(kind, body, flags & 2 != 0).ok_or_else(damaged)?;
@@ -142,6 +155,8 @@ impl Header {
 
     /// Whether it has an attribute that is a number other than 0.
     pub(crate) fn is_set(&self, name: &str) -> bool {
-        self.attributes.iter().any(|(n, value)| n == name && matches!(value, AttributeValue::Number(v) if *v != 0))
+        self.attributes
+            .iter()
+            .any(|(n, value)| n == name && matches!(value, AttributeValue::Number(v) if *v != 0))
     }
 }

@@ -168,7 +168,8 @@ impl Hdf5File {
     pub(crate) fn data(&self, dataset: &Dataset) -> Result<Vec<u8>> {
         let element = dataset.kind.size() as u64;
         let bytes = dataset.dims.iter().try_fold(element, |n, d| n.checked_mul(*d));
-        let bytes = bytes.ok_or_else(|| self.fault(format!("an array of {:?} is too large", dataset.dims)))?;
+        let bytes =
+            bytes.ok_or_else(|| self.fault(format!("an array of {:?} is too large", dataset.dims)))?;
         if bytes == 0 {
             return Ok(Vec::new());
         }

@@ -310,7 +310,8 @@ impl Hdf5Writer {
             let mut key = 0u64;
             for i in 0..count {
                 let children = &nodes[i * fan..nodes.len().min((i + 1) * fan)];
-                let sibling = |there: bool, at: usize| if there { first + (at * size) as u64 } else { UNDEFINED };
+                let sibling =
+                    |there: bool, at: usize| if there { first + (at * size) as u64 } else { UNDEFINED };
                 let mut bytes = b"TREE\0".to_vec();
                 bytes.push(level);
                 bytes.extend((children.len() as u16).to_le_bytes());
