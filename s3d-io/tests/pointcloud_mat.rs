@@ -200,7 +200,7 @@ fn damaged_files_never_panic() {
     let (mut read, mut refused) = (0, 0);
     for name in ["area.mat", "cells.mat", "single.mat", "latest.mat"] {
         let good = std::fs::read(fixture(name)).unwrap();
-        for round in 0..400 {
+        for round in 0..150 {
             let mut bytes = good.clone();
             for _ in 0..=round % 6 {
                 let at = 512 + random(bytes.len() - 512);
@@ -223,5 +223,5 @@ fn damaged_files_never_panic() {
             }
         }
     }
-    assert!(read > 500 && refused > 100, "{read} objects read, {refused} refused");
+    assert!(read > 150 && refused > 50, "{read} objects read, {refused} refused");
 }

@@ -25,8 +25,8 @@ fn original(n: f64) -> Pose {
 fn pose(layout: &Layout, uuid: &str, n: f64, frame: Frame, room: &str) {
     let original = original(n);
     let camera = match frame {
-        Frame::Panorama => Camera::panorama(original, 64),
-        Frame::View(i) => Camera::perspective(original.turned(0.3 * f64::from(i), 0.1), 64, 1.0),
+        Frame::Panorama => Camera::equirectangular(original, 64),
+        Frame::View(i) => Camera::perspective(original.turned(0.3 * f64::from(i), 0.1), 1.0, 64, 64),
     };
     let name = room.rsplit_once('_').unwrap().0;
     let path = layout.image_path(3, uuid, name, frame, Domain::Pose);

@@ -184,25 +184,30 @@ def write_tree_as_mat(tree, path):
         f.write(b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM")
 
 
+def scene_with(scan, annotations):
+    """The demo's scene file, to stand elsewhere, with other annotations."""
+    text = (scan / "scene.toml").read_text()
+    for name in ["rgb.obj", "Area_1", "cameras.csv"]:
+        assert f'"{name}"' in text
+        text = text.replace(f'"{name}"', f"'{annotations if name == 'Area_1' else scan / name}'")
+    return text
+
+
 def test_a_file_by_h5py_gives_the_labels_that_its_text_files_give(s3d, demo, tmp_path):
     """The demo's annotations, once as they are and once as double, chunked and deflated arrays."""
     scan = demo / "scan"
-    scene = (scan / "scene.toml").read_text()
-    (tree,) = [p for p in scan.iterdir() if p.is_dir() and p.name.startswith("Area_")]
-    write_tree_as_mat(tree, scan / "other.mat")
+    write_tree_as_mat(scan / "Area_1", tmp_path / "other.mat")
+    (tmp_path / "other.toml").write_text(scene_with(scan, tmp_path / "other.mat"))
     options = ["--views", "0", "--pano-width", "64", "--points-per-m2", "50", "--modalities", "pose"]
-    (scan / "other.toml").write_text(scene.replace(f'"{tree.name}"', '"other.mat"'))
-    for name in ["scene", "other"]:
-        s3d("export", scan / f"{name}.toml", "-o", tmp_path / name, *options)
+    s3d("export", scan / "scene.toml", "-o", tmp_path / "one", *options)
+    s3d("export", tmp_path / "other.toml", "-o", tmp_path / "other", *options)
     for file in ["semantic.obj", "votes.json", "rooms.json", "instances.json", "instances.npz", "pointcloud.mat"]:
-        one, other = [tmp_path / name / "area_1" / "3d" / file for name in ["scene", "other"]]
+        one, other = [tmp_path / name / "area_1" / "3d" / file for name in ["one", "other"]]
         assert one.read_bytes() == other.read_bytes(), file
 
 
-def test_damage_is_told_and_not_survived(s3d, demo, path, tmp_path):
-    scan = demo / "scan"
-    (tree,) = [p for p in scan.iterdir() if p.is_dir() and p.name.startswith("Area_")]
-    (scan / "cut.mat").write_bytes(path.read_bytes()[:-1000])
-    (scan / "cut.toml").write_text((scan / "scene.toml").read_text().replace(f'"{tree.name}"', '"cut.mat"'))
-    done = s3d("export", scan / "cut.toml", "-o", tmp_path / "cut", code=1)
+def test_a_file_that_is_cut_off_is_told(s3d, demo, path, tmp_path):
+    (tmp_path / "cut.mat").write_bytes(path.read_bytes()[:-1000])
+    (tmp_path / "cut.toml").write_text(scene_with(demo / "scan", tmp_path / "cut.mat"))
+    done = s3d("export", tmp_path / "cut.toml", "-o", tmp_path / "cut", code=1)
     assert "cut.mat" in done.stderr and "is cut off" in done.stderr
