@@ -80,6 +80,7 @@ mod mat_annotations;
 mod mat_read;
 mod mat_write;
 mod matterport;
+mod mesh_annotations;
 mod mesh_file;
 mod mesh_join;
 mod mesh_labels;

@@ -4,9 +4,10 @@ use crate::annotations::AnnotationOptions;
 use crate::mesh_file::UpAxis;
 use crate::rgb_source::{PictureSource, RgbEntry};
 use crate::scene_annotations::AnnotationTable;
-use crate::scene_cameras::{CameraSource, CamerasTable};
+use crate::scene_cameras::{CameraSource, CamerasTable, similarity};
 use crate::texture_file::read_file;
 use crate::{Error, Result};
+use s3d_geom::glam::DAffine3;
 use serde::Deserialize;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,11 @@ pub struct SceneFile {
     pub path: PathBuf,
     /// The number of the area, from 1.
     pub area: u32,
+    /// The folder of a published area that mesh, labels and scan locations come from; then `mesh` and `annotations` are
+    /// empty. See [`PublishedArea`](crate::PublishedArea).
+    pub published: Option<PathBuf>,
+    /// Takes that area's frame to the world's: turns, shifts and scales. For one of 5a and 5b.
+    pub world_from_published: DAffine3,
     /// The textured mesh, in one file or several that are joined in this order. At least one.
     pub mesh: Vec<PathBuf>,
     /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published OBJ files.
@@ -37,10 +43,18 @@ pub struct SceneFile {
 #[serde(deny_unknown_fields)]
 struct Document {
     area: NonZeroU32,
-    mesh: MeshTable,
-    annotations: AnnotationTable,
+    published: Option<PublishedTable>,
+    mesh: Option<MeshTable>,
+    annotations: Option<AnnotationTable>,
     cameras: Option<CamerasTable>,
     rgb: Option<RgbEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PublishedTable {
+    path: PathBuf,
+    transform: Option<[[f64; 4]; 4]>,
 }
 
 #[derive(Deserialize)]
@@ -88,6 +102,16 @@ struct MeshTable {
 /// "7" = ""                            # unlabelled
 /// ```
 ///
+/// A published area, or an export, brings mesh, labels and scan locations of its own, instead of `[mesh]`, `[annotations]`
+/// and `[cameras]`, of which the last may still be given:
+///
+/// ```toml
+/// area = 5
+/// [published]
+/// path      = "area_5b"
+/// transform = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]   # to the frame of 5a; may be left out
+/// ```
+///
 /// Further keys of `[rgb]` are those of [`crate::PictureOptions`].
 ///
 /// # Errors
@@ -120,17 +144,42 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
         };
         Err(fault(format!("{key} = {written:?}: {} {state}", full.display())))
     };
-    let mesh = match (&document.mesh.path, &document.mesh.paths) {
-        (Some(written), None) => vec![found("mesh.path", written, "file", Path::is_file)?],
-        (None, Some(paths)) if !paths.is_empty() => paths
-            .iter()
-            .map(|written| found("mesh.paths", written, "file", Path::is_file))
-            .collect::<Result<_>>()?,
-        _ => return Err(fault("mesh needs either path or paths, a list of at least one".into())),
+    let (mut published, mut world_from_published) = (None, DAffine3::IDENTITY);
+    if let Some(table) = &document.published {
+        if document.mesh.is_some() || document.annotations.is_some() {
+            return Err(fault(
+                "[published] brings a mesh and its labels: leave out [mesh] and [annotations]".into(),
+            ));
+        }
+        published = Some(found("published.path", &table.path, "folder", Path::is_dir)?);
+        if let Some(rows) = table.transform {
+            world_from_published = similarity(rows).map_err(|m| fault(format!("[published]: {m}")))?;
+        }
+    }
+    let missing = |key: &str| fault(format!("missing field `{key}`"));
+    let files = match (document.mesh, document.annotations) {
+        (mesh, annotations) if published.is_none() => {
+            Some((mesh.ok_or_else(|| missing("mesh"))?, annotations.ok_or_else(|| missing("annotations"))?))
+        }
+        _ => None,
     };
-    let (key, written) = document.annotations.paths().map_err(fault)?;
-    let annotations =
-        written.iter().map(|written| found(key, written, "", Path::exists)).collect::<Result<_>>()?;
+    let (mut mesh, mut annotations) = (Vec::new(), Vec::new());
+    let (mut up, mut annotation_options) = (UpAxis::Y, AnnotationOptions::default());
+    if let Some((meshes, labels)) = files {
+        mesh = match (&meshes.path, &meshes.paths) {
+            (Some(written), None) => vec![found("mesh.path", written, "file", Path::is_file)?],
+            (None, Some(paths)) if !paths.is_empty() => paths
+                .iter()
+                .map(|written| found("mesh.paths", written, "file", Path::is_file))
+                .collect::<Result<_>>()?,
+            _ => return Err(fault("mesh needs either path or paths, a list of at least one".into())),
+        };
+        let (key, written) = labels.paths().map_err(fault)?;
+        annotations =
+            written.iter().map(|written| found(key, written, "", Path::exists)).collect::<Result<_>>()?;
+        annotation_options = labels.options().map_err(fault)?;
+        up = meshes.up.unwrap_or(UpAxis::Y);
+    }
     let cameras = match document.cameras.map(CamerasTable::source).transpose() {
         Ok(Some(CameraSource::Listed { path: written, world_from_file })) => {
             let path = found("cameras.path", &written, "", Path::exists)?;
@@ -146,10 +195,12 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
     Ok(SceneFile {
         path: path.to_owned(),
         area: document.area.get(),
-        up: document.mesh.up.unwrap_or(UpAxis::Y),
+        published,
+        world_from_published,
         mesh,
+        up,
         annotations,
-        annotation_options: document.annotations.options().map_err(fault)?,
+        annotation_options,
         cameras,
         pictures,
     })
@@ -159,7 +210,7 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
 mod tests {
     use super::*;
     use crate::{PictureKind, PictureOptions, UnseenColor};
-    use s3d_geom::glam::{DAffine3, DVec3};
+    use s3d_geom::glam::DVec3;
     use s3d_label::Class;
     use std::collections::BTreeMap;
     use std::fs;
@@ -176,6 +227,9 @@ mod tests {
         let path = dir.path().join("scene.toml");
         fs::write(&path, text).unwrap();
         let scene = read_scene(&path)?;
+        if scene.published.is_some() {
+            return Ok(scene);
+        }
         assert_eq!(scene.mesh[0], dir.path().join("a.obj"));
         assert_eq!(scene.annotations[0], dir.path().join("Area_2"));
         if let Some(CameraSource::Listed { path, .. }) = &scene.cameras {
@@ -305,6 +359,32 @@ mod tests {
             ..AnnotationOptions::default()
         };
         assert_eq!(scene.annotation_options, expected);
+    }
+
+    #[test]
+    fn published_areas_bring_their_own() {
+        let text = "area = 5\n[published]\npath = \"Area_2\"\n";
+        let scene = read(text).unwrap();
+        assert!(scene.published.unwrap().ends_with("Area_2"));
+        assert!(scene.mesh.is_empty() && scene.annotations.is_empty() && scene.cameras.is_none());
+        let moved = format!(
+            "{text}transform = [[0,-1,0,7], [1,0,0,0], [0,0,1,0], [0,0,0,1]]\n[cameras]\nplace = 3\n"
+        );
+        let scene = read(&moved).unwrap();
+        assert_eq!(scene.world_from_published.transform_point3(DVec3::X), DVec3::new(7.0, 1.0, 0.0));
+        assert_eq!(scene.cameras, Some(CameraSource::Placed { distance_m: 3.0 }));
+        for (text, words) in [
+            (format!("{text}[mesh]\npath = \"a.obj\"\n"), "leave out [mesh]"),
+            (text.replace("Area_2", "Area_3"), "published.path = \"Area_3\""),
+            (
+                format!("{text}transform = [[2,0,0,0], [0,1,0,0], [0,0,1,0], [0,0,0,1]]\n"),
+                "[published]: transform",
+            ),
+            ("area = 5\n[cameras]\nplace = 3\n".into(), "missing field `mesh`"),
+        ] {
+            let message = read(&text).unwrap_err().to_string();
+            assert!(message.contains(words), "{text}: {message}");
+        }
     }
 
     #[test]

@@ -58,7 +58,7 @@ impl CamerasTable {
 }
 
 /// The rows of a 4 × 4 matrix as what it does: turn, shift and scale, nothing else.
-fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, String> {
+pub(crate) fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, String> {
     const FORM: &str = "transform is no rotation with a scale and a shift: its rows are [x, y, z, shift], the last [0, 0, 0, 1]";
     let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
     let m = DMat3::from_cols(column(0), column(1), column(2));

@@ -22,7 +22,7 @@ fn the_parts_of_the_scan_fit_together() {
     let scene = read_scene(&path).unwrap();
     assert_eq!((scene.area, scene.up), (1, UpAxis::Y));
 
-    let file = read_mesh(&scene.mesh, scene.up).unwrap();
+    let file = read_mesh(&scene.mesh[0], scene.up).unwrap();
     let mesh = &file.mesh;
     assert_eq!(mesh.positions().len(), 16_616);
     // 391 faces repeat earlier ones, most of them turned over.
@@ -32,7 +32,7 @@ fn the_parts_of_the_scan_fit_together() {
     assert_eq!((mesh.textures()[0].image.width(), mesh.textures()[0].image.height()), (1024, 1024));
     assert!((0..mesh.faces().len() as u32).all(|f| matches!(mesh.color_of(f), FaceColor::Texture(0, ..))));
     let texture = file.texture_files[0].as_ref().unwrap();
-    assert_eq!(texture.bytes, std::fs::read(scene.mesh.with_file_name("copyroom_0.jpg")).unwrap());
+    assert_eq!(texture.bytes, std::fs::read(scene.mesh[0].with_file_name("copyroom_0.jpg")).unwrap());
     assert_eq!(file.polygons_triangulated, 0);
 
     let Some(CameraSource::Listed { path, world_from_file }) = &scene.cameras else {
@@ -62,7 +62,7 @@ fn the_parts_of_the_scan_fit_together() {
 fn the_mesh_is_what_tobj_reads() {
     let Some(path) = scan() else { return };
     let scene = read_scene(&path).unwrap();
-    let mesh = read_mesh(&scene.mesh, UpAxis::Z).unwrap().mesh;
+    let mesh = read_mesh(&scene.mesh[0], UpAxis::Z).unwrap().mesh;
     let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
     let (models, _) = tobj::load_obj(&scene.mesh, &options).unwrap();
     let corner = |m: &tobj::Mesh, i: usize| {

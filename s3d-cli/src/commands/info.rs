@@ -22,7 +22,7 @@ pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
 fn report(args: &InfoArgs) -> Outcome<String> {
     let inputs = Inputs::open(std::slice::from_ref(&args.scene), args.place_cameras, args.lenient)?;
     let area = &inputs.areas[0];
-    let file = s3d_io::read_mesh(&area.scene.mesh, area.scene.up)?;
+    let file = area.read_mesh()?;
     let mut wrong: Vec<String> = area.warnings.iter().chain(&file.warnings).cloned().collect();
     let mesh = &file.mesh;
     let nearest = NearestFaces::new(mesh);
@@ -30,7 +30,7 @@ fn report(args: &InfoArgs) -> Outcome<String> {
     let scene = Scene::new(mesh);
 
     let mut text = String::new();
-    let _ = writeln!(text, "area {}\n", area.scene.area);
+    let _ = writeln!(text, "area {}\n", area.number);
     tell_mesh(&mut text, mesh);
     tell_annotations(&mut text, &annotated, &inputs);
     match Pictures::open(area, |_| true) {

@@ -8,7 +8,7 @@ use s3d_geom::{
     Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh, Voxels,
     dominant_wall_direction_deg,
 };
-use s3d_io::{Error, OnFault};
+use s3d_io::Error;
 use s3d_label::{Class, Label, LabelId, LabelTable, Room, VoteReport, Votes};
 use std::collections::{BTreeMap, HashSet};
 
@@ -82,7 +82,7 @@ pub(crate) fn annotate(
     let mut rooms = Vec::new();
     let mut total = 0u64;
     let mut skipped = SkippedLines::default();
-    let lenient = area.scene.annotation_options.on_fault == OnFault::Skip;
+    let lenient = area.lenient;
     let mut corners: Option<Corners> = None;
     let files = area.rooms.iter().map(|r| r.instances.len()).sum::<usize>();
     let progress = Progress::new("labelling", "instances", files as u64);
@@ -149,7 +149,7 @@ pub(crate) fn annotate(
         room.wall_direction_deg = upright.remove(&room.room).map_or(0, |faces| faces.direction_deg());
     }
     if rooms.is_empty() {
-        return Err(Failure::Input(format!("{}: no room in it", area.scene.annotations[0].display())));
+        return Err(Failure::Input(format!("{}: no room in it", area.path.display())));
     }
     let report = VoteReport::new(&votes, table);
     Ok(Annotated { face_labels, report, rooms, points: total, skipped })

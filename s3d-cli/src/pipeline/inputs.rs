@@ -2,33 +2,53 @@
 
 use super::manifest::half_step;
 use crate::failure::{Failure, Outcome};
+use glam::DAffine3;
 use s3d_geom::TriMesh;
 use s3d_io::{
-    AnnotatedInstance, Annotations, CameraSource, Error, MeshFile, OnFault, ScanLocation, SceneFile,
+    AnnotatedInstance, Annotations, CameraSource, Error, MeshFile, MeshOptions, OnFault, PictureSource,
+    PublishedArea, PublishedOptions, ScanLocation, SceneFile, UpAxis,
 };
-use s3d_label::{Label, LabelTable, NumberedInstance, Room, number_area};
+use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tracing::{info, warn};
 
 /// The largest number that a half float can hold.
 const LARGEST_HALF_M: f32 = 65_504.0;
 
-/// One area: its scene file, annotation files and scan locations.
+/// One area: its files, annotations and scan locations.
 pub(crate) struct AreaInput {
-    pub(crate) scene: SceneFile,
-    /// The rooms, in the order of their names, each with its annotation files.
+    /// Its number, from 1.
+    pub(crate) number: u32,
+    /// What the user named: a scene file, or the folder of a published area.
+    pub(crate) path: PathBuf,
+    source: MeshSource,
+    /// The scanner's pictures, if colours are taken from them.
+    pub(crate) pictures: Option<PictureSource>,
+    /// The rooms, in the order of their names, each with its annotated instances.
     pub(crate) rooms: Vec<RoomInput>,
     /// The scan locations.
     pub(crate) cameras: Cameras,
+    /// The list that they come from, for messages.
+    pub(crate) cameras_path: PathBuf,
     /// What was odd in the annotations, as a sentence each.
     pub(crate) warnings: Vec<String>,
+    /// Whether what is not as it should be in the annotations is skipped and counted.
+    pub(crate) lenient: bool,
+    /// All files and folders that are read.
+    pub(crate) files: Vec<PathBuf>,
+}
+
+/// Where an area's mesh comes from.
+enum MeshSource {
+    Files { paths: Vec<PathBuf>, up: UpAxis, options: MeshOptions },
+    Published(Box<PublishedArea>),
 }
 
 /// Where an area is looked at from.
 pub(crate) enum Cameras {
-    /// At these scan locations, in the order of their list.
-    Listed(Vec<ScanLocation>),
+    /// At these scan locations, in the order of their list, each with its room if the list tells.
+    Listed(Vec<ScanLocation>, Vec<Option<Room>>),
     /// At places that are chosen once its rooms are known, no two of a room nearer than this, metres.
     Placed(f64),
 }
@@ -37,7 +57,7 @@ impl Cameras {
     /// The locations that are known before the area is labelled.
     pub(crate) fn listed(&self) -> &[ScanLocation] {
         match self {
-            Self::Listed(locations) => locations,
+            Self::Listed(locations, _) => locations,
             Self::Placed(_) => &[],
         }
     }
@@ -66,27 +86,31 @@ impl Inputs {
     /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan locations,
     /// instead of which locations are placed if `place_m` says how far apart.
     pub(crate) fn open(scenes: &[PathBuf], place_m: Option<f64>, lenient: bool) -> Outcome<Self> {
-        let mut areas = Vec::new();
+        let mut areas: Vec<AreaInput> = Vec::new();
         let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
         for path in scenes {
-            let mut scene = s3d_io::read_scene(path)?;
-            let options = &mut scene.annotation_options;
-            options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
-            // Areas wait beside one another.
-            options.points_in_memory /= scenes.len() as u64;
-            if let Some(other) = area_of.insert(scene.area, path.clone()) {
+            let area = if path.is_dir() {
+                AreaInput::published(path, None, place_m)?
+            } else {
+                let mut scene = s3d_io::read_scene(path)?;
+                let options = &mut scene.annotation_options;
+                options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
+                // Areas wait beside one another.
+                options.points_in_memory /= scenes.len() as u64;
+                AreaInput::open(scene, place_m)?
+            };
+            if let Some(other) = area_of.insert(area.number, path.clone()) {
                 return Err(Failure::Input(format!(
                     "{} and {} are both area {}: give each scene an area of its own",
                     other.display(),
                     path.display(),
-                    scene.area
+                    area.number
                 )));
             }
-            let area = AreaInput::open(scene, place_m)?;
-            let list = area.cameras_path().unwrap_or(path);
+            let list = &area.cameras_path;
             for location in area.cameras.listed() {
-                if let Some(other) = location_of.insert(location.uuid.clone(), list.to_owned()) {
+                if let Some(other) = location_of.insert(location.uuid.clone(), list.clone()) {
                     let message = format!("uuid {} is also in {}", location.uuid, other.display());
                     return Err(match location.line {
                         0 => Error::format(list, message),
@@ -97,51 +121,113 @@ impl Inputs {
             }
             areas.push(area);
         }
-        areas.sort_by_key(|a| a.scene.area);
-        let labels = areas.iter().flat_map(|a| &a.rooms).flat_map(|r| &r.instances).map(|i| i.label);
-        let table = LabelTable::from_labels(labels).map_err(|e| Failure::Input(e.to_string()))?;
+        areas.sort_by_key(|a| a.number);
+        let table = label_table(&mut areas)?;
         Ok(Self { areas, table })
     }
 
     /// The numbers of the areas, ascending.
     pub(crate) fn numbers(&self) -> Vec<u32> {
-        self.areas.iter().map(|a| a.scene.area).collect()
+        self.areas.iter().map(|a| a.number).collect()
     }
 }
 
 impl AreaInput {
     fn open(scene: SceneFile, place_m: Option<f64>) -> Outcome<Self> {
-        let mut annotations = Annotations::open(&scene.annotations, &scene.annotation_options)?;
-        let warnings = std::mem::take(&mut annotations.warnings);
-        let rooms = number(&scene, annotations)?;
-        let cameras = match (place_m, &scene.cameras) {
-            (Some(distance_m), _) => Cameras::Placed(distance_m),
-            (None, Some(CameraSource::Placed { distance_m })) => Cameras::Placed(*distance_m),
-            (None, Some(CameraSource::Listed { path, world_from_file })) => {
-                Cameras::Listed(s3d_io::read_scan_locations(path, world_from_file)?)
-            }
-            (None, None) => {
-                return Err(Error::format(
-                    &scene.path,
-                    "has no scan locations: add [cameras] with a path, or place some with --place-cameras 2 (metres)",
-                )
-                .into());
-            }
+        if let Some(folder) = &scene.published {
+            let folder = folder.clone();
+            return Self::published(&folder, Some(scene), place_m);
+        }
+        let options = &scene.annotation_options;
+        let source = MeshSource::Files {
+            paths: scene.mesh.clone(),
+            up: scene.up,
+            options: MeshOptions {
+                class_column: options.class_column.clone(),
+                instance_column: options.instance_column.clone(),
+            },
         };
-        Ok(Self { scene, rooms, cameras, warnings })
+        let mut annotations = if scene.annotations.is_empty() {
+            Annotations::of_mesh(&source.read()?, options)?
+        } else {
+            Annotations::open(&scene.annotations, options)?
+        };
+        let warnings = std::mem::take(&mut annotations.warnings);
+        let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
+        let rooms =
+            number(scene.area, annotations).map_err(|e| Failure::Input(format!("{}: {e}", of.display())))?;
+        let Some((cameras, cameras_path)) = listed_cameras(&scene, place_m)? else {
+            return Err(Error::format(
+                &scene.path,
+                "has no scan locations: add [cameras] with a path, or place some with --place-cameras 2 (metres)",
+            )
+            .into());
+        };
+        Ok(Self {
+            number: scene.area,
+            source,
+            rooms,
+            cameras,
+            warnings,
+            lenient: scene.annotation_options.on_fault == OnFault::Skip,
+            files: files_of(&scene),
+            cameras_path,
+            pictures: scene.pictures,
+            path: scene.path,
+        })
     }
 
-    /// The list of scan locations, if the scene names one.
-    pub(crate) fn cameras_path(&self) -> Option<&PathBuf> {
-        match &self.scene.cameras {
-            Some(CameraSource::Listed { path, .. }) => Some(path),
-            _ => None,
+    /// Opens the folder of a published area; `scene` is what names it, if that is no command line.
+    fn published(folder: &Path, scene: Option<SceneFile>, place_m: Option<f64>) -> Outcome<Self> {
+        let options = PublishedOptions {
+            area: scene.as_ref().map(|s| s.area),
+            world_from_area: scene.as_ref().map_or(DAffine3::IDENTITY, |s| s.world_from_published),
+        };
+        let mut area = PublishedArea::open_with(folder, &options)?;
+        let mut mesh = area.read_mesh()?;
+        for label in &mut mesh.labels {
+            label.area = area.area;
         }
+        let mut warnings = std::mem::take(&mut area.warnings);
+        let mut annotations = area.annotations(&mesh)?;
+        warnings.append(&mut annotations.warnings);
+        let rooms = published_numbers(&mesh.labels, annotations);
+        let listed = match &scene {
+            Some(scene) => listed_cameras(scene, place_m)?,
+            None => place_m.map(|distance_m| (Cameras::Placed(distance_m), folder.to_owned())),
+        };
+        let (cameras, cameras_path) = listed.unwrap_or_else(|| {
+            let (locations, rooms) =
+                std::mem::take(&mut area.locations).into_iter().map(|l| (l.location, l.room)).unzip();
+            (Cameras::Listed(locations, rooms), folder.to_owned())
+        });
+        let mut files = vec![folder.to_owned()];
+        files.extend(scene.as_ref().map_or(Vec::new(), files_of));
+        Ok(Self {
+            number: area.area,
+            path: scene.as_ref().map_or(folder, |s| &s.path).to_owned(),
+            source: MeshSource::Published(Box::new(area)),
+            pictures: scene.and_then(|s| s.pictures),
+            rooms,
+            cameras,
+            cameras_path,
+            warnings,
+            lenient: false,
+            files,
+        })
     }
 
     /// Reads the mesh.
     pub(crate) fn read_mesh(&self) -> Outcome<MeshFile> {
-        Ok(s3d_io::read_mesh(&self.scene.mesh, self.scene.up)?)
+        self.source.read()
+    }
+
+    /// The data set's list of labels that the area's folder came with.
+    fn published_labels(&self) -> Option<&PathBuf> {
+        match &self.source {
+            MeshSource::Published(area) => area.labels.as_ref(),
+            MeshSource::Files { .. } => None,
+        }
     }
 
     /// Logs what the area's mesh is, and what was odd in mesh and annotations.
@@ -150,7 +236,7 @@ impl AreaInput {
         mesh_doubts(&file.mesh).iter().for_each(|w| warn!("{w}"));
         info!(
             "{}: {} faces, {} vertices, {} textures, {:.1} m²",
-            self.scene.mesh.display(),
+            self.source.describe(),
             file.mesh.faces().len(),
             file.mesh.positions().len(),
             file.mesh.textures().len(),
@@ -185,27 +271,111 @@ pub(crate) fn mesh_doubts(mesh: &TriMesh) -> Vec<String> {
     doubts
 }
 
+impl MeshSource {
+    fn read(&self) -> Outcome<MeshFile> {
+        Ok(match self {
+            Self::Files { paths, up, options } => s3d_io::read_meshes_with(paths, *up, options)?,
+            Self::Published(area) => area.read_mesh()?.file,
+        })
+    }
+
+    fn describe(&self) -> String {
+        match self {
+            Self::Published(area) => area.mesh.display().to_string(),
+            Self::Files { paths, .. } => {
+                let more = paths.len() - 1;
+                let first = paths[0].display();
+                if more == 0 { first.to_string() } else { format!("{first} and {more} more") }
+            }
+        }
+    }
+}
+
+/// The scan locations that a scene file names, or that are to be placed, and where they come from.
+fn listed_cameras(scene: &SceneFile, place_m: Option<f64>) -> Outcome<Option<(Cameras, PathBuf)>> {
+    Ok(match (place_m, &scene.cameras) {
+        (Some(distance_m), _) => Some((Cameras::Placed(distance_m), scene.path.clone())),
+        (None, Some(CameraSource::Placed { distance_m })) => {
+            Some((Cameras::Placed(*distance_m), scene.path.clone()))
+        }
+        (None, Some(CameraSource::Listed { path, world_from_file })) => {
+            let locations = s3d_io::read_scan_locations(path, world_from_file)?;
+            let rooms = vec![None; locations.len()];
+            Some((Cameras::Listed(locations, rooms), path.clone()))
+        }
+        (None, None) => None,
+    })
+}
+
+/// What a scene file names, and itself.
+fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
+    let mut files = vec![scene.path.clone()];
+    files.extend(scene.mesh.iter().chain(&scene.annotations).chain(&scene.published).cloned());
+    if let Some(CameraSource::Listed { path, .. }) = &scene.cameras {
+        files.push(path.clone());
+    }
+    files.extend(scene.pictures.iter().map(|p| p.path.clone()));
+    files
+}
+
+/// The table of all labels. That of a published data set is kept whole if it has them all, so that an index means the same
+/// in its images and in ours; else it is made of the labels at hand.
+fn label_table(areas: &mut [AreaInput]) -> Outcome<LabelTable> {
+    let labels: Vec<Label> =
+        areas.iter().flat_map(|a| &a.rooms).flat_map(|r| &r.instances).map(|i| i.label).collect();
+    for area in areas.iter_mut() {
+        let Some(path) = area.published_labels().cloned() else { continue };
+        let names = s3d_io::read_labels(&path)?;
+        match LabelTable::from_names(&names) {
+            Ok(table) if labels.iter().all(|l| table.id_of(l).is_some()) => return Ok(table),
+            Ok(_) => area.warnings.push(format!(
+                "{}: has not every label of the meshes; the table is made anew, so that indices differ from it",
+                path.display()
+            )),
+            Err(e) => area.warnings.push(format!("{}: {e}; the table is made anew", path.display())),
+        }
+    }
+    LabelTable::from_labels(labels).map_err(|e| Failure::Input(e.to_string()))
+}
+
 /// Gives every instance, whose numbers run per room, its number in the area.
-fn number(scene: &SceneFile, annotations: Annotations) -> Outcome<Vec<RoomInput>> {
-    let mut found: BTreeMap<(Room, usize, u32), AnnotatedInstance> = BTreeMap::new();
-    let mut keys = Vec::new();
-    for room in annotations.rooms {
-        for instance in room.instances {
-            keys.push((room.room, instance.class, instance.number));
-            found.insert((room.room, instance.class.index(), instance.number), instance);
-        }
+fn number(area: u32, annotations: Annotations) -> Result<Vec<RoomInput>, NumberingError> {
+    let keys = annotations.rooms.iter().flat_map(|r| r.instances.iter().map(|i| (r.room, i.class, i.number)));
+    let numbered = number_area(area, keys)?;
+    let labels = numbered.into_iter().map(|n| ((n.room, n.class, n.number_in_room), n.label)).collect();
+    Ok(named(annotations, &labels))
+}
+
+/// Gives every instance the label that it was published with: those of a class and room were numbered there in the order
+/// of their labels.
+fn published_numbers(labels: &[Label], annotations: Annotations) -> Vec<RoomInput> {
+    let mut sorted: Vec<Label> = labels.to_vec();
+    sorted.sort_by_key(|l| (l.room, l.class, l.instance));
+    sorted.dedup();
+    let mut names: BTreeMap<(Room, Class, u32), Label> = BTreeMap::new();
+    for same in sorted.chunk_by(|a, b| (a.room, a.class) == (b.room, b.class)) {
+        names.extend((1..).zip(same).map(|(number, label)| ((label.room, label.class, number), *label)));
     }
-    let numbered = number_area(scene.area, keys)
-        .map_err(|e| Failure::Input(format!("{}: {e}", scene.annotations[0].display())))?;
-    let mut rooms: Vec<RoomInput> = Vec::new();
-    for NumberedInstance { room, class, number_in_room, label } in numbered {
-        let Some(points) = found.remove(&(room, class.index(), number_in_room)) else { continue };
-        let instance = InstanceInput { label, number_in_room, points };
-        match rooms.iter_mut().find(|r| r.room == room) {
-            Some(r) => r.instances.push(instance),
-            None => rooms.push(RoomInput { room, instances: vec![instance] }),
-        }
-    }
+    named(annotations, &names)
+}
+
+fn named(annotations: Annotations, labels: &BTreeMap<(Room, Class, u32), Label>) -> Vec<RoomInput> {
+    let mut rooms: Vec<RoomInput> = annotations
+        .rooms
+        .into_iter()
+        .map(|r| RoomInput {
+            room: r.room,
+            instances: r
+                .instances
+                .into_iter()
+                .filter_map(|i| {
+                    let label = *labels.get(&(r.room, i.class, i.number))?;
+                    Some(InstanceInput { label, number_in_room: i.number, points: i })
+                })
+                .collect(),
+        })
+        .collect();
+    rooms.iter_mut().for_each(|r| r.instances.sort_by_key(|i| (i.label.class, i.number_in_room)));
     rooms.sort_by_key(|r| r.room);
-    Ok(rooms)
+    rooms
 }

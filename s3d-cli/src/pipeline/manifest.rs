@@ -55,6 +55,8 @@ struct Options {
     points_per_m2: f64,
     /// How far apart scan locations were placed, metres; null where the scenes have their own.
     place_cameras: Option<f64>,
+    /// Whether faults of the annotations were skipped.
+    lenient: bool,
     entropy_stride: u32,
     modalities: Vec<String>,
     keep_all: bool,
@@ -83,7 +85,7 @@ pub(crate) struct AreaEntry {
     pub(crate) views: u64,
     pub(crate) xyz: XyzLoss,
     /// What its RGB images are made from.
-    pub(crate) rgb: &'static str,
+    pub(crate) rgb: String,
 }
 
 /// What storing world coordinates loses.
@@ -147,6 +149,7 @@ impl Manifest {
                 pool: options.pool.to_string(),
                 points_per_m2: options.points_per_m2,
                 place_cameras: options.place_cameras,
+                lenient: options.lenient,
                 entropy_stride: options.entropy_stride,
                 modalities: options.modalities.iter().map(Domain::to_string).collect(),
                 keep_all: options.keep_all,

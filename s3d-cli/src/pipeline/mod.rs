@@ -141,7 +141,7 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     let mut entries = Vec::new();
     let mut images = ImageCount::default();
     for ((area, labelled), pictures) in inputs.areas.iter().zip(labelled).zip(&pictures) {
-        records::write_views(layout, area.scene.area, &candidates)?;
+        records::write_views(layout, area.number, &candidates)?;
         let render = |stage: &Stage<'_>| {
             let pictures = pictures.as_ref();
             render_area(area, stage, labelled, pictures, &inputs.table, layout, options, &candidates)
@@ -229,12 +229,16 @@ pub(crate) fn locate(
     seed: u64,
 ) -> Outcome<Located> {
     match &area.cameras {
-        Cameras::Listed(locations) => {
-            Ok(locations.iter().map(|l| (l.clone(), room_of(&annotated.rooms, l.pose.location))).collect())
+        Cameras::Listed(locations, rooms) => {
+            let is_known = |room: &Room| annotated.rooms.iter().any(|r| r.room == *room);
+            let room = |l: &ScanLocation, told: Option<Room>| {
+                told.filter(is_known).unwrap_or_else(|| room_of(&annotated.rooms, l.pose.location))
+            };
+            Ok(locations.iter().zip(rooms).map(|(l, told)| (l.clone(), room(l, *told))).collect())
         }
         Cameras::Placed(distance_m) => {
             let ground = Ground {
-                area: area.scene.area,
+                area: area.number,
                 scene,
                 nearest,
                 face_labels: &annotated.face_labels,
@@ -243,7 +247,7 @@ pub(crate) fn locate(
             };
             let (placed, warnings) = place_locations(&ground, Placement { distance_m: *distance_m, seed })?;
             warnings.iter().for_each(|w| warn!("{w}"));
-            info!("area {}: {} scan locations placed", area.scene.area, placed.len());
+            info!("area {}: {} scan locations placed", area.number, placed.len());
             Ok(placed)
         }
     }
@@ -259,7 +263,7 @@ fn label_area(
     options: &ExportOptions,
     candidates: &mut Vec<Candidate>,
 ) -> Outcome<LabelledArea> {
-    let number = area.scene.area;
+    let number = area.number;
     let Stage { file, scene } = stage;
     let mesh = &file.mesh;
     create_dir(&layout.mesh_dir(number))?;
@@ -322,7 +326,7 @@ fn label_area(
         panoramas: 0,
         views: 0,
         xyz: XyzLoss::of(mesh.aabb(), options.format.xyz),
-        rgb: area.scene.pictures.as_ref().map_or("texture", |p| p.kind.name()),
+        rgb: area.pictures.as_ref().map_or("texture", |p| p.kind.name()).to_owned(),
     };
     Ok(LabelledArea { annotated, locations, location_rooms, entry })
 }
@@ -336,7 +340,7 @@ fn write_area(
     layout: &Layout,
     options: &ExportOptions,
 ) -> Outcome<u64> {
-    let mesh_dir = layout.mesh_dir(area.scene.area);
+    let mesh_dir = layout.mesh_dir(area.number);
     let per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
     write_colored_mesh(&mesh_dir, file, options.compression)?;
     s3d_io::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
@@ -406,7 +410,7 @@ fn render_area(
         locations.iter().map(|l| options.only.is_empty() || options.only.contains(&l.uuid)).collect();
     let job = ImageJob {
         layout,
-        area: area.scene.area,
+        area: area.number,
         look: Look {
             scene,
             textures: &textures,
@@ -433,7 +437,7 @@ fn render_area(
     })?;
     debug!(
         "area {}: {} panoramas and {} views rendered ({:.1} s)",
-        area.scene.area,
+        area.number,
         count.panoramas,
         count.views,
         started.elapsed().as_secs_f64()

@@ -52,10 +52,7 @@ pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Outcome<()> {
     let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
     let entries = Layout::new(&root).entries(&inputs.numbers());
     for area in &inputs.areas {
-        let scene = &area.scene;
-        let others = [Some(&scene.path), Some(&scene.mesh), area.cameras_path()];
-        let pictures = scene.pictures.iter().map(|p| &p.path);
-        for path in others.into_iter().flatten().chain(&scene.annotations).chain(pictures) {
+        for path in &area.files {
             let Ok(input) = fs::canonicalize(path) else { continue };
             if entries.iter().any(|entry| input.starts_with(entry))
                 || input.is_dir() && root.starts_with(&input)

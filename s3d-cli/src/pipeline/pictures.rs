@@ -43,7 +43,7 @@ impl Pictures {
     /// # Errors
     /// For what is missing, all of it; for the first picture that is not what it should be.
     pub(crate) fn open(area: &AreaInput, is_asked: impl Fn(&ScanLocation) -> bool) -> Outcome<Option<Self>> {
-        let Some(source) = &area.scene.pictures else { return Ok(None) };
+        let Some(source) = &area.pictures else { return Ok(None) };
         let folder = PictureFolder::open(&source.path)?;
         let (mut found, mut missing, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
         for location in area.cameras.listed() {
@@ -80,7 +80,7 @@ impl Pictures {
             let message = format!(
                 "pictures of {count} of {of} locations are missing (rgb = \"{}\" in {}): {names}",
                 source.kind,
-                area.scene.path.display()
+                area.path.display()
             );
             return Err(Error::format(&source.path, message).into());
         }

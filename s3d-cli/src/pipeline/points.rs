@@ -60,7 +60,7 @@ pub(crate) fn write_points(
     faces.sort_by_cached_key(key);
     let rooms: Vec<(Option<Room>, Vec<Run>)> = runs(&faces, &annotated.face_labels, &place);
 
-    let number = area.scene.area;
+    let number = area.number;
     let sampler = SurfaceSampler::over_faces(mesh, faces, density, seed);
     let mut sink = Sink {
         ply: PlyPointWriter::create(&layout.point_cloud(number), sampler.len())?,

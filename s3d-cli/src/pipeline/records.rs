@@ -142,7 +142,7 @@ pub(crate) fn write_instance_numbers(layout: &Layout, area: &AreaInput) -> Outco
             label: i.label.to_string(),
         })
         .collect();
-    write_json(&layout.instance_numbers_json(area.scene.area), &mappings)?;
+    write_json(&layout.instance_numbers_json(area.number), &mappings)?;
     Ok(())
 }
 
