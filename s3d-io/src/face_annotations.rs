@@ -9,6 +9,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// A face and its corners.
+type Face = (u32, [Vec3; 3]);
+
 /// Points stand no farther apart than this on a face, metres, as far as [`MOST_ROWS`] allows.
 const SPACING_M: f32 = 0.05;
 /// Parts that an edge is cut into.
@@ -34,7 +37,7 @@ impl Annotations {
     ) -> Result<Self> {
         let count = mesh.faces().len();
         assert_eq!(face_labels.len(), count, "{count} faces need as many labels");
-        let mut faces: BTreeMap<(Room, Class, u32), Vec<(u32, [Vec3; 3])>> = BTreeMap::new();
+        let mut faces: BTreeMap<(Room, Class, u32), Vec<Face>> = BTreeMap::new();
         for (face, place) in (0u32..).zip(face_labels).filter(|(_, place)| **place != NO_INDEX) {
             let label = labels[*place as usize];
             let key = (label.room, label.class, label.instance);
@@ -58,12 +61,12 @@ impl Annotations {
     }
 }
 
-/// The faces of an instance with their corners.
+/// The faces of an instance.
 #[derive(Debug)]
 struct FacePoints {
     path: PathBuf,
     part: String,
-    faces: Vec<(u32, [Vec3; 3])>,
+    faces: Vec<Face>,
 }
 
 impl InstancePoints for FacePoints {

@@ -11,6 +11,7 @@ use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
 use s3d_label::{Class, Room};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -70,11 +71,11 @@ impl Annotations {
             }
             match named(&object.name, options) {
                 Ok(Named::Instance(class, number)) => {
-                    if objects.contains_key(&(class, number)) {
+                    let Entry::Vacant(place) = objects.entry((class, number)) else {
                         self.fault(path, options, format!("{}: is there twice", object.part()))?;
-                    } else {
-                        objects.insert((class, number), object);
-                    }
+                        continue;
+                    };
+                    place.insert(object);
                 }
                 Ok(Named::Other(class)) => others.push((class, object)),
                 Ok(Named::Unlabelled) => {}

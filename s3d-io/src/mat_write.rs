@@ -314,3 +314,15 @@ fn letters(mut i: usize) -> String {
         i = i / 26 - 1;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_many_are_all_different() {
+        assert_eq!([0, 25, 26, 27, 701, 702].map(letters), ["a", "z", "aa", "ba", "zz", "aaa"]);
+        let all: std::collections::BTreeSet<String> = (0..20_000).map(letters).collect();
+        assert_eq!(all.len(), 20_000);
+    }
+}
