@@ -1,0 +1,153 @@
+//! Scans in other forms than one OBJ and an S3DIS tree: published areas, labels that came with the mesh, several files.
+
+mod common;
+
+use common::{files, s3d_fails, s3d_ok, text, write_scan};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const SMALL: [&str; 6] = ["--size", "48", "--pano-width", "96", "--points-per-m2", "200"];
+
+const SIX: [&str; 2] = ["--views", "6"];
+
+fn export(input: &Path, out: &Path, extra: &[&str]) {
+    let mut args = vec!["export", text(input), "-o", text(out)];
+    args.extend(SMALL);
+    args.extend(extra);
+    s3d_ok(&args);
+}
+
+fn images(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = files(&out.join("area_3/data"));
+    all.extend(files(&out.join("area_3/pano")));
+    all
+}
+
+#[test]
+fn an_export_is_exported_again_as_published_areas_are() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = write_scan(&dir.path().join("scan"), 3);
+    let (first, second, more) =
+        (dir.path().join("first"), dir.path().join("second"), dir.path().join("more"));
+    export(&scene, &first, &SIX);
+    export(&first.join("area_3"), &second, &SIX);
+    let (a, b) = (images(&first), images(&second));
+    assert!(a.len() > 40 && a.keys().eq(b.keys()));
+    for (path, bytes) in &a {
+        // Poses go through Euler angles once more.
+        if path.extension().is_some_and(|e| e == "json") {
+            let pose = |bytes: &[u8]| serde_json::from_slice::<s3d_io::PoseFile>(bytes).unwrap().pose();
+            let (a, b) = (pose(bytes), pose(&b[path]));
+            assert!(a.location.abs_diff_eq(b.location, 1e-9), "{}", path.display());
+            assert!(a.world_from_camera.abs_diff_eq(b.world_from_camera, 1e-9), "{}", path.display());
+        } else {
+            assert!(bytes == &b[path], "{} differs", path.display());
+        }
+    }
+    for name in ["assets/semantic_labels.json", "area_3/3d/semantic.obj", "area_3/3d/rgb.obj"] {
+        assert!(fs::read(first.join(name)).unwrap() == fs::read(second.join(name)).unwrap(), "{name}");
+    }
+    // More views of the same area.
+    export(&first.join("area_3"), &more, &["--views", "12", "--keep-all", "--seed", "5"]);
+    assert!(images(&more).len() > images(&first).len());
+    // Moved, under another number, at places of its own.
+    let toml = dir.path().join("moved.toml");
+    let table = format!(
+        "area = 5\n[published]\npath = {:?}\ntransform = [[0,-1,0,7],[1,0,0,0],[0,0,1,0],[0,0,0,1]]\n",
+        text(&first.join("area_3"))
+    );
+    fs::write(&toml, &table).unwrap();
+    let moved = dir.path().join("moved");
+    export(&toml, &moved, &["--views", "0"]);
+    let labels = fs::read_to_string(moved.join("assets/semantic_labels.json")).unwrap();
+    assert!(labels.contains("table_1_office_1_5") && !labels.contains("office_1_3"));
+    let pose = |out: &Path, area: u32| {
+        let folder = out.join(format!("area_{area}/pano/pose"));
+        let (name, _) = files(&folder).into_iter().next().unwrap();
+        s3d_io::read_pose(&folder.join(name)).unwrap().pose().location
+    };
+    let (a, b) = (pose(&first, 3), pose(&moved, 5));
+    assert!((b.x - (7.0 - a.y)).abs() < 1e-9 && (b.y - a.x).abs() < 1e-9, "{a} {b}");
+    // A turn by 90° about +Z changes no distance, so no panorama's depth.
+    let depth =
+        |out: &Path, area: u32| files(&out.join(format!("area_{area}/pano/depth"))).into_values().next();
+    let (a, b) = (depth(&first, 3).unwrap(), depth(&moved, 5).unwrap());
+    assert_eq!(a.len() / 64, b.len() / 64);
+    fs::remove_file(first.join("area_3/3d/semantic.obj")).unwrap();
+    s3d_fails(
+        &["export", text(&first.join("area_3")), "-o", text(&dir.path().join("x"))],
+        1,
+        &["area_3", "semantic.obj"],
+    );
+}
+
+/// The scan's mesh as PLY, with a class and an object of each face, in as many files as there are `parts`.
+fn write_ply(scan: &Path, parts: usize) -> Vec<PathBuf> {
+    let obj = fs::read_to_string(scan.join("room.obj")).unwrap();
+    let vertices: Vec<&str> = obj.lines().filter_map(|l| l.strip_prefix("v ")).collect();
+    let mut material = "";
+    let mut quads: Vec<(usize, &str)> = Vec::new();
+    for line in obj.lines() {
+        if let Some(name) = line.strip_prefix("usemtl ") {
+            material = name;
+        }
+        if line.starts_with("f ") {
+            quads.push((4 * quads.len(), material));
+        }
+    }
+    let class = |name: &str| ["floor", "ceiling", "wall", "table"].iter().position(|n| *n == name).unwrap();
+    quads
+        .chunks(quads.len().div_ceil(parts))
+        .enumerate()
+        .map(|(part, quads)| {
+            let mut ply = format!(
+                "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+                 element face {}\nproperty list uchar int vertex_indices\nproperty int label\nproperty int instance\nend_header\n",
+                4 * quads.len(),
+                quads.len()
+            );
+            for (first, _) in quads {
+                ply += &vertices[*first..first + 4].join("\n");
+                ply += "\n";
+            }
+            for (i, (first, name)) in quads.iter().enumerate() {
+                let c = 4 * i;
+                ply += &format!("4 {c} {} {} {} {} {}\n", c + 1, c + 2, c + 3, class(name), first / 4);
+            }
+            let path = scan.join(format!("part_{part}.ply"));
+            fs::write(&path, ply).unwrap();
+            path
+        })
+        .collect()
+}
+
+#[test]
+fn labels_of_the_mesh_give_what_the_tree_gives() {
+    let dir = tempfile::tempdir().unwrap();
+    let scan = dir.path().join("scan");
+    let tree = write_scan(&scan, 3);
+    let expected = dir.path().join("expected");
+    export(&tree, &expected, &SIX);
+    for parts in [1, 3] {
+        let names: Vec<String> = write_ply(&scan, parts).iter().map(|p| format!("{:?}", text(p))).collect();
+        let toml = scan.join(format!("ply_{parts}.toml"));
+        let table = format!(
+            "area = 3\n[mesh]\npaths = [{}]\n[annotations]\nmesh = true\nroom = \"office_1\"\n[annotations.classes]\n\
+             0 = \"floor\"\n1 = \"ceiling\"\n2 = \"wall\"\n3 = \"table\"\n[cameras]\npath = \"cameras.csv\"\n",
+            names.join(", ")
+        );
+        fs::write(&toml, &table).unwrap();
+        let out = dir.path().join(format!("out_{parts}"));
+        export(&toml, &out, &SIX);
+        let labels = |out: &Path| fs::read(out.join("assets/semantic_labels.json")).unwrap();
+        assert!(labels(&expected) == labels(&out));
+        for domain in ["semantic", "depth", "normal", "global_xyz"] {
+            let of = |out: &Path| files(&out.join("area_3/data").join(domain));
+            assert!(of(&expected) == of(&out), "{domain}");
+        }
+        // A class without a meaning is named.
+        fs::write(&toml, table.replace("3 = \"table\"\n", "")).unwrap();
+        s3d_fails(&["export", text(&toml), "-o", text(&dir.path().join("x"))], 1, &["part_", "3"]);
+    }
+}
