@@ -38,6 +38,7 @@ mod channels;
 mod clusters;
 mod color;
 mod cone;
+mod face_table;
 mod filter;
 mod lanes;
 mod lens;
