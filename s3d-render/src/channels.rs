@@ -267,7 +267,7 @@ pub fn face_images_into(
         fit(image, &hits.face, [0; 3]);
         image.pixels_mut()
     });
-    lanes::run(ByFace { faces: hits.face.pixels(), missing, values, out });
+    lanes::run(ByFace { mesh: Some(scene.mesh()), faces: hits.face.pixels(), missing, values, out });
 }
 
 /// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.
@@ -285,11 +285,13 @@ fn by_face(
 ) {
     fit(out, &hits.face, [0; 3]);
     let (values, out) = (|faces: &[u32; LANES]| values(faces).map(|value| [value]), [out.pixels_mut()]);
-    lanes::run(ByFace { faces: hits.face.pixels(), missing: [missing], values, out });
+    lanes::run(ByFace { mesh: None, faces: hits.face.pixels(), missing: [missing], values, out });
 }
 
 /// `N` images at once.
 struct ByFace<'a, V, const N: usize> {
+    /// What `values` looks at.
+    mesh: Option<&'a TriMesh>,
     faces: &'a [u32],
     missing: [[u8; 3]; N],
     values: V,
@@ -303,7 +305,7 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> LaneWork for
     fn run(self, lanes: impl Lanes) {
         /// Pixels whose runs are looked for at a time.
         const BLOCK: usize = 4096;
-        let Self { faces, missing, values, mut out } = self;
+        let Self { mesh, faces, missing, values, mut out } = self;
         let mut table = FaceTable::new(BLOCK);
         let (mut starts, mut numbers, mut new) = (Vec::new(), Vec::new(), Vec::new());
         let mut stamps = vec![missing.map(stamp)];
@@ -311,6 +313,9 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> LaneWork for
             run_starts(lanes, faces, &mut starts);
             if table.number(faces, &starts, &mut numbers, &mut new) {
                 stamps.truncate(1);
+            }
+            if let Some(mesh) = mesh {
+                New::expect::<false>(&new, lanes, mesh);
             }
             for (group, count) in New::groups(&new) {
                 let values = values(&group.map(|new| new.face));

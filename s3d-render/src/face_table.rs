@@ -4,7 +4,8 @@
 //! prepared many at a time, which takes a fraction of what it takes one by one.
 
 use crate::NO_FACE;
-use crate::lanes::LANES;
+use crate::lanes::{LANES, Lanes};
+use s3d_geom::TriMesh;
 
 /// Numbers faces 1, 2, 3… as they come, [`NO_FACE`] is 0, and forgets all but that now and then: its memory is bounded.
 /// The pixels of a face lie together, in one row after another.
@@ -70,6 +71,33 @@ impl FaceTable {
 }
 
 impl New {
+    /// Fetches what of a mesh is read to prepare these faces: all at once, it comes many times as fast.
+    #[inline(always)]
+    pub(crate) fn expect<const COLORS: bool>(new: &[Self], lanes: impl Lanes, mesh: &TriMesh) {
+        let p = mesh.parts();
+        for &Self { face, .. } in new {
+            let face = face as usize;
+            lanes.expect(&p.faces[face]);
+            if COLORS && let (Some(uvs), Some(material)) = (p.face_uvs.get(face), p.face_materials.get(face))
+            {
+                lanes.expect(uvs);
+                lanes.expect(material);
+            }
+        }
+        for &Self { face, .. } in new {
+            for vertex in p.faces[face as usize] {
+                lanes.expect(&p.positions[vertex as usize]);
+            }
+            if COLORS && let Some(corners) = p.face_uvs.get(face as usize) {
+                for &corner in corners {
+                    if let Some(uv) = p.uvs.get(corner as usize) {
+                        lanes.expect(uv);
+                    }
+                }
+            }
+        }
+    }
+
     /// The list in groups, the last filled up with its last face, and how many of a group count.
     pub(crate) fn groups(new: &[Self]) -> impl Iterator<Item = ([Self; LANES], usize)> {
         new.chunks(LANES).map(|group| (std::array::from_fn(|k| group[k.min(group.len() - 1)]), group.len()))
