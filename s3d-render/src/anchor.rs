@@ -54,6 +54,32 @@ impl Attributes {
     }
 }
 
+impl Attributes {
+    /// What [`Batch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face is along a ray, an
+    /// attribute changes by (m − (a − a₀) ω / ω·e) · step / w where m = (α − a₀ω) / ω·e; and z is greatest at a corner.
+    #[inline(always)]
+    fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
+        let scale = self.whole.dot(e).recip();
+        let here = self.whole.dot(world[0] - origin) * scale;
+        let mut far = 0.0;
+        for corner in world {
+            far = most(far, (corner - origin).length_squared());
+        }
+        // A ray's direction is at least 1 long: corners are no farther along rays than they are away.
+        let mut sum = 0.0;
+        for k in 0..2 {
+            let (low, high) = self.bounds[k];
+            let value = least(most(self.above[k].dot(e) * scale, low), high);
+            for step in steps {
+                let (a, w) = (self.above[k].dot(step) * scale, self.whole.dot(step) * scale);
+                let most = (a - w * value).abs() + (high - low) * w.abs();
+                sum += most * most;
+            }
+        }
+        sum * far / (here * here) * 1.001
+    }
+}
+
 #[inline(always)]
 fn least(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
@@ -310,9 +336,12 @@ impl Batch {
         self.at[k] = (i, j);
     }
 
-    /// What [`Anchor::set`] makes of each lane.
+    /// What [`Anchor::set`] makes of each lane; and of each a bound on how fast the first two attributes change: the sum
+    /// of the squares of what a column and a row add to them is nowhere on the face above it, and more than rounding
+    /// below. Infinite in a panorama.
     #[inline(always)]
-    pub(crate) fn anchors<const TURN: bool>(&self, origin: DVec3) -> [Anchor; LANES] {
+    pub(crate) fn anchors<const TURN: bool>(&self, origin: DVec3) -> ([Anchor; LANES], [f32; LANES]) {
+        let mut fastest = [f32::INFINITY; LANES];
         let mut along = [[0.0f32; LANES]; 4];
         let (mut down, mut up) = (along, along);
         let mut base = [[0.0f32; LANES]; 3];
@@ -336,6 +365,9 @@ impl Batch {
             for n in 0..3 {
                 (base[n][k], least[n][k], most[n][k]) = (slopes.base[n], slopes.least[n], slopes.most[n]);
             }
+            if !TURN {
+                fastest[k] = attributes.fastest(world, origin, e, [x, y]) as f32;
+            }
         }
         let mut anchors = [Anchor::default(); LANES];
         for (k, anchor) in anchors.iter_mut().enumerate() {
@@ -352,7 +384,7 @@ impl Batch {
             let (i, j) = self.at[k];
             anchor.put(slopes, i, j);
         }
-        anchors
+        (anchors, fastest)
     }
 }
 
@@ -490,6 +522,33 @@ mod tests {
 
     proptest! {
         #[test]
+        fn no_point_of_a_face_changes_faster_than_its_bound(
+            corners in prop::array::uniform3((-3.0..3.0f64, -3.0..3.0f64, 0.05..9.0f64)),
+            values in prop::array::uniform3(prop::array::uniform3(-900.0..900.0f64)),
+            (p, q) in (0.0..1.0f64, 0.0..1.0f64), (r, t) in (0.0..1.0f64, 0.0..1.0f64),
+        ) {
+            // Rays (x, y, 1) from a place; the anchor and a pixel anywhere on the face.
+            let origin = DVec3::new(0.5, -0.25, 2.0);
+            let world = corners.map(|(x, y, z)| DVec3::new(x * z, y * z, z) + origin);
+            let attributes = Attributes::new(&Patch::of(world, origin), values);
+            let ray = |p: f64, q: f64| {
+                let at = world[0] * (1.0 - p) + world[1] * (p * (1.0 - q)) + world[2] * (p * q) - origin;
+                at / at.z
+            };
+            let steps = [DVec3::new(0.01, 0.0, 0.0), DVec3::new(0.0, 0.01, 0.0)];
+            let fastest = attributes.fastest(world, origin, ray(p, q), steps);
+            let (d, mut sum) = (ray(r, t), 0.0);
+            let scale = attributes.whole.dot(d).recip();
+            for above in &attributes.above[..2] {
+                for step in steps {
+                    let change = above.dot(step) - above.dot(d) * scale * attributes.whole.dot(step);
+                    sum += (change * scale) * (change * scale);
+                }
+            }
+            prop_assert!(sum <= fastest * (1.0 + 1e-6) || !fastest.is_finite(), "{sum} {fastest}");
+        }
+
+        #[test]
         fn faces_together_are_anchored_as_they_are_alone(
             corners in prop::array::uniform8(prop::array::uniform3(prop::array::uniform3(-5.0..5.0f32))),
             values in prop::array::uniform3(prop::array::uniform3(-9.0..9.0f64)),
@@ -502,7 +561,7 @@ mod tests {
             for (k, corners) in corners.iter().enumerate() {
                 batch.put(k, corners.map(glam::Vec3::from), values, folds, &grid, (7 * k, 3 * k));
             }
-            let together = if turn { batch.anchors::<true>(pose.location) } else { batch.anchors::<false>(pose.location) };
+            let (together, _) = if turn { batch.anchors::<true>(pose.location) } else { batch.anchors::<false>(pose.location) };
             for (k, corners) in corners.iter().enumerate() {
                 let world = corners.map(|p| glam::Vec3::from(p).as_dvec3());
                 let attributes = Attributes::new(&Patch::of(world, pose.location), values);

@@ -100,6 +100,7 @@ impl LaneWork for Rgb<'_> {
 /// Where a face has its colour from.
 #[derive(Clone, Copy)]
 enum Look {
+    /// A tag.
     Texture(u32),
     Corners,
     Flat([u8; 3]),
@@ -149,13 +150,15 @@ impl Prepared {
 /// them.
 struct Row {
     footprints: Footprints,
-    /// By pixel: a texture, or [`DONE`].
+    /// By pixel: a texture, perhaps with [`NARROW`]; or [`DONE`].
     tags: Vec<u32>,
     colors: Vec<[u8; 3]>,
 }
 
 /// The colour stands already.
 const DONE: u32 = u32::MAX;
+/// Footprints are nowhere wider than a pixel of the texture.
+const NARROW: u32 = 1 << 31;
 
 impl Row {
     fn new(width: usize) -> Self {
@@ -227,9 +230,14 @@ impl<L: Lanes> Painter<'_, L> {
             looks[k] = look;
             batch.put(k, self.scene.mesh().triangle(face), values, folds, grid, (at as usize, j));
         }
-        let anchors = batch.anchors::<TURN>(self.origin);
-        for (look, anchor) in looks.into_iter().zip(anchors).take(count) {
-            self.prepared.push(Prepared { look, anchor });
+        let (anchors, fastest) = batch.anchors::<TURN>(self.origin);
+        for k in 0..count {
+            let look = match looks[k] {
+                // A footprint is wide where the sum is above 1.
+                Look::Texture(texture) if fastest[k] < 0.999 => Look::Texture(texture | NARROW),
+                look => look,
+            };
+            self.prepared.push(Prepared { look, anchor: anchors[k] });
         }
     }
 
@@ -246,7 +254,7 @@ impl<L: Lanes> Painter<'_, L> {
         let Self { scene, sizes, origin, large, prepared, .. } = self;
         let Prepared { look, anchor } = &mut prepared[number as usize];
         let folds = match look {
-            Look::Texture(index) => sizes[*index as usize].folds(),
+            Look::Texture(tag) => sizes[(*tag & !NARROW) as usize].folds(),
             Look::Corners => [Fold::NOT; 3],
             Look::Flat(_) | Look::Singly => return false,
         };
@@ -290,12 +298,12 @@ impl<L: Lanes> Painter<'_, L> {
             while i < until {
                 let some = LANES.min(until - i);
                 let mut doubtful;
-                if let Look::Texture(texture) = look {
+                if let Look::Texture(tag) = look {
                     let seen = line.at::<TURN, 2, L>(lanes, i);
                     doubtful = seen.doubtful;
-                    row.footprints.store(lanes, i, &seen);
+                    row.footprints.store(lanes, i, &seen, tag & NARROW != 0);
                     if let Some(tags) = row.tags[i..].first_chunk_mut() {
-                        *tags = [texture; LANES];
+                        *tags = [tag; LANES];
                     }
                 } else {
                     let seen = line.at::<TURN, 3, L>(lanes, i);
@@ -332,9 +340,12 @@ impl<L: Lanes> Painter<'_, L> {
             // Mostly one texture, once; the others' pixels are left alone.
             let mut left = !lanes.equal(tags, DONE) & 0xFF;
             while left != 0 {
-                let texture = tags[left.trailing_zeros() as usize % LANES];
-                let these = lanes.equal(tags, texture);
-                let colors = sizes[texture as usize].colors(*lanes, &row.footprints, i, these, *max_taps);
+                let texture = tags[left.trailing_zeros() as usize % LANES] & !NARROW;
+                let narrow = lanes.equal(tags, texture | NARROW);
+                let maybe = if narrow == 0xFF { 0 } else { lanes.equal(tags, texture) };
+                let these = narrow | maybe;
+                let pixels = (these, maybe);
+                let colors = sizes[texture as usize].colors(*lanes, &row.footprints, i, pixels, *max_taps);
                 let to = row.colors[i..].as_flattened_mut().first_chunk_mut();
                 if let (0xFF, Some(to)) = (these, to) {
                     lanes.store_pixels(&colors, to);

@@ -23,13 +23,17 @@ impl Footprints {
         Self { at: two(), x: two(), y: two() }
     }
 
-    /// The eight pixels from column `i` on.
+    /// The eight pixels from column `i` on; their sides only if they are not all `narrow`.
     #[inline(always)]
-    pub(crate) fn store<L: Lanes>(&mut self, l: L, i: usize, seen: &Seen<L::F, 2>) {
+    pub(crate) fn store<L: Lanes>(&mut self, l: L, i: usize, seen: &Seen<L::F, 2>, narrow: bool) {
         for n in 0..2 {
             put(l, &mut self.at[n], i, seen.values[n]);
-            put(l, &mut self.x[n], i, seen.x[n]);
-            put(l, &mut self.y[n], i, seen.y[n]);
+        }
+        if !narrow {
+            for n in 0..2 {
+                put(l, &mut self.x[n], i, seen.x[n]);
+                put(l, &mut self.y[n], i, seen.y[n]);
+            }
         }
     }
 }
@@ -103,23 +107,27 @@ impl<'a> Sizes<'a> {
         [fold(self.wrap[0], image.width()), fold(self.wrap[1], image.height()), Fold::NOT]
     }
 
-    /// The colours of those of the eight pixels from `i` on that are among `these`, from at most `most` samples each.
+    /// The colours of those of the eight pixels from `i` on that are among `these`, from at most `most` samples each. Of
+    /// these, those that are not among `maybe` have footprints that are not wide.
     #[inline(always)]
     pub(crate) fn colors<L: Lanes>(
         &self,
         l: L,
         footprints: &Footprints,
         i: usize,
-        these: u32,
+        (these, maybe): (u32, u32),
         most: u32,
     ) -> [u32; LANES] {
         let pair = |of: &[Vec<f32>; 2]| [eight(l, &of[0], i), eight(l, &of[1], i)];
         let [x, y] = pair(&footprints.at);
+        if maybe == 0 {
+            return self.magnified(l, x, y, these);
+        }
         let ([xx, xy], [yx, yy]) = (pair(&footprints.x), pair(&footprints.y));
         let a = l.add(l.mul(xx, xx), l.mul(yx, yx));
         let c = l.add(l.mul(xy, xy), l.mul(yy, yy));
         let sum = l.add(a, c);
-        let maybe = l.greater(sum, l.splat(1.0)) & l.greater(l.splat(f32::INFINITY), sum) & these;
+        let maybe = l.greater(sum, l.splat(1.0)) & l.greater(l.splat(f32::INFINITY), sum) & maybe;
         if maybe != 0 {
             // See `taps` and `axes` of texture.rs for what follows.
             let (zero, half_of, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
@@ -161,6 +169,11 @@ impl<'a> Sizes<'a> {
                 return l.pixels(self.filtered(l, x, y, &taps, these));
             }
         }
+        self.magnified(l, x, y, these)
+    }
+
+    #[inline(always)]
+    fn magnified<L: Lanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
         let half = l.splat(0.5);
         l.pixels(self.bilinear(l, &self.sizes[0], l.sub(x, half), l.sub(y, half), these))
     }
