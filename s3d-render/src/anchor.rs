@@ -19,6 +19,7 @@
 //! 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and below f / 8000 where w hardly varies, as it mostly does in 64
 //! pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel in a texture of 4096.
 
+use crate::fold::Fold;
 use crate::lanes::{LANES, Lanes, eight};
 use crate::patch::Patch;
 use glam::DVec3;
@@ -259,34 +260,6 @@ impl Anchor {
             }
         }
         Line { anchor: self, grid, start, cos, sin }
-    }
-}
-
-/// How an attribute repeats: every `period`; beyond `half` of it, it is mirrored.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Fold {
-    divisor: f64,
-    period: f64,
-    half: f64,
-}
-
-impl Fold {
-    /// Not at all.
-    pub(crate) const NOT: Self = Self { divisor: 1.0, period: 0.0, half: f64::INFINITY };
-
-    pub(crate) fn repeat(period: f64) -> Self {
-        Self { divisor: period, period, half: f64::INFINITY }
-    }
-
-    pub(crate) fn mirror(half: f64) -> Self {
-        Self { divisor: 2.0 * half, period: 2.0 * half, half }
-    }
-
-    /// The sign and the shift that bring `value` between 0 and the period, or half of a mirrored one.
-    #[inline(always)]
-    fn of(self, value: f64) -> (f64, f64) {
-        let turn = (value / self.divisor).floor() * self.period;
-        if value - turn > self.half { (-1.0, turn + self.period) } else { (1.0, -turn) }
     }
 }
 

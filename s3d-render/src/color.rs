@@ -6,10 +6,11 @@
 //! textures, again eight pixels at a time ([`crate::filter`]). What a pixel gets depends on no other pixel but through
 //! the anchor, whose rounding it takes over.
 
-use crate::anchor::{Anchor, Attributes, Batch, Fold, Grid};
+use crate::anchor::{Anchor, Attributes, Batch, Grid};
 use crate::channels::{assert_size, fit, paint};
 use crate::face_table::{FaceTable, New};
 use crate::filter::{Footprints, Sizes};
+use crate::fold::Fold;
 use crate::lanes::{self, LANES, LaneWork, Lanes, run_starts};
 use crate::patch::{FaceCache, Patch};
 use crate::pixel_color::PixelByPixel;

@@ -4,7 +4,8 @@
 //! 32768ths of a pixel and colours in 128ths of a step of 8 bits. Before it is rounded to 8 bits a colour is off by less
 //! than 0.02 where one bilinear sample makes it, and less than 0.1 where sixteen do.
 
-use crate::anchor::{Fold, Seen};
+use crate::anchor::Seen;
+use crate::fold::Fold;
 use crate::lanes::{LANES, Lanes, eight, put};
 use s3d_geom::{Raster, Texture, Wrap};
 

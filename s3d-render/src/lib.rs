@@ -40,6 +40,7 @@ mod color;
 mod cone;
 mod face_table;
 mod filter;
+mod fold;
 mod lanes;
 mod lens;
 mod panorama;
