@@ -19,6 +19,7 @@
 //! 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and below f / 8000 where w hardly varies, as it mostly does in 64
 //! pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel in a texture of 4096.
 
+use crate::fold::Fold;
 use crate::lanes::{LANES, Lanes, eight};
 use crate::patch::Patch;
 use glam::DVec3;
@@ -42,12 +43,52 @@ pub(crate) struct Attributes {
 
 impl Attributes {
     /// From the values at the face's corners: `values[k]` are attribute k's.
+    #[inline(always)]
     pub(crate) fn new(patch: &Patch, values: [[f64; 3]; 3]) -> Self {
-        let above =
-            values.map(|at| (0..3).map(|corner| patch.weights_of_corners()[corner] * at[corner]).sum());
-        let bounds = values.map(|[a, b, c]| (a.min(b).min(c), a.max(b).max(c)));
+        let [p, q, r] = patch.weights_of_corners();
+        let (mut above, mut bounds) = ([DVec3::ZERO; 3], [(0.0, 0.0); 3]);
+        for (k, [a, b, c]) in values.into_iter().enumerate() {
+            above[k] = p * a + q * b + r * c;
+            bounds[k] = (least(least(a, b), c), most(most(a, b), c));
+        }
         Self { above, whole: patch.whole(), bounds }
     }
+}
+
+impl Attributes {
+    /// What [`Batch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face is along a ray, an
+    /// attribute changes by (m − (a − a₀) ω / ω·e) · step / w where m = (α − a₀ω) / ω·e; and z is greatest at a corner.
+    #[inline(always)]
+    fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
+        let scale = self.whole.dot(e).recip();
+        let here = self.whole.dot(world[0] - origin) * scale;
+        let mut far = 0.0;
+        for corner in world {
+            far = most(far, (corner - origin).length_squared());
+        }
+        // A ray's direction is at least 1 long: corners are no farther along rays than they are away.
+        let mut sum = 0.0;
+        for k in 0..2 {
+            let (low, high) = self.bounds[k];
+            let value = least(most(self.above[k].dot(e) * scale, low), high);
+            for step in steps {
+                let (a, w) = (self.above[k].dot(step) * scale, self.whole.dot(step) * scale);
+                let most = (a - w * value).abs() + (high - low) * w.abs();
+                sum += most * most;
+            }
+        }
+        sum * far / (here * here) * 1.001
+    }
+}
+
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn most(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// The directions of an image's pixels, for anchors.
@@ -90,8 +131,13 @@ impl Grid {
         !self.rows.is_empty()
     }
 
-    pub(crate) fn direction(&self, i: usize, j: usize) -> DVec3 {
-        self.rays.at(i as u32, j as u32)
+    /// How directions change at column `i`: from column to column and from row to row in a perspective view; in a
+    /// panorama the first is the column's unit vector.
+    fn steps(&self, i: usize) -> [DVec3; 2] {
+        match &self.rays {
+            Rays::Perspective { x_step, y_step, .. } => [*x_step, *y_step],
+            Rays::Equirectangular { columns, .. } => [columns[i].extend(0.0), DVec3::ZERO],
+        }
     }
 }
 
@@ -108,6 +154,43 @@ struct Slopes {
     along: [f32; 4],
     down: [f32; 4],
     up: [f32; 4],
+    /// The attributes at the anchor, and their bounds; folded.
+    base: [f32; 3],
+    least: [f32; 3],
+    most: [f32; 3],
+}
+
+impl Slopes {
+    /// Of attributes anchored at the direction `e`, where directions change by `steps`.
+    #[inline(always)]
+    fn new<const TURN: bool>(attributes: &Attributes, folds: [Fold; 3], e: DVec3, steps: [DVec3; 2]) -> Self {
+        let mut slopes = Self::default();
+        let scale = attributes.whole.dot(e).recip();
+        slopes.set::<TURN>(3, attributes.whole * scale, steps);
+        for (k, fold) in folds.into_iter().enumerate() {
+            let (low, high) = attributes.bounds[k];
+            let value = least(most(attributes.above[k].dot(e) * scale, low), high);
+            let m = (attributes.above[k] - attributes.whole * value) * scale;
+            let (sign, shift) = fold.of(value);
+            slopes.set::<TURN>(k, m * sign, steps);
+            slopes.base[k] = (value * sign + shift) as f32;
+            let (low, high) = ((low * sign + shift) as f32, (high * sign + shift) as f32);
+            (slopes.least[k], slopes.most[k]) = if sign < 0.0 { (high, low) } else { (low, high) };
+        }
+        slopes
+    }
+
+    #[inline(always)]
+    fn set<const TURN: bool>(&mut self, k: usize, m: DVec3, [x, y]: [DVec3; 2]) {
+        if TURN {
+            // Azimuth falls to the right.
+            self.along[k] = (m.x * x.y - m.y * x.x) as f32;
+            self.down[k] = (m.x * x.x + m.y * x.y) as f32;
+            self.up[k] = m.z as f32;
+        } else {
+            (self.along[k], self.down[k]) = (m.dot(x) as f32, m.dot(y) as f32);
+        }
+    }
 }
 
 /// Attributes anchored at a pixel; by default nowhere.
@@ -116,28 +199,18 @@ pub(crate) struct Anchor {
     pub(crate) column: i32,
     pub(crate) row: i32,
     slopes: Slopes,
-    base: [f32; 3],
-    least: [f32; 3],
-    most: [f32; 3],
 }
 
 impl Default for Anchor {
     fn default() -> Self {
-        Self {
-            column: i32::MIN,
-            row: 0,
-            slopes: Slopes::default(),
-            base: [0.0; 3],
-            least: [0.0; 3],
-            most: [0.0; 3],
-        }
+        Self { column: i32::MIN, row: 0, slopes: Slopes::default() }
     }
 }
 
 impl Anchor {
     /// Anchors the attributes at a pixel, the values folded: an attribute with a period is brought between 0 and it,
-    /// mirrored for [`Fold::Mirror`]. `false` if the face is seen edge-on there, or numbers are too large.
-    pub(crate) fn set(
+    /// mirrored if its fold is. `false` if the face is seen edge-on there, or numbers are too large.
+    pub(crate) fn set<const TURN: bool>(
         &mut self,
         attributes: &Attributes,
         folds: [Fold; 3],
@@ -145,39 +218,22 @@ impl Anchor {
         i: usize,
         j: usize,
     ) -> bool {
-        let e = grid.direction(i, j);
-        let scale = attributes.whole.dot(e).recip();
-        let slope = |slopes: &mut Slopes, k: usize, m: DVec3| {
-            let [along, down, up] = match &grid.rays {
-                Rays::Perspective { x_step, y_step, .. } => [m.dot(*x_step), m.dot(*y_step), 0.0],
-                Rays::Equirectangular { columns, .. } => {
-                    let c = columns[i];
-                    // Azimuth falls to the right.
-                    [m.x * c.y - m.y * c.x, m.x * c.x + m.y * c.y, m.z]
-                }
-            };
-            (slopes.along[k], slopes.down[k], slopes.up[k]) = (along as f32, down as f32, up as f32);
-        };
-        (self.column, self.row) = (i as i32, j as i32);
-        slope(&mut self.slopes, 3, attributes.whole * scale);
-        for (k, fold) in folds.into_iter().enumerate() {
-            let (least, most) = attributes.bounds[k];
-            let value = (attributes.above[k].dot(e) * scale).max(least).min(most);
-            let m = (attributes.above[k] - attributes.whole * value) * scale;
-            let (sign, shift) = fold.of(value);
-            slope(&mut self.slopes, k, m * sign);
-            let fold = |v: f64| (v * sign + shift) as f32;
-            (self.base[k], self.least[k], self.most[k]) = (fold(value), fold(least), fold(most));
-            if sign < 0.0 {
-                (self.least[k], self.most[k]) = (self.most[k], self.least[k]);
-            }
+        let (e, steps) = (grid.rays.at(i as u32, j as u32), grid.steps(i));
+        self.put(Slopes::new::<TURN>(attributes, folds, e, steps), i, j)
+    }
+
+    #[inline(always)]
+    fn put(&mut self, slopes: Slopes, i: usize, j: usize) -> bool {
+        let Slopes { along, down, up, base, .. } = &slopes;
+        let mut finite = true;
+        for k in 0..4 {
+            finite &= (along[k].abs() < f32::INFINITY) & (down[k].abs() < f32::INFINITY);
+            finite &= up[k].abs() < f32::INFINITY;
         }
-        let Slopes { along, down, up } = self.slopes;
-        let finite = [along, down, up].as_flattened().iter().all(|s| s.is_finite())
-            && self.base.iter().all(|b| b.abs() < 1e6);
-        if !finite {
-            self.column = i32::MIN;
+        for base in base {
+            finite &= base.abs() < 1e6;
         }
+        *self = Self { column: if finite { i as i32 } else { i32::MIN }, row: j as i32, slopes };
         finite
     }
 
@@ -207,25 +263,101 @@ impl Anchor {
     }
 }
 
-/// How an attribute repeats.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Fold {
-    Not,
-    Repeat(f64),
-    Mirror(f64),
+/// Faces to be anchored together: their numbers by lane.
+pub(crate) struct Batch {
+    /// By corner and axis.
+    corners: [[[f64; LANES]; 3]; 3],
+    /// By attribute and corner.
+    values: [[[f64; LANES]; 3]; 3],
+    /// By attribute: divisor, period and half.
+    folds: [[[f64; LANES]; 3]; 3],
+    /// The direction, and the steps there.
+    rays: [[[f64; LANES]; 3]; 3],
+    at: [(usize, usize); LANES],
 }
 
-impl Fold {
-    /// The sign and the shift that bring `value` between 0 and the period.
-    fn of(self, value: f64) -> (f64, f64) {
-        match self {
-            Fold::Not => (1.0, 0.0),
-            Fold::Repeat(period) => (1.0, -(value / period).floor() * period),
-            Fold::Mirror(period) => {
-                let turn = (value / (2.0 * period)).floor() * 2.0 * period;
-                if value - turn > period { (-1.0, turn + 2.0 * period) } else { (1.0, -turn) }
+impl Batch {
+    pub(crate) fn new() -> Self {
+        let zeros = [[[0.0; LANES]; 3]; 3];
+        Self { corners: zeros, values: zeros, folds: zeros, rays: zeros, at: [(0, 0); LANES] }
+    }
+
+    /// Says what lane `k` is: the corners and the values there, as of [`Attributes::new`], and where it is anchored.
+    #[inline(always)]
+    pub(crate) fn put(
+        &mut self,
+        k: usize,
+        corners: [glam::Vec3; 3],
+        values: [[f64; 3]; 3],
+        folds: [Fold; 3],
+        grid: &Grid,
+        (i, j): (usize, usize),
+    ) {
+        let [x, y] = grid.steps(i);
+        let rays = [grid.rays.at(i as u32, j as u32), x, y];
+        for n in 0..3 {
+            let Fold { divisor, period, half } = folds[n];
+            let fold = [divisor, period, half];
+            let (corner, ray) = (corners[n].to_array(), rays[n].to_array());
+            for m in 0..3 {
+                self.corners[n][m][k] = f64::from(corner[m]);
+                self.values[n][m][k] = values[n][m];
+                self.folds[n][m][k] = fold[m];
+                self.rays[n][m][k] = ray[m];
             }
         }
+        self.at[k] = (i, j);
+    }
+
+    /// What [`Anchor::set`] makes of each lane; and of each a bound on how fast the first two attributes change: the sum
+    /// of the squares of what a column and a row add to them is nowhere on the face above it, and more than rounding
+    /// below. Infinite in a panorama.
+    #[inline(always)]
+    pub(crate) fn anchors<const TURN: bool>(&self, origin: DVec3) -> ([Anchor; LANES], [f32; LANES]) {
+        let mut fastest = [f32::INFINITY; LANES];
+        let mut along = [[0.0f32; LANES]; 4];
+        let (mut down, mut up) = (along, along);
+        let mut base = [[0.0f32; LANES]; 3];
+        let (mut least, mut most) = (base, base);
+        // One face's arithmetic, written so that the compiler does it for several at once.
+        for k in 0..LANES {
+            let point = |v: &[[f64; LANES]; 3]| DVec3::new(v[0][k], v[1][k], v[2][k]);
+            let row = |v: &[[f64; LANES]; 3]| [v[0][k], v[1][k], v[2][k]];
+            let world = [point(&self.corners[0]), point(&self.corners[1]), point(&self.corners[2])];
+            let values = [row(&self.values[0]), row(&self.values[1]), row(&self.values[2])];
+            let fold = |n: usize| {
+                let [divisor, period, half] = row(&self.folds[n]);
+                Fold { divisor, period, half }
+            };
+            let [e, x, y] = [point(&self.rays[0]), point(&self.rays[1]), point(&self.rays[2])];
+            let attributes = Attributes::new(&Patch::of(world, origin), values);
+            let slopes = Slopes::new::<TURN>(&attributes, [fold(0), fold(1), fold(2)], e, [x, y]);
+            for n in 0..4 {
+                (along[n][k], down[n][k], up[n][k]) = (slopes.along[n], slopes.down[n], slopes.up[n]);
+            }
+            for n in 0..3 {
+                (base[n][k], least[n][k], most[n][k]) = (slopes.base[n], slopes.least[n], slopes.most[n]);
+            }
+            if !TURN {
+                fastest[k] = attributes.fastest(world, origin, e, [x, y]) as f32;
+            }
+        }
+        let mut anchors = [Anchor::default(); LANES];
+        for (k, anchor) in anchors.iter_mut().enumerate() {
+            let four = |v: &[[f32; LANES]; 4]| [v[0][k], v[1][k], v[2][k], v[3][k]];
+            let three = |v: &[[f32; LANES]; 3]| [v[0][k], v[1][k], v[2][k]];
+            let slopes = Slopes {
+                along: four(&along),
+                down: four(&down),
+                up: four(&up),
+                base: three(&base),
+                least: three(&least),
+                most: three(&most),
+            };
+            let (i, j) = self.at[k];
+            anchor.put(slopes, i, j);
+        }
+        (anchors, fastest)
     }
 }
 
@@ -269,7 +401,7 @@ impl Line<'_> {
             if n >= N && n < 3 {
                 continue;
             }
-            let Slopes { along, down, up } = &anchor.slopes;
+            let Slopes { along, down, up, .. } = &anchor.slopes;
             if TURN {
                 let change = l.sub(l.mul(l.splat(along[n] * cos), s), l.mul(l.splat(down[n] * cos), v));
                 values[n] = l.add(l.splat(start[n]), change);
@@ -289,8 +421,9 @@ impl Line<'_> {
         let mut seen = Seen { values: [zero; N], x: [zero; N], y: [zero; N], doubtful: !near & 0xFF };
         for n in 0..N {
             let offset = l.mul(values[n], scale);
-            let value = l.add(l.splat(anchor.base[n]), offset);
-            seen.values[n] = l.min(l.max(value, l.splat(anchor.least[n])), l.splat(anchor.most[n]));
+            let value = l.add(l.splat(anchor.slopes.base[n]), offset);
+            seen.values[n] =
+                l.min(l.max(value, l.splat(anchor.slopes.least[n])), l.splat(anchor.slopes.most[n]));
             seen.x[n] = l.mul(l.sub(by_column[n], l.mul(offset, by_column[3])), scale);
             seen.y[n] = l.mul(l.sub(by_row[n], l.mul(offset, by_row[3])), scale);
         }
@@ -320,7 +453,9 @@ mod tests {
         // No bounds: the plane is tested beyond the triangle, too.
         attributes.bounds = [(-1e9, 1e9); 3];
         let (grid, mut anchor) = (Grid::new(camera), Anchor::default());
-        if !anchor.set(&attributes, [Fold::Not; 3], &grid, at[0], at[1]) || !anchor.reaches(to[0], to[1]) {
+        if !anchor.set::<TURN>(&attributes, [Fold::NOT; 3], &grid, at[0], at[1])
+            || !anchor.reaches(to[0], to[1])
+        {
             return;
         }
         let exact = |x: f64, y: f64, n: usize| {
@@ -360,6 +495,60 @@ mod tests {
 
     proptest! {
         #[test]
+        fn no_point_of_a_face_changes_faster_than_its_bound(
+            corners in prop::array::uniform3((-3.0..3.0f64, -3.0..3.0f64, 0.05..9.0f64)),
+            values in prop::array::uniform3(prop::array::uniform3(-900.0..900.0f64)),
+            (p, q) in (0.0..1.0f64, 0.0..1.0f64), (r, t) in (0.0..1.0f64, 0.0..1.0f64),
+        ) {
+            // Rays (x, y, 1) from a place; the anchor and a pixel anywhere on the face.
+            let origin = DVec3::new(0.5, -0.25, 2.0);
+            let world = corners.map(|(x, y, z)| DVec3::new(x * z, y * z, z) + origin);
+            let attributes = Attributes::new(&Patch::of(world, origin), values);
+            let ray = |p: f64, q: f64| {
+                let at = world[0] * (1.0 - p) + world[1] * (p * (1.0 - q)) + world[2] * (p * q) - origin;
+                at / at.z
+            };
+            let steps = [DVec3::new(0.01, 0.0, 0.0), DVec3::new(0.0, 0.01, 0.0)];
+            let fastest = attributes.fastest(world, origin, ray(p, q), steps);
+            let (d, mut sum) = (ray(r, t), 0.0);
+            let scale = attributes.whole.dot(d).recip();
+            for above in &attributes.above[..2] {
+                for step in steps {
+                    let change = above.dot(step) - above.dot(d) * scale * attributes.whole.dot(step);
+                    sum += (change * scale) * (change * scale);
+                }
+            }
+            prop_assert!(sum <= fastest * (1.0 + 1e-6) || !fastest.is_finite(), "{sum} {fastest}");
+        }
+
+        #[test]
+        fn faces_together_are_anchored_as_they_are_alone(
+            corners in prop::array::uniform8(prop::array::uniform3(prop::array::uniform3(-5.0..5.0f32))),
+            values in prop::array::uniform3(prop::array::uniform3(-9.0..9.0f64)),
+            period in 0.5..4.0f64, turn in prop::bool::ANY,
+        ) {
+            let pose = Pose::level(DVec3::new(0.3, -0.2, 0.1), 0.4);
+            let camera = if turn { Camera::equirectangular(pose, 64) } else { Camera::perspective(pose, 1.2, 64, 32) };
+            let (grid, mut batch) = (Grid::new(&camera), Batch::new());
+            let folds = [Fold::NOT, Fold::repeat(period), Fold::mirror(period)];
+            for (k, corners) in corners.iter().enumerate() {
+                batch.put(k, corners.map(glam::Vec3::from), values, folds, &grid, (7 * k, 3 * k));
+            }
+            let (together, _) = if turn { batch.anchors::<true>(pose.location) } else { batch.anchors::<false>(pose.location) };
+            for (k, corners) in corners.iter().enumerate() {
+                let world = corners.map(|p| glam::Vec3::from(p).as_dvec3());
+                let attributes = Attributes::new(&Patch::of(world, pose.location), values);
+                let mut alone = Anchor::default();
+                if turn {
+                    alone.set::<true>(&attributes, folds, &grid, 7 * k, 3 * k);
+                } else {
+                    alone.set::<false>(&attributes, folds, &grid, 7 * k, 3 * k);
+                }
+                prop_assert_eq!(format!("{alone:?}"), format!("{:?}", together[k]));
+            }
+        }
+
+        #[test]
         fn attributes_are_exact_to_a_part_of_the_footprint(
             corners in prop::array::uniform3(prop::array::uniform3(-4.0..4.0f32)),
             values in prop::array::uniform3(prop::array::uniform3(0.0..4096.0f64)),
@@ -373,10 +562,10 @@ mod tests {
 
         #[test]
         fn folds_bring_a_value_into_the_first_period(value in -1e6..1e6f64, period in 1.0..5000.0f64) {
-            let (sign, shift) = Fold::Repeat(period).of(value);
+            let (sign, shift) = Fold::repeat(period).of(value);
             prop_assert!(sign == 1.0 && (-1e-6..=period).contains(&(value + shift)));
             prop_assert!((shift / period - (shift / period).round()).abs() < 1e-9);
-            let (sign, shift) = Fold::Mirror(period).of(value);
+            let (sign, shift) = Fold::mirror(period).of(value);
             prop_assert!((-1e-6..=period).contains(&(sign * value + shift)), "{}", sign * value + shift);
             // The same place of a texture that is mirrored at every period.
             prop_assert!((shift / (2.0 * period) - (shift / (2.0 * period)).round()).abs() < 1e-9);

@@ -91,6 +91,14 @@ impl Lanes for Avx2 {
         unsafe { _mm256_blendv_ps(positive, negative, of) }
     }
     #[inline(always)]
+    fn pick(self, these: u32, yes: __m256, no: __m256) -> __m256 {
+        unsafe { _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(lanes_of(these))) }
+    }
+    #[inline(always)]
+    fn whole(self, values: __m256) -> __m256 {
+        unsafe { _mm256_cvtepi32_ps(_mm256_cvttps_epi32(values)) }
+    }
+    #[inline(always)]
     fn greater(self, a: __m256, b: __m256) -> u32 {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(a, b)) as u32 }
     }
@@ -124,8 +132,7 @@ impl Lanes for Avx2 {
             let columns = _mm256_srai_epi32::<15>(columns);
             let columns = _mm256_add_epi32(columns, _mm256_add_epi32(columns, columns));
             let rows = _mm256_mullo_epi32(_mm256_srai_epi32::<15>(rows), _mm256_set1_epi32(stride));
-            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let these = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(these as i32), bits), bits);
+            let these = lanes_of(these);
             let mut at = [0; LANES];
             let all = _mm256_and_si256(_mm256_add_epi32(rows, columns), these);
             _mm256_storeu_si256(at.as_mut_ptr().cast(), all);
@@ -184,9 +191,7 @@ impl Lanes for Avx2 {
     fn weights(self, weights: __m256, these: u32) -> Self::Weights {
         unsafe {
             let whole = _mm256_cvttps_epi32(weights);
-            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let these = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(these as i32), bits), bits);
-            let whole = _mm256_and_si256(whole, these);
+            let whole = _mm256_and_si256(whole, lanes_of(these));
             spread(_mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256::<1>(whole)))
         }
     }
@@ -239,6 +244,10 @@ impl Lanes for Avx2 {
         }
     }
 
+    #[inline(always)]
+    fn expect<T>(self, thing: &T) {
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(thing).cast()) }
+    }
     #[inline(always)]
     fn equal(self, values: &[u32; LANES], value: u32) -> u32 {
         unsafe {
@@ -302,6 +311,14 @@ impl Lanes for Avx2 {
             }
         }
     }
+}
+
+/// All bits of the lanes of `these`.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn lanes_of(these: u32) -> __m256i {
+    let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(these as i32), bits), bits)
 }
 
 /// For each k the value of pixel k throughout the lower 128 bits and that of pixel k + 4 throughout the upper.
@@ -420,6 +437,9 @@ mod tests {
             same!(max, x, a; y, b);
             same!(sqrt, x, a);
             same!(by_sign, x, a; y, b; z, c);
+            for these in [0, 0b1001_0110, 255] {
+                same!(pick, these, these; x, a; y, b);
+            }
             let above_one = a.map(|v| if v.abs() >= 1.0 { v.abs() } else { 1.0 });
             let (whole, rest) = avx2.log2(avx2.load(&above_one));
             let (plain_whole, plain_rest) = Plain.log2(above_one);

@@ -33,7 +33,7 @@
 //! the last place of `f32` of what a single ray gives.
 
 use crate::NO_FACE;
-use crate::registers::{LANES, Registers};
+use crate::registers::{LANES, Line, Registers};
 
 /// Rows of a chunk at most.
 pub(crate) const MOST_ROWS: usize = 32;
@@ -96,10 +96,12 @@ pub(crate) struct Grid<'a> {
     pub(crate) scale: &'a [f32],
 }
 
-/// A face that was drawn.
+/// A face that was drawn: half a line of the cache.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
 pub(crate) struct Drawn {
-    /// 1/t as a function of the pixel, in the lens's own terms.
+    /// 1/t as a function [a, b, c] of the pixel: with what a lens calls u and v of its column, level and rise of its row,
+    /// a + c·rise + b·u in a perspective view, and c·rise + level·(a·u + b·v) in a panorama.
     pub(crate) inverse_t: [f64; 3],
     pub(crate) face: u32,
     /// Whether `inverse_t` is too poor for a depth: single rays give it then.
@@ -374,8 +376,8 @@ impl Canvas {
     /// Writes faces and depths into `out`, whose first pixels are the window's and whose rows are `out_pitch` apart,
     /// and empties the window.
     ///
-    /// A row's 1/t is at + across·u(i) + bend·v(i), which `function` makes from what is drawn; `u` and `v` come in groups. `single` casts the ray of
-    /// a pixel (column, row) to a face whose function is too poor.
+    /// `u` and `v` of the columns come in groups, `line` gives level and rise of a row: see [`Drawn`]. `single` casts the
+    /// ray of a pixel (column, row) to a face whose function is too poor.
     #[inline(always)]
     pub(crate) fn finish<L: Registers, const TURN: bool>(
         &mut self,
@@ -383,7 +385,7 @@ impl Canvas {
         out: (&mut [u32], &mut [f32]),
         out_pitch: usize,
         (u, v): (&[[f64; LANES]], &[[f64; LANES]]),
-        function: impl Fn(&Drawn, usize) -> [f64; 3],
+        line: impl Fn(usize) -> (f64, f64),
         single: impl Fn(u32, usize, usize) -> f64,
     ) {
         let width = self.width;
@@ -392,20 +394,18 @@ impl Canvas {
             let slots = &mut self.slots[start..start + width.next_multiple_of(LANES)];
             let faces = &mut out.0[row * out_pitch..][..width];
             let depths = &mut out.1[row * out_pitch..][..width];
-            let drawn = |slot: u32| {
-                let drawn = &self.drawn[slot as usize];
-                (function(drawn, row), drawn.face)
-            };
+            let (level, rise) = line(row);
+            let drawn = &self.drawn[..];
             let (faces, last_faces) = faces.as_chunks_mut::<LANES>();
             let (depths, last_depths) = depths.as_chunks_mut::<LANES>();
             let mut groups = slots.as_chunks::<LANES>().0.iter().zip(u.iter().zip(v));
             for ((faces, depths), (slots, (u, v))) in faces.iter_mut().zip(depths).zip(groups.by_ref()) {
-                l.resolve::<TURN>(slots, (u, v), drawn, faces, depths);
+                l.resolve::<TURN>(slots, &Line { u, v, level, rise }, drawn, faces, depths);
             }
             // A last group that is not full.
             if let Some((slots, (u, v))) = groups.next() {
                 let (mut faces, mut depths) = ([NO_FACE; LANES], [0.0; LANES]);
-                l.resolve::<TURN>(slots, (u, v), drawn, &mut faces, &mut depths);
+                l.resolve::<TURN>(slots, &Line { u, v, level, rise }, drawn, &mut faces, &mut depths);
                 last_faces.copy_from_slice(&faces[..last_faces.len()]);
                 last_depths.copy_from_slice(&depths[..last_depths.len()]);
             }

@@ -6,10 +6,11 @@
 use crate::lanes::{self, LANES, LaneWork, Lanes, run_starts};
 use crate::{
     Hits, NO_FACE, Scene,
+    face_table::{FaceTable, New},
     patch::{FaceCache, Patch},
 };
 use glam::{DMat3, DVec3, Vec3};
-use s3d_geom::{Camera, NormalAxes, Raster};
+use s3d_geom::{Camera, NormalAxes, Raster, TriMesh};
 
 /// Depth that is missing, or too far to be written.
 pub const MISSING_DEPTH: u16 = 65_535;
@@ -118,18 +119,34 @@ fn flat_normals(
     image_from_world: DMat3,
     out: &mut Raster<[u8; 3]>,
 ) {
-    let mut normals = FaceCache::new();
-    by_face(hits, MISSING_NORMAL, out, |face| {
-        *normals.get(face, || flat_normal(scene, face, camera.pose.location, image_from_world))
-    });
+    let view = (camera.pose.location, image_from_world);
+    by_face(hits, MISSING_NORMAL, out, |faces| flat_normals_of(scene.mesh(), faces, view));
 }
 
-/// The colour of a face's normal, on the side that `origin` sees: all rays start there, and see the same side.
-fn flat_normal(scene: &Scene<'_>, face: u32, origin: DVec3, image_from_world: DMat3) -> [u8; 3] {
-    let [a, b, c] = scene.mesh().triangle(face).map(|p| p.as_dvec3());
-    let normal = (b - a).cross(c - a).normalize();
-    let away = normal.dot(a - origin) > 0.0;
-    quantized(image_from_world * if away { -normal } else { normal })
+/// The colours of faces' normals, on the side that `origin` sees: all rays start there, and see the same side.
+#[inline(always)]
+fn flat_normals_of(
+    mesh: &TriMesh,
+    faces: &[u32; LANES],
+    (origin, image_from_world): (DVec3, DMat3),
+) -> [[u8; 3]; LANES] {
+    // Corner by corner and axis by axis.
+    let mut corners = [[[0.0f64; LANES]; 3]; 3];
+    for (k, &face) in faces.iter().enumerate() {
+        for (corner, p) in corners.iter_mut().zip(mesh.triangle(face)) {
+            (corner[0][k], corner[1][k], corner[2][k]) = (f64::from(p.x), f64::from(p.y), f64::from(p.z));
+        }
+    }
+    let mut channels = [[0.0f64; LANES]; 3];
+    // One face's arithmetic, written so that the compiler does it for several at once.
+    for k in 0..LANES {
+        let [a, b, c] = [0, 1, 2].map(|n| DVec3::new(corners[n][0][k], corners[n][1][k], corners[n][2][k]));
+        let normal = (b - a).cross(c - a).normalize();
+        let side = if normal.dot(a - origin) > 0.0 { -1.0 } else { 1.0 };
+        let color = shifted(image_from_world * (normal * side));
+        (channels[0][k], channels[1][k], channels[2][k]) = (color.x, color.y, color.z);
+    }
+    std::array::from_fn(|k| channels.map(|channel| channel[k] as u8))
 }
 
 fn smooth_normals(
@@ -170,9 +187,15 @@ fn smooth_normal(patch: &Patch, corners: Option<[Vec3; 3]>, d: DVec3) -> DVec3 {
 
 /// ⌊127.5 + 127.5 n + ½⌋ a channel.
 fn quantized(n: DVec3) -> [u8; 3] {
-    // A wall along an axis has a 0 that rounding may put on either side of the tie: 128 is meant. The cast rounds down
-    // and saturates.
-    (n * 127.5 + (128.0 + 1e-9)).to_array().map(|channel| channel as u8)
+    // The cast rounds down and saturates.
+    shifted(n).to_array().map(|channel| channel as u8)
+}
+
+/// 127.5 + 127.5 n + ½ a channel, and a hair more: a wall along an axis has a 0 that rounding may put on either side of
+/// the tie, and 128 is meant.
+#[inline(always)]
+fn shifted(n: DVec3) -> DVec3 {
+    n * 127.5 + (128.0 + 1e-9)
 }
 
 /// An index a face, as the colour R·65536 + G·256 + B = index; [`MISSING_INDEX`] where nothing is seen. With each face's
@@ -191,7 +214,7 @@ pub fn index_image(hits: &Hits, per_face: &[u32]) -> Raster<[u8; 3]> {
 /// # Panics
 /// As [`index_image`].
 pub fn index_image_into(hits: &Hits, per_face: &[u32], out: &mut Raster<[u8; 3]>) {
-    by_face(hits, MISSING_INDEX, out, |face| index_color(per_face, face));
+    by_face(hits, MISSING_INDEX, out, |faces| faces.map(|face| index_color(per_face, face)));
 }
 
 fn index_color(per_face: &[u32], face: u32) -> [u8; 3] {
@@ -216,7 +239,7 @@ pub fn color_per_face_image(hits: &Hits, per_face_colors: &[[u8; 3]]) -> Raster<
 /// # Panics
 /// As [`color_per_face_image`].
 pub fn color_per_face_image_into(hits: &Hits, per_face_colors: &[[u8; 3]], out: &mut Raster<[u8; 3]>) {
-    by_face(hits, [0; 3], out, |face| per_face_colors[face as usize]);
+    by_face(hits, [0; 3], out, |faces| faces.map(|face| per_face_colors[face as usize]));
 }
 
 /// The images that have one value all over a face; see [`face_images_into`].
@@ -253,13 +276,13 @@ pub fn face_images_into(
     out: &mut FaceImages,
 ) {
     assert_size(hits, camera);
-    let image_from_world = camera.normal_axes_from_world(axes);
+    let view = (camera.pose.location, camera.normal_axes_from_world(axes));
     let FaceImages { normal, index, color } = out;
-    let mut faces = FaceCache::new();
-    let value = |face| {
-        *faces.get(face, || {
-            let normal = flat_normal(scene, face, camera.pose.location, image_from_world);
-            [normal, index_color(per_face, face), per_face_colors[face as usize]]
+    let values = |faces: &[u32; LANES]| {
+        let normals = flat_normals_of(scene.mesh(), faces, view);
+        std::array::from_fn(|k| {
+            let face = faces[k];
+            [normals[k], index_color(per_face, face), per_face_colors[face as usize]]
         })
     };
     let missing = [MISSING_NORMAL, MISSING_INDEX, [0; 3]];
@@ -267,7 +290,7 @@ pub fn face_images_into(
         fit(image, &hits.face, [0; 3]);
         image.pixels_mut()
     });
-    lanes::run(ByFace { faces: hits.face.pixels(), missing, value, out });
+    lanes::run(ByFace { mesh: Some(scene.mesh()), faces: hits.face.pixels(), missing, values, out });
 }
 
 /// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.
@@ -276,41 +299,96 @@ pub fn coverage(hits: &Hits) -> f64 {
     seen as f64 / hits.face.len().max(1) as f64
 }
 
-/// An image from a value a face: `value` is asked once a run of pixels.
-fn by_face(hits: &Hits, missing: [u8; 3], out: &mut Raster<[u8; 3]>, mut value: impl FnMut(u32) -> [u8; 3]) {
+/// An image from a value a face: `values` is asked for eight faces at a time.
+fn by_face(
+    hits: &Hits,
+    missing: [u8; 3],
+    out: &mut Raster<[u8; 3]>,
+    values: impl Fn(&[u32; LANES]) -> [[u8; 3]; LANES],
+) {
     fit(out, &hits.face, [0; 3]);
-    let (value, out) = (|face| [value(face)], [out.pixels_mut()]);
-    lanes::run(ByFace { faces: hits.face.pixels(), missing: [missing], value, out });
+    let (values, out) = (|faces: &[u32; LANES]| values(faces).map(|value| [value]), [out.pixels_mut()]);
+    lanes::run(ByFace { mesh: None, faces: hits.face.pixels(), missing: [missing], values, out });
 }
 
 /// `N` images at once.
 struct ByFace<'a, V, const N: usize> {
+    /// What `values` looks at.
+    mesh: Option<&'a TriMesh>,
     faces: &'a [u32],
     missing: [[u8; 3]; N],
-    value: V,
+    values: V,
     out: [&'a mut [[u8; 3]]; N],
 }
 
-impl<V: FnMut(u32) -> [[u8; 3]; N], const N: usize> LaneWork for ByFace<'_, V, N> {
+impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> LaneWork for ByFace<'_, V, N> {
     type Output = ();
 
     #[inline(always)]
-    fn run(mut self, lanes: impl Lanes) {
+    fn run(self, lanes: impl Lanes) {
         /// Pixels whose runs are looked for at a time.
         const BLOCK: usize = 4096;
-        let mut starts = Vec::with_capacity(BLOCK + 1);
-        for (block, faces) in self.faces.chunks(BLOCK).enumerate() {
+        let Self { mesh, faces, missing, values, mut out } = self;
+        let mut table = FaceTable::new(BLOCK);
+        let (mut starts, mut numbers, mut new) = (Vec::new(), Vec::new(), Vec::new());
+        let mut stamps = vec![missing.map(stamp)];
+        for (block, faces) in faces.chunks(BLOCK).enumerate() {
             run_starts(lanes, faces, &mut starts);
+            if table.number(faces, &starts, &mut numbers, &mut new) {
+                stamps.truncate(1);
+            }
+            if let Some(mesh) = mesh {
+                New::expect::<false>(&new, lanes, mesh);
+            }
+            for (group, count) in New::groups(&new) {
+                let values = values(&group.map(|new| new.face));
+                for value in &values[..count] {
+                    let mut of = [[0; 32]; N];
+                    for (stamp, color) in of.iter_mut().zip(value) {
+                        *stamp = self::stamp(*color);
+                    }
+                    stamps.push(of);
+                }
+            }
             starts.push(faces.len() as u32);
-            for run in starts.windows(2) {
-                let (start, end) = (run[0] as usize, run[1] as usize);
-                let face = faces[start];
-                let colors = if face == NO_FACE { self.missing } else { (self.value)(face) };
-                for (out, color) in self.out.iter_mut().zip(colors) {
-                    paint(out, block * BLOCK + start, block * BLOCK + end, color);
+            for (run, &number) in starts.windows(2).zip(&numbers) {
+                let (start, end) = (block * BLOCK + run[0] as usize, block * BLOCK + run[1] as usize);
+                print(&mut out, start, end, &stamps[number as usize]);
+            }
+        }
+    }
+}
+
+/// A colour again and again, ten times and more.
+type Stamp = [u8; 32];
+
+#[inline(always)]
+fn stamp([r, g, b]: [u8; 3]) -> Stamp {
+    let mut stamp = [r; 32];
+    for k in 0..32 / 3 {
+        (stamp[3 * k + 1], stamp[3 * k + 2]) = (g, b);
+    }
+    stamp[31] = g;
+    stamp
+}
+
+/// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow.
+#[inline(always)]
+fn print<const N: usize>(images: &mut [&mut [[u8; 3]]; N], start: usize, end: usize, stamps: &[Stamp; N]) {
+    let mut at = start;
+    while at < end {
+        for (image, stamp) in images.iter_mut().zip(stamps) {
+            let bytes = &mut image.as_flattened_mut()[3 * at..];
+            match bytes.first_chunk_mut() {
+                Some(to) => *to = *stamp,
+                // At the image's end.
+                None => {
+                    let most = bytes.len().min(3 * (end - at));
+                    bytes[..most].copy_from_slice(&stamp[..most]);
                 }
             }
         }
+        at += size_of::<Stamp>() / 3;
     }
 }
 

@@ -1,18 +1,21 @@
 //! The RGB image.
 //!
-//! A row is coloured in two passes. The first walks its runs of equal faces: [`crate::anchor`] gives the texture
-//! coordinates of eight pixels at a time and their change from pixel to pixel, hence each pixel's footprint. The second
-//! walks the row regardless of runs and fetches the textures, again eight pixels at a time ([`crate::filter`]). What a
-//! pixel gets depends on no other pixel but through the anchor, whose rounding it takes over.
+//! Faces that a row is the first to show are prepared eight at a time. Then the row is coloured in two passes. The first
+//! walks its runs of equal faces: [`crate::anchor`] gives the texture coordinates of eight pixels at a time and their
+//! change from pixel to pixel, hence each pixel's footprint. The second walks the row regardless of runs and fetches the
+//! textures, again eight pixels at a time ([`crate::filter`]). What a pixel gets depends on no other pixel but through
+//! the anchor, whose rounding it takes over.
 
-use crate::anchor::{Anchor, Attributes, Fold, Grid};
+use crate::anchor::{Anchor, Attributes, Batch, Grid};
 use crate::channels::{assert_size, fit, paint};
+use crate::face_table::{FaceTable, New};
 use crate::filter::{Footprints, Sizes};
+use crate::fold::Fold;
 use crate::lanes::{self, LANES, LaneWork, Lanes, run_starts};
 use crate::patch::{FaceCache, Patch};
 use crate::pixel_color::PixelByPixel;
 use crate::texture::{Pyramids, TextureFilter};
-use crate::{Hits, NO_FACE, Scene};
+use crate::{Hits, Scene};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, Raster};
 
@@ -82,7 +85,8 @@ impl LaneWork for Rgb<'_> {
             sizes: scene.mesh().textures().iter().enumerate().map(|(k, t)| pyramids.sizes(k, t)).collect(),
             origin: camera.pose.location,
             max_taps: filter.max_taps,
-            faces: FaceCache::new(),
+            prepared: vec![Prepared::missing()],
+            large: FaceCache::new(),
             singly: PixelByPixel::new(scene, pyramids, camera, filter),
             row: Row::new(hits.face.width() as usize),
         };
@@ -94,16 +98,10 @@ impl LaneWork for Rgb<'_> {
     }
 }
 
-/// A face, prepared.
-struct Face {
-    look: Look,
-    anchor: Anchor,
-    attributes: Attributes,
-}
-
 /// Where a face has its colour from.
 #[derive(Clone, Copy)]
 enum Look {
+    /// A tag.
     Texture(u32),
     Corners,
     Flat([u8; 3]),
@@ -111,43 +109,41 @@ enum Look {
     Singly,
 }
 
-impl Face {
-    fn new(scene: &Scene<'_>, sizes: &[Sizes<'_>], face: u32, origin: DVec3) -> Self {
-        let mesh = scene.mesh();
-        let patch = Patch::new(mesh, face, origin);
-        let (look, values) = match mesh.color_of(face) {
-            FaceColor::Texture(index, texture, uvs) => {
-                let [w, h] = [texture.image.width(), texture.image.height()].map(f64::from);
-                // In pixels of the full size, to the right and downwards.
-                let x = uvs.map(|uv| f64::from(uv.x) * w);
-                let y = uvs.map(|uv| (1.0 - f64::from(uv.y)) * h);
-                let usable = sizes[index as usize].is_usable();
-                (if usable { Look::Texture(index) } else { Look::Singly }, [x, y, [0.0; 3]])
-            }
-            FaceColor::Corners(colors) => {
-                let channel = |k: usize| colors.map(|c| f64::from(c[k]));
-                (Look::Corners, [channel(0), channel(1), channel(2)])
-            }
-            FaceColor::Flat([0, 0, 0]) => (Look::Flat([1; 3]), [[0.0; 3]; 3]),
-            FaceColor::Flat(color) => (Look::Flat(color), [[0.0; 3]; 3]),
-        };
-        Self { look, anchor: Anchor::default(), attributes: Attributes::new(&patch, values) }
-    }
+/// The attributes of a face's colour: what they are, their values at its corners, and how they repeat.
+type Colored = (Look, [[f64; 3]; 3], [Fold; 3]);
 
-    /// An anchor that serves pixel (i, j).
-    #[inline(always)]
-    fn anchor(&mut self, grid: &Grid, sizes: &[Sizes<'_>], i: usize, j: usize) -> Option<&Anchor> {
-        if !self.anchor.reaches(i, j) {
-            let folds = match self.look {
-                Look::Texture(index) => sizes[index as usize].folds(),
-                Look::Corners => [Fold::Not; 3],
-                Look::Flat(_) | Look::Singly => return None,
-            };
-            if !self.anchor.set(&self.attributes, folds, grid, i, j) {
-                return None;
-            }
+#[inline(always)]
+fn colored(scene: &Scene<'_>, sizes: &[Sizes<'_>], face: u32) -> Colored {
+    let folds = [Fold::NOT; 3];
+    match scene.mesh().color_of(face) {
+        FaceColor::Texture(index, texture, uvs) => {
+            let sizes = &sizes[index as usize];
+            let [w, h] = [texture.image.width(), texture.image.height()].map(f64::from);
+            // In pixels of the full size, to the right and downwards.
+            let x = uvs.map(|uv| f64::from(uv.x) * w);
+            let y = uvs.map(|uv| (1.0 - f64::from(uv.y)) * h);
+            let look = if sizes.is_usable() { Look::Texture(index) } else { Look::Singly };
+            (look, [x, y, [0.0; 3]], sizes.folds())
         }
-        Some(&self.anchor)
+        FaceColor::Corners(colors) => {
+            let channel = |k: usize| colors.map(|c| f64::from(c[k]));
+            (Look::Corners, [channel(0), channel(1), channel(2)], folds)
+        }
+        FaceColor::Flat([0, 0, 0]) => (Look::Flat([1; 3]), [[0.0; 3]; 3], folds),
+        FaceColor::Flat(color) => (Look::Flat(color), [[0.0; 3]; 3], folds),
+    }
+}
+
+/// A face, prepared.
+struct Prepared {
+    look: Look,
+    anchor: Anchor,
+}
+
+impl Prepared {
+    /// What is missing is black.
+    fn missing() -> Self {
+        Self { look: Look::Flat([0; 3]), anchor: Anchor::default() }
     }
 }
 
@@ -155,20 +151,26 @@ impl Face {
 /// them.
 struct Row {
     footprints: Footprints,
-    /// By pixel: a texture, perhaps with [`WIDE`]; or [`DONE`].
+    /// By pixel: a texture, perhaps with [`NARROW`]; or [`DONE`].
     tags: Vec<u32>,
     colors: Vec<[u8; 3]>,
 }
 
 /// The colour stands already.
 const DONE: u32 = u32::MAX;
-/// The footprint is wider than a pixel of the texture.
-const WIDE: u32 = 1 << 31;
+/// Footprints are nowhere wider than a pixel of the texture.
+const NARROW: u32 = 1 << 31;
 
 impl Row {
     fn new(width: usize) -> Self {
         let padded = width + 2 * LANES;
         Self { footprints: Footprints::new(padded), tags: vec![DONE; padded], colors: vec![[0; 3]; padded] }
+    }
+
+    #[inline(always)]
+    fn flat(&mut self, start: usize, end: usize, color: [u8; 3]) {
+        self.tags[start..end].fill(DONE);
+        paint(&mut self.colors, start, end, color);
     }
 }
 
@@ -179,7 +181,10 @@ struct Painter<'a, L> {
     sizes: Vec<Sizes<'a>>,
     origin: DVec3,
     max_taps: u32,
-    faces: FaceCache<Face>,
+    /// By the face's number in the [`FaceTable`].
+    prepared: Vec<Prepared>,
+    /// Of faces that need one anchor after another.
+    large: FaceCache<Attributes>,
     singly: PixelByPixel<'a>,
     row: Row,
 }
@@ -188,65 +193,121 @@ impl<L: Lanes> Painter<'_, L> {
     #[inline(always)]
     fn image<const TURN: bool>(mut self, grid: &Grid, hits: &Hits, out: &mut Raster<[u8; 3]>) {
         let width = hits.face.width() as usize;
-        let mut starts = Vec::new();
+        let (mut table, mut batch) = (FaceTable::new(width), Batch::new());
+        let (mut starts, mut numbers, mut new) = (Vec::new(), Vec::new(), Vec::new());
         let rows = out.pixels_mut().chunks_exact_mut(width.max(1));
         for (j, (faces, out)) in hits.face.rows().zip(rows).enumerate() {
             run_starts(self.lanes, faces, &mut starts);
+            if table.number(faces, &starts, &mut numbers, &mut new) {
+                self.prepared.truncate(1);
+            }
+            New::expect::<true>(&new, self.lanes, self.scene.mesh());
+            for (group, count) in New::groups(&new) {
+                self.prepare::<TURN>(grid, &mut batch, j, &group, count);
+            }
             starts.push(width as u32);
-            for run in starts.windows(2) {
+            for (run, &number) in starts.windows(2).zip(&numbers) {
                 let (start, end) = (run[0] as usize, run[1] as usize);
-                match faces[start] {
-                    NO_FACE => self.flat(start, end, [0; 3]),
-                    face => self.lay_out::<TURN>(grid, face, j, start, end),
-                }
+                self.lay_out::<TURN>(grid, faces[start], number, j, start, end);
             }
             self.fetch(width);
             out.copy_from_slice(&self.row.colors[..width]);
         }
     }
 
+    /// Prepares the first `count` of some faces that row `j` is the first to show.
     #[inline(always)]
-    fn flat(&mut self, start: usize, end: usize, color: [u8; 3]) {
-        self.row.tags[start..end].fill(DONE);
-        paint(&mut self.row.colors, start, end, color);
+    fn prepare<const TURN: bool>(
+        &mut self,
+        grid: &Grid,
+        batch: &mut Batch,
+        j: usize,
+        faces: &[New; LANES],
+        count: usize,
+    ) {
+        let mut looks = [Look::Singly; LANES];
+        for (k, &New { face, at }) in faces.iter().enumerate() {
+            let (look, values, folds) = colored(self.scene, &self.sizes, face);
+            looks[k] = look;
+            batch.put(k, self.scene.mesh().triangle(face), values, folds, grid, (at as usize, j));
+        }
+        let (anchors, fastest) = batch.anchors::<TURN>(self.origin);
+        for k in 0..count {
+            let look = match looks[k] {
+                // A footprint is wide where the sum is above 1.
+                Look::Texture(texture) if fastest[k] < 0.999 => Look::Texture(texture | NARROW),
+                look => look,
+            };
+            self.prepared.push(Prepared { look, anchor: anchors[k] });
+        }
+    }
+
+    /// Anchors a face once more, at pixel (i, j).
+    #[inline(never)]
+    fn anchor_again<const TURN: bool>(
+        &mut self,
+        grid: &Grid,
+        face: u32,
+        number: u32,
+        i: usize,
+        j: usize,
+    ) -> bool {
+        let Self { scene, sizes, origin, large, prepared, .. } = self;
+        let Prepared { look, anchor } = &mut prepared[number as usize];
+        let folds = match look {
+            Look::Texture(tag) => sizes[(*tag & !NARROW) as usize].folds(),
+            Look::Corners => [Fold::NOT; 3],
+            Look::Flat(_) | Look::Singly => return false,
+        };
+        let attributes = large.get(face, || {
+            let (_, values, _) = colored(scene, sizes, face);
+            Attributes::new(&Patch::new(scene.mesh(), face, *origin), values)
+        });
+        anchor.set::<TURN>(attributes, folds, grid, i, j)
     }
 
     /// The first pass over the pixels `start` to `end` of row `j`, which all see `face`.
     #[inline(always)]
-    fn lay_out<const TURN: bool>(&mut self, grid: &Grid, face: u32, j: usize, start: usize, end: usize) {
-        let Self { lanes, scene, sizes, origin, faces, row, singly, max_taps, .. } = self;
-        let prepared = faces.get(face, || Face::new(scene, sizes, face, *origin));
-        let look = prepared.look;
+    fn lay_out<const TURN: bool>(
+        &mut self,
+        grid: &Grid,
+        face: u32,
+        number: u32,
+        j: usize,
+        start: usize,
+        end: usize,
+    ) {
+        let lanes = self.lanes;
+        let look = self.prepared[number as usize].look;
         if let Look::Flat(color) = look {
-            return self.flat(start, end, color);
+            return self.row.flat(start, end, color);
         }
         let mut i = start;
         while i < end {
-            let Some(anchor) = prepared.anchor(grid, sizes, i, j) else {
-                row.tags[i] = DONE;
-                row.colors[i] = singly.color(face, i, j);
+            if !self.prepared[number as usize].anchor.reaches(i, j)
+                && !self.anchor_again::<TURN>(grid, face, number, i, j)
+            {
+                self.row.tags[i] = DONE;
+                self.row.colors[i] = self.singly.color(face, i, j);
                 i += 1;
                 continue;
-            };
+            }
+            let Self { row, singly, prepared, .. } = self;
+            let anchor = &prepared[number as usize].anchor;
             let line = anchor.line::<TURN>(grid, j);
             let until = end.min((anchor.column + crate::anchor::REACH) as usize);
             while i < until {
                 let some = LANES.min(until - i);
                 let mut doubtful;
-                if let Look::Texture(texture) = look {
-                    let seen = line.at::<TURN, 2, L>(*lanes, i);
+                if let Look::Texture(tag) = look {
+                    let seen = line.at::<TURN, 2, L>(lanes, i);
                     doubtful = seen.doubtful;
-                    let limits = (*max_taps, sizes[texture as usize].last());
-                    let wide = row.footprints.store(*lanes, i, &seen, limits, some);
-                    let tags = &mut row.tags[i..i + LANES];
-                    tags.fill(texture);
-                    if wide != 0 {
-                        for (k, tag) in tags.iter_mut().enumerate() {
-                            *tag |= (wide >> k) << 31;
-                        }
+                    row.footprints.store(lanes, i, &seen, tag & NARROW != 0);
+                    if let Some(tags) = row.tags[i..].first_chunk_mut() {
+                        *tags = [tag; LANES];
                     }
                 } else {
-                    let seen = line.at::<TURN, 3, L>(*lanes, i);
+                    let seen = line.at::<TURN, 3, L>(lanes, i);
                     doubtful = seen.doubtful;
                     let mut channels = [[0; LANES]; 3];
                     for (value, channel) in seen.values.into_iter().zip(&mut channels) {
@@ -273,25 +334,19 @@ impl<L: Lanes> Painter<'_, L> {
     /// The second pass.
     #[inline(always)]
     fn fetch(&mut self, width: usize) {
-        let Self { lanes, sizes, row, .. } = self;
+        let Self { lanes, sizes, row, max_taps, .. } = self;
         row.tags[width..].fill(DONE);
         for i in (0..width).step_by(LANES) {
             let Some(tags) = row.tags[i..].first_chunk::<LANES>() else { return };
-            let first = tags[0];
-            if first < WIDE && lanes.equal(tags, first) == 0xFF {
-                let colors = sizes[first as usize].magnified(*lanes, &row.footprints, i);
-                if let Some(to) = row.colors[i..].as_flattened_mut().first_chunk_mut() {
-                    lanes.store_pixels(&colors, to);
-                }
-                continue;
-            }
             // Mostly one texture, once; the others' pixels are left alone.
             let mut left = !lanes.equal(tags, DONE) & 0xFF;
             while left != 0 {
-                let texture = tags[left.trailing_zeros() as usize % LANES] & !WIDE;
-                let wide = lanes.equal(tags, texture | WIDE);
-                let these = wide | lanes.equal(tags, texture);
-                let colors = sizes[texture as usize].filtered(*lanes, &row.footprints, i, these, wide);
+                let texture = tags[left.trailing_zeros() as usize % LANES] & !NARROW;
+                let narrow = lanes.equal(tags, texture | NARROW);
+                let maybe = if narrow == 0xFF { 0 } else { lanes.equal(tags, texture) };
+                let these = narrow | maybe;
+                let pixels = (these, maybe);
+                let colors = sizes[texture as usize].colors(*lanes, &row.footprints, i, pixels, *max_taps);
                 let to = row.colors[i..].as_flattened_mut().first_chunk_mut();
                 if let (0xFF, Some(to)) = (these, to) {
                     lanes.store_pixels(&colors, to);

@@ -4,110 +4,53 @@
 //! 32768ths of a pixel and colours in 128ths of a step of 8 bits. Before it is rounded to 8 bits a colour is off by less
 //! than 0.02 where one bilinear sample makes it, and less than 0.1 where sixteen do.
 
-use crate::anchor::{Fold, Seen};
+use crate::anchor::Seen;
+use crate::fold::Fold;
 use crate::lanes::{LANES, Lanes, eight, put};
 use s3d_geom::{Raster, Texture, Wrap};
 
-/// Where the pixels of a row are in their textures, and what to fetch there; in pixels of the full size. By column, and
-/// two more groups.
+/// Where the pixels of a row are in their textures, and the sides x and y of their footprints: what a column and what a
+/// row more add; in pixels of the full size. By column, and two more groups.
 #[derive(Debug, Default)]
 pub(crate) struct Footprints {
-    x: Vec<f32>,
-    y: Vec<f32>,
-    /// The size to sample: how often the full one is halved. This and the rest only where the footprint is wide.
-    level: Vec<f32>,
-    /// The weight of each sample there, and of each in the next size, in −32768ths.
-    weight: Vec<f32>,
-    next_weight: Vec<f32>,
-    /// How many samples.
-    count: Vec<f32>,
-    /// From one sample to the next.
-    step_x: Vec<f32>,
-    step_y: Vec<f32>,
+    at: [Vec<f32>; 2],
+    x: [Vec<f32>; 2],
+    y: [Vec<f32>; 2],
 }
 
 impl Footprints {
     pub(crate) fn new(len: usize) -> Self {
-        let zeros = || vec![0.0; len];
-        Self {
-            x: zeros(),
-            y: zeros(),
-            level: zeros(),
-            weight: zeros(),
-            next_weight: zeros(),
-            count: zeros(),
-            step_x: zeros(),
-            step_y: zeros(),
-        }
+        let two = || [vec![0.0; len], vec![0.0; len]];
+        Self { at: two(), x: two(), y: two() }
     }
 
-    /// The eight pixels from column `i` on, in a texture that can be halved `last` times; at most `most` samples. Bit k
-    /// of what comes back: whether the footprint of pixel k is wide, one of the first `some`.
+    /// The eight pixels from column `i` on; their sides only if they are not all `narrow`.
     #[inline(always)]
-    pub(crate) fn store<L: Lanes>(
-        &mut self,
-        l: L,
-        i: usize,
-        seen: &Seen<L::F, 2>,
-        (most, last): (u32, f32),
-        some: usize,
-    ) -> u32 {
-        put(l, &mut self.x, i, seen.values[0]);
-        put(l, &mut self.y, i, seen.values[1]);
-        // The sides x and y of the footprint; see `taps` and `axes` of texture.rs for what follows.
-        let ([xx, xy], [yx, yy]) = (seen.x, seen.y);
-        let a = l.add(l.mul(xx, xx), l.mul(yx, yx));
-        let c = l.add(l.mul(xy, xy), l.mul(yy, yy));
-        let sum = l.add(a, c);
-        let one = l.splat(1.0);
-        let maybe = l.greater(sum, one) & l.greater(l.splat(f32::INFINITY), sum) & ((1 << some) - 1);
-        if maybe == 0 {
-            return 0;
+    pub(crate) fn store<L: Lanes>(&mut self, l: L, i: usize, seen: &Seen<L::F, 2>, narrow: bool) {
+        for n in 0..2 {
+            put(l, &mut self.at[n], i, seen.values[n]);
         }
-        let half_of = l.splat(0.5);
-        let b = l.add(l.mul(xx, xy), l.mul(yx, yy));
-        let (mean, half) = (l.mul(half_of, sum), l.mul(half_of, l.sub(a, c)));
-        let root = l.sqrt(l.add(l.mul(half, half), l.mul(b, b)));
-        let long = l.sqrt(l.add(mean, root));
-        let axis_x = l.by_sign(half, b, l.add(root, half));
-        let axis_y = l.by_sign(half, l.sub(root, half), b);
-        // What makes the axis as long as that. A round footprint has no axis, and one sample.
-        let length_2 = l.add(l.mul(axis_x, axis_x), l.mul(axis_y, axis_y));
-        let stretch = l.sqrt(l.div(l.add(mean, root), l.max(length_2, l.splat(1e-30))));
-        let cross = l.sub(l.mul(xx, yy), l.mul(xy, yx));
-        let minor = l.div(l.max(cross, l.sub(l.splat(0.0), cross)), long);
-        let most = most.max(1) as f32;
-        let width = l.max(l.max(minor, l.mul(long, l.splat(1.0 / most))), one);
-        let most = l.splat(most);
-        let count = l.min(l.max(l.add(l.div(long, width), half_of), one), most);
-        let mut whole = [0; LANES];
-        l.store_int(count, &mut whole);
-        let mut counts = [0.0; LANES];
-        for k in 0..LANES {
-            counts[k] = whole[k] as f32;
+        if !narrow {
+            for n in 0..2 {
+                put(l, &mut self.x[n], i, seen.x[n]);
+                put(l, &mut self.y[n], i, seen.y[n]);
+            }
         }
-        let count = l.load(&counts);
-        let part = l.div(one, count);
-        let step = l.mul(stretch, part);
-        let (level, fraction) = l.log2(width);
-        // Beyond the last size there is the last.
-        let past = l.sub(level, l.splat(last));
-        let fraction = l.by_sign(past, fraction, l.splat(0.0));
-        let level = l.min(level, l.splat(last));
-        let share = l.mul(l.splat(-32768.0), part);
-        let next_weight = l.mul(share, fraction);
-        let wide = maybe & (l.greater(width, one) | l.greater(count, one));
-        if wide == 0 {
-            return 0;
-        }
-        put(l, &mut self.level, i, level);
-        put(l, &mut self.weight, i, l.sub(share, next_weight));
-        put(l, &mut self.next_weight, i, next_weight);
-        put(l, &mut self.count, i, count);
-        put(l, &mut self.step_x, i, l.mul(axis_x, step));
-        put(l, &mut self.step_y, i, l.mul(axis_y, step));
-        wide
     }
+}
+
+/// How eight footprints are sampled.
+struct Taps<F> {
+    /// The size to sample: how often the full one is halved.
+    level: F,
+    /// The weight of each sample there, and of each in the next size, in −32768ths.
+    weight: F,
+    next_weight: F,
+    /// How many samples.
+    count: F,
+    /// From one sample to the next.
+    step_x: F,
+    step_y: F,
 }
 
 /// A texture at one size.
@@ -158,56 +101,88 @@ impl<'a> Sizes<'a> {
     pub(crate) fn folds(&self) -> [Fold; 3] {
         let image = self.sizes[0].image;
         let fold = |wrap, size: u32| match wrap {
-            Wrap::Repeat => Fold::Repeat(f64::from(size)),
-            Wrap::Mirror => Fold::Mirror(f64::from(size)),
-            Wrap::Clamp => Fold::Not,
+            Wrap::Repeat => Fold::repeat(f64::from(size)),
+            Wrap::Mirror => Fold::mirror(f64::from(size)),
+            Wrap::Clamp => Fold::NOT,
         };
-        [fold(self.wrap[0], image.width()), fold(self.wrap[1], image.height()), Fold::Not]
+        [fold(self.wrap[0], image.width()), fold(self.wrap[1], image.height()), Fold::NOT]
     }
 
-    /// How many times the full size is halved.
-    pub(crate) fn last(&self) -> f32 {
-        (self.sizes.len() - 1) as f32
-    }
-
-    /// The colours of the eight pixels from `i` on, whose footprints are no wider than a pixel of the texture.
+    /// The colours of those of the eight pixels from `i` on that are among `these`, from at most `most` samples each. Of
+    /// these, those that are not among `maybe` have footprints that are not wide.
     #[inline(always)]
-    pub(crate) fn magnified<L: Lanes>(&self, l: L, footprints: &Footprints, i: usize) -> [u32; LANES] {
-        let half = l.splat(0.5);
-        let x = l.sub(eight(l, &footprints.x, i), half);
-        let y = l.sub(eight(l, &footprints.y, i), half);
-        l.pixels(self.bilinear(l, &self.sizes[0], x, y, 0xFF))
-    }
-
-    /// The colours of those of the eight pixels from `i` on that are among `these`; all that have a wide footprint are
-    /// among `wide`.
-    #[inline(always)]
-    pub(crate) fn filtered<L: Lanes>(
+    pub(crate) fn colors<L: Lanes>(
         &self,
         l: L,
         footprints: &Footprints,
         i: usize,
-        these: u32,
-        wide: u32,
+        (these, maybe): (u32, u32),
+        most: u32,
     ) -> [u32; LANES] {
-        let (x, y) = (eight(l, &footprints.x, i), eight(l, &footprints.y, i));
-        let (mut level, mut count) = (eight(l, &footprints.level, i), eight(l, &footprints.count, i));
-        let (mut weight, mut next) = (eight(l, &footprints.weight, i), eight(l, &footprints.next_weight, i));
-        let (mut step_x, mut step_y) = (eight(l, &footprints.step_x, i), eight(l, &footprints.step_y, i));
-        let (zero, half, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
-        if wide != 0xFF {
-            let mut sign = [0.0; LANES];
-            for (k, sign) in sign.iter_mut().enumerate() {
-                *sign = if wide >> k & 1 == 1 { 0.0 } else { -0.0 };
-            }
-            let sign = l.load(&sign);
-            level = l.by_sign(sign, zero, level);
-            count = l.by_sign(sign, one, count);
-            weight = l.by_sign(sign, l.splat(-32768.0), weight);
-            next = l.by_sign(sign, zero, next);
-            step_x = l.by_sign(sign, zero, step_x);
-            step_y = l.by_sign(sign, zero, step_y);
+        let pair = |of: &[Vec<f32>; 2]| [eight(l, &of[0], i), eight(l, &of[1], i)];
+        let [x, y] = pair(&footprints.at);
+        if maybe == 0 {
+            return self.magnified(l, x, y, these);
         }
+        let ([xx, xy], [yx, yy]) = (pair(&footprints.x), pair(&footprints.y));
+        let a = l.add(l.mul(xx, xx), l.mul(yx, yx));
+        let c = l.add(l.mul(xy, xy), l.mul(yy, yy));
+        let sum = l.add(a, c);
+        let maybe = l.greater(sum, l.splat(1.0)) & l.greater(l.splat(f32::INFINITY), sum) & maybe;
+        if maybe != 0 {
+            // See `taps` and `axes` of texture.rs for what follows.
+            let (zero, half_of, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
+            let b = l.add(l.mul(xx, xy), l.mul(yx, yy));
+            let (mean, half) = (l.mul(half_of, sum), l.mul(half_of, l.sub(a, c)));
+            let root = l.sqrt(l.add(l.mul(half, half), l.mul(b, b)));
+            let long = l.sqrt(l.add(mean, root));
+            let axis_x = l.by_sign(half, b, l.add(root, half));
+            let axis_y = l.by_sign(half, l.sub(root, half), b);
+            // What makes the axis as long as that. A round footprint has no axis, and one sample.
+            let length_2 = l.add(l.mul(axis_x, axis_x), l.mul(axis_y, axis_y));
+            let stretch = l.sqrt(l.div(l.add(mean, root), l.max(length_2, l.splat(1e-30))));
+            let cross = l.sub(l.mul(xx, yy), l.mul(xy, yx));
+            let minor = l.div(l.max(cross, l.sub(zero, cross)), long);
+            let most = most.max(1) as f32;
+            let width = l.max(l.max(minor, l.mul(long, l.splat(1.0 / most))), one);
+            let count = l.min(l.max(l.add(l.div(long, width), half_of), one), l.splat(most));
+            let count = l.whole(count);
+            let wide = maybe & (l.greater(width, one) | l.greater(count, one));
+            if wide != 0 {
+                let part = l.div(one, count);
+                let step = l.mul(stretch, part);
+                let (level, fraction) = l.log2(width);
+                // Beyond the last size there is the last.
+                let last = (self.sizes.len() - 1) as f32;
+                let past = l.sub(level, l.splat(last));
+                let fraction = l.by_sign(past, fraction, zero);
+                let level = l.min(level, l.splat(last));
+                let share = l.mul(l.splat(-32768.0), part);
+                let next_weight = l.mul(share, fraction);
+                let taps = Taps {
+                    level: l.pick(wide, level, zero),
+                    weight: l.pick(wide, l.sub(share, next_weight), l.splat(-32768.0)),
+                    next_weight: l.pick(wide, next_weight, zero),
+                    count: l.pick(wide, count, one),
+                    step_x: l.pick(wide, l.mul(axis_x, step), zero),
+                    step_y: l.pick(wide, l.mul(axis_y, step), zero),
+                };
+                return l.pixels(self.filtered(l, x, y, &taps, these));
+            }
+        }
+        self.magnified(l, x, y, these)
+    }
+
+    #[inline(always)]
+    fn magnified<L: Lanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
+        let half = l.splat(0.5);
+        l.pixels(self.bilinear(l, &self.sizes[0], l.sub(x, half), l.sub(y, half), these))
+    }
+
+    #[inline(always)]
+    fn filtered<L: Lanes>(&self, l: L, x: L::F, y: L::F, taps: &Taps<L::F>, these: u32) -> L::Mix {
+        let Taps { level, weight, next_weight, count, step_x, step_y } = *taps;
+        let (zero, half, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
         let middle = l.mul(half, l.sub(count, one));
         let (first_x, first_y) = (l.sub(x, l.mul(middle, step_x)), l.sub(y, l.mul(middle, step_y)));
 
@@ -218,7 +193,7 @@ impl<'a> Sizes<'a> {
         for of in &self.sizes {
             let here = left & !l.greater(level, at);
             // Weights of less than one part are none.
-            let weights = l.by_sign(l.sub(level, at), next, weight);
+            let weights = l.by_sign(l.sub(level, at), next_weight, weight);
             let mut active = here & l.greater(l.splat(-1.0), weights);
             let (scale_x, scale_y) = (l.splat(of.x), l.splat(of.y));
             let mut tap = zero;
@@ -236,7 +211,7 @@ impl<'a> Sizes<'a> {
             }
             at = l.add(at, one);
         }
-        l.pixels(mix)
+        mix
     }
 
     /// The bilinear colours at those of the places that are among `these` (0 is the middle of the first pixel).

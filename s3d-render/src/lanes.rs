@@ -36,6 +36,10 @@ pub(crate) trait Lanes: Copy {
     fn max(self, a: Self::F, b: Self::F) -> Self::F;
     /// `negative` where the sign bit of `of` is set, else `positive`.
     fn by_sign(self, of: Self::F, negative: Self::F, positive: Self::F) -> Self::F;
+    /// `yes` in the lanes of `these`, else `no`.
+    fn pick(self, these: u32, yes: Self::F, no: Self::F) -> Self::F;
+    /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
+    fn whole(self, values: Self::F) -> Self::F;
     /// Bit k: whether a > b in lane k.
     fn greater(self, a: Self::F, b: Self::F) -> u32;
     /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
@@ -68,6 +72,8 @@ pub(crate) trait Lanes: Copy {
     /// The lowest three bytes of each value, one after another.
     fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]);
 
+    /// Says that `thing` will be read soon.
+    fn expect<T>(self, thing: &T);
     /// Bit k: whether `values[k]` is `value`.
     fn equal(self, values: &[u32; LANES], value: u32) -> u32;
     /// Bit k: whether `values[k]` differs from `values[k − 1]`, for k from 1 on.
@@ -180,6 +186,14 @@ impl Lanes for Plain {
         each(|k| if of[k].is_sign_negative() { negative[k] } else { positive[k] })
     }
     #[inline(always)]
+    fn pick(self, these: u32, yes: Eight, no: Eight) -> Eight {
+        each(|k| if these >> k & 1 == 1 { yes[k] } else { no[k] })
+    }
+    #[inline(always)]
+    fn whole(self, values: Eight) -> Eight {
+        values.map(|v| v as i32 as f32)
+    }
+    #[inline(always)]
     fn greater(self, a: Eight, b: Eight) -> u32 {
         (0..LANES).map(|k| u32::from(a[k] > b[k]) << k).sum()
     }
@@ -276,6 +290,8 @@ impl Lanes for Plain {
         }
     }
 
+    #[inline(always)]
+    fn expect<T>(self, _: &T) {}
     #[inline(always)]
     fn equal(self, values: &[u32; LANES], value: u32) -> u32 {
         (0..LANES).map(|k| u32::from(values[k] == value) << k).sum()

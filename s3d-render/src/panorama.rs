@@ -483,11 +483,8 @@ impl Lens for Panorama<'_> {
         out_pitch: usize,
         single: impl Fn(u32, usize, usize) -> f64,
     ) {
-        let function = |drawn: &Drawn, row: usize| {
-            let [x, y, z] = drawn.inverse_t;
-            [z * self.row_sin[row], x * self.row_cos[row], y * self.row_cos[row]]
-        };
-        canvas.finish::<L, true>(l, out, out_pitch, (&self.cos, &self.sin), function, single);
+        let line = |row: usize| (self.row_cos[row], self.row_sin[row]);
+        canvas.finish::<L, true>(l, out, out_pitch, (&self.cos, &self.sin), line, single);
     }
 
     fn inverse_t(&self, drawn: &Drawn, column: usize, row: usize) -> f64 {

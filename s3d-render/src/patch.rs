@@ -16,8 +16,13 @@ pub(crate) struct Patch {
 
 impl Patch {
     pub(crate) fn new(mesh: &TriMesh, face: u32, origin: DVec3) -> Self {
-        let world = mesh.triangle(face).map(|p| p.as_dvec3());
-        let [a, b, c] = world.map(|p| p - origin);
+        Self::of(mesh.triangle(face).map(|p| p.as_dvec3()), origin)
+    }
+
+    /// Of the corners in the world.
+    #[inline(always)]
+    pub(crate) fn of(world: [DVec3; 3], origin: DVec3) -> Self {
+        let [a, b, c] = [world[0] - origin, world[1] - origin, world[2] - origin];
         // The sum itself would lose a sliver's normal.
         let whole = (world[1] - world[0]).cross(world[2] - world[0]);
         Self { weights: [b.cross(c), c.cross(a), a.cross(b)], whole }

@@ -328,12 +328,8 @@ impl<L: Lanes> Painter<'_, L> {
         let values = place.map(|p| l.mul(l.add(p, offset), scale));
         let seen = Seen { values, x: slope(along), y: slope(below), doubtful: 0 };
         let sizes = &self.sizes[face];
-        let wide = self.footprints.store(l, 0, &seen, (self.max_taps, sizes.last()), LANES) & these;
-        let colors = if these == 0xFF && wide == 0 {
-            sizes.magnified(l, &self.footprints, 0)
-        } else {
-            sizes.filtered(l, &self.footprints, 0, these, wide)
-        };
+        self.footprints.store(l, 0, &seen, false);
+        let colors = sizes.colors(l, &self.footprints, 0, (these, these), self.max_taps);
         let to = self.colors[i..].as_flattened_mut().first_chunk_mut();
         if let (0xFF, Some(to)) = (these, to) {
             l.store_pixels(&colors, to);

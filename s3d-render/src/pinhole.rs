@@ -479,11 +479,8 @@ impl Lens for Pinhole<'_> {
         out_pitch: usize,
         single: impl Fn(u32, usize, usize) -> f64,
     ) {
-        let function = |drawn: &Drawn, row: usize| {
-            let [at, across, down] = drawn.inverse_t;
-            [at + down * row as f64, across, 0.0]
-        };
-        canvas.finish::<L, false>(l, out, out_pitch, (&self.columns, &self.columns), function, single);
+        let line = |row: usize| (0.0, row as f64);
+        canvas.finish::<L, false>(l, out, out_pitch, (&self.columns, &self.columns), line, single);
     }
 
     fn inverse_t(&self, drawn: &Drawn, column: usize, row: usize) -> f64 {

@@ -4,6 +4,8 @@
 //! products and sums are rounded one by one, never fused.
 #![allow(unsafe_code)]
 
+use crate::canvas::Drawn;
+
 /// Pixels in a register (or in as many registers as it takes).
 pub(crate) const LANES: usize = 16;
 
@@ -38,27 +40,47 @@ pub(crate) trait Registers: Copy {
     /// Overwrites the lanes in `m`.
     fn store_u32(self, to: &mut [u32], m: Self::M, x: u32);
 
-    /// Depths and faces of [`LANES`] pixels. A pixel's slot stands for a face and a function at + across·u + bend·v of
-    /// the column, which is 1/t; `TURN` says whether it bends. Every set of instructions gives the same bits.
+    /// Depths and faces of [`LANES`] pixels that see the faces drawn in their slots. Every set of instructions gives the
+    /// same bits. Panics if there is no such slot.
     #[inline(always)]
     fn resolve<const TURN: bool>(
         self,
         slots: &[u32; LANES],
-        (u, v): (&[f64; LANES], &[f64; LANES]),
-        drawn: impl Fn(u32) -> ([f64; 3], u32),
+        line: &Line<'_>,
+        drawn: &[Drawn],
         faces: &mut [u32; LANES],
         depths: &mut [f32; LANES],
     ) {
         let mut values = [0.0; LANES];
         for k in 0..LANES {
-            let ([at, across, bend], face) = drawn(slots[k]);
+            let Drawn { inverse_t, face, .. } = drawn[slots[k] as usize];
             faces[k] = face;
-            values[k] = if TURN { at + across * u[k] + bend * v[k] } else { at + across * u[k] };
+            let [at, across, bend] = along::<TURN>(inverse_t, line);
+            values[k] = at + across * line.u[k];
+            if TURN {
+                values[k] += bend * line.v[k];
+            }
         }
         for k in 0..LANES {
             depths[k] = (1.0 / values[k]).abs() as f32;
         }
     }
+}
+
+/// [`LANES`] pixels of a row, as the functions of [`Drawn`] take them.
+#[derive(Clone, Copy)]
+pub(crate) struct Line<'a> {
+    pub(crate) u: &'a [f64; LANES],
+    pub(crate) v: &'a [f64; LANES],
+    /// See [`Drawn`].
+    pub(crate) level: f64,
+    pub(crate) rise: f64,
+}
+
+/// The function of a [`Drawn`] in a row: at + across·u + bend·v.
+#[inline(always)]
+fn along<const TURN: bool>([a, b, c]: [f64; 3], line: &Line<'_>) -> [f64; 3] {
+    if TURN { [c * line.rise, a * line.level, b * line.level] } else { [a + c * line.rise, b, 0.0] }
 }
 
 /// Work that is compiled for every set of instructions. `run` and what it calls in its loops are `#[inline(always)]`.
@@ -170,7 +192,8 @@ const SHORT: &str = "a slice as long as a register";
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{LANES, Registers, SHORT, Work};
+    use super::{LANES, Line, Registers, SHORT, Work, along};
+    use crate::canvas::Drawn;
     use std::arch::x86_64::*;
 
     #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -265,41 +288,87 @@ mod x86 {
         fn resolve<const TURN: bool>(
             self,
             slots: &[u32; LANES],
-            (u, v): (&[f64; LANES], &[f64; LANES]),
-            drawn: impl Fn(u32) -> ([f64; 3], u32),
+            line: &Line<'_>,
+            drawn: &[Drawn],
             faces: &mut [u32; LANES],
             depths: &mut [f32; LANES],
         ) {
-            // SAFETY: as above; all memory is that of references to arrays of sixteen.
+            // SAFETY: as above, and with AVX-512 there is AVX2.
             unsafe {
                 let all = _mm512_loadu_epi32(slots.as_ptr().cast());
-                let u = [0, 8].map(|k| _mm512_loadu_pd(u.as_ptr().add(k)));
-                let v = [0, 8].map(|k| _mm512_loadu_pd(v.as_ptr().add(k)));
-                let mut values = [_mm512_setzero_pd(); 2];
-                let mut seen = _mm512_setzero_si512();
-                // One face after another, on the pixels that see it.
-                let mut left = u16::MAX;
-                while left != 0 {
-                    let slot = slots[left.trailing_zeros() as usize];
-                    let these = _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(slot as i32));
-                    let ([at, across, bend], face) = drawn(slot);
-                    seen = _mm512_mask_set1_epi32(seen, these, face as i32);
-                    for (k, these) in [these as u8, (these >> 8) as u8].into_iter().enumerate() {
-                        let along = _mm512_mul_pd(_mm512_set1_pd(across), u[k]);
-                        let mut value = _mm512_add_pd(_mm512_set1_pd(at), along);
-                        if TURN {
-                            value = _mm512_add_pd(value, _mm512_mul_pd(_mm512_set1_pd(bend), v[k]));
-                        }
-                        values[k] = _mm512_mask_mov_pd(values[k], these, value);
-                    }
-                    left &= !these;
+                // Mostly there is one face, in a panorama one or two. (Perspective views with small faces are faster if
+                // their pairs count as a mixture.)
+                let these = _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(slots[0] as i32));
+                let other = if TURN { slots[these.trailing_ones() as usize % LANES] } else { slots[0] };
+                if these | _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(other as i32)) != u16::MAX {
+                    return resolve::<TURN>(slots, line, drawn, faces, depths);
                 }
+                let [one, other] = [slots[0], other].map(|slot| &drawn[slot as usize]);
+                let seen = _mm512_set1_epi32(other.face as i32);
+                let seen = _mm512_mask_set1_epi32(seen, these, one.face as i32);
                 _mm512_storeu_epi32(faces.as_mut_ptr().cast(), seen);
-                for (k, value) in values.into_iter().enumerate() {
+                let [one, other] = [one, other].map(|drawn| along::<TURN>(drawn.inverse_t, line));
+                for (k, these) in [(0, these as u8), (8, (these >> 8) as u8)] {
+                    let either = |n: usize| {
+                        _mm512_mask_blend_pd(these, _mm512_set1_pd(other[n]), _mm512_set1_pd(one[n]))
+                    };
+                    let u = _mm512_loadu_pd(line.u.as_ptr().add(k));
+                    let mut value = _mm512_add_pd(either(0), _mm512_mul_pd(either(1), u));
+                    if TURN {
+                        let v = _mm512_loadu_pd(line.v.as_ptr().add(k));
+                        value = _mm512_add_pd(value, _mm512_mul_pd(either(2), v));
+                    }
                     let depth = _mm512_abs_pd(_mm512_div_pd(_mm512_set1_pd(1.0), value));
-                    _mm256_storeu_ps(depths.as_mut_ptr().add(8 * k), _mm512_cvtpd_ps(depth));
+                    _mm256_storeu_ps(depths.as_mut_ptr().add(k), _mm512_cvtpd_ps(depth));
                 }
             }
+        }
+    }
+
+    /// [`Registers::resolve`], four pixels at a time.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn resolve<const TURN: bool>(
+        slots: &[u32; LANES],
+        line: &Line<'_>,
+        drawn: &[Drawn],
+        faces: &mut [u32; LANES],
+        depths: &mut [f32; LANES],
+    ) {
+        let (level, rise) = (_mm256_set1_pd(line.level), _mm256_set1_pd(line.rise));
+        // SAFETY: all loads and stores are within arrays of sixteen: k is 0, 4, 8 or 12.
+        let depths_of = |[a, b, c]: [__m256d; 3], k: usize, depths: &mut [f32; LANES]| unsafe {
+            let u = _mm256_loadu_pd(line.u.as_ptr().add(k));
+            let value = if TURN {
+                let v = _mm256_loadu_pd(line.v.as_ptr().add(k));
+                let along = _mm256_mul_pd(_mm256_mul_pd(a, level), u);
+                let bend = _mm256_mul_pd(_mm256_mul_pd(b, level), v);
+                _mm256_add_pd(_mm256_add_pd(_mm256_mul_pd(c, rise), along), bend)
+            } else {
+                _mm256_add_pd(_mm256_add_pd(a, _mm256_mul_pd(c, rise)), _mm256_mul_pd(b, u))
+            };
+            let depth = _mm256_andnot_pd(_mm256_set1_pd(-0.0), _mm256_div_pd(_mm256_set1_pd(1.0), value));
+            _mm_storeu_ps(depths.as_mut_ptr().add(k), _mm256_cvtpd_ps(depth));
+        };
+        for k in [0, 4, 8, 12] {
+            let [p, q, r, s] = [0, 1, 2, 3].map(|n| std::ptr::from_ref(&drawn[slots[k + n] as usize]));
+            // SAFETY: the halves of a `Drawn`: two numbers, and one with a face.
+            let half = |p: *const Drawn, r: *const Drawn, at: usize| unsafe {
+                let (p, r) = (p.cast::<f64>().add(at), r.cast::<f64>().add(at));
+                _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(_mm_loadu_pd(p)), _mm_loadu_pd(r))
+            };
+            let (pr, qs) = (half(p, r, 0), half(q, s, 0));
+            let (a, b) = (_mm256_unpacklo_pd(pr, qs), _mm256_unpackhi_pd(pr, qs));
+            let (pr, qs) = (half(p, r, 2), half(q, s, 2));
+            let c = _mm256_unpacklo_pd(pr, qs);
+            depths_of([a, b, c], k, depths);
+            let low = _mm256_shuffle_ps::<0b10_00_10_00>(
+                _mm256_castpd_ps(_mm256_unpackhi_pd(pr, qs)),
+                _mm256_setzero_ps(),
+            );
+            let four = _mm256_permute4x64_pd::<0b11_01_10_00>(_mm256_castps_pd(low));
+            // SAFETY: as above.
+            unsafe { _mm_storeu_pd(faces.as_mut_ptr().add(k).cast(), _mm256_castpd256_pd128(four)) };
         }
     }
 
@@ -393,6 +462,19 @@ mod x86 {
                     _mm256_storeu_ps(to, _mm256_blendv_ps(_mm256_loadu_ps(to), x, m));
                 }
             }
+        }
+
+        #[inline(always)]
+        fn resolve<const TURN: bool>(
+            self,
+            slots: &[u32; LANES],
+            line: &Line<'_>,
+            drawn: &[Drawn],
+            faces: &mut [u32; LANES],
+            depths: &mut [f32; LANES],
+        ) {
+            // SAFETY: as above.
+            unsafe { resolve::<TURN>(slots, line, drawn, faces, depths) }
         }
     }
 }
