@@ -113,7 +113,7 @@ impl Block {
         let line = 3 * sample * width;
         let bytes = line * BLOCK_LINES as usize;
         let balanced = Search {
-            candidates: Candidates::Steps,
+            candidates: Candidates::Nearby,
             // Even and odd bytes are apart, so a line comes back after half its bytes.
             line: line / 2,
             sample: sample / 2,
@@ -124,10 +124,7 @@ impl Block {
             patience: 8,
         };
         let search = match compression {
-            Compression::Fast => {
-                Search { candidates: Candidates::Quick, hash_bytes: 5, lazy: 0, patience: 5, ..balanced }
-            }
-            Compression::Balanced => balanced,
+            Compression::Fast | Compression::Balanced => balanced,
             Compression::Small => {
                 Search { candidates: Candidates::Many, lazy: 258, nice: 258, remember: 258, ..balanced }
             }

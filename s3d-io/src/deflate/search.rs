@@ -3,6 +3,7 @@
 use super::bits::BitWriter;
 use super::block::{LONGEST, Prices, Sequence, write_block};
 use super::finder::{Finder, WINDOW};
+use super::nearby::{Anywhere, Compare, Nearby};
 
 /// How hard and where repetitions are looked for.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +38,10 @@ pub(crate) enum Candidates {
     Steps,
     /// The sixteen last of its hash and those around a line back.
     Many,
+    /// Those at the 64 distances of [`Nearby`](super::nearby::Nearby), at every byte: for smooth surfaces.
+    Nearby,
+    /// The same, but repetitions of 12 bytes and more only: where bytes as they are cost little.
+    NearbyLong,
 }
 
 /// Symbols in a block.
@@ -46,9 +51,28 @@ const LONGEST_STEP: usize = 32;
 /// Bytes at the end in which nothing is looked for.
 const TAIL: usize = LONGEST + 8;
 
+/// With registers of 32 bytes.
+#[cfg(target_arch = "x86_64")]
+struct Avx2;
+
+#[cfg(target_arch = "x86_64")]
+impl Compare for Avx2 {
+    #[inline(always)]
+    fn equal(window: &[u8; 32], byte: u8) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: the window has the 32 bytes; only `run_x86_64_v3` asks, where the processor has AVX2.
+        #[allow(unsafe_code)]
+        unsafe {
+            let window = _mm256_loadu_si256(window.as_ptr().cast());
+            _mm256_movemask_epi8(_mm256_cmpeq_epi8(window, _mm256_set1_epi8(byte as i8))) as u32
+        }
+    }
+}
+
 /// One pass over data.
 pub(super) struct Parser<'a> {
     pub(super) finder: &'a mut Finder,
+    pub(super) nearby: &'a mut Nearby,
     pub(super) sequences: &'a mut Vec<Sequence>,
     pub(super) prices: &'a mut Prices,
     pub(super) search: Search,
@@ -69,19 +93,19 @@ impl Parser<'_> {
             #[allow(unsafe_code)]
             return unsafe { self.run_x86_64_v3(data, out) };
         }
-        self.run_anywhere(data, out);
+        self.run_as::<Anywhere>(data, out);
     }
 
     /// The same, compiled for counting zeros and for shifts in one instruction; integers give the same bits anywhere.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
     fn run_x86_64_v3(self, data: &[u8], out: &mut BitWriter<'_>) {
-        self.run_anywhere(data, out);
+        self.run_as::<Avx2>(data, out);
     }
 
     /// The same, compiled for any processor of the kind.
     #[inline(always)]
-    pub(super) fn run_anywhere(self, data: &[u8], out: &mut BitWriter<'_>) {
+    pub(super) fn run_as<C: Compare>(self, data: &[u8], out: &mut BitWriter<'_>) {
         let line = self.search.line;
         // Lines seen at an angle are shifted against each other by a sample or two.
         let s = self.search.sample;
@@ -95,7 +119,52 @@ impl Parser<'_> {
             Candidates::Quick => self.parse::<1, 1, 1, 1, 2>(data, above, out),
             Candidates::Steps => self.parse::<1, 4, 5, 1, 2>(data, around, out),
             Candidates::Many => self.parse::<4, 16, 5, 1, 1>(data, around, out),
+            Candidates::Nearby => self.parse_nearby::<C, 3>(data, out),
+            Candidates::NearbyLong => self.parse_nearby::<C, 12>(data, out),
         }
+    }
+
+    #[inline(always)]
+    fn parse_nearby<C: Compare, const SHORTEST: usize>(self, data: &[u8], out: &mut BitWriter<'_>) {
+        let Self { nearby, sequences, prices, boundary, .. } = self;
+        nearby.begin();
+        sequences.clear();
+        let (mut at, mut block, mut symbols, mut pending) = (0, 0, 0, 0);
+        while at < data.len() {
+            nearby.reach::<C>(data, at);
+            match nearby.longest::<SHORTEST>(at) {
+                None => at += 1,
+                Some(found) => {
+                    let here: &[u8; 8] = data[at..].first_chunk().unwrap_or(&[0; 8]);
+                    let mut saved = [0; 9];
+                    for i in 0..8 {
+                        saved[i + 1] = saved[i] + prices.literal(here[i]);
+                    }
+                    let saved = saved[found.length.min(8)] * found.length.max(8) as u32 / 8;
+                    if saved <= prices.repetition(found.length, found.distance) {
+                        at += 1;
+                    } else {
+                        sequences.push(Sequence {
+                            literals: (at - pending) as u32,
+                            length: found.length as u16,
+                            distance: found.distance as u16,
+                        });
+                        symbols += at - pending + 1;
+                        at += found.length;
+                        pending = at;
+                    }
+                }
+            }
+            let full = symbols + (at - pending) >= BLOCK || block < boundary && at >= boundary;
+            if full && at < data.len() {
+                sequences.push(Sequence { literals: (at - pending) as u32, length: 0, distance: 0 });
+                write_block(&data[block..at], sequences, false, prices, out);
+                sequences.clear();
+                (block, symbols, pending) = (at, 0, at);
+            }
+        }
+        sequences.push(Sequence { literals: (data.len() - pending) as u32, length: 0, distance: 0 });
+        write_block(&data[block..], sequences, true, prices, out);
     }
 
     /// `PIXEL` bytes belong together, after one byte at the start of each line if there is more than one. Every
@@ -113,7 +182,7 @@ impl Parser<'_> {
         rows: [usize; ROWS],
         out: &mut BitWriter<'_>,
     ) {
-        let Self { finder, sequences, prices, search, boundary } = self;
+        let Self { finder, sequences, prices, search, boundary, .. } = self;
         finder.begin::<WORDS>();
         sequences.clear();
         let end = data.len().saturating_sub(TAIL);
