@@ -18,7 +18,7 @@ mod huffman;
 mod nearby;
 mod search;
 
-pub(crate) use search::{Candidates, Search};
+pub(crate) use search::{Candidates, Search, Work, wide};
 
 use bits::BitWriter;
 use block::{Prices, Sequence};

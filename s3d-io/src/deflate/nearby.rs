@@ -19,6 +19,12 @@ const AHEAD: usize = LONGEST + 4;
 pub(super) trait Compare {
     /// Which bytes of `window` are `byte`: a bit for each, the first lowest.
     fn equal(window: &[u8; LANES], byte: u8) -> u32;
+
+    /// The same of two windows, those of the first in the upper half.
+    #[inline(always)]
+    fn equal_in_two(upper: &[u8; LANES], lower: &[u8; LANES], byte: u8) -> u64 {
+        u64::from(Self::equal(upper, byte)) << LANES | u64::from(Self::equal(lower, byte))
+    }
 }
 
 /// For any processor.
@@ -102,7 +108,7 @@ impl Nearby {
         }
         let near = |place: usize| data[place.max(LANES) - LANES..].array_windows();
         for ((word, near), &byte) in first.iter_mut().zip(near(whole)).zip(&data[whole..]) {
-            *word = u64::from(C::equal(near, byte)) << 32;
+            *word = u64::from(C::equal(near, byte)) << LANES;
         }
         if lines == self.end {
             return;
@@ -110,7 +116,7 @@ impl Nearby {
         let above = data[lines - self.line - LANES / 2..].array_windows();
         for (((word, near), above), &byte) in words.iter_mut().zip(near(lines)).zip(above).zip(&data[lines..])
         {
-            *word = u64::from(C::equal(near, byte)) << 32 | u64::from(C::equal(above, byte));
+            *word = C::equal_in_two(near, above, byte);
         }
     }
 

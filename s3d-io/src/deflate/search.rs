@@ -51,6 +51,29 @@ const LONGEST_STEP: usize = 32;
 /// Bytes at the end in which nothing is looked for.
 const TAIL: usize = LONGEST + 8;
 
+/// Loops over bytes. `run` is `#[inline(always)]`, so that it is compiled once for any processor and once for wide registers.
+pub(crate) trait Work {
+    type Output;
+    fn run(self) -> Self::Output;
+}
+
+/// Does `work` in registers of 32 bytes where the processor has them; integers give the same anywhere.
+pub(crate) fn wide<W: Work>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has what was just asked for.
+        #[allow(unsafe_code)]
+        return unsafe { wide_x86_64(work) };
+    }
+    work.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn wide_x86_64<W: Work>(work: W) -> W::Output {
+    work.run()
+}
+
 /// With registers of 32 bytes.
 #[cfg(target_arch = "x86_64")]
 struct Avx2;
@@ -65,6 +88,23 @@ impl Compare for Avx2 {
         unsafe {
             let window = _mm256_loadu_si256(window.as_ptr().cast());
             _mm256_movemask_epi8(_mm256_cmpeq_epi8(window, _mm256_set1_epi8(byte as i8))) as u32
+        }
+    }
+}
+
+/// With the same registers, and comparisons that answer with bits.
+#[cfg(target_arch = "x86_64")]
+struct Avx512;
+
+#[cfg(target_arch = "x86_64")]
+impl Compare for Avx512 {
+    #[inline(always)]
+    fn equal(window: &[u8; 32], byte: u8) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: the window has the 32 bytes; only `run_x86_64_v4` asks, where the processor has AVX-512BW and VL.
+        #[allow(unsafe_code)]
+        unsafe {
+            _mm256_cmpeq_epi8_mask(_mm256_loadu_si256(window.as_ptr().cast()), _mm256_set1_epi8(byte as i8))
         }
     }
 }
@@ -89,6 +129,13 @@ impl Parser<'_> {
             && std::arch::is_x86_feature_detected!("bmi2")
             && std::arch::is_x86_feature_detected!("lzcnt")
         {
+            if std::arch::is_x86_feature_detected!("avx512bw")
+                && std::arch::is_x86_feature_detected!("avx512vl")
+            {
+                // SAFETY: the processor has what was just asked for.
+                #[allow(unsafe_code)]
+                return unsafe { self.run_x86_64_v4(data, out) };
+            }
             // SAFETY: the processor has what was just asked for.
             #[allow(unsafe_code)]
             return unsafe { self.run_x86_64_v3(data, out) };
@@ -101,6 +148,13 @@ impl Parser<'_> {
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
     fn run_x86_64_v3(self, data: &[u8], out: &mut BitWriter<'_>) {
         self.run_as::<Avx2>(data, out);
+    }
+
+    /// The same, with registers of bits.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,avx512bw,avx512vl")]
+    fn run_x86_64_v4(self, data: &[u8], out: &mut BitWriter<'_>) {
+        self.run_as::<Avx512>(data, out);
     }
 
     /// The same, compiled for any processor of the kind.
