@@ -76,12 +76,14 @@ impl Nearby {
         (self.start, self.end) = (0, 0);
     }
 
-    /// Sees to it that the words of `at`, which does not go back, and of those ahead are there.
+    /// Sees to it that the words of `at`, which does not go back, and of those ahead are there; up to which place, it
+    /// returns.
     #[inline(always)]
-    pub(super) fn reach<C: Compare>(&mut self, data: &[u8], at: usize) {
+    pub(super) fn reach<C: Compare>(&mut self, data: &[u8], at: usize) -> usize {
         if at + AHEAD > self.end && self.end < data.len() {
             self.advance::<C>(data, at);
         }
+        if self.end < data.len() { self.end + 1 - AHEAD } else { self.end }
     }
 
     #[inline(always)]

@@ -48,6 +48,8 @@ pub(crate) enum Candidates {
 const BLOCK: usize = 16_000;
 /// Places passed over at most.
 const LONGEST_STEP: usize = 32;
+/// Bytes of which the price as literals is asked for; where there are short repetitions, longer ones pay anyway.
+const PRICED: usize = 8;
 /// Bytes at the end in which nothing is looked for.
 const TAIL: usize = LONGEST + 8;
 
@@ -178,47 +180,59 @@ impl Parser<'_> {
         }
     }
 
+    /// Repetitions of `SHORTEST` bytes and more are looked for at every byte that is in none.
     #[inline(always)]
     fn parse_nearby<C: Compare, const SHORTEST: usize>(self, data: &[u8], out: &mut BitWriter<'_>) {
         let Self { nearby, sequences, prices, boundary, .. } = self;
         nearby.begin();
         sequences.clear();
         let (mut at, mut block, mut symbols, mut pending) = (0, 0, 0, 0);
-        while at < data.len() {
-            nearby.reach::<C>(data, at);
-            match nearby.longest::<SHORTEST>(at) {
-                None => at += 1,
-                Some(found) => {
-                    let here: &[u8; 8] = data[at..].first_chunk().unwrap_or(&[0; 8]);
-                    let mut saved = [0; 9];
-                    for i in 0..8 {
-                        saved[i + 1] = saved[i] + prices.literal(here[i]);
+        // Where there is something else to do than to look for repetitions: the block may be full, or words are missing.
+        let mut pause = 0;
+        loop {
+            if at >= pause {
+                let full = symbols + (at - pending) >= BLOCK || block < boundary && at >= boundary;
+                if full || at >= data.len() {
+                    let last = at >= data.len();
+                    sequences.push(Sequence { literals: (at - pending) as u32, length: 0, distance: 0 });
+                    write_block(&data[block..at], sequences, last, prices, out);
+                    if last {
+                        return;
                     }
-                    let saved = saved[found.length.min(8)] * found.length.max(8) as u32 / 8;
-                    if saved <= prices.repetition(found.length, found.distance) {
-                        at += 1;
-                    } else {
-                        sequences.push(Sequence {
-                            literals: (at - pending) as u32,
-                            length: found.length as u16,
-                            distance: found.distance as u16,
-                        });
-                        symbols += at - pending + 1;
-                        at += found.length;
-                        pending = at;
-                    }
+                    sequences.clear();
+                    (block, symbols, pending) = (at, 0, at);
+                }
+                pause = nearby.reach::<C>(data, at).min(pending + BLOCK - symbols);
+                if block < boundary {
+                    pause = pause.min(boundary);
                 }
             }
-            let full = symbols + (at - pending) >= BLOCK || block < boundary && at >= boundary;
-            if full && at < data.len() {
-                sequences.push(Sequence { literals: (at - pending) as u32, length: 0, distance: 0 });
-                write_block(&data[block..at], sequences, false, prices, out);
-                sequences.clear();
-                (block, symbols, pending) = (at, 0, at);
+            let Some(found) = nearby.longest::<SHORTEST>(at) else {
+                at += 1;
+                continue;
+            };
+            if SHORTEST > PRICED || found.length <= PRICED {
+                let here: &[u8; PRICED] = data[at..].first_chunk().unwrap_or(&[0; PRICED]);
+                let mut saved = [0; PRICED + 1];
+                for (i, &byte) in here.iter().enumerate() {
+                    saved[i + 1] = saved[i] + prices.literal(byte);
+                }
+                let saved = saved[found.length.min(PRICED)] * found.length.max(PRICED) as u32 / PRICED as u32;
+                if saved <= prices.repetition(found.length, found.distance) {
+                    at += 1;
+                    continue;
+                }
             }
+            sequences.push(Sequence {
+                literals: (at - pending) as u32,
+                length: found.length as u16,
+                distance: found.distance as u16,
+            });
+            symbols += at - pending + 1;
+            at += found.length;
+            pending = at;
+            pause = pause.min(at + BLOCK.saturating_sub(symbols));
         }
-        sequences.push(Sequence { literals: (data.len() - pending) as u32, length: 0, distance: 0 });
-        write_block(&data[block..], sequences, true, prices, out);
     }
 
     /// `PIXEL` bytes belong together, after one byte at the start of each line if there is more than one. Every
