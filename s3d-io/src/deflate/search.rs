@@ -131,7 +131,8 @@ impl Parser<'_> {
             && std::arch::is_x86_feature_detected!("bmi2")
             && std::arch::is_x86_feature_detected!("lzcnt")
         {
-            if std::arch::is_x86_feature_detected!("avx512bw")
+            if matches!(self.search.candidates, Candidates::Nearby | Candidates::NearbyLong)
+                && std::arch::is_x86_feature_detected!("avx512bw")
                 && std::arch::is_x86_feature_detected!("avx512vl")
             {
                 // SAFETY: the processor has what was just asked for.
@@ -152,11 +153,14 @@ impl Parser<'_> {
         self.run_as::<Avx2>(data, out);
     }
 
-    /// The same, with registers of bits.
+    /// The same at fixed distances, with registers of bits.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,avx512bw,avx512vl")]
     fn run_x86_64_v4(self, data: &[u8], out: &mut BitWriter<'_>) {
-        self.run_as::<Avx512>(data, out);
+        match self.search.candidates {
+            Candidates::NearbyLong => self.parse_nearby::<Avx512, 12>(data, out),
+            _ => self.parse_nearby::<Avx512, 3>(data, out),
+        }
     }
 
     /// The same, compiled for any processor of the kind.
