@@ -3,7 +3,7 @@
 //! The `exr` crate writes the header and the table of blocks. Blocks are prepared and compressed here, since its own way
 //! takes several times as long: same format (ZIP, 16 lines a block), and no larger than OpenEXR makes it.
 
-use crate::deflate::{Candidates, Deflater, Search};
+use crate::deflate::{Candidates, Deflater, Search, Work, wide};
 use crate::{Compression, Error, Result, write_bytes};
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::block::writer::ChunksWriter;
@@ -99,6 +99,8 @@ fn encode<T: Copy, const N: usize>(
 
 /// Buffers for one block of lines, reused for all of an image.
 struct Block {
+    /// The samples of one channel in one line.
+    line: Vec<u8>,
     /// The samples' bytes, line by line and channel by channel: those at even places, then those at odd places.
     sorted: Vec<u8>,
     /// The same, each but the first as the difference to the one before.
@@ -113,7 +115,7 @@ impl Block {
         let line = 3 * sample * width;
         let bytes = line * BLOCK_LINES as usize;
         let balanced = Search {
-            candidates: Candidates::Steps,
+            candidates: Candidates::Nearby,
             // Even and odd bytes are apart, so a line comes back after half its bytes.
             line: line / 2,
             sample: sample / 2,
@@ -124,15 +126,13 @@ impl Block {
             patience: 8,
         };
         let search = match compression {
-            Compression::Fast => {
-                Search { candidates: Candidates::Quick, hash_bytes: 5, lazy: 0, patience: 5, ..balanced }
-            }
-            Compression::Balanced => balanced,
+            Compression::Fast | Compression::Balanced => balanced,
             Compression::Small => {
                 Search { candidates: Candidates::Many, lazy: 258, nice: 258, remember: 258, ..balanced }
             }
         };
         Self {
+            line: vec![0; sample * width],
             sorted: vec![0; bytes],
             prepared: vec![0; bytes],
             compressed: Vec::new(),
@@ -148,26 +148,9 @@ impl Block {
         to_le_bytes: impl Fn(T) -> [u8; N],
     ) -> Vec<u8> {
         let n = 3 * N * pixels.len();
-        let sorted = &mut self.sorted[..n];
-        let (even, odd) = sorted.split_at_mut(n / 2);
-        let half = N / 2 * width;
-        let mut lines = even.chunks_exact_mut(half).zip(odd.chunks_exact_mut(half));
-        for row in pixels.chunks_exact(width) {
-            for (channel, (even, odd)) in [2, 1, 0].into_iter().zip(&mut lines) {
-                let places = even.chunks_exact_mut(N / 2).zip(odd.chunks_exact_mut(N / 2));
-                for (pixel, (even, odd)) in row.iter().zip(places) {
-                    for (i, [low, high]) in to_le_bytes(pixel[channel]).as_chunks().0.iter().enumerate() {
-                        (even[i], odd[i]) = (*low, *high);
-                    }
-                }
-            }
-        }
-        let prepared = &mut self.prepared[..n];
-        prepared[0] = sorted[0];
-        for ((difference, byte), before) in prepared[1..].iter_mut().zip(&sorted[1..]).zip(&sorted[..n - 1]) {
-            // 128 stands for no difference.
-            *difference = byte.wrapping_sub(*before).wrapping_add(128);
-        }
+        let (sorted, prepared) = (&mut self.sorted[..n], &mut self.prepared[..n]);
+        wide(Prepare { pixels, width, to_le_bytes, line: &mut self.line, sorted, prepared });
+        let (sorted, prepared) = (&*sorted, &*prepared);
 
         self.compressed.clear();
         self.deflater.zlib(prepared, n / 2, &mut self.compressed);
@@ -177,6 +160,45 @@ impl Block {
         // A block that is not shorter is stored as it is.
         let (even, odd) = sorted.split_at(n / 2);
         even.iter().zip(odd).flat_map(|(even, odd)| [*even, *odd]).collect()
+    }
+}
+
+/// Sorts the samples' bytes and takes their differences.
+struct Prepare<'a, T, F> {
+    pixels: &'a [[T; 3]],
+    width: usize,
+    to_le_bytes: F,
+    line: &'a mut [u8],
+    sorted: &'a mut [u8],
+    prepared: &'a mut [u8],
+}
+
+impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Work for Prepare<'_, T, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { pixels, width, to_le_bytes, line, sorted, prepared } = self;
+        let half = N / 2 * width;
+        let (even, odd) = sorted.split_at_mut(sorted.len() / 2);
+        let mut lines = even.chunks_exact_mut(half).zip(odd.chunks_exact_mut(half));
+        let line = &mut line[..N * width];
+        for row in pixels.chunks_exact(width) {
+            for (channel, (even, odd)) in [2, 1, 0].into_iter().zip(&mut lines) {
+                // First one channel, then one byte in two: simple steps that are done for many at once.
+                for (sample, pixel) in line.as_chunks_mut::<N>().0.iter_mut().zip(row) {
+                    *sample = to_le_bytes(pixel[channel]);
+                }
+                let pairs = line.as_chunks::<2>().0;
+                even.iter_mut().zip(pairs).for_each(|(even, pair)| *even = pair[0]);
+                odd.iter_mut().zip(pairs).for_each(|(odd, pair)| *odd = pair[1]);
+            }
+        }
+        prepared[0] = sorted[0];
+        for ((difference, byte), before) in prepared[1..].iter_mut().zip(&sorted[1..]).zip(&*sorted) {
+            // 128 stands for no difference.
+            *difference = byte.wrapping_sub(*before).wrapping_add(128);
+        }
     }
 }
 

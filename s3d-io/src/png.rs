@@ -42,16 +42,16 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
     let patches = Search { candidates: Candidates::Patches, hash_bytes: 6, nice: 64, patience: 8, ..quick };
     let labels = Search { candidates: Candidates::Steps, hash_bytes: 4, lazy: 258, nice: 258, ..patches };
     let many = Search { candidates: Candidates::Many, remember: 258, ..labels };
+    let nearby = Search { candidates: Candidates::Nearby, ..quick };
     let plans: &[(Filter, Search)] = match (content, compression) {
         (Content::Photo, Compression::Fast) => &[(Filter::Paeth, Search { nice: 16, patience: 3, ..quick })],
         (Content::Photo, Compression::Balanced) => &[(Filter::Paeth, quick)],
         (Content::Photo, Compression::Small) => &[(Filter::Paeth, many)],
-        (Content::Normals, Compression::Fast) => &[(Filter::Up, Search { patience: 5, ..patches })],
-        (Content::Normals, Compression::Balanced) => {
-            &[(Filter::Up, Search { lazy: 16, remember: 64, ..patches })]
-        }
+        (Content::Normals, Compression::Fast | Compression::Balanced) => &[(Filter::None, nearby)],
         // Large patches repeat best as they are, small ones as differences.
-        (Content::Normals, Compression::Small) => &[(Filter::Paeth, many), (Filter::None, many)],
+        (Content::Normals, Compression::Small) => {
+            &[(Filter::Paeth, many), (Filter::None, many), (Filter::None, nearby)]
+        }
         (Content::Labels, Compression::Fast) => &[(Filter::Up, patches)],
         (Content::Labels, Compression::Balanced) => &[(Filter::Up, labels)],
         (Content::Labels, Compression::Small) => &[(Filter::Up, many), (Filter::Paeth, many)],
@@ -67,7 +67,7 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
 pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
     let bytes: Vec<u8> = image.pixels().iter().flat_map(|v| v.to_be_bytes()).collect();
     let balanced = Search {
-        candidates: Candidates::Steps,
+        candidates: Candidates::NearbyLong,
         line: 2 * image.width() as usize + 1,
         sample: 2,
         hash_bytes: 8,
@@ -76,15 +76,16 @@ pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
         remember: 258,
         patience: 8,
     };
-    let search = match compression {
-        Compression::Fast => {
-            Search { candidates: Candidates::Quick, lazy: 0, nice: 32, remember: 32, patience: 6, ..balanced }
-        }
-        Compression::Balanced => balanced,
-        Compression::Small => Search { candidates: Candidates::Many, hash_bytes: 6, lazy: 258, ..balanced },
+    let quick =
+        Search { candidates: Candidates::Quick, lazy: 0, nice: 32, remember: 32, patience: 6, ..balanced };
+    let many = Search { candidates: Candidates::Many, hash_bytes: 6, lazy: 258, ..balanced };
+    let plans: &[(Filter, Search)] = match compression {
+        Compression::Fast => &[(Filter::Paeth, quick)],
+        Compression::Balanced => &[(Filter::Paeth, balanced)],
+        Compression::Small => &[(Filter::Paeth, many), (Filter::Paeth, balanced)],
     };
     let format = Format { color: ColorType::Grayscale, depth: BitDepth::Sixteen, pixel: 2 };
-    encode(image.width(), image.height(), format, &bytes, &[(Filter::Paeth, search)])
+    encode(image.width(), image.height(), format, &bytes, plans)
 }
 
 struct Format {
@@ -96,6 +97,8 @@ struct Format {
 
 /// Lines of which it is tried out how they compress best, and from how many they are.
 const SAMPLE: (usize, usize) = (16, 128);
+/// Up to so many lines, it is tried out on all.
+const FEW_LINES: usize = 512;
 
 /// The file, made by the plan that does best on a sample of the lines.
 fn encode(width: u32, height: u32, format: Format, bytes: &[u8], plans: &[(Filter, Search)]) -> Vec<u8> {
@@ -109,7 +112,8 @@ fn encode(width: u32, height: u32, format: Format, bytes: &[u8], plans: &[(Filte
     let plan = if let [plan] = plans {
         *plan
     } else {
-        let bands = bytes.chunks(SAMPLE.1 * line).map(|band| &band[..band.len().min(SAMPLE.0 * line)]);
+        let of = if bytes.len() <= FEW_LINES * line { SAMPLE.0 } else { SAMPLE.1 };
+        let bands = bytes.chunks(of * line).map(|band| &band[..band.len().min(SAMPLE.0 * line)]);
         let sample = bands.collect::<Vec<_>>().concat();
         *plans.iter().min_by_key(|plan| compress(&sample, **plan).len()).expect("there is a plan")
     };

@@ -1,5 +1,7 @@
 //! PNG's filters: each byte less what its neighbours let expect. Source: the PNG specification, section 9.
 
+use crate::deflate::{Work, wide};
+
 /// What a byte is expected to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Filter {
@@ -18,28 +20,46 @@ pub(crate) enum Filter {
 /// If `bytes` are not whole lines.
 pub(crate) fn filtered(bytes: &[u8], line: usize, pixel: usize, filter: Filter) -> Vec<u8> {
     assert!(line > 0 && bytes.len().is_multiple_of(line), "{} bytes in lines of {line}", bytes.len());
-    let mut out = vec![0; bytes.len() / line * (line + 1)];
-    let first = vec![0; line];
-    let mut above = first.as_slice();
-    for (here, out) in bytes.chunks_exact(line).zip(out.chunks_exact_mut(line + 1)) {
-        let (number, out) = out.split_first_mut().expect("a line is not empty");
-        *number = match filter {
-            Filter::None => 0,
-            Filter::Up => 2,
-            Filter::Paeth => 4,
-        };
-        match filter {
-            Filter::None => out.copy_from_slice(here),
-            Filter::Up => {
-                out.iter_mut().zip(here.iter().zip(above)).for_each(|(o, (h, a))| *o = h.wrapping_sub(*a))
-            }
-            Filter::Paeth => paeth(here, above, pixel, out),
-        }
-        above = here;
-    }
-    out
+    wide(Filtering { bytes, line, pixel, filter })
 }
 
+struct Filtering<'a> {
+    bytes: &'a [u8],
+    line: usize,
+    pixel: usize,
+    filter: Filter,
+}
+
+impl Work for Filtering<'_> {
+    type Output = Vec<u8>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<u8> {
+        let Self { bytes, line, pixel, filter } = self;
+        let mut out = vec![0; bytes.len() / line * (line + 1)];
+        let first = vec![0; line];
+        let mut above = first.as_slice();
+        for (here, out) in bytes.chunks_exact(line).zip(out.chunks_exact_mut(line + 1)) {
+            let (number, out) = out.split_first_mut().expect("a line is not empty");
+            *number = match filter {
+                Filter::None => 0,
+                Filter::Up => 2,
+                Filter::Paeth => 4,
+            };
+            match filter {
+                Filter::None => out.copy_from_slice(here),
+                Filter::Up => {
+                    out.iter_mut().zip(here.iter().zip(above)).for_each(|(o, (h, a))| *o = h.wrapping_sub(*a))
+                }
+                Filter::Paeth => paeth(here, above, pixel, out),
+            }
+            above = here;
+        }
+        out
+    }
+}
+
+#[inline(always)]
 fn paeth(here: &[u8], above: &[u8], pixel: usize, out: &mut [u8]) {
     // Without a left neighbour, the one above is the nearest.
     for ((o, h), a) in out.iter_mut().zip(here).zip(above).take(pixel) {

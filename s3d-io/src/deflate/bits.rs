@@ -15,6 +15,15 @@ impl<'a> BitWriter<'a> {
         Self { out, end, bits: 0, count: 0 }
     }
 
+    /// Has `write` add bits to a writer that nothing else refers to, so that it is kept in registers.
+    #[inline(always)]
+    pub(super) fn quickly(&mut self, write: impl FnOnce(&mut BitWriter<'_>)) {
+        let mut own = BitWriter { out: &mut *self.out, ..*self };
+        write(&mut own);
+        let BitWriter { end, bits, count, .. } = own;
+        (self.end, self.bits, self.count) = (end, bits, count);
+    }
+
     /// Makes room for `bits` more bits.
     pub(super) fn reserve(&mut self, bits: u64) {
         let len = self.end + (bits / 8) as usize + 24;

@@ -15,13 +15,15 @@ mod bits;
 mod block;
 mod finder;
 mod huffman;
+mod nearby;
 mod search;
 
-pub(crate) use search::{Candidates, Search};
+pub(crate) use search::{Candidates, Search, Work, wide};
 
 use bits::BitWriter;
 use block::{Prices, Sequence};
 use finder::Finder;
+use nearby::Nearby;
 use search::Parser;
 
 /// Compresses one stream after the other. What one of them taught about costs serves the next, so a stream's bytes
@@ -29,6 +31,7 @@ use search::Parser;
 pub(crate) struct Deflater {
     search: Search,
     finder: Finder,
+    nearby: Nearby,
     prices: Option<Prices>,
     sequences: Vec<Sequence>,
 }
@@ -39,7 +42,8 @@ const SAMPLE: usize = 1 << 15;
 impl Deflater {
     pub(crate) fn new(search: Search) -> Self {
         let finder = Finder::new(search.hash_bytes, search.nice);
-        Self { search, finder, prices: None, sequences: Vec::new() }
+        let nearby = Nearby::new(search.line);
+        Self { search, finder, nearby, prices: None, sequences: Vec::new() }
     }
 
     /// Appends `data` to `out`, compressed. At `boundary` (0 for none) begins data of another kind.
@@ -47,9 +51,9 @@ impl Deflater {
         // Deflate, 32 KiB back; no claim about the effort; divisible by 31.
         out.extend([0x78, 0x01]);
         let prices = self.prices.get_or_insert_with(|| Prices::guess(&data[..data.len().min(SAMPLE)]));
-        let (finder, sequences) = (&mut self.finder, &mut self.sequences);
+        let (finder, nearby, sequences) = (&mut self.finder, &mut self.nearby, &mut self.sequences);
         let mut bits = BitWriter::new(out);
-        Parser { finder, sequences, prices, search: self.search, boundary }.run(data, &mut bits);
+        Parser { finder, nearby, sequences, prices, search: self.search, boundary }.run(data, &mut bits);
         bits.finish();
         out.extend(simd_adler32::adler32(&data).to_be_bytes());
     }
@@ -73,10 +77,19 @@ mod tests {
 
     /// One of each kind, from the quickest to the most thorough.
     fn searches() -> Vec<Search> {
-        use Candidates::{Many, Noise, Patches, Quick, Steps};
+        use Candidates::{Many, Nearby, NearbyLong, Noise, Patches, Quick, Steps};
         let with = |candidates, hash_bytes| Search { candidates, hash_bytes, ..SEARCH };
         let short = Search { lazy: 0, nice: 8, remember: 0, patience: 0, ..SEARCH };
-        vec![with(Noise, 8), with(Patches, 6), with(Quick, 5), short, with(Steps, 4), with(Many, 4)]
+        vec![
+            with(Noise, 8),
+            with(Patches, 6),
+            with(Quick, 5),
+            short,
+            with(Steps, 4),
+            with(Many, 4),
+            with(Nearby, 4),
+            with(NearbyLong, 4),
+        ]
     }
 
     /// Another implementation reads it, to the last byte.
@@ -169,12 +182,13 @@ mod tests {
             let mut bits = BitWriter::new(&mut plain);
             Parser {
                 finder: &mut Finder::new(search.hash_bytes, search.nice),
+                nearby: &mut Nearby::new(search.line),
                 sequences: &mut Vec::new(),
                 prices: &mut Prices::guess(&data[..SAMPLE]),
                 search,
                 boundary: 40_000,
             }
-            .run_anywhere(&data, &mut bits);
+            .run_as::<nearby::Anywhere>(&data, &mut bits);
             bits.finish();
             assert_eq!(plain, chosen[..chosen.len() - 4], "{search:?}");
         }

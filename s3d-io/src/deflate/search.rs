@@ -3,6 +3,7 @@
 use super::bits::BitWriter;
 use super::block::{LONGEST, Prices, Sequence, write_block};
 use super::finder::{Finder, WINDOW};
+use super::nearby::{Anywhere, Compare, Nearby};
 
 /// How hard and where repetitions are looked for.
 #[derive(Clone, Copy, Debug)]
@@ -37,18 +38,83 @@ pub(crate) enum Candidates {
     Steps,
     /// The sixteen last of its hash and those around a line back.
     Many,
+    /// Those at the 64 distances of [`Nearby`](super::nearby::Nearby), at every byte: for smooth surfaces.
+    Nearby,
+    /// The same, but repetitions of 12 bytes and more only: where bytes as they are cost little.
+    NearbyLong,
 }
 
 /// Symbols in a block.
 const BLOCK: usize = 16_000;
 /// Places passed over at most.
 const LONGEST_STEP: usize = 32;
+/// Bytes of which the price as literals is asked for; where there are short repetitions, longer ones pay anyway.
+const PRICED: usize = 8;
 /// Bytes at the end in which nothing is looked for.
 const TAIL: usize = LONGEST + 8;
+
+/// Loops over bytes. `run` is `#[inline(always)]`, so that it is compiled once for any processor and once for wide registers.
+pub(crate) trait Work {
+    type Output;
+    fn run(self) -> Self::Output;
+}
+
+/// Does `work` in registers of 32 bytes where the processor has them; integers give the same anywhere.
+pub(crate) fn wide<W: Work>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has what was just asked for.
+        #[allow(unsafe_code)]
+        return unsafe { wide_x86_64(work) };
+    }
+    work.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn wide_x86_64<W: Work>(work: W) -> W::Output {
+    work.run()
+}
+
+/// With registers of 32 bytes.
+#[cfg(target_arch = "x86_64")]
+struct Avx2;
+
+#[cfg(target_arch = "x86_64")]
+impl Compare for Avx2 {
+    #[inline(always)]
+    fn equal(window: &[u8; 32], byte: u8) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: the window has the 32 bytes; only `run_x86_64_v3` asks, where the processor has AVX2.
+        #[allow(unsafe_code)]
+        unsafe {
+            let window = _mm256_loadu_si256(window.as_ptr().cast());
+            _mm256_movemask_epi8(_mm256_cmpeq_epi8(window, _mm256_set1_epi8(byte as i8))) as u32
+        }
+    }
+}
+
+/// With the same registers, and comparisons that answer with bits.
+#[cfg(target_arch = "x86_64")]
+struct Avx512;
+
+#[cfg(target_arch = "x86_64")]
+impl Compare for Avx512 {
+    #[inline(always)]
+    fn equal(window: &[u8; 32], byte: u8) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: the window has the 32 bytes; only `run_x86_64_v4` asks, where the processor has AVX-512BW and VL.
+        #[allow(unsafe_code)]
+        unsafe {
+            _mm256_cmpeq_epi8_mask(_mm256_loadu_si256(window.as_ptr().cast()), _mm256_set1_epi8(byte as i8))
+        }
+    }
+}
 
 /// One pass over data.
 pub(super) struct Parser<'a> {
     pub(super) finder: &'a mut Finder,
+    pub(super) nearby: &'a mut Nearby,
     pub(super) sequences: &'a mut Vec<Sequence>,
     pub(super) prices: &'a mut Prices,
     pub(super) search: Search,
@@ -65,23 +131,41 @@ impl Parser<'_> {
             && std::arch::is_x86_feature_detected!("bmi2")
             && std::arch::is_x86_feature_detected!("lzcnt")
         {
+            if matches!(self.search.candidates, Candidates::Nearby | Candidates::NearbyLong)
+                && std::arch::is_x86_feature_detected!("avx512bw")
+                && std::arch::is_x86_feature_detected!("avx512vl")
+            {
+                // SAFETY: the processor has what was just asked for.
+                #[allow(unsafe_code)]
+                return unsafe { self.run_x86_64_v4(data, out) };
+            }
             // SAFETY: the processor has what was just asked for.
             #[allow(unsafe_code)]
             return unsafe { self.run_x86_64_v3(data, out) };
         }
-        self.run_anywhere(data, out);
+        self.run_as::<Anywhere>(data, out);
     }
 
     /// The same, compiled for counting zeros and for shifts in one instruction; integers give the same bits anywhere.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
     fn run_x86_64_v3(self, data: &[u8], out: &mut BitWriter<'_>) {
-        self.run_anywhere(data, out);
+        self.run_as::<Avx2>(data, out);
+    }
+
+    /// The same at fixed distances, with registers of bits.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,avx512bw,avx512vl")]
+    fn run_x86_64_v4(self, data: &[u8], out: &mut BitWriter<'_>) {
+        match self.search.candidates {
+            Candidates::NearbyLong => self.parse_nearby::<Avx512, 12>(data, out),
+            _ => self.parse_nearby::<Avx512, 3>(data, out),
+        }
     }
 
     /// The same, compiled for any processor of the kind.
     #[inline(always)]
-    pub(super) fn run_anywhere(self, data: &[u8], out: &mut BitWriter<'_>) {
+    pub(super) fn run_as<C: Compare>(self, data: &[u8], out: &mut BitWriter<'_>) {
         let line = self.search.line;
         // Lines seen at an angle are shifted against each other by a sample or two.
         let s = self.search.sample;
@@ -95,6 +179,63 @@ impl Parser<'_> {
             Candidates::Quick => self.parse::<1, 1, 1, 1, 2>(data, above, out),
             Candidates::Steps => self.parse::<1, 4, 5, 1, 2>(data, around, out),
             Candidates::Many => self.parse::<4, 16, 5, 1, 1>(data, around, out),
+            Candidates::Nearby => self.parse_nearby::<C, 3>(data, out),
+            Candidates::NearbyLong => self.parse_nearby::<C, 12>(data, out),
+        }
+    }
+
+    /// Repetitions of `SHORTEST` bytes and more are looked for at every byte that is in none.
+    #[inline(always)]
+    fn parse_nearby<C: Compare, const SHORTEST: usize>(self, data: &[u8], out: &mut BitWriter<'_>) {
+        let Self { nearby, sequences, prices, boundary, .. } = self;
+        nearby.begin();
+        sequences.clear();
+        let (mut at, mut block, mut symbols, mut pending) = (0, 0, 0, 0);
+        // Where there is something else to do than to look for repetitions: the block may be full, or words are missing.
+        let mut pause = 0;
+        loop {
+            if at >= pause {
+                let full = symbols + (at - pending) >= BLOCK || block < boundary && at >= boundary;
+                if full || at >= data.len() {
+                    let last = at >= data.len();
+                    sequences.push(Sequence { literals: (at - pending) as u32, length: 0, distance: 0 });
+                    write_block(&data[block..at], sequences, last, prices, out);
+                    if last {
+                        return;
+                    }
+                    sequences.clear();
+                    (block, symbols, pending) = (at, 0, at);
+                }
+                pause = nearby.reach::<C>(data, at).min(pending + BLOCK - symbols);
+                if block < boundary {
+                    pause = pause.min(boundary);
+                }
+            }
+            let Some(found) = nearby.longest::<SHORTEST>(at) else {
+                at += 1;
+                continue;
+            };
+            if SHORTEST > PRICED || found.length <= PRICED {
+                let here: &[u8; PRICED] = data[at..].first_chunk().unwrap_or(&[0; PRICED]);
+                let mut saved = [0; PRICED + 1];
+                for (i, &byte) in here.iter().enumerate() {
+                    saved[i + 1] = saved[i] + prices.literal(byte);
+                }
+                let saved = saved[found.length.min(PRICED)] * found.length.max(PRICED) as u32 / PRICED as u32;
+                if saved <= prices.repetition(found.length, found.distance) {
+                    at += 1;
+                    continue;
+                }
+            }
+            sequences.push(Sequence {
+                literals: (at - pending) as u32,
+                length: found.length as u16,
+                distance: found.distance as u16,
+            });
+            symbols += at - pending + 1;
+            at += found.length;
+            pending = at;
+            pause = pause.min(at + BLOCK.saturating_sub(symbols));
         }
     }
 
@@ -113,7 +254,7 @@ impl Parser<'_> {
         rows: [usize; ROWS],
         out: &mut BitWriter<'_>,
     ) {
-        let Self { finder, sequences, prices, search, boundary } = self;
+        let Self { finder, sequences, prices, search, boundary, .. } = self;
         finder.begin::<WORDS>();
         sequences.clear();
         let end = data.len().saturating_sub(TAIL);

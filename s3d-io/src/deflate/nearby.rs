@@ -1,0 +1,224 @@
+//! Repetitions at fixed distances: the 32 smallest, and 32 around a line.
+//!
+//! What filters leave of a smooth image repeats there and hardly anywhere else: steps that come at nearly equal intervals
+//! along a line, and again nearly below in the next. So nothing is remembered and no hash is asked; every byte is
+//! compared with those at all 64 distances, which takes two comparisons of registers. The answers are the bits of a word,
+//! and a repetition lasts as long as the words of the places that follow have a bit in common.
+
+use super::block::LONGEST;
+use super::finder::WINDOW;
+
+/// Distances of each of the two kinds.
+pub(super) const LANES: usize = 32;
+/// Places of which the words are there at a time: as much as the fastest memory takes.
+const TILE: usize = 2048;
+/// Words that a repetition's end may ask for.
+const AHEAD: usize = LONGEST + 4;
+
+/// Compares bytes, in registers where the processor has wide ones.
+pub(super) trait Compare {
+    /// Which bytes of `window` are `byte`: a bit for each, the first lowest.
+    fn equal(window: &[u8; LANES], byte: u8) -> u32;
+
+    /// The same of two windows, those of the first in the upper half.
+    #[inline(always)]
+    fn equal_in_two(upper: &[u8; LANES], lower: &[u8; LANES], byte: u8) -> u64 {
+        u64::from(Self::equal(upper, byte)) << LANES | u64::from(Self::equal(lower, byte))
+    }
+}
+
+/// For any processor.
+pub(super) struct Anywhere;
+
+impl Compare for Anywhere {
+    #[inline(always)]
+    fn equal(window: &[u8; LANES], byte: u8) -> u32 {
+        const LOW: u64 = 0x7f7f_7f7f_7f7f_7f7f;
+        let expected = u64::from(byte) * 0x0101_0101_0101_0101;
+        let mut equal = 0;
+        for (i, eight) in window.as_chunks::<8>().0.iter().enumerate() {
+            let differ = u64::from_le_bytes(*eight) ^ expected;
+            // The highest bit of each byte that is 0, then all of them side by side.
+            let zeros = !((differ & LOW) + LOW | differ | LOW);
+            equal |= ((zeros >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * i);
+        }
+        equal as u32
+    }
+}
+
+/// Which distances agree at the places of a piece of the data.
+pub(super) struct Nearby {
+    /// The highest bit for the distance 1, the 32nd for 32; the lower 32 for those from a line less 15 to a line and 16.
+    words: Vec<u64>,
+    /// The first place of `words`.
+    start: usize,
+    /// Behind the last place that was compared.
+    end: usize,
+    line: usize,
+}
+
+/// A repetition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Repeated {
+    /// 3 to [`LONGEST`].
+    pub(super) length: usize,
+    pub(super) distance: usize,
+}
+
+impl Nearby {
+    /// For lines of `line` bytes.
+    pub(super) fn new(line: usize) -> Self {
+        Self { words: vec![0; TILE + AHEAD], start: 0, end: 0, line }
+    }
+
+    /// Begins with other data.
+    pub(super) fn begin(&mut self) {
+        (self.start, self.end) = (0, 0);
+    }
+
+    /// Sees to it that the words of `at`, which does not go back, and of those ahead are there; up to which place, it
+    /// returns.
+    #[inline(always)]
+    pub(super) fn reach<C: Compare>(&mut self, data: &[u8], at: usize) -> usize {
+        if at + AHEAD > self.end && self.end < data.len() {
+            self.advance::<C>(data, at);
+        }
+        if self.end < data.len() { self.end + 1 - AHEAD } else { self.end }
+    }
+
+    #[inline(always)]
+    fn advance<C: Compare>(&mut self, data: &[u8], at: usize) {
+        let known = self.end.saturating_sub(at);
+        self.words.copy_within(at - self.start..at - self.start + known, 0);
+        (self.start, self.end) = (at, data.len().min(at + TILE));
+        let from = at + known;
+        let (words, behind) = self.words[known..].split_at_mut(self.end - from);
+        // Nothing is there behind the end.
+        behind.fill(0);
+
+        // The first bytes have less before them, and the first line none above it.
+        let lines = if self.line < LANES || self.line + LANES / 2 > WINDOW {
+            self.end
+        } else {
+            (self.line + LANES / 2).clamp(from, self.end)
+        };
+        let (first, words) = words.split_at_mut(lines - from);
+        let whole = LANES.clamp(from, lines);
+        let (fewer, first) = first.split_at_mut(whole - from);
+        for (place, word) in (from..whole).zip(fewer) {
+            *word = (1..=place).fold(0, |w, d| w | u64::from(data[place] == data[place - d]) << (64 - d));
+        }
+        let near = |place: usize| data[place.max(LANES) - LANES..].array_windows();
+        for ((word, near), &byte) in first.iter_mut().zip(near(whole)).zip(&data[whole..]) {
+            *word = u64::from(C::equal(near, byte)) << LANES;
+        }
+        if lines == self.end {
+            return;
+        }
+        let above = data[lines - self.line - LANES / 2..].array_windows();
+        for (((word, near), above), &byte) in words.iter_mut().zip(near(lines)).zip(above).zip(&data[lines..])
+        {
+            *word = C::equal_in_two(near, above, byte);
+        }
+    }
+
+    /// The longest repetition at `at`, which has been [`reach`](Self::reach)ed: the nearest of several.
+    #[inline(always)]
+    pub(super) fn longest<const SHORTEST: usize>(&self, at: usize) -> Option<Repeated> {
+        let words: &[u64; AHEAD] = self.words[at - self.start..].first_chunk().expect("they were reached");
+        let mut agree = words[..SHORTEST].iter().fold(u64::MAX, |agree, word| agree & word);
+        if agree == 0 {
+            return None;
+        }
+        let mut length = SHORTEST;
+        while length + 4 <= LONGEST {
+            let next = agree & words[length] & words[length + 1] & words[length + 2] & words[length + 3];
+            if next == 0 {
+                break;
+            }
+            (agree, length) = (next, length + 4);
+        }
+        // Up to three more, without a branch.
+        let next = if length + 2 <= LONGEST { agree & words[length] & words[length + 1] } else { 0 };
+        (agree, length) = if next != 0 { (next, length + 2) } else { (agree, length) };
+        let next = if length < LONGEST { agree & words[length] } else { 0 };
+        (agree, length) = if next != 0 { (next, length + 1) } else { (agree, length) };
+        let lane = agree.leading_zeros() as usize;
+        let distance = if lane < LANES { lane + 1 } else { self.line + lane + 1 - LANES - LANES / 2 };
+        Some(Repeated { length, distance })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The plain way: every distance, byte by byte.
+    fn reference(data: &[u8], at: usize, line: usize, shortest: usize) -> Option<Repeated> {
+        let reaches = (LANES..=WINDOW - LANES / 2).contains(&line) && at >= line + LANES / 2;
+        let above = (line.saturating_sub(LANES / 2 - 1)..=line + LANES / 2).filter(|_| reaches);
+        let mut best = None;
+        for distance in (1..=LANES.min(at)).chain(above) {
+            let here = data[at..].iter().take(LONGEST);
+            let length = here.zip(&data[at - distance..]).take_while(|(a, b)| a == b).count();
+            if length >= shortest && best.is_none_or(|b: Repeated| length > b.length) {
+                best = Some(Repeated { length, distance });
+            }
+        }
+        best
+    }
+
+    fn check<C: Compare, const SHORTEST: usize>(data: &[u8], line: usize, steps: &[usize]) {
+        let mut nearby = Nearby::new(line);
+        // A second time, with what the first left.
+        for _ in 0..2 {
+            nearby.begin();
+            let (mut at, mut steps) = (0, steps.iter().cycle());
+            while at < data.len() {
+                nearby.reach::<C>(data, at);
+                assert_eq!(nearby.longest::<SHORTEST>(at), reference(data, at, line, SHORTEST), "at {at}");
+                at += steps.next().unwrap();
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn the_longest_of_all_distances_is_found(
+            pieces in proptest::collection::vec((1usize..600, 1usize..200, 0u8..9), 1..24),
+            line in prop_oneof![1usize..200, Just(WINDOW), Just(WINDOW - LANES / 2)],
+            steps in proptest::collection::vec(1usize..259, 1..20),
+        ) {
+            // Pieces that repeat at any distance, each ended by another byte.
+            let mut data: Vec<u8> = vec![];
+            for (len, back, byte) in pieces {
+                for _ in 0..len {
+                    data.push(data.len().checked_sub(back).map_or(byte, |from| data[from]));
+                }
+                data.push(byte);
+            }
+            check::<Anywhere, 3>(&data, line, &steps);
+            check::<Anywhere, 12>(&data, line, &steps);
+        }
+
+        #[test]
+        fn equal_bytes_are_found_in_a_window(window in proptest::array::uniform32(0u8..4), low in 0u8..4) {
+            for (window, byte) in [(window, low), (window.map(|b| b.wrapping_sub(2)), low.wrapping_sub(2))] {
+                let expected = (0..LANES).fold(0, |w, i| w | u32::from(window[i] == byte) << i);
+                prop_assert_eq!(Anywhere::equal(&window, byte), expected);
+            }
+        }
+    }
+
+    #[test]
+    fn the_longest_repetition_reaches_over_pieces_of_the_data() {
+        let data = vec![5; 3 * TILE];
+        check::<Anywhere, 3>(&data, 1000, &[258]);
+        let mut nearby = Nearby::new(1000);
+        nearby.reach::<Anywhere>(&data, 0);
+        nearby.reach::<Anywhere>(&data, TILE - 100);
+        assert_eq!(nearby.longest::<3>(TILE - 100), Some(Repeated { length: LONGEST, distance: 1 }));
+    }
+}
