@@ -64,7 +64,7 @@ fn the_mesh_is_what_tobj_reads() {
     let scene = read_scene(&path).unwrap();
     let mesh = read_mesh(&scene.mesh[0], UpAxis::Z).unwrap().mesh;
     let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
-    let (models, _) = tobj::load_obj(&scene.mesh, &options).unwrap();
+    let (models, _) = tobj::load_obj(&scene.mesh[0], &options).unwrap();
     let corner = |m: &tobj::Mesh, i: usize| {
         let (v, t) = (m.indices[i] as usize * 3, m.texcoord_indices[i] as usize * 2);
         ([m.positions[v], m.positions[v + 1], m.positions[v + 2]], [m.texcoords[t], m.texcoords[t + 1]])
