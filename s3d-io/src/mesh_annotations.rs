@@ -200,9 +200,9 @@ mod tests {
     fn files_named_after_rooms_are_rooms() {
         let dir = tempfile::tempdir().unwrap();
         let paths = ["office_1.ply", "WC_2.ply"].map(|name| dir.path().join(name));
-        for path in &paths {
-            fs::write(path, strip(&[(2, 1), (5, 1)], false)).unwrap();
-        }
+        // The other lies a metre higher.
+        fs::write(&paths[0], strip(&[(2, 1), (5, 1)], false)).unwrap();
+        fs::write(&paths[1], strip(&[(2, 1), (5, 1)], false).replace(" 0\n", " 1\n")).unwrap();
         let file = read_meshes(&paths, UpAxis::Z).unwrap();
         let found = Annotations::of_mesh(&file, &AnnotationOptions { room: None, ..options() }).unwrap();
         let rooms: Vec<String> = found.rooms.iter().map(|r| r.room.to_string()).collect();
