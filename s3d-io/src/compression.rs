@@ -6,12 +6,12 @@ use std::str::FromStr;
 /// How much time the compression of images may take. What is read back is the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Compression {
-    /// A fifth faster than [`Balanced`](Self::Balanced), and up to a fifth larger.
+    /// As [`Balanced`](Self::Balanced), but less time for colours and labels, which get up to a quarter larger.
     Fast,
-    /// About as small as libpng's level 6 and OpenEXR's ZIP, in about a sixth of their time.
+    /// About as small as libpng's level 6 and OpenEXR's ZIP, in about a tenth of their time.
     #[default]
     Balanced,
-    /// Up to a quarter smaller than [`Balanced`](Self::Balanced), and four to six times slower.
+    /// Up to an eighth smaller than [`Balanced`](Self::Balanced), and five to seven times slower.
     Small,
 }
 

@@ -76,12 +76,9 @@ pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
         remember: 258,
         patience: 8,
     };
-    let quick =
-        Search { candidates: Candidates::Quick, lazy: 0, nice: 32, remember: 32, patience: 6, ..balanced };
     let many = Search { candidates: Candidates::Many, hash_bytes: 6, lazy: 258, ..balanced };
     let plans: &[(Filter, Search)] = match compression {
-        Compression::Fast => &[(Filter::Paeth, quick)],
-        Compression::Balanced => &[(Filter::Paeth, balanced)],
+        Compression::Fast | Compression::Balanced => &[(Filter::Paeth, balanced)],
         Compression::Small => &[(Filter::Paeth, many), (Filter::Paeth, balanced)],
     };
     let format = Format { color: ColorType::Grayscale, depth: BitDepth::Sixteen, pixel: 2 };
@@ -96,7 +93,7 @@ struct Format {
 }
 
 /// Lines of which it is tried out how they compress best, and from how many they are.
-const SAMPLE: (usize, usize) = (16, 128);
+const SAMPLE: (usize, usize) = (32, 128);
 /// Up to so many lines, it is tried out on all.
 const FEW_LINES: usize = 512;
 

@@ -3,8 +3,9 @@
 //! General libraries are at a loss with what filters leave of an image: they look for repetitions one after the other
 //! in chains, and the processor guesses wrong at each. Here, as they do,
 //!
-//! - a repetition is looked for at the last places that have the same hash ([`finder`]), and at those around a line back,
-//!   where there are more in images than anywhere; all are compared at once, without a branch;
+//! - a repetition is looked for at fixed distances, the smallest and those around a line back, where nearly all are if an
+//!   image is smooth ([`nearby`]); or, in other images, at the last places that have the same hash ([`finder`]). All are
+//!   compared at once, without a branch;
 //! - it is taken if it costs fewer bits than what it stands for, by the code of the block before ([`block::Prices`]), so
 //!   that noise is written as literals;
 //! - each block has its own code ([`huffman`]), and is written in the shortest of the format's three ways ([`block`]).
@@ -77,13 +78,12 @@ mod tests {
 
     /// One of each kind, from the quickest to the most thorough.
     fn searches() -> Vec<Search> {
-        use Candidates::{Many, Nearby, NearbyLong, Noise, Patches, Quick, Steps};
+        use Candidates::{Many, Nearby, NearbyLong, Noise, Patches, Steps};
         let with = |candidates, hash_bytes| Search { candidates, hash_bytes, ..SEARCH };
         let short = Search { lazy: 0, nice: 8, remember: 0, patience: 0, ..SEARCH };
         vec![
             with(Noise, 8),
             with(Patches, 6),
-            with(Quick, 5),
             short,
             with(Steps, 4),
             with(Many, 4),

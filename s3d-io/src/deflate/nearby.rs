@@ -39,7 +39,7 @@ impl Compare for Anywhere {
         for (i, eight) in window.as_chunks::<8>().0.iter().enumerate() {
             let differ = u64::from_le_bytes(*eight) ^ expected;
             // The highest bit of each byte that is 0, then all of them side by side.
-            let zeros = !((differ & LOW) + LOW | differ | LOW);
+            let zeros = !(((differ & LOW) + LOW) | differ | LOW);
             equal |= ((zeros >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * i);
         }
         equal as u32
@@ -68,11 +68,12 @@ pub(super) struct Repeated {
 impl Nearby {
     /// For lines of `line` bytes.
     pub(super) fn new(line: usize) -> Self {
-        Self { words: vec![0; TILE + AHEAD], start: 0, end: 0, line }
+        Self { words: Vec::new(), start: 0, end: 0, line }
     }
 
     /// Begins with other data.
     pub(super) fn begin(&mut self) {
+        self.words.resize(TILE + AHEAD, 0);
         (self.start, self.end) = (0, 0);
     }
 
@@ -217,6 +218,7 @@ mod tests {
         let data = vec![5; 3 * TILE];
         check::<Anywhere, 3>(&data, 1000, &[258]);
         let mut nearby = Nearby::new(1000);
+        nearby.begin();
         nearby.reach::<Anywhere>(&data, 0);
         nearby.reach::<Anywhere>(&data, TILE - 100);
         assert_eq!(nearby.longest::<3>(TILE - 100), Some(Repeated { length: LONGEST, distance: 1 }));

@@ -32,13 +32,12 @@ pub(crate) enum Candidates {
     Noise,
     /// The two last of its hash and that a line back, at every third byte: for pixels of three bytes in patches.
     Patches,
-    /// The last of its hash and that a line back, at every second byte.
-    Quick,
     /// The four last of its hash and those around a line back, at every second byte: for steps along lines.
     Steps,
     /// The sixteen last of its hash and those around a line back.
     Many,
-    /// Those at the 64 distances of [`Nearby`](super::nearby::Nearby), at every byte: for smooth surfaces.
+    /// Those at the 64 distances of [`Nearby`](super::nearby::Nearby), at every byte: for smooth surfaces. Of all else, only
+    /// the line matters to it.
     Nearby,
     /// The same, but repetitions of 12 bytes and more only: where bytes as they are cost little.
     NearbyLong,
@@ -176,7 +175,6 @@ impl Parser<'_> {
         match self.search.candidates {
             Candidates::Noise => self.parse::<1, 1, 0, 3, 3>(data, [], out),
             Candidates::Patches => self.parse::<1, 2, 1, 3, 3>(data, above, out),
-            Candidates::Quick => self.parse::<1, 1, 1, 1, 2>(data, above, out),
             Candidates::Steps => self.parse::<1, 4, 5, 1, 2>(data, around, out),
             Candidates::Many => self.parse::<4, 16, 5, 1, 1>(data, around, out),
             Candidates::Nearby => self.parse_nearby::<C, 3>(data, out),
@@ -329,5 +327,30 @@ impl Parser<'_> {
         }
         sequences.push(Sequence { literals: (data.len() - pending) as u32, length: 0, distance: 0 });
         write_block(&data[block..], sequences, true, prices, out);
+    }
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::arch::is_x86_feature_detected as has;
+
+    proptest! {
+        #[test]
+        fn all_processors_compare_alike(
+            upper in proptest::array::uniform32(0u8..4),
+            lower in proptest::array::uniform32(0u8..4),
+            byte in 0u8..4,
+        ) {
+            let expected = Anywhere::equal_in_two(&upper, &lower, byte);
+            prop_assert_eq!(expected >> 32, u64::from(Anywhere::equal(&upper, byte)));
+            if has!("avx2") {
+                prop_assert_eq!(Avx2::equal_in_two(&upper, &lower, byte), expected);
+            }
+            if has!("avx512bw") && has!("avx512vl") {
+                prop_assert_eq!(Avx512::equal_in_two(&upper, &lower, byte), expected);
+            }
+        }
     }
 }
