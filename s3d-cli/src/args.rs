@@ -114,7 +114,7 @@ pub(crate) struct DemoOptions {
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
-    /// Scene files, one an area.
+    /// Scene files, or folders of published areas (area_3), one an area.
     #[arg(required = true, value_name = "SCENE.toml")]
     pub(crate) scenes: Vec<PathBuf>,
     /// The data set's folder [default: SCENE_2d3ds beside the first scene]
@@ -347,7 +347,7 @@ pub(crate) struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// The scene file.
+    /// The scene file, or the folder of a published area.
     #[arg(value_name = "SCENE.toml")]
     pub(crate) scene: PathBuf,
     /// Show the scan locations that export would put on the floor with this option.

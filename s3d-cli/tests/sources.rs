@@ -151,3 +151,93 @@ fn labels_of_the_mesh_give_what_the_tree_gives() {
         s3d_fails(&["export", text(&toml), "-o", text(&dir.path().join("x"))], 1, &["part_", "3"]);
     }
 }
+
+#[test]
+fn columns_of_a_cloud_are_not_looked_for_in_the_mesh() {
+    let dir = tempfile::tempdir().unwrap();
+    let scan = dir.path().join("scan");
+    write_scan(&scan, 3);
+    write_ply(&scan, 1);
+    let mut cloud = String::from(
+        "ply\nformat ascii 1.0\nelement vertex 400\nproperty float x\nproperty float y\nproperty float z\n\
+         property int what\nend_header\n",
+    );
+    for i in 0..400 {
+        cloud += &format!("{} {} 0 5\n", 0.2 * f64::from(i % 20), 0.15 * f64::from(i / 20));
+    }
+    fs::write(scan.join("cloud.ply"), cloud).unwrap();
+    let toml = scan.join("cloud.toml");
+    let table = "area = 3\n[mesh]\npath = \"part_0.ply\"\n[annotations]\npath = \"cloud.ply\"\nclass = \"what\"\nroom = \"office_1\"\n\
+                 classes = { 5 = \"floor\" }\n[cameras]\npath = \"cameras.csv\"\n";
+    fs::write(&toml, table).unwrap();
+    let out = dir.path().join("out");
+    export(&toml, &out, &["--views", "0"]);
+    assert!(
+        fs::read_to_string(out.join("area_3/3d/semantic.obj")).unwrap().contains("usemtl floor_1_office_1_3")
+    );
+}
+
+#[test]
+fn pictures_need_the_locations_where_they_were_taken() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = write_scan(&dir.path().join("scan"), 3);
+    let toml = fs::read_to_string(&scene).unwrap();
+    fs::create_dir(dir.path().join("scan/skybox")).unwrap();
+    fs::write(&scene, format!("rgb = \"skybox\"\n{toml}")).unwrap();
+    let out = dir.path().join("out");
+    s3d_fails(
+        &["export", text(&scene), "-o", text(&out), "--place-cameras", "2"],
+        1,
+        &["scene.toml", "skybox", "placed"],
+    );
+    assert!(!out.exists());
+}
+
+#[test]
+fn vertices_of_a_scannet_scan_vote_for_all_faces_around_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let scan = dir.path().join("scan");
+    write_scan(&scan, 3);
+    let mesh = write_ply(&scan, 1).remove(0);
+    let folder = scan.join("scene0000_00");
+    fs::create_dir(&folder).unwrap();
+    let ply = folder.join("scene0000_00_vh_clean_2.ply");
+    fs::rename(mesh, &ply).unwrap();
+    // A segment a quad; objects as the annotators call them, walls one by one.
+    let names = ["floor", "ceiling", "wall", "wall", "wall", "wall", "table"];
+    let segments: Vec<String> = (0..4 * names.len()).map(|v| (v / 4).to_string()).collect();
+    let segs = format!("{{\"sceneId\": \"scene0000_00\", \"segIndices\": [{}]}}", segments.join(", "));
+    fs::write(folder.join("scene0000_00_vh_clean_2.0.010000.segs.json"), segs).unwrap();
+    let groups: Vec<String> = names
+        .iter()
+        .enumerate()
+        .map(|(i, name)| {
+            format!("{{\"id\": {i}, \"objectId\": {i}, \"segments\": [{i}], \"label\": \"{name}\"}}")
+        })
+        .collect();
+    let aggregation =
+        format!("{{\"sceneId\": \"scannet.scene0000_00\", \"segGroups\": [{}]}}", groups.join(", "));
+    fs::write(folder.join("scene0000_00.aggregation.json"), aggregation).unwrap();
+    let toml = scan.join("scannet.toml");
+    let table = "area = 3\n[mesh]\npath = \"scene0000_00/scene0000_00_vh_clean_2.ply\"\nup = \"z\"\n[annotations]\n\
+                 path = \"scene0000_00\"\nroom = \"office_1\"\n[cameras]\npath = \"cameras.csv\"\n";
+    fs::write(&toml, table).unwrap();
+    let out = dir.path().join("out");
+    export(&toml, &out, &["--views", "0"]);
+    let semantic = fs::read_to_string(out.join("area_3/3d/semantic.obj")).unwrap();
+    let (mut material, mut of_faces) = (String::new(), Vec::new());
+    for line in semantic.lines() {
+        if let Some(name) = line.strip_prefix("usemtl ") {
+            material = name.split('_').next().unwrap().to_owned();
+        }
+        if line.starts_with("f ") {
+            of_faces.push(material.clone());
+        }
+    }
+    let expected: Vec<&str> = names.iter().flat_map(|name| [*name; 2]).collect();
+    of_faces.sort();
+    let mut sorted = expected.clone();
+    sorted.sort_unstable();
+    assert_eq!(of_faces, sorted);
+    assert!(semantic.contains("usemtl wall_4_office_1_3"));
+}

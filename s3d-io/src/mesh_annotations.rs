@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 impl Annotations {
     /// The annotations that came with a mesh: see [`MeshLabels`].
     ///
-    /// Numbers of faces or vertices mean what [`AnnotationOptions::classes`] says; the room is that which the mesh's file is
-    /// named after (`office_3.ply`), or [`AnnotationOptions::room`]. Faces of one room, class and object number are one
+    /// Numbers of faces or vertices mean what [`AnnotationOptions::classes`] says; the room is
+    /// [`AnnotationOptions::room`], or else that which the mesh's file is named after (`office_3.ply`). Faces of one room, class and object number are one
     /// instance; those without a number are one a class and room. Without such numbers the names of materials are labels
     /// (`chair_3_office_5_1`), if those of half the faces are. Points are those of [`Annotations::from_face_labels`].
     ///
@@ -69,10 +69,10 @@ fn of_numbers(
     let mut groups: Vec<Group> = Vec::new();
     let mut index: HashMap<(u32, u32, i64), u32> = HashMap::new();
     let mut group_of = vec![NO_INDEX; classes.len()];
-    for source in 0..file.sources.len() {
-        let path = &file.sources[source].path;
+    for (source, cloud) in clouds.iter().enumerate() {
+        let path = cloud.path();
         let too_many = || Error::format(path, "has too many different classes: is the column another one?");
-        let room = match clouds[source].room().or(options.room) {
+        let room = match options.room.or(cloud.room()) {
             Some(room) => room_tags.name(&room.to_string()).ok_or_else(too_many)?,
             None => NO_TAG,
         };

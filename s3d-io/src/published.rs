@@ -1,13 +1,12 @@
 //! A published area (or one of our exports) as input: its mesh, its labels, its scan locations.
 
-use crate::cameras::FARTHEST_M;
 use crate::mesh_file::{MeshFile, UpAxis, read_mesh};
-use crate::{Annotations, Error, ImageName, Result, ScanLocation, is_valid_uuid, read_json};
-use s3d_geom::glam::{DAffine3, DVec3, Vec3};
-use s3d_geom::{NO_INDEX, Pose, TriMesh, rotation_from_euler};
-use s3d_label::{Label, Room, parse_name};
-use serde::Deserialize;
-use std::collections::{BTreeMap, HashMap};
+use crate::pose_locations::{self, PublishedLocation};
+use crate::{Annotations, Error, Result};
+use s3d_geom::glam::{DAffine3, Vec3};
+use s3d_geom::{NO_INDEX, TriMesh};
+use s3d_label::{Label, parse_name};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// How [`PublishedArea::open_with`] takes a folder.
@@ -62,15 +61,6 @@ pub struct PublishedArea {
     pub warnings: Vec<String>,
 }
 
-/// A scan location, and the room that the files say it is in.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PublishedLocation {
-    /// The place; its line is 0.
-    pub location: ScanLocation,
-    /// The room, if the pose file names one.
-    pub room: Option<Room>,
-}
-
 /// A published mesh with the label of each face.
 #[derive(Clone, Debug)]
 pub struct PublishedMesh {
@@ -80,16 +70,6 @@ pub struct PublishedMesh {
     pub labels: Vec<Label>,
     /// One a face of the mesh: its place in `labels`, or [`NO_INDEX`] if it has none.
     pub face_labels: Vec<u32>,
-}
-
-/// What is read of a pose file: the published ones differ in the rest.
-#[derive(Deserialize)]
-struct PoseOf {
-    camera_uuid: Option<String>,
-    point_uuid: Option<String>,
-    camera_original_rotation: [f64; 3],
-    camera_location: [f64; 3],
-    room: Option<String>,
 }
 
 impl PublishedArea {
@@ -133,55 +113,21 @@ impl PublishedArea {
             world_from_area: options.world_from_area,
             warnings: Vec::new(),
         };
-        this.read_locations()?;
-        Ok(this)
-    }
-
-    /// The scan locations of all pose files: one of each location's is read, of a view if there is one.
-    fn read_locations(&mut self) -> Result<()> {
-        let mut files: BTreeMap<String, (PathBuf, PoseOf)> = BTreeMap::new();
-        for folder in ["data/pose", "pano/pose"].map(|f| self.path.join(f)) {
-            for file in json_files(&folder)? {
-                let name = file.file_name().unwrap_or_default().to_string_lossy();
-                if ImageName::parse(&name).is_some_and(|n| files.contains_key(&n.uuid)) {
-                    continue;
-                }
-                let pose: PoseOf = read_json(&file)?;
-                let uuid = pose.camera_uuid.as_ref().or(pose.point_uuid.as_ref());
-                let Some(uuid) = uuid.filter(|u| is_valid_uuid(u)).cloned() else {
-                    return Err(Error::format(&file, "has no camera_uuid of letters and digits"));
-                };
-                files.entry(uuid).or_insert((file, pose));
-            }
-        }
-        if files.is_empty() {
+        let folders = ["data/pose", "pano/pose"].map(|folder| path.join(folder));
+        let found = pose_locations::read(&folders, &this.world_from_area)?;
+        if found.is_empty() {
             return Err(Error::format(
-                &self.path,
+                path,
                 "has no data/pose/*.json or pano/pose/*.json: without poses there are no scan locations",
             ));
         }
-        let m = self.world_from_area.matrix3;
-        let turn = m * (1.0 / libm::cbrt(m.determinant()));
-        for (uuid, (file, pose)) in files {
-            let location = DVec3::from_array(pose.camera_location);
-            let angles = DVec3::from_array(pose.camera_original_rotation);
-            if !angles.is_finite() || location.abs().max_element() > FARTHEST_M || !location.is_finite() {
-                return Err(Error::format(
-                    &file,
-                    format!("has its camera at {location}, turned by {angles}"),
-                ));
+        for (file, location) in found {
+            if location.room.is_none() {
+                this.warnings.push(format!("{}: names no room", file.display()));
             }
-            let room = pose.room.as_deref().and_then(room_of);
-            if room.is_none() {
-                self.warnings.push(format!("{}: names no room", file.display()));
-            }
-            let pose = Pose {
-                location: self.world_from_area.transform_point3(location),
-                world_from_camera: turn * rotation_from_euler(angles),
-            };
-            self.locations.push(PublishedLocation { location: ScanLocation { uuid, pose, line: 0 }, room });
+            this.locations.push(location);
         }
-        Ok(())
+        Ok(this)
     }
 
     /// Reads both meshes: the textured one, and the labels of its faces from the other.
@@ -277,30 +223,6 @@ fn area_of(path: &Path) -> Option<u32> {
     let name = path.file_name()?.to_str()?.to_ascii_lowercase();
     let number = name.strip_prefix("area_")?;
     number.strip_suffix(['a', 'b']).unwrap_or(number).parse().ok().filter(|n| *n > 0)
-}
-
-/// The room of "office_5_3", of which the last field is the area.
-fn room_of(name: &str) -> Option<Room> {
-    name.rsplit_once('_')?.0.parse().ok()
-}
-
-/// The `.json` files of a folder by name; none if there is no such folder.
-fn json_files(dir: &Path) -> Result<Vec<PathBuf>> {
-    let failed = |e| Error::io(dir, "read the folder", e);
-    let entries = match std::fs::read_dir(dir) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries.map_err(failed)?,
-    };
-    let mut files = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(failed)?.path();
-        let is_hidden = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
-        if path.extension().is_some_and(|e| e == "json") && !is_hidden {
-            files.push(path);
-        }
-    }
-    files.sort();
-    Ok(files)
 }
 
 /// Whether two faces are the same, but for what two ways of writing their numbers differ in.

@@ -1,22 +1,25 @@
 //! Scan locations, from any list of cameras that is read.
 
 use crate::cameras::{ScanLocation, read_cameras};
-use crate::{Error, Result, colmap_images, located_picture, nerfstudio_frames};
+use crate::matterport::{PictureFolder, read_matterport_locations};
+use crate::{Error, Result, colmap_images, located_picture, nerfstudio_frames, pose_locations};
 use s3d_geom::Pose;
 use s3d_geom::glam::{DAffine3, DMat3};
 use std::path::Path;
 
 /// What is read, for messages.
-const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, pose files, a COLMAP model (images.txt or images.bin) \
-                     or a transforms.json";
+const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files (*.json), the raw captures \
+                     of a Matterport, a COLMAP model (images.txt or images.bin) or a transforms.json";
 
 /// Reads the scan locations of `path`, a file or a folder:
 ///
 /// - `.csv`, or any ending that is not named here: the table that [`read_cameras`] reads;
 /// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a COLMAP model;
-/// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and its kin.
+/// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and its kin;
+/// - a folder of pose files of images, as published: where the scanner stood and how it was turned;
+/// - a folder with the raw captures of a Matterport: see [`read_matterport_locations`].
 ///
-/// The pictures of the last two give scan locations where they were taken: level, with the picture's heading, one for each
+/// The pictures of a COLMAP model and of a `transforms.json` give scan locations where they were taken: level, with the picture's heading, one for each
 /// uuid in their names. `world_from_file` takes the file's frame to the world (metres, Z-up): turns, shifts and scales.
 ///
 /// # Errors
@@ -35,7 +38,18 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
         if transforms.is_file() {
             return located_picture::locations_of(&transforms, turned(nerfstudio_frames::read(&transforms)?));
         }
-        return Err(Error::unsupported(path, format!("holds no scan locations: {FORMS}")));
+        let poses = pose_locations::read(&[path.to_owned()], world_from_file)?;
+        if !poses.is_empty() {
+            return Ok(poses.into_iter().map(|(_, found)| found.location).collect());
+        }
+        if PictureFolder::open(path)?.uuids().is_empty() {
+            return Err(Error::unsupported(path, format!("holds no scan locations: {FORMS}")));
+        }
+        let mut locations = read_matterport_locations(path)?;
+        locations.iter_mut().for_each(|l| l.pose = moved(&l.pose, world_from_file));
+        // They have no lines.
+        locations.iter_mut().for_each(|l| l.line = 0);
+        return Ok(locations);
     }
     if name == "images.txt" || name == "images.bin" {
         return located_picture::locations_of(path, turned(colmap_images::read(path)?));
@@ -65,6 +79,7 @@ fn moved(pose: &Pose, world_from_file: &DAffine3) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Frame, PoseFile};
     use s3d_geom::glam::{DQuat, DVec3, dvec3};
     use std::fs;
 
@@ -91,6 +106,24 @@ mod tests {
             assert!(read(p).unwrap()[0].pose.forward().abs_diff_eq(DVec3::Y, 1e-12));
         }
         assert_eq!(read("cameras.csv").unwrap()[0].pose.location, dvec3(1.0, 2.0, 3.0));
+        let pose = |uuid: &str| {
+            let pose = Pose::level(dvec3(1.0, -2.0, 1.5), 0.3);
+            let camera = s3d_geom::Camera::equirectangular(pose, 64);
+            PoseFile::new(&camera, &pose, uuid, "office_5_3", Frame::Panorama).to_json()
+        };
+        fs::create_dir(at("poses")).unwrap();
+        let uuids = ["8eb9955b866b4b5f74abb1071416c628", "508160ba5d80a2e365609578a09bab8b"];
+        for uuid in uuids {
+            fs::write(at(&format!("poses/{uuid}.json")), pose(uuid)).unwrap();
+        }
+        let poses = read("poses").unwrap();
+        assert_eq!((poses.len(), poses[0].uuid.as_str()), (2, uuids[1]));
+        assert!(poses[1].pose.location.abs_diff_eq(dvec3(1.0, -2.0, 1.5), 1e-12));
+        fs::create_dir(at("raw")).unwrap();
+        let capture = "1 0 0 7\n0 0 1 8\n0 -1 0 9\n0 0 0 1";
+        fs::write(at(&format!("raw/{}_pose_1_0.txt", uuids[0])), capture).unwrap();
+        let raw = read("raw").unwrap();
+        assert_eq!((raw.len(), raw[0].pose.location), (1, dvec3(7.0, 8.0, 9.0)));
         let message = read("empty").unwrap_err().to_string();
         assert!(message.contains("empty") && message.contains("images.txt"), "{message}");
         assert!(matches!(read("gone"), Err(Error::Io { .. })));

@@ -47,7 +47,8 @@ pub(crate) struct PackOptions {
     /// webdataset: samples of a shard, at most [default: 10000]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_count: Option<u32>,
-    /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N-000000.tar, … for each
+    /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar and
+    /// area_N_panoramas-000000.tar for each
     #[arg(long, value_name = "PREFIX", value_parser = shard_prefix)]
     pub(crate) prefix: Option<String>,
     /// webdataset: samples in a random order that this number decides, instead of by scan location

@@ -112,7 +112,7 @@ pub(crate) fn annotate(
             };
             if instance.points.are_vertices() {
                 let corners = corners.get_or_insert_with(|| Corners::new(mesh));
-                corners.vote(&cloud.positions, id, &mut votes, &nearest_faces, &mut nearest);
+                corners.vote(&cloud.positions, id, &mut votes, nearest_faces, &mut nearest);
             } else if cloud.faces.len() == cloud.len() {
                 for face in &cloud.faces {
                     if *face as usize >= mesh.faces().len() {

@@ -142,9 +142,14 @@ impl AreaInput {
         let source = MeshSource::Files {
             paths: scene.mesh.clone(),
             up: scene.up,
-            options: MeshOptions {
-                class_column: options.class_column.clone(),
-                instance_column: options.instance_column.clone(),
+            // The columns that are named are those of the annotations.
+            options: if scene.annotations.is_empty() {
+                MeshOptions {
+                    class_column: options.class_column.clone(),
+                    instance_column: options.instance_column.clone(),
+                }
+            } else {
+                MeshOptions::default()
             },
         };
         let mut annotations = if scene.annotations.is_empty() {

@@ -53,8 +53,6 @@ struct Options {
     pano_width: u32,
     pool: String,
     points_per_m2: f64,
-    /// How far apart scan locations were placed, metres; null where the scenes have their own.
-    place_cameras: Option<f64>,
     /// Whether faults of the annotations were skipped.
     lenient: bool,
     entropy_stride: u32,
@@ -86,6 +84,8 @@ pub(crate) struct AreaEntry {
     pub(crate) xyz: XyzLoss,
     /// What its RGB images are made from.
     pub(crate) rgb: String,
+    /// How far apart scan locations were placed, metres; null if the scene has its own.
+    pub(crate) place_cameras: Option<f64>,
 }
 
 /// What storing world coordinates loses.
@@ -148,7 +148,6 @@ impl Manifest {
                 pano_width: options.pano_width,
                 pool: options.pool.to_string(),
                 points_per_m2: options.points_per_m2,
-                place_cameras: options.place_cameras,
                 lenient: options.lenient,
                 entropy_stride: options.entropy_stride,
                 modalities: options.modalities.iter().map(Domain::to_string).collect(),

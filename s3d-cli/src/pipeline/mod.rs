@@ -63,6 +63,14 @@ struct LabelledArea {
     entry: AreaEntry,
 }
 
+/// What all areas share.
+#[derive(Clone, Copy)]
+struct Common<'a> {
+    table: &'a LabelTable,
+    layout: &'a Layout,
+    options: &'a ExportOptions,
+}
+
 /// A mesh that is ready for rays.
 struct Stage<'m> {
     file: &'m MeshFile,
@@ -117,11 +125,12 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
     s3d_io::write_labels(&layout.labels_json(), &names)?;
     assets::write(layout, options.format.conventions())?;
 
+    let common = Common { table: &inputs.table, layout, options };
     let mut labelled = Vec::new();
     let mut candidates = Vec::new();
     for area in &inputs.areas {
         let mut label = |stage: &Stage<'_>, nearest: NearestFaces<'_>| {
-            label_area(area, stage, nearest, &inputs.table, layout, options, &mut candidates)
+            label_area(area, stage, nearest, common, &mut candidates)
         };
         labelled.push(match (&single, nearest.take()) {
             (Some(stage), Some(nearest)) => label(stage, nearest)?,
@@ -144,7 +153,7 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
         records::write_views(layout, area.number, &candidates)?;
         let render = |stage: &Stage<'_>| {
             let pictures = pictures.as_ref();
-            render_area(area, stage, labelled, pictures, &inputs.table, layout, options, &candidates)
+            render_area(area, stage, labelled, pictures, common, &candidates)
         };
         let (entry, count) = match &single {
             Some(stage) => render(stage)?,
@@ -258,9 +267,7 @@ fn label_area(
     area: &AreaInput,
     stage: &Stage<'_>,
     nearest: NearestFaces<'_>,
-    table: &LabelTable,
-    layout: &Layout,
-    options: &ExportOptions,
+    Common { table, layout, options }: Common<'_>,
     candidates: &mut Vec<Candidate>,
 ) -> Outcome<LabelledArea> {
     let number = area.number;
@@ -327,6 +334,10 @@ fn label_area(
         views: 0,
         xyz: XyzLoss::of(mesh.aabb(), options.format.xyz),
         rgb: area.pictures.as_ref().map_or("texture", |p| p.kind.name()).to_owned(),
+        place_cameras: match area.cameras {
+            Cameras::Placed(distance_m) => Some(distance_m),
+            Cameras::Listed(..) => None,
+        },
     };
     Ok(LabelledArea { annotated, locations, location_rooms, entry })
 }
@@ -336,9 +347,7 @@ fn write_area(
     area: &AreaInput,
     file: &MeshFile,
     annotated: &Annotated,
-    table: &LabelTable,
-    layout: &Layout,
-    options: &ExportOptions,
+    Common { table, layout, options }: Common<'_>,
 ) -> Outcome<u64> {
     let mesh_dir = layout.mesh_dir(area.number);
     let per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
@@ -396,11 +405,10 @@ fn render_area(
     stage: &Stage<'_>,
     labelled: LabelledArea,
     pictures: Option<&Pictures>,
-    table: &LabelTable,
-    layout: &Layout,
-    options: &ExportOptions,
+    common: Common<'_>,
     candidates: &[Candidate],
 ) -> Outcome<(AreaEntry, ImageCount)> {
+    let Common { layout, options, .. } = common;
     let LabelledArea { annotated, locations, location_rooms, mut entry } = labelled;
     let Stage { file, scene } = stage;
     let textures = Pyramids::new(&file.mesh);
@@ -432,7 +440,7 @@ fn render_area(
     let started = Instant::now();
     let points = OnceLock::new();
     let count = write_images(&job, candidates, &|| {
-        let _ = points.set(write_area(area, file, &annotated, table, layout, options)?);
+        let _ = points.set(write_area(area, file, &annotated, common)?);
         Ok(())
     })?;
     debug!(

@@ -1,7 +1,7 @@
 //! The scanner's pictures as the source of colours: found and checked before anything is written, and made into one cube
 //! map at a time.
 
-use super::inputs::AreaInput;
+use super::inputs::{AreaInput, Cameras};
 use super::modality::Look;
 use crate::failure::Outcome;
 use s3d_geom::{Camera, Raster};
@@ -44,6 +44,17 @@ impl Pictures {
     /// For what is missing, all of it; for the first picture that is not what it should be.
     pub(crate) fn open(area: &AreaInput, is_asked: impl Fn(&ScanLocation) -> bool) -> Outcome<Option<Self>> {
         let Some(source) = &area.pictures else { return Ok(None) };
+        if matches!(area.cameras, Cameras::Placed(_)) {
+            return Err(Error::format(
+                &area.path,
+                format!(
+                    "takes colours from {} pictures, but its scan locations are placed where none was taken: give it the \
+                     locations of the pictures, or rgb = \"texture\"",
+                    source.kind
+                ),
+            )
+            .into());
+        }
         let folder = PictureFolder::open(&source.path)?;
         let (mut found, mut missing, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
         for location in area.cameras.listed() {

@@ -10,7 +10,7 @@ use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk;
 use std::collections::BTreeMap;
 
-/// A tripod's height above the floor, metres. Source: issue and paper leave it to the scanner; Matterport's stands so.
+/// A tripod's height above the floor, metres. The paper leaves it to the scanner; a tripod of Matterport's stands so.
 const HEIGHT_M: f64 = 1.5;
 
 /// How far a location keeps from every surface, metres: the first that some place of its room allows.
@@ -82,7 +82,9 @@ pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Outc
         let chosen = poisson_disk(&free, placement.distance_m, placement.seed, &name);
         for (number, index) in chosen.into_iter().enumerate() {
             let pose = Pose::level(DVec3::from_array(free[index]), 0.0);
-            let uuid = uuid_from_name(&format!("s3d place {name} {number} seed {}", placement.seed));
+            // Its place makes it another than that of any other building.
+            let [x, y, z] = free[index];
+            let uuid = uuid_from_name(&format!("s3d place {name} {number} {} {x} {y} {z}", placement.seed));
             placed.push((ScanLocation { uuid, pose, line: 0 }, room.room));
         }
     }

@@ -131,7 +131,8 @@ def test_las_offset_and_unlabelled_points(export, points, reference, tmp_path):
     labels = json.loads(found["assets/semantic_labels.json"])
     first = points["room"] == names[0]
     there = {(int(c), int(i)) for c, i in zip(points["class"][first], points["instance"][first])}
-    assert len(labels) == 1 + len(there)
+    # Null labels pad the table.
+    assert len([name for name in labels if not name.startswith("<UNK>")]) == len(there)
 
 
 @pytest.mark.parametrize("text", [True, False])
