@@ -11,7 +11,7 @@ use s3d_render::{NO_FACE, Scene, cast};
 const PROBE_WIDTH: u32 = 256;
 
 /// A location that sees less of the mesh than this is told of.
-const LOW_COVERAGE: f64 = 0.5;
+pub(crate) const LOW_COVERAGE: f64 = 0.5;
 
 /// A location that sees more back sides than this is told of.
 const MANY_BACK_SIDES: f64 = 0.5;

@@ -1,6 +1,7 @@
 //! Scan locations for a scan that comes without: on the floor of every room, spread evenly, away from walls and things.
 
 use super::annotate::SurveyedRoom;
+use super::location::{LOW_COVERAGE, Outlook};
 use crate::failure::{Failure, Outcome};
 use glam::{DVec3, Vec3, dvec3};
 use s3d_geom::{Density, NearestFaces, PointCloud, Pose, SurfaceSampler, TriMesh};
@@ -18,6 +19,9 @@ const CLEARANCES_M: [f32; 4] = [0.5, 0.35, 0.2, 0.1];
 
 /// Above the floor the tripod needs this much, metres: less is the floor's own unevenness.
 const FOOT_M: f64 = 0.05;
+
+/// Where one place sees too little, so do those this near, metres.
+const BLIND_M: f64 = 0.25;
 
 /// A floor that rises more steeply than this is none: the cosine of 45°.
 const LEVEL: f32 = 0.707;
@@ -52,7 +56,7 @@ pub(crate) type Placed = (Located, Vec<String>);
 
 /// Puts scan locations into the rooms of an area, 1.5 m above their floors, on a Poisson-disk pattern: no two of a room are
 /// nearer than the distance asked for, and every place that is free is nearer than that to one. The way up from the floor
-/// is free, and so are 0.5 m around, or less in rooms that are narrower. All look along +Y. Returns the locations with
+/// is free, and so are 0.5 m around, or less in rooms that are narrower; and half of all directions or more end at the front of a surface, if that is so anywhere in the room. All look along +Y. Returns the locations with
 /// their rooms, in the order of rooms, and a sentence on each room that has none.
 ///
 /// A room's floor is the faces labelled so; a room without any has the floor outline of its points instead, at the
@@ -79,11 +83,9 @@ pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Outc
             ));
             continue;
         }
-        let chosen = poisson_disk(&free, placement.distance_m, placement.seed, &name);
-        for (number, index) in chosen.into_iter().enumerate() {
-            let pose = Pose::level(DVec3::from_array(free[index]), 0.0);
+        for (number, [x, y, z]) in choose(ground.scene, free, placement, &name).into_iter().enumerate() {
+            let pose = Pose::level(dvec3(x, y, z), 0.0);
             // Its place makes it another than that of any other building.
-            let [x, y, z] = free[index];
             let uuid = uuid_from_name(&format!("s3d place {name} {number} {} {x} {y} {z}", placement.seed));
             placed.push((ScanLocation { uuid, pose, line: 0 }, room.room));
         }
@@ -154,6 +156,33 @@ fn free_places(scene: &Scene<'_>, nearest: &NearestFaces<'_>, feet: &[DVec3]) ->
         }
     }
     Vec::new()
+}
+
+/// Spreads locations over free places so that each sees the front of a surface in half of all directions or more: the floor of a room
+/// may go on through a door, to where the scan ends. If no place does, as in a scan without walls, that is no condition.
+fn choose(scene: &Scene<'_>, free: Vec<[f64; 3]>, placement: Placement, name: &str) -> Vec<[f64; 3]> {
+    let spread = |places: &[[f64; 3]]| -> Vec<[f64; 3]> {
+        let chosen = poisson_disk(places, placement.distance_m, placement.seed, name);
+        chosen.into_iter().map(|i| places[i]).collect()
+    };
+    let mut places = free.clone();
+    // Each turn takes places away.
+    while !places.is_empty() {
+        let chosen = spread(&places);
+        let coverage = |p: &[f64; 3]| {
+            let pose = Pose::level(DVec3::from_array(*p), 0.0);
+            let outlook = Outlook::of(scene, &ScanLocation { uuid: String::new(), pose, line: 0 });
+            outlook.coverage * (1.0 - outlook.back_sides)
+        };
+        let blind: Vec<[f64; 3]> = chosen.iter().copied().filter(|p| coverage(p) < LOW_COVERAGE).collect();
+        if blind.is_empty() {
+            return chosen;
+        }
+        let near =
+            |a: &[f64; 3], b: &[f64; 3]| DVec3::from_array(*a).distance(DVec3::from_array(*b)) < BLIND_M;
+        places.retain(|p| !blind.iter().any(|b| near(p, b)));
+    }
+    spread(&free)
 }
 
 #[cfg(test)]
@@ -239,6 +268,28 @@ mod tests {
                 assert!(at[..i].iter().all(|q| q.distance(*p) >= 0.8));
             }
         }
+    }
+
+    #[test]
+    fn nobody_is_put_where_the_scan_has_ended() {
+        // The floor goes on for 3 m beyond the wall at x = 4, which has no other side.
+        let (mesh, _) = room(4.0, 3.0);
+        let mut parts = mesh.parts().clone();
+        let first = parts.positions.len() as u32;
+        parts
+            .positions
+            .extend([[4., 0., 0.], [7., 0., 0.], [7., 3., 0.], [4., 3., 0.]].map(Vec3::from_array));
+        parts.faces.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        let mesh = TriMesh::new(parts).unwrap();
+        let scene = Scene::new(&mesh);
+        let places: Vec<[f64; 3]> = (0..60)
+            .flat_map(|i| (0..20).map(move |j| [0.6 + 0.1 * f64::from(i), 0.6 + 0.09 * f64::from(j), 1.5]))
+            .collect();
+        let placement = Placement { distance_m: 1.0, seed: 1 };
+        let chosen = choose(&scene, places.clone(), placement, "office_1_1");
+        assert!(chosen.len() >= 4 && chosen.iter().all(|p| p[0] < 4.3), "{chosen:?}");
+        let outside: Vec<[f64; 3]> = places.into_iter().filter(|p| p[0] > 5.0).collect();
+        assert!(!choose(&scene, outside, placement, "office_1_1").is_empty());
     }
 
     #[test]
