@@ -143,13 +143,51 @@ fn write_e57(dir: &Path, points: &[Point]) -> PathBuf {
     path
 }
 
+/// The structured array in an archive, stored.
+fn write_npz(dir: &Path, npy: &Path) -> PathBuf {
+    let path = dir.join("stored.npz");
+    let mut archive = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+    let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    archive.start_file("points.npy", stored).unwrap();
+    archive.write_all(&std::fs::read(npy).unwrap()).unwrap();
+    archive.finish().unwrap();
+    path
+}
+
+/// A scan of ScanNet whose vertices are the points: a segment a class and instance.
+fn write_scannet(dir: &Path, points: &[Point]) -> PathBuf {
+    const NAMES: [&str; 8] = ["wall", "floor", "chair", "table", "door", "window", "couch", "bookshelf"];
+    let folder = dir.join("scene0000_00");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::rename(write_ply(dir, points, false), folder.join("scene0000_00_vh_clean_2.ply")).unwrap();
+    let segments: Vec<String> =
+        points.iter().map(|p| (u32::from(p.class) * 25 + u32::from(p.instance)).to_string()).collect();
+    let segs = format!("{{\"sceneId\": \"scene0000_00\", \"segIndices\": [{}]}}", segments.join(","));
+    std::fs::write(folder.join("scene0000_00_vh_clean_2.0.010000.segs.json"), segs).unwrap();
+    let groups: Vec<String> = (0..200)
+        .map(|i| {
+            let name = NAMES[i / 25];
+            format!("{{\"id\": {i}, \"objectId\": {i}, \"segments\": [{i}], \"label\": \"{name}\"}}")
+        })
+        .collect();
+    let aggregation =
+        format!("{{\"sceneId\": \"scannet.scene0000_00\", \"segGroups\": [{}]}}", groups.join(","));
+    std::fs::write(folder.join("scene0000_00.aggregation.json"), aggregation).unwrap();
+    folder
+}
+
 fn clouds(c: &mut Criterion) {
     let dir = tempfile::tempdir().unwrap();
     let points = points();
+    let scannet = write_scannet(dir.path(), &points);
+    let npy = write_npy(dir.path(), &points);
+    let npz = write_npz(dir.path(), &npy);
     let paths = [
         write_ply(dir.path(), &points, true),
         write_ply(dir.path(), &points, false),
-        write_npy(dir.path(), &points),
+        npy,
+        npz,
+        scannet,
         write_las(dir.path(), &points, "cloud.las"),
         write_las(dir.path(), &points, "cloud.laz"),
         write_e57(dir.path(), &points),

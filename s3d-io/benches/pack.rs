@@ -9,7 +9,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{DQuat, dvec3, vec3};
 use s3d_geom::{Camera, PointCloud, Pose, Raster};
 use s3d_io::{
-    CocoImage, ColmapImage, Domain, Frame, ImageRow, NerfstudioCamera, NerfstudioFrame, PoseFile,
+    CocoImage, ColmapImage, Domain, Frame, ImageRow, NerfstudioCamera, NerfstudioFrame, NpyWriter, PoseFile,
     SemanticRow, TarWriter, coco_categories, coco_panoptic, read_point_sample, write_coco,
     write_colmap_binary, write_colmap_text, write_colored_points, write_image_index, write_nerfstudio,
 };
@@ -163,5 +163,22 @@ fn tables(c: &mut Criterion) {
     group.bench_function("parquet", |b| b.iter(|| write_image_index(&path, &rows).unwrap()));
 }
 
-criterion_group!(benches, shards, cameras, tables);
+/// The array of a room as loaders of S3DIS read it: seven 64-bit floats a point.
+fn npy(c: &mut Criterion) {
+    const ROWS: usize = 500_000;
+    let dir = tempfile::tempdir().unwrap();
+    let rows: Vec<u8> = (0..7 * ROWS).flat_map(|i| (i as f64 * 0.25).to_le_bytes()).collect();
+    let mut group = c.benchmark_group("npy");
+    group.throughput(Throughput::Bytes(rows.len() as u64)).sample_size(10);
+    group.bench_function("write", |b| {
+        b.iter(|| {
+            let path = dir.path().join("room.npy");
+            let mut array = NpyWriter::create(&path, "<f8", &[ROWS as u64, 7]).unwrap();
+            rows.chunks(1 << 16).for_each(|piece| array.put(piece).unwrap());
+            array.finish().unwrap()
+        });
+    });
+}
+
+criterion_group!(benches, shards, cameras, tables, npy);
 criterion_main!(benches);
