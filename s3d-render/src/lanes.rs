@@ -76,8 +76,9 @@ pub(crate) trait Lanes: Copy {
     fn expect<T>(self, thing: &T);
     /// Bit k: whether `values[k]` is `value`.
     fn equal(self, values: &[u32; LANES], value: u32) -> u32;
-    /// Bit k: whether `values[k]` differs from `values[k − 1]`, for k from 1 on.
-    fn changes(self, values: &[u32; LANES + 1]) -> u32;
+    /// Where a value differs from the one before it, ascending, as `from` and the number of values in between: how many
+    /// places that are. They are at the beginning of `to`; the rest there is anything.
+    fn changes(self, values: &[u32; LANES + 1], from: u32, to: &mut [u32; LANES]) -> usize;
     /// Depths in 512ths, rounded half up, at most 65,535.
     fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]);
     /// Points place + direction × depth, rounded to `f32`: `column` and `row` are [`DirectionPart`]s, and what belongs to
@@ -297,8 +298,15 @@ impl Lanes for Plain {
         (0..LANES).map(|k| u32::from(values[k] == value) << k).sum()
     }
     #[inline(always)]
-    fn changes(self, values: &[u32; LANES + 1]) -> u32 {
-        (0..LANES).map(|k| u32::from(values[k] != values[k + 1]) << k).sum()
+    fn changes(self, values: &[u32; LANES + 1], from: u32, to: &mut [u32; LANES]) -> usize {
+        let mut count = 0;
+        for k in 0..LANES {
+            if values[k] != values[k + 1] {
+                to[count] = from + k as u32;
+                count += 1;
+            }
+        }
+        count
     }
     #[inline(always)]
     fn depths(self, depths: &Eight, to: &mut [u16; LANES]) {
@@ -359,21 +367,23 @@ pub(crate) fn run_starts(lanes: impl Lanes, values: &[u32], starts: &mut Vec<u32
     if values.is_empty() {
         return;
     }
-    starts.push(0);
-    let mut at = 1;
-    // Four times as many values at a time: mostly there is nothing.
-    while let Some(window) = values.get(at - 1..).and_then(<[u32]>::first_chunk::<{ 4 * LANES + 1 }>) {
-        let mut changes = 0;
+    // A group of places is written whole, and its end over by the next: no branch that depends on the values.
+    starts.resize(values.len() + 4 * LANES, 0);
+    let (mut at, mut count) = (1, 1);
+    while let Some(window) = values.get(at - 1..).and_then(<[u32]>::first_chunk::<{ 4 * LANES + 1 }>)
+        && let Some(to) = starts.get_mut(count..).and_then(<[u32]>::first_chunk_mut::<{ 4 * LANES }>)
+    {
+        let mut some = 0;
         for k in 0..4 {
-            if let Some(part) = window[k * LANES..].first_chunk() {
-                changes |= lanes.changes(part) << (k * LANES);
+            if let Some(part) = window[k * LANES..].first_chunk()
+                && let Some(to) = to[some.min(k * LANES)..].first_chunk_mut()
+            {
+                some += lanes.changes(part, (at + k * LANES) as u32, to);
             }
         }
-        while changes != 0 {
-            starts.push(at as u32 + changes.trailing_zeros());
-            changes &= changes - 1;
-        }
+        count += some;
         at += 4 * LANES;
     }
+    starts.truncate(count);
     starts.extend((at..values.len()).filter(|&k| values[k] != values[k - 1]).map(|k| k as u32));
 }
