@@ -18,6 +18,7 @@ use crate::texture::{Pyramids, TextureFilter};
 use crate::{Hits, Scene};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, Raster};
+use std::ops::Range;
 
 /// The colours that the pixels see: textures filtered over each pixel's footprint, corners' colours interpolated,
 /// materials flat. Black is for what is missing alone: a dark pixel that is seen is at least (1, 1, 1).
@@ -153,7 +154,6 @@ struct Row {
     footprints: Footprints,
     /// By pixel: a texture, perhaps with [`NARROW`]; or [`DONE`].
     tags: Vec<u32>,
-    colors: Vec<[u8; 3]>,
 }
 
 /// The colour stands already.
@@ -164,13 +164,7 @@ const NARROW: u32 = 1 << 31;
 impl Row {
     fn new(width: usize) -> Self {
         let padded = width + 2 * LANES;
-        Self { footprints: Footprints::new(padded), tags: vec![DONE; padded], colors: vec![[0; 3]; padded] }
-    }
-
-    #[inline(always)]
-    fn flat(&mut self, start: usize, end: usize, color: [u8; 3]) {
-        self.tags[start..end].fill(DONE);
-        paint(&mut self.colors, start, end, color);
+        Self { footprints: Footprints::new(padded), tags: vec![DONE; padded] }
     }
 }
 
@@ -208,10 +202,9 @@ impl<L: Lanes> Painter<'_, L> {
             starts.push(width as u32);
             for (run, &number) in starts.windows(2).zip(&numbers) {
                 let (start, end) = (run[0] as usize, run[1] as usize);
-                self.lay_out::<TURN>(grid, faces[start], number, j, start, end);
+                self.lay_out::<TURN>(grid, faces[start], number, j, start..end, out);
             }
-            self.fetch(width);
-            out.copy_from_slice(&self.row.colors[..width]);
+            self.fetch(out);
         }
     }
 
@@ -274,13 +267,14 @@ impl<L: Lanes> Painter<'_, L> {
         face: u32,
         number: u32,
         j: usize,
-        start: usize,
-        end: usize,
+        Range { start, end }: Range<usize>,
+        out: &mut [[u8; 3]],
     ) {
         let lanes = self.lanes;
         let look = self.prepared[number as usize].look;
         if let Look::Flat(color) = look {
-            return self.row.flat(start, end, color);
+            self.row.tags[start..end].fill(DONE);
+            return paint(out, start, end, color);
         }
         let mut i = start;
         while i < end {
@@ -288,7 +282,7 @@ impl<L: Lanes> Painter<'_, L> {
                 && !self.anchor_again::<TURN>(grid, face, number, i, j)
             {
                 self.row.tags[i] = DONE;
-                self.row.colors[i] = self.singly.color(face, i, j);
+                out[i] = self.singly.color(face, i, j);
                 i += 1;
                 continue;
             }
@@ -316,14 +310,14 @@ impl<L: Lanes> Painter<'_, L> {
                     for k in 0..some {
                         row.tags[i + k] = DONE;
                         let color = channels.map(|c| c[k] as u8);
-                        row.colors[i + k] = if color == [0; 3] { [1; 3] } else { color };
+                        out[i + k] = if color == [0; 3] { [1; 3] } else { color };
                     }
                 }
                 doubtful &= (1 << some) - 1;
                 while doubtful != 0 {
                     let at = i + doubtful.trailing_zeros() as usize;
                     row.tags[at] = DONE;
-                    row.colors[at] = singly.color(face, at, j);
+                    out[at] = singly.color(face, at, j);
                     doubtful &= doubtful - 1;
                 }
                 i += some;
@@ -333,7 +327,8 @@ impl<L: Lanes> Painter<'_, L> {
 
     /// The second pass.
     #[inline(always)]
-    fn fetch(&mut self, width: usize) {
+    fn fetch(&mut self, out: &mut [[u8; 3]]) {
+        let width = out.len();
         let Self { lanes, sizes, row, max_taps, .. } = self;
         row.tags[width..].fill(DONE);
         for i in (0..width).step_by(LANES) {
@@ -347,7 +342,7 @@ impl<L: Lanes> Painter<'_, L> {
                 let these = narrow | maybe;
                 let pixels = (these, maybe);
                 let colors = sizes[texture as usize].colors(*lanes, &row.footprints, i, pixels, *max_taps);
-                let to = row.colors[i..].as_flattened_mut().first_chunk_mut();
+                let to = out[i..].as_flattened_mut().first_chunk_mut();
                 if let (0xFF, Some(to)) = (these, to) {
                     lanes.store_pixels(&colors, to);
                     break;
@@ -355,7 +350,7 @@ impl<L: Lanes> Painter<'_, L> {
                 for (k, color) in colors.iter().enumerate() {
                     if these >> k & 1 == 1 {
                         let [r, g, b, _] = color.to_le_bytes();
-                        row.colors[i + k] = [r, g, b];
+                        out[i + k] = [r, g, b];
                     }
                 }
                 left &= !these;
