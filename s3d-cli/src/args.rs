@@ -1,5 +1,6 @@
 //! The command line: subcommands, options, defaults, help texts.
 
+use crate::console::LogFormat;
 use crate::pack::args::PackArgs;
 use crate::pipeline::profiles::Profile;
 use clap::builder::PossibleValuesParser;
@@ -18,7 +19,7 @@ use std::path::PathBuf;
     max_term_width = 110,
     after_help = "\
 Start with the built-in scene:\n  s3d demo\nthen a scan of your own:\n  s3d info scan/scene.toml\n  s3d export scan/scene.toml -o dataset\n\n\
-Exit codes: 0 done, 1 the input or the disk, 2 the call."
+Exit codes: 0 done, 1 the input or the disk, 2 the call, 75 stopped by a signal or a full disk: call it again."
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -29,6 +30,17 @@ pub(crate) struct Cli {
     /// Log warnings and errors only, and show no progress.
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
+    /// Write to standard error for a person, or one JSON object a line for a program: log lines, progress, a line for each
+    /// finished unit of work, and a summary (docs/log.md).
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value_t,
+        value_name = "text|json",
+        hide_possible_values = true
+    )]
+    pub(crate) log: LogFormat,
 }
 
 #[derive(Debug, Subcommand)]
@@ -40,7 +52,7 @@ pub(crate) enum Command {
     Demo(DemoArgs),
     /// Turn scans into a data set: images, poses, meshes, points, labels, tables.
     #[command(
-        after_help = "Examples:\n  s3d export scan/scene.toml -o dataset\n  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all"
+        after_help = "Examples:\n  s3d export scan/scene.toml -o dataset\n  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\nAn export that was stopped or killed goes on where it was when it is called again with the same arguments."
     )]
     Export(ExportArgs),
     /// Sample a mesh densely and uniformly into a coloured point cloud.
@@ -72,6 +84,17 @@ pub(crate) enum Command {
     /// Print the tables of statistics of a data set, counted from its files.
     #[command(after_help = "Example:\n  s3d stats dataset")]
     Stats(StatsArgs),
+}
+
+impl Command {
+    /// Whether a signal stops it between files. The others write one thing or nothing, and are ended by the system.
+    pub(crate) fn stops_between_files(&self) -> bool {
+        match self {
+            Self::Demo(_) | Self::Export(_) | Self::Sample(_) => true,
+            Self::Pack(_) | Self::Xyz(_) | Self::Profile(_) => true,
+            Self::Render(_) | Self::Info(_) | Self::Stats(_) => false,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -120,7 +143,8 @@ pub(crate) struct ExportArgs {
     /// The data set's folder [default: SCENE_2d3ds beside the first scene]
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
-    /// Write into an OUT that holds something: an earlier data set there is replaced, other files stay.
+    /// Write into an OUT that holds something: an earlier data set there, or an unfinished one of another call, is
+    /// replaced, other files stay.
     #[arg(long)]
     pub(crate) overwrite: bool,
     #[command(flatten)]

@@ -6,8 +6,8 @@ use common::{copyroom, s3d, s3d_ok, text};
 use glam::{DMat3, DVec3};
 use s3d_geom::{Camera, Pose, rotation_from_euler};
 use s3d_io::{
-    Domain, Frame, ImageName, Layout, UpAxis, read_gray16, read_labels, read_mesh, read_pose, read_rgb8,
-    read_xyz,
+    Checksum, Domain, Frame, ImageName, Layout, UpAxis, read_file_list, read_gray16, read_labels, read_mesh,
+    read_pose, read_rgb8, read_xyz,
 };
 use s3d_label::{Class, LabelId, LabelTable};
 use s3d_render::{Scene, cast_ray};
@@ -236,4 +236,47 @@ fn one_view_of_a_mesh_needs_no_annotation() {
     s3d_ok(&["sample", text(&mesh), "-o", text(&cloud), "--points", "1234"]);
     assert_eq!(s3d_io::read_ply_point_count(&cloud).unwrap(), 1234);
     common::s3d_fails(&["sample", text(&mesh), "-o", text(&cloud)], 2, &["--overwrite"]);
+}
+
+/// `files.csv` lists every file of the data set but itself and the manifest, as it is, and the manifest tells of the list.
+fn assert_list_is_true(out: &Path) {
+    let layout = Layout::new(out);
+    let listed = read_file_list(&layout.file_list()).unwrap();
+    let mut there = common::files(out);
+    there.remove(Path::new("manifest.json")).unwrap();
+    let list = there.remove(Path::new("files.csv")).unwrap();
+    for record in &listed {
+        let content = there.remove(Path::new(&record.path)).unwrap_or_else(|| panic!("no {}", record.path));
+        let found = (content.len() as u64, Checksum::of(&content));
+        assert_eq!((record.bytes, record.xxh3_128), found, "{}", record.path);
+    }
+    assert!(there.is_empty(), "not listed: {:?}", there.keys());
+    let manifest = fs::read_to_string(layout.manifest()).unwrap();
+    let bytes: u64 = listed.iter().map(|record| record.bytes).sum();
+    let files = format!(
+        "\"files\": {{\n    \"list\": \"files.csv\",\n    \"count\": {},\n    \"bytes\": {bytes},\n    \"xxh3_128\": \"{}\"\n  }}",
+        listed.len(),
+        Checksum::of(&list)
+    );
+    assert!(manifest.contains(&files), "{files} is not in {manifest}");
+}
+
+#[test]
+fn the_list_of_files_is_true_and_stays_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = common::write_scan(&dir.path().join("scan"), 1);
+    let out = dir.path().join("out");
+    let small = ["--size", "32", "--pano-width", "64", "--views", "3", "--points-per-m2", "50"];
+    s3d_ok(&[&["export", text(&scene), "-o", text(&out), "--profile", "mmdet3d"], &small[..]].concat());
+    assert_list_is_true(&out);
+    let before = fs::read(out.join("files.csv")).unwrap();
+    s3d_ok(&["xyz", text(&out), "--type", "float", "--overwrite"]);
+    assert_list_is_true(&out);
+    assert!(fs::read(out.join("files.csv")).unwrap() != before);
+    s3d_ok(&["profile", text(&out), "--to", "pointnet", "--to", "open3d-ml"]);
+    assert_list_is_true(&out);
+    // A profile that is made again: what it had before is not in the list any more.
+    fs::write(out.join("profiles/pointnet/mine.txt"), "").unwrap();
+    s3d_ok(&["profile", text(&out), "--to", "pointnet", "--overwrite"]);
+    assert_list_is_true(&out);
 }

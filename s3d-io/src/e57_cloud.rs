@@ -10,7 +10,6 @@ use e57::{E57Reader, PointCloud, RawValues, Record, RecordDataType, RecordName, 
 use s3d_geom::glam::{DQuat, DVec3, dvec3};
 use std::fs::File;
 use std::io::BufReader;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// An `.e57` file.
@@ -204,7 +203,7 @@ fn range_of(kind: &RecordDataType) -> Option<(f64, f64)> {
 
 /// What `f` gives, or a sentence if it panicked: the decoder is not ours, and a damaged file must not end the program.
 fn guarded<T>(path: &Path, f: impl FnOnce() -> T) -> Result<T> {
-    catch_unwind(AssertUnwindSafe(f)).map_err(|_| Error::format(path, "its points are damaged"))
+    crate::guarded::guarded(f).ok_or_else(|| Error::format(path, "its points are damaged"))
 }
 
 impl Cloud for E57Cloud<'_> {

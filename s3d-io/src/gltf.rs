@@ -54,7 +54,8 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
     let parts = MeshParts { materials: looks.materials, textures: looks.textures, ..parts };
     let mesh =
         checked_mesh(parts, &mut warnings).map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
-    Ok(MeshFile { texture_files: looks.files, warnings, ..MeshFile::new(path, mesh) })
+    let companions = document.companions();
+    Ok(MeshFile { texture_files: looks.files, warnings, companions, ..MeshFile::new(path, mesh) })
 }
 
 /// All meshes of the scene with their places, in the order of its nodes, parents first.

@@ -169,6 +169,22 @@ impl GltfDocument {
         Ok(buffers)
     }
 
+    /// The file that a URI names.
+    fn beside(&self, uri: &str) -> PathBuf {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        // Some exporters do not encode what they write.
+        let written = folder.join(uri);
+        if fs::exists(&written).unwrap_or(false) { written } else { folder.join(percent_decode(uri).as_ref()) }
+    }
+
+    /// The files beside this one that its buffers and images are in, those that are there.
+    pub(crate) fn companions(&self) -> Vec<PathBuf> {
+        let buffers = self.root.buffers.iter().filter_map(|b| b.uri.as_deref());
+        let images = self.root.images.iter().filter_map(|i| i.uri.as_deref());
+        let files = buffers.chain(images).filter(|uri| !uri.starts_with("data:") && !uri.contains("://"));
+        files.map(|uri| self.beside(uri)).filter(|path| path.is_file()).collect()
+    }
+
     /// What a URI stands for: data in itself, or a file beside this one.
     fn resource(&self, uri: &str) -> std::result::Result<Vec<u8>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
@@ -184,14 +200,7 @@ impl GltfDocument {
         if uri.contains("://") {
             return Err("is on the network; only files beside the mesh are read".into());
         }
-        let folder = self.path.parent().unwrap_or(Path::new(""));
-        // Some exporters do not encode what they write.
-        let written = folder.join(uri);
-        let path = if fs::exists(&written).unwrap_or(false) {
-            written
-        } else {
-            folder.join(percent_decode(uri).as_ref())
-        };
+        let path = self.beside(uri);
         read_file(&path).map_err(|e| match e {
             Error::Io { source, .. } => {
                 format!("cannot be read ({source}); it belongs at {}", path.display())

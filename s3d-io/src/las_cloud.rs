@@ -10,7 +10,6 @@ use las::point::Format;
 use s3d_geom::glam::dvec3;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// Points that are unpacked at a time.
@@ -225,7 +224,7 @@ fn color_at(format: &Format) -> Option<usize> {
 
 /// What `f` gives, or a sentence if it panicked: the decoder is not ours, and a damaged file must not end the program.
 fn guarded<T>(f: impl FnOnce() -> las::Result<T>) -> std::result::Result<las::Result<T>, &'static str> {
-    catch_unwind(AssertUnwindSafe(f)).map_err(|_| "its compressed points are damaged")
+    crate::guarded::guarded(f).ok_or("its compressed points are damaged")
 }
 
 impl Cloud for LasCloud<'_> {

@@ -272,7 +272,7 @@ impl Layout {
             entries.extend([true, false].map(|train| self.list_of_fold(fold, train)));
         }
         entries.extend(PROFILES.map(|name| self.profile_dir(name)));
-        entries.extend([self.statistics_md(), self.statistics_json(), self.conventions()]);
+        entries.extend([self.statistics_md(), self.statistics_json(), self.conventions(), self.file_list()]);
         entries.push(self.manifest());
         entries
     }
@@ -437,6 +437,37 @@ impl Layout {
         self.root.join("manifest.json")
     }
 
+    /// `files.csv`: every other file but the manifest, with its size and checksum.
+    pub fn file_list(&self) -> PathBuf {
+        self.root.join("files.csv")
+    }
+
+    /// `.s3d`: what an export keeps while it is unfinished. No [entry](Self::entries) of a data set: it is gone when the
+    /// data set is complete.
+    pub fn work_dir(&self) -> PathBuf {
+        self.root.join(".s3d")
+    }
+
+    /// `.s3d/lock`: who holds its lock exports into the folder.
+    pub fn lock(&self) -> PathBuf {
+        self.work_dir().join("lock")
+    }
+
+    /// `.s3d/request.json`: what is exported, from what, with which options.
+    pub fn request(&self) -> PathBuf {
+        self.work_dir().join("request.json")
+    }
+
+    /// `.s3d/failed`: there if the export ended by an error that trying again does not mend.
+    pub fn failed(&self) -> PathBuf {
+        self.work_dir().join("failed")
+    }
+
+    /// `.s3d/journal`: which work is done; a file for each process that did some.
+    pub fn journal_dir(&self) -> PathBuf {
+        self.work_dir().join("journal")
+    }
+
     /// `statistics.md`: counts, to read.
     pub fn statistics_md(&self) -> PathBuf {
         self.root.join("statistics.md")
@@ -546,6 +577,9 @@ mod tests {
             layout.pose_schema(),
             layout.manifest_schema(),
             layout.manifest(),
+            layout.file_list(),
+            layout.request(),
+            layout.journal_dir(),
             layout.statistics_md(),
             layout.statistics_json(),
         ] {

@@ -13,6 +13,7 @@
 //! - scans: [`read_scene`], [`read_scan_locations`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
 //! - the scanner's pictures: [`PictureFolder`], [`CaptureFile`], [`read_matterport_locations`];
 //! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
+//! - what is there: [`FileRecord`], [`write_file_list`], [`Checksum`], [`sync_data_set`];
 //! - lists: [`write_labels`], [`write_splits`], [`write_image_list`]; arrays: [`NpyWriter`];
 //! - what the numbers of a data set mean: [`Conventions`];
 //! - packages for loaders, from the images of a data set ([`dataset_images`]): [`TarWriter`] (WebDataset),
@@ -47,6 +48,7 @@
 mod annotations;
 mod atomic;
 mod cameras;
+mod checksum;
 mod cloud_columns;
 mod cloud_records;
 mod coco;
@@ -60,6 +62,7 @@ mod e57_cloud;
 mod error;
 mod exr;
 mod face_annotations;
+mod file_list;
 mod flat;
 mod flat_meaning;
 mod flat_rows;
@@ -69,6 +72,7 @@ mod gltf_accessor;
 mod gltf_builder;
 mod gltf_document;
 mod gltf_material;
+mod guarded;
 mod hdf5;
 mod instances;
 mod json;
@@ -125,6 +129,7 @@ mod scene;
 mod scene_annotations;
 mod scene_cameras;
 mod splits;
+mod sync;
 mod tar;
 mod texture_file;
 mod webdataset;
@@ -132,6 +137,7 @@ mod webdataset;
 pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, Skipped};
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
 pub use cameras::{ScanLocation, read_cameras};
+pub use checksum::{BadChecksum, Checksum, ChecksumOfParts, checksum_of_file};
 pub use coco::{
     CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_category_id,
     coco_panoptic, write_coco,
@@ -144,6 +150,8 @@ pub use dataset::{
 };
 pub use error::{Error, Place, Result};
 pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
+pub use file_list::{FileRecord, read_file_list, write_file_list};
+pub use guarded::panic_is_caught;
 pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};
 pub use json::{read_json, write_json};
 pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};
@@ -179,6 +187,7 @@ pub use scan_locations::read_scan_locations;
 pub use scene::{SceneFile, read_scene};
 pub use scene_cameras::CameraSource;
 pub use splits::{Split, read_splits, write_image_list, write_splits};
+pub use sync::sync_data_set;
 pub use tar::TarWriter;
 pub use texture_file::TextureFile;
 pub use webdataset::{ShardEntry, ShardLimits, plan_shards, sample_key, sample_member, write_shard_index};

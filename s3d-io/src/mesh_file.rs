@@ -5,7 +5,7 @@ use crate::texture_file::TextureFile;
 use crate::{Error, MeshLabels, MeshSource, Result, gltf, obj, ply_mesh};
 use s3d_geom::glam::{Vec3, vec3};
 use s3d_geom::{MeshError, MeshParts, TriMesh};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The axis of a file that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
@@ -40,6 +40,9 @@ pub struct MeshFile {
     pub labels: Option<MeshLabels>,
     /// The files that the mesh comes from, and where in it each begins.
     pub sources: Vec<MeshSource>,
+    /// The other files that were read for it: libraries of materials, textures, buffers. Those that it names and that are
+    /// not there are not among them.
+    pub companions: Vec<PathBuf>,
     /// How many faces of the file had more than three corners.
     pub polygons_triangulated: usize,
     /// How many faces were left out because an earlier one has the same corners.
@@ -49,9 +52,19 @@ pub struct MeshFile {
 impl MeshFile {
     /// A mesh of the file `path`, with nothing else to say about it.
     pub(crate) fn new(path: &Path, mesh: TriMesh) -> Self {
-        let (texture_files, warnings, labels) = Default::default();
+        let (texture_files, warnings, labels, companions) = Default::default();
         let sources = vec![MeshSource { path: path.to_owned(), first_face: 0, first_vertex: 0 }];
-        Self { mesh, texture_files, warnings, labels, sources, polygons_triangulated: 0, repeated_faces: 0 }
+        let (polygons_triangulated, repeated_faces) = (0, 0);
+        Self {
+            mesh,
+            texture_files,
+            warnings,
+            labels,
+            sources,
+            companions,
+            polygons_triangulated,
+            repeated_faces,
+        }
     }
 
     /// Leaves out the faces that repeat an earlier one; labels follow the tags of the mesh, which are returned.

@@ -97,6 +97,7 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
         warnings: [joined.warnings, next.warnings].concat(),
         labels,
         sources,
+        companions: [joined.companions, next.companions].concat(),
         polygons_triangulated: joined.polygons_triangulated + next.polygons_triangulated,
         repeated_faces: joined.repeated_faces + next.repeated_faces,
     })

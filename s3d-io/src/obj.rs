@@ -73,8 +73,8 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         MeshError::NonFinite { vertex, position } => vertex_error(path, &bytes, vertex, position),
         source => Error::Mesh { path: path.to_owned(), source },
     })?;
-    let texture_files = looks.files;
-    Ok(MeshFile { texture_files, warnings, polygons_triangulated, ..MeshFile::new(path, mesh) })
+    let (texture_files, companions) = (looks.files, looks.companions);
+    Ok(MeshFile { texture_files, warnings, companions, polygons_triangulated, ..MeshFile::new(path, mesh) })
 }
 
 fn no_faces(plain: &PlainObj) -> String {

@@ -16,6 +16,8 @@ pub(crate) struct ObjLooks {
     pub(crate) textures: Vec<Texture>,
     /// One a texture.
     pub(crate) files: Vec<Option<TextureFile>>,
+    /// The libraries and images that were read.
+    pub(crate) companions: Vec<PathBuf>,
 }
 
 /// A material of a library, and the library's folder and name for messages.
@@ -28,8 +30,8 @@ impl ObjLooks {
     /// Reads the libraries that the file at `path` names, and the images of the materials that it uses.
     pub(crate) fn load(path: &Path, plain: &PlainObj, warnings: &mut Vec<String>) -> Self {
         let folder = path.parent().unwrap_or(Path::new(""));
-        let library = load_libraries(folder, plain, warnings);
         let mut looks = Self::default();
+        let library = load_libraries(folder, plain, &mut looks.companions, warnings);
         let mut wanted: Vec<PathBuf> = Vec::new();
         let mut unknown: Vec<&str> = Vec::new();
         // For each material the image, into `wanted`, and how it repeats.
@@ -76,6 +78,7 @@ impl ObjLooks {
                 .push(format!("{n} in no library and drawn gray, the first is {}", quote(first.as_bytes())));
         }
         looks.load_images(&wanted, &maps, warnings);
+        looks.companions.append(&mut wanted);
         looks
     }
 
@@ -128,7 +131,12 @@ impl ObjLooks {
 }
 
 /// All materials of all libraries by name; of two with one name the later counts.
-fn load_libraries(folder: &Path, plain: &PlainObj, warnings: &mut Vec<String>) -> HashMap<String, Found> {
+fn load_libraries(
+    folder: &Path,
+    plain: &PlainObj,
+    read: &mut Vec<PathBuf>,
+    warnings: &mut Vec<String>,
+) -> HashMap<String, Found> {
     let mut found = HashMap::new();
     for (line, names) in &plain.libraries {
         // A name may hold spaces, and a line may hold several names.
@@ -141,6 +149,7 @@ fn load_libraries(folder: &Path, plain: &PlainObj, warnings: &mut Vec<String>) -
         for library in files {
             match read_file(&library) {
                 Ok(bytes) => {
+                    read.push(library.clone());
                     let (materials, complaints) = parse_mtl(&bytes);
                     warnings.extend(complaints.iter().map(|c| format!("{}, {c}", library.display())));
                     for material in materials {
@@ -213,6 +222,9 @@ mod tests {
         let textures: Vec<_> =
             mesh.textures().iter().map(|t| (t.name.as_str(), t.wrap[0], t.image.len())).collect();
         assert_eq!(textures, [("two words.png", Wrap::Clamp, 2), ("two words.png", Wrap::Repeat, 2)]);
+        let read: Vec<&str> =
+            file.companions.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(read, ["lib.mtl", "other.mtl", "two words.png", "bad.png"]);
         let kept = TextureFile { extension: "png", bytes: png.clone() };
         assert_eq!(file.texture_files, [Some(kept.clone()), Some(kept)]);
         assert!(matches!(mesh.color_of(0), FaceColor::Texture(0, ..)));

@@ -97,6 +97,7 @@ pub(crate) fn read(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<Mes
     Ok(MeshFile {
         polygons_triangulated: cut,
         texture_files: looks.files,
+        companions: looks.companions,
         warnings,
         labels,
         ..MeshFile::new(path, mesh)
@@ -142,6 +143,8 @@ struct Looks {
     by_comment: Vec<(String, Option<u32>)>,
     textures: Vec<Texture>,
     files: Vec<Option<TextureFile>>,
+    /// The images that were read.
+    companions: Vec<PathBuf>,
 }
 
 impl Looks {
@@ -188,6 +191,7 @@ impl Looks {
                     .push(format!("texture {} {why}; its faces are drawn without it", wanted[at].display())),
             }
         }
+        looks.companions = wanted;
         looks
     }
 }
@@ -340,6 +344,7 @@ mod tests {
             );
             assert_eq!(texture.image.pixels(), [[1, 2, 3], [4, 5, 6]]);
             assert_eq!(file.texture_files[0].as_ref().unwrap().extension, "png");
+            assert!(file.companions.len() == 1 && file.companions[0].ends_with("two words.png"));
             assert!(file.warnings.is_empty());
         }
         // As MeshLab writes them: two images, one list a face; the coordinates of a polygon go with its corners.

@@ -236,6 +236,7 @@ fn buffers_beside_the_file_and_in_it() {
         let json = f.json(&format!(r#", "uri": "{uri}""#), &rest);
         let file = read_file("a.gltf", json.as_bytes(), &beside).unwrap();
         assert_eq!(triangles(&file.mesh), square());
+        assert!(file.companions.len() == 1 && file.companions[0].ends_with(beside[0].0));
     }
     let mut json = f.json("", &rest);
     while !json.len().is_multiple_of(4) {

@@ -61,6 +61,11 @@ impl Selection {
         self.keep + self.half_of_rest * (1.0 - self.discard - self.keep).max(0.0)
     }
 
+    /// How many of a pool of `n` views go for the lowest scores; the others that go are not drawn from the rest.
+    pub fn discarded(&self, n: usize) -> usize {
+        self.counts(n).discard
+    }
+
     fn counts(&self, n: usize) -> Counts {
         let of = |share: f64| share * n as f64 + SLACK;
         let discard = (of(self.discard).floor() as usize).min(n);
@@ -155,6 +160,7 @@ mod tests {
             let stays = select(&scores, &Selection::default(), 5);
             assert_eq!(stays.len(), n);
             assert!((kept(&stays) as f64 - 0.725 * n as f64).abs() <= 0.5 + 1e-6, "{n}");
+            assert_eq!(Selection::default().discarded(n), (0.15 * n as f64 + 1e-9) as usize);
             let mut ranked: Vec<usize> = (0..n).collect();
             ranked.sort_by(|&a, &b| scores[b].partial_cmp(&scores[a]).unwrap().then(a.cmp(&b)));
             let (top, bottom) =

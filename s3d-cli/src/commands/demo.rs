@@ -5,16 +5,22 @@ use crate::args::{DemoArgs, ExportOptions, FormatOptions};
 use crate::demo::{is_demo_scan, write_scan};
 use crate::failure::{Failure, Outcome};
 use crate::pipeline::{Target, export, output};
-use s3d_io::{Domain, Layout};
+use s3d_io::{Domain, Error, Layout};
 use s3d_sample::Pool;
+use std::fs;
+use std::io;
+use std::path::Path;
 use tracing::info;
 
 /// Folder of the scene's own files in OUT.
 const SCAN: &str = "scan";
 
+/// The same while they are written.
+const SCAN_PART: &str = ".s3d-scan.part";
+
 pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
     let layout = Layout::new(args.output.clone());
-    output::check(&layout, args.overwrite, &[])?;
+    output::check(&layout, args.overwrite, &[SCAN, SCAN_PART])?;
     let o = args.options;
     let options = ExportOptions {
         views: o.views,
@@ -41,7 +47,11 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         )));
     }
     on_threads(args.threads, || {
-        let scene = write_scan(&scan)?;
+        let part = args.output.join(SCAN_PART);
+        remove(&part)?;
+        let written = write_scan(&part)?;
+        put(&part, &scan, args.overwrite)?;
+        let scene = scan.join(written.file_name().unwrap_or_default());
         info!("the built-in scene is in {}", scan.display());
         let target = Target { layout: layout.clone(), overwrite: args.overwrite, allowed: &[SCAN] };
         export(&[scene], &target, &options)?;
@@ -52,4 +62,46 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         );
         Ok(())
     })
+}
+
+/// Gives the scene its place. One that is there already, of a demo that was stopped, may stay if it is the same to the
+/// byte: somebody may have changed it since.
+fn put(part: &Path, scan: &Path, overwrite: bool) -> Outcome<()> {
+    if scan.exists() {
+        if same(part, scan).map_err(|e| Error::io(scan, "read", e))? {
+            return remove(part);
+        }
+        if !overwrite {
+            remove(part)?;
+            return Err(Failure::Call(format!(
+                "{} is there and differs from the built-in scene: choose another folder, or replace it with --overwrite",
+                scan.display()
+            )));
+        }
+        // Whatever else is in it stays.
+        remove(part)?;
+        return write_scan(scan).map(drop);
+    }
+    Ok(fs::rename(part, scan).map_err(|e| Error::io(scan, "move the scene to", e))?)
+}
+
+/// Whether every file and folder of `a` is in `b` with the same bytes.
+fn same(a: &Path, b: &Path) -> io::Result<bool> {
+    if !a.is_dir() {
+        return Ok(b.is_file() && fs::read(a)? == fs::read(b)?);
+    }
+    for entry in fs::read_dir(a)? {
+        let entry = entry?;
+        if !same(&entry.path(), &b.join(entry.file_name()))? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+fn remove(folder: &Path) -> Outcome<()> {
+    match fs::remove_dir_all(folder) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(Error::io(folder, "remove", e).into()),
+        _ => Ok(()),
+    }
 }

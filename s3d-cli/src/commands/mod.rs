@@ -11,7 +11,7 @@ pub(crate) mod stats;
 pub(crate) mod xyz;
 
 use crate::args::Threads;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Failure, Outcome, passes};
 use s3d_io::Error;
 use std::io::{ErrorKind, Write, stdout};
 use std::path::Path;
@@ -21,7 +21,10 @@ fn on_threads<T: Send>(threads: Threads, work: impl FnOnce() -> Outcome<T> + Sen
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.threads.map_or(0, usize::from))
         .build()
-        .map_err(|e| Failure::Input(format!("cannot start threads: {e}")))?;
+        .map_err(|e| {
+            let message = format!("cannot start threads: {e}");
+            if passes(&e) { Failure::Again(message) } else { Failure::Input(message) }
+        })?;
     pool.install(work)
 }
 

@@ -3,7 +3,7 @@
 use crate::args::ProfileArgs;
 use crate::failure::{Failure, Outcome};
 use crate::pipeline::manifest::{Head, Manifest};
-use crate::pipeline::profiles;
+use crate::pipeline::{listing, profiles};
 use s3d_io::{Error, Layout};
 use std::fs;
 
@@ -30,6 +30,13 @@ pub(crate) fn run(args: &ProfileArgs) -> Outcome<()> {
         }
     }
     profiles::write(&layout, &head.area_numbers, &wanted)?;
-    manifest.add_profiles(&wanted.iter().map(|p| p.name()).collect::<Vec<_>>());
-    manifest.write(&layout)
+    let names: Vec<&str> = wanted.iter().map(|p| p.name()).collect();
+    manifest.add_profiles(&names);
+    let mut files = Vec::new();
+    for name in &names {
+        files.extend(listing::walk(&layout.profile_dir(name))?);
+    }
+    let changed = listing::records(&layout, &files)?;
+    let is_gone = |path: &str| names.iter().any(|name| path.starts_with(&format!("profiles/{name}/")));
+    listing::update(&layout, &mut manifest, changed, is_gone)
 }

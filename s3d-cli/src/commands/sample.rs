@@ -5,6 +5,7 @@ use crate::args::SampleArgs;
 use crate::console::Progress;
 use crate::failure::Outcome;
 use crate::pipeline::points::check_density;
+use crate::stop;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use s3d_io::PlyPointWriter;
 use std::time::Instant;
@@ -29,6 +30,7 @@ pub(crate) fn run(args: SampleArgs) -> Outcome<()> {
         let mut cloud = PointCloud::default();
         let mut at = 0;
         while at < sampler.len() {
+            stop::check()?;
             let end = sampler.len().min(at + CHUNK);
             sampler.sample(at..end, &mut cloud);
             ply.append(&cloud, &vec![0; cloud.len()])?;

@@ -4,16 +4,18 @@ use super::on_threads;
 use crate::args::XyzArgs;
 use crate::console::Progress;
 use crate::failure::{Failure, Outcome};
+use crate::pipeline::listing;
 use crate::pipeline::manifest::{Head, Manifest};
 use crate::pipeline::work::for_each_in_order;
 use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::{
-    Compression, Conventions, DepthUnits, Domain, Error, Frame, ImageName, Layout, XyzType, create_dir,
-    encode_xyz_float, encode_xyz_half, read_conventions, read_gray16, read_pose, write_bytes,
+    Compression, Conventions, DepthUnits, Domain, Error, FileRecord, Frame, ImageName, Layout, XyzType,
+    create_dir, encode_xyz_float, encode_xyz_half, read_conventions, read_gray16, read_pose, write_bytes,
 };
 use std::fs;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use tracing::info;
 
 pub(crate) fn run(args: &XyzArgs) -> Outcome<()> {
@@ -54,19 +56,25 @@ fn make(args: &XyzArgs) -> Outcome<()> {
         }
     }
     let progress = Progress::new("coordinates", "images", work.len() as u64);
+    let changed = Mutex::new(Vec::with_capacity(work.len() + 1));
     for_each_in_order(
         &work,
         || (),
         |(), work| {
-            write_one(work, conventions.depth_units, args.xyz, args.compression)?;
+            let file = make_one(work, conventions.depth_units, args.xyz, args.compression)?;
+            write_bytes(&work.xyz, &file)?;
+            let record = FileRecord::of_bytes(layout.root(), &work.xyz, &file)?;
+            changed.lock().unwrap_or_else(PoisonError::into_inner).push(record);
             progress.add(1);
             Ok(())
         },
     )?;
     drop(progress);
+    let mut changed = changed.into_inner().unwrap_or_else(PoisonError::into_inner);
     Conventions { xyz: args.xyz, ..conventions }.write(&layout.conventions())?;
+    changed.push(FileRecord::of_file(layout.root(), &layout.conventions())?);
     manifest.xyz_from_depth(args.xyz, conventions.depth_units);
-    manifest.write(&layout)?;
+    listing::update(&layout, &mut manifest, changed, |_| false)?;
     info!("{}: world coordinates of {} images from depth and pose", layout.root().display(), work.len());
     Ok(())
 }
@@ -93,7 +101,8 @@ fn images(layout: &Layout, area: u32, kind: Frame) -> Outcome<Vec<Work>> {
     Ok(works.filter(|w| w.pose.exists()).collect())
 }
 
-fn write_one(work: &Work, units: DepthUnits, kind: XyzType, compression: Compression) -> Outcome<()> {
+/// The file of an image's world coordinates.
+fn make_one(work: &Work, units: DepthUnits, kind: XyzType, compression: Compression) -> Outcome<Vec<u8>> {
     let pose = read_pose(&work.pose)?;
     let depth = read_gray16(&work.depth)?;
     let camera = if work.frame == Frame::Panorama {
@@ -112,12 +121,10 @@ fn write_one(work: &Work, units: DepthUnits, kind: XyzType, compression: Compres
         Camera::perspective(pose.pose(), fov, depth.width(), depth.height())
     };
     let points = points(&camera, &depth, units);
-    let file = match kind {
+    Ok(match kind {
         XyzType::Float => encode_xyz_float(&points, compression),
         _ => encode_xyz_half(&points.map(|p| p.map(f16::from_f32)), compression),
-    };
-    write_bytes(&work.xyz, &file)?;
-    Ok(())
+    })
 }
 
 /// location + direction × depth, the direction through the middle of the pixel; 0 where depth is missing.

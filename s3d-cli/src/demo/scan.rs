@@ -2,6 +2,7 @@
 
 use super::{DemoScene, demo_scene};
 use crate::failure::Outcome;
+use crate::stop;
 use glam::DQuat;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -58,6 +59,7 @@ fn write_annotations(dir: &Path, scene: &DemoScene) -> Outcome<()> {
     let mut noise = ChaCha8Rng::seed_from_u64(SEED);
     let mut cloud = PointCloud::default();
     for room in &rooms {
+        stop::check()?;
         let mut files = tree.room(room)?;
         for (index, instance) in scene.instances.iter().enumerate().filter(|(_, i)| i.room == *room) {
             let faces: Vec<u32> = (0u32..)

@@ -3,6 +3,7 @@
 use super::inputs::AreaInput;
 use crate::console::Progress;
 use crate::failure::{Failure, Outcome};
+use crate::stop;
 use glam::Vec3;
 use s3d_geom::{
     Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh, Voxels,
@@ -17,6 +18,9 @@ const MANY_FAR: f64 = 0.05;
 
 /// A share of labelled faces below which it is told.
 const FEW_LABELLED: f64 = 0.5;
+
+/// Points that vote at a time: a signal is followed between two such pieces.
+const CHUNK: usize = 1 << 18;
 
 /// An annotated area.
 pub(crate) struct Annotated {
@@ -93,6 +97,7 @@ pub(crate) fn annotate(
         let (mut points, mut bbox) = (0u64, Aabb::EMPTY);
         for instance in &room.instances {
             let id = table.id_of(&instance.label).unwrap_or(LabelId::NULL);
+            stop::check()?;
             cloud.clear();
             let left_out = instance.points.read(&mut cloud)?;
             skipped.lines += left_out.count;
@@ -123,9 +128,12 @@ pub(crate) fn annotate(
                     votes.add(*face, id, 0.0);
                 }
             } else {
-                nearest_faces.nearest_many(&cloud.positions, &mut nearest);
-                for n in &nearest {
-                    votes.add(n.face, id, n.distance_m);
+                for positions in cloud.positions.chunks(CHUNK) {
+                    stop::check()?;
+                    nearest_faces.nearest_many(positions, &mut nearest);
+                    for n in &nearest {
+                        votes.add(n.face, id, n.distance_m);
+                    }
                 }
             }
             cloud.positions.iter().for_each(|p| builder.add(*p));

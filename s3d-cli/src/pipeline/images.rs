@@ -2,14 +2,17 @@
 
 use super::modality::{Image, Look, Prints};
 use super::pictures::Pictures;
+use super::summary::{ImageTally, UnitTally};
 use super::views::Candidate;
 use super::work::for_each_in_order;
 use crate::console::Progress;
 use crate::failure::Outcome;
 use s3d_geom::Camera;
-use s3d_io::{Domain, Frame, Layout, PoseFile, ScanLocation, create_dir, write_bytes};
+use s3d_io::{Domain, FileRecord, Frame, Layout, PoseFile, ScanLocation, create_dir, write_bytes};
 use s3d_label::Room;
-use s3d_render::{Caster, Hits};
+use s3d_render::{Caster, Hits, NO_FACE};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 /// What is rendered, and where it goes.
 #[derive(Clone, Copy)]
@@ -22,18 +25,34 @@ pub(crate) struct ImageJob<'a> {
     pub(crate) locations: &'a [ScanLocation],
     /// The room of each location.
     pub(crate) rooms: &'a [Room],
-    /// Whether a location's images are asked for.
+    /// Whether a location's images are to be written.
     pub(crate) chosen: &'a [bool],
     pub(crate) modalities: &'a [Domain],
     pub(crate) size: u32,
     pub(crate) pano_width: u32,
+    /// Told of every location whose images are all there, by whichever thread wrote the last.
+    pub(crate) each: &'a (dyn Fn(WrittenLocation) -> Outcome<()> + Sync),
 }
 
-/// How many images were written.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ImageCount {
-    pub(crate) panoramas: u64,
-    pub(crate) views: u64,
+/// A location all of whose images are there.
+pub(crate) struct WrittenLocation {
+    /// Its index.
+    pub(crate) location: usize,
+    pub(crate) tally: UnitTally,
+    /// Sorted.
+    pub(crate) files: Vec<FileRecord>,
+    /// When its first image was begun.
+    pub(crate) started: Instant,
+}
+
+/// A location some of whose images are not there yet.
+#[derive(Default)]
+struct OpenLocation {
+    /// Images that are still to be written.
+    left: usize,
+    tally: UnitTally,
+    files: Vec<FileRecord>,
+    started: Option<Instant>,
 }
 
 /// One image in all its modalities.
@@ -53,13 +72,18 @@ enum Work<'a> {
 }
 
 /// Renders and writes the panoramas of the chosen locations and their kept views. `rest` is done once, by one of the
-/// threads, meanwhile.
+/// threads, meanwhile; none if it is done already.
 pub(crate) fn write_images(
     job: &ImageJob<'_>,
     candidates: &[Candidate],
-    rest: Rest<'_>,
-) -> Outcome<ImageCount> {
+    rest: Option<Rest<'_>>,
+) -> Outcome<()> {
     let shots = shots(job, candidates);
+    let mut open: Vec<OpenLocation> = job.locations.iter().map(|_| OpenLocation::default()).collect();
+    for shot in &shots {
+        open[shot.location].left += 1;
+    }
+    let open: Vec<Mutex<OpenLocation>> = open.into_iter().map(Mutex::new).collect();
     for domain in job.modalities {
         for frame in [Frame::Panorama, Frame::View(0)] {
             create_dir(&job.layout.image_dir(job.area, frame, *domain))?;
@@ -67,24 +91,23 @@ pub(crate) fn write_images(
     }
     let progress = Progress::new("rendering", "images", shots.len() as u64);
     let Some(pictures) = job.pictures else {
-        write_shots(job, &shots, Some(rest), &progress)?;
-        return Ok(count(&shots));
+        return write_shots(job, &shots, &open, rest, &progress);
     };
     // A location after another: one cube map is in memory, and all threads work with it.
-    let mut rest = Some(rest);
+    let mut rest = rest;
     for shots in shots.chunk_by(|a, b| a.location == b.location) {
         let location = shots[0].location;
         let cube = pictures.cube(location, &job.locations[location], job.look.scene)?;
         let look = Look { pictures: cube.as_ref().map(|cube| pictures.colors(cube)), ..job.look };
-        write_shots(&ImageJob { look, ..*job }, shots, rest.take(), &progress)?;
+        write_shots(&ImageJob { look, ..*job }, shots, &open, rest.take(), &progress)?;
     }
-    rest.map_or(Ok(()), |rest| rest())?;
-    Ok(count(&shots))
+    rest.map_or(Ok(()), |rest| rest())
 }
 
 fn write_shots(
     job: &ImageJob<'_>,
     shots: &[Shot],
+    open: &[Mutex<OpenLocation>],
     rest: Option<Rest<'_>>,
     progress: &Progress,
 ) -> Outcome<()> {
@@ -94,16 +117,21 @@ fn write_shots(
     for_each_in_order(&works, memory, |memory, work| match work {
         Work::Rest(rest) => rest(),
         Work::Shot(shot) => {
-            write_shot(job, shot, memory)?;
+            let started = Instant::now();
+            let written = write_shot(job, shot, memory)?;
             progress.add(1);
-            Ok(())
+            let mut location = open[shot.location].lock().unwrap_or_else(PoisonError::into_inner);
+            location.add(shot.frame, written, started);
+            if location.left > 0 {
+                return Ok(());
+            }
+            let OpenLocation { tally, mut files, started, .. } = std::mem::take(&mut *location);
+            drop(location);
+            files.sort();
+            let started = started.unwrap_or_else(Instant::now);
+            (job.each)(WrittenLocation { location: shot.location, tally, files, started })
         }
     })
-}
-
-fn count(shots: &[Shot]) -> ImageCount {
-    let panoramas = shots.iter().filter(|s| s.frame == Frame::Panorama).count() as u64;
-    ImageCount { panoramas, views: shots.len() as u64 - panoramas }
 }
 
 /// The images to take: of each location its panorama, which takes longest, and then its views.
@@ -131,13 +159,36 @@ struct Memory<'s> {
     prints: Prints,
 }
 
-fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Outcome<()> {
+/// What was written of a shot.
+#[derive(Default)]
+struct WrittenShot {
+    files: Vec<FileRecord>,
+    pixels: u64,
+    pixels_missing: u64,
+}
+
+impl OpenLocation {
+    fn add(&mut self, frame: Frame, shot: WrittenShot, started: Instant) {
+        self.left -= 1;
+        self.started = Some(self.started.map_or(started, |first| first.min(started)));
+        self.tally.files += shot.files.len() as u64;
+        self.tally.bytes += shot.files.iter().map(|f| f.bytes).sum::<u64>();
+        let kind = if frame == Frame::Panorama { &mut self.tally.panoramas } else { &mut self.tally.views };
+        *kind += ImageTally { images: 1, pixels: shot.pixels, pixels_missing: shot.pixels_missing };
+        self.files.extend(shot.files);
+    }
+}
+
+fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Outcome<WrittenShot> {
     let Memory { caster, hits, prints } = memory;
     let scan = &job.locations[shot.location];
     let room = job.rooms[shot.location].to_string();
-    let write = |domain: Domain, bytes: &[u8]| -> Outcome<()> {
+    let mut written = WrittenShot::default();
+    let mut write = |domain: Domain, bytes: &[u8]| -> Outcome<()> {
         let path = job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain);
-        Ok(write_bytes(&path, bytes).map(drop)?)
+        write_bytes(&path, bytes)?;
+        written.files.push(FileRecord::of_bytes(job.layout.root(), &path, bytes)?);
+        Ok(())
     };
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
     // Poses alone need no rays.
@@ -150,5 +201,9 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Outco
         let pose = PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame);
         write(Domain::Pose, &pose.to_json())?;
     }
-    Ok(())
+    if !images.is_empty() {
+        written.pixels = hits.face.len() as u64;
+        written.pixels_missing = hits.face.pixels().iter().filter(|face| **face == NO_FACE).count() as u64;
+    }
+    Ok(written)
 }

@@ -35,8 +35,10 @@ pub(crate) struct AreaInput {
     pub(crate) warnings: Vec<String>,
     /// Whether what is not as it should be in the annotations is skipped and counted.
     pub(crate) lenient: bool,
-    /// All files and folders that are read.
+    /// All files and folders that it is made from: the data set must not lie on them.
     pub(crate) files: Vec<PathBuf>,
+    /// Those that are read, and whose bytes decide those of the data set; but for what its mesh names.
+    pub(crate) sources: Vec<PathBuf>,
 }
 
 /// Where an area's mesh comes from.
@@ -110,7 +112,8 @@ impl Inputs {
             }
             let list = &area.cameras_path;
             for location in area.cameras.listed() {
-                if let Some(other) = location_of.insert(location.uuid.clone(), list.clone()) {
+                // Files of two uuids that differ by case alone would be one on many file systems.
+                if let Some(other) = location_of.insert(location.uuid.to_ascii_lowercase(), list.clone()) {
                     let message = format!("uuid {} is also in {}", location.uuid, other.display());
                     return Err(match location.line {
                         0 => Error::format(list, message),
@@ -176,6 +179,7 @@ impl AreaInput {
             warnings,
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
             files: files_of(&scene),
+            sources: files_of(&scene),
             cameras_path,
             pictures: scene.pictures,
             path: scene.path,
@@ -207,7 +211,14 @@ impl AreaInput {
             (Cameras::Listed(locations, rooms), folder.to_owned())
         });
         let mut files = vec![folder.to_owned()];
-        files.extend(scene.as_ref().map_or(Vec::new(), files_of));
+        let mut sources = vec![area.mesh.clone(), area.semantic_mesh.clone()];
+        sources.extend(area.labels.clone());
+        let poses = ["data/pose", "pano/pose"].map(|name| folder.join(name));
+        sources.extend(poses.into_iter().filter(|path| path.is_dir()));
+        if let Some(scene) = &scene {
+            files.extend(files_of(scene));
+            sources.extend(files_of(scene).into_iter().filter(|path| path != folder));
+        }
         Ok(Self {
             number: area.area,
             path: scene.as_ref().map_or(folder, |s| &s.path).to_owned(),
@@ -219,6 +230,7 @@ impl AreaInput {
             warnings,
             lenient: false,
             files,
+            sources,
         })
     }
 

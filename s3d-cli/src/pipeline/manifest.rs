@@ -1,10 +1,9 @@
 //! `manifest.json`: what made a data set, from what, with which options, and what was lost on the way.
 
-use super::images::ImageCount;
-use crate::args::ExportOptions;
+use super::request::{InputRecord, Options, Request, RequestedArea};
 use crate::failure::Outcome;
 use s3d_geom::Aabb;
-use s3d_io::{DepthUnits, Domain, Error, Layout, XyzType, read_json, write_json};
+use s3d_io::{Checksum, DepthUnits, Error, Layout, XyzType, read_json, write_json};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -29,9 +28,25 @@ pub(crate) struct Manifest {
     labels: usize,
     /// Entries of `semantic_labels.json`: null labels fill it up.
     labels_padded_to: usize,
+    /// The list of all other files; not while the export runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) files: Option<FileList>,
     /// If the world coordinates were made from depth and pose, by `s3d xyz`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     xyz_from_depth: Option<XyzFromDepth>,
+}
+
+/// The list of a data set's files, all but itself and the manifest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct FileList {
+    /// Its name.
+    pub(crate) list: String,
+    /// How many files are in it.
+    pub(crate) count: u64,
+    /// Their bytes.
+    pub(crate) bytes: u64,
+    /// The checksum of the list.
+    pub(crate) xxh3_128: Checksum,
 }
 
 /// What made world coordinates from depth, and what that loses.
@@ -46,30 +61,8 @@ struct XyzFromDepth {
     largest_depth_m: f64,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
-struct Options {
-    views: u32,
-    size: u32,
-    pano_width: u32,
-    pool: String,
-    points_per_m2: f64,
-    /// Whether faults of the annotations were skipped.
-    lenient: bool,
-    entropy_stride: u32,
-    modalities: Vec<String>,
-    keep_all: bool,
-    only: Vec<String>,
-    normals: String,
-    compression: String,
-    xyz: String,
-    normal_axes: String,
-    depth_units: String,
-    pad_labels: String,
-    profiles: Vec<String>,
-}
-
 /// What the manifest tells of an area.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct AreaEntry {
     pub(crate) area: u32,
     pub(crate) faces: usize,
@@ -86,10 +79,13 @@ pub(crate) struct AreaEntry {
     pub(crate) rgb: String,
     /// How far apart scan locations were placed, metres; null if the scene has its own.
     pub(crate) place_cameras: Option<f64>,
+    /// What it was made from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) inputs: Vec<InputRecord>,
 }
 
 /// What storing world coordinates loses.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct XyzLoss {
     #[serde(rename = "type")]
     kind: String,
@@ -134,39 +130,46 @@ pub(crate) fn half_step(value: f32) -> f64 {
 }
 
 impl Manifest {
-    /// The manifest of an export that has begun.
-    pub(crate) fn begin(options: &ExportOptions, areas: &[u32], labels: usize) -> Self {
-        let format = &options.format;
+    /// The manifest of an export that has begun; `labels` is the length of the label table.
+    pub(crate) fn begin(request: &Request, labels: usize) -> Self {
+        let padded = request.options.pad_labels.parse().unwrap_or(0);
         Self {
             generator: GENERATOR.to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            version: request.version.clone(),
             status: RUNNING.to_owned(),
-            seed: options.seed,
-            options: Options {
-                views: options.views,
-                size: options.size,
-                pano_width: options.pano_width,
-                pool: options.pool.to_string(),
-                points_per_m2: options.points_per_m2,
-                lenient: options.lenient,
-                entropy_stride: options.entropy_stride,
-                modalities: options.modalities.iter().map(Domain::to_string).collect(),
-                keep_all: options.keep_all,
-                only: options.only.clone(),
-                normals: if options.smooth_normals { "smooth" } else { "flat" }.to_owned(),
-                compression: options.compression.name().to_owned(),
-                xyz: format.xyz.name().to_owned(),
-                normal_axes: format.normal_axes.name().to_owned(),
-                depth_units: format.depth_units.name().to_owned(),
-                pad_labels: format.pad_labels.to_string(),
-                profiles: format.profiles.iter().map(|p| p.name().to_owned()).collect(),
-            },
-            area_numbers: areas.to_vec(),
+            seed: request.seed,
+            options: request.options.clone(),
+            area_numbers: request.numbers(),
             areas: Vec::new(),
             labels,
-            labels_padded_to: labels.max(format.pad_labels.0),
+            labels_padded_to: labels.max(padded),
+            files: None,
             xyz_from_depth: None,
         }
+    }
+
+    /// What was asked for when this data set was made.
+    pub(crate) fn request(&self) -> Request {
+        let areas = self.areas.iter().map(|entry| RequestedArea {
+            area: entry.area,
+            place_cameras: entry.place_cameras,
+            inputs: entry.inputs.clone(),
+        });
+        Request {
+            version: self.version.clone(),
+            seed: self.seed,
+            options: self.options.clone(),
+            areas: areas.collect(),
+        }
+    }
+
+    /// In what this data set differs from one that would be made `now`, a sentence each.
+    pub(crate) fn differences(&self, now: &Request) -> Vec<String> {
+        let mut differences = self.request().differences(now);
+        if self.xyz_from_depth.is_some() {
+            differences.push("its world coordinates were made again by `s3d xyz`".to_owned());
+        }
+        differences
     }
 
     /// The manifest of a complete data set, to be changed.
@@ -200,18 +203,11 @@ impl Manifest {
     }
 
     /// Writes that the export is complete, with what it holds.
-    pub(crate) fn complete(mut self, layout: &Layout, areas: Vec<AreaEntry>) -> Outcome<()> {
+    pub(crate) fn complete(mut self, layout: &Layout, areas: Vec<AreaEntry>, files: FileList) -> Outcome<()> {
         self.areas = areas;
+        self.files = Some(files);
         self.status = COMPLETE.to_owned();
         self.write(layout)
-    }
-}
-
-impl AreaEntry {
-    /// Adds what was rendered.
-    pub(crate) fn with_images(mut self, images: ImageCount) -> Self {
-        (self.panoramas, self.views) = (images.panoramas, images.views);
-        self
     }
 }
 
@@ -240,7 +236,7 @@ impl Head {
         if head.is_complete() {
             return Ok(head);
         }
-        Err(Error::format(&path, "the export into this folder did not finish: export again with --overwrite")
+        Err(Error::format(&path, "the export into this folder did not finish: call it again, with the same arguments, and it goes on")
             .into())
     }
 

@@ -1,11 +1,31 @@
-//! The folder of a data set: whether it may be written to, and what becomes of an earlier one in it.
+//! The folder of a data set: what is in it, whether it may be written to, what becomes of an earlier data set in it, and
+//! how an export that was killed goes on.
+//!
+//! While an export is unfinished, `.s3d/request.json` says what was asked for, `.s3d/journal` what is done of it, and the
+//! manifest says "running". An earlier data set that is replaced lies aside in `.s3d-previous` until the new one is
+//! complete. Every step from one state to the next is one rename or one file, so that whoever comes after a kill finds one
+//! of these:
+//!
+//! | `request.json` | manifest | `.s3d-previous` | |
+//! |---|---|---|---|
+//! | – | – | – | nothing |
+//! | any | complete | any | a complete data set; what else is there is to be cleaned away |
+//! | there | – or running | any | an unfinished export, to go on with |
+//! | – | – or running | there | the new one had not begun, or failed for good: the earlier one comes back |
+//! | – | running | – | the rest of an export of a version without a journal: nobody's |
 
 use super::inputs::Inputs;
-use super::manifest::Head;
+use super::journal::{Done, Finished, Journal};
+use super::listing::remove_parts;
+use super::lock::{Lock, Sharing};
+use super::manifest::{Head, Manifest};
+use super::request::Request;
+use super::summary::Account;
 use crate::failure::{Failure, Outcome};
-use s3d_io::{Error, Layout, create_dir};
+use s3d_io::{Error, Layout, create_dir, read_file_list, read_json, sync_data_set, write_bytes, write_json};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
 use tracing::{info, warn};
 
 /// Folders in OUT: an earlier data set while it is set aside, when it is, and when it goes.
@@ -13,8 +33,11 @@ const MOVING: &str = ".s3d-previous.part";
 const ASIDE: &str = ".s3d-previous";
 const TRASH: &str = ".s3d-trash";
 
-/// Refuses an OUT that holds something, unless it may be overwritten, is left of an export that did not finish, or is one
-/// of the `allowed` names; looks only, changes nothing.
+/// How many differences are named in a message.
+const MOST_NAMED: usize = 8;
+
+/// Refuses an OUT that holds something of somebody else, unless it may be overwritten or is one of the `allowed` names;
+/// looks only, changes nothing.
 pub(crate) fn check(layout: &Layout, overwrite: bool, allowed: &[&str]) -> Outcome<()> {
     let root = layout.root();
     if layout.root_misleads_loaders() {
@@ -27,16 +50,20 @@ pub(crate) fn check(layout: &Layout, overwrite: bool, allowed: &[&str]) -> Outco
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
         Err(e) => Err(Error::io(root, "use as the output folder", e).into()),
         Ok(entries) => {
+            let head = Head::read(&layout.manifest());
+            let is_ours = head.as_ref().is_some_and(Head::is_complete) || read_request(layout).is_some();
+            if overwrite || is_ours {
+                return Ok(());
+            }
             // What an export left that did not finish is nobody's.
-            let unfinished = Head::read(&layout.manifest()).filter(|head| !head.is_complete());
-            let begun = unfinished.map_or(Vec::new(), |head| layout.entries(&head.area_numbers));
+            let begun = head.map_or(Vec::new(), |head| layout.entries(&head.area_numbers));
             for entry in entries {
                 let path = entry.map_err(|e| Error::io(root, "read", e))?.path();
                 let name = path.file_name().unwrap_or_default();
-                let ours = begun.iter().any(|b| b.starts_with(&path));
-                if !overwrite && !ours && !allowed.iter().any(|a| name == *a) {
+                let ours = begun.iter().any(|b| b.starts_with(&path)) || is_working_name(name);
+                if !ours && !allowed.iter().any(|a| name == *a) {
                     return Err(Failure::Call(format!(
-                        "{} already holds {}: choose another folder, or replace the data set in it with --overwrite",
+                        "{} already holds {}: choose another folder, or write into this one with --overwrite",
                         root.display(),
                         name.display()
                     )));
@@ -45,6 +72,12 @@ pub(crate) fn check(layout: &Layout, overwrite: bool, allowed: &[&str]) -> Outco
             Ok(())
         }
     }
+}
+
+/// Whether a name in OUT is one of those that an export makes for the time being.
+fn is_working_name(name: &std::ffi::OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name == ".s3d" || name.starts_with(".s3d-")
 }
 
 /// Refuses an OUT in which the data set would lie on its own input, or in its annotations.
@@ -68,21 +101,267 @@ pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Outcome<()> {
     Ok(())
 }
 
-/// An earlier data set, set aside. Unless it is [discarded](Previous::discard), it comes back when this is dropped, so
-/// that an export that fails loses nothing that was there.
-pub(crate) struct Previous {
-    /// Its folder, if there was one.
-    set_aside: Option<Layout>,
+/// What is in OUT.
+#[derive(Debug)]
+enum Found {
+    /// Nothing of ours.
+    Nothing,
+    /// A complete data set, and in what it differs from what is asked for.
+    Complete { differences: Vec<String> },
+    /// An unfinished export of these areas, and in what it differs.
+    Unfinished { areas: Vec<u32>, differences: Vec<String>, failed: bool },
+    /// What is left of an unfinished export that nobody can go on with, of these areas.
+    Leftover { areas: Vec<u32> },
 }
 
-/// Makes the folder, and sets aside what an earlier data set of ours has there. Nothing else is touched; what is in the
-/// way of the new one and is not ours is an error.
-pub(crate) fn prepare(layout: &Layout, areas: &[u32]) -> Outcome<Previous> {
-    create_dir(layout.root())?;
-    recover(layout)?;
+fn find(layout: &Layout, request: &Request) -> Outcome<Found> {
     let head = Head::read(&layout.manifest());
-    let ours = head.as_ref().map_or(Vec::new(), |head| layout.entries(&head.area_numbers));
-    for path in layout.entries(areas) {
+    if head.as_ref().is_some_and(Head::is_complete) {
+        let differences = match Manifest::read(layout) {
+            Ok(manifest) => manifest.differences(request),
+            // Of another version.
+            Err(e) => vec![e.to_string()],
+        };
+        return Ok(Found::Complete { differences });
+    }
+    Ok(match (read_request(layout), head) {
+        (Some(begun), _) => Found::Unfinished {
+            areas: begun.numbers(),
+            differences: begun.differences(request),
+            failed: layout.failed().exists(),
+        },
+        (None, Some(head)) => Found::Leftover { areas: head.area_numbers },
+        (None, None) => Found::Nothing,
+    })
+}
+
+/// The request of an unfinished export, if there is one.
+pub(crate) fn read_request(layout: &Layout) -> Option<Request> {
+    read_json(&layout.request()).ok()
+}
+
+/// How an export begins.
+pub(crate) enum Begin {
+    /// There is something to do.
+    Session(Session),
+    /// The data set is there already.
+    NothingToDo,
+}
+
+/// An export that holds the lock of its folder. What is on the disk can be gone on with at any moment until
+/// [`Session::end`].
+pub(crate) struct Session {
+    layout: Layout,
+    lock: Lock,
+    sharing: Sharing,
+    /// What is done, by earlier runs too.
+    pub(crate) journal: Journal,
+}
+
+/// Begins an export into OUT, or goes on with it. `manifest` is written if it begins. Shards of one export may share OUT:
+/// the first of them begins it.
+///
+/// # Errors
+/// [`Failure::Call`] if OUT holds a data set or an unfinished export of another request, and `overwrite` is not set, or
+/// something that is in the way and not ours; [`Failure::Again`] if another process exports into it.
+pub(crate) fn begin(
+    layout: &Layout,
+    overwrite: bool,
+    request: &Request,
+    manifest: &Manifest,
+    sharing: Sharing,
+    account: &Account,
+) -> Outcome<Begin> {
+    // What is refused is refused before anything changes, and what is complete may lie where nothing can be changed.
+    let leftovers = [ASIDE, MOVING, TRASH].map(|name| layout.root().join(name));
+    if !leftovers.iter().any(|path| path.exists()) {
+        let found = find(layout, request)?;
+        refuse(layout, &found, overwrite)?;
+        if matches!(&found, Found::Complete { differences } if differences.is_empty())
+            && !layout.work_dir().exists()
+            && is_intact(layout, overwrite)?
+        {
+            return Ok(Begin::NothingToDo);
+        }
+    }
+    let (mut lock, is_first) = match (Lock::take(layout, Sharing::Alone), sharing) {
+        (Err(Failure::Again(_)), Sharing::Shards) => (Lock::take(layout, Sharing::Shards)?, false),
+        (lock, _) => (lock?, true),
+    };
+    let begun = if is_first {
+        begin_locked(layout, overwrite, request, manifest, account)
+    } else {
+        join(layout, request, account)
+    };
+    match begun {
+        Ok(Some(finished)) => {
+            if is_first && sharing == Sharing::Shards {
+                // In between anybody may take it: what is there then is looked at again.
+                drop(lock);
+                lock = Lock::take(layout, Sharing::Shards)?;
+                if read_request(layout).as_ref() != Some(request) {
+                    return Err(elsewhere(layout));
+                }
+            }
+            let journal = Journal::begin(layout, finished)?;
+            Ok(Begin::Session(Session { layout: layout.clone(), lock, sharing, journal }))
+        }
+        Ok(None) => {
+            lock.abandon();
+            Ok(Begin::NothingToDo)
+        }
+        Err(e) => {
+            // An earlier data set that was set aside for nothing comes back.
+            if read_request(layout).is_none()
+                && let Err(e) = recover(layout)
+            {
+                warn!("{e}");
+            }
+            lock.abandon();
+            Err(e)
+        }
+    }
+}
+
+/// Joins shards that are at work in OUT.
+fn join(layout: &Layout, request: &Request, account: &Account) -> Outcome<Option<Finished>> {
+    let found = find(layout, request)?;
+    refuse(layout, &found, false)?;
+    match found {
+        Found::Unfinished { .. } => go_on(layout, account).map(Some),
+        // They have just begun, or just ended.
+        _ => Err(elsewhere(layout)),
+    }
+}
+
+fn elsewhere(layout: &Layout) -> Failure {
+    Failure::Again(format!("{}: another process begins or ends an export there", layout.root().display()))
+}
+
+/// What is done of an unfinished export, by what its journals and files tell.
+fn go_on(layout: &Layout, account: &Account) -> Outcome<Finished> {
+    let started = Instant::now();
+    let finished = Finished::read(layout)?.checked(layout)?;
+    let tally = finished.iter().map(Done::tally).sum();
+    account.units_taken(finished.len() as u64, &tally, started);
+    info!("{}: goes on where it stopped; {} units of work are done", layout.root().display(), finished.len());
+    Ok(finished)
+}
+
+fn refuse(layout: &Layout, found: &Found, overwrite: bool) -> Outcome<()> {
+    let (what, differences) = match found {
+        Found::Complete { differences } => ("a data set", differences),
+        Found::Unfinished { differences, failed: false, .. } => ("an unfinished export", differences),
+        _ => return Ok(()),
+    };
+    if overwrite || differences.is_empty() {
+        return Ok(());
+    }
+    let mut named = differences.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("; ");
+    if differences.len() > MOST_NAMED {
+        named += &format!("; and {} more", differences.len() - MOST_NAMED);
+    }
+    Err(Failure::Call(format!(
+        "{} already holds {what} of another call ({named}): choose another folder, or replace it with --overwrite",
+        layout.root().display()
+    )))
+}
+
+/// Brings OUT to where work can go on, and returns what is done already; `None` if all is.
+fn begin_locked(
+    layout: &Layout,
+    overwrite: bool,
+    request: &Request,
+    manifest: &Manifest,
+    account: &Account,
+) -> Outcome<Option<Finished>> {
+    recover(layout)?;
+    let found = find(layout, request)?;
+    refuse(layout, &found, overwrite)?;
+    // Whatever the state, what a killed process was writing is of no use. The folders of areas are looked at, or
+    // removed, below.
+    remove_parts(layout.root(), false)?;
+    remove_parts(&layout.work_dir(), true)?;
+    for folder in layout.shared_dirs() {
+        remove_parts(&folder, false)?;
+    }
+    match found {
+        Found::Complete { differences } if differences.is_empty() && is_intact(layout, overwrite)? => {
+            return Ok(None);
+        }
+        Found::Unfinished { areas, differences, .. } if differences.is_empty() => {
+            remove(&layout.failed())?;
+            for folder in layout.entries(&areas).iter().filter(|entry| entry.is_dir()) {
+                remove_parts(folder, true)?;
+            }
+            // It may not have been written yet, or lost its bytes.
+            manifest.write(layout)?;
+            return go_on(layout, account).map(Some);
+        }
+        Found::Nothing => refuse_in_the_way(layout, request, &[])?,
+        Found::Complete { .. } => {
+            let head = Head::read(&layout.manifest());
+            let areas = head.map_or(Vec::new(), |head| head.area_numbers);
+            refuse_in_the_way(layout, request, &areas)?;
+            let moving = Layout::new(layout.root().join(MOVING));
+            move_entries(layout, &moving, &areas)?;
+            rename(moving.root(), &layout.root().join(ASIDE))?;
+            sync_data_set(layout.root(), &[])?;
+        }
+        Found::Unfinished { areas, .. } | Found::Leftover { areas } => {
+            refuse_in_the_way(layout, request, &areas)?;
+            info!("{}: what an earlier export left there is replaced", layout.root().display());
+            // From here on there is nothing to go on with; the lock stays where it is.
+            remove(&layout.request())?;
+            remove(&layout.journal_dir())?;
+            remove(&layout.failed())?;
+            layout.entries(&areas).iter().try_for_each(|path| remove(path))?;
+        }
+    }
+    write_json(&layout.request(), request)?;
+    // Files of an export without a request that tells of them would be nobody's.
+    sync_file(&layout.request())?;
+    manifest.write(layout)?;
+    Ok(Some(Finished::default()))
+}
+
+/// Whether all files of a complete data set are there, by their sizes, or `exactly`, by their content.
+fn is_intact(layout: &Layout, exactly: bool) -> Outcome<bool> {
+    let records = match read_file_list(&layout.file_list()) {
+        Ok(records) => records,
+        Err(_) if exactly => return Ok(false),
+        Err(e) => return Err(Failure::Input(format!("{e}; make the data set again with --overwrite"))),
+    };
+    let faults = if exactly {
+        let files: Vec<_> = records.iter().collect();
+        super::listing::faults(layout, &files)?.into_iter().map(|(_, fault)| fault).collect()
+    } else {
+        let wrong = |r: &&s3d_io::FileRecord| {
+            fs::metadata(r.path_in(layout.root())).map_or(true, |found| found.len() != r.bytes)
+        };
+        records.iter().filter(wrong).map(|r| r.path.clone()).collect::<Vec<String>>()
+    };
+    let Some(first) = faults.first() else { return Ok(true) };
+    if exactly {
+        warn!(
+            "{}: {} files are not as they were written, the first: {first}; all is made again",
+            layout.root().display(),
+            faults.len()
+        );
+        return Ok(false);
+    }
+    Err(Failure::Input(format!(
+        "{}: the data set was complete, but {} of its files are missing or cut, the first: {first}; make it again with \
+         --overwrite",
+        layout.root().display(),
+        faults.len()
+    )))
+}
+
+/// Refuses what is in the way of the data set that is asked for, unless it is of one of these areas, which is ours.
+fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Outcome<()> {
+    let ours = if areas.is_empty() { Vec::new() } else { layout.entries(areas) };
+    for path in layout.entries(&request.numbers()) {
         if path.exists() && !ours.contains(&path) {
             return Err(Failure::Call(format!(
                 "{} is in the way, and was not written by s3d: move it, or choose another folder",
@@ -90,19 +369,10 @@ pub(crate) fn prepare(layout: &Layout, areas: &[u32]) -> Outcome<Previous> {
             )));
         }
     }
-    let Some(head) = head else { return Ok(Previous { set_aside: None }) };
-    if !head.is_complete() {
-        ours.iter().try_for_each(|path| remove(path))?;
-        return Ok(Previous { set_aside: None });
-    }
-    let moving = Layout::new(layout.root().join(MOVING));
-    move_entries(layout, &moving, &head.area_numbers)?;
-    rename(moving.root(), &layout.root().join(ASIDE))?;
-    Ok(Previous { set_aside: Some(layout.clone()) })
+    Ok(())
 }
 
-/// Brings a folder in which an export was killed back to one of two states: the earlier data set, or the new one if it
-/// was complete.
+/// Brings a folder in which an export was killed to a state of the table above that has only one meaning.
 fn recover(layout: &Layout) -> Outcome<()> {
     let inside = |name: &str| layout.root().join(name);
     remove(&inside(TRASH))?;
@@ -114,13 +384,39 @@ fn recover(layout: &Layout) -> Outcome<()> {
         }
         remove(moving.root())?;
     }
-    if inside(ASIDE).exists() {
-        if Head::read(&layout.manifest()).is_some_and(|head| head.is_complete()) {
-            return discard(layout);
+    if Head::read(&layout.manifest()).is_some_and(|head| head.is_complete()) {
+        clear(layout)?;
+        if inside(ASIDE).exists() {
+            discard(layout)?;
         }
+    } else if inside(ASIDE).exists() && read_request(layout).is_none() {
         restore(layout)?;
     }
     Ok(())
+}
+
+/// Removes what an export keeps while it is unfinished, all but the lock.
+fn clear(layout: &Layout) -> Outcome<()> {
+    remove(&layout.request())?;
+    remove(&layout.journal_dir())?;
+    remove(&layout.failed())?;
+    for path in children(&layout.work_dir())? {
+        if path != layout.lock() {
+            remove(&path)?;
+        }
+    }
+    Ok(())
+}
+
+fn children(folder: &Path) -> Outcome<Vec<PathBuf>> {
+    let failed = |e| Error::io(folder, "read the folder", e);
+    match fs::read_dir(folder) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+        entries => {
+            let entries = entries.map_err(failed)?;
+            Ok(entries.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>().map_err(failed)?)
+        }
+    }
 }
 
 /// Removes the data set that lies aside. It goes by one rename, so that half of it is never taken for whole.
@@ -132,34 +428,59 @@ fn discard(layout: &Layout) -> Outcome<()> {
 
 /// Puts the data set that lies aside back in its place, instead of what was begun there.
 fn restore(layout: &Layout) -> Outcome<()> {
-    if let Some(begun) = Head::read(&layout.manifest()) {
-        layout.entries(&begun.area_numbers).iter().try_for_each(|path| remove(path))?;
-    }
+    let begun = read_request(layout).map(|request| request.numbers());
+    // Without a request nobody goes on with what was begun, whatever of it is still there.
+    clear(layout)?;
+    let begun = begun.or_else(|| Head::read(&layout.manifest()).map(|head| head.area_numbers));
     let aside = Layout::new(layout.root().join(ASIDE));
     if let Some(head) = Head::read(&aside.manifest()) {
+        if let Some(areas) = begun {
+            layout.entries(&areas).iter().try_for_each(|path| remove(path))?;
+        }
         move_entries(&aside, layout, &head.area_numbers)?;
     }
     remove(aside.root())
 }
 
-impl Previous {
-    /// Removes the earlier data set: the new one is complete.
-    pub(crate) fn discard(mut self) -> Outcome<()> {
-        self.set_aside.take().map_or(Ok(()), |layout| discard(&layout))
+impl Session {
+    /// Ends the export as `outcome` says. Complete, the data set takes the place of an earlier one. After a failure that
+    /// trying again may mend, everything stays as it is, to go on with; after any other an earlier data set comes back, or,
+    /// where there is none, what is done stays, but does not stand in the way of another call.
+    pub(crate) fn end<T>(self, outcome: Outcome<T>) -> Outcome<T> {
+        let Self { layout, lock, sharing, journal } = self;
+        drop(journal);
+        let ended = match &outcome {
+            // What becomes of the whole is not for one of them to say.
+            _ if sharing == Sharing::Shards => Ok(()),
+            Ok(_) => end_complete(&layout),
+            Err(Failure::Again(_)) => Ok(()),
+            Err(_) if layout.root().join(ASIDE).exists() => {
+                match restore(&layout) {
+                    Ok(()) => {
+                        info!("{}: the earlier data set is back in place", layout.root().display());
+                    }
+                    Err(e) => {
+                        warn!("the earlier data set is kept in {}: {e}", layout.root().join(ASIDE).display());
+                    }
+                }
+                Ok(())
+            }
+            Err(_) => {
+                // On a full disk it may not be possible, and is no reason to say anything else than what failed.
+                let _ = write_bytes(&layout.failed(), b"");
+                Ok(())
+            }
+        };
+        lock.abandon();
+        ended.and(outcome)
     }
 }
 
-impl Drop for Previous {
-    fn drop(&mut self) {
-        if let Some(layout) = self.set_aside.take() {
-            match restore(&layout) {
-                Ok(()) => info!("{}: the earlier data set is back in place", layout.root().display()),
-                Err(e) => {
-                    warn!("the earlier data set is kept in {}: {e}", layout.root().join(ASIDE).display())
-                }
-            }
-        }
+fn end_complete(layout: &Layout) -> Outcome<()> {
+    if layout.root().join(ASIDE).exists() {
+        discard(layout)?;
     }
+    clear(layout)
 }
 
 /// Moves a data set's entries, those that are there, from one folder to another.
@@ -188,4 +509,15 @@ fn remove(path: &Path) -> Outcome<()> {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, "remove", e).into()),
         _ => Ok(()),
     }
+}
+
+/// Brings one file to the disk, and its name.
+pub(crate) fn sync_file(path: &Path) -> Outcome<()> {
+    let synced = fs::File::open(path).and_then(|file| file.sync_all());
+    synced.map_err(|e| Error::io(path, "bring to the disk", e))?;
+    // Not every system lets folders be opened.
+    if let Some(folder) = path.parent().and_then(|folder| fs::File::open(folder).ok()) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
 }

@@ -5,6 +5,7 @@ use super::annotate::Annotated;
 use super::inputs::AreaInput;
 use crate::console::Progress;
 use crate::failure::{Failure, Outcome};
+use crate::stop;
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::{Layout, MatWriter, PlyPointWriter, S3disAreaWriter};
 use s3d_label::{LabelId, LabelTable, Room};
@@ -153,6 +154,7 @@ impl Sink<'_> {
     ) -> Outcome<()> {
         let mut at = points.start;
         while at < points.end {
+            stop::check()?;
             let end = points.end.min(at + CHUNK);
             self.sampler.sample(at..end, &mut self.cloud);
             self.ply.append(&self.cloud, &vec![label.0; self.cloud.len()])?;

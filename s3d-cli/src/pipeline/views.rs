@@ -1,15 +1,21 @@
 //! Which views are taken: candidates at every location, their entropies, the selection, and their numbers.
 
+use super::journal::Finished;
+use super::request::Request;
+use super::summary::ViewTally;
 use super::work::for_each_in_order;
 use crate::console::Progress;
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use s3d_geom::Camera;
 use s3d_io::ScanLocation;
 use s3d_label::{Class, LabelId, LabelTable};
 use s3d_render::{Caster, Hits, NO_FACE, Scene};
-use s3d_sample::{Pool, PoolItem, Selection, View, ViewDistribution, draw_view, entropy, select_pooled};
+use s3d_sample::{
+    Pool, PoolItem, Selection, UnknownPool, View, ViewDistribution, draw_view, entropy, select_pooled,
+};
 use serde::Serialize;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A candidate view of a scan location.
 #[derive(Clone, Debug, Serialize)]
@@ -52,35 +58,52 @@ pub(crate) struct Scoring {
     pub(crate) seed: u64,
 }
 
-/// Draws the candidates of an area and scores each by the entropy of what it sees.
+/// Draws the candidates of a location; `entropies` are theirs, if they are scored already.
+fn draw(
+    area: u32,
+    location: usize,
+    uuid: &str,
+    views: u32,
+    seed: u64,
+    entropies: Option<&[f64]>,
+) -> Vec<Candidate> {
+    let distribution = ViewDistribution::default();
+    let candidate = |candidate| {
+        let View { yaw_rad, pitch_rad, fov_rad } = draw_view(&distribution, seed, uuid, candidate);
+        Candidate {
+            area,
+            location,
+            camera_uuid: uuid.to_owned(),
+            candidate,
+            yaw_rad,
+            pitch_rad,
+            fov_rad,
+            entropy: entropies.and_then(|e| e.get(candidate as usize)).copied().unwrap_or(0.0),
+            frame_num: None,
+        }
+    };
+    (0..views).map(candidate).collect()
+}
+
+/// Draws the candidates of those locations of an area that are asked for, and scores each by the entropy of what it sees.
+/// What is done goes to `each`, a location at a time, by whichever thread: its uuid, and the entropies of its candidates.
 pub(crate) fn score_area(
     area: u32,
-    locations: &[ScanLocation],
+    locations: &[&ScanLocation],
     scene: &Scene<'_>,
     face_labels: &[LabelId],
     table: &LabelTable,
     scoring: Scoring,
-) -> Outcome<Vec<Candidate>> {
-    let distribution = ViewDistribution::default();
+    each: impl Fn(&str, Vec<f64>) -> Outcome<()> + Sync,
+) -> Outcome<()> {
     let mut candidates = Vec::with_capacity(locations.len() * scoring.views as usize);
     for (index, location) in locations.iter().enumerate() {
-        for candidate in 0..scoring.views {
-            let View { yaw_rad, pitch_rad, fov_rad } =
-                draw_view(&distribution, scoring.seed, &location.uuid, candidate);
-            let camera_uuid = location.uuid.clone();
-            candidates.push(Candidate {
-                area,
-                location: index,
-                camera_uuid,
-                candidate,
-                yaw_rad,
-                pitch_rad,
-                fov_rad,
-                entropy: 0.0,
-                frame_num: None,
-            });
-        }
+        candidates.extend(draw(area, index, &location.uuid, scoring.views, scoring.seed, None));
     }
+    if scoring.views == 0 {
+        return locations.iter().try_for_each(|location| each(&location.uuid, Vec::new()));
+    }
+    let left: Vec<AtomicU32> = locations.iter().map(|_| AtomicU32::new(scoring.views)).collect();
     let classes: Vec<Option<Class>> = face_labels.iter().map(|l| table.class_of(*l)).collect();
     let progress = Progress::new("scoring", "views", candidates.len() as u64);
     let scores: Vec<OnceLock<f64>> = candidates.iter().map(|_| OnceLock::new()).collect();
@@ -88,7 +111,7 @@ pub(crate) fn score_area(
     let memory = || (Caster::new(scene), Hits::default());
     for_each_in_order(&items, memory, |(caster, hits), &i| {
         let c = &candidates[i];
-        let camera = c.camera(&locations[c.location], scoring.size);
+        let camera = c.camera(locations[c.location], scoring.size);
         caster.cast_into(&camera, scoring.stride, hits);
         let mut histogram = [0u64; 13];
         for &face in hits.face.pixels() {
@@ -100,12 +123,41 @@ pub(crate) fn score_area(
         }
         let _ = scores[i].set(entropy(&histogram));
         progress.add(1);
+        // Whoever scores the last of a location hands it on.
+        if left[c.location].fetch_sub(1, Ordering::AcqRel) == 1 {
+            let views = scoring.views as usize;
+            let of_location = scores.iter().skip(c.location * views).take(views);
+            let entropies = of_location.map(|score| score.get().copied().unwrap_or(0.0)).collect();
+            each(&c.camera_uuid, entropies)?;
+        }
         Ok(())
-    })?;
-    for (c, score) in candidates.iter_mut().zip(scores) {
-        c.entropy = score.into_inner().unwrap_or(0.0);
+    })
+}
+
+/// All candidates of a request whose areas are labelled and whose locations are scored, with the selection made, and what
+/// became of them.
+///
+/// # Errors
+/// [`Failure::Input`] if something of that is missing.
+pub(crate) fn select_requested(
+    request: &Request,
+    finished: &Finished,
+) -> Outcome<(Vec<Candidate>, ViewTally)> {
+    let options = &request.options;
+    let mut candidates = Vec::new();
+    for area in request.numbers() {
+        let missing = |what: &str| Failure::Input(format!("area {area}: {what} missing"));
+        let labels = finished.labels(area).ok_or_else(|| missing("its labels are"))?;
+        for (index, uuid) in labels.locations.iter().enumerate() {
+            let entropies = finished.scores(area, uuid);
+            let entropies = entropies.ok_or_else(|| missing(&format!("the scores of {uuid} are")))?;
+            candidates.extend(draw(area, index, uuid, options.views, request.seed, Some(entropies)));
+        }
     }
-    Ok(candidates)
+    let pool: Pool = options.pool.parse().map_err(|e: UnknownPool| Failure::Input(e.to_string()))?;
+    select(&mut candidates, pool, options.keep_all, request.seed);
+    let tally = ViewTally::of(&candidates, pool, options.keep_all, &options.only);
+    Ok((candidates, tally))
 }
 
 /// Selects views over the pool, or all of them, and numbers the kept ones of each location from 0.

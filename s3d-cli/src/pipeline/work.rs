@@ -1,12 +1,13 @@
 //! Many independent pieces of work on all threads.
 
 use crate::failure::{Failure, Outcome};
+use crate::stop;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Does `work` on every item, on every thread of the current pool. Items are handed out one at a time and in order, so
-/// that a slow one delays nobody else; at most one an item a thread is under way. After a failure no further item is
-/// begun, and the failure of the first item (by order) that failed is returned. Each thread works with a state of its
+/// that a slow one delays nobody else; at most one an item a thread is under way. After a failure, or a signal that asks for
+/// an end, no further item is begun, and the failure of the first item (by order) that failed is returned. Each thread works with a state of its
 /// own, which `state` makes: memory to be used again, nothing that a result depends on.
 pub(crate) fn for_each_in_order<T: Sync, S>(
     items: &[T],
@@ -14,17 +15,17 @@ pub(crate) fn for_each_in_order<T: Sync, S>(
     work: impl Fn(&mut S, &T) -> Outcome<()> + Sync,
 ) -> Outcome<()> {
     let next = AtomicUsize::new(0);
-    let stop = AtomicBool::new(false);
+    let ended = AtomicBool::new(false);
     let failure: Mutex<Option<(usize, Failure)>> = Mutex::new(None);
     rayon::scope(|scope| {
         for _ in 0..rayon::current_num_threads().min(items.len()) {
             scope.spawn(|_| {
                 let mut state = state();
-                while !stop.load(Ordering::Relaxed) {
+                while !ended.load(Ordering::Relaxed) {
                     let i = next.fetch_add(1, Ordering::Relaxed);
                     let Some(item) = items.get(i) else { break };
-                    if let Err(e) = work(&mut state, item) {
-                        stop.store(true, Ordering::Relaxed);
+                    if let Err(e) = stop::check().and_then(|()| work(&mut state, item)) {
+                        ended.store(true, Ordering::Relaxed);
                         let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
                         if first.as_ref().is_none_or(|(j, _)| i < *j) {
                             *first = Some((i, e));

@@ -1,6 +1,7 @@
 //! The rooms of an S3DIS tree, and their points as numpy would read them.
 
 use crate::failure::Outcome;
+use crate::stop;
 use s3d_geom::PointCloud;
 use s3d_io::{AnnotationTree, Layout, PointReader};
 use s3d_label::Class;
@@ -59,6 +60,7 @@ pub(super) fn for_each_piece(path: &Path, mut each: impl FnMut(&PointCloud) -> O
     let mut reader = PointReader::open(path)?;
     let mut piece = PointCloud::default();
     while reader.read_chunk(CHUNK, &mut piece)? > 0 {
+        stop::check()?;
         each(&piece)?;
         piece.clear();
     }

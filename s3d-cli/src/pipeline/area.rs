@@ -1,0 +1,349 @@
+//! One area of an export: labelled, scored, rendered, with its meshes and points.
+
+use super::annotate::{Annotated, annotate, hidden_instances, label_doubts};
+use super::images::{ImageJob, WrittenLocation, write_images};
+use super::inputs::{AreaInput, Cameras};
+use super::journal::{Done, Journal, LabelsDone, LocationDone, RestDone, ScoresDone, Unit, tally_of};
+use super::listing;
+use super::location::{Outlook, room_of};
+use super::manifest::{AreaEntry, XyzLoss};
+use super::modality::Look;
+use super::pictures::Pictures;
+use super::place::{Ground, Located, Placement, place_locations};
+use super::points::write_points;
+use super::records;
+use super::summary::Account;
+use super::views::{Candidate, Scoring, score_area};
+use crate::args::ExportOptions;
+use crate::event::{Stage as Step, UnitKind};
+use crate::failure::Outcome;
+use crate::stop;
+use s3d_geom::{Density, NearestFaces};
+use s3d_io::{
+    Compression, Content, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation, TextureOut,
+    create_dir, encode_rgb8,
+};
+use s3d_label::{LabelTable, Room};
+use s3d_render::{Normals, Pyramids, Scene};
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use tracing::{debug, info, warn};
+
+/// An area between its labelling and its rendering.
+pub(crate) struct LabelledArea {
+    annotated: Annotated,
+    locations: Vec<ScanLocation>,
+    /// The room of each location.
+    location_rooms: Vec<Room>,
+}
+
+/// What all areas share.
+#[derive(Clone, Copy)]
+pub(crate) struct Common<'a> {
+    pub(crate) table: &'a LabelTable,
+    pub(crate) layout: &'a Layout,
+    pub(crate) options: &'a ExportOptions,
+    pub(crate) journal: &'a Journal,
+    pub(crate) account: &'a Account,
+}
+
+/// A mesh that is ready for rays.
+pub(crate) struct Stage<'m> {
+    file: &'m MeshFile,
+    scene: Scene<'m>,
+}
+
+impl<'m> Stage<'m> {
+    /// Prepares the mesh, and at the same time its nearest faces, which are needed for its labels only.
+    pub(crate) fn new(file: &'m MeshFile) -> (Self, NearestFaces<'m>) {
+        let (scene, nearest) = rayon::join(|| Scene::new(&file.mesh), || NearestFaces::new(&file.mesh));
+        (Self { file, scene }, nearest)
+    }
+
+    /// Prepares the mesh for rays alone.
+    pub(crate) fn for_rays(file: &'m MeshFile) -> Self {
+        Self { file, scene: Scene::new(&file.mesh) }
+    }
+}
+
+/// An area's scan locations, each with its room: those that are listed, or some that are placed.
+pub(crate) fn locate(
+    area: &AreaInput,
+    scene: &Scene<'_>,
+    nearest: &NearestFaces<'_>,
+    annotated: &Annotated,
+    table: &LabelTable,
+    seed: u64,
+) -> Outcome<Located> {
+    match &area.cameras {
+        Cameras::Listed(locations, rooms) => {
+            let is_known = |room: &Room| annotated.rooms.iter().any(|r| r.room == *room);
+            let room = |l: &ScanLocation, told: Option<Room>| {
+                told.filter(is_known).unwrap_or_else(|| room_of(&annotated.rooms, l.pose.location))
+            };
+            Ok(locations.iter().zip(rooms).map(|(l, told)| (l.clone(), room(l, *told))).collect())
+        }
+        Cameras::Placed(distance_m) => {
+            let ground = Ground {
+                area: area.number,
+                scene,
+                nearest,
+                face_labels: &annotated.face_labels,
+                table,
+                rooms: &annotated.rooms,
+            };
+            let (placed, warnings) = place_locations(&ground, Placement { distance_m: *distance_m, seed })?;
+            warnings.iter().for_each(|w| warn!("{w}"));
+            info!("area {}: {} scan locations placed", area.number, placed.len());
+            Ok(placed)
+        }
+    }
+}
+
+/// The files of an area's labels.
+fn label_files(layout: &Layout, area: u32) -> [PathBuf; 5] {
+    [
+        layout.instances_json(area),
+        layout.instances_npz(area),
+        layout.rooms_json(area),
+        layout.votes_json(area),
+        layout.instance_numbers_json(area),
+    ]
+}
+
+/// Labels an area, writes what is known of it then, unless that was done before, and scores the candidates of those
+/// locations that are not scored yet.
+pub(crate) fn label_area(
+    area: &AreaInput,
+    stage: &Stage<'_>,
+    nearest: NearestFaces<'_>,
+    common: Common<'_>,
+    is_ours: &dyn Fn(&Unit) -> bool,
+) -> Outcome<LabelledArea> {
+    let Common { table, layout, options, journal, account } = common;
+    let number = area.number;
+    let Stage { file, scene } = stage;
+    create_dir(&layout.mesh_dir(number))?;
+
+    let labelling = account.stage(Step::Label, Some(number));
+    let started = Instant::now();
+    let unit = Unit::Labels(number);
+    let is_known = journal.finished().has(&unit);
+    let writes = !is_known && is_ours(&unit);
+    let paths = label_files(layout, number);
+    let [json, npz, ..] = &paths;
+    let mut instances = if writes { Some(InstanceWriter::create(json, npz)?) } else { None };
+    let annotated = annotate(area, &nearest, table, |i| {
+        let Some(instances) = &mut instances else { return Ok(()) };
+        instances.push(&InstanceRecord {
+            label: &i.label.to_string(),
+            label_index: i.id.0,
+            class: i.label.class.name(),
+            room: &i.label.room.to_string(),
+            bbox: i.voxels.grid.bbox.to_array(),
+            starts: &i.voxels.starts,
+            members: &i.voxels.members,
+        })?;
+        Ok(())
+    })?;
+    tell_labels(&annotated, started);
+    if let Some(w) = annotated.skipped.sentence() {
+        warn!("{w}");
+    }
+    if let Some(w) = hidden_instances(area, &annotated.face_labels, table) {
+        warn!("{w}");
+    }
+    let located = locate(area, scene, &nearest, &annotated, table, options.seed)?;
+    drop(nearest);
+    let (locations, location_rooms): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();
+    for location in &locations {
+        stop::check()?;
+        Outlook::of(scene, location).warnings(location).iter().for_each(|w| warn!("{w}"));
+    }
+
+    let entry = area_entry(area, file, &annotated, locations.len(), options);
+    let uuids = locations.iter().map(|l| l.uuid.clone()).collect();
+    let mut done = LabelsDone { entry, locations: uuids, files: Vec::new() };
+    if let Some(instances) = instances {
+        instances.finish()?;
+        records::write_rooms(layout, number, &annotated)?;
+        records::write_votes(layout, number, &annotated.report)?;
+        records::write_instance_numbers(layout, area)?;
+        done.files = listing::records(layout, &paths)?;
+        let tally = tally_of(&done.files);
+        journal.write(Done::Labels(done))?;
+        account.unit_finished(UnitKind::Labels, number, None, &tally, started);
+    } else if !is_known {
+        journal.know(Done::Labels(done));
+    }
+    labelling.end();
+
+    let step = account.stage(Step::Score, Some(number));
+    let scoring = Scoring {
+        views: options.views,
+        size: options.size,
+        stride: options.entropy_stride,
+        seed: options.seed,
+    };
+    let missing: Vec<&ScanLocation> = {
+        let finished = journal.finished();
+        locations.iter().filter(|l| !finished.has(&Unit::Scores(number, l.uuid.clone()))).collect()
+    };
+    score_area(number, &missing, scene, &annotated.face_labels, table, scoring, |uuid, entropies| {
+        journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))
+    })?;
+    step.end();
+    Ok(LabelledArea { annotated, locations, location_rooms })
+}
+
+/// What the manifest tells of an area that is labelled.
+fn area_entry(
+    area: &AreaInput,
+    file: &MeshFile,
+    annotated: &Annotated,
+    locations: usize,
+    options: &ExportOptions,
+) -> AreaEntry {
+    let mesh = &file.mesh;
+    AreaEntry {
+        area: area.number,
+        faces: mesh.faces().len(),
+        faces_left_out: mesh.report().zero_area_faces + file.repeated_faces,
+        points: 0,
+        annotated_points: annotated.points,
+        rooms: annotated.rooms.len(),
+        locations,
+        panoramas: 0,
+        views: 0,
+        xyz: XyzLoss::of(mesh.aabb(), options.format.xyz),
+        rgb: area.pictures.as_ref().map_or("texture", |p| p.kind.name()).to_owned(),
+        place_cameras: match area.cameras {
+            Cameras::Placed(distance_m) => Some(distance_m),
+            Cameras::Listed(..) => None,
+        },
+        inputs: Vec::new(),
+    }
+}
+
+/// Writes an area's meshes and points, all but its images.
+fn write_rest(area: &AreaInput, file: &MeshFile, annotated: &Annotated, common: Common<'_>) -> Outcome<()> {
+    let Common { table, layout, options, journal, account } = common;
+    let (number, started) = (area.number, Instant::now());
+    let meshes = account.stage(Step::Meshes, Some(number));
+    let mesh_dir = layout.mesh_dir(number);
+    let per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
+    write_colored_mesh(&mesh_dir, file, options.compression)?;
+    s3d_io::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
+    meshes.end();
+    stop::check()?;
+    let sampling = account.stage(Step::Points, Some(number));
+    let density = Density::PerM2(options.points_per_m2);
+    let points = write_points(layout, area, &file.mesh, annotated, table, density, options.seed)?;
+    let mut paths = listing::walk(&mesh_dir)?;
+    let labels = label_files(layout, number);
+    paths.retain(|path| !labels.contains(path));
+    paths.extend(listing::walk(&layout.s3dis_area_dir(number))?);
+    let files = listing::records(layout, &paths)?;
+    let tally = tally_of(&files);
+    journal.write(Done::Rest(RestDone { area: number, points, files }))?;
+    sampling.end();
+    account.unit_finished(UnitKind::Rest, number, None, &tally, started);
+    Ok(())
+}
+
+/// Writes the mesh with its textures: their files as they were found, where they were used as they are.
+fn write_colored_mesh(dir: &Path, file: &MeshFile, compression: Compression) -> Outcome<()> {
+    let files: Vec<(String, Cow<'_, [u8]>)> = file
+        .mesh
+        .textures()
+        .iter()
+        .zip(&file.texture_files)
+        .map(|(texture, found)| {
+            let stem = Path::new(&texture.name).file_stem().unwrap_or_default().to_string_lossy();
+            match found {
+                Some(f) => (format!("{stem}.{}", f.extension), Cow::Borrowed(&f.bytes[..])),
+                None => {
+                    let png = encode_rgb8(&texture.image, Content::Photo, compression);
+                    (format!("{stem}.png"), Cow::Owned(png))
+                }
+            }
+        })
+        .collect();
+    let textures: Vec<TextureOut<'_>> =
+        files.iter().map(|(name, bytes)| TextureOut { name, bytes }).collect();
+    s3d_io::write_rgb_obj(dir, &file.mesh, &textures)?;
+    Ok(())
+}
+
+fn tell_labels(annotated: &Annotated, started: Instant) {
+    let total = &annotated.report.total;
+    let faces = annotated.face_labels.len();
+    info!(
+        "{} annotated points labelled {} of {faces} faces ({:.1} s)",
+        annotated.points,
+        total.faces,
+        started.elapsed().as_secs_f64()
+    );
+    for (_, room, row) in &annotated.report.rooms {
+        debug!("{room}: {} points, {} faces, {} of them contested", row.points, row.faces, row.contested);
+    }
+    label_doubts(&annotated.report).iter().for_each(|w| warn!("{w}"));
+}
+
+/// Renders those locations of an area that are to be done, and beside them writes its meshes and points if they are.
+pub(crate) fn render_area(
+    area: &AreaInput,
+    stage: &Stage<'_>,
+    labelled: LabelledArea,
+    pictures: Option<&Pictures>,
+    common: Common<'_>,
+    candidates: &[Candidate],
+    todo: &BTreeSet<&Unit>,
+) -> Outcome<()> {
+    let Common { layout, options, journal, account, .. } = common;
+    let LabelledArea { annotated, locations, location_rooms } = labelled;
+    let Stage { file, scene } = stage;
+    let number = area.number;
+    let textures = Pyramids::new(&file.mesh);
+    let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
+    let pretty_per_face: Vec<[u8; 3]> = label_per_face.iter().map(|l| s3d_io::pretty_color(*l)).collect();
+    let chosen: Vec<bool> =
+        locations.iter().map(|l| todo.contains(&Unit::Location(number, l.uuid.clone()))).collect();
+    let finish_location = |written: WrittenLocation| {
+        let WrittenLocation { location, tally, files, started } = written;
+        let uuid = &locations[location].uuid;
+        journal.write(Done::Location(LocationDone { area: number, location: uuid.clone(), tally, files }))?;
+        account.unit_finished(UnitKind::Location, number, Some(uuid), &tally, started);
+        Ok(())
+    };
+    let job = ImageJob {
+        layout,
+        area: number,
+        look: Look {
+            scene,
+            textures: &textures,
+            pictures: None,
+            normals: if options.smooth_normals { Normals::Smooth } else { Normals::Flat },
+            label_per_face: &label_per_face,
+            pretty_per_face: &pretty_per_face,
+            compression: options.compression,
+            conventions: options.format.conventions(),
+        },
+        pictures,
+        locations: &locations,
+        rooms: &location_rooms,
+        chosen: &chosen,
+        modalities: &options.modalities,
+        size: options.size,
+        pano_width: options.pano_width,
+        each: &finish_location,
+    };
+    let rendering = account.stage(Step::Render, Some(number));
+    let rest = || write_rest(area, file, &annotated, common);
+    let writes_rest = todo.contains(&Unit::Rest(number));
+    write_images(&job, candidates, if writes_rest { Some(&rest) } else { None })?;
+    rendering.end();
+    Ok(())
+}

@@ -1,0 +1,407 @@
+//! What decides the bytes of a data set: the version of s3d, the options, the input. Two exports of equal requests write
+//! the same files, so that one can go on where the other was killed.
+
+use super::inputs::{AreaInput, Cameras};
+use crate::args::ExportOptions;
+use crate::console::Progress;
+use crate::failure::Outcome;
+use crate::pipeline::listing::walk;
+use crate::pipeline::work::for_each_in_order;
+use s3d_io::{Checksum, ChecksumOfParts, Domain, Error, FileRecord, checksum_of_file};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// What is asked for. It names neither threads nor folders of the machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Request {
+    /// Of s3d.
+    pub(crate) version: String,
+    pub(crate) seed: u64,
+    pub(crate) options: Options,
+    /// The areas, by number.
+    pub(crate) areas: Vec<RequestedArea>,
+}
+
+/// Options that decide bytes, by their names in the manifest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Options {
+    pub(crate) views: u32,
+    pub(crate) size: u32,
+    pub(crate) pano_width: u32,
+    pub(crate) pool: String,
+    pub(crate) points_per_m2: f64,
+    /// Whether faults of the annotations were skipped.
+    pub(crate) lenient: bool,
+    pub(crate) entropy_stride: u32,
+    pub(crate) modalities: Vec<String>,
+    pub(crate) keep_all: bool,
+    pub(crate) only: Vec<String>,
+    pub(crate) normals: String,
+    pub(crate) compression: String,
+    pub(crate) xyz: String,
+    pub(crate) normal_axes: String,
+    pub(crate) depth_units: String,
+    pub(crate) pad_labels: String,
+    pub(crate) profiles: Vec<String>,
+}
+
+/// An area that is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RequestedArea {
+    pub(crate) area: u32,
+    /// How far apart scan locations are placed, metres; null if the scene has its own.
+    pub(crate) place_cameras: Option<f64>,
+    /// What is read.
+    pub(crate) inputs: Vec<InputRecord>,
+}
+
+/// A file or folder of the input.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct InputRecord {
+    /// From the folder of the scene file; of what is named by a whole path its last part alone. That of a folder ends with
+    /// `/`.
+    pub(crate) path: String,
+    /// Its size; of a folder that of all files in it.
+    pub(crate) bytes: u64,
+    /// The checksum of its content; of a folder that of a list of its files, a line `path,bytes,xxh3_128` each, paths from
+    /// the folder and sorted.
+    pub(crate) xxh3_128: Checksum,
+}
+
+impl Options {
+    pub(crate) fn of(options: &ExportOptions) -> Self {
+        let format = &options.format;
+        Self {
+            views: options.views,
+            size: options.size,
+            pano_width: options.pano_width,
+            pool: options.pool.to_string(),
+            points_per_m2: options.points_per_m2,
+            lenient: options.lenient,
+            entropy_stride: options.entropy_stride,
+            modalities: options.modalities.iter().map(Domain::to_string).collect(),
+            keep_all: options.keep_all,
+            only: options.only.clone(),
+            normals: if options.smooth_normals { "smooth" } else { "flat" }.to_owned(),
+            compression: options.compression.name().to_owned(),
+            xyz: format.xyz.name().to_owned(),
+            normal_axes: format.normal_axes.name().to_owned(),
+            depth_units: format.depth_units.name().to_owned(),
+            pad_labels: format.pad_labels.to_string(),
+            profiles: format.profiles.iter().map(|p| p.name().to_owned()).collect(),
+        }
+    }
+
+    /// What differs, a sentence each.
+    fn differences(&self, now: &Self) -> Vec<String> {
+        let fields = |options: &Self| match serde_json::to_value(options) {
+            Ok(Value::Object(fields)) => fields,
+            _ => serde_json::Map::new(),
+        };
+        let (there, now) = (fields(self), fields(now));
+        let differ = there.iter().filter_map(|(name, before)| {
+            let after = now.get(name)?;
+            (before != after).then(|| difference(&flag(name), before, after))
+        });
+        differ.collect()
+    }
+}
+
+/// The option on the command line that a key stands for.
+fn flag(name: &str) -> String {
+    match name {
+        "normals" => "--smooth-normals".to_owned(),
+        "profiles" => "--profile".to_owned(),
+        _ => format!("--{}", name.replace('_', "-")),
+    }
+}
+
+fn difference(flag: &str, there: &Value, now: &Value) -> String {
+    let smooth = |value: &Value| value == "smooth";
+    match (there, now) {
+        (Value::Bool(true), _) => format!("{flag} there, not now"),
+        (Value::Bool(false), _) => format!("{flag} now, not there"),
+        (a, b) if flag == "--smooth-normals" && smooth(a) != smooth(b) => {
+            difference(flag, &Value::Bool(smooth(a)), &Value::Null)
+        }
+        _ => format!("{flag} {} there, {} now", words(there), words(now)),
+    }
+}
+
+fn words(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(items) if items.is_empty() => "none".to_owned(),
+        Value::Array(items) => items.iter().map(words).collect::<Vec<_>>().join(","),
+        other => other.to_string(),
+    }
+}
+
+impl Request {
+    /// What is asked for by these options of areas with this input.
+    pub(crate) fn new(options: &ExportOptions, areas: Vec<RequestedArea>) -> Self {
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        Self { version, seed: options.seed, options: Options::of(options), areas }
+    }
+
+    /// The numbers of the areas.
+    pub(crate) fn numbers(&self) -> Vec<u32> {
+        self.areas.iter().map(|a| a.area).collect()
+    }
+
+    /// What is asked for `now` that was not asked for here, and the other way round, a sentence each; none if the two
+    /// make the same bytes.
+    pub(crate) fn differences(&self, now: &Self) -> Vec<String> {
+        let mut differences = Vec::new();
+        if self.version != now.version {
+            differences.push(format!("version {} of s3d there, {} now", self.version, now.version));
+        }
+        if self.seed != now.seed {
+            differences.push(format!("--seed {} there, {} now", self.seed, now.seed));
+        }
+        differences.extend(self.options.differences(&now.options));
+        let by_number = |areas: &[RequestedArea]| -> BTreeMap<u32, RequestedArea> {
+            areas.iter().map(|a| (a.area, a.clone())).collect()
+        };
+        let (there, now) = (by_number(&self.areas), by_number(&now.areas));
+        for (number, before) in &there {
+            match now.get(number) {
+                Some(after) => differences.extend(before.differences(after)),
+                None => differences.push(format!("area {number} there, not now")),
+            }
+        }
+        let more = now.keys().filter(|number| !there.contains_key(number));
+        differences.extend(more.map(|number| format!("area {number} now, not there")));
+        differences
+    }
+}
+
+impl RequestedArea {
+    fn differences(&self, now: &Self) -> Vec<String> {
+        let mut differences = Vec::new();
+        if self.place_cameras != now.place_cameras {
+            let words =
+                |distance: Option<f64>| distance.map_or("none".to_owned(), |m| format!("{m} m apart"));
+            differences.push(format!(
+                "placed scan locations of area {}: {} there, {} now",
+                self.area,
+                words(self.place_cameras),
+                words(now.place_cameras)
+            ));
+        }
+        let by_path = |inputs: &[InputRecord]| -> BTreeMap<String, Vec<(u64, Checksum)>> {
+            let mut map: BTreeMap<String, Vec<(u64, Checksum)>> = BTreeMap::new();
+            for input in inputs {
+                map.entry(input.path.clone()).or_default().push((input.bytes, input.xxh3_128));
+            }
+            map
+        };
+        let (there, after) = (by_path(&self.inputs), by_path(&now.inputs));
+        for (path, before) in &there {
+            match after.get(path) {
+                Some(now) if now == before => {}
+                Some(_) => differences.push(format!("{path}: other bytes")),
+                None => differences.push(format!("{path}: input there, not now")),
+            }
+        }
+        let more = after.keys().filter(|path| !there.contains_key(*path));
+        differences.extend(more.map(|path| format!("{path}: input now, not there")));
+        // The same files in another order are another input: meshes are joined in the order of the scene file.
+        if differences.is_empty() && self.inputs != now.inputs {
+            differences.push(format!("area {}: its input in another order", self.area));
+        }
+        differences
+    }
+}
+
+/// What each area asks for. All files that they read are read once, on all threads. `companions` are the files that
+/// their meshes were read from besides.
+pub(crate) fn requested_areas(
+    areas: &[AreaInput],
+    companions: &[Vec<PathBuf>],
+) -> Outcome<Vec<RequestedArea>> {
+    let paths: Vec<Vec<PathBuf>> =
+        areas.iter().zip(companions).map(|(area, besides)| [&area.sources[..], besides].concat()).collect();
+    // The files of each path: itself, or what is in it.
+    let mut files: Vec<Vec<Vec<PathBuf>>> = Vec::new();
+    for of_area in &paths {
+        let mut listed = Vec::new();
+        for path in of_area {
+            listed.push(if path.is_dir() { walk(path)? } else { vec![path.clone()] });
+        }
+        files.push(listed);
+    }
+    let mut all: Vec<&PathBuf> = files.iter().flatten().flatten().collect();
+    all.sort();
+    all.dedup();
+    let sums = checksums(&all)?;
+    let record = |area: &AreaInput, path: &Path, files: &[PathBuf]| -> Outcome<InputRecord> {
+        let name = name_of(&area.path, path);
+        if !path.is_dir() {
+            let (bytes, xxh3_128) = sums.get(path).copied().unwrap_or((0, Checksum::of(b"")));
+            return Ok(InputRecord { path: name, bytes, xxh3_128 });
+        }
+        let mut lines = ChecksumOfParts::default();
+        let mut total = 0;
+        let mut listed: Vec<(String, u64, Checksum)> = Vec::new();
+        for file in files {
+            let (bytes, sum) = sums.get(file.as_path()).copied().unwrap_or((0, Checksum::of(b"")));
+            listed.push((below(path, file), bytes, sum));
+            total += bytes;
+        }
+        listed.sort();
+        for (path, bytes, xxh3_128) in listed {
+            lines.add(FileRecord { path, bytes, xxh3_128 }.to_line().as_bytes());
+            lines.add(b"\n");
+        }
+        let (_, xxh3_128) = lines.finish();
+        Ok(InputRecord { path: format!("{name}/"), bytes: total, xxh3_128 })
+    };
+    let mut requested = Vec::new();
+    for ((area, paths), files) in areas.iter().zip(&paths).zip(&files) {
+        let inputs = paths.iter().zip(files).map(|(path, files)| record(area, path, files));
+        requested.push(RequestedArea {
+            area: area.number,
+            place_cameras: match area.cameras {
+                Cameras::Placed(distance_m) => Some(distance_m),
+                Cameras::Listed(..) => None,
+            },
+            inputs: inputs.collect::<Outcome<_>>()?,
+        });
+    }
+    Ok(requested)
+}
+
+/// Size and checksum of each file.
+fn checksums<'a>(files: &[&'a PathBuf]) -> Outcome<BTreeMap<&'a Path, (u64, Checksum)>> {
+    let sums = Mutex::new(BTreeMap::new());
+    let progress = Progress::new("reading", "input files", files.len() as u64);
+    for_each_in_order(
+        files,
+        || (),
+        |(), path| {
+            // Devices and pipes are refused: reading one may never end.
+            let what = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
+            if !what.is_file() {
+                return Err(Error::format(path, "is no file").into());
+            }
+            let sum = checksum_of_file(path)?;
+            sums.lock().unwrap_or_else(PoisonError::into_inner).insert(path.as_path(), sum);
+            progress.add(1);
+            Ok(())
+        },
+    )?;
+    Ok(sums.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// What an input is called: its path from the folder of what the user named, or else its last part.
+fn name_of(scene: &Path, path: &Path) -> String {
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    match path.strip_prefix(folder) {
+        Ok(below) if below.is_relative() && below.components().next().is_some() => slashed(below),
+        _ => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+    }
+}
+
+fn below(folder: &Path, file: &Path) -> String {
+    slashed(file.strip_prefix(folder).unwrap_or(file))
+}
+
+fn slashed(path: &Path) -> String {
+    path.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join("/")
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn request() -> Request {
+        Request {
+            version: "1.2.3".into(),
+            seed: 0,
+            options: Options {
+                views: 72,
+                size: 1080,
+                pano_width: 4096,
+                pool: "dataset".into(),
+                points_per_m2: 10_000.0,
+                lenient: false,
+                entropy_stride: 4,
+                modalities: vec!["rgb".into(), "depth".into()],
+                keep_all: false,
+                only: Vec::new(),
+                normals: "flat".into(),
+                compression: "balanced".into(),
+                xyz: "half".into(),
+                normal_axes: "paper".into(),
+                depth_units: "512".into(),
+                pad_labels: "off".into(),
+                profiles: Vec::new(),
+            },
+            areas: vec![area(1), area(3)],
+        }
+    }
+
+    fn area(area: u32) -> RequestedArea {
+        let input = |path: &str| InputRecord { path: path.into(), bytes: 7, xxh3_128: Checksum(7) };
+        RequestedArea {
+            area,
+            place_cameras: None,
+            inputs: vec![input("scene.toml"), input("rgb.obj"), input("Area_1/")],
+        }
+    }
+
+    #[test]
+    fn equal_requests_have_no_differences_and_come_back_from_json() {
+        let text = serde_json::to_string(&request()).unwrap();
+        let back: Request = serde_json::from_str(&text).unwrap();
+        assert_eq!(back, request());
+        assert!(request().differences(&back).is_empty());
+    }
+
+    #[test]
+    fn each_difference_is_told_in_words() {
+        let changed = |change: &dyn Fn(&mut Request)| {
+            let mut now = request();
+            change(&mut now);
+            assert_ne!(now, request());
+            request().differences(&now)
+        };
+        assert_eq!(changed(&|r| r.seed = 7), ["--seed 0 there, 7 now"]);
+        assert_eq!(changed(&|r| r.version = "2.0.0".into()), ["version 1.2.3 of s3d there, 2.0.0 now"]);
+        assert_eq!(changed(&|r| r.options.pano_width = 64), ["--pano-width 4096 there, 64 now"]);
+        assert_eq!(changed(&|r| r.options.keep_all = true), ["--keep-all now, not there"]);
+        assert_eq!(changed(&|r| r.options.normals = "smooth".into()), ["--smooth-normals now, not there"]);
+        assert_eq!(
+            changed(&|r| r.options.only = vec!["a".into(), "b".into()]),
+            ["--only none there, a,b now"]
+        );
+        assert_eq!(
+            changed(&|r| r.options.profiles = vec!["pointnet".into()]),
+            ["--profile none there, pointnet now"]
+        );
+        assert_eq!(changed(&|r| r.areas[1].inputs[1].xxh3_128 = Checksum(8)), ["rgb.obj: other bytes"]);
+        assert_eq!(changed(&|r| drop(r.areas[0].inputs.remove(2))), ["Area_1/: input there, not now"]);
+        assert_eq!(changed(&|r| r.areas[0].inputs.swap(0, 1)), ["area 1: its input in another order"]);
+        assert_eq!(
+            changed(&|r| r.areas[0].place_cameras = Some(2.5)),
+            ["placed scan locations of area 1: none there, 2.5 m apart now"]
+        );
+        assert_eq!(changed(&|r| drop(r.areas.remove(1))), ["area 3 there, not now"]);
+        assert_eq!(changed(&|r| r.areas[1].area = 4), ["area 3 there, not now", "area 4 now, not there"]);
+    }
+
+    #[test]
+    fn inputs_are_named_from_the_scenes_folder() {
+        let name = |scene: &str, path: &str| name_of(Path::new(scene), Path::new(path));
+        assert_eq!(name("scan/scene.toml", "scan/Area_1"), "Area_1");
+        assert_eq!(name("scan/scene.toml", "scan/../shared/a.obj"), "../shared/a.obj");
+        assert_eq!(name("scan/scene.toml", "/data/a.obj"), "a.obj");
+        assert_eq!(name("scene.toml", "a/b.obj"), "a/b.obj");
+        assert_eq!(name("scene.toml", "/data/b.obj"), "b.obj");
+        assert_eq!(name("sets/area_3", "sets/area_3/3d/rgb.obj"), "area_3/3d/rgb.obj");
+    }
+}

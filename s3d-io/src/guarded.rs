@@ -1,0 +1,36 @@
+//! Calls of decoders that are not ours and panic on damaged files.
+
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+thread_local! {
+    static DEPTH: Cell<u32> = const { Cell::new(0) };
+}
+
+/// What `f` gives, or `None` if it panicked.
+pub(crate) fn guarded<T>(f: impl FnOnce() -> T) -> Option<T> {
+    DEPTH.set(DEPTH.get() + 1);
+    let result = catch_unwind(AssertUnwindSafe(f));
+    DEPTH.set(DEPTH.get() - 1);
+    result.ok()
+}
+
+/// Whether a panic of this thread, now, is caught inside this crate and becomes an [`Error`](crate::Error): some readers
+/// call decoders that panic on damaged files. For panic hooks, which are called all the same: they may stay silent then.
+pub fn panic_is_caught() -> bool {
+    DEPTH.get() > 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_caught_and_known_to_be() {
+        assert!(!panic_is_caught());
+        assert_eq!(guarded(|| (panic_is_caught(), guarded(|| 7))), Some((true, Some(7))));
+        let hollow: Vec<u32> = Vec::new();
+        assert_eq!(guarded(|| hollow[0]), None);
+        assert!(!panic_is_caught());
+    }
+}
