@@ -14,6 +14,12 @@
 //! assert!((pixel.x - 540.0).abs() < 1e-9 && (depth - 4.0).abs() < 1e-9);
 //! ```
 
+// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what a constructor checked.
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
+)]
+
 mod aabb;
 mod camera;
 mod cloud;

@@ -347,6 +347,7 @@ fn speckled(rng: &mut ChaCha8Rng, name: &str) -> Texture {
     Texture { name: name.to_owned(), image, wrap: [Wrap::Repeat; 2] }
 }
 
+#[expect(clippy::expect_used, reason = "fixtures are made here, of finite corners and faces with an area")]
 fn checked(parts: MeshParts) -> TriMesh {
     TriMesh::new(parts).expect("a fixture is a mesh")
 }

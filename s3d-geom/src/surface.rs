@@ -139,6 +139,7 @@ impl<'m> SurfaceSampler<'m> {
     ///
     /// # Panics
     /// If the range goes beyond [`SurfaceSampler::len`], or is longer than memory can be.
+    #[expect(clippy::expect_used, reason = "a caller's mistake: see Panics")]
     pub fn sample(&self, range: Range<u64>, out: &mut PointCloud) {
         assert!(range.end <= self.len, "points {range:?} of {}", self.len);
         let n = usize::try_from(range.end.saturating_sub(range.start)).expect("points that fit into memory");

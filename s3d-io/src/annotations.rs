@@ -221,9 +221,9 @@ impl Annotations {
         for room in other.rooms {
             match self.rooms.binary_search_by_key(&room.room, |r| r.room) {
                 Ok(i) => {
-                    let sources =
-                        [&room, &self.rooms[i]].map(|r| r.instances.first().map(AnnotatedInstance::source));
-                    let [second, first] = sources.map(Option::unwrap_or_default);
+                    let source = |r: &AnnotatedRoom| r.instances.first().map(AnnotatedInstance::source);
+                    let first = self.rooms.get(i).and_then(source).unwrap_or_default();
+                    let second = source(&room).unwrap_or_default();
                     let path = room.instances.first().map_or(Path::new(""), AnnotatedInstance::path);
                     let message = format!("{} is in two sources, {first} and {second}", room.room);
                     return Err(Error::format(path, message));

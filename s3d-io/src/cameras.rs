@@ -88,20 +88,19 @@ fn header(record: &ByteRecord) -> std::result::Result<[usize; 8], String> {
 }
 
 fn location(record: &ByteRecord, order: [usize; 8], line: u64) -> std::result::Result<ScanLocation, String> {
-    let text = |i: usize| String::from_utf8_lossy(&record[order[i]]).into_owned();
-    let written = text(0);
+    let fields = order.map(|at| String::from_utf8_lossy(record.get(at).unwrap_or_default()).into_owned());
+    let [written, fields @ ..] = fields;
     let uuid: String = written.chars().filter(|&c| c != '-').map(|c| c.to_ascii_lowercase()).collect();
     if uuid.len() != 32 || !uuid.bytes().all(|b| b.is_ascii_hexdigit()) {
         return Err(format!("{written:?} is no uuid of 32 hexadecimal digits"));
     }
     let mut numbers = [0.0; 7];
-    for (i, number) in numbers.iter_mut().enumerate() {
-        let text = text(i + 1);
+    for ((number, text), column) in numbers.iter_mut().zip(&fields).zip(&COLUMNS[1..]) {
         *number = text
             .parse()
             .ok()
             .filter(|v: &f64| v.is_finite())
-            .ok_or_else(|| format!("{} is {text:?}, which is no finite number", COLUMNS[i + 1]))?;
+            .ok_or_else(|| format!("{column} is {text:?}, which is no finite number"))?;
     }
     let [x, y, z, qx, qy, qz, qw] = numbers;
     if [x, y, z].iter().any(|c| c.abs() > FARTHEST_M) {

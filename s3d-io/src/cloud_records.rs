@@ -1,5 +1,7 @@
 //! Records of fixed size, as binary PLY, NPY and LAS hold points: fields at fixed places.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::annotations::AnnotationOptions;
 use crate::cloud_columns::Columns;
 use crate::flat::ColorRange;
@@ -42,7 +44,7 @@ impl Kind {
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
             Self::Bytes(n) => n,
-            Self::Utf32(n) => 4 * n,
+            Self::Utf32(n) => n.saturating_mul(4),
         }
     }
 
@@ -72,18 +74,21 @@ enum Number {
 }
 
 impl Field {
-    /// # Panics
-    /// If it is a text, or reaches beyond the record.
-    fn number(&self, record: &[u8]) -> Number {
+    /// The record from the field on, if it reaches so far.
+    fn start<'r>(&self, record: &'r [u8]) -> Option<&'r [u8]> {
+        record.get(self.at..)
+    }
+
+    /// `None` if it is a text, or reaches beyond the record.
+    fn number(&self, record: &[u8]) -> Option<Number> {
         macro_rules! number {
             ($t:ty, $form:path, $to:ty) => {{
-                let mut bytes = [0; size_of::<$t>()];
-                bytes.copy_from_slice(&record[self.at..self.at + size_of::<$t>()]);
+                let bytes = *self.start(record)?.first_chunk()?;
                 let v = if self.big_endian { <$t>::from_be_bytes(bytes) } else { <$t>::from_le_bytes(bytes) };
                 $form(<$to>::from(v))
             }};
         }
-        match self.kind {
+        Some(match self.kind {
             Kind::I8 => number!(i8, Number::Whole, i64),
             Kind::U8 => number!(u8, Number::Whole, i64),
             Kind::I16 => number!(i16, Number::Whole, i64),
@@ -92,8 +97,7 @@ impl Field {
             Kind::U32 => number!(u32, Number::Whole, i64),
             Kind::I64 => number!(i64, Number::Whole, i64),
             Kind::U64 => {
-                let mut bytes = [0; 8];
-                bytes.copy_from_slice(&record[self.at..self.at + 8]);
+                let bytes = *self.start(record)?.first_chunk()?;
                 let v = if self.big_endian { u64::from_be_bytes(bytes) } else { u64::from_le_bytes(bytes) };
                 // Beyond, it is no number of anything: as a float it will be refused.
                 i64::try_from(v).map_or(Number::Float(v as f64), Number::Whole)
@@ -101,29 +105,31 @@ impl Field {
             Kind::F16 => number!(half::f16, Number::Float, f64),
             Kind::F32 => number!(f32, Number::Float, f64),
             Kind::F64 => number!(f64, Number::Float, f64),
-            Kind::Bytes(_) | Kind::Utf32(_) => panic!("{} is a text", self.name),
-        }
+            Kind::Bytes(_) | Kind::Utf32(_) => return None,
+        })
     }
 
+    /// Its number; not a number if it is a text, or reaches beyond the record.
     pub(crate) fn float(&self, record: &[u8]) -> f64 {
         match self.number(record) {
-            Number::Whole(n) => n as f64,
-            Number::Float(v) => v,
+            Some(Number::Whole(n)) => n as f64,
+            Some(Number::Float(v)) => v,
+            None => f64::NAN,
         }
     }
 
     /// Its value; a text is put into `text`.
     pub(crate) fn value<'a>(&self, record: &[u8], text: &'a mut String) -> Value<'a> {
         text.clear();
+        let written = self.start(record).and_then(|r| r.get(..self.kind.size()));
         match self.kind {
-            Kind::Bytes(n) => {
-                let bytes = &record[self.at..self.at + n];
-                let end = bytes.iter().position(|b| *b == 0).unwrap_or(n);
-                text.push_str(String::from_utf8_lossy(&bytes[..end]).trim());
+            Kind::Bytes(_) => {
+                let bytes = written.and_then(|w| w.split(|b| *b == 0).next());
+                text.push_str(String::from_utf8_lossy(bytes.unwrap_or_default()).trim());
                 Value::Name(text)
             }
-            Kind::Utf32(n) => {
-                for c in record[self.at..self.at + 4 * n].as_chunks::<4>().0 {
+            Kind::Utf32(_) => {
+                for c in written.unwrap_or_default().as_chunks::<4>().0 {
                     let code = if self.big_endian { u32::from_be_bytes(*c) } else { u32::from_le_bytes(*c) };
                     if code == 0 {
                         break;
@@ -133,8 +139,9 @@ impl Field {
                 Value::Name(text)
             }
             _ => match self.number(record) {
-                Number::Whole(n) => Value::Whole(n),
-                Number::Float(v) => Value::Float(v),
+                Some(Number::Whole(n)) => Value::Whole(n),
+                Some(Number::Float(v)) => Value::Float(v),
+                None => Value::None,
             },
         }
     }
@@ -159,15 +166,12 @@ pub(crate) fn color(channels: [f64; 3], is_float: bool, range: ColorRange) -> Co
         (true, ColorRange::Narrow) => (1.0, 255.0),
         (true, ColorRange::Wide) => (255.0, 1.0),
     };
-    let mut rgb = [0; 3];
-    for (i, v) in channels.into_iter().enumerate() {
-        if !(0.0..=most).contains(&v) {
-            let may_be_wider = range == ColorRange::Narrow && v > most;
-            return if may_be_wider { Color::Wider } else { Color::Beyond(i) };
-        }
-        rgb[i] = (v * scale).round() as u8;
+    if let Some(i) = channels.iter().position(|v| !(0.0..=most).contains(v)) {
+        let may_be_wider = range == ColorRange::Narrow && channels.get(i).is_some_and(|v| *v > most);
+        return if may_be_wider { Color::Wider } else { Color::Beyond(i) };
     }
-    Color::Rgb(rgb)
+    #[expect(clippy::cast_possible_truncation, reason = "0 to 255, as what is beyond was sent back")]
+    Color::Rgb(channels.map(|v| (v * scale).round() as u8))
 }
 
 /// A table of records: fields, and which of them are what.
@@ -181,7 +185,8 @@ pub(crate) struct Table {
 
 impl Table {
     /// # Errors
-    /// [`Error::Format`] if columns are missing, a coordinate or colour is a text, or records are too long.
+    /// [`Error::Format`] if columns are missing, a coordinate or colour is a text, records are too long, or a field reaches
+    /// beyond them.
     pub(crate) fn new(
         path: &Path,
         fields: Vec<Field>,
@@ -191,16 +196,22 @@ impl Table {
         let names: Vec<String> = fields.iter().map(|f| f.name.clone()).collect();
         let columns = Columns::choose(path, &names, options)?;
         let numbers = columns.position.into_iter().chain(columns.color.into_iter().flatten());
-        if let Some(text) = numbers.map(|i| &fields[i]).find(|f| f.kind.is_text()) {
+        if let Some(text) = numbers.filter_map(|i| fields.get(i)).find(|f| f.kind.is_text()) {
             return Err(Error::format(path, format!("the column {} holds texts, no numbers", text.name)));
         }
         if stride == 0 || stride > LONGEST_RECORD {
             return Err(Error::format(path, format!("records of {stride} bytes are none of points")));
         }
+        let is_inside = |f: &Field| f.at.checked_add(f.kind.size()).is_some_and(|end| end <= stride);
+        if let Some(field) = fields.iter().find(|f| !is_inside(f)) {
+            let message = format!("the column {} reaches beyond the {stride} bytes of a record", field.name);
+            return Err(Error::format(path, message));
+        }
         Ok(Self { fields, columns, stride })
     }
 
     /// Hands on record `number` (from 1). `false`: its colour is beyond the narrow range.
+    #[expect(clippy::indexing_slicing, reason = "the columns were chosen among these fields")]
     pub(crate) fn push(
         &self,
         number: u64,
@@ -219,8 +230,8 @@ impl Table {
                 Color::Rgb(found) => rgb = found,
                 Color::Wider => return Ok(false),
                 Color::Beyond(i) => {
-                    let v = self.fields[channels[i]].float(record);
-                    let name = &self.fields[channels[i]].name;
+                    let field = &self.fields[channels[i]];
+                    let (v, name) = (field.float(record), &field.name);
                     let why = format!("record {number}: {v} is no colour ({name})");
                     reading.fault(Error::format(path, why))?;
                     return Ok(true);
@@ -252,21 +263,28 @@ impl Table {
         reading: &mut Reading<'_>,
     ) -> Result<bool> {
         let mut texts = Default::default();
-        let at_once = (BLOCK / self.stride).max(1) as u64;
-        let mut block = vec![0; self.stride * at_once.min(count) as usize];
-        let mut done = 0;
-        while done < count {
-            let n = at_once.min(count - done);
-            let block = &mut block[..self.stride * n as usize];
-            fill(path, &mut source, block, done, count, self.stride)?;
-            for record in block.chunks_exact(self.stride) {
-                done += 1;
-                if !self.push(done, record, colors, &mut texts, path, reading)? {
+        let (mut done, mut block) = (0, Vec::new());
+        while let Some(n) = rows_of_block(count, done, self.stride) {
+            block.resize(n.saturating_mul(self.stride), 0);
+            fill(path, &mut source, &mut block, done, count, self.stride)?;
+            for (record, number) in block.chunks_exact(self.stride).zip(done.saturating_add(1)..) {
+                if !self.push(number, record, colors, &mut texts, path, reading)? {
                     return Ok(false);
                 }
             }
+            done = done.saturating_add(n as u64);
         }
         Ok(true)
+    }
+}
+
+/// How many records of `stride` bytes are read at once after `done` of `count`: as many as fit a block, but one at least;
+/// `None` at the end.
+pub(crate) fn rows_of_block(count: u64, done: u64, stride: usize) -> Option<usize> {
+    let most = BLOCK.checked_div(stride)?.max(1);
+    match count.checked_sub(done)? {
+        0 => None,
+        left => Some(usize::try_from(left).map_or(most, |left| left.min(most))),
     }
 }
 
@@ -279,15 +297,18 @@ pub(crate) fn fill(
     count: u64,
     stride: usize,
 ) -> Result<()> {
-    let mut at = 0;
-    while at < block.len() {
-        match source.read(&mut block[at..]) {
+    let size = block.len();
+    let mut rest = block;
+    while !rest.is_empty() {
+        match source.read(rest) {
             Ok(0) => {
-                let record = done + (at / stride) as u64 + 1;
+                let whole = size.saturating_sub(rest.len()).checked_div(stride).unwrap_or(0);
+                let record = done.saturating_add(whole as u64).saturating_add(1);
                 let message = format!("ends in record {record} of {count}: the file is cut short");
                 return Err(Error::format(path, message));
             }
-            Ok(n) => at += n,
+            // A source that claims more than it was given room for has filled it.
+            Ok(n) => rest = rest.get_mut(n..).unwrap_or_default(),
             Err(e) if e.kind() == ErrorKind::Interrupted => {}
             Err(e) if e.kind() == ErrorKind::InvalidData || e.kind() == ErrorKind::InvalidInput => {
                 return Err(Error::format(path, format!("cannot be unpacked: {e}")));
@@ -330,6 +351,44 @@ mod tests {
         assert_eq!(field(Kind::Bytes(4), false).value(b"-wa\0x", &mut text), Value::Name("wa"));
         let utf32 = [0, 0, 0, 0, b'w', 0, 0, 0, 0xfc, 0, 0, 0, 0];
         assert_eq!(field(Kind::Utf32(3), true).value(&utf32, &mut text), Value::Name("wü"));
+    }
+
+    #[test]
+    fn a_field_beyond_its_record_is_no_number() {
+        let mut text = String::new();
+        for kind in [Kind::U8, Kind::I64, Kind::F32, Kind::Bytes(3), Kind::Utf32(2)] {
+            let far = Field { at: usize::MAX, ..field(kind, false) };
+            assert!(far.float(&[1; 4]).is_nan(), "{kind:?}");
+            let nothing = if kind.is_text() { Value::Name("") } else { Value::None };
+            assert_eq!(far.value(&[1; 4], &mut text), nothing, "{kind:?}");
+        }
+        assert!(field(Kind::Bytes(1), false).float(b"-5").is_nan());
+    }
+
+    #[test]
+    fn a_table_whose_fields_reach_beyond_its_records_is_refused() {
+        let names = ["x", "y", "z", "class"];
+        let fields = (0..).zip(names).map(|(i, name)| Field {
+            name: name.to_owned(),
+            at: 4 * i,
+            kind: Kind::F32,
+            big_endian: false,
+        });
+        let table = |stride| {
+            Table::new(Path::new("a.npy"), fields.clone().collect(), stride, &AnnotationOptions::default())
+        };
+        assert_eq!(table(16).unwrap().stride, 16);
+        let message = table(15).unwrap_err().to_string();
+        assert!(message.contains("the column class reaches beyond the 15 bytes of a record"), "{message}");
+    }
+
+    #[test]
+    fn a_block_is_no_larger_for_what_a_header_claims() {
+        assert_eq!(rows_of_block(u64::MAX, 0, LONGEST_RECORD), Some(16));
+        assert_eq!(rows_of_block(u64::MAX, 7, 16), Some(BLOCK / 16));
+        assert_eq!(rows_of_block(u64::MAX, 7, 3 * BLOCK), Some(1));
+        assert_eq!(rows_of_block(12, 7, 16), Some(5));
+        assert_eq!((rows_of_block(7, 7, 16), rows_of_block(6, 7, 16)), (None, None));
     }
 
     #[test]

@@ -81,8 +81,8 @@ fn read_binary(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
             }
             take::<4>(&mut rest)?;
             let end = rest.iter().position(|&b| b == 0)?;
-            let name = &rest[..end];
-            rest = &rest[end + 1..];
+            let (name, behind) = rest.split_at_checked(end)?;
+            rest = behind.get(1..)?;
             let points = u64::from_le_bytes(take(&mut rest)?);
             let length = usize::try_from(points).ok()?.checked_mul(24)?;
             rest = rest.get(length..)?;

@@ -3,6 +3,8 @@
 //! COLMAP's conventions are ours: metres, world → camera in axes x right, y down, z forward, and the centre of the first
 //! pixel at (½, ½).
 
+#![expect(clippy::indexing_slicing, reason = "a writer: its tables are its own")]
+
 use crate::{AtomicFile, Result, create_dir};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{DMat3, DQuat, DVec3};

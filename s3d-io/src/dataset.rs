@@ -97,9 +97,10 @@ pub fn check_images_complete(layout: &Layout, images: &[DatasetImage]) -> Result
         });
     }
     for image in images {
-        if let Some(missing) = domains[&kind(image)].iter().find(|d| !image.has(**d)) {
+        let missing = domains.get(&kind(image)).and_then(|all| all.iter().find(|d| !image.has(**d)));
+        if let Some((missing, there)) = missing.zip(image.domains.first()) {
             let path = image.path(layout, *missing);
-            let there = image.relative_path(image.domains[0]);
+            let there = image.relative_path(*there);
             return Err(Error::format(
                 &path,
                 format!("missing: {there} is there, and other images have this modality"),
@@ -147,8 +148,8 @@ pub fn read_png_size(path: &Path) -> Result<(u32, u32)> {
     let Ok(head) = <[u8; 24]>::try_from(head) else {
         return Err(Error::format(path, "the PNG file ends too early"));
     };
-    let number = |at: usize| u32::from_be_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
-    let (width, height) = (number(16), number(20));
+    let width = u32::from_be_bytes([head[16], head[17], head[18], head[19]]);
+    let height = u32::from_be_bytes([head[20], head[21], head[22], head[23]]);
     if head[..8] != *b"\x89PNG\r\n\x1a\n" || head[12..16] != *b"IHDR" {
         return Err(Error::format(path, "no PNG file"));
     }

@@ -115,11 +115,14 @@ impl<'a> Scan<'a> {
                 of_file.and_then(|l| Some((l.green_min.as_ref()?, l.green_max.as_ref()?))),
                 of_file.and_then(|l| Some((l.blue_min.as_ref()?, l.blue_max.as_ref()?))),
             ];
-            std::array::from_fn(|i| {
-                let kind = &prototype[channels[i]].data_type;
-                let stated = stated[i].and_then(|(a, b)| Some((a.to_f64(kind).ok()?, b.to_f64(kind).ok()?)));
-                stated.or(range_of(kind)).filter(|(a, b)| b > a).unwrap_or((0.0, 255.0))
-            })
+            let limits = |(stated, channel): (Option<(&RecordValue, &RecordValue)>, usize)| {
+                let kind = &prototype.get(channel)?.data_type;
+                let stated = stated.and_then(|(a, b)| Some((a.to_f64(kind).ok()?, b.to_f64(kind).ok()?)));
+                stated.or(range_of(kind)).filter(|(a, b)| b > a)
+            };
+            let [r, g, b] = channels;
+            let [of_r, of_g, of_b] = stated;
+            [(of_r, r), (of_g, g), (of_b, b)].map(|channel| limits(channel).unwrap_or((0.0, 255.0)))
         });
         let pose = cloud.transform.clone().unwrap_or_default();
         let (q, t) = (pose.rotation, pose.translation);
@@ -145,13 +148,15 @@ impl<'a> Scan<'a> {
         })
     }
 
+    /// A number of a point; not a number if there is none.
     fn float(&self, values: &RawValues, i: usize) -> f64 {
-        values[i].to_f64(&self.prototype[i].data_type).unwrap_or(f64::NAN)
+        let value = values.get(i).zip(self.prototype.get(i));
+        value.and_then(|(value, record)| value.to_f64(&record.data_type).ok()).unwrap_or(f64::NAN)
     }
 
     fn value(&self, values: &RawValues, i: usize) -> Value<'static> {
-        match &values[i] {
-            RecordValue::Integer(n) => Value::Whole(*n),
+        match values.get(i) {
+            Some(RecordValue::Integer(n)) => Value::Whole(*n),
             _ => Value::Float(self.float(values, i)),
         }
     }
@@ -178,11 +183,11 @@ impl<'a> Scan<'a> {
         if self.colorless.is_some_and(|i| self.float(values, i) != 0.0) {
             return [0; 3];
         }
-        let scaled = |k: usize| {
-            let (min, max) = self.limits[k];
-            ((self.float(values, channels[k]) - min) / (max - min)).clamp(0.0, 1.0)
+        let scaled = |channel: usize, (min, max): (f64, f64)| {
+            ((self.float(values, channel) - min) / (max - min)).clamp(0.0, 1.0)
         };
-        match color([scaled(0), scaled(1), scaled(2)], true, ColorRange::Narrow) {
+        let ([r, g, b], [of_r, of_g, of_b]) = (channels, self.limits);
+        match color([scaled(r, of_r), scaled(g, of_g), scaled(b, of_b)], true, ColorRange::Narrow) {
             Color::Rgb(rgb) => rgb,
             Color::Wider | Color::Beyond(_) => [0; 3],
         }
@@ -225,7 +230,8 @@ impl Cloud for E57Cloud<'_> {
         for cloud in &scans {
             let scan = Scan::new(path, self.options, cloud)?;
             let bits: u64 = cloud.prototype.iter().map(|r| bits_of(&r.data_type)).sum();
-            if bits > 0 && u128::from(cloud.records) * u128::from(bits) > u128::from(size) * 8 {
+            // A point that takes no bit would come without end.
+            if u128::from(cloud.records) * u128::from(bits.max(1)) > u128::from(size) * 8 {
                 let message =
                     format!("claims {} points in {size} bytes: the file is cut short", cloud.records);
                 return Err(Error::format(path, message));

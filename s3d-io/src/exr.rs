@@ -63,6 +63,7 @@ pub fn write_xyz_float(path: &Path, image: &Raster<[f32; 3]>, compression: Compr
     write_bytes(path, &encode_xyz_float(image, compression))
 }
 
+#[expect(clippy::expect_used, reason = "a writer, into memory")]
 fn encode<T: Copy, const N: usize>(
     image: &Raster<[T; 3]>,
     sample_type: SampleType,
@@ -141,6 +142,7 @@ impl Block {
     }
 
     /// The contents of the block of whole rows of `width` pixels (R G B), compressed unless that makes it longer.
+    #[expect(clippy::indexing_slicing, reason = "a writer: a block has no more lines than its buffers")]
     fn compress<T: Copy, const N: usize>(
         &mut self,
         pixels: &[[T; 3]],
@@ -177,6 +179,7 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Work for Prepare<'_, T, F> {
     type Output = ();
 
     #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "a writer: buffers are as long as lines, blocks not empty")]
     fn run(self) {
         let Self { pixels, width, to_le_bytes, line, sorted, prepared } = self;
         let half = N / 2 * width;
@@ -225,10 +228,17 @@ pub fn read_xyz(path: &Path) -> Result<Raster<[f32; 3]>> {
         .no_deep_data()
         .largest_resolution_level()
         .rgb_channels(
-            |size: Vec2<usize>, _| Raster::filled(size.x() as u32, size.y() as u32, [0f32; 3]),
+            |size: Vec2<usize>, _| {
+                // The header was checked: its sides fit.
+                let [width, height] = [size.x(), size.y()].map(|side| u32::try_from(side).unwrap_or(0));
+                Raster::filled(width, height, [0f32; 3])
+            },
             |image, at, (r, g, b): (f32, f32, f32)| {
-                let index = at.y() * image.width() as usize + at.x();
-                image.pixels_mut()[index] = [r, g, b];
+                let line = (image.width() as usize).checked_mul(at.y());
+                let index = line.and_then(|line| line.checked_add(at.x()));
+                if let Some(pixel) = index.and_then(|index| image.pixels_mut().get_mut(index)) {
+                    *pixel = [r, g, b];
+                }
             },
         )
         .first_valid_layer()

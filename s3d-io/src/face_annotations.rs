@@ -39,6 +39,10 @@ impl Annotations {
         assert_eq!(face_labels.len(), count, "{count} faces need as many labels");
         let mut faces: BTreeMap<(Room, Class, u32), Vec<Face>> = BTreeMap::new();
         for (face, place) in (0u32..).zip(face_labels).filter(|(_, place)| **place != NO_INDEX) {
+            #[expect(
+                clippy::indexing_slicing,
+                reason = "the labels of faces are places in `labels`: see Panics"
+            )]
             let label = labels[*place as usize];
             let key = (label.room, label.class, label.instance);
             faces.entry(key).or_default().push((face, mesh.triangle(face)));

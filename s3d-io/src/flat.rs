@@ -92,8 +92,8 @@ pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> R
         let mut warnings = Vec::new();
         let wide =
             gather(clouds, &colors, options, &mut gathered, (&mut classes, &mut rooms), &mut warnings)?;
-        match wide {
-            Some(file) => colors[file] = ColorRange::Wide,
+        match wide.and_then(|file| colors.get_mut(file)) {
+            Some(range) => *range = ColorRange::Wide,
             None => break (gathered, classes, rooms, warnings),
         }
     };
@@ -108,20 +108,22 @@ pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> R
     let mut found: Vec<AnnotatedRoom> = Vec::new();
     let mut start = 0;
     for instance in meaning.instances {
+        #[expect(clippy::indexing_slicing, reason = "the meaning names these files by their places")]
+        let cloud = clouds[instance.file];
         let points = FlatPoints {
             store: Arc::clone(&store),
             start,
             count: instance.points,
-            path: clouds[instance.file].path().to_owned(),
-            are_vertices: clouds[instance.file].are_vertices(),
+            path: cloud.path().to_owned(),
+            are_vertices: cloud.are_vertices(),
             part: instance.part,
         };
         start += instance.points;
-        if found.last().is_none_or(|r| r.room != instance.room) {
-            found.push(AnnotatedRoom { room: instance.room, instances: Vec::new() });
+        let points = AnnotatedInstance::new(instance.class, instance.number, Arc::new(points));
+        match found.last_mut().filter(|r| r.room == instance.room) {
+            Some(room) => room.instances.push(points),
+            None => found.push(AnnotatedRoom { room: instance.room, instances: vec![points] }),
         }
-        let room = found.last_mut().expect("a room was pushed");
-        room.instances.push(AnnotatedInstance::new(instance.class, instance.number, Arc::new(points)));
     }
     Ok(Annotations { rooms: found, warnings })
 }
@@ -135,12 +137,12 @@ fn gather(
     (classes, rooms): (&mut Tags, &mut Tags),
     warnings: &mut Vec<String>,
 ) -> Result<Option<usize>> {
-    for (file, cloud) in clouds.iter().enumerate() {
+    for ((file, cloud), colors) in clouds.iter().enumerate().zip(colors) {
         let path = cloud.path();
         let mut sink = |rows: &Rows| gathered.add(file, path, rows, options.points_in_memory);
         let room = default_room(*cloud, options, rooms);
         let mut reading = Reading::new(path, options, room, (classes, rooms), &mut sink);
-        if !cloud.read(colors[file], &mut reading)? {
+        if !cloud.read(*colors, &mut reading)? {
             return Ok(Some(file));
         }
         reading.flush()?;
@@ -199,7 +201,9 @@ impl Gathered {
                 }
                 last = (key, index);
             }
-            self.groups[last.1 as usize].points += 1;
+            #[expect(clippy::indexing_slicing, reason = "each index in the map is that of a group")]
+            let group = &mut self.groups[last.1 as usize];
+            group.points += 1;
             if keep {
                 self.group_of.push(last.1);
             }
@@ -209,6 +213,10 @@ impl Gathered {
 }
 
 /// Puts the points in order: within an instance, that of the files.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "points were gathered in columns of one length, and counted by instance"
+)]
 fn in_memory(gathered: &Gathered, meaning: &Meaning, counts: &[u64]) -> FlatStore {
     let mut next: Vec<usize> = counts
         .iter()
@@ -242,14 +250,15 @@ fn spooled(
     (mut classes, mut rooms): (Tags, Tags),
 ) -> Result<FlatStore> {
     let mut writer = SpoolWriter::create(options.spool_dir.as_deref(), counts)?;
-    for (file, cloud) in clouds.iter().enumerate() {
+    for (cloud, colors) in clouds.iter().zip(colors) {
         let path = cloud.path();
         let mut sink = |rows: &Rows| {
-            for i in 0..rows.len() {
-                let key = (rows.rooms[i], rows.classes[i], rows.instances[i]);
-                let known = gathered.index.get(&key).map(|g| meaning.instance_of[*g as usize]);
-                let fits = match known {
-                    Some(Some(instance)) => writer.push(instance, rows.positions[i], rows.colors[i])?,
+            let tags = rows.rooms.iter().zip(&rows.classes).zip(&rows.instances);
+            let points = rows.positions.iter().zip(&rows.colors);
+            for (((room, class), instance), (position, color)) in tags.zip(points) {
+                let group = gathered.index.get(&(*room, *class, *instance));
+                let fits = match group.and_then(|g| meaning.instance_of.get(*g as usize)) {
+                    Some(Some(instance)) => writer.push(*instance, *position, *color)?,
                     Some(None) => true,
                     None => false,
                 };
@@ -262,12 +271,13 @@ fn spooled(
         let room = default_room(*cloud, options, &mut rooms);
         let sink: &mut Sink<'_> = &mut sink;
         let mut reading = Reading::new(path, options, room, (&mut classes, &mut rooms), sink);
-        if !cloud.read(colors[file], &mut reading)? {
+        if !cloud.read(*colors, &mut reading)? {
             return Err(changed(path));
         }
         reading.flush()?;
     }
-    writer.finish()?.ok_or_else(|| changed(clouds[0].path()))
+    let first = clouds.first().map_or(Path::new(""), |cloud| cloud.path());
+    writer.finish()?.ok_or_else(|| changed(first))
 }
 
 fn changed(path: &Path) -> Error {

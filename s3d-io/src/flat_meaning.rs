@@ -7,6 +7,7 @@ use crate::s3dis::OnFault;
 use crate::{Error, Result};
 use s3d_label::{Class, Room};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// The most tags that a message lists.
 const LISTED: usize = 20;
@@ -54,6 +55,10 @@ type Key = (Room, Class, i64, Option<Tag>);
 
 impl Meaning {
     /// Finds what tags mean. What has no meaning stops with a list of it, or is left out with a warning.
+    ///
+    /// # Panics
+    /// If a group is of none of the classes or of none of the clouds.
+    #[expect(clippy::indexing_slicing, clippy::expect_used, reason = "whoever makes groups numbers both")]
     pub(crate) fn new(
         clouds: &[&dyn Cloud],
         options: &AnnotationOptions,
@@ -98,7 +103,7 @@ impl Meaning {
             }
         }
         if found.is_empty() {
-            let path = clouds[0].path();
+            let path = clouds.first().map_or(Path::new(""), |cloud| cloud.path());
             return Err(Error::format(path, "has no annotated point: every class in it is unlabelled"));
         }
         let mut instances: Vec<FlatInstance> = Vec::new();
@@ -114,7 +119,7 @@ impl Meaning {
             };
             instances.push(FlatInstance { room: *room, class: *class, number, points, file, part });
         }
-        let instance_of = keys.iter().map(|key| key.as_ref().map(|k| index[k])).collect();
+        let instance_of = keys.iter().map(|key| index.get(key.as_ref()?).copied()).collect();
         Ok(Self { instances, instance_of })
     }
 }
@@ -154,8 +159,9 @@ impl Unknown {
     }
 
     /// The first file, the list for a message, and the number of points.
-    fn list(&self) -> Option<(usize, String, u64)> {
+    fn list<'c>(&self, clouds: &[&'c dyn Cloud]) -> Option<(&'c Path, String, u64)> {
         let file = self.0.values().map(|(_, file)| *file).min()?;
+        let path = clouds.get(file)?.path();
         let mut rows: Vec<_> = self.0.iter().collect();
         // Numbers in their order, before names.
         rows.sort_by_key(|(key, _)| (key.parse::<i64>().unwrap_or(i64::MAX), (*key).clone()));
@@ -164,7 +170,7 @@ impl Unknown {
         if rows.len() > LISTED {
             items.push(format!("and {} more", rows.len() - LISTED));
         }
-        Some((file, items.join(", "), rows.iter().map(|(_, (n, _))| n).sum()))
+        Some((path, items.join(", "), rows.iter().map(|(_, (n, _))| n).sum()))
     }
 
     fn tell_classes(
@@ -173,8 +179,7 @@ impl Unknown {
         options: &AnnotationOptions,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
-        let Some((file, list, points)) = self.list() else { return Ok(()) };
-        let path = clouds[file].path();
+        let Some((path, list, points)) = self.list(clouds) else { return Ok(()) };
         if options.unknown_as_clutter {
             warnings.push(format!("{}: classes taken for clutter: {list}", path.display()));
         } else if options.on_fault == OnFault::Skip {
@@ -200,18 +205,16 @@ impl Unknown {
         options: &AnnotationOptions,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
-        let Some((file, list, points)) = self.list() else { return Ok(()) };
-        let path = clouds[file].path();
-        let message = match (self.0.contains_key(""), options.room) {
-            (true, _) => format!(
-                "{} points are in no room: name it, as in room = \"office_1\", or name the file after it, or say which \
-                 column holds it (`rooms`)",
-                self.0[""].0
+        let Some((path, list, points)) = self.list(clouds) else { return Ok(()) };
+        let message = match (self.0.get(""), options.room) {
+            (Some((nowhere, _)), _) => format!(
+                "{nowhere} points are in no room: name it, as in room = \"office_1\", or name the file after it, or say which \
+                 column holds it (`rooms`)"
             ),
-            (false, Some(_)) => {
+            (None, Some(_)) => {
                 format!("rooms that are none: {list}. A room is named as in office_1, or numbered from 1")
             }
-            (false, None) => format!(
+            (None, None) => format!(
                 "rooms that are none: {list}. A room is named as in office_1; if they are numbers, say what type of room \
                  they are, as in room = \"office_1\""
             ),

@@ -51,15 +51,14 @@ impl Tags {
 
     /// The index of a number; `None` if there are too many different ones.
     pub(crate) fn number(&mut self, number: i64) -> Option<u32> {
-        let small = usize::try_from(number).ok().filter(|n| *n < SMALL);
-        if let Some(n) = small
-            && self.small[n] != NO_TAG
-        {
-            return Some(self.small[n]);
+        let small = usize::try_from(number).ok();
+        let known = small.and_then(|n| self.small.get(n));
+        if let Some(index) = known.filter(|index| **index != NO_TAG) {
+            return Some(*index);
         }
         let index = self.intern(Tag::Number(number))?;
-        if let Some(n) = small {
-            self.small[n] = index;
+        if let Some(known) = small.and_then(|n| self.small.get_mut(n)) {
+            *known = index;
         }
         Some(index)
     }

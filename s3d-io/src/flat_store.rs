@@ -1,5 +1,7 @@
 //! Points in the order of their instances: in memory, or in a temporary file when there are many.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::{Error, Result};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{Vec3, vec3};
@@ -10,6 +12,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// Bytes of a point in the file: three floats and three bytes.
 const POINT_BYTES: usize = 15;
+/// Points that are read back at a time.
+const POINTS_AT_ONCE: usize = 65_536;
 /// Memory for what waits to be written to the file.
 const BUFFER_BYTES: usize = 64 << 20;
 
@@ -30,6 +34,15 @@ pub(crate) struct Spool {
 
 impl FlatStore {
     /// Appends `count` points from the `start`th on to `out`.
+    ///
+    /// # Panics
+    /// If there are not so many in memory.
+    #[expect(
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        clippy::cast_possible_truncation,
+        reason = "places and counts are those by which the store was filled; what is in memory is counted by usize"
+    )]
     pub(crate) fn read(&self, start: u64, count: u64, out: &mut PointCloud) -> Result<()> {
         match self {
             Self::Memory { positions, colors } => {
@@ -43,26 +56,32 @@ impl FlatStore {
     }
 }
 
+/// Where a point begins in the file: beyond what a file can have, the system refuses to seek.
+fn byte_of(point: u64) -> u64 {
+    point.saturating_mul(POINT_BYTES as u64)
+}
+
 const READ: &str = "read back points from a temporary file in";
 const WRITE: &str = "write points to a temporary file in";
 
 impl Spool {
     fn read(&self, start: u64, count: u64, out: &mut PointCloud) -> std::io::Result<()> {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.seek(SeekFrom::Start(start * POINT_BYTES as u64))?;
-        let mut bytes = vec![0; POINT_BYTES * (count.min(65_536) as usize)];
-        let mut left = count;
+        file.seek(SeekFrom::Start(byte_of(start)))?;
+        let (mut bytes, mut left) = (Vec::new(), count);
         while left > 0 {
-            let n = left.min(65_536);
-            let piece = &mut bytes[..POINT_BYTES * n as usize];
-            file.read_exact(piece)?;
-            for point in piece.as_chunks::<POINT_BYTES>().0 {
-                let float =
-                    |i: usize| f32::from_le_bytes([point[i], point[i + 1], point[i + 2], point[i + 3]]);
-                out.positions.push(vec3(float(0), float(4), float(8)));
-                out.colors.push([point[12], point[13], point[14]]);
+            let n = usize::try_from(left).map_or(POINTS_AT_ONCE, |left| left.min(POINTS_AT_ONCE));
+            bytes.resize(n.saturating_mul(POINT_BYTES), 0);
+            file.read_exact(&mut bytes)?;
+            for p in bytes.as_chunks::<POINT_BYTES>().0 {
+                out.positions.push(vec3(
+                    f32::from_le_bytes([p[0], p[1], p[2], p[3]]),
+                    f32::from_le_bytes([p[4], p[5], p[6], p[7]]),
+                    f32::from_le_bytes([p[8], p[9], p[10], p[11]]),
+                ));
+                out.colors.push([p[12], p[13], p[14]]);
             }
-            left -= n;
+            left = left.saturating_sub(n as u64);
         }
         Ok(())
     }
@@ -72,13 +91,19 @@ impl Spool {
 pub(crate) struct SpoolWriter {
     file: File,
     dir: PathBuf,
-    /// What waits, by instance.
-    waiting: Vec<Vec<u8>>,
-    /// Where each instance goes on, in points, and where it ends.
-    next: Vec<u64>,
-    ends: Vec<u64>,
+    places: Vec<Place>,
     /// Bytes of an instance that may wait.
     most: usize,
+}
+
+/// The place of an instance.
+struct Place {
+    /// What waits to be written.
+    waiting: Vec<u8>,
+    /// Where that belongs, in points.
+    next: u64,
+    /// How many points are still to come.
+    left: u64,
 }
 
 impl SpoolWriter {
@@ -86,52 +111,48 @@ impl SpoolWriter {
     pub(crate) fn create(dir: Option<&Path>, counts: &[u64]) -> Result<Self> {
         let dir = dir.map_or_else(std::env::temp_dir, Path::to_owned);
         let file = tempfile::tempfile_in(&dir).map_err(|e| Error::io(&dir, WRITE, e))?;
-        let ends: Vec<u64> = counts
-            .iter()
-            .scan(0, |end, n| {
-                *end += n;
-                Some(*end)
-            })
-            .collect();
-        let next = ends.iter().zip(counts).map(|(end, n)| end - n).collect();
-        let share = BUFFER_BYTES / counts.len().max(1) / POINT_BYTES;
-        let most = share.clamp(1, 16_384) * POINT_BYTES;
-        Ok(Self { file, dir, waiting: vec![Vec::new(); counts.len()], next, ends, most })
+        let places = counts.iter().scan(0u64, |end, n| {
+            let next = *end;
+            *end = end.saturating_add(*n);
+            Some(Place { waiting: Vec::new(), next, left: *n })
+        });
+        let share = BUFFER_BYTES.checked_div(counts.len()).unwrap_or(BUFFER_BYTES);
+        Ok(Self { file, dir, places: places.collect(), most: share.clamp(1, 16_384 * POINT_BYTES) })
     }
 
     /// Adds a point of an instance; `false` if that has as many as were promised.
     pub(crate) fn push(&mut self, instance: usize, position: Vec3, color: [u8; 3]) -> Result<bool> {
-        let waiting = &mut self.waiting[instance];
-        if self.next[instance] + (waiting.len() / POINT_BYTES) as u64 >= self.ends[instance] {
-            return Ok(false);
-        }
+        let Some(place) = self.places.get_mut(instance) else { return Ok(false) };
+        let Some(left) = place.left.checked_sub(1) else { return Ok(false) };
+        place.left = left;
         for coordinate in position.to_array() {
-            waiting.extend_from_slice(&coordinate.to_le_bytes());
+            place.waiting.extend_from_slice(&coordinate.to_le_bytes());
         }
-        waiting.extend_from_slice(&color);
-        if waiting.len() >= self.most {
-            self.write(instance)?;
+        place.waiting.extend_from_slice(&color);
+        if place.waiting.len() >= self.most {
+            place.write(&mut self.file).map_err(|e| Error::io(&self.dir, WRITE, e))?;
         }
         Ok(true)
     }
 
-    fn write(&mut self, instance: usize) -> Result<()> {
-        let waiting = &mut self.waiting[instance];
-        let at = SeekFrom::Start(self.next[instance] * POINT_BYTES as u64);
-        let written = self.file.seek(at).and_then(|_| self.file.write_all(waiting));
-        written.map_err(|e| Error::io(&self.dir, WRITE, e))?;
-        self.next[instance] += (waiting.len() / POINT_BYTES) as u64;
-        waiting.clear();
-        Ok(())
-    }
-
     /// The points, to be read; `None` if fewer came than were promised.
     pub(crate) fn finish(mut self) -> Result<Option<FlatStore>> {
-        for instance in 0..self.waiting.len() {
-            self.write(instance)?;
+        for place in &mut self.places {
+            place.write(&mut self.file).map_err(|e| Error::io(&self.dir, WRITE, e))?;
         }
-        let complete = self.next == self.ends;
+        let complete = self.places.iter().all(|place| place.left == 0);
         Ok(complete.then(|| FlatStore::Spool(Spool { file: Mutex::new(self.file), dir: self.dir })))
+    }
+}
+
+impl Place {
+    fn write(&mut self, file: &mut File) -> std::io::Result<()> {
+        file.seek(SeekFrom::Start(byte_of(self.next)))?;
+        file.write_all(&self.waiting)?;
+        let written = self.waiting.len() / POINT_BYTES;
+        self.next = self.next.saturating_add(written as u64);
+        self.waiting.clear();
+        Ok(())
     }
 }
 

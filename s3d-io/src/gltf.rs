@@ -36,7 +36,7 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         for (p, primitive) in document.get(instance.mesh, "a node", "mesh")?.primitives.iter().enumerate() {
             if let Some(material) = primitive.material {
                 document.get(material, &format!("mesh {}, primitive {p}", instance.mesh), "material")?;
-                used[material.value()] = true;
+                used.get_mut(material.value()).into_iter().for_each(|used| *used = true);
             }
         }
     }
@@ -71,7 +71,7 @@ fn instances(document: &GltfDocument) -> Result<Vec<Instance>> {
                     *flag = true;
                 }
             }
-            (0..root.nodes.len()).filter(|&n| !is_child[n]).map(|n| Index::new(n as u32)).collect()
+            (0..).zip(is_child).filter(|(_, is_child)| !is_child).map(|(n, _)| Index::new(n)).collect()
         }
     };
     let mut instances = Vec::new();
@@ -81,7 +81,7 @@ fn instances(document: &GltfDocument) -> Result<Vec<Instance>> {
         roots.into_iter().rev().map(|n| (n, DMat4::IDENTITY)).collect();
     while let Some((index, world_from_parent)) = stack.pop() {
         let node = document.get(index, "the scene", "node")?;
-        if std::mem::replace(&mut visited[index.value()], true) {
+        if visited.get_mut(index.value()).is_none_or(|visited| std::mem::replace(visited, true)) {
             return Err(document.fail(format!("node {index} is in the scene twice; nodes must form a tree")));
         }
         let world_from_node = world_from_parent

@@ -1,5 +1,7 @@
 //! The numbers of glTF accessors, every range checked before it is read.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::Result;
 use crate::gltf_document::GltfDocument;
 use gltf::json::Index;
@@ -7,8 +9,9 @@ use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::buffer::View;
 use gltf::json::validation::Checked;
 
-/// The most elements of an accessor that has no data: one made of zeros and sparse changes can claim any number.
-const MAX_WITHOUT_DATA: u64 = 1 << 24;
+/// The most elements of an accessor that has no data: one made of zeros and sparse changes can claim any number. Those
+/// that are lawful are of morph targets, which are not read.
+const MAX_WITHOUT_DATA: u64 = 1 << 20;
 
 /// The elements of an accessor, each of `width` numbers. `f64` holds every component type exactly.
 struct Numbers {
@@ -30,16 +33,23 @@ impl GltfDocument {
             return Err(self
                 .fail(format!("{who}: accessor {index} has {} numbers an element, not {N}", numbers.width)));
         }
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "vectors are rounded to f32, which they mostly came as"
+        )]
         Ok(numbers.values.as_chunks::<N>().0.iter().map(|e| e.map(|v| v as f32)).collect())
     }
 
     /// Colours: elements of three numbers, or of four, the last of which is left out.
     pub(crate) fn read_colors(&self, index: Index<Accessor>, who: &str) -> Result<Vec<[f32; 3]>> {
         let numbers = self.numbers(index, who)?;
-        if !matches!(numbers.width, 3 | 4) {
-            return Err(self.fail(format!("{who}: accessor {index} has {} numbers a colour", numbers.width)));
+        #[expect(clippy::cast_possible_truncation, reason = "colours are rounded to f32")]
+        let color = |[r, g, b]: [f64; 3]| [r as f32, g as f32, b as f32];
+        match numbers.width {
+            3 => Ok(numbers.values.as_chunks().0.iter().map(|rgb| color(*rgb)).collect()),
+            4 => Ok(numbers.values.as_chunks().0.iter().map(|&[r, g, b, _]| color([r, g, b])).collect()),
+            width => Err(self.fail(format!("{who}: accessor {index} has {width} numbers a colour"))),
         }
-        Ok(numbers.values.chunks_exact(numbers.width).map(|e| [e[0], e[1], e[2]].map(|v| v as f32)).collect())
     }
 
     /// Indices of vertices.
@@ -49,6 +59,7 @@ impl GltfDocument {
         if numbers.width != 1 || !whole {
             return Err(self.fail(format!("{who}: accessor {index} does not hold single unsigned integers")));
         }
+        #[expect(clippy::cast_possible_truncation, reason = "each was an integer of at most 32 bits")]
         Ok(numbers.values.into_iter().map(|v| v as u32).collect())
     }
 
@@ -65,10 +76,16 @@ impl GltfDocument {
                 let offset = accessor.byte_offset.map_or(0, |o| o.0);
                 self.elements(view, offset, accessor.count.0, width, component, true, &name)?
             }
-            None if accessor.count.0 > MAX_WITHOUT_DATA => {
-                return Err(self.fail(format!("{name} claims {} elements without data", accessor.count.0)));
+            None => {
+                let count = Some(accessor.count.0).filter(|n| *n <= MAX_WITHOUT_DATA);
+                let numbers = count
+                    .and_then(|n| usize::try_from(n).ok())
+                    .and_then(|n| n.checked_mul(width))
+                    .ok_or_else(|| {
+                        self.fail(format!("{name} claims {} elements without data", accessor.count.0))
+                    })?;
+                vec![0.0; numbers]
             }
-            None => vec![0.0; accessor.count.0 as usize * width],
         };
         if let Some(sparse) = &accessor.sparse {
             let Checked::Valid(index_type) = sparse.indices.component_type else {
@@ -80,8 +97,12 @@ impl GltfDocument {
             let changes =
                 self.elements(at.buffer_view, at.byte_offset.0, n, width, component, false, &name)?;
             for (&place, change) in places.iter().zip(changes.chunks_exact(width)) {
-                let start = place as usize * width;
-                match values.get_mut(start..start + width) {
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "a whole number; what is too large is not there"
+                )]
+                let start = (place as usize).saturating_mul(width);
+                match values.get_mut(start..).and_then(|v| v.get_mut(..width)) {
                     Some(element) => element.copy_from_slice(change),
                     None => {
                         let count = accessor.count.0;
@@ -111,26 +132,41 @@ impl GltfDocument {
         name: &str,
     ) -> Result<Vec<f64>> {
         let bytes = self.view(view, name)?;
-        let size = (width * component.size()) as u64;
+        let size = width.saturating_mul(component.size());
         let stride = match self.get(view, name, "buffer view")?.byte_stride {
             Some(stride) if strided && stride.0 > 0 => stride.0 as u64,
-            _ => size,
+            _ => size as u64,
         };
-        if count == 0 {
-            return Ok(Vec::new());
-        }
-        let end = (count - 1).checked_mul(stride).and_then(|n| n.checked_add(offset)?.checked_add(size));
-        if end.is_none_or(|end| end > bytes.len() as u64) || stride < size {
+        let Some(before_last) = count.checked_sub(1) else { return Ok(Vec::new()) };
+        let inside = || {
+            let end = before_last.checked_mul(stride)?.checked_add(offset)?.checked_add(size as u64)?;
+            let is_inside = end <= bytes.len() as u64 && stride >= size as u64;
+            let [offset, stride, count] = [offset, stride, count].map(|n| usize::try_from(n).ok());
+            Some((bytes.get(offset?..)?, stride?, count?)).filter(|_| is_inside)
+        };
+        let Some((bytes, stride, count)) = inside() else {
             let length = bytes.len();
             return Err(self.fail(format!(
                 "{name} takes {count} elements of {size} bytes, each {stride} after the last, from byte {offset}, but its buffer view has {length}"
             )));
+        };
+        let elements = bytes.chunks(stride).take(count).filter_map(|element| element.get(..size));
+        let mut values = Vec::with_capacity(count.saturating_mul(width));
+        macro_rules! numbers {
+            ($type:ty) => {
+                for element in elements {
+                    let numbers = element.as_chunks().0.iter();
+                    values.extend(numbers.map(|b| f64::from(<$type>::from_le_bytes(*b))));
+                }
+            };
         }
-        let mut values = Vec::with_capacity(count as usize * width);
-        for element in bytes[offset as usize..].chunks(stride as usize).take(count as usize) {
-            values.extend(
-                element[..size as usize].chunks_exact(component.size()).map(|b| number(b, component)),
-            );
+        match component {
+            ComponentType::I8 => numbers!(i8),
+            ComponentType::U8 => numbers!(u8),
+            ComponentType::I16 => numbers!(i16),
+            ComponentType::U16 => numbers!(u16),
+            ComponentType::U32 => numbers!(u32),
+            ComponentType::F32 => numbers!(f32),
         }
         Ok(values)
     }
@@ -144,17 +180,6 @@ fn width_of(kind: Type) -> usize {
         Type::Vec4 | Type::Mat2 => 4,
         Type::Mat3 => 9,
         Type::Mat4 => 16,
-    }
-}
-
-fn number(b: &[u8], component: ComponentType) -> f64 {
-    match component {
-        ComponentType::I8 => f64::from(b[0] as i8),
-        ComponentType::U8 => f64::from(b[0]),
-        ComponentType::I16 => f64::from(i16::from_le_bytes([b[0], b[1]])),
-        ComponentType::U16 => f64::from(u16::from_le_bytes([b[0], b[1]])),
-        ComponentType::U32 => f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-        ComponentType::F32 => f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
     }
 }
 

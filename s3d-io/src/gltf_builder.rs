@@ -1,11 +1,11 @@
 //! The primitives of a glTF scene, put together to one mesh.
 
-use crate::Result;
 use crate::gltf::Instance;
 use crate::gltf_document::{GltfDocument, way_out};
 use crate::gltf_material::{GltfLooks, default_linear, srgb_from_linear};
 use crate::mesh_file::UpAxis;
 use crate::quote::{count, quote};
+use crate::{Error, Result};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
@@ -112,9 +112,10 @@ impl<'a> Builder<'a> {
         let material = p.material.map(|m| m.value());
 
         let start = self.vertex_start(instance, p, positions, &vertices, who, shared)?;
-        if let Some(&bad) = corners.iter().find(|&&v| !self.parts.positions[(start + v) as usize].is_finite())
-        {
-            let position = Vec3::from_array(vertices[bad as usize]);
+        let moved = self.parts.positions.get(start as usize..).unwrap_or_default();
+        let is_finite = |v: u32| moved.get(v as usize).is_some_and(|p| p.is_finite());
+        if let Some(&bad) = corners.iter().find(|&&v| !is_finite(v)) {
+            let position = vertices.get(bad as usize).map_or(Vec3::NAN, |v| Vec3::from_array(*v));
             return Err(self.document.fail(format!("{who}: vertex {bad} is not finite: {position}")));
         }
         let uv_start = self.uv_start(p, vertices.len(), who)?;
@@ -168,7 +169,11 @@ impl<'a> Builder<'a> {
             let moved = matrix.transform_point3(Vec3::from_array(v).as_dvec3());
             self.up.world_from_file(moved.as_vec3())
         }));
-        let base = material.map_or_else(default_linear, |m| self.looks.linear_colors[m]);
+        let base = match material {
+            Some(m) => self.looks.linear_colors.get(m).copied(),
+            None => Some(default_linear()),
+        };
+        let base = base.ok_or_else(|| no_material(self.document, who))?;
         let multiplied = match colors {
             Some(accessor) => {
                 self.same_count(accessor, vertices.len(), who, "COLOR_0")?;
@@ -195,7 +200,8 @@ impl<'a> Builder<'a> {
         let Some(material) = p.material.map(|m| m.value()).filter(|_| is_textured(p, self.looks)) else {
             return Ok(None);
         };
-        let mapping = self.looks.mappings[material];
+        let mapping =
+            self.looks.mappings.get(material).copied().ok_or_else(|| no_material(self.document, who))?;
         let Some(&accessor) = p.attributes.get(&Checked::Valid(Semantic::TexCoords(mapping.set))) else {
             self.notes.no_uvs += 1;
             return Ok(None);
@@ -297,7 +303,12 @@ fn color_accessor(p: &Primitive) -> Option<Index<Accessor>> {
 }
 
 fn is_textured(p: &Primitive, looks: &GltfLooks) -> bool {
-    p.material.is_some_and(|m| looks.materials[m.value()].texture.is_some())
+    p.material.and_then(|m| looks.materials.get(m.value())).is_some_and(|m| m.texture.is_some())
+}
+
+/// Every material that a primitive names was looked up before: this is for the next who calls the builder.
+fn no_material(document: &GltfDocument, who: &str) -> Error {
+    document.fail(format!("{who} has a material that is not there"))
 }
 
 /// The triangles that `corners` spell. glTF 2.0, section 3.7.2.1.
@@ -305,11 +316,13 @@ fn triangles_of(corners: &[u32], mode: Mode) -> Vec<[u32; 3]> {
     match mode {
         Mode::Triangles => corners.as_chunks::<3>().0.to_vec(),
         Mode::TriangleStrip => {
-            let turn =
-                |(i, w): (usize, &[u32])| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] };
-            corners.windows(3).enumerate().map(turn).collect()
+            let turn = |(i, &[a, b, c]): (usize, &[u32; 3])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] };
+            corners.array_windows().enumerate().map(turn).collect()
         }
-        Mode::TriangleFan => corners.windows(2).skip(1).map(|w| [w[0], w[1], corners[0]]).collect(),
+        Mode::TriangleFan => {
+            let Some((&hub, rim)) = corners.split_first() else { return Vec::new() };
+            rim.array_windows().map(|&[a, b]| [a, b, hub]).collect()
+        }
         Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => Vec::new(),
     }
 }

@@ -1,5 +1,7 @@
 //! The parts of a glTF file: its JSON, its buffers and the bytes that its images are made of.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::texture_file::read_file;
 use crate::{Error, Result};
 use base64::Engine;
@@ -212,32 +214,35 @@ impl GltfDocument {
 
 /// The JSON and the binary chunk of a `.glb` file.
 fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)> {
-    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let cut = || {
         Error::format(path, format!("is cut off: a .glb of {} bytes does not hold its chunks", bytes.len()))
     };
-    match word(4) {
-        Some(2) => {}
-        Some(1) => return Err(old_version(path, "1.0")),
-        Some(other) => {
+    // "glTF", the version and the length of the file; then chunks of a length, a kind and data.
+    let (_, rest) = bytes.split_first_chunk::<4>().ok_or_else(cut)?;
+    let (version, rest) = rest.split_first_chunk().ok_or_else(cut)?;
+    match u32::from_le_bytes(*version) {
+        2 => {}
+        1 => return Err(old_version(path, "1.0")),
+        other => {
             return Err(Error::unsupported(path, format!("is binary glTF of version {other}; 2 is read")));
         }
-        None => return Err(cut()),
     }
     let mut chunks = [None; 2];
-    let mut at = 12;
+    let (_, mut rest) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
     // Chunks beyond the second belong to extensions.
     for (chunk, kind) in chunks.iter_mut().zip([*b"JSON", *b"BIN\0"]) {
-        if at == bytes.len() {
+        if rest.is_empty() {
             break;
         }
-        let (Some(length), Some(found)) = (word(at), word(at + 4)) else { return Err(cut()) };
-        if found.to_le_bytes() != kind {
+        let (length, after) = rest.split_first_chunk().ok_or_else(cut)?;
+        let (found, after) = after.split_first_chunk().ok_or_else(cut)?;
+        if *found != kind {
             break;
         }
-        let data = bytes.get(at + 8..).and_then(|b| b.get(..length as usize)).ok_or_else(cut)?;
+        let length = usize::try_from(u32::from_le_bytes(*length)).ok();
+        let (data, after) = length.and_then(|n| after.split_at_checked(n)).ok_or_else(cut)?;
         *chunk = Some(data);
-        at += 8 + data.len();
+        rest = after;
     }
     let [json, blob] = chunks;
     Ok((json.ok_or_else(|| Error::format(path, "is a .glb without a JSON chunk"))?, blob))
@@ -281,19 +286,16 @@ fn percent_decode(text: &str) -> Cow<'_, str> {
     if !text.contains('%') {
         return Cow::Borrowed(text);
     }
-    let digit = |b: Option<&u8>| b.and_then(|&b| char::from(b).to_digit(16));
-    let (bytes, mut out, mut i) = (text.as_bytes(), Vec::new(), 0);
-    while i < bytes.len() {
-        match (bytes[i], digit(bytes.get(i + 1)), digit(bytes.get(i + 2))) {
-            (b'%', Some(high), Some(low)) => {
-                out.push((high * 16 + low) as u8);
-                i += 3;
-            }
-            (other, ..) => {
-                out.push(other);
-                i += 1;
-            }
-        }
+    let escape = |rest: &[u8]| {
+        let [high, low] = *rest.first_chunk()?;
+        let digits = [high, low].iter().all(u8::is_ascii_hexdigit).then_some([high, low])?;
+        u8::from_str_radix(std::str::from_utf8(&digits).ok()?, 16).ok()
+    };
+    let (mut out, mut rest) = (Vec::new(), text.as_bytes());
+    while let Some((&byte, after)) = rest.split_first() {
+        let escaped = Some(after).filter(|_| byte == b'%').and_then(escape);
+        out.push(escaped.unwrap_or(byte));
+        rest = if escaped.is_some() { after.get(2..).unwrap_or_default() } else { after };
     }
     String::from_utf8(out).map_or(Cow::Borrowed(text), Cow::Owned)
 }

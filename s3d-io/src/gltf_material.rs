@@ -61,7 +61,7 @@ impl GltfLooks {
     pub(crate) fn load(document: &GltfDocument, used: &[bool], warnings: &mut Vec<String>) -> Self {
         let mut looks = Self::default();
         let mut keys = Vec::new();
-        for (i, material) in document.root.materials.iter().enumerate() {
+        for ((i, material), used) in document.root.materials.iter().enumerate().zip(used) {
             let (factor, info) = base_color(material);
             let name = material.name.clone().unwrap_or_else(|| format!("material_{i}"));
             looks.materials.push(Material {
@@ -71,7 +71,7 @@ impl GltfLooks {
             });
             looks.linear_colors.push(factor);
             looks.mappings.push(info.map_or(UvMapping::PLAIN, mapping));
-            keys.push(info.filter(|_| used[i]).and_then(|info| {
+            keys.push(info.filter(|_| *used).and_then(|info| {
                 match texture_key(document, info.index, factor) {
                     Ok(key) => Some(key),
                     Err(why) => {
@@ -101,19 +101,19 @@ impl GltfLooks {
             }
         }
         let mut known: BTreeMap<TextureKey, u32> = BTreeMap::new();
-        for (material, key) in keys.iter().enumerate() {
+        for (material, key) in looks.materials.iter_mut().zip(&keys) {
             let Some(key) = key else { continue };
             let Some((name, Ok(loaded))) = images.get(&key.image) else { continue };
             let index = *known.entry(*key).or_insert_with(|| {
                 let factor = key.factor_bits.map(f32::from_bits);
-                let wrap = key.wrap.map(|w| WRAPS[usize::from(w)]);
+                let wrap = key.wrap.map(|w| WRAPS.get(usize::from(w)).copied().unwrap_or(Wrap::Repeat));
                 let plain = factor == [1.0; 3];
                 let image = if plain { loaded.image.clone() } else { multiplied(&loaded.image, factor) };
                 looks.textures.push(Texture { name: name.clone(), image, wrap });
                 looks.files.push(plain.then(|| loaded.file.clone()));
                 (looks.textures.len() - 1) as u32
             });
-            looks.materials[material].texture = Some(index);
+            material.texture = Some(index);
         }
         looks
     }
@@ -175,7 +175,11 @@ fn wrap_number(mode: Checked<texture::WrappingMode>) -> u8 {
 fn multiplied(image: &Raster<[u8; 3]>, factor: [f32; 3]) -> Raster<[u8; 3]> {
     let tables = factor
         .map(|f| std::array::from_fn::<u8, 256, _>(|b| srgb_from_linear(linear_from_srgb(b as u8) * f)));
-    image.map(|p| std::array::from_fn(|k| tables[k][usize::from(p[k])]))
+    image.map(|rgb| {
+        let ([r, g, b], [of_r, of_g, of_b]) = (rgb.map(usize::from), &tables);
+        #[expect(clippy::indexing_slicing, reason = "a table has an entry for each byte")]
+        [of_r[r], of_g[g], of_b[b]]
+    })
 }
 
 /// A byte of sRGB from light, 0 to 1; what is no number is black. Source: IEC 61966-2-1.

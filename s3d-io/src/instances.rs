@@ -106,15 +106,15 @@ impl InstanceWriter {
         let InstanceRecord { starts, members, .. } = *instance;
         assert!(
             starts.len() == CELLS + 1
-                && starts[0] == 0
+                && starts.first() == Some(&0)
                 && starts.is_sorted()
-                && starts[CELLS] as usize == members.len(),
+                && starts.last().is_some_and(|end| *end as usize == members.len()),
             "{} starts do not divide {} points of {} among {CELLS} voxels",
             starts.len(),
             members.len(),
             instance.label
         );
-        let points_per_voxel: Vec<u32> = starts.windows(2).map(|w| w[1] - w[0]).collect();
+        let points_per_voxel: Vec<u32> = starts.array_windows().map(|[start, end]| end - start).collect();
         let failed = |e| Error::io(self.npz.path(), "write", e);
         members.iter().try_for_each(|m| self.point_index.write_all(&m.to_le_bytes())).map_err(failed)?;
         self.entries.push(InstanceEntry {
@@ -206,7 +206,7 @@ fn write_arrays(file: AtomicFile, entries: &[InstanceEntry], spool: File) -> io:
         *sum += e.points;
         Some(*sum)
     }));
-    let total = starts[entries.len()];
+    let total = starts.last().copied().unwrap_or(0);
     archive.array("point_start", "<u8", &[n + 1], bytes(starts.into_iter(), u64::to_le_bytes))?;
     archive.stream(
         "point_index",

@@ -1,5 +1,7 @@
 //! Annotated points of LAS and LAZ files, 1.0 to 1.4. Source: "LAS Specification 1.4 - R15", ASPRS.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::annotations::AnnotationOptions;
 use crate::cloud_columns::{CLASSES, INSTANCES};
 use crate::cloud_records::{Color, Field, Kind, color};
@@ -33,6 +35,11 @@ enum Dimension {
 }
 
 impl Dimension {
+    fn classification(format: &Format) -> Self {
+        let (at, mask) = if format.is_extended { (16, 0xff) } else { (15, 0x1f) };
+        Self::Classification { at, mask }
+    }
+
     fn plain(name: &str, at: usize, kind: Kind) -> (String, Self) {
         let field = Field { name: name.to_owned(), at, kind, big_endian: false };
         (name.to_owned(), Self::Plain { field, scale: 1.0, offset: 0.0 })
@@ -40,7 +47,9 @@ impl Dimension {
 
     fn value(&self, record: &[u8]) -> Value<'static> {
         match self {
-            Self::Classification { at, mask } => Value::Whole(i64::from(record[*at] & mask)),
+            Self::Classification { at, mask } => {
+                record.get(*at).map_or(Value::None, |byte| Value::Whole(i64::from(byte & mask)))
+            }
             Self::Plain { field, scale, offset } => {
                 let mut text = String::new();
                 match field.value(record, &mut text) {
@@ -67,33 +76,30 @@ impl<'a> LasCloud<'a> {
         let mut source = BufReader::new(file);
         let mut head = Vec::new();
         source.by_ref().take(375).read_to_end(&mut head).map_err(|e| Error::io(path, "read", e))?;
-        if head.len() < 227 || &head[..4] != b"LASF" {
+        let (header, header_1_4) = (head.first_chunk::<227>(), head.first_chunk::<375>());
+        let Some(header) = header.filter(|h| h.starts_with(b"LASF")) else {
             return Err(Error::format(path, "is no LAS file: it does not begin with LASF and a header"));
-        }
-        let u16_at = |at: usize| u64::from(u16::from_le_bytes([head[at], head[at + 1]]));
-        let u32_at = |at: usize| u16_at(at) | u16_at(at + 2) << 16;
-        let u64_at = |at: usize| u32_at(at) | u32_at(at + 4) << 32;
-        let is_1_4 = head[25] >= 4 && head.len() >= 375;
-        let (offset, length, is_compressed) = (u32_at(96), u16_at(105), head[104] & 0x80 != 0);
-        let points = match u32_at(107) {
-            0 if is_1_4 => u64_at(247),
-            n if !is_1_4 => n,
-            n => u64_at(247).max(n),
         };
+        let header_1_4 = header_1_4.filter(|h| h[25] >= 4);
+        let offset = u64::from(number_at(header, 96).map_or(0, u32::from_le_bytes));
+        let length = u64::from(number_at(header, 105).map_or(0, u16::from_le_bytes));
+        let is_compressed = header[104] & 0x80 != 0;
+        let points = u64::from(number_at(header, 107).map_or(0, u32::from_le_bytes));
+        let points_1_4 = header_1_4.and_then(|h| number_at(h, 247)).map_or(0, u64::from_le_bytes);
+        let points = points.max(points_1_4);
         let cut = |what: &str| Err(Error::format(path, format!("claims {what}: the file is cut short")));
         let end = points.checked_mul(length).and_then(|n| n.checked_add(offset));
         if offset > size || end.is_none_or(|end| !is_compressed && end > size) {
             return cut(&format!("{points} points of {length} bytes in a file of {size} bytes"));
         }
         // The 1.4 header's extended records, whose lengths are numbers of 64 bits.
-        if is_1_4 && u32_at(243) > 0 {
-            let start = u64_at(235);
+        if let Some(header) = header_1_4
+            && number_at(header, 243).map_or(0, u32::from_le_bytes) > 0
+        {
+            let start = number_at(header, 235).map_or(0, u64::from_le_bytes);
             let mut record = [0; 60];
             let read = source.seek(SeekFrom::Start(start)).and_then(|_| source.read_exact(&mut record));
-            let length = u64::from_le_bytes([
-                record[20], record[21], record[22], record[23], record[24], record[25], record[26],
-                record[27],
-            ]);
+            let length = number_at(&record, 20).map_or(0, u64::from_le_bytes);
             if read.is_err()
                 || start.checked_add(60).and_then(|n| n.checked_add(length)).is_none_or(|n| n > size)
             {
@@ -108,7 +114,7 @@ impl<'a> LasCloud<'a> {
                 Ok(u64::from_le_bytes(bytes))
             };
             let mut table = number(&mut source, offset);
-            if table.as_ref().is_ok_and(|t| *t as i64 <= offset as i64) {
+            if table.as_ref().is_ok_and(|t| t.cast_signed() <= offset.cast_signed()) {
                 // A writer that could not go back puts it at the end.
                 table = number(&mut source, size.saturating_sub(8));
             }
@@ -124,55 +130,53 @@ impl<'a> LasCloud<'a> {
     /// The dimensions that can hold classes, instances or rooms, by their usual names.
     fn dimensions(&self, header: &las::Header) -> Vec<(String, Dimension)> {
         let format = header.point_format();
-        let (class_at, user_at, source_at) = if format.is_extended { (16, 17, 20) } else { (15, 17, 18) };
-        let mask = if format.is_extended { 0xff } else { 0x1f };
+        let source_at = if format.is_extended { 20 } else { 18 };
         let mut all = vec![
-            ("classification".to_owned(), Dimension::Classification { at: class_at, mask }),
-            Dimension::plain("user_data", user_at, Kind::U8),
+            ("classification".to_owned(), Dimension::classification(format)),
+            Dimension::plain("user_data", 17, Kind::U8),
             Dimension::plain("point_source_id", source_at, Kind::U16),
             Dimension::plain("intensity", 12, Kind::U16),
         ];
-        let mut at = usize::from(format.len() - format.extra_bytes);
+        let mut at = usize::from(format.len().saturating_sub(format.extra_bytes));
         let end = usize::from(format.len());
         for vlr in header.all_vlrs().filter(|v| v.user_id.starts_with("LASF_Spec") && v.record_id == 4) {
             for extra in vlr.data.as_chunks::<192>().0 {
-                let name = &extra[4..36];
-                let name = &name[..name.iter().position(|b| *b == 0).unwrap_or(32)];
+                let name = extra[4..36].split(|b| *b == 0).next().unwrap_or_default();
                 let name = String::from_utf8_lossy(name).into_owned();
-                let double = |at: usize| {
-                    let mut bytes = [0; 8];
-                    bytes.copy_from_slice(&extra[at..at + 8]);
-                    f64::from_le_bytes(bytes)
+                let double = |at: usize| number_at(extra, at).map_or(f64::NAN, f64::from_le_bytes);
+                // 11 to 20 are pairs of the first ten, 21 to 30 triples, no longer used; 0 is a number of bytes that only
+                // its writer knows.
+                let (data_type, options) = (extra[2], extra[3]);
+                let kind = match data_type % 10 {
+                    1 => Kind::U8,
+                    2 => Kind::I8,
+                    3 => Kind::U16,
+                    4 => Kind::I16,
+                    5 => Kind::U32,
+                    6 => Kind::I32,
+                    7 => Kind::U64,
+                    8 => Kind::I64,
+                    9 => Kind::F32,
+                    _ => Kind::F64,
                 };
-                let kinds = [
-                    Kind::U8,
-                    Kind::I8,
-                    Kind::U16,
-                    Kind::I16,
-                    Kind::U32,
-                    Kind::I32,
-                    Kind::U64,
-                    Kind::I64,
-                    Kind::F32,
-                    Kind::F64,
-                ];
-                // 11 to 30 are arrays of two or three, no longer used; 0 is a number of bytes that only its writer knows.
-                let (kind, bytes) = match usize::from(extra[2]) {
-                    0 => (None, usize::from(extra[3])),
-                    n @ 1..=10 => (Some(kinds[n - 1]), kinds[n - 1].size()),
-                    n @ 11..=30 => (None, kinds[(n - 1) % 10].size() * (1 + (n - 1) / 10)),
+                let (is_single, bytes) = match data_type {
+                    0 => (false, usize::from(options)),
+                    1..=10 => (true, kind.size()),
+                    11..=20 => (false, kind.size().saturating_mul(2)),
+                    21..=30 => (false, kind.size().saturating_mul(3)),
                     _ => break,
                 };
-                if at + bytes > end {
+                let behind = at.saturating_add(bytes);
+                if behind > end {
                     break;
                 }
-                if let Some(kind) = kind {
-                    let scale = if extra[3] & 8 != 0 { double(112) } else { 1.0 };
-                    let offset = if extra[3] & 16 != 0 { double(136) } else { 0.0 };
+                if is_single {
+                    let scale = if options & 8 != 0 { double(112) } else { 1.0 };
+                    let offset = if options & 16 != 0 { double(136) } else { 0.0 };
                     let field = Field { name: name.clone(), at, kind, big_endian: false };
                     all.push((name, Dimension::Plain { field, scale, offset }));
                 }
-                at += bytes;
+                at = behind;
             }
         }
         all
@@ -216,10 +220,19 @@ impl<'a> LasCloud<'a> {
     }
 }
 
+/// The bytes of a number `at` bytes into a record.
+fn number_at<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
+    bytes.get(at..)?.first_chunk().copied()
+}
+
 /// Where a record of this format has its colour, three numbers of 16 bits.
-fn color_at(format: &Format) -> Option<usize> {
-    let base = if format.is_extended { 30 } else { 20 + if format.has_gps_time { 8 } else { 0 } };
-    format.has_color.then_some(base)
+fn color_at(format: &Format) -> Option<[usize; 3]> {
+    let at = match (format.is_extended, format.has_gps_time) {
+        (true, _) => [30, 32, 34],
+        (false, true) => [28, 30, 32],
+        (false, false) => [20, 22, 24],
+    };
+    format.has_color.then_some(at)
 }
 
 /// What `f` gives, or a sentence if it panicked: the decoder is not ours, and a damaged file must not end the program.
@@ -246,28 +259,19 @@ impl Cloud for LasCloud<'_> {
         let o = self.options;
         // Extra dimensions made for labels come before the standard's.
         let class = self.named(&all, "class", o.class_column.as_ref(), &CLASSES)?;
-        let class = class.unwrap_or(all[0].1.clone());
+        let class = class.unwrap_or_else(|| Dimension::classification(&format));
         let usual: Vec<&str> = INSTANCES.into_iter().chain(["point_source_id"]).collect();
         let instance = self.named(&all, "instance", o.instance_column.as_ref(), &usual)?;
         let room = self.named(&all, "rooms", o.room_column.as_ref(), &[])?;
-        let rgb = color_at(&format);
-        let channels: Vec<Field> = rgb
-            .into_iter()
-            .flat_map(|at| [at, at + 2, at + 4])
-            .map(|at| Field { name: "colour".to_owned(), at, kind: Kind::U16, big_endian: false })
-            .collect();
-        let [x, y, z] = [0, 4, 8].map(|at| Field {
-            name: "coordinate".to_owned(),
-            at,
-            kind: Kind::I32,
-            big_endian: false,
-        });
+        let field = |name: &str, at, kind| Field { name: name.to_owned(), at, kind, big_endian: false };
+        let channels = color_at(&format).map(|at| at.map(|at| field("colour", at, Kind::U16)));
+        let [x, y, z] = [0, 4, 8].map(|at| field("coordinate", at, Kind::I32));
         let t = header.transforms();
         let count = header.number_of_points();
         let mut data = las::PointDataBuilder::new().for_header(&header).build();
-        let (mut done, mut withheld) = (0, 0u64);
-        while done < count {
-            let n = BATCH.min(count - done);
+        let (mut done, mut withheld) = (0u64, 0u64);
+        while let Some(left) = count.checked_sub(done).filter(|left| *left > 0) {
+            let n = BATCH.min(left);
             let read = guarded(|| reader.fill_points(n, &mut data)).map_err(damaged)?;
             if read.map_err(|e| self.error(done, &e))? == 0 {
                 return Err(Error::format(
@@ -276,14 +280,14 @@ impl Cloud for LasCloud<'_> {
                 ));
             }
             for record in data.raw_bytes().chunks_exact(data.record_len()) {
-                done += 1;
-                let flags = if format.is_extended { record[15] } else { record[15] >> 5 };
+                done = done.saturating_add(1);
+                let flags = record.get(15).map_or(0, |f| if format.is_extended { *f } else { f >> 5 });
                 if flags & WITHHELD != 0 {
-                    withheld += 1;
+                    withheld = withheld.saturating_add(1);
                     continue;
                 }
                 let mut found = [0; 3];
-                if let [r, g, b] = &channels[..] {
+                if let Some([r, g, b]) = &channels {
                     match color([r, g, b].map(|f| f.float(record)), false, colors) {
                         Color::Rgb(rgb) => found = rgb,
                         _ => return Ok(false),

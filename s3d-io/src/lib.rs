@@ -45,6 +45,19 @@
 //! # }
 //! ```
 
+// Whatever a file holds, reading it must not panic. What may index says so, and why.
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::unreachable,
+        clippy::indexing_slicing,
+        clippy::string_slice
+    )
+)]
+
 mod annotations;
 mod atomic;
 mod cameras;

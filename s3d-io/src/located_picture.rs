@@ -45,7 +45,7 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<LocatedPicture>) -> Result
                 locations.push(ScanLocation { uuid, pose: pose.leveled(), line });
             }
             Some(&first) => {
-                let distance = locations[first].pose.location.distance(at);
+                let distance = locations.get(first).map_or(0.0, |first| first.pose.location.distance(at));
                 if distance > SAME_PLACE_M {
                     return Err(fault(format!(
                         "{}: uuid {uuid} is another picture's too, which was taken {distance:.3} m away",

@@ -1,11 +1,13 @@
 //! Reading `pointcloud.mat`, as MATLAB saved the published ones and as [`MatWriter`](crate::MatWriter) writes it.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::annotations::Skipped;
 use crate::hdf5::read::{Dataset, Hdf5File, Kind, Object};
 use crate::s3dis::OnFault;
 use crate::{Error, Result};
 use s3d_geom::PointCloud;
-use s3d_geom::glam::{DVec3, dvec3};
+use s3d_geom::glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -110,16 +112,16 @@ impl MatObject {
     ) -> Result<Skipped> {
         assert!(out.colors.len() == out.len() && out.faces.is_empty(), "a cloud of other columns");
         let mut skipped = Skipped::default();
-        let n = self.len as usize;
-        if n == 0 {
+        if self.len == 0 {
             return Ok(skipped);
         }
         let place = |what| format!("{}, {what}", self.part);
         let positions = self.file.triples(self.points, &place("points"))?;
         let colors = self.colors.map(|at| self.file.triples(at, &place("RGB_color"))).transpose()?;
-        let counts = [Some(positions.len()), colors.as_ref().map(Triples::len)];
-        if let Some(other) = counts.into_iter().flatten().find(|count| *count != n) {
-            let part = &self.part;
+        let n = positions.len();
+        let counts = [Some(n), colors.as_ref().map(Triples::len)];
+        if let Some(other) = counts.into_iter().flatten().find(|count| *count as u64 != self.len) {
+            let (part, n) = (&self.part, self.len);
             return Err(self.fault(format!(
                 "{part}: has {n} points and {other} colours, or it changed while it was read"
             )));
@@ -127,8 +129,9 @@ impl MatObject {
         out.positions.reserve(n);
         out.colors.reserve(n);
         for i in 0..n {
-            let point = dvec3(positions.get(i, 0), positions.get(i, 1), positions.get(i, 2)) - offset_m;
-            let color = colors.as_ref().map_or([0.0; 3], |c| [c.get(i, 0), c.get(i, 1), c.get(i, 2)]);
+            #[expect(clippy::arithmetic_side_effects, reason = "floating point")]
+            let point = DVec3::from_array(positions.row(i)) - offset_m;
+            let color = colors.as_ref().map_or([0.0; 3], |c| c.row(i));
             let position = point.as_vec3();
             let wrong = if !position.is_finite() {
                 format!("lies at {point}, which is no place")
@@ -136,14 +139,15 @@ impl MatObject {
                 format!("has the colour {color:?}, which is none from 0 to 255")
             } else {
                 out.positions.push(position);
+                #[expect(clippy::cast_possible_truncation, reason = "checked above: 0 to 255")]
                 out.colors.push(color.map(|c| c.round() as u8));
                 continue;
             };
-            let error = self.fault(format!("{}: point {} {wrong}", self.part, i + 1));
+            let error = self.fault(format!("{}: point {} {wrong}", self.part, i.saturating_add(1)));
             if on_fault == OnFault::Stop {
                 return Err(error);
             }
-            skipped.count += 1;
+            skipped.count = skipped.count.saturating_add(1);
             skipped.first.get_or_insert(error);
         }
         Ok(skipped)
@@ -191,7 +195,7 @@ impl MatFile {
         match (areas.pop(), areas.is_empty()) {
             (Some(area), true) => Ok(area),
             (last, _) => {
-                let n = areas.len() + usize::from(last.is_some());
+                let n = areas.iter().chain(&last).count();
                 Err(self.hdf5.fault(format!("holds {n} areas: save each in a file of its own")))
             }
         }
@@ -252,7 +256,8 @@ impl MatFile {
             let Some(references) = self.references(&object)? else {
                 return Err(self.hdf5.fault(format!("{place}: is no struct")));
             };
-            return references.into_iter().try_for_each(|at| self.push_structs(at, place, depth - 1, found));
+            let below = depth.saturating_sub(1);
+            return references.into_iter().try_for_each(|at| self.push_structs(at, place, below, found));
         };
         // The fields of an array of structs are references to its elements', all as many.
         let mut columns = Vec::new();
@@ -272,7 +277,9 @@ impl MatFile {
             let message = format!("{place}: has {n} elements, but {} in its field {name}", other.len());
             return Err(self.hdf5.fault(message));
         }
-        found.extend((0..n).map(|i| columns.iter().map(|(name, refs)| ((*name).clone(), refs[i])).collect()));
+        let field = |i: usize, (name, refs): &(&String, Vec<u64>)| Some(((*name).clone(), *refs.get(i)?));
+        found
+            .extend((0..n).map(|i| columns.iter().filter_map(|column| field(i, column)).collect::<Fields>()));
         Ok(())
     }
 
@@ -318,18 +325,13 @@ impl MatFile {
             let text = match array.kind {
                 Kind::Integer { size: 1, .. } | Kind::Text { .. } => String::from_utf8(data).ok(),
                 Kind::Integer { size: 2, big_endian, .. } => {
-                    let unit = |b: &[u8]| {
-                        if big_endian {
-                            u16::from_be_bytes([b[0], b[1]])
-                        } else {
-                            u16::from_le_bytes([b[0], b[1]])
-                        }
-                    };
-                    String::from_utf16(&data.chunks_exact(2).map(unit).collect::<Vec<_>>()).ok()
+                    let unit = if big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+                    let units: Vec<u16> = data.as_chunks().0.iter().map(|b| unit(*b)).collect();
+                    String::from_utf16(&units).ok()
                 }
-                Kind::Integer { .. } => {
-                    let codes = data.chunks_exact(array.kind.size()).map(|b| number(array.kind, b) as u32);
-                    codes.map(char::from_u32).collect()
+                Kind::Integer { size, big_endian, .. } if size > 0 => {
+                    let codes = data.chunks_exact(size).map(|b| bits(b, big_endian));
+                    codes.map(|code| u32::try_from(code).ok().and_then(char::from_u32)).collect()
                 }
                 _ => None,
             };
@@ -360,11 +362,12 @@ impl MatFile {
         if !matches!(array.kind, Kind::Integer { .. } | Kind::Float { .. }) {
             return Err(self.hdf5.fault(format!("{place}: holds something else than real numbers")));
         }
-        let Some((n, is_by_column)) = axes_of_triples(&array.dims) else {
+        let axes = axes_of_triples(&array.dims).and_then(|(n, by)| Some((usize::try_from(n).ok()?, by)));
+        let Some((n, is_by_column)) = axes else {
             return Err(self.hdf5.fault(format!("{place}: is {}, and not N x 3", size(&array.dims))));
         };
         let data = self.hdf5.data(&array)?;
-        Ok(Triples { data, kind: array.kind, n: n as usize, is_by_column })
+        Ok(Triples { data, kind: array.kind, n, is_by_column })
     }
 }
 
@@ -382,10 +385,19 @@ impl Triples {
         self.n
     }
 
-    fn get(&self, row: usize, column: usize) -> f64 {
+    /// Three numbers; what is not there is not a number.
+    fn row(&self, row: usize) -> [f64; 3] {
         let size = self.kind.size();
-        let at = size * if self.is_by_column { column * self.n + row } else { 3 * row + column };
-        number(self.kind, &self.data[at..at + size])
+        let number = |column: usize| {
+            let element = if self.is_by_column {
+                column.checked_mul(self.n)?.checked_add(row)?
+            } else {
+                row.checked_mul(3)?.checked_add(column)?
+            };
+            let bytes = self.data.get(element.checked_mul(size)?..)?.get(..size)?;
+            Some(number(self.kind, bytes))
+        };
+        [0, 1, 2].map(|column| number(column).unwrap_or(f64::NAN))
     }
 }
 
@@ -414,18 +426,30 @@ fn field(file: &MatFile, fields: &Fields, name: &str, place: &str) -> Result<u64
 
 /// An element as a number. Not a number for what is none.
 fn number(kind: Kind, bytes: &[u8]) -> f64 {
-    let bits = |big_endian: bool| {
-        let push = |n: u64, b: &u8| n << 8 | u64::from(*b);
-        if big_endian { bytes.iter().fold(0, push) } else { bytes.iter().rev().fold(0, push) }
-    };
     match kind {
-        Kind::Integer { signed: false, big_endian, .. } => bits(big_endian) as f64,
-        Kind::Integer { size, big_endian, .. } => {
-            let unused = 64 - 8 * size as u32;
-            ((bits(big_endian) << unused) as i64 >> unused) as f64
+        Kind::Integer { signed: false, big_endian, .. } => bits(bytes, big_endian) as f64,
+        Kind::Integer { big_endian, .. } => {
+            let highest = if big_endian { bytes.first() } else { bytes.last() };
+            let is_negative = highest.is_some_and(|b| b & 0x80 != 0);
+            // A negative number has all higher bits set.
+            let start = if is_negative { u64::MAX } else { 0 };
+            bits_behind(start, bytes, big_endian).cast_signed() as f64
         }
-        Kind::Float { size: 4, big_endian } => f64::from(f32::from_bits(bits(big_endian) as u32)),
-        Kind::Float { big_endian, .. } => f64::from_bits(bits(big_endian)),
+        Kind::Float { big_endian, .. } => match <[u8; 4]>::try_from(bytes) {
+            Ok(bytes) if big_endian => f64::from(f32::from_be_bytes(bytes)),
+            Ok(bytes) => f64::from(f32::from_le_bytes(bytes)),
+            Err(_) => f64::from_bits(bits(bytes, big_endian)),
+        },
         _ => f64::NAN,
     }
+}
+
+/// The number that up to eight bytes make.
+fn bits(bytes: &[u8], big_endian: bool) -> u64 {
+    bits_behind(0, bytes, big_endian)
+}
+
+fn bits_behind(start: u64, bytes: &[u8], big_endian: bool) -> u64 {
+    let push = |n: u64, b: &u8| n << 8 | u64::from(*b);
+    if big_endian { bytes.iter().fold(start, push) } else { bytes.iter().rev().fold(start, push) }
 }

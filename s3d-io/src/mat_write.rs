@@ -1,6 +1,8 @@
 //! Writing `pointcloud.mat`: an area's points by room and object. Source: formats.md, "S3DIS tree", and the README of the
 //! published data set.
 
+#![expect(clippy::indexing_slicing, reason = "a writer: places in the file are those that it gave")]
+
 use crate::hdf5::write::{Attribute, Hdf5Writer, Kind};
 use crate::{Error, Result, pretty_color};
 use s3d_geom::glam::Vec3;
@@ -142,6 +144,7 @@ impl MatWriter {
     ///
     /// # Panics
     /// If no object was started, or there are not as many colours as positions.
+    #[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
     pub fn append(&mut self, positions: &[Vec3], colors: &[[u8; 3]]) -> Result<()> {
         let Some((name, _)) = &self.object else { panic!("points of no object") };
         assert_eq!(positions.len(), colors.len(), "{} points need as many colours", positions.len());
@@ -198,6 +201,7 @@ impl MatWriter {
         Ok(())
     }
 
+    #[expect(clippy::expect_used, reason = "an object is only started in a room")]
     fn finish_object(&mut self) -> Result<()> {
         let Some((name, global_name)) = self.object.take() else { return Ok(()) };
         let (positions, colors) = (std::mem::take(&mut self.positions), std::mem::take(&mut self.colors));

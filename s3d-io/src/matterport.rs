@@ -141,8 +141,8 @@ impl PictureFolder {
     pub fn sky_box(&self, uuid: &str) -> std::result::Result<[PathBuf; 6], String> {
         let stem = |k: usize| format!("{uuid}_skybox{k}_sami");
         let found: [Option<PathBuf>; 6] = std::array::from_fn(|k| self.picture(&stem(k)));
-        let missing: Vec<String> =
-            (0..6).filter(|&k| found[k].is_none()).map(|k| format!("{}.jpg", stem(k))).collect();
+        let missing = found.iter().enumerate().filter(|(_, path)| path.is_none());
+        let missing: Vec<String> = missing.map(|(k, _)| format!("{}.jpg", stem(k))).collect();
         if missing.is_empty() { Ok(found.map(Option::unwrap_or_default)) } else { Err(missing.join(", ")) }
     }
 
@@ -239,23 +239,24 @@ fn numbers(path: &Path) -> Result<Vec<(u64, f64)>> {
 /// [`Error::Io`]; [`Error::Format`] if they are not eleven numbers, or of no lens.
 pub fn read_intrinsics(path: &Path) -> Result<Lens> {
     let numbers = numbers(path)?;
-    let values: Vec<f64> = numbers.iter().map(|n| n.1).collect();
-    let Ok([width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3]) = <[f64; 11]>::try_from(values) else {
+    let Ok(lines_and_values) = <[(u64, f64); 11]>::try_from(numbers.as_slice()) else {
         let line = numbers.last().map_or(1, |n| n.0);
         let message =
             format!("{} numbers; intrinsics are width height fx fy cx cy k1 k2 p1 p2 k3", numbers.len());
         return Err(Error::line(path, line, message));
     };
+    let lines = lines_and_values.map(|n| n.0);
+    let [width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3] = lines_and_values.map(|n| n.1);
     let side = |v: f64| (v.fract() == 0.0 && (1.0..=65_535.0).contains(&v)).then_some(v as u32);
     let (Some(w), Some(h)) = (side(width), side(height)) else {
-        return Err(Error::line(path, numbers[0].0, format!("a picture of {width} × {height} pixels")));
+        return Err(Error::line(path, lines[0], format!("a picture of {width} × {height} pixels")));
     };
     Lens::new([w, h], DVec2::new(fx, fy), DVec2::new(cx, cy), [k1, k2, p1, p2, k3]).ok_or_else(|| {
         let message = format!(
             "no lens: fx {fx} fy {fy} cx {cx} cy {cy}, distortion {k1} {k2} {p1} {p2} {k3} (focal lengths are above 0, and the \
              middle of the picture is seen)"
         );
-        Error::line(path, numbers[2].0, message)
+        Error::line(path, lines[2], message)
     })
 }
 
@@ -267,18 +268,18 @@ pub fn read_intrinsics(path: &Path) -> Result<Lens> {
 /// not 0 0 0 1, the 3×3 part is no rotation, or the place is farther than 10,000 km away.
 pub fn read_capture_pose(path: &Path) -> Result<Pose> {
     let numbers = numbers(path)?;
-    let values: Vec<f64> = numbers.iter().map(|n| n.1).collect();
-    let Ok(m) = <[f64; 16]>::try_from(values) else {
+    let Ok(lines_and_values) = <[(u64, f64); 16]>::try_from(numbers.as_slice()) else {
         let line = numbers.last().map_or(1, |n| n.0);
         return Err(Error::line(path, line, format!("{} numbers; a 4×4 matrix has 16", numbers.len())));
     };
+    let (lines, m) = (lines_and_values.map(|n| n.0), lines_and_values.map(|n| n.1));
     let last = [m[12], m[13], m[14], m[15] - 1.0];
     if last.iter().any(|v| v.abs() > ROTATION_ERROR) {
         let message = format!("the last row is {} {} {} {}, not 0 0 0 1", m[12], m[13], m[14], m[15]);
-        return Err(Error::line(path, numbers[12].0, message));
+        return Err(Error::line(path, lines[12], message));
     }
-    let row = |k: usize| DVec3::new(m[4 * k], m[4 * k + 1], m[4 * k + 2]);
-    let turn = DMat3::from_cols(row(0), row(1), row(2)).transpose();
+    let rows = [[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]].map(DVec3::from_array);
+    let turn = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
     let square = turn.transpose() * turn;
     let off = (0..3)
         .flat_map(|k| (square.col(k) - DMat3::IDENTITY.col(k)).to_array())
@@ -287,16 +288,16 @@ pub fn read_capture_pose(path: &Path) -> Result<Pose> {
         let message = format!(
             "the upper left 3×3 part is no rotation: its axes are off by {off:.4} of being square and of length 1"
         );
-        return Err(Error::line(path, numbers[0].0, message));
+        return Err(Error::line(path, lines[0], message));
     }
     if turn.determinant() < 0.0 {
         let message = "the upper left 3×3 part mirrors: its determinant is −1, a rotation's is 1";
-        return Err(Error::line(path, numbers[0].0, message));
+        return Err(Error::line(path, lines[0], message));
     }
     let location = DVec3::new(m[3], m[7], m[11]);
     if location.abs().max_element() > FARTHEST_M {
         let message = format!("the camera is at {location}: are these metres?");
-        return Err(Error::line(path, numbers[3].0, message));
+        return Err(Error::line(path, lines[3], message));
     }
     // What rounding left off a rotation is taken out: the viewing direction stays.
     let forward = turn.z_axis.normalize();
@@ -332,8 +333,9 @@ pub fn read_matterport_locations(dir: &Path) -> Result<Vec<ScanLocation>> {
             }
         }
         let center = poses.iter().map(|p| p.location).sum::<DVec3>() / poses.len() as f64;
-        let pose = Pose { location: center, ..poses[0] };
-        locations.push(ScanLocation { uuid, pose, line });
+        // The first is there: without it there was an error.
+        let pose = poses.first().map(|first| Pose { location: center, ..*first });
+        locations.extend(pose.map(|pose| ScanLocation { uuid, pose, line }));
     }
     Ok(locations)
 }

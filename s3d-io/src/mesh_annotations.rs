@@ -26,6 +26,7 @@ impl Annotations {
     ///
     /// # Panics
     /// If the mesh has no [`MeshFile::sources`].
+    #[expect(clippy::indexing_slicing, reason = "a mesh of no file is a caller's mistake: see Panics")]
     pub fn of_mesh(file: &MeshFile, options: &AnnotationOptions) -> Result<Self> {
         let path = &file.sources[0].path;
         let (labels, mut warnings) = match &file.labels {
@@ -56,6 +57,7 @@ impl Annotations {
 }
 
 /// What columns of numbers mean: labels, and for each face its place among them.
+#[expect(clippy::indexing_slicing, reason = "columns have an entry a face; groups are counted here")]
 fn of_numbers(
     file: &MeshFile,
     classes: &[i64],

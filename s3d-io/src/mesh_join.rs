@@ -23,6 +23,7 @@ impl MeshFile {
     ///
     /// # Panics
     /// If there is no such source.
+    #[expect(clippy::indexing_slicing, reason = "another source is a caller's mistake: see Panics")]
     pub fn faces_of(&self, source: usize) -> Range<u32> {
         let end = self.sources.get(source + 1).map_or(self.mesh.faces().len() as u32, |next| next.first_face);
         self.sources[source].first_face..end

@@ -89,12 +89,12 @@ impl MeshLabels {
         let mut without = 0;
         let faces: Vec<u32> = (0..mesh.faces().len() as u32)
             .map(|face| match mesh.material_of(face).map(|m| m as usize) {
-                Some(m) if is_name[m] => {
+                Some(m) if is_name.get(m).copied().unwrap_or(false) => {
                     named += 1;
-                    places[m]
+                    places.get(m).copied().unwrap_or(NO_INDEX)
                 }
                 Some(m) => {
-                    others[m] += 1;
+                    others.get_mut(m).into_iter().for_each(|n| *n += 1);
                     NO_INDEX
                 }
                 None => {
@@ -107,8 +107,8 @@ impl MeshLabels {
             return None;
         }
         let mut warnings = Vec::new();
-        if let Some(first) = others.iter().position(|&n| n > 0) {
-            let name = quote(mesh.materials()[first].name.as_bytes());
+        if let Some((material, _)) = mesh.materials().iter().zip(&others).find(|(_, n)| **n > 0) {
+            let name = quote(material.name.as_bytes());
             let n = count(others.iter().sum(), "face");
             warnings.push(format!(
                 "{n} without a label: the names of their materials are none, the first is {name}"
@@ -134,6 +134,7 @@ impl MeshLabels {
     /// # Panics
     /// If the labels are not those of `mesh`.
     #[must_use]
+    #[expect(clippy::indexing_slicing, reason = "labels of another mesh are a caller's mistake: see Panics")]
     pub fn into_faces(self, mesh: &TriMesh) -> Self {
         match self {
             Self::Numbers { element: LabelElement::Vertex, class, instance } => {

@@ -3,7 +3,7 @@
 //! tobj reads these files too, but panics on a `Kd` of fewer than three numbers, gives up a whole library for one
 //! malformed line of no interest, and takes the options of `map_Kd` for a part of the file's name.
 
-use crate::obj_lines::{logical_lines, parse_f32, text, without_comment, words};
+use crate::obj_lines::{after, logical_lines, parse_f32, text, without_comment, words};
 use crate::quote::quote;
 use s3d_geom::{DEFAULT_COLOR, Wrap};
 
@@ -32,7 +32,7 @@ pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
     for (number, line) in logical_lines(bytes) {
         let line = &*line;
         let Some(keyword) = words(line).next() else { continue };
-        let rest = line[keyword.len()..].trim_ascii();
+        let rest = after(line, keyword).trim_ascii();
         if keyword.eq_ignore_ascii_case(b"newmtl") {
             materials.push(MtlMaterial { name: text(rest), color: DEFAULT_COLOR, map: None });
             continue;
@@ -82,25 +82,25 @@ fn parse_map(mut rest: &[u8], line: u64) -> (Option<MtlMap>, Option<&[u8]>) {
             | b"-type" | b"-colorspace" => (1, 1),
             _ => break,
         };
-        let mut after = rest[option.len()..].trim_ascii_start();
+        let mut behind = after(rest, option).trim_ascii_start();
         let mut values = Vec::new();
         while values.len() < most {
-            let Some(word) = words(after).next() else { break };
+            let Some(word) = words(behind).next() else { break };
             if values.len() >= fewest && parse_f32(word).is_none() {
                 break;
             }
             values.push(word);
-            after = after[word.len()..].trim_ascii_start();
+            behind = after(behind, word).trim_ascii_start();
         }
         let neutral = if option == b"-s" { 1.0 } else { 0.0 };
         match option {
             b"-clamp" if values.first() == Some(&&b"on"[..]) => wrap = Wrap::Clamp,
             b"-s" | b"-o" if ignored.is_none() && values.iter().any(|v| parse_f32(v) != Some(neutral)) => {
-                ignored = Some(rest[..rest.len() - after.len()].trim_ascii_end());
+                ignored = rest.strip_suffix(behind).map(<[u8]>::trim_ascii_end);
             }
             _ => {}
         }
-        rest = after;
+        rest = behind;
     }
     let name = rest.strip_prefix(b"\"").and_then(|r| r.strip_suffix(b"\"")).unwrap_or(rest);
     ((!name.is_empty()).then(|| MtlMap { file: text(name), wrap: [wrap; 2], line }), ignored)

@@ -6,7 +6,7 @@
 use crate::located_picture::LocatedPicture;
 use crate::{Error, Result, read_json};
 use s3d_geom::Pose;
-use s3d_geom::glam::{DMat3, DVec3};
+use s3d_geom::glam::{DMat3, DMat4, DVec4};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -38,14 +38,16 @@ pub(crate) fn read(path: &Path) -> Result<Vec<LocatedPicture>> {
 }
 
 fn pose(rows: &[Vec<f64>]) -> std::result::Result<Pose, String> {
-    if !(3..=4).contains(&rows.len()) || rows.iter().any(|row| row.len() != 4) {
+    let full = rows.iter().map(|row| <[f64; 4]>::try_from(row.as_slice()).ok()).collect::<Option<Vec<_>>>();
+    let (Some([x, y, z]) | Some([x, y, z, _])) = full.as_deref() else {
         return Err("is no matrix of 4 × 4 or 3 × 4 numbers".into());
-    }
+    };
     if !rows.iter().flatten().all(|v| v.is_finite()) {
         return Err("holds a number that is not finite".into());
     }
-    let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
-    let [x, y, z] = [column(0), column(1), column(2)];
+    let columns = DMat4::from_cols_array_2d(&[*x, *y, *z, [0.0, 0.0, 0.0, 1.0]]).transpose();
+    let [x, y, z, location] =
+        [columns.x_axis, columns.y_axis, columns.z_axis, columns.w_axis].map(DVec4::truncate);
     // A world in other units has axes of another length.
     let length = x.length();
     let skew =
@@ -57,13 +59,13 @@ fn pose(rows: &[Vec<f64>]) -> std::result::Result<Pose, String> {
     // Perpendicular to the last digit, keeping the viewing direction.
     let back = z.normalize();
     let right = (x - back * x.dot(back)).normalize();
-    Ok(Pose { location: column(3), world_from_camera: DMat3::from_cols(right, back.cross(right), back) })
+    Ok(Pose { location, world_from_camera: DMat3::from_cols(right, back.cross(right), back) })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_geom::glam::DQuat;
+    use s3d_geom::glam::{DQuat, DVec3};
 
     fn rows(pose: &Pose) -> String {
         let m = pose.world_from_camera;

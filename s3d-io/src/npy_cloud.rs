@@ -1,7 +1,9 @@
 //! Annotated points in numpy's arrays: NPY, and NPZ with an array a column or a few.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::annotations::AnnotationOptions;
-use crate::cloud_records::{Field, Table, fill};
+use crate::cloud_records::{Field, Table, fill, rows_of_block};
 use crate::flat::{Cloud, ColorRange};
 use crate::flat_rows::{Reading, Tag};
 use crate::npy_header::NpyHeader;
@@ -15,9 +17,6 @@ use zip::ZipArchive;
 
 /// The columns of a plain array, unless they are named.
 const PLAIN: [&str; 8] = ["x", "y", "z", "r", "g", "b", "class", "instance"];
-
-/// Rows of an NPZ's arrays that are in memory at a time.
-const ROWS_AT_ONCE: u64 = 16_384;
 
 /// An `.npy` or `.npz` file.
 pub(crate) struct NpyCloud<'a> {
@@ -64,7 +63,7 @@ impl<'a> NpyCloud<'a> {
                 reading.notes.push(format!(
                     "{path}: a plain array: its columns are taken for {}, and class numbers for S3DIS's, 0 ceiling to 12 \
                      clutter",
-                    PLAIN[..fields.len()].join(" ")
+                    fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(" ")
                 ));
             }
         }
@@ -75,7 +74,7 @@ impl<'a> NpyCloud<'a> {
         let usual = PLAIN.map(str::to_owned);
         let named = &self.options.columns;
         let names = match fields.len() {
-            n @ (7 | 8) if named.is_empty() => &usual[..n],
+            7 | 8 if named.is_empty() => &usual[..],
             n if n == named.len() => &named[..],
             n => {
                 let said = match named.len() {
@@ -145,33 +144,33 @@ impl<'a> NpyCloud<'a> {
             for field in &header.fields {
                 let name =
                     if header.is_structured { field.name.clone() } else { format!("{stem}{}", field.name) };
-                fields.push(Field { name, at: stride + field.at, ..field.clone() });
+                fields.push(Field { name, at: field.at.saturating_add(stride), ..field.clone() });
             }
-            stride += header.stride;
+            stride = header.stride.saturating_add(stride);
         }
         let table = Table::new(&self.path, fields, stride, self.options)?;
         let mut done = 0;
         let (mut block, mut column) = (Vec::new(), Vec::new());
         let mut texts = Default::default();
-        while done < rows {
-            let n = ROWS_AT_ONCE.min(rows - done) as usize;
-            block.resize(n * stride, 0);
-            let mut at = 0;
+        while let Some(n) = rows_of_block(rows, done, stride) {
+            block.resize(n.saturating_mul(stride), 0);
+            let mut at = 0usize;
             for (_, header, member) in &mut arrays {
-                column.resize(n * header.stride, 0);
+                column.resize(n.saturating_mul(header.stride), 0);
                 fill(&self.path, member, &mut column, done, rows, header.stride)?;
                 for (record, piece) in block.chunks_exact_mut(stride).zip(column.chunks_exact(header.stride))
                 {
-                    record[at..at + header.stride].copy_from_slice(piece);
+                    let place = record.get_mut(at..).and_then(|r| r.get_mut(..piece.len()));
+                    place.into_iter().for_each(|place| place.copy_from_slice(piece));
                 }
-                at += header.stride;
+                at = at.saturating_add(header.stride);
             }
-            for record in block.chunks_exact(stride) {
-                done += 1;
-                if !table.push(done, record, colors, &mut texts, &self.path, reading)? {
+            for (record, number) in block.chunks_exact(stride).zip(done.saturating_add(1)..) {
+                if !table.push(number, record, colors, &mut texts, &self.path, reading)? {
                     return Ok(false);
                 }
             }
+            done = done.saturating_add(n as u64);
         }
         Ok(true)
     }

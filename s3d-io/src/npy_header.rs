@@ -1,6 +1,8 @@
 //! The header of an NPY file: what numpy says of an array, written as a Python dictionary. Source: numpy's
 //! "NPY format", versions 1.0 to 3.0.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::cloud_records::{Field, Kind};
 use crate::{Error, Result};
 use std::io::Read;
@@ -68,7 +70,7 @@ impl NpyHeader {
     }
 
     fn parse(text: &str) -> std::result::Result<Self, Refused> {
-        let mut parser = Parser { rest: text.trim(), depth: 0 };
+        let mut parser = Parser { rest: text.trim(), levels_left: 16 };
         let Literal::Dict(entries) = parser.literal()? else { return Err(bad("no dictionary")) };
         let get = |key: &str| {
             let found = entries.iter().find(|(k, _)| *k == Literal::Text(key.to_owned())).map(|(_, v)| v);
@@ -171,7 +173,7 @@ fn push_fields(
         ("u", 8) => (Some(Kind::U64), 8),
         ("f", 8) => (Some(Kind::F64), 8),
         ("S", n) => (Some(Kind::Bytes(n)), n),
-        ("U", n) => (Some(Kind::Utf32(n)), 4 * n),
+        ("U", n) => (Some(Kind::Utf32(n)), n.saturating_mul(4)),
         ("V" | "m" | "M" | "c" | "f", n) => (None, n),
         _ => return Err(bad(&format!("the type {kind:?}"))),
     };
@@ -179,7 +181,7 @@ fn push_fields(
         if let Some(kind) = kind {
             fields.push(Field { name, at: *at, kind, big_endian });
         }
-        *at += bytes;
+        *at = at.saturating_add(bytes);
     }
     if fields.len() > MOST_COLUMNS || *at > 1 << 24 {
         return Err(bad("a huge row"));
@@ -219,7 +221,8 @@ enum Literal {
 
 struct Parser<'a> {
     rest: &'a str,
-    depth: u32,
+    /// How much deeper lists may be in lists.
+    levels_left: u32,
 }
 
 impl Parser<'_> {
@@ -231,12 +234,9 @@ impl Parser<'_> {
     }
 
     fn literal(&mut self) -> std::result::Result<Literal, Refused> {
-        self.depth += 1;
-        if self.depth > 16 {
-            return Err(bad("too deep"));
-        }
+        self.levels_left = self.levels_left.checked_sub(1).ok_or_else(|| bad("too deep"))?;
         let literal = self.inner();
-        self.depth -= 1;
+        self.levels_left = self.levels_left.saturating_add(1);
         literal
     }
 
@@ -280,9 +280,11 @@ impl Parser<'_> {
             }
         }
         let digits = self.rest.bytes().take_while(u8::is_ascii_digit).count();
-        let number = self.rest[..digits].parse().map_err(|_| bad("neither number nor text"))?;
+        let none = || bad("neither number nor text");
+        let (written, rest) = self.rest.split_at_checked(digits).ok_or_else(none)?;
+        let number = written.parse().map_err(|_| none())?;
         // Old versions wrote 3L.
-        self.rest = self.rest[digits..].trim_start_matches('L');
+        self.rest = rest.trim_start_matches('L');
         Ok(Literal::Number(number))
     }
 }

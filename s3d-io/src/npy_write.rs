@@ -31,6 +31,7 @@ impl NpyWriter {
     ///
     /// # Panics
     /// If `kind` is no type with a size of one digit, or the array has more bytes than 64 bits can count.
+    #[expect(clippy::expect_used, reason = "a caller's mistake: see Panics")]
     pub fn create(path: &Path, kind: &str, shape: &[u64]) -> Result<Self> {
         let size =
             kind.chars().last().and_then(|c| c.to_digit(10)).expect("a type ends with its size in bytes");

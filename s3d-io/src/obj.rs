@@ -40,7 +40,7 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         || ObjLooks::load(path, &plain, &mut remarks),
     );
     let (columns, faces) =
-        geometry.map_err(|vertex| vertex_error(path, &bytes, vertex, plain.positions[vertex as usize]))?;
+        geometry.map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
     let polygons_triangulated = faces.polygons;
     if faces.triangles.is_empty() {
         let reason =
@@ -113,15 +113,16 @@ fn used<T: Copy>(column: &[T], corners: &[u32]) -> (Vec<T>, Vec<u32>) {
     let Some(&first) = column.first() else { return Default::default() };
     let mut out = vec![first];
     let mut new_index = vec![NO_INDEX; column.len()];
-    new_index[0] = 0;
+    if let Some(new) = new_index.first_mut() {
+        *new = 0;
+    }
     let corners = corners.iter().map(|&corner| {
-        if corner == NO_INDEX {
-            return NO_INDEX;
-        }
-        let new = &mut new_index[corner as usize];
+        // Indices are in range, or NO_INDEX.
+        let old = corner as usize;
+        let Some((new, value)) = new_index.get_mut(old).zip(column.get(old)) else { return NO_INDEX };
         if *new == NO_INDEX {
             *new = out.len() as u32;
-            out.push(column[corner as usize]);
+            out.push(*value);
         }
         *new
     });
@@ -144,7 +145,11 @@ struct Triangles {
 
 impl Triangles {
     /// A vertex of a polygon that is not finite is the error.
-    fn new(plain: &PlainObj, columns: &Columns) -> std::result::Result<Self, u32> {
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "PlainObj checked indices and counts of corners; cuts index their polygon"
+    )]
+    fn new(plain: &PlainObj, columns: &Columns) -> std::result::Result<Self, (u32, Vec3)> {
         let mut out = Self::default();
         let mut start = 0;
         let (vertices, uvs, normals) = (&plain.corners[0], &columns.face_uvs, &columns.face_normals);
@@ -158,7 +163,7 @@ impl Triangles {
             } else {
                 let points: Vec<Vec3> = polygon.iter().map(|&v| plain.positions[v as usize]).collect();
                 if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
-                    return Err(polygon[bad]);
+                    return Err((polygon[bad], points[bad]));
                 }
                 match triangulate_face(&points) {
                     Ok(cut) => {
@@ -203,7 +208,9 @@ fn vertex_colors(plain: &PlainObj, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
     let scale = if largest > 2.0 { 1.0 } else { 255.0 };
     let mut colors = vec![DEFAULT_COLOR; plain.positions.len()];
     for (vertex, color) in &plain.colors {
-        colors[*vertex as usize] = color.map(|c| (c * scale).round().clamp(0.0, 255.0) as u8);
+        if let Some(slot) = colors.get_mut(*vertex as usize) {
+            *slot = color.map(|c| (c * scale).round().clamp(0.0, 255.0) as u8);
+        }
     }
     let without = plain.positions.len() - plain.colors.len();
     if without > 0 {

@@ -22,7 +22,10 @@ pub(crate) fn number_error(path: &Path, bytes: &[u8]) -> Error {
         if let Some(word) = numbers.iter().find(bad) {
             return Error::line(path, number, format!("{} is no number: {}", quote(word), quote(&line)));
         }
-        if is_vertex && numbers.len() == 4 && parse_f32(numbers[3]) == Some(0.0) {
+        if let [_, _, _, weight] = numbers[..]
+            && is_vertex
+            && parse_f32(weight) == Some(0.0)
+        {
             return Error::line(path, number, format!("the vertex has the weight 0: {}", quote(&line)));
         }
     }

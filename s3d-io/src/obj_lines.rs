@@ -11,10 +11,10 @@ pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = (u64, Cow<'_, 
     let mut lines = (1..).zip(bytes.split(move |&b| b == end).map(<[u8]>::trim_ascii));
     std::iter::from_fn(move || {
         let (number, line) = lines.next()?;
-        if !line.ends_with(b"\\") || line.starts_with(b"#") {
+        let Some(continued) = line.strip_suffix(b"\\").filter(|line| !line.starts_with(b"#")) else {
             return Some((number, Cow::Borrowed(line)));
-        }
-        let mut joined = line[..line.len() - 1].to_vec();
+        };
+        let mut joined = continued.to_vec();
         for (_, next) in lines.by_ref() {
             joined.push(b' ');
             joined.extend_from_slice(next.strip_suffix(b"\\").unwrap_or(next));
@@ -31,20 +31,26 @@ pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
+/// What is behind the word that starts a line.
+#[inline]
+pub(crate) fn after<'a>(line: &'a [u8], word: &[u8]) -> &'a [u8] {
+    line.get(word.len()..).unwrap_or_default()
+}
+
 /// Takes the next word off the front of a line; the sign that starts a comment ends the line.
 #[inline]
 pub(crate) fn next_word<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
-    let line = &rest[start..];
+    let line = rest.get(start..)?;
     let end = line.iter().position(|&b| b.is_ascii_whitespace() || b == b'#').unwrap_or(line.len());
-    let (word, after) = line.split_at(end);
+    let (word, after) = line.split_at_checked(end)?;
     *rest = if after.first() == Some(&b'#') { &[] } else { after };
     (!word.is_empty()).then_some(word)
 }
 
 /// `line` up to the sign that starts a comment.
 pub(crate) fn without_comment(line: &[u8]) -> &[u8] {
-    line.iter().position(|&b| b == b'#').map_or(line, |at| &line[..at])
+    line.split(|&b| b == b'#').next().unwrap_or_default()
 }
 
 /// A name in UTF-8 or, if it is not that, in Latin-1, so that different bytes stay different names.
@@ -76,7 +82,7 @@ const POWERS: [f64; 15] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e1
 #[inline]
 fn short_number(word: &[u8]) -> Option<f32> {
     let negative = word.first() == Some(&b'-');
-    let written = &word[usize::from(negative)..];
+    let written = word.strip_prefix(b"-").unwrap_or(word);
     if written.len() > 15 {
         return None;
     }
@@ -93,7 +99,7 @@ fn short_number(word: &[u8]) -> Option<f32> {
     if written.len() == usize::from(written.contains(&b'.')) {
         return None;
     }
-    let value = digits as f64 / POWERS[decimals];
+    let value = digits as f64 / POWERS.get(decimals)?;
     let between = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
     (!between).then_some(if negative { -value } else { value } as f32)
 }

@@ -89,11 +89,10 @@ impl ObjLooks {
         maps: &[Option<(usize, [Wrap; 2])>],
         warnings: &mut Vec<String>,
     ) {
-        for (at, loaded) in read_textures(wanted).into_iter().enumerate() {
-            let image = &wanted[at];
-            let users: Vec<(usize, [Wrap; 2])> = (0..maps.len())
-                .filter_map(|m| maps[m].filter(|(i, _)| *i == at).map(|(_, wrap)| (m, wrap)))
-                .collect();
+        for ((at, loaded), image) in read_textures(wanted).into_iter().enumerate().zip(wanted) {
+            let users = maps.iter().enumerate().filter_map(|(m, map)| Some((m, (*map)?)));
+            let users: Vec<(usize, [Wrap; 2])> =
+                users.filter(|(_, (i, _))| *i == at).map(|(m, (_, wrap))| (m, wrap)).collect();
             let mut texture = match loaded {
                 Ok(texture) => texture,
                 Err(why) => {
@@ -111,7 +110,9 @@ impl ObjLooks {
                     wraps.push(wrap);
                     wraps.len() - 1
                 });
-                self.materials[material].texture = Some((self.textures.len() + place) as u32);
+                if let Some(material) = self.materials.get_mut(material) {
+                    material.texture = Some((self.textures.len() + place) as u32);
+                }
             }
             let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
             while let Some((&wrap, more)) = wraps.split_first() {

@@ -3,7 +3,7 @@
 //! Faces may count their corners from the end; a line may go on on the next; only some vertices may have a colour, and only
 //! some corners a texture coordinate. Elements that are no faces are left out. Indices are known to be in range.
 
-use crate::obj_lines::{logical_lines, next_word, number, parse_f32, text, words};
+use crate::obj_lines::{after, logical_lines, next_word, number, parse_f32, text, words};
 use crate::quote::quote;
 use crate::{Error, Result};
 use s3d_geom::NO_INDEX;
@@ -93,7 +93,7 @@ impl PlainObj {
             let fail = |message: String| Error::line(path, number, format!("{message}: {}", quote(&line)));
             // A line starts with its keyword.
             let keyword = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-            let rest = &line[keyword.len()..];
+            let rest = after(&line, keyword);
             match keyword {
                 b"v" => {
                     self.add_vertex(counts[0], rest).map_err(fail)?;
@@ -122,8 +122,8 @@ impl PlainObj {
                 b"f" => {
                     let beyond = self.add_face(number, material, counts, rest).map_err(fail)?;
                     for (column, index) in beyond {
-                        if index > furthest[column] {
-                            furthest[column] = index;
+                        if let Some(furthest) = furthest.get_mut(column).filter(|f| index > **f) {
+                            *furthest = index;
                             self.forward.push((number, column, index));
                         }
                     }
@@ -145,9 +145,10 @@ impl PlainObj {
     }
 
     fn forward_fault(&self, path: &Path, bytes: &[u8], counts: [u64; 3]) -> Option<Error> {
-        let &(line, column, index) = self.forward.iter().find(|f| f.2 > counts[f.1])?;
+        let count_of = |column: usize| counts.get(column).copied().unwrap_or(0);
+        let &(line, column, index) = self.forward.iter().find(|f| f.2 > count_of(f.1))?;
         let text = logical_lines(bytes).find(|(number, _)| *number == line).map(|(_, text)| quote(&text));
-        let message = out_of_range(column, index as i64, counts[column]);
+        let message = out_of_range(column, index as i64, count_of(column));
         Some(Error::line(path, line, format!("{message}: {}", text.unwrap_or_default())))
     }
 
@@ -163,10 +164,9 @@ impl PlainObj {
     fn add_vertex(&mut self, vertex: u64, mut rest: &[u8]) -> std::result::Result<(), String> {
         let mut numbers = [&b""[..]; 8];
         let mut n = 0;
-        while n < 8
-            && let Some(word) = next_word(&mut rest)
-        {
-            numbers[n] = word;
+        for slot in &mut numbers {
+            let Some(word) = next_word(&mut rest) else { break };
+            *slot = word;
             n += 1;
         }
         if !matches!(n, 3 | 4 | 6 | 7) {
@@ -208,16 +208,16 @@ impl PlainObj {
         let mut has = [true; 3];
         while let Some(corner) = next_word(&mut rest) {
             let mut parts = corner.split(|&b| b == b'/');
-            for column in 0..3 {
+            let columns = self.corners.iter_mut().zip(counts).zip(&mut has);
+            for (column, ((indices, count), has)) in columns.enumerate() {
                 let part = parts.next().unwrap_or_default();
                 if part.is_empty() {
-                    has[column] = false;
-                    self.corners[column].push(NO_INDEX);
+                    *has = false;
+                    indices.push(NO_INDEX);
                     continue;
                 }
                 let index = whole_number(part)
                     .ok_or_else(|| format!("the index {} is no whole number", quote(part)))?;
-                let count = counts[column];
                 let absolute = if index < 0 { count as i64 + index + 1 } else { index };
                 if index == 0 || absolute < 1 {
                     return Err(out_of_range(column, index, count));
@@ -226,7 +226,7 @@ impl PlainObj {
                     beyond.push((column, absolute as u64));
                 }
                 // What u32 does not hold is beyond every column that is not refused for its length.
-                self.corners[column].push((absolute - 1).min(i64::from(NO_INDEX - 1)) as u32);
+                indices.push((absolute - 1).min(i64::from(NO_INDEX - 1)) as u32);
             }
             if parts.next().is_some() {
                 return Err(format!("the corner {} has more than three indices", quote(corner)));
@@ -261,15 +261,15 @@ fn count_columns(bytes: &[u8]) -> [u64; 3] {
     for (_, line) in logical_lines(bytes) {
         let column =
             words(&line).next().and_then(|word| [&b"v"[..], b"vt", b"vn"].iter().position(|k| *k == word));
-        if let Some(column) = column {
-            counts[column] += 1;
+        if let Some(count) = column.and_then(|column| counts.get_mut(column)) {
+            *count += 1;
         }
     }
     counts
 }
 
 fn out_of_range(column: usize, index: i64, count: u64) -> String {
-    let what = COLUMNS[column];
+    let what = COLUMNS.get(column).copied().unwrap_or_default();
     match index {
         0 => format!("{what} 0: indices count from 1"),
         _ => format!("{what} {index} is not there, {count} are"),
@@ -283,7 +283,7 @@ fn refuse_other_files(path: &Path, bytes: &[u8]) -> Result<()> {
             "is UTF-16 text; save it as UTF-8, or convert it with `iconv -t UTF-8`",
         ));
     }
-    if bytes[..bytes.len().min(4096)].contains(&0) {
+    if bytes.iter().take(4096).any(|b| *b == 0) {
         return Err(Error::format(path, "is binary; a Wavefront OBJ file is text"));
     }
     Ok(())

@@ -4,6 +4,8 @@
 //! mesh's own order, one line each, since consumers pair the two files face by face; `usemtl` stands where the material
 //! changes. Numbers are written so that they are read back bit by bit. Source: formats.md, "World and meshes".
 
+#![expect(clippy::indexing_slicing, reason = "a writer: the indices are those that TriMesh::new checked")]
+
 use crate::pretty::pretty_color;
 use crate::{Compression, Content, Result, create_dir, encode_rgb8, write_bytes, write_whole};
 use s3d_geom::glam::{Vec2, Vec3};
@@ -257,11 +259,12 @@ struct UniqueNames(HashSet<String>);
 impl UniqueNames {
     /// `name`, or with a number before its ending if it was there already.
     fn add(&mut self, name: &str) -> String {
-        let dot = name.rfind('.').unwrap_or(name.len());
+        let dot = name.rfind('.');
+        let (stem, ending) = dot.and_then(|dot| name.split_at_checked(dot)).unwrap_or((name, ""));
         let mut candidate = name.to_owned();
         let mut number = 2;
         while !self.0.insert(candidate.to_lowercase()) {
-            candidate = format!("{}_{number}{}", &name[..dot], &name[dot..]);
+            candidate = format!("{stem}_{number}{ending}");
             number += 1;
         }
         candidate

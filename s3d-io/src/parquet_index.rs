@@ -1,5 +1,7 @@
 //! A table of all images of a data set as one Parquet file.
 
+#![expect(clippy::indexing_slicing, reason = "a writer: its columns are its own")]
+
 use crate::{AtomicFile, Domain, Error, Result};
 use parquet::basic::Compression;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
@@ -157,9 +159,10 @@ fn schema(columns: &[(String, bool, Column)]) -> String {
 /// [`Error::Io`].
 pub fn write_image_index(path: &Path, rows: &[ImageRow]) -> Result<u64> {
     let failed = |e: ParquetError| match e {
-        ParquetError::External(e) if e.is::<std::io::Error>() => {
-            Error::io(path, "write", *e.downcast::<std::io::Error>().expect("it was asked"))
-        }
+        ParquetError::External(e) => match e.downcast::<std::io::Error>() {
+            Ok(e) => Error::io(path, "write", *e),
+            Err(e) => Error::io(path, "write", std::io::Error::other(e)),
+        },
         e => Error::io(path, "write", std::io::Error::other(e)),
     };
     let about =
@@ -169,14 +172,15 @@ pub fn write_image_index(path: &Path, rows: &[ImageRow]) -> Result<u64> {
         .set_created_by(concat!("s3d version ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_key_value_metadata(Some(vec![KeyValue::new("description".to_owned(), about.to_owned())]))
         .build();
-    let schema = parse_message_type(&schema(&columns(&[]))).expect("the schema is well-formed");
+    let schema = parse_message_type(&schema(&columns(&[]))).map_err(failed)?;
     let mut file = AtomicFile::create(path)?;
     let mut writer =
         SerializedFileWriter::new(&mut file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
     for rows in rows.chunks(GROUP) {
         let mut group = writer.next_row_group().map_err(failed)?;
         for (_, required, column) in columns(rows) {
-            let mut out = group.next_column().map_err(failed)?.expect("the schema has as many columns");
+            let fewer = || failed(ParquetError::General("the schema has fewer columns".to_owned()));
+            let mut out = group.next_column().map_err(failed)?.ok_or_else(fewer)?;
             write_column(&mut out, required, column).map_err(failed)?;
             out.close().map_err(failed)?;
         }

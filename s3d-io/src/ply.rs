@@ -73,16 +73,18 @@ impl PlyPointWriter {
             "{} faces for {n} points",
             cloud.faces.len()
         );
-        for start in (0..n).step_by(BATCH) {
+        let colors = cloud.colors.iter().copied().chain(std::iter::repeat([0; 3]));
+        let faces = cloud.faces.iter().copied().chain(std::iter::repeat(NO_INDEX));
+        let mut points = cloud.positions.iter().zip(labels).zip(colors).zip(faces).peekable();
+        while points.peek().is_some() {
             self.buffer.clear();
-            for (k, label) in labels[start..].iter().take(BATCH).enumerate() {
-                let i = start + k;
-                for coordinate in cloud.positions[i].to_array() {
+            for (((position, label), color), face) in points.by_ref().take(BATCH) {
+                for coordinate in position.to_array() {
                     self.buffer.extend_from_slice(&coordinate.to_le_bytes());
                 }
-                self.buffer.extend_from_slice(cloud.colors.get(i).unwrap_or(&[0; 3]));
+                self.buffer.extend_from_slice(&color);
                 self.buffer.extend_from_slice(&label.to_le_bytes());
-                self.buffer.extend_from_slice(&cloud.faces.get(i).unwrap_or(&NO_INDEX).to_le_bytes());
+                self.buffer.extend_from_slice(&face.to_le_bytes());
             }
             self.file.put(&self.buffer)?;
         }

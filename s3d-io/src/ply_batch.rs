@@ -1,5 +1,7 @@
 //! Some rows of an element of a PLY file, column by column.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 /// Rows of one element, a column a property. Columns that are not wanted are empty.
 #[derive(Debug, Default)]
 pub(crate) struct PlyBatch {
@@ -28,16 +30,19 @@ impl PlyBatch {
         self.first_row
     }
 
-    /// The numbers of a property, one a row; of a list property, all of all rows.
+    /// The numbers of a property, one a row; of a list property, all of all rows; none of one that is not wanted.
     pub(crate) fn scalars(&self, property: usize) -> &[f64] {
-        &self.columns[property].values
+        self.columns.get(property).map_or(&[], |column| &column.values)
     }
 
-    /// The list of row `row`, counted from the first of the batch.
+    /// The list of row `row`, counted from the first of the batch; empty for a property that is none or not wanted.
     pub(crate) fn list(&self, property: usize, row: usize) -> &[f64] {
-        let Column { values, ends } = &self.columns[property];
-        let start = if row == 0 { 0 } else { ends[row - 1] };
-        &values[start..ends[row]]
+        let list = |Column { values, ends }: &'_ Column| {
+            let start = row.checked_sub(1).map_or(Some(0), |before| ends.get(before).copied())?;
+            Some(start..*ends.get(row)?).filter(|range| range.end <= values.len())
+        };
+        let column = self.columns.get(property);
+        column.and_then(|c| c.values.get(list(c)?)).unwrap_or_default()
     }
 
     pub(crate) fn clear(&mut self, first_row: u64, properties: usize) {
@@ -57,6 +62,7 @@ pub(crate) fn integer(value: f64) -> Option<i64> {
     // i64::MAX as f64 is one more than an i64 holds.
     let fits =
         value.fract() == 0.0 && (-9_223_372_036_854_775_808.0..9_223_372_036_854_775_808.0).contains(&value);
+    #[expect(clippy::cast_possible_truncation, reason = "it fits")]
     fits.then_some(value as i64)
 }
 

@@ -42,6 +42,10 @@ pub(crate) fn open_vertices(path: &Path) -> Result<(PlyReader, PlyElement, bool)
 }
 
 /// The colour of a row, if it is one.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "the channels were found in the element, and are wanted of the batch"
+)]
 pub(crate) fn color_of(
     element: &PlyElement,
     batch: &PlyBatch,
@@ -63,6 +67,7 @@ impl Cloud for PlyCloud<'_> {
         self.has_faces.get()
     }
 
+    #[expect(clippy::indexing_slicing, reason = "a batch has as many rows of each column that is wanted")]
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
         let path = &self.path;
         let (mut reader, element, has_faces) = open_vertices(path)?;

@@ -16,6 +16,8 @@
 //!
 //! Numbers come as `f64`, which holds every type of PLY exactly; [`crate::ply_batch::integer`] makes whole ones of them.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::ply_batch::PlyBatch;
 use crate::ply_header::{MAX_HEADER, PlyElement, PlyEncoding, PlyHeader, PlyProperty, PlyType};
 use crate::ply_source::{BUFFER, Fault, Outcome, Source, column_of, decode, number, parse_f64};
@@ -62,16 +64,16 @@ impl PlyReader {
         }
         let mut source = Source::new(File::open(path).map_err(io)?);
         // A header is nearly always in the first bytes: more are read only where they are missing.
-        let mut size = 4096;
+        let mut size = 4096usize;
         let header = loop {
             let complete = source.need(size).map_err(io)?;
             match PlyHeader::parse(path, source.bytes()) {
-                Err(_) if complete && size < MAX_HEADER => size *= 4,
+                Err(_) if complete && size < MAX_HEADER => size = size.saturating_mul(4),
                 other => break other?,
             }
         };
-        source.start = header.bytes;
-        let line = header.lines + 1;
+        source.pass(header.bytes);
+        let line = header.lines.saturating_add(1);
         Ok(Self {
             path: path.to_owned(),
             header,
@@ -92,7 +94,7 @@ impl PlyReader {
     /// How many rows of `element` the file can hold by its size: what may be reserved for them.
     pub(crate) fn plausible_rows(&self, element: &PlyElement) -> usize {
         let row = element.min_row_bytes(self.header.encoding).max(1) as u64;
-        element.count.min(self.bytes / row) as usize
+        usize::try_from(self.bytes.checked_div(row).unwrap_or(0).min(element.count)).unwrap_or(0)
     }
 
     /// Goes to the next element, whose rows follow, over what is left of the last one. Nothing is wanted of it yet.
@@ -105,7 +107,7 @@ impl PlyReader {
             let mut rest = PlyBatch::default();
             while self.read_batch(&mut rest)? {}
         }
-        let next = self.at.map_or(0, |(element, _)| element + 1);
+        let next = self.at.map_or(0, |(element, _)| element.saturating_add(1));
         let Some(element) = self.header.elements.get(next).cloned() else { return Ok(None) };
         self.at = Some((next, 0));
         self.wanted = vec![false; element.properties.len()];
@@ -116,6 +118,10 @@ impl PlyReader {
     ///
     /// # Panics
     /// If there is no element, or no such property.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "places are found in the element; any other is a caller's mistake"
+    )]
     pub(crate) fn want(&mut self, properties: impl IntoIterator<Item = usize>) {
         self.wanted.fill(false);
         for property in properties {
@@ -123,23 +129,21 @@ impl PlyReader {
         }
     }
 
-    /// Reads the next rows of the element into `batch`, whose memory is used again; `false` if there are no more.
+    /// Reads the next rows of the element into `batch`, whose memory is used again; `false` if there are no more, or before
+    /// the first [`PlyReader::next_element`].
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] with the line or the row: the file ends too soon, a word is no number or does not
     /// fit its property's type, a line holds more than a row, a list has a negative length.
-    ///
-    /// # Panics
-    /// Before the first [`PlyReader::next_element`].
     pub(crate) fn read_batch(&mut self, batch: &mut PlyBatch) -> Result<bool> {
-        let (element, done) = self.at.expect("next_element comes first");
-        let properties = std::mem::take(&mut self.header.elements[element].properties);
-        let count = self.header.elements[element].count;
+        let Some((element, done)) = self.at else { return Ok(false) };
+        let Some(current) = self.header.elements.get_mut(element) else { return Ok(false) };
+        let (properties, count) = (std::mem::take(&mut current.properties), current.count);
         batch.clear(done, properties.len());
         let read = if properties.is_empty() {
             Ok(())
         } else {
-            let rows = (count - done).min(BATCH_ROWS);
+            let rows = count.saturating_sub(done).min(BATCH_ROWS);
             match self.header.encoding {
                 PlyEncoding::Ascii => self.ascii_rows(&properties, rows, batch),
                 _ if properties.iter().any(PlyProperty::is_list) => {
@@ -148,9 +152,12 @@ impl PlyReader {
                 _ => self.fixed_rows(&properties, rows, batch),
             }
         };
-        self.header.elements[element].properties = properties;
-        self.at = Some((element, done + batch.rows as u64));
-        read.map_err(|fault| self.fault(fault, done + batch.rows as u64))?;
+        if let Some(current) = self.header.elements.get_mut(element) {
+            current.properties = properties;
+        }
+        let done = done.saturating_add(batch.rows as u64);
+        self.at = Some((element, done));
+        read.map_err(|fault| self.fault(fault, done))?;
         Ok(batch.rows > 0)
     }
 
@@ -174,7 +181,7 @@ impl PlyReader {
 
     /// An error about row `row` of a batch that was just read.
     pub(crate) fn fail(&self, batch: &PlyBatch, row: usize, message: impl std::fmt::Display) -> Error {
-        let (name, number) = (self.row_name(), batch.first_row() + row as u64);
+        let (name, number) = (self.row_name(), batch.first_row().saturating_add(row as u64));
         let message = format!("{name} {number}: {message}");
         match batch.lines.get(row) {
             Some(&line) => Error::line(&self.path, line, message),
@@ -182,13 +189,18 @@ impl PlyReader {
         }
     }
 
+    /// The element whose rows come now.
+    fn element(&self) -> Option<&PlyElement> {
+        self.header.elements.get(self.at?.0)
+    }
+
     fn row_name(&self) -> &str {
-        self.at.map_or("row", |(element, _)| &self.header.elements[element].name)
+        self.element().map_or("row", |element| &element.name)
     }
 
     fn fault(&self, fault: Fault, row: u64) -> Error {
         let name = self.row_name();
-        let count = self.at.map_or(0, |(element, _)| self.header.elements[element].count);
+        let count = self.element().map_or(0, |element| element.count);
         match fault {
             Fault::Io(e) => Error::io(&self.path, "read", e),
             Fault::End => Error::format(
@@ -214,28 +226,30 @@ impl PlyReader {
             return Err(Fault::End);
         }
         let bytes = self.source.bytes();
-        let rows = (bytes.len() / size).min(rows as usize);
-        let bytes = &bytes[..rows * size];
+        let there = bytes.len().checked_div(size).unwrap_or(0);
+        let rows = usize::try_from(rows).map_or(there, |rows| rows.min(there));
+        let bytes = bytes.get(..rows.saturating_mul(size)).unwrap_or_default();
         let big = self.header.encoding == PlyEncoding::BigEndian;
-        let mut offset = 0;
-        for (p, property) in properties.iter().enumerate() {
-            if self.wanted[p] {
-                column_of(bytes, size, offset, property.kind, big, &mut batch.columns[p].values);
+        let mut offset = 0usize;
+        for ((property, wanted), column) in properties.iter().zip(&self.wanted).zip(&mut batch.columns) {
+            if *wanted {
+                column_of(bytes, size, offset, property.kind, big, &mut column.values);
             }
-            offset += property.kind.size();
+            offset = offset.saturating_add(property.kind.size());
         }
         batch.rows = rows;
-        self.source.start += rows * size;
+        let read = bytes.len();
+        self.source.pass(read);
         Ok(())
     }
 
     /// Rows with lists, whose size is known when they are read.
     fn binary_rows(&mut self, properties: &[PlyProperty], rows: u64, batch: &mut PlyBatch) -> Outcome {
         let big = self.header.encoding == PlyEncoding::BigEndian;
-        let mut values = 0;
+        let mut values = 0usize;
         for _ in 0..rows {
-            for (p, property) in properties.iter().enumerate() {
-                let column = self.wanted[p].then(|| &mut batch.columns[p]);
+            for ((property, wanted), column) in properties.iter().zip(&self.wanted).zip(&mut batch.columns) {
+                let column = wanted.then_some(column);
                 let n = match property.list {
                     None => 1,
                     Some(kind) => {
@@ -245,21 +259,21 @@ impl PlyReader {
                 };
                 let size = property.kind.size();
                 let Some(column) = column else {
-                    self.source.skip(n as u64 * size as u64)?;
+                    self.source.skip((n as u64).saturating_mul(size as u64))?;
                     continue;
                 };
-                let mut rest = n * size;
+                let mut rest = n.saturating_mul(size);
                 while rest > 0 {
                     let bytes = self.source.take(rest.min(BUFFER / 2))?;
                     decode(bytes, property.kind, big, &mut column.values);
-                    rest -= bytes.len();
+                    rest = rest.saturating_sub(bytes.len());
                 }
                 if property.is_list() {
                     column.ends.push(column.values.len());
-                    values += n;
+                    values = values.saturating_add(n);
                 }
             }
-            batch.rows += 1;
+            batch.rows = batch.rows.saturating_add(1);
             if values > BATCH_VALUES {
                 break;
             }
@@ -268,8 +282,12 @@ impl PlyReader {
     }
 
     /// Rows of words. A row starts on a line of its own; it may go on on the next.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "what is wanted, and the batch's columns, have an entry a property"
+    )]
     fn ascii_rows(&mut self, properties: &[PlyProperty], rows: u64, batch: &mut PlyBatch) -> Outcome {
-        let mut values = 0;
+        let mut values = 0usize;
         for _ in 0..rows {
             for (p, property) in properties.iter().enumerate() {
                 let wanted = self.wanted[p];
@@ -291,11 +309,11 @@ impl PlyReader {
                 if wanted && property.is_list() {
                     let column = &mut batch.columns[p];
                     column.ends.push(column.values.len());
-                    values += n;
+                    values = values.saturating_add(n);
                 }
             }
             self.row_end = self.line;
-            batch.rows += 1;
+            batch.rows = batch.rows.saturating_add(1);
             if values > BATCH_VALUES {
                 break;
             }
@@ -343,6 +361,7 @@ fn list_length(length: f64, wanted: bool, property: &PlyProperty) -> std::result
     if wanted && length > MAX_LIST as f64 {
         return Err(format!("the list {} has {length} entries; up to {MAX_LIST} are read", property.name));
     }
+    #[expect(clippy::cast_possible_truncation, reason = "a whole number of at most 32 bits")]
     Ok(length as usize)
 }
 

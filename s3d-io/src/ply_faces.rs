@@ -146,14 +146,17 @@ impl PlyFaces {
     pub(crate) fn triangles(&self, positions: &[Vec3]) -> PlyTriangles {
         let mut out = PlyTriangles::default();
         out.faces.reserve(self.sizes.len());
-        let mut start = 0;
+        let mut start = 0usize;
         let mut points = Vec::new();
         for (polygon, &size) in self.sizes.iter().enumerate() {
-            let corners = &self.corners[start as usize..][..size as usize];
+            let Some(corners) = self.corners.get(start..).and_then(|c| c.get(..size as usize)) else { break };
             let mut add = |triangle: [u32; 3]| {
-                out.faces.push(triangle.map(|c| corners[c as usize]));
-                out.corners.push(triangle.map(|c| start + c));
-                out.polygons.push(polygon as u32);
+                let of = |c: u32| corners.get(c as usize).copied().unwrap_or(NO_INDEX);
+                // What 32 bits do not count has no coordinates on the texture.
+                let number = |c: u32| u32::try_from(start.saturating_add(c as usize)).unwrap_or(NO_INDEX);
+                out.faces.push(triangle.map(of));
+                out.corners.push(triangle.map(number));
+                out.polygons.push(u32::try_from(polygon).unwrap_or(NO_INDEX));
             };
             match size {
                 0..3 => {
@@ -163,7 +166,9 @@ impl PlyFaces {
                 3 => add([0, 1, 2]),
                 _ => {
                     points.clear();
-                    points.extend(corners.iter().map(|&c| positions[c as usize]));
+                    points.extend(
+                        corners.iter().map(|&c| positions.get(c as usize).copied().unwrap_or(Vec3::NAN)),
+                    );
                     match triangulate_face(&points) {
                         Ok(cut) => {
                             cut.into_iter().for_each(add);
@@ -173,7 +178,7 @@ impl PlyFaces {
                     }
                 }
             }
-            start += size;
+            start = start.saturating_add(size as usize);
         }
         out
     }
@@ -220,9 +225,8 @@ pub(crate) struct PlyTriangles {
 
 /// The place of the list of corners: by its name, or the only list of integers.
 fn corner_list(path: &Path, element: &PlyElement) -> Result<usize> {
-    let mut lists = (0..element.properties.len())
-        .filter(|&p| element.properties[p].is_list() && element.properties[p].kind.is_integer());
-    let only = lists.next().filter(|_| lists.next().is_none());
+    let mut lists = element.properties.iter().enumerate().filter(|(_, p)| p.is_list() && p.kind.is_integer());
+    let only = lists.next().filter(|_| lists.next().is_none()).map(|(place, _)| place);
     element.find_list(&CORNERS).or(only).ok_or_else(|| {
         let names: Vec<&str> = element.properties.iter().map(|p| p.name.as_str()).collect();
         let (name, names) = (&element.name, names.join(", "));

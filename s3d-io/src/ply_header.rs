@@ -3,6 +3,8 @@
 //! PLY has no standard beyond Greg Turk's description of 1994. What is read here is what files hold: both families of type
 //! names (`uchar` and `uint8`), lines that end in LF, CR LF or CR, comments anywhere, any elements in any order.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::quote::quote;
 use crate::{Error, Result};
 use std::path::Path;
@@ -169,13 +171,13 @@ impl PlyHeader {
     /// # Errors
     /// [`Error::Format`] with the line.
     pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
-        let head = &bytes[..bytes.len().min(MAX_HEADER)];
-        let first_end = head.iter().position(|b| matches!(b, b'\n' | b'\r'));
-        let first = head[..first_end.unwrap_or(head.len())].trim_ascii_end();
-        if first != b"ply" {
+        let head = bytes.get(..MAX_HEADER).unwrap_or(bytes);
+        let mut lines = head.split(|b| matches!(b, b'\n' | b'\r'));
+        let first = lines.next().unwrap_or_default();
+        if first.trim_ascii_end() != b"ply" {
             return Err(Error::format(path, "is no PLY file: it does not start with the line \"ply\""));
         }
-        let line_end = match first_end.map(|at| &head[at..]) {
+        let line_end = match head.get(first.len()..) {
             Some([b'\r', rest @ ..]) if rest.first() != Some(&b'\n') => b'\r',
             _ => b'\n',
         };
@@ -188,10 +190,12 @@ impl PlyHeader {
             line_end,
         };
         let mut encoding = None;
-        while let Some(length) = head[header.bytes..].iter().position(|&b| b == line_end) {
-            let line = head[header.bytes..header.bytes + length].trim_ascii();
-            header.bytes += length + 1;
-            header.lines += 1;
+        // The last piece has no end.
+        let pieces = head.split_inclusive(|&b| b == line_end).filter(|piece| piece.ends_with(&[line_end]));
+        for piece in pieces {
+            let line = piece.trim_ascii();
+            header.bytes = header.bytes.saturating_add(piece.len());
+            header.lines = header.lines.saturating_add(1);
             let fail = |message: String| {
                 let shown = quote(line);
                 Error::line(path, header.lines, format!("{message}: {shown}"))
@@ -204,7 +208,7 @@ impl PlyHeader {
                 ("", _) => {}
                 ("ply", []) if header.lines == 1 => {}
                 ("comment" | "obj_info", _) => {
-                    header.comments.push(text[keyword.len()..].trim().to_owned());
+                    header.comments.push(text.strip_prefix(keyword).unwrap_or(&text).trim().to_owned());
                 }
                 ("format", [name, ..]) => {
                     encoding = Some(match *name {

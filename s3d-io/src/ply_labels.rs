@@ -125,10 +125,10 @@ fn column(element: &PlyElement, asked: Option<&str>, known: &[&str]) -> Option<O
         }
         None => element.find_scalar(known),
     };
-    Some(property.map(|property| Column {
-        property,
-        demanded: asked.is_some(),
-        broken: false,
-        column: LabelColumn { name: element.properties[property].name.clone(), values: Vec::new() },
-    }))
+    let column = |property: usize| {
+        let name = element.properties.get(property)?.name.clone();
+        let column = LabelColumn { name, values: Vec::new() };
+        Some(Column { property, demanded: asked.is_some(), broken: false, column })
+    };
+    Some(property.and_then(column))
 }

@@ -41,7 +41,8 @@ pub(crate) fn read(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<Mes
         let known =
             ["vertex", "face", "tristrips"].iter().position(|name| element.name.eq_ignore_ascii_case(name));
         // Of two elements with one name the first counts, as for the header.
-        match known.filter(|&k| !std::mem::replace(&mut done[k], true)) {
+        let is_first = |k: &usize| done.get_mut(*k).is_some_and(|done| !std::mem::replace(done, true));
+        match known.filter(is_first) {
             Some(0) => {
                 let labels = labels.as_mut().filter(|l| belongs(l, LabelElement::Vertex));
                 vertices = PlyVertices::read(path, &mut reader, &element, up, labels)?;
@@ -175,10 +176,10 @@ impl Looks {
             }
             looks.by_comment.push((name, None));
         }
-        for (at, loaded) in read_textures(&wanted).into_iter().enumerate() {
+        for ((at, loaded), image) in read_textures(&wanted).into_iter().enumerate().zip(&wanted) {
             match loaded {
                 Ok(loaded) => {
-                    let name = wanted[at].file_name().unwrap_or_default().to_string_lossy().into_owned();
+                    let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
                     for (slot, _) in
                         looks.by_comment.iter_mut().zip(&places).filter(|(_, place)| **place == at)
                     {
@@ -188,7 +189,7 @@ impl Looks {
                     looks.files.push(Some(loaded.file));
                 }
                 Err(why) => warnings
-                    .push(format!("texture {} {why}; its faces are drawn without it", wanted[at].display())),
+                    .push(format!("texture {} {why}; its faces are drawn without it", image.display())),
             }
         }
         looks.companions = wanted;

@@ -1,5 +1,7 @@
 //! The bytes of a PLY file, read ahead, and the numbers that they spell.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::ply_header::PlyType;
 use std::fs::File;
 use std::io::Read;
@@ -43,24 +45,24 @@ impl Source {
     }
 
     pub(crate) fn bytes(&self) -> &[u8] {
-        &self.buffer[self.start..self.end]
+        self.buffer.get(self.start..self.end).unwrap_or_default()
     }
 
     /// Reads until there are `n` bytes; `false` if the file ends before.
     pub(crate) fn need(&mut self, n: usize) -> std::io::Result<bool> {
-        if self.end - self.start >= n {
+        let there = self.bytes().len();
+        if there >= n {
             return Ok(true);
         }
         self.buffer.copy_within(self.start..self.end, 0);
-        self.end -= self.start;
-        self.start = 0;
+        (self.start, self.end) = (0, there);
         if self.buffer.len() < n {
             self.buffer.resize(n, 0);
         }
         while self.end < n {
-            match self.file.read(&mut self.buffer[self.end..]) {
+            match self.file.read(self.buffer.get_mut(self.end..).unwrap_or_default()) {
                 Ok(0) => return Ok(false),
-                Ok(read) => self.end += read,
+                Ok(read) => self.end = self.end.saturating_add(read),
                 Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
                 Err(e) => return Err(e),
             }
@@ -71,18 +73,24 @@ impl Source {
     /// The next `n` bytes.
     #[inline]
     pub(crate) fn take(&mut self, n: usize) -> std::result::Result<&[u8], Fault> {
-        if self.end - self.start < n && !self.need(n)? {
+        if self.bytes().len() < n && !self.need(n)? {
             return Err(Fault::End);
         }
-        self.start += n;
-        Ok(&self.buffer[self.start - n..self.start])
+        let taken = self.buffer.get(self.start..).and_then(|bytes| bytes.get(..n)).ok_or(Fault::End)?;
+        self.start = self.start.saturating_add(n);
+        Ok(taken)
+    }
+
+    /// Goes on behind the next `n` bytes, which are there.
+    pub(crate) fn pass(&mut self, n: usize) {
+        self.start = self.start.saturating_add(n).min(self.end);
     }
 
     pub(crate) fn skip(&mut self, mut n: u64) -> Outcome {
         while n > 0 {
-            let step = n.min(BUFFER as u64);
-            self.take(step as usize)?;
-            n -= step;
+            let step = usize::try_from(n).map_or(BUFFER, |n| n.min(BUFFER));
+            self.take(step)?;
+            n = n.saturating_sub(step as u64);
         }
         Ok(())
     }
@@ -90,39 +98,40 @@ impl Source {
     /// The next word, and its line.
     pub(crate) fn word(&mut self, line_end: u8, line: &mut u64) -> std::result::Result<&[u8], Fault> {
         loop {
-            let bytes = &self.buffer[self.start..self.end];
-            match bytes.iter().position(|b| !b.is_ascii_whitespace()) {
-                Some(space) => {
-                    *line += bytes[..space].iter().filter(|&&b| b == line_end).count() as u64;
-                    self.start += space;
-                    break;
-                }
-                None => {
-                    *line += bytes.iter().filter(|&&b| b == line_end).count() as u64;
-                    self.start = self.end;
-                    if !self.need(1)? {
-                        return Err(Fault::End);
-                    }
-                }
+            let bytes = self.bytes();
+            let space = bytes.iter().take_while(|b| b.is_ascii_whitespace());
+            let (mut spaces, mut ends) = (0usize, 0u64);
+            for byte in space {
+                spaces = spaces.saturating_add(1);
+                ends = ends.saturating_add((*byte == line_end).into());
+            }
+            let found = spaces < bytes.len();
+            *line = line.saturating_add(ends);
+            self.pass(spaces);
+            if found {
+                break;
+            }
+            if !self.need(1)? {
+                return Err(Fault::End);
             }
         }
-        let mut length = 0;
+        let mut length = 0usize;
         loop {
-            let bytes = &self.buffer[self.start..self.end];
-            if let Some(more) = bytes[length..].iter().position(u8::is_ascii_whitespace) {
-                length += more;
+            let bytes = self.bytes();
+            let unseen = bytes.get(length..).unwrap_or_default();
+            if let Some(more) = unseen.iter().position(u8::is_ascii_whitespace) {
+                length = length.saturating_add(more);
                 break;
             }
             length = bytes.len();
             if length > MAX_WORD {
                 return Err(Fault::Line(*line, format!("a word of more than {MAX_WORD} characters")));
             }
-            if !self.need(length + 1)? {
+            if !self.need(length.saturating_add(1))? {
                 break;
             }
         }
-        self.start += length;
-        Ok(&self.buffer[self.start - length..self.start])
+        self.take(length)
     }
 }
 
@@ -137,13 +146,12 @@ pub(crate) fn column_of(
 ) {
     macro_rules! rows {
         ($type:ty) => {{
-            let rows = bytes
-                .chunks_exact(stride)
-                .map(|row| row[offset..].first_chunk().copied().unwrap_or_default());
+            // What a row does not reach to is not a number.
+            let rows = bytes.chunks_exact(stride).map(|row| row.get(offset..)?.first_chunk());
             if big {
-                out.extend(rows.map(|b| f64::from(<$type>::from_be_bytes(b))));
+                out.extend(rows.map(|b| b.map_or(f64::NAN, |b| f64::from(<$type>::from_be_bytes(*b)))));
             } else {
-                out.extend(rows.map(|b| f64::from(<$type>::from_le_bytes(b))));
+                out.extend(rows.map(|b| b.map_or(f64::NAN, |b| f64::from(<$type>::from_le_bytes(*b)))));
             }
         }};
     }
@@ -193,7 +201,7 @@ const POWERS: [f64; 19] =
 /// The number that a word spells, rounded once as `str::parse` does. C's other spellings of NaN are known.
 pub(crate) fn parse_f64(word: &[u8]) -> Option<f64> {
     let negative = word.first() == Some(&b'-');
-    let written = &word[usize::from(negative)..];
+    let written = word.strip_prefix(b"-").unwrap_or(word);
     if let Some(value) = plain_f64(written) {
         return Some(if negative { -value } else { value });
     }
@@ -211,7 +219,8 @@ fn plain_f64(written: &[u8]) -> Option<f64> {
     let (mut digits, mut point) = (0u64, written.len());
     for (at, &byte) in written.iter().enumerate() {
         match byte {
-            b'0'..=b'9' => digits = digits * 10 + u64::from(byte - b'0'),
+            // 19 digits fit into 64 bits.
+            b'0'..=b'9' => digits = digits.wrapping_mul(10).wrapping_add(u64::from(byte & 15)),
             b'.' if point == written.len() => point = at,
             _ => return None,
         }
@@ -220,7 +229,8 @@ fn plain_f64(written: &[u8]) -> Option<f64> {
     if written.len() == usize::from(point < written.len()) || digits >= 1 << 53 {
         return None;
     }
-    Some(digits as f64 / POWERS[(written.len() - point).saturating_sub(1)])
+    let decimals = written.len().saturating_sub(point).saturating_sub(1);
+    POWERS.get(decimals).map(|power| digits as f64 / power)
 }
 
 #[cfg(test)]

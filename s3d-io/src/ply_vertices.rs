@@ -97,9 +97,9 @@ struct Colors {
 
 impl Colors {
     fn new(element: &PlyElement, places: [usize; 3]) -> Self {
-        let kinds = places.map(|p| element.properties[p].kind);
+        let [r, g, b] = places.map(|p| element.properties.get(p).map(|p| p.kind));
         // Three types that differ are read as numbers.
-        let kind = if kinds == [kinds[0]; 3] { kinds[0] } else { PlyType::F32 };
+        let kind = r.filter(|_| r == g && g == b).unwrap_or(PlyType::F32);
         Self { places, kind, bytes: Vec::new(), numbers: Vec::new() }
     }
 

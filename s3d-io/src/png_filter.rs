@@ -1,5 +1,7 @@
 //! PNG's filters: each byte less what its neighbours let expect. Source: the PNG specification, section 9.
 
+#![expect(clippy::indexing_slicing, reason = "a writer: lines are of the length that was asked for")]
+
 use crate::deflate::{Work, wide};
 
 /// What a byte is expected to be.
@@ -40,7 +42,7 @@ impl Work for Filtering<'_> {
         let first = vec![0; line];
         let mut above = first.as_slice();
         for (here, out) in bytes.chunks_exact(line).zip(out.chunks_exact_mut(line + 1)) {
-            let (number, out) = out.split_first_mut().expect("a line is not empty");
+            let Some((number, out)) = out.split_first_mut() else { continue };
             *number = match filter {
                 Filter::None => 0,
                 Filter::Up => 2,

@@ -1,5 +1,7 @@
 //! Some of the points of a large cloud.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::{AtomicFile, Error, Place, Result};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::Vec3;
@@ -14,7 +16,7 @@ const MAX_HEADER: u64 = 65_536;
 struct Header {
     bytes: u64,
     count: u64,
-    stride: u64,
+    stride: usize,
     /// Offsets of x, y, z (float) and of red, green, blue (uchar).
     position: [usize; 3],
     color: Option<[usize; 3]>,
@@ -35,7 +37,7 @@ pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
     let size = file.metadata().map_err(io)?.len();
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let header = read_header(path, &mut reader)?;
-    let needed = header.count.checked_mul(header.stride).and_then(|b| b.checked_add(header.bytes));
+    let needed = header.count.checked_mul(header.stride as u64).and_then(|b| b.checked_add(header.bytes));
     if needed.is_none_or(|needed| needed > size) {
         return Err(Error::format(
             path,
@@ -49,23 +51,34 @@ pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
 
     let chosen = header.count.min(most as u64);
     let mut cloud = PointCloud::default();
-    let mut point = vec![0; header.stride as usize];
-    let mut at = 0;
+    let mut point = vec![0; header.stride];
+    let mut at = 0u64;
     for k in 0..chosen {
-        // The middle of the k-th of as many equal parts; u128, as counts may be anything.
-        let i = ((2 * u128::from(k) + 1) * u128::from(header.count) / (2 * u128::from(chosen))) as u64;
-        reader.seek_relative(((i - at) * header.stride) as i64).map_err(io)?;
+        // The middle of the k-th of as many equal parts.
+        let i = middle_of_part(k, chosen, header.count);
+        let skipped = i.saturating_sub(at).saturating_mul(header.stride as u64);
+        reader.seek_relative(skipped.cast_signed()).map_err(io)?;
         reader.read_exact(&mut point).map_err(io)?;
-        at = i + 1;
-        let position =
-            header.position.map(|o| f32::from_le_bytes([point[o], point[o + 1], point[o + 2], point[o + 3]]));
+        at = i.saturating_add(1);
+        let float = |o: usize| point.get(o..).and_then(<[u8]>::first_chunk).map(|b| f32::from_le_bytes(*b));
+        let position = header.position.map(|o| float(o).unwrap_or(f32::NAN));
         if !position.iter().all(|c| c.is_finite()) {
             return Err(Error::format(path, format!("point {i} (counted from 0) is at {position:?}")));
         }
         cloud.positions.push(Vec3::from_array(position));
-        cloud.colors.push(header.color.map_or([0; 3], |offsets| offsets.map(|o| point[o])));
+        let byte = |o: usize| point.get(o).copied().unwrap_or(0);
+        cloud.colors.push(header.color.map_or([0; 3], |offsets| offsets.map(byte)));
     }
     Ok(cloud)
+}
+
+/// The number of the element in the middle of the `k`th of `parts` parts of `count`, which are as many or more.
+fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
+    // u128, as counts may be anything.
+    let [k, parts, count] = [k, parts, count].map(u128::from);
+    let middle =
+        k.saturating_mul(2).saturating_add(1).saturating_mul(count).checked_div(parts.saturating_mul(2));
+    middle.and_then(|i| u64::try_from(i).ok()).unwrap_or(0)
 }
 
 /// Writes a cloud as a binary little-endian PLY file of positions (float) and colours (uchar, black if it has none), as
@@ -109,16 +122,16 @@ pub fn write_colored_points(path: &Path, cloud: &PointCloud) -> Result<u64> {
 }
 
 fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
-    let mut bytes = 0;
-    let (mut number, mut binary, mut in_vertex) = (0, false, false);
-    let (mut count, mut stride) = (None, 0u64);
+    let mut bytes = 0u64;
+    let (mut number, mut binary, mut in_vertex) = (0u64, false, false);
+    let (mut count, mut stride) = (None, 0usize);
     let mut columns: Vec<(String, String, usize)> = Vec::new();
     loop {
         let mut line = Vec::new();
         let read =
             reader.take(MAX_HEADER).read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
-        bytes += read as u64;
-        number += 1;
+        bytes = bytes.saturating_add(read as u64);
+        number = number.saturating_add(1);
         let text = String::from_utf8_lossy(&line);
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         let wrong =
@@ -153,8 +166,8 @@ fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
                     "double" | "float64" => 8,
                     other => return Err(wrong(format!("\"{other}\" is no type of a property"))),
                 };
-                columns.push((name.to_owned(), kind.to_owned(), stride as usize));
-                stride += size;
+                columns.push((name.to_owned(), kind.to_owned(), stride));
+                stride = stride.saturating_add(size);
             }
             ["end_header"] => break,
             _ => {}

@@ -124,6 +124,10 @@ impl PoseFile {
     }
 
     /// The file's bytes: JSON on one line, keys in the order of the fields, numbers that come back exactly.
+    #[expect(
+        clippy::expect_used,
+        reason = "only maps with other keys than strings, and own serializers, can fail"
+    )]
     pub fn to_json(&self) -> Vec<u8> {
         let mut json = serde_json::to_vec(self).expect("numbers and strings can be written as JSON");
         json.push(b'\n');

@@ -1,5 +1,7 @@
 //! A colour for each instance, for looking at.
 
+#![expect(clippy::indexing_slicing, reason = "places are taken modulo the length")]
+
 /// The colour of label `label_index` in `semantic_pretty` images and in `semantic.mtl`: never black, mid grey for the null
 /// label (index 0), and all different for any of the first 20,000 labels.
 ///

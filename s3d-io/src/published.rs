@@ -145,7 +145,7 @@ impl PublishedArea {
 
         let parsed: Vec<Option<Label>> =
             semantic.materials().iter().map(|m| parse_name(&m.name).ok().flatten()).collect();
-        let other = |f: u32| semantic.material_of(f).and_then(|m| parsed[m as usize]);
+        let other = |f: u32| semantic.material_of(f).and_then(|m| *parsed.get(m as usize)?);
         let mut labels = Vec::new();
         let mut places: HashMap<Label, u32> = HashMap::new();
         let mut place = |label: Option<Label>| {

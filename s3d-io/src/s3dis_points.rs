@@ -110,9 +110,10 @@ impl PointReader {
         assert!(out.colors.len() == out.len() && out.faces.is_empty(), "a cloud of other columns");
         let mut n = 0;
         while n < max_points {
-            let unread = &self.block[self.start..self.end];
-            let (line, used) = match unread.iter().position(|&b| b == b'\n') {
-                Some(length) => (&unread[..length], length + 1),
+            let unread = self.block.get(self.start..self.end).unwrap_or_default();
+            let end = unread.iter().position(|&b| b == b'\n');
+            let (line, used) = match end.and_then(|length| unread.split_at_checked(length)) {
+                Some((line, _)) => (line, line.len() + 1),
                 None if !self.at_end && unread.len() <= LONGEST_LINE => {
                     self.refill()?;
                     continue;
@@ -151,7 +152,7 @@ impl PointReader {
         self.end -= self.start;
         self.start = 0;
         loop {
-            match self.file.read(&mut self.block[self.end..]) {
+            match self.file.read(self.block.get_mut(self.end..).unwrap_or_default()) {
                 Ok(0) => self.at_end = true,
                 Ok(n) => self.end += n,
                 Err(e) if e.kind() == ErrorKind::Interrupted => continue,

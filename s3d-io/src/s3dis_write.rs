@@ -1,5 +1,7 @@
 //! Writing the S3DIS tree: text files of annotated points. Source: formats.md, "S3DIS tree".
 
+#![expect(clippy::indexing_slicing, reason = "a writer: its tables are its own")]
+
 use crate::{AtomicFile, Error, Result, create_dir, write_whole};
 use s3d_geom::glam::Vec3;
 use std::path::{Path, PathBuf};

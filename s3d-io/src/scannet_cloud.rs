@@ -9,7 +9,7 @@ use crate::ply_batch::PlyBatch;
 use crate::ply_cloud::{color_of, open_vertices};
 use crate::quote::quote;
 use crate::{Error, Result};
-use s3d_geom::glam::dvec3;
+use s3d_geom::glam::DVec3;
 use s3d_label::Class;
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -286,8 +286,11 @@ impl Cloud for ScannetCloud {
         while reader.read_batch(&mut batch)? {
             for row in 0..batch.len() {
                 let vertex = batch.first_row() + row as u64;
-                let Some(object) = object_of.get(&segments[vertex as usize]) else { continue };
-                let group = &aggregation.seg_groups[*object];
+                let segment = usize::try_from(vertex).ok().and_then(|vertex| segments.get(vertex));
+                let object = segment.and_then(|segment| object_of.get(segment));
+                let Some(group) = object.and_then(|object| aggregation.seg_groups.get(*object)) else {
+                    continue;
+                };
                 let color = match color_of(&element, &batch, rgb, row, colors) {
                     Color::Rgb(rgb) => rgb,
                     Color::Wider => return Ok(false),
@@ -296,8 +299,9 @@ impl Cloud for ScannetCloud {
                         continue;
                     }
                 };
+                let number = |p: usize| batch.scalars(p).get(row).copied().unwrap_or(f64::NAN);
                 let point = Row {
-                    position: dvec3(batch.scalars(x)[row], batch.scalars(y)[row], batch.scalars(z)[row]),
+                    position: DVec3::from_array([x, y, z].map(number)),
                     color,
                     class: Value::Name(group.label.trim()),
                     instance: group.object().map_or(Value::None, Value::Whole),

@@ -124,7 +124,7 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
         match e.span() {
             // An error at the very start is about the file as a whole: a table that is missing.
             Some(span) if span.end > 0 => {
-                let line = text[..span.start.min(text.len())].matches('\n').count() + 1;
+                let line = text.bytes().take(span.start).filter(|b| *b == b'\n').count() + 1;
                 Error::line(path, line as u64, message)
             }
             _ => Error::format(path, message),

@@ -1,7 +1,7 @@
 //! The table `[cameras]` of a `scene.toml`.
 
 use crate::mesh_file::UpAxis;
-use s3d_geom::glam::{DAffine3, DMat3, DVec3};
+use s3d_geom::glam::{DAffine3, DMat3, DMat4, DVec3};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -60,8 +60,9 @@ impl CamerasTable {
 /// The rows of a 4 × 4 matrix as what it does: turn, shift and scale, nothing else.
 pub(crate) fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, String> {
     const FORM: &str = "transform is no rotation with a scale and a shift: its rows are [x, y, z, shift], the last [0, 0, 0, 1]";
-    let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
-    let m = DMat3::from_cols(column(0), column(1), column(2));
+
+    let columns = DMat4::from_cols_array_2d(&rows).transpose();
+    let m = DMat3::from_mat4(columns);
     let scale = libm::cbrt(m.determinant());
     let is_finite = rows.iter().flatten().all(|v| v.is_finite());
     let is_similar = (m.transpose() * m)
@@ -69,5 +70,5 @@ pub(crate) fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, S
     if !is_finite || rows[3] != [0.0, 0.0, 0.0, 1.0] || scale <= 0.0 || !is_similar {
         return Err(FORM.into());
     }
-    Ok(DAffine3 { matrix3: m, translation: column(3) })
+    Ok(DAffine3 { matrix3: m, translation: columns.w_axis.truncate() })
 }

@@ -1,5 +1,7 @@
 //! Texture images: PNG and JPEG files to 8-bit colour.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use crate::{Error, Result};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
@@ -43,22 +45,23 @@ pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTextur
     let undecodable = |e: image::ImageError| format!("cannot be decoded: {e}");
     let (width, height) =
         ImageReader::with_format(Cursor::new(&bytes), format).into_dimensions().map_err(undecodable)?;
-    let pixels = u64::from(width) * u64::from(height);
+    let pixels = u64::from(width).saturating_mul(u64::from(height));
     if pixels == 0 || width > MAX_SIDE || height > MAX_SIDE {
         return Err(format!("is {width} × {height} pixels large; a side has 1 to {MAX_SIDE}"));
     }
-    if pixels > bytes.len() as u64 * MAX_PIXELS_PER_BYTE {
+    if pixels > (bytes.len() as u64).saturating_mul(MAX_PIXELS_PER_BYTE) {
         return Err(format!("claims {width} × {height} pixels in {} bytes", bytes.len()));
     }
     let mut reader = ImageReader::with_format(Cursor::new(&bytes), format);
     // The size is plausible by now; the library's own limit would refuse textures of 16,384² pixels.
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(pixels * 16 + (64 << 20));
+    limits.max_alloc = Some(pixels.saturating_mul(16).saturating_add(64 << 20));
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(undecodable)?;
     let rgb = if decoder.color_type() == ColorType::Rgb8 {
         // Most are: they are decoded to where they stay.
-        let mut rgb = vec![[0; 3]; pixels as usize];
+        let count = usize::try_from(pixels).map_err(|_| format!("has {pixels} pixels, too many"))?;
+        let mut rgb = vec![[0; 3]; count];
         decoder.read_image(rgb.as_flattened_mut()).map_err(undecodable)?;
         rgb
     } else {

@@ -29,6 +29,7 @@ impl InstanceSummary {
         id: LabelId,
         points: impl IntoIterator<Item = Vec3>,
     ) -> Option<Self> {
+        #[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
         let label = table.get(id).unwrap_or_else(|| panic!("label {id} of a table of {}", table.len()));
         let mut count = 0;
         let bbox = Aabb::from_points(points.into_iter().inspect(|_| count += 1));
@@ -48,11 +49,9 @@ impl InstanceSummary {
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         assert_eq!(self.label, other.label, "two different instances");
-        let side = |i: usize| {
-            let (a, b) = (self.bbox[i], other.bbox[i]);
-            if i < 3 { a.min(b) } else { a.max(b) }
-        };
-        Self { points: self.points + other.points, bbox: std::array::from_fn(side), ..self }
+        let ([a, b, c, d, e, f], [x, y, z, u, v, w]) = (self.bbox, other.bbox);
+        let bbox = [a.min(x), b.min(y), c.min(z), d.max(u), e.max(v), f.max(w)];
+        Self { points: self.points + other.points, bbox, ..self }
     }
 }
 

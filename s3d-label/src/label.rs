@@ -156,9 +156,13 @@ impl Digits {
     fn new(mut number: u32, last: Option<u8>) -> Self {
         let mut bytes = [0; 11];
         let mut start = bytes.len();
+        let mut places = bytes.iter_mut().rev();
+        // Ten digits and the last byte: there is a place for each.
         let mut put = |byte| {
-            start -= 1;
-            bytes[start] = byte;
+            if let Some(place) = places.next() {
+                *place = byte;
+                start -= 1;
+            }
         };
         if let Some(byte) = last {
             put(byte);
@@ -174,7 +178,7 @@ impl Digits {
     }
 
     fn as_bytes(&self) -> &[u8] {
-        &self.bytes[self.start..]
+        self.bytes.get(self.start..).unwrap_or_default()
     }
 }
 

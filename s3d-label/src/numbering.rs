@@ -50,14 +50,14 @@ pub fn number_area(
 ) -> Result<Vec<NumberedInstance>, NumberingError> {
     let mut instances: Vec<(Room, Class, u32)> = instances.into_iter().collect();
     instances.sort_unstable();
-    if let Some(pair) = instances.windows(2).find(|pair| pair[0] == pair[1]) {
-        let (room, class, number_in_room) = pair[0];
+    if let Some(&[(room, class, number_in_room), _]) = instances.array_windows().find(|[a, b]| a == b) {
         return Err(NumberingError::Duplicate { area, room, class, number_in_room });
     }
-    let mut last = [0; Class::ALL.len()];
+    let mut last = [0u32; Class::ALL.len()];
     Ok(instances
         .into_iter()
         .map(|(room, class, number_in_room)| {
+            #[expect(clippy::indexing_slicing, reason = "there is a number for each class")]
             let instance = &mut last[class.index()];
             *instance += 1;
             let label = Label { class, instance: *instance, room, area };

@@ -65,6 +65,8 @@ impl VoteReport {
     ///
     /// # Panics
     /// If there are votes for a label that is not in the table.
+    #[expect(clippy::indexing_slicing, reason = "there is a row for each class")]
+    #[expect(clippy::expect_used, reason = "a caller's mistake, which was refused above: see Panics")]
     pub fn new(votes: &Votes, table: &LabelTable) -> Self {
         let largest = votes.largest_label();
         assert!(largest.index() < table.len(), "votes for label {largest} of a table of {}", table.len());

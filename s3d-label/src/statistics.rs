@@ -18,7 +18,9 @@ impl ClassCounts {
     pub fn from_table(table: &LabelTable) -> Self {
         let mut areas: BTreeMap<u32, [u64; 13]> = BTreeMap::new();
         for (_, label) in table.iter() {
-            areas.entry(label.area).or_default()[label.class.index()] += 1;
+            #[expect(clippy::indexing_slicing, reason = "there is a column for each class")]
+            let count = &mut areas.entry(label.area).or_default()[label.class.index()];
+            *count += 1;
         }
         Self { areas: areas.into_iter().collect() }
     }
@@ -49,7 +51,9 @@ impl RoomCounts {
         let rooms: BTreeSet<(u32, Room)> = table.iter().map(|(_, label)| (label.area, label.room)).collect();
         let mut areas: BTreeMap<u32, [u64; 11]> = BTreeMap::new();
         for (area, room) in rooms {
-            areas.entry(area).or_default()[room.room_type.index()] += 1;
+            #[expect(clippy::indexing_slicing, reason = "there is a column for each type")]
+            let count = &mut areas.entry(area).or_default()[room.room_type.index()];
+            *count += 1;
         }
         Self { areas: areas.into_iter().collect() }
     }
@@ -66,11 +70,14 @@ impl RoomCounts {
 }
 
 fn of<const N: usize>(areas: &[(u32, [u64; N])], area: u32, column: usize) -> u64 {
-    areas.iter().find(|(a, _)| *a == area).map_or(0, |(_, counts)| counts[column])
+    areas.iter().find(|(a, _)| *a == area).and_then(|(_, counts)| counts.get(column)).copied().unwrap_or(0)
 }
 
 fn total<const N: usize>(areas: &[(u32, [u64; N])]) -> [u64; N] {
-    areas.iter().fold([0; N], |sum, (_, counts)| std::array::from_fn(|i| sum[i] + counts[i]))
+    areas.iter().fold([0; N], |mut sum, (_, counts)| {
+        sum.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
+        sum
+    })
 }
 
 #[cfg(test)]

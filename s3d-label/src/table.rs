@@ -118,9 +118,9 @@ impl LabelTable {
             return Err(TableError::Zero { label });
         }
         labels.sort_unstable();
-        if let Some(i) = labels.windows(2).position(|pair| pair[0].cmp_key(&pair[1]).is_eq()) {
-            let (other, label) = (labels[i], labels[i + 1]);
-            return Err(TableError::Duplicate { index: i + 2, label, first: i + 1, other });
+        let mut pairs = (1..).zip(labels.array_windows());
+        if let Some((first, &[other, label])) = pairs.find(|(_, [a, b])| a.cmp_key(b).is_eq()) {
+            return Err(TableError::Duplicate { index: first + 1, label, first, other });
         }
         Self { labels }.checked_count()
     }
@@ -134,9 +134,9 @@ impl LabelTable {
         if names.first().is_none_or(|name| name != NULL_NAME) {
             return Err(TableError::NoNull { found: names.first().cloned().unwrap_or_default() });
         }
-        let count = names.iter().rposition(|name| name != NULL_NAME).map_or(1, |last| last + 1);
-        let mut labels: Vec<Label> = Vec::with_capacity(count - 1);
-        for (index, name) in names[..count].iter().enumerate().skip(1) {
+        let last = names.iter().rposition(|name| name != NULL_NAME).unwrap_or(0);
+        let mut labels: Vec<Label> = Vec::with_capacity(last);
+        for (index, name) in names.iter().enumerate().take(last + 1).skip(1) {
             let label = parse_name(name)
                 .map_err(|source| TableError::Name { index, source })?
                 .ok_or(TableError::Null { index })?;
@@ -144,9 +144,10 @@ impl LabelTable {
                 && before.cmp_key(&label) != Ordering::Less
             {
                 // The labels so far are sorted: a duplicate of any of them is found by bisection.
-                return Err(match labels.binary_search_by(|l| l.cmp_key(&label)) {
-                    Ok(i) => TableError::Duplicate { index, label, first: i + 1, other: labels[i] },
-                    Err(_) => TableError::Order { index, label, before },
+                let same = labels.binary_search_by(|l| l.cmp_key(&label)).ok();
+                return Err(match same.and_then(|i| Some((i, *labels.get(i)?))) {
+                    Some((i, other)) => TableError::Duplicate { index, label, first: i + 1, other },
+                    None => TableError::Order { index, label, before },
                 });
             }
             labels.push(label);

@@ -1,5 +1,11 @@
 //! Votes of annotated points for the labels of faces.
 
+#![expect(
+    clippy::indexing_slicing,
+    clippy::expect_used,
+    reason = "every point of a scan votes here: faces are a caller's (see Panics), entries are those that heads point to"
+)]
+
 use crate::LabelId;
 
 /// In place of an index into the entries: the list ends here.

@@ -32,6 +32,11 @@
 //! Depth is computed at the end from the `f64` functions of the face that is seen, and rounded once: within one step of
 //! the last place of `f32` of what a single ray gives.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "slices are cut to the length of the array: there is nothing left of the check"
+)]
+
 use crate::NO_FACE;
 use crate::registers::{LANES, Line, Registers};
 

@@ -32,6 +32,12 @@
 //! # Ok::<(), s3d_geom::MeshError>(())
 //! ```
 
+// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what TriMesh::new and Camera checked.
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
+)]
+
 mod anchor;
 #[cfg(target_arch = "x86_64")]
 mod avx2;

@@ -10,6 +10,12 @@
 //! differences of tangents. Near a plane's zero all terms are as small as the chunk, so the error of `f32` is as in a
 //! perspective view: a few parts in 10⁵ of a pixel.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::unreachable,
+    reason = "slices are cut to the length of the array; a camera has rays of its own kind"
+)]
+
 use crate::canvas::{
     Canvas, Chunk, Cover, Drawn, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED,
 };

@@ -6,6 +6,12 @@
 //! from two corners at least [`SHORT`] apart is good to 1e-8 over a chunk. Faces that reach farther out, behind the
 //! camera, or have shorter edges, get their planes in space instead.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::unreachable,
+    reason = "slices are cut to the length of the array; a camera has rays of its own kind"
+)]
+
 use crate::canvas::{
     Canvas, Chunk, Cover, Drawn, EDGE_ERROR, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED,
 };

@@ -27,6 +27,12 @@
 //! assert_eq!(stays.iter().filter(|&&stays| stays).count(), 52);
 //! ```
 
+// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what they ordered themselves.
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
+)]
+
 mod entropy;
 mod fold;
 mod poisson_disk;

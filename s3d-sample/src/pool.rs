@@ -78,6 +78,7 @@ impl PoolItem<'_> {
 ///
 /// # Panics
 /// If a view is there twice, and as [`select`] does.
+#[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
 pub fn select_pooled(items: &[PoolItem<'_>], pool: Pool, options: &Selection, seed: u64) -> Vec<bool> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     order.sort_unstable_by(|&a, &b| items[a].name().cmp(&items[b].name()));

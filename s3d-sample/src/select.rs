@@ -98,6 +98,7 @@ const WEIGHT_SIGMA: f64 = 0.5;
 ///
 /// # Panics
 /// If a score is negative or not finite, or [`Selection::check`] fails.
+#[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
 pub fn select(scores: &[f64], options: &Selection, seed: u64) -> Vec<bool> {
     if let Err(error) = options.check() {
         panic!("{error}");

@@ -91,6 +91,7 @@ pub struct View {
 ///
 /// # Panics
 /// If [`ViewDistribution::check`] fails.
+#[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
 pub fn draw_view(dist: &ViewDistribution, seed: u64, location: &str, number: u32) -> View {
     if let Err(error) = dist.check() {
         panic!("{error}");

@@ -12,6 +12,12 @@
 //!
 //! Everything is done with integers and depends on the data alone: the same bytes on every machine.
 
+#![expect(
+    clippy::indexing_slicing,
+    clippy::expect_used,
+    reason = "a writer, on the way of every byte of an image: places are those that its own search found"
+)]
+
 mod bits;
 mod block;
 mod finder;

@@ -1,5 +1,7 @@
 //! Arrays in chunks: a B-tree of pieces, each perhaps shuffled and deflated.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use super::UNDEFINED;
 use super::read::{Cursor, Dataset, Filter, Hdf5File};
 use crate::Result;
@@ -63,9 +65,10 @@ pub(super) fn read(
     let mut data = vec![0; size.ok_or_else(damaged)?];
     for piece in &chunks {
         let stored = file.bytes(piece.address, u64::from(piece.stored))?;
-        let piece_data = unfilter(stored, piece.skipped, &dataset.filters, element, chunk_bytes as usize)
+        let size = usize::try_from(chunk_bytes).ok();
+        size.and_then(|size| unfilter(stored, piece.skipped, &dataset.filters, element, size))
+            .and_then(|unpacked| place(&mut data, &dataset.dims, &unpacked, chunk, &piece.offset, element))
             .ok_or_else(damaged)?;
-        place(&mut data, &dataset.dims, &piece_data, chunk, &piece.offset, element);
     }
     Ok(data)
 }
@@ -73,21 +76,26 @@ pub(super) fn read(
 /// The chunks under a B-tree.
 fn list(file: &Hdf5File, tree: u64, axes: usize) -> Result<Vec<Chunk>> {
     let damaged = || file.fault("the list of an array's chunks is damaged");
-    let (key, mut chunks) = (8 + 8 * (axes + 1), Vec::new());
+    // A key: bytes and filters, an offset along each axis and in the element. A node has one more than children.
+    let key_bytes = axes.checked_add(2).and_then(|n| n.checked_mul(8)).ok_or_else(damaged)?;
+    let entry_bytes = key_bytes.checked_add(8).ok_or_else(damaged)?;
+    let mut chunks = Vec::new();
     let mut nodes = if tree == UNDEFINED { Vec::new() } else { vec![(tree, MAX_LEVELS)] };
     let mut left = file.len() / 8;
     while let Some((address, below)) = nodes.pop() {
-        let head = file.bytes(address, 24)?;
-        let (level, count) = (head[5], usize::from(u16::from_le_bytes([head[6], head[7]])));
-        left = left.checked_sub(1 + count as u64).ok_or_else(damaged)?;
+        let head: [u8; 24] = file.array(address)?;
+        let (level, count) = (head[5], u16::from_le_bytes([head[6], head[7]]));
+        left = left.checked_sub(1).and_then(|n| n.checked_sub(count.into())).ok_or_else(damaged)?;
         if !head.starts_with(b"TREE\x01") || level >= below {
             return Err(damaged());
         }
-        let body = file.bytes(address + 24, ((key + 8) * count) as u64)?;
-        for entry in body.chunks_exact(key + 8) {
+        let body_bytes = (entry_bytes as u64).checked_mul(count.into()).ok_or_else(damaged)?;
+        let body = file.bytes(address.checked_add(24).ok_or_else(damaged)?, body_bytes)?;
+        for entry in body.chunks_exact(entry_bytes) {
             let mut entry = Cursor::new(entry);
             let mut parse = || {
-                let (stored, skipped) = (entry.number(4)? as u32, entry.number(4)? as u32);
+                let (stored, skipped) =
+                    (u32::from_le_bytes(entry.array()?), u32::from_le_bytes(entry.array()?));
                 let offset = (0..axes).map(|_| entry.number(8)).collect::<Option<Vec<u64>>>()?;
                 entry.number(8)?;
                 Some(Chunk { offset, stored, skipped, address: entry.number(8)? })
@@ -119,12 +127,16 @@ fn unfilter(
             // Its checksum is left to zlib's, or to nobody.
             Filter::Fletcher32 => data.truncate(data.len().checked_sub(4)?),
             // A little more than the chunk: there may be a checksum.
-            Filter::Deflate => data = fdeflate::decompress_to_vec_bounded(&data, size + 4).ok()?,
+            Filter::Deflate => {
+                data = fdeflate::decompress_to_vec_bounded(&data, size.checked_add(4)?).ok()?;
+            }
             Filter::Shuffle => {
-                let n = data.len() / element;
+                // All first bytes of the elements, then all second ones…; what is no whole element is behind.
+                let n = data.len().checked_div(element)?;
                 let mut whole = data.clone();
-                for (byte, plane) in data[..n * element].chunks_exact(n.max(1)).enumerate() {
-                    plane.iter().enumerate().for_each(|(i, v)| whole[i * element + byte] = *v);
+                for (byte, plane) in data.chunks_exact(n.max(1)).take(element).enumerate() {
+                    let places = whole.iter_mut().skip(byte).step_by(element);
+                    places.zip(plane).for_each(|(place, v)| *place = *v);
                 }
                 data = whole;
             }
@@ -134,25 +146,45 @@ fn unfilter(
     (data.len() == size).then_some(data)
 }
 
-/// Copies a chunk to its place; what lies beyond the array is filling.
-fn place(data: &mut [u8], dims: &[u64], chunk: &[u8], extents: &[u64], offset: &[u64], element: usize) {
+/// Copies a chunk to its place; what lies beyond the array is filling. `None` if the chunk or the array is smaller than its
+/// extents say.
+fn place(
+    data: &mut [u8],
+    dims: &[u64],
+    chunk: &[u8],
+    extents: &[u64],
+    offset: &[u64],
+    element: usize,
+) -> Option<()> {
     if offset.iter().zip(dims).any(|(o, d)| o >= d) {
-        return;
+        return Some(());
     }
-    let Some(last) = dims.len().checked_sub(1) else { return data.copy_from_slice(&chunk[..data.len()]) };
     // How many of the chunk's elements are in the array, along each axis.
-    let inside: Vec<u64> = (0..dims.len()).map(|axis| extents[axis].min(dims[axis] - offset[axis])).collect();
-    let run = inside[last] as usize * element;
-    let mut at = vec![0u64; dims.len()];
+    let within = |((e, d), o): ((&u64, &u64), &u64)| Some(*e.min(&d.checked_sub(*o)?));
+    let inside = extents.iter().zip(dims).zip(offset).map(within).collect::<Option<Vec<u64>>>()?;
+    // Elements of the last axis lie in a row.
+    let run = usize::try_from(inside.last().copied().unwrap_or(1)).ok()?.checked_mul(element)?;
+    let (mut at, first) = (vec![0u64; dims.len()], vec![0; dims.len()]);
     loop {
         let index = |start: &[u64], dims: &[u64]| {
-            at.iter().zip(start).zip(dims).fold(0u64, |n, ((a, s), d)| n * d + a + s) as usize * element
+            let mut axes = at.iter().zip(start).zip(dims);
+            let index =
+                axes.try_fold(0u64, |n, ((a, s), d)| n.checked_mul(*d)?.checked_add(*a)?.checked_add(*s))?;
+            usize::try_from(index).ok()?.checked_mul(element)
         };
-        let (to, from) = (index(offset, dims), index(&vec![0; dims.len()], extents));
-        data[to..to + run].copy_from_slice(&chunk[from..from + run]);
-        // The next row: all axes but the last count up.
-        let Some(axis) = (0..last).rev().find(|&axis| at[axis] + 1 < inside[axis]) else { return };
-        at[axis] += 1;
-        at[axis + 1..].fill(0);
+        let (to, from) = (index(offset, dims)?, index(&first, extents)?);
+        let row = chunk.get(from..)?.get(..run)?;
+        data.get_mut(to..)?.get_mut(..run)?.copy_from_slice(row);
+        // The next row: all axes but the last count up, and begin again at their ends.
+        let mut axes = at.iter_mut().zip(&inside);
+        axes.next_back();
+        let counted = axes.rev().any(|(at, inside)| {
+            let next = at.checked_add(1).filter(|next| next < inside);
+            *at = next.unwrap_or(0);
+            next.is_some()
+        });
+        if !counted {
+            return Some(());
+        }
     }
 }

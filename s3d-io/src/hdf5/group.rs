@@ -1,5 +1,7 @@
 //! The members of groups.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use super::header::Header;
 use super::message::until_zero;
 use super::read::{Cursor, Hdf5File};
@@ -35,10 +37,11 @@ pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(St
     let mut left = file.len() / 8;
     while let Some((address, below)) = nodes.pop() {
         left = left.checked_sub(1).ok_or_else(damaged)?;
-        let head = file.bytes(address, 8)?;
+        let head: [u8; 8] = file.array(address)?;
+        let count = u64::from(u16::from_le_bytes([head[6], head[7]]));
+        let behind = |bytes: u64| address.checked_add(bytes).ok_or_else(damaged);
         if head.starts_with(b"SNOD") {
-            let count = u64::from(u16::from_le_bytes([head[6], head[7]]));
-            let entries = file.bytes(address + 8, 40 * count)?;
+            let entries = file.bytes(behind(8)?, count.saturating_mul(40))?;
             for entry in entries.chunks_exact(40) {
                 let mut entry = Cursor::new(entry);
                 let (Some(name), Some(object)) = (entry.number(8), entry.number(8)) else {
@@ -54,11 +57,11 @@ pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(St
         if !head.starts_with(b"TREE\0") || level >= below {
             return Err(damaged());
         }
-        let count = usize::from(u16::from_le_bytes([head[6], head[7]]));
-        let body = file.bytes(address + 24, 8 * (2 * count as u64 + 1))?;
-        let children = body[8..].chunks_exact(16).map(|pair| Cursor::new(pair).number(8).unwrap_or(0));
+        // A name, a child, a name, a child… and a name.
+        let body = file.bytes(behind(32)?, count.saturating_mul(16))?;
+        let children: Vec<[u8; 8]> = body.as_chunks().0.iter().step_by(2).copied().collect();
         // The last first, as they are taken from the end.
-        nodes.extend(children.rev().map(|child| (child, level)));
+        nodes.extend(children.into_iter().rev().map(|child| (u64::from_le_bytes(child), level)));
     }
     Ok(Some(found))
 }

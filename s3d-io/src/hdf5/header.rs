@@ -1,5 +1,7 @@
 //! Object headers: the messages that make an object a group or an array.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use super::message::{self, AttributeValue};
 use super::read::{Cursor, Dataset, Filter, Hdf5File, Kind, Layout};
 use crate::Result;
@@ -7,7 +9,7 @@ use crate::Result;
 /// Blocks that a header may be continued in.
 const MAX_BLOCKS: usize = 256;
 /// Bytes that the messages of a header may have: attributes and compact data end at 64 KiB each.
-const MAX_BYTES: usize = 1 << 24;
+const MAX_BYTES: u64 = 1 << 24;
 
 /// What the header of an object says.
 #[derive(Debug, Default)]
@@ -45,24 +47,26 @@ impl Header {
             let times = if flags & 0x20 != 0 { 16 } else { 0 };
             let phases = if flags & 0x10 != 0 { 4 } else { 0 };
             let width = 1usize << (flags & 3);
-            cursor.take(6 + times + phases).ok_or_else(damaged)?;
+            for bytes in [6, times, phases] {
+                cursor.take(bytes).ok_or_else(damaged)?;
+            }
             let size = cursor.number(width).ok_or_else(damaged)?;
-            blocks.push((address + (6 + times + phases + width) as u64, size));
+            let before = head.len().checked_sub(cursor.rest().len()).ok_or_else(damaged)?;
+            blocks.push((address.checked_add(before as u64).ok_or_else(damaged)?, size));
         } else {
             if cursor.byte() != Some(1) {
                 return Err(damaged());
             }
             let size = cursor.take(7).and_then(|_| cursor.number(4)).ok_or_else(damaged)?;
-            blocks.push((address + 16, size));
+            blocks.push((address.checked_add(16).ok_or_else(damaged)?, size));
         }
-        let (mut read, mut total) = (0, 0);
+        let (mut blocks_left, mut bytes_left) = (MAX_BLOCKS, MAX_BYTES);
         while let Some((at, size)) = blocks.pop() {
-            (read, total) = (read + 1, total + size.min(MAX_BYTES as u64) as usize);
-            if read > MAX_BLOCKS || total > MAX_BYTES {
-                return Err(damaged());
-            }
+            let is_first = blocks_left == MAX_BLOCKS;
+            blocks_left = blocks_left.checked_sub(1).ok_or_else(damaged)?;
+            bytes_left = bytes_left.checked_sub(size).ok_or_else(damaged)?;
             let mut bytes = &file.bytes(at, size)?[..];
-            if new && read > 1 {
+            if new && !is_first {
                 // A signature before the messages and a checksum behind them.
                 bytes = bytes
                     .strip_prefix(b"OCHK")
@@ -79,18 +83,18 @@ impl Header {
             };
             while cursor.rest().len() >= prefix {
                 let (kind, size, flags) = if new {
-                    let (kind, size, flags) = (cursor.number(1), cursor.number(2), cursor.byte());
-                    cursor.take(prefix - 4);
+                    let (kind, size, flags) = (cursor.number(1), cursor.size(2), cursor.byte());
+                    cursor.take(if has_order { 2 } else { 0 });
                     (kind, size, flags)
                 } else {
-                    let (kind, size, flags) = (cursor.number(2), cursor.number(2), cursor.byte());
+                    let (kind, size, flags) = (cursor.number(2), cursor.size(2), cursor.byte());
                     cursor.take(3);
                     (kind, size, flags)
                 };
                 let (Some(kind), Some(size), Some(flags)) = (kind, size, flags) else {
                     return Err(damaged());
                 };
-                let body = cursor.take(size as usize).ok_or_else(damaged)?;
+                let body = cursor.take(size).ok_or_else(damaged)?;
                 if kind == 0x10 {
                     let mut body = Cursor::new(body);
                     let (Some(at), Some(size)) = (body.number(8), body.number(8)) else {

@@ -1,5 +1,7 @@
 //! The messages of object headers, each from its bytes; `None` where they are damaged.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use super::UNDEFINED;
 use super::read::{Cursor, Filter, Kind, Layout};
 
@@ -32,11 +34,11 @@ pub(super) fn dataspace(m: &mut Cursor<'_>) -> Option<Vec<u64>> {
 pub(super) fn datatype(m: &mut Cursor<'_>) -> Option<Kind> {
     let class = m.byte()? & 0x0f;
     let bits = m.number(3)?;
-    let size = usize::try_from(m.number(4)?).ok()?;
+    let size = m.size(4)?;
     let big_endian = bits & 1 != 0;
     let other = Kind::Other { size };
     // All bits of the element count: else it is of no type that MATLAB writes.
-    let is_whole = |m: &mut Cursor<'_>| Some(m.number(2)? == 0 && m.number(2)? == 8 * size as u64);
+    let is_whole = |m: &mut Cursor<'_>| Some(m.size(2)? == 0 && Some(m.size(2)?) == size.checked_mul(8));
     Some(match class {
         0 if is_whole(m)? && (1..=8).contains(&size) => {
             Kind::Integer { size, signed: bits & 8 != 0, big_endian }
@@ -61,7 +63,7 @@ pub(super) fn layout(body: &[u8]) -> Option<Layout> {
     }
     Some(match m.byte()? {
         0 => {
-            let size = m.number(2)? as usize;
+            let size = m.size(2)?;
             Layout::Compact(m.take(size)?.to_vec())
         }
         1 => Layout::Contiguous { address: m.number(8)?, size: m.number(8)? },
@@ -85,11 +87,12 @@ pub(super) fn filters(body: &[u8]) -> Option<Vec<Filter>> {
     }
     let mut filters = Vec::new();
     for _ in 0..count {
-        let id = m.number(2)? as u16;
-        let name = if version == 1 || id >= 256 { m.number(2)? as usize } else { 0 };
-        let (_flags, values) = (m.number(2)?, m.number(2)? as usize);
-        m.take(if version == 1 { name.next_multiple_of(8) } else { name })?;
-        m.take(4 * (values + if version == 1 { values % 2 } else { 0 }))?;
+        let id = u16::from_le_bytes(m.array()?);
+        let name = if version == 1 || id >= 256 { m.size(2)? } else { 0 };
+        let (_flags, values) = (m.number(2)?, m.size(2)?.checked_mul(4)?);
+        for bytes in [name, values] {
+            m.take(if version == 1 { bytes.checked_next_multiple_of(8)? } else { bytes })?;
+        }
         filters.push(match id {
             1 => Filter::Deflate,
             2 => Filter::Shuffle,
@@ -105,8 +108,9 @@ pub(super) fn link(body: &[u8]) -> Option<Option<(String, u64)>> {
     let mut m = Cursor::new(body);
     let (_version, flags) = (m.byte()?, m.byte()?);
     let is_hard = if flags & 8 != 0 { m.byte()? == 0 } else { true };
-    m.take(if flags & 4 != 0 { 8 } else { 0 } + if flags & 0x10 != 0 { 1 } else { 0 })?;
-    let length = usize::try_from(m.number(1 << (flags & 3))?).ok()?;
+    m.take(if flags & 4 != 0 { 8 } else { 0 })?;
+    m.take(if flags & 0x10 != 0 { 1 } else { 0 })?;
+    let length = m.size(1 << (flags & 3))?;
     let name = String::from_utf8_lossy(m.take(length)?).into_owned();
     if is_hard { Some(Some((name, m.number(8)?))) } else { Some(None) }
 }
@@ -123,14 +127,17 @@ pub(super) fn link_info_is_dense(body: &[u8]) -> Option<bool> {
 pub(super) fn attribute(body: &[u8]) -> Option<(String, AttributeValue)> {
     let mut m = Cursor::new(body);
     let (version, flags) = (m.byte()?, m.byte()?);
-    let sizes = [m.number(2)? as usize, m.number(2)? as usize, m.number(2)? as usize];
+    let sizes = [m.size(2)?, m.size(2)?, m.size(2)?];
     if !(1..=3).contains(&version) || version > 1 && flags & 3 != 0 {
         return None;
     }
     m.take(usize::from(version == 3))?;
-    let mut part = |size: usize| m.take(if version == 1 { size.next_multiple_of(8) } else { size });
+    let mut part = |size: usize| {
+        let padded = if version == 1 { size.checked_next_multiple_of(8)? } else { size };
+        m.take(padded)?.get(..size)
+    };
     let (name, kind, space) = (part(sizes[0])?, part(sizes[1])?, part(sizes[2])?);
-    let name = String::from_utf8_lossy(until_zero(&name[..sizes[0]])).into_owned();
+    let name = String::from_utf8_lossy(until_zero(name)).into_owned();
     let kind = datatype(&mut Cursor::new(kind))?;
     if dataspace(&mut Cursor::new(space))?.iter().any(|d| *d != 1) {
         return None;

@@ -1,5 +1,7 @@
 //! Reading HDF5: objects by address, their members, attributes and data.
 
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
 use super::header::Header;
 use super::{SIGNATURE, UNDEFINED, chunks, group};
 use crate::{Error, Result};
@@ -78,8 +80,9 @@ pub(crate) struct Object {
 pub(crate) struct Hdf5File {
     path: PathBuf,
     file: Mutex<File>,
-    /// Bytes of the file behind its user block, where addresses begin.
-    len: u64,
+    /// Bytes of the file.
+    file_len: u64,
+    /// Bytes before those that addresses count, fewer than the file has.
     user_block: u64,
     /// Address of the root group.
     root: u64,
@@ -97,19 +100,18 @@ impl Hdf5File {
         let mut this = Self {
             path: path.to_owned(),
             file: Mutex::new(file),
-            len: metadata.len(),
+            file_len: metadata.len(),
             user_block: 0,
             root: UNDEFINED,
         };
-        let mut at = 0;
-        while this.bytes(at, 8).map_or(true, |b| b != SIGNATURE) {
-            at = (2 * at).max(512);
-            if at >= this.len {
+        let mut at = 0u64;
+        while this.array(at).map_or(true, |b| b != SIGNATURE) {
+            at = at.saturating_mul(2).max(512);
+            if at >= this.file_len {
                 return Err(this.fault(this.not_hdf5()));
             }
         }
         this.user_block = at;
-        this.len -= at;
         this.root = this.superblock()?;
         Ok(this)
     }
@@ -129,21 +131,20 @@ impl Hdf5File {
 
     /// The address of the root group.
     fn superblock(&self) -> Result<u64> {
-        let version = self.bytes(8, 1)?[0];
+        let [version] = self.array(8)?;
+        // Version 1 has four bytes more than version 0 before the addresses: of the end, and with the root's entry.
         let (sizes, root, end) = match version {
-            0 | 1 => {
-                let extra = if version == 1 { 4 } else { 0 };
-                (13, 24 + extra + 4 * 8 + 8, 24 + extra + 16)
-            }
+            0 => (13, 64, 40),
+            1 => (13, 68, 44),
             2 | 3 => (9, 36, 28),
             _ => return Err(self.fault(format!("has a superblock of version {version}; 0 to 3 are read"))),
         };
-        if self.bytes(sizes, 2)? != [8, 8] {
+        if self.array(sizes)? != [8, 8] {
             return Err(self.fault("has addresses of another size than eight bytes, which are not read"));
         }
         let end = self.number(end)?;
-        if end > self.len + self.user_block {
-            let (is, should) = (self.len + self.user_block, end);
+        if end > self.file_len {
+            let (is, should) = (self.file_len, end);
             return Err(self.fault(format!("is cut off: it has {is} of {should} bytes; fetch it again")));
         }
         self.number(root)
@@ -188,34 +189,50 @@ impl Hdf5File {
 
     /// `len` bytes at an address.
     pub(crate) fn bytes(&self, address: u64, len: u64) -> Result<Vec<u8>> {
-        let inside = address.checked_add(len).is_some_and(|end| end <= self.len);
-        let size = usize::try_from(len).ok().filter(|_| inside);
-        let Some(size) = size else {
-            return Err(self.fault(format!(
-                "points to {len} bytes at {address}, beyond its end: it is damaged, or its download is not complete"
-            )));
-        };
+        let (start, size) = self.piece(address, len)?;
         let mut bytes = vec![0; size];
-        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.seek(SeekFrom::Start(self.user_block + address))
-            .and_then(|_| file.read_exact(&mut bytes))
-            .map_err(|e| Error::io(&self.path, "read", e))?;
+        self.fill(start, &mut bytes)?;
         Ok(bytes)
+    }
+
+    /// The `N` bytes at an address.
+    pub(crate) fn array<const N: usize>(&self, address: u64) -> Result<[u8; N]> {
+        let (start, _) = self.piece(address, N as u64)?;
+        let mut bytes = [0; N];
+        self.fill(start, &mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// Where in the file `len` bytes at an address begin, and how many they are, if it has them.
+    fn piece(&self, address: u64, len: u64) -> Result<(u64, usize)> {
+        let start = self.user_block.checked_add(address);
+        let inside = start.filter(|s| s.checked_add(len).is_some_and(|end| end <= self.file_len));
+        inside.zip(usize::try_from(len).ok()).ok_or_else(|| {
+            self.fault(format!(
+                "points to {len} bytes at {address}, beyond its end: it is damaged, or its download is not complete"
+            ))
+        })
+    }
+
+    fn fill(&self, start: u64, bytes: &mut [u8]) -> Result<()> {
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(start))
+            .and_then(|_| file.read_exact(bytes))
+            .map_err(|e| Error::io(&self.path, "read", e))
     }
 
     /// Up to `len` bytes at an address, fewer at the end of the file.
     pub(crate) fn some_bytes(&self, address: u64, len: u64) -> Result<Vec<u8>> {
-        self.bytes(address, len.min(self.len.saturating_sub(address)))
+        self.bytes(address, len.min(self.len().saturating_sub(address)))
     }
 
     fn number(&self, address: u64) -> Result<u64> {
-        let bytes = self.bytes(address, 8)?;
-        Ok(bytes.iter().rev().fold(0, |n, b| n << 8 | u64::from(*b)))
+        self.array(address).map(u64::from_le_bytes)
     }
 
     /// Bytes of the file behind the user block.
     pub(crate) fn len(&self) -> u64 {
-        self.len
+        self.file_len.saturating_sub(self.user_block)
     }
 
     /// An error about the file.
@@ -253,8 +270,21 @@ impl<'a> Cursor<'a> {
         Some(self.take(n)?.iter().rev().fold(0, |n, b| n << 8 | u64::from(*b)))
     }
 
+    /// The next number of `n` bytes, at most 8, as a number of bytes in memory.
+    pub(crate) fn size(&mut self, n: usize) -> Option<usize> {
+        usize::try_from(self.number(n)?).ok()
+    }
+
+    /// The next `N` bytes.
+    pub(crate) fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (head, rest) = self.bytes.split_first_chunk()?;
+        self.bytes = rest;
+        Some(*head)
+    }
+
     pub(crate) fn byte(&mut self) -> Option<u8> {
-        Some(self.take(1)?[0])
+        let [byte] = self.array()?;
+        Some(byte)
     }
 
     pub(crate) fn rest(self) -> &'a [u8] {

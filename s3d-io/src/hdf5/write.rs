@@ -1,5 +1,7 @@
 //! Writing HDF5 from front to back: each object once, its data before its header, groups when their members are there.
 
+#![expect(clippy::indexing_slicing, reason = "a writer: places in the file are those that it gave")]
+
 use super::{SIGNATURE, UNDEFINED};
 use crate::{AtomicFile, Error, Result};
 use std::io::{Seek, SeekFrom, Write};
