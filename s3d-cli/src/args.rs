@@ -84,6 +84,11 @@ pub(crate) enum Command {
     /// Print the tables of statistics of a data set, counted from its files.
     #[command(after_help = "Example:\n  s3d stats dataset")]
     Stats(StatsArgs),
+    /// Read a data set back and check it: against its manifest, against itself, and every image against the mesh.
+    #[command(
+        after_help = "Examples:\n  s3d verify dataset\n  s3d verify dataset --full\nEach fault is a line on standard output; the last line counts. Exit code 0 without faults, 1 with some."
+    )]
+    Verify(VerifyArgs),
 }
 
 impl Command {
@@ -92,7 +97,7 @@ impl Command {
         match self {
             Self::Demo(_) | Self::Export(_) | Self::Sample(_) => true,
             Self::Pack(_) | Self::Xyz(_) | Self::Profile(_) => true,
-            Self::Render(_) | Self::Info(_) | Self::Stats(_) => false,
+            Self::Render(_) | Self::Info(_) | Self::Stats(_) | Self::Verify(_) => false,
         }
     }
 }
@@ -392,6 +397,19 @@ pub(crate) struct StatsArgs {
     /// The data set's folder.
     #[arg(value_name = "OUT")]
     pub(crate) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct VerifyArgs {
+    /// The data set's folder.
+    #[arg(value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point cloud. Every
+    /// pixel of every image is compared in either case.
+    #[arg(long)]
+    pub(crate) full: bool,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
 }
 
 #[derive(Debug, Args)]

@@ -75,7 +75,7 @@ pub(crate) fn passes(error: &(dyn StdError + 'static)) -> bool {
     false
 }
 
-fn passes_io(error: &io::Error) -> bool {
+pub(crate) fn passes_io(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         ErrorKind::StorageFull
@@ -97,19 +97,19 @@ fn passes_io(error: &io::Error) -> bool {
 
 /// Those that std has no kind for.
 #[cfg(unix)]
-fn passes_raw(code: i32) -> bool {
+pub(crate) fn passes_raw(code: i32) -> bool {
     [libc::EIO, libc::EMFILE, libc::ENFILE, libc::ENOLCK, libc::ENOBUFS, libc::ESHUTDOWN].contains(&code)
 }
 
 /// Those that std has no kind for: ERROR_TOO_MANY_OPEN_FILES, ERROR_SHARING_VIOLATION, ERROR_LOCK_VIOLATION,
 /// ERROR_NETNAME_DELETED, ERROR_IO_DEVICE.
 #[cfg(windows)]
-fn passes_raw(code: i32) -> bool {
+pub(crate) fn passes_raw(code: i32) -> bool {
     [4, 32, 33, 64, 1117].contains(&code)
 }
 
 #[cfg(not(any(unix, windows)))]
-fn passes_raw(_: i32) -> bool {
+pub(crate) fn passes_raw(_: i32) -> bool {
     false
 }
 

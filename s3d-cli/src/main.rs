@@ -11,6 +11,7 @@ mod pack;
 mod panics;
 mod pipeline;
 mod stop;
+mod verify;
 
 use args::{Cli, Command};
 use clap::Parser;
@@ -61,5 +62,6 @@ fn run(command: Command) -> Outcome<()> {
         Command::Xyz(args) => commands::xyz::run(&args),
         Command::Profile(args) => commands::profile::run(&args),
         Command::Stats(args) => commands::stats::run(&args),
+        Command::Verify(args) => commands::verify::run(&args),
     }
 }

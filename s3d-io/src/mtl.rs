@@ -4,6 +4,7 @@
 //! malformed line of no interest, and takes the options of `map_Kd` for a part of the file's name.
 
 use crate::obj_lines::{after, logical_lines, parse_f32, text, without_comment, words};
+use crate::obj_write::{WRAP_COMMENT, wrap_name};
 use crate::quote::quote;
 use s3d_geom::{DEFAULT_COLOR, Wrap};
 
@@ -29,12 +30,18 @@ pub(crate) struct MtlMap {
 pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
     let mut materials: Vec<MtlMaterial> = Vec::new();
     let mut warnings = Vec::new();
+    // What a comment of ours says of the texture to come.
+    let mut wrap = None;
     for (number, line) in logical_lines(bytes) {
         let line = &*line;
         let Some(keyword) = words(line).next() else { continue };
         let rest = after(line, keyword).trim_ascii();
         if keyword.eq_ignore_ascii_case(b"newmtl") {
             materials.push(MtlMaterial { name: text(rest), color: DEFAULT_COLOR, map: None });
+            continue;
+        }
+        if let Some(words) = line.strip_prefix(WRAP_COMMENT.as_bytes()) {
+            wrap = parse_wrap(words);
             continue;
         }
         let Some(material) = materials.last_mut() else { continue };
@@ -44,7 +51,10 @@ pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
                 None => warnings.push(format!("line {number}: {} is no colour", quote(line))),
             }
         } else if keyword.eq_ignore_ascii_case(b"map_Kd") {
-            let (map, ignored) = parse_map(rest, number);
+            let (mut map, ignored) = parse_map(rest, number);
+            if let (Some(map), Some(wrap)) = (&mut map, wrap.take()) {
+                map.wrap = wrap;
+            }
             if let Some(option) = ignored {
                 warnings.push(format!("line {number}: {} is not applied to the texture", quote(option)));
             }
@@ -55,6 +65,15 @@ pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
         }
     }
     (materials, warnings)
+}
+
+/// Two words, for u and v.
+fn parse_wrap(rest: &[u8]) -> Option<[Wrap; 2]> {
+    let wrap = |word: &[u8]| {
+        [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp].into_iter().find(|w| wrap_name(*w).as_bytes() == word)
+    };
+    let mut words = words(rest);
+    Some([wrap(words.next()?)?, wrap(words.next()?)?])
 }
 
 /// Up to three numbers from 0 to 1; one stands for all three. `None` if it is something else, such as `Kd spectral …`.
@@ -137,6 +156,16 @@ mod tests {
         assert_eq!(map("-odd.png"), (found("-odd.png", Wrap::Repeat), 0));
         assert_eq!(map("\"C:\\my scans\\a.png\""), (found("C:\\my scans\\a.png", Wrap::Repeat), 0));
         assert_eq!(map("-clamp on"), (None, 1));
+    }
+
+    #[test]
+    fn a_comment_of_ours_tells_how_a_texture_goes_on() {
+        let (m, warnings) = parse_mtl(
+            b"newmtl a\n# s3d wrap mirror clamp\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n# s3d wrap odd clamp\nmap_Kd c.png\n",
+        );
+        assert!(warnings.is_empty());
+        let wraps: Vec<_> = m.iter().map(|m| m.map.as_ref().unwrap().wrap).collect();
+        assert_eq!(wraps, [[Wrap::Mirror, Wrap::Clamp], [Wrap::Repeat; 2]]);
     }
 
     #[test]

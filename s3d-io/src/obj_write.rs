@@ -32,7 +32,7 @@ pub struct TextureOut<'a> {
 /// `textures` holds the image files of [`TriMesh::textures`], one each; if it is empty, PNG files are made from the
 /// textures' pixels. Positions, texture coordinates, normals and vertex colours are those of the mesh; what is not finite
 /// (unused, so) is written as 0. Faces without a material get one called `default`. OBJ cannot say that a texture is
-/// mirrored beyond its edge: it is repeated then.
+/// mirrored beyond its edge: it is repeated then, but for [`read_mesh`](crate::read_mesh), which is told in a comment.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
@@ -77,7 +77,11 @@ pub fn write_rgb_obj(dir: &Path, mesh: &TriMesh, textures: &[TextureOut<'_>]) ->
     let clamped = clamped_textures(mesh);
     bytes += write_whole(&dir.join("rgb.mtl"), |w| {
         for (material, name) in mesh.materials().iter().zip(&materials) {
-            let texture = material.texture.map(|t| (texture_files[t as usize].as_str(), clamped[t as usize]));
+            let texture = material.texture.map(|t| MapOut {
+                file: &texture_files[t as usize],
+                clamped: clamped[t as usize],
+                wrap: mesh.textures()[t as usize].wrap,
+            });
             write_material(w, name, material.color, texture)?;
         }
         let all_have_one = (0..mesh.faces().len() as u32).all(|f| mesh.material_of(f).is_some());
@@ -198,15 +202,40 @@ fn write_face(
     w.write_all(b"\n")
 }
 
+/// Starts a comment that tells our own reader how the next texture goes on beyond its edges, where MTL files cannot say it,
+/// or do not for the sake of other readers.
+pub(crate) const WRAP_COMMENT: &str = "# s3d wrap";
+
+/// The word for a wrap in such a comment.
+pub(crate) const fn wrap_name(wrap: Wrap) -> &'static str {
+    match wrap {
+        Wrap::Repeat => "repeat",
+        Wrap::Mirror => "mirror",
+        Wrap::Clamp => "clamp",
+    }
+}
+
+/// The texture of a material.
+struct MapOut<'a> {
+    file: &'a str,
+    /// Whether its option says that it does not repeat.
+    clamped: bool,
+    wrap: [Wrap; 2],
+}
+
 fn write_material(
     w: &mut dyn Write,
     name: &str,
     color: [u8; 3],
-    texture: Option<(&str, bool)>,
+    texture: Option<MapOut<'_>>,
 ) -> io::Result<()> {
     let [r, g, b] = color.map(unit);
     writeln!(w, "newmtl {name}\nKd {r} {g} {b}\nillum 1")?;
-    if let Some((file, clamped)) = texture {
+    if let Some(MapOut { file, clamped, wrap }) = texture {
+        let said = if clamped { Wrap::Clamp } else { Wrap::Repeat };
+        if wrap != [said; 2] {
+            writeln!(w, "{WRAP_COMMENT} {} {}", wrap_name(wrap[0]), wrap_name(wrap[1]))?;
+        }
         writeln!(w, "map_Kd {}{TEXTURE_FOLDER}/{file}", if clamped { "-clamp on " } else { "" })?;
     }
     w.write_all(b"\n")
@@ -451,8 +480,22 @@ mod tests {
         // Face 0 (material 1, texture 0) reaches beyond the edge, face 2 does not.
         assert!(
             mtl.contains("map_Kd -clamp on rgb_textures/Scan.png\n")
-                && mtl.contains("map_Kd rgb_textures/scan_2.png\n")
+                && mtl.contains("# s3d wrap clamp clamp\nmap_Kd rgb_textures/scan_2.png\n")
         );
+    }
+
+    #[test]
+    fn our_reader_is_told_how_textures_go_on() {
+        for wrap in [[Wrap::Clamp; 2], [Wrap::Mirror, Wrap::Clamp], [Wrap::Repeat; 2]] {
+            let mut parts = textured();
+            parts.textures.iter_mut().for_each(|t| t.wrap = wrap);
+            let dir = tempfile::tempdir().unwrap();
+            write_rgb_obj(dir.path(), &TriMesh::new(parts).unwrap(), &[]).unwrap();
+            let mesh = crate::read_mesh(&dir.path().join("rgb.obj"), crate::UpAxis::Y).unwrap().mesh;
+            assert!(!mesh.textures().is_empty() && mesh.textures().iter().all(|t| t.wrap == wrap), "{wrap:?}");
+            let mtl = std::fs::read_to_string(dir.path().join("rgb.mtl")).unwrap();
+            assert_eq!(mtl.contains(WRAP_COMMENT), wrap != [Wrap::Repeat; 2]);
+        }
     }
 
     #[test]

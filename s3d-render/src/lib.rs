@@ -76,7 +76,7 @@ pub use color::{rgb_image, rgb_image_into, rgb_image_with};
 pub use cube_map::CubeMap;
 pub use cube_sources::SkyBoxTurn;
 pub use picture_color::{Unseen, picture_image, picture_image_into};
-pub use pixel_color::rgb_image_pixel_by_pixel;
+pub use pixel_color::{rgb_image_pixel_by_pixel, rgb_of_ray};
 pub use points::{xyz_image, xyz_image_half, xyz_image_half_into, xyz_image_into};
 pub use ray::{Hit, cast_ray, cast_ray_brute_force};
 pub use scene::Scene;

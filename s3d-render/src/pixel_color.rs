@@ -33,6 +33,34 @@ pub fn rgb_image_pixel_by_pixel(
     Raster::from_vec(hits.face.width(), hits.face.height(), out)
 }
 
+/// The colour that the ray of `camera` along `direction` sees on `face`, which it hits: for places between pixels, or rays
+/// of no image. `direction` is as [`Camera::direction`] gives it. Channels are those of [`rgb_image_pixel_by_pixel`] at a
+/// pixel's centre.
+///
+/// # Panics
+/// If there is no face `face`, or `pyramids` are another mesh's.
+pub fn rgb_of_ray(
+    scene: &Scene<'_>,
+    pyramids: &Pyramids,
+    camera: &Camera,
+    direction: DVec3,
+    face: u32,
+    filter: &TextureFilter,
+) -> [u8; 3] {
+    let steps = match camera.projection {
+        Projection::Perspective { .. } => {
+            let f = camera.focal_px();
+            Steps::Same(camera.pose.right() / f, -camera.pose.up() / f)
+        }
+        Projection::Equirectangular => Steps::Turn {
+            rad_per_pixel: std::f64::consts::TAU / f64::from(camera.width),
+            rows: vec![(direction.truncate().length(), direction.z)],
+        },
+    };
+    let paint = Paint::new(scene, pyramids, face, camera.pose.location);
+    seen_color(paint.at(direction, 0, &steps, filter))
+}
+
 /// The colours of an image's pixels, one by one.
 pub(crate) struct PixelByPixel<'a> {
     scene: &'a Scene<'a>,

@@ -395,6 +395,18 @@ fn close(mesh: &TriMesh, camera: &Camera, max_taps: u32) {
         assert_eq!(*f == [0; 3], hits.face.pixels()[k] == NO_FACE);
     }
     assert!(samples_differ <= 1 + fast.len() / 20_000, "{samples_differ} pixels of {camera:?}");
+    // Single rays through pixels' centres are those pixels.
+    let mut rays_differ = 0;
+    for (k, e) in exact.pixels().iter().enumerate().step_by(13) {
+        let (face, width) = (hits.face.pixels()[k], camera.width as usize);
+        if face == NO_FACE {
+            continue;
+        }
+        let direction = camera.direction((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
+        let color = s3d_render::rgb_of_ray(&scene, &pyramids, camera, direction, face, &filter);
+        rays_differ += usize::from((0..3).any(|c| color[c].abs_diff(e[c]) > 1));
+    }
+    assert!(rays_differ <= 1 + fast.len() / 20_000, "{rays_differ} rays of {camera:?}");
     // A colour is off by 0.1 at most, and so seldom rounded otherwise.
     assert!(differ * 10 <= fast.len(), "{differ} of {} pixels are rounded otherwise", fast.len());
 }

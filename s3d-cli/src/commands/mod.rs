@@ -8,6 +8,7 @@ pub(crate) mod profile;
 pub(crate) mod render;
 pub(crate) mod sample;
 pub(crate) mod stats;
+pub(crate) mod verify;
 pub(crate) mod xyz;
 
 use crate::args::Threads;

@@ -128,7 +128,7 @@ fn make_one(work: &Work, units: DepthUnits, kind: XyzType, compression: Compress
 }
 
 /// location + direction × depth, the direction through the middle of the pixel; 0 where depth is missing.
-fn points(camera: &Camera, depth: &Raster<u16>, units: DepthUnits) -> Raster<[f32; 3]> {
+pub(crate) fn points(camera: &Camera, depth: &Raster<u16>, units: DepthUnits) -> Raster<[f32; 3]> {
     let rays = camera.rays();
     let mut points = Raster::filled(depth.width(), depth.height(), [0.0; 3]);
     let mut pixels = depth.pixels().iter().zip(points.pixels_mut());

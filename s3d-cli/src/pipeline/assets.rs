@@ -2,6 +2,7 @@
 
 use crate::failure::Outcome;
 use s3d_io::{Conventions, Layout, create_dir, write_bytes};
+use std::path::PathBuf;
 
 /// Reads every kind of file of a data set, in Python.
 const UTILS_PY: &str = include_str!("../../assets/utils.py");
@@ -12,8 +13,17 @@ const MANIFEST_SCHEMA: &str = include_str!("../../assets/manifest.schema.json");
 pub(crate) fn write(layout: &Layout, conventions: Conventions) -> Outcome<()> {
     conventions.write(&layout.conventions())?;
     create_dir(&layout.schema_dir())?;
-    write_bytes(&layout.utils_py(), UTILS_PY.as_bytes())?;
-    write_bytes(&layout.pose_schema(), POSE_SCHEMA.as_bytes())?;
-    write_bytes(&layout.manifest_schema(), MANIFEST_SCHEMA.as_bytes())?;
+    for (path, text) in texts(layout) {
+        write_bytes(&path, text.as_bytes())?;
+    }
     Ok(())
+}
+
+/// The assets that are the same in every data set: where they lie, and what they hold.
+pub(crate) fn texts(layout: &Layout) -> [(PathBuf, &'static str); 3] {
+    [
+        (layout.utils_py(), UTILS_PY),
+        (layout.pose_schema(), POSE_SCHEMA),
+        (layout.manifest_schema(), MANIFEST_SCHEMA),
+    ]
 }

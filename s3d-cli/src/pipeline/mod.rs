@@ -5,7 +5,7 @@
 
 pub(crate) mod annotate;
 mod area;
-mod assets;
+pub(crate) mod assets;
 pub(crate) mod finish;
 pub(crate) mod images;
 pub(crate) mod inputs;

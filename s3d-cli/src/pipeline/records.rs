@@ -109,6 +109,8 @@ pub(crate) fn write_votes(layout: &Layout, area: u32, report: &VoteReport) -> Ou
         rooms: report
             .rooms
             .iter()
+            // The table has the rooms of all areas.
+            .filter(|(of, ..)| *of == area)
             .map(|(_, r, row)| Named { name: r.to_string(), row: row.into() })
             .collect(),
         classes: report

@@ -1,0 +1,323 @@
+//! One image after another: its files against each other, and against the mesh.
+
+use super::files::Files;
+use super::labels::Labels;
+use super::mesh::LabelledMesh;
+use super::pixels::{Difference, Pixels};
+use super::pose::{self, CheckedPose};
+use super::rays::difference;
+use super::report::{Report, Topic};
+use super::told::Told;
+use super::views::Views;
+use half::f16;
+use s3d_geom::{Camera, Raster};
+use s3d_io::{Conventions, DatasetImage, Domain, Frame, Layout, XyzType};
+use s3d_render::{Caster, FaceImages, Hits, MISSING_INDEX, Pyramids, Scene};
+use std::path::Path;
+use std::sync::Mutex;
+
+const SIZES: (Topic, &str) = (Topic::Images, "sizes");
+const MISSING: (Topic, &str) = (Topic::Images, "missing modalities");
+const INDICES: (Topic, &str) = (Topic::Images, "label indices");
+const PRETTY: (Topic, &str) = (Topic::Images, "colours of labels");
+const NOTHING: (Topic, &str) = (Topic::Images, "pixels that see nothing");
+const COORDINATES: (Topic, &str) = (Topic::Images, "coordinates and depth");
+
+/// An image whose pose contradicts itself may differ from the mesh in a share of pixels: its camera is not exact.
+const SLACK: f64 = 0.005;
+
+/// What the images of an area are held against.
+pub(crate) struct Stage<'a> {
+    pub(crate) layout: &'a Layout,
+    pub(crate) told: &'a Told,
+    pub(crate) labels: &'a Labels,
+    pub(crate) mesh: &'a LabelledMesh,
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) textures: &'a Pyramids,
+    pub(crate) pretty_per_face: &'a [[u8; 3]],
+    /// Whether RGB comes from the mesh.
+    pub(crate) rgb_from_mesh: bool,
+    pub(crate) report: &'a Report,
+}
+
+impl Stage<'_> {
+    /// In which forms numbers are written.
+    pub(crate) fn conventions(&self) -> Conventions {
+        self.told.conventions()
+    }
+}
+
+/// What every image of an area is checked with.
+pub(crate) struct ImageCheck<'a> {
+    pub(crate) layout: &'a Layout,
+    pub(crate) told: &'a Told,
+    pub(crate) labels: Option<&'a Labels>,
+    pub(crate) views: &'a Views,
+    pub(crate) files: &'a Files,
+    /// None if the meshes cannot be used.
+    pub(crate) stage: Option<&'a Stage<'a>>,
+    pub(crate) report: &'a Report,
+    pub(crate) domains: &'a [Domain],
+    /// What differs from the mesh, for a second look.
+    pub(crate) odd: &'a Mutex<Vec<Odd>>,
+    /// The cameras of the images, as far as they could be read.
+    pub(crate) cameras: &'a Mutex<Vec<(usize, Camera)>>,
+}
+
+/// A file that differs from the mesh.
+pub(crate) struct Odd {
+    /// Its image, by place in the list.
+    pub(crate) image: usize,
+    pub(crate) domain: Domain,
+    pub(crate) difference: Difference,
+    pub(crate) camera: Camera,
+}
+
+/// What a thread keeps from image to image.
+pub(crate) struct Memory<'s> {
+    pub(super) caster: Option<Caster<'s, 's>>,
+    pub(super) hits: Hits,
+    pub(super) faces: FaceImages,
+    pub(super) depth: Raster<u16>,
+    pub(super) xyz: Raster<[f32; 3]>,
+    pub(super) half: Raster<[f16; 3]>,
+}
+
+impl<'s> Memory<'s> {
+    pub(crate) fn new(stage: Option<&'s Stage<'s>>) -> Self {
+        Self {
+            caster: stage.map(|s| Caster::new(s.scene)),
+            hits: Hits::default(),
+            faces: FaceImages::default(),
+            depth: Raster::filled(0, 0, 0),
+            xyz: Raster::filled(0, 0, [0.0; 3]),
+            half: Raster::filled(0, 0, [f16::ZERO; 3]),
+        }
+    }
+}
+
+impl ImageCheck<'_> {
+    /// Checks all files of an image.
+    pub(crate) fn check(&self, index: usize, image: &DatasetImage, memory: &mut Memory<'_>) {
+        let report = self.report;
+        let size = match image.frame {
+            Frame::View(_) => (self.told.options.size, self.told.options.size),
+            Frame::Panorama => (self.told.options.pano_width, self.told.options.pano_width / 2),
+        };
+        for &domain in self.domains {
+            let path = image.path(self.layout, domain);
+            report.check(image.has(domain), MISSING, &path, || {
+                format!("missing: {} is there", image.relative_path(image.domains[0]))
+            });
+            if image.has(domain) {
+                self.files.check(&path, report);
+            }
+        }
+        for &domain in image.domains.iter().filter(|d| !self.domains.contains(d)) {
+            report.fault(
+                MISSING.0,
+                "modalities that were not asked for",
+                &image.path(self.layout, domain),
+                "the manifest does not tell of this modality",
+            );
+        }
+        let pose =
+            image.has(Domain::Pose).then(|| pose::read_and_check(self.layout, image, size, report)).flatten();
+        if let Some(pose) = &pose {
+            let path = image.path(self.layout, Domain::Pose);
+            let draw = self.views.draw_of(image);
+            if draw.is_some() || image.frame == Frame::Panorama {
+                pose::check_draw(pose, draw, &path, report);
+            }
+            self.cameras.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, pose.camera));
+        }
+        let cast = match (&pose, &mut memory.caster) {
+            (Some(pose), Some(caster)) => {
+                caster.cast_into(&pose.camera, 1, &mut memory.hits);
+                true
+            }
+            _ => false,
+        };
+        let mut files = ImageFiles {
+            check: self,
+            index,
+            pose: pose.as_ref(),
+            cast,
+            seen: None,
+            depth: None,
+            semantic: None,
+        };
+        for &domain in self.domains.iter().filter(|d| **d != Domain::Pose && image.has(**d)) {
+            let path = image.path(self.layout, domain);
+            let Some(pixels) = report.read(Topic::Images, Pixels::read(domain, &path)) else { continue };
+            let fits = report.check(pixels.size() == size, SIZES, &path, || {
+                let (w, h) = pixels.size();
+                format!("{w} × {h} pixels, and the manifest tells of {} × {}", size.0, size.1)
+            });
+            if fits {
+                files.domain(domain, pixels, &path, memory);
+            }
+        }
+    }
+}
+
+/// The files of one image, one after another.
+struct ImageFiles<'a> {
+    check: &'a ImageCheck<'a>,
+    index: usize,
+    pose: Option<&'a CheckedPose>,
+    /// Whether the memory holds the image's hits.
+    cast: bool,
+    /// Where nothing is seen, by the first domain that says so exactly.
+    seen: Option<(Domain, Vec<bool>)>,
+    depth: Option<Raster<u16>>,
+    semantic: Option<Raster<[u8; 3]>>,
+}
+
+impl ImageFiles<'_> {
+    fn domain(&mut self, domain: Domain, pixels: Pixels, path: &Path, memory: &mut Memory<'_>) {
+        self.against_mesh(domain, &pixels, memory);
+        self.nothing(domain, &pixels, path);
+        match (domain, pixels) {
+            (Domain::Depth, Pixels::Depth(depth)) => self.depth = Some(depth),
+            (Domain::Semantic, Pixels::Color(indices)) => {
+                self.indices(&indices, path);
+                self.semantic = Some(indices);
+            }
+            (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path),
+            (Domain::GlobalXyz, Pixels::Xyz(points)) => self.coordinates(&points, path),
+            _ => {}
+        }
+    }
+
+    /// Modalities agree on where nothing is seen. Depth also is missing where it is too large, and coordinates that are
+    /// made from depth are missing with it: those two are compared in [`Self::coordinates`].
+    fn nothing(&mut self, domain: Domain, pixels: &Pixels, path: &Path) {
+        if domain == Domain::GlobalXyz {
+            return;
+        }
+        let missing = pixels.missing(domain);
+        let Some((other, expected)) = &self.seen else {
+            if domain != Domain::Depth {
+                self.seen = Some((domain, missing));
+            }
+            return;
+        };
+        // Too far for a depth is no fault.
+        let wrong = |(m, e): (&bool, &bool)| if domain == Domain::Depth { *e && !*m } else { m != e };
+        let mut pairs = missing.iter().zip(expected);
+        let first = pairs.clone().position(wrong);
+        let count = if first.is_some() { pairs.by_ref().filter(|p| wrong(*p)).count() } else { 0 };
+        self.check.report.check(first.is_none(), NOTHING, path, || {
+            let (at, width) = (first.unwrap_or_default() as u32, pixels.size().0);
+            let says = if missing[at as usize] { "is missing, and is not" } else { "is not missing, and is" };
+            format!(
+                "{count} pixels disagree with {other} on what is seen; the first, ({}, {}), {says} there",
+                at % width,
+                at / width
+            )
+        });
+    }
+
+    fn indices(&self, indices: &Raster<[u8; 3]>, path: &Path) {
+        let Some(labels) = self.check.labels else { return };
+        let of = |[r, g, b]: [u8; 3]| u32::from_be_bytes([0, r, g, b]);
+        let wrong = |p: &[u8; 3]| of(*p) as usize >= labels.len() && *p != MISSING_INDEX;
+        let first = indices.pixels().iter().position(wrong);
+        self.check.report.check(first.is_none(), INDICES, path, || {
+            let (at, width) = (first.unwrap_or_default(), indices.width() as usize);
+            let count = indices.pixels().iter().filter(|p| wrong(p)).count();
+            let value = indices.pixels()[at];
+            format!(
+                "{count} pixels have an index that the table of {} labels does not; the first is ({}, {}): {}",
+                labels.len(),
+                at % width,
+                at / width,
+                of(value)
+            )
+        });
+    }
+
+    /// Colours are those of the indices.
+    fn pretty(&self, colors: &Raster<[u8; 3]>, path: &Path) {
+        let (Some(labels), Some(indices)) = (self.check.labels, &self.semantic) else { return };
+        let expected = |[r, g, b]: [u8; 3]| {
+            labels.pretty.get(u32::from_be_bytes([0, r, g, b]) as usize).copied().unwrap_or([0; 3])
+        };
+        let same = |c: [u8; 3], i: [u8; 3]| c == expected(i);
+        let text = |c| format!("{c:?}");
+        let difference = Difference::of(colors, indices, same, text, |i| text(expected(i)));
+        self.check.report.check(difference.is_none(), PRETTY, path, || {
+            difference
+                .map_or(String::new(), |d| d.sentence("the colours of the labels in the semantic image"))
+        });
+    }
+
+    /// Coordinates are what depth and pose give, as far as both are rounded.
+    fn coordinates(&self, points: &Raster<[f32; 3]>, path: &Path) {
+        let (Some(pose), Some(depth)) = (self.pose, &self.depth) else { return };
+        let units = self.check.told.conventions().depth_units;
+        let (camera, rays) = (&pose.camera, pose.camera.rays());
+        let origin = camera.pose.location;
+        let from_depth = self.check.told.xyz_from_depth.is_some();
+        // What depth is rounded to, and what is too far for it.
+        let (half_depth, far) = (0.5 / units.per_m(), 65_534.0 / units.per_m());
+        let is_half = self.check.told.conventions().xyz == XyzType::Half;
+        let mut first = None;
+        let mut count = 0u64;
+        for y in 0..points.height() {
+            for (x, (point, depth)) in (0..).zip(points.row(y).iter().zip(depth.row(y))) {
+                let missing = *point == [0.0; 3];
+                let p = glam::DVec3::from_array(point.map(f64::from));
+                let ray = rays.at(x, y);
+                let wrong = match units.metres(*depth) {
+                    // Beyond what depth can say there may be a point.
+                    None => !missing && (from_depth || (p - origin).length() < far * 0.999),
+                    Some(metres) => {
+                        let expected = origin + ray * metres;
+                        let off = (p - expected).abs();
+                        let step = |k: usize| {
+                            let c = p[k].abs();
+                            // A half float has 11 significant bits; a 32-bit one 24.
+                            let rounding = if is_half { c * 4.9e-4 + 3e-8 } else { c * 6e-8 };
+                            let of_depth = if from_depth { 0.0 } else { half_depth * ray[k].abs() };
+                            of_depth + rounding + 1e-6 * (1.0 + origin[k].abs())
+                        };
+                        // Written so that what is no number is wrong.
+                        !(off.x <= step(0) && off.y <= step(1) && off.z <= step(2))
+                    }
+                };
+                if wrong {
+                    count += 1;
+                    first.get_or_insert((x, y));
+                }
+            }
+        }
+        self.check.report.check(count == 0, COORDINATES, path, || {
+            let (x, y) = first.unwrap_or_default();
+            let seen = units.metres(depth.at(x, y)).map(|m| (origin + rays.at(x, y) * m).as_vec3().to_array());
+            let expected = seen.map_or("nothing".to_owned(), |p| format!("{p:?}"));
+            format!(
+                "{count} of {} pixels are not where depth and pose put them; the first is ({x}, {y}): {:?} for {expected}",
+                points.len(),
+                points.at(x, y)
+            )
+        });
+    }
+
+    /// Holds a file against what the mesh shows.
+    fn against_mesh(&self, domain: Domain, pixels: &Pixels, memory: &mut Memory<'_>) {
+        let (Some(pose), Some(stage), true) = (self.pose, self.check.stage, self.cast) else { return };
+        if domain == Domain::Rgb && !stage.rgb_from_mesh {
+            return;
+        }
+        let difference = difference(stage, domain, pixels, pose, &self.depth, memory);
+        self.check.report.checked(1);
+        let Some(difference) = difference else { return };
+        if !pose.is_consistent && (difference.count as f64) < SLACK * difference.of as f64 {
+            return;
+        }
+        let odd = Odd { image: self.index, domain, difference, camera: pose.camera };
+        self.check.odd.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(odd);
+    }
+}

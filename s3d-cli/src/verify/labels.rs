@@ -1,0 +1,58 @@
+//! The label table, and the labels that the meshes give their faces.
+
+use super::report::{Report, Topic};
+use super::told::Told;
+use s3d_io::{Layout, pretty_color, read_labels};
+use s3d_label::{LabelTable, NULL_NAME};
+use std::collections::HashMap;
+
+const ORDER: (Topic, &str) = (Topic::Labels, "the label table");
+
+/// Names and indices, as the file has them, in order or not.
+pub(crate) struct Labels {
+    /// All, without the null labels at the end that fill the table up.
+    pub(crate) names: Vec<String>,
+    indices: HashMap<String, u32>,
+    /// A colour an index.
+    pub(crate) pretty: Vec<[u8; 3]>,
+}
+
+impl Labels {
+    /// Reads and checks `semantic_labels.json`.
+    pub(crate) fn read(layout: &Layout, told: &Told, report: &Report) -> Option<Self> {
+        let path = layout.labels_json();
+        let mut names = report.read(Topic::Labels, read_labels(&path))?;
+        let checks = report.of(ORDER, &path);
+        if let Err(e) = LabelTable::from_names(&names) {
+            checks.check(false, || format!("out of order, or no table: {e}"));
+        }
+        if told.labels_padded_to > 0 {
+            checks.check(names.len() == told.labels_padded_to, || {
+                format!("{} entries, and the manifest tells of {}", names.len(), told.labels_padded_to)
+            });
+        }
+        let count = names.iter().rposition(|name| name != NULL_NAME).map_or(1, |last| last + 1);
+        names.truncate(count);
+        checks.check(count == told.labels, || {
+            format!("{count} labels, the null label included, and the manifest tells of {}", told.labels)
+        });
+        let indices = names.iter().enumerate().map(|(i, name)| (name.clone(), i as u32)).collect();
+        let pretty = (0..names.len() as u32).map(pretty_color).collect();
+        Some(Self { names, indices, pretty })
+    }
+
+    /// The index of a name.
+    pub(crate) fn index_of(&self, name: &str) -> Option<u32> {
+        self.indices.get(name).copied()
+    }
+
+    /// The name at an index.
+    pub(crate) fn name_of(&self, index: u32) -> &str {
+        self.names.get(index as usize).map_or("nothing", String::as_str)
+    }
+
+    /// How many there are, the null label included.
+    pub(crate) fn len(&self) -> usize {
+        self.names.len()
+    }
+}

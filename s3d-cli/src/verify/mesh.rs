@@ -1,0 +1,152 @@
+//! The exported meshes: one for colours, the same for labels, and the votes that made these.
+
+use super::labels::Labels;
+use super::report::{Report, Topic};
+use super::told::Told;
+use s3d_geom::TriMesh;
+use s3d_io::{Layout, MeshFile, UpAxis, read_json, read_mesh};
+use s3d_label::{Class, parse_name};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const MESH: (Topic, &str) = (Topic::Mesh, "meshes that differ");
+const VOTES: (Topic, &str) = (Topic::Mesh, "faces and votes");
+
+/// The index of a face whose label is not in the table.
+pub(crate) const NOT_IN_TABLE: u32 = 0xff_fffe;
+
+/// An area's mesh with the label of each face.
+pub(crate) struct LabelledMesh {
+    pub(crate) file: MeshFile,
+    /// An index a face.
+    pub(crate) labels: Vec<u32>,
+}
+
+/// Reads and checks both meshes of an area.
+pub(crate) fn read_and_check(
+    layout: &Layout,
+    area: u32,
+    told: &Told,
+    labels: &Labels,
+    report: &Report,
+) -> Option<LabelledMesh> {
+    let (colored, semantic) = (layout.rgb_obj(area), layout.semantic_obj(area));
+    let read = |path: &Path| {
+        let file = report.read(Topic::Mesh, read_mesh(path, UpAxis::Y))?;
+        for warning in &file.warnings {
+            report.fault(Topic::Mesh, "what is wrong in a mesh", path, warning);
+        }
+        Some(file)
+    };
+    let semantic_file = read(&semantic);
+    let names = semantic_file.map(|file| (label_names(&file.mesh, labels, &semantic, report), file.mesh));
+    let file = read(&colored)?;
+    let faces = file.mesh.faces().len();
+    if let Some(told) = told.area(area) {
+        report.check(faces == told.faces, MESH, &colored, || {
+            format!("{faces} faces, and the manifest tells of {}", told.faces)
+        });
+    }
+    let (face_labels, other) = names?;
+    let same = report.check(faces == other.faces().len(), MESH, &semantic, || {
+        format!("{} faces, and rgb.obj has {faces}", other.faces().len())
+    });
+    if !same {
+        return None;
+    }
+    let differs = (0..faces as u32).find(|&f| file.mesh.triangle(f) != other.triangle(f));
+    report.check(differs.is_none(), MESH, &semantic, || {
+        let face = differs.unwrap_or_default();
+        format!(
+            "face {face} (from 0) is {:?}, and that of rgb.obj {:?}",
+            other.triangle(face),
+            file.mesh.triangle(face)
+        )
+    });
+    drop(other);
+    check_votes(layout, area, &face_labels, labels, report);
+    Some(LabelledMesh { file, labels: face_labels })
+}
+
+/// The index of each face's label.
+fn label_names(mesh: &TriMesh, labels: &Labels, path: &Path, report: &Report) -> Vec<u32> {
+    let indices: Vec<u32> = mesh
+        .materials()
+        .iter()
+        .map(|m| {
+            let index = labels.index_of(&m.name);
+            report.check(index.is_some(), MESH, path, || {
+                format!("the material {:?} is no label of semantic_labels.json", m.name)
+            });
+            index.unwrap_or(NOT_IN_TABLE)
+        })
+        .collect();
+    let of = |face| mesh.material_of(face).map_or(NOT_IN_TABLE, |m| indices[m as usize]);
+    (0..mesh.faces().len() as u32).map(of).collect()
+}
+
+#[derive(Deserialize)]
+struct VoteRecord {
+    name: String,
+    faces_voted: u64,
+}
+
+#[derive(Deserialize)]
+struct TotalRecord {
+    faces_voted: u64,
+}
+
+#[derive(Deserialize)]
+struct VotesRecord {
+    faces: u64,
+    faces_without_votes: u64,
+    total: TotalRecord,
+    rooms: Vec<VoteRecord>,
+    classes: Vec<VoteRecord>,
+}
+
+/// Holds the labels of `semantic.obj` against the report on the votes: faces in all, by room and by class.
+fn check_votes(layout: &Layout, area: u32, face_labels: &[u32], labels: &Labels, report: &Report) {
+    let path = layout.votes_json(area);
+    let Some(votes) = report.read(Topic::Mesh, read_json::<VotesRecord>(&path)) else { return };
+    let mut per_label = vec![0u64; labels.len()];
+    for &label in face_labels {
+        if let Some(count) = per_label.get_mut(label as usize) {
+            *count += 1;
+        }
+    }
+    let mut rooms: BTreeMap<String, u64> = BTreeMap::new();
+    let mut classes: BTreeMap<&str, u64> = Class::ALL.map(|c| (c.name(), 0)).into();
+    let mut others = 0;
+    for (name, count) in labels.names.iter().zip(&per_label).filter(|(_, count)| **count > 0) {
+        match parse_name(name) {
+            Ok(Some(label)) => {
+                *rooms.entry(label.room.to_string()).or_default() += count;
+                *classes.entry(label.class.name()).or_default() += count;
+            }
+            _ => others += count,
+        }
+    }
+    let checks = report.of(VOTES, &path);
+    let is = |what: &str, told: u64, found: u64| {
+        checks.check(told == found, || format!("{told} faces {what}, and semantic.obj has {found}"));
+    };
+    is("in all", votes.faces, face_labels.len() as u64);
+    is("without votes", votes.faces_without_votes, others);
+    is("with votes", votes.total.faces_voted, per_label.iter().sum::<u64>() - others);
+    // Rooms of other areas may bear the same name: they have no face here.
+    let mut told: BTreeMap<String, u64> = BTreeMap::new();
+    votes.rooms.iter().for_each(|r| *told.entry(r.name.clone()).or_default() += r.faces_voted);
+    for room in rooms.keys().chain(told.keys()).collect::<std::collections::BTreeSet<_>>() {
+        let of = |map: &BTreeMap<String, u64>| map.get(room).copied().unwrap_or(0);
+        is(&format!("of {room}"), of(&told), of(&rooms));
+    }
+    for class in &votes.classes {
+        is(
+            &format!("of class {}", class.name),
+            class.faces_voted,
+            classes.get(&*class.name).copied().unwrap_or(0),
+        );
+    }
+}

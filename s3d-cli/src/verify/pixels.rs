@@ -1,0 +1,134 @@
+//! The files of one image: what each should hold, and where it does not.
+
+use s3d_geom::Raster;
+use s3d_io::{Domain, Result, read_gray16, read_rgb8, read_xyz};
+use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
+use std::path::Path;
+
+/// The pixels of a file.
+pub(crate) enum Pixels {
+    /// 8-bit R G B.
+    Color(Raster<[u8; 3]>),
+    Depth(Raster<u16>),
+    Xyz(Raster<[f32; 3]>),
+}
+
+impl Pixels {
+    /// Reads the file of a domain.
+    ///
+    /// # Panics
+    /// For poses, which have no pixels.
+    pub(crate) fn read(domain: Domain, path: &Path) -> Result<Self> {
+        Ok(match domain {
+            Domain::Depth => Self::Depth(read_gray16(path)?),
+            Domain::GlobalXyz => Self::Xyz(read_xyz(path)?),
+            Domain::Pose => unreachable!("a pose has no pixels"),
+            _ => Self::Color(read_rgb8(path)?),
+        })
+    }
+
+    /// Width and height.
+    pub(crate) fn size(&self) -> (u32, u32) {
+        match self {
+            Self::Color(r) => (r.width(), r.height()),
+            Self::Depth(r) => (r.width(), r.height()),
+            Self::Xyz(r) => (r.width(), r.height()),
+        }
+    }
+
+    /// A pixel's numbers as they stand in the file; a depth is the first of the three.
+    pub(crate) fn value(&self, x: u32, y: u32) -> [f64; 3] {
+        match self {
+            Self::Color(r) => r.at(x, y).map(f64::from),
+            Self::Depth(r) => [f64::from(r.at(x, y)), 0.0, 0.0],
+            Self::Xyz(r) => r.at(x, y).map(f64::from),
+        }
+    }
+
+    /// For each pixel, whether it says that nothing is seen there.
+    pub(crate) fn missing(&self, domain: Domain) -> Vec<bool> {
+        let color = match domain {
+            Domain::Normal => MISSING_NORMAL,
+            Domain::Semantic => MISSING_INDEX,
+            _ => [0; 3],
+        };
+        match self {
+            Self::Color(r) => r.pixels().iter().map(|p| *p == color).collect(),
+            Self::Depth(r) => r.pixels().iter().map(|p| *p == MISSING_DEPTH).collect(),
+            Self::Xyz(r) => r.pixels().iter().map(|p| *p == [0.0; 3]).collect(),
+        }
+    }
+}
+
+/// How the pixels of a file differ from what they should be.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Difference {
+    pub(crate) count: u64,
+    /// How many pixels were compared.
+    pub(crate) of: u64,
+    /// Column and row of the first.
+    pub(crate) first: (u32, u32),
+    /// What stands there, and what should.
+    pub(crate) found: String,
+    pub(crate) expected: String,
+}
+
+impl Difference {
+    /// Compares images of one size; `None` if they are equal.
+    pub(crate) fn of<T: Copy + PartialEq, U: Copy>(
+        found: &Raster<T>,
+        expected: &Raster<U>,
+        same: impl Fn(T, U) -> bool,
+        text: impl Fn(T) -> String,
+        expected_text: impl Fn(U) -> String,
+    ) -> Option<Self> {
+        let mut difference: Option<Self> = None;
+        for (y, (row, other)) in (0..).zip(found.rows().zip(expected.rows())) {
+            let equal = row.iter().zip(other).fold(true, |all, (a, b)| all & same(*a, *b));
+            if equal {
+                continue;
+            }
+            for (x, (a, b)) in (0..).zip(row.iter().zip(other)) {
+                if same(*a, *b) {
+                    continue;
+                }
+                let d = difference.get_or_insert_with(|| Self {
+                    count: 0,
+                    of: found.len() as u64,
+                    first: (x, y),
+                    found: text(*a),
+                    expected: expected_text(*b),
+                });
+                d.count += 1;
+            }
+        }
+        difference
+    }
+
+    /// As a sentence: `what` is where the expected values come from.
+    pub(crate) fn sentence(&self, what: &str) -> String {
+        let Self { count, of, first: (x, y), found, expected } = self;
+        let percent = 100.0 * *count as f64 / *of as f64;
+        let percent = if percent < 0.1 { "less than 0.1".to_owned() } else { format!("{percent:.1}") };
+        format!(
+            "{count} of {of} pixels ({percent} %) are not {what}; the first is ({x}, {y}): {found}, should be {expected}"
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_counted() {
+        let a = Raster::from_vec(2, 4, vec![0u16, 1, 2, 3, 4, 5, 6, 7]);
+        let b = Raster::from_vec(2, 4, vec![0u16, 1, 2, 9, 4, 5, 6, 9]);
+        let compare = |b| Difference::of(&a, b, |a, b| a == b, |v| v.to_string(), |v| v.to_string());
+        assert_eq!(compare(&a), None);
+        assert_eq!(
+            compare(&b).unwrap().sentence("what the mesh shows"),
+            "2 of 8 pixels (25.0 %) are not what the mesh shows; the first is (1, 1): 3, should be 9"
+        );
+    }
+}
