@@ -1,9 +1,10 @@
 //! The images of a data set on the disk: which there are, and which of their files.
 
+use crate::texture_file::open_file;
 use crate::{Domain, Error, Frame, ImageName, Layout, Result, image_stem, read_json};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
@@ -143,7 +144,7 @@ pub fn read_views(path: &Path) -> Result<Vec<ViewRecord>> {
 /// [`Error::Io`]; [`Error::Format`] if it is no PNG file or has no pixel.
 pub fn read_png_size(path: &Path) -> Result<(u32, u32)> {
     let mut head = Vec::with_capacity(24);
-    let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
+    let file = open_file(path)?;
     file.take(24).read_to_end(&mut head).map_err(|e| Error::io(path, "read", e))?;
     let Ok(head) = <[u8; 24]>::try_from(head) else {
         return Err(Error::format(path, "the PNG file ends too early"));

@@ -4,6 +4,8 @@
 //! takes several times as long: same format (ZIP, 16 lines a block), and no larger than OpenEXR makes it.
 
 use crate::deflate::{Candidates, Deflater, Search, Work, wide};
+use crate::guarded::guarded;
+use crate::texture_file::read_file;
 use crate::{Compression, Error, Result, write_bytes};
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::block::writer::ChunksWriter;
@@ -19,8 +21,11 @@ use std::path::Path;
 /// Lines in a block of the compression "ZIP". It is the format's number.
 const BLOCK_LINES: u32 = 16;
 
-/// Images with more pixels than this are not read.
+/// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
 const MAX_PIXELS: usize = 1 << 30;
+/// The most pixels that a byte of a file stands for: deflate, which shrinks best of the format's ways, makes 1,032 of it,
+/// and a pixel has three samples of two bytes at least.
+const MAX_PIXELS_PER_BYTE: usize = 1032 / 6;
 
 /// World coordinates as the bytes of an OpenEXR file of half floats: channels R G B = X Y Z in metres, (0, 0, 0) where
 /// there is nothing; scan lines from the top, ZIP. Source: formats.md, "Images".
@@ -210,7 +215,7 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Work for Prepare<'_, T, F> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no OpenEXR file, damaged, or has no channels R G B.
 pub fn read_xyz(path: &Path) -> Result<Raster<[f32; 3]>> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = read_file(path)?;
     let failed =
         |e: exr::error::Error| Error::format(path, format!("no readable OpenEXR file of R G B: {e}"));
     let too_large = |width: usize, height: usize| {
@@ -222,30 +227,37 @@ pub fn read_xyz(path: &Path) -> Result<Raster<[f32; 3]>> {
         if width.checked_mul(height).is_none_or(|n| n > MAX_PIXELS) {
             return Err(too_large(width, height));
         }
+        if width * height > bytes.len().saturating_mul(MAX_PIXELS_PER_BYTE) {
+            let message = format!("claims {width} × {height} pixels in {} bytes", bytes.len());
+            return Err(Error::format(path, message));
+        }
     }
     use exr::prelude::{ReadChannels, ReadLayers, Vec2};
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size: Vec2<usize>, _| {
-                // The header was checked: its sides fit.
-                let [width, height] = [size.x(), size.y()].map(|side| u32::try_from(side).unwrap_or(0));
-                Raster::filled(width, height, [0f32; 3])
-            },
-            |image, at, (r, g, b): (f32, f32, f32)| {
-                let line = (image.width() as usize).checked_mul(at.y());
-                let index = line.and_then(|line| line.checked_add(at.x()));
-                if let Some(pixel) = index.and_then(|index| image.pixels_mut().get_mut(index)) {
-                    *pixel = [r, g, b];
-                }
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(failed)?;
+    let read = || {
+        exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .rgb_channels(
+                |size: Vec2<usize>, _| {
+                    // The header was checked: its sides fit.
+                    let [width, height] = [size.x(), size.y()].map(|side| u32::try_from(side).unwrap_or(0));
+                    Raster::filled(width, height, [0f32; 3])
+                },
+                |image, at, (r, g, b): (f32, f32, f32)| {
+                    let line = (image.width() as usize).checked_mul(at.y());
+                    let index = line.and_then(|line| line.checked_add(at.x()));
+                    if let Some(pixel) = index.and_then(|index| image.pixels_mut().get_mut(index)) {
+                        *pixel = [r, g, b];
+                    }
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_buffered(Cursor::new(bytes))
+    };
+    let damaged = || Error::format(path, "no readable OpenEXR file of R G B: its blocks are damaged");
+    let image = guarded(read).ok_or_else(damaged)?.map_err(failed)?;
     Ok(image.layer_data.channel_data.pixels)
 }
 

@@ -41,7 +41,7 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         }
     }
     let mut warnings = Vec::new();
-    let looks = GltfLooks::load(&document, &used, &mut warnings);
+    let looks = GltfLooks::load(&document, &used, &mut warnings)?;
     let mut builder = Builder::new(&document, &looks, up, &instances)?;
     for instance in &instances {
         builder.add(instance)?;

@@ -13,6 +13,9 @@ use s3d_geom::glam::{DMat3, Vec2, Vec3};
 use s3d_geom::{MeshParts, NO_INDEX};
 use std::collections::HashMap;
 
+/// The most vertices and corners of faces that are placed, 30 GB of them. A file can place a mesh any number of times.
+const MAX_ELEMENTS: u64 = 1 << 30;
+
 /// Collects the columns of a mesh.
 pub(crate) struct Builder<'a> {
     document: &'a GltfDocument,
@@ -53,8 +56,22 @@ impl<'a> Builder<'a> {
         instances: &[Instance],
     ) -> Result<Self> {
         let mut colored = false;
+        let mut elements = 0u64;
         for instance in instances {
             let mesh = document.get(instance.mesh, "a node", "mesh")?;
+            for p in &mesh.primitives {
+                let positions = p.attributes.get(&Checked::Valid(Semantic::Positions));
+                for accessor in p.indices.iter().chain(positions) {
+                    let count = document.root.get(*accessor).map_or(0, |a| a.count.0);
+                    elements = elements.saturating_add(count);
+                }
+            }
+            if elements > MAX_ELEMENTS {
+                return Err(document.fail(format!(
+                    "places {} meshes of more than {MAX_ELEMENTS} vertices and corners together: cut the scene in parts",
+                    instances.len()
+                )));
+            }
             colored |= mesh.primitives.iter().any(|p| color_accessor(p).is_some() && !is_textured(p, looks));
         }
         let (parts, uv_starts, notes) = Default::default();

@@ -176,7 +176,11 @@ impl GltfDocument {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         // Some exporters do not encode what they write.
         let written = folder.join(uri);
-        if fs::exists(&written).unwrap_or(false) { written } else { folder.join(percent_decode(uri).as_ref()) }
+        if fs::exists(&written).unwrap_or(false) {
+            written
+        } else {
+            folder.join(percent_decode(uri).as_ref())
+        }
     }
 
     /// The files beside this one that its buffers and images are in, those that are there.

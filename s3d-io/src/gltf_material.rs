@@ -2,7 +2,7 @@
 
 use crate::gltf_document::{GltfDocument, way_out};
 use crate::quote::quote;
-use crate::texture_file::{LoadedTexture, TextureFile, decode_texture};
+use crate::texture_file::{LoadedTexture, TextureFault, TextureFile, Together, decode_texture};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index, texture};
 use rayon::prelude::*;
@@ -58,7 +58,14 @@ const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 
 impl GltfLooks {
     /// The looks of all materials; images are decoded for those that are `used`, each once.
-    pub(crate) fn load(document: &GltfDocument, used: &[bool], warnings: &mut Vec<String>) -> Self {
+    ///
+    /// # Errors
+    /// For images that are too large.
+    pub(crate) fn load(
+        document: &GltfDocument,
+        used: &[bool],
+        warnings: &mut Vec<String>,
+    ) -> crate::Result<Self> {
         let mut looks = Self::default();
         let mut keys = Vec::new();
         for ((i, material), used) in document.root.materials.iter().enumerate().zip(used) {
@@ -84,15 +91,20 @@ impl GltfLooks {
                 }
             }));
         }
-        let mut images: BTreeMap<usize, (String, Result<LoadedTexture, String>)> = BTreeMap::new();
+        type Loaded = (String, Result<LoadedTexture, TextureFault>);
+        let mut images: BTreeMap<usize, Loaded> = BTreeMap::new();
         for key in keys.iter().flatten() {
-            images.entry(key.image).or_insert_with(|| (String::new(), Err(String::new())));
+            let nothing = || (String::new(), Err(TextureFault::Unreadable(String::new())));
+            images.entry(key.image).or_insert_with(nothing);
         }
         images.par_iter_mut().for_each(|(&image, slot)| {
             let (name, bytes) = document.image(image);
-            *slot = (name, bytes.and_then(decode_texture));
+            *slot = (name, bytes.map_err(TextureFault::Unreadable).and_then(decode_texture));
         });
         for (name, image) in images.values() {
+            if let Err(why @ TextureFault::TooLarge(_)) = image {
+                return Err(document.fail(format!("texture {} {why}", quote(name.as_bytes()))));
+            }
             if let Err(why) = image {
                 warnings.push(format!(
                     "texture {} {why}; its materials are drawn in their colour",
@@ -101,9 +113,16 @@ impl GltfLooks {
             }
         }
         let mut known: BTreeMap<TextureKey, u32> = BTreeMap::new();
+        let mut together = Together::default();
         for (material, key) in looks.materials.iter_mut().zip(&keys) {
             let Some(key) = key else { continue };
             let Some((name, Ok(loaded))) = images.get(&key.image) else { continue };
+            if !known.contains_key(key) {
+                let (width, height) = (loaded.image.width(), loaded.image.height());
+                together.add(width, height).map_err(|message| {
+                    document.fail(format!("texture {} {message}", quote(name.as_bytes())))
+                })?;
+            }
             let index = *known.entry(*key).or_insert_with(|| {
                 let factor = key.factor_bits.map(f32::from_bits);
                 let wrap = key.wrap.map(|w| WRAPS.get(usize::from(w)).copied().unwrap_or(Wrap::Repeat));
@@ -115,7 +134,7 @@ impl GltfLooks {
             });
             material.texture = Some(index);
         }
-        looks
+        Ok(looks)
     }
 }
 

@@ -1,5 +1,6 @@
 //! JSON files: pretty-printed, keys in the order of the struct, a line feed at the end.
 
+use crate::texture_file::read_file;
 use crate::{Error, Result, write_bytes};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -20,7 +21,7 @@ pub fn write_json<T: Serialize + ?Sized>(path: &Path, value: &T) -> Result<u64> 
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line if the file is no JSON or no `T`.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = read_file(path)?;
     serde_json::from_slice(&bytes).map_err(|e| Error::line(path, e.line() as u64, e.to_string()))
 }
 

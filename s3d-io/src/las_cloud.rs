@@ -3,19 +3,28 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::annotations::AnnotationOptions;
+use crate::bounded_claims::BoundedClaims;
 use crate::cloud_columns::{CLASSES, INSTANCES};
 use crate::cloud_records::{Color, Field, Kind, color};
 use crate::flat::{Cloud, ColorRange};
 use crate::flat_rows::{Reading, Row, Value};
+use crate::guarded::guarded;
 use crate::{Error, Result};
 use las::point::Format;
 use s3d_geom::glam::dvec3;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering::Relaxed;
 
-/// Points that are unpacked at a time.
+/// Points that are unpacked at a time, at most, and their bytes.
 const BATCH: u64 = 65_536;
+const BATCH_BYTES: u64 = 1 << 23;
+/// The most points that a byte of a compressed file stands for: a hundred times what the flattest scans come to. Layers
+/// that say nothing take no bytes, so any number could be claimed.
+const MAX_POINTS_PER_BYTE: u64 = 1024;
+/// Numbers of points and bytes in a chunk of compressed points that are believed whatever the file's size.
+const PLAUSIBLE: u32 = 1 << 24;
 /// The bit of a point that was deleted: "withheld".
 const WITHHELD: u8 = 0b100;
 
@@ -89,7 +98,8 @@ impl<'a> LasCloud<'a> {
         let points = points.max(points_1_4);
         let cut = |what: &str| Err(Error::format(path, format!("claims {what}: the file is cut short")));
         let end = points.checked_mul(length).and_then(|n| n.checked_add(offset));
-        if offset > size || end.is_none_or(|end| !is_compressed && end > size) {
+        let is_bomb = is_compressed && points > size.saturating_mul(MAX_POINTS_PER_BYTE);
+        if offset > size || is_bomb || end.is_none_or(|end| !is_compressed && end > size) {
             return cut(&format!("{points} points of {length} bytes in a file of {size} bytes"));
         }
         // The 1.4 header's extended records, whose lengths are numbers of 64 bits.
@@ -235,11 +245,6 @@ fn color_at(format: &Format) -> Option<[usize; 3]> {
     format.has_color.then_some(at)
 }
 
-/// What `f` gives, or a sentence if it panicked: the decoder is not ours, and a damaged file must not end the program.
-fn guarded<T>(f: impl FnOnce() -> las::Result<T>) -> std::result::Result<las::Result<T>, &'static str> {
-    crate::guarded::guarded(f).ok_or("its compressed points are damaged")
-}
-
 impl Cloud for LasCloud<'_> {
     fn path(&self) -> &Path {
         &self.path
@@ -248,13 +253,19 @@ impl Cloud for LasCloud<'_> {
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
         let path = &self.path;
         self.preflight()?;
-        let damaged = |why: &str| Error::format(path, why);
         let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
-        let file = BufReader::with_capacity(1 << 18, file);
-        let reader = guarded(|| las::Reader::new(file)).map_err(damaged)?;
+        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+        let (file, most) = BoundedClaims::new(BufReader::with_capacity(1 << 18, file));
+        let damaged = || Error::format(path, "its compressed points are damaged");
+        let reader = guarded(|| las::Reader::new(file)).ok_or_else(damaged)?;
         let mut reader = reader.map_err(|e| self.error(0, &e))?;
         let header = reader.header().clone();
         let format = *header.point_format();
+        if format.is_extended {
+            // Compressed points of these formats are layers, each with its size before it. Others are streams, of which
+            // four bytes may be any number.
+            most.store(u32::try_from(size).unwrap_or(u32::MAX).max(PLAUSIBLE), Relaxed);
+        }
         let all = self.dimensions(&header);
         let o = self.options;
         // Extra dimensions made for labels come before the standard's.
@@ -269,10 +280,11 @@ impl Cloud for LasCloud<'_> {
         let t = header.transforms();
         let count = header.number_of_points();
         let mut data = las::PointDataBuilder::new().for_header(&header).build();
+        let at_once = BATCH_BYTES.checked_div(u64::from(format.len())).unwrap_or(1).clamp(1, BATCH);
         let (mut done, mut withheld) = (0u64, 0u64);
         while let Some(left) = count.checked_sub(done).filter(|left| *left > 0) {
-            let n = BATCH.min(left);
-            let read = guarded(|| reader.fill_points(n, &mut data)).map_err(damaged)?;
+            let n = at_once.min(left);
+            let read = guarded(|| reader.fill_points(n, &mut data)).ok_or_else(damaged)?;
             if read.map_err(|e| self.error(done, &e))? == 0 {
                 return Err(Error::format(
                     path,

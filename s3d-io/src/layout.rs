@@ -162,9 +162,9 @@ fn parse_frame(word: &str) -> Option<Frame> {
     if digits { word.parse().ok().map(Frame::View) } else { None }
 }
 
-/// Whether `uuid` can stand in file names: ASCII letters, digits and hyphens, and nowhere "rgb".
+/// Whether `uuid` can stand in file names: 1 to 64 ASCII letters, digits and hyphens, and nowhere "rgb".
 pub fn is_valid_uuid(uuid: &str) -> bool {
-    !uuid.is_empty()
+    (1..=64).contains(&uuid.len())
         && uuid.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-')
         && !uuid.to_ascii_lowercase().contains("rgb")
 }
@@ -533,6 +533,8 @@ mod tests {
             assert_eq!(ImageName::parse(name), None, "{name}");
         }
         assert!(!is_valid_uuid("a_b") && !is_valid_uuid("aRgb1") && is_valid_uuid("5c29-59c3"));
+        assert!(is_valid_uuid(&"5".repeat(64)) && !is_valid_uuid(&"5".repeat(65)));
+        assert!(["", "..", "a/b", "a\\b", "a\0", "/", "ä"].iter().all(|uuid| !is_valid_uuid(uuid)));
         assert!(!is_valid_room("office") && !is_valid_room("open_space_1") && is_valid_room("WC_1"));
     }
 

@@ -60,6 +60,7 @@
 
 mod annotations;
 mod atomic;
+mod bounded_claims;
 mod cameras;
 mod checksum;
 mod cloud_columns;
@@ -170,6 +171,7 @@ pub use guarded::panic_is_caught;
 pub use instance_arrays::{InstanceArrays, read_instance_arrays, read_instance_members};
 pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};
 pub use json::{read_json, write_json};
+pub use labelled_points::{LabelledPoint, LabelledPoints};
 pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};
 pub use layout::{
     Domain, Frame, ImageName, Layout, PROFILES, UnknownDomain, image_stem, is_valid_room, is_valid_uuid,
@@ -188,7 +190,6 @@ pub use nerfstudio_write::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 pub use npy_write::NpyWriter;
 pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
 pub use parquet_index::{ImageRow, SemanticRow, write_image_index};
-pub use labelled_points::{LabelledPoint, LabelledPoints};
 pub use ply::{PlyPointWriter, read_ply_point_count};
 pub use png::{Content, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
 pub use point_sample::{read_point_sample, write_colored_points};

@@ -237,17 +237,26 @@ impl MatFile {
     /// The structs of a struct array, of one struct or of cells of structs.
     fn structs(&self, address: u64, place: &str) -> Result<Vec<Fields>> {
         let mut found = Vec::new();
-        self.push_structs(address, place, MAX_DEPTH, &mut found)?;
+        // Every struct and every cell of a sound file has a header of its own.
+        let mut left = self.hdf5.len() / 16;
+        self.push_structs(address, place, MAX_DEPTH, &mut left, &mut found)?;
         Ok(found)
     }
 
-    fn push_structs(&self, address: u64, place: &str, depth: usize, found: &mut Vec<Fields>) -> Result<()> {
-        // Every struct of a sound file has a header of its own.
-        if depth == 0 || found.len() as u64 > self.hdf5.len() / 16 {
+    fn push_structs(
+        &self,
+        address: u64,
+        place: &str,
+        depth: usize,
+        left: &mut u64,
+        found: &mut Vec<Fields>,
+    ) -> Result<()> {
+        if depth == 0 || *left == 0 {
             return Err(self
                 .hdf5
                 .fault(format!("{place}: refers to itself, or more often than there is place for")));
         }
+        *left -= 1;
         let object = self.hdf5.object(address)?;
         if object.header.is_set("MATLAB_empty") {
             return Ok(());
@@ -257,7 +266,9 @@ impl MatFile {
                 return Err(self.hdf5.fault(format!("{place}: is no struct")));
             };
             let below = depth.saturating_sub(1);
-            return references.into_iter().try_for_each(|at| self.push_structs(at, place, below, found));
+            return references
+                .into_iter()
+                .try_for_each(|at| self.push_structs(at, place, below, left, found));
         };
         // The fields of an array of structs are references to its elements', all as many.
         let mut columns = Vec::new();

@@ -3,7 +3,8 @@
 //! Source: formats.md, "The scanner's own pictures". A folder's files are looked up in it and in the folders in it, as
 //! Matterport3D has colours, poses and intrinsics apart (`matterport_color_images/`…).
 
-use crate::texture_file::{decode_texture, read_file};
+use crate::guarded::guarded;
+use crate::texture_file::{TextureFault, decode_texture, read_file};
 use crate::{Error, Result, ScanLocation};
 use glam::{DMat3, DVec2, DVec3};
 use image::ImageReader;
@@ -79,7 +80,11 @@ fn check_size(path: &Path, (w, h): (u32, u32), lens: &Lens) -> Result<()> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no such image or is damaged.
 pub fn read_picture(path: &Path) -> Result<Raster<[u8; 3]>> {
-    Ok(decode_texture(read_file(path)?).map_err(|message| Error::format(path, message))?.image)
+    let texture = decode_texture(read_file(path)?).map_err(|fault| match fault {
+        TextureFault::TooLarge(message) => Error::unsupported(path, message),
+        TextureFault::Unreadable(message) => Error::format(path, message),
+    })?;
+    Ok(texture.image)
 }
 
 /// Width and height of a PNG or JPEG file, from its first bytes.
@@ -93,7 +98,9 @@ pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
     }
     let open = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
     let reader = open.map_err(|e| Error::io(path, "read", e))?;
-    reader.into_dimensions().map_err(|e| Error::format(path, format!("is no picture that can be read: {e}")))
+    let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
+    let size = guarded(|| reader.into_dimensions()).ok_or_else(|| failed("its header is damaged"))?;
+    size.map_err(|e| failed(&e.to_string()))
 }
 
 impl PictureFolder {

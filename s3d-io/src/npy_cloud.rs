@@ -149,6 +149,7 @@ impl<'a> NpyCloud<'a> {
             stride = header.stride.saturating_add(stride);
         }
         let table = Table::new(&self.path, fields, stride, self.options)?;
+        // Rows may be as long as 64 KiB: what is in memory is a few MiB all the same.
         let mut done = 0;
         let (mut block, mut column) = (Vec::new(), Vec::new());
         let mut texts = Default::default();

@@ -39,6 +39,7 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
         },
         || ObjLooks::load(path, &plain, &mut remarks),
     );
+    let looks = looks?;
     let (columns, faces) =
         geometry.map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
     let polygons_triangulated = faces.polygons;

@@ -1,5 +1,6 @@
 //! How the faces of an OBJ file look: its libraries and the images that they name.
 
+use crate::Result;
 use crate::mtl::{MtlMaterial, parse_mtl};
 use crate::obj_plain::PlainObj;
 use crate::quote::{count, quote};
@@ -28,7 +29,10 @@ struct Found {
 
 impl ObjLooks {
     /// Reads the libraries that the file at `path` names, and the images of the materials that it uses.
-    pub(crate) fn load(path: &Path, plain: &PlainObj, warnings: &mut Vec<String>) -> Self {
+    ///
+    /// # Errors
+    /// For images that are too large.
+    pub(crate) fn load(path: &Path, plain: &PlainObj, warnings: &mut Vec<String>) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut looks = Self::default();
         let library = load_libraries(folder, plain, &mut looks.companions, warnings);
@@ -77,9 +81,9 @@ impl ObjLooks {
             warnings
                 .push(format!("{n} in no library and drawn gray, the first is {}", quote(first.as_bytes())));
         }
-        looks.load_images(&wanted, &maps, warnings);
+        looks.load_images(&wanted, &maps, warnings)?;
         looks.companions.append(&mut wanted);
-        looks
+        Ok(looks)
     }
 
     /// Decodes the images and lays them on their materials: a texture for each way in which an image repeats.
@@ -88,8 +92,8 @@ impl ObjLooks {
         wanted: &[PathBuf],
         maps: &[Option<(usize, [Wrap; 2])>],
         warnings: &mut Vec<String>,
-    ) {
-        for ((at, loaded), image) in read_textures(wanted).into_iter().enumerate().zip(wanted) {
+    ) -> Result<()> {
+        for ((at, loaded), image) in read_textures(wanted)?.into_iter().enumerate().zip(wanted) {
             let users = maps.iter().enumerate().filter_map(|(m, map)| Some((m, (*map)?)));
             let users: Vec<(usize, [Wrap; 2])> =
                 users.filter(|(_, (i, _))| *i == at).map(|(m, (_, wrap))| (m, wrap)).collect();
@@ -128,6 +132,7 @@ impl ObjLooks {
                 wraps.remove(0);
             }
         }
+        Ok(())
     }
 }
 

@@ -263,15 +263,31 @@ fn clamped_textures(mesh: &TriMesh) -> Vec<bool> {
     clamped
 }
 
+/// The most characters of a cleaned name: file systems take 255 bytes, and a temporary file's name is longer.
+const MAX_NAME: usize = 128;
+
 /// A file name of ASCII letters, digits, `-`, `.` and `_`, not hidden, and without "rgb", which loaders replace in paths.
+/// One that Windows keeps for a device (`con.png`) gets a `_` in front; a long one is cut before its ending.
 fn clean_file_name(name: &str) -> String {
     let safe = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_') { c } else { '_' };
     let mut clean: String = name.chars().map(safe).collect();
     while let Some(at) = clean.to_ascii_lowercase().find("rgb") {
         clean.replace_range(at..at + 3, "color");
     }
-    let clean = clean.trim_start_matches('.');
-    if clean.is_empty() { "texture".into() } else { clean.into() }
+    // Windows drops dots at the end.
+    let clean = clean.trim_matches('.');
+    if clean.is_empty() {
+        return "texture".into();
+    }
+    let device = clean.split('.').next().unwrap_or_default().to_ascii_lowercase();
+    let numbered = device.strip_prefix("com").or(device.strip_prefix("lpt"));
+    let is_device = matches!(device.as_str(), "con" | "prn" | "aux" | "nul")
+        || numbered.is_some_and(|n| n.len() == 1 && n.bytes().all(|b| b.is_ascii_digit()));
+    let clean = if is_device { format!("_{clean}") } else { clean.to_owned() };
+    let (stem, ending) =
+        clean.split_at(clean.rfind('.').filter(|at| clean.len() - at <= 8).unwrap_or(clean.len()));
+    let stem = stem.get(..MAX_NAME - ending.len()).unwrap_or(stem);
+    format!("{stem}{ending}")
 }
 
 /// A material name without white space, which ends it in many readers.
@@ -307,6 +323,35 @@ mod tests {
     use s3d_geom::glam::{vec2, vec3};
     use s3d_geom::{Material, MeshParts, Raster, Texture};
     use std::path::PathBuf;
+
+    #[test]
+    fn names_of_files_stay_in_their_folder_and_work_everywhere() {
+        for (name, clean) in [
+            ("wall.png", "wall.png"),
+            ("../../etc/passwd", "_.._etc_passwd"),
+            ("..\\..\\x.png", "_.._x.png"),
+            ("/etc/passwd", "_etc_passwd"),
+            ("C:\\x.png", "C__x.png"),
+            ("a\0b\n.png", "a_b_.png"),
+            ("...", "texture"),
+            ("", "texture"),
+            (".hidden.jpg", "hidden.jpg"),
+            ("dots...", "dots"),
+            ("con.png", "_con.png"),
+            ("COM7", "_COM7"),
+            ("lpt1.tar.gz", "_lpt1.tar.gz"),
+            ("console.png", "console.png"),
+            ("com10.png", "com10.png"),
+            ("Rgb.png", "color.png"),
+        ] {
+            assert_eq!(clean_file_name(name), clean, "{name:?}");
+        }
+        let long = clean_file_name(&format!("{}.png", "ä".repeat(500)));
+        assert!(long.len() == MAX_NAME && long.ends_with("_.png"), "{long}");
+        let mut names = UniqueNames::default();
+        let unique = ["Wall.png", "wall.PNG", "WALL.png", "wall_2.png"].map(|name| names.add(name));
+        assert_eq!(unique, ["Wall.png", "wall_2.PNG", "WALL_3.png", "wall_2_2.png"]);
+    }
 
     /// What another reader finds in an OBJ file: per face its corners' positions, coordinates, normals, colours, in the
     /// world's axes again, and its material's name.
@@ -492,7 +537,10 @@ mod tests {
             let dir = tempfile::tempdir().unwrap();
             write_rgb_obj(dir.path(), &TriMesh::new(parts).unwrap(), &[]).unwrap();
             let mesh = crate::read_mesh(&dir.path().join("rgb.obj"), crate::UpAxis::Y).unwrap().mesh;
-            assert!(!mesh.textures().is_empty() && mesh.textures().iter().all(|t| t.wrap == wrap), "{wrap:?}");
+            assert!(
+                !mesh.textures().is_empty() && mesh.textures().iter().all(|t| t.wrap == wrap),
+                "{wrap:?}"
+            );
             let mtl = std::fs::read_to_string(dir.path().join("rgb.mtl")).unwrap();
             assert_eq!(mtl.contains(WRAP_COMMENT), wrap != [Wrap::Repeat; 2]);
         }

@@ -1,8 +1,8 @@
 //! Labelled point clouds as binary PLY files.
 
+use crate::texture_file::open_file;
 use crate::{AtomicFile, Error, Result};
 use s3d_geom::{NO_INDEX, PointCloud};
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -110,7 +110,7 @@ impl PlyPointWriter {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it has no such header.
 pub fn read_ply_point_count(path: &Path) -> Result<u64> {
-    let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
+    let file = open_file(path)?;
     // A header is short; what goes on for longer is none.
     for line in BufReader::new(file.take(65_536)).split(b'\n') {
         let line = line.map_err(|e| Error::io(path, "read", e))?;

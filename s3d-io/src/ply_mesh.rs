@@ -73,7 +73,7 @@ pub(crate) fn read(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<Mes
     if has_face_colors && vertices.colors.is_empty() {
         warnings.push("colours of faces are not read; colours of vertices or a texture are".into());
     }
-    let looks = Looks::load(path, &header, &mut warnings);
+    let looks = Looks::load(path, &header, &mut warnings)?;
     let mut parts = MeshParts::default();
     lay_textures(&mut parts, &mut vertices, &mut faces, &triangles, &looks, &mut warnings);
     let PlyTriangles { faces: triangles, polygons, cut, .. } = triangles;
@@ -149,7 +149,9 @@ struct Looks {
 }
 
 impl Looks {
-    fn load(path: &Path, header: &PlyHeader, warnings: &mut Vec<String>) -> Self {
+    /// # Errors
+    /// For textures that are too large.
+    fn load(path: &Path, header: &PlyHeader, warnings: &mut Vec<String>) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let names = header.comments.iter().filter_map(|comment| {
             let (keyword, name) = comment.split_once(char::is_whitespace)?;
@@ -176,7 +178,7 @@ impl Looks {
             }
             looks.by_comment.push((name, None));
         }
-        for ((at, loaded), image) in read_textures(&wanted).into_iter().enumerate().zip(&wanted) {
+        for ((at, loaded), image) in read_textures(&wanted)?.into_iter().enumerate().zip(&wanted) {
             match loaded {
                 Ok(loaded) => {
                     let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -193,7 +195,7 @@ impl Looks {
             }
         }
         looks.companions = wanted;
-        looks
+        Ok(looks)
     }
 }
 

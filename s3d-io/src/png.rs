@@ -2,15 +2,18 @@
 
 use crate::deflate::{Candidates, Deflater, Search};
 use crate::png_filter::{Filter, filtered};
+use crate::texture_file::open_file;
 use crate::{Compression, Error, Result, write_bytes};
 use png::{BitDepth, ColorType};
 use s3d_geom::Raster;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 /// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
 const MAX_PIXELS: u64 = 1 << 30;
+
+/// What deflate can make of a byte at most.
+const MAX_DEFLATE: u64 = 1032;
 
 /// What an 8-bit image shows, which decides how it compresses best. The pixels come back the same whatever is said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -181,7 +184,8 @@ pub fn read_gray16(path: &Path) -> Result<Raster<u16>> {
 }
 
 fn decode(path: &Path, color: ColorType, depth: BitDepth) -> Result<(u32, u32, Vec<u8>)> {
-    let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
+    let file = open_file(path)?;
+    let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
     let failed = |e| match e {
         png::DecodingError::IoError(e) if e.kind() != std::io::ErrorKind::UnexpectedEof => {
             Error::io(path, "read", e)
@@ -202,7 +206,11 @@ fn decode(path: &Path, color: ColorType, depth: BitDepth) -> Result<(u32, u32, V
             format!("{width} × {height} pixels are more than {MAX_PIXELS}"),
         ));
     }
-    let mut bytes = vec![0; width as usize * height as usize * info.bytes_per_pixel()];
+    let needed = u64::from(width) * u64::from(height) * info.bytes_per_pixel() as u64;
+    if needed > size.saturating_mul(MAX_DEFLATE) {
+        return Err(Error::format(path, format!("claims {width} × {height} pixels in {size} bytes")));
+    }
+    let mut bytes = vec![0; needed as usize];
     reader.next_frame(&mut bytes).map_err(failed)?;
     Ok((width, height, bytes))
 }

@@ -2,10 +2,10 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
+use crate::texture_file::open_file;
 use crate::{AtomicFile, Error, Place, Result};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::Vec3;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -33,7 +33,7 @@ struct Header {
 /// coordinate is not finite.
 pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
     let io = |e| Error::io(path, "read", e);
-    let file = File::open(path).map_err(io)?;
+    let file = open_file(path)?;
     let size = file.metadata().map_err(io)?.len();
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let header = read_header(path, &mut reader)?;

@@ -52,7 +52,15 @@ pub(crate) fn read(
     let m = world_from_file.matrix3;
     let turn = m * (1.0 / libm::cbrt(m.determinant()));
     let mut found = Vec::new();
+    let mut in_lower_case: BTreeMap<String, String> = BTreeMap::new();
     for (uuid, (file, pose)) in files {
+        if let Some(other) = in_lower_case.insert(uuid.to_ascii_lowercase(), uuid.clone()) {
+            let message = format!(
+                "its camera_uuid {uuid} differs from {other} of another file in case only; where case does not count, files \
+                 of both would have one name: rename one"
+            );
+            return Err(Error::format(&file, message));
+        }
         let location = DVec3::from_array(pose.camera_location);
         let angles = DVec3::from_array(pose.camera_original_rotation);
         if !angles.is_finite() || location.abs().max_element() > FARTHEST_M || !location.is_finite() {

@@ -4,6 +4,7 @@ use crate::annotations::Skipped;
 use crate::obj_lines::words;
 use crate::quote::quote;
 use crate::s3dis::OnFault;
+use crate::texture_file::open_file;
 use crate::{Error, Result};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{Vec3, vec3};
@@ -64,10 +65,7 @@ impl PointReader {
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for a folder or a device.
     pub fn open_with(path: &Path, on_fault: OnFault) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
-        if !file.metadata().is_ok_and(|m| m.is_file()) {
-            return Err(Error::format(path, "is no file of points"));
-        }
+        let file = open_file(path)?;
         Ok(Self {
             path: path.to_owned(),
             file,

@@ -109,7 +109,8 @@ fn split_name(name: &str) -> Option<(&str, &str)> {
     if name.len() <= 100 {
         return Some(("", name));
     }
-    let mut slashes = name.match_indices('/').filter_map(|(at, _)| Some((name.get(..at)?, name.get(at + 1..)?)));
+    let mut slashes =
+        name.match_indices('/').filter_map(|(at, _)| Some((name.get(..at)?, name.get(at + 1..)?)));
     slashes.find(|(folders, rest)| folders.len() <= 155 && (1..=100).contains(&rest.len()))
 }
 
@@ -118,7 +119,8 @@ fn header(name: &str, size: u64, kind: u8) -> [u8; BLOCK as usize] {
     let mut block = [0; BLOCK as usize];
     let mut put = |at: usize, bytes: &[u8]| block[at..at + bytes.len()].copy_from_slice(bytes);
     // What does not fit stands in the extended header; its beginning is here for programs that read none.
-    let beginning = name.split_at_checked(name.floor_char_boundary(100)).map_or("", |(beginning, _)| beginning);
+    let beginning =
+        name.split_at_checked(name.floor_char_boundary(100)).map_or("", |(beginning, _)| beginning);
     let (folders, rest) = split_name(name).unwrap_or(("", beginning));
     put(0, rest.as_bytes());
     put(100, b"0000644\0");

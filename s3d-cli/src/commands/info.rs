@@ -7,6 +7,7 @@ use crate::pipeline::annotate::{Annotated, annotate, hidden_instances, label_dou
 use crate::pipeline::inputs::{Inputs, mesh_doubts};
 use crate::pipeline::locate;
 use crate::pipeline::location::Outlook;
+use crate::pipeline::overlap::overlap_doubts;
 use crate::pipeline::pictures::Pictures;
 use s3d_geom::{NearestFaces, TriMesh};
 use s3d_label::Class;
@@ -64,6 +65,7 @@ fn report(args: &InfoArgs) -> Outcome<String> {
     wrong.extend(annotated.skipped.sentence());
     wrong.extend(mesh_doubts(mesh));
     wrong.extend(label_doubts(&annotated.report));
+    wrong.extend(overlap_doubts(&annotated.rooms));
     wrong.extend(hidden_instances(area, &annotated.face_labels, &inputs.table));
     let _ =
         writeln!(text, "\n{}", if wrong.is_empty() { "nothing looks wrong" } else { "what looks wrong:" });

@@ -8,6 +8,7 @@ use super::listing;
 use super::location::{Outlook, room_of};
 use super::manifest::{AreaEntry, XyzLoss};
 use super::modality::Look;
+use super::overlap::overlap_doubts;
 use super::pictures::Pictures;
 use super::place::{Ground, Located, Placement, place_locations};
 use super::points::write_points;
@@ -155,6 +156,7 @@ pub(crate) fn label_area(
     if let Some(w) = hidden_instances(area, &annotated.face_labels, table) {
         warn!("{w}");
     }
+    overlap_doubts(&annotated.rooms).iter().for_each(|w| warn!("{w}"));
     let located = locate(area, scene, &nearest, &annotated, table, options.seed)?;
     drop(nearest);
     let (locations, location_rooms): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();

@@ -223,7 +223,7 @@ pub(crate) struct Head {
 impl Head {
     /// The manifest at `path`, if there is one and it is ours, of a complete data set or of one that was begun.
     pub(crate) fn read(path: &Path) -> Option<Self> {
-        let head: Self = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
+        let head: Self = read_json(path).ok()?;
         (head.generator == GENERATOR).then_some(head)
     }
 

@@ -16,6 +16,7 @@ pub(crate) mod lock;
 pub(crate) mod manifest;
 pub(crate) mod modality;
 pub(crate) mod output;
+pub(crate) mod overlap;
 pub(crate) mod pictures;
 pub(crate) mod place;
 pub(crate) mod points;

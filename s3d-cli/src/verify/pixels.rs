@@ -124,7 +124,8 @@ mod tests {
     fn differences_are_counted() {
         let a = Raster::from_vec(2, 4, vec![0u16, 1, 2, 3, 4, 5, 6, 7]);
         let b = Raster::from_vec(2, 4, vec![0u16, 1, 2, 9, 4, 5, 6, 9]);
-        let compare = |b| Difference::of(&a, b, |a, b| a == b, |v| v.to_string(), |v| v.to_string());
+        let compare =
+            |b: &Raster<u16>| Difference::of(&a, b, |a, b| a == b, |v| v.to_string(), |v: u16| v.to_string());
         assert_eq!(compare(&a), None);
         assert_eq!(
             compare(&b).unwrap().sentence("what the mesh shows"),

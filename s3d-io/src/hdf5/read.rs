@@ -4,6 +4,7 @@
 
 use super::header::Header;
 use super::{SIGNATURE, UNDEFINED, chunks, group};
+use crate::texture_file::open_file;
 use crate::{Error, Result};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -92,11 +93,8 @@ impl Hdf5File {
     /// Opens a file.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let io = |e| Error::io(path, "read", e);
-        let file = File::open(path).map_err(io)?;
+        let file = open_file(path)?;
         let metadata = file.metadata().map_err(io)?;
-        if !metadata.is_file() {
-            return Err(Error::format(path, "is no file"));
-        }
         let mut this = Self {
             path: path.to_owned(),
             file: Mutex::new(file),

@@ -1,0 +1,676 @@
+//! Input that is broken, hostile or absurd: every export of it ends soon, with exit code 1 and a message that names the
+//! file; nothing that a file says makes the program write outside of OUT.
+
+mod common;
+
+use common::{UUID_A, UUID_B, s3d_ok, text, write_scan};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{ErrorKind, Read, Seek};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// The longest that refusing something may take. It is a fraction of a second on a machine that does nothing else.
+const LIMIT: Duration = Duration::from_secs(120);
+const SMALL: [&str; 8] = ["--size", "32", "--pano-width", "64", "--views", "3", "--points-per-m2", "50"];
+
+struct Scan {
+    dir: tempfile::TempDir,
+    scene: PathBuf,
+}
+
+impl Scan {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = write_scan(&dir.path().join("scan"), 1);
+        Self { dir, scene }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.dir.path().join("scan").join(name)
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.file(name), content).unwrap();
+    }
+
+    fn out(&self) -> PathBuf {
+        self.dir.path().join("out")
+    }
+
+    fn replace(&self, name: &str, from: &str, to: &str) {
+        let content = fs::read_to_string(self.file(name)).unwrap();
+        assert!(content.contains(from), "{name} holds {from:?}");
+        self.write(name, content.replacen(from, to, 1));
+    }
+
+    /// Makes `name` the mesh, the annotations or the list of cameras; the room of a cloud is `office_1`.
+    fn use_mesh(&self, name: &str) {
+        self.replace("scene.toml", "path = \"room.obj\"", &format!("path = \"{name}\""));
+    }
+
+    fn use_annotations(&self, name: &str) {
+        self.replace("scene.toml", "path = \"Area_1\"", &format!("path = \"{name}\""));
+    }
+
+    fn use_cameras(&self, name: &str) {
+        self.replace("scene.toml", "path = \"cameras.csv\"", &format!("path = \"{name}\""));
+    }
+
+    /// An export fails with exit code 1, says so, and leaves everything beside OUT as it was, and no OUT that looks complete.
+    fn refused(&self, parts: &[&str]) {
+        let before = listing(self.dir.path());
+        let out = self.out();
+        let mut args = vec!["export", text(&self.scene), "-o", text(&out)];
+        args.extend(SMALL);
+        let (code, log) = run(&args);
+        assert_eq!(code, Some(1), "{parts:?}: {log}");
+        for part in parts {
+            assert!(log.contains(part), "{part:?} is not in the message: {log}");
+        }
+        let mut after = listing(self.dir.path());
+        after.retain(|path, _| !path.starts_with(&out));
+        assert_eq!(after, before, "a refused export left something beside OUT: {log}");
+        // Points are read late: what was begun until then says so.
+        let manifest = fs::read_to_string(out.join("manifest.json")).unwrap_or_default();
+        assert!(!out.exists() || manifest.contains("\"running\""), "OUT looks complete: {manifest}");
+    }
+
+    /// An export succeeds; its log.
+    fn exported(&self) -> String {
+        let out = self.out();
+        let mut args = vec!["export", text(&self.scene), "-o", text(&out)];
+        args.extend(SMALL);
+        s3d_ok(&args)
+    }
+}
+
+/// Runs `s3d`, which must end by itself, soon, and without a panic: its exit code and what it logged.
+fn run(args: &[&str]) -> (Option<i32>, String) {
+    wait(Command::new(env!("CARGO_BIN_EXE_s3d")).args(args))
+}
+
+fn wait(command: &mut Command) -> (Option<i32>, String) {
+    let mut log = tempfile::tempfile().unwrap();
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(log.try_clone().unwrap());
+    let started = Instant::now();
+    let mut child = loop {
+        match command.spawn() {
+            // A copy that was just written: a process that another test started had it open for a moment.
+            Err(e) if e.kind() == ErrorKind::ExecutableFileBusy && started.elapsed() < LIMIT => {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            child => break child.expect("the binary starts"),
+        }
+    };
+    let status = loop {
+        match child.try_wait().unwrap() {
+            Some(status) => break status,
+            None if started.elapsed() > LIMIT => {
+                child.kill().unwrap();
+                panic!("{command:?} does not end");
+            }
+            None => std::thread::sleep(Duration::from_millis(10)),
+        }
+    };
+    let mut text = Vec::new();
+    log.rewind().unwrap();
+    log.read_to_end(&mut text).unwrap();
+    let text = String::from_utf8_lossy(&text).into_owned();
+    assert!(!text.contains("panicked") && !text.contains("memory allocation"), "{command:?}: {text}");
+    assert!(status.code().is_some_and(|code| code <= 2), "{command:?}: {status}: {text}");
+    (status.code(), text)
+}
+
+/// Every path below `dir` with what it is and its size; nothing is opened, and no link is followed.
+fn listing(dir: &Path) -> BTreeMap<PathBuf, (String, u64)> {
+    let mut all = BTreeMap::new();
+    let mut folders = vec![dir.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).into_iter().flatten() {
+            let path = entry.unwrap().path();
+            let what = fs::symlink_metadata(&path).unwrap();
+            if what.is_dir() {
+                folders.push(path.clone());
+            }
+            let size = if what.is_file() { what.len() } else { 0 };
+            all.insert(path, (format!("{:?}", what.file_type()), size));
+        }
+    }
+    all
+}
+
+/// A PNG file of one gray pixel whose header claims another size, its checksum right.
+fn png_that_claims(width: u32, height: u32) -> Vec<u8> {
+    let mut header = b"IHDR".to_vec();
+    header.extend(width.to_be_bytes());
+    header.extend(height.to_be_bytes());
+    header.extend([1, 0, 0, 0, 0]);
+    let crc = !header.iter().fold(!0u32, |crc, &b| {
+        (0..8).fold(crc ^ u32::from(b), |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 })
+    });
+    let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\r".to_vec();
+    png.extend(header);
+    png.extend(crc.to_be_bytes());
+    // One chunk of data with two bytes, and the end.
+    png.extend(b"\0\0\0\x0aIDAT\x78\x9c\x63\x60\0\0\0\x02\0\x01\x48\xaf\xa4\x71\0\0\0\0IEND\xae\x42\x60\x82");
+    png
+}
+
+/// A JPEG file that ends behind a header of this size.
+fn jpeg_that_claims(width: u16, height: u16) -> Vec<u8> {
+    let mut jpeg = b"\xff\xd8\xff\xe0\0\x10JFIF\0\x01\x01\0\0\x01\0\x01\0\0\xff\xc0\0\x11\x08".to_vec();
+    jpeg.extend(height.to_be_bytes());
+    jpeg.extend(width.to_be_bytes());
+    jpeg.extend(b"\x03\x01\x11\0\x02\x11\0\x03\x11\0\xff\xda\0\x0c\x03\x01\0\x02\0\x03\0\0\x3f\0\0\xff\xd9");
+    jpeg
+}
+
+#[test]
+fn a_texture_bomb_is_refused_with_its_size_and_the_limit() {
+    for (name, bytes) in
+        [("bomb.png", png_that_claims(60_000, 60_000)), ("bomb.jpg", jpeg_that_claims(60_000, 60_000))]
+    {
+        let scan = Scan::new();
+        scan.write(name, bytes);
+        scan.replace("room.mtl", "newmtl floor\n", &format!("newmtl floor\nmap_Kd {name}\n"));
+        scan.refused(&[name, "60000 × 60000 pixels", "536870912"]);
+    }
+    // Many that are not too large by themselves.
+    let scan = Scan::new();
+    let (mut obj, mut mtl) = (fs::read_to_string(scan.file("room.obj")).unwrap(), String::new());
+    // Behind the end of an image anything may follow; here it makes the size one that the file could hold.
+    let mut large = png_that_claims(23_000, 23_000);
+    large.resize(70_000, 0);
+    scan.write("large.png", large);
+    for i in 0..20 {
+        fs::copy(scan.file("large.png"), scan.file(&format!("large_{i}.png"))).unwrap();
+        mtl += &format!("newmtl m{i}\nmap_Kd large_{i}.png\n");
+        obj += &format!("usemtl m{i}\nf 1 2 3\n");
+    }
+    scan.write("room.obj", obj);
+    scan.write("room.mtl", mtl);
+    scan.refused(&["large_16.png", "8589934592"]);
+    // An image that claims what its bytes cannot hold is as one that is damaged.
+    let scan = Scan::new();
+    scan.write("claim.png", png_that_claims(16_000, 16_000));
+    scan.replace("room.mtl", "newmtl floor\n", "newmtl floor\nmap_Kd claim.png\n");
+    let log = scan.exported();
+    assert!(log.contains("claim.png claims 16000 × 16000 pixels in"), "{log}");
+}
+
+#[test]
+fn one_bad_line_among_many_is_named() {
+    // Both the line and the ones before it are read as a stream. (With a hundred million lines: see docs/formats.md, "Limits".)
+    let scan = Scan::new();
+    let path = "Area_1/office_1/Annotations/floor_1.txt";
+    let mut points = "1.234 2.345 0.001 120 130 140\n".repeat(1_500_000);
+    points += "1.234 2.345 0.001 120 130 14x\n";
+    scan.write(path, points);
+    scan.refused(&["floor_1.txt, line 1500001", "14x"]);
+}
+
+#[test]
+fn a_mesh_of_degenerate_faces_only_is_refused() {
+    let scan = Scan::new();
+    let mut obj = "v 0 0 0\nv 1 0 0\nv 2 0 0\n".to_owned();
+    for _ in 0..1000 {
+        obj += "f 1 2 3\nf 1 1 2\nf 2 2 2\n";
+    }
+    scan.write("room.obj", obj);
+    scan.refused(&["room.obj", "no face"]);
+}
+
+#[test]
+fn rooms_that_overlap_are_exported_and_told() {
+    let scan = Scan::new();
+    let (from, to) = (scan.file("Area_1/office_1/Annotations"), scan.file("Area_1/lobby_1/Annotations"));
+    fs::create_dir_all(&to).unwrap();
+    for name in ["floor_1.txt", "ceiling_1.txt", "wall_1.txt"] {
+        fs::copy(from.join(name), to.join(name)).unwrap();
+    }
+    let log = scan.exported();
+    assert!(log.contains("rooms lobby_1 and office_1 overlap: 100 % of the floor of"), "{log}");
+    let info = common::s3d(&["info", text(&scan.scene)]);
+    assert!(String::from_utf8_lossy(&info.stdout).contains("overlap: 100 %"));
+}
+
+#[test]
+fn a_camera_inside_a_wall_is_told() {
+    let scan = Scan::new();
+    scan.write("cameras.csv", format!("{UUID_A},2,1.5,1.5,0,0,0,1\n{UUID_B},0.004,1.5,1.5,0,0,0,1\n"));
+    let log = scan.exported();
+    assert!(log.contains(&format!("location {UUID_B} is 4 mm from a surface")), "{log}");
+    assert!(!log.contains(&format!("location {UUID_A} is")), "{log}");
+}
+
+/// Names of files of every kind that is read, by the part of a scan that they are.
+const MESHES: [&str; 4] = ["m.obj", "m.ply", "m.gltf", "m.glb"];
+const ANNOTATIONS: [&str; 8] =
+    ["a.ply", "a.npy", "a.npz", "a.las", "a.laz", "a.e57", "a.mat", "scene0000_00.aggregation.json"];
+const CAMERAS: [&str; 4] = ["c.csv", "images.txt", "images.bin", "transforms.json"];
+
+/// Refuses a scan of which one file was put there by `make`, once for each kind of file, naming it.
+fn every_kind_is_refused(make: impl Fn(&Path), parts: &[&str]) {
+    type Choose = fn(&Scan, &str);
+    let kinds: [(&[&str], Choose); 3] =
+        [(&MESHES, Scan::use_mesh), (&ANNOTATIONS, Scan::use_annotations), (&CAMERAS, Scan::use_cameras)];
+    for (names, choose) in kinds {
+        for name in names {
+            let scan = Scan::new();
+            make(&scan.file(name));
+            choose(&scan, name);
+            scan.refused(&[&[*name][..], parts].concat());
+        }
+    }
+    for name in ["scene.toml", "room.obj", "cameras.csv", "Area_1/office_1/Annotations/floor_1.txt"] {
+        let scan = Scan::new();
+        fs::remove_file(scan.file(name)).unwrap();
+        make(&scan.file(name));
+        let file = name.rsplit('/').next().unwrap();
+        if scan.file(name).is_dir() && file == "floor_1.txt" {
+            // What else lies in the folders of annotations is left out.
+            assert!(scan.exported().contains("floor_1.txt: not a file of points, left out"));
+        } else {
+            scan.refused(&[file]);
+        }
+    }
+}
+
+#[test]
+fn empty_files_are_refused() {
+    every_kind_is_refused(|path| fs::write(path, b"").unwrap(), &[]);
+}
+
+#[test]
+fn folders_in_place_of_files_are_refused() {
+    every_kind_is_refused(|path| fs::create_dir(path).unwrap(), &[]);
+}
+
+#[test]
+fn files_of_zeros_and_of_noise_are_refused() {
+    every_kind_is_refused(|path| fs::write(path, [0; 5000]).unwrap(), &[]);
+    let mut state = 1u32;
+    let noise: Vec<u8> = (0..5000)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        })
+        .collect();
+    every_kind_is_refused(|path| fs::write(path, &noise).unwrap(), &[]);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_that_lead_nowhere_are_refused() {
+    let circle = |path: &Path| std::os::unix::fs::symlink(path.file_name().unwrap(), path).unwrap();
+    every_kind_is_refused(circle, &[]);
+    let scan = Scan::new();
+    fs::remove_dir_all(scan.file("Area_1/office_1/Annotations")).unwrap();
+    circle(&scan.file("Area_1/office_1/Annotations"));
+    scan.refused(&["Area_1/office_1"]);
+    // A texture is only drawn without.
+    let scan = Scan::new();
+    circle(&scan.file("wall.png"));
+    scan.replace("room.mtl", "newmtl floor\n", "newmtl floor\nmap_Kd wall.png\n");
+    assert!(scan.exported().contains("wall.png"));
+}
+
+/// A pipe that nobody writes to: opening it would wait for ever.
+#[cfg(target_os = "linux")]
+#[test]
+fn pipes_in_place_of_files_are_refused() {
+    let pipe = |path: &Path| {
+        let made = Command::new("mkfifo").arg(path).status();
+        assert!(made.unwrap().success(), "mkfifo belongs to every Linux");
+    };
+    every_kind_is_refused(pipe, &[]);
+    let scan = Scan::new();
+    let data_set = scan.dir.path().join("data");
+    fs::create_dir(&data_set).unwrap();
+    pipe(&data_set.join("manifest.json"));
+    for args in
+        [&["stats", text(&data_set)][..], &["sample", text(&data_set.join("manifest.json")), "-o", "x.ply"]]
+    {
+        assert_eq!(run(args).0, Some(1));
+    }
+}
+
+/// Files that may not be read. The superuser may read everything, so the binary is run as somebody else then.
+#[cfg(target_os = "linux")]
+#[test]
+fn files_that_may_not_be_read_are_refused() {
+    use std::os::unix::fs::{PermissionsExt, chown};
+    use std::os::unix::process::CommandExt;
+    const NOBODY: u32 = 65_534;
+    let allow = |path: &Path, mode| fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
+    for name in
+        ["scene.toml", "room.obj", "room.mtl", "cameras.csv", "Area_1/office_1/Annotations/floor_1.txt"]
+    {
+        let scan = Scan::new();
+        allow(scan.dir.path(), 0o755);
+        let binary = scan.dir.path().join("s3d");
+        fs::copy(env!("CARGO_BIN_EXE_s3d"), &binary).unwrap();
+        allow(&scan.file(name), 0);
+        let out = scan.dir.path().join("home/out");
+        fs::create_dir(scan.dir.path().join("home")).unwrap();
+        let mut command = Command::new(&binary);
+        command.args(["export", text(&scan.scene), "-o", text(&out)]).args(SMALL);
+        if fs::File::open(scan.file(name)).is_ok() {
+            chown(scan.dir.path().join("home"), Some(NOBODY), Some(NOBODY)).unwrap();
+            command.uid(NOBODY).gid(NOBODY);
+        }
+        let (code, log) = wait(&mut command);
+        // Without its library a mesh is drawn gray.
+        assert_eq!(code, Some(i32::from(name != "room.mtl")), "{name}: {log}");
+        assert!(log.contains(name.rsplit('/').next().unwrap()) && log.contains("ermission denied"), "{log}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_no_text_are_no_trouble() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let odd = OsStr::from_bytes(b"a\xff\xfe.txt");
+    let scan = Scan::new();
+    fs::write(scan.file("Area_1/office_1/Annotations").join(odd), "1 2 3 4 5 6\n").unwrap();
+    scan.refused(&["Annotations/a", "names no instance"]);
+    // The scan's own folder may be called anything.
+    let scan = Scan::new();
+    let moved = scan.dir.path().join(OsStr::from_bytes(b"sc\xffan"));
+    fs::rename(scan.file(""), &moved).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_s3d"));
+    command.arg("export").arg(moved.join("scene.toml")).arg("-o").arg(scan.out()).args(SMALL);
+    let (code, log) = wait(&mut command);
+    assert_eq!(code, Some(0), "{log}");
+}
+
+#[test]
+fn deep_nesting_is_refused() {
+    let deep = |open: &str| open.repeat(100_000);
+    for (name, content) in [
+        ("transforms.json", deep("[")),
+        ("transforms.json", format!("{{\"frames\":{}", deep("{\"a\":"))),
+        ("images.txt", deep("[")),
+    ] {
+        let scan = Scan::new();
+        scan.write(name, content);
+        scan.use_cameras(name);
+        scan.refused(&[name]);
+    }
+    for (name, content) in [
+        ("m.gltf", deep("[")),
+        ("m.gltf", format!("{{\"asset\":{{\"version\":\"2.0\"}},\"extras\":{}", deep("["))),
+    ] {
+        let scan = Scan::new();
+        scan.write(name, content);
+        scan.use_mesh(name);
+        scan.refused(&[name]);
+    }
+    // Nodes of nodes, each in the next: as deep as a file likes.
+    let nodes: Vec<String> = (1..50_000).map(|n| format!("{{\"children\":[{n}]}}")).collect();
+    let scan = Scan::new();
+    let nodes = format!("{},{{}}", nodes.join(","));
+    scan.write(
+        "m.gltf",
+        format!("{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{nodes}]}}"),
+    );
+    scan.use_mesh("m.gltf");
+    scan.refused(&["m.gltf", "no mesh"]);
+    for content in [format!("a = {}", deep("[")), format!("a = {}", deep("{a="))] {
+        let scan = Scan::new();
+        scan.write("scene.toml", content);
+        scan.refused(&["scene.toml"]);
+    }
+    let scan = Scan::new();
+    scan.write("scene0000_00.aggregation.json", deep("{\"segGroups\":["));
+    scan.use_annotations("scene0000_00.aggregation.json");
+    scan.refused(&["scene0000_00.aggregation.json"]);
+}
+
+#[test]
+fn coordinates_that_are_none_are_refused() {
+    for bad in ["nan", "inf", "-inf", "1e39", "1e999"] {
+        let scan = Scan::new();
+        scan.replace("room.obj", "v 0 0 -0\n", &format!("v {bad} 0 0\n"));
+        scan.refused(&["room.obj, line", bad]);
+        let scan = Scan::new();
+        scan.replace("Area_1/office_1/Annotations/floor_1.txt", "0.100 ", &format!("{bad} "));
+        scan.refused(&["floor_1.txt, line 1", bad]);
+    }
+    for bad in ["nan", "inf", "1e999", "1e8", "-1e300"] {
+        let scan = Scan::new();
+        scan.write("cameras.csv", format!("{UUID_A},{bad},1,1,0,0,0,1\n"));
+        scan.refused(&["cameras.csv, line 1"]);
+    }
+}
+
+#[test]
+fn enormous_and_tiny_numbers_are_no_trouble() {
+    // Finite, and absurd: a mesh as large as floats go, points as far and as near to each other as they go.
+    for (name, from, to) in [
+        ("room.obj", "v 0 0 -0\n", "v -3e38 -3e38 -3e38\n"),
+        ("room.obj", "v 0 0 -0\n", "v 1e-44 1e-44 -1e-44\n"),
+        ("Area_1/office_1/Annotations/floor_1.txt", "0.100 ", "3e38 "),
+        ("Area_1/office_1/Annotations/floor_1.txt", "0.100 ", "1e-44 "),
+        ("Area_1/office_1/Annotations/table_1.txt", "0.700 ", "-3e38 "),
+    ] {
+        let scan = Scan::new();
+        scan.replace(name, from, to);
+        let out = scan.out();
+        let mut args = vec!["export", text(&scan.scene), "-o", text(&out)];
+        args.extend(SMALL);
+        let (code, log) = run(&args);
+        assert!(code == Some(0) || log.contains("room.obj") || log.contains("_1.txt"), "{name} {to}: {log}");
+    }
+    for (from, to) in
+        [("area = 1", "area = 4294967296"), ("area = 1", "area = -1"), ("area = 1", "area = 1e9")]
+    {
+        let scan = Scan::new();
+        scan.replace("scene.toml", from, to);
+        scan.refused(&["scene.toml, line 1"]);
+    }
+}
+
+#[test]
+fn counts_that_a_header_claims_are_not_believed() {
+    const HUGE: [&str; 3] = ["4294967294", "1000000000000", "18446744073709551615"];
+    for count in HUGE {
+        let head = format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n");
+        let xyz = "property float x\nproperty float y\nproperty float z\n";
+        let scan = Scan::new();
+        scan.write(
+            "m.ply",
+            format!("{head}{xyz}element face {count}\nproperty list uchar int vertex_indices\nend_header\n"),
+        );
+        scan.use_mesh("m.ply");
+        scan.refused(&["m.ply"]);
+        let scan = Scan::new();
+        scan.write("a.ply", format!("{head}{xyz}property int label\nend_header\n"));
+        scan.use_annotations("a.ply");
+        scan.refused(&["a.ply"]);
+        let mut npy =
+            format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, 8), }}").into_bytes();
+        npy.resize(118, b' ');
+        let scan = Scan::new();
+        scan.write("a.npy", [&b"\x93NUMPY\x01\0\x76\0"[..], &npy].concat());
+        scan.use_annotations("a.npy");
+        scan.refused(&["a.npy"]);
+    }
+    let scan = Scan::new();
+    scan.write("images.bin", u64::MAX.to_le_bytes());
+    scan.use_cameras("images.bin");
+    scan.refused(&["images.bin"]);
+    let scan = Scan::new();
+    let accessor = "{\"componentType\":5126,\"count\":9000000000000000000,\"type\":\"MAT4\"}";
+    scan.write(
+        "m.gltf",
+        format!(
+            "{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{{\"mesh\":0}}],\"meshes\":[{{\"primitives\":[{{\"attributes\":\
+             {{\"POSITION\":0}},\"indices\":0}}]}}],\"accessors\":[{accessor}],\"buffers\":[{{\"byteLength\":9000000000}}]}}"
+        ),
+    );
+    scan.use_mesh("m.gltf");
+    scan.refused(&["m.gltf"]);
+}
+
+/// A glTF box of one triangle whose names lead elsewhere.
+fn gltf_with_names(names: &[&str]) -> String {
+    use std::fmt::Write as _;
+    let (mut materials, mut textures, mut images, mut primitives) =
+        <(String, String, String, String)>::default();
+    // A PNG file of two pixels.
+    let png =
+        "iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAAAAD0lEQVR4nGPgYmBgYGAAAABeAA1Tm0cOAAAAAElFTkSuQmCC";
+    for (i, name) in names.iter().enumerate() {
+        let name = name.replace('\\', "\\\\").replace('\0', "\\u0000").replace('\n', "\\n");
+        let comma = if i == 0 { "" } else { "," };
+        let _ = write!(
+            materials,
+            "{comma}{{\"name\":\"{name}\",\"pbrMetallicRoughness\":{{\"baseColorTexture\":{{\"index\":{i}}}}}}}"
+        );
+        let _ = write!(textures, "{comma}{{\"source\":{i}}}");
+        let _ = write!(images, "{comma}{{\"name\":\"{name}\",\"uri\":\"data:image/png;base64,{png}\"}}");
+        let _ = write!(
+            primitives,
+            "{comma}{{\"attributes\":{{\"POSITION\":{i},\"TEXCOORD_0\":{i}}},\"material\":{i}}}"
+        );
+    }
+    // Texture coordinates are positions here: which they are does not matter.
+    let primitives = primitives.replace(",\"TEXCOORD_0\"", ",\"_IGNORED\"");
+    let accessors =
+        vec!["{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}"; names.len()]
+            .join(",");
+    format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0}}],\
+         \"meshes\":[{{\"primitives\":[{primitives}]}}],\"materials\":[{materials}],\"textures\":[{textures}],\
+         \"images\":[{images}],\"accessors\":[{accessors}],\"bufferViews\":[{{\"buffer\":0,\"byteLength\":36}}],\
+         \"buffers\":[{{\"byteLength\":36,\"uri\":\"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAAAAAIC/\"}}]}}"
+    )
+}
+
+/// Exports, which must succeed; all that is new lies in OUT, under names that every system takes.
+fn exports_only_into_out(scan: &Scan) -> BTreeMap<PathBuf, (String, u64)> {
+    let before = listing(scan.dir.path());
+    scan.exported();
+    let out = scan.out();
+    let (inside, outside): (BTreeMap<_, _>, BTreeMap<_, _>) =
+        listing(scan.dir.path()).into_iter().partition(|(path, _)| path.starts_with(&out));
+    assert_eq!(outside, before, "something outside of OUT changed");
+    let mut in_lower_case = std::collections::BTreeSet::new();
+    for path in inside.keys() {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+        let is_device =
+            ["con", "nul", "aux", "prn"].contains(&name.to_lowercase().split('.').next().unwrap());
+        assert!(name.chars().all(fits) && !name.ends_with('.') && !is_device, "{name}");
+        assert!(in_lower_case.insert(path.to_str().unwrap().to_lowercase()), "{name} twice but for case");
+    }
+    inside
+}
+
+#[test]
+fn names_in_a_mesh_lead_nowhere() {
+    let scan = Scan::new();
+    let long = "n".repeat(3000);
+    let names = [
+        "../../evil",
+        "/tmp/evil",
+        "..\\\\..\\\\evil",
+        "C:\\\\evil",
+        "a\0b",
+        "a\nb",
+        "CON",
+        "nul",
+        "Wall",
+        "wall",
+        "WALL",
+        ".",
+        "..",
+        "",
+        ".hidden",
+        "rgb",
+        long.as_str(),
+    ];
+    scan.write("m.gltf", gltf_with_names(&names));
+    scan.use_mesh("m.gltf");
+    exports_only_into_out(&scan);
+    // An OBJ file's images may lie elsewhere; their copies do not.
+    let scan = Scan::new();
+    let png = {
+        let mut png = png_that_claims(1, 1);
+        png[24] = 8;
+        png
+    };
+    for name in ["secret.png", "scan/Wall.png", "scan/wall.png"] {
+        fs::write(scan.dir.path().join(name), &png).unwrap();
+    }
+    scan.replace("room.mtl", "newmtl floor\n", "newmtl floor\nmap_Kd ../secret.png\n");
+    scan.replace("room.mtl", "newmtl wall\n", "newmtl wall\nmap_Kd Wall.png\n");
+    scan.replace("room.mtl", "newmtl table\n", "newmtl table\nmap_Kd wall.png\n");
+    exports_only_into_out(&scan);
+    // What is no image is not copied, wherever it is.
+    let scan = Scan::new();
+    fs::write(scan.dir.path().join("secret"), "a password").unwrap();
+    scan.replace("room.mtl", "newmtl floor\n", "newmtl floor\nmap_Kd ../secret\n");
+    for (path, _) in exports_only_into_out(&scan) {
+        assert!(!fs::read(&path).is_ok_and(|bytes| bytes.windows(10).any(|w| w == b"a password")));
+    }
+}
+
+#[test]
+fn names_in_lists_and_annotations_lead_nowhere() {
+    // A scan location is named by a hash of its picture's name.
+    let scan = Scan::new();
+    scan.write(
+        "images.txt",
+        "1 1 0 0 0 -2 -1.2 -1.5 1 ../../../evil.jpg\n\n2 1 0 0 0 -1 -1 -1.5 1 /etc/passwd\n\n",
+    );
+    scan.use_cameras("images.txt");
+    exports_only_into_out(&scan);
+    for uuid in ["../../evil", "/etc/passwd", "a\\\\b", "..", "", "a b", &"5".repeat(300)] {
+        let scan = Scan::new();
+        fs::create_dir(scan.file("poses")).unwrap();
+        scan.write(
+            "poses/pose.json",
+            format!(
+                "{{\"camera_uuid\":\"{uuid}\",\"camera_original_rotation\":[1.57,0,0],\"camera_location\":[2,1.2,1.5],\
+                 \"room\":\"../../x_1_1\"}}"
+            ),
+        );
+        scan.use_cameras("poses");
+        scan.refused(&["pose.json", "camera_uuid"]);
+        let scan = Scan::new();
+        scan.write("cameras.csv", format!("\"{uuid}\",2,1.2,1.5,0,0,0,1\n"));
+        scan.refused(&["cameras.csv, line 1", "uuid"]);
+    }
+    // Uuids that differ in case alone would share files where case does not count.
+    let scan = Scan::new();
+    fs::create_dir(scan.file("poses")).unwrap();
+    for (name, uuid) in [("a", "ABCDEF"), ("b", "abcdef")] {
+        scan.write(
+            &format!("poses/{name}.json"),
+            format!(
+                "{{\"camera_uuid\":\"{uuid}\",\"camera_original_rotation\":[1.57,0,0],\"camera_location\":[2,1.2,1.5]}}"
+            ),
+        );
+    }
+    scan.use_cameras("poses");
+    scan.refused(&["b.json", "abcdef differs from ABCDEF of another file in case only"]);
+    // Rooms and classes of annotations are known words and numbers.
+    for room in ["../../evil_1", "office_../1", "office_1/..", "CON_1"] {
+        let scan = Scan::new();
+        scan.use_annotations("a.ply");
+        scan.replace("scene.toml", "[cameras]", &format!("room = \"{room}\"\n[cameras]"));
+        scan.write("a.ply", "");
+        scan.refused(&["scene.toml", "room"]);
+    }
+    let scan = Scan::new();
+    fs::create_dir_all(scan.file("Area_1/x\\..\\evil_1/Annotations")).unwrap();
+    scan.refused(&["evil_1"]);
+    let scan = Scan::new();
+    scan.write("Area_1/office_1/Annotations/x\\evil_1.txt", "1 2 3 4 5 6\n");
+    scan.refused(&["evil_1.txt"]);
+}

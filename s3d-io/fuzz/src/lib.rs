@@ -1,0 +1,95 @@
+//! What all fuzz targets share: a folder in memory, a limit to what may be allocated, and the feeds of the crate's tests.
+
+#[path = "../../tests/feed/mod.rs"]
+mod feed;
+
+use feed::{FEEDS, Feed};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::path::PathBuf;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// Counts what is allocated, and ends the process when that is more than an input of this size warrants. libFuzzer's own
+/// limits see neither pages that were never touched nor, without a sanitizer, single allocations.
+struct Limited;
+
+static LIVE: AtomicUsize = AtomicUsize::new(0);
+static LIMIT: AtomicUsize = AtomicUsize::new(usize::MAX);
+
+fn grow(bytes: usize) {
+    let live = LIVE.fetch_add(bytes, Relaxed).saturating_add(bytes);
+    let limit = LIMIT.load(Relaxed);
+    if live > limit {
+        LIMIT.store(usize::MAX, Relaxed);
+        eprintln!("{bytes} bytes more make {live}; the input warrants {limit}");
+        eprintln!("{}", std::backtrace::Backtrace::force_capture());
+        std::process::abort();
+    }
+}
+
+unsafe impl GlobalAlloc for Limited {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        grow(layout.size());
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        grow(layout.size());
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // Both may live while the content is moved.
+        grow(size);
+        LIVE.fetch_sub(layout.size(), Relaxed);
+        unsafe { System.realloc(place, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        LIVE.fetch_sub(layout.size(), Relaxed);
+        unsafe { System.dealloc(place, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Limited = Limited;
+
+struct Target {
+    feed: Feed,
+    dir: PathBuf,
+    /// What may be allocated: so much, and so much for each byte of the input.
+    base: usize,
+    per_byte: usize,
+}
+
+static TARGET: OnceLock<Target> = OnceLock::new();
+
+/// Chooses the reader and makes its folder.
+pub fn start(name: &str) {
+    let (_, feed) = FEEDS.into_iter().find(|(n, _)| *n == name).expect("a feed has this name");
+    // No threads: a run is to depend on its input alone.
+    rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().expect("the first pool");
+    // Decoders that are not ours may panic on what is damaged, and are caught where they are called. libfuzzer-sys ends
+    // the process at any panic.
+    let aborts = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !s3d_io::is_guarded() {
+            aborts(panic);
+        }
+    }));
+    let root = std::env::var_os("S3D_FUZZ_DIR").map_or_else(|| "/dev/shm".into(), PathBuf::from);
+    let dir = root.join(format!("s3d-fuzz-{name}-{}", std::process::id()));
+    std::fs::create_dir_all(&dir).expect("the folder can be made");
+    // A pixel of a compressed image may take an eighth of a bit; a byte of deflated numbers becomes a thousand.
+    let per_byte = if matches!(name, "texture" | "gltf" | "png" | "exr") { 32 << 10 } else { 4 << 10 };
+    let target = Target { feed, dir, base: 256 << 20, per_byte };
+    assert!(TARGET.set(target).is_ok(), "started twice");
+}
+
+/// Reads `data`.
+pub fn run(data: &[u8]) {
+    let Some(target) = TARGET.get() else { return };
+    LIMIT.store(LIVE.load(Relaxed) + target.base + target.per_byte * data.len(), Relaxed);
+    (target.feed)(&target.dir, data);
+    LIMIT.store(usize::MAX, Relaxed);
+}

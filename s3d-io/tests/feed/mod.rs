@@ -1,0 +1,282 @@
+//! Any bytes, fed to every reader of this crate: what the fuzz targets run (`../fuzz`), and the test of what they found.
+//!
+//! Each entry of [`FEEDS`] writes the bytes to a file, or a few, in a folder of its own, and reads that as an export would.
+//! Whether it can be read does not matter; it must end, without a panic, in memory that the file's size warrants, and an
+//! error must name a file.
+
+use s3d_geom::PointCloud;
+use s3d_geom::glam::DAffine3;
+use s3d_io::*;
+use s3d_label::Class;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What a name of a fuzz target means: puts `data` in the folder and reads it.
+pub type Feed = fn(&Path, &[u8]);
+
+/// Every reader, by the name of its fuzz target.
+pub const FEEDS: [(&str, Feed); 18] = [
+    ("obj", obj),
+    ("mtl", mtl),
+    ("texture", texture),
+    ("gltf", gltf),
+    ("ply_mesh", ply_mesh),
+    ("ply_cloud", ply_cloud),
+    ("s3dis", s3dis),
+    ("cameras", cameras),
+    ("captures", captures),
+    ("json", json),
+    ("scene", scene),
+    ("npy", npy),
+    ("las", las),
+    ("e57", e57),
+    ("scannet", scannet),
+    ("mat", mat),
+    ("png", png),
+    ("exr", exr),
+];
+
+/// A triangle with a texture, whose library is `m.mtl`.
+const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl wall\nf 1/1 2/1 3/1\n";
+
+/// A message about a file must name it, and stay one that can be read.
+fn check<T>(dir: &Path, result: Result<T>) -> Option<T> {
+    match result {
+        Ok(value) => Some(value),
+        Err(e) => {
+            assert!(e.path().starts_with(dir), "{e} names no file that was read");
+            assert!(!e.to_string().is_empty());
+            None
+        }
+    }
+}
+
+fn file(dir: &Path, name: &str, data: &[u8]) -> PathBuf {
+    let path = dir.join(name);
+    fs::write(&path, data).expect("the folder can be written");
+    path
+}
+
+/// What a mesh promises: indices in range, finite corners, a column an element or none.
+fn check_mesh(dir: &Path, result: Result<MeshFile>) -> Option<MeshFile> {
+    let file = check(dir, result)?;
+    let mesh = &file.mesh;
+    for f in 0..mesh.faces().len() as u32 {
+        assert!(mesh.triangle(f).iter().all(|p| p.is_finite()));
+        if let Some(m) = mesh.material_of(f) {
+            let texture = mesh.materials()[m as usize].texture;
+            assert!(texture.is_none_or(|t| (t as usize) < file.texture_files.len()));
+        }
+    }
+    let _ = Annotations::of_mesh(&file, &numbered());
+    Some(file)
+}
+
+/// Annotations whose classes are numbers, and whose room is said.
+fn numbered() -> AnnotationOptions {
+    let classes =
+        [("2", Some(Class::Floor)), ("6", Some(Class::Wall)), ("19", Some(Class::Chair)), ("1", None)];
+    AnnotationOptions {
+        room: Some("office_1".parse().expect("a room")),
+        classes: classes.into_iter().map(|(key, class)| (key.to_owned(), class)).collect(),
+        unknown_as_clutter: true,
+        ..AnnotationOptions::default()
+    }
+}
+
+/// Annotations as they are read by default, then with all that can be forgiven and too many points for memory.
+fn annotations(dir: &Path, path: &Path) {
+    let skip = AnnotationOptions { on_fault: OnFault::Skip, points_in_memory: 16, ..numbered() };
+    for options in [numbered(), skip] {
+        let options = AnnotationOptions { spool_dir: Some(dir.to_owned()), ..options };
+        let Some(found) = check(dir, Annotations::open(&[path.to_owned()], &options)) else { continue };
+        for instance in found.rooms.iter().flat_map(|r| &r.instances) {
+            let mut cloud = PointCloud::default();
+            if check(dir, instance.read(&mut cloud)).is_some() {
+                assert_eq!(cloud.positions.len(), cloud.colors.len());
+                assert!(cloud.positions.iter().all(|p| p.is_finite()));
+            }
+        }
+    }
+}
+
+fn obj(dir: &Path, data: &[u8]) {
+    let path = file(dir, "mesh.obj", data);
+    for up in [UpAxis::Y, UpAxis::Z] {
+        check_mesh(dir, read_mesh(&path, up));
+    }
+}
+
+/// A library, and whatever images it names.
+fn mtl(dir: &Path, data: &[u8]) {
+    file(dir, "m.mtl", data);
+    check_mesh(dir, read_mesh(&file(dir, "mesh.obj", OBJ.as_bytes()), UpAxis::Z));
+}
+
+/// An image of a material.
+fn texture(dir: &Path, data: &[u8]) {
+    let image = file(dir, "wall.png", data);
+    file(dir, "m.mtl", b"newmtl wall\nmap_Kd wall.png\n");
+    check_mesh(dir, read_mesh(&file(dir, "mesh.obj", OBJ.as_bytes()), UpAxis::Z));
+    check(dir, read_picture_size(&image));
+}
+
+/// Binary glTF and the JSON form by what the bytes begin with.
+fn gltf(dir: &Path, data: &[u8]) {
+    let name = if data.starts_with(b"glTF") { "mesh.glb" } else { "mesh.gltf" };
+    check_mesh(dir, read_mesh(&file(dir, name, data), UpAxis::Y));
+}
+
+fn ply_mesh(dir: &Path, data: &[u8]) {
+    let path = file(dir, "mesh.ply", data);
+    check_mesh(dir, read_mesh(&path, UpAxis::Z));
+    check(dir, read_ply_point_count(&path));
+}
+
+fn ply_cloud(dir: &Path, data: &[u8]) {
+    let path = file(dir, "cloud.ply", data);
+    annotations(dir, &path);
+    check(dir, read_point_sample(&path, 100));
+}
+
+fn s3dis(dir: &Path, data: &[u8]) {
+    let path = file(dir, "chair_1.txt", data);
+    for on_fault in [OnFault::Stop, OnFault::Skip] {
+        let mut cloud = PointCloud::default();
+        let Some(mut reader) = check(dir, PointReader::open_with(&path, on_fault)) else { return };
+        while check(dir, reader.read_chunk(1000, &mut cloud)).is_some_and(|n| n > 0) {}
+        assert!(cloud.positions.iter().all(|p| p.is_finite()));
+    }
+}
+
+/// The byte in front tells which of several readers of small files gets the rest.
+fn choice(data: &[u8], n: u8) -> (u8, &[u8]) {
+    data.split_first().map_or((0, data), |(first, rest)| (first % n, rest))
+}
+
+/// Lists of cameras: a CSV table, a COLMAP model as text and binary, a transforms.json.
+fn cameras(dir: &Path, data: &[u8]) {
+    let (which, data) = choice(data, 4);
+    let name = ["cameras.csv", "images.txt", "images.bin", "transforms.json"][usize::from(which)];
+    let path = file(dir, name, data);
+    if let Some(found) = check(dir, read_scan_locations(&path, &DAffine3::IDENTITY)) {
+        assert!(found.iter().all(|l| is_valid_uuid(&l.uuid) && l.pose.location.is_finite()));
+    }
+}
+
+/// A folder of raw captures: poses and intrinsics.
+fn captures(dir: &Path, data: &[u8]) {
+    const UUID: &str = "8eb9955b866b4b5f74abb1071416c628";
+    let (which, data) = choice(data, 2);
+    if which == 0 {
+        check(dir, read_intrinsics(&file(dir, &format!("{UUID}_intrinsics_1.txt"), data)));
+    } else {
+        let path = file(dir, &format!("{UUID}_pose_1_0.txt"), data);
+        check(dir, read_capture_pose(&path));
+        check(dir, read_scan_locations(dir, &DAffine3::IDENTITY));
+        fs::remove_file(path).expect("the folder can be written");
+    }
+}
+
+/// The JSON files of a data set: a pose and a folder of poses, labels, instances, views, splits, conventions.
+fn json(dir: &Path, data: &[u8]) {
+    let (which, data) = choice(data, 6);
+    match which {
+        0 => {
+            let poses = dir.join("poses");
+            fs::create_dir_all(&poses).expect("the folder can be written");
+            let path = file(&poses, "pose.json", data);
+            if let Some(pose) = check(dir, read_pose(&path)) {
+                let _ = (pose.pose(), pose.original());
+            }
+            check(dir, read_scan_locations(&poses, &DAffine3::IDENTITY));
+        }
+        1 => {
+            if let Some(names) = check(dir, read_labels(&file(dir, "semantic_labels.json", data))) {
+                names.iter().for_each(|name| drop(s3d_label::parse_name(name)));
+            }
+        }
+        2 => drop(check(dir, read_instances(&file(dir, "instances.json", data)))),
+        3 => drop(check(dir, read_views(&file(dir, "views.json", data)))),
+        4 => drop(check(dir, read_splits(&file(dir, "splits.json", data)))),
+        _ => drop(check(dir, read_conventions(&file(dir, "conventions.json", data)))),
+    }
+}
+
+/// A scene whose files are there, so that reading gets past looking for them.
+fn scene(dir: &Path, data: &[u8]) {
+    fs::create_dir_all(dir.join("a")).expect("the folder can be written");
+    for name in ["m.obj", "c.csv"] {
+        file(dir, name, b"");
+    }
+    check(dir, read_scene(&file(dir, "scene.toml", data)));
+}
+
+/// An array, or an archive of arrays, by what the bytes begin with.
+fn npy(dir: &Path, data: &[u8]) {
+    let name = if data.starts_with(b"PK") { "cloud.npz" } else { "cloud.npy" };
+    annotations(dir, &file(dir, name, data));
+}
+
+/// LAS and LAZ: the header tells which it is, whatever the name.
+fn las(dir: &Path, data: &[u8]) {
+    annotations(dir, &file(dir, "cloud.las", data));
+}
+
+/// The checksums of pages are made right, so that what is in them is looked at.
+fn e57(dir: &Path, data: &[u8]) {
+    let mut data = data.to_vec();
+    let page = data.get(40..48).map_or(0, |b| b.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b)));
+    let page = if (64..=1 << 20).contains(&page) { page } else { 1024 };
+    for page in data.chunks_exact_mut(page) {
+        let (content, sum) = page.split_at_mut(page.len() - 4);
+        sum.copy_from_slice(&crc32c(content).to_be_bytes());
+    }
+    annotations(dir, &file(dir, "cloud.e57", &data));
+}
+
+/// The checksum of Castagnoli.
+fn crc32c(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0u32, |crc, &b| {
+        (0..8).fold(crc ^ u32::from(b), |c, _| if c & 1 == 1 { 0x82f6_3b78 ^ (c >> 1) } else { c >> 1 })
+    })
+}
+
+/// ScanNet's two lists, a zero byte between them, beside a mesh of four vertices.
+fn scannet(dir: &Path, data: &[u8]) {
+    const PLY: &[u8] =
+        b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n\
+        property list uchar int vertex_indices\nend_header\n\
+        0 0 0 1 2 3\n1 0 0 1 2 3\n0 1 0 1 2 3\n0 0 1 1 2 3\n3 0 1 2\n";
+    let at = data.iter().position(|&b| b == 0).unwrap_or(data.len());
+    let (objects, segments) = data.split_at(at);
+    let scan = dir.join("scene0000_00");
+    fs::create_dir_all(&scan).expect("the folder can be written");
+    file(&scan, "scene0000_00.aggregation.json", objects);
+    file(&scan, "scene0000_00_vh_clean_2.0.010000.segs.json", segments.get(1..).unwrap_or_default());
+    file(&scan, "scene0000_00_vh_clean_2.ply", PLY);
+    annotations(dir, &scan);
+}
+
+fn mat(dir: &Path, data: &[u8]) {
+    let path = file(dir, "pointcloud.mat", data);
+    if let Some(area) = check(dir, MatArea::open(&path)) {
+        for object in area.rooms.iter().flat_map(|r| &r.objects) {
+            check(dir, object.read(&mut PointCloud::default()));
+        }
+    }
+    annotations(dir, &path);
+}
+
+fn png(dir: &Path, data: &[u8]) {
+    let path = file(dir, "image.png", data);
+    let rgb = check(dir, read_rgb8(&path)).map(|image| (image.width(), image.height()));
+    let gray = check(dir, read_gray16(&path)).map(|image| (image.width(), image.height()));
+    let size = check(dir, read_png_size(&path));
+    assert!(rgb.or(gray).is_none_or(|read| Some(read) == size));
+}
+
+fn exr(dir: &Path, data: &[u8]) {
+    check(dir, read_xyz(&file(dir, "image.exr", data)));
+}
