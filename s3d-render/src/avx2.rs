@@ -1,50 +1,29 @@
 //! [`Lanes`] by AVX2, without fused multiplications: their rounding is not every processor's.
 //!
-//! All that is unsafe here is to use these instructions, which [`Avx2::detect`] asks for, and to load from and store to
+//! All that is unsafe here is to use these instructions, which [`Blend::detect`] asks for, and to load from and store to
 //! references of the right size.
 #![allow(unsafe_code)]
 
-use crate::lanes::{LANES, LaneWork, Lanes};
+use crate::blend::Blend;
+use crate::lanes::{LANES, Lanes};
 use half::f16;
 use std::arch::x86_64::*;
 
-/// Proof that the processor has AVX2, F16C and the bit instructions that come with them.
+/// The processor has AVX2, F16C and the bit instructions that come with them, of which `B` is proof; and what `B` blends
+/// texels with.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Avx2(());
-
-impl Avx2 {
-    pub(crate) fn detect() -> Option<Self> {
-        (is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("f16c")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("popcnt"))
-        .then_some(Self(()))
-    }
-
-    /// Does `work`, compiled for these instructions throughout.
-    pub(crate) fn run<W: LaneWork>(self, work: W) -> W::Output {
-        #[target_feature(enable = "avx2,f16c,bmi1,bmi2,popcnt")]
-        fn with_avx2<W: LaneWork>(work: W, lanes: Avx2) -> W::Output {
-            work.run(lanes)
-        }
-        // SAFETY: the processor has these instructions, or there were no `self`.
-        unsafe { with_avx2(work, self) }
-    }
-}
+pub(crate) struct Avx2<B>(pub(crate) B);
 
 // SAFETY of all blocks below: an `Avx2` exists only where the processor has the instructions; pointers are to references
 // as large as what is loaded or stored, and nothing asks for more than bytes' alignment.
-impl Lanes for Avx2 {
+impl<B: Blend> Lanes for Avx2<B> {
     type F = __m256;
     /// To the right, then downwards.
     type Parts = __m256i;
-    /// The upper pixels of places k and k + 4, then the lower ones.
-    type Quads = [__m128i; 8];
-    /// Two pixels each, k and k + 4: R G B at the beginning of each 128 bits count.
-    type Mix = [__m256i; 4];
-    /// The weights of pixels k and k + 4, throughout 128 bits each.
-    type Weights = [__m256i; 4];
+    type Weights = __m128i;
+    type Corners = B::Corners;
+    type Quads = B::Quads;
+    type Mix = B::Mix;
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m256 {
@@ -159,72 +138,49 @@ impl Lanes for Avx2 {
             if stride < 0 || _mm256_movemask_ps(_mm256_castsi256_ps(beyond)) != 0 {
                 return None;
             }
-            let mut quads = [_mm_setzero_si128(); 8];
-            for k in 0..4 {
-                // SAFETY: 0 ≤ at ≤ limit, and so at + stride + 8 is within the bytes.
-                let (a, b) = (bytes.as_ptr().add(at[k] as usize), bytes.as_ptr().add(at[k + 4] as usize));
-                let two = |a: *const u8, b: *const u8| {
-                    _mm_set_epi64x(b.cast::<i64>().read_unaligned(), a.cast::<i64>().read_unaligned())
-                };
-                quads[k] = two(a, b);
-                quads[k + 4] = two(a.add(stride as usize), b.add(stride as usize));
-            }
-            Some(quads)
+            // SAFETY: 0 ≤ at ≤ limit, and so at + stride + 8 is within the bytes.
+            Some(self.0.quads(bytes.as_ptr(), at, stride as usize))
         }
     }
     #[inline(always)]
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
-        unsafe {
-            let mut quads = [_mm_setzero_si128(); 8];
-            for k in 0..4 {
-                quads[k] = _mm_set_epi64x(upper[k + 4] as i64, upper[k] as i64);
-                quads[k + 4] = _mm_set_epi64x(lower[k + 4] as i64, lower[k] as i64);
-            }
-            quads
-        }
+        self.0.quads_from(upper, lower)
     }
     #[inline(always)]
-    fn bilinear(self, quads: Self::Quads, parts: __m256i) -> Self::Mix {
-        unsafe { bilinear(quads, parts) }
-    }
-    #[inline(always)]
-    fn weights(self, weights: __m256, these: u32) -> Self::Weights {
+    fn weights(self, weights: __m256, these: u32) -> __m128i {
         unsafe {
             let whole = _mm256_cvttps_epi32(weights);
             let whole = _mm256_and_si256(whole, lanes_of(these));
-            spread(_mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256::<1>(whole)))
+            _mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256::<1>(whole))
+        }
+    }
+    #[inline(always)]
+    fn all(self) -> __m128i {
+        unsafe { _mm_set1_epi16(i16::MIN) }
+    }
+    #[inline(always)]
+    fn corners(self, parts: __m256i, weights: __m128i) -> Self::Corners {
+        unsafe {
+            let lower = _mm_mulhrs_epi16(weights, _mm256_extracti128_si256::<1>(parts));
+            let rows = _mm256_set_m128i(lower, _mm_sub_epi16(weights, lower));
+            let x = _mm256_broadcastsi128_si256(_mm256_castsi256_si128(parts));
+            let right = _mm256_mulhrs_epi16(rows, x);
+            let left = _mm256_sub_epi16(rows, right);
+            self.0.corners(_mm256_unpacklo_epi16(left, right), _mm256_unpackhi_epi16(left, right))
         }
     }
     #[inline(always)]
     fn no_mix(self) -> Self::Mix {
-        unsafe { [_mm256_setzero_si256(); 4] }
+        self.0.none()
     }
     #[inline(always)]
-    fn add_weighted(self, sum: Self::Mix, colors: Self::Mix, weights: Self::Weights) -> Self::Mix {
-        unsafe {
-            let mut sum = sum;
-            for k in 0..4 {
-                sum[k] = _mm256_sub_epi16(sum[k], _mm256_mulhrs_epi16(colors[k], weights[k]));
-            }
-            sum
-        }
+    fn add_weighted(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+        self.0.add(sum, quads, corners)
     }
     #[inline(always)]
     fn pixels(self, mix: Self::Mix) -> [u32; LANES] {
         unsafe {
-            let half = _mm256_set1_epi16(64);
-            let mut bytes = mix;
-            for pair in &mut bytes {
-                *pair = _mm256_srai_epi16::<7>(_mm256_add_epi16(*pair, half));
-            }
-            // Eight bytes a pixel: 0 1 | 4 5, and 2 3 | 6 7.
-            let a = _mm256_packus_epi16(bytes[0], bytes[1]);
-            let b = _mm256_packus_epi16(bytes[2], bytes[3]);
-            let all = _mm256_castps_si256(_mm256_shuffle_ps::<0b10_00_10_00>(
-                _mm256_castsi256_ps(a),
-                _mm256_castsi256_ps(b),
-            ));
-            let colors = _mm256_and_si256(all, _mm256_set1_epi32(0xFF_FF_FF));
+            let colors = self.0.bytes(mix);
             let black = _mm256_cmpeq_epi32(colors, _mm256_setzero_si256());
             let colors = _mm256_or_si256(colors, _mm256_and_si256(black, _mm256_set1_epi32(0x01_01_01)));
             let mut pixels = [0; LANES];
@@ -343,38 +299,6 @@ fn lanes_of(these: u32) -> __m256i {
     _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(these as i32), bits), bits)
 }
 
-/// For each k the value of pixel k throughout the lower 128 bits and that of pixel k + 4 throughout the upper.
-#[inline]
-#[target_feature(enable = "avx2")]
-fn spread(values: __m128i) -> [__m256i; 4] {
-    let both = _mm256_broadcastsi128_si256(values);
-    // The two bytes of value k, and of value k + 4.
-    const fn bytes(k: i64) -> (i64, i64) {
-        let pattern = 0x0001_0001_0001_0001;
-        let two = [2 * k, 2 * k + 8];
-        ((two[0] + ((two[0] + 1) << 8)) * pattern, (two[1] + ((two[1] + 1) << 8)) * pattern)
-    }
-    let of = |(low, high)| _mm256_shuffle_epi8(both, _mm256_setr_epi64x(low, low, high, high));
-    [of(bytes(0)), of(bytes(1)), of(bytes(2)), of(bytes(3))]
-}
-
-/// See [`Lanes::bilinear`].
-#[inline]
-#[target_feature(enable = "avx2")]
-fn bilinear(quads: [__m128i; 8], parts: __m256i) -> [__m256i; 4] {
-    let x = spread(_mm256_castsi256_si128(parts));
-    let y = spread(_mm256_extracti128_si256::<1>(parts));
-    let mut colors = x;
-    for k in 0..4 {
-        let upper = _mm256_slli_epi16::<7>(_mm256_cvtepu8_epi16(quads[k]));
-        let lower = _mm256_slli_epi16::<7>(_mm256_cvtepu8_epi16(quads[k + 4]));
-        let left = _mm256_add_epi16(upper, _mm256_mulhrs_epi16(_mm256_sub_epi16(lower, upper), y[k]));
-        let right = _mm256_srli_si256::<6>(left);
-        colors[k] = _mm256_add_epi16(left, _mm256_mulhrs_epi16(_mm256_sub_epi16(right, left), x[k]));
-    }
-    colors
-}
-
 /// See [`Lanes::points`]; four numbers each.
 #[inline]
 #[target_feature(enable = "avx2")]
@@ -422,6 +346,7 @@ fn points<const TURN: bool>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::blend::{Full, Half};
     use crate::lanes::Plain;
     use proptest::prelude::*;
 
@@ -439,10 +364,56 @@ mod tests {
         a.map(|v| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() })
     }
 
+    /// Sums of colours with weights, and without.
+    fn same_colors<L: Lanes>(
+        lanes: L,
+        upper: &[u64; LANES],
+        lower: &[u64; LANES],
+        (x, y): (&[i16; LANES], &[i16; LANES]),
+        weights: &[f32; LANES],
+        these: u32,
+    ) -> Result<(), TestCaseError> {
+        let quads = lanes.quads_from(upper, lower);
+        let plain_quads = Plain.quads_from(upper, lower);
+        let parts = (lanes.parts(x, y), Plain.parts(x, y));
+        let all = (lanes.corners(parts.0, lanes.all()), Plain.corners(parts.1, Plain.all()));
+        let some = (lanes.weights(lanes.load(weights), these), Plain.weights(*weights, these));
+        let some = (lanes.corners(parts.0, some.0), Plain.corners(parts.1, some.1));
+        let (mut sum, mut plain) = (lanes.no_mix(), Plain.no_mix());
+        for (corners, plain_corners) in [some, some, all] {
+            sum = lanes.add_weighted(sum, quads, corners);
+            plain = Plain.add_weighted(plain, plain_quads, plain_corners);
+            prop_assert_eq!(lanes.pixels(sum), Plain.pixels(plain));
+        }
+        let one = lanes.add_weighted(lanes.no_mix(), quads, all.0);
+        let plain = Plain.add_weighted(Plain.no_mix(), plain_quads, all.1);
+        prop_assert_eq!(lanes.pixels(one), Plain.pixels(plain));
+        Ok(())
+    }
+
+    /// What is read of an image.
+    fn same_quads<L: Lanes>(
+        lanes: L,
+        bytes: &[u8],
+        at: &[i32; LANES],
+        parts: L::Parts,
+        plain_parts: ([i16; LANES], [i16; LANES]),
+    ) -> Result<(), TestCaseError> {
+        let (quads, plain) = (lanes.quads(bytes, at, 36), Plain.quads(bytes, at, 36));
+        prop_assert_eq!(quads.is_some(), plain.is_some());
+        if let (Some(quads), Some(plain)) = (quads, plain) {
+            let got = lanes.add_weighted(lanes.no_mix(), quads, lanes.corners(parts, lanes.all()));
+            let all = Plain.corners(plain_parts, Plain.all());
+            let want = Plain.add_weighted(Plain.no_mix(), plain, all);
+            prop_assert_eq!(lanes.pixels(got), Plain.pixels(want));
+        }
+        Ok(())
+    }
+
     proptest! {
         #[test]
         fn numbers_are_those_of_plain_rust(a in eight(), b in eight(), c in eight()) {
-            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
             let (x, y, z) = (avx2.load(&a), avx2.load(&b), avx2.load(&c));
             let mut got = [0.0; LANES];
             macro_rules! same {
@@ -480,20 +451,14 @@ mod tests {
         fn colors_are_those_of_plain_rust(
             upper: [u64; LANES], lower: [u64; LANES],
             x in prop::array::uniform8(0i16..), y in prop::array::uniform8(0i16..),
-            weights in prop::array::uniform8(-16384.0..=0.0f32), full in prop::bool::ANY, these in 0u32..256,
+            weights in prop::array::uniform8(-32768.0..=0.0f32), these in 0u32..256,
         ) {
-            let Some(avx2) = Avx2::detect() else { return Ok(()) };
-            let (quads, parts) = (avx2.quads_from(&upper, &lower), avx2.parts(&x, &y));
-            let got = avx2.bilinear(quads, parts);
-            let want = Plain.bilinear(Plain.quads_from(&upper, &lower), Plain.parts(&x, &y));
-            prop_assert_eq!(avx2.pixels(got), Plain.pixels(want));
-            let weights = if full { [-32768.0; LANES] } else { weights };
-            let (w, v) = (avx2.weights(avx2.load(&weights), these), Plain.weights(weights, these));
-            let (sum, plain) = (avx2.add_weighted(avx2.no_mix(), got, w), Plain.add_weighted(Plain.no_mix(), want, v));
-            prop_assert_eq!(avx2.pixels(sum), Plain.pixels(plain));
-            if !full {
-                let (sum, plain) = (avx2.add_weighted(sum, got, w), Plain.add_weighted(plain, want, v));
-                prop_assert_eq!(avx2.pixels(sum), Plain.pixels(plain));
+            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
+            if let Some(half) = Half::detect() {
+                same_colors(Avx2(half), &upper, &lower, (&x, &y), &weights, these)?;
+            }
+            if let Some(full) = Full::detect() {
+                same_colors(Avx2(full), &upper, &lower, (&x, &y), &weights, these)?;
             }
             let packed = upper.map(|v| v as u32);
             let (mut got, mut want) = ([0; 3 * LANES], [0; 3 * LANES]);
@@ -507,23 +472,21 @@ mod tests {
             x in prop::array::uniform8(-2.0..12.0f32), y in prop::array::uniform8(-2.0..9.0f32),
             these in 0u32..256, bytes in prop::collection::vec(any::<u8>(), 0..400),
         ) {
-            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
             let (at, parts) = avx2.place(avx2.load(&x), avx2.load(&y), 36, these);
             let (plain_at, plain_parts) = Plain.place(x, y, 36, these);
             let (mut got_x, mut got_y) = ([0; LANES], [0; LANES]);
             avx2.store_parts(parts, &mut got_x, &mut got_y);
             prop_assert_eq!((at, (got_x, got_y)), (plain_at, plain_parts));
-            let (quads, plain) = (avx2.quads(&bytes, &at, 36), Plain.quads(&bytes, &at, 36));
-            prop_assert_eq!(quads.is_some(), plain.is_some());
-            if let (Some(quads), Some(plain)) = (quads, plain) {
-                let (got, want) = (avx2.bilinear(quads, parts), Plain.bilinear(plain, plain_parts));
-                prop_assert_eq!(avx2.pixels(got), Plain.pixels(want));
+            same_quads(avx2, &bytes, &at, parts, plain_parts)?;
+            if let Some(full) = Full::detect().map(Avx2) {
+                same_quads(full, &bytes, &at, parts, plain_parts)?;
             }
         }
 
         #[test]
         fn changes_are_those_of_plain_rust(values in prop::array::uniform9(0u32..3)) {
-            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
             let (mut got, mut want) = ([0; LANES], [0; LANES]);
             let (some, same) = (avx2.changes(&values, 70_000, &mut got), Plain.changes(&values, 70_000, &mut want));
             prop_assert_eq!(&got[..some], &want[..same]);
@@ -536,7 +499,7 @@ mod tests {
             column in prop::array::uniform24(-2.0..2.0f64), row in prop::array::uniform3(-2.0..2.0f64),
             place in prop::array::uniform3(-100.0..100.0f64), depths in eight(),
         ) {
-            let Some(avx2) = Avx2::detect() else { return Ok(()) };
+            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
             let four = |a: [f64; 3]| std::array::from_fn(|k| a[k % 3]);
             let (row, place): ([f64; 12], [f64; 12]) = (four(row), four(place));
             let (mut got, mut want) = ([0.0; 24], [0.0; 24]);

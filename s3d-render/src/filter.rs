@@ -1,8 +1,9 @@
 //! Textures fetched for eight pixels at a time.
 //!
 //! Gives what [`crate::texture::Pyramid::sample`] gives, in integers: places between a texture's pixels are kept in
-//! 32768ths of a pixel and colours in 128ths of a step of 8 bits. Before it is rounded to 8 bits a colour is off by less
-//! than 0.02 where one bilinear sample makes it, and less than 0.1 where sixteen do.
+//! 32768ths of a pixel, and so are the weights of all pixels that make a colour; their products are added without
+//! rounding. Before it is rounded to 8 bits a colour is off by less than 0.03 where one bilinear sample makes it. Where
+//! sixteen do, the weights of samples, rounded down, may darken it by 0.12.
 
 use crate::anchor::Seen;
 use crate::fold::Fold;
@@ -66,6 +67,16 @@ struct Size<'a> {
     /// Pixels of this size a pixel of the full one.
     x: f32,
     y: f32,
+}
+
+/// What is read around eight places, one by one: see [`Lanes::place`] and [`Lanes::quads_from`].
+#[derive(Default)]
+struct Places {
+    at: [i32; LANES],
+    x: [i16; LANES],
+    y: [i16; LANES],
+    upper: [u64; LANES],
+    lower: [u64; LANES],
 }
 
 /// A texture at all its sizes.
@@ -176,7 +187,7 @@ impl<'a> Sizes<'a> {
     #[inline(always)]
     fn magnified<L: Lanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
         let half = l.splat(0.5);
-        l.pixels(self.bilinear(l, &self.sizes[0], l.sub(x, half), l.sub(y, half), these))
+        l.pixels(self.add(l, l.no_mix(), &self.sizes[0], (l.sub(x, half), l.sub(y, half)), l.all(), these))
     }
 
     #[inline(always)]
@@ -200,8 +211,7 @@ impl<'a> Sizes<'a> {
             while active != 0 {
                 let x = l.sub(l.mul(l.add(first_x, l.mul(tap, step_x)), scale_x), half);
                 let y = l.sub(l.mul(l.add(first_y, l.mul(tap, step_y)), scale_y), half);
-                let colors = self.bilinear(l, of, x, y, active);
-                mix = l.add_weighted(mix, colors, l.weights(weights, active));
+                mix = self.add(l, mix, of, (x, y), l.weights(weights, active), active);
                 tap = l.add(tap, one);
                 active &= l.greater(count, tap);
             }
@@ -214,9 +224,18 @@ impl<'a> Sizes<'a> {
         mix
     }
 
-    /// The bilinear colours at those of the places that are among `these` (0 is the middle of the first pixel).
+    /// `mix` and the weighted bilinear colours at those of the places that are among `these` (0 is the middle of the first
+    /// pixel).
     #[inline(always)]
-    fn bilinear<L: Lanes>(&self, l: L, size: &Size<'a>, x: L::F, y: L::F, these: u32) -> L::Mix {
+    fn add<L: Lanes>(
+        &self,
+        l: L,
+        mix: L::Mix,
+        size: &Size<'a>,
+        (x, y): (L::F, L::F),
+        weights: L::Weights,
+        these: u32,
+    ) -> L::Mix {
         let zero = l.splat(0.0);
         let outside = l.greater(zero, x) | l.greater(zero, y);
         let inside = l.greater(l.splat(size.right), x) & l.greater(l.splat(size.bottom), y) & !outside;
@@ -224,34 +243,48 @@ impl<'a> Sizes<'a> {
         if inside & these == these
             && let Some(quads) = l.quads(size.bytes, &at, size.stride)
         {
-            return l.bilinear(quads, parts);
+            return l.add_weighted(mix, quads, l.corners(parts, weights));
         }
         let (mut xs, mut ys) = ([0.0; LANES], [0.0; LANES]);
         l.store(x, &mut xs);
         l.store(y, &mut ys);
-        let (mut upper, mut lower) = ([0; LANES], [0; LANES]);
-        let (mut parts_x, mut parts_y) = ([0; LANES], [0; LANES]);
-        l.store_parts(parts, &mut parts_x, &mut parts_y);
+        let mut places = Places { at, ..Places::default() };
+        l.store_parts(parts, &mut places.x, &mut places.y);
+        self.read_singly(size, &xs, &ys, inside, these, &mut places);
+        let corners = l.corners(l.parts(&places.x, &places.y), weights);
+        l.add_weighted(mix, l.quads_from(&places.upper, &places.lower), corners)
+    }
+
+    /// Reads what is at those of the places that are among `these`; of them, those among `inside` are not at the image's
+    /// edge.
+    #[cold]
+    #[inline(never)]
+    fn read_singly(
+        &self,
+        size: &Size<'a>,
+        xs: &[f32; LANES],
+        ys: &[f32; LANES],
+        inside: u32,
+        these: u32,
+        places: &mut Places,
+    ) {
         for k in 0..LANES {
             if these >> k & 1 == 0 {
                 continue;
             }
-            let begin = at[k] as usize;
+            let begin = places.at[k] as usize;
             let below = begin.wrapping_add(size.stride as usize);
             match (word(size.bytes, begin), word(size.bytes, below)) {
-                (Some(a), Some(b)) if inside >> k & 1 == 1 => (upper[k], lower[k]) = (a, b),
+                (Some(a), Some(b)) if inside >> k & 1 == 1 => (places.upper[k], places.lower[k]) = (a, b),
                 _ => {
                     let quad = self.at_the_edge(size, xs[k], ys[k]);
-                    ((upper[k], lower[k]), (parts_x[k], parts_y[k])) = quad;
+                    ((places.upper[k], places.lower[k]), (places.x[k], places.y[k])) = quad;
                 }
             }
         }
-        l.bilinear(l.quads_from(&upper, &lower), l.parts(&parts_x, &parts_y))
     }
 
     /// The 2 × 2 pixels around a place of which some are not side by side, and the place's parts.
-    #[cold]
-    #[inline(never)]
     fn at_the_edge(&self, size: &Size<'a>, x: f32, y: f32) -> ((u64, u64), (i16, i16)) {
         let image = size.image;
         let split = |v: f32| {

@@ -1,7 +1,8 @@
 //! Eight pixels at a time, with the same bits on every processor.
 //!
 //! [`Lanes`] names the few operations on eight values that images need. [`Plain`] has them in ordinary Rust, which defines
-//! what they give; `Avx2` (in `avx2.rs`) gives the same faster. Every operation is on integers or rounds once, as
+//! what they give; `Avx2` (in `avx2.rs`, and `blend.rs` for textures) gives the
+//! same faster. Every operation is on integers or rounds once, as
 //! IEEE 754 says it must, so that no result depends on which of the two ran.
 
 use half::f16;
@@ -17,10 +18,12 @@ pub(crate) trait Lanes: Copy {
     type Parts: Copy;
     /// The 2 × 2 pixels of a texture around each of eight places.
     type Quads: Copy;
-    /// Colours of eight pixels in 128ths.
-    type Mix: Copy;
     /// Weights of eight pixels in −32768ths: negative, so that 1 fits into 16 bits.
     type Weights: Copy;
+    /// The same of the 2 × 2 pixels of a texture around each of eight places.
+    type Corners: Copy;
+    /// Sums of weighted colours of eight pixels, in −32768ths of a step of 8 bits.
+    type Mix: Copy;
 
     fn splat(self, value: f32) -> Self::F;
     fn load(self, from: &[f32; LANES]) -> Self::F;
@@ -59,14 +62,17 @@ pub(crate) trait Lanes: Copy {
     fn quads(self, bytes: &[u8], at: &[i32; LANES], stride: i32) -> Option<Self::Quads>;
     /// R G B of two neighbours in the lowest six bytes of each: upper ones, lower ones.
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
-    /// The bilinear colours: two steps of [`part`], off by less than 0.02 of the exact ones.
-    fn bilinear(self, quads: Self::Quads, parts: Self::Parts) -> Self::Mix;
     /// Weights from −1 (0) to −32768 (1), rounded towards 0; none in lanes that are not among `these`.
     fn weights(self, weights: Self::F, these: u32) -> Self::Weights;
+    /// Weights of 1.
+    fn all(self) -> Self::Weights;
+    /// Weights shared out to the 2 × 2 pixels around places, downwards and then to the right, by [`part`]: each is off by
+    /// at most 1, and together they are what was shared out.
+    fn corners(self, parts: Self::Parts, weights: Self::Weights) -> Self::Corners;
     /// No colour.
     fn no_mix(self) -> Self::Mix;
-    /// `sum` and weighted colours.
-    fn add_weighted(self, sum: Self::Mix, colors: Self::Mix, weights: Self::Weights) -> Self::Mix;
+    /// `sum` and weighted colours. Nothing is rounded.
+    fn add_weighted(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix;
     /// Rounded to bytes, R G B in the lowest three of each value; never black.
     fn pixels(self, mix: Self::Mix) -> [u32; LANES];
     /// The lowest three bytes of each value, one after another.
@@ -118,8 +124,14 @@ pub(crate) trait LaneWork {
 /// Does `work` with the widest registers of the processor.
 pub(crate) fn run<W: LaneWork>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
-    if let Some(avx2) = crate::avx2::Avx2::detect() {
-        return avx2.run(work);
+    {
+        use crate::blend::{Blend, Full, Half};
+        if let Some(full) = Full::detect() {
+            return full.run(work);
+        }
+        if let Some(half) = Half::detect() {
+            return half.run(work);
+        }
     }
     work.run(Plain)
 }
@@ -139,8 +151,10 @@ impl Lanes for Plain {
     type F = Eight;
     type Parts = ([i16; LANES], [i16; LANES]);
     type Quads = [[u64; LANES]; 2];
-    type Mix = [[i16; 3]; LANES];
     type Weights = [i16; LANES];
+    /// By pixel: of the upper row left and right, and of the lower one.
+    type Corners = [[[i16; 2]; 2]; LANES];
+    type Mix = [[i32; 3]; LANES];
 
     #[inline(always)]
     fn splat(self, value: f32) -> Eight {
@@ -248,35 +262,46 @@ impl Lanes for Plain {
         [*upper, *lower]
     }
     #[inline(always)]
-    fn bilinear(self, quads: Self::Quads, (x, y): Self::Parts) -> Self::Mix {
-        std::array::from_fn(|k| {
-            let [upper, lower] = quads.map(|of| of[k].to_le_bytes());
-            let column = |c: usize| {
-                let (a, b) = (i16::from(upper[c]) << 7, i16::from(lower[c]) << 7);
-                a + part(b - a, y[k])
-            };
-            std::array::from_fn(|c| {
-                let (left, right) = (column(c), column(c + 3));
-                left + part(right - left, x[k])
-            })
-        })
-    }
-    #[inline(always)]
     fn weights(self, weights: Eight, these: u32) -> [i16; LANES] {
         std::array::from_fn(|k| if these >> k & 1 == 1 { weights[k] as i16 } else { 0 })
+    }
+    #[inline(always)]
+    fn all(self) -> [i16; LANES] {
+        [i16::MIN; LANES]
+    }
+    #[inline(always)]
+    fn corners(self, (x, y): Self::Parts, weights: [i16; LANES]) -> Self::Corners {
+        std::array::from_fn(|k| {
+            let lower = part(weights[k], y[k]);
+            [weights[k] - lower, lower].map(|row| {
+                let right = part(row, x[k]);
+                [row - right, right]
+            })
+        })
     }
     #[inline(always)]
     fn no_mix(self) -> Self::Mix {
         [[0; 3]; LANES]
     }
     #[inline(always)]
-    fn add_weighted(self, sum: Self::Mix, colors: Self::Mix, weights: [i16; LANES]) -> Self::Mix {
-        std::array::from_fn(|k| std::array::from_fn(|c| sum[k][c] - part(colors[k][c], weights[k])))
+    fn add_weighted(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+        std::array::from_fn(|k| {
+            let mut sum = sum[k];
+            for (row, weights) in quads.iter().zip(corners[k]) {
+                let texels = row[k].to_le_bytes();
+                for (n, weight) in weights.into_iter().enumerate() {
+                    for c in 0..3 {
+                        sum[c] += i32::from(texels[3 * n + c]) * i32::from(weight);
+                    }
+                }
+            }
+            sum
+        })
     }
     #[inline(always)]
     fn pixels(self, mix: Self::Mix) -> [u32; LANES] {
         mix.map(|color| {
-            let [r, g, b] = color.map(|c| ((c + 64) >> 7).clamp(0, 255) as u8);
+            let [r, g, b] = color.map(|c| ((0x4000 - c) >> 15).clamp(0, 255) as u8);
             match u32::from_le_bytes([r, g, b, 0]) {
                 0 => 0x01_01_01,
                 color => color,

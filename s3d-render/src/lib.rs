@@ -41,6 +41,8 @@
 mod anchor;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod blend;
 mod canvas;
 mod channels;
 mod clusters;
