@@ -10,6 +10,7 @@ use glam::{DVec2, Vec2, Vec3, dvec2};
 use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// How a footprint is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +51,7 @@ impl Default for FootprintOptions {
 pub struct FootprintBuilder {
     options: FootprintOptions,
     /// Where in `cells` a grid cell is.
-    index: HashMap<[i64; 2], usize>,
+    index: HashMap<[i64; 2], usize, BuildHasherDefault<CellHasher>>,
     cells: Vec<Cell>,
     /// The cell of the last point: the next one is often in it.
     last: Option<([i64; 2], usize)>,
@@ -81,6 +82,29 @@ impl Cell {
     }
 }
 
+/// Hashes a grid cell: a multiplication a coordinate. Clouds of hundreds of millions of points look cells up, and nobody
+/// gains from cells that collide.
+#[derive(Clone, Copy, Debug, Default)]
+struct CellHasher(u64);
+
+impl Hasher for CellHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        let (words, rest) = bytes.as_chunks::<8>();
+        let words = words.iter().map(|w| u64::from_ne_bytes(*w));
+        for word in words.chain(rest.iter().map(|b| u64::from(*b))) {
+            let product = u128::from(self.0.rotate_left(32) ^ word) * u128::from(0x9e37_79b9_7f4a_7c15_u64);
+            self.0 = product as u64 ^ (product >> 64) as u64;
+        }
+    }
+
+    // The length of a key, which is the same for all.
+    fn write_usize(&mut self, _length: usize) {}
+}
+
 impl FootprintBuilder {
     /// Starts without a point.
     ///
@@ -90,7 +114,7 @@ impl FootprintBuilder {
         for length in [options.cell_m, options.alpha_m] {
             assert!(length > 0.0 && length.is_finite(), "a length of {length} m");
         }
-        Self { options, index: HashMap::new(), cells: Vec::new(), last: None }
+        Self { options, index: HashMap::default(), cells: Vec::new(), last: None }
     }
 
     /// Takes a point of the room, world metres, at any height. A point that is not finite is left out.

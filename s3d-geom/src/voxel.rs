@@ -30,6 +30,13 @@ impl VoxelGrid {
         cell_between(&self.planes(), point)
     }
 
+    /// The voxel of each of `points`, as [`VoxelGrid::cell_of`] gives it, into `out`, whose content they replace.
+    pub fn cells_of(&self, points: &[Vec3], out: &mut Vec<u8>) {
+        let planes = self.planes();
+        out.clear();
+        out.extend(points.iter().map(|&p| cell_between(&planes, p) as u8));
+    }
+
     /// The box of voxel `cell`. It contains, in `f32`, every point of the box that [`VoxelGrid::cell_of`] puts there.
     ///
     /// # Panics
@@ -91,8 +98,8 @@ impl Voxels {
         }
         assert!(u32::try_from(points.len()).is_ok(), "{} points in one instance", points.len());
         let grid = VoxelGrid { bbox: Aabb::from_points(points.iter().copied()) };
-        let planes = grid.planes();
-        let cells: Vec<u8> = points.iter().map(|&p| cell_between(&planes, p) as u8).collect();
+        let mut cells = Vec::with_capacity(points.len());
+        grid.cells_of(points, &mut cells);
 
         let mut starts = vec![0u32; VoxelGrid::CELLS + 1];
         for &cell in &cells {

@@ -221,8 +221,9 @@ fn ply(c: &mut Criterion) {
 
 /// Points a second into `instances.json` and `instances.npz`, 100 instances of 10,000.
 fn instances(c: &mut Criterion) {
-    let members: Vec<u32> = (0..10_000).collect();
-    let starts: Vec<u32> = (0..=216).map(|c| c * 10_000 / 216).collect();
+    let points: Vec<Vec3> =
+        (0..10_000u32).map(|i| vec3((i % 97) as f32, (i % 89) as f32, (i % 83) as f32) * 0.01).collect();
+    let bbox = Aabb::from_points(points.iter().copied());
     let mut group = c.benchmark_group("instances");
     group.sample_size(10).throughput(Throughput::Elements(1_000_000));
     group.bench_function("json_and_npz", |b| {
@@ -236,11 +237,9 @@ fn instances(c: &mut Criterion) {
                     label_index,
                     class: "chair",
                     room: "office_1",
-                    bbox: [0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
-                    starts: &starts,
-                    members: &members,
+                    bbox,
                 };
-                writer.push(&record).expect("the instance");
+                writer.push(&record, &mut &points[..]).expect("the instance");
             }
             writer.finish().expect("the names")
         });

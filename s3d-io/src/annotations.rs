@@ -2,6 +2,7 @@
 
 use crate::e57_cloud::E57Cloud;
 use crate::flat::{Cloud, read_flat};
+use crate::instance_passes::PointBlocks;
 use crate::las_cloud::LasCloud;
 use crate::npy_cloud::NpyCloud;
 use crate::ply_cloud::PlyCloud;
@@ -119,6 +120,14 @@ pub(crate) trait InstancePoints: Debug + Send + Sync {
     fn are_vertices(&self) -> bool {
         false
     }
+
+    /// The same points, to be read block by block.
+    fn open(&self) -> Result<Box<dyn PointBlocks + '_>>;
+
+    /// The folder for a copy of the points, if reading them a second time would take longer than reading that.
+    fn copy_to(&self) -> Option<PathBuf> {
+        None
+    }
 }
 
 impl AnnotatedInstance {
@@ -138,6 +147,14 @@ impl AnnotatedInstance {
     /// If `out` has points without colours, or with faces where these points have none.
     pub fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
         self.points.read(out)
+    }
+
+    pub(crate) fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
+        self.points.open()
+    }
+
+    pub(crate) fn copy_to(&self) -> Option<PathBuf> {
+        self.points.copy_to()
     }
 
     /// Whether its points are the vertices of a mesh. Where that is the scene's own, a vertex is equally near to all faces
@@ -246,6 +263,7 @@ impl Annotations {
             ));
         }
         let on_fault = options.on_fault;
+        let spool_dir = options.spool_dir.clone().map(Arc::new);
         let tree = AnnotationTree::open_with(
             dir,
             &TreeOptions {
@@ -260,7 +278,8 @@ impl Annotations {
                 .instances
                 .into_iter()
                 .map(|i| {
-                    AnnotatedInstance::new(i.class, i.number, Arc::new(TextPoints { path: i.path, on_fault }))
+                    let points = TextPoints { path: i.path, on_fault, spool_dir: spool_dir.clone() };
+                    AnnotatedInstance::new(i.class, i.number, Arc::new(points))
                 })
                 .collect(),
         });
@@ -298,6 +317,8 @@ fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn
 struct TextPoints {
     path: PathBuf,
     on_fault: OnFault,
+    /// See [`AnnotationOptions::spool_dir`].
+    spool_dir: Option<Arc<PathBuf>>,
 }
 
 impl InstancePoints for TextPoints {
@@ -313,6 +334,14 @@ impl InstancePoints for TextPoints {
 
     fn part(&self) -> String {
         String::new()
+    }
+
+    fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
+        Ok(Box::new(PointReader::open_with(&self.path, self.on_fault)?))
+    }
+
+    fn copy_to(&self) -> Option<PathBuf> {
+        Some(self.spool_dir.as_ref().map_or_else(std::env::temp_dir, |dir| (**dir).clone()))
     }
 }
 

@@ -47,9 +47,7 @@ pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
         if text.is_empty() || text.starts_with(b"#") {
             continue;
         }
-        let mut record = ByteRecord::new();
-        let mut reader = ReaderBuilder::new().has_headers(false).trim(Trim::All).from_reader(text);
-        reader.read_byte_record(&mut record).map_err(|e| Error::line(path, line, e.to_string()))?;
+        let record = fields(text).map_err(|e| Error::line(path, line, e.to_string()))?;
         if record.len() != COLUMNS.len() {
             let message =
                 format!("{} fields; a location has {}: {}", record.len(), COLUMNS.len(), COLUMNS.join(","));
@@ -73,6 +71,18 @@ pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
         return Err(Error::format(path, format!("has no scan location; a line is {}", COLUMNS.join(","))));
     }
     Ok(locations)
+}
+
+/// The fields of a line, without white space around them.
+fn fields(text: &[u8]) -> csv::Result<ByteRecord> {
+    // Making a reader takes a hundred times as long as cutting a line without quotes.
+    if !text.contains(&b'"') {
+        return Ok(text.split(|b| *b == b',').map(<[u8]>::trim_ascii).collect());
+    }
+    let mut record = ByteRecord::new();
+    let mut reader = ReaderBuilder::new().has_headers(false).trim(Trim::All).from_reader(text);
+    reader.read_byte_record(&mut record)?;
+    Ok(record)
 }
 
 /// Where each of [`COLUMNS`] is.

@@ -1,6 +1,7 @@
 //! The labels of a mesh's faces as a source of annotations.
 
 use crate::annotations::{AnnotatedInstance, AnnotatedRoom, Annotations, InstancePoints, Skipped};
+use crate::instance_passes::PointBlocks;
 use crate::{Error, Result};
 use s3d_geom::glam::Vec3;
 use s3d_geom::{NO_INDEX, PointCloud, TriMesh};
@@ -75,14 +76,12 @@ struct FacePoints {
 
 impl InstancePoints for FacePoints {
     fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
-        assert!(out.faces.len() == out.len(), "points with faces beside points without");
-        for &(face, corners) in &self.faces {
-            out.positions.extend(corners);
-            push_inner(corners, &mut out.positions);
-            out.faces.resize(out.positions.len(), face);
-        }
-        out.colors.resize(out.positions.len(), [0; 3]);
+        self.open()?.read_block(usize::MAX, out)?;
         Ok(Skipped::default())
+    }
+
+    fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
+        Ok(Box::new(FaceBlocks { faces: &self.faces }))
     }
 
     fn path(&self) -> &Path {
@@ -91,6 +90,34 @@ impl InstancePoints for FacePoints {
 
     fn part(&self) -> String {
         self.part.clone()
+    }
+}
+
+/// The points of an instance's faces, block by block; all points of a face are in one, which may be longer by them.
+struct FaceBlocks<'a> {
+    /// The faces that are left.
+    faces: &'a [Face],
+}
+
+impl PointBlocks for FaceBlocks<'_> {
+    fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool> {
+        assert!(out.faces.len() == out.len(), "points with faces beside points without");
+        let end = out.len().saturating_add(points);
+        while let Some((&(face, corners), rest)) = self.faces.split_first() {
+            out.positions.extend(corners);
+            push_inner(corners, &mut out.positions);
+            out.faces.resize(out.positions.len(), face);
+            self.faces = rest;
+            if out.positions.len() >= end {
+                break;
+            }
+        }
+        out.colors.resize(out.positions.len(), [0; 3]);
+        Ok(!self.faces.is_empty())
+    }
+
+    fn skipped(&mut self) -> Skipped {
+        Skipped::default()
     }
 }
 

@@ -11,6 +11,7 @@ use crate::annotations::{
 use crate::flat_meaning::{Group, Meaning};
 use crate::flat_rows::{NO_TAG, Reading, Rows, Sink, Tags};
 use crate::flat_store::{FlatStore, SpoolWriter};
+use crate::instance_passes::PointBlocks;
 use crate::{Error, Result};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::Vec3;
@@ -255,10 +256,16 @@ fn spooled(
         let mut sink = |rows: &Rows| {
             let tags = rows.rooms.iter().zip(&rows.classes).zip(&rows.instances);
             let points = rows.positions.iter().zip(&rows.colors);
+            let (mut last, mut known) = ((NO_TAG, NO_TAG, 0), None);
             for (((room, class), instance), (position, color)) in tags.zip(points) {
-                let group = gathered.index.get(&(*room, *class, *instance));
-                let fits = match group.and_then(|g| meaning.instance_of.get(*g as usize)) {
-                    Some(Some(instance)) => writer.push(*instance, *position, *color)?,
+                let key = (*room, *class, *instance);
+                if key != last || known.is_none() {
+                    let group = gathered.index.get(&key);
+                    known = group.and_then(|g| meaning.instance_of.get(*g as usize)).copied();
+                    last = key;
+                }
+                let fits = match known {
+                    Some(Some(instance)) => writer.push(instance, *position, *color)?,
                     Some(None) => true,
                     None => false,
                 };
@@ -311,6 +318,30 @@ impl InstancePoints for FlatPoints {
 
     fn are_vertices(&self) -> bool {
         self.are_vertices
+    }
+
+    fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
+        Ok(Box::new(FlatBlocks { points: self, done: 0 }))
+    }
+}
+
+/// The points of an instance of a flat cloud, block by block.
+struct FlatBlocks<'a> {
+    points: &'a FlatPoints,
+    done: u64,
+}
+
+impl PointBlocks for FlatBlocks<'_> {
+    fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool> {
+        let FlatPoints { store, start, count, .. } = self.points;
+        let n = (points as u64).min(count - self.done);
+        store.read(start + self.done, n, out)?;
+        self.done += n;
+        Ok(self.done < *count)
+    }
+
+    fn skipped(&mut self) -> Skipped {
+        Skipped::default()
     }
 }
 
@@ -503,6 +534,15 @@ mod tests {
         assert!(message.contains("more than 10000 different classes"), "{message}");
         let message = read(&[TestCloud::new("a.las", &[(0, 0, 0)])], &options()).unwrap_err().to_string();
         assert!(message.contains("no annotated point"), "{message}");
+    }
+
+    #[test]
+    fn a_column_of_other_numbers_is_no_column_of_instances() {
+        let rows: Vec<TestRow> = (0..=MAX_GROUPS as i64).map(|i| (1, i, 0)).collect();
+        let enough = TestCloud::new("a.las", &rows[1..]);
+        assert_eq!(read(&[enough], &options()).unwrap().rooms[0].instances.len(), MAX_GROUPS);
+        let message = read(&[TestCloud::new("a.las", &rows)], &options()).unwrap_err().to_string();
+        assert!(message.contains("a.las: tells of more than 1000000 instances"), "{message}");
     }
 
     /// The plain version: every point to the list of its key.

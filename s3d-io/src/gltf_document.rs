@@ -11,6 +11,7 @@ use gltf::json;
 use serde::Deserialize;
 use std::borrow::Cow;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Extensions that change nothing that is read, beside all whose names start with `KHR_materials_`: those change
@@ -66,7 +67,7 @@ struct Head {
 impl GltfDocument {
     /// Reads a `.gltf` or `.glb` file, told apart by its content, and its buffers.
     pub(crate) fn open(path: &Path) -> Result<Self> {
-        let bytes = read_file(path)?;
+        let mut bytes = read_file(path)?;
         let (text, blob) =
             if bytes.starts_with(b"glTF") { split_glb(path, &bytes)? } else { (&bytes[..], None) };
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
@@ -81,6 +82,12 @@ impl GltfDocument {
         check_extensions(path, &head.required)?;
         let root = json::Root::from_slice(text).map_err(json_error)?;
         let mut document = Self { path: path.to_owned(), root, buffers: Vec::new() };
+        // The chunk stays where it was read to: it is most of the file.
+        let blob = blob.map(|blob| {
+            bytes.truncate(blob.end);
+            bytes.drain(..blob.start);
+            bytes
+        });
         document.buffers = document.load_buffers(blob)?;
         Ok(document)
     }
@@ -141,15 +148,15 @@ impl GltfDocument {
         (name, bytes)
     }
 
-    fn load_buffers(&self, blob: Option<&[u8]>) -> Result<Vec<Vec<u8>>> {
+    fn load_buffers(&self, mut blob: Option<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
         let mut buffers = Vec::new();
         for (i, json) in self.root.buffers.iter().enumerate() {
-            let bytes = match (&json.uri, blob) {
+            let bytes = match (&json.uri, blob.take_if(|_| i == 0 && json.uri.is_none())) {
                 (Some(uri), _) => self.resource(uri).map_err(|why| {
                     let name = if uri.starts_with("data:") { "the data URI" } else { uri };
                     self.fail(format!("buffer {i}: {name} {why}"))
                 })?,
-                (None, Some(blob)) if i == 0 => blob.to_vec(),
+                (None, Some(blob)) => blob,
                 (None, _) => {
                     // What an extension compresses may have a buffer that is not there.
                     let meshopt =
@@ -216,8 +223,8 @@ impl GltfDocument {
     }
 }
 
-/// The JSON and the binary chunk of a `.glb` file.
-fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)> {
+/// The JSON of a `.glb` file, and where its binary chunk is.
+fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Range<usize>>)> {
     let cut = || {
         Error::format(path, format!("is cut off: a .glb of {} bytes does not hold its chunks", bytes.len()))
     };
@@ -231,7 +238,7 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [
             return Err(Error::unsupported(path, format!("is binary glTF of version {other}; 2 is read")));
         }
     }
-    let mut chunks = [None; 2];
+    let mut chunks = [const { None }; 2];
     let (_, mut rest) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
     // Chunks beyond the second belong to extensions.
     for (chunk, kind) in chunks.iter_mut().zip([*b"JSON", *b"BIN\0"]) {
@@ -245,10 +252,12 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [
         }
         let length = usize::try_from(u32::from_le_bytes(*length)).ok();
         let (data, after) = length.and_then(|n| after.split_at_checked(n)).ok_or_else(cut)?;
-        *chunk = Some(data);
+        let start = bytes.len().saturating_sub(data.len().saturating_add(after.len()));
+        *chunk = Some(start..start.saturating_add(data.len()));
         rest = after;
     }
     let [json, blob] = chunks;
+    let json = json.and_then(|json| bytes.get(json));
     Ok((json.ok_or_else(|| Error::format(path, "is a .glb without a JSON chunk"))?, blob))
 }
 

@@ -4,8 +4,11 @@
 //! equal voxels, each with its occupancy and its points. Voxel (ix, iy, iz), counted from the box's smallest corner, has
 //! the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "Labels".
 
+use crate::instance_passes::PointPasses;
 use crate::npy_write::npy_header;
+use crate::voxel_members::VoxelMembers;
 use crate::{AtomicFile, Error, Result, read_json, write_whole};
+use s3d_geom::{Aabb, VoxelGrid, Voxels};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
@@ -14,9 +17,9 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 /// Voxels of an instance.
-const CELLS: usize = 6 * 6 * 6;
+const CELLS: usize = VoxelGrid::CELLS;
 
-/// One instance, as [`InstanceWriter::push`] takes it.
+/// One instance but its points, as [`InstanceWriter::push`] takes it.
 #[derive(Clone, Copy, Debug)]
 pub struct InstanceRecord<'a> {
     /// Its label: "chair_3_office_5_1".
@@ -27,12 +30,8 @@ pub struct InstanceRecord<'a> {
     pub class: &'a str,
     /// Type and number of its room: "office_5".
     pub room: &'a str,
-    /// `[xmin, ymin, zmin, xmax, ymax, zmax]` of its points, world metres.
-    pub bbox: [f32; 6],
-    /// The points of voxel `c` are `members[starts[c]..starts[c + 1]]`: 217 numbers.
-    pub starts: &'a [u32],
-    /// Indices of the instance's points (from 0, in the order of its file in the S3DIS tree), grouped by voxel.
-    pub members: &'a [u32],
+    /// The tightest box of its points, world metres.
+    pub bbox: Aabb,
 }
 
 /// One instance, as `instances.json` holds it.
@@ -70,7 +69,7 @@ pub struct InstanceEntry {
 /// | `point_start` | u64, n + 1 | the points of instance i are `point_index[point_start[i]:point_start[i+1]]` |
 /// | `point_index` | u32, N | points of an instance (from 0, in the order of its file in the S3DIS tree), voxel after voxel |
 ///
-/// Memory: about a kilobyte an instance. Point indices wait in a nameless temporary file.
+/// Memory: about 1.3 kilobytes an instance, whatever its points. Point indices wait in a nameless temporary file.
 #[derive(Debug)]
 pub struct InstanceWriter {
     json: PathBuf,
@@ -95,39 +94,71 @@ impl InstanceWriter {
         })
     }
 
-    /// Appends an instance.
+    /// Appends an instance, whose points are in the order of its file in the S3DIS tree. Those that are not in memory are
+    /// gone through twice, once to count them by voxel and once to write their indices, which takes 14 MB.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`]; [`Error::Format`] for more points than `u32` can number; those of the points' own file.
     ///
     /// # Panics
-    /// If `starts` is not 217 ascending numbers from 0 to the number of members.
-    pub fn push(&mut self, instance: &InstanceRecord<'_>) -> Result<()> {
-        let InstanceRecord { starts, members, .. } = *instance;
-        assert!(
-            starts.len() == CELLS + 1
-                && starts.first() == Some(&0)
-                && starts.is_sorted()
-                && starts.last().is_some_and(|end| *end as usize == members.len()),
-            "{} starts do not divide {} points of {} among {CELLS} voxels",
-            starts.len(),
-            members.len(),
-            instance.label
-        );
-        let points_per_voxel: Vec<u32> = starts.array_windows().map(|[start, end]| end - start).collect();
-        let failed = |e| Error::io(self.npz.path(), "write", e);
-        members.iter().try_for_each(|m| self.point_index.write_all(&m.to_le_bytes())).map_err(failed)?;
+    /// If it has no point; if the box of points in memory is another than theirs.
+    pub fn push(&mut self, instance: &InstanceRecord<'_>, points: &mut dyn PointPasses) -> Result<()> {
+        let label = instance.label;
+        assert!(!points.is_empty(), "{label} has no point");
+        if u32::try_from(points.len()).is_err() {
+            let message = format!(
+                "{label} has {} points; point_index can number {} of an instance: annotate it in parts",
+                points.len(),
+                u32::MAX
+            );
+            return Err(Error::format(self.npz.path(), message));
+        }
+        let grid = VoxelGrid { bbox: instance.bbox };
+        let points_per_voxel = match points.in_memory().and_then(Voxels::from_points) {
+            Some(voxels) => {
+                assert_eq!(voxels.grid, grid, "the box of {label} is not that of its points");
+                self.put(&voxels.members)?;
+                voxels.starts.windows(2).map(|w| w[1] - w[0]).collect()
+            }
+            None => self.put_in_passes(grid, points)?,
+        };
         self.entries.push(InstanceEntry {
-            label: instance.label.to_owned(),
+            label: label.to_owned(),
             label_index: instance.label_index,
             class: instance.class.to_owned(),
             room: instance.room.to_owned(),
-            points: members.len() as u64,
-            bbox: instance.bbox,
+            points: points.len(),
+            bbox: instance.bbox.to_array(),
             voxel_occupancy: points_per_voxel.iter().map(|&n| u8::from(n > 0)).collect(),
             points_per_voxel,
         });
         Ok(())
+    }
+
+    /// Appends indices of points.
+    fn put(&mut self, members: &[u32]) -> Result<()> {
+        let failed = |e| Error::io(self.npz.path(), "write", e);
+        members.iter().try_for_each(|m| self.point_index.write_all(&m.to_le_bytes())).map_err(failed)
+    }
+
+    /// Appends the indices of points that are not in memory, and returns how many are in each voxel.
+    fn put_in_passes(&mut self, grid: VoxelGrid, points: &mut dyn PointPasses) -> Result<Vec<u32>> {
+        let failed = |e| Error::io(self.npz.path(), "write", e);
+        let mut counts = vec![0u32; CELLS];
+        let mut cells = Vec::new();
+        points.pass(&mut |block| {
+            grid.cells_of(block, &mut cells);
+            cells.iter().for_each(|cell| counts[usize::from(*cell)] += 1);
+            Ok(())
+        })?;
+        self.point_index.flush().map_err(failed)?;
+        let mut members = VoxelMembers::new(self.point_index.get_mut(), &counts).map_err(failed)?;
+        points.pass(&mut |block| {
+            grid.cells_of(block, &mut cells);
+            members.add(&cells).map_err(failed)
+        })?;
+        members.finish().map_err(failed)?;
+        Ok(counts)
     }
 
     /// Gives both files their names, and returns their size in bytes.
@@ -201,11 +232,7 @@ fn write_arrays(file: AtomicFile, entries: &[InstanceEntry], spool: File) -> io:
     archive.array("voxel_occupancy", "|u1", &[n, 6, 6, 6], occupancy.collect::<Vec<_>>().as_slice())?;
     let counts = entries.iter().flat_map(|e| e.points_per_voxel.iter().copied());
     archive.array("points_per_voxel", "<u4", &[n, 6, 6, 6], bytes(counts, u32::to_le_bytes))?;
-    let mut starts = vec![0u64];
-    starts.extend(entries.iter().scan(0, |sum, e| {
-        *sum += e.points;
-        Some(*sum)
-    }));
+    let starts = point_starts(entries);
     let total = starts.last().copied().unwrap_or(0);
     archive.array("point_start", "<u8", &[n + 1], bytes(starts.into_iter(), u64::to_le_bytes))?;
     archive.stream(
@@ -218,19 +245,37 @@ fn write_arrays(file: AtomicFile, entries: &[InstanceEntry], spool: File) -> io:
     Ok(archive.zip.finish()?)
 }
 
+/// Where the points of each instance start among those of all, and where they end.
+fn point_starts(entries: &[InstanceEntry]) -> Vec<u64> {
+    let ends = entries.iter().scan(0, |sum, e| {
+        *sum += e.points;
+        Some(*sum)
+    });
+    std::iter::once(0).chain(ends).collect()
+}
+
 fn bytes<T, const N: usize>(values: impl Iterator<Item = T>, to_le_bytes: impl Fn(T) -> [u8; N]) -> Vec<u8> {
     values.flat_map(to_le_bytes).collect()
 }
 
 /// An `.npz` file: an archive of `.npy` files, stored as they are.
-struct Archive {
-    zip: ZipWriter<AtomicFile>,
+struct Archive<W: Write + Seek> {
+    zip: ZipWriter<W>,
 }
 
-impl Archive {
+impl<W: Write + Seek> Archive<W> {
     fn array(&mut self, name: &str, kind: &str, shape: &[u64], data: impl AsRef<[u8]>) -> io::Result<()> {
         let mut data = data.as_ref();
         self.stream(name, kind, shape, data.len() as u64, &mut data)
+    }
+
+    /// Starts an array of about `size` bytes. Beyond 4 GiB its header needs room for 64 bits.
+    fn start(&mut self, name: &str, size: u64) -> io::Result<()> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .last_modified_time(DateTime::default())
+            .large_file(size > 0xf000_0000);
+        Ok(self.zip.start_file(format!("{name}.npy"), options)?)
     }
 
     fn stream(
@@ -241,11 +286,7 @@ impl Archive {
         size: u64,
         data: &mut dyn io::Read,
     ) -> io::Result<()> {
-        let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Stored)
-            .last_modified_time(DateTime::default())
-            .large_file(size > 0xf000_0000);
-        self.zip.start_file(format!("{name}.npy"), options)?;
+        self.start(name, size)?;
         self.zip.write_all(&npy_header(kind, shape))?;
         let copied = io::copy(data, &mut self.zip)?;
         if copied != size {
@@ -258,40 +299,55 @@ impl Archive {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use s3d_geom::glam::{Vec3, vec3};
     use std::io::Read;
 
-    fn starts(counts: &[(usize, u32)]) -> Vec<u32> {
-        let mut starts = vec![0; CELLS + 1];
-        for &(cell, count) in counts {
-            starts[cell + 1..].iter_mut().for_each(|s| *s += count);
+    const CHAIR: Aabb = Aabb { min: vec3(0.1, -2.0, 0.0), max: vec3(1.5, -1.25, 0.9) };
+    const WALL: Aabb = Aabb { min: Vec3::splat(5.0), max: Vec3::splat(5.0) };
+
+    /// Points of the chair in the voxels 215, 0, 215, 0 and (0, 1, 1).
+    fn chair_points() -> [Vec3; 5] {
+        let size = CHAIR.size();
+        [
+            CHAIR.max,
+            CHAIR.min,
+            CHAIR.max - 0.1 * size,
+            CHAIR.min + 0.1 * size,
+            CHAIR.min + size * vec3(0.1, 0.2, 0.2),
+        ]
+    }
+
+    fn record(label: &str) -> InstanceRecord<'_> {
+        match label {
+            "chair_3_office_5_1" => {
+                InstanceRecord { label, label_index: 9, class: "chair", room: "office_5", bbox: CHAIR }
+            }
+            _ => InstanceRecord { label, label_index: 40, class: "wall", room: "WC_2", bbox: WALL },
         }
-        starts
+    }
+
+    /// Points that pretend to be on a disk: they come two by two.
+    struct OnDisk<'a>(&'a [Vec3]);
+
+    impl PointPasses for OnDisk<'_> {
+        fn len(&self) -> u64 {
+            self.0.len() as u64
+        }
+
+        fn in_memory(&self) -> Option<&[Vec3]> {
+            None
+        }
+
+        fn pass(&mut self, each: &mut dyn FnMut(&[Vec3]) -> Result<()>) -> Result<()> {
+            self.0.chunks(2).try_for_each(each)
+        }
     }
 
     fn write(dir: &Path) -> Vec<InstanceEntry> {
         let (json, npz) = (dir.join("instances.json"), dir.join("instances.npz"));
         let mut writer = InstanceWriter::create(&json, &npz).unwrap();
-        let (a, b) = (starts(&[(0, 2), (7, 1), (215, 2)]), starts(&[(36, 1)]));
-        let first = InstanceRecord {
-            label: "chair_3_office_5_1",
-            label_index: 9,
-            class: "chair",
-            room: "office_5",
-            bbox: [0.1, -2.0, 0.0, 1.5, -1.25, 0.9],
-            starts: &a,
-            members: &[1, 3, 4, 0, 2],
-        };
-        let second = InstanceRecord {
-            label: "wall_1_WC_2_1",
-            label_index: 40,
-            class: "wall",
-            room: "WC_2",
-            bbox: [5.0; 6],
-            starts: &b,
-            members: &[0],
-        };
-        writer.push(&first).unwrap();
-        writer.push(&second).unwrap();
+        writer.push(&record("chair_3_office_5_1"), &mut &chair_points()[..]).unwrap();
+        writer.push(&record("wall_1_WC_2_1"), &mut &[WALL.min][..]).unwrap();
         let bytes = writer.finish().unwrap();
         let size = |path: &Path| std::fs::metadata(path).unwrap().len();
         assert_eq!(bytes, size(&json) + size(&npz));
@@ -360,19 +416,97 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "do not divide 1 points of wall_1_WC_2_1")]
-    fn starts_that_do_not_fit_are_a_callers_mistake() {
+    fn points_on_the_disk_give_the_same_bytes() {
+        let points: Vec<Vec3> =
+            (0..70_000).map(|i| vec3((i % 251) as f32, (i % 13) as f32, (i / 9000) as f32)).collect();
+        let bbox = Aabb::from_points(points.iter().copied());
+        let written = |on_disk: bool| {
+            let dir = tempfile::tempdir().unwrap();
+            let (json, npz) = (dir.path().join("i.json"), dir.path().join("i.npz"));
+            let mut writer = InstanceWriter::create(&json, &npz).unwrap();
+            for label in ["chair_3_office_5_1", "wall_1_WC_2_1"] {
+                let record = InstanceRecord { bbox, ..record(label) };
+                match on_disk {
+                    true => writer.push(&record, &mut OnDisk(&points)).unwrap(),
+                    false => writer.push(&record, &mut &points[..]).unwrap(),
+                }
+            }
+            writer.push(&record("chair_3_office_5_1"), &mut &chair_points()[..]).unwrap();
+            writer.finish().unwrap();
+            [json, npz].map(|path| std::fs::read(path).unwrap())
+        };
+        assert!(written(true) == written(false));
+    }
+
+    /// As many points as are asked for, none of which is ever read.
+    struct Claimed(u64);
+
+    impl PointPasses for Claimed {
+        fn len(&self) -> u64 {
+            self.0
+        }
+
+        fn in_memory(&self) -> Option<&[Vec3]> {
+            None
+        }
+
+        fn pass(&mut self, _each: &mut dyn FnMut(&[Vec3]) -> Result<()>) -> Result<()> {
+            panic!("the points are read")
+        }
+    }
+
+    #[test]
+    fn more_points_than_indices_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let mut writer =
             InstanceWriter::create(&dir.path().join("i.json"), &dir.path().join("i.npz")).unwrap();
-        let _ = writer.push(&InstanceRecord {
-            label: "wall_1_WC_2_1",
+        let message = writer.push(&record("wall_1_WC_2_1"), &mut Claimed(1 << 32)).unwrap_err().to_string();
+        assert!(message.contains("wall_1_WC_2_1 has 4294967296 points"), "{message}");
+        assert!(message.contains("i.npz") && message.ends_with("annotate it in parts"), "{message}");
+    }
+
+    #[test]
+    fn totals_go_beyond_32_bits() {
+        let entry = |points| InstanceEntry {
+            label: "wall_1_WC_2_1".to_owned(),
             label_index: 1,
-            class: "wall",
-            room: "WC_2",
+            class: "wall".to_owned(),
+            room: "WC_2".to_owned(),
+            points,
             bbox: [0.0; 6],
-            starts: &starts(&[(0, 2)]),
-            members: &[0],
-        });
+            voxel_occupancy: vec![0; CELLS],
+            points_per_voxel: vec![0; CELLS],
+        };
+        let entries = [entry(u64::from(u32::MAX)), entry(7)];
+        assert_eq!(point_starts(&entries), [0, u64::from(u32::MAX), (1 << 32) + 6]);
+    }
+
+    #[test]
+    fn an_array_beyond_4_gib_has_a_header_of_64_bits() {
+        for (size, is_large) in [(1 << 33, true), (1 << 20, false)] {
+            let mut archive = Archive { zip: ZipWriter::new(io::Cursor::new(Vec::new())) };
+            archive.start("point_index", size).unwrap();
+            archive.zip.write_all(b"abc").unwrap();
+            let bytes = archive.zip.finish().unwrap().into_inner();
+            // The local header: version 4.5 is needed, the sizes are elsewhere, namely in an extra field of the kind 1.
+            assert_eq!(bytes[..4], *b"PK\x03\x04");
+            let extra = 30 + "point_index.npy".len();
+            let sizes = if is_large { [0xff; 8] } else { [3, 0, 0, 0, 3, 0, 0, 0] };
+            assert_eq!((bytes[4] == 45, &bytes[18..26]), (is_large, &sizes[..]));
+            assert_eq!(bytes[extra..].starts_with(&[1, 0, 16, 0, 3, 0, 0, 0]), is_large);
+            let mut zip = zip::ZipArchive::new(io::Cursor::new(bytes)).unwrap();
+            let mut text = String::new();
+            zip.by_name("point_index.npy").unwrap().read_to_string(&mut text).unwrap();
+            assert_eq!(text, "abc");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "wall_1_WC_2_1 has no point")]
+    fn an_instance_without_points_is_a_callers_mistake() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut writer =
+            InstanceWriter::create(&dir.path().join("i.json"), &dir.path().join("i.npz")).unwrap();
+        let _ = writer.push(&record("wall_1_WC_2_1"), &mut &[][..]);
     }
 }

@@ -89,6 +89,7 @@ mod gltf_material;
 mod guarded;
 mod hdf5;
 mod instance_arrays;
+mod instance_passes;
 mod instances;
 mod json;
 mod labelled_points;
@@ -148,6 +149,7 @@ mod splits;
 mod sync;
 mod tar;
 mod texture_file;
+mod voxel_members;
 mod webdataset;
 
 pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, Skipped};
@@ -169,6 +171,7 @@ pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, writ
 pub use file_list::{FileRecord, read_file_list, write_file_list};
 pub use guarded::panic_is_caught;
 pub use instance_arrays::{InstanceArrays, read_instance_arrays, read_instance_members};
+pub use instance_passes::{InstancePasses, InstanceReader, PointPasses};
 pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};
 pub use json::{read_json, write_json};
 pub use labelled_points::{LabelledPoint, LabelledPoints};

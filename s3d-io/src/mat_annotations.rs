@@ -3,6 +3,7 @@
 use crate::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, Skipped,
 };
+use crate::instance_passes::PointBlocks;
 use crate::mat_read::{MatArea, MatObject, MatRoom};
 use crate::quote::quote;
 use crate::s3dis::OnFault;
@@ -152,6 +153,27 @@ impl InstancePoints for MatPoints {
 
     fn part(&self) -> String {
         self.object.part().to_owned()
+    }
+
+    fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
+        Ok(Box::new(MatBlocks { points: self, skipped: Skipped::default() }))
+    }
+}
+
+/// The points of an object in one block: the file holds them by column.
+struct MatBlocks<'a> {
+    points: &'a MatPoints,
+    skipped: Skipped,
+}
+
+impl PointBlocks for MatBlocks<'_> {
+    fn read_block(&mut self, _points: usize, out: &mut PointCloud) -> Result<bool> {
+        self.skipped = self.points.read(out)?;
+        Ok(false)
+    }
+
+    fn skipped(&mut self) -> Skipped {
+        std::mem::take(&mut self.skipped)
     }
 }
 

@@ -37,6 +37,7 @@ impl ObjLooks {
         let mut looks = Self::default();
         let library = load_libraries(folder, plain, &mut looks.companions, warnings);
         let mut wanted: Vec<PathBuf> = Vec::new();
+        let mut place_of: HashMap<PathBuf, usize> = HashMap::new();
         let mut unknown: Vec<&str> = Vec::new();
         // For each material the image, into `wanted`, and how it repeats.
         let mut maps: Vec<Option<(usize, [Wrap; 2])>> = Vec::new();
@@ -56,10 +57,10 @@ impl ObjLooks {
                                 f.library.display()
                             ));
                         }
-                        let at = wanted.iter().position(|w| *w == image).unwrap_or_else(|| {
+                        let at = *place_of.entry(image.clone()).or_insert(wanted.len());
+                        if at == wanted.len() {
                             wanted.push(image);
-                            wanted.len() - 1
-                        });
+                        }
                         map = Some((at, m.wrap));
                     }
                     None => warnings.push(format!(

@@ -1,6 +1,7 @@
 //! The points of the S3DIS tree: `x y z r g b` a line.
 
 use crate::annotations::Skipped;
+use crate::instance_passes::PointBlocks;
 use crate::obj_lines::words;
 use crate::quote::quote;
 use crate::s3dis::OnFault;
@@ -158,6 +159,16 @@ impl PointReader {
             }
             return Ok(());
         }
+    }
+}
+
+impl PointBlocks for PointReader {
+    fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool> {
+        Ok(self.read_chunk(points, out)? == points)
+    }
+
+    fn skipped(&mut self) -> Skipped {
+        Skipped { count: self.skipped, first: self.first_skipped.take() }
     }
 }
 

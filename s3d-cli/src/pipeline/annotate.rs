@@ -6,21 +6,21 @@ use crate::failure::{Failure, Outcome};
 use crate::stop;
 use glam::Vec3;
 use s3d_geom::{
-    Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh, Voxels,
+    Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh,
     dominant_wall_direction_deg,
 };
-use s3d_io::Error;
+use s3d_io::{Error, InstanceReader, PointPasses};
 use s3d_label::{Class, Label, LabelId, LabelTable, Room, VoteReport, Votes};
 use std::collections::{BTreeMap, HashSet};
+
+/// Points of an instance that are in memory, twice: while some are looked up, the next are read.
+const BLOCK_POINTS: usize = 1 << 19;
 
 /// A share of points far from every face above which it is told.
 const MANY_FAR: f64 = 0.05;
 
 /// A share of labelled faces below which it is told.
 const FEW_LABELLED: f64 = 0.5;
-
-/// Points that vote at a time: a signal is followed between two such pieces.
-const CHUNK: usize = 1 << 18;
 
 /// An annotated area.
 pub(crate) struct Annotated {
@@ -69,17 +69,19 @@ pub(crate) struct SurveyedRoom {
 pub(crate) struct AnnotatedInstance<'a> {
     pub(crate) label: Label,
     pub(crate) id: LabelId,
-    /// Its box, and the voxel of each of its points.
-    pub(crate) voxels: &'a Voxels,
+    /// The box of its points.
+    pub(crate) bbox: Aabb,
+    /// Its points, at least one, to be gone through again.
+    pub(crate) points: &'a mut dyn PointPasses,
 }
 
-/// Reads an area's annotated points, one instance at a time, and lets each vote for its nearest face. `each` gets every
-/// instance with its box and voxels, in the order of rooms and of numbers in the room.
+/// Reads an area's annotated points, one instance at a time and block by block, and lets each vote for its nearest face.
+/// `each` gets every instance with its box and points, in the order of rooms and of numbers in the room.
 pub(crate) fn annotate(
     area: &AreaInput,
     nearest_faces: &NearestFaces<'_>,
     table: &LabelTable,
-    mut each: impl FnMut(&AnnotatedInstance<'_>) -> Outcome<()>,
+    mut each: impl FnMut(AnnotatedInstance<'_>) -> Outcome<()>,
 ) -> Outcome<Annotated> {
     let mesh = nearest_faces.mesh();
     let mut votes = Votes::new(mesh.faces().len());
@@ -90,64 +92,66 @@ pub(crate) fn annotate(
     let mut corners: Option<Corners> = None;
     let files = area.rooms.iter().map(|r| r.instances.len()).sum::<usize>();
     let progress = Progress::new("labelling", "instances", files as u64);
-    let mut cloud = PointCloud::default();
+    let mut reader = InstanceReader::new(BLOCK_POINTS);
     let mut nearest: Vec<Nearest> = Vec::new();
     for room in &area.rooms {
         let mut builder = FootprintBuilder::new(FootprintOptions::default());
-        let (mut points, mut bbox) = (0u64, Aabb::EMPTY);
+        let (mut points, mut room_bbox) = (0u64, Aabb::EMPTY);
         for instance in &room.instances {
             let id = table.id_of(&instance.label).unwrap_or(LabelId::NULL);
             stop::check()?;
-            cloud.clear();
-            let left_out = instance.points.read(&mut cloud)?;
+            let mut bbox = Aabb::EMPTY;
+            let (mut passes, left_out) = reader.read(&instance.points, |block| -> Outcome<()> {
+                stop::check()?;
+                if !instance.points.are_vertices() && !has_faces(block) {
+                    nearest_faces.nearest_many(&block.positions, &mut nearest);
+                }
+                // The floor's outline takes as long as counting votes, which is one thread's work too.
+                let outline = || {
+                    block.positions.iter().for_each(|p| builder.add(*p));
+                    bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
+                };
+                let vote = || {
+                    if instance.points.are_vertices() {
+                        let corners = corners.get_or_insert_with(|| Corners::new(mesh));
+                        corners.vote(&block.positions, id, &mut votes, nearest_faces, &mut nearest);
+                        Ok(())
+                    } else if has_faces(block) {
+                        vote_for_faces(block, id, &mut votes)
+                            .map_err(|m| Error::format(instance.points.path(), m))
+                    } else {
+                        nearest.iter().for_each(|n| votes.add(n.face, id, n.distance_m));
+                        Ok(())
+                    }
+                };
+                let (voted, ()) = rayon::join(vote, outline);
+                Ok(voted?)
+            })?;
             skipped.lines += left_out.count;
             if let Some(first) = left_out.first {
                 skipped.first.get_or_insert(first.to_string());
             }
-            let Some(voxels) = Voxels::from_points(&cloud.positions) else {
+            progress.add(1);
+            if passes.is_empty() {
                 let source = instance.points.source();
                 if lenient {
                     skipped.empty_instances += 1;
                     skipped.first.get_or_insert(format!("{source}: no point in it"));
-                    progress.add(1);
                     continue;
                 }
                 let message = "no point in it: remove the file, or annotate the instance";
                 return Err(Error::format(instance.points.path(), message).into());
-            };
-            if instance.points.are_vertices() {
-                let corners = corners.get_or_insert_with(|| Corners::new(mesh));
-                corners.vote(&cloud.positions, id, &mut votes, nearest_faces, &mut nearest);
-            } else if cloud.faces.len() == cloud.len() {
-                for face in &cloud.faces {
-                    if *face as usize >= mesh.faces().len() {
-                        let message =
-                            format!("a point is of face {face}; the mesh has {}", mesh.faces().len());
-                        return Err(Error::format(instance.points.path(), message).into());
-                    }
-                    votes.add(*face, id, 0.0);
-                }
-            } else {
-                for positions in cloud.positions.chunks(CHUNK) {
-                    stop::check()?;
-                    nearest_faces.nearest_many(positions, &mut nearest);
-                    for n in &nearest {
-                        votes.add(n.face, id, n.distance_m);
-                    }
-                }
             }
-            cloud.positions.iter().for_each(|p| builder.add(*p));
-            each(&AnnotatedInstance { label: instance.label, id, voxels: &voxels })?;
-            points += cloud.len() as u64;
-            bbox = bbox.union(voxels.grid.bbox);
-            progress.add(1);
+            points += passes.len();
+            room_bbox = room_bbox.union(bbox);
+            each(AnnotatedInstance { label: instance.label, id, bbox, points: &mut passes })?;
         }
         total += points;
         rooms.push(SurveyedRoom {
             room: room.room,
             points,
             footprint: builder.finish(),
-            bbox,
+            bbox: room_bbox,
             wall_direction_deg: 0,
         });
     }
@@ -161,6 +165,22 @@ pub(crate) fn annotate(
     }
     let report = VoteReport::new(&votes, table);
     Ok(Annotated { face_labels, report, rooms, points: total, skipped })
+}
+
+/// Whether it is known which face each point belongs to.
+fn has_faces(block: &PointCloud) -> bool {
+    block.faces.len() == block.len()
+}
+
+/// Lets each point vote for the face that it belongs to, or says which face there is not.
+fn vote_for_faces(block: &PointCloud, id: LabelId, votes: &mut Votes) -> Result<(), String> {
+    for face in &block.faces {
+        if *face as usize >= votes.face_count() {
+            return Err(format!("a point is of face {face}; the mesh has {}", votes.face_count()));
+        }
+        votes.add(*face, id, 0.0);
+    }
+    Ok(())
 }
 
 /// What looks wrong between mesh and annotations, as a sentence each.

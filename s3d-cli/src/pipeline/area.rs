@@ -50,6 +50,10 @@ pub(crate) struct Common<'a> {
     pub(crate) account: &'a Account,
 }
 
+/// With more faces than this, what is only needed while two hierarchies are built, 200 bytes a face each, should not be in
+/// memory twice.
+const LARGE_MESH: usize = 2_000_000;
+
 /// A mesh that is ready for rays.
 pub(crate) struct Stage<'m> {
     file: &'m MeshFile,
@@ -57,9 +61,12 @@ pub(crate) struct Stage<'m> {
 }
 
 impl<'m> Stage<'m> {
-    /// Prepares the mesh, and at the same time its nearest faces, which are needed for its labels only.
+    /// Prepares the mesh, and its nearest faces (at the same time, unless it is large), which are needed for its labels only.
     pub(crate) fn new(file: &'m MeshFile) -> (Self, NearestFaces<'m>) {
-        let (scene, nearest) = rayon::join(|| Scene::new(&file.mesh), || NearestFaces::new(&file.mesh));
+        let (scene, nearest) = match file.mesh.faces().len() {
+            0..=LARGE_MESH => rayon::join(|| Scene::new(&file.mesh), || NearestFaces::new(&file.mesh)),
+            _ => (Scene::new(&file.mesh), NearestFaces::new(&file.mesh)),
+        };
         (Self { file, scene }, nearest)
     }
 
@@ -138,16 +145,14 @@ pub(crate) fn label_area(
     let mut instances = if writes { Some(InstanceWriter::create(json, npz)?) } else { None };
     let annotated = annotate(area, &nearest, table, |i| {
         let Some(instances) = &mut instances else { return Ok(()) };
-        instances.push(&InstanceRecord {
+        let record = InstanceRecord {
             label: &i.label.to_string(),
             label_index: i.id.0,
             class: i.label.class.name(),
             room: &i.label.room.to_string(),
-            bbox: i.voxels.grid.bbox.to_array(),
-            starts: &i.voxels.starts,
-            members: &i.voxels.members,
-        })?;
-        Ok(())
+            bbox: i.bbox,
+        };
+        Ok(instances.push(&record, i.points)?)
     })?;
     tell_labels(&annotated, started);
     if let Some(w) = annotated.skipped.sentence() {

@@ -98,16 +98,17 @@ impl Outlook {
 /// # Panics
 /// If there is no room.
 pub(crate) fn room_of(rooms: &[SurveyedRoom], point: DVec3) -> Room {
-    let distance = |r: &SurveyedRoom| {
-        if !r.footprint.polygons.is_empty() {
-            return r.footprint.distance(point.x, point.y);
-        }
-        let (min, max) = (r.bbox.min.as_dvec3().truncate(), r.bbox.max.as_dvec3().truncate());
-        point.truncate().distance(point.truncate().clamp(min, max))
-    };
     let mut best = (f64::INFINITY, rooms[0].room);
     for r in rooms {
-        let distance = distance(r);
+        let (min, max) = (r.bbox.min.as_dvec3().truncate(), r.bbox.max.as_dvec3().truncate());
+        let mut distance = point.truncate().distance(point.truncate().clamp(min, max));
+        // An outline lies in the box: it is no nearer, but for rounding.
+        if distance > 1.000_001 * best.0 {
+            continue;
+        }
+        if !r.footprint.polygons.is_empty() {
+            distance = r.footprint.distance(point.x, point.y);
+        }
         if distance < best.0 {
             best = (distance, r.room);
         }
