@@ -2,6 +2,7 @@
 
 use crate::console::LogFormat;
 use crate::pack::args::PackArgs;
+use crate::pipeline::deal::Shard;
 use crate::pipeline::profiles::Profile;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, value_parser};
@@ -55,6 +56,16 @@ pub(crate) enum Command {
         after_help = "Examples:\n  s3d export scan/scene.toml -o dataset\n  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\nAn export that was stopped or killed goes on where it was when it is called again with the same arguments."
     )]
     Export(ExportArgs),
+    /// Label scenes and score their views ahead of an export that many machines share.
+    #[command(
+        after_help = "Examples:\n  s3d plan scan/scene.toml -o plan\n  s3d export scan/scene.toml -o dataset --plan plan --shard 1/4\nThe options are those of the export that labels and scores depend on. docs/cluster has files for Slurm and others."
+    )]
+    Plan(PlanArgs),
+    /// Make one data set of what the shards of an export have written.
+    #[command(
+        after_help = "Examples:\n  s3d merge dataset -o dataset\n  s3d merge shard_1 shard_2 shard_3 -o dataset\nIt is that of a single run, byte for byte. What is missing is told with the shard to run again."
+    )]
+    Merge(MergeArgs),
     /// Sample a mesh densely and uniformly into a coloured point cloud.
     #[command(after_help = "Example:\n  s3d sample scan/rgb.obj -o cloud.ply --points-per-m2 10000")]
     Sample(SampleArgs),
@@ -96,7 +107,7 @@ impl Command {
     pub(crate) fn stops_between_files(&self) -> bool {
         match self {
             Self::Demo(_) | Self::Export(_) | Self::Sample(_) => true,
-            Self::Pack(_) | Self::Xyz(_) | Self::Profile(_) => true,
+            Self::Plan(_) | Self::Merge(_) | Self::Pack(_) | Self::Xyz(_) | Self::Profile(_) => true,
             Self::Render(_) | Self::Info(_) | Self::Stats(_) | Self::Verify(_) => false,
         }
     }
@@ -152,8 +163,87 @@ pub(crate) struct ExportArgs {
     /// replaced, other files stay.
     #[arg(long)]
     pub(crate) overwrite: bool,
+    /// Do one of N parts of the work, such as 2/4. The parts may be done anywhere, in any order, into one OUT or one each;
+    /// `s3d merge` makes the data set of them.
+    #[arg(long, value_name = "i/N", value_parser = parsed::<Shard>)]
+    pub(crate) shard: Option<Shard>,
+    /// Take labels and scores from the folder that `s3d plan` made, instead of making them.
+    #[arg(long, value_name = "PLAN")]
+    pub(crate) plan: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) options: ExportOptions,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PlanArgs {
+    /// Scene files, or folders of published areas, one an area.
+    #[arg(required = true, value_name = "SCENE.toml")]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// The plan's folder; called again, what is missing in it is made.
+    #[arg(short, long, value_name = "PLAN")]
+    pub(crate) output: PathBuf,
+    /// Make the first, second, ... of N parts of the plan; the parts may be made anywhere, in any order.
+    #[arg(long, value_name = "i/N", value_parser = parsed::<Shard>)]
+    pub(crate) shard: Option<Shard>,
+    /// Candidate views a scan location.
+    #[arg(long, value_name = "N", default_value_t = 72, value_parser = value_parser!(u32).range(0..=100_000))]
+    views: u32,
+    /// Width and height of a view in pixels.
+    #[arg(long, value_name = "PX", default_value_t = 1080, value_parser = value_parser!(u32).range(8..=16_384))]
+    size: u32,
+    /// Everything random comes from it.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Put scan locations on the floor of every room, no two of a room nearer than this.
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    place_cameras: Option<f64>,
+    /// Count the classes of a candidate view on every Nth pixel of both axes.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = value_parser!(u32).range(1..=64))]
+    entropy_stride: u32,
+    /// Skip and count what is not as it should be in the annotations.
+    #[arg(long)]
+    lenient: bool,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+impl PlanArgs {
+    /// The options of an export of poses alone, which a plan with these labels and scores is for, among others.
+    pub(crate) fn export_options(&self) -> ExportOptions {
+        ExportOptions {
+            views: self.views,
+            size: self.size,
+            pano_width: 8,
+            seed: self.seed,
+            pool: Pool::Dataset,
+            // Of points nothing is asked.
+            points_per_m2: f64::MIN_POSITIVE,
+            place_cameras: self.place_cameras,
+            entropy_stride: self.entropy_stride,
+            modalities: vec![Domain::Pose],
+            keep_all: false,
+            only: Vec::new(),
+            smooth_normals: false,
+            lenient: self.lenient,
+            compression: Compression::default(),
+            format: FormatOptions::default(),
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MergeArgs {
+    /// The folders that shards of the same export wrote into, in any order; OUT may be one of them.
+    #[arg(required = true, value_name = "SHARD")]
+    pub(crate) shards: Vec<PathBuf>,
+    /// The data set's folder.
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Write into an OUT that holds something: an earlier data set there is replaced, other files stay.
+    #[arg(long)]
+    pub(crate) overwrite: bool,
     #[command(flatten)]
     pub(crate) threads: Threads,
 }

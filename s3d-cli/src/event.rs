@@ -84,6 +84,8 @@ pub(crate) enum Stage {
     Render,
     Meshes,
     Points,
+    /// Of shards: their files come into one folder.
+    Merge,
     Tables,
 }
 
@@ -97,6 +99,7 @@ impl Stage {
             Self::Render => "render",
             Self::Meshes => "meshes",
             Self::Points => "points",
+            Self::Merge => "merge",
             Self::Tables => "tables",
         }
     }

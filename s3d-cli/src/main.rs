@@ -55,6 +55,8 @@ fn run(command: Command) -> Outcome<()> {
     match command {
         Command::Demo(args) => commands::demo::run(args),
         Command::Export(args) => commands::export::run(args),
+        Command::Plan(args) => commands::plan::run(&args),
+        Command::Merge(args) => commands::merge::run(args),
         Command::Sample(args) => commands::sample::run(args),
         Command::Render(args) => commands::render::run(args),
         Command::Info(args) => commands::info::run(args),

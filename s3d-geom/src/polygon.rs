@@ -8,6 +8,10 @@ use thiserror::Error;
 /// Coordinates beyond this are refused: products of them would overflow.
 const LARGEST_COORDINATE: f64 = 1e60;
 
+/// A face of more corners is refused: where they lie without order, the time that cutting takes grows faster than their
+/// number. It is half a second then.
+const MOST_CORNERS: usize = 1 << 14;
+
 /// Why an outline cannot be cut into triangles. Corners count from 0; in a [`Polygon`], those of the holes follow those
 /// of the outer ring.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -16,6 +20,12 @@ pub enum PolygonError {
     /// An outline has fewer than three corners.
     #[error("an outline of {corners} corners encloses nothing")]
     TooFewCorners {
+        /// How many there are.
+        corners: usize,
+    },
+    /// A face has more corners than are cut.
+    #[error("an outline of {corners} corners; faces have up to 16,384")]
+    TooManyCorners {
         /// How many there are.
         corners: usize,
     },
@@ -116,11 +126,14 @@ impl Polygon {
 /// straight line and repeated corners are fine, and so is an outline that runs to a hole and back over the same edge.
 ///
 /// # Errors
-/// [`PolygonError`] for fewer than three corners, a corner that is no number, no area, or an outline that crosses itself
-/// as seen along the normal.
+/// [`PolygonError`] for fewer than three corners or more than 16,384, a corner that is no number, no area, or an outline
+/// that crosses itself as seen along the normal.
 pub fn triangulate_face(corners: &[Vec3]) -> Result<Vec<[u32; 3]>, PolygonError> {
     if corners.len() < 3 {
         return Err(PolygonError::TooFewCorners { corners: corners.len() });
+    }
+    if corners.len() > MOST_CORNERS {
+        return Err(PolygonError::TooManyCorners { corners: corners.len() });
     }
     if let Some(corner) = corners.iter().position(|p| !p.is_finite()) {
         return Err(PolygonError::OutOfRange { corner });
@@ -314,6 +327,17 @@ mod tests {
             [1.0, 3.0],
             [0.0, 3.0],
         ]));
+    }
+
+    #[test]
+    fn a_face_has_so_many_corners_at_most() {
+        let circle = |n: usize| -> Vec<Vec3> {
+            let angle = |i: usize| i as f32 / n as f32 * std::f32::consts::TAU;
+            (0..n).map(|i| vec3(9.0 * angle(i).cos(), 9.0 * angle(i).sin(), 1.0)).collect()
+        };
+        assert_eq!(triangulate_face(&circle(MOST_CORNERS)).unwrap().len(), MOST_CORNERS - 2);
+        let corners = MOST_CORNERS + 1;
+        assert_eq!(triangulate_face(&circle(corners)), Err(PolygonError::TooManyCorners { corners }));
     }
 
     #[test]

@@ -13,7 +13,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use half::f16;
 use s3d_geom::glam::{DVec3, Vec3, vec3};
-use s3d_geom::{Camera, PointCloud, Pose, Raster, TriMesh};
+use s3d_geom::{Aabb, Camera, PointCloud, Pose, Raster, TriMesh};
 use s3d_io::{
     Compression, Content, Frame, InstanceRecord, InstanceWriter, PlyPointWriter, PoseFile, S3disAreaWriter,
     encode_gray16, encode_rgb8, encode_xyz_float, encode_xyz_half, pretty_color, write_semantic_obj,

@@ -45,13 +45,13 @@ impl<'a> Archive<'a> {
             .zip
             .by_name(&format!("{name}.npy"))
             .map_err(|e| Error::format(path, format!("the array {name:?}: {e}")))?;
-        let mut header = vec![0; 10];
         let other = |_| Error::format(path, format!("{name:?} is no NPY array"));
-        entry.read_exact(&mut header).map_err(other)?;
-        let length = usize::from(u16::from_le_bytes([header[8], header[9]]));
-        header.resize(10 + length, 0);
-        entry.read_exact(&mut header[10..]).map_err(other)?;
-        Ok((header, entry))
+        let (mut start, mut length) = ([0; 8], [0; 2]);
+        entry.read_exact(&mut start).map_err(other)?;
+        entry.read_exact(&mut length).map_err(other)?;
+        let mut text = vec![0; usize::from(u16::from_le_bytes(length))];
+        entry.read_exact(&mut text).map_err(other)?;
+        Ok(([&start[..], &length, &text].concat(), entry))
     }
 
     /// The values of an array of this type; `shape` tells its shape from how many bytes there are.
@@ -146,8 +146,9 @@ pub fn read_instance_members(
     let (header, mut values) = archive.array(name)?;
     check_header(path, name, &header, "<u4", &[total])?;
     let (mut bytes, mut members) = (Vec::new(), Vec::new());
-    for (i, pair) in point_start.windows(2).enumerate() {
-        let size = 4 * (pair[1] - pair[0]);
+    for (i, [start, end]) in point_start.array_windows().enumerate() {
+        // It ascends.
+        let size = (end - start).saturating_mul(4);
         bytes.clear();
         // Memory grows as bytes arrive, whatever is claimed.
         values.by_ref().take(size).read_to_end(&mut bytes).map_err(|e| damaged(path, name, &e))?;
@@ -174,9 +175,8 @@ fn numbers<T, const N: usize>(bytes: &[u8], from_le_bytes: impl Fn([u8; N]) -> T
 mod tests {
     use super::*;
     use crate::{InstanceRecord, InstanceWriter, read_instances};
-
-    /// Voxels of an instance.
-    const CELLS: usize = 6 * 6 * 6;
+    use s3d_geom::Aabb;
+    use s3d_geom::glam::vec3;
 
     #[test]
     fn the_arrays_come_back_and_damage_is_told() {
@@ -187,20 +187,12 @@ mod tests {
         assert_eq!((empty.labels.len(), &empty.point_start[..]), (0, &[0][..]));
 
         let mut writer = InstanceWriter::create(&json, &npz).unwrap();
-        let mut starts = vec![0; 7];
-        starts.resize(CELLS + 1, 3);
-        for (label, members) in [("chair_3_office_5_1", [2, 0, 1]), ("wall_1_WC_2_1", [0, 1, 2])] {
-            writer
-                .push(&InstanceRecord {
-                    label,
-                    label_index: 7,
-                    class: "chair",
-                    room: "office_5",
-                    bbox: [0.1, -2.0, 0.0, 1.5, -1.25, 0.9],
-                    starts: &starts,
-                    members: &members,
-                })
-                .unwrap();
+        let bbox = Aabb { min: vec3(0.1, -2.0, 0.0), max: vec3(1.5, -1.25, 0.9) };
+        // The first voxel and the last.
+        let points = [bbox.max, bbox.min, bbox.max - 0.1 * bbox.size()];
+        for label in ["chair_3_office_5_1", "wall_1_WC_2_1"] {
+            let record = InstanceRecord { label, label_index: 7, class: "chair", room: "office_5", bbox };
+            writer.push(&record, &mut &points[..]).unwrap();
         }
         writer.finish().unwrap();
         let (arrays, entries) = (read_instance_arrays(&npz).unwrap(), read_instances(&json).unwrap());
@@ -208,7 +200,7 @@ mod tests {
         assert_eq!((&arrays.label_index[..], &arrays.point_start[..]), (&[7, 7][..], &[0, 3, 6][..]));
         let mut members = Vec::new();
         read_instance_members(&npz, &arrays.point_start, |i, of| members.push((i, of.to_vec()))).unwrap();
-        assert_eq!(members, [(0, vec![2, 0, 1]), (1, vec![0, 1, 2])]);
+        assert_eq!(members, [(0, vec![1, 0, 2]), (1, vec![1, 0, 2])]);
         for (starts, words) in [(&[0, 3, 7][..], "shape [7]"), (&[1, 6][..], "does not divide")] {
             let e = read_instance_members(&npz, starts, |_, _| ()).unwrap_err().to_string();
             assert!(e.contains(words), "{e}");

@@ -8,9 +8,6 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
-/// Bytes of a position in a temporary file.
-const POSITION_BYTES: usize = 12;
-
 /// Points that can be gone through in blocks, as often as is asked for, each time in the same order.
 pub trait PointPasses {
     /// How many there are.
@@ -222,10 +219,9 @@ impl PositionFile {
             let n = left.min(block_points as u64);
             block.clear();
             for _ in 0..n {
-                let mut bytes = [0; POSITION_BYTES];
-                file.read_exact(&mut bytes).map_err(failed)?;
-                let [x, y, z] = [0, 4, 8]
-                    .map(|i| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]));
+                let mut bytes = [[0; 4]; 3];
+                file.read_exact(bytes.as_flattened_mut()).map_err(failed)?;
+                let [x, y, z] = bytes.map(f32::from_le_bytes);
                 block.push(vec3(x, y, z));
             }
             each(block)?;

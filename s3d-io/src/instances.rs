@@ -118,7 +118,7 @@ impl InstanceWriter {
             Some(voxels) => {
                 assert_eq!(voxels.grid, grid, "the box of {label} is not that of its points");
                 self.put(&voxels.members)?;
-                voxels.starts.windows(2).map(|w| w[1] - w[0]).collect()
+                voxels.starts.array_windows().map(|[start, end]| end - start).collect()
             }
             None => self.put_in_passes(grid, points)?,
         };
@@ -148,7 +148,11 @@ impl InstanceWriter {
         let mut cells = Vec::new();
         points.pass(&mut |block| {
             grid.cells_of(block, &mut cells);
-            cells.iter().for_each(|cell| counts[usize::from(*cell)] += 1);
+            for cell in &cells {
+                if let Some(count) = counts.get_mut(usize::from(*cell)) {
+                    *count += 1;
+                }
+            }
             Ok(())
         })?;
         self.point_index.flush().map_err(failed)?;

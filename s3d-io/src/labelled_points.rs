@@ -89,13 +89,14 @@ impl LabelledPoints {
         let mut bytes = [0; POINT_BYTES];
         for _ in 0..n {
             self.file.read_exact(&mut bytes).map_err(|e| Error::io(&self.path, "read", e))?;
-            let word = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
-            let float = |at| f32::from_le_bytes(word(at));
+            let [x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3, r, g, b, l0, l1, l2, l3, f0, f1, f2, f3] =
+                bytes;
+            let [x, y, z] = [[x0, x1, x2, x3], [y0, y1, y2, y3], [z0, z1, z2, z3]].map(f32::from_le_bytes);
             out.push(LabelledPoint {
-                position: Vec3::new(float(0), float(4), float(8)),
-                color: [bytes[12], bytes[13], bytes[14]],
-                label: u32::from_le_bytes(word(15)),
-                face: u32::from_le_bytes(word(19)),
+                position: Vec3::new(x, y, z),
+                color: [r, g, b],
+                label: u32::from_le_bytes([l0, l1, l2, l3]),
+                face: u32::from_le_bytes([f0, f1, f2, f3]),
             });
         }
         self.left -= n;

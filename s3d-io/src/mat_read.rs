@@ -256,7 +256,7 @@ impl MatFile {
                 .hdf5
                 .fault(format!("{place}: refers to itself, or more often than there is place for")));
         }
-        *left -= 1;
+        *left = left.saturating_sub(1);
         let object = self.hdf5.object(address)?;
         if object.header.is_set("MATLAB_empty") {
             return Ok(());

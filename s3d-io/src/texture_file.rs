@@ -69,7 +69,7 @@ fn decode(
     [width, height]: [u32; 2],
 ) -> std::result::Result<Raster<[u8; 3]>, String> {
     let undecodable = |e: image::ImageError| e.to_string();
-    let pixels = u64::from(width) * u64::from(height);
+    let pixels = u64::from(width).saturating_mul(u64::from(height));
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     // The size is plausible by now; the library's own limit would refuse textures of 16,384² pixels.
     let mut limits = Limits::no_limits();
@@ -91,7 +91,7 @@ fn decode(
 
 /// What an image is and how large, by its first bytes; the size is one that the file can hold.
 fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static str, [u32; 2]), TextureFault> {
-    let (format, extension) = match image::guess_format(&bytes) {
+    let (format, extension) = match image::guess_format(bytes) {
         Ok(ImageFormat::Png) => (ImageFormat::Png, "png"),
         Ok(ImageFormat::Jpeg) => (ImageFormat::Jpeg, "jpg"),
         Ok(other) => {
@@ -106,7 +106,7 @@ fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static s
         Some(Err(e)) => return Err(TextureFault::Unreadable(format!("cannot be decoded: {e}"))),
         None => return Err(TextureFault::Unreadable("cannot be decoded: its header is damaged".into())),
     };
-    let pixels = u64::from(width) * u64::from(height);
+    let pixels = u64::from(width).saturating_mul(u64::from(height));
     if pixels == 0 || width > MAX_SIDE || height > MAX_SIDE {
         let message = format!("is {width} × {height} pixels large; a side has 1 to {MAX_SIDE}");
         return Err(TextureFault::Unreadable(message));
@@ -117,7 +117,7 @@ fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static s
              cut it in parts"
         )));
     }
-    if pixels > bytes.len() as u64 * MAX_PIXELS_PER_BYTE {
+    if pixels > (bytes.len() as u64).saturating_mul(MAX_PIXELS_PER_BYTE) {
         let message = format!("claims {width} × {height} pixels in {} bytes", bytes.len());
         return Err(TextureFault::Unreadable(message));
     }
@@ -167,8 +167,8 @@ pub(crate) struct Together {
 impl Together {
     /// Adds a texture, before there is memory for it; a sentence if that makes too many.
     pub(crate) fn add(&mut self, width: u32, height: u32) -> std::result::Result<(), String> {
-        self.pixels = self.pixels.saturating_add(u64::from(width) * u64::from(height));
-        self.textures += 1;
+        self.pixels = self.pixels.saturating_add(u64::from(width).saturating_mul(u64::from(height)));
+        self.textures = self.textures.saturating_add(1);
         if self.pixels <= MAX_PIXELS_TOGETHER {
             return Ok(());
         }

@@ -40,7 +40,7 @@ impl<'a> VoxelMembers<'a> {
     /// Takes the voxels of the next points. Points that were not counted are an error: their file has changed.
     pub(crate) fn add(&mut self, cells: &[u8]) -> io::Result<()> {
         for cell in cells {
-            let voxel = &mut self.voxels[usize::from(*cell)];
+            let voxel = self.voxels.get_mut(usize::from(*cell)).ok_or_else(changed)?;
             voxel.waiting.extend_from_slice(&self.next.to_le_bytes());
             if voxel.waiting.len() >= 4 * MOST_WAITING {
                 voxel.write(self.file)?;

@@ -1,4 +1,5 @@
 //! An annotated cloud takes no memory for its points: a test of its own process, whose peak the system tells.
+#![allow(clippy::print_stderr, reason = "says why it measures nothing")]
 
 use s3d_geom::Aabb;
 use s3d_io::{

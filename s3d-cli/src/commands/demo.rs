@@ -54,7 +54,7 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         let scene = scan.join(written.file_name().unwrap_or_default());
         info!("the built-in scene is in {}", scan.display());
         let target = Target { layout: layout.clone(), overwrite: args.overwrite, allowed: &[SCAN] };
-        export(&[scene], &target, &options)?;
+        export(&[scene], &target, &options, None)?;
         info!(
             "look at {} and {}",
             layout.area_dir(1).join("pano").display(),

@@ -3,7 +3,8 @@
 use super::on_threads;
 use crate::args::ExportArgs;
 use crate::failure::Outcome;
-use crate::pipeline::{Target, export};
+use crate::pipeline::plan::Plan;
+use crate::pipeline::{Target, export, export_shard};
 use s3d_io::Layout;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,11 @@ pub(crate) fn run(args: ExportArgs) -> Outcome<()> {
     let output = args.output.unwrap_or_else(|| default_output(&args.scenes[0]));
     let target = Target { layout: Layout::new(output), overwrite: args.overwrite, allowed: &[] };
     let options = args.options.canonical();
-    on_threads(args.threads, || export(&args.scenes, &target, &options))
+    let plan = args.plan.as_deref().map(Plan::open).transpose()?;
+    on_threads(args.threads, || match args.shard {
+        Some(shard) => export_shard(&args.scenes, &target, &options, shard, plan.as_ref()),
+        None => export(&args.scenes, &target, &options, plan.as_ref()),
+    })
 }
 
 /// The data set's folder if none is given: beside the scene file, named after it.

@@ -3,7 +3,9 @@
 pub(crate) mod demo;
 pub(crate) mod export;
 pub(crate) mod info;
+pub(crate) mod merge;
 pub(crate) mod pack;
+pub(crate) mod plan;
 pub(crate) mod profile;
 pub(crate) mod render;
 pub(crate) mod sample;

@@ -23,6 +23,7 @@ const MANY_FAR: f64 = 0.05;
 const FEW_LABELLED: f64 = 0.5;
 
 /// An annotated area.
+#[derive(Debug)]
 pub(crate) struct Annotated {
     /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted.
     pub(crate) face_labels: Vec<LabelId>,
@@ -35,7 +36,7 @@ pub(crate) struct Annotated {
 }
 
 /// What a lenient reading left out of the files of instances.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(crate) struct SkippedLines {
     lines: u64,
     empty_instances: u64,
@@ -55,6 +56,7 @@ impl SkippedLines {
 }
 
 /// What is known of a room from its points and faces.
+#[derive(Debug)]
 pub(crate) struct SurveyedRoom {
     pub(crate) room: Room,
     pub(crate) points: u64,

@@ -1,6 +1,7 @@
 //! One area of an export: labelled, scored, rendered, with its meshes and points.
 
 use super::annotate::{Annotated, annotate, hidden_instances, label_doubts};
+use super::area_plan::{AreaPlan, RoomNames};
 use super::images::{ImageJob, WrittenLocation, write_images};
 use super::inputs::{AreaInput, Cameras};
 use super::journal::{Done, Journal, LabelsDone, LocationDone, RestDone, ScoresDone, Unit, tally_of};
@@ -11,18 +12,19 @@ use super::modality::Look;
 use super::overlap::overlap_doubts;
 use super::pictures::Pictures;
 use super::place::{Ground, Located, Placement, place_locations};
+use super::plan::Plan;
 use super::points::write_points;
 use super::records;
 use super::summary::Account;
 use super::views::{Candidate, Scoring, score_area};
 use crate::args::ExportOptions;
 use crate::event::{Stage as Step, UnitKind};
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::stop;
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::{
-    Compression, Content, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation, TextureOut,
-    create_dir, encode_rgb8,
+    Compression, Content, FileRecord, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation,
+    TextureOut, create_dir, encode_rgb8,
 };
 use s3d_label::{LabelTable, Room};
 use s3d_render::{Normals, Pyramids, Scene};
@@ -32,14 +34,6 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tracing::{debug, info, warn};
 
-/// An area between its labelling and its rendering.
-pub(crate) struct LabelledArea {
-    annotated: Annotated,
-    locations: Vec<ScanLocation>,
-    /// The room of each location.
-    location_rooms: Vec<Room>,
-}
-
 /// What all areas share.
 #[derive(Clone, Copy)]
 pub(crate) struct Common<'a> {
@@ -48,6 +42,17 @@ pub(crate) struct Common<'a> {
     pub(crate) options: &'a ExportOptions,
     pub(crate) journal: &'a Journal,
     pub(crate) account: &'a Account,
+    /// Where labelled areas are kept, a folder each.
+    pub(crate) cache: &'a Path,
+    /// Which units this process writes.
+    pub(crate) is_ours: &'a (dyn Fn(&Unit) -> bool + Sync),
+}
+
+impl Common<'_> {
+    /// The folder of a labelled area.
+    fn cache_of(&self, area: u32) -> PathBuf {
+        self.cache.join(format!("area_{area}"))
+    }
 }
 
 /// With more faces than this, what is only needed while two hierarchies are built, 200 bytes a face each, should not be in
@@ -68,6 +73,20 @@ impl<'m> Stage<'m> {
             _ => (Scene::new(&file.mesh), NearestFaces::new(&file.mesh)),
         };
         (Self { file, scene }, nearest)
+    }
+
+    /// Prepares the mesh, with its nearest faces if they are needed.
+    pub(crate) fn prepare(file: &'m MeshFile, with_nearest: bool) -> (Self, Option<NearestFaces<'m>>) {
+        if !with_nearest {
+            return (Self::for_rays(file), None);
+        }
+        let (stage, nearest) = Self::new(file);
+        (stage, Some(nearest))
+    }
+
+    /// The mesh's nearest faces.
+    pub(crate) fn nearest(&self) -> NearestFaces<'m> {
+        NearestFaces::new(&self.file.mesh)
     }
 
     /// Prepares the mesh for rays alone.
@@ -121,28 +140,45 @@ fn label_files(layout: &Layout, area: u32) -> [PathBuf; 5] {
     ]
 }
 
-/// Labels an area, writes what is known of it then, unless that was done before, and scores the candidates of those
-/// locations that are not scored yet.
+/// An area that was labelled before, if it can be taken as it is: not where the files of its labels are still to be written.
+pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<AreaPlan> {
+    let unit = Unit::Labels(area);
+    let folder = common.cache_of(area);
+    let writes = (common.is_ours)(&unit) && !common.journal.finished().has(&unit);
+    if writes || !AreaPlan::is_in(&folder) {
+        return None;
+    }
+    match AreaPlan::read(&folder, area) {
+        Ok(plan) => Some(plan),
+        Err(e) => {
+            warn!("{e}; the area is labelled again");
+            None
+        }
+    }
+}
+
+/// Labels an area, keeps what is known then, and writes the files of its labels, if that is ours and was not done before.
 pub(crate) fn label_area(
     area: &AreaInput,
     stage: &Stage<'_>,
     nearest: NearestFaces<'_>,
     common: Common<'_>,
-    is_ours: &dyn Fn(&Unit) -> bool,
-) -> Outcome<LabelledArea> {
-    let Common { table, layout, options, journal, account } = common;
+) -> Outcome<AreaPlan> {
+    let Common { table, layout, options, journal, account, is_ours, .. } = common;
     let number = area.number;
     let Stage { file, scene } = stage;
-    create_dir(&layout.mesh_dir(number))?;
 
     let labelling = account.stage(Step::Label, Some(number));
     let started = Instant::now();
     let unit = Unit::Labels(number);
-    let is_known = journal.finished().has(&unit);
-    let writes = !is_known && is_ours(&unit);
+    let writes = !journal.finished().has(&unit) && is_ours(&unit);
     let paths = label_files(layout, number);
     let [json, npz, ..] = &paths;
-    let mut instances = if writes { Some(InstanceWriter::create(json, npz)?) } else { None };
+    let mut instances = None;
+    if writes {
+        create_dir(&layout.mesh_dir(number))?;
+        instances = Some(InstanceWriter::create(json, npz)?);
+    }
     let annotated = annotate(area, &nearest, table, |i| {
         let Some(instances) = &mut instances else { return Ok(()) };
         let record = InstanceRecord {
@@ -169,24 +205,101 @@ pub(crate) fn label_area(
         stop::check()?;
         Outlook::of(scene, location).warnings(location).iter().for_each(|w| warn!("{w}"));
     }
+    let plan = AreaPlan {
+        area: number,
+        annotated,
+        names: RoomNames::of(&area.rooms),
+        locations,
+        location_rooms,
+        mesh_box: file.mesh.aabb(),
+        mesh_area_m2: file.mesh.total_area(),
+        faces_left_out: file.mesh.report().zero_area_faces + file.repeated_faces,
+    };
+    plan.write(&common.cache_of(number))?;
 
-    let entry = area_entry(area, file, &annotated, locations.len(), options);
-    let uuids = locations.iter().map(|l| l.uuid.clone()).collect();
-    let mut done = LabelsDone { entry, locations: uuids, files: Vec::new() };
     if let Some(instances) = instances {
         instances.finish()?;
-        records::write_rooms(layout, number, &annotated)?;
-        records::write_votes(layout, number, &annotated.report)?;
-        records::write_instance_numbers(layout, area)?;
-        done.files = listing::records(layout, &paths)?;
-        let tally = tally_of(&done.files);
-        journal.write(Done::Labels(done))?;
+        records::write_rooms(layout, number, &plan.annotated)?;
+        records::write_votes(layout, number, &plan.annotated.report)?;
+        records::write_instance_numbers(layout, number, &plan.names)?;
+        let files = listing::records(layout, &paths)?;
+        let tally = tally_of(&files);
+        journal.write(Done::Labels(labels_done(area, &plan, options, files)))?;
         account.unit_finished(UnitKind::Labels, number, None, &tally, started);
-    } else if !is_known {
-        journal.know(Done::Labels(done));
     }
+    know_labels(area, &plan, &common);
     labelling.end();
+    Ok(plan)
+}
 
+/// Tells the journal of an area's labels, if it does not know of them: their files are another's work.
+pub(crate) fn know_labels(area: &AreaInput, plan: &AreaPlan, common: &Common<'_>) {
+    if !common.journal.finished().has(&Unit::Labels(area.number)) {
+        common.journal.know(Done::Labels(labels_done(area, plan, common.options, Vec::new())));
+    }
+}
+
+/// Takes an area's labels and scores from a plan: their files if they are ours, and the scores that are.
+pub(crate) fn take_from_plan(area: &AreaInput, from: &Plan, common: &Common<'_>) -> Outcome<AreaPlan> {
+    let Common { layout, options, journal, account, is_ours, .. } = *common;
+    let started = Instant::now();
+    let number = area.number;
+    let plan = from.area(number)?;
+    let unit = Unit::Labels(number);
+    if !journal.finished().has(&unit) && is_ours(&unit) {
+        let files = from.bring_labels(number, layout)?;
+        let tally = tally_of(&files);
+        journal.write(Done::Labels(labels_done(area, &plan, options, files)))?;
+        account.unit_finished(UnitKind::Labels, number, None, &tally, started);
+    }
+    know_labels(area, &plan, common);
+    for location in &plan.locations {
+        let unit = Unit::Scores(number, location.uuid.clone());
+        if journal.finished().has(&unit) {
+            continue;
+        }
+        let scores = from.scores(number, &location.uuid)?;
+        if is_ours(&unit) { journal.write(scores)? } else { journal.know(scores) }
+    }
+    Ok(plan)
+}
+
+fn labels_done(
+    area: &AreaInput,
+    plan: &AreaPlan,
+    options: &ExportOptions,
+    files: Vec<FileRecord>,
+) -> LabelsDone {
+    let locations = plan.locations.iter().map(|l| l.uuid.clone()).collect();
+    LabelsDone { entry: area_entry(area, plan, options), locations, files }
+}
+
+/// The locations of an area whose candidates are ours to score and are not scored yet.
+fn unscored<'p>(plan: &'p AreaPlan, common: &Common<'_>) -> Vec<&'p ScanLocation> {
+    let unit = |l: &ScanLocation| Unit::Scores(plan.area, l.uuid.clone());
+    let mut todo: Vec<&ScanLocation> = {
+        let finished = common.journal.finished();
+        plan.locations.iter().filter(|l| !finished.has(&unit(l))).collect()
+    };
+    // Whose they are may depend on the journal itself, which must not be held then.
+    todo.retain(|l| (common.is_ours)(&unit(l)));
+    todo
+}
+
+/// Whether something of an area is still to be scored.
+pub(crate) fn is_unscored(plan: &AreaPlan, common: &Common<'_>) -> bool {
+    !unscored(plan, common).is_empty()
+}
+
+/// Scores the candidates of those locations of an area that are ours and not scored yet.
+pub(crate) fn score(plan: &AreaPlan, stage: &Stage<'_>, common: Common<'_>) -> Outcome<()> {
+    let Common { table, options, journal, account, .. } = common;
+    let number = plan.area;
+    check_faces(plan, stage)?;
+    let missing = unscored(plan, &common);
+    if missing.is_empty() {
+        return Ok(());
+    }
     let step = account.stage(Step::Score, Some(number));
     let scoring = Scoring {
         views: options.views,
@@ -194,37 +307,37 @@ pub(crate) fn label_area(
         stride: options.entropy_stride,
         seed: options.seed,
     };
-    let missing: Vec<&ScanLocation> = {
-        let finished = journal.finished();
-        locations.iter().filter(|l| !finished.has(&Unit::Scores(number, l.uuid.clone()))).collect()
-    };
-    score_area(number, &missing, scene, &annotated.face_labels, table, scoring, |uuid, entropies| {
+    let (labels, scene) = (&plan.annotated.face_labels, &stage.scene);
+    score_area(number, &missing, scene, labels, table, scoring, |uuid, entropies| {
         journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))
     })?;
     step.end();
-    Ok(LabelledArea { annotated, locations, location_rooms })
+    debug!("area {number}: {} of {} locations scored", missing.len(), plan.locations.len());
+    Ok(())
+}
+
+/// Refuses labels of another mesh.
+fn check_faces(plan: &AreaPlan, stage: &Stage<'_>) -> Outcome<()> {
+    let (labels, faces) = (plan.annotated.face_labels.len(), stage.file.mesh.faces().len());
+    if labels == faces {
+        return Ok(());
+    }
+    Err(Failure::Input(format!("area {}: {labels} faces are labelled, and the mesh has {faces}", plan.area)))
 }
 
 /// What the manifest tells of an area that is labelled.
-fn area_entry(
-    area: &AreaInput,
-    file: &MeshFile,
-    annotated: &Annotated,
-    locations: usize,
-    options: &ExportOptions,
-) -> AreaEntry {
-    let mesh = &file.mesh;
+fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> AreaEntry {
     AreaEntry {
         area: area.number,
-        faces: mesh.faces().len(),
-        faces_left_out: mesh.report().zero_area_faces + file.repeated_faces,
+        faces: plan.annotated.face_labels.len(),
+        faces_left_out: plan.faces_left_out,
         points: 0,
-        annotated_points: annotated.points,
-        rooms: annotated.rooms.len(),
-        locations,
+        annotated_points: plan.annotated.points,
+        rooms: plan.annotated.rooms.len(),
+        locations: plan.locations.len(),
         panoramas: 0,
         views: 0,
-        xyz: XyzLoss::of(mesh.aabb(), options.format.xyz),
+        xyz: XyzLoss::of(plan.mesh_box, options.format.xyz),
         rgb: area.pictures.as_ref().map_or("texture", |p| p.kind.name()).to_owned(),
         place_cameras: match area.cameras {
             Cameras::Placed(distance_m) => Some(distance_m),
@@ -235,19 +348,19 @@ fn area_entry(
 }
 
 /// Writes an area's meshes and points, all but its images.
-fn write_rest(area: &AreaInput, file: &MeshFile, annotated: &Annotated, common: Common<'_>) -> Outcome<()> {
-    let Common { table, layout, options, journal, account } = common;
+fn write_rest(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common: Common<'_>) -> Outcome<()> {
+    let Common { table, layout, options, journal, account, .. } = common;
     let (number, started) = (area.number, Instant::now());
     let meshes = account.stage(Step::Meshes, Some(number));
     let mesh_dir = layout.mesh_dir(number);
-    let per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
+    let per_face: Vec<u32> = plan.annotated.face_labels.iter().map(|l| l.0).collect();
     write_colored_mesh(&mesh_dir, file, options.compression)?;
     s3d_io::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
     meshes.end();
     stop::check()?;
     let sampling = account.stage(Step::Points, Some(number));
     let density = Density::PerM2(options.points_per_m2);
-    let points = write_points(layout, area, &file.mesh, annotated, table, density, options.seed)?;
+    let points = write_points(layout, &file.mesh, plan, table, density, options.seed)?;
     let mut paths = listing::walk(&mesh_dir)?;
     let labels = label_files(layout, number);
     paths.retain(|path| !labels.contains(path));
@@ -303,16 +416,18 @@ fn tell_labels(annotated: &Annotated, started: Instant) {
 pub(crate) fn render_area(
     area: &AreaInput,
     stage: &Stage<'_>,
-    labelled: LabelledArea,
+    plan: &AreaPlan,
     pictures: Option<&Pictures>,
     common: Common<'_>,
     candidates: &[Candidate],
     todo: &BTreeSet<&Unit>,
 ) -> Outcome<()> {
     let Common { layout, options, journal, account, .. } = common;
-    let LabelledArea { annotated, locations, location_rooms } = labelled;
+    let AreaPlan { annotated, locations, location_rooms, .. } = plan;
     let Stage { file, scene } = stage;
     let number = area.number;
+    check_faces(plan, stage)?;
+    create_dir(&layout.mesh_dir(number))?;
     let textures = Pyramids::new(&file.mesh);
     let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
     let pretty_per_face: Vec<[u8; 3]> = label_per_face.iter().map(|l| s3d_io::pretty_color(*l)).collect();
@@ -339,8 +454,8 @@ pub(crate) fn render_area(
             conventions: options.format.conventions(),
         },
         pictures,
-        locations: &locations,
-        rooms: &location_rooms,
+        locations,
+        rooms: location_rooms,
         chosen: &chosen,
         modalities: &options.modalities,
         size: options.size,
@@ -348,7 +463,7 @@ pub(crate) fn render_area(
         each: &finish_location,
     };
     let rendering = account.stage(Step::Render, Some(number));
-    let rest = || write_rest(area, file, &annotated, common);
+    let rest = || write_rest(area, file, plan, common);
     let writes_rest = todo.contains(&Unit::Rest(number));
     write_images(&job, candidates, if writes_rest { Some(&rest) } else { None })?;
     rendering.end();

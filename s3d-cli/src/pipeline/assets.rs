@@ -9,8 +9,17 @@ const UTILS_PY: &str = include_str!("../../assets/utils.py");
 const POSE_SCHEMA: &str = include_str!("../../assets/pose.schema.json");
 const MANIFEST_SCHEMA: &str = include_str!("../../assets/manifest.schema.json");
 
-/// Writes `conventions.json`, `assets/utils.py` and `assets/schema`.
-pub(crate) fn write(layout: &Layout, conventions: Conventions) -> Outcome<()> {
+/// Writes the names of a label table, padded to as many as `pad_labels` if there are fewer, `conventions.json`,
+/// `assets/utils.py` and `assets/schema`.
+pub(crate) fn write(
+    layout: &Layout,
+    mut names: Vec<String>,
+    pad_labels: usize,
+    conventions: Conventions,
+) -> Outcome<()> {
+    create_dir(&layout.assets_dir())?;
+    s3d_io::pad_labels(&mut names, pad_labels);
+    s3d_io::write_labels(&layout.labels_json(), &names)?;
     conventions.write(&layout.conventions())?;
     create_dir(&layout.schema_dir())?;
     for (path, text) in texts(layout) {

@@ -39,6 +39,16 @@ pub(crate) struct AreaInput {
     pub(crate) files: Vec<PathBuf>,
     /// Those that are read, and whose bytes decide those of the data set; but for what its mesh names.
     pub(crate) sources: Vec<PathBuf>,
+    /// Those among them that are annotations and nothing else.
+    pub(crate) annotations: Vec<PathBuf>,
+}
+
+/// What of an area is opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Opened {
+    All,
+    /// All but its annotations, which a plan stands for: it has no rooms then.
+    NoAnnotations,
 }
 
 /// Where an area's mesh comes from.
@@ -88,19 +98,41 @@ impl Inputs {
     /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan locations,
     /// instead of which locations are placed if `place_m` says how far apart.
     pub(crate) fn open(scenes: &[PathBuf], place_m: Option<f64>, lenient: bool) -> Outcome<Self> {
+        let mut areas = Self::open_areas(scenes, place_m, lenient, Opened::All)?;
+        let table = label_table(&mut areas)?;
+        Ok(Self { areas, table })
+    }
+
+    /// The same without the annotations, for which a plan stands that has this table: rooms are not known then.
+    pub(crate) fn open_planned(
+        scenes: &[PathBuf],
+        place_m: Option<f64>,
+        lenient: bool,
+        table: LabelTable,
+    ) -> Outcome<Self> {
+        let areas = Self::open_areas(scenes, place_m, lenient, Opened::NoAnnotations)?;
+        Ok(Self { areas, table })
+    }
+
+    fn open_areas(
+        scenes: &[PathBuf],
+        place_m: Option<f64>,
+        lenient: bool,
+        opened: Opened,
+    ) -> Outcome<Vec<AreaInput>> {
         let mut areas: Vec<AreaInput> = Vec::new();
         let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
         for path in scenes {
             let area = if path.is_dir() {
-                AreaInput::published(path, None, place_m)?
+                AreaInput::published(path, None, place_m, opened)?
             } else {
                 let mut scene = s3d_io::read_scene(path)?;
                 let options = &mut scene.annotation_options;
                 options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
                 // Areas wait beside one another.
                 options.points_in_memory /= scenes.len() as u64;
-                AreaInput::open(scene, place_m)?
+                AreaInput::open(scene, place_m, opened)?
             };
             if let Some(other) = area_of.insert(area.number, path.clone()) {
                 return Err(Failure::Input(format!(
@@ -125,8 +157,7 @@ impl Inputs {
             areas.push(area);
         }
         areas.sort_by_key(|a| a.number);
-        let table = label_table(&mut areas)?;
-        Ok(Self { areas, table })
+        Ok(areas)
     }
 
     /// The numbers of the areas, ascending.
@@ -136,10 +167,10 @@ impl Inputs {
 }
 
 impl AreaInput {
-    fn open(scene: SceneFile, place_m: Option<f64>) -> Outcome<Self> {
+    fn open(scene: SceneFile, place_m: Option<f64>, opened: Opened) -> Outcome<Self> {
         if let Some(folder) = &scene.published {
             let folder = folder.clone();
-            return Self::published(&folder, Some(scene), place_m);
+            return Self::published(&folder, Some(scene), place_m, opened);
         }
         let options = &scene.annotation_options;
         let source = MeshSource::Files {
@@ -155,15 +186,18 @@ impl AreaInput {
                 MeshOptions::default()
             },
         };
-        let mut annotations = if scene.annotations.is_empty() {
-            Annotations::of_mesh(&source.read()?, options)?
-        } else {
-            Annotations::open(&scene.annotations, options)?
-        };
-        let warnings = std::mem::take(&mut annotations.warnings);
-        let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
-        let rooms =
-            number(scene.area, annotations).map_err(|e| Failure::Input(format!("{}: {e}", of.display())))?;
+        let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
+        if opened == Opened::All {
+            let mut annotations = if scene.annotations.is_empty() {
+                Annotations::of_mesh(&source.read()?, options)?
+            } else {
+                Annotations::open(&scene.annotations, options)?
+            };
+            warnings = std::mem::take(&mut annotations.warnings);
+            let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
+            rooms = number(scene.area, annotations)
+                .map_err(|e| Failure::Input(format!("{}: {e}", of.display())))?;
+        }
         let Some((cameras, cameras_path)) = listed_cameras(&scene, place_m)? else {
             return Err(Error::format(
                 &scene.path,
@@ -180,6 +214,7 @@ impl AreaInput {
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
             files: files_of(&scene),
             sources: files_of(&scene),
+            annotations: scene.annotations,
             cameras_path,
             pictures: scene.pictures,
             path: scene.path,
@@ -187,20 +222,28 @@ impl AreaInput {
     }
 
     /// Opens the folder of a published area; `scene` is what names it, if that is no command line.
-    fn published(folder: &Path, scene: Option<SceneFile>, place_m: Option<f64>) -> Outcome<Self> {
+    fn published(
+        folder: &Path,
+        scene: Option<SceneFile>,
+        place_m: Option<f64>,
+        opened: Opened,
+    ) -> Outcome<Self> {
         let options = PublishedOptions {
             area: scene.as_ref().map(|s| s.area),
             world_from_area: scene.as_ref().map_or(DAffine3::IDENTITY, |s| s.world_from_published),
         };
         let mut area = PublishedArea::open_with(folder, &options)?;
-        let mut mesh = area.read_mesh()?;
-        for label in &mut mesh.labels {
-            label.area = area.area;
-        }
         let mut warnings = std::mem::take(&mut area.warnings);
-        let mut annotations = area.annotations(&mesh)?;
-        warnings.append(&mut annotations.warnings);
-        let rooms = published_numbers(&mesh.labels, annotations);
+        let mut rooms = Vec::new();
+        if opened == Opened::All {
+            let mut mesh = area.read_mesh()?;
+            for label in &mut mesh.labels {
+                label.area = area.area;
+            }
+            let mut annotations = area.annotations(&mesh)?;
+            warnings.append(&mut annotations.warnings);
+            rooms = published_numbers(&mesh.labels, annotations);
+        }
         let listed = match &scene {
             Some(scene) => listed_cameras(scene, place_m)?,
             None => place_m.map(|distance_m| (Cameras::Placed(distance_m), folder.to_owned())),
@@ -231,6 +274,7 @@ impl AreaInput {
             lenient: false,
             files,
             sources,
+            annotations: Vec::new(),
         })
     }
 

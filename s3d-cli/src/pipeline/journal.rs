@@ -12,6 +12,7 @@ use crate::failure::Outcome;
 use s3d_io::{Checksum, Error, FileRecord, Layout, create_dir};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::PathBuf;
@@ -19,7 +20,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use tracing::{debug, warn};
 
 /// A piece of work.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub(crate) enum Unit {
     /// The labels of an area: instances, rooms, votes.
     Labels(u32),
@@ -36,6 +38,17 @@ impl Unit {
     pub(crate) fn area(&self) -> u32 {
         match self {
             Self::Labels(area) | Self::Scores(area, _) | Self::Location(area, _) | Self::Rest(area) => *area,
+        }
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Labels(area) => write!(f, "labels of area {area}"),
+            Self::Scores(area, uuid) => write!(f, "scores of location {uuid} of area {area}"),
+            Self::Location(area, uuid) => write!(f, "images of location {uuid} of area {area}"),
+            Self::Rest(area) => write!(f, "meshes and points of area {area}"),
         }
     }
 }
@@ -167,6 +180,11 @@ impl Finished {
         self.units.len()
     }
 
+    /// A unit that is done.
+    pub(crate) fn get(&self, unit: &Unit) -> Option<&Done> {
+        self.units.get(unit)
+    }
+
     /// All of them, in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Done> {
         self.units.values()
@@ -204,6 +222,11 @@ impl Finished {
         })
     }
 
+    /// How many scan locations some areas have, as far as these are labelled.
+    pub(crate) fn count_locations(&self, areas: &[u32]) -> usize {
+        areas.iter().filter_map(|area| self.labels(*area)).map(|labels| labels.locations.len()).sum()
+    }
+
     /// What is written in the journals of an export, lines that are torn left out. Nothing of it is checked yet.
     pub(crate) fn read(layout: &Layout) -> Outcome<Self> {
         let mut finished = Self::default();
@@ -225,9 +248,14 @@ impl Finished {
 
     /// Reads the files of all units, and leaves out each unit of which one is missing or not the one that was written:
     /// it is to be done again.
-    pub(crate) fn checked(mut self, layout: &Layout) -> Outcome<Self> {
+    pub(crate) fn checked(self, layout: &Layout) -> Outcome<Self> {
+        self.checked_where(layout, |_| true)
+    }
+
+    /// The same for units of which `which` holds; others are taken as they are.
+    pub(crate) fn checked_where(mut self, layout: &Layout, which: impl Fn(&Unit) -> bool) -> Outcome<Self> {
         let (mut of, mut files) = (Vec::new(), Vec::new());
-        for (unit, done) in &self.units {
+        for (unit, done) in self.units.iter().filter(|(unit, _)| which(unit)) {
             for file in done.files() {
                 of.push(unit.clone());
                 files.push(file);
@@ -278,6 +306,15 @@ impl Journal {
     /// Takes a unit for done for the rest of this process alone: its files are another's work.
     pub(crate) fn know(&self, done: Done) {
         self.finished().insert(done);
+    }
+
+    /// Reads the files of the finished units of which `which` holds, and takes those for not done of which one is not as it
+    /// was written.
+    pub(crate) fn check(&self, layout: &Layout, which: impl Fn(&Unit) -> bool) -> Outcome<()> {
+        let finished = self.finished().clone();
+        let checked = finished.checked_where(layout, which)?;
+        *self.finished() = checked;
+        Ok(())
     }
 
     /// All that is finished so far.

@@ -148,6 +148,11 @@ impl Manifest {
         }
     }
 
+    /// How many entries the file of labels has.
+    pub(crate) fn labels_padded_to(&self) -> usize {
+        self.labels_padded_to
+    }
+
     /// What was asked for when this data set was made.
     pub(crate) fn request(&self) -> Request {
         let areas = self.areas.iter().map(|entry| RequestedArea {

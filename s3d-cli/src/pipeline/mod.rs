@@ -5,49 +5,60 @@
 
 pub(crate) mod annotate;
 mod area;
+mod area_plan;
 pub(crate) mod assets;
+mod checked;
+pub(crate) mod deal;
 pub(crate) mod finish;
 pub(crate) mod images;
 pub(crate) mod inputs;
 pub(crate) mod journal;
+mod label_list;
 pub(crate) mod listing;
 pub(crate) mod location;
 pub(crate) mod lock;
 pub(crate) mod manifest;
+mod merge;
 pub(crate) mod modality;
 pub(crate) mod output;
 pub(crate) mod overlap;
 pub(crate) mod pictures;
 pub(crate) mod place;
+pub(crate) mod plan;
 pub(crate) mod points;
 pub(crate) mod profiles;
 pub(crate) mod records;
 pub(crate) mod request;
+mod shard;
 pub(crate) mod statistics;
 pub(crate) mod summary;
+mod transfer;
 pub(crate) mod views;
 pub(crate) mod work;
 
 pub(crate) use area::locate;
+pub(crate) use merge::merge;
+pub(crate) use shard::export_shard;
 
 use crate::args::ExportOptions;
 use crate::event::Stage as Step;
 use crate::failure::{Failure, Outcome};
 use crate::stop;
-use area::{Common, LabelledArea, Stage};
-use finish::{finish, missing_units};
+use area::{Common, Stage};
+use area_plan::AreaPlan;
+use finish::{Made, finish, missing_units};
 use inputs::{AreaInput, Cameras, Inputs};
 use journal::{Journal, Unit};
-use lock::Sharing;
 use manifest::Manifest;
 use output::Begin;
 use pictures::Pictures;
+use plan::Plan;
 use points::check_density;
 use request::{Request, requested_areas};
 use s3d_geom::NearestFaces;
-use s3d_io::{Domain, Layout, MeshFile, create_dir};
+use s3d_io::{Domain, Layout, MeshFile};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use summary::Account;
 use tracing::{debug, info, warn};
 use views::{Candidate, select_requested};
@@ -71,29 +82,43 @@ pub(crate) struct Job<'a> {
     pictures: Vec<Option<Pictures>>,
     /// The mesh, if there is one area.
     single: Option<MeshFile>,
+    /// Where labels and scores come from, if they were made before.
+    plan: Option<&'a Plan>,
 }
 
 /// What is known after labelling: by area, unless all of it was done before.
 pub(crate) struct Labelled<'j> {
     single: Option<Stage<'j>>,
-    areas: Vec<Option<LabelledArea>>,
+    areas: Vec<Option<AreaPlan>>,
 }
 
-/// Turns scenes into a data set.
-pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOptions) -> Outcome<()> {
+/// Which areas are labelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scope {
+    /// Those of which something is still to be done.
+    Unfinished,
+    All,
+}
+
+/// Turns scenes into a data set; with a plan, labels and scores are taken from there.
+pub(crate) fn export(
+    scenes: &[PathBuf],
+    target: &Target<'_>,
+    options: &ExportOptions,
+    plan: Option<&Plan>,
+) -> Outcome<()> {
     let account = Account::new();
     let layout = &target.layout;
     output::check(layout, target.overwrite, target.allowed)?;
-    let job = Job::open(scenes, layout, options, &account)?;
+    let job = Job::open(scenes, layout, options, plan, &account)?;
     let manifest = job.manifest();
-    let session =
-        match output::begin(layout, target.overwrite, &job.request, &manifest, Sharing::Alone, &account)? {
-            Begin::NothingToDo => {
-                info!("{}: the data set is complete; nothing to do", layout.root().display());
-                return Ok(());
-            }
-            Begin::Session(session) => session,
-        };
+    let session = match output::begin(layout, target.overwrite, &job.request, &manifest, &account)? {
+        Begin::NothingToDo => {
+            info!("{}: the data set is complete; nothing to do", layout.root().display());
+            return Ok(());
+        }
+        Begin::Session(session) => session,
+    };
     let made = job.run(layout, &session.journal, &account).and_then(|()| {
         let tables = account.stage(Step::Tables, None);
         let made = finish(layout, &job.request, manifest, &session.journal.finished())?;
@@ -101,10 +126,14 @@ pub(crate) fn export(scenes: &[PathBuf], target: &Target<'_>, options: &ExportOp
         Ok(made)
     });
     let made = session.end(made)?;
-    account.set_files(made.files, made.bytes);
-    let areas = job.inputs.areas.len();
-    account.summarize(&layout.root().display().to_string(), areas, made.locations, made.views);
+    tell_made(account, layout, &job.request, &made);
     Ok(())
+}
+
+/// Tells what a complete data set holds.
+fn tell_made(account: Account, layout: &Layout, request: &Request, made: &Made) {
+    account.set_files(made.files, made.bytes);
+    account.summarize(&layout.root().display().to_string(), request.areas.len(), made.locations, made.views);
 }
 
 impl<'a> Job<'a> {
@@ -113,11 +142,16 @@ impl<'a> Job<'a> {
         scenes: &[PathBuf],
         layout: &Layout,
         options: &'a ExportOptions,
+        plan: Option<&'a Plan>,
         account: &Account,
     ) -> Outcome<Self> {
         let loading = account.stage(Step::Load, None);
         debug!("{options:?}");
-        let inputs = Inputs::open(scenes, options.place_cameras, options.lenient)?;
+        let (place, lenient) = (options.place_cameras, options.lenient);
+        let inputs = match plan {
+            Some(plan) => Inputs::open_planned(scenes, place, lenient, plan.table()?)?,
+            None => Inputs::open(scenes, place, lenient)?,
+        };
         check_only(&inputs, &options.only)?;
         output::check_inputs(layout, &inputs)?;
         check_label_count(inputs.table.len() - 1)?;
@@ -137,10 +171,15 @@ impl<'a> Job<'a> {
             companions.push(file.companions.clone());
             single = (inputs.areas.len() == 1).then_some(file);
         }
-        let request = Request::new(options, requested_areas(&inputs.areas, &companions)?);
+        let known = plan.map(Plan::request);
+        let request = Request::new(options, requested_areas(&inputs.areas, &companions, known)?);
+        if let Some(plan) = plan {
+            plan.refuse_other(&request)?;
+            plan.require_complete()?;
+        }
         loading.end();
         stop::check()?;
-        Ok(Self { inputs, request, options, pictures, single })
+        Ok(Self { inputs, request, options, pictures, single, plan })
     }
 
     /// The manifest that says that this export runs.
@@ -151,93 +190,123 @@ impl<'a> Job<'a> {
     /// Does all units that are not done yet.
     fn run(&self, layout: &Layout, journal: &Journal, account: &Account) -> Outcome<()> {
         self.write_assets(layout)?;
-        let labelled = self.label(layout, journal, account, &|_| true)?;
+        let cache = layout.work_dir();
+        let common = self.common(layout, journal, account, &cache, &|_| true);
+        let labelled = self.label(common, Scope::Unfinished)?;
         let (candidates, _) = select_requested(&self.request, &journal.finished())?;
         let kept = candidates.iter().filter(|c| c.frame_num.is_some()).count();
         info!("selected {kept} of {} candidate views", candidates.len());
-        self.render(layout, journal, account, labelled, &candidates, &|_| true)
+        self.render(common, &labelled, &candidates)
     }
 
     /// Writes what is known before any unit is done: the label table, `assets`, `conventions.json`.
     pub(crate) fn write_assets(&self, layout: &Layout) -> Outcome<()> {
         let format = &self.options.format;
-        create_dir(&layout.assets_dir())?;
-        let mut names = self.inputs.table.names();
-        s3d_io::pad_labels(&mut names, format.pad_labels.0);
-        s3d_io::write_labels(&layout.labels_json(), &names)?;
-        assets::write(layout, format.conventions())
+        let names = self.inputs.table.names();
+        assets::write(layout, names, format.pad_labels.0, format.conventions())
     }
 
-    fn common<'b>(&'b self, layout: &'b Layout, journal: &'b Journal, account: &'b Account) -> Common<'b> {
-        Common { table: &self.inputs.table, layout, options: self.options, journal, account }
+    fn common<'b>(
+        &'b self,
+        layout: &'b Layout,
+        journal: &'b Journal,
+        account: &'b Account,
+        cache: &'b Path,
+        is_ours: &'b (dyn Fn(&Unit) -> bool + Sync),
+    ) -> Common<'b> {
+        let (table, options) = (&self.inputs.table, self.options);
+        Common { table, layout, options, journal, account, cache, is_ours }
     }
 
-    /// Labels the areas of which something is still to be done, and scores those of their locations that are not scored.
-    /// The files of an area's labels are written if `is_ours` holds for that unit; if not, what it tells is known to the
+    /// Labels areas, those of which something is still to be done or all, and scores those of their locations that are not
+    /// scored. The files of an area's labels are written if that unit is ours; if not, what it tells is known to the
     /// journal, but not written in it.
-    pub(crate) fn label(
-        &self,
-        layout: &Layout,
-        journal: &Journal,
-        account: &Account,
-        is_ours: &dyn Fn(&Unit) -> bool,
-    ) -> Outcome<Labelled<'_>> {
-        let common = self.common(layout, journal, account);
-        let missing = missing_units(&self.request, &journal.finished());
-        let is_needed = |area: u32| missing.iter().any(|unit| unit.area() == area);
-        let any = self.inputs.areas.iter().any(|area| is_needed(area.number));
-        let single = self.single.as_ref().filter(|_| any);
-        let (single, mut nearest) = single.map(Stage::new).unzip();
-        let mut areas = Vec::new();
+    fn label(&self, common: Common<'_>, scope: Scope) -> Outcome<Labelled<'_>> {
+        let missing = missing_units(&self.request, &common.journal.finished());
+        let is_needed = |area: u32| scope == Scope::All || missing.iter().any(|unit| unit.area() == area);
+        let mut labelled = Labelled { single: None, areas: Vec::new() };
         for area in &self.inputs.areas {
-            if !is_needed(area.number) {
-                areas.push(None);
-                continue;
-            }
-            let label = |stage: &Stage<'_>, nearest: NearestFaces<'_>| {
-                area::label_area(area, stage, nearest, common, is_ours)
+            let plan = match self.plan {
+                _ if !is_needed(area.number) => None,
+                Some(plan) => Some(area::take_from_plan(area, plan, &common)?),
+                None => Some(self.label_area(area, common, &mut labelled.single)?),
             };
-            areas.push(Some(match (&single, nearest.take()) {
-                (Some(stage), Some(nearest)) => label(stage, nearest)?,
-                _ => {
-                    let loading = account.stage(Step::Load, Some(area.number));
-                    let file = area.read_mesh()?;
-                    let (stage, nearest) = Stage::new(&file);
-                    loading.end();
-                    label(&stage, nearest)?
-                }
-            }));
+            labelled.areas.push(plan);
         }
-        let finished = journal.finished();
+        let finished = common.journal.finished();
         let labels = self.request.areas.iter().filter_map(|a| finished.labels(a.area));
         only_known(labels.flat_map(|l| &l.locations).map(String::as_str), &self.options.only)?;
-        Ok(Labelled { single, areas })
+        Ok(labelled)
     }
 
-    /// Renders the locations, and writes the meshes and points, that are not done yet and for which `is_ours` holds.
-    pub(crate) fn render(
+    /// Labels an area, or takes it as it was labelled before, and scores what is ours and not scored. Its mesh, ready for
+    /// rays, is kept in `single` if there is but one area.
+    fn label_area<'j>(
+        &'j self,
+        area: &AreaInput,
+        common: Common<'_>,
+        single: &mut Option<Stage<'j>>,
+    ) -> Outcome<AreaPlan> {
+        let before = area::labelled_before(area.number, &common);
+        if let Some(plan) = &before {
+            area::know_labels(area, plan, &common);
+        }
+        let before = match before {
+            Some(plan) if !area::is_unscored(&plan, &common) => return Ok(plan),
+            before => before,
+        };
+        let is_labelled = before.is_some();
+        let finish = |stage: &Stage<'_>, nearest: Option<NearestFaces<'_>>| {
+            let plan = match (before, nearest) {
+                (Some(plan), _) => plan,
+                (None, Some(nearest)) => area::label_area(area, stage, nearest, common)?,
+                (None, None) => area::label_area(area, stage, stage.nearest(), common)?,
+            };
+            area::score(&plan, stage, common)?;
+            Ok(plan)
+        };
+        if let Some(file) = &self.single {
+            let (stage, nearest) = Stage::prepare(file, !is_labelled);
+            let plan = finish(&stage, nearest)?;
+            *single = Some(stage);
+            return Ok(plan);
+        }
+        let loading = common.account.stage(Step::Load, Some(area.number));
+        let file = area.read_mesh()?;
+        let (stage, nearest) = Stage::prepare(&file, !is_labelled);
+        loading.end();
+        finish(&stage, nearest)
+    }
+
+    /// The part of a plan that an area is: its labels and those scores that are ours.
+    fn plan_area(
         &self,
+        area: &AreaInput,
         layout: &Layout,
         journal: &Journal,
         account: &Account,
-        labelled: Labelled<'_>,
-        candidates: &[Candidate],
-        is_ours: &dyn Fn(&Unit) -> bool,
+        is_ours: &(dyn Fn(&Unit) -> bool + Sync),
     ) -> Outcome<()> {
-        let common = self.common(layout, journal, account);
-        let missing = missing_units(&self.request, &journal.finished());
+        let common = self.common(layout, journal, account, layout.root(), is_ours);
+        self.label_area(area, common, &mut None).map(drop)
+    }
+
+    /// Renders the locations, and writes the meshes and points, that are ours and not done yet.
+    fn render(&self, common: Common<'_>, labelled: &Labelled<'_>, candidates: &[Candidate]) -> Outcome<()> {
+        let missing = missing_units(&self.request, &common.journal.finished());
         let Labelled { single, areas } = labelled;
-        for ((area, labelled), pictures) in self.inputs.areas.iter().zip(areas).zip(&self.pictures) {
+        for ((area, plan), pictures) in self.inputs.areas.iter().zip(areas).zip(&self.pictures) {
             let todo: BTreeSet<&Unit> =
-                missing.iter().filter(|unit| unit.area() == area.number && is_ours(unit)).collect();
-            let Some(labelled) = labelled.filter(|_| !todo.is_empty()) else { continue };
+                missing.iter().filter(|unit| unit.area() == area.number && (common.is_ours)(unit)).collect();
+            let Some(plan) = plan.as_ref().filter(|_| !todo.is_empty()) else { continue };
             let render = |stage: &Stage<'_>| {
-                area::render_area(area, stage, labelled, pictures.as_ref(), common, candidates, &todo)
+                area::render_area(area, stage, plan, pictures.as_ref(), common, candidates, &todo)
             };
-            match &single {
-                Some(stage) => render(stage)?,
-                None => {
-                    let loading = account.stage(Step::Load, Some(area.number));
+            match (single, &self.single) {
+                (Some(stage), _) => render(stage)?,
+                (None, Some(file)) => render(&Stage::for_rays(file))?,
+                (None, None) => {
+                    let loading = common.account.stage(Step::Load, Some(area.number));
                     let file = area.read_mesh()?;
                     let stage = Stage::for_rays(&file);
                     loading.end();

@@ -22,10 +22,11 @@ use super::manifest::{Head, Manifest};
 use super::request::Request;
 use super::summary::Account;
 use crate::failure::{Failure, Outcome};
+use crate::stop;
 use s3d_io::{Error, Layout, create_dir, read_file_list, read_json, sync_data_set, write_bytes, write_json};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tracing::{info, warn};
 
 /// Folders in OUT: an earlier data set while it is set aside, when it is, and when it goes.
@@ -75,7 +76,7 @@ pub(crate) fn check(layout: &Layout, overwrite: bool, allowed: &[&str]) -> Outco
 }
 
 /// Whether a name in OUT is one of those that an export makes for the time being.
-fn is_working_name(name: &std::ffi::OsStr) -> bool {
+pub(crate) fn is_working_name(name: &std::ffi::OsStr) -> bool {
     let name = name.to_string_lossy();
     name == ".s3d" || name.starts_with(".s3d-")
 }
@@ -153,13 +154,11 @@ pub(crate) enum Begin {
 pub(crate) struct Session {
     layout: Layout,
     lock: Lock,
-    sharing: Sharing,
     /// What is done, by earlier runs too.
     pub(crate) journal: Journal,
 }
 
-/// Begins an export into OUT, or goes on with it. `manifest` is written if it begins. Shards of one export may share OUT:
-/// the first of them begins it.
+/// Begins an export into OUT, or goes on with it. `manifest` is written if it begins.
 ///
 /// # Errors
 /// [`Failure::Call`] if OUT holds a data set or an unfinished export of another request, and `overwrite` is not set, or
@@ -169,7 +168,6 @@ pub(crate) fn begin(
     overwrite: bool,
     request: &Request,
     manifest: &Manifest,
-    sharing: Sharing,
     account: &Account,
 ) -> Outcome<Begin> {
     // What is refused is refused before anything changes, and what is complete may lie where nothing can be changed.
@@ -184,27 +182,11 @@ pub(crate) fn begin(
             return Ok(Begin::NothingToDo);
         }
     }
-    let (mut lock, is_first) = match (Lock::take(layout, Sharing::Alone), sharing) {
-        (Err(Failure::Again(_)), Sharing::Shards) => (Lock::take(layout, Sharing::Shards)?, false),
-        (lock, _) => (lock?, true),
-    };
-    let begun = if is_first {
-        begin_locked(layout, overwrite, request, manifest, account)
-    } else {
-        join(layout, request, account)
-    };
-    match begun {
+    let lock = Lock::take(layout, Sharing::Alone)?;
+    match begin_locked(layout, overwrite, request, manifest, account) {
         Ok(Some(finished)) => {
-            if is_first && sharing == Sharing::Shards {
-                // In between anybody may take it: what is there then is looked at again.
-                drop(lock);
-                lock = Lock::take(layout, Sharing::Shards)?;
-                if read_request(layout).as_ref() != Some(request) {
-                    return Err(elsewhere(layout));
-                }
-            }
             let journal = Journal::begin(layout, finished)?;
-            Ok(Begin::Session(Session { layout: layout.clone(), lock, sharing, journal }))
+            Ok(Begin::Session(Session { layout: layout.clone(), lock, journal }))
         }
         Ok(None) => {
             lock.abandon();
@@ -223,19 +205,69 @@ pub(crate) fn begin(
     }
 }
 
-/// Joins shards that are at work in OUT.
-fn join(layout: &Layout, request: &Request, account: &Account) -> Outcome<Option<Finished>> {
-    let found = find(layout, request)?;
-    refuse(layout, &found, false)?;
-    match found {
-        Found::Unfinished { .. } => go_on(layout, account).map(Some),
-        // They have just begun, or just ended.
-        _ => Err(elsewhere(layout)),
+/// How often a shard looks whether it may begin, and how long in all.
+const BEGIN_EVERY: Duration = Duration::from_millis(100);
+const BEGIN_WITHIN: Duration = Duration::from_secs(60);
+
+/// Begins a shard's work in OUT, or goes on with it; other shards of the same request may be at work there. Nothing of what
+/// is done is checked yet.
+///
+/// # Errors
+/// As [`begin`]; [`Failure::Again`] if somebody merges or exports into it alone.
+pub(crate) fn begin_shard(
+    layout: &Layout,
+    overwrite: bool,
+    request: &Request,
+    manifest: &Manifest,
+) -> Outcome<Begin> {
+    let started = Instant::now();
+    loop {
+        // Whoever comes first begins, alone for that moment.
+        match Lock::take(layout, Sharing::Alone) {
+            Ok(lock) => {
+                let begun = begin_alone(layout, overwrite, request, manifest);
+                lock.abandon();
+                if !begun? {
+                    return Ok(Begin::NothingToDo);
+                }
+            }
+            Err(Failure::Again(_)) => {}
+            Err(e) => return Err(e),
+        }
+        match Lock::take(layout, Sharing::Shards) {
+            Ok(lock) => {
+                let found = find(layout, request)?;
+                if let Err(e) = refuse(layout, &found, overwrite) {
+                    lock.abandon();
+                    return Err(e);
+                }
+                if matches!(&found, Found::Unfinished { differences, .. } if differences.is_empty()) {
+                    let journal = Journal::begin(layout, Finished::read(layout)?)?;
+                    return Ok(Begin::Session(Session { layout: layout.clone(), lock, journal }));
+                }
+                lock.abandon();
+            }
+            Err(e @ Failure::Again(_)) if started.elapsed() > BEGIN_WITHIN => return Err(e),
+            Err(Failure::Again(_)) => {}
+            Err(e) => return Err(e),
+        }
+        stop::check()?;
+        std::thread::sleep(BEGIN_EVERY);
     }
 }
 
-fn elsewhere(layout: &Layout) -> Failure {
-    Failure::Again(format!("{}: another process begins or ends an export there", layout.root().display()))
+/// Brings OUT to where shards can work; whether there is something to do.
+fn begin_alone(layout: &Layout, overwrite: bool, request: &Request, manifest: &Manifest) -> Outcome<bool> {
+    recover(layout)?;
+    match find(layout, request)? {
+        // Files that are being written stay: where locks hold on one machine alone, others may be at work.
+        Found::Unfinished { differences, .. } if differences.is_empty() => {
+            remove(&layout.failed())?;
+            manifest.write(layout)?;
+            Ok(true)
+        }
+        _ => Ok(begin_locked(layout, overwrite, request, manifest, &Account::new())?.is_some()),
+    }
 }
 
 /// What is done of an unfinished export, by what its journals and files tell.
@@ -298,7 +330,10 @@ fn begin_locked(
             manifest.write(layout)?;
             return go_on(layout, account).map(Some);
         }
-        Found::Nothing => refuse_in_the_way(layout, request, &[])?,
+        Found::Nothing => {
+            refuse_in_the_way(layout, request, &[])?;
+            clear(layout)?;
+        }
         Found::Complete { .. } => {
             let head = Head::read(&layout.manifest());
             let areas = head.map_or(Vec::new(), |head| head.area_numbers);
@@ -312,9 +347,7 @@ fn begin_locked(
             refuse_in_the_way(layout, request, &areas)?;
             info!("{}: what an earlier export left there is replaced", layout.root().display());
             // From here on there is nothing to go on with; the lock stays where it is.
-            remove(&layout.request())?;
-            remove(&layout.journal_dir())?;
-            remove(&layout.failed())?;
+            clear(layout)?;
             layout.entries(&areas).iter().try_for_each(|path| remove(path))?;
         }
     }
@@ -446,12 +479,12 @@ impl Session {
     /// Ends the export as `outcome` says. Complete, the data set takes the place of an earlier one. After a failure that
     /// trying again may mend, everything stays as it is, to go on with; after any other an earlier data set comes back, or,
     /// where there is none, what is done stays, but does not stand in the way of another call.
+    ///
+    /// A shard's work ends by dropping it: what is done stays, whatever became of the rest.
     pub(crate) fn end<T>(self, outcome: Outcome<T>) -> Outcome<T> {
-        let Self { layout, lock, sharing, journal } = self;
+        let Self { layout, lock, journal } = self;
         drop(journal);
         let ended = match &outcome {
-            // What becomes of the whole is not for one of them to say.
-            _ if sharing == Sharing::Shards => Ok(()),
             Ok(_) => end_complete(&layout),
             Err(Failure::Again(_)) => Ok(()),
             Err(_) if layout.root().join(ASIDE).exists() => {

@@ -1,8 +1,7 @@
 //! The dense labelled point cloud: a PLY file, and by room and instance the S3DIS tree that loaders read and
 //! `pointcloud.mat`.
 
-use super::annotate::Annotated;
-use super::inputs::AreaInput;
+use super::area_plan::AreaPlan;
 use crate::console::Progress;
 use crate::failure::{Failure, Outcome};
 use crate::stop;
@@ -37,16 +36,16 @@ type Places = BTreeMap<LabelId, (Room, u32)>;
 /// last, and into the PLY file only. Returns how many there are.
 pub(crate) fn write_points(
     layout: &Layout,
-    area: &AreaInput,
     mesh: &TriMesh,
-    annotated: &Annotated,
+    plan: &AreaPlan,
     table: &LabelTable,
     density: Density,
     seed: u64,
 ) -> Outcome<u64> {
     // Number in the room of every label of this area: the tree's files are named by it.
     let mut place = Places::new();
-    for room in &area.rooms {
+    let annotated = &plan.annotated;
+    for room in &plan.names {
         for instance in &room.instances {
             if let Some(id) = table.id_of(&instance.label) {
                 place.insert(id, (room.room, instance.number_in_room));
@@ -61,7 +60,7 @@ pub(crate) fn write_points(
     faces.sort_by_cached_key(key);
     let rooms: Vec<(Option<Room>, Vec<Run>)> = runs(&faces, &annotated.face_labels, &place);
 
-    let number = area.number;
+    let number = plan.area;
     let sampler = SurfaceSampler::over_faces(mesh, faces, density, seed);
     let mut sink = Sink {
         ply: PlyPointWriter::create(&layout.point_cloud(number), sampler.len())?,

@@ -2,7 +2,7 @@
 //! keys mean by their names.
 
 use super::annotate::Annotated;
-use super::inputs::AreaInput;
+use super::area_plan::RoomNames;
 use super::views::Candidate;
 use crate::failure::Outcome;
 use s3d_io::{Domain, Error, Frame, ImageName, Layout, Split, create_dir, write_json};
@@ -125,7 +125,7 @@ pub(crate) fn write_votes(layout: &Layout, area: u32, report: &VoteReport) -> Ou
 
 /// Writes `area_N/3d/instance_numbers.json`: which label each instance of the annotation tree, whose numbers run per
 /// room, has in the area.
-pub(crate) fn write_instance_numbers(layout: &Layout, area: &AreaInput) -> Outcome<()> {
+pub(crate) fn write_instance_numbers(layout: &Layout, area: u32, rooms: &[RoomNames]) -> Outcome<()> {
     #[derive(Serialize)]
     struct Mapping {
         room: String,
@@ -133,8 +133,7 @@ pub(crate) fn write_instance_numbers(layout: &Layout, area: &AreaInput) -> Outco
         number_in_room: u32,
         label: String,
     }
-    let mappings: Vec<Mapping> = area
-        .rooms
+    let mappings: Vec<Mapping> = rooms
         .iter()
         .flat_map(|r| &r.instances)
         .map(|i| Mapping {
@@ -144,7 +143,7 @@ pub(crate) fn write_instance_numbers(layout: &Layout, area: &AreaInput) -> Outco
             label: i.label.to_string(),
         })
         .collect();
-    write_json(&layout.instance_numbers_json(area.number), &mappings)?;
+    write_json(&layout.instance_numbers_json(area), &mappings)?;
     Ok(())
 }
 

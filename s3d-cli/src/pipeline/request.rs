@@ -4,10 +4,11 @@
 use super::inputs::{AreaInput, Cameras};
 use crate::args::ExportOptions;
 use crate::console::Progress;
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::pipeline::listing::walk;
 use crate::pipeline::work::for_each_in_order;
-use s3d_io::{Checksum, ChecksumOfParts, Domain, Error, FileRecord, checksum_of_file};
+use s3d_geom::NormalAxes;
+use s3d_io::{Checksum, ChecksumOfParts, Conventions, Domain, Error, FileRecord, checksum_of_file};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -95,6 +96,17 @@ impl Options {
         }
     }
 
+    /// What the numbers in the images' files mean.
+    pub(crate) fn conventions(&self) -> Outcome<Conventions> {
+        let unknown = |name: &str, word: &str| Failure::Input(format!("{name} {word:?} is not known"));
+        Ok(Conventions {
+            depth_units: self.depth_units.parse().map_err(|_| unknown("depth_units", &self.depth_units))?,
+            normal_axes: NormalAxes::from_name(&self.normal_axes)
+                .ok_or_else(|| unknown("normal_axes", &self.normal_axes))?,
+            xyz: self.xyz.parse().map_err(|_| unknown("xyz", &self.xyz))?,
+        })
+    }
+
     /// What differs, a sentence each.
     fn differences(&self, now: &Self) -> Vec<String> {
         let fields = |options: &Self| match serde_json::to_value(options) {
@@ -150,6 +162,37 @@ impl Request {
     /// The numbers of the areas.
     pub(crate) fn numbers(&self) -> Vec<u32> {
         self.areas.iter().map(|a| a.area).collect()
+    }
+
+    /// What is known of a file or folder of an area's input, by its name.
+    fn input(&self, area: u32, name: &str) -> Option<&InputRecord> {
+        let area = self.areas.iter().find(|a| a.area == area)?;
+        area.inputs.iter().find(|i| i.path.strip_suffix('/').unwrap_or(&i.path) == name)
+    }
+
+    /// The same request with nothing asked for but labels and scores: what a plan is made for.
+    pub(crate) fn of_plan(&self) -> Self {
+        let Options { views, size, lenient, entropy_stride, .. } = self.options;
+        let options = Options {
+            views,
+            size,
+            pano_width: 0,
+            pool: String::new(),
+            points_per_m2: 0.0,
+            lenient,
+            entropy_stride,
+            modalities: Vec::new(),
+            keep_all: false,
+            only: Vec::new(),
+            normals: String::new(),
+            compression: String::new(),
+            xyz: String::new(),
+            normal_axes: String::new(),
+            depth_units: String::new(),
+            pad_labels: String::new(),
+            profiles: Vec::new(),
+        };
+        Self { options, ..self.clone() }
     }
 
     /// What is asked for `now` that was not asked for here, and the other way round, a sentence each; none if the two
@@ -218,19 +261,32 @@ impl RequestedArea {
 }
 
 /// What each area asks for. All files that they read are read once, on all threads. `companions` are the files that
-/// their meshes were read from besides.
+/// their meshes were read from besides. Of annotations and folders that are `known` from a plan, and have as many bytes as
+/// then, the checksum is taken from there.
 pub(crate) fn requested_areas(
     areas: &[AreaInput],
     companions: &[Vec<PathBuf>],
+    known: Option<&Request>,
 ) -> Outcome<Vec<RequestedArea>> {
     let paths: Vec<Vec<PathBuf>> =
         areas.iter().zip(companions).map(|(area, besides)| [&area.sources[..], besides].concat()).collect();
-    // The files of each path: itself, or what is in it.
+    // The files of each path: itself, or what is in it; and what a plan knows of the path.
     let mut files: Vec<Vec<Vec<PathBuf>>> = Vec::new();
-    for of_area in &paths {
+    let mut taken: BTreeMap<(u32, &Path), InputRecord> = BTreeMap::new();
+    for (area, of_area) in areas.iter().zip(&paths) {
         let mut listed = Vec::new();
         for path in of_area {
-            listed.push(if path.is_dir() { walk(path)? } else { vec![path.clone()] });
+            let files = if path.is_dir() { walk(path)? } else { vec![path.clone()] };
+            let record = known.and_then(|known| known.input(area.number, &name_of(&area.path, path)));
+            if (path.is_dir() || area.annotations.contains(path))
+                && let Some(record) = record
+                && total_bytes(&files)? == record.bytes
+            {
+                taken.insert((area.number, path), record.clone());
+                listed.push(Vec::new());
+            } else {
+                listed.push(files);
+            }
         }
         files.push(listed);
     }
@@ -239,6 +295,9 @@ pub(crate) fn requested_areas(
     all.dedup();
     let sums = checksums(&all)?;
     let record = |area: &AreaInput, path: &Path, files: &[PathBuf]| -> Outcome<InputRecord> {
+        if let Some(record) = taken.get(&(area.number, path)) {
+            return Ok(record.clone());
+        }
         let name = name_of(&area.path, path);
         if !path.is_dir() {
             let (bytes, xxh3_128) = sums.get(path).copied().unwrap_or((0, Checksum::of(b"")));
@@ -273,6 +332,15 @@ pub(crate) fn requested_areas(
         });
     }
     Ok(requested)
+}
+
+/// How many bytes some files have, without reading them.
+fn total_bytes(files: &[PathBuf]) -> Outcome<u64> {
+    let mut total = 0;
+    for file in files {
+        total += std::fs::metadata(file).map_err(|e| Error::io(file, "read", e))?.len();
+    }
+    Ok(total)
 }
 
 /// Size and checksum of each file.
@@ -392,6 +460,28 @@ pub(crate) mod tests {
         );
         assert_eq!(changed(&|r| drop(r.areas.remove(1))), ["area 3 there, not now"]);
         assert_eq!(changed(&|r| r.areas[1].area = 4), ["area 3 there, not now", "area 4 now, not there"]);
+    }
+
+    #[test]
+    fn a_plan_is_for_any_images_of_the_same_scores() {
+        let changed = |change: &dyn Fn(&mut Request)| {
+            let mut now = request();
+            change(&mut now);
+            request().of_plan().differences(&now.of_plan())
+        };
+        let other_images = |r: &mut Request| {
+            r.options.pano_width = 64;
+            r.options.pool = "area".into();
+            r.options.only = vec!["a".into()];
+            r.options.xyz = "none".into();
+        };
+        assert!(changed(&other_images).is_empty());
+        assert_eq!(changed(&|r| r.options.size = 64), ["--size 1080 there, 64 now"]);
+        assert_eq!(changed(&|r| r.options.lenient = true), ["--lenient now, not there"]);
+        assert_eq!(changed(&|r| r.seed = 7), ["--seed 0 there, 7 now"]);
+        let known = request();
+        assert_eq!(known.input(3, "Area_1").map(|i| i.path.as_str()), Some("Area_1/"));
+        assert!(known.input(1, "rgb.obj").is_some() && known.input(2, "rgb.obj").is_none());
     }
 
     #[test]

@@ -68,12 +68,16 @@ static TARGET: OnceLock<Target> = OnceLock::new();
 pub fn start(name: &str) {
     let (_, feed) = FEEDS.into_iter().find(|(n, _)| *n == name).expect("a feed has this name");
     // No threads: a run is to depend on its input alone.
-    rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().expect("the first pool");
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .use_current_thread()
+        .build_global()
+        .expect("the first pool");
     // Decoders that are not ours may panic on what is damaged, and are caught where they are called. libfuzzer-sys ends
     // the process at any panic.
     let aborts = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
-        if !s3d_io::is_guarded() {
+        if !s3d_io::panic_is_caught() {
             aborts(panic);
         }
     }));

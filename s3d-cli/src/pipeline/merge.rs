@@ -1,0 +1,261 @@
+//! Shards of an export to one data set: the files of all units linked or copied into one folder, each checked, and the
+//! tables written.
+
+use super::assets;
+use super::deal::Deal;
+use super::finish::{finish, missing_units};
+use super::journal::{Done, Finished, Unit};
+use super::label_list::LabelList;
+use super::lock::{Lock, Sharing};
+use super::manifest::Manifest;
+use super::output::{self, Begin};
+use super::request::Request;
+use super::summary::Account;
+use super::transfer::bring;
+use super::work::for_each_in_order;
+use super::{Target, tell_made};
+use crate::console::Progress;
+use crate::event::Stage;
+use crate::failure::{Failure, Outcome};
+use crate::stop;
+use s3d_io::{Error, Layout};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use tracing::info;
+
+/// Most units that a message names.
+const MOST_NAMED: usize = 8;
+
+/// What a shard has left in its folder.
+struct Part {
+    layout: Layout,
+    request: Request,
+    finished: Finished,
+    /// Who does what, for each number of shards that worked in this folder.
+    deals: Vec<Deal>,
+}
+
+/// Makes one data set of the folders of shards, in any order; OUT may be one of them.
+///
+/// # Errors
+/// [`Failure::Call`] if they are of different calls, or OUT holds another data set; [`Failure::Input`] with the shards
+/// that are to be run again if something is missing or damaged; [`Failure::Again`] if a shard is still at work.
+pub(crate) fn merge(folders: &[PathBuf], target: &Target<'_>) -> Outcome<()> {
+    let account = Account::new();
+    let layout = &target.layout;
+    let folders = distinct(folders)?;
+    if let [only] = &folders[..]
+        && is_same(only, layout.root())
+        && output::read_request(&Layout::new(only)).is_none()
+        && Manifest::read(layout).is_ok()
+    {
+        info!("{}: the data set is complete; nothing to do", layout.root().display());
+        return Ok(());
+    }
+    let stage = account.stage(Stage::Load, None);
+    // OUT's own lock is taken when the merge begins in it.
+    let apart = folders.iter().filter(|folder| !is_same(folder, layout.root()));
+    let _locks = apart.map(|folder| lock(folder)).collect::<Outcome<Vec<_>>>()?;
+    let parts = folders.iter().map(|folder| Part::read(folder)).collect::<Outcome<Vec<Part>>>()?;
+    let Some(first) = parts.first() else {
+        return Err(Failure::Call("there is no shard to merge".to_owned()));
+    };
+    let request = &first.request;
+    refuse_mixed(&parts)?;
+    let mut all = Finished::default();
+    parts.iter().flat_map(|part| part.finished.iter()).for_each(|done| all.insert(done.clone()));
+    let missing = missing_units(request, &all);
+    if !missing.is_empty() {
+        return Err(told_missing(&parts, &missing, "is missing"));
+    }
+    let labels = LabelList::read(&LabelList::path(&first.layout))?;
+    stage.end();
+
+    output::check(layout, target.overwrite, target.allowed)?;
+    let manifest = Manifest::begin(request, labels.len());
+    let session = match output::begin(layout, target.overwrite, request, &manifest, &account)? {
+        Begin::NothingToDo => {
+            info!("{}: the data set is complete; nothing to do", layout.root().display());
+            return Ok(());
+        }
+        Begin::Session(session) => session,
+    };
+    let merged = || {
+        let stage = account.stage(Stage::Merge, None);
+        // Should this OUT be merged again, or gone on with.
+        labels.write(&LabelList::path(layout))?;
+        gather(layout, &parts, &all, &session)?;
+        stage.end();
+        let stage = account.stage(Stage::Tables, None);
+        let options = &request.options;
+        assets::write(layout, labels.names().to_vec(), manifest.labels_padded_to(), options.conventions()?)?;
+        let made = finish(layout, request, manifest, &session.journal.finished())?;
+        stage.end();
+        Ok(made)
+    };
+    let merged = merged();
+    let works_in_out = parts.iter().any(|part| is_same(part.layout.root(), layout.root()));
+    let made = match merged {
+        // What its shards have done stays.
+        Err(e) if works_in_out => return Err(e),
+        merged => session.end(merged)?,
+    };
+    tell_made(account, layout, request, &made);
+    Ok(())
+}
+
+/// The folders, each once, as they are on the disk.
+fn distinct(folders: &[PathBuf]) -> Outcome<Vec<PathBuf>> {
+    let mut distinct: Vec<PathBuf> = Vec::new();
+    for folder in folders {
+        if !folder.is_dir() {
+            let source = std::io::Error::from(ErrorKind::NotFound);
+            return Err(Error::io(folder, "read the folder of a shard", source).into());
+        }
+        if !distinct.iter().any(|other| is_same(other, folder)) {
+            distinct.push(folder.clone());
+        }
+    }
+    Ok(distinct)
+}
+
+/// Whether two paths lead to the same folder.
+fn is_same(a: &Path, b: &Path) -> bool {
+    match (fs::canonicalize(a), fs::canonicalize(b)) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => a == b,
+    }
+}
+
+/// Holds a shard's folder, so that nobody is at work in it; one that cannot be written to holds still by itself.
+fn lock(folder: &Path) -> Outcome<Option<Lock>> {
+    let layout = Layout::new(folder);
+    if !layout.lock().exists() {
+        return Ok(None);
+    }
+    match Lock::take(&layout, Sharing::Alone) {
+        Ok(lock) => Ok(Some(lock)),
+        Err(Failure::File(Error::Io { source, .. }))
+            if matches!(source.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) =>
+        {
+            Ok(None)
+        }
+        Err(e) => Err(e),
+    }
+}
+
+impl Part {
+    fn read(folder: &Path) -> Outcome<Self> {
+        let layout = Layout::new(folder);
+        let Some(request) = output::read_request(&layout) else {
+            let message = if Manifest::read(&layout).is_ok() {
+                "is a complete data set, and no shard of one"
+            } else {
+                "holds no shard of an export: give the folders that `s3d export --shard` wrote"
+            };
+            return Err(Error::format(folder, message).into());
+        };
+        let finished = Finished::read(&layout)?;
+        let deals = Deal::read_all(&layout)?;
+        Ok(Self { layout, request, finished, deals })
+    }
+}
+
+/// Refuses shards of different calls.
+fn refuse_mixed(parts: &[Part]) -> Outcome<()> {
+    let Some((first, others)) = parts.split_first() else { return Ok(()) };
+    for other in others {
+        let differences = first.request.differences(&other.request);
+        if !differences.is_empty() {
+            return Err(Failure::Call(format!(
+                "{} and {} are shards of different calls: {} (\"there\" is {}, \"now\" is {})",
+                first.layout.root().display(),
+                other.layout.root().display(),
+                differences.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("; "),
+                first.layout.root().display(),
+                other.layout.root().display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// What is to be done about units that are not there.
+fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Failure {
+    let named: Vec<String> = missing.iter().take(MOST_NAMED).map(Unit::to_string).collect();
+    let more = match missing.len() - named.len() {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    // By number of shards, which of them are to be run.
+    let mut shards: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    for deal in parts.iter().flat_map(|part| &part.deals) {
+        shards.entry(deal.shards()).or_default().extend(deal.shards_of(missing));
+    }
+    let calls = shards.into_iter().filter(|(_, numbers)| !numbers.is_empty()).map(|(of, numbers)| {
+        let calls: Vec<String> = numbers.iter().map(|i| format!("--shard {i}/{of}")).collect();
+        calls.join(", ")
+    });
+    let calls: Vec<String> = calls.collect();
+    let calls = if calls.is_empty() { "every shard".to_owned() } else { calls.join(", or ") };
+    Failure::Input(format!("{}{more} {what}: run again {calls}, and merge then", named.join(", ")))
+}
+
+/// Brings the files of all units that OUT has not yet into it, and checks each there.
+fn gather(layout: &Layout, parts: &[Part], all: &Finished, session: &output::Session) -> Outcome<()> {
+    let units: Vec<Unit> =
+        all.iter().map(Done::unit).filter(|u| !session.journal.finished().has(u)).collect();
+    let files: usize = all.iter().map(|done| done.files().len()).sum();
+    let progress = Progress::new("merging", "files", files as u64);
+    let faults: Mutex<Vec<(Unit, String)>> = Mutex::new(Vec::new());
+    for_each_in_order(
+        &units,
+        || (),
+        |(), unit| {
+            let mut fault = None;
+            for part in parts {
+                // OUT's own were looked at when the merge began, and this one is not among those that are whole.
+                let Some(done) =
+                    part.finished.get(unit).filter(|_| !is_same(part.layout.root(), layout.root()))
+                else {
+                    continue;
+                };
+                match bring_unit(layout, part, done)? {
+                    None => {
+                        progress.add(done.files().len() as u64);
+                        return session.journal.write(done.clone());
+                    }
+                    Some(found) => {
+                        fault = fault.or(Some(format!("{}/{found}", part.layout.root().display())))
+                    }
+                }
+            }
+            let fault = fault.unwrap_or_else(|| format!("{}: {unit} is damaged", layout.root().display()));
+            faults.lock().unwrap_or_else(PoisonError::into_inner).push((unit.clone(), fault));
+            Ok(())
+        },
+    )?;
+    let mut faults = faults.into_inner().unwrap_or_else(PoisonError::into_inner);
+    faults.sort();
+    match faults.first() {
+        None => Ok(()),
+        Some((_, first)) => {
+            let units: Vec<Unit> = faults.iter().map(|(unit, _)| unit.clone()).collect();
+            Err(told_missing(parts, &units, &format!("is damaged ({first})")))
+        }
+    }
+}
+
+/// Brings the files of a unit into OUT; tells what is wrong with the first that is not the one that was written.
+fn bring_unit(layout: &Layout, part: &Part, done: &Done) -> Outcome<Option<String>> {
+    for record in done.files() {
+        stop::check()?;
+        if let Some(fault) = bring(record, part.layout.root(), layout.root())? {
+            return Ok(Some(fault));
+        }
+    }
+    Ok(None)
+}

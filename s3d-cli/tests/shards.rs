@@ -1,0 +1,377 @@
+//! Shards of an export, merged, are byte for byte what a single run writes.
+
+mod common;
+
+use common::{UUID_A, UUID_B, files, s3d, s3d_fails, s3d_ok, text, write_scan};
+use s3d_geom::Raster;
+use s3d_io::{Compression, Content, write_rgb8};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+const SMALL: [&str; 8] = ["--size", "48", "--pano-width", "96", "--views", "8", "--points-per-m2", "40"];
+const SCORING: [&str; 4] = ["--size", "48", "--views", "8"];
+
+type Files = BTreeMap<PathBuf, Vec<u8>>;
+
+/// Scenes, a folder for everything, and what a single run of them with these options writes.
+struct Trial {
+    dir: tempfile::TempDir,
+    scenes: Vec<PathBuf>,
+    options: Vec<String>,
+    single: Files,
+}
+
+impl Trial {
+    fn of(scenes: impl FnOnce(&Path) -> Vec<PathBuf>, options: &[&str]) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let scenes = scenes(dir.path());
+        let options: Vec<String> = SMALL.iter().chain(options).map(|o| (*o).to_owned()).collect();
+        let mut trial = Self { dir, scenes, options, single: Files::new() };
+        let out = trial.path("single");
+        s3d_ok(&words(&trial.export(&out, &[])));
+        trial.single = files(&out);
+        assert!(trial.single.len() > 20);
+        trial
+    }
+
+    /// Two areas of two locations each.
+    fn two_areas(options: &[&str]) -> Self {
+        Self::of(|dir| vec![write_scan(&dir.join("one"), 1), write_scan(&dir.join("five"), 5)], options)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    fn export(&self, out: &Path, extra: &[&str]) -> Vec<String> {
+        let mut args = vec!["export".to_owned()];
+        args.extend(self.scenes.iter().map(|s| text(s).to_owned()));
+        args.extend(["-o".to_owned(), text(out).to_owned()]);
+        args.extend(self.options.iter().cloned());
+        args.extend(extra.iter().map(|e| (*e).to_owned()));
+        args
+    }
+
+    fn shard(&self, out: &Path, i: u32, n: u32, extra: &[&str]) {
+        let shard = format!("{i}/{n}");
+        s3d_ok(&words(&self.export(out, &[&["--shard", &shard], extra].concat())));
+    }
+
+    fn plan(&self, plan: &Path, extra: &[&str]) {
+        let mut args = vec!["plan"];
+        args.extend(self.scenes.iter().map(|s| text(s)));
+        args.extend(["-o", text(plan)]);
+        args.extend(SCORING);
+        args.extend(extra);
+        s3d_ok(&args);
+    }
+
+    /// Merges, and compares with the single run.
+    fn merge(&self, shards: &[&Path], out: &Path) {
+        s3d_ok(&merging(shards, out));
+        self.assert_single(out);
+    }
+
+    fn assert_single(&self, out: &Path) {
+        let merged = files(out);
+        let names = |files: &Files| files.keys().map(|k| k.display().to_string()).collect::<Vec<_>>();
+        assert_eq!(names(&merged), names(&self.single));
+        for (path, bytes) in &merged {
+            assert!(bytes == &self.single[path], "{} differs", path.display());
+        }
+    }
+}
+
+fn words(args: &[String]) -> Vec<&str> {
+    args.iter().map(String::as_str).collect()
+}
+
+fn merging<'a>(shards: &[&'a Path], out: &'a Path) -> Vec<&'a str> {
+    let mut args = vec!["merge"];
+    args.extend(shards.iter().map(|s| text(s)));
+    args.extend(["-o", text(out)]);
+    args
+}
+
+/// Starts `s3d` and lets it run.
+fn begin(args: &[&str]) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_s3d"));
+    command.args(args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the binary starts")
+}
+
+#[test]
+fn any_number_of_shards_with_an_out_of_their_own() {
+    let trial = Trial::two_areas(&[]);
+    // The last: more shards than there is work.
+    for n in [1, 3, 17] {
+        let outs: Vec<PathBuf> = (1..=n).map(|i| trial.path(&format!("own-{n}-{i}"))).collect();
+        // From the last to the first, and one twice.
+        for i in (1..=n).rev().chain([1]) {
+            trial.shard(&outs[i as usize - 1], i, n, &[]);
+        }
+        let mut shards: Vec<&Path> = outs.iter().map(PathBuf::as_path).collect();
+        shards.rotate_left(n as usize / 2);
+        shards.push(&outs[0]);
+        let out = trial.path(&format!("merged-{n}"));
+        trial.merge(&shards, &out);
+        // Twice by mistake.
+        trial.merge(&shards, &out);
+    }
+}
+
+#[test]
+fn shards_that_share_an_out() {
+    let trial = Trial::two_areas(&["--profile", "pointcept,pointnet", "--pool", "area"]);
+    let out = trial.path("shared");
+    // All at once, and the second twice by mistake.
+    let calls = [1, 2, 3, 2].map(|i| trial.export(&out, &["--shard", &format!("{i}/3")]));
+    let mut children: Vec<Child> = calls.iter().map(|call| begin(&words(call))).collect();
+    for child in &mut children {
+        assert!(child.wait().unwrap().success());
+    }
+    assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains("\"running\""));
+    // While a shard is at work nobody merges.
+    let lock = fs::File::open(out.join(".s3d/lock")).unwrap();
+    lock.lock_shared().unwrap();
+    s3d_fails(&merging(&[&out], &out), 75, &["another process", "go on with: "]);
+    s3d_fails(&merging(&[&out], &trial.path("elsewhere")), 75, &["another process"]);
+    drop(lock);
+    trial.merge(&[&out], &out);
+    // A shard that comes late finds all done, and so does another merge.
+    trial.shard(&out, 3, 3, &[]);
+    trial.merge(&[&out], &out);
+    // Other numbers of shards go together: a unit is a unit.
+    let mixed = trial.path("mixed");
+    for (i, n) in [(1, 2), (1, 3), (2, 3), (3, 3)] {
+        trial.shard(&mixed, i, n, &[]);
+    }
+    trial.merge(&[&mixed], &mixed);
+}
+
+#[test]
+fn with_a_plan_that_is_made_by_one_or_by_many() {
+    let trial = Trial::two_areas(&["--pool", "location"]);
+    let (plan, parts) = (trial.path("plan"), trial.path("parts"));
+    trial.plan(&plan, &[]);
+    for shard in ["3/3", "1/3", "2/3", "1/3"] {
+        trial.plan(&parts, &["--shard", shard]);
+    }
+    let annotations = ["one", "five"].map(|name| trial.path(name)).map(|dir| {
+        let folder = fs::read_dir(&dir).unwrap().map(|e| e.unwrap().path());
+        folder.into_iter().find(|p| p.is_dir()).unwrap()
+    });
+    let out = trial.path("out");
+    for i in 1..=2 {
+        trial.shard(&out, i, 2, &["--plan", text(&parts)]);
+    }
+    trial.merge(&[&out], &out);
+    // Nor does a plan keep a single run from being the single run.
+    let whole = trial.path("whole");
+    s3d_ok(&words(&trial.export(&whole, &["--plan", text(&plan)])));
+    trial.assert_single(&whole);
+    // Annotations are not opened again: what is in them now is not even text, of the same length.
+    for folder in &annotations {
+        for name in files(folder).keys() {
+            let length = fs::metadata(folder.join(name)).unwrap().len();
+            fs::write(folder.join(name), vec![0xff; length as usize]).unwrap();
+        }
+    }
+    let later = trial.path("later");
+    trial.shard(&later, 1, 1, &["--plan", text(&plan)]);
+    trial.merge(&[&later], &later);
+}
+
+#[test]
+fn what_a_plan_is_not_for_is_refused() {
+    let trial = Trial::two_areas(&[]);
+    let (plan, out) = (trial.path("plan"), trial.path("out"));
+    let fails = |extra: &[&str], code: i32, parts: &[&str]| {
+        let call = trial.export(&out, &[&["--shard", "1/2", "--plan", text(&plan)], extra].concat());
+        s3d_fails(&words(&call), code, parts);
+        assert!(!out.exists(), "nothing is begun");
+    };
+    fails(&[], 1, &["holds no plan", "s3d plan"]);
+    trial.plan(&plan, &["--shard", "1/3"]);
+    fails(&[], 1, &["is not complete", "s3d plan"]);
+    for shard in ["2/3", "3/3"] {
+        trial.plan(&plan, &["--shard", shard]);
+    }
+    fails(&["--seed", "7"], 2, &["--seed 0 there, 7 now"]);
+    let other = trial.plan_again(&plan, &["--seed", "7"]);
+    assert!(other.contains("--seed 0 there, 7 now"), "{other}");
+    // A journal that was damaged, a table, the labels of faces: made again by another call.
+    for (part, message) in [
+        ("journal", "is not complete"),
+        ("instances.json", "instances.json: "),
+        ("face_labels", "is damaged"),
+    ] {
+        let all = files(&plan);
+        let (name, whole) =
+            all.iter().find(|(name, bytes)| text(name).contains(part) && !bytes.is_empty()).unwrap();
+        fs::write(plan.join(name), &whole[..whole.len() / 2]).unwrap();
+        let call = trial.export(&out, &["--shard", "1/1", "--plan", text(&plan)]);
+        s3d_fails(&words(&call), 1, &[message]);
+        trial.plan(&plan, &[]);
+        let _ = fs::remove_dir_all(&out);
+    }
+    trial.shard(&out, 1, 1, &["--plan", text(&plan)]);
+    trial.merge(&[&out], &out);
+    fs::remove_dir_all(&out).unwrap();
+    // An input that has changed.
+    let mesh = trial.path("one/room.obj");
+    let obj = fs::read_to_string(&mesh).unwrap();
+    fs::write(&mesh, obj.replacen("v 4 ", "v 4.5 ", 1)).unwrap();
+    fails(&[], 2, &["room.obj: other bytes"]);
+}
+
+impl Trial {
+    /// What a plan with other options is refused with.
+    fn plan_again(&self, plan: &Path, extra: &[&str]) -> String {
+        let mut args = vec!["plan"];
+        args.extend(self.scenes.iter().map(|s| text(s)));
+        args.extend(["-o", text(plan)]);
+        args.extend(SCORING);
+        args.extend(extra);
+        let done = s3d(&args);
+        assert_eq!(done.status.code(), Some(2));
+        String::from_utf8(done.stderr).unwrap()
+    }
+}
+
+#[test]
+fn a_shard_that_is_killed_is_run_again() {
+    let trial = Trial::two_areas(&["--modalities", "rgb,depth,pose"]);
+    let (out, own) = (trial.path("shared"), trial.path("own"));
+    trial.shard(&out, 1, 2, &[]);
+    // Killed at some moments of its run, each a little later, and at last left alone.
+    let started = Instant::now();
+    for (out, i) in [(&out, 2), (&own, 1)] {
+        for delay in [5, 20, 60, 120] {
+            let mut child = begin(&words(&trial.export(out, &["--shard", &format!("{i}/2")])));
+            std::thread::sleep(Duration::from_millis(delay));
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+        trial.shard(out, i, 2, &[]);
+    }
+    assert!(started.elapsed() < Duration::from_secs(600));
+    trial.merge(&[&out], &out);
+    // The other one's own folder has half of it.
+    let halves = trial.path("halves");
+    s3d_fails(&merging(&[&own], &halves), 1, &["--shard 2/2"]);
+    assert!(!halves.exists());
+    let second = trial.path("second");
+    trial.shard(&second, 2, 2, &[]);
+    trial.merge(&[&second, &own], &halves);
+}
+
+#[test]
+fn a_shard_that_is_missing_damaged_or_of_another_call_is_named() {
+    let trial = Trial::two_areas(&["--modalities", "depth,pose"]);
+    let outs = [1, 2, 3].map(|i| trial.path(&format!("shard-{i}")));
+    for (i, out) in (1..).zip(&outs) {
+        trial.shard(out, i, 3, &[]);
+    }
+    let out = trial.path("merged");
+    let all = [outs[0].as_path(), &outs[1], &outs[2]];
+    s3d_fails(&merging(&[all[0], all[2]], &out), 1, &["--shard 2/3"]);
+    s3d_fails(&merging(&[all[0], &trial.path("nowhere")], &out), 1, &["nowhere"]);
+    assert!(!out.exists());
+    // One byte of an image.
+    let image = files(all[2]).into_keys().find(|name| name.extension().is_some_and(|e| e == "png")).unwrap();
+    let path = all[2].join(image);
+    let whole = fs::read(&path).unwrap();
+    let mut damaged = whole.clone();
+    *damaged.last_mut().unwrap() ^= 1;
+    fs::write(&path, &damaged).unwrap();
+    s3d_fails(&merging(&all, &out), 1, &["other content", "--shard 3/3"]);
+    // Run again it mends that, and the merge goes on.
+    trial.shard(all[2], 3, 3, &[]);
+    assert_eq!(fs::read(&path).unwrap(), whole);
+    trial.merge(&all, &out);
+    // Other options, and other input.
+    let other = trial.path("other");
+    trial.shard(&other, 2, 3, &["--seed", "7"]);
+    s3d_fails(&merging(&[all[0], &other, all[2]], &trial.path("mix")), 2, &["--seed 0 there, 7 now"]);
+    // An OUT that holds something else is left alone unless it may be replaced.
+    s3d_fails(&merging(&[all[0], all[1], all[2]], &trial.path("single")), 0, &["nothing to do"]);
+    let single_of_seven = trial.path("seven");
+    s3d_ok(&words(&trial.export(&single_of_seven, &["--seed", "7"])));
+    s3d_fails(&merging(&all, &single_of_seven), 2, &["--seed 7 there, 0 now", "--overwrite"]);
+    s3d_ok(&[&merging(&all, &single_of_seven)[..], &["--overwrite"]].concat());
+    trial.assert_single(&single_of_seven);
+    // Shards may begin there as well, if all of them say that they mean it.
+    let call = trial.export(&other, &["--shard", "1/2"]);
+    s3d_fails(&words(&call), 2, &["an unfinished export of another call", "--seed 7 there, 0 now"]);
+    let again = trial.path("seven-again");
+    s3d_ok(&words(&trial.export(&again, &["--seed", "7"])));
+    for out in [&other, &again] {
+        for i in 1..=2 {
+            trial.shard(out, i, 2, &["--overwrite"]);
+        }
+        trial.merge(&[out], out);
+    }
+}
+
+#[test]
+fn locations_that_are_placed_and_those_that_are_asked_for() {
+    let place = ["--place-cameras", "1.5"];
+    let trial = Trial::two_areas(&[&place[..], &["--modalities", "rgb,pose", "--keep-all"]].concat());
+    let plan = trial.path("plan");
+    for shard in ["2/2", "1/2"] {
+        trial.plan(&plan, &[&place[..], &["--shard", shard]].concat());
+    }
+    let outs = ["with", "without"].map(|name| trial.path(name));
+    for i in 1..=3 {
+        trial.shard(&outs[0], i, 3, &["--plan", text(&plan)]);
+        trial.shard(&outs[1], i, 3, &[]);
+    }
+    outs.iter().for_each(|out| trial.merge(&[out], out));
+
+    let trial = Trial::two_areas(&["--only", UUID_A]);
+    let out = trial.path("only");
+    for i in 1..=2 {
+        trial.shard(&out, i, 2, &[]);
+    }
+    trial.merge(&[&out], &out);
+}
+
+#[test]
+fn colours_from_pictures() {
+    let trial = Trial::of(
+        |dir| {
+            let scene = write_scan(&dir.join("scan"), 1);
+            let toml = fs::read_to_string(&scene).unwrap();
+            fs::write(&scene, format!("rgb = \"panorama\"\n{toml}")).unwrap();
+            fs::create_dir(dir.join("scan/panorama")).unwrap();
+            for (k, uuid) in [(0u32, UUID_A), (90, UUID_B)] {
+                let pixels = (0..64 * 32u32).map(|i| [(4 * (i % 64)) as u8, (8 * (i / 64)) as u8, k as u8]);
+                let image = Raster::from_vec(64, 32, pixels.collect());
+                let path = dir.join(format!("scan/panorama/{uuid}.png"));
+                write_rgb8(&path, &image, Content::Photo, Compression::Fast).unwrap();
+            }
+            vec![scene]
+        },
+        &["--modalities", "rgb"],
+    );
+    let out = trial.path("out");
+    for i in 1..=2 {
+        trial.shard(&out, i, 2, &[]);
+    }
+    trial.merge(&[&out], &out);
+}
+
+#[test]
+fn wrong_calls_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = write_scan(&dir.path().join("scan"), 1);
+    for shard in ["0/2", "3/2", "2", "a/b"] {
+        s3d_fails(&["export", text(&scene), "--shard", shard], 2, &["--shard"]);
+    }
+    s3d_fails(&["merge", "-o", "x"], 2, &["SHARD"]);
+    let out = dir.path().join("out");
+    s3d_fails(&merging(&[&dir.path().join("scan")], &out), 1, &["no shard"]);
+}
