@@ -130,6 +130,17 @@ def plot(x0, y0, width, height, what, unit, data):
     return "\n".join(lines)
 
 
+def table_of(rows):
+    """The rows for people, as Markdown."""
+    lines = ["| what grows | size | processor s | of which system | wall clock s | peak MB | data set MB |",
+             "|---|---:|---:|---:|---:|---:|---:|"]
+    for r in rows:
+        user, system = float(r["user_s"]), float(r["sys_s"])
+        lines.append(f"| {CURVES[r['curve']][0]} | {int(r['size']):,} | {user + system:.1f} | {system:.1f} | "
+                     f"{float(r['wall_s']):.0f} | {int(r['peak_mb']):,} | {int(r['output_mb']):,} |")
+    return "\n".join(lines)
+
+
 def tens(exponent):
     return {-2: "0.01", -1: "0.1", 0: "1", 1: "10", 2: "100", 3: "1,000", 4: "10,000", 5: "100,000", 6: "1 million",
             7: "10 million", 8: "100 million", 9: "1 billion"}[exponent]
@@ -142,7 +153,7 @@ def main():
     parser.add_argument("--generator", default=str(ROOT / "target/release/examples/large_scene"))
     parser.add_argument("--only", default=",".join(CURVES), help="curves to measure")
     parser.add_argument("--most", type=int, default=10**12, help="largest size to measure")
-    parser.add_argument("--draw", action="store_true", help="draw what is measured already, and measure nothing")
+    parser.add_argument("--draw", action="store_true", help="draw what is measured already and print it as a table, and measure nothing")
     args = parser.parse_args()
     table = HERE / "large.csv"
     rows = list(csv.DictReader(table.open())) if table.exists() else []
@@ -157,6 +168,7 @@ def main():
                     writer.writeheader()
                     writer.writerows(rows)
     draw(rows, HERE / "large.svg")
+    print(table_of(rows))
 
 
 if __name__ == "__main__":

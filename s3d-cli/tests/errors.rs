@@ -488,3 +488,20 @@ fn a_full_disk_is_told() {
     assert!(log.contains("standard output") && !log.contains("panicked"), "{log}");
     assert!(log.contains("; go on with: "), "{log}");
 }
+
+/// A data set that is made from one in OUT that it would replace, of another area.
+#[test]
+fn an_earlier_data_set_that_is_the_input_is_not_overwritten() {
+    let dir = tempfile::tempdir().unwrap();
+    let small = ["--size", "32", "--pano-width", "64", "--views", "0", "--points-per-m2", "5"];
+    let out = dir.path().join("out");
+    let scene = write_scan(&dir.path().join("one"), 1);
+    s3d_ok(&[&["export", text(&scene), "-o", text(&out)], &small[..]].concat());
+    let before = files(&out);
+    let scene = write_scan(&dir.path().join("seven"), 7);
+    let toml = std::fs::read_to_string(&scene).unwrap();
+    std::fs::write(&scene, toml.replace("room.obj", "../out/area_1/3d/rgb.obj")).unwrap();
+    let call = [&["export", text(&scene), "-o", text(&out), "--overwrite"], &small[..]].concat();
+    s3d_fails(&call, 2, &["over its own input", "area_1/3d/rgb.obj"]);
+    assert!(files(&out) == before);
+}

@@ -280,3 +280,43 @@ fn the_list_of_files_is_true_and_stays_so() {
     s3d_ok(&["profile", text(&out), "--to", "pointnet", "--overwrite"]);
     assert_list_is_true(&out);
 }
+
+/// A command that changes a complete data set, and fails on the way, can be called again as it was.
+#[test]
+fn coordinates_and_profiles_that_failed_are_made_by_the_same_call() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = common::write_scan(&dir.path().join("scan"), 1);
+    let out = dir.path().join("out");
+    let small = ["--size", "32", "--pano-width", "64", "--views", "3", "--points-per-m2", "50"];
+    let modalities = ["--modalities", "depth,pose", "--keep-all"];
+    s3d_ok(&[&["export", text(&scene), "-o", text(&out)], &small[..], &modalities[..]].concat());
+    let layout = Layout::new(&out);
+
+    let poses = layout.image_dir(1, Frame::View(0), Domain::Pose);
+    let last = common::files(&poses).into_keys().next_back().unwrap();
+    let pose = fs::read(poses.join(&last)).unwrap();
+    fs::write(poses.join(&last), "{").unwrap();
+    common::s3d_fails(&["xyz", text(&out)], 1, &[text(&last)]);
+    assert!(!out.join(".s3d").exists());
+    fs::write(poses.join(&last), pose).unwrap();
+    s3d_ok(&["xyz", text(&out)]);
+    assert_list_is_true(&out);
+
+    let rooms = layout.s3dis_area_dir(1);
+    let points = common::files(&rooms);
+    points.keys().for_each(|name| fs::write(rooms.join(name), "no points").unwrap());
+    common::s3d_fails(&["profile", text(&out), "--to", "pointnet"], 1, &["Area_1"]);
+    points.iter().for_each(|(name, content)| fs::write(rooms.join(name), content).unwrap());
+    s3d_ok(&["profile", text(&out), "--to", "pointnet"]);
+    assert_list_is_true(&out);
+
+    // Not while somebody else changes it.
+    fs::create_dir(out.join(".s3d")).unwrap();
+    let lock = fs::File::create(out.join(".s3d/lock")).unwrap();
+    lock.lock().unwrap();
+    common::s3d_fails(&["xyz", text(&out), "--overwrite"], 75, &["another process"]);
+    common::s3d_fails(&["profile", text(&out), "--to", "open3d-ml"], 75, &["another process"]);
+    drop(lock);
+    s3d_ok(&["profile", text(&out), "--to", "open3d-ml"]);
+    assert_list_is_true(&out);
+}

@@ -375,3 +375,83 @@ fn wrong_calls_are_refused() {
     let out = dir.path().join("out");
     s3d_fails(&merging(&[&dir.path().join("scan")], &out), 1, &["no shard"]);
 }
+
+/// All folders below `dir`, empty ones too.
+fn folders(dir: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut left = vec![dir.to_owned()];
+    while let Some(folder) = left.pop() {
+        let below = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).filter(|path| path.is_dir());
+        left.extend(below);
+        found.push(folder.strip_prefix(dir).unwrap().to_owned());
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn merged_too_early_again_or_by_another_version() {
+    // The second area has no images: its folders are there all the same.
+    let trial = Trial::two_areas(&["--only", UUID_A, "--modalities", "depth"]);
+    let [one, two] = ["one-of-two", "two-of-two"].map(|name| trial.path(name));
+    trial.shard(&one, 1, 2, &[]);
+    // What is missing may come yet, as long as some shard is at work.
+    let lock = fs::File::open(one.join(".s3d/lock")).unwrap();
+    lock.lock_shared().unwrap();
+    s3d_fails(&merging(&[&one], &one), 75, &["another process", "go on with: "]);
+    drop(lock);
+    s3d_fails(&merging(&[&one], &one), 1, &["--shard 2/2"]);
+    trial.shard(&two, 2, 2, &[]);
+    // As in the folder of one that was killed early, or of an export without shards.
+    fs::remove_file(two.join(".s3d/labels.jsonl")).unwrap();
+    let out = trial.path("merged");
+    let log = s3d_ok(&merging(&[&two, &one], &out));
+    assert!(log.contains("1 panoramas and"), "the account is that of all shards: {log}");
+    trial.assert_single(&out);
+    assert_eq!(folders(&out), folders(&trial.path("single")));
+
+    let requests = [&one, &two].map(|shard| shard.join(".s3d/request.json"));
+    let written = requests.each_ref().map(|path| fs::read_to_string(path).unwrap());
+    for (path, text) in requests.iter().zip(&written) {
+        fs::write(path, text.replace(env!("CARGO_PKG_VERSION"), "0.0.1")).unwrap();
+    }
+    let call = trial.path("other-version");
+    s3d_fails(&merging(&[&one, &two], &call), 2, &["version 0.0.1 of s3d", "merge with that version"]);
+    // One with other options is no less of a shard, and nobody's to remove.
+    for (path, text) in requests.iter().zip(&written) {
+        let other = text.replace(env!("CARGO_PKG_VERSION"), "0.0.1").replace("\"seed\": 0,", "");
+        assert!(other.len() + 8 < text.len());
+        fs::write(path, other).unwrap();
+    }
+    s3d_fails(&merging(&[&one, &two], &call), 2, &["version 0.0.1 of s3d", "merge with that version"]);
+    let before = files(&one);
+    for how in [&["--shard", "1/2"][..], &[]] {
+        s3d_fails(&words(&trial.export(&one, how)), 2, &["version 0.0.1 of s3d there", "--overwrite"]);
+    }
+    assert_eq!(files(&one), before);
+    requests.iter().zip(&written).for_each(|(path, text)| fs::write(path, text).unwrap());
+
+    // Into one of them, and twice by mistake.
+    trial.merge(&[&one, &two], &one);
+    let log = s3d_ok(&merging(&[&one, &two], &one));
+    assert!(log.contains("nothing to do"), "{log}");
+    trial.assert_single(&one);
+}
+
+#[test]
+fn a_plan_is_no_folder_for_a_data_set() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenes = [1, 5].map(|area| write_scan(&dir.path().join(area.to_string()), area));
+    let plan = dir.path().join("plan");
+    s3d_ok(&[&["plan", text(&scenes[0]), "-o", text(&plan)], &SCORING[..]].concat());
+    let before = files(&plan);
+    for scene in &scenes {
+        let call = [&["export", text(scene), "-o", text(&plan), "--overwrite"], &SMALL[..]].concat();
+        s3d_fails(&call, 2, &["holds a plan"]);
+        assert_eq!(files(&plan), before);
+    }
+    // Nobody can say what a plan is for that lost its first file.
+    fs::write(plan.join("plan.jsonl"), "{").unwrap();
+    let call = [&["plan", text(&scenes[0]), "-o", text(&plan)], &SCORING[..]].concat();
+    s3d_fails(&call, 1, &["plan.jsonl", "remove the folder"]);
+}

@@ -9,10 +9,11 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write as _};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 const SMALL: [&str; 8] = ["--size", "64", "--pano-width", "128", "--views", "12", "--points-per-m2", "300"];
@@ -169,15 +170,32 @@ fn a_signal_stops_each_stage_soon_and_the_command_told_goes_on() {
     }
 }
 
-/// Starts an export that waits for ever: what lies in its folder is a pipe that nobody writes into, as a file on a server
-/// that is away.
+/// Starts an export that reads its mesh for minutes, in one call: faces whose many corners have no order take long to be
+/// cut into triangles.
 fn start_endless(dir: &Path) -> Run {
     let (scene, out) = (write_scan(dir, 1), dir.join("out"));
-    fs::create_dir_all(&out).unwrap();
-    let manifest = out.join("manifest.json");
-    assert!(manifest.exists() || Command::new("mkfifo").arg(&manifest).status().unwrap().success());
+    let mut obj = fs::OpenOptions::new().append(true).open(dir.join("room.obj")).unwrap();
+    let (corners, mut random) = (16_000, 1u64);
+    let mut text_of_faces = String::new();
+    for _ in 0..corners {
+        let mut next = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (random >> 40) as f64 / 1e6
+        };
+        let _ = writeln!(text_of_faces, "v {} 0 {}", next(), next());
+    }
+    for face in 0..100 {
+        text_of_faces.push('f');
+        (0..corners).for_each(|i| {
+            let _ = write!(text_of_faces, " {}", 1 + (i * 7_919 + face) % corners - corners - 1);
+        });
+        text_of_faces.push('\n');
+    }
+    obj.write_all(text_of_faces.as_bytes()).unwrap();
     let mut run = Run::start(&["export", text(&scene), "-o", text(&out)]);
     run.wait_for("start", |e| kind(e) == "started");
+    // All that comes before is done by then.
+    sleep(Duration::from_secs(1));
     run
 }
 

@@ -1,9 +1,9 @@
 //! `files.csv`: every file of a data set with its size and checksum.
 
+use crate::texture_file::open_file;
 use crate::{Checksum, Error, Result, checksum_of_file, write_whole};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
@@ -134,7 +134,7 @@ pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Chec
 /// leads out of the folder, one that does not sort behind the one before, a last line without a line feed.
 pub fn read_file_list(path: &Path) -> Result<Vec<FileRecord>> {
     let failed = |e| Error::io(path, "read", e);
-    let mut lines = BufReader::new(File::open(path).map_err(failed)?);
+    let mut lines = BufReader::new(open_file(path)?);
     let mut records: Vec<FileRecord> = Vec::new();
     let mut known: BTreeSet<String> = BTreeSet::new();
     let mut line = Vec::new();

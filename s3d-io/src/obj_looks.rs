@@ -156,7 +156,9 @@ fn load_libraries(
         for library in files {
             match read_file(&library) {
                 Ok(bytes) => {
-                    read.push(library.clone());
+                    if !read.contains(&library) {
+                        read.push(library.clone());
+                    }
                     let (materials, complaints) = parse_mtl(&bytes);
                     warnings.extend(complaints.iter().map(|c| format!("{}, {c}", library.display())));
                     for material in materials {

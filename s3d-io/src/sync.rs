@@ -14,41 +14,62 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// [`Error::Io`]: the disk did not take the data after all.
 pub fn sync_data_set(root: &Path, files: &[PathBuf]) -> Result<()> {
-    let failed = |e| Error::io(root, "bring to the disk", e);
-    let folder = File::open(root).map_err(failed)?;
-    if sync_file_system(&folder).map_err(failed)? {
+    if sync_file_system(root).map_err(|e| Error::io(root, "bring to the disk", e))? {
         return Ok(());
     }
-    for path in files {
-        let synced = File::open(path).and_then(|file| file.sync_all());
-        synced.map_err(|e| Error::io(path, "bring to the disk", e))?;
-    }
-    let mut folders: Vec<&Path> = files.iter().filter_map(|path| path.parent()).collect();
-    folders.sort();
-    folders.dedup();
-    for path in folders.into_iter().chain([root]) {
-        // Not every system lets folders be opened; where it does not, names are as safe as it makes them.
-        if let Ok(folder) = File::open(path) {
-            let _ = folder.sync_all();
-        }
+    sync_one_by_one(root, files)
+}
+
+/// Brings one file to the disk, and its name.
+///
+/// # Errors
+/// [`Error::Io`]: it is not there, or the disk did not take it after all.
+pub fn sync_file(path: &Path) -> Result<()> {
+    sync_content(path)?;
+    if let Some(folder) = path.parent() {
+        sync_folder(folder);
     }
     Ok(())
 }
 
+fn sync_one_by_one(root: &Path, files: &[PathBuf]) -> Result<()> {
+    files.iter().try_for_each(|path| sync_content(path))?;
+    let mut folders: Vec<&Path> = files.iter().filter_map(|path| path.parent()).collect();
+    folders.sort();
+    folders.dedup();
+    folders.into_iter().chain([root]).for_each(sync_folder);
+    Ok(())
+}
+
+fn sync_content(path: &Path) -> Result<()> {
+    // Windows syncs through handles that may write alone.
+    let opened = if cfg!(windows) { File::options().write(true).open(path) } else { File::open(path) };
+    let synced = opened.and_then(|file| file.sync_all());
+    synced.map_err(|e| Error::io(path, "bring to the disk", e))
+}
+
+/// Not every system lets folders be opened (Windows does not); where it does not, names are as safe as it makes them.
+fn sync_folder(path: &Path) {
+    if let Ok(folder) = File::open(path) {
+        let _ = folder.sync_all();
+    }
+}
+
 /// Whether the file system took all that was written in one call.
 #[cfg(target_os = "linux")]
-fn sync_file_system(folder: &File) -> std::io::Result<bool> {
+fn sync_file_system(root: &Path) -> std::io::Result<bool> {
     use rustix::io::Errno;
-    match rustix::fs::syncfs(folder) {
+    match rustix::fs::syncfs(File::open(root)?) {
         Ok(()) => Ok(true),
         Err(Errno::NOSYS | Errno::OPNOTSUPP | Errno::INVAL) => Ok(false),
         Err(e) => Err(e.into()),
     }
 }
 
+/// There is no such call; a folder that is not there is told of all the same.
 #[cfg(not(target_os = "linux"))]
-fn sync_file_system(_: &File) -> std::io::Result<bool> {
-    Ok(false)
+fn sync_file_system(root: &Path) -> std::io::Result<bool> {
+    std::fs::metadata(root).map(|_| false)
 }
 
 #[cfg(test)]
@@ -64,5 +85,22 @@ mod tests {
         sync_data_set(dir.path(), std::slice::from_ref(&path)).unwrap();
         let message = sync_data_set(&dir.path().join("gone"), &[path]).unwrap_err().to_string();
         assert!(message.contains("gone: cannot bring to the disk"), "{message}");
+    }
+
+    /// What other systems do runs here too.
+    #[test]
+    fn files_are_synced_one_by_one_and_one_that_is_gone_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let paths = ["a.txt", "b.txt"].map(|name| dir.path().join(name));
+        for path in &paths {
+            write_bytes(path, b"a").unwrap();
+        }
+        sync_one_by_one(dir.path(), &paths).unwrap();
+        paths.iter().for_each(|path| sync_file(path).unwrap());
+        std::fs::remove_file(&paths[1]).unwrap();
+        for failed in [sync_one_by_one(dir.path(), &paths), sync_file(&paths[1])] {
+            let message = failed.unwrap_err().to_string();
+            assert!(message.contains("b.txt: cannot bring to the disk"), "{message}");
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::args::ProfileArgs;
 use crate::failure::{Failure, Outcome};
+use crate::pipeline::lock::Lock;
 use crate::pipeline::manifest::{Head, Manifest};
 use crate::pipeline::{listing, profiles};
 use s3d_io::{Error, Layout};
@@ -9,8 +10,14 @@ use std::fs;
 
 pub(crate) fn run(args: &ProfileArgs) -> Outcome<()> {
     let layout = Layout::new(args.output.clone());
-    let head = Head::require(&layout)?;
-    let mut manifest = Manifest::read(&layout)?;
+    Head::require(&layout)?;
+    // Nobody may replace the data set meanwhile.
+    Lock::during(&layout, || make(&layout, args))
+}
+
+fn make(layout: &Layout, args: &ProfileArgs) -> Outcome<()> {
+    let head = Head::require(layout)?;
+    let mut manifest = Manifest::read(layout)?;
     let mut wanted = args.profiles.clone();
     wanted.sort();
     wanted.dedup();
@@ -29,14 +36,20 @@ pub(crate) fn run(args: &ProfileArgs) -> Outcome<()> {
             fs::remove_dir_all(&dir).map_err(|e| Error::io(&dir, "remove", e))?;
         }
     }
-    profiles::write(&layout, &head.area_numbers, &wanted)?;
+    if let Err(e) = profiles::write(layout, &head.area_numbers, &wanted) {
+        // Halves of profiles would stand in the way of the same call.
+        for profile in &wanted {
+            let _ = fs::remove_dir_all(layout.profile_dir(profile.name()));
+        }
+        return Err(e);
+    }
     let names: Vec<&str> = wanted.iter().map(|p| p.name()).collect();
     manifest.add_profiles(&names);
     let mut files = Vec::new();
     for name in &names {
         files.extend(listing::walk(&layout.profile_dir(name))?);
     }
-    let changed = listing::records(&layout, &files)?;
+    let changed = listing::records(layout, &files)?;
     let is_gone = |path: &str| names.iter().any(|name| path.starts_with(&format!("profiles/{name}/")));
-    listing::update(&layout, &mut manifest, changed, is_gone)
+    listing::update(layout, &mut manifest, changed, is_gone)
 }

@@ -5,6 +5,7 @@ use crate::args::XyzArgs;
 use crate::console::Progress;
 use crate::failure::{Failure, Outcome};
 use crate::pipeline::listing;
+use crate::pipeline::lock::Lock;
 use crate::pipeline::manifest::{Head, Manifest};
 use crate::pipeline::work::for_each_in_order;
 use half::f16;
@@ -19,7 +20,10 @@ use std::sync::{Mutex, PoisonError};
 use tracing::info;
 
 pub(crate) fn run(args: &XyzArgs) -> Outcome<()> {
-    on_threads(args.threads, || make(args))
+    let layout = Layout::new(args.output.clone());
+    Head::require(&layout)?;
+    // Nobody may replace the data set meanwhile.
+    Lock::during(&layout, || on_threads(args.threads, || make(&layout, args)))
 }
 
 /// The files of one image.
@@ -30,15 +34,14 @@ struct Work {
     frame: Frame,
 }
 
-fn make(args: &XyzArgs) -> Outcome<()> {
-    let layout = Layout::new(args.output.clone());
-    let head = Head::require(&layout)?;
-    let mut manifest = Manifest::read(&layout)?;
+fn make(layout: &Layout, args: &XyzArgs) -> Outcome<()> {
+    let head = Head::require(layout)?;
+    let mut manifest = Manifest::read(layout)?;
     let conventions = read_conventions(&layout.conventions())?;
     let mut work = Vec::new();
     for area in &head.area_numbers {
         for kind in [Frame::Panorama, Frame::View(0)] {
-            work.extend(images(&layout, *area, kind)?);
+            work.extend(images(layout, *area, kind)?);
         }
     }
     if work.is_empty() {
@@ -57,7 +60,7 @@ fn make(args: &XyzArgs) -> Outcome<()> {
     }
     let progress = Progress::new("coordinates", "images", work.len() as u64);
     let changed = Mutex::new(Vec::with_capacity(work.len() + 1));
-    for_each_in_order(
+    let made = for_each_in_order(
         &work,
         || (),
         |(), work| {
@@ -68,13 +71,20 @@ fn make(args: &XyzArgs) -> Outcome<()> {
             progress.add(1);
             Ok(())
         },
-    )?;
+    );
     drop(progress);
     let mut changed = changed.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Err(e) = made {
+        // Files that are in no list would stand in the way of the same call.
+        if !args.overwrite {
+            changed.iter().for_each(|record| drop(fs::remove_file(record.path_in(layout.root()))));
+        }
+        return Err(e);
+    }
     Conventions { xyz: args.xyz, ..conventions }.write(&layout.conventions())?;
     changed.push(FileRecord::of_file(layout.root(), &layout.conventions())?);
     manifest.xyz_from_depth(args.xyz, conventions.depth_units);
-    listing::update(&layout, &mut manifest, changed, |_| false)?;
+    listing::update(layout, &mut manifest, changed, |_| false)?;
     info!("{}: world coordinates of {} images from depth and pose", layout.root().display(), work.len());
     Ok(())
 }

@@ -10,7 +10,7 @@ use super::inputs::RoomInput;
 use crate::failure::Outcome;
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use s3d_geom::{Aabb, Footprint, Polygon, Pose};
-use s3d_io::{Checksum, Error, NpyWriter, ScanLocation, create_dir};
+use s3d_io::{Checksum, Error, NpyWriter, ScanLocation, create_dir, is_valid_uuid};
 use s3d_label::{Class, Label, LabelId, Room, VoteReport, VoteRow};
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
@@ -220,6 +220,12 @@ impl AreaFile {
         }
         let (mut locations, mut location_rooms) = (Vec::new(), Vec::new());
         for file in self.locations {
+            // It will stand in the names of files.
+            if !is_valid_uuid(&file.uuid) {
+                return Err(
+                    Error::format(path, format!("{:?} is no uuid of a scan location", file.uuid)).into()
+                );
+            }
             location_rooms.push(parsed(path, &file.room)?);
             let pose = Pose {
                 location: DVec3::from_array(file.location),
@@ -488,5 +494,16 @@ mod tests {
         }
         std::fs::remove_file(&labels).unwrap();
         assert!(refusal(3).contains("face_labels.npy"), "{}", refusal(3));
+    }
+
+    #[test]
+    fn uuids_that_lead_elsewhere_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut runner = proptest::test_runner::TestRunner::deterministic();
+        let mut plan = any_plan().new_tree(&mut runner).unwrap().current();
+        plan.locations[0].uuid = "../../elsewhere".into();
+        plan.write(dir.path()).unwrap();
+        let e = AreaPlan::read(dir.path(), 3).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(e.contains("\"../../elsewhere\" is no uuid"), "{e}");
     }
 }

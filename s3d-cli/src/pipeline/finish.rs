@@ -4,7 +4,6 @@
 use super::journal::{Finished, Unit};
 use super::listing;
 use super::manifest::{AreaEntry, Manifest};
-use super::output::sync_file;
 use super::profiles::{self, Profile};
 use super::records;
 use super::request::Request;
@@ -13,7 +12,7 @@ use super::summary::{UnitTally, ViewTally};
 use super::views::select_requested;
 use crate::failure::{Failure, Outcome};
 use crate::stop;
-use s3d_io::{Error, Layout, sync_data_set};
+use s3d_io::{Domain, Error, Frame, Layout, UnknownDomain, create_dir, sync_data_set, sync_file};
 use s3d_sample::folds;
 use std::fs;
 use std::path::PathBuf;
@@ -89,6 +88,14 @@ pub(crate) fn finish(
     }
     for done in finished.iter().filter(|done| areas.contains(&done.unit().area())) {
         files.extend_from_slice(done.files());
+    }
+    // A merge makes none for images that no shard has.
+    for name in &request.options.modalities {
+        let domain: Domain = name.parse().map_err(|e: UnknownDomain| Failure::Input(e.to_string()))?;
+        for (area, frame) in areas.iter().flat_map(|area| [(*area, Frame::Panorama), (*area, Frame::View(0))])
+        {
+            create_dir(&layout.image_dir(area, frame, domain))?;
+        }
     }
     stop::check()?;
     let folds = folds(&areas);

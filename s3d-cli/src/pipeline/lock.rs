@@ -63,6 +63,17 @@ impl Lock {
         }
     }
 
+    /// The lock of a complete data set that a command changes, for the time of `work`.
+    ///
+    /// # Errors
+    /// As [`Lock::take`], and those of `work`.
+    pub(crate) fn during<T>(layout: &Layout, work: impl FnOnce() -> Outcome<T>) -> Outcome<T> {
+        let lock = Self::take(layout, Sharing::Alone)?;
+        let done = work();
+        lock.abandon();
+        done
+    }
+
     /// Gives the lock back, and takes the working folder away if nothing was begun.
     pub(crate) fn abandon(self) {
         if !self.layout.request().exists() {

@@ -1,10 +1,11 @@
 //! `manifest.json`: what made a data set, from what, with which options, and what was lost on the way.
 
 use super::request::{InputRecord, Options, Request, RequestedArea};
-use crate::failure::Outcome;
+use crate::failure::{Outcome, passes_io};
 use s3d_geom::Aabb;
 use s3d_io::{Checksum, DepthUnits, Error, Layout, XyzType, read_json, write_json};
 use serde::{Deserialize, Serialize};
+use std::io::ErrorKind;
 use std::path::Path;
 
 const GENERATOR: &str = "s3d";
@@ -216,6 +217,23 @@ impl Manifest {
     }
 }
 
+/// What a file holds; nothing if it is not there, or is none of ours.
+///
+/// # Errors
+/// Those of the disk or the network at this moment, and of permissions: what cannot be read now may be there all the same,
+/// and must not be taken for gone.
+pub(crate) fn if_there<T>(read: s3d_io::Result<T>) -> Outcome<Option<T>> {
+    match read {
+        Ok(value) => Ok(Some(value)),
+        Err(Error::Io { path, action, source })
+            if passes_io(&source) || source.kind() == ErrorKind::PermissionDenied =>
+        {
+            Err(Error::Io { path, action, source }.into())
+        }
+        Err(_) => Ok(None),
+    }
+}
+
 /// What a manifest tells of the data set beside it.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Head {
@@ -227,15 +245,18 @@ pub(crate) struct Head {
 
 impl Head {
     /// The manifest at `path`, if there is one and it is ours, of a complete data set or of one that was begun.
-    pub(crate) fn read(path: &Path) -> Option<Self> {
-        let head: Self = read_json(path).ok()?;
-        (head.generator == GENERATOR).then_some(head)
+    ///
+    /// # Errors
+    /// It cannot be read now: as [`if_there`].
+    pub(crate) fn read(path: &Path) -> Outcome<Option<Self>> {
+        let head: Option<Self> = if_there(read_json(path))?;
+        Ok(head.filter(|head| head.generator == GENERATOR))
     }
 
     /// The manifest of a folder that must hold a complete data set of ours.
     pub(crate) fn require(layout: &Layout) -> Outcome<Self> {
         let path = layout.manifest();
-        let head = Self::read(&path).ok_or_else(|| {
+        let head = Self::read(&path)?.ok_or_else(|| {
             Error::format(&path, "not there, or not written by s3d: give the folder of a data set")
         })?;
         if head.is_complete() {
@@ -254,6 +275,21 @@ impl Head {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_cannot_be_read_now_is_not_taken_for_gone() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("manifest.json");
+        assert!(Head::read(&path).unwrap().is_none());
+        std::fs::write(&path, "{}").unwrap();
+        assert!(Head::read(&path).unwrap().is_none());
+        std::fs::write(&path, r#"{"generator":"s3d","status":"complete","area_numbers":[3]}"#).unwrap();
+        assert!(Head::read(&path).unwrap().is_some_and(|head| head.is_complete()));
+        let failed = |kind: ErrorKind| if_there::<()>(Err(Error::io(&path, "read", kind.into())));
+        assert!(failed(ErrorKind::NotFound).unwrap().is_none());
+        assert_eq!(failed(ErrorKind::StaleNetworkFileHandle).unwrap_err().exit_code(), 75);
+        assert_eq!(failed(ErrorKind::PermissionDenied).unwrap_err().exit_code(), 1);
+    }
 
     #[test]
     fn steps_of_half_floats() {

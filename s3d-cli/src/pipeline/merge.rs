@@ -10,7 +10,7 @@ use super::lock::{Lock, Sharing};
 use super::manifest::Manifest;
 use super::output::{self, Begin};
 use super::request::Request;
-use super::summary::Account;
+use super::summary::{Account, UnitTally};
 use super::transfer::bring;
 use super::work::for_each_in_order;
 use super::{Target, tell_made};
@@ -24,6 +24,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 use tracing::info;
 
 /// Most units that a message names.
@@ -47,31 +48,31 @@ pub(crate) fn merge(folders: &[PathBuf], target: &Target<'_>) -> Outcome<()> {
     let account = Account::new();
     let layout = &target.layout;
     let folders = distinct(folders)?;
-    if let [only] = &folders[..]
-        && is_same(only, layout.root())
-        && output::read_request(&Layout::new(only)).is_none()
-        && Manifest::read(layout).is_ok()
-    {
+    if is_done(&folders, layout)? {
         info!("{}: the data set is complete; nothing to do", layout.root().display());
         return Ok(());
     }
     let stage = account.stage(Stage::Load, None);
-    // OUT's own lock is taken when the merge begins in it.
-    let apart = folders.iter().filter(|folder| !is_same(folder, layout.root()));
-    let _locks = apart.map(|folder| lock(folder)).collect::<Outcome<Vec<_>>>()?;
+    // OUT's own lock is taken again when the merge begins in it; until then nobody may be at work there either.
+    let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        folders.iter().partition(|folder| is_same(folder, layout.root()));
+    let _locks = apart.into_iter().map(|folder| lock(folder)).collect::<Outcome<Vec<_>>>()?;
+    let own_lock = inside.into_iter().map(|folder| lock(folder)).collect::<Outcome<Vec<_>>>()?;
     let parts = folders.iter().map(|folder| Part::read(folder)).collect::<Outcome<Vec<Part>>>()?;
+    drop(own_lock);
     let Some(first) = parts.first() else {
         return Err(Failure::Call("there is no shard to merge".to_owned()));
     };
     let request = &first.request;
     refuse_mixed(&parts)?;
+    refuse_other_version(first)?;
     let mut all = Finished::default();
     parts.iter().flat_map(|part| part.finished.iter()).for_each(|done| all.insert(done.clone()));
     let missing = missing_units(request, &all);
     if !missing.is_empty() {
         return Err(told_missing(&parts, &missing, "is missing"));
     }
-    let labels = LabelList::read(&LabelList::path(&first.layout))?;
+    let labels = label_list(&parts)?;
     stage.end();
 
     output::check(layout, target.overwrite, target.allowed)?;
@@ -87,7 +88,7 @@ pub(crate) fn merge(folders: &[PathBuf], target: &Target<'_>) -> Outcome<()> {
         let stage = account.stage(Stage::Merge, None);
         // Should this OUT be merged again, or gone on with.
         labels.write(&LabelList::path(layout))?;
-        gather(layout, &parts, &all, &session)?;
+        gather(layout, &parts, &all, &session, &account)?;
         stage.end();
         let stage = account.stage(Stage::Tables, None);
         let options = &request.options;
@@ -105,6 +106,34 @@ pub(crate) fn merge(folders: &[PathBuf], target: &Target<'_>) -> Outcome<()> {
     };
     tell_made(account, layout, request, &made);
     Ok(())
+}
+
+/// Whether OUT, one of the folders, holds what they make already: they were merged before.
+fn is_done(folders: &[PathBuf], layout: &Layout) -> Outcome<bool> {
+    let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        folders.iter().partition(|folder| is_same(folder, layout.root()));
+    if inside.is_empty() || output::read_request(layout)?.is_some() {
+        return Ok(false);
+    }
+    let Ok(manifest) = Manifest::read(layout) else { return Ok(false) };
+    for folder in apart {
+        let of = output::read_request(&Layout::new(folder))?;
+        if !of.is_some_and(|of| manifest.differences(&of).is_empty()) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The label table, from the first that has it whole: a shard that was killed early has none, nor has an export that was
+/// begun without shards.
+fn label_list(parts: &[Part]) -> Outcome<LabelList> {
+    let found = parts.iter().find_map(|part| LabelList::read(&LabelList::path(&part.layout)).ok());
+    found.ok_or_else(|| {
+        Failure::Input(
+            "none of the folders has the label table: run any of the shards again, and merge then".to_owned(),
+        )
+    })
 }
 
 /// The folders, each once, as they are on the disk.
@@ -150,7 +179,10 @@ fn lock(folder: &Path) -> Outcome<Option<Lock>> {
 impl Part {
     fn read(folder: &Path) -> Outcome<Self> {
         let layout = Layout::new(folder);
-        let Some(request) = output::read_request(&layout) else {
+        let Some(request) = output::read_request(&layout)? else {
+            if let Some(version) = output::begun_by_other_version(&layout)? {
+                return Err(other_version(folder, &version));
+            }
             let message = if Manifest::read(&layout).is_ok() {
                 "is a complete data set, and no shard of one"
             } else {
@@ -183,6 +215,23 @@ fn refuse_mixed(parts: &[Part]) -> Outcome<()> {
     Ok(())
 }
 
+/// Refuses shards of another version of s3d, whose tables would be others.
+fn refuse_other_version(part: &Part) -> Outcome<()> {
+    let there = &part.request.version;
+    if there == env!("CARGO_PKG_VERSION") {
+        return Ok(());
+    }
+    Err(other_version(part.layout.root(), there))
+}
+
+fn other_version(folder: &Path, there: &str) -> Failure {
+    Failure::Call(format!(
+        "{} is a shard by version {there} of s3d, and this is {}: merge with that version",
+        folder.display(),
+        env!("CARGO_PKG_VERSION")
+    ))
+}
+
 /// What is to be done about units that are not there.
 fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Failure {
     let named: Vec<String> = missing.iter().take(MOST_NAMED).map(Unit::to_string).collect();
@@ -205,10 +254,18 @@ fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Failure {
 }
 
 /// Brings the files of all units that OUT has not yet into it, and checks each there.
-fn gather(layout: &Layout, parts: &[Part], all: &Finished, session: &output::Session) -> Outcome<()> {
+fn gather(
+    layout: &Layout,
+    parts: &[Part],
+    all: &Finished,
+    session: &output::Session,
+    account: &Account,
+) -> Outcome<()> {
+    let started = Instant::now();
     let units: Vec<Unit> =
         all.iter().map(Done::unit).filter(|u| !session.journal.finished().has(u)).collect();
-    let files: usize = all.iter().map(|done| done.files().len()).sum();
+    let tally: UnitTally = units.iter().filter_map(|unit| all.get(unit)).map(Done::tally).sum();
+    let files: usize = units.iter().filter_map(|unit| all.get(unit)).map(|done| done.files().len()).sum();
     let progress = Progress::new("merging", "files", files as u64);
     let faults: Mutex<Vec<(Unit, String)>> = Mutex::new(Vec::new());
     for_each_in_order(
@@ -241,7 +298,10 @@ fn gather(layout: &Layout, parts: &[Part], all: &Finished, session: &output::Ses
     let mut faults = faults.into_inner().unwrap_or_else(PoisonError::into_inner);
     faults.sort();
     match faults.first() {
-        None => Ok(()),
+        None => {
+            account.units_taken(units.len() as u64, &tally, started);
+            Ok(())
+        }
         Some((_, first)) => {
             let units: Vec<Unit> = faults.iter().map(|(unit, _)| unit.clone()).collect();
             Err(told_missing(parts, &units, &format!("is damaged ({first})")))

@@ -6,6 +6,7 @@
 pub(crate) mod annotate;
 mod area;
 mod area_plan;
+mod aside;
 pub(crate) mod assets;
 mod checked;
 pub(crate) mod deal;

@@ -14,25 +14,21 @@
 //! | – | – or running | there | the new one had not begun, or failed for good: the earlier one comes back |
 //! | – | running | – | the rest of an export of a version without a journal: nobody's |
 
+use super::aside::{ASIDE, MOVING, TRASH, clear, discard, move_entries, recover, remove, rename, restore};
 use super::inputs::Inputs;
 use super::journal::{Done, Finished, Journal};
 use super::listing::remove_parts;
 use super::lock::{Lock, Sharing};
-use super::manifest::{Head, Manifest};
+use super::manifest::{Head, Manifest, if_there};
 use super::request::Request;
 use super::summary::Account;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Failure, Outcome, passes};
 use crate::stop;
-use s3d_io::{Error, Layout, create_dir, read_file_list, read_json, sync_data_set, write_bytes, write_json};
+use s3d_io::{Error, Layout, read_file_list, read_json, sync_data_set, sync_file, write_bytes, write_json};
+use serde::Deserialize;
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tracing::{info, warn};
-
-/// Folders in OUT: an earlier data set while it is set aside, when it is, and when it goes.
-const MOVING: &str = ".s3d-previous.part";
-const ASIDE: &str = ".s3d-previous";
-const TRASH: &str = ".s3d-trash";
 
 /// How many differences are named in a message.
 const MOST_NAMED: usize = 8;
@@ -47,12 +43,16 @@ pub(crate) fn check(layout: &Layout, overwrite: bool, allowed: &[&str]) -> Outco
             root.display()
         );
     }
+    // Its journals would be taken for those of an export.
+    if super::plan::is_in(root) {
+        return Err(Failure::Call(format!("{} holds a plan: choose another folder", root.display())));
+    }
     match fs::read_dir(root) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
         Err(e) => Err(Error::io(root, "use as the output folder", e).into()),
         Ok(entries) => {
-            let head = Head::read(&layout.manifest());
-            let is_ours = head.as_ref().is_some_and(Head::is_complete) || read_request(layout).is_some();
+            let head = Head::read(&layout.manifest())?;
+            let is_ours = head.as_ref().is_some_and(Head::is_complete) || read_request(layout)?.is_some();
             if overwrite || is_ours {
                 return Ok(());
             }
@@ -81,10 +81,16 @@ pub(crate) fn is_working_name(name: &std::ffi::OsStr) -> bool {
     name == ".s3d" || name.starts_with(".s3d-")
 }
 
-/// Refuses an OUT in which the data set would lie on its own input, or in its annotations.
+/// Refuses an OUT in which the data set, or an earlier one that it replaces, would lie on its own input, or in its
+/// annotations.
 pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Outcome<()> {
     let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
-    let entries = Layout::new(&root).entries(&inputs.numbers());
+    // Those of a data set that is there go, too, if it has other areas.
+    let mut areas = inputs.numbers();
+    areas.extend(Head::read(&layout.manifest())?.map_or(Vec::new(), |head| head.area_numbers));
+    areas.extend(read_request(layout)?.map_or(Vec::new(), |request| request.numbers()));
+    let mut entries = Layout::new(&root).entries(&areas);
+    entries.push(root.join(ASIDE));
     for area in &inputs.areas {
         for path in &area.files {
             let Ok(input) = fs::canonicalize(path) else { continue };
@@ -116,29 +122,50 @@ enum Found {
 }
 
 fn find(layout: &Layout, request: &Request) -> Outcome<Found> {
-    let head = Head::read(&layout.manifest());
+    let head = Head::read(&layout.manifest())?;
     if head.as_ref().is_some_and(Head::is_complete) {
         let differences = match Manifest::read(layout) {
             Ok(manifest) => manifest.differences(request),
+            Err(e @ Failure::Again(_)) => return Err(e),
             // Of another version.
             Err(e) => vec![e.to_string()],
         };
         return Ok(Found::Complete { differences });
     }
-    Ok(match (read_request(layout), head) {
+    Ok(match (read_request(layout)?, head) {
         (Some(begun), _) => Found::Unfinished {
             areas: begun.numbers(),
             differences: begun.differences(request),
             failed: layout.failed().exists(),
         },
-        (None, Some(head)) => Found::Leftover { areas: head.area_numbers },
+        (None, Some(head)) => match begun_by_other_version(layout)? {
+            Some(there) => Found::Unfinished {
+                areas: head.area_numbers,
+                differences: vec![format!("version {there} of s3d there, {} now", request.version)],
+                failed: layout.failed().exists(),
+            },
+            None => Found::Leftover { areas: head.area_numbers },
+        },
         (None, None) => Found::Nothing,
     })
 }
 
 /// The request of an unfinished export, if there is one.
-pub(crate) fn read_request(layout: &Layout) -> Option<Request> {
-    read_json(&layout.request()).ok()
+///
+/// # Errors
+/// It cannot be read now: as [`if_there`].
+pub(crate) fn read_request(layout: &Layout) -> Outcome<Option<Request>> {
+    if_there(read_json(&layout.request()))
+}
+
+/// The version of s3d that began an unfinished export whose request this one cannot read, for it has other options.
+pub(crate) fn begun_by_other_version(layout: &Layout) -> Outcome<Option<String>> {
+    #[derive(Deserialize)]
+    struct Of {
+        version: String,
+    }
+    let of: Option<Of> = if_there(read_json(&layout.request()))?;
+    Ok(of.map(|of| of.version).filter(|version| version != env!("CARGO_PKG_VERSION")))
 }
 
 /// How an export begins.
@@ -194,7 +221,7 @@ pub(crate) fn begin(
         }
         Err(e) => {
             // An earlier data set that was set aside for nothing comes back.
-            if read_request(layout).is_none()
+            if matches!(read_request(layout), Ok(None))
                 && let Err(e) = recover(layout)
             {
                 warn!("{e}");
@@ -246,6 +273,12 @@ pub(crate) fn begin_shard(
                     return Ok(Begin::Session(Session { layout: layout.clone(), lock, journal }));
                 }
                 lock.abandon();
+                if started.elapsed() > BEGIN_WITHIN {
+                    return Err(Failure::Again(format!(
+                        "{}: shards of another call are at work in it",
+                        layout.root().display()
+                    )));
+                }
             }
             Err(e @ Failure::Again(_)) if started.elapsed() > BEGIN_WITHIN => return Err(e),
             Err(Failure::Again(_)) => {}
@@ -335,7 +368,7 @@ fn begin_locked(
             clear(layout)?;
         }
         Found::Complete { .. } => {
-            let head = Head::read(&layout.manifest());
+            let head = Head::read(&layout.manifest())?;
             let areas = head.map_or(Vec::new(), |head| head.area_numbers);
             refuse_in_the_way(layout, request, &areas)?;
             let moving = Layout::new(layout.root().join(MOVING));
@@ -362,6 +395,7 @@ fn begin_locked(
 fn is_intact(layout: &Layout, exactly: bool) -> Outcome<bool> {
     let records = match read_file_list(&layout.file_list()) {
         Ok(records) => records,
+        Err(e) if passes(&e) => return Err(e.into()),
         Err(_) if exactly => return Ok(false),
         Err(e) => return Err(Failure::Input(format!("{e}; make the data set again with --overwrite"))),
     };
@@ -405,76 +439,6 @@ fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Outco
     Ok(())
 }
 
-/// Brings a folder in which an export was killed to a state of the table above that has only one meaning.
-fn recover(layout: &Layout) -> Outcome<()> {
-    let inside = |name: &str| layout.root().join(name);
-    remove(&inside(TRASH))?;
-    let moving = Layout::new(inside(MOVING));
-    if moving.root().exists() {
-        // The manifest moves last: it is in one of the two.
-        if let Some(head) = Head::read(&moving.manifest()).or_else(|| Head::read(&layout.manifest())) {
-            move_entries(&moving, layout, &head.area_numbers)?;
-        }
-        remove(moving.root())?;
-    }
-    if Head::read(&layout.manifest()).is_some_and(|head| head.is_complete()) {
-        clear(layout)?;
-        if inside(ASIDE).exists() {
-            discard(layout)?;
-        }
-    } else if inside(ASIDE).exists() && read_request(layout).is_none() {
-        restore(layout)?;
-    }
-    Ok(())
-}
-
-/// Removes what an export keeps while it is unfinished, all but the lock.
-fn clear(layout: &Layout) -> Outcome<()> {
-    remove(&layout.request())?;
-    remove(&layout.journal_dir())?;
-    remove(&layout.failed())?;
-    for path in children(&layout.work_dir())? {
-        if path != layout.lock() {
-            remove(&path)?;
-        }
-    }
-    Ok(())
-}
-
-fn children(folder: &Path) -> Outcome<Vec<PathBuf>> {
-    let failed = |e| Error::io(folder, "read the folder", e);
-    match fs::read_dir(folder) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        entries => {
-            let entries = entries.map_err(failed)?;
-            Ok(entries.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>().map_err(failed)?)
-        }
-    }
-}
-
-/// Removes the data set that lies aside. It goes by one rename, so that half of it is never taken for whole.
-fn discard(layout: &Layout) -> Outcome<()> {
-    let trash = layout.root().join(TRASH);
-    rename(&layout.root().join(ASIDE), &trash)?;
-    remove(&trash)
-}
-
-/// Puts the data set that lies aside back in its place, instead of what was begun there.
-fn restore(layout: &Layout) -> Outcome<()> {
-    let begun = read_request(layout).map(|request| request.numbers());
-    // Without a request nobody goes on with what was begun, whatever of it is still there.
-    clear(layout)?;
-    let begun = begun.or_else(|| Head::read(&layout.manifest()).map(|head| head.area_numbers));
-    let aside = Layout::new(layout.root().join(ASIDE));
-    if let Some(head) = Head::read(&aside.manifest()) {
-        if let Some(areas) = begun {
-            layout.entries(&areas).iter().try_for_each(|path| remove(path))?;
-        }
-        move_entries(&aside, layout, &head.area_numbers)?;
-    }
-    remove(aside.root())
-}
-
 impl Session {
     /// Ends the export as `outcome` says. Complete, the data set takes the place of an earlier one. After a failure that
     /// trying again may mend, everything stays as it is, to go on with; after any other an earlier data set comes back, or,
@@ -514,43 +478,4 @@ fn end_complete(layout: &Layout) -> Outcome<()> {
         discard(layout)?;
     }
     clear(layout)
-}
-
-/// Moves a data set's entries, those that are there, from one folder to another.
-fn move_entries(from: &Layout, to: &Layout, areas: &[u32]) -> Outcome<()> {
-    create_dir(to.root())?;
-    for (source, target) in from.entries(areas).iter().zip(to.entries(areas)) {
-        if source.exists() {
-            target.parent().map_or(Ok(()), create_dir)?;
-            rename(source, &target)?;
-        }
-    }
-    // The folders that hold nothing now.
-    for folder in from.shared_dirs() {
-        let _ = fs::remove_dir(folder);
-    }
-    Ok(())
-}
-
-fn rename(from: &Path, to: &Path) -> Outcome<()> {
-    fs::rename(from, to).map_err(|e| Error::io(from, "move", e).into())
-}
-
-fn remove(path: &Path) -> Outcome<()> {
-    let gone = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-    match gone {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, "remove", e).into()),
-        _ => Ok(()),
-    }
-}
-
-/// Brings one file to the disk, and its name.
-pub(crate) fn sync_file(path: &Path) -> Outcome<()> {
-    let synced = fs::File::open(path).and_then(|file| file.sync_all());
-    synced.map_err(|e| Error::io(path, "bring to the disk", e))?;
-    // Not every system lets folders be opened.
-    if let Some(folder) = path.parent().and_then(|folder| fs::File::open(folder).ok()) {
-        let _ = folder.sync_all();
-    }
-    Ok(())
 }

@@ -42,8 +42,24 @@ struct PlanFile {
     labels: LabelList,
 }
 
+/// Whether a folder holds a plan.
+pub(crate) fn is_in(folder: &Path) -> bool {
+    plan_file(folder).exists()
+}
+
 fn plan_file(folder: &Path) -> PathBuf {
     folder.join("plan.jsonl")
+}
+
+fn read_plan_file(path: &Path) -> Outcome<PlanFile> {
+    // Without it, nobody knows what the rest of the folder is for.
+    let again = "remove the folder, and call `s3d plan` again";
+    read_checked(path).map_err(|e| match e {
+        Failure::File(Error::Format { .. }) => {
+            Error::format(path, format!("is damaged, or of another version of s3d: {again}")).into()
+        }
+        other => other,
+    })
 }
 
 fn area_folder(folder: &Path, area: u32) -> PathBuf {
@@ -57,10 +73,10 @@ impl Plan {
     /// If there is none, or it is damaged.
     pub(crate) fn open(folder: &Path) -> Outcome<Self> {
         let path = plan_file(folder);
-        if !path.exists() {
+        if !is_in(folder) {
             return Err(Error::format(folder, "holds no plan: make one with `s3d plan`").into());
         }
-        let file = read_checked(&path)?;
+        let file = read_plan_file(&path)?;
         let layout = Layout::new(folder);
         let finished = Finished::read(&layout)?;
         Ok(Self { layout, file, finished })
@@ -155,7 +171,7 @@ pub(crate) fn make(scenes: &[PathBuf], folder: &Path, options: &ExportOptions, s
     let job = Job::open(scenes, &layout, options, None, &account)?;
     let path = plan_file(folder);
     if path.exists() {
-        let there: PlanFile = read_checked(&path)?;
+        let there = read_plan_file(&path)?;
         refuse_other(folder, &there.request, &job.request)?;
     } else {
         create_dir(folder)?;

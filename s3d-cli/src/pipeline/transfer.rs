@@ -16,12 +16,11 @@ pub(crate) fn bring(record: &FileRecord, from: &Path, to: &Path) -> Outcome<Opti
     if let Some(folder) = target.parent() {
         create_dir(folder)?;
     }
-    match fs::remove_file(&target) {
-        Err(e) if e.kind() != ErrorKind::NotFound => return Err(Error::io(&target, "replace", e).into()),
-        _ => {}
-    }
-    // Whatever keeps it from being linked, a copy says it better.
-    if fs::hard_link(&source, &target).is_err() {
+    // Of a link to a file a second name would be a link too, to a file that somebody else may remove. Whatever else keeps it
+    // from being linked, a name that is taken among that, a copy says it better: it takes its place only when it is whole,
+    // so that nothing is lost should the two be one file, as through two paths to one folder.
+    let is_link = fs::symlink_metadata(&source).is_ok_and(|found| found.is_symlink());
+    if is_link || fs::hard_link(&source, &target).is_err() {
         let mut reader = match File::open(&source) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Some(format!("{}: {e}", record.path))),
             reader => reader.map_err(|e| Error::io(&source, "read", e))?,
@@ -63,5 +62,26 @@ mod tests {
             let outside = FileRecord { path: path.into(), ..record.clone() };
             assert!(bring(&outside, &from, &to).is_err(), "{path}");
         }
+    }
+
+    /// A folder that is mounted at two places has two paths that look like two folders.
+    #[cfg(unix)]
+    #[test]
+    fn one_folder_by_two_paths_keeps_its_files_and_links_become_files() {
+        let dir = tempfile::tempdir().unwrap();
+        let (from, two) = (dir.path().join("from"), dir.path().join("two"));
+        create_dir(&from).unwrap();
+        std::os::unix::fs::symlink(&from, &two).unwrap();
+        fs::write(from.join("b"), b"content").unwrap();
+        let record = FileRecord::of_file(&from, &from.join("b")).unwrap();
+        assert_eq!(bring(&record, &from, &two).unwrap(), None);
+        assert_eq!(fs::read(from.join("b")).unwrap(), b"content");
+
+        let (linked, to) = (dir.path().join("linked"), dir.path().join("to"));
+        create_dir(&linked).unwrap();
+        std::os::unix::fs::symlink(from.join("b"), linked.join("b")).unwrap();
+        assert_eq!(bring(&record, &linked, &to).unwrap(), None);
+        fs::remove_dir_all(&from).unwrap();
+        assert_eq!(fs::read(to.join("b")).unwrap(), b"content");
     }
 }

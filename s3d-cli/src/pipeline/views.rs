@@ -151,6 +151,14 @@ pub(crate) fn select_requested(
         for (index, uuid) in labels.locations.iter().enumerate() {
             let entropies = finished.scores(area, uuid);
             let entropies = entropies.ok_or_else(|| missing(&format!("the scores of {uuid} are")))?;
+            // No more is drawn than was scored, whatever a request claims.
+            if entropies.len() != options.views as usize {
+                return Err(Failure::Input(format!(
+                    "area {area}: location {uuid} has {} scores instead of {}, one a candidate view",
+                    entropies.len(),
+                    options.views
+                )));
+            }
             candidates.extend(draw(area, index, uuid, options.views, request.seed, Some(entropies)));
         }
     }
@@ -182,5 +190,41 @@ pub(crate) fn select(candidates: &mut [Candidate], pool: Pool, keep_all: bool, s
             c.frame_num = Some(next);
             next += 1;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::journal::{Done, LabelsDone, ScoresDone};
+    use super::super::request::tests::request;
+    use super::*;
+
+    #[test]
+    fn as_many_views_are_drawn_as_were_scored() {
+        let mut request = request();
+        request.areas.truncate(1);
+        request.options.views = 3;
+        let area = request.areas[0].area;
+        let entry = serde_json::json!({
+            "area": area, "faces": 0, "faces_left_out": 0, "points": 0, "annotated_points": 0, "rooms": 0,
+            "locations": 1, "panoramas": 0, "views": 0, "rgb": "texture", "place_cameras": null,
+            "xyz": { "type": "half", "largest_coordinate_m": 0.0, "largest_step_m": null },
+        });
+        let mut finished = Finished::default();
+        finished.insert(Done::Labels(LabelsDone {
+            entry: serde_json::from_value(entry).unwrap(),
+            locations: vec!["a".into()],
+            files: Vec::new(),
+        }));
+        let scores = |n| Done::Scores(ScoresDone { area, location: "a".into(), entropies: vec![1.0; n] });
+        finished.insert(scores(3));
+        assert_eq!(select_requested(&request, &finished).unwrap().0.len(), 3);
+        for n in [2, 4] {
+            finished.insert(scores(n));
+            let e = select_requested(&request, &finished).unwrap_err().to_string();
+            assert!(e.contains(&format!("{n} scores instead of 3")), "{e}");
+        }
+        request.options.views = u32::MAX;
+        assert!(select_requested(&request, &finished).is_err());
     }
 }

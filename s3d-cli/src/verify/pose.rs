@@ -263,7 +263,8 @@ mod tests {
         }
         let flip = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
         let location = DVec3::new(1.0, -2.0, 1.5);
-        let cases: [(&str, &dyn Fn(&mut PoseFile)); 9] = [
+        type Change<'c> = &'c dyn Fn(&mut PoseFile);
+        let cases: [(&str, Change<'_>); 9] = [
             ("final_camera_rotation: it is transposed", &|f| rows(f, |r, t| (r.transpose(), t))),
             ("not −R · camera_location, but it is with that of the angles", &|f| {
                 rows(f, |r, t| (r.transpose(), t))

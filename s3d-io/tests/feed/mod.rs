@@ -12,10 +12,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What a name of a fuzz target means: puts `data` in the folder and reads it.
-pub type Feed = fn(&Path, &[u8]);
+pub(crate) type Feed = fn(&Path, &[u8]);
 
 /// Every reader, by the name of its fuzz target.
-pub const FEEDS: [(&str, Feed); 18] = [
+pub(crate) const FEEDS: [(&str, Feed); 18] = [
     ("obj", obj),
     ("mtl", mtl),
     ("texture", texture),
