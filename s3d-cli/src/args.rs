@@ -1,5 +1,8 @@
 //! The command line: subcommands, options, defaults, help texts.
 
+use crate::arg_values::{
+    even_width, field_of_view, finite, normal_axes, parsed, point, positive, stored_xyz, uuid,
+};
 use crate::console::LogFormat;
 use crate::pack::args::PackArgs;
 use crate::pipeline::deal::Shard;
@@ -532,62 +535,6 @@ pub(crate) struct ProfileArgs {
     /// Replace what is in OUT/profiles/NAME.
     #[arg(long)]
     pub(crate) overwrite: bool,
-}
-
-fn normal_axes(word: &str) -> Result<NormalAxes, String> {
-    NormalAxes::from_name(word).ok_or_else(|| "must be paper or opencv".to_owned())
-}
-
-fn stored_xyz(word: &str) -> Result<XyzType, String> {
-    match word.parse() {
-        Ok(kind @ (XyzType::Half | XyzType::Float)) => Ok(kind),
-        _ => Err("must be half or float".to_owned()),
-    }
-}
-
-pub(crate) fn parsed<T: std::str::FromStr>(text: &str) -> Result<T, String>
-where
-    T::Err: std::fmt::Display,
-{
-    text.trim().parse().map_err(|e: T::Err| e.to_string())
-}
-
-fn finite(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(v) if v.is_finite() => Ok(v),
-        _ => Err("not a number".to_owned()),
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let v = finite(text)?;
-    if v > 0.0 { Ok(v) } else { Err("must be above 0".to_owned()) }
-}
-
-fn field_of_view(text: &str) -> Result<f64, String> {
-    let v = finite(text)?;
-    if v > 0.0 && v < 180.0 { Ok(v) } else { Err("must be between 0 and 180 degrees".to_owned()) }
-}
-
-/// A uuid as the data set writes it, however it was written.
-fn uuid(text: &str) -> Result<String, String> {
-    let uuid = text.trim().replace('-', "").to_ascii_lowercase();
-    if uuid.len() == 32 && uuid.bytes().all(|b| b.is_ascii_hexdigit()) {
-        return Ok(uuid);
-    }
-    Err("no uuid of 32 hexadecimal digits; scene files come before --only".to_owned())
-}
-
-fn even_width(text: &str) -> Result<u32, String> {
-    match text.trim().parse::<u32>() {
-        Ok(v) if (8..=32_768).contains(&v) && v % 2 == 0 => Ok(v),
-        _ => Err("must be an even number from 8 to 32768".to_owned()),
-    }
-}
-
-fn point(text: &str) -> Result<DVec3, String> {
-    let v = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
-    <[f64; 3]>::try_from(v).map(DVec3::from_array).map_err(|_| "must be three numbers: x,y,z".to_owned())
 }
 
 #[cfg(test)]

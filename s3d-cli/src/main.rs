@@ -1,5 +1,6 @@
 //! `s3d`: from an annotated scan to a registered 2D-3D-Semantic data set.
 
+mod arg_values;
 mod args;
 mod commands;
 mod console;

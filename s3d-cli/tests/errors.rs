@@ -2,64 +2,10 @@
 
 mod common;
 
+use common::scan::Scan;
 use common::{UUID_A, files, s3d, s3d_fails, s3d_ok, text, write_scan};
 use std::fs;
-use std::path::{Path, PathBuf};
-
-const SMALL: [&str; 8] = ["--size", "32", "--pano-width", "64", "--views", "3", "--points-per-m2", "50"];
-
-struct Scan {
-    dir: tempfile::TempDir,
-    scene: PathBuf,
-}
-
-impl Scan {
-    fn new() -> Self {
-        let dir = tempfile::tempdir().unwrap();
-        let scene = write_scan(&dir.path().join("scan"), 1);
-        Self { dir, scene }
-    }
-
-    fn file(&self, name: &str) -> PathBuf {
-        self.dir.path().join("scan").join(name)
-    }
-
-    fn annotation(&self, name: &str) -> PathBuf {
-        self.file("Area_1/office_1/Annotations").join(name)
-    }
-
-    fn out(&self) -> PathBuf {
-        self.dir.path().join("out")
-    }
-
-    fn replace(&self, name: &str, from: &str, to: &str) {
-        let path = self.file(name);
-        let content = fs::read_to_string(&path).unwrap();
-        assert!(content.contains(from), "{name} holds {from:?}");
-        fs::write(path, content.replacen(from, to, 1)).unwrap();
-    }
-
-    fn args<'a>(&'a self, out: &'a Path) -> Vec<&'a str> {
-        let mut args = vec!["export", text(&self.scene), "-o", text(out)];
-        args.extend(SMALL);
-        args
-    }
-
-    /// An export fails with exit code 1, says so, and leaves no OUT.
-    fn fails(&self, parts: &[&str]) {
-        let out = self.out();
-        s3d_fails(&self.args(&out), 1, parts);
-        assert!(!out.exists(), "a failed export of bad input wrote something");
-    }
-
-    /// An export succeeds and logs each of these parts.
-    fn warns(&self, parts: &[&str]) {
-        let log = s3d_ok(&self.args(&self.out()));
-        for part in parts {
-            assert!(log.contains(part), "{part:?} is not in the log: {log}");
-        }
-    }
-}
+use std::path::Path;
 
 #[test]
 fn wrong_calls_exit_with_2() {

@@ -4,96 +4,10 @@
 //! room and scan location by splitting its name at `_`. So below the root `rgb` stands in a path only where a domain
 //! stands (besides `3d/rgb.obj` and its fellows, which are named as published), and no part holds an underscore.
 
+use crate::domain::Domain;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
-use thiserror::Error;
-
-/// What an image shows; the data set calls it the domain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Domain {
-    /// Colour.
-    Rgb,
-    /// Depth, 512 units a metre.
-    Depth,
-    /// Surface normals.
-    Normal,
-    /// Indices into `semantic_labels.json`.
-    Semantic,
-    /// A colour per instance, for looking at.
-    SemanticPretty,
-    /// World coordinates.
-    GlobalXyz,
-    /// The camera.
-    Pose,
-}
-
-/// A word that names no domain.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error(
-    "no modality is called {word:?}; there are rgb, depth, normal, semantic, semantic_pretty, global_xyz and pose"
-)]
-pub struct UnknownDomain {
-    /// The word.
-    pub word: String,
-}
-
-impl Domain {
-    /// All of them, in the order of formats.md.
-    pub const ALL: [Self; 7] = [
-        Self::Rgb,
-        Self::Depth,
-        Self::Normal,
-        Self::Semantic,
-        Self::SemanticPretty,
-        Self::GlobalXyz,
-        Self::Pose,
-    ];
-
-    /// Its folder, by which users name it too: "normal".
-    pub fn folder(self) -> &'static str {
-        match self {
-            Self::Rgb => "rgb",
-            Self::Depth => "depth",
-            Self::Normal => "normal",
-            Self::Semantic => "semantic",
-            Self::SemanticPretty => "semantic_pretty",
-            Self::GlobalXyz => "global_xyz",
-            Self::Pose => "pose",
-        }
-    }
-
-    /// What stands at the end of its files' names: "normals". The folder's name for all other domains.
-    pub fn suffix(self) -> &'static str {
-        if self == Self::Normal { "normals" } else { self.folder() }
-    }
-
-    /// The ending of its files, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::GlobalXyz => "exr",
-            Self::Pose => "json",
-            _ => "png",
-        }
-    }
-}
-
-impl fmt::Display for Domain {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.folder())
-    }
-}
-
-impl FromStr for Domain {
-    type Err = UnknownDomain;
-
-    /// From the name of the folder.
-    fn from_str(word: &str) -> Result<Self, UnknownDomain> {
-        let found = Self::ALL.into_iter().find(|d| d.folder() == word);
-        found.ok_or_else(|| UnknownDomain { word: word.to_owned() })
-    }
-}
 
 /// Which image of a scan location: `frame_…` in a file's name, `frame_num` in a pose file (a number, or the word).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

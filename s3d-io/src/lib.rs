@@ -72,6 +72,7 @@ mod compression;
 mod conventions;
 mod dataset;
 mod deflate;
+mod domain;
 mod e57_cloud;
 mod error;
 mod exr;
@@ -166,6 +167,7 @@ pub use conventions::{Conventions, DepthUnits, UnknownWord, XyzType, read_conven
 pub use dataset::{
     DatasetImage, ViewRecord, check_images_complete, dataset_images, read_png_size, read_views,
 };
+pub use domain::{Domain, UnknownDomain};
 pub use error::{Error, Place, Result};
 pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
 pub use file_list::{FileRecord, read_file_list, write_file_list};
@@ -176,9 +178,7 @@ pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instance
 pub use json::{read_json, write_json};
 pub use labelled_points::{LabelledPoint, LabelledPoints};
 pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};
-pub use layout::{
-    Domain, Frame, ImageName, Layout, PROFILES, UnknownDomain, image_stem, is_valid_room, is_valid_uuid,
-};
+pub use layout::{Frame, ImageName, Layout, PROFILES, image_stem, is_valid_room, is_valid_uuid};
 pub use located_picture::uuid_from_name;
 pub use mat_read::{MatArea, MatObject, MatRoom};
 pub use mat_write::MatWriter;

@@ -1,6 +1,7 @@
 //! The options of `s3d pack`: which package, and what belongs to each.
 
-use crate::args::{Threads, parsed};
+use crate::arg_values::parsed;
+use crate::args::Threads;
 use crate::failure::{Failure, Outcome};
 use clap::{Args, value_parser};
 use s3d_io::{Compression, Domain};

@@ -1,6 +1,8 @@
 //! What the tests of the command line share: running the real binary, and a small scan to run it on.
 #![allow(dead_code)]
 
+pub(crate) mod scan;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
