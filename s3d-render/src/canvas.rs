@@ -61,6 +61,20 @@ const BEHIND: f32 = 1.0 + 5e-4;
 /// Tiles of so many pixels, both ways, know the farthest that they see.
 pub(crate) const TILE: usize = LANES;
 
+/// What of a row of tiles lies between two rows: its first row, and how many there are.
+#[inline(always)]
+pub(crate) fn part_of_tile(tile_row: usize, top: usize, bottom: usize) -> (usize, usize) {
+    let first = top.max(tile_row * TILE);
+    (first, bottom.min(tile_row * TILE + TILE - 1) + 1 - first)
+}
+
+/// From where a tile is drawn to hold what of it lies between two columns, and whether half a register does.
+#[inline(always)]
+pub(crate) fn half_of_tile(tile_column: usize, left: usize, right: usize) -> (usize, bool) {
+    let (first, middle) = (tile_column * TILE, tile_column * TILE + TILE / 2);
+    if left >= middle { (middle, true) } else { (first, right < middle) }
+}
+
 /// A linear function of the pixel in a chunk.
 ///
 /// Its value in column i and row j from the anchor is at + across·u(i) + bend·v(i) + down·r(j): see [`Chunk`].

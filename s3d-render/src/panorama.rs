@@ -17,7 +17,8 @@
 )]
 
 use crate::canvas::{
-    Canvas, Chunk, Cover, Drawn, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED,
+    Canvas, Chunk, Cover, Drawn, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED, half_of_tile,
+    part_of_tile,
 };
 use crate::clusters::{Cluster, MOST_CORNERS, Node, PACKET};
 use crate::cone::{Cone, Plane};
@@ -393,9 +394,9 @@ impl Work for Tiles<'_, '_> {
         let Self { lens, canvas, planes, reach, slot, poor } = self;
         let mut tangents = [0.0; MOST_ROWS];
         for tile_row in reach.top / TILE..=reach.bottom / TILE {
-            let rows = TILE.min(canvas.height() - tile_row * TILE);
+            let (row, rows) = part_of_tile(tile_row, reach.top, reach.bottom);
             for tile_column in reach.left / TILE..=reach.right / TILE {
-                let (column, row) = (tile_column * TILE, tile_row * TILE);
+                let (column, narrow) = half_of_tile(tile_column, reach.left, reach.right);
                 let (grid, mut chunk) = lens.chunk(planes, column, row, rows, slot, &mut tangents);
                 if chunk.edges.iter().any(|e| lens.range(e, &grid).1 < -2.0 * chunk.edge_error - 1e-6) {
                     continue;
@@ -412,11 +413,13 @@ impl Work for Tiles<'_, '_> {
                     continue;
                 }
                 canvas.touch_tile(tile_column, tile_row);
-                if error < TRUSTED * low {
-                    canvas.draw::<L, true, false>(l, &grid, &chunk);
-                } else {
-                    (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
-                    canvas.draw::<L, true, true>(l, &grid, &chunk);
+                let trusted = error < TRUSTED * low;
+                (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
+                match (narrow, trusted) {
+                    (true, true) => canvas.draw::<L::Half, true, false>(l.half(), &grid, &chunk),
+                    (true, false) => canvas.draw::<L::Half, true, true>(l.half(), &grid, &chunk),
+                    (false, true) => canvas.draw::<L, true, false>(l, &grid, &chunk),
+                    (false, false) => canvas.draw::<L, true, true>(l, &grid, &chunk),
                 }
             }
         }

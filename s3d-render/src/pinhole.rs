@@ -14,6 +14,7 @@
 
 use crate::canvas::{
     Canvas, Chunk, Cover, Drawn, EDGE_ERROR, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED,
+    half_of_tile, part_of_tile,
 };
 use crate::clusters::{Cluster, MOST_CORNERS, Node, PACKET};
 use crate::cone::Cone;
@@ -372,15 +373,17 @@ impl Work for Tiles<'_> {
     #[inline(always)]
     fn run<L: Registers>(self, l: L) {
         let Self { canvas, planes, reach, edge_error, slot, poor } = self;
-        const LAST: f32 = (TILE - 1) as f32;
         let nearest = (reach.inverse_t.1 * (1.0 + 1e-6)) as f32;
         for tile_row in reach.top / TILE..=reach.bottom / TILE {
-            let rows = TILE.min(canvas.height() - tile_row * TILE);
+            let (top, rows) = part_of_tile(tile_row, reach.top, reach.bottom);
             for tile_column in reach.left / TILE..=reach.right / TILE {
-                let mut chunk = planes.chunk(tile_column * TILE, tile_row * TILE, slot, edge_error);
+                let (column, narrow) = half_of_tile(tile_column, reach.left, reach.right);
+                let mut chunk = planes.chunk(column, top, slot, edge_error);
+                let last = ((if narrow { TILE / 2 } else { TILE }) - 1) as f32;
+                let last_row = (rows - 1) as f32;
                 // Where a function is greatest and least on the tile.
                 let range = |f: &Linear| {
-                    let (x, y) = (f.across * LAST, f.down * LAST);
+                    let (x, y) = (f.across * last, f.down * last_row);
                     (f.at + x.min(0.0) + y.min(0.0), f.at + x.max(0.0) + y.max(0.0))
                 };
                 if chunk.edges.iter().any(|e| range(e).1 < -2.0 * edge_error) {
@@ -393,18 +396,21 @@ impl Work for Tiles<'_> {
                     continue;
                 }
                 let q = &chunk.inverse_t;
-                let error = INVERSE_T_ROUNDING * (q.at.abs() + (q.across.abs() + q.down.abs()) * LAST);
+                let error =
+                    INVERSE_T_ROUNDING * (q.at.abs() + q.across.abs() * last + q.down.abs() * last_row);
                 let (low, high) = range(q);
                 if high + error <= 0.0 || canvas.tile_hides(tile_column, tile_row, nearest.min(high + error))
                 {
                     continue;
                 }
                 canvas.touch_tile(tile_column, tile_row);
-                if error < TRUSTED * low {
-                    canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
-                } else {
-                    (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
-                    canvas.draw::<L, false, true>(l, &grid(rows), &chunk);
+                let trusted = error < TRUSTED * low;
+                (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
+                match (narrow, trusted) {
+                    (true, true) => canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk),
+                    (true, false) => canvas.draw::<L::Half, false, true>(l.half(), &grid(rows), &chunk),
+                    (false, true) => canvas.draw::<L, false, false>(l, &grid(rows), &chunk),
+                    (false, false) => canvas.draw::<L, false, true>(l, &grid(rows), &chunk),
                 }
             }
         }
