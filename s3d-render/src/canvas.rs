@@ -53,7 +53,7 @@ pub(crate) const TRUSTED: f32 = 1e-5;
 pub(crate) const INVERSE_T_ROUNDING: f32 = 3e-7;
 
 /// Values of 1/t that differ by no more steps of the last place are for exact arithmetic to order.
-const CLOSE: i32 = 424;
+pub(crate) const CLOSE: i32 = 424;
 
 /// What is behind a tile must be so by this factor: ten times [`CLOSE`].
 const BEHIND: f32 = 1.0 + 5e-4;
@@ -110,8 +110,10 @@ pub(crate) struct Chunk {
 pub(crate) struct Grid<'a> {
     pub(crate) u: &'a [f32; LANES],
     pub(crate) v: &'a [f32; LANES],
-    pub(crate) rows: &'a [f32],
-    /// As long as `rows`; nothing in perspective views.
+    pub(crate) rows: &'a [f32; MOST_ROWS],
+    /// How many rows there are; at least one.
+    pub(crate) count: usize,
+    /// One a row; nothing in perspective views.
     pub(crate) scale: &'a [f32],
 }
 
@@ -307,56 +309,41 @@ impl Canvas {
         grid: &Grid<'_>,
         chunk: &Chunk,
     ) {
-        let (u, v) = (l.load(grid.u), l.load(grid.v));
-        let along = |f: &Linear| {
-            let sum = l.add(l.mul(l.splat(f.across), u), l.splat(f.at));
-            if TURN { l.add(l.mul(l.splat(f.bend), v), sum) } else { sum }
-        };
-        let [e0, e1, e2] = chunk.edges;
-        let (a0, a1, a2, aq) = (along(&e0), along(&e1), along(&e2), along(&chunk.inverse_t));
-        let (d0, d1, d2) = (l.splat(e0.down), l.splat(e1.down), l.splat(e2.down));
-        let dq = l.splat(chunk.inverse_t.down);
-        let (error, minus_error) = (l.splat(chunk.edge_error), l.splat(-chunk.edge_error));
-        let (trusted, off) = (l.splat(chunk.trusted), l.splat(chunk.inverse_t_error));
-        let value = |start: L::F, step: L::F, row: L::F| l.add(start, l.mul(step, row));
-        let mut at = chunk.row * self.pitch + chunk.column;
-        for (k, &row) in grid.rows.iter().enumerate() {
-            let r = l.splat(row);
-            let inside = l.min(value(a0, d0, r), l.min(value(a1, d1, r), value(a2, d2, r)));
-            let mut q = value(aq, dq, r);
-            if TURN {
-                q = l.mul(q, l.splat(grid.scale[k]));
-            }
-            let best = &mut self.inverse_t[at..at + L::N];
-            let old = l.load(best);
-            let mut wins = l.and(l.above(inside, error), l.steps_above(q, old, CLOSE));
-            let mut rivals = l.above(inside, minus_error);
-            if CARE {
-                wins = l.and(wins, l.above(q, trusted));
-                rivals = l.and(rivals, l.steps_above(l.add(q, off), old, -CLOSE));
-            } else {
-                rivals = l.and(rivals, l.steps_above(q, old, -CLOSE));
-            }
-            l.store_f32(best, wins, q);
-            l.store_u32(&mut self.slots[at..at + L::N], wins, chunk.slot);
-            let doubts = l.bits(rivals) & !l.bits(wins);
-            if doubts != 0 {
-                let mut bound = [0.0; LANES];
-                let all = l.steps_above(l.splat(1.0), l.splat(0.0), 0);
-                l.store_f32(&mut bound, all, if CARE { l.add(q, off) } else { q });
-                self.doubt(doubts, at, chunk.slot, &bound);
-            }
-            at += self.pitch;
+        let at = chunk.row * self.pitch + chunk.column;
+        let window = (&mut self.inverse_t[at..], &mut self.slots[at..], self.pitch);
+        let mut doubts = [0; MOST_ROWS];
+        let any = l.draw::<TURN, CARE>(window, grid, chunk, &mut doubts);
+        if any {
+            self.doubt(&doubts, grid, chunk, TURN, CARE);
         }
     }
 
+    /// Notes pixels of a chunk, by row, that may see its face.
     #[cold]
-    fn doubt(&mut self, mut lanes: u16, at: usize, slot: u32, bound: &[f32; LANES]) {
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            if at % self.pitch + lane < self.width {
-                self.doubts.push(Doubt { pixel: (at + lane) as u32, slot, inverse_t: bound[lane] });
+    #[inline(never)]
+    fn doubt(&mut self, doubts: &[u16; MOST_ROWS], grid: &Grid<'_>, chunk: &Chunk, turn: bool, care: bool) {
+        let f = &chunk.inverse_t;
+        for (k, (&lanes, &row)) in doubts.iter().zip(grid.rows).take(grid.count).enumerate() {
+            let mut lanes = lanes;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                if chunk.column + lane >= self.width {
+                    continue;
+                }
+                let mut bound = f.across * grid.u[lane] + f.at;
+                if turn {
+                    bound += f.bend * grid.v[lane];
+                }
+                bound += f.down * row;
+                if turn {
+                    bound *= grid.scale[k];
+                }
+                if care {
+                    bound += chunk.inverse_t_error;
+                }
+                let pixel = (chunk.row + k) * self.pitch + chunk.column + lane;
+                self.doubts.push(Doubt { pixel: pixel as u32, slot: chunk.slot, inverse_t: bound });
             }
         }
     }

@@ -299,8 +299,8 @@ impl<'m> Panorama<'m> {
             size = most64(size, terms);
         }
         let edge_error = (EDGE_ROUNDING * size + planes.edge_off * away + 1e-12) as f32;
-        let grid =
-            Grid { u: &self.u, v: &self.v, rows: &tangents[..rows], scale: &self.scale[row..row + rows] };
+        let scale = &self.scale[row..row + rows];
+        let grid = Grid { u: &self.u, v: &self.v, rows: tangents, count: rows, scale };
         (grid, Chunk { column, row, edges, edge_error, inverse_t, slot, ..Chunk::default() })
     }
 
@@ -311,7 +311,7 @@ impl<'m> Panorama<'m> {
         let (first, last) = (grid.scale[0], grid.scale[grid.scale.len() - 1]);
         // cos φ is least at one of the ends.
         let (least_cos, most_cos) = if first < last { (first, last) } else { (last, first) };
-        let most_cos = if grid.rows.len() > 1 { 1.0f32.min(most_cos * 1.5) } else { most_cos };
+        let most_cos = if grid.count > 1 { 1.0f32.min(most_cos * 1.5) } else { most_cos };
         let low = if low > 0.0 { low * least_cos } else { low };
         (low, INVERSE_T_ROUNDING * size * most_cos)
     }
@@ -320,7 +320,7 @@ impl<'m> Panorama<'m> {
     #[inline(always)]
     fn range(&self, f: &Linear, grid: &Grid<'_>) -> (f32, f32, f32) {
         let last = LANES - 1;
-        let down = f.down * grid.rows[grid.rows.len() - 1];
+        let down = f.down * grid.rows[grid.count - 1];
         let (u, v) = (f.across * self.u[last], f.bend * self.v[last]);
         let along = u + v;
         // Between its ends the function along a row bulges by the square of the angle over 8.

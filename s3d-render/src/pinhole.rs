@@ -54,7 +54,7 @@ const COLUMNS: [f32; LANES] = {
 };
 
 fn grid(rows: usize) -> Grid<'static> {
-    Grid { u: &COLUMNS, v: &COLUMNS, rows: &COUNT[..rows], scale: &[] }
+    Grid { u: &COLUMNS, v: &COLUMNS, rows: &COUNT, count: rows, scale: &[] }
 }
 
 /// Three edge functions and 1/t: at + across·i + down·j.

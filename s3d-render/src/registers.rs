@@ -1,14 +1,15 @@
 //! Sixteen pixels at a time: the few operations that the visibility pass needs, on the widest registers there are.
 //!
 //! Which set of instructions a processor has is asked when the program runs ([`run`]). All sets give the same bits:
-//! products and sums are rounded one by one, never fused.
+//! products and sums are rounded one by one, never fused. No closure with an operation goes to a function of the standard
+//! library in a loop that counts, as `map` of an array: that function is compiled for any processor and is then called.
 #![expect(
     clippy::expect_used,
     reason = "slices are cut to the length of the array: there is nothing left of the check"
 )]
 #![allow(unsafe_code)]
 
-use crate::canvas::Drawn;
+use crate::canvas::{CLOSE, Chunk, Drawn, Grid, Linear, MOST_ROWS};
 
 /// Pixels in a register (or in as many registers as it takes).
 pub(crate) const LANES: usize = 16;
@@ -43,6 +44,82 @@ pub(crate) trait Registers: Copy {
     fn store_f32(self, to: &mut [f32], m: Self::M, x: Self::F);
     /// Overwrites the lanes in `m`.
     fn store_u32(self, to: &mut [u32], m: Self::M, x: u32);
+
+    /// Overwrites the first `N`.
+    fn put(self, to: &mut [f32], x: Self::F);
+
+    /// Draws a chunk: see [`Canvas::draw`](crate::canvas::Canvas::draw). `best` and `slots` begin at its anchor, `pitch`
+    /// is from row to row. Notes doubtful pixels by row, and says whether there are any: a call from row to row would
+    /// take the registers.
+    #[inline(always)]
+    fn draw<const TURN: bool, const CARE: bool>(
+        self,
+        (best, slots, pitch): (&mut [f32], &mut [u32], usize),
+        grid: &Grid<'_>,
+        chunk: &Chunk,
+        doubts: &mut [u16; MOST_ROWS],
+    ) -> bool {
+        let l = self;
+        let rows = grid.count;
+        assert!(0 < rows && rows <= MOST_ROWS && (!TURN || rows <= grid.scale.len()));
+        let cells = pitch * (rows - 1) + Self::N;
+        assert!(cells <= best.len() && cells <= slots.len());
+        let (u, v) = (l.load(grid.u), l.load(grid.v));
+        let along = |f: &Linear| {
+            let sum = l.add(l.mul(l.splat(f.across), u), l.splat(f.at));
+            if TURN { l.add(l.mul(l.splat(f.bend), v), sum) } else { sum }
+        };
+        let [e0, e1, e2] = chunk.edges;
+        let (a0, a1, a2, aq) = (along(&e0), along(&e1), along(&e2), along(&chunk.inverse_t));
+        // What each row adds: from here the processor spreads a number over a register without a step of its own.
+        let mut down = [[0.0; MOST_ROWS]; 4];
+        for (down, f) in down.iter_mut().zip([&e0, &e1, &e2, &chunk.inverse_t]) {
+            let step = l.splat(f.down);
+            let mut k = 0;
+            while k < rows {
+                l.put(&mut down[k..], l.mul(step, l.load(&grid.rows[k..])));
+                k += Self::N;
+            }
+        }
+        let (error, minus_error) = (l.splat(chunk.edge_error), l.splat(-chunk.edge_error));
+        let (trusted, off) = (l.splat(chunk.trusted), l.splat(chunk.inverse_t_error));
+        let mut any = 0;
+        for k in 0..rows {
+            // SAFETY: k is below `rows`; that there are so many rows everywhere was asserted.
+            let (best, slots, r0, r1, r2, rq, scale) = unsafe {
+                (
+                    std::slice::from_raw_parts_mut(best.as_mut_ptr().add(k * pitch), Self::N),
+                    std::slice::from_raw_parts_mut(slots.as_mut_ptr().add(k * pitch), Self::N),
+                    l.splat(*down[0].get_unchecked(k)),
+                    l.splat(*down[1].get_unchecked(k)),
+                    l.splat(*down[2].get_unchecked(k)),
+                    l.splat(*down[3].get_unchecked(k)),
+                    if TURN { *grid.scale.get_unchecked(k) } else { 1.0 },
+                )
+            };
+            let inside = l.min(l.add(a0, r0), l.min(l.add(a1, r1), l.add(a2, r2)));
+            let mut q = l.add(aq, rq);
+            if TURN {
+                q = l.mul(q, l.splat(scale));
+            }
+            let old = l.load(best);
+            let mut wins = l.and(l.above(inside, error), l.steps_above(q, old, CLOSE));
+            let mut rivals = l.above(inside, minus_error);
+            if CARE {
+                wins = l.and(wins, l.above(q, trusted));
+                rivals = l.and(rivals, l.steps_above(l.add(q, off), old, -CLOSE));
+            } else {
+                rivals = l.and(rivals, l.steps_above(q, old, -CLOSE));
+            }
+            l.store_f32(best, wins, q);
+            l.store_u32(slots, wins, chunk.slot);
+            let open = l.bits(rivals) & !l.bits(wins);
+            // SAFETY: as above.
+            unsafe { *doubts.get_unchecked_mut(k) = open };
+            any |= open;
+        }
+        any != 0
+    }
 
     /// Depths and faces of [`LANES`] pixels that see the faces drawn in their slots. Every set of instructions gives the
     /// same bits. Panics if there is no such slot.
@@ -139,6 +216,11 @@ impl<const N: usize> Registers for Portable<N> {
     #[inline(always)]
     fn load(self, from: &[f32]) -> Self::F {
         *from.first_chunk().expect(SHORT)
+    }
+
+    #[inline(always)]
+    fn put(self, to: &mut [f32], x: Self::F) {
+        *to.first_chunk_mut().expect(SHORT) = x;
     }
 
     #[inline(always)]
@@ -239,6 +321,12 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn put(self, to: &mut [f32], x: Self::F) {
+            let to: &mut [f32; LANES] = to.first_chunk_mut().expect(SHORT);
+            unsafe { _mm512_storeu_ps(to.as_mut_ptr(), x) }
+        }
+
+        #[inline(always)]
         fn add(self, a: Self::F, b: Self::F) -> Self::F {
             unsafe { _mm512_add_ps(a, b) }
         }
@@ -307,11 +395,11 @@ mod x86 {
                 if these | _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(other as i32)) != u16::MAX {
                     return resolve::<TURN>(slots, line, drawn, faces, depths);
                 }
-                let [one, other] = [slots[0], other].map(|slot| &drawn[slot as usize]);
+                let (one, other) = (&drawn[slots[0] as usize], &drawn[other as usize]);
                 let seen = _mm512_set1_epi32(other.face as i32);
                 let seen = _mm512_mask_set1_epi32(seen, these, one.face as i32);
                 _mm512_storeu_epi32(faces.as_mut_ptr().cast(), seen);
-                let [one, other] = [one, other].map(|drawn| along::<TURN>(drawn.inverse_t, line));
+                let (one, other) = (along::<TURN>(one.inverse_t, line), along::<TURN>(other.inverse_t, line));
                 for (k, these) in [(0, these as u8), (8, (these >> 8) as u8)] {
                     let either = |n: usize| {
                         _mm512_mask_blend_pd(these, _mm512_set1_pd(other[n]), _mm512_set1_pd(one[n]))
@@ -329,19 +417,28 @@ mod x86 {
         }
     }
 
-    /// [`Registers::resolve`], four pixels at a time.
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    fn resolve<const TURN: bool>(
-        slots: &[u32; LANES],
+    /// A half of each of two `Drawn`: two numbers, or one with a face.
+    #[inline(always)]
+    unsafe fn halves<const AT: usize>(p: &Drawn, r: &Drawn) -> __m256d {
+        // SAFETY: the caller has references to them; the processor has AVX2.
+        unsafe {
+            let p = std::ptr::from_ref(p).cast::<f64>().add(AT);
+            let r = std::ptr::from_ref(r).cast::<f64>().add(AT);
+            _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(_mm_loadu_pd(p)), _mm_loadu_pd(r))
+        }
+    }
+
+    /// Depths of the four pixels from `k` on, which is at most twelve.
+    #[inline(always)]
+    unsafe fn four_depths<const TURN: bool>(
+        [a, b, c]: [__m256d; 3],
         line: &Line<'_>,
-        drawn: &[Drawn],
-        faces: &mut [u32; LANES],
+        k: usize,
         depths: &mut [f32; LANES],
     ) {
-        let (level, rise) = (_mm256_set1_pd(line.level), _mm256_set1_pd(line.rise));
-        // SAFETY: all loads and stores are within arrays of sixteen: k is 0, 4, 8 or 12.
-        let depths_of = |[a, b, c]: [__m256d; 3], k: usize, depths: &mut [f32; LANES]| unsafe {
+        // SAFETY: all loads and stores are within arrays of sixteen; the processor has AVX2.
+        unsafe {
+            let (level, rise) = (_mm256_set1_pd(line.level), _mm256_set1_pd(line.rise));
             let u = _mm256_loadu_pd(line.u.as_ptr().add(k));
             let value = if TURN {
                 let v = _mm256_loadu_pd(line.v.as_ptr().add(k));
@@ -353,19 +450,30 @@ mod x86 {
             };
             let depth = _mm256_andnot_pd(_mm256_set1_pd(-0.0), _mm256_div_pd(_mm256_set1_pd(1.0), value));
             _mm_storeu_ps(depths.as_mut_ptr().add(k), _mm256_cvtpd_ps(depth));
-        };
+        }
+    }
+
+    /// [`Registers::resolve`], four pixels at a time.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn resolve<const TURN: bool>(
+        slots: &[u32; LANES],
+        line: &Line<'_>,
+        drawn: &[Drawn],
+        faces: &mut [u32; LANES],
+        depths: &mut [f32; LANES],
+    ) {
         for k in [0, 4, 8, 12] {
-            let [p, q, r, s] = [0, 1, 2, 3].map(|n| std::ptr::from_ref(&drawn[slots[k + n] as usize]));
-            // SAFETY: the halves of a `Drawn`: two numbers, and one with a face.
-            let half = |p: *const Drawn, r: *const Drawn, at: usize| unsafe {
-                let (p, r) = (p.cast::<f64>().add(at), r.cast::<f64>().add(at));
-                _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(_mm_loadu_pd(p)), _mm_loadu_pd(r))
-            };
-            let (pr, qs) = (half(p, r, 0), half(q, s, 0));
+            let (p, q) = (&drawn[slots[k] as usize], &drawn[slots[k + 1] as usize]);
+            let (r, s) = (&drawn[slots[k + 2] as usize], &drawn[slots[k + 3] as usize]);
+            // SAFETY: references to what was drawn.
+            let (pr, qs) = unsafe { (halves::<0>(p, r), halves::<0>(q, s)) };
             let (a, b) = (_mm256_unpacklo_pd(pr, qs), _mm256_unpackhi_pd(pr, qs));
-            let (pr, qs) = (half(p, r, 2), half(q, s, 2));
+            // SAFETY: as above.
+            let (pr, qs) = unsafe { (halves::<2>(p, r), halves::<2>(q, s)) };
             let c = _mm256_unpacklo_pd(pr, qs);
-            depths_of([a, b, c], k, depths);
+            // SAFETY: k is 0, 4, 8 or 12.
+            unsafe { four_depths::<TURN>([a, b, c], line, k, depths) };
             let low = _mm256_shuffle_ps::<0b10_00_10_00>(
                 _mm256_castpd_ps(_mm256_unpackhi_pd(pr, qs)),
                 _mm256_setzero_ps(),
@@ -405,6 +513,14 @@ mod x86 {
         fn load(self, from: &[f32]) -> Self::F {
             let from = &from[..Self::N];
             std::array::from_fn(|k| unsafe { _mm256_loadu_ps(from.as_ptr().add(k * WIDE)) })
+        }
+
+        #[inline(always)]
+        fn put(self, to: &mut [f32], x: Self::F) {
+            let to = &mut to[..Self::N];
+            for (k, x) in x.into_iter().enumerate() {
+                unsafe { _mm256_storeu_ps(to.as_mut_ptr().add(k * WIDE), x) };
+            }
         }
 
         #[inline(always)]
