@@ -221,10 +221,6 @@ impl Canvas {
         self.poor.clear();
     }
 
-    pub(crate) fn height(&self) -> usize {
-        self.height
-    }
-
     /// Enters a face and says under which number.
     #[inline(always)]
     pub(crate) fn enter(&mut self, drawn: Drawn) -> u32 {

@@ -7,13 +7,13 @@ use obvhs::bvh2::Bvh2;
 use s3d_geom::TriMesh;
 
 /// No group has more faces; so a corner's place in its group fits a byte.
-const MOST_FACES: u32 = 64;
+pub(crate) const MOST_FACES: usize = 64;
 
 /// Corners are handled in packets of so many.
 pub(crate) const PACKET: usize = 8;
 
 /// No group has more corners, padding included.
-pub(crate) const MOST_CORNERS: usize = 3 * MOST_FACES as usize;
+pub(crate) const MOST_CORNERS: usize = 3 * MOST_FACES;
 
 /// A node of the tree: a box, and what is in it.
 #[derive(Clone, Copy, Debug)]
@@ -81,7 +81,7 @@ impl Clusters {
         let mut stack = vec![(0, 0)];
         while let Some((from, to)) = stack.pop() {
             let branch = &bvh.nodes[from as usize];
-            clusters.nodes[to].content = if counts[from as usize] <= MOST_FACES || branch.is_leaf() {
+            clusters.nodes[to].content = if counts[from as usize] <= MOST_FACES as u32 || branch.is_leaf() {
                 Content::Cluster(clusters.add(bvh, from, &mut gather))
             } else {
                 let first = clusters.nodes.len();
@@ -215,7 +215,7 @@ mod tests {
             let Content::Cluster(index) = node.content else { continue };
             groups += 1;
             let cluster = clusters.cluster(index);
-            assert!(cluster.faces.len() <= MOST_FACES as usize && cluster.faces.len() == cluster.ids.len());
+            assert!(cluster.faces.len() <= MOST_FACES && cluster.faces.len() == cluster.ids.len());
             for (&id, corners) in cluster.ids.iter().zip(cluster.faces) {
                 assert!(!std::mem::replace(&mut met[id as usize], true));
                 for (&corner, p) in corners.iter().zip(mesh.triangle(id)) {

@@ -42,6 +42,7 @@ mod anchor;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
+mod batch;
 mod blend;
 mod canvas;
 mod channels;

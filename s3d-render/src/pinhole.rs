@@ -3,15 +3,12 @@
 //! A corner p (relative to the camera) is in column x = (ρ·p)/(φ·p) and row y = (δ·p)/(φ·p) of the window, pixel centres
 //! at whole numbers, at the depth z = φ·p. For a corner that is no farther out than [`GUARD`] pixels x and y are good to
 //! 2⁻⁵³·8·GUARD < 2e-11 pixels, since |p|/z is then bounded by the angle of the guard band; so an edge function made
-//! from two corners at least [`SHORT`] apart is good to 1e-8 over a chunk. Faces that reach farther out, behind the
-//! camera, or have shorter edges, get their planes in space instead.
+//! from two corners at least 1e-3 apart is good to 1e-8 over a chunk. Faces that reach farther out, behind the camera,
+//! or have shorter edges, get their planes in space instead. The others are set up by [`Batch`], a cluster at a time.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::unreachable,
-    reason = "slices are cut to the length of the array; a camera has rays of its own kind"
-)]
+#![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
 
+use crate::batch::{Batch, Kind};
 use crate::canvas::{
     Canvas, Chunk, Cover, Drawn, EDGE_ERROR, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED,
     half_of_tile, part_of_tile,
@@ -25,12 +22,6 @@ use s3d_geom::{Rays, TriMesh};
 
 /// Pixels from the window's first that a corner may be away.
 const GUARD: f64 = 16_384.0;
-
-/// An edge that is shorter, in pixels, has no direction to speak of.
-const SHORT: f64 = 1e-3;
-
-/// Pixels around a face's corners that it may yet touch, as far as is known.
-const MARGIN: f64 = 1e-4;
 
 /// 0, 1, 2 …: columns from the anchor, and rows.
 const COUNT: [f32; MOST_ROWS] = {
@@ -59,10 +50,10 @@ fn grid(rows: usize) -> Grid<'static> {
 
 /// Three edge functions and 1/t: at + across·i + down·j.
 #[derive(Clone, Copy, Debug)]
-struct Planes {
-    at: [f64; 4],
-    across: [f64; 4],
-    down: [f64; 4],
+pub(crate) struct Planes {
+    pub(crate) at: [f64; 4],
+    pub(crate) across: [f64; 4],
+    pub(crate) down: [f64; 4],
 }
 
 /// A perspective view's window.
@@ -82,14 +73,22 @@ pub(crate) struct Pinhole<'m> {
     height: usize,
     columns: Vec<[f64; LANES]>,
     projected: Box<Projected>,
+    batch: Box<Batch>,
 }
 
 /// The corners of a cluster.
-struct Projected {
-    x: [f64; MOST_CORNERS],
-    y: [f64; MOST_CORNERS],
+pub(crate) struct Projected {
+    pub(crate) x: [f64; MOST_CORNERS],
+    pub(crate) y: [f64; MOST_CORNERS],
     /// 1/z; 0 for a corner that is behind the camera or too far out.
-    inverse_z: [f64; MOST_CORNERS],
+    pub(crate) inverse_z: [f64; MOST_CORNERS],
+}
+
+impl Projected {
+    pub(crate) fn new() -> Self {
+        let none = [0.0; MOST_CORNERS];
+        Self { x: none, y: none, inverse_z: none }
+    }
 }
 
 impl<'m> Pinhole<'m> {
@@ -120,110 +119,34 @@ impl<'m> Pinhole<'m> {
             width: spot.width,
             height: spot.height,
             columns: groups(&(0..spot.width).map(|i| i as f64).collect::<Vec<_>>()),
-            projected: Box::new(Projected {
-                x: [0.0; MOST_CORNERS],
-                y: [0.0; MOST_CORNERS],
-                inverse_z: [0.0; MOST_CORNERS],
-            }),
+            projected: Box::new(Projected::new()),
+            batch: Box::new(Batch::new()),
         }
     }
 
-    /// Projects the corners of a cluster; says whether all of them are ahead and within the guard band.
+    /// Projects the corners of a cluster.
     #[inline(always)]
-    fn project(&mut self, corners: &[[[f32; PACKET]; 3]]) -> bool {
+    fn project(&mut self, corners: &[[[f32; PACKET]; 3]]) {
         let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
-        let mut bad = 0;
         for (k, [x, y, z]) in corners.iter().enumerate() {
-            let at = k * PACKET;
-            let xs: &mut [f64; PACKET] = (&mut self.projected.x[at..at + PACKET]).try_into().unwrap();
-            let ys: &mut [f64; PACKET] = (&mut self.projected.y[at..at + PACKET]).try_into().unwrap();
-            let qs: &mut [f64; PACKET] = (&mut self.projected.inverse_z[at..at + PACKET]).try_into().unwrap();
+            // Arrays of their own, so that all eight go together.
+            let (mut xs, mut ys, mut qs) = ([0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
             for i in 0..PACKET {
                 let (x, y, z) = (f64::from(x[i]) - o.x, f64::from(y[i]) - o.y, f64::from(z[i]) - o.z);
                 let depth = f.x * x + f.y * y + f.z * z;
                 let q = 1.0 / depth;
                 let px = (r.x * x + r.y * y + r.z * z) * q;
                 let py = (d.x * x + d.y * y + d.z * z) * q;
-                let good = (depth > 0.0) & (px.abs() < GUARD) & (py.abs() < GUARD);
                 xs[i] = px;
                 ys[i] = py;
-                qs[i] = if good { q } else { 0.0 };
-                bad += u32::from(!good);
+                let q = if depth > 0.0 { q } else { 0.0 };
+                let q = if px.abs() < GUARD { q } else { 0.0 };
+                qs[i] = if py.abs() < GUARD { q } else { 0.0 };
             }
-        }
-        bad == 0
-    }
-
-    #[inline(always)]
-    fn draw_face<L: Registers>(&self, l: L, canvas: &mut Canvas, corners: [u8; 4], face: u32) {
-        let p = &self.projected;
-        let [a, b, c] = [corners[0], corners[1], corners[2]].map(usize::from);
-        let (x, y) = ([p.x[a], p.x[b], p.x[c]], [p.y[a], p.y[b], p.y[c]]);
-        let low = |v: [f64; 3]| least(least(v[0], v[1]), v[2]);
-        let high = |v: [f64; 3]| most(most(v[0], v[1]), v[2]);
-        let left = most((low(x) - MARGIN).ceil(), 0.0);
-        let right = least((high(x) + MARGIN).floor(), self.width as f64 - 1.0);
-        let top = most((low(y) - MARGIN).ceil(), 0.0);
-        let bottom = least((high(y) + MARGIN).floor(), self.height as f64 - 1.0);
-        if !(left <= right && top <= bottom) {
-            return;
-        }
-        let q = [p.inverse_z[a], p.inverse_z[b], p.inverse_z[c]];
-        let (left, right, top, bottom) = (left as usize, right as usize, top as usize, bottom as usize);
-        let reach = Reach { left, right, top, bottom, inverse_t: (low(q), high(q)) };
-        let small = right - left < LANES && bottom - top < MOST_ROWS;
-
-        // Edge k is opposite to corner k, from corner k + 1 to k + 2.
-        let (x1, x2) = ([x[1], x[2], x[0]], [x[2], x[0], x[1]]);
-        let (y1, y2) = ([y[1], y[2], y[0]], [y[2], y[0], y[1]]);
-        let mut across = [0.0; 4];
-        let mut down = [0.0; 4];
-        let mut at = [0.0; 4];
-        let mut length = [0.0; 3];
-        for k in 0..3 {
-            across[k] = y1[k] - y2[k];
-            down[k] = x2[k] - x1[k];
-            at[k] = -(across[k] * x1[k] + down[k] * y1[k]);
-            length[k] = across[k].abs() + down[k].abs();
-        }
-        // Twice the area: what the edge functions add up to, anywhere.
-        let area = across[0] * (x[0] - x[1]) + down[0] * (y[0] - y[1]);
-        if !(low(length) > SHORT && area.abs() > 1e-4) {
-            return self.draw_in_space(canvas, face);
-        }
-        let scale = 1.0 / area;
-        for k in 0..3 {
-            at[3] += q[k] * at[k];
-            across[3] += q[k] * across[k];
-            down[3] += q[k] * down[k];
-        }
-        let sign = if area > 0.0 { 1.0 } else { -1.0 };
-        let factor = [sign / length[0], sign / length[1], sign / length[2], scale];
-        for k in 0..4 {
-            at[k] *= factor[k];
-            across[k] *= factor[k];
-            down[k] *= factor[k];
-        }
-        let planes = Planes { at, across, down };
-        let slot = canvas.enter(Drawn { inverse_t: [at[3], across[3], down[3]], face, poor: false });
-        if small {
-            let mut chunk = planes.chunk(left, top, slot, EDGE_ERROR);
-            let spread = (chunk.inverse_t.across.abs() * 15.0)
-                + chunk.inverse_t.down.abs() * (bottom - top) as f32
-                + chunk.inverse_t.at.abs();
-            let error = INVERSE_T_ROUNDING * spread;
-            let rows = bottom - top + 1;
-            let trusted = error < TRUSTED * reach.inverse_t.0 as f32;
-            (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
-            match (right - left < 8, trusted) {
-                (true, true) => canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk),
-                (true, false) => canvas.draw::<L::Half, false, true>(l.half(), &grid(rows), &chunk),
-                (false, true) => canvas.draw::<L, false, false>(l, &grid(rows), &chunk),
-                (false, false) => canvas.draw::<L, false, true>(l, &grid(rows), &chunk),
-            }
-        } else {
-            let (planes, reach) = (&planes, &reach);
-            Tiles { canvas, planes, reach, edge_error: EDGE_ERROR, slot, poor: false }.run(l);
+            let at = k * PACKET;
+            self.projected.x[at..at + PACKET].copy_from_slice(&xs);
+            self.projected.y[at..at + PACKET].copy_from_slice(&ys);
+            self.projected.inverse_z[at..at + PACKET].copy_from_slice(&qs);
         }
     }
 
@@ -324,22 +247,12 @@ impl<'m> Pinhole<'m> {
 
 /// The pixels that a face may cover, and the least and greatest 1/t that it may have there.
 #[derive(Clone, Copy, Debug)]
-struct Reach {
-    left: usize,
-    right: usize,
-    top: usize,
-    bottom: usize,
-    inverse_t: (f64, f64),
-}
-
-#[inline(always)]
-fn least(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn most(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
+pub(crate) struct Reach {
+    pub(crate) left: usize,
+    pub(crate) right: usize,
+    pub(crate) top: usize,
+    pub(crate) bottom: usize,
+    pub(crate) inverse_t: (f64, f64),
 }
 
 impl Planes {
@@ -472,13 +385,41 @@ impl Lens for Pinhole<'_> {
 
     #[inline(always)]
     fn draw<L: Registers>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>) {
-        let all_good = self.project(cluster.corners);
-        for (&corners, &face) in cluster.faces.iter().zip(cluster.ids) {
-            if !all_good && corners[..3].iter().any(|&k| self.projected.inverse_z[usize::from(k)] == 0.0) {
-                self.draw_in_space(canvas, face);
+        self.project(cluster.corners);
+        self.batch.set_up(cluster.faces, &self.projected, self.width as f64, self.height as f64);
+        let batch = &*self.batch;
+        let enter = |canvas: &mut Canvas, i: usize| {
+            canvas.enter(Drawn { inverse_t: batch.inverse_t(i), face: cluster.ids[i], poor: false })
+        };
+        for i in batch.faces(Kind::Large) {
+            let slot = enter(canvas, i);
+            let (planes, reach) = (&batch.planes(i), &batch.reach(i));
+            Tiles { canvas, planes, reach, edge_error: EDGE_ERROR, slot, poor: false }.run(l);
+        }
+        for i in batch.faces(Kind::Narrow) {
+            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk);
+        }
+        for i in batch.faces(Kind::Small) {
+            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
+        }
+        for i in batch.faces(Kind::Wide) {
+            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
+            let (chunk, columns) = batch.second_chunk(i, &chunk);
+            if columns <= LANES / 2 {
+                canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk);
             } else {
-                self.draw_face(l, canvas, corners, face);
+                canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
             }
+        }
+        for i in batch.faces(Kind::Careful) {
+            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            canvas.draw::<L, false, true>(l, &grid(rows), &chunk);
+        }
+        for i in batch.faces(Kind::InSpace) {
+            self.draw_in_space(canvas, cluster.ids[i]);
         }
     }
 

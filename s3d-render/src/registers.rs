@@ -1,8 +1,8 @@
 //! Sixteen pixels at a time: the few operations that the visibility pass needs, on the widest registers there are.
 //!
 //! Which set of instructions a processor has is asked when the program runs ([`run`]). All sets give the same bits:
-//! products and sums are rounded one by one, never fused. No closure with an operation goes to a function of the standard
-//! library in a loop that counts, as `map` of an array: that function is compiled for any processor and is then called.
+//! products and sums are rounded one by one, never fused. Where time counts, no closure with instructions goes to `map` of
+//! an array: that is compiled for any processor, and would be called.
 #![expect(
     clippy::expect_used,
     reason = "slices are cut to the length of the array: there is nothing left of the check"
@@ -10,6 +10,7 @@
 #![allow(unsafe_code)]
 
 use crate::canvas::{CLOSE, Chunk, Drawn, Grid, Linear, MOST_ROWS};
+use std::slice::from_raw_parts_mut;
 
 /// Pixels in a register (or in as many registers as it takes).
 pub(crate) const LANES: usize = 16;
@@ -62,7 +63,7 @@ pub(crate) trait Registers: Copy {
         let l = self;
         let rows = grid.count;
         assert!(0 < rows && rows <= MOST_ROWS && (!TURN || rows <= grid.scale.len()));
-        let cells = pitch * (rows - 1) + Self::N;
+        let cells = pitch.saturating_mul(rows - 1).saturating_add(Self::N);
         assert!(cells <= best.len() && cells <= slots.len());
         let (u, v) = (l.load(grid.u), l.load(grid.v));
         let along = |f: &Linear| {
@@ -85,22 +86,16 @@ pub(crate) trait Registers: Copy {
         let (trusted, off) = (l.splat(chunk.trusted), l.splat(chunk.inverse_t_error));
         let mut any = 0;
         for k in 0..rows {
-            // SAFETY: k is below `rows`; that there are so many rows everywhere was asserted.
-            let (best, slots, r0, r1, r2, rq, scale) = unsafe {
-                (
-                    std::slice::from_raw_parts_mut(best.as_mut_ptr().add(k * pitch), Self::N),
-                    std::slice::from_raw_parts_mut(slots.as_mut_ptr().add(k * pitch), Self::N),
-                    l.splat(*down[0].get_unchecked(k)),
-                    l.splat(*down[1].get_unchecked(k)),
-                    l.splat(*down[2].get_unchecked(k)),
-                    l.splat(*down[3].get_unchecked(k)),
-                    if TURN { *grid.scale.get_unchecked(k) } else { 1.0 },
-                )
+            // SAFETY: k is below `rows`; that so many rows are within both was asserted.
+            let (best, slots) = unsafe {
+                let (best, slots) = (best.as_mut_ptr().add(k * pitch), slots.as_mut_ptr().add(k * pitch));
+                (from_raw_parts_mut(best, Self::N), from_raw_parts_mut(slots, Self::N))
             };
+            let (r0, r1, r2) = (l.splat(down[0][k]), l.splat(down[1][k]), l.splat(down[2][k]));
             let inside = l.min(l.add(a0, r0), l.min(l.add(a1, r1), l.add(a2, r2)));
-            let mut q = l.add(aq, rq);
+            let mut q = l.add(aq, l.splat(down[3][k]));
             if TURN {
-                q = l.mul(q, l.splat(scale));
+                q = l.mul(q, l.splat(grid.scale[k]));
             }
             let old = l.load(best);
             let mut wins = l.and(l.above(inside, error), l.steps_above(q, old, CLOSE));
@@ -113,10 +108,8 @@ pub(crate) trait Registers: Copy {
             }
             l.store_f32(best, wins, q);
             l.store_u32(slots, wins, chunk.slot);
-            let open = l.bits(rivals) & !l.bits(wins);
-            // SAFETY: as above.
-            unsafe { *doubts.get_unchecked_mut(k) = open };
-            any |= open;
+            doubts[k] = l.bits(rivals) & !l.bits(wins);
+            any |= doubts[k];
         }
         any != 0
     }
