@@ -1,5 +1,38 @@
 //! Bits into bytes, lowest first.
 
+/// Up to 48 bits and their number, in one word: the number in its lowest byte.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Bits(u64);
+
+impl Bits {
+    /// The lowest `count` bits of `value`; the others are 0.
+    #[inline(always)]
+    pub(super) const fn new(value: u64, count: u32) -> Self {
+        Self(value << 8 | count as u64)
+    }
+
+    /// These, and then the next.
+    #[inline(always)]
+    pub(super) fn then(self, next: Self) -> Self {
+        let count = (self.0 & 0xff) + (next.0 & 0xff);
+        Self((self.value() | next.value() << self.shift()) << 8 | count)
+    }
+
+    #[inline(always)]
+    fn value(self) -> u64 {
+        self.0 >> 8
+    }
+
+    /// The number, for a shift.
+    #[inline(always)]
+    fn shift(self) -> u64 {
+        self.0 & 0x3f
+    }
+}
+
+/// Bits that may be added between two flushes.
+const MOST: u64 = 56;
+
 /// Appends bits to a vector of bytes.
 pub(super) struct BitWriter<'a> {
     out: &'a mut Vec<u8>,
@@ -15,15 +48,6 @@ impl<'a> BitWriter<'a> {
         Self { out, end, bits: 0, count: 0 }
     }
 
-    /// Has `write` add bits to a writer that nothing else refers to, so that it is kept in registers.
-    #[inline(always)]
-    pub(super) fn quickly(&mut self, write: impl FnOnce(&mut BitWriter<'_>)) {
-        let mut own = BitWriter { out: &mut *self.out, ..*self };
-        write(&mut own);
-        let BitWriter { end, bits, count, .. } = own;
-        (self.end, self.bits, self.count) = (end, bits, count);
-    }
-
     /// Makes room for `bits` more bits.
     pub(super) fn reserve(&mut self, bits: u64) {
         let len = self.end + (bits / 8) as usize + 24;
@@ -32,11 +56,16 @@ impl<'a> BitWriter<'a> {
         }
     }
 
-    /// Adds the lowest `count` bits; the others are 0. At most 56 bits may be added between two flushes.
+    /// Adds the lowest `count` bits; the others are 0. At most [`MOST`] bits may be added between two flushes.
     #[inline(always)]
     pub(super) fn add(&mut self, bits: u64, count: u32) {
         self.bits |= bits << self.count;
         self.count += count;
+    }
+
+    /// As [`add`](Self::add).
+    pub(super) fn append(&mut self, bits: Bits) {
+        self.add(bits.value(), bits.shift() as u32);
     }
 
     /// Stores the whole bytes.
@@ -47,6 +76,42 @@ impl<'a> BitWriter<'a> {
         // At most 63 bits are there, so the shift is by 56 at most.
         self.bits >>= self.count & !7;
         self.count &= 7;
+    }
+
+    /// Adds the bits that `table` has for each of `indices`, modulo its length. There is room for them.
+    #[inline(always)]
+    pub(super) fn all<I: Copy + Into<usize>, const N: usize>(
+        &mut self,
+        indices: &[[I; 4]],
+        table: &[Bits; N],
+    ) {
+        // What is written may be anywhere, as far as the compiler knows: all that is needed is kept outside of memory.
+        let out = self.out.as_mut_slice();
+        let (mut end, mut bits, mut count) = (self.end, self.bits, u64::from(self.count));
+        for four in indices {
+            // Joined in pairs, as adding to the writer's bits waits for what was added before.
+            let [a, b, c, d] = four.map(|i| table[i.into() % N]);
+            let (first, second) = (a.value() | b.value() << a.shift(), c.value() | d.value() << c.shift());
+            let (n, more) = ((a.0 + b.0) & 0xff, (c.0 + d.0) & 0xff);
+            let (mut value, mut sum) = (first | second << (n & 0x3f), n + more);
+            if sum > MOST {
+                bits |= first << count;
+                count += n;
+                out[end..end + 8].copy_from_slice(&bits.to_le_bytes());
+                end += (count / 8) as usize;
+                bits >>= count & 0x38;
+                count &= 7;
+                (value, sum) = (second, more);
+            }
+            bits |= value << count;
+            count += sum;
+            out[end..end + 8].copy_from_slice(&bits.to_le_bytes());
+            end += (count / 8) as usize;
+            // At most 63 bits are there, so the shift is by 56 at most.
+            bits >>= count & 0x38;
+            count &= 7;
+        }
+        (self.end, self.bits, self.count) = (end, bits, count as u32);
     }
 
     /// Fills the last byte with zeros.
@@ -72,6 +137,7 @@ impl<'a> BitWriter<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::array::from_fn;
 
     #[test]
     fn bits_come_lowest_first_and_bytes_after_whole_bytes() {
@@ -88,5 +154,33 @@ mod tests {
         out.add(0b11, 2);
         out.finish();
         assert_eq!(bytes, [7, 0b1111_1101, 255, 255, 255, 255, 255, 0b111, 1, 2, 0b11]);
+    }
+
+    #[test]
+    fn bits_of_a_table_are_those_that_are_added_one_by_one() {
+        // From none to as many as there may be: four of them are too many for one step.
+        let table: [Bits; 32] = from_fn(|i| {
+            let count = (3 * i as u32).min(28);
+            Bits::new(0x5_a5a5_a5a5_u64.rotate_left(i as u32) & ((1 << count) - 1), count)
+        });
+        let indices: Vec<[u16; 4]> =
+            (0..1000u32).map(|i| from_fn(|k| (i.wrapping_mul(2_654_435_761) >> (6 * k)) as u16)).collect();
+        let (mut bytes, mut expected) = (vec![], vec![]);
+        let mut out = BitWriter::new(&mut bytes);
+        out.reserve(4000 * 28);
+        out.add(1, 3);
+        out.all(&indices, &table);
+        out.finish();
+        let mut plain = BitWriter::new(&mut expected);
+        plain.reserve(4000 * 28);
+        plain.add(1, 3);
+        for &i in indices.as_flattened() {
+            plain.append(table[usize::from(i) % 32]);
+            plain.flush();
+        }
+        plain.finish();
+        assert_eq!(bytes, expected);
+        let joined = Bits::new(0b101, 3).then(Bits::new(0b01, 2));
+        assert_eq!((joined, joined.value(), joined.shift()), (Bits::new(0b01101, 5), 0b01101, 5));
     }
 }

@@ -1,26 +1,18 @@
 //! Blocks: what was found becomes bits, in whichever of the three forms of RFC 1951 is shortest.
 
-use super::bits::BitWriter;
+use super::bits::{BitWriter, Bits};
 use super::huffman::{canonical_codes, code_lengths};
+use super::nearby::{LANES, Repeated};
+use super::tokens::{Tokens, count_bytes};
 use std::array::from_fn;
+use std::ops::Range;
 
 /// The longest repetition.
 pub(super) const LONGEST: usize = 258;
 
-/// Bytes as they are, and then a repetition.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sequence {
-    /// Number of bytes as they are.
-    pub(super) literals: u32,
-    /// Length of the repetition, 3 to 258; 0 if there is none.
-    pub(super) length: u16,
-    /// How far back it is, 1 to 32,768 (as 0 if there is none).
-    pub(super) distance: u16,
-}
-
 const END_OF_BLOCK: usize = 256;
 const LITERALS_AND_LENGTHS: usize = 286;
-const DISTANCES: usize = 30;
+pub(super) const DISTANCES: usize = 30;
 /// The order in which the lengths of the code for code lengths are written.
 const LENGTHS_ORDER: [usize; 19] = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
 /// The longest code of a symbol, in bits: one less than the format allows, so that four are written in one step.
@@ -44,7 +36,7 @@ const fn length_symbol(length: usize) -> (usize, u32) {
 
 /// The symbol of a distance of 1 to 32,768 and its number of extra bits.
 #[inline(always)]
-const fn distance_symbol(distance: usize) -> (usize, u32) {
+pub(super) const fn distance_symbol(distance: usize) -> (usize, u32) {
     let d = distance - 1;
     // The first four have symbols of their own, as if they had a bit more.
     let extra = (d | 2).ilog2() - 1;
@@ -52,7 +44,7 @@ const fn distance_symbol(distance: usize) -> (usize, u32) {
 }
 
 /// Symbol and number of extra bits by length − 3.
-const LENGTH_SYMBOLS: [(u8, u8); 256] = {
+pub(super) const LENGTH_SYMBOLS: [(u8, u8); 256] = {
     let mut table = [(0, 0); 256];
     let mut i = 0;
     while i < 256 {
@@ -70,30 +62,34 @@ pub(super) struct Prices {
     lengths: [u8; 256],
     /// By the distance's logarithm, rounded down, with its extra bits.
     distances: [u8; 16],
+    /// The same by lane.
+    lanes: [u8; 2 * LANES],
 }
 
 impl Prices {
     /// Before there was a block: literals as they are distributed in `data`.
-    pub(super) fn guess(data: &[u8]) -> Self {
+    pub(super) fn guess(data: &[u8], tokens: &Tokens) -> Self {
         let mut codes = Codes { litlen: [0; 288], distance: [5; 32] };
         let mut counts = [0; 256];
         count_bytes(data, &mut counts);
         code_lengths(&counts, LONGEST_CODE, &mut codes.litlen[..256]);
         codes.litlen[257..].fill(7);
-        Self::of(&codes)
+        Self::of(&codes, tokens)
     }
 
-    fn of(codes: &Codes) -> Self {
+    fn of(codes: &Codes, tokens: &Tokens) -> Self {
         let price = |length: u8| if length == 0 { RARE } else { length };
+        let distances: [u8; 16] = from_fn(|log| {
+            // Two symbols have that logarithm, nearly.
+            let shorter = codes.distance[2 * log].min(codes.distance[(2 * log + 1).min(DISTANCES - 1)]);
+            price(shorter).min(FAR) + (log as u8).saturating_sub(1)
+        });
         Self {
             literals: from_fn(|byte| price(codes.litlen[byte])),
             lengths: LENGTH_SYMBOLS
                 .map(|(symbol, extra)| price(codes.litlen[257 + usize::from(symbol)]) + extra),
-            distances: from_fn(|log| {
-                // Two symbols have that logarithm, nearly.
-                let shorter = codes.distance[2 * log].min(codes.distance[(2 * log + 1).min(DISTANCES - 1)]);
-                price(shorter).min(FAR) + (log as u8).saturating_sub(1)
-            }),
+            lanes: tokens.lanes.map(|distance| distances[distance.ilog2() as usize & 15]),
+            distances,
         }
     }
 
@@ -106,24 +102,33 @@ impl Prices {
     pub(super) fn repetition(&self, length: usize, distance: usize) -> u32 {
         u32::from(self.lengths[length - 3]) + u32::from(self.distances[distance.ilog2() as usize & 15])
     }
-}
 
-/// Adds how often each byte occurs.
-fn count_bytes(data: &[u8], counts: &mut [u32]) {
-    // Four tables: equal bytes in a row would wait for each other.
-    let mut tables = [[0u32; 256]; 4];
-    let (fours, rest) = data.as_chunks::<4>();
-    for four in fours {
-        for (table, &byte) in tables.iter_mut().zip(four) {
-            table[usize::from(byte)] += 1;
+    /// Whether a repetition of what is at `at`, of `SHORTEST` bytes at least, costs less than its bytes as they are. Only the
+    /// first `PRICED` of them are asked.
+    #[inline(always)]
+    pub(super) fn pays<const PRICED: usize, const SHORTEST: usize>(
+        &self,
+        data: &[u8],
+        at: usize,
+        found: Repeated,
+    ) -> bool {
+        let price = u32::from(self.lengths[found.length - 3]) + u32::from(self.lanes[found.lane]);
+        let here: &[u8; PRICED] = data[at..].first_chunk().unwrap_or(&[0; PRICED]);
+        let literals = here.map(|byte| self.literal(byte));
+        if SHORTEST >= PRICED {
+            return literals.iter().sum::<u32>() * found.length as u32 / PRICED as u32 > price;
         }
-    }
-    rest.iter().for_each(|&byte| tables[0][usize::from(byte)] += 1);
-    for (i, count) in counts[..256].iter_mut().enumerate() {
-        *count += tables.iter().map(|t| t[i]).sum::<u32>();
+        // In an array, so that the length needs no branch.
+        let (mut sums, mut sum) = ([0; PRICED], 0);
+        for (at, literal) in sums.iter_mut().zip(literals) {
+            sum += literal;
+            *at = sum;
+        }
+        sums[found.length.min(PRICED) - 1] * found.length.max(PRICED) as u32 / PRICED as u32 > price
     }
 }
 
+/// The lengths of the codes of a block, 0 of symbols that do not occur.
 struct Codes {
     litlen: [u8; 288],
     distance: [u8; 32],
@@ -141,6 +146,11 @@ impl Codes {
         Self { litlen, distance: [5; 32] }
     };
 
+    /// The codes themselves: of literals and lengths, and of distances.
+    fn values(&self) -> ([Bits; 288], [Bits; 32]) {
+        (values(&self.litlen), values(&self.distance))
+    }
+
     fn cost(&self, counts: &Counts) -> u64 {
         let sum = |counts: &[u32], lengths: &[u8]| -> u64 {
             counts.iter().zip(lengths).map(|(&n, &l)| u64::from(n) * u64::from(l)).sum()
@@ -149,11 +159,18 @@ impl Codes {
     }
 }
 
-struct Counts {
-    litlen: [u32; 288],
-    distance: [u32; 32],
+fn values<const N: usize>(lengths: &[u8; N]) -> [Bits; N] {
+    let mut codes = [0; N];
+    canonical_codes(lengths, &mut codes);
+    from_fn(|i| Bits::new(codes[i].into(), lengths[i].into()))
+}
+
+/// How often each symbol occurs.
+pub(super) struct Counts {
+    pub(super) litlen: [u32; 288],
+    pub(super) distance: [u32; 32],
     /// Extra bits of lengths and distances.
-    extra: u64,
+    pub(super) extra: u64,
 }
 
 /// The lengths of both codes, themselves coded.
@@ -233,73 +250,45 @@ impl Description {
     }
 }
 
-/// Bytes that are done without asking how many literals there are: mostly there are few.
-const FEW: usize = 3;
-/// Bytes from which on it pays to write four in a step.
-const FOURS: usize = 16;
-/// Bytes from which on it pays to count in several tables.
-const MANY: usize = 1000;
-
-/// Writes `data` as one block, as `sequences` take it apart, and learns what things cost.
+/// Writes what is in `place` of `data` as one block, as `tokens` take it apart, and learns what things cost.
 #[inline(always)]
 pub(super) fn write_block(
     data: &[u8],
-    sequences: &[Sequence],
+    place: Range<usize>,
+    tokens: &mut Tokens,
     last: bool,
     prices: &mut Prices,
     out: &mut BitWriter<'_>,
 ) {
-    let mut counts = Counts { litlen: [0; 288], distance: [0; 32], extra: 0 };
-    let mut at = 0;
-    for s in sequences {
-        let literals = s.literals as usize;
-        let rest = match data[at..].first_chunk::<FEW>() {
-            Some(few) => {
-                for (i, &byte) in few.iter().enumerate() {
-                    counts.litlen[usize::from(byte)] += u32::from(i < literals);
-                }
-                FEW.min(literals)
-            }
-            None => 0,
-        };
-        let rest = &data[at + rest..at + literals];
-        if rest.len() < MANY {
-            rest.iter().for_each(|&byte| counts.litlen[usize::from(byte)] += 1);
-        } else {
-            count_bytes(rest, &mut counts.litlen);
-        }
-        at += literals + usize::from(s.length);
-        if s.length > 0 {
-            let (symbol, extra) = LENGTH_SYMBOLS[usize::from(s.length) - 3];
-            let (d, distance_extra) = distance_symbol(usize::from(s.distance));
-            counts.litlen[257 + usize::from(symbol)] += 1;
-            counts.distance[d] += 1;
-            counts.extra += u64::from(extra) + u64::from(distance_extra);
-        }
-    }
+    let mut counts = tokens.count(data);
     counts.litlen[END_OF_BLOCK] = 1;
 
     let mut codes = Codes { litlen: [0; 288], distance: [0; 32] };
     code_lengths(&counts.litlen, LONGEST_CODE, &mut codes.litlen);
     code_lengths(&counts.distance, LONGEST_CODE, &mut codes.distance);
-    *prices = Prices::of(&codes);
+    *prices = Prices::of(&codes, tokens);
     let description = Description::new(&codes);
     let dynamic = description.bits + codes.cost(&counts) + counts.extra;
     let fixed = Codes::FIXED.cost(&counts) + counts.extra;
-    let stored = 8 * data.len() as u64 + 40 * data.len().div_ceil(0xffff).max(1) as u64;
+    let stored = 8 * place.len() as u64 + 40 * place.len().div_ceil(0xffff).max(1) as u64;
     let first = u64::from(last);
     if stored < dynamic.min(fixed) {
-        write_stored(data, last, out);
-    } else if fixed <= dynamic {
-        out.reserve(fixed + 3);
+        write_stored(&data[place], last, out);
+        return;
+    }
+    out.reserve(dynamic.min(fixed) + 3);
+    let codes = if fixed <= dynamic {
         out.add(first | 1 << 1, 3);
-        out.quickly(|out| write_sequences(data, sequences, &Codes::FIXED, out));
+        &Codes::FIXED
     } else {
-        out.reserve(dynamic + 3);
         out.add(first | 2 << 1, 3);
         description.write(out);
-        out.quickly(|out| write_sequences(data, sequences, &codes, out));
-    }
+        &codes
+    };
+    let (litlen, distance) = codes.values();
+    tokens.write(data, &litlen, &distance, out);
+    out.append(litlen[END_OF_BLOCK]);
+    out.flush();
 }
 
 fn write_stored(data: &[u8], last: bool, out: &mut BitWriter<'_>) {
@@ -312,67 +301,4 @@ fn write_stored(data: &[u8], last: bool, out: &mut BitWriter<'_>) {
         out.flush();
         out.bytes(piece);
     }
-}
-
-#[inline(always)]
-fn write_sequences(data: &[u8], sequences: &[Sequence], codes: &Codes, out: &mut BitWriter<'_>) {
-    let (mut litlens, mut distances) = ([0; 288], [0; 32]);
-    canonical_codes(&codes.litlen, &mut litlens);
-    canonical_codes(&codes.distance, &mut distances);
-    // Bits and their number, in one word.
-    let literals: [u32; 256] = from_fn(|i| u32::from(litlens[i]) | u32::from(codes.litlen[i]) << 16);
-    let lengths: [u32; 256] = from_fn(|i| {
-        let (symbol, extra) = LENGTH_SYMBOLS[i];
-        let s = 257 + usize::from(symbol);
-        let value = if extra == 0 { 0 } else { i as u32 & ((1 << extra) - 1) };
-        let n = u32::from(codes.litlen[s]);
-        u32::from(litlens[s]) | value << n | (n + u32::from(extra)) << 24
-    });
-    let mut at = 0;
-    for s in sequences {
-        let n = s.literals as usize;
-        let mut done = 0;
-        if let Some(few) = data[at..].first_chunk::<FEW>() {
-            for (i, &byte) in few.iter().enumerate() {
-                let entry = if i < n { literals[usize::from(byte)] } else { 0 };
-                out.add(u64::from(entry & 0xffff), entry >> 16);
-            }
-            done = FEW.min(n);
-            out.flush();
-        }
-        let rest = &data[at + done..at + n];
-        let (fours, rest) = rest.split_at(if rest.len() < FOURS { 0 } else { rest.len() & !3 });
-        let fours = fours.as_chunks::<4>().0;
-        for four in fours {
-            // Joined in pairs, as adding to the writer's bits waits for what was added before.
-            let [a, b, c, d] = four.map(|byte| literals[usize::from(byte)]);
-            let pair = |a: u32, b: u32| {
-                let bits = u64::from(a & 0xffff) | u64::from(b & 0xffff) << (a >> 16);
-                (bits, (a >> 16) + (b >> 16))
-            };
-            let ((low, few), (high, more)) = (pair(a, b), pair(c, d));
-            out.add(low | high << few, few + more);
-            out.flush();
-        }
-        for bytes in rest.chunks(FEW) {
-            for &byte in bytes {
-                let entry = literals[usize::from(byte)];
-                out.add(u64::from(entry & 0xffff), entry >> 16);
-            }
-            out.flush();
-        }
-        at += s.literals as usize + usize::from(s.length);
-        if s.length > 0 {
-            let entry = lengths[usize::from(s.length) - 3];
-            out.add(u64::from(entry & 0xff_ffff), entry >> 24);
-            let d = usize::from(s.distance);
-            let (symbol, extra) = distance_symbol(d);
-            let n = u32::from(codes.distance[symbol]);
-            let value = (d as u64 - 1) & ((1 << extra) - 1);
-            out.add(u64::from(distances[symbol]) | value << n, n + extra);
-            out.flush();
-        }
-    }
-    out.add(litlens[END_OF_BLOCK].into(), codes.litlen[END_OF_BLOCK].into());
-    out.flush();
 }

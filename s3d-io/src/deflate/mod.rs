@@ -24,14 +24,16 @@ mod finder;
 mod huffman;
 mod nearby;
 mod search;
+mod tokens;
 
 pub(crate) use search::{Candidates, Search, Work, wide};
 
 use bits::BitWriter;
-use block::{Prices, Sequence};
+use block::Prices;
 use finder::Finder;
 use nearby::Nearby;
 use search::Parser;
+use tokens::Tokens;
 
 /// Compresses one stream after the other. What one of them taught about costs serves the next, so a stream's bytes
 /// depend on those before: make a new one for each file.
@@ -40,7 +42,7 @@ pub(crate) struct Deflater {
     finder: Finder,
     nearby: Nearby,
     prices: Option<Prices>,
-    sequences: Vec<Sequence>,
+    tokens: Tokens,
 }
 
 /// How much of the first data is looked at to begin with.
@@ -50,17 +52,19 @@ impl Deflater {
     pub(crate) fn new(search: Search) -> Self {
         let finder = Finder::new(search.hash_bytes, search.nice);
         let nearby = Nearby::new(search.line);
-        Self { search, finder, nearby, prices: None, sequences: Vec::new() }
+        let tokens = Tokens::new(nearby::lanes(search.line));
+        Self { search, finder, nearby, prices: None, tokens }
     }
 
     /// Appends `data` to `out`, compressed. At `boundary` (0 for none) begins data of another kind.
     pub(crate) fn zlib(&mut self, data: &[u8], boundary: usize, out: &mut Vec<u8>) {
         // Deflate, 32 KiB back; no claim about the effort; divisible by 31.
         out.extend([0x78, 0x01]);
-        let prices = self.prices.get_or_insert_with(|| Prices::guess(&data[..data.len().min(SAMPLE)]));
-        let (finder, nearby, sequences) = (&mut self.finder, &mut self.nearby, &mut self.sequences);
+        let (finder, nearby, tokens) = (&mut self.finder, &mut self.nearby, &mut self.tokens);
+        let sample = &data[..data.len().min(SAMPLE)];
+        let prices = self.prices.get_or_insert_with(|| Prices::guess(sample, tokens));
         let mut bits = BitWriter::new(out);
-        Parser { finder, nearby, sequences, prices, search: self.search, boundary }.run(data, &mut bits);
+        Parser { finder, nearby, tokens, prices, search: self.search, boundary }.run(data, &mut bits);
         bits.finish();
         out.extend(simd_adler32::adler32(&data).to_be_bytes());
     }
@@ -186,11 +190,12 @@ mod tests {
             Deflater::new(search).zlib(&data, 40_000, &mut chosen);
             let mut plain = vec![0x78, 0x01];
             let mut bits = BitWriter::new(&mut plain);
+            let mut tokens = Tokens::new(nearby::lanes(search.line));
             Parser {
                 finder: &mut Finder::new(search.hash_bytes, search.nice),
                 nearby: &mut Nearby::new(search.line),
-                sequences: &mut Vec::new(),
-                prices: &mut Prices::guess(&data[..SAMPLE]),
+                prices: &mut Prices::guess(&data[..SAMPLE], &tokens),
+                tokens: &mut tokens,
                 search,
                 boundary: 40_000,
             }

@@ -7,6 +7,8 @@
 
 use super::block::LONGEST;
 use super::finder::WINDOW;
+use std::array::from_fn;
+use std::hint::select_unpredictable;
 
 /// Distances of each of the two kinds.
 pub(super) const LANES: usize = 32;
@@ -62,7 +64,13 @@ pub(super) struct Nearby {
 pub(super) struct Repeated {
     /// 3 to [`LONGEST`].
     pub(super) length: usize,
-    pub(super) distance: usize,
+    /// Which of the distances: see [`lanes`].
+    pub(super) lane: usize,
+}
+
+/// The distances that are asked for: the 32 smallest, and 32 around a line.
+pub(super) fn lanes(line: usize) -> [usize; 2 * LANES] {
+    from_fn(|lane| if lane < LANES { lane + 1 } else { (line + lane + 1).saturating_sub(LANES + LANES / 2) })
 }
 
 impl Nearby {
@@ -123,30 +131,51 @@ impl Nearby {
         }
     }
 
-    /// The longest repetition at `at`, which has been [`reach`](Self::reach)ed: the nearest of several.
+    /// The places that have been [`reach`](Self::reach)ed.
     #[inline(always)]
-    pub(super) fn longest<const SHORTEST: usize>(&self, at: usize) -> Option<Repeated> {
+    pub(super) fn places(&self) -> Places<'_> {
+        Places { words: &self.words, start: self.start }
+    }
+}
+
+/// The words of some places.
+#[derive(Clone, Copy)]
+pub(super) struct Places<'a> {
+    words: &'a [u64],
+    /// The first of them.
+    start: usize,
+}
+
+impl Places<'_> {
+    /// The longest repetition at `at`, which has been [`reach`](Nearby::reach)ed: the nearest of several.
+    #[inline(always)]
+    pub(super) fn longest<const SHORTEST: usize>(self, at: usize) -> Option<Repeated> {
+        const { assert!(SHORTEST >= 3 && (LONGEST - SHORTEST) % 4 >= 2, "only a third byte more may be too many") };
         let words: &[u64; AHEAD] = self.words[at - self.start..].first_chunk().expect("they were reached");
         let mut agree = words[..SHORTEST].iter().fold(u64::MAX, |agree, word| agree & word);
         if agree == 0 {
             return None;
         }
         let mut length = SHORTEST;
-        while length + 4 <= LONGEST {
-            let next = agree & words[length] & words[length + 1] & words[length + 2] & words[length + 3];
-            if next == 0 {
+        let [mut first, mut second, mut third, mut fourth] = from_fn(|i| words[length + i]);
+        loop {
+            let next = agree & (first & second & (third & fourth));
+            if next == 0 || length + 4 > LONGEST {
                 break;
             }
             (agree, length) = (next, length + 4);
+            [first, second, third, fourth] = from_fn(|i| words[length + i]);
         }
         // Up to three more, without a branch.
-        let next = if length + 2 <= LONGEST { agree & words[length] & words[length + 1] } else { 0 };
-        (agree, length) = if next != 0 { (next, length + 2) } else { (agree, length) };
-        let next = if length < LONGEST { agree & words[length] } else { 0 };
-        (agree, length) = if next != 0 { (next, length + 1) } else { (agree, length) };
-        let lane = agree.leading_zeros() as usize;
-        let distance = if lane < LANES { lane + 1 } else { self.line + lane + 1 - LANES - LANES / 2 };
-        Some(Repeated { length, distance })
+        let one = agree & first;
+        let two = one & second;
+        let three = if length + 3 <= LONGEST { two & third } else { 0 };
+        length += usize::from(one != 0) + usize::from(two != 0) + usize::from(three != 0);
+        let agree = select_unpredictable(one != 0, one, agree);
+        let agree = select_unpredictable(two != 0, two, agree);
+        let agree = select_unpredictable(three != 0, three, agree);
+        // One bit at least is left.
+        Some(Repeated { length, lane: (agree.leading_zeros() as usize) & (2 * LANES - 1) })
     }
 }
 
@@ -156,15 +185,15 @@ mod tests {
     use proptest::prelude::*;
 
     /// The plain way: every distance, byte by byte.
-    fn reference(data: &[u8], at: usize, line: usize, shortest: usize) -> Option<Repeated> {
+    fn reference(data: &[u8], at: usize, line: usize, shortest: usize) -> Option<(usize, usize)> {
         let reaches = (LANES..=WINDOW - LANES / 2).contains(&line) && at >= line + LANES / 2;
         let above = (line.saturating_sub(LANES / 2 - 1)..=line + LANES / 2).filter(|_| reaches);
         let mut best = None;
         for distance in (1..=LANES.min(at)).chain(above) {
             let here = data[at..].iter().take(LONGEST);
             let length = here.zip(&data[at - distance..]).take_while(|(a, b)| a == b).count();
-            if length >= shortest && best.is_none_or(|b: Repeated| length > b.length) {
-                best = Some(Repeated { length, distance });
+            if length >= shortest && best.is_none_or(|(most, _)| length > most) {
+                best = Some((length, distance));
             }
         }
         best
@@ -178,7 +207,8 @@ mod tests {
             let (mut at, mut steps) = (0, steps.iter().cycle());
             while at < data.len() {
                 nearby.reach::<C>(data, at);
-                assert_eq!(nearby.longest::<SHORTEST>(at), reference(data, at, line, SHORTEST), "at {at}");
+                let found = nearby.places().longest::<SHORTEST>(at).map(|f| (f.length, lanes(line)[f.lane]));
+                assert_eq!(found, reference(data, at, line, SHORTEST), "at {at}");
                 at += steps.next().unwrap();
             }
         }
@@ -201,7 +231,7 @@ mod tests {
                 data.push(byte);
             }
             check::<Anywhere, 3>(&data, line, &steps);
-            check::<Anywhere, 12>(&data, line, &steps);
+            check::<Anywhere, 11>(&data, line, &steps);
         }
 
         #[test]
@@ -221,6 +251,6 @@ mod tests {
         nearby.begin();
         nearby.reach::<Anywhere>(&data, 0);
         nearby.reach::<Anywhere>(&data, TILE - 100);
-        assert_eq!(nearby.longest::<3>(TILE - 100), Some(Repeated { length: LONGEST, distance: 1 }));
+        assert_eq!(nearby.places().longest::<3>(TILE - 100), Some(Repeated { length: LONGEST, lane: 0 }));
     }
 }

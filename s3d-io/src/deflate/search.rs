@@ -1,9 +1,10 @@
 //! Data to sequences: which bytes are written as they are, and which as repetitions.
 
 use super::bits::BitWriter;
-use super::block::{LONGEST, Prices, Sequence, write_block};
+use super::block::{LONGEST, Prices, write_block};
 use super::finder::{Finder, WINDOW};
 use super::nearby::{Anywhere, Compare, Nearby};
+use super::tokens::{BLOCK, Tokens};
 
 /// How hard and where repetitions are looked for.
 #[derive(Clone, Copy, Debug)]
@@ -39,16 +40,19 @@ pub(crate) enum Candidates {
     /// Those at the 64 distances of [`Nearby`](super::nearby::Nearby), at every byte: for smooth surfaces. Of all else, only
     /// the line matters to it.
     Nearby,
-    /// The same, but repetitions of 12 bytes and more only: where bytes as they are cost little.
+    /// The same, but only long repetitions, and not at every byte: where bytes as they are cost little.
     NearbyLong,
 }
 
-/// Symbols in a block.
-const BLOCK: usize = 16_000;
 /// Places passed over at most.
 const LONGEST_STEP: usize = 32;
 /// Bytes of which the price as literals is asked for; where there are short repetitions, longer ones pay anyway.
 const PRICED: usize = 8;
+/// Bytes, at least, of repetitions where only long ones are looked for: more than are priced.
+const LONG: usize = 11;
+/// Steps to the next place where only long ones are looked for: if there was none, and if it cost too much. What begins
+/// between two places is found at the second.
+const LONG_STEPS: (usize, usize) = (2, 4);
 /// Bytes at the end in which nothing is looked for.
 const TAIL: usize = LONGEST + 8;
 
@@ -114,7 +118,7 @@ impl Compare for Avx512 {
 pub(super) struct Parser<'a> {
     pub(super) finder: &'a mut Finder,
     pub(super) nearby: &'a mut Nearby,
-    pub(super) sequences: &'a mut Vec<Sequence>,
+    pub(super) tokens: &'a mut Tokens,
     pub(super) prices: &'a mut Prices,
     pub(super) search: Search,
     /// A place where a block ends, as the data is of another kind after it.
@@ -157,7 +161,7 @@ impl Parser<'_> {
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,avx512bw,avx512vl")]
     fn run_x86_64_v4(self, data: &[u8], out: &mut BitWriter<'_>) {
         match self.search.candidates {
-            Candidates::NearbyLong => self.parse_nearby::<Avx512, 12>(data, out),
+            Candidates::NearbyLong => self.parse_nearby::<Avx512, LONG>(data, out),
             _ => self.parse_nearby::<Avx512, 3>(data, out),
         }
     }
@@ -178,62 +182,65 @@ impl Parser<'_> {
             Candidates::Steps => self.parse::<1, 4, 5, 1, 2>(data, around, out),
             Candidates::Many => self.parse::<4, 16, 5, 1, 1>(data, around, out),
             Candidates::Nearby => self.parse_nearby::<C, 3>(data, out),
-            Candidates::NearbyLong => self.parse_nearby::<C, 12>(data, out),
+            Candidates::NearbyLong => self.parse_nearby::<C, LONG>(data, out),
         }
     }
 
-    /// Repetitions of `SHORTEST` bytes and more are looked for at every byte that is in none.
+    /// Repetitions of `SHORTEST` bytes and more are looked for where there is none.
     #[inline(always)]
     fn parse_nearby<C: Compare, const SHORTEST: usize>(self, data: &[u8], out: &mut BitWriter<'_>) {
-        let Self { nearby, sequences, prices, boundary, .. } = self;
+        let Self { nearby, tokens, prices, boundary, .. } = self;
+        let steps = if SHORTEST > PRICED { LONG_STEPS } else { (1, 1) };
         nearby.begin();
-        sequences.clear();
-        let (mut at, mut block, mut symbols, mut pending) = (0, 0, 0, 0);
-        // Where there is something else to do than to look for repetitions: the block may be full, or words are missing.
-        let mut pause = 0;
+        tokens.clear();
+        // The block's first byte, the first that is in no sequence, and the place where the block is full if no repetition
+        // comes before.
+        let (mut at, mut block, mut pending, mut full) = (0, 0, 0, BLOCK);
         loop {
-            if at >= pause {
-                let full = symbols + (at - pending) >= BLOCK || block < boundary && at >= boundary;
-                if full || at >= data.len() {
-                    let last = at >= data.len();
-                    sequences.push(Sequence { literals: (at - pending) as u32, length: 0, distance: 0 });
-                    write_block(&data[block..at], sequences, last, prices, out);
-                    if last {
-                        return;
-                    }
-                    sequences.clear();
-                    (block, symbols, pending) = (at, 0, at);
+            at = at.min(data.len());
+            if at >= full || block < boundary && at >= boundary || at >= data.len() {
+                let last = at >= data.len();
+                tokens.literals(data, pending, at);
+                write_block(data, block..at, tokens, last, prices, out);
+                if last {
+                    return;
                 }
-                pause = nearby.reach::<C>(data, at).min(pending + BLOCK - symbols);
-                if block < boundary {
-                    pause = pause.min(boundary);
-                }
+                tokens.clear();
+                (block, pending, full) = (at, at, at + BLOCK);
             }
-            let Some(found) = nearby.longest::<SHORTEST>(at) else {
-                at += 1;
-                continue;
-            };
-            if SHORTEST > PRICED || found.length <= PRICED {
-                let here: &[u8; PRICED] = data[at..].first_chunk().unwrap_or(&[0; PRICED]);
-                let mut saved = [0; PRICED + 1];
-                for (i, &byte) in here.iter().enumerate() {
-                    saved[i + 1] = saved[i] + prices.literal(byte);
-                }
-                let saved = saved[found.length.min(PRICED)] * found.length.max(PRICED) as u32 / PRICED as u32;
-                if saved <= prices.repetition(found.length, found.distance) {
-                    at += 1;
+            // Where there is something else to do than to look for repetitions: the block may be full, or words are missing.
+            let mut pause = nearby.reach::<C>(data, at).min(full);
+            if block < boundary {
+                pause = pause.min(boundary);
+            }
+            let places = nearby.places();
+            while at < pause {
+                let Some(mut found) = places.longest::<SHORTEST>(at) else {
+                    at += steps.0;
+                    continue;
+                };
+                if (SHORTEST > PRICED || found.length <= PRICED)
+                    && !prices.pays::<PRICED, SHORTEST>(data, at, found)
+                {
+                    at += steps.1;
                     continue;
                 }
+                if steps != (1, 1) {
+                    let distance = tokens.lanes[found.lane];
+                    while at > pending.max(distance)
+                        && found.length < LONGEST
+                        && data[at - 1] == data[at - 1 - distance]
+                    {
+                        at -= 1;
+                        found.length += 1;
+                    }
+                }
+                tokens.literals(data, pending, at);
+                tokens.repetition_in(found.lane, found.length);
+                at += found.length;
+                pending = at;
+                full += found.length - 1;
             }
-            sequences.push(Sequence {
-                literals: (at - pending) as u32,
-                length: found.length as u16,
-                distance: found.distance as u16,
-            });
-            symbols += at - pending + 1;
-            at += found.length;
-            pending = at;
-            pause = pause.min(at + BLOCK.saturating_sub(symbols));
         }
     }
 
@@ -252,9 +259,9 @@ impl Parser<'_> {
         rows: [usize; ROWS],
         out: &mut BitWriter<'_>,
     ) {
-        let Self { finder, sequences, prices, search, boundary, .. } = self;
+        let Self { finder, tokens, prices, search, boundary, .. } = self;
         finder.begin::<WORDS>();
-        sequences.clear();
+        tokens.clear();
         let end = data.len().saturating_sub(TAIL);
         let mut at = 1;
         // The block's first byte, its symbols so far, and the first byte that is in no sequence.
@@ -298,11 +305,8 @@ impl Parser<'_> {
                     at -= 1;
                     found.length += 1;
                 }
-                sequences.push(Sequence {
-                    literals: (at - pending) as u32,
-                    length: found.length as u16,
-                    distance: found.distance as u16,
-                });
+                tokens.literals(data, pending, at);
+                tokens.repetition(found.length, found.distance);
                 symbols += at - pending + 1;
                 at += found.length;
                 pending = at;
@@ -319,14 +323,14 @@ impl Parser<'_> {
             }
             let full = symbols + (at - pending) >= BLOCK || block < boundary && at >= boundary;
             if full && at < end {
-                sequences.push(Sequence { literals: (at - pending) as u32, length: 0, distance: 0 });
-                write_block(&data[block..at], sequences, false, prices, out);
-                sequences.clear();
+                tokens.literals(data, pending, at);
+                write_block(data, block..at, tokens, false, prices, out);
+                tokens.clear();
                 (block, symbols, pending) = (at, 0, at);
             }
         }
-        sequences.push(Sequence { literals: (data.len() - pending) as u32, length: 0, distance: 0 });
-        write_block(&data[block..], sequences, true, prices, out);
+        tokens.literals(data, pending, data.len());
+        write_block(data, block..data.len(), tokens, true, prices, out);
     }
 }
 

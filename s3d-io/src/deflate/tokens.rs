@@ -1,0 +1,299 @@
+//! What a block consists of, one small number after the other: bytes as they are, lengths, distances, and bits.
+//!
+//! All of them are counted and written in the same way, without a question of which kind is next: a processor would
+//! guess the answer wrong. So a block's table has the bits of each of them ([`Table`]).
+
+use super::bits::{BitWriter, Bits};
+use super::block::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST, distance_symbol};
+use super::finder::WINDOW;
+use super::nearby::LANES;
+use std::array::from_fn;
+
+/// Symbols in a block; only steps over several bytes make it a few more.
+pub(super) const BLOCK: usize = 16_000;
+/// Tokens in a block at most: a repetition takes four.
+const ROOM: usize = 4 * (BLOCK + 4 * LONGEST);
+
+/// Bytes as they are come first; then there is a token for each length, with the extra bits of its symbol;
+const LENGTH: usize = 256;
+/// then one for each symbol of distances, without its extra bits;
+const DISTANCE: usize = LENGTH + LONGEST - 2;
+/// one for each of the distances of [`Nearby`](super::nearby::Nearby), with them;
+const LANE: usize = DISTANCE + DISTANCES;
+/// and those for bits alone: the empty one, the two of one bit, the four of two, up to those of [`MOST_BITS`].
+const BITS: usize = LANE + 2 * LANES;
+const MOST_BITS: u32 = 7;
+/// How many there are.
+const KINDS: usize = BITS + (2 << MOST_BITS) - 1;
+/// The power of two that is not less.
+const SLOTS: usize = KINDS.next_power_of_two();
+
+/// The token of the lowest `count` bits of `value`, up to [`MOST_BITS`]. The others are 0.
+#[inline(always)]
+fn bits_token(value: usize, count: u32) -> u16 {
+    (BITS + (1 << count) - 1 + value) as u16
+}
+
+/// Bytes as they are from which on they are counted and written where they lie, instead of as tokens.
+const LONG: usize = 64;
+
+/// The tokens of a block.
+pub(super) struct Tokens {
+    tokens: Box<[u16; ROOM]>,
+    len: usize,
+    runs: Vec<Run>,
+    /// The distance of each lane.
+    pub(super) lanes: [usize; 2 * LANES],
+}
+
+/// Many bytes as they are.
+struct Run {
+    /// How many tokens, a multiple of four, come before.
+    tokens: usize,
+    /// Where the bytes begin in the data, and how many they are, a multiple of four.
+    from: usize,
+    len: usize,
+}
+
+impl Tokens {
+    /// None as yet; `lanes` are the distances that [`repetition_in`](Self::repetition_in) means.
+    pub(super) fn new(lanes: [usize; 2 * LANES]) -> Self {
+        let lanes = lanes.map(|distance| distance.clamp(1, WINDOW));
+        let tokens = vec![0; ROOM].try_into().expect("as many");
+        Self { tokens, len: 0, runs: Vec::new(), lanes }
+    }
+
+    /// Forgets them.
+    pub(super) fn clear(&mut self) {
+        self.len = 0;
+        self.runs.clear();
+    }
+
+    /// Adds the bytes of `data` in `from..to` as they are.
+    #[inline(always)]
+    pub(super) fn literals(&mut self, data: &[u8], mut from: usize, to: usize) {
+        const FEW: usize = 16;
+        if to - from >= LONG {
+            from = self.run(from, to);
+        }
+        // Sixteen at once, whether there are as many or not: mostly there are few, which are then overwritten.
+        let few = data[from..].first_chunk::<FEW>().zip(self.tokens[self.len..].first_chunk_mut());
+        let done = few.map_or(0, |(bytes, tokens)| {
+            *tokens = bytes.map(u16::from);
+            FEW
+        });
+        self.len += to - from;
+        if to - from > done {
+            let tokens = &mut self.tokens[..self.len];
+            let rest = &data[from + done..to];
+            let begin = tokens.len() - rest.len();
+            tokens[begin..].iter_mut().zip(rest).for_each(|(token, byte)| *token = u16::from(*byte));
+        }
+    }
+
+    /// Adds most of many bytes; the first that is left, it returns.
+    #[cold]
+    #[inline(never)]
+    fn run(&mut self, from: usize, to: usize) -> usize {
+        self.pad();
+        let len = (to - from) & !3;
+        self.runs.push(Run { tokens: self.len, from, len });
+        from + len
+    }
+
+    /// Fills up to a multiple of four, with what is no bits.
+    fn pad(&mut self) {
+        let len = self.len.next_multiple_of(4);
+        self.push([bits_token(0, 0); 3]);
+        self.len = len;
+    }
+
+    /// Adds a repetition of 3 to 258 bytes from 1 to 32,768 bytes back.
+    #[inline(always)]
+    pub(super) fn repetition(&mut self, length: usize, distance: usize) {
+        let (symbol, extra) = distance_symbol(distance);
+        let value = (distance - 1) & ((1 << extra) - 1);
+        let first = extra.min(MOST_BITS);
+        self.push([
+            (LENGTH + length - 3) as u16,
+            (DISTANCE + symbol) as u16,
+            bits_token(value & ((1 << first) - 1), first),
+            bits_token(value >> first, extra - first),
+        ]);
+    }
+
+    /// Adds a repetition of 3 to 258 bytes at the distance of a lane.
+    #[inline(always)]
+    pub(super) fn repetition_in(&mut self, lane: usize, length: usize) {
+        self.push([(LENGTH + length - 3) as u16, (LANE + lane) as u16]);
+    }
+
+    #[inline(always)]
+    fn push<const N: usize>(&mut self, tokens: [u16; N]) {
+        self.tokens[self.len..self.len + N].copy_from_slice(&tokens);
+        self.len += N;
+    }
+
+    /// How often each symbol occurs; `data` are the bytes that [`literals`](Self::literals) was told of.
+    pub(super) fn count(&mut self, data: &[u8]) -> Counts {
+        self.pad();
+        // Four tables: equal tokens in a row would wait for each other.
+        let mut tables = [[0u16; SLOTS]; 4];
+        for four in self.tokens[..self.len].as_chunks::<4>().0 {
+            for (table, &token) in tables.iter_mut().zip(four) {
+                table[usize::from(token) % SLOTS] += 1;
+            }
+        }
+        let counts: [u32; KINDS] = from_fn(|i| tables.iter().map(|t| u32::from(t[i])).sum());
+
+        let mut sums = Counts { litlen: [0; 288], distance: [0; 32], extra: 0 };
+        sums.litlen[..LENGTH].copy_from_slice(&counts[..LENGTH]);
+        for (&n, (symbol, extra)) in counts[LENGTH..DISTANCE].iter().zip(LENGTH_SYMBOLS) {
+            sums.litlen[257 + usize::from(symbol)] += n;
+            sums.extra += u64::from(n) * u64::from(extra);
+        }
+        for run in &self.runs {
+            count_bytes(&data[run.from..run.from + run.len], &mut sums.litlen);
+        }
+        sums.distance[..DISTANCES].copy_from_slice(&counts[DISTANCE..LANE]);
+        for (&n, distance) in counts[LANE..BITS].iter().zip(self.lanes) {
+            let (symbol, extra) = distance_symbol(distance);
+            sums.distance[symbol] += n;
+            sums.extra += u64::from(n) * u64::from(extra);
+        }
+        for (i, &n) in counts[BITS..].iter().enumerate() {
+            sums.extra += u64::from(n) * u64::from((i + 1).ilog2());
+        }
+        sums
+    }
+
+    /// Writes them; there is [room](BitWriter::reserve) for that.
+    #[inline(always)]
+    pub(super) fn write(
+        &self,
+        data: &[u8],
+        litlen: &[Bits; 288],
+        distance: &[Bits; 32],
+        out: &mut BitWriter<'_>,
+    ) {
+        let mut table = [Bits::default(); SLOTS];
+        for (entry, bits) in table.iter_mut().zip(&litlen[..LENGTH]) {
+            *entry = *bits;
+        }
+        for (i, (entry, (symbol, extra))) in
+            table[LENGTH..DISTANCE].iter_mut().zip(LENGTH_SYMBOLS).enumerate()
+        {
+            let value = if extra == 0 { 0 } else { i & ((1 << extra) - 1) };
+            *entry = litlen[257 + usize::from(symbol)].then(Bits::new(value as u64, extra.into()));
+        }
+        table[DISTANCE..LANE].copy_from_slice(&distance[..DISTANCES]);
+        for (entry, of) in table[LANE..BITS].iter_mut().zip(self.lanes) {
+            let (symbol, extra) = distance_symbol(of);
+            *entry = distance[symbol].then(Bits::new((of as u64 - 1) & ((1 << extra) - 1), extra));
+        }
+        for (i, entry) in table[BITS..KINDS].iter_mut().enumerate() {
+            let count = (i + 1).ilog2();
+            *entry = Bits::new(i as u64 + 1 - (1 << count), count);
+        }
+        let mut done = 0;
+        for run in &self.runs {
+            out.all(self.tokens[done..run.tokens].as_chunks().0, &table);
+            out.all(data[run.from..run.from + run.len].as_chunks().0, &table);
+            done = run.tokens;
+        }
+        out.all(self.tokens[done..self.len].as_chunks().0, &table);
+    }
+}
+
+/// Adds how often each byte occurs.
+pub(super) fn count_bytes(data: &[u8], counts: &mut [u32]) {
+    // Four tables: equal bytes in a row would wait for each other.
+    let mut tables = [[0u32; 256]; 4];
+    let (fours, rest) = data.as_chunks::<4>();
+    for four in fours {
+        for (table, &byte) in tables.iter_mut().zip(four) {
+            table[usize::from(byte)] += 1;
+        }
+    }
+    rest.iter().for_each(|&byte| tables[0][usize::from(byte)] += 1);
+    for (i, count) in counts[..256].iter_mut().enumerate() {
+        *count += tables.iter().map(|t| t[i]).sum::<u32>();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::nearby::lanes;
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A table in which each token has bits of its own, as a reader takes them apart.
+    const PLAIN: ([Bits; 288], [Bits; 32]) = {
+        let (mut litlen, mut distance) = ([Bits::new(0, 0); 288], [Bits::new(0, 0); 32]);
+        let mut i = 0;
+        while i < 288 {
+            litlen[i] = Bits::new(i as u64, 9);
+            i += 1;
+        }
+        i = 0;
+        while i < 32 {
+            distance[i] = Bits::new(i as u64, 5);
+            i += 1;
+        }
+        (litlen, distance)
+    };
+
+    proptest! {
+        #[test]
+        fn symbols_are_counted_and_written_in_order(
+            parts in proptest::collection::vec((0usize..200, 3usize..=258, 1usize..=WINDOW, 0usize..64), 0..40),
+            line in 50usize..40_000,
+        ) {
+            let data: Vec<u8> = (0..10_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+            let mut tokens = Tokens::new(lanes(line));
+            tokens.clear();
+            // The plain way: symbol by symbol, each with its extra bits.
+            let (mut litlen, mut distances, mut extra, mut expected) = ([0; 288], [0; 32], 0, vec![]);
+            let mut plain = BitWriter::new(&mut expected);
+            plain.reserve(1 << 20);
+            let mut put = |value: usize, count: u32| {
+                plain.add(value as u64, count);
+                plain.flush();
+            };
+            let mut at = 0;
+            for (i, (literals, length, distance, lane)) in parts.into_iter().enumerate() {
+                tokens.literals(&data, at, at + literals);
+                for &byte in &data[at..at + literals] {
+                    litlen[usize::from(byte)] += 1;
+                    put(byte.into(), 9);
+                }
+                at += literals;
+                let distance = if i % 2 == 0 {
+                    tokens.repetition(length, distance);
+                    distance
+                } else {
+                    tokens.repetition_in(lane, length);
+                    tokens.lanes[lane]
+                };
+                let (symbol, bits) = LENGTH_SYMBOLS[length - 3];
+                litlen[257 + usize::from(symbol)] += 1;
+                put(257 + usize::from(symbol), 9);
+                put((length - 3) % (1 << bits) * usize::from(bits > 0), bits.into());
+                let (symbol, more) = distance_symbol(distance);
+                distances[symbol] += 1;
+                put(symbol, 5);
+                put((distance - 1) % (1 << more), more);
+                extra += u64::from(bits) + u64::from(more);
+            }
+            plain.finish();
+            let counts = tokens.count(&data);
+            prop_assert_eq!((counts.litlen, counts.distance, counts.extra), (litlen, distances, extra));
+            let mut written = vec![];
+            let mut out = BitWriter::new(&mut written);
+            out.reserve(1 << 20);
+            tokens.write(&data, &PLAIN.0, &PLAIN.1, &mut out);
+            out.finish();
+            prop_assert_eq!(written, expected);
+        }
+    }
+}
