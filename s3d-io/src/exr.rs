@@ -105,7 +105,7 @@ fn encode<T: Copy, const N: usize>(
 
 /// Buffers for one block of lines, reused for all of an image.
 struct Block {
-    /// The samples of one channel in one line.
+    /// One line, channel by channel.
     line: Vec<u8>,
     /// The samples' bytes, line by line and channel by channel: those at even places, then those at odd places.
     sorted: Vec<u8>,
@@ -138,7 +138,7 @@ impl Block {
             }
         };
         Self {
-            line: vec![0; sample * width],
+            line: vec![0; line],
             sorted: vec![0; bytes],
             prepared: vec![0; bytes],
             compressed: Vec::new(),
@@ -187,19 +187,18 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Work for Prepare<'_, T, F> {
     #[expect(clippy::indexing_slicing, reason = "a writer: buffers are as long as lines, blocks not empty")]
     fn run(self) {
         let Self { pixels, width, to_le_bytes, line, sorted, prepared } = self;
-        let half = N / 2 * width;
+        let half = 3 * N / 2 * width;
         let (even, odd) = sorted.split_at_mut(sorted.len() / 2);
-        let mut lines = even.chunks_exact_mut(half).zip(odd.chunks_exact_mut(half));
-        let line = &mut line[..N * width];
-        for row in pixels.chunks_exact(width) {
-            for (channel, (even, odd)) in [2, 1, 0].into_iter().zip(&mut lines) {
-                // First one channel, then one byte in two: simple steps that are done for many at once.
-                for (sample, pixel) in line.as_chunks_mut::<N>().0.iter_mut().zip(row) {
-                    *sample = to_le_bytes(pixel[channel]);
-                }
-                let pairs = line.as_chunks::<2>().0;
-                even.iter_mut().zip(pairs).for_each(|(even, pair)| *even = pair[0]);
-                odd.iter_mut().zip(pairs).for_each(|(odd, pair)| *odd = pair[1]);
+        let lines = even.chunks_exact_mut(half).zip(odd.chunks_exact_mut(half));
+        for (row, (even, odd)) in pixels.chunks_exact(width).zip(lines) {
+            // First the three channels, then one byte in two: simple steps that are done for many at once.
+            let (blue, rest) = line.as_chunks_mut::<N>().0.split_at_mut(width);
+            let (green, red) = rest.split_at_mut(width);
+            for (((pixel, b), g), r) in row.iter().zip(blue).zip(green).zip(red) {
+                [*r, *g, *b] = pixel.map(&to_le_bytes);
+            }
+            for ((even, odd), pair) in even.iter_mut().zip(odd).zip(line.as_chunks::<2>().0) {
+                [*even, *odd] = *pair;
             }
         }
         prepared[0] = sorted[0];

@@ -78,9 +78,10 @@ impl<'a> BitWriter<'a> {
         self.count &= 7;
     }
 
-    /// Adds the bits that `table` has for each of `indices`, modulo its length. There is room for them.
+    /// Adds the bits that `table` has for each of `indices`, modulo its length; if `FIT`, any four are [`MOST`] at most. There
+    /// is room for them.
     #[inline(always)]
-    pub(super) fn all<I: Copy + Into<usize>, const N: usize>(
+    pub(super) fn all<I: Copy + Into<usize>, const N: usize, const FIT: bool>(
         &mut self,
         indices: &[[I; 4]],
         table: &[Bits; N],
@@ -92,16 +93,16 @@ impl<'a> BitWriter<'a> {
             // Joined in pairs, as adding to the writer's bits waits for what was added before.
             let [a, b, c, d] = four.map(|i| table[i.into() % N]);
             let (first, second) = (a.value() | b.value() << a.shift(), c.value() | d.value() << c.shift());
-            let (n, more) = ((a.0 + b.0) & 0xff, (c.0 + d.0) & 0xff);
-            let (mut value, mut sum) = (first | second << (n & 0x3f), n + more);
-            if sum > MOST {
+            let (n, more) = (a.0 + b.0, c.0 + d.0);
+            let (mut value, mut sum) = (first | second << (n & 0x3f), (n + more) & 0xff);
+            if !FIT && sum > MOST {
                 bits |= first << count;
-                count += n;
+                count += n & 0xff;
                 out[end..end + 8].copy_from_slice(&bits.to_le_bytes());
                 end += (count / 8) as usize;
                 bits >>= count & 0x38;
                 count &= 7;
-                (value, sum) = (second, more);
+                (value, sum) = (second, more & 0xff);
             }
             bits |= value << count;
             count += sum;
@@ -169,7 +170,7 @@ mod tests {
         let mut out = BitWriter::new(&mut bytes);
         out.reserve(4000 * 28);
         out.add(1, 3);
-        out.all(&indices, &table);
+        out.all::<_, _, false>(&indices, &table);
         out.finish();
         let mut plain = BitWriter::new(&mut expected);
         plain.reserve(4000 * 28);

@@ -37,6 +37,18 @@ fn bits_token(value: usize, count: u32) -> u16 {
 /// Bytes as they are from which on they are counted and written where they lie, instead of as tokens.
 const LONG: usize = 64;
 
+/// What those for bits alone stand for.
+const ALONE: [Bits; KINDS - BITS] = {
+    let mut table = [Bits::new(0, 0); KINDS - BITS];
+    let mut i = 0;
+    while i < table.len() {
+        let count = (i + 1).ilog2();
+        table[i] = Bits::new(i as u64 + 1 - (1 << count), count);
+        i += 1;
+    }
+    table
+};
+
 /// The tokens of a block.
 pub(super) struct Tokens {
     tokens: Box<[u16; ROOM]>,
@@ -144,16 +156,24 @@ impl Tokens {
                 table[usize::from(token) % SLOTS] += 1;
             }
         }
-        let counts: [u32; KINDS] = from_fn(|i| tables.iter().map(|t| u32::from(t[i])).sum());
+        let mut counts = [0u32; SLOTS];
+        for table in &tables {
+            counts.iter_mut().zip(table).for_each(|(n, more)| *n += u32::from(*more));
+        }
 
         let mut sums = Counts { litlen: [0; 288], distance: [0; 32], extra: 0 };
         sums.litlen[..LENGTH].copy_from_slice(&counts[..LENGTH]);
-        for (&n, (symbol, extra)) in counts[LENGTH..DISTANCE].iter().zip(LENGTH_SYMBOLS) {
-            sums.litlen[257 + usize::from(symbol)] += n;
-            sums.extra += u64::from(n) * u64::from(extra);
-        }
         for run in &self.runs {
             count_bytes(&data[run.from..run.from + run.len], &mut sums.litlen);
+        }
+        let lengths = LENGTH_SYMBOLS.chunk_by(|(a, _), (b, _)| a == b);
+        let mut rest = &counts[LENGTH..DISTANCE];
+        for same in lengths {
+            let (these, others) = rest.split_at(same.len());
+            let ((symbol, extra), n) = (same[0], these.iter().sum::<u32>());
+            sums.litlen[257 + usize::from(symbol)] += n;
+            sums.extra += u64::from(n) * u64::from(extra);
+            rest = others;
         }
         sums.distance[..DISTANCES].copy_from_slice(&counts[DISTANCE..LANE]);
         for (&n, distance) in counts[LANE..BITS].iter().zip(self.lanes) {
@@ -161,8 +181,9 @@ impl Tokens {
             sums.distance[symbol] += n;
             sums.extra += u64::from(n) * u64::from(extra);
         }
-        for (i, &n) in counts[BITS..].iter().enumerate() {
-            sums.extra += u64::from(n) * u64::from((i + 1).ilog2());
+        for count in 1..=MOST_BITS {
+            let n = counts[usize::from(bits_token(0, count))..][..1 << count].iter().sum::<u32>();
+            sums.extra += u64::from(n) * u64::from(count);
         }
         sums
     }
@@ -191,17 +212,15 @@ impl Tokens {
             let (symbol, extra) = distance_symbol(of);
             *entry = distance[symbol].then(Bits::new((of as u64 - 1) & ((1 << extra) - 1), extra));
         }
-        for (i, entry) in table[BITS..KINDS].iter_mut().enumerate() {
-            let count = (i + 1).ilog2();
-            *entry = Bits::new(i as u64 + 1 - (1 << count), count);
-        }
+        table[BITS..KINDS].copy_from_slice(&ALONE);
+        let literals: &[Bits; LENGTH] = table.first_chunk().expect("they come first");
         let mut done = 0;
         for run in &self.runs {
-            out.all(self.tokens[done..run.tokens].as_chunks().0, &table);
-            out.all(data[run.from..run.from + run.len].as_chunks().0, &table);
+            out.all::<_, _, false>(self.tokens[done..run.tokens].as_chunks().0, &table);
+            out.all::<_, _, true>(data[run.from..run.from + run.len].as_chunks().0, literals);
             done = run.tokens;
         }
-        out.all(self.tokens[done..self.len].as_chunks().0, &table);
+        out.all::<_, _, false>(self.tokens[done..self.len].as_chunks().0, &table);
     }
 }
 
