@@ -147,6 +147,13 @@ pub(super) struct Places<'a> {
 }
 
 impl Places<'_> {
+    /// The first place from `at` to `until` at which there is a repetition of three bytes; `until` if there is none.
+    #[inline(always)]
+    pub(super) fn next(self, at: usize, until: usize) -> usize {
+        let words = &self.words[at - self.start..until + 2 - self.start];
+        at + words.array_windows().take_while(|[a, b, c]| a & b & c == 0).count()
+    }
+
     /// The longest repetition at `at`, which has been [`reach`](Nearby::reach)ed: the nearest of several.
     #[inline(always)]
     pub(super) fn longest<const SHORTEST: usize>(self, at: usize) -> Option<Repeated> {

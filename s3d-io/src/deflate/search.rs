@@ -216,7 +216,7 @@ impl Parser<'_> {
             let places = nearby.places();
             while at < pause {
                 let Some(mut found) = places.longest::<SHORTEST>(at) else {
-                    at += steps.0;
+                    at = if SHORTEST == 3 { places.next(at + 1, pause) } else { at + steps.0 };
                     continue;
                 };
                 if (SHORTEST > PRICED || found.length <= PRICED)
