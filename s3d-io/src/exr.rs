@@ -195,7 +195,9 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Work for Prepare<'_, T, F> {
             let (blue, rest) = line.as_chunks_mut::<N>().0.split_at_mut(width);
             let (green, red) = rest.split_at_mut(width);
             for (((pixel, b), g), r) in row.iter().zip(blue).zip(green).zip(red) {
-                [*r, *g, *b] = pixel.map(&to_le_bytes);
+                *r = to_le_bytes(pixel[0]);
+                *g = to_le_bytes(pixel[1]);
+                *b = to_le_bytes(pixel[2]);
             }
             for ((even, odd), pair) in even.iter_mut().zip(odd).zip(line.as_chunks::<2>().0) {
                 [*even, *odd] = *pair;

@@ -68,7 +68,8 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
 /// # Panics
 /// If it has no pixel.
 pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
-    let bytes: Vec<u8> = image.pixels().iter().flat_map(|v| v.to_be_bytes()).collect();
+    let mut bytes = vec![0; 2 * image.len()];
+    bytes.as_chunks_mut().0.iter_mut().zip(image.pixels()).for_each(|(pair, v)| *pair = v.to_be_bytes());
     let balanced = Search {
         candidates: Candidates::NearbyLong,
         line: 2 * image.width() as usize + 1,
