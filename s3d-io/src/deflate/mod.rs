@@ -8,7 +8,8 @@
 //!   compared at once, without a branch;
 //! - it is taken if it costs fewer bits than what it stands for, by the code of the block before ([`block::Prices`]), so
 //!   that noise is written as literals;
-//! - each block has its own code ([`huffman`]), and is written in the shortest of the format's three ways ([`block`]).
+//! - each block is a list of small numbers ([`tokens`]), has its own code ([`huffman`]), and is written in the shortest of
+//!   the format's three ways ([`block`]).
 //!
 //! Everything is done with integers and depends on the data alone: the same bytes on every machine.
 

@@ -1,4 +1,4 @@
-//! Data to sequences: which bytes are written as they are, and which as repetitions.
+//! Data to tokens: which bytes are written as they are, and which as repetitions.
 
 use super::bits::BitWriter;
 use super::block::{LONGEST, Prices, write_block};
@@ -193,7 +193,7 @@ impl Parser<'_> {
         let steps = if SHORTEST > PRICED { LONG_STEPS } else { (1, 1) };
         nearby.begin();
         tokens.clear();
-        // The block's first byte, the first that is in no sequence, and the place where the block is full if no repetition
+        // The block's first byte, the first that is in no token, and the place where the block is full if no repetition
         // comes before.
         let (mut at, mut block, mut pending, mut full) = (0, 0, 0, BLOCK);
         loop {
@@ -264,7 +264,7 @@ impl Parser<'_> {
         tokens.clear();
         let end = data.len().saturating_sub(TAIL);
         let mut at = 1;
-        // The block's first byte, its symbols so far, and the first byte that is in no sequence.
+        // The block's first byte, its symbols so far, and the first byte that is in no token.
         let (mut block, mut symbols, mut pending) = (0, 0, 0);
         let mut line_end = search.line;
         while at < end {

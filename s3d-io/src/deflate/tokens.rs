@@ -1,13 +1,12 @@
 //! What a block consists of, one small number after the other: bytes as they are, lengths, distances, and bits.
 //!
 //! All of them are counted and written in the same way, without a question of which kind is next: a processor would
-//! guess the answer wrong. So a block's table has the bits of each of them ([`Table`]).
+//! guess the answer wrong. Only many bytes as they are stay where they lie, and are counted and written from there.
 
 use super::bits::{BitWriter, Bits};
 use super::block::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST, distance_symbol};
 use super::finder::WINDOW;
 use super::nearby::LANES;
-use std::array::from_fn;
 
 /// Symbols in a block; only steps over several bytes make it a few more.
 pub(super) const BLOCK: usize = 16_000;
