@@ -8,7 +8,7 @@ mod common;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{DVec3, dvec3, vec3};
 use s3d_geom::{Camera, Pose, Raster, TriMesh, scan_like};
-use s3d_render::{FaceImages, Hits, Normals, Pyramids, Scene, TextureFilter};
+use s3d_render::{Hits, Modalities, Normals, Pyramids, Scene, Shading, TextureFilter, ViewImages};
 use std::hint::black_box;
 use std::path::Path;
 
@@ -53,7 +53,15 @@ fn shade(c: &mut Criterion) {
             let (mut semantic, mut colored) = (normal.clone(), normal.clone());
             let mut depth = Raster::filled(1, 1, 0);
             let mut xyz = s3d_render::xyz_image_half(&shots[0].1, &shots[0].0);
-            let mut faces = FaceImages::default();
+            let mut images = ViewImages::default();
+            let shading = Shading {
+                scene: &scene,
+                pyramids: &pyramids,
+                filter,
+                normal_axes: s3d_geom::NormalAxes::Paper,
+                index_per_face: &index,
+                color_per_face: &pretty,
+            };
             bench("rgb", &mut |c, h| {
                 s3d_render::rgb_image_into(&scene, &pyramids, h, c, &filter, &mut rgb);
             });
@@ -70,31 +78,13 @@ fn shade(c: &mut Criterion) {
             });
             bench("semantic", &mut |_, h| s3d_render::index_image_into(h, &index, &mut semantic));
             bench("pretty", &mut |_, h| s3d_render::color_per_face_image_into(h, &pretty, &mut colored));
+            let faces = Modalities { faces: true, ..Modalities::default() };
             bench("normal, semantic and pretty at once", &mut |c, h| {
-                s3d_render::face_images_into(
-                    &scene,
-                    h,
-                    c,
-                    s3d_geom::NormalAxes::Paper,
-                    &index,
-                    &pretty,
-                    &mut faces,
-                );
+                s3d_render::view_images_into(&shading, h, c, faces, &mut images);
             });
             bench("xyz half", &mut |c, h| s3d_render::xyz_image_half_into(h, c, &mut xyz));
             bench("all six", &mut |c, h| {
-                s3d_render::rgb_image_into(&scene, &pyramids, h, c, &filter, &mut rgb);
-                s3d_render::depth_image_into(h, &mut depth);
-                s3d_render::face_images_into(
-                    &scene,
-                    h,
-                    c,
-                    s3d_geom::NormalAxes::Paper,
-                    &index,
-                    &pretty,
-                    &mut faces,
-                );
-                s3d_render::xyz_image_half_into(h, c, &mut xyz);
+                s3d_render::view_images_into(&shading, h, c, Modalities::ALL, &mut images);
             });
             bench("all six, new images", &mut |c, h| {
                 drop(black_box(s3d_render::rgb_image(&scene, &pyramids, h, c)));

@@ -139,7 +139,7 @@ impl<B: Blend> Lanes for Avx2<B> {
                 return None;
             }
             // SAFETY: 0 ≤ at ≤ limit, and so at + stride + 8 is within the bytes.
-            Some(self.0.quads(bytes.as_ptr(), at, stride as usize))
+            Some(self.0.quads(bytes.as_ptr(), std::hint::black_box(at), stride as usize))
         }
     }
     #[inline(always)]

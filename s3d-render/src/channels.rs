@@ -3,12 +3,11 @@
 //! Every image has the size of the hits. Those that depend on the rays' directions take the camera that the hits were
 //! cast with, one ray a pixel.
 
-use crate::lanes::{self, LANES, LaneWork, Lanes, run_starts};
-use crate::{
-    Hits, NO_FACE, Scene,
-    face_table::{FaceTable, New},
-    patch::{FaceCache, Patch},
-};
+use crate::lanes::{self, LANES, LaneWork, Lanes};
+use crate::patch::{FaceCache, Patch};
+use crate::runs::{Runs, band_rows};
+use crate::stamps::Stamps;
+use crate::{Hits, NO_FACE, Scene};
 use glam::{DMat3, DVec3, Vec3};
 use s3d_geom::{Camera, NormalAxes, Raster, TriMesh};
 
@@ -62,16 +61,22 @@ impl LaneWork for Depths<'_> {
 
     #[inline(always)]
     fn run(self, lanes: impl Lanes) {
-        let (eights, rest) = self.depths.as_chunks::<LANES>();
-        let (out, last) = self.out.as_chunks_mut::<LANES>();
-        for (depths, out) in eights.iter().zip(out) {
-            lanes.depths(depths, out);
-        }
-        let (mut depths, mut rounded) = ([0.0; LANES], [0; LANES]);
-        depths[..rest.len()].copy_from_slice(rest);
-        lanes.depths(&depths, &mut rounded);
-        last.copy_from_slice(&rounded[..rest.len()]);
+        depths(lanes, self.depths, self.out);
     }
+}
+
+/// Depths in 512ths of a metre.
+#[inline(always)]
+pub(crate) fn depths(lanes: impl Lanes, depths: &[f32], out: &mut [u16]) {
+    let (eights, rest) = depths.as_chunks::<LANES>();
+    let (out, last) = out.as_chunks_mut::<LANES>();
+    for (depths, out) in eights.iter().zip(out) {
+        lanes.depths(depths, out);
+    }
+    let (mut depths, mut rounded) = ([0.0; LANES], [0; LANES]);
+    depths[..rest.len()].copy_from_slice(rest);
+    lanes.depths(&depths, &mut rounded);
+    last.copy_from_slice(&rounded[..rest.len()]);
 }
 
 /// Gives `out` the size of `like`.
@@ -120,12 +125,12 @@ fn flat_normals(
     out: &mut Raster<[u8; 3]>,
 ) {
     let view = (camera.pose.location, image_from_world);
-    by_face(hits, MISSING_NORMAL, out, |faces| flat_normals_of(scene.mesh(), faces, view));
+    by_face(Some(scene), hits, MISSING_NORMAL, out, |faces| flat_normals_of(scene.mesh(), faces, view));
 }
 
 /// The colours of faces' normals, on the side that `origin` sees: all rays start there, and see the same side.
 #[inline(always)]
-fn flat_normals_of(
+pub(crate) fn flat_normals_of(
     mesh: &TriMesh,
     faces: &[u32; LANES],
     (origin, image_from_world): (DVec3, DMat3),
@@ -214,10 +219,11 @@ pub fn index_image(hits: &Hits, per_face: &[u32]) -> Raster<[u8; 3]> {
 /// # Panics
 /// As [`index_image`].
 pub fn index_image_into(hits: &Hits, per_face: &[u32], out: &mut Raster<[u8; 3]>) {
-    by_face(hits, MISSING_INDEX, out, |faces| faces.map(|face| index_color(per_face, face)));
+    by_face(None, hits, MISSING_INDEX, out, |faces| faces.map(|face| index_color(per_face, face)));
 }
 
-fn index_color(per_face: &[u32], face: u32) -> [u8; 3] {
+#[inline(always)]
+pub(crate) fn index_color(per_face: &[u32], face: u32) -> [u8; 3] {
     let index = per_face[face as usize];
     let [high, r, g, b] = index.to_be_bytes();
     assert!(high == 0, "the index {index} of face {face} does not fit into 24 bits");
@@ -239,58 +245,7 @@ pub fn color_per_face_image(hits: &Hits, per_face_colors: &[[u8; 3]]) -> Raster<
 /// # Panics
 /// As [`color_per_face_image`].
 pub fn color_per_face_image_into(hits: &Hits, per_face_colors: &[[u8; 3]], out: &mut Raster<[u8; 3]>) {
-    by_face(hits, [0; 3], out, |faces| faces.map(|face| per_face_colors[face as usize]));
-}
-
-/// The images that have one value all over a face; see [`face_images_into`].
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FaceImages {
-    /// [`normal_image`] with [`Normals::Flat`], in the axes asked for.
-    pub normal: Raster<[u8; 3]>,
-    /// [`index_image`].
-    pub index: Raster<[u8; 3]>,
-    /// [`color_per_face_image`].
-    pub color: Raster<[u8; 3]>,
-}
-
-impl Default for FaceImages {
-    /// Without pixels.
-    fn default() -> Self {
-        let empty = || Raster::filled(0, 0, [0; 3]);
-        Self { normal: empty(), index: empty(), color: empty() }
-    }
-}
-
-/// The flat normals (in the given axes), indices and colours of faces in one walk over the hits, in little more than half
-/// the time of three.
-///
-/// # Panics
-/// As [`normal_image`], [`index_image`] and [`color_per_face_image`].
-pub fn face_images_into(
-    scene: &Scene<'_>,
-    hits: &Hits,
-    camera: &Camera,
-    axes: NormalAxes,
-    per_face: &[u32],
-    per_face_colors: &[[u8; 3]],
-    out: &mut FaceImages,
-) {
-    assert_size(hits, camera);
-    let view = (camera.pose.location, camera.normal_axes_from_world(axes));
-    let FaceImages { normal, index, color } = out;
-    let values = |faces: &[u32; LANES]| {
-        let normals = flat_normals_of(scene.mesh(), faces, view);
-        std::array::from_fn(|k| {
-            let face = faces[k];
-            [normals[k], index_color(per_face, face), per_face_colors[face as usize]]
-        })
-    };
-    let missing = [MISSING_NORMAL, MISSING_INDEX, [0; 3]];
-    let out = [normal, index, color].map(|image| {
-        fit(image, &hits.face, [0; 3]);
-        image.pixels_mut()
-    });
-    lanes::run(ByFace { mesh: Some(scene.mesh()), faces: hits.face.pixels(), missing, values, out });
+    by_face(None, hits, [0; 3], out, |faces| faces.map(|face| per_face_colors[face as usize]));
 }
 
 /// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.
@@ -301,94 +256,39 @@ pub fn coverage(hits: &Hits) -> f64 {
 
 /// An image from a value a face: `values` is asked for eight faces at a time.
 fn by_face(
+    scene: Option<&Scene<'_>>,
     hits: &Hits,
     missing: [u8; 3],
     out: &mut Raster<[u8; 3]>,
     values: impl Fn(&[u32; LANES]) -> [[u8; 3]; LANES],
 ) {
     fit(out, &hits.face, [0; 3]);
-    let (values, out) = (|faces: &[u32; LANES]| values(faces).map(|value| [value]), [out.pixels_mut()]);
-    lanes::run(ByFace { mesh: None, faces: hits.face.pixels(), missing: [missing], values, out });
+    let values = |faces: &[u32; LANES]| values(faces).map(|value| [value]);
+    lanes::run(ByFace { mesh: scene.map(Scene::mesh), hits, stamps: Stamps::new([missing], values), out });
 }
 
-/// `N` images at once.
-struct ByFace<'a, V, const N: usize> {
-    /// What `values` looks at.
+struct ByFace<'a, V> {
+    /// What values look at.
     mesh: Option<&'a TriMesh>,
-    faces: &'a [u32],
-    missing: [[u8; 3]; N],
-    values: V,
-    out: [&'a mut [[u8; 3]]; N],
+    hits: &'a Hits,
+    stamps: Stamps<V, 1>,
+    out: &'a mut Raster<[u8; 3]>,
 }
 
-impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> LaneWork for ByFace<'_, V, N> {
+impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> LaneWork for ByFace<'_, V> {
     type Output = ();
 
     #[inline(always)]
     fn run(self, lanes: impl Lanes) {
-        /// Pixels whose runs are looked for at a time.
-        const BLOCK: usize = 4096;
-        let Self { mesh, faces, missing, values, mut out } = self;
-        let mut table = FaceTable::new(BLOCK);
-        let (mut starts, mut numbers, mut new) = (Vec::new(), Vec::new(), Vec::new());
-        let mut stamps = vec![missing.map(stamp)];
-        for (block, faces) in faces.chunks(BLOCK).enumerate() {
-            run_starts(lanes, faces, &mut starts);
-            if table.number(faces, &starts, &mut numbers, &mut new) {
-                stamps.truncate(1);
+        let Self { mesh, hits, mut stamps, out } = self;
+        let width = hits.face.width() as usize;
+        let (mut runs, band) = (Runs::new(width), (band_rows(width) * width).max(1));
+        for (faces, out) in hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band)) {
+            if runs.find(lanes, faces) {
+                stamps.forget();
             }
-            if let Some(mesh) = mesh {
-                New::expect::<false>(&new, lanes, mesh);
-            }
-            for (group, count) in New::groups(&new) {
-                let values = values(&group.map(|new| new.face));
-                for value in &values[..count] {
-                    let mut of = [[0; 32]; N];
-                    for (stamp, color) in of.iter_mut().zip(value) {
-                        *stamp = self::stamp(*color);
-                    }
-                    stamps.push(of);
-                }
-            }
-            starts.push(faces.len() as u32);
-            for (run, &number) in starts.windows(2).zip(&numbers) {
-                let (start, end) = (block * BLOCK + run[0] as usize, block * BLOCK + run[1] as usize);
-                print(&mut out, start, end, &stamps[number as usize]);
-            }
+            stamps.band(lanes, mesh, &runs, [out]);
         }
-    }
-}
-
-/// A colour again and again, ten times and more.
-type Stamp = [u8; 32];
-
-#[inline(always)]
-fn stamp([r, g, b]: [u8; 3]) -> Stamp {
-    let mut stamp = [r; 32];
-    for k in 0..32 / 3 {
-        (stamp[3 * k + 1], stamp[3 * k + 2]) = (g, b);
-    }
-    stamp[31] = g;
-    stamp
-}
-
-/// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow.
-#[inline(always)]
-fn print<const N: usize>(images: &mut [&mut [[u8; 3]]; N], start: usize, end: usize, stamps: &[Stamp; N]) {
-    let mut at = start;
-    while at < end {
-        for (image, stamp) in images.iter_mut().zip(stamps) {
-            let bytes = &mut image.as_flattened_mut()[3 * at..];
-            match bytes.first_chunk_mut() {
-                Some(to) => *to = *stamp,
-                // At the image's end.
-                None => {
-                    let most = bytes.len().min(3 * (end - at));
-                    bytes[..most].copy_from_slice(&stamp[..most]);
-                }
-            }
-        }
-        at += size_of::<Stamp>() / 3;
     }
 }
 

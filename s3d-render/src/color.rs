@@ -1,19 +1,20 @@
 //! The RGB image.
 //!
-//! Faces that a row is the first to show are prepared eight at a time. Then the row is coloured in two passes. The first
-//! walks its runs of equal faces: [`crate::anchor`] gives the texture coordinates of eight pixels at a time and their
+//! Faces that a band of rows is the first to show are prepared eight at a time. Then each row is coloured in two passes. The
+//! first walks its runs of equal faces: [`crate::anchor`] gives the texture coordinates of eight pixels at a time and their
 //! change from pixel to pixel, hence each pixel's footprint. The second walks the row regardless of runs and fetches the
 //! textures, again eight pixels at a time ([`crate::filter`]). What a pixel gets depends on no other pixel but through
 //! the anchor, whose rounding it takes over.
 
 use crate::anchor::{Anchor, Attributes, Batch, Grid};
 use crate::channels::{assert_size, fit, paint};
-use crate::face_table::{FaceTable, New};
+use crate::face_table::New;
 use crate::filter::{Footprints, Sizes};
 use crate::fold::Fold;
-use crate::lanes::{self, LANES, LaneWork, Lanes, run_starts};
+use crate::lanes::{self, LANES, LaneWork, Lanes};
 use crate::patch::{FaceCache, Patch};
 use crate::pixel_color::PixelByPixel;
+use crate::runs::{Runs, band_rows};
 use crate::texture::{Pyramids, TextureFilter};
 use crate::{Hits, Scene};
 use glam::DVec3;
@@ -80,21 +81,19 @@ impl LaneWork for Rgb<'_> {
     fn run(self, lanes: impl Lanes) {
         let Self { scene, pyramids, hits, camera, filter, out } = self;
         let grid = Grid::new(camera);
-        let painter = Painter {
-            lanes,
-            scene,
-            sizes: scene.mesh().textures().iter().enumerate().map(|(k, t)| pyramids.sizes(k, t)).collect(),
-            origin: camera.pose.location,
-            max_taps: filter.max_taps,
-            prepared: vec![Prepared::missing()],
-            large: FaceCache::new(),
-            singly: PixelByPixel::new(scene, pyramids, camera, filter),
-            row: Row::new(hits.face.width() as usize),
-        };
-        if grid.is_turn() {
-            painter.image::<true>(&grid, hits, out);
-        } else {
-            painter.image::<false>(&grid, hits, out);
+        let mut painter = Painter::new(lanes, scene, pyramids, camera, filter);
+        let width = hits.face.width() as usize;
+        let (mut runs, band) = (Runs::new(width), (band_rows(width) * width).max(1));
+        let parts = hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band));
+        for (k, (faces, out)) in parts.enumerate() {
+            if runs.find(lanes, faces) {
+                painter.forget();
+            }
+            if grid.is_turn() {
+                painter.band::<true>(&grid, &runs, k * band_rows(width), faces, out);
+            } else {
+                painter.band::<false>(&grid, &runs, k * band_rows(width), faces, out);
+            }
         }
     }
 }
@@ -151,6 +150,7 @@ impl Prepared {
 /// A row between its two passes. Values are stored eight at a time, beyond the end of their run: the next run's go over
 /// them.
 struct Row {
+    width: usize,
     footprints: Footprints,
     /// By pixel: a texture, perhaps with [`NARROW`]; or [`DONE`].
     tags: Vec<u32>,
@@ -164,18 +164,20 @@ const NARROW: u32 = 1 << 31;
 impl Row {
     fn new(width: usize) -> Self {
         let padded = width + 2 * LANES;
-        Self { footprints: Footprints::new(padded), tags: vec![DONE; padded] }
+        Self { width, footprints: Footprints::new(padded), tags: vec![DONE; padded] }
     }
 }
 
-struct Painter<'a, L> {
+/// Colours a view band by band.
+pub(crate) struct Painter<'a, L> {
     lanes: L,
     scene: &'a Scene<'a>,
     /// By texture.
     sizes: Vec<Sizes<'a>>,
     origin: DVec3,
     max_taps: u32,
-    /// By the face's number in the [`FaceTable`].
+    batch: Batch,
+    /// By the face's number in the [`Runs`].
     prepared: Vec<Prepared>,
     /// Of faces that need one anchor after another.
     large: FaceCache<Attributes>,
@@ -183,38 +185,66 @@ struct Painter<'a, L> {
     row: Row,
 }
 
-impl<L: Lanes> Painter<'_, L> {
-    #[inline(always)]
-    fn image<const TURN: bool>(mut self, grid: &Grid, hits: &Hits, out: &mut Raster<[u8; 3]>) {
-        let width = hits.face.width() as usize;
-        let (mut table, mut batch) = (FaceTable::new(width), Batch::new());
-        let (mut starts, mut numbers, mut new) = (Vec::new(), Vec::new(), Vec::new());
-        let rows = out.pixels_mut().chunks_exact_mut(width.max(1));
-        for (j, (faces, out)) in hits.face.rows().zip(rows).enumerate() {
-            run_starts(self.lanes, faces, &mut starts);
-            if table.number(faces, &starts, &mut numbers, &mut new) {
-                self.prepared.truncate(1);
-            }
-            New::expect::<true>(&new, self.lanes, self.scene.mesh());
-            for (group, count) in New::groups(&new) {
-                self.prepare::<TURN>(grid, &mut batch, j, &group, count);
-            }
-            starts.push(width as u32);
-            for (run, &number) in starts.windows(2).zip(&numbers) {
-                let (start, end) = (run[0] as usize, run[1] as usize);
-                self.lay_out::<TURN>(grid, faces[start], number, j, start..end, out);
-            }
-            self.fetch(out);
+impl<'a, L: Lanes> Painter<'a, L> {
+    pub(crate) fn new(
+        lanes: L,
+        scene: &'a Scene<'a>,
+        pyramids: &'a Pyramids,
+        camera: &'a Camera,
+        filter: &'a TextureFilter,
+    ) -> Self {
+        Self {
+            lanes,
+            scene,
+            sizes: scene.mesh().textures().iter().enumerate().map(|(k, t)| pyramids.sizes(k, t)).collect(),
+            origin: camera.pose.location,
+            max_taps: filter.max_taps,
+            batch: Batch::new(),
+            prepared: vec![Prepared::missing()],
+            large: FaceCache::new(),
+            singly: PixelByPixel::new(scene, pyramids, camera, filter),
+            row: Row::new(camera.width as usize),
         }
     }
 
-    /// Prepares the first `count` of some faces that row `j` is the first to show.
+    /// Forgets all faces.
+    pub(crate) fn forget(&mut self) {
+        self.prepared.truncate(1);
+    }
+
+    /// Colours the band from row `first_row` on, which sees `faces`.
+    #[inline(always)]
+    pub(crate) fn band<const TURN: bool>(
+        &mut self,
+        grid: &Grid,
+        runs: &Runs,
+        first_row: usize,
+        faces: &[u32],
+        out: &mut [[u8; 3]],
+    ) {
+        let width = self.row.width;
+        for k in 0..runs.new_groups() {
+            let (group, count) = runs.new_group::<true>(self.lanes, Some(self.scene.mesh()), k);
+            self.prepare::<TURN>(grid, first_row, &group, count);
+        }
+        let (mut j, mut from) = (0, 0);
+        for (start, end, number) in runs.all() {
+            if start == from + width {
+                self.fetch(&mut out[from..start]);
+                (j, from) = (j + 1, start);
+            }
+            let row = &mut out[from..from + width];
+            self.lay_out::<TURN>(grid, faces[start], number, first_row + j, start - from..end - from, row);
+        }
+        self.fetch(&mut out[from..]);
+    }
+
+    /// Prepares the first `count` of some faces that the band from row `first_row` on is the first to show.
     #[inline(always)]
     fn prepare<const TURN: bool>(
         &mut self,
         grid: &Grid,
-        batch: &mut Batch,
-        j: usize,
+        first_row: usize,
         faces: &[New; LANES],
         count: usize,
     ) {
@@ -222,9 +252,10 @@ impl<L: Lanes> Painter<'_, L> {
         for (k, &New { face, at }) in faces.iter().enumerate() {
             let (look, values, folds) = colored(self.scene, &self.sizes, face);
             looks[k] = look;
-            batch.put(k, self.scene.mesh().triangle(face), values, folds, grid, (at as usize, j));
+            let at = (at as usize % self.row.width, first_row + at as usize / self.row.width);
+            self.batch.put(k, self.scene.mesh().triangle(face), values, folds, grid, at);
         }
-        let (anchors, fastest) = batch.anchors::<TURN>(self.origin);
+        let (anchors, fastest) = self.batch.anchors::<TURN>(self.origin);
         for k in 0..count {
             let look = match looks[k] {
                 // A footprint is wide where the sum is above 1.

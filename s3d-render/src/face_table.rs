@@ -4,7 +4,7 @@
 //! prepared many at a time, which takes a fraction of what it takes one by one.
 
 use crate::NO_FACE;
-use crate::lanes::{LANES, Lanes};
+use crate::lanes::Lanes;
 use s3d_geom::TriMesh;
 
 /// Numbers faces 1, 2, 3… as they come, [`NO_FACE`] is 0, and forgets all but that now and then: its memory is bounded.
@@ -97,11 +97,6 @@ impl New {
             }
         }
     }
-
-    /// The list in groups, the last filled up with its last face, and how many of a group count.
-    pub(crate) fn groups(new: &[Self]) -> impl Iterator<Item = ([Self; LANES], usize)> {
-        new.chunks(LANES).map(|group| (std::array::from_fn(|k| group[k.min(group.len() - 1)]), group.len()))
-    }
 }
 
 #[cfg(test)]
@@ -125,12 +120,10 @@ mod tests {
                 if table.number(&faces, &starts, &mut numbers, &mut new) {
                     things.truncate(1);
                 }
-                for (group, count) in New::groups(&new) {
-                    things.extend(group[..count].iter().map(|new| {
-                        assert_eq!(faces[new.at as usize], new.face);
-                        new.face
-                    }));
-                }
+                things.extend(new.iter().map(|new| {
+                    assert_eq!(faces[new.at as usize], new.face);
+                    new.face
+                }));
                 prop_assert!(things.len() <= table.most);
                 for (face, number) in faces.iter().zip(&numbers) {
                     prop_assert_eq!(things[*number as usize], *face);

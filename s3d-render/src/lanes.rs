@@ -384,31 +384,3 @@ pub(crate) fn put<L: Lanes>(lanes: L, to: &mut [f32], at: usize, values: L::F) {
         lanes.store(values, to);
     }
 }
-
-/// Where each run of equal values starts, ascending; 0 is one.
-#[inline(always)]
-pub(crate) fn run_starts(lanes: impl Lanes, values: &[u32], starts: &mut Vec<u32>) {
-    starts.clear();
-    if values.is_empty() {
-        return;
-    }
-    // A group of places is written whole, and its end over by the next: no branch that depends on the values.
-    starts.resize(values.len() + 4 * LANES, 0);
-    let (mut at, mut count) = (1, 1);
-    while let Some(window) = values.get(at - 1..).and_then(<[u32]>::first_chunk::<{ 4 * LANES + 1 }>)
-        && let Some(to) = starts.get_mut(count..).and_then(<[u32]>::first_chunk_mut::<{ 4 * LANES }>)
-    {
-        let mut some = 0;
-        for k in 0..4 {
-            if let Some(part) = window[k * LANES..].first_chunk()
-                && let Some(to) = to[some.min(k * LANES)..].first_chunk_mut()
-            {
-                some += lanes.changes(part, (at + k * LANES) as u32, to);
-            }
-        }
-        count += some;
-        at += 4 * LANES;
-    }
-    starts.truncate(count);
-    starts.extend((at..values.len()).filter(|&k| values[k] != values[k - 1]).map(|k| k as u32));
-}

@@ -65,15 +65,18 @@ mod pixel_color;
 mod points;
 mod ray;
 mod registers;
+mod runs;
 mod scene;
+mod stamps;
 mod stitch;
 mod texture;
+mod view;
 mod visibility;
 
 pub use channels::{
-    FaceImages, MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, color_per_face_image,
-    color_per_face_image_into, coverage, depth_image, depth_image_into, depth_image_mm_into,
-    face_images_into, index_image, index_image_into, normal_image, normal_image_into,
+    MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, color_per_face_image, color_per_face_image_into,
+    coverage, depth_image, depth_image_into, depth_image_mm_into, index_image, index_image_into,
+    normal_image, normal_image_into,
 };
 pub use color::{rgb_image, rgb_image_into, rgb_image_with};
 pub use cube_map::CubeMap;
@@ -85,6 +88,7 @@ pub use ray::{Hit, cast_ray, cast_ray_brute_force};
 pub use scene::Scene;
 pub use stitch::{Capture, StitchOptions, stitch};
 pub use texture::{Pyramids, TextureFilter};
+pub use view::{FaceImages, Modalities, Shading, ViewImages, view_images_into};
 pub use visibility::{Caster, Hits, NO_FACE, cast, cast_ray_by_ray, cast_strided};
 
 #[cfg(doctest)]

@@ -5,7 +5,7 @@ use crate::channels::{assert_size, fit};
 use crate::lanes::{self, LANES, LaneWork, Lanes};
 use glam::DVec3;
 use half::f16;
-use s3d_geom::{Camera, Raster, Rays};
+use s3d_geom::{Camera, Projection, Raster, Rays};
 
 /// The points that are seen, in world metres; (0, 0, 0) where nothing is. A point seen exactly at the world's origin
 /// cannot be told from a missing one: that is the format's, not ours.
@@ -48,7 +48,7 @@ pub fn xyz_image_half_into(hits: &Hits, camera: &Camera, out: &mut Raster<[f16; 
 }
 
 /// A number type that coordinates are written in.
-trait Coordinate: Copy {
+pub(crate) trait Coordinate: Copy {
     const ZERO: Self;
     /// [`Lanes::points`] in this type.
     fn points<const TURN: bool>(
@@ -93,55 +93,77 @@ impl Coordinate for f16 {
 
 fn points<T: Coordinate>(hits: &Hits, camera: &Camera, out: &mut Raster<[T; 3]>) {
     assert_size(hits, camera);
-    let place = camera.pose.location;
-    match camera.rays() {
-        Rays::Perspective { x_step, y_step, origin } => lanes::run(Points::<T, false> {
-            columns: (0..camera.width).map(|i| origin + x_step * (f64::from(i) + 0.5)).collect(),
-            rows: (0..camera.height).map(|j| y_step * (f64::from(j) + 0.5)).collect(),
-            place,
-            hits,
-            out,
-        }),
-        Rays::Equirectangular { columns, rows } => lanes::run(Points::<T, true> {
-            columns: columns.into_iter().map(|c| DVec3::new(c.x, c.y, 1.0)).collect(),
-            rows: rows.into_iter().map(|r| DVec3::new(r.x, r.x, r.y)).collect(),
-            place,
-            hits,
-            out,
-        }),
+    match camera.projection {
+        Projection::Perspective { .. } => lanes::run(All::<T, false> { hits, camera, out }),
+        Projection::Equirectangular => lanes::run(All::<T, true> { hits, camera, out }),
     }
 }
 
-/// A pixel's direction is made of a vector a column and one a row: their sum in a perspective view, their product axis
-/// by axis in a panorama (`TURN`). That is what [`Rays::at`] gives, to the last bit.
-struct Points<'a, T, const TURN: bool> {
-    columns: Vec<DVec3>,
-    rows: Vec<DVec3>,
-    place: DVec3,
+struct All<'a, T, const TURN: bool> {
     hits: &'a Hits,
+    camera: &'a Camera,
     out: &'a mut Raster<[T; 3]>,
 }
 
-impl<T: Coordinate, const TURN: bool> LaneWork for Points<'_, T, TURN> {
+impl<T: Coordinate, const TURN: bool> LaneWork for All<'_, T, TURN> {
     type Output = ();
 
     #[inline(always)]
-    fn run(mut self, lanes: impl Lanes) {
-        let width = self.columns.len();
-        self.columns.resize(width.next_multiple_of(LANES), DVec3::ZERO);
-        let columns: Vec<f64> = self.columns.iter().flat_map(|c| c.to_array()).collect();
-        let (columns, _) = columns.as_chunks::<{ 3 * LANES }>();
+    fn run(self, lanes: impl Lanes) {
+        let directions = Directions::new(self.camera);
+        directions.points::<TURN, T>(lanes, 0, self.hits.depth.pixels(), self.out.pixels_mut());
+    }
+}
+
+/// The directions of an image's pixels. Each is made of a vector a column and one a row: their sum in a perspective view,
+/// their product axis by axis in a panorama (`TURN`). That is what [`Rays::at`] gives, to the last bit.
+pub(crate) struct Directions {
+    /// In groups; the last filled up.
+    columns: Vec<[f64; 3 * LANES]>,
+    rows: Vec<DVec3>,
+    width: usize,
+    place: DVec3,
+}
+
+impl Directions {
+    pub(crate) fn new(camera: &Camera) -> Self {
+        let (mut columns, rows): (Vec<DVec3>, Vec<DVec3>) = match camera.rays() {
+            Rays::Perspective { x_step, y_step, origin } => (
+                (0..camera.width).map(|i| origin + x_step * (f64::from(i) + 0.5)).collect(),
+                (0..camera.height).map(|j| y_step * (f64::from(j) + 0.5)).collect(),
+            ),
+            Rays::Equirectangular { columns, rows } => (
+                columns.into_iter().map(|c| DVec3::new(c.x, c.y, 1.0)).collect(),
+                rows.into_iter().map(|r| DVec3::new(r.x, r.x, r.y)).collect(),
+            ),
+        };
+        let width = columns.len();
+        columns.resize(width.next_multiple_of(LANES), DVec3::ZERO);
+        let columns: Vec<f64> = columns.iter().flat_map(|c| c.to_array()).collect();
+        let columns = columns.as_chunks().0.to_vec();
+        Self { columns, rows, width, place: camera.pose.location }
+    }
+
+    /// The points that some rows see, from `first_row` on.
+    #[inline(always)]
+    pub(crate) fn points<const TURN: bool, T: Coordinate>(
+        &self,
+        lanes: impl Lanes,
+        first_row: usize,
+        depths: &[f32],
+        out: &mut [[T; 3]],
+    ) {
         let repeated = |v: DVec3| std::array::from_fn(|k| v.to_array()[k % 3]);
-        let place = repeated(self.place);
-        let out = self.out.pixels_mut().chunks_exact_mut(width.max(1));
-        for ((depths, out), row) in self.hits.depth.rows().zip(out).zip(&self.rows) {
+        let (place, width) = (repeated(self.place), self.width.max(1));
+        let rows = &self.rows[first_row..];
+        for ((depths, out), row) in depths.chunks_exact(width).zip(out.chunks_exact_mut(width)).zip(rows) {
             let row = repeated(*row);
             let (eights, rest) = depths.as_chunks::<LANES>();
             let (out, last) = out.as_flattened_mut().as_chunks_mut::<{ 3 * LANES }>();
-            for ((depths, out), column) in eights.iter().zip(out).zip(columns) {
+            for ((depths, out), column) in eights.iter().zip(out).zip(&self.columns) {
                 T::points::<TURN>(lanes, column, &row, depths, &place, out);
             }
-            if let (false, Some(column)) = (rest.is_empty(), columns.last()) {
+            if let (false, Some(column)) = (rest.is_empty(), self.columns.last()) {
                 let (mut depths, mut points) = ([f32::INFINITY; LANES], [T::ZERO; 3 * LANES]);
                 depths[..rest.len()].copy_from_slice(rest);
                 T::points::<TURN>(lanes, column, &row, &depths, &place, &mut points);

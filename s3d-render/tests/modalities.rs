@@ -5,7 +5,9 @@ mod common;
 
 use s3d_geom::glam::{DVec3, Vec2, Vec3, dvec3, vec2, vec3};
 use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, TriMesh, Wrap};
-use s3d_render::{Hits, NO_FACE, Normals, Pyramids, Scene};
+use s3d_render::{
+    Hits, Modalities, NO_FACE, Normals, Pyramids, Scene, Shading, TextureFilter, view_images_into,
+};
 
 /// A room of 4 × 4 × 3 m around (0, 0, 1.5); two faces a wall, whose index / 2 is: 0 floor, 1 ceiling, 2 wall at +Y,
 /// 3 at −Y, 4 at +X, 5 at −X. Wound to face inwards, textured with (0, 0) to (1, 1) a wall.
@@ -483,11 +485,11 @@ fn rgb_of_scans_is_what_single_pixels_give() {
 #[test]
 fn images_are_what_single_pixels_give() {
     let mesh = s3d_geom::scan_like(20_000, 5);
-    let scene = Scene::new(&mesh);
+    let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
     let faces = mesh.faces().len() as u32;
     let index: Vec<u32> = (0..faces).map(|f| f * 631 % (1 << 24)).collect();
     let color: Vec<[u8; 3]> = (0..faces).map(|f| [f as u8, (f >> 8) as u8, 7]).collect();
-    let mut all = s3d_render::FaceImages::default();
+    let mut all = s3d_render::ViewImages::default();
     let mut again = s3d_render::xyz_image_half(&s3d_render::cast(&scene, &view(0.0, 0.0)), &view(0.0, 0.0));
     for camera in all_kinds(dvec3(3.0, 2.5, 1.5)) {
         let hits = s3d_render::cast(&scene, &camera);
@@ -521,16 +523,21 @@ fn images_are_what_single_pixels_give() {
             assert_eq!((indices.pixels()[k], colors.pixels()[k]), ([r, g, b], color[face as usize]));
         }
         // Into what holds the images of another camera.
-        s3d_render::face_images_into(
-            &scene,
-            &hits,
-            &camera,
-            s3d_geom::NormalAxes::Paper,
-            &index,
-            &color,
-            &mut all,
-        );
-        assert_eq!((&all.normal, &all.index, &all.color), (&normal, &indices, &colors));
+        let shading = Shading {
+            scene: &scene,
+            pyramids: &pyramids,
+            filter: TextureFilter::default(),
+            normal_axes: s3d_geom::NormalAxes::Paper,
+            index_per_face: &index,
+            color_per_face: &color,
+        };
+        let faces = Modalities { faces: true, ..Modalities::default() };
+        for wanted in [faces, Modalities::ALL] {
+            view_images_into(&shading, &hits, &camera, wanted, &mut all);
+            assert_eq!((&all.faces.normal, &all.faces.index, &all.faces.color), (&normal, &indices, &colors));
+        }
+        assert_eq!((&all.depth, &all.xyz), (&depth, &half));
+        assert_eq!(all.rgb, s3d_render::rgb_image(&scene, &pyramids, &hits, &camera));
         s3d_render::xyz_image_half_into(&hits, &camera, &mut again);
         assert_eq!(again, half);
         let mut other = depth.map(|_| 7);

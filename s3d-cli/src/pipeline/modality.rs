@@ -1,16 +1,15 @@
 //! Hits to the bytes of an image file, one function for every modality.
 
 use super::pictures::PictureColors;
-use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::{
     Compression, Content, Conventions, DepthUnits, Domain, XyzType, encode_gray16, encode_rgb8,
     encode_xyz_float, encode_xyz_half,
 };
 use s3d_render::{
-    FaceImages, Hits, Normals, Pyramids, Scene, TextureFilter, color_per_face_image_into, depth_image_into,
-    depth_image_mm_into, face_images_into, index_image_into, normal_image_into, rgb_image_into,
-    xyz_image_half_into, xyz_image_into,
+    Hits, Modalities, Normals, Pyramids, Scene, Shading, TextureFilter, ViewImages,
+    color_per_face_image_into, depth_image_into, depth_image_mm_into, index_image_into, normal_image_into,
+    rgb_image_into, view_images_into, xyz_image_half_into, xyz_image_into,
 };
 
 /// What images of a mesh are made from.
@@ -71,13 +70,10 @@ impl Image {
 
 /// Memory of the images of a view, for one view after another.
 pub(crate) struct Prints {
-    rgb: Raster<[u8; 3]>,
-    depth: Raster<u16>,
-    xyz: Raster<[f16; 3]>,
+    images: ViewImages,
     xyz_float: Raster<[f32; 3]>,
-    faces: FaceImages,
-    /// Whether `faces` holds all of its images of the view at hand.
-    faces_made: bool,
+    /// Which of `images` are those of the view at hand.
+    made: Modalities,
 }
 
 impl Prints {
@@ -87,14 +83,8 @@ impl Prints {
 
 impl Default for Prints {
     fn default() -> Self {
-        Self {
-            rgb: Raster::filled(0, 0, [0; 3]),
-            depth: Raster::filled(0, 0, 0),
-            xyz: Raster::filled(0, 0, [f16::ZERO; 3]),
-            xyz_float: Raster::filled(0, 0, [0.0; 3]),
-            faces: FaceImages::default(),
-            faces_made: false,
-        }
+        let xyz_float = Raster::filled(0, 0, [0.0; 3]);
+        Self { images: ViewImages::default(), xyz_float, made: Modalities::default() }
     }
 }
 
@@ -113,13 +103,17 @@ impl Look<'_> {
         mut each: impl FnMut(Image, Vec<u8>) -> Result<(), E>,
     ) -> Result<(), E> {
         let large = hits.face.len() > Prints::MOST_PIXELS;
-        prints.faces_made = false;
-        let together = [Image::Normal, Image::Semantic, Image::SemanticPretty];
-        if !large && self.normals == Normals::Flat && together.iter().all(|image| images.contains(image)) {
-            let (labels, colors) = (self.label_per_face, self.pretty_per_face);
-            let axes = self.conventions.normal_axes;
-            face_images_into(self.scene, hits, camera, axes, labels, colors, &mut prints.faces);
-            prints.faces_made = true;
+        prints.made = if large { Modalities::default() } else { self.together(images) };
+        if prints.made != Modalities::default() {
+            let shading = Shading {
+                scene: self.scene,
+                pyramids: self.textures,
+                filter: TextureFilter::default(),
+                normal_axes: self.conventions.normal_axes,
+                index_per_face: self.label_per_face,
+                color_per_face: self.pretty_per_face,
+            };
+            view_images_into(&shading, hits, camera, prints.made, &mut prints.images);
         }
         for &image in images {
             each(image, self.file(image, hits, camera, prints))?;
@@ -130,13 +124,27 @@ impl Look<'_> {
         Ok(())
     }
 
+    /// The images that are made in one walk over the hits.
+    fn together(&self, images: &[Image]) -> Modalities {
+        let wants = |image| images.contains(&image);
+        let Conventions { depth_units, xyz, .. } = self.conventions;
+        let flat = self.normals == Normals::Flat;
+        Modalities {
+            rgb: wants(Image::Rgb) && self.pictures.is_none(),
+            depth: wants(Image::Depth) && depth_units == DepthUnits::Per512,
+            faces: flat && [Image::Normal, Image::Semantic, Image::SemanticPretty].into_iter().all(wants),
+            xyz: wants(Image::GlobalXyz) && xyz != XyzType::Float,
+        }
+    }
+
     fn file(&self, image: Image, hits: &Hits, camera: &Camera, prints: &mut Prints) -> Vec<u8> {
         let compression = self.compression;
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
-        let Prints { rgb, depth, xyz, xyz_float, faces, faces_made } = prints;
+        let Prints { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made } = prints;
         match image {
             Image::Rgb => {
                 match &self.pictures {
+                    _ if made.rgb => {}
                     Some(pictures) => pictures.image_into(self, hits, camera, rgb),
                     None => {
                         let filter = TextureFilter::default();
@@ -147,26 +155,27 @@ impl Look<'_> {
             }
             Image::Depth => {
                 match depth_units {
+                    _ if made.depth => {}
                     DepthUnits::Per512 => depth_image_into(hits, depth),
                     DepthUnits::Millimetres => depth_image_mm_into(hits, depth),
                 }
                 encode_gray16(depth, compression)
             }
             Image::Normal => {
-                if !*faces_made {
+                if !made.faces {
                     let out = &mut faces.normal;
                     normal_image_into(self.scene, hits, camera, self.normals, normal_axes, out);
                 }
                 encode_rgb8(&faces.normal, Content::Normals, compression)
             }
             Image::Semantic => {
-                if !*faces_made {
+                if !made.faces {
                     index_image_into(hits, self.label_per_face, &mut faces.index);
                 }
                 encode_rgb8(&faces.index, Content::Labels, compression)
             }
             Image::SemanticPretty => {
-                if !*faces_made {
+                if !made.faces {
                     color_per_face_image_into(hits, self.pretty_per_face, &mut faces.color);
                 }
                 encode_rgb8(&faces.color, Content::Labels, compression)
@@ -176,7 +185,9 @@ impl Look<'_> {
                 encode_xyz_float(xyz_float, compression)
             }
             Image::GlobalXyz => {
-                xyz_image_half_into(hits, camera, xyz);
+                if !made.xyz {
+                    xyz_image_half_into(hits, camera, xyz);
+                }
                 encode_xyz_half(xyz, compression)
             }
         }

@@ -9,10 +9,9 @@ use super::rays::difference;
 use super::report::{Report, Topic};
 use super::told::Told;
 use super::views::Views;
-use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::{Conventions, DatasetImage, Domain, Frame, Layout, XyzType};
-use s3d_render::{Caster, FaceImages, Hits, MISSING_INDEX, Pyramids, Scene};
+use s3d_render::{Caster, Hits, MISSING_INDEX, Pyramids, Scene, ViewImages};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -77,10 +76,8 @@ pub(crate) struct Odd {
 pub(crate) struct Memory<'s> {
     pub(super) caster: Option<Caster<'s, 's>>,
     pub(super) hits: Hits,
-    pub(super) faces: FaceImages,
-    pub(super) depth: Raster<u16>,
+    pub(super) images: ViewImages,
     pub(super) xyz: Raster<[f32; 3]>,
-    pub(super) half: Raster<[f16; 3]>,
 }
 
 impl<'s> Memory<'s> {
@@ -88,10 +85,8 @@ impl<'s> Memory<'s> {
         Self {
             caster: stage.map(|s| Caster::new(s.scene)),
             hits: Hits::default(),
-            faces: FaceImages::default(),
-            depth: Raster::filled(0, 0, 0),
+            images: ViewImages::default(),
             xyz: Raster::filled(0, 0, [0.0; 3]),
-            half: Raster::filled(0, 0, [f16::ZERO; 3]),
         }
     }
 }

@@ -8,9 +8,8 @@ use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::{DepthUnits, Domain, XyzType};
 use s3d_render::{
-    MISSING_INDEX, Normals, TextureFilter, color_per_face_image_into, depth_image_into, depth_image_mm_into,
-    face_images_into, index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into,
-    xyz_image_into,
+    MISSING_INDEX, TextureFilter, color_per_face_image_into, depth_image_into, depth_image_mm_into,
+    index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into, xyz_image_into,
 };
 
 /// How a file differs from what the mesh shows: exactly, for the meshes of an export are those that it was rendered from, to
@@ -23,7 +22,7 @@ pub(super) fn difference(
     depth_file: &Option<Raster<u16>>,
     memory: &mut Memory<'_>,
 ) -> Option<Difference> {
-    let Memory { hits, faces, depth, xyz, half, .. } = memory;
+    let Memory { hits, images, xyz, .. } = memory;
     let (camera, conventions) = (&pose.camera, stage.conventions());
     let colors = |found: &Raster<[u8; 3]>, expected: &Raster<[u8; 3]>| {
         Difference::of(found, expected, |a, b| a == b, |c| format!("{c:?}"), |c| format!("{c:?}"))
@@ -32,40 +31,35 @@ pub(super) fn difference(
         Pixels::Color(found) => match domain {
             Domain::Rgb => {
                 let filter = TextureFilter::default();
-                rgb_image_into(stage.scene, stage.textures, hits, camera, &filter, &mut faces.normal);
-                colors(found, &faces.normal)
+                rgb_image_into(stage.scene, stage.textures, hits, camera, &filter, &mut images.rgb);
+                colors(found, &images.rgb)
             }
             Domain::Normal => {
                 let (normals, axes) = (stage.told.normals(), conventions.normal_axes);
-                if normals == Normals::Flat {
-                    // The three images of faces at once.
-                    let (labels, pretty) = (&stage.mesh.labels, stage.pretty_per_face);
-                    face_images_into(stage.scene, hits, camera, axes, labels, pretty, faces);
-                } else {
-                    normal_image_into(stage.scene, hits, camera, normals, axes, &mut faces.normal);
-                }
-                colors(found, &faces.normal)
+                let out = &mut images.faces.normal;
+                normal_image_into(stage.scene, hits, camera, normals, axes, out);
+                colors(found, out)
             }
             Domain::Semantic => {
-                index_image_into(hits, &stage.mesh.labels, &mut faces.index);
+                index_image_into(hits, &stage.mesh.labels, &mut images.faces.index);
                 let index = |c: [u8; 3]| u32::from_be_bytes([0, c[0], c[1], c[2]]);
                 let text = |c: [u8; 3]| match c {
                     MISSING_INDEX => "nothing".to_owned(),
                     c => format!("{} ({})", index(c), stage.labels.name_of(index(c))),
                 };
-                Difference::of(found, &faces.index, |a, b| a == b, text, text)
+                Difference::of(found, &images.faces.index, |a, b| a == b, text, text)
             }
             _ => {
-                color_per_face_image_into(hits, stage.pretty_per_face, &mut faces.color);
-                colors(found, &faces.color)
+                color_per_face_image_into(hits, stage.pretty_per_face, &mut images.faces.color);
+                colors(found, &images.faces.color)
             }
         },
         Pixels::Depth(found) => {
             match conventions.depth_units {
-                DepthUnits::Per512 => depth_image_into(hits, depth),
-                DepthUnits::Millimetres => depth_image_mm_into(hits, depth),
+                DepthUnits::Per512 => depth_image_into(hits, &mut images.depth),
+                DepthUnits::Millimetres => depth_image_mm_into(hits, &mut images.depth),
             }
-            Difference::of(found, depth, |a, b| a == b, |d| d.to_string(), |d| d.to_string())
+            Difference::of(found, &images.depth, |a, b| a == b, |d| d.to_string(), |d| d.to_string())
         }
         Pixels::Xyz(found) => {
             let text = |p: [f32; 3]| format!("{p:?}");
@@ -89,9 +83,9 @@ pub(super) fn difference(
                 return Difference::of(found, &points, same, text, text);
             }
             if is_half {
-                xyz_image_half_into(hits, camera, half);
+                xyz_image_half_into(hits, camera, &mut images.xyz);
                 let same = |a: [f32; 3], b: [f16; 3]| a == rounded(b);
-                return Difference::of(found, half, same, text, |p| text(rounded(p)));
+                return Difference::of(found, &images.xyz, same, text, |p| text(rounded(p)));
             }
             xyz_image_into(hits, camera, xyz);
             Difference::of(found, xyz, same, text, text)
