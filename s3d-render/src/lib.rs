@@ -8,6 +8,7 @@
 //!   the data set (formats.md, "Images"). A semantic image is an index image: this crate stores faces and knows no
 //!   labels.
 //! - [`Pyramids`] and [`rgb_image`]: hits → colours, textures filtered over each pixel's footprint.
+//! - [`view_images_into`]: all of these in one walk over the hits, in less time and the same to the bit.
 //! - [`CubeMap`] and [`picture_image`]: hits → colours from the scanner's own pictures, be they a sky box, a panorama or
 //!   captures that overlap ([`stitch()`]).
 //!
