@@ -208,7 +208,7 @@ pub use scan_locations::read_scan_locations;
 pub use scene::{SceneFile, read_scene};
 pub use scene_cameras::CameraSource;
 pub use splits::{Split, read_splits, write_image_list, write_splits};
-pub use sync::{sync_data_set, sync_file};
+pub use sync::{SyncAhead, sync_data_set, sync_file};
 pub use tar::TarWriter;
 pub use texture_file::TextureFile;
 pub use webdataset::{ShardEntry, ShardLimits, plan_shards, sample_key, sample_member, write_shard_index};

@@ -2,7 +2,14 @@
 
 use crate::{Error, Result};
 use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
+
+/// How long [`SyncAhead`] rests.
+const REST: Duration = Duration::from_secs(1);
 
 /// Returns when all that was written below the folder `root` is on the disk, so that a power loss later takes nothing of
 /// it away. `files` are the files that count.
@@ -18,6 +25,47 @@ pub fn sync_data_set(root: &Path, files: &[PathBuf]) -> Result<()> {
         return Ok(());
     }
     sync_one_by_one(root, files)
+}
+
+/// Brings what is written below a folder to the disk while more is written, so that little is left for [`sync_data_set`] to
+/// wait for. Where the system has no call for that it does nothing.
+#[derive(Debug)]
+pub struct SyncAhead {
+    root: PathBuf,
+    /// Closed when it should end.
+    open: Sender<()>,
+    thread: Option<JoinHandle<io::Result<()>>>,
+}
+
+impl SyncAhead {
+    /// Begins, on a thread of its own that waits for the disk nearly all the time. Dropped, it ends soon.
+    pub fn start(root: &Path) -> Self {
+        let (open, is_open) = mpsc::channel();
+        let folder = root.to_owned();
+        let work = move || {
+            while is_open.recv_timeout(REST) == Err(RecvTimeoutError::Timeout) {
+                if !sync_file_system(&folder)? {
+                    break;
+                }
+            }
+            Ok(())
+        };
+        // Without a thread all is left for the end.
+        let thread = Builder::new().name("sync".to_owned()).spawn(work).ok();
+        Self { root: root.to_owned(), open, thread }
+    }
+
+    /// Ends.
+    ///
+    /// # Errors
+    /// [`Error::Io`]: the disk did not take something. The system tells that once, so that no sync after this would.
+    pub fn end(self) -> Result<()> {
+        let Self { root, open, thread } = self;
+        drop(open);
+        let Some(thread) = thread else { return Ok(()) };
+        let ended = thread.join().unwrap_or_else(|_| Err(io::Error::other("the thread that syncs panicked")));
+        ended.map_err(|e| Error::io(&root, "bring to the disk", e))
+    }
 }
 
 /// Brings one file to the disk, and its name.
@@ -57,7 +105,7 @@ fn sync_folder(path: &Path) {
 
 /// Whether the file system took all that was written in one call.
 #[cfg(target_os = "linux")]
-fn sync_file_system(root: &Path) -> std::io::Result<bool> {
+fn sync_file_system(root: &Path) -> io::Result<bool> {
     use rustix::io::Errno;
     match rustix::fs::syncfs(File::open(root)?) {
         Ok(()) => Ok(true),
@@ -68,7 +116,7 @@ fn sync_file_system(root: &Path) -> std::io::Result<bool> {
 
 /// There is no such call; a folder that is not there is told of all the same.
 #[cfg(not(target_os = "linux"))]
-fn sync_file_system(root: &Path) -> std::io::Result<bool> {
+fn sync_file_system(root: &Path) -> io::Result<bool> {
     std::fs::metadata(root).map(|_| false)
 }
 
@@ -84,6 +132,21 @@ mod tests {
         write_bytes(&path, b"a").unwrap();
         sync_data_set(dir.path(), std::slice::from_ref(&path)).unwrap();
         let message = sync_data_set(&dir.path().join("gone"), &[path]).unwrap_err().to_string();
+        assert!(message.contains("gone: cannot bring to the disk"), "{message}");
+    }
+
+    #[test]
+    fn syncing_ahead_ends_and_tells_of_a_folder_that_is_gone() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        let ahead = SyncAhead::start(dir.path());
+        write_bytes(&path, b"a").unwrap();
+        ahead.end().unwrap();
+        let ahead = SyncAhead::start(&dir.path().join("gone"));
+        while !ahead.thread.as_ref().unwrap().is_finished() {
+            std::thread::yield_now();
+        }
+        let message = ahead.end().unwrap_err().to_string();
         assert!(message.contains("gone: cannot bring to the disk"), "{message}");
     }
 

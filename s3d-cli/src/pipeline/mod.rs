@@ -57,7 +57,7 @@ use plan::Plan;
 use points::check_density;
 use request::{Request, requested_areas};
 use s3d_geom::NearestFaces;
-use s3d_io::{Domain, Layout, MeshFile};
+use s3d_io::{Domain, Layout, MeshFile, SyncAhead};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use summary::Account;
@@ -190,6 +190,7 @@ impl<'a> Job<'a> {
 
     /// Does all units that are not done yet.
     fn run(&self, layout: &Layout, journal: &Journal, account: &Account) -> Outcome<()> {
+        let disk = SyncAhead::start(layout.root());
         self.write_assets(layout)?;
         let cache = layout.work_dir();
         let common = self.common(layout, journal, account, &cache, &|_| true);
@@ -197,7 +198,8 @@ impl<'a> Job<'a> {
         let (candidates, _) = select_requested(&self.request, &journal.finished())?;
         let kept = candidates.iter().filter(|c| c.frame_num.is_some()).count();
         info!("selected {kept} of {} candidate views", candidates.len());
-        self.render(common, &labelled, &candidates)
+        self.render(common, &labelled, &candidates)?;
+        Ok(disk.end()?)
     }
 
     /// Writes what is known before any unit is done: the label table, `assets`, `conventions.json`.
