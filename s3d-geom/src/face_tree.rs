@@ -7,6 +7,7 @@ use crate::{Aabb, NO_INDEX, TriMesh};
 use glam::{DVec3, Vec3, Vec3A};
 use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris, node::Bvh2Node};
 use obvhs::{BvhBuildParams, triangle::Triangle};
+use rayon::prelude::*;
 use std::time::Duration;
 
 /// The hierarchy.
@@ -31,6 +32,9 @@ const LEAF: u32 = 1 << 31;
 
 /// Triangles that a leaf holds at most.
 const LEAF_SIZE: usize = 8;
+
+/// Leaves that one task makes at least.
+const LEAVES_OF_TASK: usize = 256;
 
 /// The nearest triangle.
 #[derive(Clone, Copy)]
@@ -64,13 +68,12 @@ impl FaceTree {
         let mut tree = Self { nodes: vec![Node8::new()], leaves: Vec::new() };
         // A node of ours, and the one of theirs that it opens.
         let mut open = vec![(0, 0)];
+        let mut leaves = Vec::new();
         while let Some((own, theirs)) = open.pop() {
             for child in eight_below(&bvh, &sizes, theirs) {
                 let id = if sizes[child] <= LEAF_SIZE {
-                    let triangle = |face: u32| (face, SortedTriangle::new(mesh.triangle(face)));
-                    let members: Vec<_> = faces_of(&bvh, child).map(triangle).collect();
-                    tree.leaves.push(Triangles8::new(&members));
-                    LEAF + (tree.leaves.len() - 1) as u32
+                    leaves.push(child);
+                    LEAF + (leaves.len() - 1) as u32
                 } else {
                     tree.nodes.push(Node8::new());
                     open.push((tree.nodes.len() - 1, child));
@@ -79,6 +82,10 @@ impl FaceTree {
                 tree.nodes[own].push(bvh.nodes[child].aabb(), id);
             }
         }
+        let triangle = |face: u32| (face, SortedTriangle::new(mesh.triangle(face)));
+        let leaf = |members: Vec<_>| Triangles8::new(&members);
+        let leaves = leaves.par_iter().with_min_len(LEAVES_OF_TASK);
+        tree.leaves = leaves.map(|&of| leaf(faces_of(&bvh, of).map(triangle).collect())).collect();
         tree
     }
 

@@ -52,7 +52,7 @@ pub(crate) trait PointBlocks: Send {
     fn skipped(&mut self) -> Skipped;
 }
 
-/// Reads the points of instances in blocks, one instance after another. It holds two blocks, whose memory it keeps.
+/// Reads the points of instances in blocks, one instance after another. It holds three blocks, whose memory it keeps.
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -64,7 +64,7 @@ pub(crate) trait PointBlocks: Send {
 /// let area = Annotations::open(&[dir.path().to_owned()], &Default::default())?;
 /// let mut reader = InstanceReader::new(1);
 /// let mut top = f32::MIN;
-/// let (mut points, _) = reader.read(&area.rooms[0].instances[0], |block| {
+/// let (mut points, _) = reader.read(&area.rooms[0].instances[0], None, |block| {
 ///     top = block.positions.iter().fold(top, |top, p| top.max(p.z));
 ///     Ok::<(), Error>(())
 /// })?;
@@ -73,65 +73,92 @@ pub(crate) trait PointBlocks: Send {
 /// assert_eq!((points.len(), below), (2, 1));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug)]
-pub struct InstanceReader {
+pub struct InstanceReader<'a> {
     block_points: usize,
     /// The block at hand, and the next.
     now: PointCloud,
     next: PointCloud,
+    /// An instance that is begun already, and its first block.
+    ahead: Option<(&'a AnnotatedInstance, Result<Begun<'a>>)>,
+    first: PointCloud,
+}
+
+/// The points of an instance of which the first block has been read.
+struct Begun<'a> {
+    source: Box<dyn PointBlocks + 'a>,
+    more: bool,
+}
+
+impl<'a> Begun<'a> {
+    fn new(instance: &'a AnnotatedInstance, points: usize, block: &mut PointCloud) -> Result<Self> {
+        let mut source = instance.open()?;
+        block.clear();
+        let more = source.read_block(points, block)?;
+        Ok(Self { source, more })
+    }
 }
 
 /// The points of an instance that [`InstanceReader::read`] has gone through once, to be gone through again.
-#[derive(Debug)]
-pub struct InstancePasses<'a> {
+pub struct InstancePasses<'r, 'a> {
     instance: &'a AnnotatedInstance,
-    reader: &'a mut InstanceReader,
+    reader: &'r mut InstanceReader<'a>,
     len: u64,
     /// The positions, if reading the instance's own file again would take longer.
     copy: Option<PositionFile>,
 }
 
-impl InstanceReader {
+impl<'a> InstanceReader<'a> {
     /// A reader of blocks of that many points; 15 bytes each, and 4 more if their faces are known.
     ///
     /// # Panics
     /// If it is 0.
     pub fn new(block_points: usize) -> Self {
         assert!(block_points > 0, "blocks of no points");
-        Self { block_points, now: PointCloud::default(), next: PointCloud::default() }
+        let (now, next, first) = Default::default();
+        Self { block_points, now, next, ahead: None, first }
     }
 
     /// Hands all points of an instance to `each`, block after block, with what [`AnnotatedInstance::read`] gives of each;
     /// not even one block if it has no point. The next block is read meanwhile, on another thread of the current rayon
-    /// pool. Returns the points, to be gone through again, and what was left out.
+    /// pool; during the last that is the first block of `then`, the instance that is going to be read after this one.
+    /// Returns the points, to be gone through again, and what was left out.
     ///
     /// # Errors
     /// What `each` returns, which ends the reading; as [`AnnotatedInstance::read`].
-    pub fn read<'a, E: From<Error> + Send>(
-        &'a mut self,
+    pub fn read<E: From<Error> + Send>(
+        &mut self,
         instance: &'a AnnotatedInstance,
+        then: Option<&'a AnnotatedInstance>,
         mut each: impl FnMut(&PointCloud) -> std::result::Result<(), E> + Send,
-    ) -> std::result::Result<(InstancePasses<'a>, Skipped), E> {
-        let mut source = instance.open()?;
-        let Self { block_points, now, next } = self;
-        now.clear();
-        let mut more = source.read_block(*block_points, now)?;
+    ) -> std::result::Result<(InstancePasses<'_, 'a>, Skipped), E> {
+        let Self { block_points, now, next, ahead, first } = self;
+        let points = *block_points;
+        let Begun { mut source, mut more } = match ahead.take() {
+            Some((begun, of)) if std::ptr::eq(begun, instance) => {
+                std::mem::swap(now, first);
+                of?
+            }
+            _ => Begun::new(instance, points, now)?,
+        };
         let (mut len, mut copy) = (0, None);
         if more && let Some(dir) = instance.copy_to() {
             copy = Some(PositionFile::create(dir)?);
         }
         while !now.is_empty() {
             len += now.len() as u64;
-            let mut done = || -> std::result::Result<(), E> {
+            let done = || -> std::result::Result<(), E> {
                 copy.iter_mut().try_for_each(|file| file.append(&now.positions))?;
                 each(now)
             };
             if !more {
-                done()?;
+                let begin = || then.map(|then| (then, Begun::new(then, points, first)));
+                let (begun, done) = rayon::join(begin, done);
+                done?;
+                *ahead = begun;
                 break;
             }
             next.clear();
-            let (read, done) = rayon::join(|| source.read_block(*block_points, next), done);
+            let (read, done) = rayon::join(|| source.read_block(points, next), done);
             done?;
             more = read?;
             if next.is_empty() {
@@ -146,7 +173,7 @@ impl InstanceReader {
     }
 }
 
-impl PointPasses for InstancePasses<'_> {
+impl PointPasses for InstancePasses<'_, '_> {
     fn len(&self) -> u64 {
         self.len
     }
@@ -277,7 +304,7 @@ mod tests {
                 let mut first = PointCloud::default();
                 let mut most = 0;
                 let (mut passes, skipped) = reader
-                    .read(&instance, |block| {
+                    .read(&instance, None, |block| {
                         most = most.max(block.len());
                         first.positions.extend(&block.positions);
                         first.colors.extend(&block.colors);
@@ -305,13 +332,50 @@ mod tests {
 
     #[test]
     fn a_reader_goes_from_instance_to_instance() {
-        let dir = tempfile::tempdir().unwrap();
-        let [tree, cloud] = instances(dir.path(), 20);
-        let mut reader = InstanceReader::new(6);
-        for instance in [&tree, &cloud, &tree] {
-            let (passes, _) = reader.read(instance, |_| Ok::<(), Error>(())).unwrap();
-            assert_eq!(passes.len(), 20);
+        for points in [1, 6, 20] {
+            let dir = tempfile::tempdir().unwrap();
+            let [tree, cloud] = instances(dir.path(), points);
+            let mut whole = PointCloud::default();
+            tree.read(&mut whole).unwrap();
+            let mut reader = InstanceReader::new(6);
+            // What was said to follow, what was not, and nothing.
+            for (instance, then) in [
+                (&tree, Some(&cloud)),
+                (&cloud, Some(&cloud)),
+                (&tree, Some(&tree)),
+                (&tree, None),
+                (&cloud, None),
+            ] {
+                let mut positions = Vec::new();
+                let (mut passes, _) = reader
+                    .read(instance, then, |block| {
+                        positions.extend(&block.positions);
+                        Ok::<(), Error>(())
+                    })
+                    .unwrap();
+                assert_eq!((passes.len(), &positions), (u64::from(points), &whole.positions));
+                positions.clear();
+                passes
+                    .pass(&mut |block| {
+                        positions.extend(block);
+                        Ok(())
+                    })
+                    .unwrap();
+                assert_eq!(positions, whole.positions);
+            }
         }
+    }
+
+    #[test]
+    fn what_is_wrong_with_the_next_instance_is_told_when_it_is_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let [tree, cloud] = instances(dir.path(), 5);
+        fs::write(tree.path(), "1 2 3 4 5 x\n").unwrap();
+        let mut reader = InstanceReader::new(6);
+        let (passes, _) = reader.read(&cloud, Some(&tree), |_| Ok::<(), Error>(())).unwrap();
+        assert_eq!(passes.len(), 5);
+        let read = reader.read(&tree, None, |_| Ok::<(), Error>(()));
+        assert!(read.is_err_and(|e| e.to_string().contains("wall_1.txt")));
     }
 
     #[test]
@@ -325,7 +389,7 @@ mod tests {
         let mut reader = InstanceReader::new(6);
         let mut blocks = 0;
         let (passes, skipped) = reader
-            .read(&area.rooms[0].instances[0], |_| {
+            .read(&area.rooms[0].instances[0], None, |_| {
                 blocks += 1;
                 Ok::<(), Error>(())
             })
@@ -341,12 +405,12 @@ mod tests {
         let failure = || Error::format(std::path::Path::new("x"), "enough");
         let mut reader = InstanceReader::new(6);
         let mut blocks = 0;
-        let read = reader.read(&tree, |_| {
+        let read = reader.read(&tree, None, |_| {
             blocks += 1;
             if blocks == 2 { Err(failure()) } else { Ok(()) }
         });
         assert!(read.is_err() && blocks == 2);
-        let (mut passes, _) = reader.read(&tree, |_| Ok::<(), Error>(())).unwrap();
+        let (mut passes, _) = reader.read(&tree, None, |_| Ok::<(), Error>(())).unwrap();
         assert!(passes.pass(&mut |_| Err(failure())).is_err());
     }
 }

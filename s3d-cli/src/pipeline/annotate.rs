@@ -5,6 +5,7 @@ use crate::console::Progress;
 use crate::failure::{Failure, Outcome};
 use crate::stop;
 use glam::Vec3;
+use rayon::prelude::*;
 use s3d_geom::{
     Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh,
     dominant_wall_direction_deg,
@@ -13,7 +14,7 @@ use s3d_io::{Error, InstanceReader, PointPasses};
 use s3d_label::{Class, Label, LabelId, LabelTable, Room, VoteReport, Votes};
 use std::collections::{BTreeMap, HashSet};
 
-/// Points of an instance that are in memory, twice: while some are looked up, the next are read.
+/// Points that are in memory, three times: while some are looked up, those that follow are read.
 const BLOCK_POINTS: usize = 1 << 19;
 
 /// A share of points far from every face above which it is told.
@@ -87,7 +88,7 @@ pub(crate) fn annotate(
 ) -> Outcome<Annotated> {
     let mesh = nearest_faces.mesh();
     let mut votes = Votes::new(mesh.faces().len());
-    let mut rooms = Vec::new();
+    let (mut rooms, mut outlines) = (Vec::new(), Vec::new());
     let mut total = 0u64;
     let mut skipped = SkippedLines::default();
     let lenient = area.lenient;
@@ -96,14 +97,16 @@ pub(crate) fn annotate(
     let progress = Progress::new("labelling", "instances", files as u64);
     let mut reader = InstanceReader::new(BLOCK_POINTS);
     let mut nearest: Vec<Nearest> = Vec::new();
+    let mut following = area.rooms.iter().flat_map(|r| &r.instances).skip(1);
     for room in &area.rooms {
         let mut builder = FootprintBuilder::new(FootprintOptions::default());
         let (mut points, mut room_bbox) = (0u64, Aabb::EMPTY);
         for instance in &room.instances {
             let id = table.id_of(&instance.label).unwrap_or(LabelId::NULL);
+            let then = following.next().map(|instance| &instance.points);
             stop::check()?;
             let mut bbox = Aabb::EMPTY;
-            let (mut passes, left_out) = reader.read(&instance.points, |block| -> Outcome<()> {
+            let (mut passes, left_out) = reader.read(&instance.points, then, |block| -> Outcome<()> {
                 stop::check()?;
                 if !instance.points.are_vertices() && !has_faces(block) {
                     nearest_faces.nearest_many(&block.positions, &mut nearest);
@@ -152,20 +155,27 @@ pub(crate) fn annotate(
         rooms.push(SurveyedRoom {
             room: room.room,
             points,
-            footprint: builder.finish(),
+            footprint: Footprint::default(),
             bbox: room_bbox,
             wall_direction_deg: 0,
         });
-    }
-    let face_labels = votes.face_labels();
-    let mut upright = upright_faces(mesh, table, &face_labels);
-    for room in &mut rooms {
-        room.wall_direction_deg = upright.remove(&room.room).map_or(0, |faces| faces.direction_deg());
+        outlines.push(builder);
     }
     if rooms.is_empty() {
         return Err(Failure::Input(format!("{}: no room in it", area.path.display())));
     }
-    let report = VoteReport::new(&votes, table);
+    let label = || {
+        let face_labels = votes.face_labels();
+        let upright = || upright_faces(mesh, table, &face_labels);
+        let (upright, report) = rayon::join(upright, || VoteReport::new(&votes, table));
+        (face_labels, upright, report)
+    };
+    let draw = || outlines.par_iter().map(FootprintBuilder::finish).collect::<Vec<Footprint>>();
+    let ((face_labels, mut upright, report), footprints) = rayon::join(label, draw);
+    for (room, footprint) in rooms.iter_mut().zip(footprints) {
+        room.footprint = footprint;
+        room.wall_direction_deg = upright.remove(&room.room).map_or(0, |faces| faces.direction_deg());
+    }
     Ok(Annotated { face_labels, report, rooms, points: total, skipped })
 }
 
