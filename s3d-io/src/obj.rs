@@ -1,11 +1,11 @@
 //! Wavefront OBJ with its material libraries.
 //!
 //! [`PlainObj`] understands the dialects and reads the numbers, [`crate::obj_diagnose`] finds the line of a bad one,
-//! [`ObjLooks`] the libraries and images; here the parts become a mesh.
+//! [`ObjNames`] and [`ObjLooks`] the libraries and images; here the parts become a mesh.
 
 use crate::mesh_file::{MeshFile, UpAxis, checked_mesh};
 use crate::obj_diagnose::{number_error, vertex_error};
-use crate::obj_looks::ObjLooks;
+use crate::obj_looks::{ObjLooks, ObjNames};
 use crate::obj_plain::PlainObj;
 use crate::quote::count;
 use crate::texture_file::read_file;
@@ -22,26 +22,13 @@ use std::path::Path;
 /// As [`crate::read_mesh`].
 pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
     let bytes = read_file(path)?;
-    let plain = PlainObj::parse(path, &bytes)?;
-    if plain.faces.is_empty() {
-        return Err(Error::format(path, no_faces(&plain)));
-    }
-    let mut warnings = Vec::new();
-    if plain.has_bad_number {
-        return Err(number_error(path, &bytes));
-    }
-    // Decoding images takes as long as all else, and needs nothing of it.
-    let mut remarks = Vec::new();
+    // Decoding images takes as long as all else, and needs nothing of it but names.
+    let (mut warnings, mut remarks) = (Vec::new(), Vec::new());
     let (geometry, looks) = rayon::join(
-        || {
-            let columns = Columns::new(&plain);
-            Triangles::new(&plain, &columns).map(|faces| (columns, faces))
-        },
-        || ObjLooks::load(path, &plain, &mut remarks),
+        || Geometry::read(path, &bytes),
+        || ObjLooks::load(path, &ObjNames::find(&bytes), &mut remarks),
     );
-    let looks = looks?;
-    let (columns, faces) =
-        geometry.map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
+    let (Geometry { plain, columns, faces }, looks) = (geometry?, looks?);
     let polygons_triangulated = faces.polygons;
     if faces.triangles.is_empty() {
         let reason =
@@ -51,14 +38,14 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
     if let Some((line, why, n)) = &faces.refused {
         warnings.push(format!("{} left out: the first, on line {line}, {why}", count(*n, "polygon")));
     }
-    if let Some(first) = plain.short_faces.first() {
-        let n = count(plain.short_faces.len(), "face");
+    if let Some(first) = plain.elements.short_faces.first() {
+        let n = count(plain.elements.short_faces.len(), "face");
         warnings.push(format!("{n} with fewer than three corners left out, the first on line {first}"));
     }
     let colors = vertex_colors(&plain, &mut warnings);
     warnings.append(&mut remarks);
     let parts = MeshParts {
-        positions: plain.positions.iter().map(|&p| up.world_from_file(p)).collect(),
+        positions: plain.values.positions.iter().map(|&p| up.world_from_file(p)).collect(),
         faces: faces.triangles,
         colors,
         uvs: columns.uvs,
@@ -78,12 +65,35 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
     Ok(MeshFile { texture_files, warnings, companions, polygons_triangulated, ..MeshFile::new(path, mesh) })
 }
 
-fn no_faces(plain: &PlainObj) -> String {
-    let mut message = format!("has no face, only {}", count(plain.positions.len(), "vertex"));
-    if plain.points_and_lines > 0 {
-        message += &format!(" and {}", count(plain.points_and_lines, "point and line element"));
+/// What an OBJ file holds itself.
+struct Geometry {
+    plain: PlainObj,
+    columns: Columns,
+    faces: Triangles,
+}
+
+impl Geometry {
+    fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let plain = PlainObj::parse(path, bytes)?;
+        if plain.elements.faces.is_empty() {
+            return Err(Error::format(path, no_faces(&plain)));
+        }
+        if plain.values.has_bad_number {
+            return Err(number_error(path, bytes));
+        }
+        let columns = Columns::new(&plain);
+        let faces = Triangles::new(&plain, &columns)
+            .map_err(|(vertex, position)| vertex_error(path, bytes, vertex, position))?;
+        Ok(Self { plain, columns, faces })
     }
-    if let Some(line) = plain.short_faces.first() {
+}
+
+fn no_faces(plain: &PlainObj) -> String {
+    let mut message = format!("has no face, only {}", count(plain.values.positions.len(), "vertex"));
+    if plain.elements.points_and_lines > 0 {
+        message += &format!(" and {}", count(plain.elements.points_and_lines, "point and line element"));
+    }
+    if let Some(line) = plain.elements.short_faces.first() {
         message += &format!("; faces need three corners, the first that has fewer is on line {line}");
     }
     message + "; a mesh is needed"
@@ -101,8 +111,8 @@ struct Columns {
 
 impl Columns {
     fn new(plain: &PlainObj) -> Self {
-        let (uvs, face_uvs) = used(&plain.uvs, &plain.corners[1]);
-        let (normals, face_normals) = used(&plain.normals, &plain.corners[2]);
+        let (uvs, face_uvs) = used(&plain.values.uvs, &plain.elements.corners[1]);
+        let (normals, face_normals) = used(&plain.values.normals, &plain.elements.corners[2]);
         let normals = normals.into_iter().map(|n| n / n.length()).collect();
         Self { uvs, face_uvs, normals, face_normals }
     }
@@ -153,8 +163,8 @@ impl Triangles {
     fn new(plain: &PlainObj, columns: &Columns) -> std::result::Result<Self, (u32, Vec3)> {
         let mut out = Self::default();
         let mut start = 0;
-        let (vertices, uvs, normals) = (&plain.corners[0], &columns.face_uvs, &columns.face_normals);
-        for face in &plain.faces {
+        let (vertices, uvs, normals) = (&plain.elements.corners[0], &columns.face_uvs, &columns.face_normals);
+        for face in &plain.elements.faces {
             let n = face.corners as usize;
             let corners = start..start + n;
             start += n;
@@ -162,7 +172,7 @@ impl Triangles {
             let cut = if n == 3 {
                 vec![[0, 1, 2]]
             } else {
-                let points: Vec<Vec3> = polygon.iter().map(|&v| plain.positions[v as usize]).collect();
+                let points: Vec<Vec3> = polygon.iter().map(|&v| plain.values.positions[v as usize]).collect();
                 if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
                     return Err((polygon[bad], points[bad]));
                 }
@@ -192,7 +202,7 @@ impl Triangles {
                 column.clear();
             }
         }
-        if plain.materials.is_empty() {
+        if !plain.elements.has_materials {
             out.materials.clear();
         }
         Ok(out)
@@ -202,22 +212,22 @@ impl Triangles {
 /// One colour a vertex if any has one. Files write them from 0 to 1, some from 0 to 255: the largest tells, with room for
 /// what is a little too bright.
 fn vertex_colors(plain: &PlainObj, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
-    if plain.colors.is_empty() {
+    if plain.values.colors.is_empty() {
         return Vec::new();
     }
-    let largest = plain.colors.iter().flat_map(|(_, c)| c).fold(0.0f32, |a, &b| a.max(b));
+    let largest = plain.values.colors.iter().flat_map(|(_, c)| c).fold(0.0f32, |a, &b| a.max(b));
     let scale = if largest > 2.0 { 1.0 } else { 255.0 };
-    let mut colors = vec![DEFAULT_COLOR; plain.positions.len()];
-    for (vertex, color) in &plain.colors {
+    let mut colors = vec![DEFAULT_COLOR; plain.values.positions.len()];
+    for (vertex, color) in &plain.values.colors {
         if let Some(slot) = colors.get_mut(*vertex as usize) {
             *slot = color.map(|c| (c * scale).round().clamp(0.0, 255.0) as u8);
         }
     }
-    let without = plain.positions.len() - plain.colors.len();
+    let without = plain.values.positions.len() - plain.values.colors.len();
     if without > 0 {
         warnings.push(format!(
             "{without} of {} vertices have no colour and are made gray",
-            plain.positions.len()
+            plain.values.positions.len()
         ));
     }
     colors
@@ -422,7 +432,7 @@ mod tests {
             let columns = Columns::new(&plain);
             for corner in 0..3 * picks.len() {
                 let [v, t, n] = [&theirs.indices, &theirs.texcoord_indices, &theirs.normal_indices].map(|i| i[corner] as usize);
-                let position = plain.positions[plain.corners[0][corner] as usize];
+                let position = plain.values.positions[plain.elements.corners[0][corner] as usize];
                 prop_assert_eq!(&position.to_array()[..], &theirs.positions[3 * v..3 * v + 3]);
                 let uv = columns.uvs[columns.face_uvs[corner] as usize];
                 prop_assert_eq!(&uv.to_array()[..], &theirs.texcoords[2 * t..2 * t + 2]);

@@ -1,5 +1,6 @@
 //! The lines of OBJ and MTL files.
 
+use memchr::memchr;
 use std::borrow::Cow;
 
 /// The statements of a file with the line, from 1, on which each starts: without surrounding space, a line that ends in
@@ -7,8 +8,8 @@ use std::borrow::Cow;
 /// any LF, CR. Empty lines and comments stay.
 pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = (u64, Cow<'_, [u8]>)> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
-    let mut lines = (1..).zip(bytes.split(move |&b| b == end).map(<[u8]>::trim_ascii));
+    let end = if memchr(b'\n', bytes).is_some() { b'\n' } else { b'\r' };
+    let mut lines = (1..).zip(split(bytes, end).map(<[u8]>::trim_ascii));
     std::iter::from_fn(move || {
         let (number, line) = lines.next()?;
         let Some(continued) = line.strip_suffix(b"\\").filter(|line| !line.starts_with(b"#")) else {
@@ -23,6 +24,19 @@ pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = (u64, Cow<'_, 
             }
         }
         Some((number, Cow::Owned(joined.trim_ascii().to_vec())))
+    })
+}
+
+/// What is between the `end`s.
+fn split(bytes: &[u8], end: u8) -> impl Iterator<Item = &[u8]> {
+    let mut rest = Some(bytes);
+    std::iter::from_fn(move || {
+        let bytes = rest?;
+        let Some((line, after)) = memchr(end, bytes).and_then(|at| bytes.split_at_checked(at)) else {
+            return rest.take();
+        };
+        rest = after.get(1..);
+        Some(line)
     })
 }
 

@@ -2,17 +2,48 @@
 
 use crate::Result;
 use crate::mtl::{MtlMaterial, parse_mtl};
-use crate::obj_plain::PlainObj;
+use crate::obj_lines::{after, logical_lines, text};
 use crate::quote::{count, quote};
 use crate::texture_file::{TextureFile, read_file, read_textures};
 use s3d_geom::{DEFAULT_COLOR, Material, Raster, Texture, Wrap};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
+
+/// The names in an OBJ file, found ahead of everything else in it: with them its images can be decoded while it is read.
+#[derive(Default)]
+pub(crate) struct ObjNames {
+    /// Those that `usemtl` gives, in the order of their first use.
+    pub(crate) materials: Vec<String>,
+    /// The lines and names of `mtllib`.
+    libraries: Vec<(u64, String)>,
+}
+
+impl ObjNames {
+    /// Finds them in the content of a file.
+    pub(crate) fn find(bytes: &[u8]) -> Self {
+        let mut names = Self::default();
+        let mut known = HashSet::new();
+        for (number, line) in logical_lines(bytes) {
+            // Most lines are of vertices and faces.
+            if !matches!(line.first(), Some(b'u' | b'm')) {
+                continue;
+            }
+            let keyword = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+            let name = text(after(&line, keyword).trim_ascii());
+            match keyword {
+                b"usemtl" if known.insert(name.clone()) => names.materials.push(name),
+                b"mtllib" => names.libraries.push((number, name)),
+                _ => {}
+            }
+        }
+        names
+    }
+}
 
 /// Materials and textures of the faces.
 #[derive(Default)]
 pub(crate) struct ObjLooks {
-    /// In the order of [`PlainObj::materials`].
+    /// In the order of [`ObjNames::materials`].
     pub(crate) materials: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
     /// One a texture.
@@ -28,20 +59,20 @@ struct Found {
 }
 
 impl ObjLooks {
-    /// Reads the libraries that the file at `path` names, and the images of the materials that it uses.
+    /// Reads the libraries that the file at `path` has `names` of, and the images of the materials that it uses.
     ///
     /// # Errors
     /// For images that are too large.
-    pub(crate) fn load(path: &Path, plain: &PlainObj, warnings: &mut Vec<String>) -> Result<Self> {
+    pub(crate) fn load(path: &Path, names: &ObjNames, warnings: &mut Vec<String>) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut looks = Self::default();
-        let library = load_libraries(folder, plain, &mut looks.companions, warnings);
+        let library = load_libraries(folder, &names.libraries, &mut looks.companions, warnings);
         let mut wanted: Vec<PathBuf> = Vec::new();
         let mut place_of: HashMap<PathBuf, usize> = HashMap::new();
         let mut unknown: Vec<&str> = Vec::new();
         // For each material the image, into `wanted`, and how it repeats.
         let mut maps: Vec<Option<(usize, [Wrap; 2])>> = Vec::new();
-        for name in &plain.materials {
+        for name in &names.materials {
             let found = library.get(name.as_str());
             let color = found.map_or(DEFAULT_COLOR, |f| f.material.color);
             looks.materials.push(Material { name: name.clone(), color, texture: None });
@@ -140,12 +171,12 @@ impl ObjLooks {
 /// All materials of all libraries by name; of two with one name the later counts.
 fn load_libraries(
     folder: &Path,
-    plain: &PlainObj,
+    libraries: &[(u64, String)],
     read: &mut Vec<PathBuf>,
     warnings: &mut Vec<String>,
 ) -> HashMap<String, Found> {
     let mut found = HashMap::new();
-    for (line, names) in &plain.libraries {
+    for (line, names) in libraries {
         // A name may hold spaces, and a line may hold several names.
         let whole = resolve(folder, names);
         let files: Vec<PathBuf> = if whole.is_file() || names.split_whitespace().count() < 2 {

@@ -3,7 +3,7 @@
 //! Faces may count their corners from the end; a line may go on on the next; only some vertices may have a colour, and only
 //! some corners a texture coordinate. Elements that are no faces are left out. Indices are known to be in range.
 
-use crate::obj_lines::{after, logical_lines, next_word, number, parse_f32, text, words};
+use crate::obj_lines::{after, logical_lines, next_word, number, parse_f32, text};
 use crate::quote::quote;
 use crate::{Error, Result};
 use s3d_geom::NO_INDEX;
@@ -15,7 +15,7 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PlainFace {
     pub(crate) line: u64,
-    /// Into [`PlainObj::materials`], or [`NO_INDEX`].
+    /// Into [`crate::obj_looks::ObjNames::materials`], or [`NO_INDEX`].
     pub(crate) material: u32,
     /// At least 3.
     pub(crate) corners: u32,
@@ -26,31 +26,46 @@ pub(crate) struct PlainFace {
 }
 
 /// An OBJ file, understood.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct PlainObj {
+    pub(crate) values: Values,
+    pub(crate) elements: Elements,
+}
+
+/// What elements are made of.
+#[derive(Debug, Default)]
+pub(crate) struct Values {
     /// The columns of `v`, `vt` and `vn`, as written but for a vertex's weight, by which it is divided.
     pub(crate) positions: Vec<Vec3>,
     pub(crate) uvs: Vec<Vec2>,
     pub(crate) normals: Vec<Vec3>,
     /// Whether one of these is no number, or a weight 0. Which one is for [`crate::obj_diagnose`] to find.
     pub(crate) has_bad_number: bool,
+    /// Vertex, from 0, and colour as written, of the vertices that have one.
+    pub(crate) colors: Vec<(u32, [f32; 3])>,
+}
+
+/// Faces, and what is left out.
+#[derive(Debug, Default)]
+pub(crate) struct Elements {
     pub(crate) faces: Vec<PlainFace>,
     /// The indices of all faces' corners into the three columns, from 0, [`NO_INDEX`] for none.
     pub(crate) corners: [Vec<u32>; 3],
-    /// Vertex, from 0, and colour as written, of the vertices that have one.
-    pub(crate) colors: Vec<(u32, [f32; 3])>,
-    /// The names that `usemtl` gives, in the order of their first use.
-    pub(crate) materials: Vec<String>,
-    /// The lines and names of `mtllib`.
-    pub(crate) libraries: Vec<(u64, String)>,
+    /// Whether there is a `usemtl`.
+    pub(crate) has_materials: bool,
     /// Lines of `f` elements with fewer than three corners.
     pub(crate) short_faces: Vec<u64>,
     /// Number of `p` and `l` elements.
     pub(crate) points_and_lines: usize,
+    /// How many values each column has had so far: in the end, all.
+    counts: [u64; 3],
     /// Faces may come before their vertices: line, column and index of those wait here for the file's end, if the index
     /// is larger than all before in its column. (No smaller one is out of range before a larger one is.)
     forward: Vec<(u64, usize, u64)>,
 }
+
+/// What is wrong with a line.
+type Fault = (u64, String);
 
 /// The columns that a corner of a face points into.
 const COLUMNS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
@@ -63,93 +78,66 @@ impl PlainObj {
     /// it is UTF-16 or binary.
     pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
         refuse_other_files(path, bytes)?;
-        let mut plain = Self::default();
-        let counts = match plain.add_lines(path, bytes) {
-            Ok(counts) => counts,
-            // The fault may lie behind an index that points beyond the file's end: the first is told.
-            Err(later) => {
-                let first = plain.forward_fault(path, bytes, count_columns(bytes));
-                return Err(first.unwrap_or(later));
-            }
-        };
-        if let Some(fault) = plain.forward_fault(path, bytes, counts) {
-            return Err(fault);
+        // Faces need of the values no more than their number; each takes half of the time.
+        let ((values, bad_value), (elements, bad_element)) =
+            rayon::join(|| Values::read(bytes), || Elements::read(bytes));
+        // Of several faults the first is told; an index that no value comes to have is one of its own line.
+        let counts = if bad_element.is_some() { count_columns(bytes) } else { elements.counts };
+        let faults = [bad_value, bad_element, elements.forward_fault(bytes, counts)];
+        if let Some((line, message)) = faults.into_iter().flatten().min_by_key(|(line, _)| *line) {
+            return Err(Error::line(path, line, message));
         }
-        if counts.iter().any(|&n| n >= u64::from(NO_INDEX)) {
+        if elements.counts.iter().any(|&n| n >= u64::from(NO_INDEX)) {
             return Err(Error::unsupported(
                 path,
                 "has more vertices than 32 bits count; cut the scan into parts",
             ));
         }
-        Ok(plain)
+        Ok(Self { values, elements })
+    }
+}
+
+/// A line's keyword, with which it starts, and what follows.
+#[inline]
+fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
+    let keyword = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+    (keyword, after(line, keyword))
+}
+
+fn fault(number: u64, line: &[u8], message: String) -> Fault {
+    (number, format!("{message}: {}", quote(line)))
+}
+
+impl Values {
+    /// Reads up to the first fault.
+    fn read(bytes: &[u8]) -> (Self, Option<Fault>) {
+        let mut values = Self::default();
+        let mut lines = logical_lines(bytes).filter(|(_, line)| line.first() == Some(&b'v'));
+        let fault = lines.find_map(|(number, line)| values.add(&line).err().map(|m| fault(number, &line, m)));
+        (values, fault)
     }
 
-    /// Adds all lines, and gives the number of those of each column.
-    fn add_lines(&mut self, path: &Path, bytes: &[u8]) -> Result<[u64; 3]> {
-        let mut known: HashMap<String, u32> = HashMap::new();
-        let mut material = NO_INDEX;
-        let (mut counts, mut furthest) = ([0u64; 3], [0u64; 3]);
-        for (number, line) in logical_lines(bytes) {
-            let fail = |message: String| Error::line(path, number, format!("{message}: {}", quote(&line)));
-            // A line starts with its keyword.
-            let keyword = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-            let rest = after(&line, keyword);
-            match keyword {
-                b"v" => {
-                    self.add_vertex(counts[0], rest).map_err(fail)?;
-                    counts[0] += 1;
-                }
-                b"vt" => {
-                    // A texture of one dimension has no second coordinate.
-                    let mut rest = rest;
-                    let u = next_word(&mut rest)
-                        .ok_or_else(|| fail("a texture coordinate without a number".into()))?;
-                    let uv = [u, next_word(&mut rest).unwrap_or(b"0")].map(|word| self.number(word));
-                    self.uvs.push(vec2(uv[0], uv[1]));
-                    counts[1] += 1;
-                }
-                b"vn" => {
-                    let mut rest = rest;
-                    let mut normal = [0.0; 3];
-                    for value in &mut normal {
-                        let word = next_word(&mut rest)
-                            .ok_or_else(|| fail("a normal needs three numbers".into()))?;
-                        *value = self.number(word);
-                    }
-                    self.normals.push(Vec3::from_array(normal));
-                    counts[2] += 1;
-                }
-                b"f" => {
-                    let beyond = self.add_face(number, material, counts, rest).map_err(fail)?;
-                    for (column, index) in beyond {
-                        if let Some(furthest) = furthest.get_mut(column).filter(|f| index > **f) {
-                            *furthest = index;
-                            self.forward.push((number, column, index));
-                        }
-                    }
-                }
-                b"usemtl" => {
-                    let name = text(rest.trim_ascii());
-                    material = *known.entry(name).or_insert_with_key(|name| {
-                        self.materials.push(name.clone());
-                        (self.materials.len() - 1) as u32
-                    });
-                }
-                b"mtllib" => self.libraries.push((number, text(rest.trim_ascii()))),
-                b"p" | b"l" => self.points_and_lines += 1,
-                // Objects, groups, smoothing and curves say nothing about faces; comments and unknown words neither.
-                _ => {}
+    fn add(&mut self, line: &[u8]) -> std::result::Result<(), String> {
+        let (keyword, mut rest) = keyword(line);
+        match keyword {
+            b"v" => self.add_vertex(rest)?,
+            b"vt" => {
+                // A texture of one dimension has no second coordinate.
+                let u = next_word(&mut rest).ok_or("a texture coordinate without a number")?;
+                let uv = [u, next_word(&mut rest).unwrap_or(b"0")].map(|word| self.number(word));
+                self.uvs.push(vec2(uv[0], uv[1]));
             }
+            b"vn" => {
+                let mut normal = [0.0; 3];
+                for value in &mut normal {
+                    let word = next_word(&mut rest).ok_or("a normal needs three numbers")?;
+                    *value = self.number(word);
+                }
+                self.normals.push(Vec3::from_array(normal));
+            }
+            _ => {}
         }
-        Ok(counts)
-    }
-
-    fn forward_fault(&self, path: &Path, bytes: &[u8], counts: [u64; 3]) -> Option<Error> {
-        let count_of = |column: usize| counts.get(column).copied().unwrap_or(0);
-        let &(line, column, index) = self.forward.iter().find(|f| f.2 > count_of(f.1))?;
-        let text = logical_lines(bytes).find(|(number, _)| *number == line).map(|(_, text)| quote(&text));
-        let message = out_of_range(column, index as i64, count_of(column));
-        Some(Error::line(path, line, format!("{message}: {}", text.unwrap_or_default())))
+        Ok(())
     }
 
     /// Reads a number of a column.
@@ -161,7 +149,7 @@ impl PlainObj {
         })
     }
 
-    fn add_vertex(&mut self, vertex: u64, mut rest: &[u8]) -> std::result::Result<(), String> {
+    fn add_vertex(&mut self, mut rest: &[u8]) -> std::result::Result<(), String> {
         let mut numbers = [&b""[..]; 8];
         let mut n = 0;
         for slot in &mut numbers {
@@ -181,7 +169,6 @@ impl PlainObj {
             self.has_bad_number |= weight == 0.0;
             position /= weight;
         }
-        self.positions.push(position);
         // A seventh is the colour's alpha.
         if n >= 6 {
             let mut color = [0.0; 3];
@@ -190,17 +177,70 @@ impl PlainObj {
                     .ok_or_else(|| format!("the colour {} is no finite number", quote(word)))?;
             }
             // More vertices than u32 counts are refused at the end.
-            self.colors.push((vertex as u32, color));
+            self.colors.push((self.positions.len() as u32, color));
+        }
+        self.positions.push(position);
+        Ok(())
+    }
+}
+
+impl Elements {
+    /// Reads up to the first fault.
+    fn read(bytes: &[u8]) -> (Self, Option<Fault>) {
+        let mut elements = Self::default();
+        let fault = elements.add_lines(bytes).err();
+        (elements, fault)
+    }
+
+    fn add_lines(&mut self, bytes: &[u8]) -> std::result::Result<(), Fault> {
+        let mut materials: HashMap<String, u32> = HashMap::new();
+        let mut material = NO_INDEX;
+        let mut furthest = [0u64; 3];
+        for (number, line) in logical_lines(bytes) {
+            let (keyword, rest) = keyword(&line);
+            match keyword {
+                b"v" => self.counts[0] += 1,
+                b"vt" => self.counts[1] += 1,
+                b"vn" => self.counts[2] += 1,
+                b"f" => {
+                    let beyond = self
+                        .add_face(number, material, rest)
+                        .map_err(|message| fault(number, &line, message))?;
+                    for (column, index) in beyond {
+                        if let Some(furthest) = furthest.get_mut(column).filter(|f| index > **f) {
+                            *furthest = index;
+                            self.forward.push((number, column, index));
+                        }
+                    }
+                }
+                b"usemtl" => {
+                    self.has_materials = true;
+                    let next = materials.len() as u32;
+                    material = *materials.entry(text(rest.trim_ascii())).or_insert(next);
+                }
+                b"p" | b"l" => self.points_and_lines += 1,
+                // Objects, groups, smoothing and curves say nothing about faces; comments and unknown words neither. For
+                // libraries see `ObjNames`.
+                _ => {}
+            }
         }
         Ok(())
     }
 
-    /// Adds a face, and gives back the columns and indices, from 1, that lie beyond `counts`.
+    /// The first face with a corner beyond columns of so many values.
+    fn forward_fault(&self, bytes: &[u8], counts: [u64; 3]) -> Option<Fault> {
+        let count_of = |column: usize| counts.get(column).copied().unwrap_or(0);
+        let &(line, column, index) = self.forward.iter().find(|f| f.2 > count_of(f.1))?;
+        let text = logical_lines(bytes).find(|(number, _)| *number == line);
+        let message = out_of_range(column, index as i64, count_of(column));
+        Some(fault(line, &text.map_or_else(Vec::new, |(_, text)| text.into_owned()), message))
+    }
+
+    /// Adds a face, and gives back the columns and indices, from 1, that lie beyond the columns so far.
     fn add_face(
         &mut self,
         line: u64,
         material: u32,
-        counts: [u64; 3],
         mut rest: &[u8],
     ) -> std::result::Result<Vec<(usize, u64)>, String> {
         let mut beyond = Vec::new();
@@ -208,7 +248,7 @@ impl PlainObj {
         let mut has = [true; 3];
         while let Some(corner) = next_word(&mut rest) {
             let mut parts = corner.split(|&b| b == b'/');
-            let columns = self.corners.iter_mut().zip(counts).zip(&mut has);
+            let columns = self.corners.iter_mut().zip(self.counts).zip(&mut has);
             for (column, ((indices, count), has)) in columns.enumerate() {
                 let part = parts.next().unwrap_or_default();
                 if part.is_empty() {
@@ -259,8 +299,7 @@ fn whole_number(word: &[u8]) -> Option<i64> {
 fn count_columns(bytes: &[u8]) -> [u64; 3] {
     let mut counts = [0; 3];
     for (_, line) in logical_lines(bytes) {
-        let column =
-            words(&line).next().and_then(|word| [&b"v"[..], b"vt", b"vn"].iter().position(|k| *k == word));
+        let column = [&b"v"[..], b"vt", b"vn"].iter().position(|k| *k == keyword(&line).0);
         if let Some(count) = column.and_then(|column| counts.get_mut(column)) {
             *count += 1;
         }
@@ -292,6 +331,7 @@ fn refuse_other_files(path: &Path, bytes: &[u8]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::obj_looks::ObjNames;
 
     fn parse(text: &str) -> Result<PlainObj> {
         PlainObj::parse(Path::new("a.obj"), text.as_bytes())
@@ -301,47 +341,48 @@ mod tests {
 
     #[test]
     fn dialects_become_plain() {
-        let plain = parse(&format!(
+        let text = format!(
             "{THREE}vt 0.5\nvn 0 0 1 7\nusemtl a b \nf 1/1/1 2/1/1 \\\n 3/1/1 # c\nusemtl c\nf -3//-1 -2//-1 -1//-1\nusemtl a b\nl 1 2 3\np 1\nf 1 2\nf\nf 1/1 2 3"
-        ))
-        .unwrap();
-        assert_eq!(plain.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
-        assert_eq!((plain.uvs, plain.normals), (vec![vec2(0.5, 0.0)], vec![Vec3::Z]));
+        );
+        let plain = parse(&text).unwrap();
+        assert_eq!(plain.values.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
+        assert_eq!((plain.values.uvs, plain.values.normals), (vec![vec2(0.5, 0.0)], vec![Vec3::Z]));
         let none = NO_INDEX;
-        assert_eq!(plain.corners[0], [0, 1, 2, 0, 1, 2, 0, 1, 2]);
-        assert_eq!(plain.corners[1], [0, 0, 0, none, none, none, 0, none, none]);
-        assert_eq!(plain.corners[2], [0, 0, 0, 0, 0, 0, none, none, none]);
-        assert_eq!(plain.materials, ["a b", "c"]);
+        assert_eq!(plain.elements.corners[0], [0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        assert_eq!(plain.elements.corners[1], [0, 0, 0, none, none, none, 0, none, none]);
+        assert_eq!(plain.elements.corners[2], [0, 0, 0, 0, 0, 0, none, none, none]);
+        assert!(plain.elements.has_materials);
+        assert_eq!(ObjNames::find(text.as_bytes()).materials, ["a b", "c"]);
         let face =
             |line, material, has_uv, has_normal| PlainFace { line, material, corners: 3, has_uv, has_normal };
         assert_eq!(
-            plain.faces,
+            plain.elements.faces,
             [face(7, 0, true, true), face(10, 1, false, true), face(16, 0, false, false)]
         );
-        assert_eq!((plain.short_faces, plain.points_and_lines), (vec![14, 15], 2));
+        assert_eq!((plain.elements.short_faces, plain.elements.points_and_lines), (vec![14, 15], 2));
     }
 
     #[test]
     fn numbers_are_read_or_remembered_as_bad() {
         let plain = parse("v 1 2 4 2\nv 1 nan 3\nvt -0.25\nvn 0 0 2 x").unwrap();
-        assert_eq!(plain.positions[0], Vec3::new(0.5, 1.0, 2.0));
-        assert!(plain.positions[1].y.is_nan() && !plain.has_bad_number);
-        assert_eq!((plain.uvs[0], plain.normals[0]), (vec2(-0.25, 0.0), Vec3::Z * 2.0));
+        assert_eq!(plain.values.positions[0], Vec3::new(0.5, 1.0, 2.0));
+        assert!(plain.values.positions[1].y.is_nan() && !plain.values.has_bad_number);
+        assert_eq!((plain.values.uvs[0], plain.values.normals[0]), (vec2(-0.25, 0.0), Vec3::Z * 2.0));
         for text in ["v 1 2 x", "v 1 2 3 0", "v 1 2 3 z", "vt 0 x", "vn 0 0 1-"] {
-            assert!(parse(text).unwrap().has_bad_number, "{text}");
+            assert!(parse(text).unwrap().values.has_bad_number, "{text}");
         }
     }
 
     #[test]
     fn a_face_may_come_before_its_vertices() {
-        assert_eq!(parse(&format!("f 1 2 3\n{THREE}")).unwrap().faces.len(), 1);
+        assert_eq!(parse(&format!("f 1 2 3\n{THREE}")).unwrap().elements.faces.len(), 1);
     }
 
     #[test]
     fn colours_stay_with_their_vertices() {
         let plain = parse("v 0 0 0\nv 1 0 0 0.5 1 0\nv 0 1 0 1 1 1 1\n").unwrap();
-        assert_eq!(plain.colors, [(1, [0.5, 1.0, 0.0]), (2, [1.0; 3])]);
-        assert_eq!(plain.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
+        assert_eq!(plain.values.colors, [(1, [0.5, 1.0, 0.0]), (2, [1.0; 3])]);
+        assert_eq!(plain.values.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
     }
 
     #[test]
