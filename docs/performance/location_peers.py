@@ -19,6 +19,7 @@ Both in turns, round after round; medians. Then the whole export of each scene: 
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -44,9 +45,11 @@ class Spent:
 
 
 def export(scene, out, *options):
-    """Runs an export: user seconds, wall seconds, peak memory in MB."""
+    """Runs an export into a new folder: user seconds, wall seconds, peak memory in MB."""
+    shutil.rmtree(out, ignore_errors=True)
+    os.sync()
     started = time.perf_counter()
-    command = [S3D, "export", scene, "-o", out, "--overwrite", "--quiet", *options]
+    command = [S3D, "export", scene, "-o", out, "--quiet", *options]
     child = subprocess.Popen([str(c) for c in command], stderr=subprocess.DEVNULL)
     _, status, usage = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
