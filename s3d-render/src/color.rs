@@ -6,6 +6,7 @@
 //! textures, again eight pixels at a time ([`crate::filter`]). What a pixel gets depends on no other pixel but through
 //! the anchor, whose rounding it takes over.
 
+use crate::ahead::Ahead;
 use crate::anchor::{Anchor, Attributes, Batch, Grid};
 use crate::channels::{assert_size, fit, paint};
 use crate::face_table::New;
@@ -90,9 +91,9 @@ impl LaneWork for Rgb<'_> {
                 painter.forget();
             }
             if grid.is_turn() {
-                painter.band::<true>(&grid, &runs, k * band_rows(width), faces, out);
+                painter.band::<true>(&grid, &runs, k * band_rows(width), faces, out, &Ahead::default());
             } else {
-                painter.band::<false>(&grid, &runs, k * band_rows(width), faces, out);
+                painter.band::<false>(&grid, &runs, k * band_rows(width), faces, out, &Ahead::default());
             }
         }
     }
@@ -221,6 +222,7 @@ impl<'a, L: Lanes> Painter<'a, L> {
         first_row: usize,
         faces: &[u32],
         out: &mut [[u8; 3]],
+        ahead: &Ahead<'_>,
     ) {
         let width = self.row.width;
         for k in 0..runs.new_groups() {
@@ -230,13 +232,13 @@ impl<'a, L: Lanes> Painter<'a, L> {
         let (mut j, mut from) = (0, 0);
         for (start, end, number) in runs.all() {
             if start == from + width {
-                self.fetch(&mut out[from..start]);
+                self.fetch(&mut out[from..start], from, ahead);
                 (j, from) = (j + 1, start);
             }
             let row = &mut out[from..from + width];
             self.lay_out::<TURN>(grid, faces[start], number, first_row + j, start - from..end - from, row);
         }
-        self.fetch(&mut out[from..]);
+        self.fetch(&mut out[from..], from, ahead);
     }
 
     /// Prepares the first `count` of some faces that the band from row `first_row` on is the first to show.
@@ -358,11 +360,14 @@ impl<'a, L: Lanes> Painter<'a, L> {
 
     /// The second pass.
     #[inline(always)]
-    fn fetch(&mut self, out: &mut [[u8; 3]]) {
+    fn fetch(&mut self, out: &mut [[u8; 3]], from: usize, ahead: &Ahead<'_>) {
         let width = out.len();
         let Self { lanes, sizes, row, max_taps, .. } = self;
         row.tags[width..].fill(DONE);
         for i in (0..width).step_by(LANES) {
+            if i.is_multiple_of(Ahead::PIXELS) {
+                ahead.expect(*lanes, from + i);
+            }
             let Some(tags) = row.tags[i..].first_chunk::<LANES>() else { return };
             // Mostly one texture, once; the others' pixels are left alone.
             let mut left = !lanes.equal(tags, DONE) & 0xFF;
@@ -378,14 +383,21 @@ impl<'a, L: Lanes> Painter<'a, L> {
                     lanes.store_pixels(&colors, to);
                     break;
                 }
-                for (k, color) in colors.iter().enumerate() {
-                    if these >> k & 1 == 1 {
-                        let [r, g, b, _] = color.to_le_bytes();
-                        out[i + k] = [r, g, b];
-                    }
-                }
+                put_some(&colors, these, &mut out[i..]);
                 left &= !these;
             }
+        }
+    }
+}
+
+/// Those of eight colours that are among `these`. Not inlined: that would take registers from the loop that rarely calls it.
+#[cold]
+#[inline(never)]
+fn put_some(colors: &[u32; LANES], these: u32, to: &mut [[u8; 3]]) {
+    for (k, (color, to)) in colors.iter().zip(to).enumerate() {
+        if these >> k & 1 == 1 {
+            let [r, g, b, _] = color.to_le_bytes();
+            *to = [r, g, b];
         }
     }
 }

@@ -39,6 +39,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod ahead;
 mod anchor;
 #[cfg(target_arch = "x86_64")]
 mod avx2;

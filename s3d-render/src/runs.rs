@@ -8,7 +8,7 @@ use crate::lanes::{LANES, Lanes};
 use s3d_geom::TriMesh;
 
 /// Pixels of a band, about.
-const BAND: usize = 1 << 14;
+const BAND: usize = 1 << 13;
 
 /// New faces that are fetched from memory while as many are prepared.
 const AHEAD: usize = 4 * LANES;

@@ -3,6 +3,7 @@
 //! Band by band, so that hits and what belongs to their faces are in the cache for one modality after another. The images
 //! are those of the functions that make one each.
 
+use crate::ahead::Ahead;
 use crate::anchor::Grid;
 use crate::channels::{
     MISSING_INDEX, MISSING_NORMAL, assert_size, depths, fit, flat_normals_of, index_color,
@@ -190,7 +191,21 @@ impl View<'_> {
                 stamps.forget();
             }
             if wanted.rgb {
-                painter.band::<TURN>(grid, &runs, k * rows, faces, &mut rgb.pixels_mut()[pixels.clone()]);
+                let (next, end) = (pixels.end, hits.face.len().min(pixels.end + band));
+                let (done, rest) = rgb.pixels_mut().split_at_mut(next);
+                let ahead = Ahead {
+                    faces: &hits.face.pixels()[next..end],
+                    distances: &hits.depth.pixels()[next..end],
+                    depth: if wanted.depth { &depth.pixels()[next..end] } else { &[] },
+                    xyz: if wanted.xyz { &xyz.pixels()[next..end] } else { &[] },
+                    rgb: &rest[..end - next],
+                    stamps: if wanted.faces {
+                        [&*normal, &*index, &*color].map(|i| &i.pixels()[pixels.clone()])
+                    } else {
+                        [&[]; 3]
+                    },
+                };
+                painter.band::<TURN>(grid, &runs, k * rows, faces, &mut done[pixels.start..], &ahead);
             }
             if wanted.faces {
                 let out =
