@@ -5,7 +5,7 @@
 #![allow(unsafe_code)]
 
 use crate::blend::Blend;
-use crate::lanes::{LANES, Lanes};
+use crate::lanes::{LANES, Lanes, STAMP};
 use half::f16;
 use std::arch::x86_64::*;
 
@@ -199,6 +199,17 @@ impl<B: Blend> Lanes for Avx2<B> {
             _mm_storel_epi64(to.as_mut_ptr().add(16).cast(), _mm256_extracti128_si256::<1>(close));
         }
     }
+    #[inline(always)]
+    fn store_repeated(self, packed: u32, to: &mut [u8; STAMP]) {
+        unsafe {
+            let three = _mm256_setr_epi8(
+                0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, //
+                1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1,
+            );
+            let bytes = _mm256_shuffle_epi8(_mm256_set1_epi32(packed as i32), three);
+            _mm256_storeu_si256(to.as_mut_ptr().cast(), bytes);
+        }
+    }
 
     #[inline(always)]
     fn expect<T>(self, thing: &T) {
@@ -247,9 +258,9 @@ impl<B: Blend> Lanes for Avx2<B> {
         to: &mut [f32; 3 * LANES],
     ) {
         unsafe {
-            let points = points::<TURN>(column, row, depths, place);
-            for (k, four) in points.iter().enumerate() {
-                _mm_storeu_ps(to.as_mut_ptr().add(4 * k), *four);
+            let points = self.0.points::<TURN>(column, row, depths, place);
+            for (k, eight) in points.iter().enumerate() {
+                _mm256_storeu_ps(to.as_mut_ptr().add(8 * k), *eight);
             }
         }
     }
@@ -263,10 +274,9 @@ impl<B: Blend> Lanes for Avx2<B> {
         to: &mut [f16; 3 * LANES],
     ) {
         unsafe {
-            let points = points::<TURN>(column, row, depths, place);
-            for k in 0..3 {
-                let eight = _mm256_set_m128(points[2 * k + 1], points[2 * k]);
-                let eight = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(eight);
+            let points = self.0.points::<TURN>(column, row, depths, place);
+            for (k, eight) in points.iter().enumerate() {
+                let eight = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(*eight);
                 _mm_storeu_si128(to.as_mut_ptr().add(8 * k).cast(), eight);
             }
         }
@@ -299,15 +309,15 @@ fn lanes_of(these: u32) -> __m256i {
     _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(these as i32), bits), bits)
 }
 
-/// See [`Lanes::points`]; four numbers each.
+/// See [`Blend::points`].
 #[inline]
 #[target_feature(enable = "avx2")]
-fn points<const TURN: bool>(
+pub(crate) fn points<const TURN: bool>(
     column: &[f64; 3 * LANES],
     row: &[f64; 12],
     depths: &[f32; LANES],
     place: &[f64; 12],
-) -> [__m128; 6] {
+) -> [__m256; 3] {
     // SAFETY: loads from references, of no more than they hold.
     let load = |from: &[f64], k: usize| unsafe { _mm256_loadu_pd(from[4 * k..4 * k + 4].as_ptr()) };
     let all = unsafe { _mm256_loadu_ps(depths.as_ptr()) };
@@ -340,7 +350,7 @@ fn points<const TURN: bool>(
             out[3 * half + k] = _mm_and_ps(_mm256_cvtpd_ps(point), masks[k]);
         }
     }
-    out
+    [_mm256_set_m128(out[1], out[0]), _mm256_set_m128(out[3], out[2]), _mm256_set_m128(out[5], out[4])]
 }
 
 #[cfg(test)]
@@ -410,6 +420,25 @@ mod tests {
         Ok(())
     }
 
+    /// Points that are seen, and those in half floats.
+    fn same_points(
+        lanes: impl Lanes,
+        column: &[f64; 24],
+        row: &[f64; 12],
+        depths: &[f32; LANES],
+        place: &[f64; 12],
+    ) -> Result<(), TestCaseError> {
+        let (mut got, mut want) = ([0.0; 24], [0.0; 24]);
+        lanes.points::<false>(column, row, depths, place, &mut got);
+        Plain.points::<false>(column, row, depths, place, &mut want);
+        prop_assert_eq!(got.map(f32::to_bits), want.map(f32::to_bits));
+        let (mut got, mut want) = ([f16::ZERO; 24], [f16::ZERO; 24]);
+        lanes.half_points::<true>(column, row, depths, place, &mut got);
+        Plain.half_points::<true>(column, row, depths, place, &mut want);
+        prop_assert_eq!(got.map(f16::to_bits), want.map(f16::to_bits));
+        Ok(())
+    }
+
     proptest! {
         #[test]
         fn numbers_are_those_of_plain_rust(a in eight(), b in eight(), c in eight()) {
@@ -465,6 +494,10 @@ mod tests {
             avx2.store_pixels(&packed, &mut got);
             Plain.store_pixels(&packed, &mut want);
             prop_assert_eq!(got, want);
+            let (mut got, mut want) = ([0; STAMP], [0; STAMP]);
+            avx2.store_repeated(packed[0], &mut got);
+            Plain.store_repeated(packed[0], &mut want);
+            prop_assert_eq!(got, want);
         }
 
         #[test]
@@ -502,14 +535,10 @@ mod tests {
             let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
             let four = |a: [f64; 3]| std::array::from_fn(|k| a[k % 3]);
             let (row, place): ([f64; 12], [f64; 12]) = (four(row), four(place));
-            let (mut got, mut want) = ([0.0; 24], [0.0; 24]);
-            avx2.points::<false>(&column, &row, &depths, &place, &mut got);
-            Plain.points::<false>(&column, &row, &depths, &place, &mut want);
-            prop_assert_eq!(got.map(f32::to_bits), want.map(f32::to_bits));
-            let (mut got, mut want) = ([f16::ZERO; 24], [f16::ZERO; 24]);
-            avx2.half_points::<true>(&column, &row, &depths, &place, &mut got);
-            Plain.half_points::<true>(&column, &row, &depths, &place, &mut want);
-            prop_assert_eq!(got.map(f16::to_bits), want.map(f16::to_bits));
+            same_points(avx2, &column, &row, &depths, &place)?;
+            if let Some(full) = Full::detect().map(Avx2) {
+                same_points(full, &column, &row, &depths, &place)?;
+            }
         }
     }
 }

@@ -7,7 +7,7 @@
 //! from places of an image that were compared with its end.
 #![allow(unsafe_code)]
 
-use crate::avx2::Avx2;
+use crate::avx2::{self, Avx2};
 use crate::lanes::{LANES, LaneWork};
 use std::arch::x86_64::*;
 
@@ -34,6 +34,14 @@ pub(crate) trait Blend: Copy {
     fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix;
     /// R, G, B and 0, rounded to bytes.
     fn bytes(self, mix: Self::Mix) -> __m256i;
+    /// What [`crate::lanes::Lanes::points`] stores.
+    fn points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &[f32; LANES],
+        place: &[f64; 12],
+    ) -> [__m256; 3];
 }
 
 /// The upper neighbours' R G B R G B as 16-bit numbers R R, G G, B B; and the lower ones'.
@@ -150,6 +158,16 @@ impl Blend for Half {
             _mm256_packus_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d))
         }
     }
+    #[inline(always)]
+    fn points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &[f32; LANES],
+        place: &[f64; 12],
+    ) -> [__m256; 3] {
+        unsafe { avx2::points::<TURN>(column, row, depths, place) }
+    }
 }
 
 /// 64 bytes: pixels 0 to 3 a register, and 4 to 7.
@@ -246,6 +264,35 @@ impl Blend for Full {
             // 0 4 2 6 | 1 5 3 7.
             let bytes = _mm256_packus_epi16(first, last);
             _mm256_permutevar8x32_epi32(bytes, _mm256_setr_epi32(0, 4, 2, 6, 1, 5, 3, 7))
+        }
+    }
+    #[inline(always)]
+    fn points<const TURN: bool>(
+        self,
+        column: &[f64; 3 * LANES],
+        row: &[f64; 12],
+        depths: &[f32; LANES],
+        place: &[f64; 12],
+    ) -> [__m256; 3] {
+        // Of the numbers 8k to 8k + 7: whose depth it is, and where x y z x y z… begins.
+        const DEPTHS: [[i64; 8]; 3] =
+            [[0, 0, 0, 1, 1, 1, 2, 2], [2, 3, 3, 3, 4, 4, 4, 5], [5, 5, 6, 6, 6, 7, 7, 7]];
+        const AXES: [usize; 3] = [0, 2, 1];
+        /// Infinities and what is not a number.
+        const MISSING: i32 = 0b1001_1001;
+        unsafe {
+            let all = _mm512_cvtps_pd(_mm256_loadu_ps(depths.as_ptr()));
+            let load = |from: &[f64], k: usize| _mm512_loadu_pd(from[k..k + 8].as_ptr());
+            let mut points = [_mm256_setzero_ps(); 3];
+            for k in 0..3 {
+                let depths = _mm512_permutexvar_pd(_mm512_loadu_si512(DEPTHS[k].as_ptr().cast()), all);
+                let (column, row) = (load(column, 8 * k), load(row, AXES[k]));
+                let direction = if TURN { _mm512_mul_pd(column, row) } else { _mm512_add_pd(column, row) };
+                let point = _mm512_add_pd(load(place, AXES[k]), _mm512_mul_pd(direction, depths));
+                let seen = !_mm512_fpclass_pd_mask::<MISSING>(depths);
+                points[k] = _mm512_maskz_cvtpd_ps(seen, point);
+            }
+            points
         }
     }
 }

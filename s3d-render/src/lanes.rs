@@ -10,6 +10,9 @@ use half::f16;
 /// How many pixels go together.
 pub(crate) const LANES: usize = 8;
 
+/// Bytes of a colour again and again, ten times and more.
+pub(crate) const STAMP: usize = 32;
+
 /// Operations on eight values.
 pub(crate) trait Lanes: Copy {
     /// Eight `f32`.
@@ -77,6 +80,8 @@ pub(crate) trait Lanes: Copy {
     fn pixels(self, mix: Self::Mix) -> [u32; LANES];
     /// The lowest three bytes of each value, one after another.
     fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]);
+    /// The lowest three bytes of a value, again and again.
+    fn store_repeated(self, packed: u32, to: &mut [u8; STAMP]);
 
     /// Says that `thing` will be read soon.
     fn expect<T>(self, thing: &T);
@@ -314,6 +319,10 @@ impl Lanes for Plain {
             let [r, g, b, _] = value.to_le_bytes();
             *pixel = [r, g, b];
         }
+    }
+    #[inline(always)]
+    fn store_repeated(self, packed: u32, to: &mut [u8; STAMP]) {
+        *to = std::array::from_fn(|k| packed.to_le_bytes()[k % 3]);
     }
 
     #[inline(always)]

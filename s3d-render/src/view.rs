@@ -210,7 +210,9 @@ impl View<'_> {
             if wanted.faces {
                 let out =
                     [&mut *normal, &mut *index, &mut *color].map(|i| &mut i.pixels_mut()[pixels.clone()]);
-                stamps.band(lanes, Some(scene.mesh()), &runs, out);
+                // For colours the faces have been fetched already.
+                let mesh = (!wanted.rgb).then_some(scene.mesh());
+                stamps.band(lanes, mesh, &runs, out);
             }
         }
     }
