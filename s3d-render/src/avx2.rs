@@ -224,17 +224,8 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn changes(self, values: &[u32; LANES + 1], from: u32, to: &mut [u32; LANES]) -> usize {
-        unsafe {
-            let before = _mm256_loadu_si256(values.as_ptr().cast());
-            let after = _mm256_loadu_si256(values.as_ptr().add(1).cast());
-            let same = _mm256_cmpeq_epi32(before, after);
-            let changes = !(_mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32) & 0xFF;
-            let places = _mm_loadl_epi64(BITS[changes as usize].as_ptr().cast());
-            let places = _mm256_add_epi32(_mm256_cvtepu8_epi32(places), _mm256_set1_epi32(from as i32));
-            _mm256_storeu_si256(to.as_mut_ptr().cast(), places);
-            changes.count_ones() as usize
-        }
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+        self.0.changes(values, from, to)
     }
     #[inline(always)]
     fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]) {
@@ -300,6 +291,28 @@ static BITS: [[u8; 8]; 256] = {
     }
     table
 };
+
+/// See [`Lanes::changes`].
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+pub(crate) fn changes(values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+    let mut count = 0;
+    for first in [0, LANES] {
+        // SAFETY: loads and stores of eight values, from `first` + 1 ≤ 9 on and from `count` ≤ 8 on.
+        unsafe {
+            let before = _mm256_loadu_si256(values.as_ptr().add(first).cast());
+            let after = _mm256_loadu_si256(values.as_ptr().add(first + 1).cast());
+            let same = _mm256_cmpeq_epi32(before, after);
+            let changes = !(_mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32) & 0xFF;
+            let places = _mm_loadl_epi64(BITS[changes as usize].as_ptr().cast());
+            let from = _mm256_set1_epi32((from + first as u32) as i32);
+            let places = _mm256_add_epi32(_mm256_cvtepu8_epi32(places), from);
+            _mm256_storeu_si256(to.as_mut_ptr().add(count).cast(), places);
+            count += changes.count_ones() as usize;
+        }
+    }
+    count
+}
 
 /// All bits of the lanes of `these`.
 #[inline]
@@ -518,11 +531,17 @@ mod tests {
         }
 
         #[test]
-        fn changes_are_those_of_plain_rust(values in prop::array::uniform9(0u32..3)) {
+        fn changes_are_those_of_plain_rust(values in prop::collection::vec(0u32..3, 17)) {
             let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
-            let (mut got, mut want) = ([0; LANES], [0; LANES]);
-            let (some, same) = (avx2.changes(&values, 70_000, &mut got), Plain.changes(&values, 70_000, &mut want));
+            let window = std::array::from_fn(|k| values[k]);
+            let (mut got, mut want) = ([0; 16], [0; 16]);
+            let same = Plain.changes(&window, 70_000, &mut want);
+            let some = avx2.changes(&window, 70_000, &mut got);
             prop_assert_eq!(&got[..some], &want[..same]);
+            if let Some(full) = Full::detect().map(Avx2) {
+                let some = full.changes(&window, 70_000, &mut got);
+                prop_assert_eq!(&got[..some], &want[..same]);
+            }
             let eight = std::array::from_fn(|k| values[k] << 30);
             prop_assert_eq!(avx2.equal(&eight, 1 << 30), Plain.equal(&eight, 1 << 30));
         }

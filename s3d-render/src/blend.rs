@@ -34,6 +34,8 @@ pub(crate) trait Blend: Copy {
     fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix;
     /// R, G, B and 0, rounded to bytes.
     fn bytes(self, mix: Self::Mix) -> __m256i;
+    /// See [`crate::lanes::Lanes::changes`].
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
     /// What [`crate::lanes::Lanes::points`] stores.
     fn points<const TURN: bool>(
         self,
@@ -159,6 +161,10 @@ impl Blend for Half {
         }
     }
     #[inline(always)]
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+        unsafe { avx2::changes(values, from, to) }
+    }
+    #[inline(always)]
     fn points<const TURN: bool>(
         self,
         column: &[f64; 3 * LANES],
@@ -264,6 +270,18 @@ impl Blend for Full {
             // 0 4 2 6 | 1 5 3 7.
             let bytes = _mm256_packus_epi16(first, last);
             _mm256_permutevar8x32_epi32(bytes, _mm256_setr_epi32(0, 4, 2, 6, 1, 5, 3, 7))
+        }
+    }
+    #[inline(always)]
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+        unsafe {
+            let before = _mm512_loadu_si512(values.as_ptr().cast());
+            let after = _mm512_loadu_si512(values.as_ptr().add(1).cast());
+            let changes = _mm512_cmpneq_epi32_mask(before, after);
+            let numbers = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            let places = _mm512_add_epi32(numbers, _mm512_set1_epi32(from as i32));
+            _mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(changes, places));
+            changes.count_ones() as usize
         }
     }
     #[inline(always)]

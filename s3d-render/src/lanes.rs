@@ -89,7 +89,7 @@ pub(crate) trait Lanes: Copy {
     fn equal(self, values: &[u32; LANES], value: u32) -> u32;
     /// Where a value differs from the one before it, ascending, as `from` and the number of values in between: how many
     /// places that are. They are at the beginning of `to`; the rest there is anything.
-    fn changes(self, values: &[u32; LANES + 1], from: u32, to: &mut [u32; LANES]) -> usize;
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
     /// Depths in 512ths, rounded half up, at most 65,535.
     fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]);
     /// Points place + direction × depth, rounded to `f32`: `column` and `row` are [`DirectionPart`]s, and what belongs to
@@ -332,9 +332,9 @@ impl Lanes for Plain {
         (0..LANES).map(|k| u32::from(values[k] == value) << k).sum()
     }
     #[inline(always)]
-    fn changes(self, values: &[u32; LANES + 1], from: u32, to: &mut [u32; LANES]) -> usize {
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
         let mut count = 0;
-        for k in 0..LANES {
+        for k in 0..2 * LANES {
             if values[k] != values[k + 1] {
                 to[count] = from + k as u32;
                 count += 1;

@@ -103,11 +103,11 @@ fn add_starts(lanes: impl Lanes, values: &[u32], from: usize, starts: &mut Vec<u
         && let Some(to) = starts.get_mut(count..).and_then(<[u32]>::first_chunk_mut::<{ 4 * LANES }>)
     {
         let mut some = 0;
-        for k in 0..4 {
-            if let Some(part) = window[k * LANES..].first_chunk()
-                && let Some(to) = to[some.min(k * LANES)..].first_chunk_mut()
+        for first in [0, 2 * LANES] {
+            if let Some(part) = window[first..].first_chunk()
+                && let Some(to) = to[some.min(first)..].first_chunk_mut()
             {
-                some += lanes.changes(part, (from + at + k * LANES) as u32, to);
+                some += lanes.changes(part, (from + at + first) as u32, to);
             }
         }
         count += some;
