@@ -284,7 +284,7 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> LaneWork for ByFace<'_, V> {
         let width = hits.face.width() as usize;
         let (mut runs, band) = (Runs::new(width), (band_rows(width) * width).max(1));
         for (faces, out) in hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band)) {
-            if runs.find(lanes, faces) {
+            if runs.find(lanes, mesh, faces) {
                 stamps.forget();
             }
             stamps.band(lanes, mesh, &runs, [out]);

@@ -87,7 +87,7 @@ impl LaneWork for Rgb<'_> {
         let (mut runs, band) = (Runs::new(width), (band_rows(width) * width).max(1));
         let parts = hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band));
         for (k, (faces, out)) in parts.enumerate() {
-            if runs.find(lanes, faces) {
+            if runs.find(lanes, Some(scene.mesh()), faces) {
                 painter.forget();
             }
             if grid.is_turn() {

@@ -34,10 +34,13 @@ impl FaceTable {
     }
 
     /// Looks up the faces of a block's runs, which begin at `starts`: in `numbers` their numbers, in `new` those that had
-    /// none and get the next ones. Whether all earlier numbers are forgotten.
+    /// none and get the next ones. Whether all earlier numbers are forgotten. What `mesh`, if any, has of new faces
+    /// themselves is fetched from memory.
     #[inline(always)]
     pub(crate) fn number(
         &mut self,
+        lanes: impl Lanes,
+        mesh: Option<&TriMesh>,
         faces: &[u32],
         starts: &[u32],
         numbers: &mut Vec<u32>,
@@ -62,6 +65,9 @@ impl FaceTable {
                     *place = (face, number);
                     self.count += 1;
                     new.push(New { face, at });
+                    if let Some(mesh) = mesh {
+                        expect_face(lanes, mesh, face as usize);
+                    }
                 }
             }
             numbers.push(number);
@@ -71,19 +77,11 @@ impl FaceTable {
 }
 
 impl New {
-    /// Fetches what of a mesh is read to prepare these faces: all at once, it comes many times as fast.
+    /// Fetches what of a mesh is read to prepare these faces, besides what [`FaceTable::number`] has fetched: all at once,
+    /// it comes many times as fast.
     #[inline(always)]
     pub(crate) fn expect<const COLORS: bool>(new: &[Self], lanes: impl Lanes, mesh: &TriMesh) {
         let p = mesh.parts();
-        for &Self { face, .. } in new {
-            let face = face as usize;
-            lanes.expect(&p.faces[face]);
-            if COLORS && let (Some(uvs), Some(material)) = (p.face_uvs.get(face), p.face_materials.get(face))
-            {
-                lanes.expect(uvs);
-                lanes.expect(material);
-            }
-        }
         for &Self { face, .. } in new {
             for vertex in p.faces[face as usize] {
                 lanes.expect(&p.positions[vertex as usize]);
@@ -99,9 +97,23 @@ impl New {
     }
 }
 
+/// Fetches what leads to a face's corners.
+#[inline(always)]
+fn expect_face(lanes: impl Lanes, mesh: &TriMesh, face: usize) {
+    let p = mesh.parts();
+    if let Some(corners) = p.faces.get(face) {
+        lanes.expect(corners);
+    }
+    if let (Some(uvs), Some(material)) = (p.face_uvs.get(face), p.face_materials.get(face)) {
+        lanes.expect(uvs);
+        lanes.expect(material);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::Plain;
     use proptest::prelude::*;
 
     proptest! {
@@ -117,7 +129,7 @@ mod tests {
                 let faces: Vec<u32> =
                     block.iter().map(|f| if f % 9 == 0 { NO_FACE } else { (f % 300) * step }).collect();
                 let starts: Vec<u32> = (0..faces.len() as u32).collect();
-                if table.number(&faces, &starts, &mut numbers, &mut new) {
+                if table.number(Plain, None, &faces, &starts, &mut numbers, &mut new) {
                     things.truncate(1);
                 }
                 things.extend(new.iter().map(|new| {

@@ -44,12 +44,12 @@ impl Runs {
 
     /// Finds the runs of the next band. Whether faces have forgotten their numbers, which then begin with 1 again.
     #[inline(always)]
-    pub(crate) fn find(&mut self, lanes: impl Lanes, faces: &[u32]) -> bool {
+    pub(crate) fn find(&mut self, lanes: impl Lanes, mesh: Option<&TriMesh>, faces: &[u32]) -> bool {
         self.starts.clear();
         for (row, faces) in faces.chunks(self.width.max(1)).enumerate() {
             add_starts(lanes, faces, row * self.width, &mut self.starts);
         }
-        let forgotten = self.table.number(faces, &self.starts, &mut self.numbers, &mut self.new);
+        let forgotten = self.table.number(lanes, mesh, faces, &self.starts, &mut self.numbers, &mut self.new);
         self.starts.push(faces.len() as u32);
         forgotten
     }
@@ -136,7 +136,7 @@ mod tests {
             for band in bands {
                 let mut faces: Vec<u32> = band.iter().flat_map(|&(face, n)| std::iter::repeat_n(face, n)).collect();
                 faces.resize(faces.len().next_multiple_of(width), 7);
-                if runs.find(Plain, &faces) {
+                if runs.find(Plain, Some(&mesh), &faces) {
                     things.truncate(1);
                 }
                 for k in 0..runs.new_groups() {

@@ -186,7 +186,7 @@ impl View<'_> {
             if !wanted.rgb && !wanted.faces {
                 continue;
             }
-            if runs.find(lanes, faces) {
+            if runs.find(lanes, Some(scene.mesh()), faces) {
                 painter.forget();
                 stamps.forget();
             }
