@@ -3,8 +3,8 @@
 use crate::lanes::Lanes;
 use half::f16;
 
-/// By pixel of a band, what is next in turn after its colours: the rest of its images, and hits and images of the next
-/// band. By default nothing.
+/// By pixel of a band, what is next in turn after its colours: the images that are painted afterwards, and hits and images
+/// of the next band. By default nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ahead<'a> {
     pub(crate) faces: &'a [u32],

@@ -17,6 +17,7 @@ use crate::texture::{Pyramids, TextureFilter};
 use crate::{Hits, Scene};
 use half::f16;
 use s3d_geom::{Camera, NormalAxes, Raster};
+use std::ops::Range;
 
 /// What a view's images are made from, besides its hits.
 #[derive(Clone, Copy)]
@@ -191,19 +192,17 @@ impl View<'_> {
                 stamps.forget();
             }
             if wanted.rgb {
-                let (next, end) = (pixels.end, hits.face.len().min(pixels.end + band));
-                let (done, rest) = rgb.pixels_mut().split_at_mut(next);
+                let next = pixels.end..hits.face.len().min(pixels.end + band);
+                let (done, rest) = rgb.pixels_mut().split_at_mut(next.start);
+                let part = |of: &Range<usize>, wanted| if wanted { of.clone() } else { 0..0 };
+                let stamped = part(&pixels, wanted.faces);
                 let ahead = Ahead {
-                    faces: &hits.face.pixels()[next..end],
-                    distances: &hits.depth.pixels()[next..end],
-                    depth: if wanted.depth { &depth.pixels()[next..end] } else { &[] },
-                    xyz: if wanted.xyz { &xyz.pixels()[next..end] } else { &[] },
-                    rgb: &rest[..end - next],
-                    stamps: if wanted.faces {
-                        [&*normal, &*index, &*color].map(|i| &i.pixels()[pixels.clone()])
-                    } else {
-                        [&[]; 3]
-                    },
+                    faces: &hits.face.pixels()[next.clone()],
+                    distances: &hits.depth.pixels()[part(&next, wanted.depth || wanted.xyz)],
+                    depth: &depth.pixels()[part(&next, wanted.depth)],
+                    xyz: &xyz.pixels()[part(&next, wanted.xyz)],
+                    rgb: &rest[..next.len()],
+                    stamps: [&*normal, &*index, &*color].map(|i| &i.pixels()[stamped.clone()]),
                 };
                 painter.band::<TURN>(grid, &runs, k * rows, faces, &mut done[pixels.start..], &ahead);
             }
