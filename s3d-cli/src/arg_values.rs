@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use s3d_geom::NormalAxes;
-use s3d_io::XyzType;
+use s3d_io::{PADDED_LABELS, XyzType};
 
 pub(crate) fn normal_axes(word: &str) -> Result<NormalAxes, String> {
     NormalAxes::from_name(word).ok_or_else(|| "must be paper or opencv".to_owned())
@@ -58,4 +58,34 @@ pub(crate) fn even_width(text: &str) -> Result<u32, String> {
 pub(crate) fn point(text: &str) -> Result<DVec3, String> {
     let v = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
     <[f64; 3]>::try_from(v).map(DVec3::from_array).map_err(|_| "must be three numbers: x,y,z".to_owned())
+}
+
+/// How many entries the label table has at least.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PadLabels(pub(crate) usize);
+
+impl Default for PadLabels {
+    fn default() -> Self {
+        Self(PADDED_LABELS)
+    }
+}
+
+impl std::fmt::Display for PadLabels {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.0 == 0 { f.write_str("off") } else { write!(f, "{}", self.0) }
+    }
+}
+
+impl std::str::FromStr for PadLabels {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        if word == "off" {
+            return Ok(Self(0));
+        }
+        match word.parse() {
+            Ok(n @ 1..=65_536) => Ok(Self(n)),
+            _ => Err("must be off, or a number of entries from 1 to 65536".to_owned()),
+        }
+    }
 }

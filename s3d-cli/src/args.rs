@@ -1,7 +1,7 @@
 //! The command line: subcommands, options, defaults, help texts.
 
 use crate::arg_values::{
-    even_width, field_of_view, finite, normal_axes, parsed, point, positive, stored_xyz, uuid,
+    PadLabels, even_width, field_of_view, finite, normal_axes, parsed, point, positive, stored_xyz, uuid,
 };
 use crate::console::LogFormat;
 use crate::pack::args::PackArgs;
@@ -11,7 +11,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, value_parser};
 use glam::DVec3;
 use s3d_geom::NormalAxes;
-use s3d_io::{Compression, Conventions, DepthUnits, Domain, PADDED_LABELS, UpAxis, XyzType};
+use s3d_io::{Compression, Conventions, DepthUnits, Domain, UpAxis, XyzType};
 use s3d_sample::Pool;
 use std::path::PathBuf;
 
@@ -333,36 +333,6 @@ impl FormatOptions {
     /// What `conventions.json` tells of them.
     pub(crate) fn conventions(&self) -> Conventions {
         Conventions { depth_units: self.depth_units, normal_axes: self.normal_axes, xyz: self.xyz }
-    }
-}
-
-/// How many entries the label table has at least.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct PadLabels(pub(crate) usize);
-
-impl Default for PadLabels {
-    fn default() -> Self {
-        Self(PADDED_LABELS)
-    }
-}
-
-impl std::fmt::Display for PadLabels {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.0 == 0 { f.write_str("off") } else { write!(f, "{}", self.0) }
-    }
-}
-
-impl std::str::FromStr for PadLabels {
-    type Err = String;
-
-    fn from_str(word: &str) -> Result<Self, String> {
-        if word == "off" {
-            return Ok(Self(0));
-        }
-        match word.parse() {
-            Ok(n @ 1..=65_536) => Ok(Self(n)),
-            _ => Err("must be off, or a number of entries from 1 to 65536".to_owned()),
-        }
     }
 }
 
