@@ -5,7 +5,6 @@ use crate::console::Progress;
 use crate::failure::{Failure, Outcome};
 use crate::stop;
 use glam::Vec3;
-use rayon::prelude::*;
 use s3d_geom::{
     Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh,
     dominant_wall_direction_deg,
@@ -88,7 +87,9 @@ pub(crate) fn annotate(
 ) -> Outcome<Annotated> {
     let mesh = nearest_faces.mesh();
     let mut votes = Votes::new(mesh.faces().len());
-    let (mut rooms, mut outlines) = (Vec::new(), Vec::new());
+    let mut rooms = Vec::new();
+    // The last room's points: its outline is drawn beside what follows.
+    let mut undrawn: Option<FootprintBuilder> = None;
     let mut total = 0u64;
     let mut skipped = SkippedLines::default();
     let lenient = area.lenient;
@@ -106,7 +107,7 @@ pub(crate) fn annotate(
             let then = following.next().map(|instance| &instance.points);
             stop::check()?;
             let mut bbox = Aabb::EMPTY;
-            let (mut passes, left_out) = reader.read(&instance.points, then, |block| -> Outcome<()> {
+            let vote_for_all = |block: &PointCloud| -> Outcome<()> {
                 stop::check()?;
                 if !instance.points.are_vertices() && !has_faces(block) {
                     nearest_faces.nearest_many(&block.positions, &mut nearest);
@@ -131,7 +132,14 @@ pub(crate) fn annotate(
                 };
                 let (voted, ()) = rayon::join(vote, outline);
                 Ok(voted?)
-            })?;
+            };
+            let before = undrawn.take();
+            let (read, outline) = rayon::join(
+                || reader.read(&instance.points, then, vote_for_all),
+                || before.map(|b| b.finish()),
+            );
+            set_outline(&mut rooms, outline);
+            let (mut passes, left_out) = read?;
             skipped.lines += left_out.count;
             if let Some(first) = left_out.first {
                 skipped.first.get_or_insert(first.to_string());
@@ -152,6 +160,8 @@ pub(crate) fn annotate(
             each(AnnotatedInstance { label: instance.label, id, bbox, points: &mut passes })?;
         }
         total += points;
+        // Of a room before one without an instance.
+        set_outline(&mut rooms, undrawn.take().map(|b| b.finish()));
         rooms.push(SurveyedRoom {
             room: room.room,
             points,
@@ -159,7 +169,7 @@ pub(crate) fn annotate(
             bbox: room_bbox,
             wall_direction_deg: 0,
         });
-        outlines.push(builder);
+        undrawn = Some(builder);
     }
     if rooms.is_empty() {
         return Err(Failure::Input(format!("{}: no room in it", area.path.display())));
@@ -170,13 +180,19 @@ pub(crate) fn annotate(
         let (upright, report) = rayon::join(upright, || VoteReport::new(&votes, table));
         (face_labels, upright, report)
     };
-    let draw = || outlines.par_iter().map(FootprintBuilder::finish).collect::<Vec<Footprint>>();
-    let ((face_labels, mut upright, report), footprints) = rayon::join(label, draw);
-    for (room, footprint) in rooms.iter_mut().zip(footprints) {
-        room.footprint = footprint;
+    let ((face_labels, mut upright, report), outline) = rayon::join(label, || undrawn.map(|b| b.finish()));
+    set_outline(&mut rooms, outline);
+    for room in &mut rooms {
         room.wall_direction_deg = upright.remove(&room.room).map_or(0, |faces| faces.direction_deg());
     }
     Ok(Annotated { face_labels, report, rooms, points: total, skipped })
+}
+
+/// Gives the last room its outline, if that is drawn now.
+fn set_outline(rooms: &mut [SurveyedRoom], outline: Option<Footprint>) {
+    if let (Some(room), Some(outline)) = (rooms.last_mut(), outline) {
+        room.footprint = outline;
+    }
 }
 
 /// Whether it is known which face each point belongs to.
