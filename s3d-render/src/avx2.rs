@@ -5,7 +5,7 @@
 #![allow(unsafe_code)]
 
 use crate::blend::Blend;
-use crate::lanes::{LANES, Lanes, STAMP};
+use crate::lanes::{LANES, Lanes, STAMP, Texels};
 use half::f16;
 use std::arch::x86_64::*;
 
@@ -18,6 +18,7 @@ pub(crate) struct Avx2<B>(pub(crate) B);
 // as large as what is loaded or stored, and nothing asks for more than bytes' alignment.
 impl<B: Blend> Lanes for Avx2<B> {
     type F = __m256;
+    type I = __m256i;
     /// To the right, then downwards.
     type Parts = __m256i;
     type Weights = __m128i;
@@ -100,21 +101,36 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn place(self, x: __m256, y: __m256, stride: i32, these: u32) -> ([i32; LANES], __m256i) {
+    fn fixed(self, values: __m256) -> __m256i {
+        unsafe { _mm256_cvttps_epi32(_mm256_mul_ps(values, _mm256_set1_ps(32768.0))) }
+    }
+    #[inline(always)]
+    fn add_fixed(self, a: __m256i, b: __m256i) -> __m256i {
+        unsafe { _mm256_add_epi32(a, b) }
+    }
+    #[inline(always)]
+    fn store_fixed(self, values: __m256i, to: &mut [i32; LANES]) {
+        unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), values) }
+    }
+    #[inline(always)]
+    fn within(self, values: __m256i, end: u32) -> u32 {
         unsafe {
-            let one = _mm256_set1_ps(32768.0);
-            let columns = _mm256_cvttps_epi32(_mm256_mul_ps(x, one));
-            let rows = _mm256_cvttps_epi32(_mm256_mul_ps(y, one));
+            // What is negative is large without a sign.
+            let most = _mm256_max_epu32(values, _mm256_set1_epi32(end as i32));
+            let beyond = _mm256_cmpeq_epi32(most, values);
+            !(_mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32) & 0xFF
+        }
+    }
+    #[inline(always)]
+    fn place(self, x: __m256i, y: __m256i, stride: i32, these: u32) -> (__m256i, __m256i) {
+        unsafe {
             let rest = _mm256_set1_epi32(0x7FFF);
             // x of pixels 0 to 3, y of 0 to 3, then of 4 to 7.
-            let parts = _mm256_packus_epi32(_mm256_and_si256(columns, rest), _mm256_and_si256(rows, rest));
-            let columns = _mm256_srai_epi32::<15>(columns);
+            let parts = _mm256_packus_epi32(_mm256_and_si256(x, rest), _mm256_and_si256(y, rest));
+            let columns = _mm256_srai_epi32::<15>(x);
             let columns = _mm256_add_epi32(columns, _mm256_add_epi32(columns, columns));
-            let rows = _mm256_mullo_epi32(_mm256_srai_epi32::<15>(rows), _mm256_set1_epi32(stride));
-            let these = lanes_of(these);
-            let mut at = [0; LANES];
-            let all = _mm256_and_si256(_mm256_add_epi32(rows, columns), these);
-            _mm256_storeu_si256(at.as_mut_ptr().cast(), all);
+            let rows = _mm256_mullo_epi32(_mm256_srai_epi32::<15>(y), _mm256_set1_epi32(stride));
+            let at = _mm256_and_si256(_mm256_add_epi32(rows, columns), lanes_of(these));
             (at, _mm256_permute4x64_epi64::<0b11_01_10_00>(parts))
         }
     }
@@ -130,28 +146,30 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn quads(self, bytes: &[u8], at: &[i32; LANES], stride: i32) -> Option<Self::Quads> {
-        let limit = i32::try_from(bytes.len()).ok()?.checked_sub(stride.checked_add(8)?)?;
-        unsafe {
-            let all = _mm256_loadu_si256(at.as_ptr().cast());
-            let beyond = _mm256_or_si256(all, _mm256_cmpgt_epi32(all, _mm256_set1_epi32(limit)));
-            if stride < 0 || _mm256_movemask_ps(_mm256_castsi256_ps(beyond)) != 0 {
-                return None;
-            }
-            // SAFETY: 0 ≤ at ≤ limit, and so at + stride + 8 is within the bytes.
-            Some(self.0.quads(bytes.as_ptr(), std::hint::black_box(at), stride as usize))
+    fn quads(self, image: &Texels<'_>, at: __m256i) -> Option<Self::Quads> {
+        if self.within(at, image.end()) != 0xFF {
+            return None;
         }
+        // SAFETY: 0 ≤ at < end.
+        Some(unsafe { self.0.quads(image.bytes().as_ptr(), at, image.stride() as usize) })
     }
     #[inline(always)]
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
         self.0.quads_from(upper, lower)
     }
     #[inline(always)]
-    fn weights(self, weights: __m256, these: u32) -> __m128i {
+    fn weights(self, weights: __m256) -> __m128i {
         unsafe {
             let whole = _mm256_cvttps_epi32(weights);
-            let whole = _mm256_and_si256(whole, lanes_of(these));
             _mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256::<1>(whole))
+        }
+    }
+    #[inline(always)]
+    fn only(self, these: u32, weights: __m128i) -> __m128i {
+        unsafe {
+            let bits = _mm_setr_epi16(1, 2, 4, 8, 16, 32, 64, 128);
+            let all = _mm_and_si128(_mm_set1_epi16(these as i16), bits);
+            _mm_and_si128(weights, _mm_cmpeq_epi16(all, bits))
         }
     }
     #[inline(always)]
@@ -400,7 +418,8 @@ mod tests {
         let plain_quads = Plain.quads_from(upper, lower);
         let parts = (lanes.parts(x, y), Plain.parts(x, y));
         let all = (lanes.corners(parts.0, lanes.all()), Plain.corners(parts.1, Plain.all()));
-        let some = (lanes.weights(lanes.load(weights), these), Plain.weights(*weights, these));
+        let some = (lanes.weights(lanes.load(weights)), Plain.weights(*weights));
+        let some = (lanes.only(these, some.0), Plain.only(these, some.1));
         let some = (lanes.corners(parts.0, some.0), Plain.corners(parts.1, some.1));
         let (mut sum, mut plain) = (lanes.no_mix(), Plain.no_mix());
         for (corners, plain_corners) in [some, some, all] {
@@ -417,12 +436,11 @@ mod tests {
     /// What is read of an image.
     fn same_quads<L: Lanes>(
         lanes: L,
-        bytes: &[u8],
-        at: &[i32; LANES],
-        parts: L::Parts,
-        plain_parts: ([i16; LANES], [i16; LANES]),
+        image: &Texels<'_>,
+        (at, parts): (L::I, L::Parts),
+        (plain_at, plain_parts): ([i32; LANES], ([i16; LANES], [i16; LANES])),
     ) -> Result<(), TestCaseError> {
-        let (quads, plain) = (lanes.quads(bytes, at, 36), Plain.quads(bytes, at, 36));
+        let (quads, plain) = (lanes.quads(image, at), Plain.quads(image, plain_at));
         prop_assert_eq!(quads.is_some(), plain.is_some());
         if let (Some(quads), Some(plain)) = (quads, plain) {
             let got = lanes.add_weighted(lanes.no_mix(), quads, lanes.corners(parts, lanes.all()));
@@ -519,14 +537,32 @@ mod tests {
             these in 0u32..256, bytes in prop::collection::vec(any::<u8>(), 0..400),
         ) {
             let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
-            let (at, parts) = avx2.place(avx2.load(&x), avx2.load(&y), 36, these);
-            let (plain_at, plain_parts) = Plain.place(x, y, 36, these);
-            let (mut got_x, mut got_y) = ([0; LANES], [0; LANES]);
-            avx2.store_parts(parts, &mut got_x, &mut got_y);
-            prop_assert_eq!((at, (got_x, got_y)), (plain_at, plain_parts));
-            same_quads(avx2, &bytes, &at, parts, plain_parts)?;
+            let image = Texels::new(&bytes, 36);
+            let (a, b) = (avx2.fixed(avx2.load(&x)), avx2.fixed(avx2.load(&y)));
+            let (at, parts) = avx2.place(a, b, 36, these);
+            let plain = Plain.place(Plain.fixed(x), Plain.fixed(y), 36, these);
+            let mut got = ([0; LANES], ([0; LANES], [0; LANES]));
+            avx2.store_fixed(at, &mut got.0);
+            avx2.store_parts(parts, &mut got.1.0, &mut got.1.1);
+            prop_assert_eq!(got, plain);
+            same_quads(avx2, &image, (at, parts), plain)?;
             if let Some(full) = Full::detect().map(Avx2) {
-                same_quads(full, &bytes, &at, parts, plain_parts)?;
+                same_quads(full, &image, full.place(a, b, 36, these), plain)?;
+            }
+        }
+
+        #[test]
+        fn whole_numbers_are_those_of_plain_rust(a in eight(), b in eight(), end in 0u32..=1 << 31) {
+            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
+            let (x, y) = (avx2.fixed(avx2.load(&a)), avx2.fixed(avx2.load(&b)));
+            let (plain_x, plain_y) = (Plain.fixed(a), Plain.fixed(b));
+            let (mut got, sum) = ([0; LANES], Plain.add_fixed(plain_x, plain_y));
+            avx2.store_fixed(x, &mut got);
+            prop_assert_eq!(got, plain_x);
+            avx2.store_fixed(avx2.add_fixed(x, y), &mut got);
+            prop_assert_eq!(got, sum);
+            for end in [end, sum[0] as u32 & i32::MAX as u32, 0] {
+                prop_assert_eq!(avx2.within(avx2.add_fixed(x, y), end), Plain.within(sum, end));
             }
         }
 

@@ -28,7 +28,7 @@ pub(crate) trait Blend: Copy {
     fn corners(self, low: __m256i, high: __m256i) -> Self::Corners;
     /// # Safety
     /// At every place, and `stride` bytes after it, are eight bytes.
-    unsafe fn quads(self, bytes: *const u8, at: &[i32; LANES], stride: usize) -> Self::Quads;
+    unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads;
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
     fn none(self) -> Self::Mix;
     fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix;
@@ -57,12 +57,15 @@ const NEIGHBORS: [[i8; 16]; 2] = [
 /// # Safety
 /// At every place, and `stride` bytes after it, are eight bytes.
 #[inline(always)]
-unsafe fn pairs(bytes: *const u8, at: &[i32; LANES], stride: usize) -> [__m128i; LANES] {
+unsafe fn pairs(bytes: *const u8, at: __m256i, stride: usize) -> [__m128i; LANES] {
     unsafe {
+        let (mut each, below) = ([0u32; LANES], bytes.add(stride));
+        _mm256_storeu_si256(each.as_mut_ptr().cast(), at);
         let mut pairs = [_mm_setzero_si128(); LANES];
         for k in 0..LANES {
-            let upper = bytes.add(at[k] as usize);
-            let (upper, lower) = (upper.cast::<f64>(), upper.add(stride).cast::<f64>());
+            // Volatile, since compilers would rather take `at` apart than load from where it was stored: twice the work.
+            let at = std::ptr::read_volatile(&each[k]) as usize;
+            let (upper, lower) = (bytes.add(at).cast::<f64>(), below.add(at).cast::<f64>());
             pairs[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_load_sd(upper), lower));
         }
         pairs
@@ -103,7 +106,7 @@ impl Blend for Half {
         }
     }
     #[inline(always)]
-    unsafe fn quads(self, bytes: *const u8, at: &[i32; LANES], stride: usize) -> Self::Quads {
+    unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads {
         unsafe {
             let pairs = pairs(bytes, at, stride);
             let mut quads = [_mm256_setzero_si256(); 4];
@@ -216,7 +219,7 @@ impl Blend for Full {
         }
     }
     #[inline(always)]
-    unsafe fn quads(self, bytes: *const u8, at: &[i32; LANES], stride: usize) -> Self::Quads {
+    unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads {
         unsafe {
             let [a, b, c, d, e, f, g, h] = pairs(bytes, at, stride);
             let (ab, cd) = (_mm256_set_m128i(b, a), _mm256_set_m128i(d, c));

@@ -7,7 +7,7 @@
 
 use crate::anchor::Seen;
 use crate::fold::Fold;
-use crate::lanes::{LANES, Lanes, eight, put};
+use crate::lanes::{LANES, Lanes, Texels, eight, put};
 use s3d_geom::{Raster, Texture, Wrap};
 
 /// Where the pixels of a row are in their textures, and the sides x and y of their footprints: what a column and what a
@@ -58,12 +58,10 @@ struct Taps<F> {
 #[derive(Clone, Copy)]
 struct Size<'a> {
     image: &'a Raster<[u8; 3]>,
-    bytes: &'a [u8],
-    /// Bytes a row.
-    stride: i32,
-    /// The last column and row.
-    right: f32,
-    bottom: f32,
+    texels: Texels<'a>,
+    /// The last column and row, in 32768ths of a pixel.
+    right: u32,
+    bottom: u32,
     /// Pixels of this size a pixel of the full one.
     x: f32,
     y: f32,
@@ -79,6 +77,37 @@ struct Places {
     lower: [u64; LANES],
 }
 
+/// Places in an image that go on in steps: 0 is the middle of the first pixel.
+struct Walk<L: Lanes> {
+    first: (L::F, L::F),
+    step: (L::F, L::F),
+    /// Where it has come to, and the step, in 32768ths.
+    place: (L::I, L::I),
+    fixed_step: (L::I, L::I),
+}
+
+impl<L: Lanes> Walk<L> {
+    #[inline(always)]
+    fn at(l: L, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
+        let (place, fixed_step) = ((l.fixed(first.0), l.fixed(first.1)), (l.fixed(step.0), l.fixed(step.1)));
+        Self { first, step, place, fixed_step }
+    }
+
+    /// In one of the sizes; given are places and steps in pixels of the full one.
+    #[inline(always)]
+    fn new(l: L, size: &Size<'_>, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
+        let (x, y, half) = (l.splat(size.x), l.splat(size.y), l.splat(0.5));
+        let first = (l.sub(l.mul(first.0, x), half), l.sub(l.mul(first.1, y), half));
+        Self::at(l, first, (l.mul(step.0, x), l.mul(step.1, y)))
+    }
+
+    #[inline(always)]
+    fn go_on(&mut self, l: L) {
+        let (place, step) = (self.place, self.fixed_step);
+        self.place = (l.add_fixed(place.0, step.0), l.add_fixed(place.1, step.1));
+    }
+}
+
 /// A texture at all its sizes.
 pub(crate) struct Sizes<'a> {
     wrap: [Wrap; 2],
@@ -88,12 +117,13 @@ pub(crate) struct Sizes<'a> {
 impl<'a> Sizes<'a> {
     pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
         let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)) as f32;
+        // Larger sizes are not used.
+        let last = |size: u32| (size.clamp(1, 1 << 15) - 1) << 15;
         let size = |image: &'a Raster<[u8; 3]>| Size {
             image,
-            bytes: image.pixels().as_flattened(),
-            stride: image.width() as i32 * 3,
-            right: image.width().saturating_sub(1) as f32,
-            bottom: image.height().saturating_sub(1) as f32,
+            texels: Texels::new(image.pixels().as_flattened(), image.width() as i32 * 3),
+            right: last(image.width()),
+            bottom: last(image.height()),
             x: ratio(image.width(), full.image.width()),
             y: ratio(image.height(), full.image.height()),
         };
@@ -186,8 +216,9 @@ impl<'a> Sizes<'a> {
 
     #[inline(always)]
     fn magnified<L: Lanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
-        let half = l.splat(0.5);
-        l.pixels(self.add(l, l.no_mix(), &self.sizes[0], (l.sub(x, half), l.sub(y, half)), l.all(), these))
+        let (size, half, zero) = (&self.sizes[0], l.splat(0.5), l.splat(0.0));
+        let walk = Walk::at(l, (l.sub(x, half), l.sub(y, half)), (zero, zero));
+        l.pixels(self.add(l, l.no_mix(), size, &walk, zero, l.all(), these))
     }
 
     #[inline(always)]
@@ -195,10 +226,33 @@ impl<'a> Sizes<'a> {
         let Taps { level, weight, next_weight, count, step_x, step_y } = *taps;
         let (zero, half, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
         let middle = l.mul(half, l.sub(count, one));
-        let (first_x, first_y) = (l.sub(x, l.mul(middle, step_x)), l.sub(y, l.mul(middle, step_y)));
+        let first = (l.sub(x, l.mul(middle, step_x)), l.sub(y, l.mul(middle, step_y)));
+        let step = (step_x, step_y);
 
         let mut mix = l.no_mix();
-        // Size after size, each for the pixels that need it: neighbours mostly need the same two.
+        let mut levels = [0.0; LANES];
+        l.store(level, &mut levels);
+        let at = levels[these.trailing_zeros() as usize % LANES];
+        let same = l.splat(at);
+        if (l.greater(level, same) | l.greater(same, level)) & these == 0
+            && l.greater(l.splat(-1.0), next_weight) & these != 0
+            && let Some([this, next]) = self.sizes.get(at as usize..).and_then(<[_]>::first_chunk)
+        {
+            // The same two sizes for all, as mostly: both in one loop, of which nobody can foretell when it ends.
+            let (mut a, mut b) = (Walk::new(l, this, first, step), Walk::new(l, next, first, step));
+            let (weights, next_weights) = (l.weights(weight), l.weights(next_weight));
+            let (mut active, mut tap) = (these, zero);
+            while active != 0 {
+                mix = self.add(l, mix, this, &a, tap, l.only(active, weights), active);
+                mix = self.add(l, mix, next, &b, tap, l.only(active, next_weights), active);
+                a.go_on(l);
+                b.go_on(l);
+                tap = l.add(tap, one);
+                active &= l.greater(count, tap);
+            }
+            return mix;
+        }
+        // Size after size, each for the pixels that need it.
         let mut left = these;
         let mut at = zero;
         for of in &self.sizes {
@@ -206,12 +260,10 @@ impl<'a> Sizes<'a> {
             // Weights of less than one part are none.
             let weights = l.by_sign(l.sub(level, at), next_weight, weight);
             let mut active = here & l.greater(l.splat(-1.0), weights);
-            let (scale_x, scale_y) = (l.splat(of.x), l.splat(of.y));
-            let mut tap = zero;
+            let (weights, mut walk, mut tap) = (l.weights(weights), Walk::new(l, of, first, step), zero);
             while active != 0 {
-                let x = l.sub(l.mul(l.add(first_x, l.mul(tap, step_x)), scale_x), half);
-                let y = l.sub(l.mul(l.add(first_y, l.mul(tap, step_y)), scale_y), half);
-                mix = self.add(l, mix, of, (x, y), l.weights(weights, active), active);
+                mix = self.add(l, mix, of, &walk, tap, l.only(active, weights), active);
+                walk.go_on(l);
                 tap = l.add(tap, one);
                 active &= l.greater(count, tap);
             }
@@ -224,31 +276,32 @@ impl<'a> Sizes<'a> {
         mix
     }
 
-    /// `mix` and the weighted bilinear colours at those of the places that are among `these` (0 is the middle of the first
-    /// pixel).
+    /// `mix` and the weighted bilinear colours at those of the places that are among `these`, after `tap` steps of the walk.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "all of them in registers")]
     fn add<L: Lanes>(
         &self,
         l: L,
         mix: L::Mix,
         size: &Size<'a>,
-        (x, y): (L::F, L::F),
+        walk: &Walk<L>,
+        tap: L::F,
         weights: L::Weights,
         these: u32,
     ) -> L::Mix {
-        let zero = l.splat(0.0);
-        let outside = l.greater(zero, x) | l.greater(zero, y);
-        let inside = l.greater(l.splat(size.right), x) & l.greater(l.splat(size.bottom), y) & !outside;
-        let (at, parts) = l.place(x, y, size.stride, these);
+        let (x, y) = walk.place;
+        let inside = l.within(x, size.right) & l.within(y, size.bottom);
+        let (at, parts) = l.place(x, y, size.texels.stride(), these);
         if inside & these == these
-            && let Some(quads) = l.quads(size.bytes, &at, size.stride)
+            && let Some(quads) = l.quads(&size.texels, at)
         {
             return l.add_weighted(mix, quads, l.corners(parts, weights));
         }
         let (mut xs, mut ys) = ([0.0; LANES], [0.0; LANES]);
-        l.store(x, &mut xs);
-        l.store(y, &mut ys);
-        let mut places = Places { at, ..Places::default() };
+        l.store(l.add(walk.first.0, l.mul(tap, walk.step.0)), &mut xs);
+        l.store(l.add(walk.first.1, l.mul(tap, walk.step.1)), &mut ys);
+        let mut places = Places::default();
+        l.store_fixed(at, &mut places.at);
         l.store_parts(parts, &mut places.x, &mut places.y);
         self.read_singly(size, &xs, &ys, inside, these, &mut places);
         let corners = l.corners(l.parts(&places.x, &places.y), weights);
@@ -273,8 +326,8 @@ impl<'a> Sizes<'a> {
                 continue;
             }
             let begin = places.at[k] as usize;
-            let below = begin.wrapping_add(size.stride as usize);
-            match (word(size.bytes, begin), word(size.bytes, below)) {
+            let below = begin.wrapping_add(size.texels.stride() as usize);
+            match (word(size.texels.bytes(), begin), word(size.texels.bytes(), below)) {
                 (Some(a), Some(b)) if inside >> k & 1 == 1 => (places.upper[k], places.lower[k]) = (a, b),
                 _ => {
                     let quad = self.at_the_edge(size, xs[k], ys[k]);

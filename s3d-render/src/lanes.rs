@@ -17,6 +17,8 @@ pub(crate) const STAMP: usize = 32;
 pub(crate) trait Lanes: Copy {
     /// Eight `f32`.
     type F: Copy;
+    /// Eight whole numbers; of coordinates in an image, in 32768ths of a pixel.
+    type I: Copy;
     /// Eight numbers from 0 to 1 to the right and eight downwards, in 32768ths.
     type Parts: Copy;
     /// The 2 × 2 pixels of a texture around each of eight places.
@@ -53,20 +55,29 @@ pub(crate) trait Lanes: Copy {
 
     /// ⌊log2⌋ of values of at least 1, and what is left of the logarithm to 0.01.
     fn log2(self, values: Self::F) -> (Self::F, Self::F);
+    /// In 32768ths, rounded towards 0; the least number where that does not fit.
+    fn fixed(self, values: Self::F) -> Self::I;
+    /// Sums, wrapped around.
+    fn add_fixed(self, a: Self::I, b: Self::I) -> Self::I;
+    fn store_fixed(self, values: Self::I, to: &mut [i32; LANES]);
+    /// Bit k: whether 0 ≤ v < `end` in lane k; `end` is at most 2^31.
+    fn within(self, values: Self::I, end: u32) -> u32;
     /// Of the places (x, y) of an image whose rows are `stride` bytes: where the upper left pixel begins, and how far
     /// beyond it the places are. The beginning of the image in lanes that are not among `these`; anything for places that
     /// are not in an image of less than 2^15 columns, rows and 2^31 bytes.
-    fn place(self, x: Self::F, y: Self::F, stride: i32, these: u32) -> ([i32; LANES], Self::Parts);
+    fn place(self, x: Self::I, y: Self::I, stride: i32, these: u32) -> (Self::I, Self::Parts);
     /// What [`Lanes::place`] gives, from the 32768ths.
     fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> Self::Parts;
     /// The 32768ths.
     fn store_parts(self, parts: Self::Parts, x: &mut [i16; LANES], y: &mut [i16; LANES]);
-    /// The 2 × 2 pixels whose upper left ones begin at `at`; `None` if one is too near the end of `bytes`.
-    fn quads(self, bytes: &[u8], at: &[i32; LANES], stride: i32) -> Option<Self::Quads>;
+    /// The 2 × 2 pixels whose upper left ones begin at `at`; `None` if one is too near the image's end.
+    fn quads(self, image: &Texels<'_>, at: Self::I) -> Option<Self::Quads>;
     /// R G B of two neighbours in the lowest six bytes of each: upper ones, lower ones.
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
-    /// Weights from −1 (0) to −32768 (1), rounded towards 0; none in lanes that are not among `these`.
-    fn weights(self, weights: Self::F, these: u32) -> Self::Weights;
+    /// Weights from −1 (0) to −32768 (1), rounded towards 0.
+    fn weights(self, weights: Self::F) -> Self::Weights;
+    /// `weights`, and none in lanes that are not among `these`.
+    fn only(self, these: u32, weights: Self::Weights) -> Self::Weights;
     /// Weights of 1.
     fn all(self) -> Self::Weights;
     /// Weights shared out to the 2 × 2 pixels around places, downwards and then to the right, by [`part`]: each is off by
@@ -113,6 +124,40 @@ pub(crate) trait Lanes: Copy {
     );
 }
 
+/// An image's bytes, and up to where 2 × 2 pixels can be read at once.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Texels<'a> {
+    bytes: &'a [u8],
+    stride: i32,
+    end: u32,
+}
+
+impl<'a> Texels<'a> {
+    /// Of rows of `stride` bytes.
+    pub(crate) fn new(bytes: &'a [u8], stride: i32) -> Self {
+        let len = i32::try_from(bytes.len()).unwrap_or(0);
+        let end = if stride < 0 { 0 } else { i64::from(len) - i64::from(stride) - 7 };
+        Self { bytes, stride, end: end.max(0) as u32 }
+    }
+
+    #[inline(always)]
+    pub(crate) fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// Bytes a row.
+    #[inline(always)]
+    pub(crate) fn stride(&self) -> i32 {
+        self.stride
+    }
+
+    /// From every place before this one on there are eight bytes, and eight more a `stride` later. Less than 2^31.
+    #[inline(always)]
+    pub(crate) fn end(&self) -> u32 {
+        self.end
+    }
+}
+
 /// a · b / 32768, rounded half up.
 #[inline(always)]
 pub(crate) fn part(a: i16, b: i16) -> i16 {
@@ -154,6 +199,7 @@ fn each(f: impl FnMut(usize) -> f32) -> Eight {
 
 impl Lanes for Plain {
     type F = Eight;
+    type I = [i32; LANES];
     type Parts = ([i16; LANES], [i16; LANES]);
     type Quads = [[u64; LANES]; 2];
     type Weights = [i16; LANES];
@@ -234,14 +280,29 @@ impl Lanes for Plain {
         (whole, fraction)
     }
     #[inline(always)]
-    fn place(self, x: Eight, y: Eight, stride: i32, these: u32) -> ([i32; LANES], Self::Parts) {
-        let (columns, rows) = (x.map(|v| (v * 32768.0) as i32), y.map(|v| (v * 32768.0) as i32));
+    fn fixed(self, values: Eight) -> [i32; LANES] {
+        // The smallest number that does not fit.
+        const END: f32 = 2_147_483_648.0;
+        values.map(|v| v * 32768.0).map(|v| if v < END { v as i32 } else { i32::MIN })
+    }
+    #[inline(always)]
+    fn add_fixed(self, a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
+        std::array::from_fn(|k| a[k].wrapping_add(b[k]))
+    }
+    #[inline(always)]
+    fn store_fixed(self, values: [i32; LANES], to: &mut [i32; LANES]) {
+        *to = values;
+    }
+    #[inline(always)]
+    fn within(self, values: [i32; LANES], end: u32) -> u32 {
+        // What is negative is large without a sign.
+        (0..LANES).map(|k| u32::from((values[k] as u32) < end) << k).sum()
+    }
+    #[inline(always)]
+    fn place(self, x: [i32; LANES], y: [i32; LANES], stride: i32, these: u32) -> ([i32; LANES], Self::Parts) {
         let rest = |v: i32| (v & 0x7FFF) as i16;
-        let at = |k: usize| (rows[k] >> 15).wrapping_mul(stride).wrapping_add((columns[k] >> 15) * 3);
-        (
-            std::array::from_fn(|k| if these >> k & 1 == 1 { at(k) } else { 0 }),
-            (columns.map(rest), rows.map(rest)),
-        )
+        let at = |k: usize| (y[k] >> 15).wrapping_mul(stride).wrapping_add((x[k] >> 15) * 3);
+        (std::array::from_fn(|k| if these >> k & 1 == 1 { at(k) } else { 0 }), (x.map(rest), y.map(rest)))
     }
     #[inline(always)]
     fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> Self::Parts {
@@ -252,11 +313,11 @@ impl Lanes for Plain {
         (*x, *y) = parts;
     }
     #[inline(always)]
-    fn quads(self, bytes: &[u8], at: &[i32; LANES], stride: i32) -> Option<Self::Quads> {
+    fn quads(self, image: &Texels<'_>, at: [i32; LANES]) -> Option<Self::Quads> {
         let mut quads = [[0; LANES]; 2];
-        for (quads, below) in quads.iter_mut().zip([0, stride as usize]) {
-            for (quad, &at) in quads.iter_mut().zip(at) {
-                let bytes = bytes.get(usize::try_from(at).ok()? + below..)?.first_chunk()?;
+        for (quads, below) in quads.iter_mut().zip([0, image.stride as usize]) {
+            for (quad, at) in quads.iter_mut().zip(at) {
+                let bytes = image.bytes.get(usize::try_from(at).ok()? + below..)?.first_chunk()?;
                 *quad = u64::from_le_bytes(*bytes);
             }
         }
@@ -267,8 +328,12 @@ impl Lanes for Plain {
         [*upper, *lower]
     }
     #[inline(always)]
-    fn weights(self, weights: Eight, these: u32) -> [i16; LANES] {
-        std::array::from_fn(|k| if these >> k & 1 == 1 { weights[k] as i16 } else { 0 })
+    fn weights(self, weights: Eight) -> [i16; LANES] {
+        weights.map(|weight| weight as i16)
+    }
+    #[inline(always)]
+    fn only(self, these: u32, weights: [i16; LANES]) -> [i16; LANES] {
+        std::array::from_fn(|k| if these >> k & 1 == 1 { weights[k] } else { 0 })
     }
     #[inline(always)]
     fn all(self) -> [i16; LANES] {
