@@ -237,10 +237,11 @@ impl Anchor {
         finite
     }
 
-    /// Whether the anchor serves a pixel.
+    /// Whether the anchor serves the [`LANES`] pixels from a column on.
     #[inline(always)]
     pub(crate) fn reaches(&self, i: usize, j: usize) -> bool {
-        (-REACH..REACH).contains(&(i as i32).wrapping_sub(self.column)) && (j as i32 - self.row).abs() < REACH
+        (-REACH..=REACH - LANES as i32).contains(&(i as i32).wrapping_sub(self.column))
+            && (j as i32 - self.row).abs() < REACH
     }
 
     /// The row `j` of pixels.

@@ -230,13 +230,15 @@ impl<'a, L: Lanes> Painter<'a, L> {
             self.prepare::<TURN>(grid, first_row, &group, count);
         }
         let (mut j, mut from) = (0, 0);
-        for (start, end, number) in runs.all() {
+        for pieces in runs.pieces().windows(2) {
+            let (start, end) = (pieces[0].start as usize, pieces[1].start as usize);
             if start == from + width {
                 self.fetch(&mut out[from..start], from, ahead);
                 (j, from) = (j + 1, start);
             }
             let row = &mut out[from..from + width];
-            self.lay_out::<TURN>(grid, faces[start], number, first_row + j, start - from..end - from, row);
+            let columns = start - from..end - from;
+            self.lay_out::<TURN>(grid, faces[start], pieces[0].number, first_row + j, columns, row);
         }
         self.fetch(&mut out[from..], from, ahead);
     }
@@ -292,7 +294,7 @@ impl<'a, L: Lanes> Painter<'a, L> {
         anchor.set::<TURN>(attributes, folds, grid, i, j)
     }
 
-    /// The first pass over the pixels `start` to `end` of row `j`, which all see `face`.
+    /// The first pass over the pixels `start` to `end` of row `j`, [`LANES`] at most, which all see `face`.
     #[inline(always)]
     fn lay_out<const TURN: bool>(
         &mut self,
@@ -304,57 +306,52 @@ impl<'a, L: Lanes> Painter<'a, L> {
         out: &mut [[u8; 3]],
     ) {
         let lanes = self.lanes;
-        let look = self.prepared[number as usize].look;
+        let Prepared { look, anchor } = &self.prepared[number as usize];
+        let look = *look;
         if let Look::Flat(color) = look {
             self.row.tags[start..end].fill(DONE);
             return paint(out, start, end, color);
         }
-        let mut i = start;
-        while i < end {
-            if !self.prepared[number as usize].anchor.reaches(i, j)
-                && !self.anchor_again::<TURN>(grid, face, number, i, j)
-            {
-                self.row.tags[i] = DONE;
-                out[i] = self.singly.color(face, i, j);
-                i += 1;
-                continue;
-            }
-            let Self { row, singly, prepared, .. } = self;
-            let anchor = &prepared[number as usize].anchor;
-            let line = anchor.line::<TURN>(grid, j);
-            let until = end.min((anchor.column + crate::anchor::REACH) as usize);
-            while i < until {
-                let some = LANES.min(until - i);
-                let mut doubtful;
-                if let Look::Texture(tag) = look {
-                    let seen = line.at::<TURN, 2, L>(lanes, i);
-                    doubtful = seen.doubtful;
-                    row.footprints.store(lanes, i, &seen, tag & NARROW != 0);
-                    if let Some(tags) = row.tags[i..].first_chunk_mut() {
-                        *tags = [tag; LANES];
-                    }
-                } else {
-                    let seen = line.at::<TURN, 3, L>(lanes, i);
-                    doubtful = seen.doubtful;
-                    let mut channels = [[0; LANES]; 3];
-                    for (value, channel) in seen.values.into_iter().zip(&mut channels) {
-                        lanes.store_int(lanes.add(value, lanes.splat(0.5)), channel);
-                    }
-                    for k in 0..some {
-                        row.tags[i + k] = DONE;
-                        let color = channels.map(|c| c[k] as u8);
-                        out[i + k] = if color == [0; 3] { [1; 3] } else { color };
-                    }
+        let mut anchor = anchor;
+        if !anchor.reaches(start, j) {
+            if !self.anchor_again::<TURN>(grid, face, number, start, j) {
+                self.row.tags[start..end].fill(DONE);
+                for (i, color) in (start..).zip(&mut out[start..end]) {
+                    *color = self.singly.color(face, i, j);
                 }
-                doubtful &= (1 << some) - 1;
-                while doubtful != 0 {
-                    let at = i + doubtful.trailing_zeros() as usize;
-                    row.tags[at] = DONE;
-                    out[at] = singly.color(face, at, j);
-                    doubtful &= doubtful - 1;
-                }
-                i += some;
+                return;
             }
+            anchor = &self.prepared[number as usize].anchor;
+        }
+        let line = anchor.line::<TURN>(grid, j);
+        let row = &mut self.row;
+        let mut doubtful;
+        if let Look::Texture(tag) = look {
+            let seen = line.at::<TURN, 2, L>(lanes, start);
+            doubtful = seen.doubtful;
+            row.footprints.store(lanes, start, &seen, tag & NARROW != 0);
+            if let Some(tags) = row.tags[start..].first_chunk_mut() {
+                *tags = [tag; LANES];
+            }
+        } else {
+            let seen = line.at::<TURN, 3, L>(lanes, start);
+            doubtful = seen.doubtful;
+            let mut channels = [[0; LANES]; 3];
+            for (value, channel) in seen.values.into_iter().zip(&mut channels) {
+                lanes.store_int(lanes.add(value, lanes.splat(0.5)), channel);
+            }
+            for (k, i) in (start..end).enumerate() {
+                row.tags[i] = DONE;
+                let color = channels.map(|c| c[k] as u8);
+                out[i] = if color == [0; 3] { [1; 3] } else { color };
+            }
+        }
+        doubtful &= (1 << (end - start)) - 1;
+        while doubtful != 0 {
+            let at = start + doubtful.trailing_zeros() as usize;
+            row.tags[at] = DONE;
+            out[at] = self.singly.color(face, at, j);
+            doubtful &= doubtful - 1;
         }
     }
 

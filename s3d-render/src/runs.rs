@@ -28,6 +28,17 @@ pub(crate) struct Runs {
     numbers: Vec<u32>,
     /// The faces that got their number in this band.
     new: Vec<New>,
+    /// See [`Runs::pieces`].
+    pieces: Vec<Piece>,
+}
+
+/// Part of a run, of [`LANES`] pixels or, at the run's end, fewer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece {
+    /// Its first pixel.
+    pub(crate) start: u32,
+    /// Its face's number.
+    pub(crate) number: u32,
 }
 
 impl Runs {
@@ -39,6 +50,7 @@ impl Runs {
             starts: Vec::new(),
             numbers: Vec::new(),
             new: Vec::new(),
+            pieces: Vec::new(),
         }
     }
 
@@ -51,14 +63,38 @@ impl Runs {
         }
         let forgotten = self.table.number(lanes, mesh, faces, &self.starts, &mut self.numbers, &mut self.new);
         self.starts.push(faces.len() as u32);
+        self.cut();
         forgotten
     }
 
-    /// The runs: first pixel, the pixel after the last, and the number of the face.
+    /// All runs in pieces, one after another, and one more that begins where the last one ends. None reaches from row to
+    /// row.
     #[inline(always)]
-    pub(crate) fn all(&self) -> impl Iterator<Item = (usize, usize, u32)> {
-        let ends = self.starts.windows(2).map(|run| (run[0] as usize, run[1] as usize));
-        ends.zip(&self.numbers).map(|((start, end), &number)| (start, end, number))
+    pub(crate) fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
+    /// Cuts the runs. A loop for each piece of a run ends when nobody can foretell: here it is out of the way of those that
+    /// have much to do.
+    #[inline(always)]
+    fn cut(&mut self) {
+        const PIECE: u32 = LANES as u32;
+        let Self { starts, numbers, pieces, .. } = self;
+        pieces.clear();
+        for (run, &number) in starts.windows(2).zip(numbers.iter()) {
+            let (start, end) = (run[0], run[1]);
+            let at = pieces.len();
+            pieces.extend([start, start + PIECE].map(|start| Piece { start, number }));
+            if end - start > 2 * PIECE {
+                pieces.extend(
+                    (start + 2 * PIECE..end).step_by(PIECE as usize).map(|start| Piece { start, number }),
+                );
+            } else {
+                pieces.truncate(at + 1 + usize::from(end - start > PIECE));
+            }
+        }
+        let end = starts.last().copied().unwrap_or(0);
+        pieces.push(Piece { start: end, number: 0 });
     }
 
     /// How many groups of [`LANES`] faces have to be prepared.
@@ -147,11 +183,13 @@ mod tests {
                     }
                 }
                 let mut next = 0;
-                for (start, end, number) in runs.all() {
+                for (piece, after) in runs.pieces().iter().zip(&runs.pieces()[1..]) {
+                    let (start, end) = (piece.start as usize, after.start as usize);
                     prop_assert_eq!(start, next);
-                    prop_assert_eq!(start / width, (end - 1) / width);
-                    prop_assert!(faces[start..end].iter().all(|&face| face == things[number as usize]));
-                    prop_assert!(start % width == 0 || faces[start - 1] != faces[start]);
+                    prop_assert!((1..=LANES).contains(&(end - start)) && start / width == (end - 1) / width);
+                    prop_assert!(faces[start..end].iter().all(|&face| face == things[piece.number as usize]));
+                    let cut = end - start < LANES && end % width != 0;
+                    prop_assert!(!cut || faces[end - 1] != faces[end]);
                     next = end;
                 }
                 prop_assert_eq!(next, faces.len());

@@ -42,8 +42,9 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> Stamps<V, N>
                 self.colors.push(colors);
             }
         }
-        for (start, end, number) in runs.all() {
-            print(lanes, &mut out, start, end, &self.colors[number as usize]);
+        for pieces in runs.pieces().windows(2) {
+            let (start, end) = (pieces[0].start as usize, pieces[1].start as usize);
+            print(lanes, &mut out, start, end, &self.colors[pieces[0].number as usize]);
         }
     }
 }
@@ -53,7 +54,8 @@ fn packed([r, g, b]: [u8; 3]) -> u32 {
     u32::from_le_bytes([r, g, b, 0])
 }
 
-/// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow.
+/// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow: no more pixels than
+/// a stamp has.
 #[inline(always)]
 fn print<const N: usize>(
     lanes: impl Lanes,
@@ -62,21 +64,17 @@ fn print<const N: usize>(
     end: usize,
     colors: &[u32; N],
 ) {
-    let mut at = start;
-    while at < end {
-        for (image, &color) in images.iter_mut().zip(colors) {
-            let bytes = &mut image.as_flattened_mut()[3 * at..];
-            match bytes.first_chunk_mut() {
-                Some(to) => lanes.store_repeated(color, to),
-                // At the image's end.
-                None => {
-                    let most = bytes.len().min(3 * (end - at));
-                    let mut stamp = [0; STAMP];
-                    lanes.store_repeated(color, &mut stamp);
-                    bytes[..most].copy_from_slice(&stamp[..most]);
-                }
+    for (image, &color) in images.iter_mut().zip(colors) {
+        let bytes = &mut image.as_flattened_mut()[3 * start..];
+        match bytes.first_chunk_mut() {
+            Some(to) => lanes.store_repeated(color, to),
+            // At the image's end.
+            None => {
+                let mut stamp = [0; STAMP];
+                lanes.store_repeated(color, &mut stamp);
+                let most = 3 * (end - start);
+                bytes[..most].copy_from_slice(&stamp[..most]);
             }
         }
-        at += STAMP / 3;
     }
 }
