@@ -184,22 +184,22 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Outco
     let scan = &job.locations[shot.location];
     let room = job.rooms[shot.location].to_string();
     let mut written = WrittenShot::default();
-    let mut write = |domain: Domain, bytes: &[u8]| -> Outcome<()> {
+    let write = |domain: Domain, bytes: &[u8]| -> Outcome<FileRecord> {
         let path = job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain);
         write_bytes(&path, bytes)?;
-        written.files.push(FileRecord::of_bytes(job.layout.root(), &path, bytes)?);
-        Ok(())
+        Ok(FileRecord::of_bytes(job.layout.root(), &path, bytes)?)
     };
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
     // Poses alone need no rays.
     if !images.is_empty() {
         caster.cast_into(&shot.camera, 1, hits);
-        job.look.encode(&images, hits, &shot.camera, prints, |image, file| write(image.domain(), &file))?;
+        let each = |image: Image, file: Vec<u8>| write(image.domain(), &file);
+        written.files = job.look.encode(&images, hits, &shot.camera, prints, each)?;
     }
     if job.modalities.contains(&Domain::Pose) {
         let room = format!("{room}_{}", job.area);
         let pose = PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame);
-        write(Domain::Pose, &pose.to_json())?;
+        written.files.push(write(Domain::Pose, &pose.to_json())?);
     }
     if !images.is_empty() {
         written.pixels = hits.face.len() as u64;

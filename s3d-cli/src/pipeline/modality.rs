@@ -1,6 +1,7 @@
 //! Hits to the bytes of an image file, one function for every modality.
 
 use super::pictures::PictureColors;
+use rayon::prelude::*;
 use s3d_geom::{Camera, Raster};
 use s3d_io::{
     Compression, Content, Conventions, DepthUnits, Domain, XyzType, encode_gray16, encode_rgb8,
@@ -89,19 +90,20 @@ impl Default for Prints {
 }
 
 impl Look<'_> {
-    /// The files of some images of a view, from the view's hits, one after another. Nothing but time depends on what
-    /// `prints` were used for before.
+    /// What `each` makes of the files of some images of a view, from the view's hits, in the order of `images`. Threads of the
+    /// current rayon pool that have nothing else to do take part. Nothing but time depends on what `prints` were used for
+    /// before.
     ///
     /// # Errors
     /// That of `each`, which is given every file.
-    pub(crate) fn encode<E>(
+    pub(crate) fn encode<T: Send, E: Send>(
         &self,
         images: &[Image],
         hits: &Hits,
         camera: &Camera,
         prints: &mut Prints,
-        mut each: impl FnMut(Image, Vec<u8>) -> Result<(), E>,
-    ) -> Result<(), E> {
+        each: impl Fn(Image, Vec<u8>) -> Result<T, E> + Sync,
+    ) -> Result<Vec<T>, E> {
         let large = hits.face.len() > Prints::MOST_PIXELS;
         prints.made = if large { Modalities::default() } else { self.together(images) };
         if prints.made != Modalities::default() {
@@ -115,13 +117,19 @@ impl Look<'_> {
             };
             view_images_into(&shading, hits, camera, prints.made, &mut prints.images);
         }
+        let mut done = Vec::new();
         for &image in images {
-            each(image, self.file(image, hits, camera, prints))?;
+            self.draw(image, hits, camera, prints);
             if large {
+                done.push(each(image, self.file(image, prints))?);
                 *prints = Prints::default();
             }
         }
-        Ok(())
+        if !large {
+            let files = images.par_iter().with_max_len(1);
+            done = files.map(|&image| each(image, self.file(image, prints))).collect::<Result<_, E>>()?;
+        }
+        Ok(done)
     }
 
     /// The images that are made in one walk over the hits.
@@ -137,59 +145,49 @@ impl Look<'_> {
         }
     }
 
-    fn file(&self, image: Image, hits: &Hits, camera: &Camera, prints: &mut Prints) -> Vec<u8> {
-        let compression = self.compression;
+    /// Draws an image that is not made yet.
+    fn draw(&self, image: Image, hits: &Hits, camera: &Camera, prints: &mut Prints) {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
         let Prints { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made } = prints;
         match image {
-            Image::Rgb => {
-                match &self.pictures {
-                    _ if made.rgb => {}
-                    Some(pictures) => pictures.image_into(self, hits, camera, rgb),
-                    None => {
-                        let filter = TextureFilter::default();
-                        rgb_image_into(self.scene, self.textures, hits, camera, &filter, rgb);
-                    }
+            Image::Rgb if !made.rgb => match &self.pictures {
+                Some(pictures) => pictures.image_into(self, hits, camera, rgb),
+                None => {
+                    let filter = TextureFilter::default();
+                    rgb_image_into(self.scene, self.textures, hits, camera, &filter, rgb);
                 }
-                encode_rgb8(rgb, Content::Photo, compression)
+            },
+            Image::Depth if !made.depth => match depth_units {
+                DepthUnits::Per512 => depth_image_into(hits, depth),
+                DepthUnits::Millimetres => depth_image_mm_into(hits, depth),
+            },
+            Image::Normal if !made.faces => {
+                normal_image_into(self.scene, hits, camera, self.normals, normal_axes, &mut faces.normal);
             }
-            Image::Depth => {
-                match depth_units {
-                    _ if made.depth => {}
-                    DepthUnits::Per512 => depth_image_into(hits, depth),
-                    DepthUnits::Millimetres => depth_image_mm_into(hits, depth),
-                }
-                encode_gray16(depth, compression)
+            Image::Semantic if !made.faces => index_image_into(hits, self.label_per_face, &mut faces.index),
+            Image::SemanticPretty if !made.faces => {
+                color_per_face_image_into(hits, self.pretty_per_face, &mut faces.color);
             }
-            Image::Normal => {
-                if !made.faces {
-                    let out = &mut faces.normal;
-                    normal_image_into(self.scene, hits, camera, self.normals, normal_axes, out);
-                }
-                encode_rgb8(&faces.normal, Content::Normals, compression)
-            }
-            Image::Semantic => {
-                if !made.faces {
-                    index_image_into(hits, self.label_per_face, &mut faces.index);
-                }
-                encode_rgb8(&faces.index, Content::Labels, compression)
-            }
-            Image::SemanticPretty => {
-                if !made.faces {
-                    color_per_face_image_into(hits, self.pretty_per_face, &mut faces.color);
-                }
-                encode_rgb8(&faces.color, Content::Labels, compression)
-            }
-            Image::GlobalXyz if xyz_type == XyzType::Float => {
-                xyz_image_into(hits, camera, xyz_float);
+            Image::GlobalXyz if xyz_type == XyzType::Float => xyz_image_into(hits, camera, xyz_float),
+            Image::GlobalXyz if !made.xyz => xyz_image_half_into(hits, camera, xyz),
+            _ => {}
+        }
+    }
+
+    /// The file of an image that is drawn.
+    fn file(&self, image: Image, prints: &Prints) -> Vec<u8> {
+        let compression = self.compression;
+        let Prints { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, .. } = prints;
+        match image {
+            Image::Rgb => encode_rgb8(rgb, Content::Photo, compression),
+            Image::Depth => encode_gray16(depth, compression),
+            Image::Normal => encode_rgb8(&faces.normal, Content::Normals, compression),
+            Image::Semantic => encode_rgb8(&faces.index, Content::Labels, compression),
+            Image::SemanticPretty => encode_rgb8(&faces.color, Content::Labels, compression),
+            Image::GlobalXyz if self.conventions.xyz == XyzType::Float => {
                 encode_xyz_float(xyz_float, compression)
             }
-            Image::GlobalXyz => {
-                if !made.xyz {
-                    xyz_image_half_into(hits, camera, xyz);
-                }
-                encode_xyz_half(xyz, compression)
-            }
+            Image::GlobalXyz => encode_xyz_half(xyz, compression),
         }
     }
 }
