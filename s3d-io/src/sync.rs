@@ -43,7 +43,7 @@ impl SyncAhead {
         let (open, is_open) = mpsc::channel();
         let folder = root.to_owned();
         let work = move || {
-            while is_open.recv_timeout(REST) == Err(RecvTimeoutError::Timeout) {
+            while is_open.recv_timeout(REST) != Err(RecvTimeoutError::Disconnected) {
                 if !sync_file_system(&folder)? {
                     break;
                 }
@@ -55,7 +55,13 @@ impl SyncAhead {
         Self { root: root.to_owned(), open, thread }
     }
 
-    /// Ends.
+    /// Begins a sync at once, or when that under way is done, and does not wait for it.
+    pub fn sync_now(&self) {
+        // A thread that is gone has failed, which the end tells.
+        let _ = self.open.send(());
+    }
+
+    /// Ends, when what is under way is done.
     ///
     /// # Errors
     /// [`Error::Io`]: the disk did not take something. The system tells that once, so that no sync after this would.
@@ -141,11 +147,10 @@ mod tests {
         let path = dir.path().join("a.txt");
         let ahead = SyncAhead::start(dir.path());
         write_bytes(&path, b"a").unwrap();
+        ahead.sync_now();
         ahead.end().unwrap();
         let ahead = SyncAhead::start(&dir.path().join("gone"));
-        while !ahead.thread.as_ref().unwrap().is_finished() {
-            std::thread::yield_now();
-        }
+        ahead.sync_now();
         let message = ahead.end().unwrap_err().to_string();
         assert!(message.contains("gone: cannot bring to the disk"), "{message}");
     }

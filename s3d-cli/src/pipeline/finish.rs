@@ -12,7 +12,7 @@ use super::summary::{UnitTally, ViewTally};
 use super::views::select_requested;
 use crate::failure::{Failure, Outcome};
 use crate::stop;
-use s3d_io::{Domain, Error, Frame, Layout, UnknownDomain, create_dir, sync_data_set, sync_file};
+use s3d_io::{Domain, Error, Frame, Layout, SyncAhead, UnknownDomain, create_dir, sync_data_set, sync_file};
 use s3d_sample::folds;
 use std::fs;
 use std::path::PathBuf;
@@ -56,7 +56,7 @@ pub(crate) fn is_chosen(request: &Request, uuid: &str) -> bool {
 
 /// Writes the tables, the list of files and, when all of it is on the disk, the manifest that says that the data set is
 /// complete. Beside the units' files there must be `assets` and `conventions.json`. `manifest` is the one that was written
-/// when the export began.
+/// when the export began; `disk` what brings the units' files to the disk, if something does.
 ///
 /// # Errors
 /// [`Failure::Input`] if a unit is missing.
@@ -65,6 +65,7 @@ pub(crate) fn finish(
     request: &Request,
     manifest: Manifest,
     finished: &Finished,
+    disk: Option<SyncAhead>,
 ) -> Outcome<Made> {
     if let Some(unit) = missing_units(request, finished).first() {
         return Err(Failure::Input(format!("{}: {unit:?} is missing", layout.root().display())));
@@ -111,6 +112,7 @@ pub(crate) fn finish(
     let (count, listed) = (list.count, list.bytes);
     // A manifest that says "complete" on a disk that lost what it tells of would be a lie.
     let paths: Vec<PathBuf> = files.iter().map(|f| f.path_in(layout.root())).collect();
+    disk.map_or(Ok(()), SyncAhead::end)?;
     sync_data_set(layout.root(), &paths)?;
     manifest.complete(layout, entries, list)?;
     sync_file(&layout.manifest())?;

@@ -93,7 +93,7 @@ pub(crate) fn merge(folders: &[PathBuf], target: &Target<'_>) -> Outcome<()> {
         let stage = account.stage(Stage::Tables, None);
         let options = &request.options;
         assets::write(layout, labels.names().to_vec(), manifest.labels_padded_to(), options.conventions()?)?;
-        let made = finish(layout, request, manifest, &session.journal.finished())?;
+        let made = finish(layout, request, manifest, &session.journal.finished(), None)?;
         stage.end();
         Ok(made)
     };

@@ -120,9 +120,9 @@ pub(crate) fn export(
         }
         Begin::Session(session) => session,
     };
-    let made = job.run(layout, &session.journal, &account).and_then(|()| {
+    let made = job.run(layout, &session.journal, &account).and_then(|disk| {
         let tables = account.stage(Step::Tables, None);
-        let made = finish(layout, &job.request, manifest, &session.journal.finished())?;
+        let made = finish(layout, &job.request, manifest, &session.journal.finished(), Some(disk))?;
         tables.end();
         Ok(made)
     });
@@ -188,8 +188,8 @@ impl<'a> Job<'a> {
         Manifest::begin(&self.request, self.inputs.table.len())
     }
 
-    /// Does all units that are not done yet.
-    fn run(&self, layout: &Layout, journal: &Journal, account: &Account) -> Outcome<()> {
+    /// Does all units that are not done yet. What it has written goes to the disk meanwhile, and on after it.
+    fn run(&self, layout: &Layout, journal: &Journal, account: &Account) -> Outcome<SyncAhead> {
         let disk = SyncAhead::start(layout.root());
         self.write_assets(layout)?;
         let cache = layout.work_dir();
@@ -199,7 +199,8 @@ impl<'a> Job<'a> {
         let kept = candidates.iter().filter(|c| c.frame_num.is_some()).count();
         info!("selected {kept} of {} candidate views", candidates.len());
         self.render(common, &labelled, &candidates)?;
-        Ok(disk.end()?)
+        disk.sync_now();
+        Ok(disk)
     }
 
     /// Writes what is known before any unit is done: the label table, `assets`, `conventions.json`.
