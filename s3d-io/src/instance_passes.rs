@@ -64,7 +64,7 @@ pub(crate) trait PointBlocks: Send {
 /// let area = Annotations::open(&[dir.path().to_owned()], &Default::default())?;
 /// let mut reader = InstanceReader::new(1);
 /// let mut top = f32::MIN;
-/// let (mut points, _) = reader.read(&area.rooms[0].instances[0], None, |block| {
+/// let (mut points, _) = reader.read(&area.rooms[0].instances[0], None, |block, _| {
 ///     top = block.positions.iter().fold(top, |top, p| top.max(p.z));
 ///     Ok::<(), Error>(())
 /// })?;
@@ -118,8 +118,8 @@ impl<'a> InstanceReader<'a> {
         Self { block_points, now, next, ahead: None, first }
     }
 
-    /// Hands all points of an instance to `each`, block after block, with what [`AnnotatedInstance::read`] gives of each;
-    /// not even one block if it has no point. The next block is read meanwhile, on another thread of the current rayon
+    /// Hands all points of an instance to `each`, block after block, with what [`AnnotatedInstance::read`] gives of each,
+    /// and whether the block is all of them; not even one block if it has no point. The next block is read meanwhile, on another thread of the current rayon
     /// pool; during the last that is the first block of `then`, the instance that is going to be read after this one.
     /// Returns the points, to be gone through again, and what was left out.
     ///
@@ -129,7 +129,7 @@ impl<'a> InstanceReader<'a> {
         &mut self,
         instance: &'a AnnotatedInstance,
         then: Option<&'a AnnotatedInstance>,
-        mut each: impl FnMut(&PointCloud) -> std::result::Result<(), E> + Send,
+        mut each: impl FnMut(&PointCloud, bool) -> std::result::Result<(), E> + Send,
     ) -> std::result::Result<(InstancePasses<'_, 'a>, Skipped), E> {
         let Self { block_points, now, next, ahead, first } = self;
         let points = *block_points;
@@ -145,10 +145,11 @@ impl<'a> InstanceReader<'a> {
             copy = Some(PositionFile::create(dir)?);
         }
         while !now.is_empty() {
+            let is_whole = len == 0 && !more;
             len += now.len() as u64;
             let done = || -> std::result::Result<(), E> {
                 copy.iter_mut().try_for_each(|file| file.append(&now.positions))?;
-                each(now)
+                each(now, is_whole)
             };
             if !more {
                 let begin = || then.map(|then| (then, Begun::new(then, points, first)));
@@ -304,7 +305,8 @@ mod tests {
                 let mut first = PointCloud::default();
                 let mut most = 0;
                 let (mut passes, skipped) = reader
-                    .read(&instance, None, |block| {
+                    .read(&instance, None, |block, is_whole| {
+                        assert!(!is_whole || block.len() == points as usize);
                         most = most.max(block.len());
                         first.positions.extend(&block.positions);
                         first.colors.extend(&block.colors);
@@ -348,7 +350,7 @@ mod tests {
             ] {
                 let mut positions = Vec::new();
                 let (mut passes, _) = reader
-                    .read(instance, then, |block| {
+                    .read(instance, then, |block, _| {
                         positions.extend(&block.positions);
                         Ok::<(), Error>(())
                     })
@@ -372,9 +374,9 @@ mod tests {
         let [tree, cloud] = instances(dir.path(), 5);
         fs::write(tree.path(), "1 2 3 4 5 x\n").unwrap();
         let mut reader = InstanceReader::new(6);
-        let (passes, _) = reader.read(&cloud, Some(&tree), |_| Ok::<(), Error>(())).unwrap();
+        let (passes, _) = reader.read(&cloud, Some(&tree), |_, _| Ok::<(), Error>(())).unwrap();
         assert_eq!(passes.len(), 5);
-        let read = reader.read(&tree, None, |_| Ok::<(), Error>(()));
+        let read = reader.read(&tree, None, |_, _| Ok::<(), Error>(()));
         assert!(read.is_err_and(|e| e.to_string().contains("wall_1.txt")));
     }
 
@@ -389,7 +391,7 @@ mod tests {
         let mut reader = InstanceReader::new(6);
         let mut blocks = 0;
         let (passes, skipped) = reader
-            .read(&area.rooms[0].instances[0], None, |_| {
+            .read(&area.rooms[0].instances[0], None, |_, _| {
                 blocks += 1;
                 Ok::<(), Error>(())
             })
@@ -405,12 +407,12 @@ mod tests {
         let failure = || Error::format(std::path::Path::new("x"), "enough");
         let mut reader = InstanceReader::new(6);
         let mut blocks = 0;
-        let read = reader.read(&tree, None, |_| {
+        let read = reader.read(&tree, None, |_, _| {
             blocks += 1;
             if blocks == 2 { Err(failure()) } else { Ok(()) }
         });
         assert!(read.is_err() && blocks == 2);
-        let (mut passes, _) = reader.read(&tree, None, |_| Ok::<(), Error>(())).unwrap();
+        let (mut passes, _) = reader.read(&tree, None, |_, _| Ok::<(), Error>(())).unwrap();
         assert!(passes.pass(&mut |_| Err(failure())).is_err());
     }
 }

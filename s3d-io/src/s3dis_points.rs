@@ -2,11 +2,13 @@
 
 use crate::annotations::Skipped;
 use crate::instance_passes::PointBlocks;
-use crate::obj_lines::words;
+use crate::obj_lines::{number, words};
 use crate::quote::quote;
 use crate::s3dis::OnFault;
 use crate::texture_file::open_file;
 use crate::{Error, Result};
+use memchr::{memchr, memrchr};
+use rayon::prelude::*;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{Vec3, vec3};
 use std::fs::File;
@@ -17,6 +19,12 @@ use std::path::{Path, PathBuf};
 const BLOCK: usize = 1 << 20;
 /// The longest line that may hold a point.
 const LONGEST_LINE: usize = 1 << 16;
+/// The shortest: `0 0 0 0 0 0` and its end.
+const SHORTEST_LINE: usize = 12;
+/// Bytes that one thread reads at a time.
+const PIECE: usize = 1 << 16;
+/// What files of UTF-8 may begin with.
+const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Reads points of a file piece by piece, so that one of any size needs little memory.
 ///
@@ -107,14 +115,15 @@ impl PointReader {
     pub fn read_chunk(&mut self, max_points: usize, out: &mut PointCloud) -> Result<usize> {
         assert!(max_points > 0, "a chunk of no points");
         assert!(out.colors.len() == out.len() && out.faces.is_empty(), "a cloud of other columns");
-        let mut n = 0;
+        let mut n = self.read_pieces(max_points, out);
         while n < max_points {
             let unread = self.block.get(self.start..self.end).unwrap_or_default();
-            let end = unread.iter().position(|&b| b == b'\n');
+            let end = memchr(b'\n', unread);
             let (line, used) = match end.and_then(|length| unread.split_at_checked(length)) {
                 Some((line, _)) => (line, line.len() + 1),
                 None if !self.at_end && unread.len() <= LONGEST_LINE => {
                     self.refill()?;
+                    n += self.read_pieces(max_points - n, out);
                     continue;
                 }
                 None if unread.is_empty() => break,
@@ -122,7 +131,7 @@ impl PointReader {
             };
             self.line += 1;
             // A mark of UTF-8 is no part of the first number.
-            let line = if self.line == 1 { line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line) } else { line };
+            let line = if self.line == 1 { line.strip_prefix(MARK).unwrap_or(line) } else { line };
             match parse_point(line) {
                 Ok(Some((position, color))) => {
                     out.positions.push(position);
@@ -143,6 +152,31 @@ impl PointReader {
             self.start += used;
         }
         Ok(n)
+    }
+
+    /// Appends the points of all whole lines at hand, on all threads, and gives their number. Nothing if something is wrong
+    /// with one, or if they may be more than `max_points`.
+    fn read_pieces(&mut self, max_points: usize, out: &mut PointCloud) -> usize {
+        let unread = self.block.get(self.start..self.end).unwrap_or_default();
+        let Some((lines, _)) = memrchr(b'\n', unread).and_then(|last| unread.split_at_checked(last + 1))
+        else {
+            return 0;
+        };
+        let has_mark = self.line == 0 && lines.starts_with(MARK);
+        if has_mark || lines.len() / SHORTEST_LINE >= max_points {
+            return 0;
+        }
+        let pieces: Vec<&[u8]> = pieces(lines).collect();
+        let read: Option<Vec<(PointCloud, u64)>> = pieces.par_iter().map(|piece| points_of(piece)).collect();
+        let Some(read) = read else { return 0 };
+        self.start += lines.len();
+        let before = out.len();
+        for (points, lines) in read {
+            out.positions.extend_from_slice(&points.positions);
+            out.colors.extend_from_slice(&points.colors);
+            self.line += lines;
+        }
+        out.len() - before
     }
 
     /// Moves what is not used up to the front and fills the rest of the block.
@@ -185,6 +219,32 @@ pub fn read_points(path: &Path, out: &mut PointCloud) -> Result<()> {
     Ok(())
 }
 
+/// Whole lines, cut into parts of whole lines.
+fn pieces(mut lines: &[u8]) -> impl Iterator<Item = &[u8]> {
+    std::iter::from_fn(move || {
+        let end =
+            lines.get(PIECE..).and_then(|rest| memchr(b'\n', rest)).map_or(lines.len(), |at| PIECE + at + 1);
+        let (piece, rest) = lines.split_at_checked(end)?;
+        lines = rest;
+        (!piece.is_empty()).then_some(piece)
+    })
+}
+
+/// The points of whole lines and the number of these, if nothing is wrong with any.
+fn points_of(mut lines: &[u8]) -> Option<(PointCloud, u64)> {
+    let mut points = PointCloud::default();
+    let mut n = 0;
+    while let Some((line, rest)) = memchr(b'\n', lines).and_then(|end| lines.split_at_checked(end)) {
+        lines = rest.get(1..)?;
+        n += 1;
+        if let Some((position, color)) = parse_point(line).ok()? {
+            points.positions.push(position);
+            points.colors.push(color);
+        }
+    }
+    Some((points, n))
+}
+
 /// The point of a line, or `None` if the line is empty.
 fn parse_point(line: &[u8]) -> std::result::Result<Option<(Vec3, [u8; 3])>, String> {
     let mut words = words(line);
@@ -203,8 +263,7 @@ fn parse_point(line: &[u8]) -> std::result::Result<Option<(Vec3, [u8; 3])>, Stri
         return Err(format!("not a point `x y z r g b`: {than}{} fields", n.min(6)));
     }
     let coordinate = |word: &[u8]| -> std::result::Result<f32, String> {
-        let number: Option<f32> = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
-        match number {
+        match number(word) {
             Some(v) if v.is_finite() => Ok(v),
             Some(_) => Err(format!("the coordinate {} is not finite", quote(word))),
             None => Err(format!("the coordinate {} is no number", quote(word))),

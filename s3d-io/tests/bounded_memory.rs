@@ -50,7 +50,7 @@ fn a_cloud_of_one_instance_is_boxed_and_voxelised_in_little_memory() {
     let mut bbox = Aabb::EMPTY;
     let mut reader = InstanceReader::new(BLOCK);
     let (mut points, _) = reader
-        .read(instance, None, |block| {
+        .read(instance, None, |block, _| {
             bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
             Ok::<(), Error>(())
         })

@@ -11,7 +11,7 @@ use s3d_geom::{
 };
 use s3d_io::{Error, InstanceReader, PointPasses};
 use s3d_label::{Class, Label, LabelId, LabelTable, Room, VoteReport, Votes};
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 
 /// Points that are in memory, three times: while some are looked up, those that follow are read.
 const BLOCK_POINTS: usize = 1 << 19;
@@ -83,7 +83,7 @@ pub(crate) fn annotate(
     area: &AreaInput,
     nearest_faces: &NearestFaces<'_>,
     table: &LabelTable,
-    mut each: impl FnMut(AnnotatedInstance<'_>) -> Outcome<()>,
+    mut each: impl FnMut(AnnotatedInstance<'_>) -> Outcome<()> + Send,
 ) -> Outcome<Annotated> {
     let mesh = nearest_faces.mesh();
     let mut votes = Votes::new(mesh.faces().len());
@@ -106,17 +106,10 @@ pub(crate) fn annotate(
             let id = table.id_of(&instance.label).unwrap_or(LabelId::NULL);
             let then = following.next().map(|instance| &instance.points);
             stop::check()?;
-            let mut bbox = Aabb::EMPTY;
-            let vote_for_all = |block: &PointCloud| -> Outcome<()> {
+            let (mut bbox, mut is_handed_out) = (Aabb::EMPTY, false);
+            let vote_for_all = |block: &PointCloud, is_whole: bool| -> Outcome<()> {
                 stop::check()?;
-                if !instance.points.are_vertices() && !has_faces(block) {
-                    nearest_faces.nearest_many(&block.positions, &mut nearest);
-                }
-                // The floor's outline takes as long as counting votes, which is one thread's work too.
-                let outline = || {
-                    block.positions.iter().for_each(|p| builder.add(*p));
-                    bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
-                };
+                bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
                 let vote = || {
                     if instance.points.are_vertices() {
                         let corners = corners.get_or_insert_with(|| Corners::new(mesh));
@@ -126,12 +119,24 @@ pub(crate) fn annotate(
                         vote_for_faces(block, id, &mut votes)
                             .map_err(|m| Error::format(instance.points.path(), m))
                     } else {
+                        nearest_faces.nearest_many(&block.positions, &mut nearest);
                         nearest.iter().for_each(|n| votes.add(n.face, id, n.distance_m));
                         Ok(())
                     }
                 };
-                let (voted, ()) = rayon::join(vote, outline);
-                Ok(voted?)
+                // Votes are counted by one thread; the others draw the floor's outline, and write.
+                let outline = || block.positions.iter().for_each(|p| builder.add(*p));
+                let hand_out = || {
+                    if !is_whole {
+                        return Ok(());
+                    }
+                    is_handed_out = true;
+                    let points = &mut &block.positions[..];
+                    each(AnnotatedInstance { label: instance.label, id, bbox, points })
+                };
+                let (voted, ((), handed_out)) = rayon::join(vote, || rayon::join(outline, hand_out));
+                voted?;
+                handed_out
             };
             let before = undrawn.take();
             let (read, outline) = rayon::join(
@@ -157,7 +162,9 @@ pub(crate) fn annotate(
             }
             points += passes.len();
             room_bbox = room_bbox.union(bbox);
-            each(AnnotatedInstance { label: instance.label, id, bbox, points: &mut passes })?;
+            if !is_handed_out {
+                each(AnnotatedInstance { label: instance.label, id, bbox, points: &mut passes })?;
+            }
         }
         total += points;
         // Of a room before one without an instance.
@@ -240,9 +247,10 @@ pub(crate) fn hidden_instances(
     face_labels: &[LabelId],
     table: &LabelTable,
 ) -> Option<String> {
-    let seen: HashSet<LabelId> = face_labels.iter().copied().collect();
+    let mut seen = vec![false; table.len()];
+    face_labels.iter().for_each(|label| seen[label.0 as usize] = true);
     let instances = area.rooms.iter().flat_map(|r| &r.instances);
-    let mut hidden = instances.filter(|i| table.id_of(&i.label).is_none_or(|id| !seen.contains(&id)));
+    let mut hidden = instances.filter(|i| table.id_of(&i.label).is_none_or(|id| !seen[id.0 as usize]));
     let first = hidden.next()?;
     Some(format!(
         "{} annotated instances win no face of the mesh, the first {}: they are in no image and no sampled point",
