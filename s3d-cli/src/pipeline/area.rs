@@ -21,6 +21,7 @@ use crate::args::ExportOptions;
 use crate::event::{Stage as Step, UnitKind};
 use crate::failure::{Failure, Outcome};
 use crate::stop;
+use rayon::prelude::*;
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::{
     Compression, Content, FileRecord, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation,
@@ -201,10 +202,6 @@ pub(crate) fn label_area(
     let located = locate(area, scene, &nearest, &annotated, table, options.seed)?;
     drop(nearest);
     let (locations, location_rooms): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();
-    for location in &locations {
-        stop::check()?;
-        Outlook::of(scene, location).warnings(location).iter().for_each(|w| warn!("{w}"));
-    }
     let plan = AreaPlan {
         area: number,
         annotated,
@@ -215,9 +212,9 @@ pub(crate) fn label_area(
         mesh_area_m2: file.mesh.total_area(),
         faces_left_out: file.mesh.report().zero_area_faces + file.repeated_faces,
     };
-    plan.write(&common.cache_of(number))?;
-
-    if let Some(instances) = instances {
+    let write = || -> Outcome<()> {
+        plan.write(&common.cache_of(number))?;
+        let Some(instances) = instances else { return Ok(()) };
         instances.finish()?;
         records::write_rooms(layout, number, &plan.annotated)?;
         records::write_votes(layout, number, &plan.annotated.report)?;
@@ -226,10 +223,23 @@ pub(crate) fn label_area(
         let tally = tally_of(&files);
         journal.write(Done::Labels(labels_done(area, &plan, options, files)))?;
         account.unit_finished(UnitKind::Labels, number, None, &tally, started);
-    }
+        Ok(())
+    };
+    let (doubts, written) = rayon::join(|| location_doubts(scene, &plan.locations), write);
+    doubts?.iter().for_each(|w| warn!("{w}"));
+    written?;
     know_labels(area, &plan, &common);
     labelling.end();
     Ok(plan)
+}
+
+/// What looks wrong about scan locations, as a sentence each.
+fn location_doubts(scene: &Scene<'_>, locations: &[ScanLocation]) -> Outcome<Vec<String>> {
+    let doubts = locations.par_iter().map(|location| -> Outcome<Vec<String>> {
+        stop::check()?;
+        Ok(Outlook::of(scene, location).warnings(location))
+    });
+    Ok(doubts.collect::<Outcome<Vec<_>>>()?.concat())
 }
 
 /// Tells the journal of an area's labels, if it does not know of them: their files are another's work.
