@@ -2,6 +2,7 @@
 
 use crate::{Aabb, Texture};
 use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// In place of an index: this face (or corner) has none.
@@ -194,7 +195,7 @@ impl TriMesh {
 
         let has_area: Vec<bool> = parts
             .faces
-            .iter()
+            .par_iter()
             .map(|f| area_vector(f.map(|v| parts.positions[v as usize])) != DVec3::ZERO)
             .collect();
         report.zero_area_faces = has_area.iter().filter(|&&keep| !keep).count();

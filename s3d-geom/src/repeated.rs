@@ -2,7 +2,7 @@
 
 use crate::mesh::keep_where;
 use crate::{MeshParts, TriMesh};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use rayon::prelude::*;
 
 impl TriMesh {
     /// The mesh without the faces that repeat an earlier one — the same three corners in space, in any order — and how
@@ -11,8 +11,9 @@ impl TriMesh {
     #[must_use]
     pub fn without_repeated_faces(self) -> (Self, usize) {
         let count = self.faces().len();
-        let mut by_hash: Vec<(u64, u32)> = (0..count as u32).map(|f| (hash(corners(&self, f)), f)).collect();
-        by_hash.sort_unstable();
+        let mut by_hash: Vec<(u64, u32)> =
+            (0..count as u32).into_par_iter().map(|f| (hash(corners(&self, f)), f)).collect();
+        by_hash.par_sort_unstable();
         let mut keep = vec![true; count];
         for group in by_hash.chunk_by(|a, b| a.0 == b.0) {
             // Almost always one face. Others are repeated if their corners are, whatever their hashes say.
@@ -44,9 +45,9 @@ fn corners(mesh: &TriMesh, face: u32) -> [[u32; 3]; 3] {
 }
 
 fn hash(corners: [[u32; 3]; 3]) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    corners.hash(&mut hasher);
-    hasher.finish()
+    let mix =
+        |hash: u64, part: &u32| (hash ^ u64::from(*part)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+    corners.as_flattened().iter().fold(0, mix)
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::texture_file::read_file;
 use crate::{Error, Result};
 use s3d_geom::glam::{Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Reads an OBJ file, the libraries that it names and their `map_Kd` images.
@@ -111,8 +112,10 @@ struct Columns {
 
 impl Columns {
     fn new(plain: &PlainObj) -> Self {
-        let (uvs, face_uvs) = used(&plain.values.uvs, &plain.elements.corners[1]);
-        let (normals, face_normals) = used(&plain.values.normals, &plain.elements.corners[2]);
+        let ((uvs, face_uvs), (normals, face_normals)) = rayon::join(
+            || used(&plain.values.uvs, &plain.elements.corners[1]),
+            || used(&plain.values.normals, &plain.elements.corners[2]),
+        );
         let normals = normals.into_iter().map(|n| n / n.length()).collect();
         Self { uvs, face_uvs, normals, face_normals }
     }
@@ -170,7 +173,7 @@ impl Triangles {
             start += n;
             let polygon = &vertices[corners.clone()];
             let cut = if n == 3 {
-                vec![[0, 1, 2]]
+                Cow::Borrowed(&[[0, 1, 2]][..])
             } else {
                 let points: Vec<Vec3> = polygon.iter().map(|&v| plain.values.positions[v as usize]).collect();
                 if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
@@ -179,7 +182,7 @@ impl Triangles {
                 match triangulate_face(&points) {
                     Ok(cut) => {
                         out.polygons += 1;
-                        cut
+                        Cow::Owned(cut)
                     }
                     Err(e) => {
                         out.refused.get_or_insert_with(|| (face.line, e.to_string(), 0)).2 += 1;
@@ -189,7 +192,7 @@ impl Triangles {
             };
             let uvs = (face.has_uv && !uvs.is_empty()).then(|| &uvs[corners.clone()]);
             let normals = (face.has_normal && !normals.is_empty()).then(|| &normals[corners]);
-            for triangle in cut {
+            for triangle in cut.iter() {
                 let pick = |column: &[u32]| triangle.map(|c| column[c as usize]);
                 out.triangles.push(pick(polygon));
                 out.uvs.push(uvs.map_or([NO_INDEX; 3], pick));

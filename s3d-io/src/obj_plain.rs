@@ -236,6 +236,32 @@ impl Elements {
         Some(fault(line, &text.map_or_else(Vec::new, |(_, text)| text.into_owned()), message))
     }
 
+    /// The indices of a corner, from 1 and 0 for none, however it is written.
+    fn any_corner(&self, corner: &[u8]) -> std::result::Result<[u64; 3], String> {
+        let mut indices = [0; 3];
+        let mut parts = corner.split(|&b| b == b'/');
+        for (column, (index, count)) in indices.iter_mut().zip(self.counts).enumerate() {
+            let part = parts.next().unwrap_or_default();
+            if part.is_empty() {
+                continue;
+            }
+            let written =
+                whole_number(part).ok_or_else(|| format!("the index {} is no whole number", quote(part)))?;
+            let absolute = if written < 0 { count as i64 + written + 1 } else { written };
+            if absolute < 1 {
+                return Err(out_of_range(column, written, count));
+            }
+            *index = absolute as u64;
+        }
+        if parts.next().is_some() {
+            return Err(format!("the corner {} has more than three indices", quote(corner)));
+        }
+        if indices[0] == 0 {
+            return Err(format!("the corner {} has no vertex", quote(corner)));
+        }
+        Ok(indices)
+    }
+
     /// Adds a face, and gives back the columns and indices, from 1, that lie beyond the columns so far.
     fn add_face(
         &mut self,
@@ -247,32 +273,19 @@ impl Elements {
         let (start, mut corners) = (self.corners[0].len(), 0);
         let mut has = [true; 3];
         while let Some(corner) = next_word(&mut rest) {
-            let mut parts = corner.split(|&b| b == b'/');
-            let columns = self.corners.iter_mut().zip(self.counts).zip(&mut has);
-            for (column, ((indices, count), has)) in columns.enumerate() {
-                let part = parts.next().unwrap_or_default();
-                if part.is_empty() {
-                    *has = false;
-                    indices.push(NO_INDEX);
-                    continue;
-                }
-                let index = whole_number(part)
-                    .ok_or_else(|| format!("the index {} is no whole number", quote(part)))?;
-                let absolute = if index < 0 { count as i64 + index + 1 } else { index };
-                if index == 0 || absolute < 1 {
-                    return Err(out_of_range(column, index, count));
-                }
-                if absolute as u64 > count {
-                    beyond.push((column, absolute as u64));
-                }
+            let indices = match plain_corner(corner) {
+                Some(indices) => indices,
+                None => self.any_corner(corner)?,
+            };
+            let columns = self.corners.iter_mut().zip(self.counts).zip(&mut has).zip(indices);
+            for (column, (((column_indices, count), has), index)) in columns.enumerate() {
                 // What u32 does not hold is beyond every column that is not refused for its length.
-                indices.push((absolute - 1).min(i64::from(NO_INDEX - 1)) as u32);
-            }
-            if parts.next().is_some() {
-                return Err(format!("the corner {} has more than three indices", quote(corner)));
-            }
-            if !has[0] {
-                return Err(format!("the corner {} has no vertex", quote(corner)));
+                let from_0 = index.checked_sub(1).map_or(NO_INDEX, |i| i.min(u64::from(NO_INDEX - 1)) as u32);
+                column_indices.push(from_0);
+                *has &= index > 0;
+                if index > count {
+                    beyond.push((column, index));
+                }
             }
             corners += 1;
         }
@@ -284,6 +297,27 @@ impl Elements {
         }
         Ok(beyond)
     }
+}
+
+/// The indices of a corner, from 1 and 0 for none, if it is written as nearly all are: digits, and a vertex at least.
+#[inline]
+fn plain_corner(corner: &[u8]) -> Option<[u64; 3]> {
+    // So many digits cannot overflow.
+    if corner.len() > 18 {
+        return None;
+    }
+    let mut indices = [0; 3];
+    let mut columns = indices.iter_mut();
+    let mut index: &mut u64 = columns.next()?;
+    for &byte in corner {
+        match byte {
+            b'0' if *index == 0 => return None,
+            b'0'..=b'9' => *index = *index * 10 + u64::from(byte - b'0'),
+            b'/' => index = columns.next()?,
+            _ => return None,
+        }
+    }
+    (indices[0] > 0).then_some(indices)
 }
 
 /// The whole number that a word spells, if 64 bits hold it.
