@@ -346,7 +346,7 @@ fn faces_below(bvh: &Bvh2) -> Vec<usize> {
 /// Beyond this the builder's surface areas would overflow.
 const LARGEST_COORDINATE: f32 = 1e15;
 
-/// The hierarchy of two boxes a node that ours is made from. Its leaves hold no more than [`LEAF_SIZE`] faces.
+/// The hierarchy of two boxes a node that ours is made from. Its leaves hold a face each.
 fn build_bvh(mesh: &TriMesh) -> Bvh2 {
     let bounds = mesh.aabb();
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
@@ -357,7 +357,12 @@ fn build_bvh(mesh: &TriMesh) -> Bvh2 {
             Triangle { v0, v1, v2 }
         })
         .collect();
-    let params = BvhBuildParams { max_prims_per_leaf: LEAF_SIZE as u32, ..BvhBuildParams::medium_build() };
+    // Ours gathers leaves itself: theirs need not.
+    let params = BvhBuildParams {
+        max_prims_per_leaf: 1,
+        post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
+        ..BvhBuildParams::medium_build()
+    };
     let mut bvh = build_bvh2_from_tris(&triangles, params, &mut Duration::default());
     if scale != 1.0 {
         for node in bvh.nodes.iter_mut().filter(|node| node.is_leaf()) {
