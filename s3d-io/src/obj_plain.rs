@@ -366,12 +366,35 @@ fn refuse_other_files(path: &Path, bytes: &[u8]) -> Result<()> {
 mod tests {
     use super::*;
     use crate::obj_looks::ObjNames;
+    use proptest::prelude::*;
 
     fn parse(text: &str) -> Result<PlainObj> {
         PlainObj::parse(Path::new("a.obj"), text.as_bytes())
     }
 
     const THREE: &str = "v 0 0 0\nv 1 0 0 # x\nv\t0 1 0\n";
+
+    proptest! {
+        #[test]
+        fn a_plain_corner_is_any_corner(corner in "[0-9/-]{0,20}") {
+            let elements = Elements { counts: [9; 3], ..Elements::default() };
+            if let Some(indices) = plain_corner(corner.as_bytes()) {
+                prop_assert_eq!(elements.any_corner(corner.as_bytes()), Ok(indices));
+            }
+        }
+    }
+
+    #[test]
+    fn corners_are_plain_as_nearly_all_files_write_them() {
+        for (corner, indices) in
+            [("7", [7, 0, 0]), ("10/20", [10, 20, 0]), ("1//3", [1, 0, 3]), ("12/34/50", [12, 34, 50])]
+        {
+            assert_eq!(plain_corner(corner.as_bytes()), Some(indices));
+        }
+        for corner in ["", "/1", "0", "1/0", "-1", "+1", "01", "1/2/3/4", "1234567890123456789"] {
+            assert_eq!(plain_corner(corner.as_bytes()), None, "{corner}");
+        }
+    }
 
     #[test]
     fn dialects_become_plain() {

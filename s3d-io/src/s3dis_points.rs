@@ -372,6 +372,31 @@ mod tests {
     }
 
     #[test]
+    fn a_fault_among_many_lines_has_its_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        let n = 5 * BLOCK / 20;
+        // In the first piece, in one between, in a later block.
+        for bad in [3, 2 * PIECE / 20, n - 7] {
+            let line = |i| if i == bad { "x\n".to_owned() } else { format!("{i}.5 0 1 2 3 4\n\n") };
+            fs::write(&path, (0..n).map(line).collect::<String>()).unwrap();
+            // Each line but the bad one is followed by an empty one.
+            let words = format!("line {}: not a point", 2 * bad + 1);
+            let mut cloud = PointCloud::default();
+            let message = read_points(&path, &mut cloud).unwrap_err().to_string();
+            assert!(message.contains(&words), "{message}");
+            assert_eq!(cloud.len(), bad);
+            let mut reader = PointReader::open_with(&path, OnFault::Skip).unwrap();
+            cloud.clear();
+            while reader.read_chunk(usize::MAX, &mut cloud).unwrap() > 0 {}
+            assert_eq!((cloud.len(), reader.skipped()), (n - 1, 1));
+            assert!(reader.first_skipped().unwrap().to_string().contains(&words));
+            let x = (0..n).filter(|i| *i != bad).map(|i| i as f32 + 0.5);
+            assert!(cloud.positions.iter().map(|p| p.x).eq(x));
+        }
+    }
+
+    #[test]
     fn an_endless_line_is_refused_without_holding_it() {
         let message = read(&vec![b'1'; 3 * BLOCK]).unwrap_err().to_string();
         assert!(message.contains("line 1: not a point") && message.len() < 300, "{message}");
