@@ -119,8 +119,9 @@ impl<'a> InstanceReader<'a> {
     }
 
     /// Hands all points of an instance to `each`, block after block, with what [`AnnotatedInstance::read`] gives of each,
-    /// and whether the block is all of them; not even one block if it has no point. The next block is read meanwhile, on another thread of the current rayon
-    /// pool; during the last that is the first block of `then`, the instance that is going to be read after this one.
+    /// and whether the block is all of them; not even one block if it has no point. The next block is read meanwhile, on
+    /// another thread of the current rayon pool; during the last that is the first block of `then`, the instance that is
+    /// going to be read after this one.
     /// Returns the points, to be gone through again, and what was left out.
     ///
     /// # Errors
