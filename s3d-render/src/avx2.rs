@@ -5,7 +5,7 @@
 #![allow(unsafe_code)]
 
 use crate::blend::Blend;
-use crate::lanes::{LANES, Lanes, STAMP, Texels};
+use crate::lanes::{EightRays, LANES, Lanes, STAMP, Texels};
 use half::f16;
 use std::arch::x86_64::*;
 
@@ -258,32 +258,18 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-        to: &mut [f32; 3 * LANES],
-    ) {
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
         unsafe {
-            let points = self.0.points::<TURN>(column, row, depths, place);
+            let points = self.0.points::<TURN>(rays);
             for (k, eight) in points.iter().enumerate() {
                 _mm256_storeu_ps(to.as_mut_ptr().add(8 * k), *eight);
             }
         }
     }
     #[inline(always)]
-    fn half_points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-        to: &mut [f16; 3 * LANES],
-    ) {
+    fn half_points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
         unsafe {
-            let points = self.0.points::<TURN>(column, row, depths, place);
+            let points = self.0.points::<TURN>(rays);
             for (k, eight) in points.iter().enumerate() {
                 let eight = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(*eight);
                 _mm_storeu_si128(to.as_mut_ptr().add(8 * k).cast(), eight);
@@ -343,12 +329,8 @@ fn lanes_of(these: u32) -> __m256i {
 /// See [`Blend::points`].
 #[inline]
 #[target_feature(enable = "avx2")]
-pub(crate) fn points<const TURN: bool>(
-    column: &[f64; 3 * LANES],
-    row: &[f64; 12],
-    depths: &[f32; LANES],
-    place: &[f64; 12],
-) -> [__m256; 3] {
+pub(crate) fn points<const TURN: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
+    let EightRays { column, row, depths, place } = *rays;
     // SAFETY: loads from references, of no more than they hold.
     let load = |from: &[f64], k: usize| unsafe { _mm256_loadu_pd(from[4 * k..4 * k + 4].as_ptr()) };
     let all = unsafe { _mm256_loadu_ps(depths.as_ptr()) };
@@ -452,20 +434,14 @@ mod tests {
     }
 
     /// Points that are seen, and those in half floats.
-    fn same_points(
-        lanes: impl Lanes,
-        column: &[f64; 24],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-    ) -> Result<(), TestCaseError> {
+    fn same_points(lanes: impl Lanes, rays: &EightRays<'_>) -> Result<(), TestCaseError> {
         let (mut got, mut want) = ([0.0; 24], [0.0; 24]);
-        lanes.points::<false>(column, row, depths, place, &mut got);
-        Plain.points::<false>(column, row, depths, place, &mut want);
+        lanes.points::<false>(rays, &mut got);
+        Plain.points::<false>(rays, &mut want);
         prop_assert_eq!(got.map(f32::to_bits), want.map(f32::to_bits));
         let (mut got, mut want) = ([f16::ZERO; 24], [f16::ZERO; 24]);
-        lanes.half_points::<true>(column, row, depths, place, &mut got);
-        Plain.half_points::<true>(column, row, depths, place, &mut want);
+        lanes.half_points::<true>(rays, &mut got);
+        Plain.half_points::<true>(rays, &mut want);
         prop_assert_eq!(got.map(f16::to_bits), want.map(f16::to_bits));
         Ok(())
     }
@@ -590,9 +566,10 @@ mod tests {
             let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
             let four = |a: [f64; 3]| std::array::from_fn(|k| a[k % 3]);
             let (row, place): ([f64; 12], [f64; 12]) = (four(row), four(place));
-            same_points(avx2, &column, &row, &depths, &place)?;
+            let rays = EightRays { column: &column, row: &row, depths: &depths, place: &place };
+            same_points(avx2, &rays)?;
             if let Some(full) = Full::detect().map(Avx2) {
-                same_points(full, &column, &row, &depths, &place)?;
+                same_points(full, &rays)?;
             }
         }
     }

@@ -8,7 +8,7 @@
 #![allow(unsafe_code)]
 
 use crate::avx2::{self, Avx2};
-use crate::lanes::{LANES, LaneWork};
+use crate::lanes::{EightRays, LANES, LaneWork};
 use std::arch::x86_64::*;
 
 /// The widest registers that hold texels. Its values are proof that the processor has what they take.
@@ -37,13 +37,7 @@ pub(crate) trait Blend: Copy {
     /// See [`crate::lanes::Lanes::changes`].
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
     /// What [`crate::lanes::Lanes::points`] stores.
-    fn points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-    ) -> [__m256; 3];
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3];
 }
 
 /// The upper neighbours' R G B R G B as 16-bit numbers R R, G G, B B; and the lower ones'.
@@ -168,14 +162,8 @@ impl Blend for Half {
         unsafe { avx2::changes(values, from, to) }
     }
     #[inline(always)]
-    fn points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-    ) -> [__m256; 3] {
-        unsafe { avx2::points::<TURN>(column, row, depths, place) }
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
+        unsafe { avx2::points::<TURN>(rays) }
     }
 }
 
@@ -288,19 +276,14 @@ impl Blend for Full {
         }
     }
     #[inline(always)]
-    fn points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-    ) -> [__m256; 3] {
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
         // Of the numbers 8k to 8k + 7: whose depth it is, and where x y z x y z… begins.
         const DEPTHS: [[i64; 8]; 3] =
             [[0, 0, 0, 1, 1, 1, 2, 2], [2, 3, 3, 3, 4, 4, 4, 5], [5, 5, 6, 6, 6, 7, 7, 7]];
         const AXES: [usize; 3] = [0, 2, 1];
         /// Infinities and what is not a number.
         const MISSING: i32 = 0b1001_1001;
+        let EightRays { column, row, depths, place } = *rays;
         unsafe {
             let all = _mm512_cvtps_pd(_mm256_loadu_ps(depths.as_ptr()));
             let load = |from: &[f64], k: usize| _mm512_loadu_pd(from[k..k + 8].as_ptr());

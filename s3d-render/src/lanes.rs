@@ -103,25 +103,10 @@ pub(crate) trait Lanes: Copy {
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
     /// Depths in 512ths, rounded half up, at most 65,535.
     fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]);
-    /// Points place + direction × depth, rounded to `f32`: `column` and `row` are [`DirectionPart`]s, and what belongs to
-    /// an axis repeats x y z x y z…
-    fn points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-        to: &mut [f32; 3 * LANES],
-    );
+    /// Points place + direction × depth, rounded to `f32`; `TURN` says how a direction is made.
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]);
     /// As [`Lanes::points`], rounded once more to half floats.
-    fn half_points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-        to: &mut [f16; 3 * LANES],
-    );
+    fn half_points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]);
 }
 
 /// An image's bytes, and up to where 2 × 2 pixels can be read at once.
@@ -156,6 +141,19 @@ impl<'a> Texels<'a> {
     pub(crate) fn end(&self) -> u32 {
         self.end
     }
+}
+
+/// Eight rays side by side, and how far they reach. What belongs to an axis repeats: x y z x y z…
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EightRays<'a> {
+    /// Of each ray, what its column gives to its direction.
+    pub(crate) column: &'a [f64; 3 * LANES],
+    /// What their row gives: to be added to that, or multiplied by it axis by axis if the columns turn.
+    pub(crate) row: &'a [f64; 12],
+    /// Missing where it is not finite.
+    pub(crate) depths: &'a [f32; LANES],
+    /// Where they start.
+    pub(crate) place: &'a [f64; 12],
 }
 
 /// a · b / 32768, rounded half up.
@@ -413,14 +411,8 @@ impl Lanes for Plain {
         *to = depths.map(|depth| (((depth * 1024.0).clamp(0.0, 131_070.0) as i32 + 1) >> 1) as u16);
     }
     #[inline(always)]
-    fn points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &Eight,
-        place: &[f64; 12],
-        to: &mut [f32; 3 * LANES],
-    ) {
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
+        let EightRays { column, row, depths, place } = *rays;
         *to = std::array::from_fn(|k| {
             let (axis, depth) = (k % 3, depths[k / 3]);
             let direction = if TURN { column[k] * row[axis] } else { column[k] + row[axis] };
@@ -428,16 +420,9 @@ impl Lanes for Plain {
         });
     }
     #[inline(always)]
-    fn half_points<const TURN: bool>(
-        self,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &Eight,
-        place: &[f64; 12],
-        to: &mut [f16; 3 * LANES],
-    ) {
+    fn half_points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
         let mut points = [0.0; 3 * LANES];
-        self.points::<TURN>(column, row, depths, place, &mut points);
+        self.points::<TURN>(rays, &mut points);
         *to = points.map(f16::from_f32);
     }
 }

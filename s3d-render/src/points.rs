@@ -2,7 +2,7 @@
 
 use crate::Hits;
 use crate::channels::{assert_size, fit};
-use crate::lanes::{self, LANES, LaneWork, Lanes};
+use crate::lanes::{self, EightRays, LANES, LaneWork, Lanes};
 use glam::DVec3;
 use half::f16;
 use s3d_geom::{Camera, Projection, Raster, Rays};
@@ -51,43 +51,22 @@ pub fn xyz_image_half_into(hits: &Hits, camera: &Camera, out: &mut Raster<[f16; 
 pub(crate) trait Coordinate: Copy {
     const ZERO: Self;
     /// [`Lanes::points`] in this type.
-    fn points<const TURN: bool>(
-        lanes: impl Lanes,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-        to: &mut [Self; 3 * LANES],
-    );
+    fn points<const TURN: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]);
 }
 
 impl Coordinate for f32 {
     const ZERO: Self = 0.0;
     #[inline(always)]
-    fn points<const TURN: bool>(
-        lanes: impl Lanes,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-        to: &mut [Self; 3 * LANES],
-    ) {
-        lanes.points::<TURN>(column, row, depths, place, to);
+    fn points<const TURN: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]) {
+        lanes.points::<TURN>(rays, to);
     }
 }
 
 impl Coordinate for f16 {
     const ZERO: Self = f16::ZERO;
     #[inline(always)]
-    fn points<const TURN: bool>(
-        lanes: impl Lanes,
-        column: &[f64; 3 * LANES],
-        row: &[f64; 12],
-        depths: &[f32; LANES],
-        place: &[f64; 12],
-        to: &mut [Self; 3 * LANES],
-    ) {
-        lanes.half_points::<TURN>(column, row, depths, place, to);
+    fn points<const TURN: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]) {
+        lanes.half_points::<TURN>(rays, to);
     }
 }
 
@@ -161,12 +140,13 @@ impl Directions {
             let (eights, rest) = depths.as_chunks::<LANES>();
             let (out, last) = out.as_flattened_mut().as_chunks_mut::<{ 3 * LANES }>();
             for ((depths, out), column) in eights.iter().zip(out).zip(&self.columns) {
-                T::points::<TURN>(lanes, column, &row, depths, &place, out);
+                T::points::<TURN>(lanes, &EightRays { column, row: &row, depths, place: &place }, out);
             }
             if let (false, Some(column)) = (rest.is_empty(), self.columns.last()) {
                 let (mut depths, mut points) = ([f32::INFINITY; LANES], [T::ZERO; 3 * LANES]);
                 depths[..rest.len()].copy_from_slice(rest);
-                T::points::<TURN>(lanes, column, &row, &depths, &place, &mut points);
+                let rays = EightRays { column, row: &row, depths: &depths, place: &place };
+                T::points::<TURN>(lanes, &rays, &mut points);
                 last.copy_from_slice(&points[..last.len()]);
             }
         }
