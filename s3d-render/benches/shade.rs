@@ -1,43 +1,25 @@
 //! How long do the images of a view take, once its hits are known: each modality alone, and all six?
 //!
-//! Nine views of 1080² and a panorama of 4096 × 2048 from one place, in the scan-like mesh of 300,000 faces, the real scan
-//! beside the project if it is there, and the OBJ file (Z up) that `S3D_BENCH_OFFICE` names, seen from (4.03, 3.07, 1.5).
+//! Nine views of 1080² and a panorama of 4096 × 2048 from one place in each of the scenes of [`common::shaded_scene`].
 
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use s3d_geom::glam::{DVec3, dvec3, vec3};
-use s3d_geom::{Camera, Pose, Raster, TriMesh, scan_like};
+use s3d_geom::{Camera, Pose, Raster};
 use s3d_render::{Hits, Modalities, Normals, Pyramids, Scene, Shading, TextureFilter, ViewImages};
 use std::hint::black_box;
-use std::path::Path;
-
-fn meshes() -> Vec<(&'static str, TriMesh, DVec3)> {
-    let mut meshes = vec![("scan-like", scan_like(300_000, 1), dvec3(3.0, 2.5, 1.5))];
-    if let Some((path, location)) = common::real_scan() {
-        meshes.push(("copyroom", common::read_obj(&path), location));
-    }
-    if let Ok(path) = std::env::var("S3D_BENCH_OFFICE") {
-        // The reader turns Y up to Z up: back again.
-        let mut parts = common::read_obj(Path::new(&path)).into_parts();
-        parts.positions.iter_mut().for_each(|p| *p = vec3(p.x, p.z, -p.y));
-        meshes.push(("office", TriMesh::new(parts).expect("it was a mesh"), dvec3(4.03, 3.07, 1.5)));
-    }
-    // Textures with about three pixels for one of the image's: the filter has work to do.
-    meshes.push(("fine textures", common::furnished_room(285_000), common::room_location()));
-    meshes
-}
 
 fn shade(c: &mut Criterion) {
     let mut group = c.benchmark_group("shade");
     group.sample_size(10);
-    for (name, mesh, location) in &meshes() {
-        let scene = Scene::new(mesh);
-        let pyramids = Pyramids::new(mesh);
+    for name in ["scan-like", "copyroom", "office", "fine-textures"] {
+        let Some((mesh, location)) = common::shaded_scene(name) else { continue };
+        let scene = Scene::new(&mesh);
+        let pyramids = Pyramids::new(&mesh);
         let index: Vec<u32> = (0..mesh.faces().len() as u32).collect();
         let pretty: Vec<[u8; 3]> = index.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
-        let panorama = Camera::equirectangular(Pose::level(*location, 0.4), 4096);
-        for (what, cameras) in [("9 views", common::views(*location, 1080)), ("panorama", vec![panorama])] {
+        let panorama = Camera::equirectangular(Pose::level(location, 0.4), 4096);
+        for (what, cameras) in [("9 views", common::views(location, 1080)), ("panorama", vec![panorama])] {
             let shots: Vec<(Camera, Hits)> =
                 cameras.into_iter().map(|camera| (camera, s3d_render::cast(&scene, &camera))).collect();
             group

@@ -23,8 +23,8 @@
 #[path = "../benches/common/mod.rs"]
 mod common;
 
-use s3d_geom::glam::{DVec2, DVec3, Vec3, dvec3, vec3};
-use s3d_geom::{Camera, Pose, Rays, TriMesh, scan_like};
+use s3d_geom::glam::{DVec2, DVec3, Vec3, dvec3};
+use s3d_geom::{Camera, Pose, Rays, scan_like};
 use s3d_render::{Caster, Hits, Scene};
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -51,7 +51,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = options()?;
     let mesh = match options.mesh.strip_prefix("scan-like:") {
         Some(faces) => scan_like(faces.parse()?, 1),
-        None => read_obj(Path::new(&options.mesh), options.z_up)?,
+        None if options.z_up => common::z_up(&common::read_obj(Path::new(&options.mesh))),
+        None => common::read_obj(Path::new(&options.mesh)),
     };
     let started = Instant::now();
     let scene = Scene::new(&mesh);
@@ -108,14 +109,6 @@ fn options() -> Result<Options, Box<dyn Error>> {
     let coordinate = |text: &str| text.parse::<f32>().map(f64::from);
     let origin = dvec3(coordinate(&x)?, coordinate(&y)?, coordinate(&z)?);
     Ok(Options { mesh, origin, z_up, rounds, threads, dump })
-}
-
-fn read_obj(path: &Path, z_up: bool) -> Result<TriMesh, Box<dyn Error>> {
-    let mesh = common::read_obj(path);
-    // That reader takes Y for up.
-    let turn = |p: &Vec3| if z_up { vec3(p.x, p.z, -p.y) } else { *p };
-    let positions = mesh.positions().iter().map(turn).collect();
-    Ok(TriMesh::from_faces(positions, mesh.faces().to_vec())?)
 }
 
 fn views(origin: DVec3) -> Vec<Camera> {

@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub)]
 
 use s3d_geom::glam::{DVec3, Vec3, dvec3, vec2, vec3};
-use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, TriMesh};
+use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, TriMesh, scan_like};
 use std::path::{Path, PathBuf};
 
 /// A furnished room of 8 × 6 × 3 m whose surfaces are noisy grids like a scan's, textured with a grain of 2 cm; about
@@ -163,6 +163,30 @@ pub fn read_obj(path: &Path) -> TriMesh {
 pub fn real_scan() -> Option<(PathBuf, DVec3)> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scans/copyroom/rgb.obj");
     path.exists().then_some((path, dvec3(13.1, 9.65, 1.4)))
+}
+
+/// The scenes that images are made of to see how long that takes, and where one stands in them: `scan-like`, generated;
+/// `copyroom`, the real scan beside the project; `office`, the OBJ file with Z up that `S3D_BENCH_OFFICE` names; and
+/// `fine-textures`, with about three of their pixels for one of the image's: the filter has work to do. `None` if it is not
+/// there.
+pub fn shaded_scene(name: &str) -> Option<(TriMesh, DVec3)> {
+    match name {
+        "scan-like" => Some((scan_like(300_000, 1), dvec3(3.0, 2.5, 1.5))),
+        "copyroom" => real_scan().map(|(path, location)| (read_obj(&path), location)),
+        "office" => {
+            let path = PathBuf::from(std::env::var_os("S3D_BENCH_OFFICE")?);
+            Some((z_up(&read_obj(&path)), dvec3(4.03, 3.07, 1.5)))
+        }
+        "fine-textures" => Some((furnished_room(285_000), room_location())),
+        _ => None,
+    }
+}
+
+/// A mesh of [`read_obj`] whose file had Z up.
+pub fn z_up(mesh: &TriMesh) -> TriMesh {
+    let mut parts = mesh.clone().into_parts();
+    parts.positions.iter_mut().for_each(|p| *p = vec3(p.x, p.z, -p.y));
+    TriMesh::new(parts).expect("it was a mesh")
 }
 
 /// Views all around from one place: level, up and down.

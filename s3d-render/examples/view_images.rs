@@ -1,0 +1,51 @@
+//! How long a view's six images take from its hits, again and again, for a comparison of two states of the project:
+//!
+//! ```text
+//! cargo run --release -p s3d-render --example view_images -- scan-like|copyroom|office|fine-textures
+//! ```
+//!
+//! For every line that comes in it makes the images of nine views of 1080² and prints a line: the milliseconds of each. So
+//! `docs/performance/states.py` can let two programs take turns, a fraction of a second each, which a busy machine disturbs
+//! alike. The scenes are those of the bench `shade`.
+
+#[path = "../benches/common/mod.rs"]
+mod common;
+
+use s3d_geom::{Camera, NormalAxes};
+use s3d_render::{
+    Hits, Modalities, Pyramids, Scene, Shading, TextureFilter, ViewImages, cast, view_images_into,
+};
+use std::error::Error;
+use std::time::Instant;
+
+#[allow(clippy::print_stdout)]
+fn main() -> Result<(), Box<dyn Error>> {
+    let name = std::env::args().nth(1).ok_or("usage: view_images scan-like|copyroom|office|fine-textures")?;
+    let (mesh, location) = common::shaded_scene(&name).ok_or_else(|| format!("no scene {name} here"))?;
+    let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+    let index: Vec<u32> = (0..mesh.faces().len() as u32).collect();
+    let color: Vec<[u8; 3]> = index.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
+    let shading = Shading {
+        scene: &scene,
+        pyramids: &pyramids,
+        filter: TextureFilter::default(),
+        normal_axes: NormalAxes::Paper,
+        index_per_face: &index,
+        color_per_face: &color,
+    };
+    let views = common::views(location, 1080);
+    let shots: Vec<(Camera, Hits)> =
+        views.into_iter().map(|camera| (camera, cast(&scene, &camera))).collect();
+    let mut images = ViewImages::default();
+    for line in std::io::stdin().lines() {
+        line?;
+        let mut milliseconds = Vec::new();
+        for (camera, hits) in &shots {
+            let started = Instant::now();
+            view_images_into(&shading, hits, camera, Modalities::ALL, &mut images);
+            milliseconds.push(format!("{:.4}", started.elapsed().as_secs_f64() * 1e3));
+        }
+        println!("{}", milliseconds.join(" "));
+    }
+    Ok(())
+}
