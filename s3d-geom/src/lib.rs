@@ -23,42 +23,34 @@
 mod aabb;
 mod camera;
 mod cloud;
-mod curve;
-mod face_tree;
-mod footprint;
-mod lens;
-mod merge;
 mod mesh;
 mod nearest;
-mod polygon;
-mod pose;
+mod outline;
 mod primitives;
 mod raster;
-mod repeated;
 mod surface;
-mod texture;
-mod triangle;
-mod triangle8;
 mod voxel;
-mod wall_direction;
 mod wide;
 
 pub use aabb::Aabb;
-pub use camera::{Camera, NormalAxes, Projection, Rays};
+pub use camera::{
+    Camera, Lens, NormalAxes, Pose, Projection, Rays, euler_from_rotation, rotation_from_euler,
+};
 pub use cloud::PointCloud;
-pub use footprint::{Footprint, FootprintBuilder, FootprintOptions};
 pub use glam;
-pub use lens::Lens;
-pub use mesh::{DEFAULT_COLOR, FaceColor, Material, MeshError, MeshParts, MeshReport, NO_INDEX, TriMesh};
+pub use mesh::{
+    DEFAULT_COLOR, FaceColor, Material, MeshError, MeshParts, MeshReport, NO_INDEX, Texture, TriMesh, Wrap,
+    sample_bilinear,
+};
 pub use nearest::{Nearest, NearestFaces, nearest_brute_force};
-pub use polygon::{Polygon, PolygonError, triangulate_face};
-pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
+pub use outline::{
+    Footprint, FootprintBuilder, FootprintOptions, Polygon, PolygonError, dominant_wall_direction_deg,
+    triangulate_face,
+};
 pub use primitives::{cuboid, cylinder, furnished_room, grid, quad, room, scan_like, scan_like_rooms};
 pub use raster::Raster;
 pub use surface::{Density, SurfaceSampler};
-pub use texture::{Texture, Wrap, sample_bilinear};
 pub use voxel::{VoxelGrid, Voxels};
-pub use wall_direction::dominant_wall_direction_deg;
 
 /// The example of the README, compiled.
 #[cfg(doctest)]

@@ -1,6 +1,12 @@
 //! Textured triangle meshes, checked once, where they are made.
 
-use crate::{Aabb, Texture};
+mod merge;
+mod repeated;
+mod texture;
+
+pub use texture::{Texture, Wrap, sample_bilinear};
+
+use crate::Aabb;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use thiserror::Error;

@@ -16,7 +16,7 @@
 //!
 //! Where numbers get so large or small that they overflow or lose digits, the bound is 0.
 
-use crate::triangle::SortedTriangle;
+use super::triangle::SortedTriangle;
 use crate::wide::{max, min};
 use glam::Vec3A;
 

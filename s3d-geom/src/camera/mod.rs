@@ -3,7 +3,12 @@
 //! Pixel coordinates: x to the right, y down, the centre of pixel (i, j) at (i + ½, j + ½). Source: formats.md,
 //! "Cameras".
 
-use crate::Pose;
+mod lens;
+mod pose;
+
+pub use lens::Lens;
+pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
+
 use glam::{DMat3, DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 

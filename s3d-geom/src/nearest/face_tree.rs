@@ -1,7 +1,7 @@
 //! A bounding volume hierarchy over the faces of a mesh, eight boxes or triangles at a time.
 
-use crate::triangle::SortedTriangle;
-use crate::triangle8::Triangles8;
+use super::triangle::SortedTriangle;
+use super::triangle8::Triangles8;
 use crate::wide::{at_most, least, max, min};
 use crate::{Aabb, NO_INDEX, TriMesh};
 use glam::{DVec3, Vec3, Vec3A};

@@ -1,6 +1,6 @@
 //! Faces that lie in a mesh more than once.
 
-use crate::mesh::keep_where;
+use super::keep_where;
 use crate::{MeshParts, TriMesh};
 use rayon::prelude::*;
 

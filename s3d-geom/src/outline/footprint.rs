@@ -4,8 +4,8 @@
 //! triangles of a Delaunay triangulation whose circumscribed circle is small, so that the outline follows corners and
 //! pillars and still spans the gaps under furniture.
 
-use crate::Polygon;
-use crate::polygon::{edges, signed_area};
+use super::polygon::Polygon;
+use super::polygon::{edges, signed_area};
 use glam::{DVec2, Vec2, Vec3, dvec2};
 use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};

@@ -6,13 +6,18 @@
 //! All arithmetic that decides is `f64`, on corners in the order of their coordinates. So faces that share an edge or a
 //! corner get bit by bit the same distance there, whatever their winding and the indices of their vertices.
 
-use crate::curve::{MOST_POINTS, along_a_curve};
-use crate::face_tree::{FaceTree, Search, Starts};
-use crate::triangle::SortedTriangle;
+mod curve;
+mod face_tree;
+mod triangle;
+mod triangle8;
+
 use crate::wide::{self, Work};
 use crate::{Aabb, NO_INDEX, TriMesh};
+use curve::{MOST_POINTS, along_a_curve};
+use face_tree::{FaceTree, Search, Starts};
 use glam::Vec3;
 use rayon::prelude::*;
+use triangle::SortedTriangle;
 
 /// The face of a mesh nearest to a point, and the point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]

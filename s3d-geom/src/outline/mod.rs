@@ -1,0 +1,9 @@
+//! Outlines in a plane: polygons and their triangles, the floors of rooms, the direction of walls.
+
+mod footprint;
+mod polygon;
+mod wall_direction;
+
+pub use footprint::{Footprint, FootprintBuilder, FootprintOptions};
+pub use polygon::{Polygon, PolygonError, triangulate_face};
+pub use wall_direction::dominant_wall_direction_deg;
