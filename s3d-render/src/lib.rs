@@ -39,59 +39,32 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
-mod ahead;
-mod anchor;
-#[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod batch;
-mod blend;
-mod canvas;
-mod channels;
-mod clusters;
-mod color;
-mod cone;
-mod cube_map;
-mod cube_sources;
-mod face_table;
-mod fill;
-mod filter;
-mod fold;
-mod lanes;
-mod lens;
-mod panorama;
-mod patch;
-mod picture_color;
-mod pinhole;
-mod pixel_color;
-mod points;
+mod hits;
+mod picture;
+mod raster;
 mod ray;
-mod registers;
-mod runs;
 mod scene;
-mod stamps;
-mod stitch;
-mod texture;
-mod view;
-mod visibility;
+mod shade;
+mod simd;
 
-pub use channels::{
+pub use hits::{Hits, NO_FACE};
+pub use picture::cube_map::CubeMap;
+pub use picture::cube_sources::SkyBoxTurn;
+pub use picture::picture_color::{Unseen, picture_image, picture_image_into};
+pub use picture::stitch::{Capture, StitchOptions, stitch};
+pub use raster::visibility::{Caster, cast, cast_ray_by_ray, cast_strided};
+pub use ray::caster::{Hit, cast_ray, cast_ray_brute_force};
+pub use scene::Scene;
+pub use shade::channels::{
     MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, color_per_face_image, color_per_face_image_into,
     coverage, depth_image, depth_image_into, depth_image_mm_into, index_image, index_image_into,
     normal_image, normal_image_into,
 };
-pub use color::{rgb_image, rgb_image_into, rgb_image_with};
-pub use cube_map::CubeMap;
-pub use cube_sources::SkyBoxTurn;
-pub use picture_color::{Unseen, picture_image, picture_image_into};
-pub use pixel_color::{rgb_image_pixel_by_pixel, rgb_of_ray};
-pub use points::{xyz_image, xyz_image_half, xyz_image_half_into, xyz_image_into};
-pub use ray::{Hit, cast_ray, cast_ray_brute_force};
-pub use scene::Scene;
-pub use stitch::{Capture, StitchOptions, stitch};
-pub use texture::{Pyramids, TextureFilter};
-pub use view::{FaceImages, Modalities, Shading, ViewImages, view_images_into};
-pub use visibility::{Caster, Hits, NO_FACE, cast, cast_ray_by_ray, cast_strided};
+pub use shade::color::{rgb_image, rgb_image_into, rgb_image_with};
+pub use shade::mip_maps::{Pyramids, TextureFilter};
+pub use shade::pixel_color::{rgb_image_pixel_by_pixel, rgb_of_ray};
+pub use shade::points::{xyz_image, xyz_image_half, xyz_image_half_into, xyz_image_into};
+pub use shade::view::{FaceImages, Modalities, Shading, ViewImages, view_images_into};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,6 +1,6 @@
 //! A mesh and the tree over its faces.
 
-use crate::clusters::Clusters;
+use crate::raster::clusters::Clusters;
 use glam::DVec3;
 use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
 use s3d_geom::TriMesh;

@@ -1,0 +1,45 @@
+//! What the pixels of an image see.
+
+use s3d_geom::Raster;
+
+/// In place of a face: the pixel's ray hits nothing.
+pub const NO_FACE: u32 = u32::MAX;
+
+/// What the pixels of an image see. All modalities of a view are made from it, so they agree pixel for pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hits {
+    /// The face that each pixel's ray hits first, [`NO_FACE`] where it hits nothing.
+    pub face: Raster<u32>,
+    /// How far away it is in metres, as the multiple of the ray's direction that [`Camera::rays`](s3d_geom::Camera::rays) gives: z along the
+    /// optical axis in a perspective view, the distance in a panorama. Infinite where nothing is hit.
+    pub depth: Raster<f32>,
+}
+
+impl Default for Hits {
+    /// Of no pixel.
+    fn default() -> Self {
+        Self { face: Raster::from_vec(0, 0, Vec::new()), depth: Raster::from_vec(0, 0, Vec::new()) }
+    }
+}
+
+impl Hits {
+    /// Makes room for an image; what is in it is anything.
+    pub(crate) fn resize(&mut self, width: u32, height: u32) {
+        if (self.face.width(), self.face.height()) == (width, height) {
+            return;
+        }
+        let n = width as usize * height as usize;
+        let Hits { face, depth } = std::mem::take(self);
+        let (mut faces, mut depths) = (face.into_vec(), depth.into_vec());
+        // A panorama's memory is not for a view to keep.
+        if faces.capacity() > 4 * n {
+            (faces, depths) = (Vec::new(), Vec::new());
+        }
+        faces.resize(n, NO_FACE);
+        depths.resize(n, f32::INFINITY);
+        *self = Self {
+            face: Raster::from_vec(width, height, faces),
+            depth: Raster::from_vec(width, height, depths),
+        };
+    }
+}

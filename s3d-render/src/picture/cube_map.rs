@@ -1,0 +1,375 @@
+//! Cube maps: what is seen all around from one place.
+//!
+//! Six faces of 90° each, in the order and with the names of the scanner's sky boxes (formats.md, "The scanner's own
+//! pictures"): 0 up, 1 right, 2 back, 3 left, 4 front, 5 down, relative to the location's original camera E(original).
+//! Faces 1 to 4 are what that camera sees when it turns on the spot, and 0 and 5 what it sees when it looks straight up or
+//! down from the front: the lower edge of *up* and the upper edge of *down* meet *front*. Every face is seen from
+//! inside, its first row at its top.
+//!
+//! A face is stored with a border of a 32nd of its width on every side, which shows what its neighbours show there. So a
+//! face can be filtered as any texture is, at every reduction down to a face of 32 pixels, and no seam shows.
+
+use crate::picture::fill::fill_unseen;
+use crate::shade::filter::Sizes;
+use crate::shade::mip_maps::{Pyramid, TextureFilter, halved};
+use glam::{DMat3, DVec2, DVec3, dvec2};
+use rayon::prelude::*;
+use s3d_geom::{Pose, Raster, Texture, Wrap};
+
+/// How many times its border a face is wide.
+const BORDERS: u32 = 32;
+
+/// The widest face.
+const MAX_SIZE: u32 = 8192;
+
+/// The axes of a face in the cube's frame, which is the original camera's in OpenCV's axes: x right, y down, z forward.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FaceAxes {
+    /// For the face's right, its down and its forward: which axis of the frame, and its sign.
+    pub(crate) right: (usize, i8),
+    pub(crate) down: (usize, i8),
+    pub(crate) forward: (usize, i8),
+}
+
+/// By number of the face.
+pub(crate) const AXES: [FaceAxes; 6] = [
+    FaceAxes { right: (0, 1), down: (2, 1), forward: (1, -1) },
+    FaceAxes { right: (2, -1), down: (1, 1), forward: (0, 1) },
+    FaceAxes { right: (0, -1), down: (1, 1), forward: (2, -1) },
+    FaceAxes { right: (2, 1), down: (1, 1), forward: (0, -1) },
+    FaceAxes { right: (0, 1), down: (1, 1), forward: (2, 1) },
+    FaceAxes { right: (0, 1), down: (2, -1), forward: (1, 1) },
+];
+
+fn axis((axis, sign): (usize, i8)) -> DVec3 {
+    let mut v = DVec3::ZERO;
+    v[axis] = f64::from(sign);
+    v
+}
+
+/// The face that a direction in the cube's frame goes through; of two at the same angle, the one of the earlier axis.
+#[inline]
+pub(crate) fn face_of(d: DVec3) -> usize {
+    let a = d.abs();
+    if a.x >= a.y && a.x >= a.z {
+        if d.x < 0.0 { 3 } else { 1 }
+    } else if a.y >= a.z {
+        if d.y < 0.0 { 0 } else { 5 }
+    } else if d.z < 0.0 {
+        2
+    } else {
+        4
+    }
+}
+
+/// The place on a face's plane, −1 to 1 to the right and downwards within the face, of a direction in the cube's frame.
+#[inline]
+pub(crate) fn place_on(face: usize, d: DVec3) -> DVec2 {
+    let along = |(axis, sign): (usize, i8)| d[axis] * f64::from(sign);
+    let FaceAxes { right, down, forward } = AXES[face];
+    dvec2(along(right), along(down)) / along(forward)
+}
+
+/// The picture all around a place, in six faces; see the module for the order and the directions of the faces.
+#[derive(Clone, Debug)]
+pub struct CubeMap {
+    pose: Pose,
+    size: u32,
+    border: u32,
+    /// With their borders.
+    faces: Vec<Texture>,
+    reductions: Vec<Vec<Raster<[u8; 3]>>>,
+    /// By face, with its border: 255 what a picture shows, 0 what none does. `None` if all is shown.
+    seen: Option<Vec<Raster<u8>>>,
+}
+
+/// A pixel of a cube map before it is made: a colour of 0 to 255 a channel, or nothing.
+pub(crate) type Texel = Option<[f32; 3]>;
+
+impl CubeMap {
+    /// The size of a face that [`CubeMap`]s can have and that is at least `wanted`: a multiple of 32 up to 8,192.
+    pub fn fitting_size(wanted: f64) -> u32 {
+        let parts = (wanted / f64::from(BORDERS)).clamp(1.0, f64::from(MAX_SIZE / BORDERS));
+        libm::ceil(parts - 1e-9) as u32 * BORDERS
+    }
+
+    /// A cube map around `pose` (E(original)) with faces of `size` pixels, each pixel from `texel`, which is given the
+    /// face, the column and row in the face with its border, and the direction in the cube's frame. On all threads of the
+    /// current pool.
+    pub(crate) fn build(
+        pose: Pose,
+        size: u32,
+        texel: impl Fn(usize, u32, u32, DVec3) -> Texel + Sync,
+    ) -> Self {
+        let size = Self::fitting_size(f64::from(size));
+        let (border, width) = (size / BORDERS, size + 2 * (size / BORDERS));
+        let mut faces = Vec::with_capacity(6);
+        let mut masks = Vec::with_capacity(6);
+        for face in 0..6 {
+            let mut colors = Raster::filled(width, width, [0u8; 3]);
+            let mut mask = Raster::filled(width, width, 0u8);
+            let rows = colors.pixels_mut().par_chunks_mut(width as usize);
+            rows.zip(mask.pixels_mut().par_chunks_mut(width as usize)).enumerate().for_each(
+                |(y, (row, seen))| {
+                    for (x, (pixel, seen)) in row.iter_mut().zip(seen).enumerate() {
+                        let (x, y) = (x as u32, y as u32);
+                        if let Some(color) = texel(face, x, y, direction_of(face, size, x, y)) {
+                            *pixel = color.map(|c| (c + 0.5) as u8);
+                            *seen = 255;
+                        }
+                    }
+                },
+            );
+            faces.push(colors);
+            masks.push(mask);
+        }
+        let all_seen = masks.iter().all(|mask| mask.pixels().iter().all(|&m| m == 255));
+        let seen = (!all_seen).then_some(masks);
+        if let Some(seen) = &seen {
+            faces.par_iter_mut().zip(seen).for_each(|(face, seen)| fill_unseen(face, seen));
+        }
+        let reductions =
+            faces.iter().map(|face| std::iter::successors(halved(face), halved).collect()).collect();
+        let faces = faces
+            .into_iter()
+            .map(|image| Texture { name: String::new(), image, wrap: [Wrap::Clamp; 2] })
+            .collect();
+        Self { pose, size, border, faces, reductions, seen }
+    }
+
+    /// Every pixel of a map with faces of `size`: its face, its column and row there, and its direction in the cube's frame.
+    pub(crate) fn directions(size: u32) -> impl Iterator<Item = (usize, u32, u32, DVec3)> {
+        let width = size + 2 * (size / BORDERS);
+        let at = move |face: usize, k: u32| (face, k % width, k / width);
+        let all = (0..6).flat_map(move |face| (0..width * width).map(move |k| at(face, k)));
+        all.map(move |(face, x, y)| (face, x, y, direction_of(face, size, x, y)))
+    }
+
+    /// The place and direction of the camera that it is relative to.
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// Width and height of a face in pixels.
+    pub fn size(&self) -> u32 {
+        self.size
+    }
+
+    /// The number of bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        let colors = self.faces.iter().map(|f| &f.image).chain(self.reductions.iter().flatten());
+        let seen = self.seen.iter().flatten().map(Raster::len).sum::<usize>();
+        3 * colors.map(Raster::len).sum::<usize>() + seen
+    }
+
+    /// The share of the pixels that pictures show, borders included: 1 if there is no hole.
+    pub fn coverage(&self) -> f64 {
+        let Some(seen) = &self.seen else { return 1.0 };
+        let all = seen.iter().map(Raster::len).sum::<usize>();
+        seen.iter().flat_map(Raster::pixels).filter(|&&m| m > 0).count() as f64 / all as f64
+    }
+
+    /// A face without its border, as a sky box has it.
+    ///
+    /// # Panics
+    /// If there is no such face: 0 to 5.
+    pub fn face(&self, face: usize) -> Raster<[u8; 3]> {
+        let (from, to) = (self.border, self.border + self.size);
+        let image = &self.faces[face].image;
+        let rows = (from..to).flat_map(|y| &image.row(y)[from as usize..to as usize]);
+        Raster::from_vec(self.size, self.size, rows.copied().collect())
+    }
+
+    /// World → the cube's frame.
+    pub(crate) fn frame_from_world(&self) -> DMat3 {
+        self.pose.opencv_from_world()
+    }
+
+    /// The stored faces at all their sizes, for the fast filter.
+    pub(crate) fn sizes(&self) -> [Sizes<'_>; 6] {
+        std::array::from_fn(|face| Sizes::new(&self.faces[face], &self.reductions[face]))
+    }
+
+    /// What is added to the place on a face's plane, and what it is multiplied by then, to come to pixels of the stored
+    /// face.
+    pub(crate) fn pixels_of_place(&self) -> (f64, f64) {
+        let half = 0.5 * f64::from(self.size);
+        ((f64::from(self.border) + half) / half, half)
+    }
+
+    /// Whether there are holes.
+    pub(crate) fn has_holes(&self) -> bool {
+        self.seen.is_some()
+    }
+
+    /// How much of what is at a place of a stored face, in pixels, a picture shows: 0 to 255, bilinear.
+    #[inline]
+    pub(crate) fn seen_at(&self, face: usize, x: f32, y: f32) -> u8 {
+        let Some(seen) = &self.seen else { return 255 };
+        let mask = &seen[face];
+        let last = mask.width() as i32 - 1;
+        // Never below −½ nor NaN beyond what a cast brings to 0.
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (xf, yf) = (x.floor(), y.floor());
+        let (px, py) = (((x - xf) * 256.0) as u32, ((y - yf) * 256.0) as u32);
+        let column = |i: i32| i.clamp(0, last) as u32;
+        let (x0, x1) = (column(xf as i32), column((xf as i32).saturating_add(1)));
+        let (y0, y1) = (column(yf as i32), column((yf as i32).saturating_add(1)));
+        let at = |x, y| u32::from(mask.at(x, y));
+        let upper = at(x0, y0) * (256 - px) + at(x1, y0) * px;
+        let lower = at(x0, y1) * (256 - px) + at(x1, y1) * px;
+        ((upper * (256 - py) + lower * py) >> 16) as u8
+    }
+
+    /// The colour in a direction of the world, 0 to 255 a channel, over the footprint whose sides are `x` and `y` (how the
+    /// direction changes to the next pixel), and how much of it a picture shows, 0 to 255. The plain form of
+    /// [`crate::picture_image`].
+    pub fn sample(&self, direction: DVec3, x: DVec3, y: DVec3, filter: &TextureFilter) -> ([f32; 3], u8) {
+        let turn = self.frame_from_world();
+        let d = turn * direction;
+        let face = face_of(d);
+        let at = place_on(face, d);
+        let forward = axis(AXES[face].forward);
+        // (u / m)' = (u' − u / m · m') / m
+        let depth = d.dot(forward);
+        let slope = |v: DVec3| {
+            let v = turn * v;
+            let (right, down) = (v.dot(axis(AXES[face].right)), v.dot(axis(AXES[face].down)));
+            (dvec2(right, down) - at * v.dot(forward)) / depth
+        };
+        let (offset, scale) = self.pixels_of_place();
+        let width = f64::from(self.faces[face].image.width());
+        let flip = dvec2(1.0, -1.0);
+        let pixel = (at + offset) * scale;
+        let uv = dvec2(pixel.x / width, 1.0 - pixel.y / width);
+        let pyramid = Pyramid::new(&self.faces[face], &self.reductions[face]);
+        let per_pixel = scale / width * flip;
+        let color = pyramid.sample(uv, slope(x) * per_pixel, slope(y) * per_pixel, filter);
+        (color, self.seen_at(face, pixel.x as f32, pixel.y as f32))
+    }
+}
+
+/// The direction, in the cube's frame and with a depth of 1 on the face, of the centre of a pixel of a face with its border.
+fn direction_of(face: usize, size: u32, x: u32, y: u32) -> DVec3 {
+    let half = 0.5 * f64::from(size);
+    let at = |i: u32| (f64::from(i) + 0.5 - f64::from(size / BORDERS)) / half - 1.0;
+    let FaceAxes { right, down, forward } = AXES[face];
+    axis(right) * at(x) + axis(down) * at(y) + axis(forward)
+}
+
+/// The cameras that see the faces with their borders, pixel for pixel, from `pose`.
+pub(crate) fn face_cameras(pose: &Pose, size: u32) -> [s3d_geom::Camera; 6] {
+    let width = size + 2 * (size / BORDERS);
+    let fov = 2.0 * libm::atan(f64::from(width) / f64::from(size));
+    let world_from_frame = pose.opencv_from_world().transpose();
+    AXES.map(|FaceAxes { right, down, forward }| {
+        let [right, down, forward] = [right, down, forward].map(|a| world_from_frame * axis(a));
+        let world_from_camera = DMat3::from_cols(right, -down, -forward);
+        s3d_geom::Camera::perspective(Pose { location: pose.location, world_from_camera }, fov, width, width)
+    })
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use glam::{DQuat, dvec3};
+    use proptest::prelude::*;
+
+    /// A colour for each direction of the world, smooth and different everywhere.
+    pub(crate) fn color_of(direction: DVec3) -> [f32; 3] {
+        let d = direction.normalize();
+        [d.x, d.y, d.z].map(|c| (127.5 + 100.0 * c) as f32)
+    }
+
+    pub(crate) fn pose() -> Pose {
+        Pose::from_scanner(dvec3(1.0, 2.0, 1.5), DQuat::from_rotation_z(0.8) * DQuat::from_rotation_x(0.03))
+    }
+
+    pub(crate) fn close(a: [f32; 3], b: [f32; 3], bound: f32) -> bool {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() <= bound)
+    }
+
+    fn smooth(size: u32) -> CubeMap {
+        let world = pose().opencv_from_world().transpose();
+        CubeMap::build(pose(), size, |_, _, _, d| Some(color_of(world * d)))
+    }
+
+    proptest! {
+        /// Seams included: the second direction has two or three components that are nearly equal.
+        #[test]
+        fn every_direction_has_its_colour(d in prop::array::uniform3(-1.0..1.0f64), tilt in -0.01..0.01f64, far in any::<bool>()) {
+            static CUBE: std::sync::LazyLock<CubeMap> = std::sync::LazyLock::new(|| smooth(256));
+            let cube = &*CUBE;
+            let mut d = DVec3::from(d);
+            prop_assume!(d.length() > 0.1);
+            if far {
+                d = cube.frame_from_world().transpose() * dvec3(1.0f64.copysign(d.x), (1.0 + tilt).copysign(d.y), d.z);
+            }
+            let tiny = DVec3::splat(1e-9);
+            let (color, seen) = cube.sample(d, tiny, tiny, &TextureFilter::default());
+            prop_assert!(close(color, color_of(d), 1.0) && seen == 255, "{color:?} {:?}", color_of(d));
+            // A footprint of eight pixels.
+            let (x, y) = d.normalize().any_orthonormal_pair();
+            let (x, y) = (x * d.length() * (8.0 / 128.0), y * d.length() * (8.0 / 128.0));
+            let (color, _) = cube.sample(d, x, y, &TextureFilter::default());
+            prop_assert!(close(color, color_of(d), 2.0), "{color:?} {:?}", color_of(d));
+        }
+    }
+
+    #[test]
+    fn faces_are_what_the_turned_camera_sees() {
+        use std::f64::consts::FRAC_PI_2;
+        let cube = smooth(64);
+        let turns = [
+            (0.0, FRAC_PI_2),
+            (-FRAC_PI_2, 0.0),
+            (2.0 * FRAC_PI_2, 0.0),
+            (FRAC_PI_2, 0.0),
+            (0.0, 0.0),
+            (0.0, -FRAC_PI_2),
+        ];
+        for (face, (yaw, pitch)) in turns.into_iter().enumerate() {
+            let camera = s3d_geom::Camera::perspective(pose().turned(yaw, pitch), FRAC_PI_2, 64, 64);
+            let (image, rays) = (cube.face(face), camera.rays());
+            for (x, y) in (0..64 * 64).map(|k| (k % 64, k / 64)) {
+                let color = image.at(x, y).map(f32::from);
+                assert!(close(color, color_of(rays.at(x, y)), 0.51), "face {face} at ({x}, {y})");
+            }
+        }
+        assert_eq!((cube.size(), cube.coverage(), cube.pose()), (64, 1.0, &pose()));
+        assert_eq!(cube.face(0).width(), 64);
+    }
+
+    #[test]
+    fn face_cameras_see_the_stored_pixels() {
+        for (face, camera) in face_cameras(&pose(), 96).iter().enumerate() {
+            assert_eq!(camera.width, 96 + 6);
+            let turn = pose().opencv_from_world();
+            for (x, y) in [(0, 0), (3, 98), (50, 51), (101, 7)] {
+                let expected = direction_of(face, 96, x, y);
+                assert!((turn * camera.rays().at(x, y)).abs_diff_eq(expected, 1e-12), "{face} {x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_are_multiples_that_fit() {
+        assert_eq!([0.0, 32.0, 32.5, 1024.0, 1e9].map(CubeMap::fitting_size), [32, 32, 64, 1024, 8192]);
+    }
+
+    #[test]
+    fn holes_are_told_and_filled() {
+        let world = pose().opencv_from_world().transpose();
+        // Nothing below 45°.
+        let below = |d: DVec3| (world * d).normalize().z < -std::f64::consts::FRAC_1_SQRT_2;
+        let cube = CubeMap::build(pose(), 64, |_, _, _, d| (!below(d)).then(|| color_of(world * d)));
+        let tiny = DVec3::splat(1e-9);
+        let sample = |d: DVec3| cube.sample(d, tiny, tiny, &TextureFilter::default());
+        assert_eq!(sample(dvec3(1.0, 0.0, -0.9)).1, 255);
+        let (color, seen) = sample(dvec3(0.3, 0.0, -1.0));
+        assert!(seen == 0 && color[2] > 20.0, "{color:?}");
+        assert!((0.8..0.9).contains(&cube.coverage()), "{}", cube.coverage());
+        // The rim is half seen.
+        assert!((0..100).any(|k| (1..255).contains(&sample(dvec3(1.0, 0.0, -0.9 - 0.002 * f64::from(k))).1)));
+    }
+}

@@ -1,0 +1,272 @@
+//! Cube maps from sky boxes and from equirectangular photographs.
+
+use crate::picture::cube_map::{CubeMap, face_of, place_on};
+use crate::shade::mip_maps::{Pyramid, TextureFilter, halved};
+use glam::{DVec2, dvec2};
+use s3d_geom::{Pose, Raster, Texture, Wrap};
+
+/// Near its poles a pixel sees many columns of a photograph and few rows: as many samples as keep the rows apart.
+const AT_POLES: TextureFilter = TextureFilter { max_taps: 256 };
+
+/// Which way the upper and the lower picture of a sky box are turned: with which side picture the lower edge of the one
+/// and the upper edge of the other meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SkyBoxTurn {
+    /// What agrees best along the edges, each for itself; *front* if nothing agrees better.
+    ///
+    /// Viewers of Matterport's sky boxes (Matterport3DSimulator, PanoBasic) have them meet *right*; taken literally,
+    /// formats.md has them meet *front*. Pictures tell.
+    #[default]
+    Detect,
+    /// With picture 4.
+    Front,
+    /// With picture 1.
+    Right,
+    /// With picture 2.
+    Back,
+    /// With picture 3.
+    Left,
+}
+
+impl SkyBoxTurn {
+    /// How many quarter turns from *front* to the right.
+    fn quarters(self) -> Option<u32> {
+        match self {
+            Self::Detect => None,
+            Self::Front => Some(0),
+            Self::Right => Some(1),
+            Self::Back => Some(2),
+            Self::Left => Some(3),
+        }
+    }
+}
+
+impl CubeMap {
+    /// From the six pictures of a sky box, in the order of the faces and all of one size, with faces of `size` pixels, or
+    /// of the pictures' own. Pictures of a multiple of 32 pixels are taken as they are.
+    ///
+    /// # Panics
+    /// If there are not six square pictures of one size of at least 1 pixel.
+    pub fn from_sky_box(
+        pictures: [&Raster<[u8; 3]>; 6],
+        turn: SkyBoxTurn,
+        pose: &Pose,
+        size: Option<u32>,
+    ) -> Self {
+        let n = pictures[0].width();
+        let square = pictures.iter().all(|p| (p.width(), p.height()) == (n, n));
+        assert!(square && n > 0, "a sky box is six square pictures of one size");
+        let quarters = [0, 5].map(|face| turn.quarters().unwrap_or_else(|| agreeing_turn(&pictures, face)));
+        let turned = [turned(pictures[0], quarters[0]), turned(pictures[5], (4 - quarters[1]) % 4)];
+        let [_, right, back, left, front, _] = pictures;
+        let pictures = [&turned[0], right, back, left, front, &turned[1]];
+        let size = Self::fitting_size(f64::from(size.unwrap_or(n)));
+        let pyramids: Vec<SourcePyramid> =
+            pictures.iter().map(|p| SourcePyramid::new((*p).clone(), [Wrap::Clamp; 2])).collect();
+        let (width, step) = (f64::from(n), f64::from(n) / f64::from(size));
+        Self::build(*pose, size, |_, _, _, d| {
+            let face = face_of(d);
+            let at = (place_on(face, d) + 1.0) * (0.5 * width);
+            Some(pyramids[face].sample(at, dvec2(step, 0.0), dvec2(0.0, step), &TextureFilter::default()))
+        })
+    }
+
+    /// From an equirectangular photograph, whose columns are longitudes growing to the right and whose rows are latitudes
+    /// from +90° at the top to −90°, upright in the world (+Z up). Its centre column looks along the forward axis of
+    /// `pose` projected to the horizon, turned by `yaw_rad` to the left: formats.md's panoramas have 0. With faces of
+    /// `size` pixels, or of as many as keep what the photograph shows.
+    ///
+    /// # Panics
+    /// If the photograph has no pixel.
+    pub fn from_equirectangular(
+        photo: &Raster<[u8; 3]>,
+        yaw_rad: f64,
+        pose: &Pose,
+        size: Option<u32>,
+    ) -> Self {
+        use std::f64::consts::{PI, TAU};
+        let (w, h) = (f64::from(photo.width()), f64::from(photo.height()));
+        assert!(!photo.is_empty(), "a photograph has pixels");
+        let size = Self::fitting_size(size.map_or(w * (1.25 / PI), f64::from));
+        let pyramid = SourcePyramid::new(photo.clone(), [Wrap::Repeat, Wrap::Clamp]);
+        let world_from_frame = pose.opencv_from_world().transpose();
+        let azimuth = pose.azimuth_rad() + yaw_rad;
+        let angle = 2.0 / f64::from(size);
+        Self::build(*pose, size, |_, _, _, d| {
+            // A pixel at the depth 1 and the distance r is seen under the angle 2/size · 1/r, across even 1/r².
+            let distance = d.length();
+            let v = world_from_frame * d;
+            let flat = libm::hypot(v.x, v.y);
+            let turn = (azimuth - libm::atan2(v.y, v.x)) / TAU + 0.5;
+            let latitude = libm::atan2(v.z, flat);
+            let place = dvec2((turn - turn.floor()) * w, (0.5 - latitude / PI) * h);
+            // A circle of latitude shortens towards the pole, where a pixel sees many columns.
+            let around = (angle / flat).min(TAU) / TAU * w;
+            let along = angle / distance / PI * h;
+            Some(pyramid.sample(place, dvec2(around, 0.0), dvec2(0.0, along), &AT_POLES))
+        })
+    }
+}
+
+/// The quarter turns of the upper (0) or lower (5) picture with which its edges agree best with those of the sides.
+fn agreeing_turn(pictures: &[&Raster<[u8; 3]>; 6], face: usize) -> u32 {
+    let n = pictures[0].width();
+    let difference = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| u64::from(a[k].abs_diff(b[k]))).sum::<u64>();
+    let cost = |quarters: u32| -> u64 {
+        let cap = turned(pictures[face], if face == 0 { quarters } else { (4 - quarters) % 4 });
+        (0..n)
+            .map(|i| {
+                let last = n - 1;
+                // Along the edge with the front from left to right, then right, back and left, each as its own picture goes.
+                let (edge, row) = if face == 0 {
+                    ([cap.at(i, last), cap.at(last, last - i), cap.at(last - i, 0), cap.at(0, i)], 0)
+                } else {
+                    ([cap.at(i, 0), cap.at(last, i), cap.at(last - i, last), cap.at(0, last - i)], last)
+                };
+                let sides = [4, 1, 2, 3].map(|side| pictures[side].at(i, row));
+                edge.into_iter().zip(sides).map(|(a, b)| difference(a, b)).sum::<u64>()
+            })
+            .sum()
+    };
+    (0..4).min_by_key(|&quarters| cost(quarters)).unwrap_or(0)
+}
+
+/// The picture turned so that what was its lower edge becomes its right one, `quarters` times.
+fn turned(picture: &Raster<[u8; 3]>, quarters: u32) -> Raster<[u8; 3]> {
+    let n = picture.width();
+    let pixels = (0..n * n).map(|k| {
+        let (mut x, mut y) = (k % n, k / n);
+        for _ in 0..quarters {
+            // What is at (x, y) now was at (n − 1 − y, x): (right, middle) was (middle, bottom).
+            (x, y) = (n - 1 - y, x);
+        }
+        picture.at(x, y)
+    });
+    Raster::from_vec(n, n, pixels.collect())
+}
+
+/// A source picture at every size, sampled at pixels of its full one.
+pub(crate) struct SourcePyramid {
+    full: Texture,
+    reductions: Vec<Raster<[u8; 3]>>,
+}
+
+impl SourcePyramid {
+    pub(crate) fn new(image: Raster<[u8; 3]>, wrap: [Wrap; 2]) -> Self {
+        let reductions = std::iter::successors(halved(&image), halved).collect();
+        Self { full: Texture { name: String::new(), image, wrap }, reductions }
+    }
+
+    /// The colour around a place in pixels (y down), over the footprint with the sides `x` and `y` in pixels.
+    #[inline]
+    pub(crate) fn sample(&self, at: DVec2, x: DVec2, y: DVec2, filter: &TextureFilter) -> [f32; 3] {
+        let size = dvec2(f64::from(self.full.image.width()), f64::from(self.full.image.height()));
+        let (uv, x, y) = (at / size, x / size, y / size);
+        let pyramid = Pyramid::new(&self.full, &self.reductions);
+        pyramid.sample(dvec2(uv.x, 1.0 - uv.y), dvec2(x.x, -x.y), dvec2(y.x, -y.y), filter)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::cube_map::tests::{color_of, pose};
+    use glam::{DVec3, dvec3};
+    use s3d_geom::Camera;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn taken(camera: &Camera) -> Raster<[u8; 3]> {
+        let rays = camera.rays();
+        let pixel = |k: u32| color_of(rays.at(k % camera.width, k / camera.width)).map(|c| (c + 0.5) as u8);
+        Raster::from_vec(camera.width, camera.height, (0..camera.width * camera.height).map(pixel).collect())
+    }
+
+    /// Up and down after a turn by so many quarters to the right.
+    fn sky_box(quarters: u32, size: u32) -> Vec<Raster<[u8; 3]>> {
+        let heading = -f64::from(quarters) * FRAC_PI_2;
+        let turns = [
+            (heading, FRAC_PI_2),
+            (-FRAC_PI_2, 0.0),
+            (2.0 * FRAC_PI_2, 0.0),
+            (FRAC_PI_2, 0.0),
+            (0.0, 0.0),
+            (heading, -FRAC_PI_2),
+        ];
+        turns
+            .map(|(yaw, pitch)| taken(&Camera::perspective(pose().turned(yaw, pitch), FRAC_PI_2, size, size)))
+            .into()
+    }
+
+    /// The largest difference to the right colour, all around.
+    fn error(cube: &CubeMap) -> f32 {
+        let tiny = DVec3::splat(1e-9);
+        let directions = (0..4000).map(|k| {
+            let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 4000.0;
+            let (sin, cos) = libm::sincos(2.399_963 * f64::from(k));
+            dvec3(cos, sin, 0.0) * (1.0 - z * z).sqrt() + DVec3::Z * z
+        });
+        let differences = directions.flat_map(|d| {
+            let color = cube.sample(d, tiny, tiny, &TextureFilter::default()).0;
+            (0..3).map(move |k| (color[k] - color_of(d)[k]).abs())
+        });
+        differences.fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn sky_boxes_are_right_whichever_way_their_caps_are_turned() {
+        let named = [SkyBoxTurn::Front, SkyBoxTurn::Right, SkyBoxTurn::Back, SkyBoxTurn::Left];
+        for (quarters, turn) in named.into_iter().enumerate() {
+            // 90 pixels are no multiple of 32.
+            for size in [64, 90] {
+                let pictures = sky_box(quarters as u32, size);
+                let pictures: [&Raster<[u8; 3]>; 6] = std::array::from_fn(|k| &pictures[k]);
+                for turn in [turn, SkyBoxTurn::Detect] {
+                    let cube = CubeMap::from_sky_box(pictures, turn, &pose(), None);
+                    assert!(error(&cube) < 4.0, "{turn:?} {size}: {}", error(&cube));
+                }
+                let wrong = CubeMap::from_sky_box(pictures, named[(quarters + 1) % 4], &pose(), None);
+                assert!(error(&wrong) > 60.0);
+            }
+        }
+    }
+
+    #[test]
+    fn pictures_of_a_fitting_size_are_taken_as_they_are() {
+        let pictures = sky_box(0, 64);
+        let cube =
+            CubeMap::from_sky_box(std::array::from_fn(|k| &pictures[k]), SkyBoxTurn::Front, &pose(), None);
+        for (face, picture) in pictures.iter().enumerate() {
+            assert_eq!(&cube.face(face), picture, "face {face}");
+        }
+    }
+
+    #[test]
+    fn a_mirrored_or_exchanged_face_is_far_off() {
+        let pictures = sky_box(0, 64);
+        let all: [&Raster<[u8; 3]>; 6] = std::array::from_fn(|k| &pictures[k]);
+        for face in 0..6 {
+            let rows = pictures[face].rows().flat_map(|row| row.iter().rev().copied());
+            let mirrored = Raster::from_vec(64, 64, rows.collect());
+            let mut wrong = all;
+            wrong[face] = &mirrored;
+            assert!(error(&CubeMap::from_sky_box(wrong, SkyBoxTurn::Front, &pose(), None)) > 60.0, "{face}");
+            let mut wrong = all;
+            wrong.swap(face, (face + 1) % 6);
+            assert!(error(&CubeMap::from_sky_box(wrong, SkyBoxTurn::Front, &pose(), None)) > 60.0, "{face}");
+        }
+    }
+
+    #[test]
+    fn an_equirectangular_photograph_is_right_to_its_poles() {
+        for yaw in [0.0, 0.7] {
+            let photo = taken(&Camera::equirectangular(pose().turned(yaw, 0.0), 512));
+            let cube = CubeMap::from_equirectangular(&photo, yaw, &pose(), None);
+            assert_eq!(cube.size(), 224, "512 · 1.25 / π, in steps of 32");
+            // A turn about an axis 0.03 rad off the vertical is no turn of the heading by as much.
+            let bound = if yaw == 0.0 { 2.0 } else { 4.0 };
+            assert!(error(&cube) < bound, "{yaw}: {}", error(&cube));
+        }
+        let photo = taken(&Camera::equirectangular(pose(), 512));
+        assert!(error(&CubeMap::from_equirectangular(&photo, 0.7, &pose(), Some(64))) > 50.0);
+    }
+}

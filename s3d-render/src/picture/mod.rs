@@ -1,0 +1,7 @@
+//! Colours from pictures: cube maps, what they are made from, and how an image samples them.
+
+pub(crate) mod cube_map;
+pub(crate) mod cube_sources;
+pub(crate) mod fill;
+pub(crate) mod picture_color;
+pub(crate) mod stitch;

@@ -1,0 +1,487 @@
+//! The RGB image from pictures: colours of a cube map where the mesh is seen.
+//!
+//! As in [`crate::shade::color`] eight pixels go together, and their footprints are filtered by [`crate::shade::filter`]: a face of the
+//! cube is a texture whose coordinates are ratios of linear functions of the ray's direction. Those directions are unit
+//! vectors, or of unit depth, so that `f32` does without an anchor: a place in a face of 4,096 pixels is off by less than
+//! a 500th of a pixel.
+
+use crate::hits::{Hits, NO_FACE};
+use crate::picture::cube_map::{AXES, CubeMap, FaceAxes};
+use crate::scene::Scene;
+use crate::shade::anchor::Seen;
+use crate::shade::channels::{assert_size, fit};
+use crate::shade::color::rgb_image_into;
+use crate::shade::filter::{Footprints, Sizes};
+use crate::shade::mip_maps::{Pyramids, TextureFilter};
+use crate::simd::lanes::{self, LANES, LaneWork, Lanes, eight};
+use glam::DVec3;
+use s3d_geom::{Camera, Raster, Rays};
+
+/// What a pixel of the mesh shows that no picture shows.
+#[derive(Clone, Copy, Debug)]
+pub enum Unseen<'a> {
+    /// The mesh's own colour.
+    Mesh(&'a Scene<'a>, &'a Pyramids),
+    /// What pictures show around the hole, blurred into it.
+    Nearby,
+}
+
+/// The colours of the pixels that see the mesh, from pictures; black where there is no mesh, and there alone: a dark pixel
+/// is at least (1, 1, 1). The camera stands where the cube map was made, or parallax shows.
+///
+/// # Panics
+/// If the hits are not of the camera's size, or the pyramids are another mesh's.
+pub fn picture_image(
+    cube: &CubeMap,
+    unseen: Unseen<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    filter: &TextureFilter,
+) -> Raster<[u8; 3]> {
+    let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
+    picture_image_into(cube, unseen, hits, camera, filter, &mut out);
+    out
+}
+
+/// As [`picture_image`], into an image that is used again.
+///
+/// # Panics
+/// As [`picture_image`].
+pub fn picture_image_into(
+    cube: &CubeMap,
+    unseen: Unseen<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    filter: &TextureFilter,
+    out: &mut Raster<[u8; 3]>,
+) {
+    assert_size(hits, camera);
+    fit(out, &hits.face, [0; 3]);
+    let Unseen::Mesh(scene, pyramids) = unseen else {
+        lanes::run(Picture { cube, hits, camera, filter, out, shown: None });
+        return;
+    };
+    if !cube.has_holes() {
+        lanes::run(Picture { cube, hits, camera, filter, out, shown: None });
+        return;
+    }
+    let mut shown = Raster::filled(out.width(), out.height(), 255u8);
+    lanes::run(Picture { cube, hits, camera, filter, out, shown: Some(&mut shown) });
+    if shown.pixels().iter().all(|&s| s == 255) {
+        return;
+    }
+    let mut mesh = Raster::filled(0, 0, [0; 3]);
+    rgb_image_into(scene, pyramids, hits, camera, filter, &mut mesh);
+    for ((pixel, &mesh), &shown) in out.pixels_mut().iter_mut().zip(mesh.pixels()).zip(shown.pixels()) {
+        if shown < 255 {
+            *pixel = mixed(*pixel, mesh, shown);
+        }
+    }
+}
+
+/// `shown` 255ths of `picture`, the rest of `mesh`; not black if one of them is not.
+fn mixed(picture: [u8; 3], mesh: [u8; 3], shown: u8) -> [u8; 3] {
+    let shown = u32::from(shown);
+    let color: [u8; 3] = std::array::from_fn(|k| {
+        ((u32::from(picture[k]) * shown + u32::from(mesh[k]) * (255 - shown) + 127) / 255) as u8
+    });
+    if color == [0; 3] && (picture, mesh) != ([0; 3], [0; 3]) { [1; 3] } else { color }
+}
+
+struct Picture<'a> {
+    cube: &'a CubeMap,
+    hits: &'a Hits,
+    camera: &'a Camera,
+    filter: &'a TextureFilter,
+    out: &'a mut Raster<[u8; 3]>,
+    /// How much of a pixel a picture shows, if that is asked.
+    shown: Option<&'a mut Raster<u8>>,
+}
+
+impl LaneWork for Picture<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, lanes: impl Lanes) {
+        let grid = Directions::new(self.cube, self.camera);
+        if grid.is_turn {
+            self.image::<true>(lanes, &grid);
+        } else {
+            self.image::<false>(lanes, &grid);
+        }
+    }
+}
+
+/// The directions of an image's pixels in the cube's frame: what belongs to a column and what to a row, in a panorama
+/// multiplied, and added.
+struct Directions {
+    /// By axis and column; two groups more.
+    columns: [Vec<f32>; 3],
+    /// How `columns` change from column to column.
+    slopes: [Vec<f32>; 3],
+    rows: Vec<Row>,
+    /// Whether it is a panorama's.
+    is_turn: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Row {
+    /// What columns are multiplied by, and what is added then; 1 in a perspective view.
+    scale: f32,
+    add: [f32; 3],
+    /// The same for the change from row to row.
+    slope_scale: f32,
+    slope_add: [f32; 3],
+}
+
+fn narrow(v: DVec3) -> [f32; 3] {
+    v.to_array().map(|c| c as f32)
+}
+
+impl Directions {
+    fn new(cube: &CubeMap, camera: &Camera) -> Self {
+        let turn = cube.frame_from_world();
+        let (w, h) = (camera.width, camera.height);
+        let spread = |values: &dyn Fn(u32) -> DVec3| -> [Vec<f32>; 3] {
+            let all: Vec<[f32; 3]> = (0..w).map(|i| narrow(values(i))).collect();
+            std::array::from_fn(|k| {
+                // The last column again beyond the end, so that the padding has a direction too.
+                let last = all.last().map_or(0.0, |c| c[k]);
+                all.iter().map(|c| c[k]).chain(std::iter::repeat_n(last, 2 * LANES)).collect()
+            })
+        };
+        match camera.rays() {
+            Rays::Perspective { x_step, y_step, origin } => {
+                let (x, y, o) = (turn * x_step, turn * y_step, turn * origin);
+                let row = |j: u32| Row {
+                    scale: 1.0,
+                    add: narrow(o + y * (f64::from(j) + 0.5)),
+                    slope_scale: 0.0,
+                    slope_add: narrow(y),
+                };
+                Self {
+                    columns: spread(&|i| x * (f64::from(i) + 0.5)),
+                    is_turn: false,
+                    slopes: spread(&|_| x),
+                    rows: (0..h).map(row).collect(),
+                }
+            }
+            Rays::Equirectangular { columns, rows } => {
+                use std::f64::consts::{PI, TAU};
+                let up = turn * DVec3::Z;
+                let (right, down) = (TAU / f64::from(w), PI / f64::from(h));
+                let row = |j: u32| {
+                    let r = rows[j as usize];
+                    // Longitude grows to the right and azimuth to the left; latitude falls.
+                    Row {
+                        scale: r.x as f32,
+                        add: narrow(up * r.y),
+                        slope_scale: (r.y * down) as f32,
+                        slope_add: narrow(up * (-r.x * down)),
+                    }
+                };
+                let column = |i: u32| turn * columns[i as usize].extend(0.0);
+                let slope = |i: u32| {
+                    let c = columns[i as usize];
+                    turn * DVec3::new(c.y, -c.x, 0.0) * right
+                };
+                Self {
+                    columns: spread(&column),
+                    is_turn: true,
+                    slopes: spread(&slope),
+                    rows: (0..h).map(row).collect(),
+                }
+            }
+        }
+    }
+}
+
+impl Picture<'_> {
+    #[inline(always)]
+    fn image<const TURN: bool>(self, l: impl Lanes, grid: &Directions) {
+        let Self { cube, hits, filter, out, mut shown, .. } = self;
+        let width = hits.face.width() as usize;
+        let sizes = cube.sizes();
+        let mut painter = Painter {
+            lanes: l,
+            cube,
+            sizes: &sizes,
+            max_taps: filter.max_taps,
+            place: cube.pixels_of_place(),
+            footprints: Footprints::new(2 * LANES),
+            colors: vec![[0; 3]; width + 2 * LANES],
+            shown: vec![255; width + 2 * LANES],
+            wants_shown: shown.is_some(),
+        };
+        for (j, faces) in hits.face.rows().enumerate() {
+            painter.row::<TURN>(grid, j, faces);
+            let from = j * width;
+            let to = &mut out.pixels_mut()[from..from + width];
+            to.copy_from_slice(&painter.colors[..width]);
+            if let Some(shown) = &mut shown {
+                shown.pixels_mut()[from..from + width].copy_from_slice(&painter.shown[..width]);
+            }
+            if faces.contains(&NO_FACE) {
+                for (pixel, _) in to.iter_mut().zip(faces).filter(|(_, face)| **face == NO_FACE) {
+                    *pixel = [0; 3];
+                }
+            }
+        }
+    }
+}
+
+/// A direction of the cube's frame along a face's right, down and forward.
+#[inline(always)]
+fn on_face<L: Lanes>(l: L, face: usize, v: &[L::F; 3]) -> [L::F; 3] {
+    let FaceAxes { right, down, forward } = AXES[face];
+    [right, down, forward].map(|(axis, sign)| if sign < 0 { l.sub(l.splat(0.0), v[axis]) } else { v[axis] })
+}
+
+struct Painter<'a, L> {
+    lanes: L,
+    cube: &'a CubeMap,
+    sizes: &'a [Sizes<'a>; 6],
+    max_taps: u32,
+    /// From places on a face's plane to pixels: what is added, then multiplied.
+    place: (f64, f64),
+    /// Of one group.
+    footprints: Footprints,
+    colors: Vec<[u8; 3]>,
+    shown: Vec<u8>,
+    wants_shown: bool,
+}
+
+impl<L: Lanes> Painter<'_, L> {
+    #[inline(always)]
+    fn row<const TURN: bool>(&mut self, grid: &Directions, j: usize, faces: &[u32]) {
+        let l = self.lanes;
+        let row = grid.rows[j];
+        let (scale, slope_scale) = (l.splat(row.scale), l.splat(row.slope_scale));
+        for i in (0..faces.len()).step_by(LANES) {
+            let group = &faces[i..faces.len().min(i + LANES)];
+            if group.iter().all(|&face| face == NO_FACE) {
+                continue;
+            }
+            let mut direction = [l.splat(0.0); 3];
+            let (mut along, mut down) = (direction, direction);
+            for k in 0..3 {
+                let column = eight(l, &grid.columns[k], i);
+                let slope = eight(l, &grid.slopes[k], i);
+                let (add, slope_add) = (l.splat(row.add[k]), l.splat(row.slope_add[k]));
+                if TURN {
+                    direction[k] = l.add(l.mul(column, scale), add);
+                    along[k] = l.mul(slope, scale);
+                    down[k] = l.add(l.mul(column, slope_scale), slope_add);
+                } else {
+                    direction[k] = l.add(column, add);
+                    along[k] = slope;
+                    down[k] = slope_add;
+                }
+            }
+            self.group(i, group.len(), &direction, &along, &down);
+        }
+    }
+
+    /// The pixels from `i` on, the first `some` of them in the image.
+    #[inline(always)]
+    fn group(&mut self, i: usize, some: usize, direction: &[L::F; 3], along: &[L::F; 3], down: &[L::F; 3]) {
+        let l = self.lanes;
+        let zero = l.splat(0.0);
+        let size = direction.map(|c| l.max(c, l.sub(zero, c)));
+        let [x, y, z] = size;
+        // As `face_of` has it: of equal ones the earlier.
+        let is_x = !(l.greater(y, x) | l.greater(z, x)) & 0xFF;
+        let is_y = !is_x & !l.greater(z, y) & 0xFF;
+        let is_z = !is_x & !is_y & 0xFF;
+        let mut left = 0xFFu32;
+        while left != 0 {
+            let lane = 1 << left.trailing_zeros();
+            let (axis, whole) = if is_x & lane != 0 {
+                (0, is_x)
+            } else if is_y & lane != 0 {
+                (1, is_y)
+            } else {
+                (2, is_z)
+            };
+            let negative = l.greater(zero, direction[axis]);
+            let (face, these) = if negative & lane != 0 {
+                ([3, 0, 2][axis], whole & negative)
+            } else {
+                ([1, 5, 4][axis], whole & !negative)
+            };
+            self.face(face, i, some, these, &[direction, along, down].map(|v| on_face(l, face, v)));
+            left &= !these;
+        }
+    }
+
+    /// Those pixels of a group that are among `these`, which all look through one face. `directions` and their changes to
+    /// the next column and row are in the face's axes.
+    #[inline(always)]
+    fn face(&mut self, face: usize, i: usize, some: usize, these: u32, directions: &[[L::F; 3]; 3]) {
+        let l = self.lanes;
+        let [[right, down, forward], along, below] = *directions;
+        let inverse = l.div(l.splat(1.0), forward);
+        let place = [l.mul(right, inverse), l.mul(down, inverse)];
+        let (offset, scale) = (l.splat(self.place.0 as f32), l.splat(self.place.1 as f32));
+        let per_step = l.mul(inverse, scale);
+        // (u / m)' = (u' − u / m · m') / m
+        let slope = |v: [L::F; 3]| [0, 1].map(|k| l.mul(l.sub(v[k], l.mul(place[k], v[2])), per_step));
+        let values = place.map(|p| l.mul(l.add(p, offset), scale));
+        let seen = Seen { values, x: slope(along), y: slope(below), doubtful: 0 };
+        let sizes = &self.sizes[face];
+        self.footprints.store(l, 0, &seen, false);
+        let colors = sizes.colors(l, &self.footprints, 0, (these, these), self.max_taps);
+        let to = self.colors[i..].as_flattened_mut().first_chunk_mut();
+        if let (0xFF, Some(to)) = (these, to) {
+            l.store_pixels(&colors, to);
+        } else {
+            for (k, color) in colors.iter().enumerate() {
+                if these >> k & 1 == 1 {
+                    let [r, g, b, _] = color.to_le_bytes();
+                    self.colors[i + k] = [r, g, b];
+                }
+            }
+        }
+        if self.wants_shown {
+            let [mut x, mut y] = [[0.0; LANES]; 2];
+            l.store(values[0], &mut x);
+            l.store(values[1], &mut y);
+            for k in 0..some {
+                if these >> k & 1 == 1 {
+                    self.shown[i + k] = self.cube.seen_at(face, x[k], y[k]);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::lanes::Plain;
+    use glam::dvec3;
+    use s3d_geom::{Pose, TriMesh, furnished_room};
+
+    fn pose() -> Pose {
+        Pose::from_scanner(
+            dvec3(2.2, 2.0, 1.4),
+            glam::DQuat::from_rotation_z(0.7) * glam::DQuat::from_rotation_x(0.02),
+        )
+    }
+
+    /// Noise, and a hole below.
+    fn noise(hole: bool) -> CubeMap {
+        CubeMap::build(pose(), 256, |face, x, y, d| {
+            let mut h = (face as u32 * 7919 + x * 104_729 + y * 1_299_709).wrapping_mul(0x9E37_79B1);
+            h ^= h >> 15;
+            let rough = h.wrapping_mul(0x85EB_CA77).to_le_bytes().map(f32::from);
+            (!hole || d.y < 0.6 * d.length()).then_some([rough[0], rough[1] * 0.2, 0.0])
+        })
+    }
+
+    fn cameras() -> [Camera; 5] {
+        [
+            Camera::perspective(pose().turned(0.3, -0.4), 1.2, 301, 203),
+            Camera::perspective(pose().turned(2.0, -0.6), 0.2, 67, 65),
+            // Far smaller than the cube map.
+            Camera::perspective(pose().turned(-0.8, 0.2), 2.4, 37, 31),
+            Camera::equirectangular(pose(), 256),
+            Camera::equirectangular(pose(), 2048),
+        ]
+    }
+
+    /// A room without its ceiling.
+    fn open_room() -> TriMesh {
+        let mut parts = furnished_room(3).into_parts();
+        let high = |f: &[u32; 3]| f.iter().all(|&v| parts.positions[v as usize].z > 2.4);
+        let keep: Vec<bool> = parts.faces.iter().map(|f| !high(f)).collect();
+        let mut next = keep.iter();
+        parts.faces.retain(|_| *next.next().unwrap());
+        for faces in [&mut parts.face_uvs, &mut parts.face_normals] {
+            let mut next = keep.iter();
+            faces.retain(|_| *next.next().unwrap());
+        }
+        let mut next = keep.iter();
+        parts.face_materials.retain(|_| *next.next().unwrap());
+        TriMesh::new(parts).unwrap()
+    }
+
+    #[test]
+    fn pixels_are_samples_of_the_cube_map_where_there_is_mesh() {
+        let mesh = open_room();
+        let scene = Scene::new(&mesh);
+        let cube = noise(false);
+        let filter = TextureFilter::default();
+        for camera in cameras() {
+            let hits = crate::cast(&scene, &camera);
+            let image = picture_image(&cube, Unseen::Nearby, &hits, &camera, &filter);
+            let (mut far, mut seen) = (0, 0);
+            for (x, y) in (0..camera.width * camera.height).map(|k| (k % camera.width, k / camera.width)) {
+                let (fx, fy) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+                let pixel = image.at(x, y);
+                if hits.face.at(x, y) == NO_FACE {
+                    assert_eq!(pixel, [0; 3]);
+                    continue;
+                }
+                let around = |dx: f64, dy: f64| camera.direction(fx + dx, fy + dy);
+                let (along, down) =
+                    (around(0.5, 0.0) - around(-0.5, 0.0), around(0.0, 0.5) - around(0.0, -0.5));
+                let (color, _) = cube.sample(around(0.0, 0.0), along, down, &filter);
+                assert_ne!(pixel, [0; 3]);
+                seen += 1;
+                far += usize::from((0..3).any(|k| (f32::from(pixel[k]) - color[k]).abs() > 1.6));
+            }
+            // Where rounding decides how many samples there are, or on which face a seam's pixel is.
+            assert!(seen > 500 && far * 200 <= seen, "{far} of {seen} in {camera:?}");
+        }
+    }
+
+    #[test]
+    fn holes_show_the_mesh_or_what_is_around() {
+        let mesh = furnished_room(3);
+        let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+        let camera = Camera::equirectangular(pose(), 256);
+        let hits = crate::cast(&scene, &camera);
+        let filter = TextureFilter::default();
+        let cube = noise(true);
+        let mesh_image = crate::rgb_image(&scene, &pyramids, &hits, &camera);
+        let nearby = picture_image(&cube, Unseen::Nearby, &hits, &camera, &filter);
+        let image = picture_image(&cube, Unseen::Mesh(&scene, &pyramids), &hits, &camera, &filter);
+        let rows = |from: u32, to: u32| from as usize * 256..to as usize * 256;
+        assert_eq!(image.pixels()[rows(0, 80)], nearby.pixels()[rows(0, 80)]);
+        assert_eq!(image.pixels()[rows(105, 128)], mesh_image.pixels()[rows(105, 128)]);
+        assert!(
+            nearby.pixels()[rows(105, 128)].iter().all(|p| p[2] <= 1 && p[0] > 20),
+            "filled from the noise"
+        );
+    }
+
+    #[test]
+    fn every_set_of_instructions_gives_the_same_bytes() {
+        let mesh = open_room();
+        let scene = Scene::new(&mesh);
+        let (cube, filter) = (noise(true), TextureFilter::default());
+        for camera in cameras() {
+            let hits = crate::cast(&scene, &camera);
+            let run = |plain: bool| {
+                let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
+                let mut shown = Raster::filled(camera.width, camera.height, 0);
+                let work = Picture {
+                    cube: &cube,
+                    hits: &hits,
+                    camera: &camera,
+                    filter: &filter,
+                    out: &mut out,
+                    shown: Some(&mut shown),
+                };
+                if plain {
+                    work.run(Plain)
+                } else {
+                    lanes::run(work)
+                }
+                (out, shown)
+            };
+            assert_eq!(run(true), run(false));
+        }
+    }
+}

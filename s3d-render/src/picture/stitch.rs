@@ -1,0 +1,410 @@
+//! Cube maps from captures: pictures of real cameras that overlap, from about one place.
+//!
+//! A pixel of the cube takes the mean of the captures that see it, each with a weight that falls smoothly to 0 towards the
+//! border of its picture, so that no seam shows. Before that, each capture's exposure is brought to that of the others:
+//! one factor a channel, by least squares over what they see in common.
+//!
+//! **Parallax.** The cameras of a scanner turn about its axis and stand some centimetres from it, and from each other. With
+//! the mesh of the scene a pixel of the cube looks up the point that it sees, and takes it from those captures in which no
+//! other surface hides it. Without, or where there is no mesh, all stand at the centre: off by their distance from it over
+//! the distance of what is seen, 2 cm at 2 m being ten pixels of 1,000 a radian.
+
+use crate::hits::{Hits, NO_FACE};
+use crate::picture::cube_map::{CubeMap, face_cameras};
+use crate::picture::cube_sources::SourcePyramid;
+use crate::raster::visibility::cast;
+use crate::scene::Scene;
+use glam::{DMat3, DVec2, DVec3, dvec2};
+use rayon::prelude::*;
+use s3d_geom::{Camera, Lens, Pose, Raster, Wrap};
+
+/// How far behind the nearest surface a point may be and still be seen: a part of its depth, and metres.
+const BEHIND: (f64, f64) = (0.01, 0.02);
+
+/// Pixels across the images that tell what hides what.
+const DEPTH_WIDTH: u32 = 640;
+
+/// A face of the cube in which captures are compared.
+const GAIN_SIZE: u32 = 64;
+
+/// How far a factor may well be from 1, and how far colours of one thing are apart in two captures, 0 to 255.
+const GAIN_DEVIATION: f64 = 1.0;
+const COLOR_DEVIATION: f64 = 10.0;
+
+/// Darker and brighter colours tell nothing of exposure.
+const TELLING: std::ops::RangeInclusive<f32> = 8.0..=247.0;
+
+/// A picture and the camera that took it.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    /// The picture, of the lens's size.
+    pub image: Raster<[u8; 3]>,
+    /// The camera's lens.
+    pub lens: Lens,
+    /// Where the camera was; in the project's axes, as all poses.
+    pub pose: Pose,
+}
+
+/// How captures become a cube map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StitchOptions {
+    /// Width of a face in pixels; what keeps the sharpest capture's pixels if it is not said.
+    pub size: Option<u32>,
+    /// Whether exposures are brought together.
+    pub gains: bool,
+}
+
+impl Default for StitchOptions {
+    fn default() -> Self {
+        Self { size: None, gains: true }
+    }
+}
+
+/// The cube map around `pose` (E(original) of the location) of captures taken about there. With `scene` parallax is taken
+/// into account; see the module. What no capture sees is a hole. On all threads of the current pool.
+///
+/// # Panics
+/// If there is no capture, or a picture is not of its lens's size.
+pub fn stitch(
+    captures: Vec<Capture>,
+    pose: &Pose,
+    scene: Option<&Scene<'_>>,
+    options: &StitchOptions,
+) -> CubeMap {
+    assert!(!captures.is_empty(), "a cube map needs captures");
+    let sharpest = captures.iter().map(|c| c.lens.focal_px().max_element()).fold(0.0, f64::max);
+    let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
+    let world_from_frame = pose.opencv_from_world().transpose();
+    let views: Vec<View> = captures.into_par_iter().map(|c| View::new(c, pose, scene)).collect();
+    let gains = if options.gains && views.len() > 1 {
+        let rays = Rays::new(pose, GAIN_SIZE, scene);
+        gains(&views, GAIN_SIZE, &rays, world_from_frame)
+    } else {
+        vec![[1.0; 3]; views.len()]
+    };
+    let rays = Rays::new(pose, size, scene);
+    CubeMap::build(*pose, size, |face, x, y, d| {
+        let ray = Ray { direction: world_from_frame * d, depth: rays.depth(face, x, y), size };
+        let (mut sum, mut total) = ([0.0f32; 3], 0.0f32);
+        for (view, gain) in views.iter().zip(&gains) {
+            if let Some((color, weight)) = view.sees(&ray) {
+                (0..3).for_each(|k| sum[k] += weight * gain[k] * color[k]);
+                total += weight;
+            }
+        }
+        (total > 0.0).then(|| sum.map(|c| (c / total).min(255.0)))
+    })
+}
+
+/// The depths of the scene behind each pixel of the cube.
+struct Rays(Option<Vec<Hits>>);
+
+impl Rays {
+    fn new(pose: &Pose, size: u32, scene: Option<&Scene<'_>>) -> Self {
+        Self(
+            scene
+                .map(|scene| face_cameras(pose, size).par_iter().map(|camera| cast(scene, camera)).collect()),
+        )
+    }
+
+    fn depth(&self, face: usize, x: u32, y: u32) -> Option<f64> {
+        let hits = &self.0.as_ref()?[face];
+        (hits.face.at(x, y) != NO_FACE).then(|| f64::from(hits.depth.at(x, y)))
+    }
+}
+
+/// What a pixel of the cube looks at.
+struct Ray {
+    /// In the world, with a depth of 1 on its face.
+    direction: DVec3,
+    /// How far on that direction there is a surface, if that is known.
+    depth: Option<f64>,
+    /// Of the cube's faces.
+    size: u32,
+}
+
+/// A capture, prepared.
+struct View {
+    picture: SourcePyramid,
+    lens: Lens,
+    /// World → the camera's OpenCV axes.
+    camera_from_world: DMat3,
+    /// From the camera to the cube's centre, world.
+    center: DVec3,
+    forward: DVec3,
+    /// The cosine of the angle from its axis beyond which it sees nothing.
+    least_cosine: f64,
+    /// What it sees of the scene.
+    surface: Option<(Camera, Hits)>,
+}
+
+impl View {
+    fn new(capture: Capture, pose: &Pose, scene: Option<&Scene<'_>>) -> Self {
+        let Capture { image, lens, pose: own } = capture;
+        assert_eq!(
+            (image.width(), image.height()),
+            (lens.width(), lens.height()),
+            "a picture has its lens's size"
+        );
+        let reach = lens.reach();
+        let surface = scene.map(|scene| {
+            let camera = Camera::perspective(own, 2.0 * libm::atan(1.01 * reach), DEPTH_WIDTH, DEPTH_WIDTH);
+            let hits = cast(scene, &camera);
+            (camera, hits)
+        });
+        Self {
+            picture: SourcePyramid::new(image, [Wrap::Clamp; 2]),
+            lens,
+            camera_from_world: own.opencv_from_world(),
+            center: pose.location - own.location,
+            forward: own.forward(),
+            least_cosine: 1.0 / (1.0 + reach * reach).sqrt() - 1e-9,
+            surface,
+        }
+    }
+
+    /// The colour that the capture has of what a ray sees, and its weight.
+    fn sees(&self, ray: &Ray) -> Option<([f32; 3], f32)> {
+        let direction = match (&self.surface, ray.depth) {
+            (Some(_), Some(depth)) => self.center + ray.direction * depth,
+            _ => ray.direction,
+        };
+        let (cosine, length_2) = (self.forward.dot(direction), direction.length_squared());
+        if cosine <= 0.0 || cosine * cosine < self.least_cosine * self.least_cosine * length_2 {
+            return None;
+        }
+        let v = self.camera_from_world * direction;
+        let pixel = self.lens.project(v)?;
+        let (w, h) = (f64::from(self.lens.width()), f64::from(self.lens.height()));
+        if !(pixel.x > 0.5 && pixel.y > 0.5 && pixel.x < w - 0.5 && pixel.y < h - 0.5) {
+            return None;
+        }
+        if ray.depth.is_some() && self.is_hidden(v) {
+            return None;
+        }
+        // 1 in the middle of the picture and 0 at its border, along either axis.
+        let inner = |at: f64, size: f64| 1.0 - (2.0 * at / size - 1.0) * (2.0 * at / size - 1.0);
+        let weight = inner(pixel.x, w) * inner(pixel.y, h);
+        // A pixel of the cube is 2/size wide at the depth 1; distortion hardly changes how much of the picture that is.
+        let step = ray.direction.length() * 2.0 / f64::from(ray.size) / ray.direction.length_squared();
+        let along = self.lens.focal_px() * (step * length_2.sqrt() / v.z);
+        let color = self.picture.sample(pixel, DVec2::X * along.x, DVec2::Y * along.y, &Default::default());
+        Some((color, (weight * weight) as f32))
+    }
+
+    /// Whether something is in front of the point at `v`, in the camera's axes.
+    fn is_hidden(&self, v: DVec3) -> bool {
+        let Some((camera, hits)) = &self.surface else { return false };
+        let focal = camera.focal_px();
+        let middle = 0.5 * f64::from(camera.width);
+        let at = dvec2(v.x, v.y) * (focal / v.z) + middle - 0.5;
+        let (x, y) = (at.x.floor(), at.y.floor());
+        let last = f64::from(camera.width - 2);
+        let (x, y) = (x.clamp(0.0, last) as u32, y.clamp(0.0, last) as u32);
+        // The farthest around: at an edge both sides may be seen.
+        let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+        let far = around.map(|(x, y)| hits.depth.at(x, y)).into_iter().fold(0.0, f32::max);
+        v.z > f64::from(far) * (1.0 + BEHIND.0) + BEHIND.1
+    }
+}
+
+/// A factor a capture and channel that brings colours of what several see together: the least sum, over the pairs that
+/// overlap, of (gᵢ·meanᵢ − gⱼ·meanⱼ)² and of (1 − g)², each by its deviation and the number of pixels.
+fn gains(views: &[View], size: u32, rays: &Rays, world_from_frame: DMat3) -> Vec<[f32; 3]> {
+    let n = views.len();
+    // By pair: pixels and the sums of the colours of the first.
+    let mut sums = vec![(0.0f64, [0.0f64; 3]); n * n];
+    let colors = CubeMap::directions(size).map(|(face, x, y, d)| {
+        let ray = Ray { direction: world_from_frame * d, depth: rays.depth(face, x, y), size };
+        views.iter().map(|v| v.sees(&ray).map(|(c, _)| c)).collect::<Vec<_>>()
+    });
+    for seen in colors {
+        let telling = |c: &[f32; 3]| c.iter().all(|v| TELLING.contains(v));
+        let seen: Vec<(usize, [f32; 3])> =
+            seen.into_iter().enumerate().filter_map(|(i, c)| Some((i, c.filter(telling)?))).collect();
+        for &(i, color) in &seen {
+            for &(j, _) in seen.iter().filter(|(j, _)| *j != i) {
+                let (count, sum) = &mut sums[i * n + j];
+                *count += 1.0;
+                (0..3).for_each(|k| sum[k] += f64::from(color[k]));
+            }
+        }
+    }
+    let mut gains = vec![[1.0f32; 3]; n];
+    for k in 0..3 {
+        let mut matrix = vec![0.0; n * n];
+        let mut right = vec![0.0; n];
+        for i in 0..n {
+            // A capture that overlaps none keeps its exposure.
+            matrix[i * n + i] += 1e-6;
+            right[i] += 1e-6;
+            for j in (0..n).filter(|&j| j != i) {
+                let (count, sum) = sums[i * n + j];
+                if count == 0.0 {
+                    continue;
+                }
+                let (own, other) = (sum[k] / count, sums[j * n + i].1[k] / count);
+                let weight = count / (COLOR_DEVIATION * COLOR_DEVIATION);
+                let prior = count / (GAIN_DEVIATION * GAIN_DEVIATION);
+                matrix[i * n + i] += 2.0 * weight * own * own + prior;
+                matrix[i * n + j] -= 2.0 * weight * own * other;
+                right[i] += prior;
+            }
+        }
+        for (gain, solved) in gains.iter_mut().zip(solve(matrix, right)) {
+            gain[k] = solved.clamp(0.25, 4.0) as f32;
+        }
+    }
+    gains
+}
+
+/// The solution of a system with a symmetric, positive definite matrix, row by row.
+fn solve(mut matrix: Vec<f64>, mut right: Vec<f64>) -> Vec<f64> {
+    let n = right.len();
+    for i in 0..n {
+        for row in i + 1..n {
+            let factor = matrix[row * n + i] / matrix[i * n + i];
+            for column in i..n {
+                matrix[row * n + column] -= factor * matrix[i * n + column];
+            }
+            right[row] -= factor * right[i];
+        }
+    }
+    for i in (0..n).rev() {
+        let known: f64 = (i + 1..n).map(|j| matrix[i * n + j] * right[j]).sum();
+        right[i] = (right[i] - known) / matrix[i * n + i];
+    }
+    right
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TextureFilter;
+    use crate::picture::cube_map::tests::{close, color_of, pose};
+    use glam::{DQuat, dvec3};
+    use proptest::prelude::*;
+
+    /// Eighteen captures as a scanner takes them, from one place, of `seen`.
+    fn captures(seen: impl Fn(usize, DVec3) -> [f32; 3]) -> Vec<Capture> {
+        let lens = Lens::new(
+            [160, 128],
+            dvec2(110.0, 109.0),
+            dvec2(81.0, 62.5),
+            [0.08, -0.05, 0.001, -0.0008, 0.01],
+        );
+        let lens = lens.unwrap();
+        (0..18usize)
+            .map(|k| {
+                let yaw = -((k % 6) as f64) * std::f64::consts::FRAC_PI_3 + 0.2;
+                let own = pose().turned(yaw, [0.95, 0.02, -0.95][k / 6]);
+                let world = own.opencv_from_world().transpose();
+                let pixel = |i: u32| {
+                    let at = dvec2(f64::from(i % 160) + 0.5, f64::from(i / 160) + 0.5);
+                    seen(k, world * lens.direction(at).unwrap()).map(|c| (c + 0.5).clamp(0.0, 255.0) as u8)
+                };
+                Capture {
+                    image: Raster::from_vec(160, 128, (0..160 * 128).map(pixel).collect()),
+                    lens,
+                    pose: own,
+                }
+            })
+            .collect()
+    }
+
+    fn directions() -> impl Iterator<Item = DVec3> {
+        (0..3000).map(|k| {
+            let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 3000.0;
+            let (sin, cos) = libm::sincos(2.399_963 * f64::from(k));
+            dvec3(cos, sin, 0.0) * (1.0 - z * z).sqrt() + DVec3::Z * z
+        })
+    }
+
+    fn sample(cube: &CubeMap, d: DVec3) -> ([f32; 3], u8) {
+        cube.sample(d, DVec3::splat(1e-9), DVec3::splat(1e-9), &TextureFilter::default())
+    }
+
+    #[test]
+    fn captures_are_undistorted_and_put_in_their_places() {
+        let cube = stitch(captures(|_, d| color_of(d)), &pose(), None, &StitchOptions::default());
+        assert_eq!(cube.size(), 224, "twice the focal length");
+        for d in directions() {
+            let (color, seen) = sample(&cube, d);
+            // Straight up and down no camera looks.
+            if seen == 255 {
+                assert!(close(color, color_of(d), 1.5), "{d}: {color:?} {:?}", color_of(d));
+            } else {
+                assert!(d.z.abs() > 0.95, "{d} is not seen");
+            }
+        }
+        let turned: Vec<Capture> = captures(|_, d| color_of(d))
+            .into_iter()
+            .map(|c| Capture { pose: c.pose.turned(0.1, 0.0), ..c })
+            .collect();
+        let wrong = stitch(turned, &pose(), None, &StitchOptions::default());
+        assert!(directions().any(|d| !close(sample(&wrong, d).0, color_of(d), 8.0)));
+    }
+
+    #[test]
+    fn exposures_are_brought_together() {
+        // Every capture has an exposure of its own.
+        let exposure = |k: usize| 1.0 + 0.15 * (((k * 7) % 5) as f32 - 2.0) / 2.0;
+        let gray = |k: usize, _: DVec3| [120.0 * exposure(k), 100.0, 90.0 * exposure(k + 3)];
+        let spread = |gains: bool| {
+            let cube = stitch(captures(gray), &pose(), None, &StitchOptions { gains, size: Some(64) });
+            let seen = directions().map(|d| sample(&cube, d)).filter(|s| s.1 == 255).map(|s| s.0[0]);
+            let (low, high) = seen.fold((255.0f32, 0.0f32), |(l, h), c| (l.min(c), h.max(c)));
+            high - low
+        };
+        let (before, after) = (spread(false), spread(true));
+        assert!(before > 30.0 && after < 4.0, "{before} {after}");
+    }
+
+    proptest! {
+        #[test]
+        fn systems_are_solved(values in prop::collection::vec(-1.0..1.0f64, 20)) {
+            // AᵀA + 1 is positive definite.
+            let (a, x) = values.split_at(16);
+            let matrix: Vec<f64> = (0..16)
+                .map(|k| (0..4).map(|r| a[4 * r + k / 4] * a[4 * r + k % 4]).sum::<f64>() + f64::from(u8::from(k / 4 == k % 4)))
+                .collect();
+            let right = (0..4).map(|i| (0..4).map(|j| matrix[4 * i + j] * x[j]).sum()).collect();
+            for (solved, x) in solve(matrix, right).iter().zip(x) {
+                prop_assert!((solved - x).abs() < 1e-9);
+            }
+        }
+    }
+
+    /// Cameras beside the centre, and a thing in the room: with the mesh each pixel is where the mesh has it.
+    #[test]
+    fn parallax_is_taken_out_with_the_mesh() {
+        let mesh = s3d_geom::furnished_room(5);
+        let (scene, pyramids) = (Scene::new(&mesh), crate::Pyramids::new(&mesh));
+        let center = Pose::from_scanner(dvec3(2.2, 2.1, 1.4), DQuat::from_rotation_z(0.4));
+        let lens = Lens::new([320, 256], dvec2(215.0, 215.0), dvec2(160.0, 128.0), [0.0; 5]).unwrap();
+        let shots: Vec<Capture> = (0..18usize)
+            .map(|k| {
+                let turned =
+                    center.turned(-((k % 6) as f64) * std::f64::consts::FRAC_PI_3, [0.95, 0.0, -0.95][k / 6]);
+                let location =
+                    center.location + 0.06 * turned.forward() + DVec3::Z * (0.05 - 0.05 * (k / 6) as f64);
+                let own = Pose { location, ..turned };
+                let camera = Camera::perspective(own, 2.0 * libm::atan(160.0 / 215.0), 320, 256);
+                let image = crate::rgb_image(&scene, &pyramids, &cast(&scene, &camera), &camera);
+                Capture { image, lens, pose: own }
+            })
+            .collect();
+        let view = Camera::perspective(center.turned(0.5, -0.3), 1.2, 240, 240);
+        let hits = cast(&scene, &view);
+        let direct = crate::rgb_image(&scene, &pyramids, &hits, &view);
+        let error = |scene: Option<&Scene<'_>>| {
+            let cube = stitch(shots.clone(), &center, scene, &StitchOptions::default());
+            let filter = TextureFilter::default();
+            let image = crate::picture_image(&cube, crate::Unseen::Nearby, &hits, &view, &filter);
+            let squares = image.pixels().as_flattened().iter().zip(direct.pixels().as_flattened());
+            squares.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum::<f64>() / (3.0 * 240.0 * 240.0)
+        };
+        let (without, with) = (error(None), error(Some(&scene)));
+        assert!(with < 0.25 * without, "mean square {without} without the mesh, {with} with it");
+    }
+}

@@ -1,0 +1,408 @@
+//! The faces of a cluster in a perspective view, set up eight at a time.
+//!
+//! One face after another is a chain of divisions, and of branches that nobody foresees: is it in the window, is it
+//! small, how wide is it? So all faces of a cluster are set up first, in arrays and without a branch, sorted by how they
+//! are drawn, and then drawn kind by kind.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "slices are cut to the length of the array: there is nothing left of the check"
+)]
+
+use crate::raster::canvas::{Chunk, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TRUSTED};
+use crate::raster::clusters::MOST_FACES;
+use crate::raster::pinhole::{Planes, Projected, Reach};
+use crate::simd::registers::LANES;
+
+/// An edge that is shorter, in pixels, has no direction to speak of: see the module `pinhole`.
+const SHORT: f64 = 1e-3;
+
+/// Pixels around a face's corners that it may yet touch, as far as is known.
+const MARGIN: f64 = 1e-4;
+
+/// Faces that are set up together.
+const GROUP: usize = 8;
+
+/// How a face is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Covers no centre of a pixel.
+    Nothing = 0,
+    /// In one chunk of at most 8 columns.
+    Narrow,
+    /// In one chunk.
+    Small,
+    /// In one chunk, with care.
+    Careful,
+    /// In two chunks side by side.
+    Wide,
+    /// Tile by tile.
+    Large,
+    /// By its planes in space: behind the camera, too far out, or with next to no area.
+    InSpace,
+}
+
+type Values<T> = [T; MOST_FACES];
+
+/// What is known of each face of a cluster.
+pub(crate) struct Batch {
+    x: [Values<f64>; 3],
+    y: [Values<f64>; 3],
+    /// 1/z of the corners.
+    q: [Values<f64>; 3],
+    /// First and last column and row of pixels, cut off at the window.
+    left: Values<f64>,
+    right: Values<f64>,
+    top: Values<f64>,
+    bottom: Values<f64>,
+    /// See [`Planes`].
+    at: [Values<f64>; 4],
+    across: [Values<f64>; 4],
+    down: [Values<f64>; 4],
+    /// The same from the first column and row on.
+    chunk_at: [Values<f32>; 4],
+    /// No value of 1/t in a face's chunk, or its two, is farther off.
+    error: Values<f32>,
+    kind: Values<u32>,
+    /// Faces by kind, and how many there are.
+    lists: [Values<u8>; KINDS],
+    counts: [usize; KINDS],
+}
+
+const KINDS: usize = 7;
+
+impl Batch {
+    pub(crate) fn new() -> Self {
+        Self {
+            x: [[0.0; MOST_FACES]; 3],
+            y: [[0.0; MOST_FACES]; 3],
+            q: [[0.0; MOST_FACES]; 3],
+            left: [0.0; MOST_FACES],
+            right: [0.0; MOST_FACES],
+            top: [0.0; MOST_FACES],
+            bottom: [0.0; MOST_FACES],
+            at: [[0.0; MOST_FACES]; 4],
+            across: [[0.0; MOST_FACES]; 4],
+            down: [[0.0; MOST_FACES]; 4],
+            chunk_at: [[0.0; MOST_FACES]; 4],
+            error: [0.0; MOST_FACES],
+            kind: [0; MOST_FACES],
+            lists: [[0; MOST_FACES]; KINDS],
+            counts: [0; KINDS],
+        }
+    }
+
+    /// Sets up faces, given by the places of their corners, in a window of a size.
+    #[inline(always)]
+    pub(crate) fn set_up(&mut self, faces: &[[u8; 4]], corners: &Projected, width: f64, height: f64) {
+        for (i, places) in faces.iter().enumerate() {
+            for (k, &place) in places[..3].iter().enumerate() {
+                let place = usize::from(place);
+                self.x[k][i] = corners.x[place];
+                self.y[k][i] = corners.y[place];
+                self.q[k][i] = corners.inverse_z[place];
+            }
+        }
+        // The last group is filled up with what was there: nobody looks at it.
+        for first in (0..faces.len()).step_by(GROUP) {
+            self.set_up_group(first, width - 1.0, height - 1.0);
+        }
+        self.counts = [0; KINDS];
+        for (i, &kind) in self.kind[..faces.len()].iter().enumerate() {
+            let (list, count) = (&mut self.lists[kind as usize], &mut self.counts[kind as usize]);
+            list[*count % MOST_FACES] = i as u8;
+            *count += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn set_up_group(&mut self, first: usize, last_column: f64, last_row: f64) {
+        let three = |from: &[Values<f64>; 3]| {
+            [group(&from[0], first), group(&from[1], first), group(&from[2], first)]
+        };
+        let (xs, ys, qs) = (three(&self.x), three(&self.y), three(&self.q));
+        // Arrays of their own, so that all faces of the group go together.
+        let (mut lefts, mut rights) = ([0.0; GROUP], [0.0; GROUP]);
+        let (mut tops, mut bottoms) = ([0.0; GROUP], [0.0; GROUP]);
+        let (mut ats, mut acrosses, mut downs) = ([[0.0; GROUP]; 4], [[0.0; GROUP]; 4], [[0.0; GROUP]; 4]);
+        let mut chunk_ats = [[0.0; GROUP]; 4];
+        let mut errors = [0.0; GROUP];
+        let mut kinds = [0; GROUP];
+        for i in 0..GROUP {
+            let x = [xs[0][i], xs[1][i], xs[2][i]];
+            let y = [ys[0][i], ys[1][i], ys[2][i]];
+            let q = [qs[0][i], qs[1][i], qs[2][i]];
+            let left = most((low(x) - MARGIN).ceil(), 0.0);
+            let right = least((high(x) + MARGIN).floor(), last_column);
+            let top = most((low(y) - MARGIN).ceil(), 0.0);
+            let bottom = least((high(y) + MARGIN).floor(), last_row);
+
+            // Edge k is opposite to corner k, from corner k + 1 to k + 2.
+            let across = [y[1] - y[2], y[2] - y[0], y[0] - y[1]];
+            let down = [x[2] - x[1], x[0] - x[2], x[1] - x[0]];
+            let at = [
+                -(across[0] * x[1] + down[0] * y[1]),
+                -(across[1] * x[2] + down[1] * y[2]),
+                -(across[2] * x[0] + down[2] * y[0]),
+            ];
+            let length = [
+                across[0].abs() + down[0].abs(),
+                across[1].abs() + down[1].abs(),
+                across[2].abs() + down[2].abs(),
+            ];
+            // Twice the area: what the edge functions add up to, anywhere.
+            let area = across[0] * (x[0] - x[1]) + down[0] * (y[0] - y[1]);
+            let scale = 1.0 / area;
+            let sign = if area > 0.0 { 1.0 } else { -1.0 };
+            let factor = [sign / length[0], sign / length[1], sign / length[2]];
+            let sum = |f: [f64; 3]| (q[0] * f[0] + q[1] * f[1] + q[2] * f[2]) * scale;
+            let at = [at[0] * factor[0], at[1] * factor[1], at[2] * factor[2], sum(at)];
+            let across = [across[0] * factor[0], across[1] * factor[1], across[2] * factor[2], sum(across)];
+            let down = [down[0] * factor[0], down[1] * factor[1], down[2] * factor[2], sum(down)];
+
+            // The chunk from the first column and row on.
+            let chunk_at = [
+                (at[0] + across[0] * left + down[0] * top) as f32,
+                (at[1] + across[1] * left + down[1] * top) as f32,
+                (at[2] + across[2] * left + down[2] * top) as f32,
+                (at[3] + across[3] * left + down[3] * top) as f32,
+            ];
+            // A second chunk begins sixteen columns on: its terms are bounded by those of one that is twice as wide.
+            let small = right - left < LANES as f64;
+            let reach = if small { 15.0 } else { 31.0 };
+            let spread = (across[3] as f32).abs() * reach
+                + (down[3] as f32).abs() * (bottom - top) as f32
+                + chunk_at[3].abs();
+            let error = INVERSE_T_ROUNDING * spread;
+
+            let trusted = error < TRUSTED * low(q) as f32;
+            let kind =
+                if right - left < (LANES / 2) as f64 { Kind::Narrow as u32 } else { Kind::Small as u32 };
+            let kind = if trusted { kind } else { Kind::Careful as u32 };
+            let kind = if small { kind } else { Kind::Large as u32 };
+            let wide = if trusted { Kind::Wide as u32 } else { kind };
+            let wide = if right - left < (2 * LANES) as f64 { wide } else { kind };
+            let kind = if small { kind } else { wide };
+            let kind = if bottom - top < MOST_ROWS as f64 { kind } else { Kind::Large as u32 };
+            let kind = if low(length) > SHORT { kind } else { Kind::InSpace as u32 };
+            let kind = if area.abs() > 1e-4 { kind } else { Kind::InSpace as u32 };
+            let kind = if left <= right { kind } else { Kind::Nothing as u32 };
+            let kind = if top <= bottom { kind } else { Kind::Nothing as u32 };
+            kinds[i] = if low(q) > 0.0 { kind } else { Kind::InSpace as u32 };
+
+            (lefts[i], rights[i], tops[i], bottoms[i]) = (left, right, top, bottom);
+            errors[i] = error;
+            for k in 0..4 {
+                (ats[k][i], acrosses[k][i], downs[k][i]) = (at[k], across[k], down[k]);
+                chunk_ats[k][i] = chunk_at[k];
+            }
+        }
+        put(&mut self.left, first, &lefts);
+        put(&mut self.right, first, &rights);
+        put(&mut self.top, first, &tops);
+        put(&mut self.bottom, first, &bottoms);
+        put(&mut self.error, first, &errors);
+        put(&mut self.kind, first, &kinds);
+        for k in 0..4 {
+            put(&mut self.at[k], first, &ats[k]);
+            put(&mut self.across[k], first, &acrosses[k]);
+            put(&mut self.down[k], first, &downs[k]);
+            put(&mut self.chunk_at[k], first, &chunk_ats[k]);
+        }
+    }
+
+    /// The places in the cluster of the faces of a kind.
+    #[inline(always)]
+    pub(crate) fn faces(&self, kind: Kind) -> impl Iterator<Item = usize> {
+        let list = &self.lists[kind as usize][..self.counts[kind as usize]];
+        list.iter().map(|&i| usize::from(i) % MOST_FACES)
+    }
+
+    /// 1/t as a function of the pixel, as [`Drawn`](crate::raster::canvas::Drawn) has it.
+    #[inline(always)]
+    pub(crate) fn inverse_t(&self, i: usize) -> [f64; 3] {
+        [self.at[3][i], self.across[3][i], self.down[3][i]]
+    }
+
+    /// A face in one chunk, or the first of its two, and its number of rows.
+    #[inline(always)]
+    pub(crate) fn chunk(&self, i: usize, slot: u32) -> (Chunk, usize) {
+        let f = |k: usize| Linear {
+            at: self.chunk_at[k][i],
+            across: self.across[k][i] as f32,
+            bend: 0.0,
+            down: self.down[k][i] as f32,
+        };
+        let (column, row) = (self.left[i] as usize, self.top[i] as usize);
+        let chunk = Chunk {
+            column,
+            row,
+            edges: [f(0), f(1), f(2)],
+            edge_error: EDGE_ERROR,
+            inverse_t: f(3),
+            inverse_t_error: self.error[i],
+            trusted: self.error[i] / TRUSTED,
+            slot,
+        };
+        (chunk, self.bottom[i] as usize - row + 1)
+    }
+
+    /// The second chunk of a face that has two, and how many columns of the face it holds.
+    #[inline(always)]
+    pub(crate) fn second_chunk(&self, i: usize, first: &Chunk) -> (Chunk, usize) {
+        let (left, top) = (self.left[i] + LANES as f64, self.top[i]);
+        let at = |k: usize| (self.at[k][i] + self.across[k][i] * left + self.down[k][i] * top) as f32;
+        let mut chunk = *first;
+        chunk.column += LANES;
+        chunk.edges[0].at = at(0);
+        chunk.edges[1].at = at(1);
+        chunk.edges[2].at = at(2);
+        chunk.inverse_t.at = at(3);
+        (chunk, self.right[i] as usize - chunk.column + 1)
+    }
+
+    #[inline(always)]
+    pub(crate) fn planes(&self, i: usize) -> Planes {
+        let four = |f: &[Values<f64>; 4]| [f[0][i], f[1][i], f[2][i], f[3][i]];
+        Planes { at: four(&self.at), across: four(&self.across), down: four(&self.down) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn reach(&self, i: usize) -> Reach {
+        let q = [self.q[0][i], self.q[1][i], self.q[2][i]];
+        Reach {
+            left: self.left[i] as usize,
+            right: self.right[i] as usize,
+            top: self.top[i] as usize,
+            bottom: self.bottom[i] as usize,
+            inverse_t: (low(q), high(q)),
+        }
+    }
+}
+
+#[inline(always)]
+fn group(values: &Values<f64>, first: usize) -> [f64; GROUP] {
+    values[first..first + GROUP].try_into().unwrap()
+}
+
+#[inline(always)]
+fn put<T: Copy>(values: &mut Values<T>, first: usize, group: &[T; GROUP]) {
+    values[first..first + GROUP].copy_from_slice(group);
+}
+
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn most(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn low(v: [f64; 3]) -> f64 {
+    least(least(v[0], v[1]), v[2])
+}
+
+#[inline(always)]
+fn high(v: [f64; 3]) -> f64 {
+    most(most(v[0], v[1]), v[2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const WIDTH: f64 = 90.0;
+    const HEIGHT: f64 = 70.0;
+
+    /// A corner in the window or not far from it, with its 1/z; or one without a place in the view.
+    fn corner() -> impl Strategy<Value = [f64; 3]> {
+        let at = |size: f64| {
+            prop_oneof![-0.2 * size..1.2 * size, (0.0..1.0f64).prop_map(move |s| (s * size).round())]
+        };
+        prop_oneof![
+            12 => (at(WIDTH), at(HEIGHT), 0.1..10.0f64).prop_map(|(x, y, q)| [x, y, q]),
+            1 => Just([f64::NAN, f64::INFINITY, 0.0]),
+        ]
+    }
+
+    /// Corners that are near each other, as those of small faces are, or anywhere.
+    fn face() -> impl Strategy<Value = [[f64; 3]; 3]> {
+        (prop::array::uniform3(corner()), prop_oneof![Just(1.0), Just(0.3), Just(0.1)]).prop_map(
+            |(c, spread)| {
+                c.map(|p| [c[0][0] + (p[0] - c[0][0]) * spread, c[0][1] + (p[1] - c[0][1]) * spread, p[2]])
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn a_face_reaches_over_the_pixels_in_it(faces in prop::collection::vec(face(), 1..=MOST_FACES)) {
+            let mut corners = Projected::new();
+            for (place, [x, y, q]) in faces.as_flattened().iter().enumerate() {
+                (corners.x[place], corners.y[place], corners.inverse_z[place]) = (*x, *y, *q);
+            }
+            let places: Vec<_> = (0..faces.len() as u8).map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 0]).collect();
+            let mut batch = Batch::new();
+            // What a fuller cluster left behind does no harm.
+            batch.set_up(&vec![[0, 1, 2, 0]; MOST_FACES], &corners, WIDTH, HEIGHT);
+            batch.set_up(&places, &corners, WIDTH, HEIGHT);
+
+            let kinds = [
+                Kind::Nothing, Kind::Narrow, Kind::Small, Kind::Careful, Kind::Wide, Kind::Large, Kind::InSpace,
+            ];
+            let mut kind_of = vec![None; faces.len()];
+            for kind in kinds {
+                for i in batch.faces(kind) {
+                    prop_assert!(kind_of[i].replace(kind).is_none());
+                }
+            }
+            for (i, c) in faces.iter().enumerate() {
+                let kind = kind_of[i].unwrap();
+                if c.iter().any(|p| p[2] == 0.0) {
+                    prop_assert_eq!(kind, Kind::InSpace);
+                    continue;
+                }
+                let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+                    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+                };
+                let [p, q, r] = c.map(|p| [p[0], p[1]]);
+                let whole = area(p, q, r);
+                let reach = batch.reach(i);
+                let (columns, rows) = (reach.left..=reach.right, reach.top..=reach.bottom);
+                let one = matches!(kind, Kind::Narrow | Kind::Small | Kind::Careful);
+                if one || kind == Kind::Wide {
+                    let most = if kind == Kind::Narrow { 8 } else if one { LANES } else { 2 * LANES };
+                    prop_assert!(columns.clone().count() <= most && rows.clone().count() <= MOST_ROWS);
+                }
+                for (x, y) in (0..WIDTH as usize).flat_map(|x| (0..HEIGHT as usize).map(move |y| (x, y))) {
+                    let at = [x as f64, y as f64];
+                    let weights = [area(at, q, r), area(p, at, r), area(p, q, at)].map(|w| w / whole);
+                    if !(weights.iter().all(|&w| w > 1e-6) && whole.abs() > 1e-3) {
+                        continue;
+                    }
+                    prop_assert!(kind != Kind::Nothing && columns.contains(&x) && rows.contains(&y));
+                    if !(one || kind == Kind::Wide) {
+                        continue;
+                    }
+                    let (mut chunk, rows) = batch.chunk(i, 5);
+                    if x >= chunk.column + LANES {
+                        let (second, columns) = batch.second_chunk(i, &chunk);
+                        prop_assert!(kind == Kind::Wide && x < second.column + columns);
+                        chunk = second;
+                    }
+                    let (u, r) = ((x - chunk.column) as f32, (y - chunk.row) as f32);
+                    prop_assert!(y < chunk.row + rows && chunk.slot == 5);
+                    let value = |f: &Linear| f.at + f.across * u + f.down * r;
+                    prop_assert!(chunk.edges.iter().all(|e| value(e) > -EDGE_ERROR));
+                    let expected = weights[0] * c[0][2] + weights[1] * c[1][2] + weights[2] * c[2][2];
+                    let off = (f64::from(value(&chunk.inverse_t)) - expected).abs();
+                    prop_assert!(off <= 1.01 * f64::from(chunk.inverse_t_error) + 1e-9 * expected, "{off}");
+                }
+            }
+        }
+    }
+}

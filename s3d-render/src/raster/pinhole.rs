@@ -1,0 +1,447 @@
+//! Perspective views, for the visibility pass.
+//!
+//! A corner p (relative to the camera) is in column x = (ρ·p)/(φ·p) and row y = (δ·p)/(φ·p) of the window, pixel centres
+//! at whole numbers, at the depth z = φ·p. For a corner that is no farther out than [`GUARD`] pixels x and y are good to
+//! 2⁻⁵³·8·GUARD < 2e-11 pixels, since |p|/z is then bounded by the angle of the guard band; so an edge function made
+//! from two corners at least 1e-3 apart is good to 1e-8 over a chunk. Faces that reach farther out, behind the camera,
+//! or have shorter edges, get their planes in space instead. The others are set up by [`Batch`], a cluster at a time.
+
+#![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
+
+use crate::raster::batch::{Batch, Kind};
+use crate::raster::canvas::{
+    Canvas, Chunk, Cover, Drawn, EDGE_ERROR, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED,
+    half_of_tile, part_of_tile,
+};
+use crate::raster::clusters::{Cluster, MOST_CORNERS, Node, PACKET};
+use crate::raster::window::{Lens, Pixels, Spot, groups};
+use crate::ray::cone::Cone;
+use crate::simd::registers::{self, LANES, Registers, Work};
+use glam::DVec3;
+use s3d_geom::{Rays, TriMesh};
+
+/// Pixels from the window's first that a corner may be away.
+const GUARD: f64 = 16_384.0;
+
+/// 0, 1, 2 …: columns from the anchor, and rows.
+const COUNT: [f32; MOST_ROWS] = {
+    let mut count = [0.0; MOST_ROWS];
+    let mut k = 0;
+    while k < MOST_ROWS {
+        count[k] = k as f32;
+        k += 1;
+    }
+    count
+};
+
+const COLUMNS: [f32; LANES] = {
+    let mut count = [0.0; LANES];
+    let mut k = 0;
+    while k < LANES {
+        count[k] = k as f32;
+        k += 1;
+    }
+    count
+};
+
+fn grid(rows: usize) -> Grid<'static> {
+    Grid { u: &COLUMNS, v: &COLUMNS, rows: &COUNT, count: rows, scale: &[] }
+}
+
+/// Three edge functions and 1/t: at + across·i + down·j.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Planes {
+    pub(crate) at: [f64; 4],
+    pub(crate) across: [f64; 4],
+    pub(crate) down: [f64; 4],
+}
+
+/// A perspective view's window.
+pub(crate) struct Pinhole<'m> {
+    mesh: &'m TriMesh,
+    origin: DVec3,
+    /// ρ, δ and φ.
+    across: DVec3,
+    down: DVec3,
+    ahead: DVec3,
+    /// The direction of the ray in column 0 and row 0, and from column to column and row to row.
+    first: DVec3,
+    step_x: DVec3,
+    step_y: DVec3,
+    pixels: Pixels,
+    width: usize,
+    height: usize,
+    columns: Vec<[f64; LANES]>,
+    projected: Box<Projected>,
+    batch: Box<Batch>,
+}
+
+/// The corners of a cluster.
+pub(crate) struct Projected {
+    pub(crate) x: [f64; MOST_CORNERS],
+    pub(crate) y: [f64; MOST_CORNERS],
+    /// 1/z; 0 for a corner that is behind the camera or too far out.
+    pub(crate) inverse_z: [f64; MOST_CORNERS],
+}
+
+impl Projected {
+    pub(crate) fn new() -> Self {
+        let none = [0.0; MOST_CORNERS];
+        Self { x: none, y: none, inverse_z: none }
+    }
+}
+
+impl<'m> Pinhole<'m> {
+    /// The window of `spot` of a view with the axes `right`, `down` and `forward`.
+    pub(crate) fn new(mesh: &'m TriMesh, spot: &Spot<'_>) -> Self {
+        let camera = spot.camera;
+        let pixels = Pixels::new(spot);
+        let Rays::Perspective { x_step, y_step, origin } = pixels.rays else {
+            unreachable!("a perspective camera has perspective rays")
+        };
+        let (pose, stride) = (&camera.pose, f64::from(spot.stride));
+        let focal = camera.focal_px() / stride;
+        // Sample i of the window is pixel centre offset + stride · i.
+        let offset = |start: usize| f64::from(spot.stride / 2) + stride * start as f64 + 0.5;
+        let (x, y) = (offset(spot.column), offset(spot.row));
+        let (cx, cy) = (0.5 * f64::from(camera.width) - x, 0.5 * f64::from(camera.height) - y);
+        let forward = pose.forward();
+        Self {
+            mesh,
+            origin: pose.location,
+            across: pose.right() * focal + forward * (cx / stride),
+            down: -pose.up() * focal + forward * (cy / stride),
+            ahead: forward,
+            first: origin + x_step * x + y_step * y,
+            step_x: x_step * stride,
+            step_y: y_step * stride,
+            pixels,
+            width: spot.width,
+            height: spot.height,
+            columns: groups(&(0..spot.width).map(|i| i as f64).collect::<Vec<_>>()),
+            projected: Box::new(Projected::new()),
+            batch: Box::new(Batch::new()),
+        }
+    }
+
+    /// Projects the corners of a cluster.
+    #[inline(always)]
+    fn project(&mut self, corners: &[[[f32; PACKET]; 3]]) {
+        let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
+        for (k, [x, y, z]) in corners.iter().enumerate() {
+            // Arrays of their own, so that all eight go together.
+            let (mut xs, mut ys, mut qs) = ([0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
+            for i in 0..PACKET {
+                let (x, y, z) = (f64::from(x[i]) - o.x, f64::from(y[i]) - o.y, f64::from(z[i]) - o.z);
+                let depth = f.x * x + f.y * y + f.z * z;
+                let q = 1.0 / depth;
+                let px = (r.x * x + r.y * y + r.z * z) * q;
+                let py = (d.x * x + d.y * y + d.z * z) * q;
+                xs[i] = px;
+                ys[i] = py;
+                let q = if depth > 0.0 { q } else { 0.0 };
+                let q = if px.abs() < GUARD { q } else { 0.0 };
+                qs[i] = if py.abs() < GUARD { q } else { 0.0 };
+            }
+            let at = k * PACKET;
+            self.projected.x[at..at + PACKET].copy_from_slice(&xs);
+            self.projected.y[at..at + PACKET].copy_from_slice(&ys);
+            self.projected.inverse_z[at..at + PACKET].copy_from_slice(&qs);
+        }
+    }
+
+    /// Draws a face by its planes in space: one that reaches behind the camera, or has next to no area.
+    #[inline(never)]
+    fn draw_in_space(&self, canvas: &mut Canvas, face: u32) {
+        let Some(cone) = Cone::new(self.mesh, face, self.origin) else { return };
+        let Some(reach) = self.reach_of(&cone) else { return };
+        let [a, b, c] = cone.corners;
+        let (mut at, mut across, mut down) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+        let farthest = self.first.length()
+            + self.step_x.length() * self.width as f64
+            + self.step_y.length() * self.height as f64;
+        let mut edge_error = 0.0;
+        for (k, (p, q)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
+            let n = p.cross(q);
+            let length = n.length();
+            let (x, y) = (n.dot(self.step_x), n.dot(self.step_y));
+            let slope = x.abs() + y.abs();
+            if !(length > 0.0 && slope > 0.0) {
+                // No plane, or one that is the same everywhere: it never decides.
+                at[k] = 1.0;
+                continue;
+            }
+            let off = 1e-15 + 8e-16 * p.length() * q.length() / length;
+            edge_error = f64::max(edge_error, off * farthest * length / slope);
+            at[k] = n.dot(self.first) / slope;
+            across[k] = x / slope;
+            down[k] = y / slope;
+        }
+        let plane = cone.plane;
+        // Near the plane of the face nothing but single rays can tell.
+        let known = plane.offset > 1e-7 * plane.normal.length() * a.length();
+        if known {
+            let n = plane.normal / plane.offset;
+            (at[3], across[3], down[3]) = (n.dot(self.first), n.dot(self.step_x), n.dot(self.step_y));
+        }
+        let planes = Planes { at, across, down };
+        let inverse_t = [at[3], across[3], down[3]];
+        let slot = canvas.enter(Drawn { inverse_t, face, poor: !known });
+        let edge_error = EDGE_ERROR + edge_error as f32;
+        let (planes, reach) = (&planes, &reach);
+        registers::run(Tiles { canvas, planes, reach, edge_error, slot, poor: !known });
+    }
+
+    /// The pixels that a face may cover; `None` if it is behind the camera or beside the window.
+    fn reach_of(&self, cone: &Cone) -> Option<Reach> {
+        let infinite = f64::INFINITY;
+        let (mut x, mut y) = ((infinite, -infinite), (infinite, -infinite));
+        let mut q = (infinite, 0.0f64);
+        let widen = |range: &mut (f64, f64), v: f64| *range = (range.0.min(v), range.1.max(v));
+        for (k, &p) in cone.corners.iter().enumerate() {
+            let z = self.ahead.dot(p);
+            // A depth that rounding may have put on the wrong side counts as either.
+            let size = p.abs().element_sum();
+            if z > 1e-12 * size {
+                widen(&mut x, self.across.dot(p) / z);
+                widen(&mut y, self.down.dot(p) / z);
+                q = (q.0.min(1.0 / z), q.1.max(1.0 / z));
+            }
+            if z <= 1e-12 * size {
+                q.0 = 0.0;
+                q.1 = infinite;
+            }
+            // An edge that passes the camera's plane goes off to infinity, on the side where it passes.
+            let next = cone.corners[(k + 1) % 3];
+            let z_next = self.ahead.dot(next);
+            let near = |z: f64, p: DVec3| z.abs() <= 1e-12 * p.abs().element_sum();
+            if (z > 0.0) != (z_next > 0.0) || near(z, p) || near(z_next, next) {
+                let s = if z == z_next { 0.5 } else { (z / (z - z_next)).clamp(0.0, 1.0) };
+                let at = p + (next - p) * s;
+                let slack = 1e-9 * (size + next.abs().element_sum());
+                for (range, axis) in [(&mut x, self.across), (&mut y, self.down)] {
+                    let v = axis.dot(at);
+                    let slack = slack * axis.abs().element_sum();
+                    if v > -slack || near(z, p) || near(z_next, next) {
+                        range.1 = infinite;
+                    }
+                    if v < slack || near(z, p) || near(z_next, next) {
+                        range.0 = -infinite;
+                    }
+                }
+            }
+        }
+        let left = (x.0 - 0.01).ceil().max(0.0);
+        let right = (x.1 + 0.01).floor().min(self.width as f64 - 1.0);
+        let top = (y.0 - 0.01).ceil().max(0.0);
+        let bottom = (y.1 + 0.01).floor().min(self.height as f64 - 1.0);
+        (left <= right && top <= bottom).then_some(Reach {
+            left: left as usize,
+            right: right as usize,
+            top: top as usize,
+            bottom: bottom as usize,
+            inverse_t: q,
+        })
+    }
+}
+
+/// The pixels that a face may cover, and the least and greatest 1/t that it may have there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reach {
+    pub(crate) left: usize,
+    pub(crate) right: usize,
+    pub(crate) top: usize,
+    pub(crate) bottom: usize,
+    pub(crate) inverse_t: (f64, f64),
+}
+
+impl Planes {
+    #[inline(always)]
+    fn chunk(&self, column: usize, row: usize, slot: u32, edge_error: f32) -> Chunk {
+        let (i, j) = (column as f64, row as f64);
+        let mut f = [Linear::default(); 4];
+        for (k, f) in f.iter_mut().enumerate() {
+            f.at = (self.at[k] + self.across[k] * i + self.down[k] * j) as f32;
+            f.across = self.across[k] as f32;
+            f.down = self.down[k] as f32;
+        }
+        let [e0, e1, e2, inverse_t] = f;
+        Chunk { column, row, edges: [e0, e1, e2], edge_error, inverse_t, slot, ..Chunk::default() }
+    }
+}
+
+/// A face on all the tiles that it may cover.
+struct Tiles<'a> {
+    canvas: &'a mut Canvas,
+    planes: &'a Planes,
+    reach: &'a Reach,
+    edge_error: f32,
+    slot: u32,
+    poor: bool,
+}
+
+impl Work for Tiles<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Registers>(self, l: L) {
+        let Self { canvas, planes, reach, edge_error, slot, poor } = self;
+        let nearest = (reach.inverse_t.1 * (1.0 + 1e-6)) as f32;
+        for tile_row in reach.top / TILE..=reach.bottom / TILE {
+            let (top, rows) = part_of_tile(tile_row, reach.top, reach.bottom);
+            for tile_column in reach.left / TILE..=reach.right / TILE {
+                let (column, narrow) = half_of_tile(tile_column, reach.left, reach.right);
+                let mut chunk = planes.chunk(column, top, slot, edge_error);
+                let last = ((if narrow { TILE / 2 } else { TILE }) - 1) as f32;
+                let last_row = (rows - 1) as f32;
+                // Where a function is greatest and least on the tile.
+                let range = |f: &Linear| {
+                    let (x, y) = (f.across * last, f.down * last_row);
+                    (f.at + x.min(0.0) + y.min(0.0), f.at + x.max(0.0) + y.max(0.0))
+                };
+                if chunk.edges.iter().any(|e| range(e).1 < -2.0 * edge_error) {
+                    continue;
+                }
+                if poor {
+                    chunk.inverse_t = Linear { at: f32::MAX, ..Linear::default() };
+                    (chunk.inverse_t_error, chunk.trusted) = (f32::INFINITY, f32::INFINITY);
+                    canvas.draw::<L, false, true>(l, &grid(rows), &chunk);
+                    continue;
+                }
+                let q = &chunk.inverse_t;
+                let error =
+                    INVERSE_T_ROUNDING * (q.at.abs() + q.across.abs() * last + q.down.abs() * last_row);
+                let (low, high) = range(q);
+                if high + error <= 0.0 || canvas.tile_hides(tile_column, tile_row, nearest.min(high + error))
+                {
+                    continue;
+                }
+                canvas.touch_tile(tile_column, tile_row);
+                let trusted = error < TRUSTED * low;
+                (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
+                match (narrow, trusted) {
+                    (true, true) => canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk),
+                    (true, false) => canvas.draw::<L::Half, false, true>(l.half(), &grid(rows), &chunk),
+                    (false, true) => canvas.draw::<L, false, false>(l, &grid(rows), &chunk),
+                    (false, false) => canvas.draw::<L, false, true>(l, &grid(rows), &chunk),
+                }
+            }
+        }
+    }
+}
+
+impl Lens for Pinhole<'_> {
+    #[inline(always)]
+    fn cover(&self, node: &Node) -> Option<Cover> {
+        let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
+        let mut xs = [0.0f32; 8];
+        let mut ys = [0.0f32; 8];
+        let mut zs = [0.0f32; 8];
+        let lo = [0, 1, 2].map(|k| (f64::from(node.min[k]) - o[k]) as f32);
+        let hi = [0, 1, 2].map(|k| (f64::from(node.max[k]) - o[k]) as f32);
+        let [r, d, f] = [r, d, f].map(|v| v.as_vec3().to_array());
+        for k in 0..8 {
+            let x = if k & 1 == 0 { lo[0] } else { hi[0] };
+            let y = if k & 2 == 0 { lo[1] } else { hi[1] };
+            let z = if k & 4 == 0 { lo[2] } else { hi[2] };
+            xs[k] = r[0] * x + r[1] * y + r[2] * z;
+            ys[k] = d[0] * x + d[1] * y + d[2] * z;
+            zs[k] = f[0] * x + f[1] * y + f[2] * z;
+        }
+        let size = |v: [f32; 3]| {
+            (0..3)
+                .map(|k| v[k].abs() * if lo[k].abs() > hi[k].abs() { lo[k].abs() } else { hi[k].abs() })
+                .sum::<f32>()
+        };
+        let off = 1e-6 * size(f);
+        let nearest = zs.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a }) - off;
+        let farthest = zs.iter().fold(f32::NEG_INFINITY, |a, &b| if b > a { b } else { a }) + off;
+        if farthest <= 0.0 {
+            return None;
+        }
+        let off = 1e-6 * (size(r) + size(d)) + off * (self.width + self.height) as f32;
+        let (width, height) = (self.width as f32, self.height as f32);
+        if nearest <= 1e-4 * farthest {
+            let outside = |v: &[f32; 8], size: f32| {
+                (0..8).all(|k| v[k] + zs[k] < -off) || (0..8).all(|k| v[k] - size * zs[k] > off)
+            };
+            if outside(&xs, width) || outside(&ys, height) {
+                return None;
+            }
+            return Cover::new((0.0, width), (0.0, height), (self.width, self.height), f32::INFINITY);
+        }
+        let mut x = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut y = x;
+        for k in 0..8 {
+            let q = 1.0 / zs[k];
+            let (px, py) = (xs[k] * q, ys[k] * q);
+            x = (if px < x.0 { px } else { x.0 }, if px > x.1 { px } else { x.1 });
+            y = (if py < y.0 { py } else { y.0 }, if py > y.1 { py } else { y.1 });
+        }
+        let pad = 0.01 + off / nearest;
+        let (columns, rows) = ((x.0 - pad, x.1 + pad), (y.0 - pad, y.1 + pad));
+        Cover::new(columns, rows, (self.width, self.height), 1.0 / nearest)
+    }
+
+    #[inline(always)]
+    fn draw<L: Registers>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>) {
+        self.project(cluster.corners);
+        self.batch.set_up(cluster.faces, &self.projected, self.width as f64, self.height as f64);
+        let batch = &*self.batch;
+        let enter = |canvas: &mut Canvas, i: usize| {
+            canvas.enter(Drawn { inverse_t: batch.inverse_t(i), face: cluster.ids[i], poor: false })
+        };
+        for i in batch.faces(Kind::Large) {
+            let slot = enter(canvas, i);
+            let (planes, reach) = (&batch.planes(i), &batch.reach(i));
+            Tiles { canvas, planes, reach, edge_error: EDGE_ERROR, slot, poor: false }.run(l);
+        }
+        for i in batch.faces(Kind::Narrow) {
+            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk);
+        }
+        for i in batch.faces(Kind::Small) {
+            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
+        }
+        for i in batch.faces(Kind::Wide) {
+            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
+            let (chunk, columns) = batch.second_chunk(i, &chunk);
+            if columns <= LANES / 2 {
+                canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk);
+            } else {
+                canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
+            }
+        }
+        for i in batch.faces(Kind::Careful) {
+            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            canvas.draw::<L, false, true>(l, &grid(rows), &chunk);
+        }
+        for i in batch.faces(Kind::InSpace) {
+            self.draw_in_space(canvas, cluster.ids[i]);
+        }
+    }
+
+    #[inline(always)]
+    fn finish<L: Registers>(
+        &self,
+        l: L,
+        canvas: &mut Canvas,
+        out: (&mut [u32], &mut [f32]),
+        out_pitch: usize,
+        single: impl Fn(u32, usize, usize) -> f64,
+    ) {
+        let line = |row: usize| (0.0, row as f64);
+        canvas.finish::<L, false>(l, out, out_pitch, (&self.columns, &self.columns), line, single);
+    }
+
+    fn inverse_t(&self, drawn: &Drawn, column: usize, row: usize) -> f64 {
+        let [at, across, down] = drawn.inverse_t;
+        at + across * column as f64 + down * row as f64
+    }
+
+    fn direction(&self, column: usize, row: usize) -> DVec3 {
+        self.pixels.direction(column, row)
+    }
+}

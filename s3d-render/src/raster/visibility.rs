@@ -1,0 +1,150 @@
+//! Which face each pixel of a camera sees, and how far away.
+
+use crate::hits::{Hits, NO_FACE};
+use crate::raster::panorama::Panorama;
+use crate::raster::pinhole::Pinhole;
+use crate::raster::window::{self, Memory, Spot};
+use crate::ray::caster::RayCaster;
+use crate::scene::Scene;
+use s3d_geom::{Camera, Projection, Raster};
+use std::f64::consts::TAU;
+
+/// Casts image after image of a scene, and keeps its memory between them: what a thread that renders should hold.
+///
+/// Nothing but time depends on what was cast before.
+pub struct Caster<'s, 'm> {
+    scene: &'s Scene<'m>,
+    memory: Memory,
+}
+
+/// The most pixels of a window that is cast at once: what a second-level cache and some of the third hold.
+const WINDOW: usize = 1 << 17;
+
+/// The most columns of a window, and rows: their numbers fit into 16 bits.
+const MOST_SIDE: usize = 1 << 14;
+
+impl<'s, 'm> Caster<'s, 'm> {
+    /// A caster for a scene.
+    pub fn new(scene: &'s Scene<'m>) -> Self {
+        Self { scene, memory: Memory::default() }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &'s Scene<'m> {
+        self.scene
+    }
+
+    /// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Runs on the
+    /// calling thread alone.
+    pub fn cast(&mut self, camera: &Camera) -> Hits {
+        self.cast_strided(camera, 1)
+    }
+
+    /// Casts the rays of every `stride`th pixel of every `stride`th row; see [`cast_strided`].
+    ///
+    /// # Panics
+    /// If `stride` is 0.
+    pub fn cast_strided(&mut self, camera: &Camera, stride: u32) -> Hits {
+        let mut hits = Hits::default();
+        self.cast_into(camera, stride, &mut hits);
+        hits
+    }
+
+    /// As [`Self::cast_strided`], into memory that is there: what `hits` held is lost. Images of one size after another
+    /// cost no new memory.
+    ///
+    /// # Panics
+    /// If `stride` is 0.
+    pub fn cast_into(&mut self, camera: &Camera, stride: u32, hits: &mut Hits) {
+        let (columns, rows) = (samples(camera.width, stride), samples(camera.height, stride));
+        hits.resize(columns, rows);
+        let (columns, rows) = (columns as usize, rows as usize);
+        if columns == 0 || rows == 0 {
+            return;
+        }
+        if !camera.pose.location.is_finite() {
+            hits.face.pixels_mut().fill(NO_FACE);
+            hits.depth.pixels_mut().fill(f32::INFINITY);
+            return;
+        }
+        let step_rad = TAU / f64::from(camera.width) * f64::from(stride);
+        if camera.projection == Projection::Equirectangular && step_rad > Panorama::WIDEST_STEP_RAD {
+            *hits = cast_ray_by_ray(self.scene, camera, stride);
+            return;
+        }
+        // A panorama is cast in sectors: what is opposite to a sector's middle is far from it.
+        let most_columns = match camera.projection {
+            Projection::Perspective { .. } => columns.min(MOST_SIDE),
+            Projection::Equirectangular => columns.div_ceil(4).min(MOST_SIDE),
+        };
+        // As many windows as it takes, of one height but for the last.
+        let windows = (rows * most_columns).div_ceil(WINDOW);
+        let most_rows = rows.div_ceil(windows).min(MOST_SIDE);
+        for row in (0..rows).step_by(most_rows) {
+            for column in (0..columns).step_by(most_columns) {
+                let (width, height) = (most_columns.min(columns - column), most_rows.min(rows - row));
+                let spot = Spot { camera, stride, column, row, width, height };
+                let first = row * columns + column;
+                let out = (&mut hits.face.pixels_mut()[first..], &mut hits.depth.pixels_mut()[first..]);
+                let (scene, origin, memory) = (self.scene, camera.pose.location, &mut self.memory);
+                match camera.projection {
+                    Projection::Perspective { .. } => {
+                        let lens = Pinhole::new(scene.mesh(), &spot);
+                        window::cast(scene, origin, lens, (width, height), memory, out, columns);
+                    }
+                    Projection::Equirectangular => {
+                        let lens = Panorama::new(scene.mesh(), &spot);
+                        window::cast(scene, origin, lens, (width, height), memory, out, columns);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Runs on the
+/// calling thread alone. [`Caster`] keeps its memory for the next image.
+pub fn cast(scene: &Scene<'_>, camera: &Camera) -> Hits {
+    Caster::new(scene).cast(camera)
+}
+
+/// Casts the rays of every `stride`th pixel of every `stride`th row, from pixel (stride / 2, stride / 2) on: enough to
+/// score a view. Along an axis of n pixels there are (n − 1 − stride / 2) / stride + 1 of them (rounding down), none if
+/// stride / 2 ≥ n. A stride of 1 is [`cast`].
+///
+/// # Panics
+/// If `stride` is 0.
+pub fn cast_strided(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits {
+    Caster::new(scene).cast_strided(camera, stride)
+}
+
+/// As [`cast_strided`], one exact ray at a time: the reference that tests and benches hold the fast one against.
+///
+/// # Panics
+/// If `stride` is 0.
+pub fn cast_ray_by_ray(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits {
+    let (columns, rows) = (strided(camera.width, stride), strided(camera.height, stride));
+    let mut caster = RayCaster::new(scene, camera.pose.location);
+    let rays = camera.rays();
+    let (mut faces, mut depths) = (Vec::new(), Vec::new());
+    for &j in &rows {
+        for &i in &columns {
+            let hit = caster.cast(rays.at(i, j));
+            faces.push(hit.map_or(NO_FACE, |h| h.face));
+            depths.push(hit.map_or(f32::INFINITY, |h| h.t as f32));
+        }
+    }
+    let (width, height) = (columns.len() as u32, rows.len() as u32);
+    Hits { face: Raster::from_vec(width, height, faces), depth: Raster::from_vec(width, height, depths) }
+}
+
+/// How many samples there are along `size` pixels.
+fn samples(size: u32, stride: u32) -> u32 {
+    assert!(stride > 0, "a stride of 0 pixels");
+    if stride / 2 < size { (size - 1 - stride / 2) / stride + 1 } else { 0 }
+}
+
+fn strided(size: u32, stride: u32) -> Vec<u32> {
+    assert!(stride > 0, "a stride of 0 pixels");
+    (stride / 2..size).step_by(stride as usize).collect()
+}

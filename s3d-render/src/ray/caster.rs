@@ -1,0 +1,375 @@
+//! Single rays: the exact answer, one ray at a time.
+
+use crate::ray::cone::Cone;
+use crate::scene::Scene;
+use glam::DVec3;
+use s3d_geom::TriMesh;
+
+/// Distances that agree to this relative difference are equal; the lowest face among them is the one that is hit. It
+/// covers the rounding of `f64` at edges that faces share. A wider one would hide faces of real scans, which hold
+/// overlapping ones that are less than a micrometre apart, behind others that are truly farther.
+pub(crate) const TIE: f64 = 1e-12;
+
+/// A box this much farther than the nearest hit is not looked into: more than a face's distance may be off.
+const SLACK: f64 = 2e-6;
+
+/// The face that a ray hits first, and where.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Index of the face.
+    pub face: u32,
+    /// The point is origin + t · direction; above 0.
+    pub t: f64,
+}
+
+/// The first face that the ray from `origin` along `direction` hits, from either side.
+///
+/// - Watertight: what passes through an edge or a corner hits a face there; the rim belongs to a face.
+/// - A face whose plane contains the origin is not hit: it has no width from there. Nothing at t ≤ 0 is hit.
+/// - Of faces whose t agree to 1e-12 of the nearest, the lowest index is hit: coplanar duplicates do not depend on the
+///   order in which they are met.
+///
+/// `t` is good to 1e-7 of itself (or 1e-12 m); a face seen within 1e-8 rad of edge-on gives a place on it. A direction
+/// or origin that is not finite, or no direction, hits nothing.
+pub fn cast_ray(scene: &Scene<'_>, origin: DVec3, direction: DVec3) -> Option<Hit> {
+    RayCaster::new(scene, origin).cast(direction)
+}
+
+/// As [`cast_ray`], by trying every face: the reference that tests hold the tree against.
+pub fn cast_ray_brute_force(mesh: &TriMesh, origin: DVec3, direction: DVec3) -> Option<Hit> {
+    if !is_ray(origin, direction) {
+        return None;
+    }
+    let mut nearest = Nearest::default();
+    for face in 0..mesh.faces().len() as u32 {
+        nearest.meet(mesh, face, origin, direction);
+    }
+    nearest.hit()
+}
+
+fn is_ray(origin: DVec3, direction: DVec3) -> bool {
+    origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO
+}
+
+/// The hits that may still be the nearest.
+#[derive(Default)]
+pub(crate) struct Nearest {
+    t_min: Option<f64>,
+    candidates: Vec<Hit>,
+}
+
+impl Nearest {
+    pub(crate) fn meet(&mut self, mesh: &TriMesh, face: u32, origin: DVec3, direction: DVec3) {
+        let Some(cone) = Cone::new(mesh, face, origin).filter(|c| c.contains(direction)) else { return };
+        let t = cone.distance(direction);
+        if t <= self.reach() {
+            self.t_min = Some(self.t_min.map_or(t, |t_min| t_min.min(t)));
+            self.candidates.push(Hit { face, t });
+        }
+    }
+
+    /// What lies farther is not the nearest, even with a lower index.
+    fn reach(&self) -> f64 {
+        self.t_min.map_or(f64::INFINITY, |t| t * (1.0 + TIE))
+    }
+
+    pub(crate) fn hit(&self) -> Option<Hit> {
+        self.candidates.iter().filter(|h| h.t <= self.reach()).min_by_key(|h| h.face).copied()
+    }
+}
+
+/// Casts rays from one origin and keeps its memory between them.
+pub(crate) struct RayCaster<'s, 'm> {
+    scene: &'s Scene<'m>,
+    origin: DVec3,
+    /// By how much boxes grow, in metres: far more than the rounding of `f64`, far less than anything else.
+    padding: DVec3,
+    stack: Vec<(f64, u32)>,
+    nearest: Nearest,
+}
+
+impl<'s, 'm> RayCaster<'s, 'm> {
+    pub(crate) fn new(scene: &'s Scene<'m>, origin: DVec3) -> Self {
+        let padding = DVec3::splat(1e-12 * scene.magnitude(origin));
+        Self { scene, origin, padding, stack: Vec::with_capacity(64), nearest: Nearest::default() }
+    }
+
+    /// See [`cast_ray`].
+    pub(crate) fn cast(&mut self, direction: DVec3) -> Option<Hit> {
+        if !is_ray(self.origin, direction) {
+            return None;
+        }
+        let (mesh, bvh) = (self.scene.mesh(), self.scene.bvh());
+        // Finite even where a component is 0, so that no 0 · ∞ arises.
+        let inverse = direction.map(|d| if d.abs() < 1e-290 { 1e290f64.copysign(d) } else { d.recip() });
+        self.nearest.t_min = None;
+        self.nearest.candidates.clear();
+        self.stack.clear();
+        self.stack.extend(self.enter(0, inverse).map(|t| (t, 0)));
+        while let Some((t_enter, node)) = self.stack.pop() {
+            if self.nearest.t_min.is_some_and(|t| t_enter > t * (1.0 + SLACK)) {
+                continue;
+            }
+            let node = &bvh.nodes[node as usize];
+            let first = node.first_index;
+            if node.is_leaf() {
+                for slot in first..first + node.prim_count {
+                    let face = bvh.primitive_indices[slot as usize];
+                    self.nearest.meet(mesh, face, self.origin, direction);
+                }
+                continue;
+            }
+            match (self.enter(first, inverse), self.enter(first + 1, inverse)) {
+                (Some(left), Some(right)) if left <= right => {
+                    self.stack.push((right, first + 1));
+                    self.stack.push((left, first));
+                }
+                (left, right) => {
+                    self.stack.extend(left.map(|t| (t, first)));
+                    self.stack.extend(right.map(|t| (t, first + 1)));
+                }
+            }
+        }
+        self.nearest.hit()
+    }
+
+    /// Where the ray enters the box of a node, at 0 if it starts inside.
+    fn enter(&self, node: u32, inverse: DVec3) -> Option<f64> {
+        let aabb = self.scene.bvh().nodes[node as usize].aabb();
+        let a = (aabb.min.as_dvec3() - self.origin - self.padding) * inverse;
+        let b = (aabb.max.as_dvec3() - self.origin + self.padding) * inverse;
+        let (enter, leave) = (a.min(b).max_element().max(0.0), a.max(b).min_element());
+        // The slabs themselves are rounded to a few parts in 1e16.
+        (enter <= leave * (1.0 + 1e-14)).then_some(enter * (1.0 - 1e-14))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Vec3, dvec3, vec3};
+    use proptest::prelude::*;
+    use s3d_geom::{Camera, Pose};
+    use std::f32::consts::{PI, TAU};
+
+    fn mesh(positions: &[Vec3], faces: &[[u32; 3]]) -> TriMesh {
+        TriMesh::from_faces(positions.to_vec(), faces.to_vec()).unwrap()
+    }
+
+    fn check(mesh: &TriMesh, origin: DVec3, directions: impl IntoIterator<Item = DVec3>) -> Vec<Option<Hit>> {
+        let scene = Scene::new(mesh);
+        let cast = |d| {
+            let hit = cast_ray(&scene, origin, d);
+            assert_eq!(hit, cast_ray_brute_force(mesh, origin, d), "from {origin} along {d}");
+            hit
+        };
+        directions.into_iter().map(cast).collect()
+    }
+
+    /// A box of 12 faces, seen from inside or outside.
+    fn cube(center: Vec3, half: Vec3) -> TriMesh {
+        let corners: Vec<Vec3> = (0..8)
+            .map(|k| {
+                center
+                    + half * vec3((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32).map(|b| 2.0 * b - 1.0)
+            })
+            .collect();
+        let quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+        let faces: Vec<[u32; 3]> = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        mesh(&corners, &faces)
+    }
+
+    /// A closed ball of rings and sectors whose corners are irrational.
+    fn ball(center: Vec3, radius: f32, rings: u32, sectors: u32) -> TriMesh {
+        let mut corners = vec![center - Vec3::Z * radius];
+        for ring in 1..rings {
+            for sector in 0..sectors {
+                let (lat, lon) =
+                    (ring as f32 / rings as f32 * PI, (sector as f32 + 0.3) / sectors as f32 * TAU);
+                corners
+                    .push(center + radius * vec3(lat.sin() * lon.cos(), lat.sin() * lon.sin(), -lat.cos()));
+            }
+        }
+        corners.push(center + Vec3::Z * radius);
+        let last = corners.len() as u32 - 1;
+        let at = |ring: u32, sector: u32| match ring {
+            0 => 0,
+            r if r == rings => last,
+            r => 1 + (r - 1) * sectors + sector % sectors,
+        };
+        let mut faces = Vec::new();
+        for ring in 0..rings {
+            for sector in 0..sectors {
+                let [a, b] = [at(ring, sector), at(ring, sector + 1)];
+                let [c, d] = [at(ring + 1, sector), at(ring + 1, sector + 1)];
+                faces.extend(
+                    [[a, b, d], [a, d, c]].into_iter().filter(|[a, b, c]| a != b && b != c && a != c),
+                );
+            }
+        }
+        mesh(&corners, &faces)
+    }
+
+    /// Directions that hit corners and the middles of edges exactly (where they are representable), and near them.
+    fn awkward(mesh: &TriMesh, origin: DVec3) -> Vec<DVec3> {
+        let mut directions = Vec::new();
+        for face in 0..mesh.faces().len() as u32 {
+            let [a, b, c] = mesh.triangle(face).map(|p| p.as_dvec3() - origin);
+            directions.extend([a, b, c, 0.5 * (a + b), 0.5 * (b + c), 0.3 * c + 0.7 * a, a + b + c]);
+            directions.extend([a * 3.7, b * 1e-3, a.map(|x| x * (1.0 + 1e-16)), b + DVec3::splat(1e-15)]);
+        }
+        directions
+    }
+
+    #[test]
+    fn closed_surfaces_have_no_pinholes() {
+        for (center, scale) in
+            [(Vec3::ZERO, 1.0), (vec3(1000.3, -999.7, 12.1), 1.0), (vec3(3.3, 7.7, 1.1), 0.01)]
+        {
+            for mesh in [cube(center, vec3(3.0, 2.0, 1.5) * scale), ball(center, 2.0 * scale, 12, 17)] {
+                for off in [DVec3::ZERO, dvec3(0.21, -0.37, 0.11)] {
+                    let origin = center.as_dvec3() + off * f64::from(scale);
+                    let mut directions = awkward(&mesh, origin);
+                    let camera = Camera::equirectangular(Pose::level(origin, 0.3), 48);
+                    let rays = camera.rays();
+                    directions.extend((0..48 * 24).map(|k| rays.at(k % 48, k / 48)));
+                    for hit in check(&mesh, origin, directions) {
+                        let hit = hit.expect("a closed surface is hit from inside");
+                        assert!(hit.t > 0.0);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_leaks_through_a_wall_of_slivers() {
+        // A fan of 4,000 slivers from one corner over a wall, in front of another wall: the second is never seen.
+        let mut corners = vec![vec3(-1.0, 2.0, -1.0)];
+        let rim: Vec<Vec3> = (0..=4000).map(|k| vec3(1.0, 2.0, -1.0 + k as f32 * 5e-4)).collect();
+        corners.extend(&rim);
+        let mut faces: Vec<[u32; 3]> = (1..=4000).map(|k| [0, k, k + 1]).collect();
+        let n = corners.len() as u32;
+        corners.extend([vec3(-9.0, 3.0, -9.0), vec3(9.0, 3.0, -9.0), vec3(0.0, 3.0, 20.0)]);
+        faces.push([n, n + 1, n + 2]);
+        let mesh = mesh(&corners, &faces);
+        let origin = dvec3(0.1, 0.0, -0.2);
+        let towards = |p: Vec3| p.as_dvec3() - origin;
+        // Inside the fan, along its edges.
+        let directions = rim[1..4000]
+            .iter()
+            .step_by(13)
+            .flat_map(|&p| [0.1, 0.5, 0.9, 0.999].map(|s| towards(corners[0]) * (1.0 - s) + towards(p) * s));
+        for hit in check(&mesh, origin, directions.collect::<Vec<_>>()) {
+            assert!(hit.is_some_and(|h| h.face < 4000), "{hit:?}");
+        }
+    }
+
+    #[test]
+    fn the_lowest_of_coplanar_faces_is_hit() {
+        let wall = [vec3(-1.0, 2.0, -1.0), vec3(1.0, 2.0, -1.0), vec3(0.1, 2.0, 1.0)];
+        let near: Vec<Vec3> = wall.iter().map(|p| *p * vec3(1.0, 1.0 + 4e-7, 1.0)).collect();
+        let nearer: Vec<Vec3> = wall.iter().map(|p| *p - Vec3::Y * 1e-3).collect();
+        let corners = [&wall[..], &near, &wall].concat();
+        let three = mesh(&corners, &[[3, 4, 5], [0, 1, 2], [8, 7, 6]]);
+        for hit in check(&three, DVec3::ZERO, [DVec3::Y, dvec3(0.1, 1.0, -0.1)]) {
+            assert_eq!(hit.unwrap().face, 1, "of the nearest two the first, and not the one 4e-7 farther");
+        }
+        let corners = [corners, nearer].concat();
+        let four = mesh(&corners, &[[3, 4, 5], [0, 1, 2], [8, 7, 6], [9, 10, 11]]);
+        assert_eq!(check(&four, DVec3::ZERO, [DVec3::Y])[0].unwrap().face, 3);
+    }
+
+    #[test]
+    fn a_face_in_the_origins_plane_is_not_hit() {
+        let floor = mesh(&[Vec3::ZERO, Vec3::X, Vec3::Y], &[[0, 1, 2]]);
+        let all = [DVec3::X, -DVec3::X, DVec3::Z, -DVec3::Z, dvec3(1.0, 1.0, -1e-9)];
+        for origin in [dvec3(0.25, 0.25, 0.0), dvec3(-1.0, 0.25, 0.0), DVec3::ZERO] {
+            assert!(check(&floor, origin, all).iter().all(Option::is_none));
+        }
+        let above = check(&floor, dvec3(0.25, 0.25, 1e-12), all);
+        assert_eq!(above.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, true, true]);
+        assert!((above[3].unwrap().t - 1e-12).abs() < 1e-24);
+    }
+
+    #[test]
+    fn what_is_no_ray_hits_nothing() {
+        let floor = mesh(&[-Vec3::ONE, Vec3::X * 9.0, Vec3::Y * 9.0], &[[0, 1, 2]]);
+        for d in [DVec3::ZERO, DVec3::NAN, dvec3(f64::INFINITY, 0.0, 0.0)] {
+            assert_eq!(check(&floor, DVec3::Z, [d]), [None]);
+        }
+        assert_eq!(check(&floor, DVec3::NAN, [DVec3::Z]), [None]);
+    }
+
+    /// Where the ray meets the plane of a face, by the textbook, and the barycentric coordinates there.
+    fn textbook(mesh: &TriMesh, face: u32, origin: DVec3, d: DVec3) -> (f64, [f64; 3]) {
+        let [a, b, c] = mesh.triangle(face).map(|p| p.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let p = d.cross(e2);
+        let q = (origin - a).cross(e1);
+        let det = e1.dot(p);
+        let (u, v) = ((origin - a).dot(p) / det, d.dot(q) / det);
+        (e2.dot(q) / det, [1.0 - u - v, u, v])
+    }
+
+    fn corner(range: f32) -> impl Strategy<Value = Vec3> {
+        prop::array::uniform3(-range..range).prop_map(Vec3::from)
+    }
+
+    fn direction() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(128))]
+
+        #[test]
+        fn soups_give_what_the_textbook_says(
+            corners in prop::collection::vec(corner(3.0), 3..60), d in prop::collection::vec(direction(), 20),
+            far in prop::sample::select(vec![Vec3::ZERO, vec3(1000.0, -1000.0, 50.0)]),
+        ) {
+            let corners: Vec<Vec3> = corners.iter().map(|p| *p + far).collect();
+            let faces: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+            let Ok(soup) = TriMesh::from_faces(corners, faces) else { return Ok(()) };
+            let origin = far.as_dvec3() + dvec3(0.1, 0.2, 0.3);
+            for (hit, d) in check(&soup, origin, d.clone()).into_iter().zip(d) {
+                let all = (0..soup.faces().len() as u32).map(|f| textbook(&soup, f, origin, d));
+                let inside = |w: [f64; 3], by: f64| w.iter().all(|&w| w > by);
+                let nearest = all.filter(|(t, w)| *t > 0.0 && inside(*w, 1e-9)).map(|(t, _)| t).fold(f64::MAX, f64::min);
+                match hit {
+                    Some(hit) => {
+                        let (t, w) = textbook(&soup, hit.face, origin, d);
+                        prop_assert!((hit.t - t).abs() <= 1e-6 * t && inside(w, -1e-9), "{hit:?} {t} {w:?}");
+                        prop_assert!(hit.t <= nearest * (1.0 + 2e-6));
+                    }
+                    None => prop_assert_eq!(nearest, f64::MAX),
+                }
+            }
+        }
+
+        #[test]
+        fn rays_at_corners_and_edges_of_a_soup_are_the_same_by_any_way(
+            corners in prop::collection::vec(corner(1.0), 12), picks in prop::collection::vec(0u32..12, 30),
+        ) {
+            // Twelve corners shared by ten faces at random: many shared edges and corners, slivers, overlaps.
+            let faces: Vec<[u32; 3]> = picks.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
+            let Ok(soup) = TriMesh::from_faces(corners.clone(), faces) else { return Ok(()) };
+            for origin in [dvec3(0.1, -0.2, 3.0), corners[0].as_dvec3(), corners[1].lerp(corners[2], 0.5).as_dvec3()] {
+                check(&soup, origin, awkward(&soup, origin));
+            }
+        }
+
+        #[test]
+        fn slivers_do_not_throw_the_distance(
+            a in corner(3.0), b in corner(3.0), s in 0.0..1.0f32, w in -1e-6..1e-6f32, t in 0.1..0.9f64,
+        ) {
+            let c = a.lerp(b, s) + vec3(w, -w, 2.0 * w);
+            let Ok(sliver) = TriMesh::from_faces(vec![a, b, c], vec![[0, 1, 2]]) else { return Ok(()) };
+            let origin = dvec3(0.3, 0.1, 9.0);
+            let at = a.as_dvec3().lerp(b.as_dvec3(), t).lerp(c.as_dvec3(), 0.4);
+            for hit in check(&sliver, origin, [at - origin]).into_iter().flatten() {
+                prop_assert!((hit.t - 1.0).abs() < 1e-5, "{hit:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,575 @@
+//! Attributes over a face, eight pixels at a time.
+//!
+//! An attribute (a texture coordinate, a channel of the colour) is a ratio a(d) = (α·d) / (ω·d) of linear functions of
+//! the ray's direction d (see [`crate::shade::patch`]). Taken in `f64` a pixel, that is most of an image's time; taken in `f32`,
+//! the numerator loses the digits that count. So it is anchored at a pixel of the face with the direction e, where the
+//! attribute is a₀ = a(e), once in `f64`:
+//!
+//! ```text
+//! a(d) = a₀ + n(d) / w(d),   n(d) = (α − a₀ω)·(d − e) / ω·e,   w(d) = 1 + ω·(d − e) / ω·e
+//! ```
+//!
+//! Both n and what is added to 1 are linear in d − e and small near the anchor, so nothing cancels. Along a row d − e is
+//! made of two functions of the column's offset k from the anchor alone: in a perspective view of k itself; in a
+//! panorama, with the turn δ from column to column, of sin kδ and 1 − cos kδ.
+//!
+//! Error: an anchor serves pixels that are at most [`REACH`] columns and rows away and whose w is within 1/[`DEEP`] to
+//! [`DEEP`]. n and w each go through fewer than 8 roundings of 2⁻²⁴ relative to the pixels between; with f what one pixel
+//! more adds to the attribute, here or at the anchor, the quotient is off by less than
+//! 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and below f / 8000 where w hardly varies, as it mostly does in 64
+//! pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel in a texture of 4096.
+
+use crate::shade::patch::Patch;
+use crate::shade::wrap_mode::Fold;
+use crate::simd::lanes::{LANES, Lanes, eight};
+use glam::DVec3;
+use s3d_geom::{Camera, Rays};
+
+/// How far from its anchor a pixel may be, in columns and in rows.
+pub(crate) const REACH: i32 = 64;
+/// How many times nearer or farther than its anchor a pixel may be.
+pub(crate) const DEEP: f32 = 16.0;
+
+/// Up to three attributes of a face.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Attributes {
+    /// α of each.
+    pub(crate) above: [DVec3; 3],
+    /// ω.
+    pub(crate) whole: DVec3,
+    /// Between what bounds each is: what rounding throws outside is brought back.
+    pub(crate) bounds: [(f64, f64); 3],
+}
+
+impl Attributes {
+    /// From the values at the face's corners: `values[k]` are attribute k's.
+    #[inline(always)]
+    pub(crate) fn new(patch: &Patch, values: [[f64; 3]; 3]) -> Self {
+        let [p, q, r] = patch.weights_of_corners();
+        let (mut above, mut bounds) = ([DVec3::ZERO; 3], [(0.0, 0.0); 3]);
+        for (k, [a, b, c]) in values.into_iter().enumerate() {
+            above[k] = p * a + q * b + r * c;
+            bounds[k] = (least(least(a, b), c), most(most(a, b), c));
+        }
+        Self { above, whole: patch.whole(), bounds }
+    }
+}
+
+impl Attributes {
+    /// What [`Batch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face is along a ray, an
+    /// attribute changes by (m − (a − a₀) ω / ω·e) · step / w where m = (α − a₀ω) / ω·e; and z is greatest at a corner.
+    #[inline(always)]
+    fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
+        let scale = self.whole.dot(e).recip();
+        let here = self.whole.dot(world[0] - origin) * scale;
+        let mut far = 0.0;
+        for corner in world {
+            far = most(far, (corner - origin).length_squared());
+        }
+        // A ray's direction is at least 1 long: corners are no farther along rays than they are away.
+        let mut sum = 0.0;
+        for k in 0..2 {
+            let (low, high) = self.bounds[k];
+            let value = least(most(self.above[k].dot(e) * scale, low), high);
+            for step in steps {
+                let (a, w) = (self.above[k].dot(step) * scale, self.whole.dot(step) * scale);
+                let most = (a - w * value).abs() + (high - low) * w.abs();
+                sum += most * most;
+            }
+        }
+        sum * far / (here * here) * 1.001
+    }
+}
+
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn most(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The directions of an image's pixels, for anchors.
+pub(crate) struct Grid {
+    rays: Rays,
+    /// In a panorama δ, else 1.
+    turn: f32,
+    /// In a panorama the rows' cosines and sines of latitude.
+    rows: Vec<[f64; 2]>,
+    /// By column offset + [`REACH`]: sin kδ, or k.
+    sines: [f32; 2 * REACH as usize + LANES],
+    /// 1 − cos kδ, or 0.
+    versines: [f32; 2 * REACH as usize + LANES],
+}
+
+impl Grid {
+    pub(crate) fn new(camera: &Camera) -> Self {
+        let rays = camera.rays();
+        let offset = |at: usize| at as f64 - f64::from(REACH);
+        let (turn, rows) = match &rays {
+            Rays::Perspective { .. } => (None, vec![]),
+            Rays::Equirectangular { rows, .. } => (
+                Some(std::f64::consts::TAU / f64::from(camera.width)),
+                rows.iter().map(|row| [row.x, row.y]).collect(),
+            ),
+        };
+        // 1 − cos a = 2 sin² a/2, without cancellation.
+        let versine = |a: f64| 2.0 * libm_sin(0.5 * a) * libm_sin(0.5 * a);
+        Self {
+            rays,
+            turn: turn.unwrap_or(1.0) as f32,
+            rows,
+            sines: std::array::from_fn(|k| turn.map_or(offset(k), |t| libm_sin(offset(k) * t)) as f32),
+            versines: std::array::from_fn(|k| turn.map_or(0.0, |t| versine(offset(k) * t)) as f32),
+        }
+    }
+
+    /// Whether it is a panorama's.
+    pub(crate) fn is_turn(&self) -> bool {
+        !self.rows.is_empty()
+    }
+
+    /// How directions change at column `i`: from column to column and from row to row in a perspective view; in a
+    /// panorama the first is the column's unit vector.
+    fn steps(&self, i: usize) -> [DVec3; 2] {
+        match &self.rays {
+            Rays::Perspective { x_step, y_step, .. } => [*x_step, *y_step],
+            Rays::Equirectangular { columns, .. } => [columns[i].extend(0.0), DVec3::ZERO],
+        }
+    }
+}
+
+/// As glam's, which is the same on every platform.
+fn libm_sin(a: f64) -> f64 {
+    glam::DVec2::from_angle(a).y
+}
+
+/// Linear functions of d − e, n of the three attributes and w: in a perspective view `along` · columns + `down` · rows.
+/// In a panorama, with c(k) the unit vector of the column's azimuth, `along` what c(0) turns towards, `down` along c(0),
+/// and `up` upwards.
+#[derive(Clone, Copy, Debug, Default)]
+struct Slopes {
+    along: [f32; 4],
+    down: [f32; 4],
+    up: [f32; 4],
+    /// The attributes at the anchor, and their bounds; folded.
+    base: [f32; 3],
+    least: [f32; 3],
+    most: [f32; 3],
+}
+
+impl Slopes {
+    /// Of attributes anchored at the direction `e`, where directions change by `steps`.
+    #[inline(always)]
+    fn new<const TURN: bool>(attributes: &Attributes, folds: [Fold; 3], e: DVec3, steps: [DVec3; 2]) -> Self {
+        let mut slopes = Self::default();
+        let scale = attributes.whole.dot(e).recip();
+        slopes.set::<TURN>(3, attributes.whole * scale, steps);
+        for (k, fold) in folds.into_iter().enumerate() {
+            let (low, high) = attributes.bounds[k];
+            let value = least(most(attributes.above[k].dot(e) * scale, low), high);
+            let m = (attributes.above[k] - attributes.whole * value) * scale;
+            let (sign, shift) = fold.of(value);
+            slopes.set::<TURN>(k, m * sign, steps);
+            slopes.base[k] = (value * sign + shift) as f32;
+            let (low, high) = ((low * sign + shift) as f32, (high * sign + shift) as f32);
+            (slopes.least[k], slopes.most[k]) = if sign < 0.0 { (high, low) } else { (low, high) };
+        }
+        slopes
+    }
+
+    #[inline(always)]
+    fn set<const TURN: bool>(&mut self, k: usize, m: DVec3, [x, y]: [DVec3; 2]) {
+        if TURN {
+            // Azimuth falls to the right.
+            self.along[k] = (m.x * x.y - m.y * x.x) as f32;
+            self.down[k] = (m.x * x.x + m.y * x.y) as f32;
+            self.up[k] = m.z as f32;
+        } else {
+            (self.along[k], self.down[k]) = (m.dot(x) as f32, m.dot(y) as f32);
+        }
+    }
+}
+
+/// Attributes anchored at a pixel; by default nowhere.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Anchor {
+    pub(crate) column: i32,
+    pub(crate) row: i32,
+    slopes: Slopes,
+}
+
+impl Default for Anchor {
+    fn default() -> Self {
+        Self { column: i32::MIN, row: 0, slopes: Slopes::default() }
+    }
+}
+
+impl Anchor {
+    /// Anchors the attributes at a pixel, the values folded: an attribute with a period is brought between 0 and it,
+    /// mirrored if its fold is. `false` if the face is seen edge-on there, or numbers are too large.
+    pub(crate) fn set<const TURN: bool>(
+        &mut self,
+        attributes: &Attributes,
+        folds: [Fold; 3],
+        grid: &Grid,
+        i: usize,
+        j: usize,
+    ) -> bool {
+        let (e, steps) = (grid.rays.at(i as u32, j as u32), grid.steps(i));
+        self.put(Slopes::new::<TURN>(attributes, folds, e, steps), i, j)
+    }
+
+    #[inline(always)]
+    fn put(&mut self, slopes: Slopes, i: usize, j: usize) -> bool {
+        let Slopes { along, down, up, base, .. } = &slopes;
+        let mut finite = true;
+        for k in 0..4 {
+            finite &= (along[k].abs() < f32::INFINITY) & (down[k].abs() < f32::INFINITY);
+            finite &= up[k].abs() < f32::INFINITY;
+        }
+        for base in base {
+            finite &= base.abs() < 1e6;
+        }
+        *self = Self { column: if finite { i as i32 } else { i32::MIN }, row: j as i32, slopes };
+        finite
+    }
+
+    /// Whether the anchor serves the [`LANES`] pixels from a column on.
+    #[inline(always)]
+    pub(crate) fn reaches(&self, i: usize, j: usize) -> bool {
+        (-REACH..=REACH - LANES as i32).contains(&(i as i32).wrapping_sub(self.column))
+            && (j as i32 - self.row).abs() < REACH
+    }
+
+    /// The row `j` of pixels.
+    #[inline(always)]
+    pub(crate) fn line<'a, const TURN: bool>(&'a self, grid: &'a Grid, j: usize) -> Line<'a> {
+        let (level, rise, cos, sin) = if TURN {
+            let ([cos, sin], [cos_e, sin_e]) = (grid.rows[j], grid.rows[self.row as usize]);
+            ((cos - cos_e) as f32, (sin - sin_e) as f32, cos as f32, sin as f32)
+        } else {
+            ((j as i32 - self.row) as f32, 0.0, 1.0, 0.0)
+        };
+        let mut start = [0.0; 4];
+        for (k, start) in start.iter_mut().enumerate() {
+            *start = level * self.slopes.down[k];
+            if TURN {
+                *start += rise * self.slopes.up[k];
+            }
+        }
+        Line { anchor: self, grid, start, cos, sin }
+    }
+}
+
+/// Faces to be anchored together: their numbers by lane.
+pub(crate) struct Batch {
+    /// By corner and axis.
+    corners: [[[f64; LANES]; 3]; 3],
+    /// By attribute and corner.
+    values: [[[f64; LANES]; 3]; 3],
+    /// By attribute: divisor, period and half.
+    folds: [[[f64; LANES]; 3]; 3],
+    /// The direction, and the steps there.
+    rays: [[[f64; LANES]; 3]; 3],
+    at: [(usize, usize); LANES],
+}
+
+impl Batch {
+    pub(crate) fn new() -> Self {
+        let zeros = [[[0.0; LANES]; 3]; 3];
+        Self { corners: zeros, values: zeros, folds: zeros, rays: zeros, at: [(0, 0); LANES] }
+    }
+
+    /// Says what lane `k` is: the corners and the values there, as of [`Attributes::new`], and where it is anchored.
+    #[inline(always)]
+    pub(crate) fn put(
+        &mut self,
+        k: usize,
+        corners: [glam::Vec3; 3],
+        values: [[f64; 3]; 3],
+        folds: [Fold; 3],
+        grid: &Grid,
+        (i, j): (usize, usize),
+    ) {
+        let [x, y] = grid.steps(i);
+        let rays = [grid.rays.at(i as u32, j as u32), x, y];
+        for n in 0..3 {
+            let Fold { divisor, period, half } = folds[n];
+            let fold = [divisor, period, half];
+            let (corner, ray) = (corners[n].to_array(), rays[n].to_array());
+            for m in 0..3 {
+                self.corners[n][m][k] = f64::from(corner[m]);
+                self.values[n][m][k] = values[n][m];
+                self.folds[n][m][k] = fold[m];
+                self.rays[n][m][k] = ray[m];
+            }
+        }
+        self.at[k] = (i, j);
+    }
+
+    /// What [`Anchor::set`] makes of each lane; and of each a bound on how fast the first two attributes change: the sum
+    /// of the squares of what a column and a row add to them is nowhere on the face above it, and more than rounding
+    /// below. Infinite in a panorama.
+    #[inline(always)]
+    pub(crate) fn anchors<const TURN: bool>(&self, origin: DVec3) -> ([Anchor; LANES], [f32; LANES]) {
+        let mut fastest = [f32::INFINITY; LANES];
+        let mut along = [[0.0f32; LANES]; 4];
+        let (mut down, mut up) = (along, along);
+        let mut base = [[0.0f32; LANES]; 3];
+        let (mut least, mut most) = (base, base);
+        // One face's arithmetic, written so that the compiler does it for several at once.
+        for k in 0..LANES {
+            let point = |v: &[[f64; LANES]; 3]| DVec3::new(v[0][k], v[1][k], v[2][k]);
+            let row = |v: &[[f64; LANES]; 3]| [v[0][k], v[1][k], v[2][k]];
+            let world = [point(&self.corners[0]), point(&self.corners[1]), point(&self.corners[2])];
+            let values = [row(&self.values[0]), row(&self.values[1]), row(&self.values[2])];
+            let fold = |n: usize| {
+                let [divisor, period, half] = row(&self.folds[n]);
+                Fold { divisor, period, half }
+            };
+            let [e, x, y] = [point(&self.rays[0]), point(&self.rays[1]), point(&self.rays[2])];
+            let attributes = Attributes::new(&Patch::of(world, origin), values);
+            let slopes = Slopes::new::<TURN>(&attributes, [fold(0), fold(1), fold(2)], e, [x, y]);
+            for n in 0..4 {
+                (along[n][k], down[n][k], up[n][k]) = (slopes.along[n], slopes.down[n], slopes.up[n]);
+            }
+            for n in 0..3 {
+                (base[n][k], least[n][k], most[n][k]) = (slopes.base[n], slopes.least[n], slopes.most[n]);
+            }
+            if !TURN {
+                fastest[k] = attributes.fastest(world, origin, e, [x, y]) as f32;
+            }
+        }
+        let mut anchors = [Anchor::default(); LANES];
+        for (k, anchor) in anchors.iter_mut().enumerate() {
+            let four = |v: &[[f32; LANES]; 4]| [v[0][k], v[1][k], v[2][k], v[3][k]];
+            let three = |v: &[[f32; LANES]; 3]| [v[0][k], v[1][k], v[2][k]];
+            let slopes = Slopes {
+                along: four(&along),
+                down: four(&down),
+                up: four(&up),
+                base: three(&base),
+                least: three(&least),
+                most: three(&most),
+            };
+            let (i, j) = self.at[k];
+            anchor.put(slopes, i, j);
+        }
+        (anchors, fastest)
+    }
+}
+
+/// A row of pixels near an anchor.
+pub(crate) struct Line<'a> {
+    anchor: &'a Anchor,
+    grid: &'a Grid,
+    /// n and w − 1 in the anchor's column.
+    start: [f32; 4],
+    /// In a panorama the row's.
+    cos: f32,
+    sin: f32,
+}
+
+/// Attributes of eight pixels.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<F, const N: usize> {
+    pub(crate) values: [F; N],
+    /// What a column more adds to each.
+    pub(crate) x: [F; N],
+    /// What a row more adds to each.
+    pub(crate) y: [F; N],
+    /// Bit k: whether pixel k is so much nearer or farther than the anchor that its values are not exact enough.
+    pub(crate) doubtful: u32,
+}
+
+impl Line<'_> {
+    /// The first `N` attributes of the eight pixels from column `i` on.
+    #[inline(always)]
+    pub(crate) fn at<const TURN: bool, const N: usize, L: Lanes>(&self, lanes: L, i: usize) -> Seen<L::F, N> {
+        let l = lanes;
+        let Self { anchor, grid, start, cos, sin } = *self;
+        let k = (i as i32 - anchor.column + REACH) as usize;
+        let s = eight(l, &grid.sines, k);
+        let v = if TURN { eight(l, &grid.versines, k) } else { s };
+        let cosine = l.sub(l.splat(1.0), v);
+        // Loops and no closures: those would not be compiled for the lanes' instructions.
+        let zero = l.splat(0.0);
+        let (mut values, mut by_column, mut by_row) = ([zero; 4], [zero; 4], [zero; 4]);
+        for n in 0..4 {
+            if n >= N && n < 3 {
+                continue;
+            }
+            let Slopes { along, down, up, .. } = &anchor.slopes;
+            if TURN {
+                let change = l.sub(l.mul(l.splat(along[n] * cos), s), l.mul(l.splat(down[n] * cos), v));
+                values[n] = l.add(l.splat(start[n]), change);
+                let (level, rise) = (cos * grid.turn, sin * grid.turn);
+                let (a, b) = (l.mul(l.splat(along[n] * level), cosine), l.mul(l.splat(down[n] * level), s));
+                by_column[n] = l.sub(a, b);
+                let (a, b) = (l.mul(l.splat(down[n] * rise), cosine), l.mul(l.splat(along[n] * rise), s));
+                by_row[n] = l.sub(l.add(a, b), l.splat(up[n] * level));
+            } else {
+                values[n] = l.add(l.splat(start[n]), l.mul(l.splat(along[n]), s));
+                (by_column[n], by_row[n]) = (l.splat(along[n]), l.splat(down[n]));
+            }
+        }
+        let w = l.add(l.splat(1.0), values[3]);
+        let near = l.greater(w, l.splat(1.0 / DEEP)) & l.greater(l.splat(DEEP), w);
+        let scale = l.div(l.splat(1.0), w);
+        let mut seen = Seen { values: [zero; N], x: [zero; N], y: [zero; N], doubtful: !near & 0xFF };
+        for n in 0..N {
+            let offset = l.mul(values[n], scale);
+            let value = l.add(l.splat(anchor.slopes.base[n]), offset);
+            seen.values[n] =
+                l.min(l.max(value, l.splat(anchor.slopes.least[n])), l.splat(anchor.slopes.most[n]));
+            seen.x[n] = l.mul(l.sub(by_column[n], l.mul(offset, by_column[3])), scale);
+            seen.y[n] = l.mul(l.sub(by_row[n], l.mul(offset, by_row[3])), scale);
+        }
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::lanes::Plain;
+    use proptest::prelude::*;
+    use s3d_geom::{Pose, TriMesh};
+
+    /// What eight pixels get, and what is exact in `f64`: values, change by column and by row.
+    fn check<const TURN: bool>(
+        camera: &Camera,
+        corners: [[f32; 3]; 3],
+        values: [[f64; 3]; 3],
+        at: [usize; 2],
+        to: [usize; 2],
+    ) {
+        let mesh = TriMesh::from_faces(corners.map(glam::Vec3::from).to_vec(), vec![[0, 1, 2]]);
+        let Ok(mesh) = mesh else { return };
+        let patch = Patch::new(&mesh, 0, camera.pose.location);
+        let mut attributes = Attributes::new(&patch, values);
+        // No bounds: the plane is tested beyond the triangle, too.
+        attributes.bounds = [(-1e9, 1e9); 3];
+        let (grid, mut anchor) = (Grid::new(camera), Anchor::default());
+        if !anchor.set::<TURN>(&attributes, [Fold::NOT; 3], &grid, at[0], at[1])
+            || !anchor.reaches(to[0], to[1])
+        {
+            return;
+        }
+        let exact = |x: f64, y: f64, n: usize| {
+            let d = camera.direction(x + 0.5, y + 0.5);
+            attributes.above[n].dot(d) / attributes.whole.dot(d)
+        };
+        let seen: Seen<_, 3> = anchor.line::<TURN>(&grid, to[1]).at::<TURN, 3, _>(Plain, to[0]);
+        for k in 0..LANES {
+            let (x, y) = ((to[0] + k) as f64, to[1] as f64);
+            if seen.doubtful >> k & 1 == 1 || to[0] + k >= camera.width as usize {
+                continue;
+            }
+            for n in 0..3 {
+                let change = |x: f64, y: f64| {
+                    let h = 1e-3;
+                    let by_x = (exact(x + h, y, n) - exact(x - h, y, n)) / (2.0 * h);
+                    let by_y = (exact(x, y + h, n) - exact(x, y - h, n)) / (2.0 * h);
+                    (by_x, by_y)
+                };
+                let ((xx, xy), (ax, ay)) = (change(x, y), change(at[0] as f64, at[1] as f64));
+                let footprint = [xx, xy, ax, ay].into_iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+                // All attributes go through the same w: the widest footprint bounds it.
+                let value = exact(x, y, n);
+                let bound = footprint / 500.0
+                    + f64::from(f32::EPSILON) * (value.abs() + exact(at[0] as f64, at[1] as f64, n).abs());
+                let off = (f64::from(seen.values[n][k]) - value).abs();
+                assert!(
+                    off <= bound,
+                    "attribute {n} of ({x}, {y}) is {value}, off by {off:e}, bound {bound:e}"
+                );
+                for (got, want) in [(seen.x[n][k], xx), (seen.y[n][k], xy)] {
+                    assert!((f64::from(got) - want).abs() <= 0.01 * footprint + 1e-9, "{got} for {want}");
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_point_of_a_face_changes_faster_than_its_bound(
+            corners in prop::array::uniform3((-3.0..3.0f64, -3.0..3.0f64, 0.05..9.0f64)),
+            values in prop::array::uniform3(prop::array::uniform3(-900.0..900.0f64)),
+            (p, q) in (0.0..1.0f64, 0.0..1.0f64), (r, t) in (0.0..1.0f64, 0.0..1.0f64),
+        ) {
+            // Rays (x, y, 1) from a place; the anchor and a pixel anywhere on the face.
+            let origin = DVec3::new(0.5, -0.25, 2.0);
+            let world = corners.map(|(x, y, z)| DVec3::new(x * z, y * z, z) + origin);
+            let attributes = Attributes::new(&Patch::of(world, origin), values);
+            let ray = |p: f64, q: f64| {
+                let at = world[0] * (1.0 - p) + world[1] * (p * (1.0 - q)) + world[2] * (p * q) - origin;
+                at / at.z
+            };
+            let steps = [DVec3::new(0.01, 0.0, 0.0), DVec3::new(0.0, 0.01, 0.0)];
+            let fastest = attributes.fastest(world, origin, ray(p, q), steps);
+            let (d, mut sum) = (ray(r, t), 0.0);
+            let scale = attributes.whole.dot(d).recip();
+            for above in &attributes.above[..2] {
+                for step in steps {
+                    let change = above.dot(step) - above.dot(d) * scale * attributes.whole.dot(step);
+                    sum += (change * scale) * (change * scale);
+                }
+            }
+            prop_assert!(sum <= fastest * (1.0 + 1e-6) || !fastest.is_finite(), "{sum} {fastest}");
+        }
+
+        #[test]
+        fn faces_together_are_anchored_as_they_are_alone(
+            corners in prop::array::uniform8(prop::array::uniform3(prop::array::uniform3(-5.0..5.0f32))),
+            values in prop::array::uniform3(prop::array::uniform3(-9.0..9.0f64)),
+            period in 0.5..4.0f64, turn in prop::bool::ANY,
+        ) {
+            let pose = Pose::level(DVec3::new(0.3, -0.2, 0.1), 0.4);
+            let camera = if turn { Camera::equirectangular(pose, 64) } else { Camera::perspective(pose, 1.2, 64, 32) };
+            let (grid, mut batch) = (Grid::new(&camera), Batch::new());
+            let folds = [Fold::NOT, Fold::repeat(period), Fold::mirror(period)];
+            for (k, corners) in corners.iter().enumerate() {
+                batch.put(k, corners.map(glam::Vec3::from), values, folds, &grid, (7 * k, 3 * k));
+            }
+            let (together, _) = if turn { batch.anchors::<true>(pose.location) } else { batch.anchors::<false>(pose.location) };
+            for (k, corners) in corners.iter().enumerate() {
+                let world = corners.map(|p| glam::Vec3::from(p).as_dvec3());
+                let attributes = Attributes::new(&Patch::of(world, pose.location), values);
+                let mut alone = Anchor::default();
+                if turn {
+                    alone.set::<true>(&attributes, folds, &grid, 7 * k, 3 * k);
+                } else {
+                    alone.set::<false>(&attributes, folds, &grid, 7 * k, 3 * k);
+                }
+                prop_assert_eq!(format!("{alone:?}"), format!("{:?}", together[k]));
+            }
+        }
+
+        #[test]
+        fn attributes_are_exact_to_a_part_of_the_footprint(
+            corners in prop::array::uniform3(prop::array::uniform3(-4.0..4.0f32)),
+            values in prop::array::uniform3(prop::array::uniform3(0.0..4096.0f64)),
+            i in 0usize..400, j in 0usize..200, di in -64i32..64, dj in -63i32..64, yaw in 0.0..6.0f64,
+        ) {
+            let to = [(i as i32 + di).clamp(0, 399) as usize, (j as i32 + dj).clamp(0, 199) as usize];
+            let pose = Pose::level(glam::dvec3(0.3, -0.2, 0.1), yaw);
+            check::<false>(&Camera::perspective(pose, 1.2, 400, 200), corners, values, [i, j], to);
+            check::<true>(&Camera::equirectangular(pose, 400), corners, values, [i, j], to);
+        }
+
+        #[test]
+        fn folds_bring_a_value_into_the_first_period(value in -1e6..1e6f64, period in 1.0..5000.0f64) {
+            let (sign, shift) = Fold::repeat(period).of(value);
+            prop_assert!(sign == 1.0 && (-1e-6..=period).contains(&(value + shift)));
+            prop_assert!((shift / period - (shift / period).round()).abs() < 1e-9);
+            let (sign, shift) = Fold::mirror(period).of(value);
+            prop_assert!((-1e-6..=period).contains(&(sign * value + shift)), "{}", sign * value + shift);
+            // The same place of a texture that is mirrored at every period.
+            prop_assert!((shift / (2.0 * period) - (shift / (2.0 * period)).round()).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,323 @@
+//! From hits to the images of the data set. Source: formats.md, "Images".
+//!
+//! Every image has the size of the hits. Those that depend on the rays' directions take the camera that the hits were
+//! cast with, one ray a pixel.
+
+use crate::hits::{Hits, NO_FACE};
+use crate::scene::Scene;
+use crate::shade::flat_painter::Stamps;
+use crate::shade::patch::{FaceCache, Patch};
+use crate::shade::spans::{Runs, band_rows};
+use crate::simd::lanes::{self, LANES, LaneWork, Lanes};
+use glam::{DMat3, DVec3, Vec3};
+use s3d_geom::{Camera, NormalAxes, Raster, TriMesh};
+
+/// Depth that is missing, or too far to be written.
+pub const MISSING_DEPTH: u16 = 65_535;
+/// A normal that is missing.
+pub const MISSING_NORMAL: [u8; 3] = [128; 3];
+/// An index that is missing: the ray hits nothing.
+pub const MISSING_INDEX: [u8; 3] = [13; 3];
+
+/// Which normals a face has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Normals {
+    /// The face's own, the same all over it.
+    #[default]
+    Flat,
+    /// Interpolated between the normals at its corners; the face's own if the mesh has none there.
+    Smooth,
+}
+
+/// Depth in 512ths of a metre, rounded half up: z-depth in a perspective view, distance in a panorama.
+/// [`MISSING_DEPTH`] where nothing is seen and beyond 65,534 units (128 m).
+pub fn depth_image(hits: &Hits) -> Raster<u16> {
+    let mut out = Raster::filled(hits.depth.width(), hits.depth.height(), 0);
+    depth_image_into(hits, &mut out);
+    out
+}
+
+/// As [`depth_image`], into an image that is used again.
+pub fn depth_image_into(hits: &Hits, out: &mut Raster<u16>) {
+    fit(out, &hits.depth, 0);
+    lanes::run(Depths { depths: hits.depth.pixels(), out: out.pixels_mut() });
+}
+
+/// As [`depth_image_into`], in millimetres: [`MISSING_DEPTH`] where nothing is seen and beyond 65.534 m.
+pub fn depth_image_mm_into(hits: &Hits, out: &mut Raster<u16>) {
+    fit(out, &hits.depth, 0);
+    for (depth, out) in hits.depth.pixels().iter().zip(out.pixels_mut()) {
+        // The product is exact; the cast rounds down and saturates, at infinity too.
+        *out = (f64::from(*depth) * 1000.0 + 0.5) as u16;
+    }
+}
+
+struct Depths<'a> {
+    depths: &'a [f32],
+    out: &'a mut [u16],
+}
+
+impl LaneWork for Depths<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, lanes: impl Lanes) {
+        depths(lanes, self.depths, self.out);
+    }
+}
+
+/// Depths in 512ths of a metre.
+#[inline(always)]
+pub(crate) fn depths(lanes: impl Lanes, depths: &[f32], out: &mut [u16]) {
+    let (eights, rest) = depths.as_chunks::<LANES>();
+    let (out, last) = out.as_chunks_mut::<LANES>();
+    for (depths, out) in eights.iter().zip(out) {
+        lanes.depths(depths, out);
+    }
+    let (mut depths, mut rounded) = ([0.0; LANES], [0; LANES]);
+    depths[..rest.len()].copy_from_slice(rest);
+    lanes.depths(&depths, &mut rounded);
+    last.copy_from_slice(&rounded[..rest.len()]);
+}
+
+/// Gives `out` the size of `like`.
+pub(crate) fn fit<T: Copy, U>(out: &mut Raster<T>, like: &Raster<U>, value: T) {
+    if (out.width(), out.height()) != (like.width(), like.height()) {
+        *out = Raster::filled(like.width(), like.height(), value);
+    }
+}
+
+/// Surface normals in the axes of [`Camera::normal_image_from_world`], the paper's, a channel = ⌊127.5 + 127.5 n + ½⌋; a normal never
+/// points away from the camera (its dot product with the ray is at most 0). [`MISSING_NORMAL`] where nothing is seen.
+///
+/// # Panics
+/// If the hits are not of the camera's size.
+pub fn normal_image(scene: &Scene<'_>, hits: &Hits, camera: &Camera, normals: Normals) -> Raster<[u8; 3]> {
+    let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
+    normal_image_into(scene, hits, camera, normals, NormalAxes::Paper, &mut out);
+    out
+}
+
+/// As [`normal_image`], with a choice of [axes](Camera::normal_axes_from_world) and into an image that is used again.
+///
+/// # Panics
+/// As [`normal_image`].
+pub fn normal_image_into(
+    scene: &Scene<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    normals: Normals,
+    axes: NormalAxes,
+    out: &mut Raster<[u8; 3]>,
+) {
+    assert_size(hits, camera);
+    let image_from_world = camera.normal_axes_from_world(axes);
+    match normals {
+        Normals::Flat => flat_normals(scene, hits, camera, image_from_world, out),
+        Normals::Smooth => *out = smooth_normals(scene, hits, camera, image_from_world),
+    }
+}
+
+fn flat_normals(
+    scene: &Scene<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    image_from_world: DMat3,
+    out: &mut Raster<[u8; 3]>,
+) {
+    let view = (camera.pose.location, image_from_world);
+    by_face(Some(scene), hits, MISSING_NORMAL, out, |faces| flat_normals_of(scene.mesh(), faces, view));
+}
+
+/// The colours of faces' normals, on the side that `origin` sees: all rays start there, and see the same side.
+#[inline(always)]
+pub(crate) fn flat_normals_of(
+    mesh: &TriMesh,
+    faces: &[u32; LANES],
+    (origin, image_from_world): (DVec3, DMat3),
+) -> [[u8; 3]; LANES] {
+    // Corner by corner and axis by axis.
+    let mut corners = [[[0.0f64; LANES]; 3]; 3];
+    for (k, &face) in faces.iter().enumerate() {
+        for (corner, p) in corners.iter_mut().zip(mesh.triangle(face)) {
+            (corner[0][k], corner[1][k], corner[2][k]) = (f64::from(p.x), f64::from(p.y), f64::from(p.z));
+        }
+    }
+    let mut channels = [[0.0f64; LANES]; 3];
+    // One face's arithmetic, written so that the compiler does it for several at once.
+    for k in 0..LANES {
+        let [a, b, c] = [0, 1, 2].map(|n| DVec3::new(corners[n][0][k], corners[n][1][k], corners[n][2][k]));
+        let normal = (b - a).cross(c - a).normalize();
+        let side = if normal.dot(a - origin) > 0.0 { -1.0 } else { 1.0 };
+        let color = shifted(image_from_world * (normal * side));
+        (channels[0][k], channels[1][k], channels[2][k]) = (color.x, color.y, color.z);
+    }
+    std::array::from_fn(|k| channels.map(|channel| channel[k] as u8))
+}
+
+fn smooth_normals(
+    scene: &Scene<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    image_from_world: DMat3,
+) -> Raster<[u8; 3]> {
+    let mesh = scene.mesh();
+    let mut patches = FaceCache::new();
+    let rays = camera.rays();
+    let mut out = Vec::with_capacity(hits.face.len());
+    for (j, faces) in hits.face.rows().enumerate() {
+        for (i, &face) in faces.iter().enumerate() {
+            if face == NO_FACE {
+                out.push(MISSING_NORMAL);
+                continue;
+            }
+            let patch = patches.get(face, || Patch::new(mesh, face, camera.pose.location));
+            let normal = smooth_normal(patch, mesh.corner_normals(face), rays.at(i as u32, j as u32));
+            out.push(quantized(image_from_world * normal));
+        }
+    }
+    Raster::from_vec(hits.face.width(), hits.face.height(), out)
+}
+
+/// The normal where the ray along `d` arrives, on the side that it sees.
+fn smooth_normal(patch: &Patch, corners: Option<[Vec3; 3]>, d: DVec3) -> DVec3 {
+    let (flat, away) = patch.normal_towards(d);
+    let Some(corners) = corners else { return flat };
+    let sum: DVec3 = corners.iter().zip(patch.weights(d)).map(|(n, w)| n.as_dvec3() * w).sum();
+    // Corner normals follow the winding, which the flat normal shows.
+    let sum = if away { -sum } else { sum };
+    // One that points away is bent until it is edge-on.
+    let beyond = sum.dot(d).max(0.0);
+    (sum - d * (beyond / d.length_squared())).try_normalize().unwrap_or(flat)
+}
+
+/// ⌊127.5 + 127.5 n + ½⌋ a channel.
+fn quantized(n: DVec3) -> [u8; 3] {
+    // The cast rounds down and saturates.
+    shifted(n).to_array().map(|channel| channel as u8)
+}
+
+/// 127.5 + 127.5 n + ½ a channel, and a hair more: a wall along an axis has a 0 that rounding may put on either side of
+/// the tie, and 128 is meant.
+#[inline(always)]
+fn shifted(n: DVec3) -> DVec3 {
+    n * 127.5 + (128.0 + 1e-9)
+}
+
+/// An index a face, as the colour R·65536 + G·256 + B = index; [`MISSING_INDEX`] where nothing is seen. With each face's
+/// index into the label table it is the semantic image.
+///
+/// # Panics
+/// If there is not an index for each face that is seen, or one does not fit into 24 bits.
+pub fn index_image(hits: &Hits, per_face: &[u32]) -> Raster<[u8; 3]> {
+    let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
+    index_image_into(hits, per_face, &mut out);
+    out
+}
+
+/// As [`index_image`], into an image that is used again.
+///
+/// # Panics
+/// As [`index_image`].
+pub fn index_image_into(hits: &Hits, per_face: &[u32], out: &mut Raster<[u8; 3]>) {
+    by_face(None, hits, MISSING_INDEX, out, |faces| faces.map(|face| index_color(per_face, face)));
+}
+
+#[inline(always)]
+pub(crate) fn index_color(per_face: &[u32], face: u32) -> [u8; 3] {
+    let index = per_face[face as usize];
+    let [high, r, g, b] = index.to_be_bytes();
+    assert!(high == 0, "the index {index} of face {face} does not fit into 24 bits");
+    [r, g, b]
+}
+
+/// A colour a face, black where nothing is seen.
+///
+/// # Panics
+/// If there is not a colour for each face that is seen.
+pub fn color_per_face_image(hits: &Hits, per_face_colors: &[[u8; 3]]) -> Raster<[u8; 3]> {
+    let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
+    color_per_face_image_into(hits, per_face_colors, &mut out);
+    out
+}
+
+/// As [`color_per_face_image`], into an image that is used again.
+///
+/// # Panics
+/// As [`color_per_face_image`].
+pub fn color_per_face_image_into(hits: &Hits, per_face_colors: &[[u8; 3]], out: &mut Raster<[u8; 3]>) {
+    by_face(None, hits, [0; 3], out, |faces| faces.map(|face| per_face_colors[face as usize]));
+}
+
+/// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.
+pub fn coverage(hits: &Hits) -> f64 {
+    let seen = hits.face.pixels().iter().filter(|&&face| face != NO_FACE).count();
+    seen as f64 / hits.face.len().max(1) as f64
+}
+
+/// An image from a value a face: `values` is asked for eight faces at a time.
+fn by_face(
+    scene: Option<&Scene<'_>>,
+    hits: &Hits,
+    missing: [u8; 3],
+    out: &mut Raster<[u8; 3]>,
+    values: impl Fn(&[u32; LANES]) -> [[u8; 3]; LANES],
+) {
+    fit(out, &hits.face, [0; 3]);
+    let values = |faces: &[u32; LANES]| values(faces).map(|value| [value]);
+    lanes::run(ByFace { mesh: scene.map(Scene::mesh), hits, stamps: Stamps::new([missing], values), out });
+}
+
+struct ByFace<'a, V> {
+    /// What values look at.
+    mesh: Option<&'a TriMesh>,
+    hits: &'a Hits,
+    stamps: Stamps<V, 1>,
+    out: &'a mut Raster<[u8; 3]>,
+}
+
+impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> LaneWork for ByFace<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, lanes: impl Lanes) {
+        let Self { mesh, hits, mut stamps, out } = self;
+        let width = hits.face.width() as usize;
+        let (mut runs, band) = (Runs::new(width), (band_rows(width) * width).max(1));
+        for (faces, out) in hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band)) {
+            if runs.find(lanes, mesh, faces) {
+                stamps.forget();
+            }
+            stamps.band(lanes, mesh, &runs, [out]);
+        }
+    }
+}
+
+/// Gives the pixels from `start` to `end` a colour, and perhaps some of those that follow.
+#[inline(always)]
+pub(crate) fn paint(out: &mut [[u8; 3]], start: usize, end: usize, color: [u8; 3]) {
+    let [r, g, b] = color.map(u64::from);
+    let p = r | g << 8 | b << 16;
+    // Eight pixels are three words.
+    let words = [p | p << 24 | p << 48, p >> 16 | p << 8 | p << 32 | p << 56, p >> 8 | p << 16 | p << 40];
+    let mut at = start;
+    while at < end {
+        let Some(eight) = out.get_mut(at..at + LANES) else {
+            return out[at..end].fill(color);
+        };
+        for (bytes, word) in eight.as_flattened_mut().as_chunks_mut::<8>().0.iter_mut().zip(words) {
+            *bytes = word.to_le_bytes();
+        }
+        at += LANES;
+    }
+}
+
+pub(crate) fn assert_size(hits: &Hits, camera: &Camera) {
+    let (w, h) = (hits.face.width(), hits.face.height());
+    assert!(
+        (w, h) == (camera.width, camera.height),
+        "hits of {w}×{h} pixels for a camera of {}×{}",
+        camera.width,
+        camera.height
+    );
+}

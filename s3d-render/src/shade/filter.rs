@@ -1,0 +1,364 @@
+//! Textures fetched for eight pixels at a time.
+//!
+//! Gives what [`crate::shade::mip_maps::Pyramid::sample`] gives, in integers: places between a texture's pixels are kept in
+//! 32768ths of a pixel, and so are the weights of all pixels that make a colour; their products are added without
+//! rounding. Before it is rounded to 8 bits a colour is off by less than 0.03 where one bilinear sample makes it. Where
+//! sixteen do, the weights of samples, rounded down, may darken it by 0.12. Samples of a footprint are steps of whole
+//! 32768ths apart, so that the last of eight is off by less than a 4000th of a pixel.
+
+use crate::shade::anchor::Seen;
+use crate::shade::wrap_mode::Fold;
+use crate::simd::lanes::{LANES, Lanes, Texels, eight, put};
+use s3d_geom::{Raster, Texture, Wrap};
+
+/// Where the pixels of a row are in their textures, and the sides x and y of their footprints: what a column and what a
+/// row more add; in pixels of the full size. By column, and two more groups.
+#[derive(Debug, Default)]
+pub(crate) struct Footprints {
+    at: [Vec<f32>; 2],
+    x: [Vec<f32>; 2],
+    y: [Vec<f32>; 2],
+}
+
+impl Footprints {
+    pub(crate) fn new(len: usize) -> Self {
+        let two = || [vec![0.0; len], vec![0.0; len]];
+        Self { at: two(), x: two(), y: two() }
+    }
+
+    /// The eight pixels from column `i` on; their sides only if they are not all `narrow`.
+    #[inline(always)]
+    pub(crate) fn store<L: Lanes>(&mut self, l: L, i: usize, seen: &Seen<L::F, 2>, narrow: bool) {
+        for n in 0..2 {
+            put(l, &mut self.at[n], i, seen.values[n]);
+        }
+        if !narrow {
+            for n in 0..2 {
+                put(l, &mut self.x[n], i, seen.x[n]);
+                put(l, &mut self.y[n], i, seen.y[n]);
+            }
+        }
+    }
+}
+
+/// How eight footprints are sampled.
+struct Taps<F> {
+    /// The size to sample: how often the full one is halved.
+    level: F,
+    /// The weight of each sample there, and of each in the next size, in −32768ths.
+    weight: F,
+    next_weight: F,
+    /// How many samples.
+    count: F,
+    /// From one sample to the next.
+    step_x: F,
+    step_y: F,
+}
+
+/// A texture at one size.
+#[derive(Clone, Copy)]
+struct Size<'a> {
+    image: &'a Raster<[u8; 3]>,
+    texels: Texels<'a>,
+    /// The last column and row, in 32768ths of a pixel.
+    right: u32,
+    bottom: u32,
+    /// Pixels of this size a pixel of the full one.
+    x: f32,
+    y: f32,
+}
+
+/// What is read around eight places, one by one: see [`Lanes::place`] and [`Lanes::quads_from`].
+#[derive(Default)]
+struct Places {
+    at: [i32; LANES],
+    x: [i16; LANES],
+    y: [i16; LANES],
+    upper: [u64; LANES],
+    lower: [u64; LANES],
+}
+
+/// Places in an image that go on in steps: 0 is the middle of the first pixel.
+struct Walk<L: Lanes> {
+    first: (L::F, L::F),
+    step: (L::F, L::F),
+    /// Where it has come to, and the step, in 32768ths.
+    place: (L::I, L::I),
+    fixed_step: (L::I, L::I),
+}
+
+impl<L: Lanes> Walk<L> {
+    #[inline(always)]
+    fn at(l: L, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
+        let (place, fixed_step) = ((l.fixed(first.0), l.fixed(first.1)), (l.fixed(step.0), l.fixed(step.1)));
+        Self { first, step, place, fixed_step }
+    }
+
+    /// In one of the sizes; given are places and steps in pixels of the full one.
+    #[inline(always)]
+    fn new(l: L, size: &Size<'_>, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
+        let (x, y, half) = (l.splat(size.x), l.splat(size.y), l.splat(0.5));
+        let first = (l.sub(l.mul(first.0, x), half), l.sub(l.mul(first.1, y), half));
+        Self::at(l, first, (l.mul(step.0, x), l.mul(step.1, y)))
+    }
+
+    #[inline(always)]
+    fn go_on(&mut self, l: L) {
+        let (place, step) = (self.place, self.fixed_step);
+        self.place = (l.add_fixed(place.0, step.0), l.add_fixed(place.1, step.1));
+    }
+}
+
+/// A texture at all its sizes.
+pub(crate) struct Sizes<'a> {
+    wrap: [Wrap; 2],
+    sizes: Vec<Size<'a>>,
+}
+
+impl<'a> Sizes<'a> {
+    pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
+        let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)) as f32;
+        // Larger sizes are not used.
+        let last = |size: u32| (size.clamp(1, 1 << 15) - 1) << 15;
+        let size = |image: &'a Raster<[u8; 3]>| Size {
+            image,
+            texels: Texels::new(image.pixels().as_flattened(), image.width() as i32 * 3),
+            right: last(image.width()),
+            bottom: last(image.height()),
+            x: ratio(image.width(), full.image.width()),
+            y: ratio(image.height(), full.image.height()),
+        };
+        Self { wrap: full.wrap, sizes: std::iter::once(&full.image).chain(reductions).map(size).collect() }
+    }
+
+    /// Whether places in it fit the numbers here.
+    pub(crate) fn is_usable(&self) -> bool {
+        let image = self.sizes[0].image;
+        !image.is_empty()
+            && image.width().max(image.height()) < 1 << 15
+            && 3 * image.len() < i32::MAX as usize
+    }
+
+    /// How coordinates in pixels of the full size repeat.
+    pub(crate) fn folds(&self) -> [Fold; 3] {
+        let image = self.sizes[0].image;
+        let fold = |wrap, size: u32| match wrap {
+            Wrap::Repeat => Fold::repeat(f64::from(size)),
+            Wrap::Mirror => Fold::mirror(f64::from(size)),
+            Wrap::Clamp => Fold::NOT,
+        };
+        [fold(self.wrap[0], image.width()), fold(self.wrap[1], image.height()), Fold::NOT]
+    }
+
+    /// The colours of those of the eight pixels from `i` on that are among `these`, from at most `most` samples each. Of
+    /// these, those that are not among `maybe` have footprints that are not wide.
+    #[inline(always)]
+    pub(crate) fn colors<L: Lanes>(
+        &self,
+        l: L,
+        footprints: &Footprints,
+        i: usize,
+        (these, maybe): (u32, u32),
+        most: u32,
+    ) -> [u32; LANES] {
+        let pair = |of: &[Vec<f32>; 2]| [eight(l, &of[0], i), eight(l, &of[1], i)];
+        let [x, y] = pair(&footprints.at);
+        if maybe == 0 {
+            return self.magnified(l, x, y, these);
+        }
+        let ([xx, xy], [yx, yy]) = (pair(&footprints.x), pair(&footprints.y));
+        let a = l.add(l.mul(xx, xx), l.mul(yx, yx));
+        let c = l.add(l.mul(xy, xy), l.mul(yy, yy));
+        let sum = l.add(a, c);
+        let maybe = l.greater(sum, l.splat(1.0)) & l.greater(l.splat(f32::INFINITY), sum) & maybe;
+        if maybe != 0 {
+            // See `taps` and `axes` of texture.rs for what follows.
+            let (zero, half_of, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
+            let b = l.add(l.mul(xx, xy), l.mul(yx, yy));
+            let (mean, half) = (l.mul(half_of, sum), l.mul(half_of, l.sub(a, c)));
+            let root = l.sqrt(l.add(l.mul(half, half), l.mul(b, b)));
+            let long = l.sqrt(l.add(mean, root));
+            let axis_x = l.by_sign(half, b, l.add(root, half));
+            let axis_y = l.by_sign(half, l.sub(root, half), b);
+            // What makes the axis as long as that. A round footprint has no axis, and one sample.
+            let length_2 = l.add(l.mul(axis_x, axis_x), l.mul(axis_y, axis_y));
+            let stretch = l.sqrt(l.div(l.add(mean, root), l.max(length_2, l.splat(1e-30))));
+            let cross = l.sub(l.mul(xx, yy), l.mul(xy, yx));
+            let minor = l.div(l.max(cross, l.sub(zero, cross)), long);
+            let most = most.max(1) as f32;
+            let width = l.max(l.max(minor, l.mul(long, l.splat(1.0 / most))), one);
+            let count = l.min(l.max(l.add(l.div(long, width), half_of), one), l.splat(most));
+            let count = l.whole(count);
+            let wide = maybe & (l.greater(width, one) | l.greater(count, one));
+            if wide != 0 {
+                let part = l.div(one, count);
+                let step = l.mul(stretch, part);
+                let (level, fraction) = l.log2(width);
+                // Beyond the last size there is the last.
+                let last = (self.sizes.len() - 1) as f32;
+                let past = l.sub(level, l.splat(last));
+                let fraction = l.by_sign(past, fraction, zero);
+                let level = l.min(level, l.splat(last));
+                let share = l.mul(l.splat(-32768.0), part);
+                let next_weight = l.mul(share, fraction);
+                let taps = Taps {
+                    level: l.pick(wide, level, zero),
+                    weight: l.pick(wide, l.sub(share, next_weight), l.splat(-32768.0)),
+                    next_weight: l.pick(wide, next_weight, zero),
+                    count: l.pick(wide, count, one),
+                    step_x: l.pick(wide, l.mul(axis_x, step), zero),
+                    step_y: l.pick(wide, l.mul(axis_y, step), zero),
+                };
+                return l.pixels(self.filtered(l, x, y, &taps, these));
+            }
+        }
+        self.magnified(l, x, y, these)
+    }
+
+    #[inline(always)]
+    fn magnified<L: Lanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
+        let (size, half, zero) = (&self.sizes[0], l.splat(0.5), l.splat(0.0));
+        let walk = Walk::at(l, (l.sub(x, half), l.sub(y, half)), (zero, zero));
+        l.pixels(self.add(l, l.no_mix(), size, &walk, zero, l.all(), these))
+    }
+
+    #[inline(always)]
+    fn filtered<L: Lanes>(&self, l: L, x: L::F, y: L::F, taps: &Taps<L::F>, these: u32) -> L::Mix {
+        let Taps { level, weight, next_weight, count, step_x, step_y } = *taps;
+        let (zero, half, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
+        let middle = l.mul(half, l.sub(count, one));
+        let first = (l.sub(x, l.mul(middle, step_x)), l.sub(y, l.mul(middle, step_y)));
+        let step = (step_x, step_y);
+
+        let mut mix = l.no_mix();
+        let mut levels = [0.0; LANES];
+        l.store(level, &mut levels);
+        let at = levels[these.trailing_zeros() as usize % LANES];
+        let same = l.splat(at);
+        if (l.greater(level, same) | l.greater(same, level)) & these == 0
+            && l.greater(l.splat(-1.0), next_weight) & these != 0
+            && let Some([this, next]) = self.sizes.get(at as usize..).and_then(<[_]>::first_chunk)
+        {
+            // The same two sizes for all, as mostly: both in one loop, of which nobody can foretell when it ends.
+            let (mut a, mut b) = (Walk::new(l, this, first, step), Walk::new(l, next, first, step));
+            let (weights, next_weights) = (l.weights(weight), l.weights(next_weight));
+            let (mut active, mut tap) = (these, zero);
+            while active != 0 {
+                mix = self.add(l, mix, this, &a, tap, l.only(active, weights), active);
+                mix = self.add(l, mix, next, &b, tap, l.only(active, next_weights), active);
+                a.go_on(l);
+                b.go_on(l);
+                tap = l.add(tap, one);
+                active &= l.greater(count, tap);
+            }
+            return mix;
+        }
+        // Size after size, each for the pixels that need it.
+        let mut left = these;
+        let mut at = zero;
+        for of in &self.sizes {
+            let here = left & !l.greater(level, at);
+            // Weights of less than one part are none.
+            let weights = l.by_sign(l.sub(level, at), next_weight, weight);
+            let mut active = here & l.greater(l.splat(-1.0), weights);
+            let (weights, mut walk, mut tap) = (l.weights(weights), Walk::new(l, of, first, step), zero);
+            while active != 0 {
+                mix = self.add(l, mix, of, &walk, tap, l.only(active, weights), active);
+                walk.go_on(l);
+                tap = l.add(tap, one);
+                active &= l.greater(count, tap);
+            }
+            left &= !l.greater(at, level);
+            if left == 0 {
+                break;
+            }
+            at = l.add(at, one);
+        }
+        mix
+    }
+
+    /// `mix` and the weighted bilinear colours at those of the places that are among `these`, after `tap` steps of the walk.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "all of them in registers")]
+    fn add<L: Lanes>(
+        &self,
+        l: L,
+        mix: L::Mix,
+        size: &Size<'a>,
+        walk: &Walk<L>,
+        tap: L::F,
+        weights: L::Weights,
+        these: u32,
+    ) -> L::Mix {
+        let (x, y) = walk.place;
+        let inside = l.within(x, size.right) & l.within(y, size.bottom);
+        let (at, parts) = l.place(x, y, size.texels.stride(), these);
+        if inside & these == these
+            && let Some(quads) = l.quads(&size.texels, at)
+        {
+            return l.add_weighted(mix, quads, l.corners(parts, weights));
+        }
+        let (mut xs, mut ys) = ([0.0; LANES], [0.0; LANES]);
+        l.store(l.add(walk.first.0, l.mul(tap, walk.step.0)), &mut xs);
+        l.store(l.add(walk.first.1, l.mul(tap, walk.step.1)), &mut ys);
+        let mut places = Places::default();
+        l.store_fixed(at, &mut places.at);
+        l.store_parts(parts, &mut places.x, &mut places.y);
+        self.read_singly(size, &xs, &ys, inside, these, &mut places);
+        let corners = l.corners(l.parts(&places.x, &places.y), weights);
+        l.add_weighted(mix, l.quads_from(&places.upper, &places.lower), corners)
+    }
+
+    /// Reads what is at those of the places that are among `these`; of them, those among `inside` are not at the image's
+    /// edge.
+    #[cold]
+    #[inline(never)]
+    fn read_singly(
+        &self,
+        size: &Size<'a>,
+        xs: &[f32; LANES],
+        ys: &[f32; LANES],
+        inside: u32,
+        these: u32,
+        places: &mut Places,
+    ) {
+        for k in 0..LANES {
+            if these >> k & 1 == 0 {
+                continue;
+            }
+            let begin = places.at[k] as usize;
+            let below = begin.wrapping_add(size.texels.stride() as usize);
+            match (word(size.texels.bytes(), begin), word(size.texels.bytes(), below)) {
+                (Some(a), Some(b)) if inside >> k & 1 == 1 => (places.upper[k], places.lower[k]) = (a, b),
+                _ => {
+                    let quad = self.at_the_edge(size, xs[k], ys[k]);
+                    ((places.upper[k], places.lower[k]), (places.x[k], places.y[k])) = quad;
+                }
+            }
+        }
+    }
+
+    /// The 2 × 2 pixels around a place of which some are not side by side, and the place's parts.
+    fn at_the_edge(&self, size: &Size<'a>, x: f32, y: f32) -> ((u64, u64), (i16, i16)) {
+        let image = size.image;
+        let split = |v: f32| {
+            let v = if v.is_finite() { f64::from(v) } else { 0.0 };
+            (v.floor() as i64, ((v - v.floor()) * 32768.0) as i16)
+        };
+        let ((column, x), (row, y)) = (split(x), split(y));
+        let columns = [column, column + 1].map(|i| self.wrap[0].index(i, image.width()));
+        // v grows upwards and rows downwards: mirroring and repeating are the same seen from either side.
+        let rows = [row, row + 1].map(|j| self.wrap[1].index(j, image.height()));
+        let pair = |j: u32| {
+            let ([a, b, c], [d, e, f]) = (image.at(columns[0], j), image.at(columns[1], j));
+            u64::from_le_bytes([a, b, c, d, e, f, 0, 0])
+        };
+        ((pair(rows[0]), pair(rows[1])), (x, y))
+    }
+}
+
+/// Eight bytes, if there are as many.
+#[inline(always)]
+fn word(bytes: &[u8], at: usize) -> Option<u64> {
+    bytes.get(at..)?.first_chunk().map(|b| u64::from_le_bytes(*b))
+}

@@ -1,0 +1,80 @@
+//! Images that have one value all over a face, painted run by run.
+
+use crate::shade::spans::Runs;
+use crate::simd::lanes::{LANES, Lanes, STAMP};
+use s3d_geom::TriMesh;
+
+/// `N` such images of a view, painted band by band.
+pub(crate) struct Stamps<V, const N: usize> {
+    /// The colours of eight faces in each of the images.
+    values: V,
+    /// By a face's number, its colours, R in the lowest byte; 0 is for what is missing.
+    colors: Vec<[u32; N]>,
+}
+
+impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> Stamps<V, N> {
+    pub(crate) fn new(missing: [[u8; 3]; N], values: V) -> Self {
+        Self { values, colors: vec![missing.map(packed)] }
+    }
+
+    /// Forgets all faces.
+    pub(crate) fn forget(&mut self) {
+        self.colors.truncate(1);
+    }
+
+    /// Paints a band: `out` is its part of each image. What `values` look at in `mesh`, if given, is fetched from memory.
+    #[inline(always)]
+    pub(crate) fn band(
+        &mut self,
+        lanes: impl Lanes,
+        mesh: Option<&TriMesh>,
+        runs: &Runs,
+        mut out: [&mut [[u8; 3]]; N],
+    ) {
+        for k in 0..runs.new_groups() {
+            let (group, count) = runs.new_group::<false>(lanes, mesh, k);
+            let values = (self.values)(&group.map(|new| new.face));
+            for value in &values[..count] {
+                let mut colors = [0; N];
+                for (color, value) in colors.iter_mut().zip(value) {
+                    *color = packed(*value);
+                }
+                self.colors.push(colors);
+            }
+        }
+        for pieces in runs.pieces().windows(2) {
+            let (start, end) = (pieces[0].start as usize, pieces[1].start as usize);
+            print(lanes, &mut out, start, end, &self.colors[pieces[0].number as usize]);
+        }
+    }
+}
+
+#[inline(always)]
+fn packed([r, g, b]: [u8; 3]) -> u32 {
+    u32::from_le_bytes([r, g, b, 0])
+}
+
+/// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow: no more pixels than
+/// a stamp has.
+#[inline(always)]
+fn print<const N: usize>(
+    lanes: impl Lanes,
+    images: &mut [&mut [[u8; 3]]; N],
+    start: usize,
+    end: usize,
+    colors: &[u32; N],
+) {
+    for (image, &color) in images.iter_mut().zip(colors) {
+        let bytes = &mut image.as_flattened_mut()[3 * start..];
+        match bytes.first_chunk_mut() {
+            Some(to) => lanes.store_repeated(color, to),
+            // At the image's end.
+            None => {
+                let mut stamp = [0; STAMP];
+                lanes.store_repeated(color, &mut stamp);
+                let most = 3 * (end - start);
+                bytes[..most].copy_from_slice(&stamp[..most]);
+            }
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! A face as a function of the ray's direction: where on it a ray arrives, and how fast that changes from ray to ray.
+
+use crate::hits::NO_FACE;
+use glam::{DVec2, DVec3, Vec2};
+use s3d_geom::TriMesh;
+
+/// A face seen from an origin. The ray along d meets it at the corners' mean with the weights w(k)·d / Σ w(k)·d: these
+/// are ratios of linear functions of d, so any attribute and its change from pixel to pixel come in closed form.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patch {
+    /// The normals of the planes through the origin and the edge opposite to each corner.
+    weights: [DVec3; 3],
+    /// Their sum: along the face's normal by its winding, twice as long as its area.
+    whole: DVec3,
+}
+
+impl Patch {
+    pub(crate) fn new(mesh: &TriMesh, face: u32, origin: DVec3) -> Self {
+        Self::of(mesh.triangle(face).map(|p| p.as_dvec3()), origin)
+    }
+
+    /// Of the corners in the world.
+    #[inline(always)]
+    pub(crate) fn of(world: [DVec3; 3], origin: DVec3) -> Self {
+        let [a, b, c] = [world[0] - origin, world[1] - origin, world[2] - origin];
+        // The sum itself would lose a sliver's normal.
+        let whole = (world[1] - world[0]).cross(world[2] - world[0]);
+        Self { weights: [b.cross(c), c.cross(a), a.cross(b)], whole }
+    }
+
+    /// The functions w(k) of the three corners.
+    pub(crate) fn weights_of_corners(&self) -> [DVec3; 3] {
+        self.weights
+    }
+
+    /// The denominator, in place of the weights' sum.
+    pub(crate) fn whole(&self) -> DVec3 {
+        self.whole
+    }
+
+    /// The face's unit normal on the side that the origin sees, and whether that is its back.
+    #[inline]
+    pub(crate) fn normal_towards(&self, d: DVec3) -> (DVec3, bool) {
+        let away = self.whole.dot(d) > 0.0;
+        let normal = self.whole.normalize();
+        (if away { -normal } else { normal }, away)
+    }
+
+    /// The corners' weights where the ray along `d` arrives; they add up to 1, and are never negative.
+    #[inline(always)]
+    pub(crate) fn weights(&self, d: DVec3) -> [f64; 3] {
+        let sign = if self.whole.dot(d) < 0.0 { -1.0 } else { 1.0 };
+        let w = self.weights.map(|w| (sign * w.dot(d)).max(0.0));
+        let sum = w[0] + w[1] + w[2];
+        if sum > 0.0 { w.map(|w| w / sum) } else { [1.0 / 3.0; 3] }
+    }
+}
+
+/// Texture coordinates over a face: uv(d) = (u·d, v·d) / (whole·d).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct UvPatch {
+    u: DVec3,
+    v: DVec3,
+    whole: DVec3,
+    /// The coordinates' box: what rounding throws outside is brought back.
+    min: DVec2,
+    max: DVec2,
+}
+
+impl UvPatch {
+    pub(crate) fn new(patch: &Patch, uvs: [Vec2; 3]) -> Self {
+        let uvs = uvs.map(|uv| uv.as_dvec2());
+        let mix = |k: usize| (0..3).map(|i| patch.weights[i] * uvs[i][k]).sum::<DVec3>();
+        Self {
+            u: mix(0),
+            v: mix(1),
+            whole: patch.whole,
+            min: uvs[0].min(uvs[1]).min(uvs[2]),
+            max: uvs[0].max(uvs[1]).max(uvs[2]),
+        }
+    }
+
+    /// The coordinates where the ray along `d` arrives, and what a step of the direction by `dx` and by `dy` adds, to
+    /// first order.
+    #[inline(always)]
+    pub(crate) fn at(&self, d: DVec3, dx: DVec3, dy: DVec3) -> (DVec2, DVec2, DVec2) {
+        let scale = self.whole.dot(d).recip();
+        let uv = DVec2::new(self.u.dot(d), self.v.dot(d)) * scale;
+        let step = |s: DVec3| (DVec2::new(self.u.dot(s), self.v.dot(s)) - uv * self.whole.dot(s)) * scale;
+        let (x, y) = (step(dx), step(dy));
+        // `max` and `min` take a coordinate that is not a number (a face seen exactly edge-on) into the box, too.
+        (uv.max(self.min).min(self.max), x, y)
+    }
+}
+
+/// Things prepared once a face, as long as no other face takes their place: the pixels of a face lie together, in one
+/// row after another.
+pub(crate) struct FaceCache<T> {
+    /// By place, which a face's index gives: the face, and where its thing is.
+    places: Vec<(u32, u32)>,
+    things: Vec<T>,
+}
+
+impl<T> FaceCache<T> {
+    /// Far more than the faces across a panorama, a power of two.
+    const SIZE: usize = 8192;
+
+    pub(crate) fn new() -> Self {
+        Self { places: vec![(NO_FACE, u32::MAX); Self::SIZE], things: Vec::new() }
+    }
+
+    #[inline(always)]
+    pub(crate) fn get(&mut self, face: u32, make: impl FnOnce() -> T) -> &mut T {
+        let (of, at) = &mut self.places[face as usize % Self::SIZE];
+        if *of != face {
+            *of = face;
+            match self.things.get_mut(*at as usize) {
+                Some(thing) => *thing = make(),
+                None => {
+                    *at = self.things.len() as u32;
+                    self.things.push(make());
+                }
+            }
+        }
+        &mut self.things[*at as usize]
+    }
+}

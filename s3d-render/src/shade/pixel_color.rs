@@ -1,0 +1,181 @@
+//! The RGB image, a pixel at a time in `f64`: what the fast way is held against, and what it asks where its `f32` would
+//! not do.
+
+use crate::hits::{Hits, NO_FACE};
+use crate::scene::Scene;
+use crate::shade::channels::assert_size;
+use crate::shade::mip_maps::{Pyramid, Pyramids, TextureFilter};
+use crate::shade::patch::{FaceCache, Patch, UvPatch};
+use glam::DVec3;
+use s3d_geom::{Camera, FaceColor, Projection, Raster, Rays};
+
+/// As [`crate::rgb_image_with`], one pixel at a time: the reference that tests and benches hold the fast one against.
+/// Channels differ by 1 at most, where rounding decides; but for the few pixels whose footprint is so near to the next
+/// number of samples that rounding decides how many there are.
+///
+/// # Panics
+/// As [`crate::rgb_image`].
+pub fn rgb_image_pixel_by_pixel(
+    scene: &Scene<'_>,
+    pyramids: &Pyramids,
+    hits: &Hits,
+    camera: &Camera,
+    filter: &TextureFilter,
+) -> Raster<[u8; 3]> {
+    assert_size(hits, camera);
+    let mut pixels = PixelByPixel::new(scene, pyramids, camera, filter);
+    let mut out = Vec::with_capacity(hits.face.len());
+    for (j, faces) in hits.face.rows().enumerate() {
+        out.extend(faces.iter().enumerate().map(|(i, &face)| match face {
+            NO_FACE => [0; 3],
+            face => pixels.color(face, i, j),
+        }));
+    }
+    Raster::from_vec(hits.face.width(), hits.face.height(), out)
+}
+
+/// The colour that the ray of `camera` along `direction` sees on `face`, which it hits: for places between pixels, or rays
+/// of no image. `direction` is as [`Camera::direction`] gives it. Channels are those of [`rgb_image_pixel_by_pixel`] at a
+/// pixel's centre.
+///
+/// # Panics
+/// If there is no face `face`, or `pyramids` are another mesh's.
+pub fn rgb_of_ray(
+    scene: &Scene<'_>,
+    pyramids: &Pyramids,
+    camera: &Camera,
+    direction: DVec3,
+    face: u32,
+    filter: &TextureFilter,
+) -> [u8; 3] {
+    let steps = match camera.projection {
+        Projection::Perspective { .. } => {
+            let f = camera.focal_px();
+            Steps::Same(camera.pose.right() / f, -camera.pose.up() / f)
+        }
+        Projection::Equirectangular => Steps::Turn {
+            rad_per_pixel: std::f64::consts::TAU / f64::from(camera.width),
+            rows: vec![(direction.truncate().length(), direction.z)],
+        },
+    };
+    let paint = Paint::new(scene, pyramids, face, camera.pose.location);
+    seen_color(paint.at(direction, 0, &steps, filter))
+}
+
+/// The colours of an image's pixels, one by one.
+pub(crate) struct PixelByPixel<'a> {
+    scene: &'a Scene<'a>,
+    pyramids: &'a Pyramids,
+    filter: &'a TextureFilter,
+    origin: DVec3,
+    rays: Rays,
+    steps: Steps,
+    /// Made when the first pixel is asked for.
+    paints: Option<FaceCache<Paint<'a>>>,
+}
+
+impl<'a> PixelByPixel<'a> {
+    pub(crate) fn new(
+        scene: &'a Scene<'a>,
+        pyramids: &'a Pyramids,
+        camera: &Camera,
+        filter: &'a TextureFilter,
+    ) -> Self {
+        let (steps, rays) = (Steps::new(camera), camera.rays());
+        Self { scene, pyramids, filter, origin: camera.pose.location, rays, steps, paints: None }
+    }
+
+    /// What pixel (i, j), which sees `face`, shows of it.
+    pub(crate) fn color(&mut self, face: u32, i: usize, j: usize) -> [u8; 3] {
+        let Self { scene, pyramids, origin, .. } = *self;
+        let paints = self.paints.get_or_insert_with(FaceCache::new);
+        let paint = paints.get(face, || Paint::new(scene, pyramids, face, origin));
+        let d = self.rays.at(i as u32, j as u32);
+        seen_color(paint.at(d, j, &self.steps, self.filter))
+    }
+}
+
+/// Rounded to 8 bits, and never black.
+fn seen_color(color: [f32; 3]) -> [u8; 3] {
+    match color.map(|channel| (channel + 0.5) as u8) {
+        [0, 0, 0] => [1, 1, 1],
+        rgb => rgb,
+    }
+}
+
+/// How a face is coloured, prepared for the origin.
+enum Paint<'a> {
+    Texture(Pyramid<'a>, UvPatch),
+    Corners(Patch, [[u8; 3]; 3]),
+    Flat([u8; 3]),
+}
+
+impl<'a> Paint<'a> {
+    fn new(scene: &Scene<'a>, pyramids: &'a Pyramids, face: u32, origin: DVec3) -> Self {
+        let patch = || Patch::new(scene.mesh(), face, origin);
+        match scene.mesh().color_of(face) {
+            FaceColor::Texture(index, texture, uvs) => {
+                Self::Texture(pyramids.pyramid(index, texture), UvPatch::new(&patch(), uvs))
+            }
+            FaceColor::Corners(corners) => Self::Corners(patch(), corners),
+            FaceColor::Flat(color) => Self::Flat(color),
+        }
+    }
+
+    /// The colour that the ray along `d`, in row `j` of the image, sees: 0 to 255 a channel.
+    #[inline(always)]
+    fn at(&self, d: DVec3, j: usize, steps: &Steps, filter: &TextureFilter) -> [f32; 3] {
+        match self {
+            Self::Texture(pyramid, uv) => {
+                let (x, y) = steps.at(d, j);
+                let (uv, x, y) = uv.at(d, x, y);
+                pyramid.sample(uv, x, y, filter)
+            }
+            Self::Corners(patch, corners) => {
+                let weights = patch.weights(d).map(|w| w as f32);
+                std::array::from_fn(|k| (0..3).map(|i| f32::from(corners[i][k]) * weights[i]).sum())
+            }
+            Self::Flat(color) => color.map(f32::from),
+        }
+    }
+}
+
+/// What a pixel to the right and a pixel down add to a direction.
+enum Steps {
+    Same(DVec3, DVec3),
+    /// Radians a pixel: a panorama's pixels are squares on the sphere's map.
+    Turn {
+        rad_per_pixel: f64,
+        rows: Vec<(f64, f64)>,
+    },
+}
+
+impl Steps {
+    fn new(camera: &Camera) -> Self {
+        match camera.rays() {
+            Rays::Perspective { x_step, y_step, .. } => Self::Same(x_step, y_step),
+            Rays::Equirectangular { rows, .. } => {
+                debug_assert_eq!(camera.projection, Projection::Equirectangular);
+                let rad_per_pixel = std::f64::consts::TAU / f64::from(camera.width);
+                Self::Turn { rad_per_pixel, rows: rows.into_iter().map(Into::into).collect() }
+            }
+        }
+    }
+
+    /// The derivatives of the direction `d`, in row `j`, by column and row.
+    #[inline(always)]
+    fn at(&self, d: DVec3, j: usize) -> (DVec3, DVec3) {
+        match self {
+            Self::Same(x, y) => (*x, *y),
+            Self::Turn { rad_per_pixel, rows } => {
+                // Azimuth falls to the right and latitude falls downwards. d = (cos lat · a, sin lat), |a| = 1; rows
+                // are never at a pole, so cos lat > 0.
+                let (cos, sin) = rows[j];
+                let x = DVec3::new(d.y, -d.x, 0.0) * *rad_per_pixel;
+                let up = sin / cos;
+                let y = DVec3::new(d.x * up, d.y * up, -cos) * *rad_per_pixel;
+                (x, y)
+            }
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! All images of a view from its hits, in one walk.
+//!
+//! Band by band, so that hits and what belongs to their faces are in the cache for one modality after another. The images
+//! are those of the functions that make one each.
+
+use crate::hits::Hits;
+use crate::scene::Scene;
+use crate::shade::anchor::Grid;
+use crate::shade::channels::{
+    MISSING_INDEX, MISSING_NORMAL, assert_size, depths, fit, flat_normals_of, index_color,
+};
+use crate::shade::color::Painter;
+use crate::shade::flat_painter::Stamps;
+use crate::shade::mip_maps::{Pyramids, TextureFilter};
+use crate::shade::points::Directions;
+use crate::shade::prefetch::Ahead;
+use crate::shade::spans::{Runs, band_rows};
+use crate::simd::lanes::{self, LANES, LaneWork, Lanes};
+use half::f16;
+use s3d_geom::{Camera, NormalAxes, Raster};
+use std::ops::Range;
+
+/// What a view's images are made from, besides its hits.
+#[derive(Clone, Copy)]
+pub struct Shading<'a> {
+    /// The scene that was cast.
+    pub scene: &'a Scene<'a>,
+    /// Its textures.
+    pub pyramids: &'a Pyramids,
+    /// How they are read.
+    pub filter: TextureFilter,
+    /// The axes of normals.
+    pub normal_axes: NormalAxes,
+    /// As [`crate::index_image`] takes them; may be empty if that is not made.
+    pub index_per_face: &'a [u32],
+    /// As [`crate::color_per_face_image`] takes them; may be empty if that is not made.
+    pub color_per_face: &'a [[u8; 3]],
+}
+
+/// Which images of a view are made; by default none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Modalities {
+    /// [`ViewImages::rgb`].
+    pub rgb: bool,
+    /// [`ViewImages::depth`].
+    pub depth: bool,
+    /// All of [`ViewImages::faces`].
+    pub faces: bool,
+    /// [`ViewImages::xyz`].
+    pub xyz: bool,
+}
+
+impl Modalities {
+    /// All images.
+    pub const ALL: Self = Self { rgb: true, depth: true, faces: true, xyz: true };
+}
+
+/// The images of a view; see [`view_images_into`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewImages {
+    /// [`crate::rgb_image_with`].
+    pub rgb: Raster<[u8; 3]>,
+    /// [`crate::depth_image`].
+    pub depth: Raster<u16>,
+    /// Those that have one value all over a face.
+    pub faces: FaceImages,
+    /// [`crate::xyz_image_half`].
+    pub xyz: Raster<[f16; 3]>,
+}
+
+/// The images that have one value all over a face.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FaceImages {
+    /// [`crate::normal_image`] with [`crate::Normals::Flat`], in the axes asked for.
+    pub normal: Raster<[u8; 3]>,
+    /// [`crate::index_image`].
+    pub index: Raster<[u8; 3]>,
+    /// [`crate::color_per_face_image`].
+    pub color: Raster<[u8; 3]>,
+}
+
+impl Default for ViewImages {
+    /// Without pixels.
+    fn default() -> Self {
+        Self {
+            rgb: Raster::filled(0, 0, [0; 3]),
+            depth: Raster::filled(0, 0, 0),
+            faces: FaceImages::default(),
+            xyz: Raster::filled(0, 0, [f16::ZERO; 3]),
+        }
+    }
+}
+
+impl Default for FaceImages {
+    /// Without pixels.
+    fn default() -> Self {
+        let empty = || Raster::filled(0, 0, [0; 3]);
+        Self { normal: empty(), index: empty(), color: empty() }
+    }
+}
+
+/// Makes those of a view's images that are wanted, in less time than one after another. The others in `out` stay what they
+/// were; memory that has the right size already is used again.
+///
+/// # Panics
+/// If the hits are not of the camera's size, or `shading` is not for the faces that are seen: see [`crate::rgb_image`],
+/// [`crate::index_image`] and [`crate::color_per_face_image`].
+pub fn view_images_into(
+    shading: &Shading<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    wanted: Modalities,
+    out: &mut ViewImages,
+) {
+    assert_size(hits, camera);
+    let ViewImages { rgb, depth, faces, xyz } = out;
+    let FaceImages { normal, index, color } = faces;
+    if wanted.rgb {
+        fit(rgb, &hits.face, [0; 3]);
+    }
+    if wanted.depth {
+        fit(depth, &hits.face, 0);
+    }
+    if wanted.faces {
+        for image in [normal, index, color] {
+            fit(image, &hits.face, [0; 3]);
+        }
+    }
+    if wanted.xyz {
+        fit(xyz, &hits.face, [f16::ZERO; 3]);
+    }
+    lanes::run(View { shading, hits, camera, wanted, out });
+}
+
+struct View<'a> {
+    shading: &'a Shading<'a>,
+    hits: &'a Hits,
+    camera: &'a Camera,
+    wanted: Modalities,
+    out: &'a mut ViewImages,
+}
+
+impl LaneWork for View<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, lanes: impl Lanes) {
+        let grid = Grid::new(self.camera);
+        if grid.is_turn() {
+            self.bands::<true>(lanes, &grid);
+        } else {
+            self.bands::<false>(lanes, &grid);
+        }
+    }
+}
+
+impl View<'_> {
+    #[inline(always)]
+    fn bands<const TURN: bool>(self, lanes: impl Lanes, grid: &Grid) {
+        let Self { shading, hits, camera, wanted, out } = self;
+        let &Shading { scene, pyramids, ref filter, normal_axes, index_per_face, color_per_face } = shading;
+        let ViewImages { rgb, depth, faces: FaceImages { normal, index, color }, xyz } = out;
+        let mut painter = Painter::new(lanes, scene, pyramids, camera, filter);
+        let view = (camera.pose.location, camera.normal_axes_from_world(normal_axes));
+        let values = |faces: &[u32; LANES]| {
+            let normals = flat_normals_of(scene.mesh(), faces, view);
+            std::array::from_fn(|k| {
+                let face = faces[k];
+                [normals[k], index_color(index_per_face, face), color_per_face[face as usize]]
+            })
+        };
+        let mut stamps = Stamps::new([MISSING_NORMAL, MISSING_INDEX, [0; 3]], values);
+        let directions = Directions::new(camera);
+
+        let width = hits.face.width() as usize;
+        let (mut runs, rows) = (Runs::new(width), band_rows(width));
+        let band = (rows * width).max(1);
+        for (k, faces) in hits.face.pixels().chunks(band).enumerate() {
+            let pixels = k * band..k * band + faces.len();
+            let distances = &hits.depth.pixels()[pixels.clone()];
+            if wanted.depth {
+                depths(lanes, distances, &mut depth.pixels_mut()[pixels.clone()]);
+            }
+            if wanted.xyz {
+                let out = &mut xyz.pixels_mut()[pixels.clone()];
+                directions.points::<TURN, f16>(lanes, k * rows, distances, out);
+            }
+            if !wanted.rgb && !wanted.faces {
+                continue;
+            }
+            if runs.find(lanes, Some(scene.mesh()), faces) {
+                painter.forget();
+                stamps.forget();
+            }
+            if wanted.rgb {
+                let next = pixels.end..hits.face.len().min(pixels.end + band);
+                let (done, rest) = rgb.pixels_mut().split_at_mut(next.start);
+                let part = |of: &Range<usize>, wanted| if wanted { of.clone() } else { 0..0 };
+                let stamped = part(&pixels, wanted.faces);
+                let ahead = Ahead {
+                    faces: &hits.face.pixels()[next.clone()],
+                    distances: &hits.depth.pixels()[part(&next, wanted.depth || wanted.xyz)],
+                    depth: &depth.pixels()[part(&next, wanted.depth)],
+                    xyz: &xyz.pixels()[part(&next, wanted.xyz)],
+                    rgb: &rest[..next.len()],
+                    stamps: [&*normal, &*index, &*color].map(|i| &i.pixels()[stamped.clone()]),
+                };
+                painter.band::<TURN>(grid, &runs, k * rows, faces, &mut done[pixels.start..], &ahead);
+            }
+            if wanted.faces {
+                let out =
+                    [&mut *normal, &mut *index, &mut *color].map(|i| &mut i.pixels_mut()[pixels.clone()]);
+                // For colours the faces have been fetched already.
+                let mesh = (!wanted.rgb).then_some(scene.mesh());
+                stamps.band(lanes, mesh, &runs, out);
+            }
+        }
+    }
+}

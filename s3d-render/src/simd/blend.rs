@@ -1,0 +1,302 @@
+//! What [`Avx2`] does with textures, in registers of 32 and of 64 bytes.
+//!
+//! A place's 2 × 2 pixels are in 128 bits, the two neighbours of the upper row in the first half and those of the lower row in
+//! the second: one instruction multiplies neighbours by their weights and adds the two, for all channels.
+//!
+//! All that is unsafe here is, as in `avx2.rs`, to use these instructions, which [`Blend::detect`] asks for, and to load
+//! from places of an image that were compared with its end.
+#![allow(unsafe_code)]
+
+use crate::simd::avx2::{self, Avx2};
+use crate::simd::lanes::{EightRays, LANES, LaneWork};
+use std::arch::x86_64::*;
+
+/// The widest registers that hold texels. Its values are proof that the processor has what they take.
+pub(crate) trait Blend: Copy {
+    /// The weights of the 2 × 2 pixels of eight places.
+    type Corners: Copy;
+    /// The 2 × 2 pixels.
+    type Quads: Copy;
+    /// Weighted sums.
+    type Mix: Copy;
+
+    fn detect() -> Option<Self>;
+    /// Does `work`, compiled for these instructions throughout.
+    fn run<W: LaneWork>(self, work: W) -> W::Output;
+    /// Of the weights of neighbours in a row: those of pixels 0 to 3 in the upper and then in the lower row, and those of
+    /// pixels 4 to 7.
+    fn corners(self, low: __m256i, high: __m256i) -> Self::Corners;
+    /// # Safety
+    /// At every place, and `stride` bytes after it, are eight bytes.
+    unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads;
+    fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
+    fn none(self) -> Self::Mix;
+    fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix;
+    /// R, G, B and 0, rounded to bytes.
+    fn bytes(self, mix: Self::Mix) -> __m256i;
+    /// See [`crate::simd::lanes::Lanes::changes`].
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
+    /// What [`crate::simd::lanes::Lanes::points`] stores.
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3];
+}
+
+/// The upper neighbours' R G B R G B as 16-bit numbers R R, G G, B B; and the lower ones'.
+const NEIGHBORS: [[i8; 16]; 2] = [
+    [0, -1, 3, -1, 1, -1, 4, -1, 2, -1, 5, -1, -1, -1, -1, -1],
+    [8, -1, 11, -1, 9, -1, 12, -1, 10, -1, 13, -1, -1, -1, -1, -1],
+];
+
+/// The 2 × 2 pixels of each place.
+///
+/// # Safety
+/// At every place, and `stride` bytes after it, are eight bytes.
+#[inline(always)]
+unsafe fn pairs(bytes: *const u8, at: __m256i, stride: usize) -> [__m128i; LANES] {
+    unsafe {
+        let (mut each, below) = ([0u32; LANES], bytes.add(stride));
+        _mm256_storeu_si256(each.as_mut_ptr().cast(), at);
+        let mut pairs = [_mm_setzero_si128(); LANES];
+        for k in 0..LANES {
+            // Volatile, since compilers would rather take `at` apart than load from where it was stored: twice the work.
+            let at = std::ptr::read_volatile(&each[k]) as usize;
+            let (upper, lower) = (bytes.add(at).cast::<f64>(), below.add(at).cast::<f64>());
+            pairs[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_load_sd(upper), lower));
+        }
+        pairs
+    }
+}
+
+/// 32 bytes: pixels k and k + 4 a register.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Half(());
+
+// SAFETY of all blocks below: a `Half` exists only where the processor has AVX2, a `Full` only where it has AVX-512 too.
+impl Blend for Half {
+    /// Of the upper neighbours, as pixels in a register, and of the lower ones.
+    type Corners = [__m256i; 2];
+    type Quads = [__m256i; 4];
+    type Mix = [__m256i; 4];
+
+    fn detect() -> Option<Self> {
+        (is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("f16c")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("popcnt"))
+        .then_some(Self(()))
+    }
+    fn run<W: LaneWork>(self, work: W) -> W::Output {
+        #[target_feature(enable = "avx2,f16c,bmi1,bmi2,popcnt")]
+        fn with_avx2<W: LaneWork>(work: W, lanes: Avx2<Half>) -> W::Output {
+            work.run(lanes)
+        }
+        // SAFETY: the processor has these instructions, or there were no `self`.
+        unsafe { with_avx2(work, Avx2(self)) }
+    }
+    #[inline(always)]
+    fn corners(self, low: __m256i, high: __m256i) -> Self::Corners {
+        unsafe {
+            [_mm256_permute2x128_si256::<0x20>(low, high), _mm256_permute2x128_si256::<0x31>(low, high)]
+        }
+    }
+    #[inline(always)]
+    unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads {
+        unsafe {
+            let pairs = pairs(bytes, at, stride);
+            let mut quads = [_mm256_setzero_si256(); 4];
+            for k in 0..4 {
+                quads[k] = _mm256_set_m128i(pairs[k + 4], pairs[k]);
+            }
+            quads
+        }
+    }
+    #[inline(always)]
+    fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
+        unsafe {
+            let mut quads = [_mm256_setzero_si256(); 4];
+            for k in 0..4 {
+                let [a, b, c, d] = [upper[k], lower[k], upper[k + 4], lower[k + 4]].map(|v| v as i64);
+                quads[k] = _mm256_setr_epi64x(a, b, c, d);
+            }
+            quads
+        }
+    }
+    #[inline(always)]
+    fn none(self) -> Self::Mix {
+        unsafe { [_mm256_setzero_si256(); 4] }
+    }
+    #[inline(always)]
+    fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+        unsafe {
+            let mut mix = sum;
+            for (neighbors, corners) in NEIGHBORS.iter().zip(corners) {
+                let neighbors = _mm256_broadcastsi128_si256(_mm_loadu_si128(neighbors.as_ptr().cast()));
+                let weights = [
+                    _mm256_shuffle_epi32::<0b00_00_00_00>(corners),
+                    _mm256_shuffle_epi32::<0b01_01_01_01>(corners),
+                    _mm256_shuffle_epi32::<0b10_10_10_10>(corners),
+                    _mm256_shuffle_epi32::<0b11_11_11_11>(corners),
+                ];
+                for k in 0..4 {
+                    let colors = _mm256_shuffle_epi8(quads[k], neighbors);
+                    mix[k] = _mm256_add_epi32(mix[k], _mm256_madd_epi16(colors, weights[k]));
+                }
+            }
+            mix
+        }
+    }
+    #[inline(always)]
+    fn bytes(self, mix: Self::Mix) -> __m256i {
+        unsafe {
+            let half = _mm256_set1_epi32(0x4000);
+            let mut whole = mix;
+            for whole in &mut whole {
+                *whole = _mm256_srai_epi32::<15>(_mm256_sub_epi32(half, *whole));
+            }
+            let [a, b, c, d] = whole;
+            _mm256_packus_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d))
+        }
+    }
+    #[inline(always)]
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+        unsafe { avx2::changes(values, from, to) }
+    }
+    #[inline(always)]
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
+        unsafe { avx2::points::<TURN>(rays) }
+    }
+}
+
+/// 64 bytes: pixels 0 to 3 a register, and 4 to 7.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Full(());
+
+impl Blend for Full {
+    /// By register, of the upper neighbours and of the lower ones.
+    type Corners = [[__m512i; 2]; 2];
+    type Quads = [__m512i; 2];
+    type Mix = [__m512i; 2];
+
+    fn detect() -> Option<Self> {
+        (Half::detect().is_some()
+            && is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx512vnni"))
+        .then_some(Self(()))
+    }
+    fn run<W: LaneWork>(self, work: W) -> W::Output {
+        #[target_feature(enable = "avx2,f16c,bmi1,bmi2,popcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vnni")]
+        fn with_avx512<W: LaneWork>(work: W, lanes: Avx2<Full>) -> W::Output {
+            work.run(lanes)
+        }
+        // SAFETY: the processor has these instructions, or there were no `self`.
+        unsafe { with_avx512(work, Avx2(self)) }
+    }
+    #[inline(always)]
+    fn corners(self, low: __m256i, high: __m256i) -> Self::Corners {
+        unsafe {
+            let upper = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+            let lower = _mm512_setr_epi32(4, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 7, 7, 7, 7);
+            let (low, high) = (_mm512_castsi256_si512(low), _mm512_castsi256_si512(high));
+            [
+                [_mm512_permutexvar_epi32(upper, low), _mm512_permutexvar_epi32(lower, low)],
+                [_mm512_permutexvar_epi32(upper, high), _mm512_permutexvar_epi32(lower, high)],
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads {
+        unsafe {
+            let [a, b, c, d, e, f, g, h] = pairs(bytes, at, stride);
+            let (ab, cd) = (_mm256_set_m128i(b, a), _mm256_set_m128i(d, c));
+            let (ef, gh) = (_mm256_set_m128i(f, e), _mm256_set_m128i(h, g));
+            [
+                _mm512_inserti64x4::<1>(_mm512_castsi256_si512(ab), cd),
+                _mm512_inserti64x4::<1>(_mm512_castsi256_si512(ef), gh),
+            ]
+        }
+    }
+    #[inline(always)]
+    fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
+        unsafe {
+            let mut quads = [_mm512_setzero_si512(); 2];
+            for (quad, k) in quads.iter_mut().zip([0, 4]) {
+                let [a, b, c, d] = [upper[k], lower[k], upper[k + 1], lower[k + 1]].map(|v| v as i64);
+                let [e, f, g, h] = [upper[k + 2], lower[k + 2], upper[k + 3], lower[k + 3]].map(|v| v as i64);
+                *quad = _mm512_setr_epi64(a, b, c, d, e, f, g, h);
+            }
+            quads
+        }
+    }
+    #[inline(always)]
+    fn none(self) -> Self::Mix {
+        unsafe { [_mm512_setzero_si512(); 2] }
+    }
+    #[inline(always)]
+    fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+        unsafe {
+            let mut mix = sum;
+            for k in 0..2 {
+                for (neighbors, weights) in NEIGHBORS.iter().zip(corners[k]) {
+                    let neighbors = _mm512_broadcast_i32x4(_mm_loadu_si128(neighbors.as_ptr().cast()));
+                    mix[k] = _mm512_dpwssd_epi32(mix[k], _mm512_shuffle_epi8(quads[k], neighbors), weights);
+                }
+            }
+            mix
+        }
+    }
+    #[inline(always)]
+    fn bytes(self, mix: Self::Mix) -> __m256i {
+        unsafe {
+            let half = _mm512_set1_epi32(0x4000);
+            let mut whole = mix;
+            for whole in &mut whole {
+                *whole = _mm512_srai_epi32::<15>(_mm512_sub_epi32(half, *whole));
+            }
+            // 0 4 | 1 5 | 2 6 | 3 7.
+            let words = _mm512_packs_epi32(whole[0], whole[1]);
+            let (first, last) = (_mm512_castsi512_si256(words), _mm512_extracti64x4_epi64::<1>(words));
+            // 0 4 2 6 | 1 5 3 7.
+            let bytes = _mm256_packus_epi16(first, last);
+            _mm256_permutevar8x32_epi32(bytes, _mm256_setr_epi32(0, 4, 2, 6, 1, 5, 3, 7))
+        }
+    }
+    #[inline(always)]
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+        unsafe {
+            let before = _mm512_loadu_si512(values.as_ptr().cast());
+            let after = _mm512_loadu_si512(values.as_ptr().add(1).cast());
+            let changes = _mm512_cmpneq_epi32_mask(before, after);
+            let numbers = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            let places = _mm512_add_epi32(numbers, _mm512_set1_epi32(from as i32));
+            _mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(changes, places));
+            changes.count_ones() as usize
+        }
+    }
+    #[inline(always)]
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
+        // Of the numbers 8k to 8k + 7: whose depth it is, and where x y z x y z… begins.
+        const DEPTHS: [[i64; 8]; 3] =
+            [[0, 0, 0, 1, 1, 1, 2, 2], [2, 3, 3, 3, 4, 4, 4, 5], [5, 5, 6, 6, 6, 7, 7, 7]];
+        const AXES: [usize; 3] = [0, 2, 1];
+        /// Infinities and what is not a number.
+        const MISSING: i32 = 0b1001_1001;
+        let EightRays { column, row, depths, place } = *rays;
+        unsafe {
+            let all = _mm512_cvtps_pd(_mm256_loadu_ps(depths.as_ptr()));
+            let load = |from: &[f64], k: usize| _mm512_loadu_pd(from[k..k + 8].as_ptr());
+            let mut points = [_mm256_setzero_ps(); 3];
+            for k in 0..3 {
+                let depths = _mm512_permutexvar_pd(_mm512_loadu_si512(DEPTHS[k].as_ptr().cast()), all);
+                let (column, row) = (load(column, 8 * k), load(row, AXES[k]));
+                let direction = if TURN { _mm512_mul_pd(column, row) } else { _mm512_add_pd(column, row) };
+                let point = _mm512_add_pd(load(place, AXES[k]), _mm512_mul_pd(direction, depths));
+                let seen = !_mm512_fpclass_pd_mask::<MISSING>(depths);
+                points[k] = _mm512_maskz_cvtpd_ps(seen, point);
+            }
+            points
+        }
+    }
+}

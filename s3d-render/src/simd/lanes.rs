@@ -1,0 +1,445 @@
+//! Eight pixels at a time, with the same bits on every processor.
+//!
+//! [`Lanes`] names the few operations on eight values that images need. [`Plain`] has them in ordinary Rust, which defines
+//! what they give; `Avx2` (in `avx2.rs`, and `blend.rs` for textures) gives the
+//! same faster. Every operation is on integers or rounds once, as
+//! IEEE 754 says it must, so that no result depends on which of the two ran.
+
+use half::f16;
+
+/// How many pixels go together.
+pub(crate) const LANES: usize = 8;
+
+/// Bytes of a colour again and again, ten times and more.
+pub(crate) const STAMP: usize = 32;
+
+/// Operations on eight values.
+pub(crate) trait Lanes: Copy {
+    /// Eight `f32`.
+    type F: Copy;
+    /// Eight whole numbers; of coordinates in an image, in 32768ths of a pixel.
+    type I: Copy;
+    /// Eight numbers from 0 to 1 to the right and eight downwards, in 32768ths.
+    type Parts: Copy;
+    /// The 2 × 2 pixels of a texture around each of eight places.
+    type Quads: Copy;
+    /// Weights of eight pixels in −32768ths: negative, so that 1 fits into 16 bits.
+    type Weights: Copy;
+    /// The same of the 2 × 2 pixels of a texture around each of eight places.
+    type Corners: Copy;
+    /// Sums of weighted colours of eight pixels, in −32768ths of a step of 8 bits.
+    type Mix: Copy;
+
+    fn splat(self, value: f32) -> Self::F;
+    fn load(self, from: &[f32; LANES]) -> Self::F;
+    fn store(self, values: Self::F, to: &mut [f32; LANES]);
+    fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sqrt(self, a: Self::F) -> Self::F;
+    /// The smaller; `b` if one is not a number.
+    fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    /// The larger; `b` if one is not a number.
+    fn max(self, a: Self::F, b: Self::F) -> Self::F;
+    /// `negative` where the sign bit of `of` is set, else `positive`.
+    fn by_sign(self, of: Self::F, negative: Self::F, positive: Self::F) -> Self::F;
+    /// `yes` in the lanes of `these`, else `no`.
+    fn pick(self, these: u32, yes: Self::F, no: Self::F) -> Self::F;
+    /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
+    fn whole(self, values: Self::F) -> Self::F;
+    /// Bit k: whether a > b in lane k.
+    fn greater(self, a: Self::F, b: Self::F) -> u32;
+    /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
+    fn store_int(self, values: Self::F, to: &mut [i32; LANES]);
+
+    /// ⌊log2⌋ of values of at least 1, and what is left of the logarithm to 0.01.
+    fn log2(self, values: Self::F) -> (Self::F, Self::F);
+    /// In 32768ths, rounded towards 0; the least number where that does not fit.
+    fn fixed(self, values: Self::F) -> Self::I;
+    /// Sums, wrapped around.
+    fn add_fixed(self, a: Self::I, b: Self::I) -> Self::I;
+    fn store_fixed(self, values: Self::I, to: &mut [i32; LANES]);
+    /// Bit k: whether 0 ≤ v < `end` in lane k; `end` is at most 2^31.
+    fn within(self, values: Self::I, end: u32) -> u32;
+    /// Of the places (x, y) of an image whose rows are `stride` bytes: where the upper left pixel begins, and how far
+    /// beyond it the places are. The beginning of the image in lanes that are not among `these`; anything for places that
+    /// are not in an image of less than 2^15 columns, rows and 2^31 bytes.
+    fn place(self, x: Self::I, y: Self::I, stride: i32, these: u32) -> (Self::I, Self::Parts);
+    /// What [`Lanes::place`] gives, from the 32768ths.
+    fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> Self::Parts;
+    /// The 32768ths.
+    fn store_parts(self, parts: Self::Parts, x: &mut [i16; LANES], y: &mut [i16; LANES]);
+    /// The 2 × 2 pixels whose upper left ones begin at `at`; `None` if one is too near the image's end.
+    fn quads(self, image: &Texels<'_>, at: Self::I) -> Option<Self::Quads>;
+    /// R G B of two neighbours in the lowest six bytes of each: upper ones, lower ones.
+    fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
+    /// Weights from −1 (0) to −32768 (1), rounded towards 0.
+    fn weights(self, weights: Self::F) -> Self::Weights;
+    /// `weights`, and none in lanes that are not among `these`.
+    fn only(self, these: u32, weights: Self::Weights) -> Self::Weights;
+    /// Weights of 1.
+    fn all(self) -> Self::Weights;
+    /// Weights shared out to the 2 × 2 pixels around places, downwards and then to the right, by [`part`]: each is off by
+    /// at most 1, and together they are what was shared out.
+    fn corners(self, parts: Self::Parts, weights: Self::Weights) -> Self::Corners;
+    /// No colour.
+    fn no_mix(self) -> Self::Mix;
+    /// `sum` and weighted colours. Nothing is rounded.
+    fn add_weighted(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix;
+    /// Rounded to bytes, R G B in the lowest three of each value; never black.
+    fn pixels(self, mix: Self::Mix) -> [u32; LANES];
+    /// The lowest three bytes of each value, one after another.
+    fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]);
+    /// The lowest three bytes of a value, again and again.
+    fn store_repeated(self, packed: u32, to: &mut [u8; STAMP]);
+
+    /// Says that `thing` will be read soon.
+    fn expect<T>(self, thing: &T);
+    /// Bit k: whether `values[k]` is `value`.
+    fn equal(self, values: &[u32; LANES], value: u32) -> u32;
+    /// Where a value differs from the one before it, ascending, as `from` and the number of values in between: how many
+    /// places that are. They are at the beginning of `to`; the rest there is anything.
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
+    /// Depths in 512ths, rounded half up, at most 65,535.
+    fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]);
+    /// Points place + direction × depth, rounded to `f32`; `TURN` says how a direction is made.
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]);
+    /// As [`Lanes::points`], rounded once more to half floats.
+    fn half_points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]);
+}
+
+/// An image's bytes, and up to where 2 × 2 pixels can be read at once.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Texels<'a> {
+    bytes: &'a [u8],
+    stride: i32,
+    end: u32,
+}
+
+impl<'a> Texels<'a> {
+    /// Of rows of `stride` bytes.
+    pub(crate) fn new(bytes: &'a [u8], stride: i32) -> Self {
+        let len = i32::try_from(bytes.len()).unwrap_or(0);
+        let end = if stride < 0 { 0 } else { i64::from(len) - i64::from(stride) - 7 };
+        Self { bytes, stride, end: end.max(0) as u32 }
+    }
+
+    #[inline(always)]
+    pub(crate) fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// Bytes a row.
+    #[inline(always)]
+    pub(crate) fn stride(&self) -> i32 {
+        self.stride
+    }
+
+    /// From every place before this one on there are eight bytes, and eight more a `stride` later. Less than 2^31.
+    #[inline(always)]
+    pub(crate) fn end(&self) -> u32 {
+        self.end
+    }
+}
+
+/// Eight rays side by side, and how far they reach. What belongs to an axis repeats: x y z x y z…
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EightRays<'a> {
+    /// Of each ray, what its column gives to its direction.
+    pub(crate) column: &'a [f64; 3 * LANES],
+    /// What their row gives: to be added to that, or multiplied by it axis by axis if the columns turn.
+    pub(crate) row: &'a [f64; 12],
+    /// Missing where it is not finite.
+    pub(crate) depths: &'a [f32; LANES],
+    /// Where they start.
+    pub(crate) place: &'a [f64; 12],
+}
+
+/// a · b / 32768, rounded half up.
+#[inline(always)]
+pub(crate) fn part(a: i16, b: i16) -> i16 {
+    ((i32::from(a) * i32::from(b) + 0x4000) >> 15) as i16
+}
+
+/// Work that is compiled once for every set of instructions. `run` and what it calls in its loops are
+/// `#[inline(always)]`.
+pub(crate) trait LaneWork {
+    type Output;
+    fn run(self, lanes: impl Lanes) -> Self::Output;
+}
+
+/// Does `work` with the widest registers of the processor.
+pub(crate) fn run<W: LaneWork>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use crate::simd::blend::{Blend, Full, Half};
+        if let Some(full) = Full::detect() {
+            return full.run(work);
+        }
+        if let Some(half) = Half::detect() {
+            return half.run(work);
+        }
+    }
+    work.run(Plain)
+}
+
+/// Ordinary Rust.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plain;
+
+type Eight = [f32; LANES];
+
+#[inline(always)]
+fn each(f: impl FnMut(usize) -> f32) -> Eight {
+    std::array::from_fn(f)
+}
+
+impl Lanes for Plain {
+    type F = Eight;
+    type I = [i32; LANES];
+    type Parts = ([i16; LANES], [i16; LANES]);
+    type Quads = [[u64; LANES]; 2];
+    type Weights = [i16; LANES];
+    /// By pixel: of the upper row left and right, and of the lower one.
+    type Corners = [[[i16; 2]; 2]; LANES];
+    type Mix = [[i32; 3]; LANES];
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Eight {
+        [value; LANES]
+    }
+    #[inline(always)]
+    fn load(self, from: &Eight) -> Eight {
+        *from
+    }
+    #[inline(always)]
+    fn store(self, values: Eight, to: &mut Eight) {
+        *to = values;
+    }
+    #[inline(always)]
+    fn add(self, a: Eight, b: Eight) -> Eight {
+        each(|k| a[k] + b[k])
+    }
+    #[inline(always)]
+    fn sub(self, a: Eight, b: Eight) -> Eight {
+        each(|k| a[k] - b[k])
+    }
+    #[inline(always)]
+    fn mul(self, a: Eight, b: Eight) -> Eight {
+        each(|k| a[k] * b[k])
+    }
+    #[inline(always)]
+    fn div(self, a: Eight, b: Eight) -> Eight {
+        each(|k| a[k] / b[k])
+    }
+    #[inline(always)]
+    fn sqrt(self, a: Eight) -> Eight {
+        a.map(f32::sqrt)
+    }
+    #[inline(always)]
+    fn min(self, a: Eight, b: Eight) -> Eight {
+        each(|k| if a[k] < b[k] { a[k] } else { b[k] })
+    }
+    #[inline(always)]
+    fn max(self, a: Eight, b: Eight) -> Eight {
+        each(|k| if a[k] > b[k] { a[k] } else { b[k] })
+    }
+    #[inline(always)]
+    fn by_sign(self, of: Eight, negative: Eight, positive: Eight) -> Eight {
+        each(|k| if of[k].is_sign_negative() { negative[k] } else { positive[k] })
+    }
+    #[inline(always)]
+    fn pick(self, these: u32, yes: Eight, no: Eight) -> Eight {
+        each(|k| if these >> k & 1 == 1 { yes[k] } else { no[k] })
+    }
+    #[inline(always)]
+    fn whole(self, values: Eight) -> Eight {
+        values.map(|v| v as i32 as f32)
+    }
+    #[inline(always)]
+    fn greater(self, a: Eight, b: Eight) -> u32 {
+        (0..LANES).map(|k| u32::from(a[k] > b[k]) << k).sum()
+    }
+    #[inline(always)]
+    fn store_int(self, values: Eight, to: &mut [i32; LANES]) {
+        *to = values.map(|v| v as i32);
+    }
+
+    #[inline(always)]
+    fn log2(self, values: Eight) -> (Eight, Eight) {
+        let whole = values.map(|v| ((v.to_bits() >> 23) as i32 - 127) as f32);
+        // A parabola through both ends.
+        let fraction = values.map(|v| {
+            let mantissa = f32::from_bits((v.to_bits() & 0x007F_FFFF) | 0x3F80_0000);
+            let fraction = (2.0 - mantissa * (1.0 / 3.0)) * mantissa - 5.0 / 3.0;
+            if fraction > 0.0 { fraction } else { 0.0 }
+        });
+        (whole, fraction)
+    }
+    #[inline(always)]
+    fn fixed(self, values: Eight) -> [i32; LANES] {
+        // The smallest number that does not fit.
+        const END: f32 = 2_147_483_648.0;
+        values.map(|v| v * 32768.0).map(|v| if v < END { v as i32 } else { i32::MIN })
+    }
+    #[inline(always)]
+    fn add_fixed(self, a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
+        std::array::from_fn(|k| a[k].wrapping_add(b[k]))
+    }
+    #[inline(always)]
+    fn store_fixed(self, values: [i32; LANES], to: &mut [i32; LANES]) {
+        *to = values;
+    }
+    #[inline(always)]
+    fn within(self, values: [i32; LANES], end: u32) -> u32 {
+        // What is negative is large without a sign.
+        (0..LANES).map(|k| u32::from((values[k] as u32) < end) << k).sum()
+    }
+    #[inline(always)]
+    fn place(self, x: [i32; LANES], y: [i32; LANES], stride: i32, these: u32) -> ([i32; LANES], Self::Parts) {
+        let rest = |v: i32| (v & 0x7FFF) as i16;
+        let at = |k: usize| (y[k] >> 15).wrapping_mul(stride).wrapping_add((x[k] >> 15) * 3);
+        (std::array::from_fn(|k| if these >> k & 1 == 1 { at(k) } else { 0 }), (x.map(rest), y.map(rest)))
+    }
+    #[inline(always)]
+    fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> Self::Parts {
+        (*x, *y)
+    }
+    #[inline(always)]
+    fn store_parts(self, parts: Self::Parts, x: &mut [i16; LANES], y: &mut [i16; LANES]) {
+        (*x, *y) = parts;
+    }
+    #[inline(always)]
+    fn quads(self, image: &Texels<'_>, at: [i32; LANES]) -> Option<Self::Quads> {
+        let mut quads = [[0; LANES]; 2];
+        for (quads, below) in quads.iter_mut().zip([0, image.stride as usize]) {
+            for (quad, at) in quads.iter_mut().zip(at) {
+                let bytes = image.bytes.get(usize::try_from(at).ok()? + below..)?.first_chunk()?;
+                *quad = u64::from_le_bytes(*bytes);
+            }
+        }
+        Some(quads)
+    }
+    #[inline(always)]
+    fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
+        [*upper, *lower]
+    }
+    #[inline(always)]
+    fn weights(self, weights: Eight) -> [i16; LANES] {
+        weights.map(|weight| weight as i16)
+    }
+    #[inline(always)]
+    fn only(self, these: u32, weights: [i16; LANES]) -> [i16; LANES] {
+        std::array::from_fn(|k| if these >> k & 1 == 1 { weights[k] } else { 0 })
+    }
+    #[inline(always)]
+    fn all(self) -> [i16; LANES] {
+        [i16::MIN; LANES]
+    }
+    #[inline(always)]
+    fn corners(self, (x, y): Self::Parts, weights: [i16; LANES]) -> Self::Corners {
+        std::array::from_fn(|k| {
+            let lower = part(weights[k], y[k]);
+            [weights[k] - lower, lower].map(|row| {
+                let right = part(row, x[k]);
+                [row - right, right]
+            })
+        })
+    }
+    #[inline(always)]
+    fn no_mix(self) -> Self::Mix {
+        [[0; 3]; LANES]
+    }
+    #[inline(always)]
+    fn add_weighted(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+        std::array::from_fn(|k| {
+            let mut sum = sum[k];
+            for (row, weights) in quads.iter().zip(corners[k]) {
+                let texels = row[k].to_le_bytes();
+                for (n, weight) in weights.into_iter().enumerate() {
+                    for c in 0..3 {
+                        sum[c] += i32::from(texels[3 * n + c]) * i32::from(weight);
+                    }
+                }
+            }
+            sum
+        })
+    }
+    #[inline(always)]
+    fn pixels(self, mix: Self::Mix) -> [u32; LANES] {
+        mix.map(|color| {
+            let [r, g, b] = color.map(|c| ((0x4000 - c) >> 15).clamp(0, 255) as u8);
+            match u32::from_le_bytes([r, g, b, 0]) {
+                0 => 0x01_01_01,
+                color => color,
+            }
+        })
+    }
+    #[inline(always)]
+    fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]) {
+        for (pixel, value) in to.as_chunks_mut::<3>().0.iter_mut().zip(packed) {
+            let [r, g, b, _] = value.to_le_bytes();
+            *pixel = [r, g, b];
+        }
+    }
+    #[inline(always)]
+    fn store_repeated(self, packed: u32, to: &mut [u8; STAMP]) {
+        *to = std::array::from_fn(|k| packed.to_le_bytes()[k % 3]);
+    }
+
+    #[inline(always)]
+    fn expect<T>(self, _: &T) {}
+    #[inline(always)]
+    fn equal(self, values: &[u32; LANES], value: u32) -> u32 {
+        (0..LANES).map(|k| u32::from(values[k] == value) << k).sum()
+    }
+    #[inline(always)]
+    fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+        let mut count = 0;
+        for k in 0..2 * LANES {
+            if values[k] != values[k + 1] {
+                to[count] = from + k as u32;
+                count += 1;
+            }
+        }
+        count
+    }
+    #[inline(always)]
+    fn depths(self, depths: &Eight, to: &mut [u16; LANES]) {
+        // ⌊x + ½⌋ = ⌊(⌊2x⌋ + 1) / 2⌋, and 2x is exact. The cast takes what is not a number to 0.
+        *to = depths.map(|depth| (((depth * 1024.0).clamp(0.0, 131_070.0) as i32 + 1) >> 1) as u16);
+    }
+    #[inline(always)]
+    fn points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
+        let EightRays { column, row, depths, place } = *rays;
+        *to = std::array::from_fn(|k| {
+            let (axis, depth) = (k % 3, depths[k / 3]);
+            let direction = if TURN { column[k] * row[axis] } else { column[k] + row[axis] };
+            if depth.is_finite() { (place[axis] + direction * f64::from(depth)) as f32 } else { 0.0 }
+        });
+    }
+    #[inline(always)]
+    fn half_points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
+        let mut points = [0.0; 3 * LANES];
+        self.points::<TURN>(rays, &mut points);
+        *to = points.map(f16::from_f32);
+    }
+}
+
+/// The eight values from the `at`th on; 0 if there are not as many.
+#[inline(always)]
+pub(crate) fn eight<L: Lanes>(lanes: L, of: &[f32], at: usize) -> L::F {
+    match of[at..].first_chunk() {
+        Some(values) => lanes.load(values),
+        None => lanes.splat(0.0),
+    }
+}
+
+/// Stores eight values from the `at`th on, if there are as many.
+#[inline(always)]
+pub(crate) fn put<L: Lanes>(lanes: L, to: &mut [f32], at: usize, values: L::F) {
+    if let Some(to) = to[at..].first_chunk_mut() {
+        lanes.store(values, to);
+    }
+}
