@@ -7,7 +7,7 @@ use common::{UUID_A, UUID_B, files, s3d_fails, s3d_ok, text, write_scan};
 use glam::{DVec2, DVec3, dvec2};
 use s3d_geom::{Camera, Lens, Pose, Raster, TriMesh};
 use s3d_io::{Compression, Content, UpAxis, read_cameras, read_gray16, read_mesh, read_rgb8, write_rgb8};
-use s3d_render::{Pyramids, Scene, cast, rgb_image};
+use s3d_render::{MipMaps, Scene, cast, rgb_image};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 use std::fmt::Write as _;
 use std::fs;
@@ -21,16 +21,16 @@ fn write(path: &Path, image: &Raster<[u8; 3]>) {
 /// A photographer in a mesh.
 struct Studio<'m> {
     scene: Scene<'m>,
-    pyramids: Pyramids,
+    mip_maps: MipMaps,
 }
 
 impl<'m> Studio<'m> {
     fn new(mesh: &'m TriMesh) -> Self {
-        Self { scene: Scene::new(mesh), pyramids: Pyramids::new(mesh) }
+        Self { scene: Scene::new(mesh), mip_maps: MipMaps::new(mesh) }
     }
 
     fn take(&self, camera: &Camera) -> Raster<[u8; 3]> {
-        rgb_image(&self.scene, &self.pyramids, &cast(&self.scene, camera), camera)
+        rgb_image(&self.scene, &self.mip_maps, &cast(&self.scene, camera), camera)
     }
 
     /// What each face of a sky box shows, by the words of formats.md; up and down are held as one looks up and down from

@@ -9,7 +9,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{DVec2, dvec2};
 use s3d_geom::{Camera, Lens, Pose, Raster};
 use s3d_render::{
-    Capture, CubeMap, Hits, Pyramids, Scene, SkyBoxTurn, StitchOptions, TextureFilter, Unseen,
+    Capture, CubeMap, Hits, MipMaps, Scene, SkyBoxTurn, StitchOptions, TextureFilter, Unseen,
     picture_image_into, stitch,
 };
 
@@ -39,7 +39,7 @@ fn captures(pose: &Pose) -> Vec<Capture> {
 
 fn pictures(c: &mut Criterion) {
     let mesh = common::furnished_room(285_000);
-    let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+    let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
     let pose = Pose::level(common::room_location(), 0.13);
     let mut group = c.benchmark_group("pictures");
     group.sample_size(10);
@@ -54,7 +54,7 @@ fn pictures(c: &mut Criterion) {
         b.iter(|| CubeMap::from_equirectangular(&panorama, 0.0, &pose, None));
     });
     let options = StitchOptions::default();
-    group.bench_function("cube map from 18 captures, with their pyramids", |b| {
+    group.bench_function("cube map from 18 captures, with their mip_maps", |b| {
         b.iter(|| stitch(shots.clone(), &pose, None, &options));
     });
     group.bench_function("the same with parallax", |b| {
@@ -74,7 +74,7 @@ fn pictures(c: &mut Criterion) {
         for (name, cube, unseen) in [
             ("whole cube map", &whole, Unseen::Nearby),
             ("holes, filled", &holes, Unseen::Nearby),
-            ("holes, the mesh", &holes, Unseen::Mesh(&scene, &pyramids)),
+            ("holes, the mesh", &holes, Unseen::Mesh(&scene, &mip_maps)),
         ] {
             group.bench_function(format!("rgb, {what}, {name}"), |b| {
                 b.iter(|| {
@@ -87,7 +87,7 @@ fn pictures(c: &mut Criterion) {
         group.bench_function(format!("rgb, {what}, textures"), |b| {
             b.iter(|| {
                 for (camera, hits) in &shots {
-                    s3d_render::rgb_image_into(&scene, &pyramids, hits, camera, &filter, &mut out);
+                    s3d_render::rgb_image_into(&scene, &mip_maps, hits, camera, &filter, &mut out);
                 }
             });
         });

@@ -9,7 +9,7 @@ mod common;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{DVec3, dvec3};
 use s3d_geom::{Camera, Pose, TriMesh, scan_like};
-use s3d_render::{Caster, Hits, Normals, Pyramids, Scene};
+use s3d_render::{Caster, Hits, MipMaps, Normals, Scene};
 use std::path::Path;
 
 fn meshes() -> Vec<(String, TriMesh, DVec3)> {
@@ -65,7 +65,7 @@ fn channels(c: &mut Criterion) {
     group.sample_size(20);
     for (name, mesh, location) in &meshes() {
         let scene = Scene::new(mesh);
-        let pyramids = Pyramids::new(mesh);
+        let mip_maps = MipMaps::new(mesh);
         let per_face: Vec<u32> = (0..mesh.faces().len() as u32).collect();
         let colors: Vec<[u8; 3]> = per_face.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
         let cameras = [
@@ -77,7 +77,7 @@ fn channels(c: &mut Criterion) {
             group.throughput(Throughput::Elements(hits.face.len() as u64));
             let id = |channel: &str| BenchmarkId::new(format!("{channel}, {what}"), name);
             group.bench_function(id("rgb"), |b| {
-                b.iter(|| s3d_render::rgb_image(&scene, &pyramids, &hits, camera))
+                b.iter(|| s3d_render::rgb_image(&scene, &mip_maps, &hits, camera))
             });
             group.bench_function(id("depth"), |b| b.iter(|| s3d_render::depth_image(&hits)));
             group.bench_function(id("flat normals"), |b| {
@@ -89,8 +89,7 @@ fn channels(c: &mut Criterion) {
                 b.iter(|| s3d_render::color_per_face_image(&hits, &colors));
             });
         }
-        group
-            .bench_function(BenchmarkId::new("build the pyramids", name), |b| b.iter(|| Pyramids::new(mesh)));
+        group.bench_function(BenchmarkId::new("build the mip_maps", name), |b| b.iter(|| MipMaps::new(mesh)));
     }
     group.finish();
 }

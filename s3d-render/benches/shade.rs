@@ -6,7 +6,7 @@ mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::{Camera, Pose, Raster};
-use s3d_render::{Hits, Modalities, Normals, Pyramids, Scene, Shading, TextureFilter, ViewImages};
+use s3d_render::{Hits, MipMaps, Modalities, Normals, Scene, Shading, TextureFilter, ViewImages};
 use std::hint::black_box;
 
 fn shade(c: &mut Criterion) {
@@ -15,7 +15,7 @@ fn shade(c: &mut Criterion) {
     for name in ["scan-like", "copyroom", "office", "fine-textures"] {
         let Some((mesh, location)) = common::shaded_scene(name) else { continue };
         let scene = Scene::new(&mesh);
-        let pyramids = Pyramids::new(&mesh);
+        let mip_maps = MipMaps::new(&mesh);
         let index: Vec<u32> = (0..mesh.faces().len() as u32).collect();
         let pretty: Vec<[u8; 3]> = index.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
         let panorama = Camera::equirectangular(Pose::level(location, 0.4), 4096);
@@ -38,14 +38,14 @@ fn shade(c: &mut Criterion) {
             let mut images = ViewImages::default();
             let shading = Shading {
                 scene: &scene,
-                pyramids: &pyramids,
+                mip_maps: &mip_maps,
                 filter,
                 normal_axes: s3d_geom::NormalAxes::Paper,
-                index_per_face: &index,
-                color_per_face: &pretty,
+                index_of_face: &index,
+                color_of_face: &pretty,
             };
             bench("rgb", &mut |c, h| {
-                s3d_render::rgb_image_into(&scene, &pyramids, h, c, &filter, &mut rgb);
+                s3d_render::rgb_image_into(&scene, &mip_maps, h, c, &filter, &mut rgb);
             });
             bench("depth", &mut |_, h| s3d_render::depth_image_into(h, &mut depth));
             bench("normal", &mut |c, h| {
@@ -69,7 +69,7 @@ fn shade(c: &mut Criterion) {
                 s3d_render::view_images_into(&shading, h, c, Modalities::ALL, &mut images);
             });
             bench("all six, new images", &mut |c, h| {
-                drop(black_box(s3d_render::rgb_image(&scene, &pyramids, h, c)));
+                drop(black_box(s3d_render::rgb_image(&scene, &mip_maps, h, c)));
                 drop(black_box(s3d_render::depth_image(h)));
                 drop(black_box(s3d_render::normal_image(&scene, h, c, Normals::Flat)));
                 drop(black_box(s3d_render::index_image(h, &index)));

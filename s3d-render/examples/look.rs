@@ -11,7 +11,7 @@ mod common;
 
 use s3d_geom::glam::{DVec3, dvec3};
 use s3d_geom::{Camera, Pose, Raster};
-use s3d_render::{Normals, Pyramids, Scene};
+use s3d_render::{MipMaps, Normals, Scene};
 use std::error::Error;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
 
     let scene = Scene::new(&mesh);
-    let pyramids = Pyramids::new(&mesh);
+    let mip_maps = MipMaps::new(&mesh);
     let per_face: Vec<u32> = (0..mesh.faces().len() as u32).collect();
     let pose = Pose::level(location, yaw);
     let views = [
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let bytes = image.pixels().as_flattened();
             image::save_buffer(path, bytes, image.width(), image.height(), image::ColorType::Rgb8)
         };
-        save("rgb", &s3d_render::rgb_image(&scene, &pyramids, &hits, camera))?;
+        save("rgb", &s3d_render::rgb_image(&scene, &mip_maps, &hits, camera))?;
         save("normal", &s3d_render::normal_image(&scene, &hits, camera, Normals::Flat))?;
         save("face", &s3d_render::index_image(&hits, &per_face))?;
         let depth = s3d_render::depth_image(&hits);

@@ -13,7 +13,7 @@ mod common;
 
 use s3d_geom::{Camera, NormalAxes};
 use s3d_render::{
-    Hits, Modalities, Pyramids, Scene, Shading, TextureFilter, ViewImages, cast, view_images_into,
+    Hits, MipMaps, Modalities, Scene, Shading, TextureFilter, ViewImages, cast, view_images_into,
 };
 use std::error::Error;
 use std::time::Instant;
@@ -22,16 +22,16 @@ use std::time::Instant;
 fn main() -> Result<(), Box<dyn Error>> {
     let name = std::env::args().nth(1).ok_or("usage: view_images scan-like|copyroom|office|fine-textures")?;
     let (mesh, location) = common::shaded_scene(&name).ok_or_else(|| format!("no scene {name} here"))?;
-    let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+    let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
     let index: Vec<u32> = (0..mesh.faces().len() as u32).collect();
     let color: Vec<[u8; 3]> = index.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
     let shading = Shading {
         scene: &scene,
-        pyramids: &pyramids,
+        mip_maps: &mip_maps,
         filter: TextureFilter::default(),
         normal_axes: NormalAxes::Paper,
-        index_per_face: &index,
-        color_per_face: &color,
+        index_of_face: &index,
+        color_of_face: &color,
     };
     let views = common::views(location, 1080);
     let shots: Vec<(Camera, Hits)> =

@@ -7,7 +7,7 @@
 //! - [`depth_image`], [`normal_image`], [`xyz_image`], [`index_image`], [`color_per_face_image`]: hits → the images of
 //!   the data set (formats.md, "Images"). A semantic image is an index image: this crate stores faces and knows no
 //!   labels.
-//! - [`Pyramids`] and [`rgb_image`]: hits → colours, textures filtered over each pixel's footprint.
+//! - [`MipMaps`] and [`rgb_image`]: hits → colours, textures filtered over each pixel's footprint.
 //! - [`view_images_into`]: all of these in one walk over the hits, in less time and the same to the bit.
 //! - [`CubeMap`] and [`picture_image`]: hits → colours from the scanner's own pictures, be they a sky box, a panorama or
 //!   captures that overlap ([`stitch()`]).
@@ -61,7 +61,7 @@ pub use shade::channels::{
     normal_image, normal_image_into,
 };
 pub use shade::color::{rgb_image, rgb_image_into, rgb_image_with};
-pub use shade::mip_maps::{Pyramids, TextureFilter};
+pub use shade::mip_maps::{MipMaps, TextureFilter};
 pub use shade::pixel_color::{rgb_image_pixel_by_pixel, rgb_of_ray};
 pub use shade::points::{xyz_image, xyz_image_half, xyz_image_half_into, xyz_image_into};
 pub use shade::view::{FaceImages, Modalities, Shading, ViewImages, view_images_into};

@@ -6,7 +6,7 @@ mod common;
 use s3d_geom::glam::{DVec3, Vec2, Vec3, dvec3, vec2, vec3};
 use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, TriMesh, Wrap};
 use s3d_render::{
-    Hits, Modalities, NO_FACE, Normals, Pyramids, Scene, Shading, TextureFilter, view_images_into,
+    Hits, MipMaps, Modalities, NO_FACE, Normals, Scene, Shading, TextureFilter, view_images_into,
 };
 
 /// A room of 4 × 4 × 3 m around (0, 0, 1.5); two faces a wall, whose index / 2 is: 0 floor, 1 ceiling, 2 wall at +Y,
@@ -51,7 +51,7 @@ fn view(yaw: f64, pitch: f64) -> Camera {
 fn rgb(mesh: &TriMesh, camera: &Camera) -> Raster<[u8; 3]> {
     let scene = Scene::new(mesh);
     let hits = s3d_render::cast(&scene, camera);
-    s3d_render::rgb_image(&scene, &Pyramids::new(mesh), &hits, camera)
+    s3d_render::rgb_image(&scene, &MipMaps::new(mesh), &hits, camera)
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn what_is_missing_is_missing_everywhere() {
     let hits = s3d_render::cast(&scene, &camera);
     let share = s3d_render::coverage(&hits);
     assert!(share > 0.05 && share < 0.95);
-    let rgb = s3d_render::rgb_image(&scene, &Pyramids::new(&mesh), &hits, &camera);
+    let rgb = s3d_render::rgb_image(&scene, &MipMaps::new(&mesh), &hits, &camera);
     let depth = s3d_render::depth_image(&hits);
     let [flat, smooth] =
         [Normals::Flat, Normals::Smooth].map(|n| s3d_render::normal_image(&scene, &hits, &camera, n));
@@ -333,10 +333,10 @@ fn a_floor_seen_at_an_angle_keeps_what_runs_along_it() {
     let camera = Camera::perspective(pose, 50f64.to_radians(), 400, 400);
     let scene = Scene::new(&mesh);
     let hits = s3d_render::cast(&scene, &camera);
-    let pyramids = Pyramids::new(&mesh);
+    let mip_maps = MipMaps::new(&mesh);
     let contrast = |max_taps: u32| {
         let filter = s3d_render::TextureFilter { max_taps };
-        let image = s3d_render::rgb_image_with(&scene, &pyramids, &hits, &camera, &filter);
+        let image = s3d_render::rgb_image_with(&scene, &mip_maps, &hits, &camera, &filter);
         let row: Vec<u8> =
             (120..280).filter(|&x| hits.face.at(x, 235) < 2).map(|x| image.at(x, 235)[0]).collect();
         assert!(row.len() > 100);
@@ -383,11 +383,11 @@ fn an_index_beyond_24_bits_is_a_callers_mistake() {
 /// The fast image against the one of single pixels: no channel may differ by more than 1, but in a few pixels where
 /// rounding decides how many samples are taken.
 fn close(mesh: &TriMesh, camera: &Camera, max_taps: u32) {
-    let (scene, pyramids) = (Scene::new(mesh), Pyramids::new(mesh));
+    let (scene, mip_maps) = (Scene::new(mesh), MipMaps::new(mesh));
     let hits = s3d_render::cast(&scene, camera);
     let filter = s3d_render::TextureFilter { max_taps };
-    let fast = s3d_render::rgb_image_with(&scene, &pyramids, &hits, camera, &filter);
-    let exact = s3d_render::rgb_image_pixel_by_pixel(&scene, &pyramids, &hits, camera, &filter);
+    let fast = s3d_render::rgb_image_with(&scene, &mip_maps, &hits, camera, &filter);
+    let exact = s3d_render::rgb_image_pixel_by_pixel(&scene, &mip_maps, &hits, camera, &filter);
     let (mut differ, mut samples_differ) = (0, 0);
     for (k, (f, e)) in fast.pixels().iter().zip(exact.pixels()).enumerate() {
         let most = (0..3).map(|c| f[c].abs_diff(e[c])).max().unwrap_or(0);
@@ -405,7 +405,7 @@ fn close(mesh: &TriMesh, camera: &Camera, max_taps: u32) {
             continue;
         }
         let direction = camera.direction((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
-        let color = s3d_render::rgb_of_ray(&scene, &pyramids, camera, direction, face, &filter);
+        let color = s3d_render::rgb_of_ray(&scene, &mip_maps, camera, direction, face, &filter);
         rays_differ += usize::from((0..3).any(|c| color[c].abs_diff(e[c]) > 1));
     }
     assert!(rays_differ <= 1 + fast.len() / 20_000, "{rays_differ} rays of {camera:?}");
@@ -485,7 +485,7 @@ fn rgb_of_scans_is_what_single_pixels_give() {
 #[test]
 fn images_are_what_single_pixels_give() {
     let mesh = s3d_geom::scan_like(20_000, 5);
-    let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+    let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
     let faces = mesh.faces().len() as u32;
     let index: Vec<u32> = (0..faces).map(|f| f * 631 % (1 << 24)).collect();
     let color: Vec<[u8; 3]> = (0..faces).map(|f| [f as u8, (f >> 8) as u8, 7]).collect();
@@ -525,11 +525,11 @@ fn images_are_what_single_pixels_give() {
         // Into what holds the images of another camera.
         let shading = Shading {
             scene: &scene,
-            pyramids: &pyramids,
+            mip_maps: &mip_maps,
             filter: TextureFilter::default(),
             normal_axes: s3d_geom::NormalAxes::Paper,
-            index_per_face: &index,
-            color_per_face: &color,
+            index_of_face: &index,
+            color_of_face: &color,
         };
         let faces = Modalities { faces: true, ..Modalities::default() };
         for wanted in [faces, Modalities::ALL] {
@@ -537,7 +537,7 @@ fn images_are_what_single_pixels_give() {
             assert_eq!((&all.faces.normal, &all.faces.index, &all.faces.color), (&normal, &indices, &colors));
         }
         assert_eq!((&all.depth, &all.xyz), (&depth, &half));
-        assert_eq!(all.rgb, s3d_render::rgb_image(&scene, &pyramids, &hits, &camera));
+        assert_eq!(all.rgb, s3d_render::rgb_image(&scene, &mip_maps, &hits, &camera));
         s3d_render::xyz_image_half_into(&hits, &camera, &mut again);
         assert_eq!(again, half);
         let mut other = depth.map(|_| 7);
@@ -549,15 +549,15 @@ fn images_are_what_single_pixels_give() {
 #[test]
 fn an_image_that_is_used_again_is_as_a_new_one() {
     let mesh = textured(chart(64), Wrap::Clamp);
-    let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+    let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
     let filter = s3d_render::TextureFilter::default();
     let mut again = Raster::filled(5, 5, [9; 3]);
     for camera in all_kinds(EYE) {
         // The second time it holds the image of the turned camera.
         for camera in [camera, Camera { pose: camera.pose.turned(1.0, 0.0), ..camera }] {
             let hits = s3d_render::cast(&scene, &camera);
-            s3d_render::rgb_image_into(&scene, &pyramids, &hits, &camera, &filter, &mut again);
-            assert_eq!(again, s3d_render::rgb_image(&scene, &pyramids, &hits, &camera));
+            s3d_render::rgb_image_into(&scene, &mip_maps, &hits, &camera, &filter, &mut again);
+            assert_eq!(again, s3d_render::rgb_image(&scene, &mip_maps, &hits, &camera));
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::failure::{Failure, Outcome};
 use crate::pipeline::modality::{Image, Look, Prints};
 use s3d_geom::{Camera, Pose};
 use s3d_io::{Compression, Content, Conventions, create_dir, encode_rgb8, write_bytes, write_json};
-use s3d_render::{Hits, NO_FACE, Normals, Pyramids, Scene, cast, coverage};
+use s3d_render::{Hits, MipMaps, NO_FACE, Normals, Scene, cast, coverage};
 use serde::Serialize;
 use std::time::Instant;
 use tracing::{info, warn};
@@ -59,7 +59,7 @@ fn render(args: &RenderArgs) -> Outcome<()> {
     let file = s3d_io::read_mesh(&args.mesh.mesh, args.mesh.up())?;
     file.warnings.iter().for_each(|w| warn!("{w}"));
     let scene = Scene::new(&file.mesh);
-    let textures = Pyramids::new(&file.mesh);
+    let textures = MipMaps::new(&file.mesh);
     let started = Instant::now();
     let hits = cast(&scene, &camera);
     let cast_seconds = started.elapsed().as_secs_f64();

@@ -28,7 +28,7 @@ use s3d_io::{
     TextureOut, create_dir, encode_rgb8,
 };
 use s3d_label::{LabelTable, Room};
-use s3d_render::{Normals, Pyramids, Scene};
+use s3d_render::{MipMaps, Normals, Scene};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -438,7 +438,7 @@ pub(crate) fn render_area(
     let number = area.number;
     check_faces(plan, stage)?;
     create_dir(&layout.mesh_dir(number))?;
-    let textures = Pyramids::new(&file.mesh);
+    let textures = MipMaps::new(&file.mesh);
     let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
     let pretty_per_face: Vec<[u8; 3]> = label_per_face.iter().map(|l| s3d_io::pretty_color(*l)).collect();
     let chosen: Vec<bool> =

@@ -8,16 +8,16 @@ use s3d_io::{
     encode_xyz_float, encode_xyz_half,
 };
 use s3d_render::{
-    Hits, Modalities, Normals, Pyramids, Scene, Shading, TextureFilter, ViewImages,
-    color_per_face_image_into, depth_image_into, depth_image_mm_into, index_image_into, normal_image_into,
-    rgb_image_into, view_images_into, xyz_image_half_into, xyz_image_into,
+    Hits, MipMaps, Modalities, Normals, Scene, Shading, TextureFilter, ViewImages, color_per_face_image_into,
+    depth_image_into, depth_image_mm_into, index_image_into, normal_image_into, rgb_image_into,
+    view_images_into, xyz_image_half_into, xyz_image_into,
 };
 
 /// What images of a mesh are made from.
 #[derive(Clone, Copy)]
 pub(crate) struct Look<'a> {
     pub(crate) scene: &'a Scene<'a>,
-    pub(crate) textures: &'a Pyramids,
+    pub(crate) textures: &'a MipMaps,
     /// Colours that are not the textures'.
     pub(crate) pictures: Option<PictureColors<'a>>,
     pub(crate) normals: Normals,
@@ -109,11 +109,11 @@ impl Look<'_> {
         if prints.made != Modalities::default() {
             let shading = Shading {
                 scene: self.scene,
-                pyramids: self.textures,
+                mip_maps: self.textures,
                 filter: TextureFilter::default(),
                 normal_axes: self.conventions.normal_axes,
-                index_per_face: self.label_per_face,
-                color_per_face: self.pretty_per_face,
+                index_of_face: self.label_per_face,
+                color_of_face: self.pretty_per_face,
             };
             view_images_into(&shading, hits, camera, prints.made, &mut prints.images);
         }

@@ -11,7 +11,7 @@ use super::told::Told;
 use super::views::Views;
 use s3d_geom::{Camera, Raster};
 use s3d_io::{Conventions, DatasetImage, Domain, Frame, Layout, XyzType};
-use s3d_render::{Caster, Hits, MISSING_INDEX, Pyramids, Scene, ViewImages};
+use s3d_render::{Caster, Hits, MISSING_INDEX, MipMaps, Scene, ViewImages};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -32,7 +32,7 @@ pub(crate) struct Stage<'a> {
     pub(crate) labels: &'a Labels,
     pub(crate) mesh: &'a LabelledMesh,
     pub(crate) scene: &'a Scene<'a>,
-    pub(crate) textures: &'a Pyramids,
+    pub(crate) textures: &'a MipMaps,
     pub(crate) pretty_per_face: &'a [[u8; 3]],
     /// Whether RGB comes from the mesh.
     pub(crate) rgb_from_mesh: bool,

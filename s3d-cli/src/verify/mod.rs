@@ -36,7 +36,7 @@ pub(crate) use report::Report;
 use report::Topic;
 use s3d_geom::Camera;
 use s3d_io::{DatasetImage, Domain, Layout, dataset_images, pretty_color};
-use s3d_render::{Pyramids, Scene};
+use s3d_render::{MipMaps, Scene};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 use told::Told;
@@ -98,7 +98,7 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Outcom
         return check_images(common, area, images, None);
     };
     let scene = Scene::new(&mesh.file.mesh);
-    let textures = Pyramids::new(&mesh.file.mesh);
+    let textures = MipMaps::new(&mesh.file.mesh);
     let pretty = |label: &u32| if *label == NOT_IN_TABLE { [0; 3] } else { pretty_color(*label) };
     let pretty_per_face: Vec<[u8; 3]> = mesh.labels.iter().map(pretty).collect();
     let source = told.area(area).map_or("texture", |a| a.rgb.as_str());

@@ -10,8 +10,8 @@
 //! face can be filtered as any texture is, at every reduction down to a face of 32 pixels, and no seam shows.
 
 use crate::picture::fill::fill_unseen;
-use crate::shade::filter::Sizes;
-use crate::shade::mip_maps::{Pyramid, TextureFilter, halved};
+use crate::shade::filter::MipLevels;
+use crate::shade::mip_maps::{MipMap, TextureFilter, halved};
 use glam::{DMat3, DVec2, DVec3, dvec2};
 use rayon::prelude::*;
 use s3d_geom::{Pose, Raster, Texture, Wrap};
@@ -185,9 +185,9 @@ impl CubeMap {
         self.pose.opencv_from_world()
     }
 
-    /// The stored faces at all their sizes, for the fast filter.
-    pub(crate) fn sizes(&self) -> [Sizes<'_>; 6] {
-        std::array::from_fn(|face| Sizes::new(&self.faces[face], &self.reductions[face]))
+    /// The stored faces at all their levels, for the fast filter.
+    pub(crate) fn levels(&self) -> [MipLevels<'_>; 6] {
+        std::array::from_fn(|face| MipLevels::new(&self.faces[face], &self.reductions[face]))
     }
 
     /// What is added to the place on a face's plane, and what it is multiplied by then, to come to pixels of the stored
@@ -242,9 +242,9 @@ impl CubeMap {
         let flip = dvec2(1.0, -1.0);
         let pixel = (at + offset) * scale;
         let uv = dvec2(pixel.x / width, 1.0 - pixel.y / width);
-        let pyramid = Pyramid::new(&self.faces[face], &self.reductions[face]);
+        let mip_map = MipMap::new(&self.faces[face], &self.reductions[face]);
         let per_pixel = scale / width * flip;
-        let color = pyramid.sample(uv, slope(x) * per_pixel, slope(y) * per_pixel, filter);
+        let color = mip_map.sample(uv, slope(x) * per_pixel, slope(y) * per_pixel, filter);
         (color, self.seen_at(face, pixel.x as f32, pixel.y as f32))
     }
 }

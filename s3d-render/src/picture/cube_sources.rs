@@ -1,7 +1,7 @@
 //! Cube maps from sky boxes and from equirectangular photographs.
 
 use crate::picture::cube_map::{CubeMap, face_of, place_on};
-use crate::shade::mip_maps::{Pyramid, TextureFilter, halved};
+use crate::shade::mip_maps::{MipMap, TextureFilter, halved};
 use glam::{DVec2, dvec2};
 use s3d_geom::{Pose, Raster, Texture, Wrap};
 
@@ -61,13 +61,13 @@ impl CubeMap {
         let [_, right, back, left, front, _] = pictures;
         let pictures = [&turned[0], right, back, left, front, &turned[1]];
         let size = Self::fitting_size(f64::from(size.unwrap_or(n)));
-        let pyramids: Vec<SourcePyramid> =
-            pictures.iter().map(|p| SourcePyramid::new((*p).clone(), [Wrap::Clamp; 2])).collect();
+        let mip_maps: Vec<SourceMipMap> =
+            pictures.iter().map(|p| SourceMipMap::new((*p).clone(), [Wrap::Clamp; 2])).collect();
         let (width, step) = (f64::from(n), f64::from(n) / f64::from(size));
         Self::build(*pose, size, |_, _, _, d| {
             let face = face_of(d);
             let at = (place_on(face, d) + 1.0) * (0.5 * width);
-            Some(pyramids[face].sample(at, dvec2(step, 0.0), dvec2(0.0, step), &TextureFilter::default()))
+            Some(mip_maps[face].sample(at, dvec2(step, 0.0), dvec2(0.0, step), &TextureFilter::default()))
         })
     }
 
@@ -88,7 +88,7 @@ impl CubeMap {
         let (w, h) = (f64::from(photo.width()), f64::from(photo.height()));
         assert!(!photo.is_empty(), "a photograph has pixels");
         let size = Self::fitting_size(size.map_or(w * (1.25 / PI), f64::from));
-        let pyramid = SourcePyramid::new(photo.clone(), [Wrap::Repeat, Wrap::Clamp]);
+        let mip_map = SourceMipMap::new(photo.clone(), [Wrap::Repeat, Wrap::Clamp]);
         let world_from_frame = pose.opencv_from_world().transpose();
         let azimuth = pose.azimuth_rad() + yaw_rad;
         let angle = 2.0 / f64::from(size);
@@ -103,7 +103,7 @@ impl CubeMap {
             // A circle of latitude shortens towards the pole, where a pixel sees many columns.
             let around = (angle / flat).min(TAU) / TAU * w;
             let along = angle / distance / PI * h;
-            Some(pyramid.sample(place, dvec2(around, 0.0), dvec2(0.0, along), &AT_POLES))
+            Some(mip_map.sample(place, dvec2(around, 0.0), dvec2(0.0, along), &AT_POLES))
         })
     }
 }
@@ -146,12 +146,12 @@ fn turned(picture: &Raster<[u8; 3]>, quarters: u32) -> Raster<[u8; 3]> {
 }
 
 /// A source picture at every size, sampled at pixels of its full one.
-pub(crate) struct SourcePyramid {
+pub(crate) struct SourceMipMap {
     full: Texture,
     reductions: Vec<Raster<[u8; 3]>>,
 }
 
-impl SourcePyramid {
+impl SourceMipMap {
     pub(crate) fn new(image: Raster<[u8; 3]>, wrap: [Wrap; 2]) -> Self {
         let reductions = std::iter::successors(halved(&image), halved).collect();
         Self { full: Texture { name: String::new(), image, wrap }, reductions }
@@ -162,8 +162,8 @@ impl SourcePyramid {
     pub(crate) fn sample(&self, at: DVec2, x: DVec2, y: DVec2, filter: &TextureFilter) -> [f32; 3] {
         let size = dvec2(f64::from(self.full.image.width()), f64::from(self.full.image.height()));
         let (uv, x, y) = (at / size, x / size, y / size);
-        let pyramid = Pyramid::new(&self.full, &self.reductions);
-        pyramid.sample(dvec2(uv.x, 1.0 - uv.y), dvec2(x.x, -x.y), dvec2(y.x, -y.y), filter)
+        let mip_map = MipMap::new(&self.full, &self.reductions);
+        mip_map.sample(dvec2(uv.x, 1.0 - uv.y), dvec2(x.x, -x.y), dvec2(y.x, -y.y), filter)
     }
 }
 

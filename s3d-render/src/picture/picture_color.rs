@@ -8,11 +8,11 @@
 use crate::hits::{Hits, NO_FACE};
 use crate::picture::cube_map::{AXES, CubeMap, FaceAxes};
 use crate::scene::Scene;
-use crate::shade::anchor::Seen;
+use crate::shade::anchor::Interpolated;
 use crate::shade::channels::{assert_size, fit};
 use crate::shade::color::rgb_image_into;
-use crate::shade::filter::{Footprints, Sizes};
-use crate::shade::mip_maps::{Pyramids, TextureFilter};
+use crate::shade::filter::{Footprints, MipLevels};
+use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::simd::lanes::{self, LANES, LaneWork, Lanes, eight};
 use glam::DVec3;
 use s3d_geom::{Camera, Raster, Rays};
@@ -21,7 +21,7 @@ use s3d_geom::{Camera, Raster, Rays};
 #[derive(Clone, Copy, Debug)]
 pub enum Unseen<'a> {
     /// The mesh's own colour.
-    Mesh(&'a Scene<'a>, &'a Pyramids),
+    Mesh(&'a Scene<'a>, &'a MipMaps),
     /// What pictures show around the hole, blurred into it.
     Nearby,
 }
@@ -30,7 +30,7 @@ pub enum Unseen<'a> {
 /// is at least (1, 1, 1). The camera stands where the cube map was made, or parallax shows.
 ///
 /// # Panics
-/// If the hits are not of the camera's size, or the pyramids are another mesh's.
+/// If the hits are not of the camera's size, or the mip_maps are another mesh's.
 pub fn picture_image(
     cube: &CubeMap,
     unseen: Unseen<'_>,
@@ -57,21 +57,21 @@ pub fn picture_image_into(
 ) {
     assert_size(hits, camera);
     fit(out, &hits.face, [0; 3]);
-    let Unseen::Mesh(scene, pyramids) = unseen else {
-        lanes::run(Picture { cube, hits, camera, filter, out, shown: None });
+    let Unseen::Mesh(scene, mip_maps) = unseen else {
+        lanes::run(PictureKernel { cube, hits, camera, filter, out, shown: None });
         return;
     };
     if !cube.has_holes() {
-        lanes::run(Picture { cube, hits, camera, filter, out, shown: None });
+        lanes::run(PictureKernel { cube, hits, camera, filter, out, shown: None });
         return;
     }
     let mut shown = Raster::filled(out.width(), out.height(), 255u8);
-    lanes::run(Picture { cube, hits, camera, filter, out, shown: Some(&mut shown) });
+    lanes::run(PictureKernel { cube, hits, camera, filter, out, shown: Some(&mut shown) });
     if shown.pixels().iter().all(|&s| s == 255) {
         return;
     }
     let mut mesh = Raster::filled(0, 0, [0; 3]);
-    rgb_image_into(scene, pyramids, hits, camera, filter, &mut mesh);
+    rgb_image_into(scene, mip_maps, hits, camera, filter, &mut mesh);
     for ((pixel, &mesh), &shown) in out.pixels_mut().iter_mut().zip(mesh.pixels()).zip(shown.pixels()) {
         if shown < 255 {
             *pixel = mixed(*pixel, mesh, shown);
@@ -88,7 +88,7 @@ fn mixed(picture: [u8; 3], mesh: [u8; 3], shown: u8) -> [u8; 3] {
     if color == [0; 3] && (picture, mesh) != ([0; 3], [0; 3]) { [1; 3] } else { color }
 }
 
-struct Picture<'a> {
+struct PictureKernel<'a> {
     cube: &'a CubeMap,
     hits: &'a Hits,
     camera: &'a Camera,
@@ -98,13 +98,13 @@ struct Picture<'a> {
     shown: Option<&'a mut Raster<u8>>,
 }
 
-impl LaneWork for Picture<'_> {
+impl LaneWork for PictureKernel<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self, lanes: impl Lanes) {
-        let grid = Directions::new(self.cube, self.camera);
-        if grid.is_turn {
+        let grid = CubeRays::new(self.cube, self.camera);
+        if grid.is_panorama {
             self.image::<true>(lanes, &grid);
         } else {
             self.image::<false>(lanes, &grid);
@@ -114,18 +114,18 @@ impl LaneWork for Picture<'_> {
 
 /// The directions of an image's pixels in the cube's frame: what belongs to a column and what to a row, in a panorama
 /// multiplied, and added.
-struct Directions {
+struct CubeRays {
     /// By axis and column; two groups more.
     columns: [Vec<f32>; 3],
     /// How `columns` change from column to column.
     slopes: [Vec<f32>; 3],
-    rows: Vec<Row>,
+    rows: Vec<RowFactors>,
     /// Whether it is a panorama's.
-    is_turn: bool,
+    is_panorama: bool,
 }
 
 #[derive(Clone, Copy)]
-struct Row {
+struct RowFactors {
     /// What columns are multiplied by, and what is added then; 1 in a perspective view.
     scale: f32,
     add: [f32; 3],
@@ -138,7 +138,7 @@ fn narrow(v: DVec3) -> [f32; 3] {
     v.to_array().map(|c| c as f32)
 }
 
-impl Directions {
+impl CubeRays {
     fn new(cube: &CubeMap, camera: &Camera) -> Self {
         let turn = cube.frame_from_world();
         let (w, h) = (camera.width, camera.height);
@@ -153,7 +153,7 @@ impl Directions {
         match camera.rays() {
             Rays::Perspective { x_step, y_step, origin } => {
                 let (x, y, o) = (turn * x_step, turn * y_step, turn * origin);
-                let row = |j: u32| Row {
+                let row = |j: u32| RowFactors {
                     scale: 1.0,
                     add: narrow(o + y * (f64::from(j) + 0.5)),
                     slope_scale: 0.0,
@@ -161,7 +161,7 @@ impl Directions {
                 };
                 Self {
                     columns: spread(&|i| x * (f64::from(i) + 0.5)),
-                    is_turn: false,
+                    is_panorama: false,
                     slopes: spread(&|_| x),
                     rows: (0..h).map(row).collect(),
                 }
@@ -173,7 +173,7 @@ impl Directions {
                 let row = |j: u32| {
                     let r = rows[j as usize];
                     // Longitude grows to the right and azimuth to the left; latitude falls.
-                    Row {
+                    RowFactors {
                         scale: r.x as f32,
                         add: narrow(up * r.y),
                         slope_scale: (r.y * down) as f32,
@@ -187,7 +187,7 @@ impl Directions {
                 };
                 Self {
                     columns: spread(&column),
-                    is_turn: true,
+                    is_panorama: true,
                     slopes: spread(&slope),
                     rows: (0..h).map(row).collect(),
                 }
@@ -196,16 +196,16 @@ impl Directions {
     }
 }
 
-impl Picture<'_> {
+impl PictureKernel<'_> {
     #[inline(always)]
-    fn image<const TURN: bool>(self, l: impl Lanes, grid: &Directions) {
+    fn image<const PANORAMA: bool>(self, l: impl Lanes, grid: &CubeRays) {
         let Self { cube, hits, filter, out, mut shown, .. } = self;
         let width = hits.face.width() as usize;
-        let sizes = cube.sizes();
-        let mut painter = Painter {
+        let levels = cube.levels();
+        let mut painter = PicturePainter {
             lanes: l,
             cube,
-            sizes: &sizes,
+            levels: &levels,
             max_taps: filter.max_taps,
             place: cube.pixels_of_place(),
             footprints: Footprints::new(2 * LANES),
@@ -214,7 +214,7 @@ impl Picture<'_> {
             wants_shown: shown.is_some(),
         };
         for (j, faces) in hits.face.rows().enumerate() {
-            painter.row::<TURN>(grid, j, faces);
+            painter.row::<PANORAMA>(grid, j, faces);
             let from = j * width;
             let to = &mut out.pixels_mut()[from..from + width];
             to.copy_from_slice(&painter.colors[..width]);
@@ -237,10 +237,10 @@ fn on_face<L: Lanes>(l: L, face: usize, v: &[L::F; 3]) -> [L::F; 3] {
     [right, down, forward].map(|(axis, sign)| if sign < 0 { l.sub(l.splat(0.0), v[axis]) } else { v[axis] })
 }
 
-struct Painter<'a, L> {
+struct PicturePainter<'a, L> {
     lanes: L,
     cube: &'a CubeMap,
-    sizes: &'a [Sizes<'a>; 6],
+    levels: &'a [MipLevels<'a>; 6],
     max_taps: u32,
     /// From places on a face's plane to pixels: what is added, then multiplied.
     place: (f64, f64),
@@ -251,9 +251,9 @@ struct Painter<'a, L> {
     wants_shown: bool,
 }
 
-impl<L: Lanes> Painter<'_, L> {
+impl<L: Lanes> PicturePainter<'_, L> {
     #[inline(always)]
-    fn row<const TURN: bool>(&mut self, grid: &Directions, j: usize, faces: &[u32]) {
+    fn row<const PANORAMA: bool>(&mut self, grid: &CubeRays, j: usize, faces: &[u32]) {
         let l = self.lanes;
         let row = grid.rows[j];
         let (scale, slope_scale) = (l.splat(row.scale), l.splat(row.slope_scale));
@@ -268,7 +268,7 @@ impl<L: Lanes> Painter<'_, L> {
                 let column = eight(l, &grid.columns[k], i);
                 let slope = eight(l, &grid.slopes[k], i);
                 let (add, slope_add) = (l.splat(row.add[k]), l.splat(row.slope_add[k]));
-                if TURN {
+                if PANORAMA {
                     direction[k] = l.add(l.mul(column, scale), add);
                     along[k] = l.mul(slope, scale);
                     down[k] = l.add(l.mul(column, slope_scale), slope_add);
@@ -327,10 +327,10 @@ impl<L: Lanes> Painter<'_, L> {
         // (u / m)' = (u' − u / m · m') / m
         let slope = |v: [L::F; 3]| [0, 1].map(|k| l.mul(l.sub(v[k], l.mul(place[k], v[2])), per_step));
         let values = place.map(|p| l.mul(l.add(p, offset), scale));
-        let seen = Seen { values, x: slope(along), y: slope(below), doubtful: 0 };
-        let sizes = &self.sizes[face];
+        let seen = Interpolated { values, x: slope(along), y: slope(below), doubtful: 0 };
+        let levels = &self.levels[face];
         self.footprints.store(l, 0, &seen, false);
-        let colors = sizes.colors(l, &self.footprints, 0, (these, these), self.max_taps);
+        let colors = levels.colors(l, &self.footprints, 0, (these, these), self.max_taps);
         let to = self.colors[i..].as_flattened_mut().first_chunk_mut();
         if let (0xFF, Some(to)) = (these, to) {
             l.store_pixels(&colors, to);
@@ -439,14 +439,14 @@ mod tests {
     #[test]
     fn holes_show_the_mesh_or_what_is_around() {
         let mesh = furnished_room(3);
-        let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+        let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
         let camera = Camera::equirectangular(pose(), 256);
         let hits = crate::cast(&scene, &camera);
         let filter = TextureFilter::default();
         let cube = noise(true);
-        let mesh_image = crate::rgb_image(&scene, &pyramids, &hits, &camera);
+        let mesh_image = crate::rgb_image(&scene, &mip_maps, &hits, &camera);
         let nearby = picture_image(&cube, Unseen::Nearby, &hits, &camera, &filter);
-        let image = picture_image(&cube, Unseen::Mesh(&scene, &pyramids), &hits, &camera, &filter);
+        let image = picture_image(&cube, Unseen::Mesh(&scene, &mip_maps), &hits, &camera, &filter);
         let rows = |from: u32, to: u32| from as usize * 256..to as usize * 256;
         assert_eq!(image.pixels()[rows(0, 80)], nearby.pixels()[rows(0, 80)]);
         assert_eq!(image.pixels()[rows(105, 128)], mesh_image.pixels()[rows(105, 128)]);
@@ -466,7 +466,7 @@ mod tests {
             let run = |plain: bool| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 let mut shown = Raster::filled(camera.width, camera.height, 0);
-                let work = Picture {
+                let work = PictureKernel {
                     cube: &cube,
                     hits: &hits,
                     camera: &camera,

@@ -11,7 +11,7 @@
 
 use crate::hits::{Hits, NO_FACE};
 use crate::picture::cube_map::{CubeMap, face_cameras};
-use crate::picture::cube_sources::SourcePyramid;
+use crate::picture::cube_sources::SourceMipMap;
 use crate::raster::visibility::cast;
 use crate::scene::Scene;
 use glam::{DMat3, DVec2, DVec3, dvec2};
@@ -75,16 +75,17 @@ pub fn stitch(
     let sharpest = captures.iter().map(|c| c.lens.focal_px().max_element()).fold(0.0, f64::max);
     let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
     let world_from_frame = pose.opencv_from_world().transpose();
-    let views: Vec<View> = captures.into_par_iter().map(|c| View::new(c, pose, scene)).collect();
+    let views: Vec<PreparedCapture> =
+        captures.into_par_iter().map(|c| PreparedCapture::new(c, pose, scene)).collect();
     let gains = if options.gains && views.len() > 1 {
-        let rays = Rays::new(pose, GAIN_SIZE, scene);
+        let rays = SceneDepths::new(pose, GAIN_SIZE, scene);
         gains(&views, GAIN_SIZE, &rays, world_from_frame)
     } else {
         vec![[1.0; 3]; views.len()]
     };
-    let rays = Rays::new(pose, size, scene);
+    let rays = SceneDepths::new(pose, size, scene);
     CubeMap::build(*pose, size, |face, x, y, d| {
-        let ray = Ray { direction: world_from_frame * d, depth: rays.depth(face, x, y), size };
+        let ray = CubeRay { direction: world_from_frame * d, depth: rays.depth(face, x, y), size };
         let (mut sum, mut total) = ([0.0f32; 3], 0.0f32);
         for (view, gain) in views.iter().zip(&gains) {
             if let Some((color, weight)) = view.sees(&ray) {
@@ -97,9 +98,9 @@ pub fn stitch(
 }
 
 /// The depths of the scene behind each pixel of the cube.
-struct Rays(Option<Vec<Hits>>);
+struct SceneDepths(Option<Vec<Hits>>);
 
-impl Rays {
+impl SceneDepths {
     fn new(pose: &Pose, size: u32, scene: Option<&Scene<'_>>) -> Self {
         Self(
             scene
@@ -114,7 +115,7 @@ impl Rays {
 }
 
 /// What a pixel of the cube looks at.
-struct Ray {
+struct CubeRay {
     /// In the world, with a depth of 1 on its face.
     direction: DVec3,
     /// How far on that direction there is a surface, if that is known.
@@ -124,8 +125,8 @@ struct Ray {
 }
 
 /// A capture, prepared.
-struct View {
-    picture: SourcePyramid,
+struct PreparedCapture {
+    picture: SourceMipMap,
     lens: Lens,
     /// World → the camera's OpenCV axes.
     camera_from_world: DMat3,
@@ -133,12 +134,12 @@ struct View {
     center: DVec3,
     forward: DVec3,
     /// The cosine of the angle from its axis beyond which it sees nothing.
-    least_cosine: f64,
+    min_cosine: f64,
     /// What it sees of the scene.
     surface: Option<(Camera, Hits)>,
 }
 
-impl View {
+impl PreparedCapture {
     fn new(capture: Capture, pose: &Pose, scene: Option<&Scene<'_>>) -> Self {
         let Capture { image, lens, pose: own } = capture;
         assert_eq!(
@@ -153,24 +154,24 @@ impl View {
             (camera, hits)
         });
         Self {
-            picture: SourcePyramid::new(image, [Wrap::Clamp; 2]),
+            picture: SourceMipMap::new(image, [Wrap::Clamp; 2]),
             lens,
             camera_from_world: own.opencv_from_world(),
             center: pose.location - own.location,
             forward: own.forward(),
-            least_cosine: 1.0 / (1.0 + reach * reach).sqrt() - 1e-9,
+            min_cosine: 1.0 / (1.0 + reach * reach).sqrt() - 1e-9,
             surface,
         }
     }
 
     /// The colour that the capture has of what a ray sees, and its weight.
-    fn sees(&self, ray: &Ray) -> Option<([f32; 3], f32)> {
+    fn sees(&self, ray: &CubeRay) -> Option<([f32; 3], f32)> {
         let direction = match (&self.surface, ray.depth) {
             (Some(_), Some(depth)) => self.center + ray.direction * depth,
             _ => ray.direction,
         };
         let (cosine, length_2) = (self.forward.dot(direction), direction.length_squared());
-        if cosine <= 0.0 || cosine * cosine < self.least_cosine * self.least_cosine * length_2 {
+        if cosine <= 0.0 || cosine * cosine < self.min_cosine * self.min_cosine * length_2 {
             return None;
         }
         let v = self.camera_from_world * direction;
@@ -210,12 +211,12 @@ impl View {
 
 /// A factor a capture and channel that brings colours of what several see together: the least sum, over the pairs that
 /// overlap, of (gᵢ·meanᵢ − gⱼ·meanⱼ)² and of (1 − g)², each by its deviation and the number of pixels.
-fn gains(views: &[View], size: u32, rays: &Rays, world_from_frame: DMat3) -> Vec<[f32; 3]> {
+fn gains(views: &[PreparedCapture], size: u32, rays: &SceneDepths, world_from_frame: DMat3) -> Vec<[f32; 3]> {
     let n = views.len();
     // By pair: pixels and the sums of the colours of the first.
     let mut sums = vec![(0.0f64, [0.0f64; 3]); n * n];
     let colors = CubeMap::directions(size).map(|(face, x, y, d)| {
-        let ray = Ray { direction: world_from_frame * d, depth: rays.depth(face, x, y), size };
+        let ray = CubeRay { direction: world_from_frame * d, depth: rays.depth(face, x, y), size };
         views.iter().map(|v| v.sees(&ray).map(|(c, _)| c)).collect::<Vec<_>>()
     });
     for seen in colors {
@@ -379,7 +380,7 @@ mod tests {
     #[test]
     fn parallax_is_taken_out_with_the_mesh() {
         let mesh = s3d_geom::furnished_room(5);
-        let (scene, pyramids) = (Scene::new(&mesh), crate::Pyramids::new(&mesh));
+        let (scene, mip_maps) = (Scene::new(&mesh), crate::MipMaps::new(&mesh));
         let center = Pose::from_scanner(dvec3(2.2, 2.1, 1.4), DQuat::from_rotation_z(0.4));
         let lens = Lens::new([320, 256], dvec2(215.0, 215.0), dvec2(160.0, 128.0), [0.0; 5]).unwrap();
         let shots: Vec<Capture> = (0..18usize)
@@ -390,13 +391,13 @@ mod tests {
                     center.location + 0.06 * turned.forward() + DVec3::Z * (0.05 - 0.05 * (k / 6) as f64);
                 let own = Pose { location, ..turned };
                 let camera = Camera::perspective(own, 2.0 * libm::atan(160.0 / 215.0), 320, 256);
-                let image = crate::rgb_image(&scene, &pyramids, &cast(&scene, &camera), &camera);
+                let image = crate::rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
                 Capture { image, lens, pose: own }
             })
             .collect();
         let view = Camera::perspective(center.turned(0.5, -0.3), 1.2, 240, 240);
         let hits = cast(&scene, &view);
-        let direct = crate::rgb_image(&scene, &pyramids, &hits, &view);
+        let direct = crate::rgb_image(&scene, &mip_maps, &hits, &view);
         let error = |scene: Option<&Scene<'_>>| {
             let cube = stitch(shots.clone(), &center, scene, &StitchOptions::default());
             let filter = TextureFilter::default();

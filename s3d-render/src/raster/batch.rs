@@ -9,9 +9,9 @@
     reason = "slices are cut to the length of the array: there is nothing left of the check"
 )]
 
-use crate::raster::canvas::{Chunk, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TRUSTED};
-use crate::raster::clusters::MOST_FACES;
-use crate::raster::pinhole::{Planes, Projected, Reach};
+use crate::raster::canvas::{Chunk, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TRUSTED};
+use crate::raster::clusters::MAX_FACES;
+use crate::raster::pinhole::{PinholeBounds, PinholeCorners, PinholePlanes};
 use crate::simd::registers::LANES;
 
 /// An edge that is shorter, in pixels, has no direction to speak of: see the module `pinhole`.
@@ -25,7 +25,7 @@ const GROUP: usize = 8;
 
 /// How a face is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum DrawKind {
     /// Covers no centre of a pixel.
     Nothing = 0,
     /// In one chunk of at most 8 columns.
@@ -42,10 +42,10 @@ pub(crate) enum Kind {
     InSpace,
 }
 
-type Values<T> = [T; MOST_FACES];
+type Values<T> = [T; MAX_FACES];
 
 /// What is known of each face of a cluster.
-pub(crate) struct Batch {
+pub(crate) struct FaceBatch {
     x: [Values<f64>; 3],
     y: [Values<f64>; 3],
     /// 1/z of the corners.
@@ -55,7 +55,7 @@ pub(crate) struct Batch {
     right: Values<f64>,
     top: Values<f64>,
     bottom: Values<f64>,
-    /// See [`Planes`].
+    /// See [`PinholePlanes`].
     at: [Values<f64>; 4],
     across: [Values<f64>; 4],
     down: [Values<f64>; 4],
@@ -71,30 +71,30 @@ pub(crate) struct Batch {
 
 const KINDS: usize = 7;
 
-impl Batch {
+impl FaceBatch {
     pub(crate) fn new() -> Self {
         Self {
-            x: [[0.0; MOST_FACES]; 3],
-            y: [[0.0; MOST_FACES]; 3],
-            q: [[0.0; MOST_FACES]; 3],
-            left: [0.0; MOST_FACES],
-            right: [0.0; MOST_FACES],
-            top: [0.0; MOST_FACES],
-            bottom: [0.0; MOST_FACES],
-            at: [[0.0; MOST_FACES]; 4],
-            across: [[0.0; MOST_FACES]; 4],
-            down: [[0.0; MOST_FACES]; 4],
-            chunk_at: [[0.0; MOST_FACES]; 4],
-            error: [0.0; MOST_FACES],
-            kind: [0; MOST_FACES],
-            lists: [[0; MOST_FACES]; KINDS],
+            x: [[0.0; MAX_FACES]; 3],
+            y: [[0.0; MAX_FACES]; 3],
+            q: [[0.0; MAX_FACES]; 3],
+            left: [0.0; MAX_FACES],
+            right: [0.0; MAX_FACES],
+            top: [0.0; MAX_FACES],
+            bottom: [0.0; MAX_FACES],
+            at: [[0.0; MAX_FACES]; 4],
+            across: [[0.0; MAX_FACES]; 4],
+            down: [[0.0; MAX_FACES]; 4],
+            chunk_at: [[0.0; MAX_FACES]; 4],
+            error: [0.0; MAX_FACES],
+            kind: [0; MAX_FACES],
+            lists: [[0; MAX_FACES]; KINDS],
             counts: [0; KINDS],
         }
     }
 
     /// Sets up faces, given by the places of their corners, in a window of a size.
     #[inline(always)]
-    pub(crate) fn set_up(&mut self, faces: &[[u8; 4]], corners: &Projected, width: f64, height: f64) {
+    pub(crate) fn set_up(&mut self, faces: &[[u8; 4]], corners: &PinholeCorners, width: f64, height: f64) {
         for (i, places) in faces.iter().enumerate() {
             for (k, &place) in places[..3].iter().enumerate() {
                 let place = usize::from(place);
@@ -110,7 +110,7 @@ impl Batch {
         self.counts = [0; KINDS];
         for (i, &kind) in self.kind[..faces.len()].iter().enumerate() {
             let (list, count) = (&mut self.lists[kind as usize], &mut self.counts[kind as usize]);
-            list[*count % MOST_FACES] = i as u8;
+            list[*count % MAX_FACES] = i as u8;
             *count += 1;
         }
     }
@@ -132,10 +132,10 @@ impl Batch {
             let x = [xs[0][i], xs[1][i], xs[2][i]];
             let y = [ys[0][i], ys[1][i], ys[2][i]];
             let q = [qs[0][i], qs[1][i], qs[2][i]];
-            let left = most((low(x) - MARGIN).ceil(), 0.0);
-            let right = least((high(x) + MARGIN).floor(), last_column);
-            let top = most((low(y) - MARGIN).ceil(), 0.0);
-            let bottom = least((high(y) + MARGIN).floor(), last_row);
+            let left = max((low(x) - MARGIN).ceil(), 0.0);
+            let right = min((high(x) + MARGIN).floor(), last_column);
+            let top = max((low(y) - MARGIN).ceil(), 0.0);
+            let bottom = min((high(y) + MARGIN).floor(), last_row);
 
             // Edge k is opposite to corner k, from corner k + 1 to k + 2.
             let across = [y[1] - y[2], y[2] - y[0], y[0] - y[1]];
@@ -169,26 +169,29 @@ impl Batch {
             ];
             // A second chunk begins sixteen columns on: its terms are bounded by those of one that is twice as wide.
             let small = right - left < LANES as f64;
-            let reach = if small { 15.0 } else { 31.0 };
-            let spread = (across[3] as f32).abs() * reach
+            let bounds = if small { 15.0 } else { 31.0 };
+            let spread = (across[3] as f32).abs() * bounds
                 + (down[3] as f32).abs() * (bottom - top) as f32
                 + chunk_at[3].abs();
             let error = INVERSE_T_ROUNDING * spread;
 
             let trusted = error < TRUSTED * low(q) as f32;
-            let kind =
-                if right - left < (LANES / 2) as f64 { Kind::Narrow as u32 } else { Kind::Small as u32 };
-            let kind = if trusted { kind } else { Kind::Careful as u32 };
-            let kind = if small { kind } else { Kind::Large as u32 };
-            let wide = if trusted { Kind::Wide as u32 } else { kind };
+            let kind = if right - left < (LANES / 2) as f64 {
+                DrawKind::Narrow as u32
+            } else {
+                DrawKind::Small as u32
+            };
+            let kind = if trusted { kind } else { DrawKind::Careful as u32 };
+            let kind = if small { kind } else { DrawKind::Large as u32 };
+            let wide = if trusted { DrawKind::Wide as u32 } else { kind };
             let wide = if right - left < (2 * LANES) as f64 { wide } else { kind };
             let kind = if small { kind } else { wide };
-            let kind = if bottom - top < MOST_ROWS as f64 { kind } else { Kind::Large as u32 };
-            let kind = if low(length) > SHORT { kind } else { Kind::InSpace as u32 };
-            let kind = if area.abs() > 1e-4 { kind } else { Kind::InSpace as u32 };
-            let kind = if left <= right { kind } else { Kind::Nothing as u32 };
-            let kind = if top <= bottom { kind } else { Kind::Nothing as u32 };
-            kinds[i] = if low(q) > 0.0 { kind } else { Kind::InSpace as u32 };
+            let kind = if bottom - top < MAX_ROWS as f64 { kind } else { DrawKind::Large as u32 };
+            let kind = if low(length) > SHORT { kind } else { DrawKind::InSpace as u32 };
+            let kind = if area.abs() > 1e-4 { kind } else { DrawKind::InSpace as u32 };
+            let kind = if left <= right { kind } else { DrawKind::Nothing as u32 };
+            let kind = if top <= bottom { kind } else { DrawKind::Nothing as u32 };
+            kinds[i] = if low(q) > 0.0 { kind } else { DrawKind::InSpace as u32 };
 
             (lefts[i], rights[i], tops[i], bottoms[i]) = (left, right, top, bottom);
             errors[i] = error;
@@ -213,12 +216,12 @@ impl Batch {
 
     /// The places in the cluster of the faces of a kind.
     #[inline(always)]
-    pub(crate) fn faces(&self, kind: Kind) -> impl Iterator<Item = usize> {
+    pub(crate) fn faces(&self, kind: DrawKind) -> impl Iterator<Item = usize> {
         let list = &self.lists[kind as usize][..self.counts[kind as usize]];
-        list.iter().map(|&i| usize::from(i) % MOST_FACES)
+        list.iter().map(|&i| usize::from(i) % MAX_FACES)
     }
 
-    /// 1/t as a function of the pixel, as [`Drawn`](crate::raster::canvas::Drawn) has it.
+    /// 1/t as a function of the pixel, as [`DrawnFace`](crate::raster::canvas::DrawnFace) has it.
     #[inline(always)]
     pub(crate) fn inverse_t(&self, i: usize) -> [f64; 3] {
         [self.at[3][i], self.across[3][i], self.down[3][i]]
@@ -262,15 +265,15 @@ impl Batch {
     }
 
     #[inline(always)]
-    pub(crate) fn planes(&self, i: usize) -> Planes {
+    pub(crate) fn planes(&self, i: usize) -> PinholePlanes {
         let four = |f: &[Values<f64>; 4]| [f[0][i], f[1][i], f[2][i], f[3][i]];
-        Planes { at: four(&self.at), across: four(&self.across), down: four(&self.down) }
+        PinholePlanes { at: four(&self.at), across: four(&self.across), down: four(&self.down) }
     }
 
     #[inline(always)]
-    pub(crate) fn reach(&self, i: usize) -> Reach {
+    pub(crate) fn bounds(&self, i: usize) -> PinholeBounds {
         let q = [self.q[0][i], self.q[1][i], self.q[2][i]];
-        Reach {
+        PinholeBounds {
             left: self.left[i] as usize,
             right: self.right[i] as usize,
             top: self.top[i] as usize,
@@ -291,23 +294,23 @@ fn put<T: Copy>(values: &mut Values<T>, first: usize, group: &[T; GROUP]) {
 }
 
 #[inline(always)]
-fn least(a: f64, b: f64) -> f64 {
+fn min(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-fn most(a: f64, b: f64) -> f64 {
+fn max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 #[inline(always)]
 fn low(v: [f64; 3]) -> f64 {
-    least(least(v[0], v[1]), v[2])
+    min(min(v[0], v[1]), v[2])
 }
 
 #[inline(always)]
 fn high(v: [f64; 3]) -> f64 {
-    most(most(v[0], v[1]), v[2])
+    max(max(v[0], v[1]), v[2])
 }
 
 #[cfg(test)]
@@ -340,19 +343,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_face_reaches_over_the_pixels_in_it(faces in prop::collection::vec(face(), 1..=MOST_FACES)) {
-            let mut corners = Projected::new();
+        fn a_face_reaches_over_the_pixels_in_it(faces in prop::collection::vec(face(), 1..=MAX_FACES)) {
+            let mut corners = PinholeCorners::new();
             for (place, [x, y, q]) in faces.as_flattened().iter().enumerate() {
                 (corners.x[place], corners.y[place], corners.inverse_z[place]) = (*x, *y, *q);
             }
             let places: Vec<_> = (0..faces.len() as u8).map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 0]).collect();
-            let mut batch = Batch::new();
+            let mut batch = FaceBatch::new();
             // What a fuller cluster left behind does no harm.
-            batch.set_up(&vec![[0, 1, 2, 0]; MOST_FACES], &corners, WIDTH, HEIGHT);
+            batch.set_up(&vec![[0, 1, 2, 0]; MAX_FACES], &corners, WIDTH, HEIGHT);
             batch.set_up(&places, &corners, WIDTH, HEIGHT);
 
             let kinds = [
-                Kind::Nothing, Kind::Narrow, Kind::Small, Kind::Careful, Kind::Wide, Kind::Large, Kind::InSpace,
+                DrawKind::Nothing, DrawKind::Narrow, DrawKind::Small, DrawKind::Careful, DrawKind::Wide, DrawKind::Large, DrawKind::InSpace,
             ];
             let mut kind_of = vec![None; faces.len()];
             for kind in kinds {
@@ -363,7 +366,7 @@ mod tests {
             for (i, c) in faces.iter().enumerate() {
                 let kind = kind_of[i].unwrap();
                 if c.iter().any(|p| p[2] == 0.0) {
-                    prop_assert_eq!(kind, Kind::InSpace);
+                    prop_assert_eq!(kind, DrawKind::InSpace);
                     continue;
                 }
                 let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
@@ -371,12 +374,12 @@ mod tests {
                 };
                 let [p, q, r] = c.map(|p| [p[0], p[1]]);
                 let whole = area(p, q, r);
-                let reach = batch.reach(i);
-                let (columns, rows) = (reach.left..=reach.right, reach.top..=reach.bottom);
-                let one = matches!(kind, Kind::Narrow | Kind::Small | Kind::Careful);
-                if one || kind == Kind::Wide {
-                    let most = if kind == Kind::Narrow { 8 } else if one { LANES } else { 2 * LANES };
-                    prop_assert!(columns.clone().count() <= most && rows.clone().count() <= MOST_ROWS);
+                let bounds = batch.bounds(i);
+                let (columns, rows) = (bounds.left..=bounds.right, bounds.top..=bounds.bottom);
+                let one = matches!(kind, DrawKind::Narrow | DrawKind::Small | DrawKind::Careful);
+                if one || kind == DrawKind::Wide {
+                    let most = if kind == DrawKind::Narrow { 8 } else if one { LANES } else { 2 * LANES };
+                    prop_assert!(columns.clone().count() <= most && rows.clone().count() <= MAX_ROWS);
                 }
                 for (x, y) in (0..WIDTH as usize).flat_map(|x| (0..HEIGHT as usize).map(move |y| (x, y))) {
                     let at = [x as f64, y as f64];
@@ -384,14 +387,14 @@ mod tests {
                     if !(weights.iter().all(|&w| w > 1e-6) && whole.abs() > 1e-3) {
                         continue;
                     }
-                    prop_assert!(kind != Kind::Nothing && columns.contains(&x) && rows.contains(&y));
-                    if !(one || kind == Kind::Wide) {
+                    prop_assert!(kind != DrawKind::Nothing && columns.contains(&x) && rows.contains(&y));
+                    if !(one || kind == DrawKind::Wide) {
                         continue;
                     }
                     let (mut chunk, rows) = batch.chunk(i, 5);
                     if x >= chunk.column + LANES {
                         let (second, columns) = batch.second_chunk(i, &chunk);
-                        prop_assert!(kind == Kind::Wide && x < second.column + columns);
+                        prop_assert!(kind == DrawKind::Wide && x < second.column + columns);
                         chunk = second;
                     }
                     let (u, r) = ((x - chunk.column) as f32, (y - chunk.row) as f32);

@@ -12,7 +12,7 @@
 //! # Why it is exact
 //!
 //! The four functions are set up in `f64`, moved to a pixel at the face (the *anchor* of a chunk of 16 × up to
-//! [`MOST_ROWS`] pixels), rounded to `f32` there, and evaluated with one multiplication and one addition a row. Take an
+//! [`MAX_ROWS`] pixels), rounded to `f32` there, and evaluated with one multiplication and one addition a row. Take an
 //! edge function e(i, j) = c + a·i + b·j with |a| + |b| = 1, so that e is about a distance in pixels, and |i| ≤ 15,
 //! |j| ≤ 31. Near its zero |c| ≤ 46, so the roundings of a, b, c, two products and two sums are at most
 //! 2⁻²⁴·(46 + 46 + 46 + 92) < 1.4e-5; `f64` before it adds less than 1e-8 (lenses say why). [`EDGE_ERROR`] is twice
@@ -20,7 +20,7 @@
 //! the error, certainly not.
 //!
 //! 1/t is off by at most 2⁻²²·(|c| + |a|·15 + |b|·31), which is held against what it is worth: where that is more than
-//! [`TRUSTED`] of the value, the pixel is not certain. Values that differ by more than [`CLOSE`] steps of the last place
+//! [`TRUSTED`] of the value, the pixel is not certain. Values that differ by more than [`CLOSE_ULPS`] steps of the last place
 //! (2.5e-5 of themselves at least: two errors, and some) are in order.
 //!
 //! Whatever is not certain — a pixel too near an edge, two faces almost equally far — goes to a list of *doubts*: this
@@ -38,10 +38,10 @@
 )]
 
 use crate::hits::NO_FACE;
-use crate::simd::registers::{LANES, Line, Registers};
+use crate::simd::registers::{LANES, Registers, RowGroup};
 
 /// Rows of a chunk at most.
-pub(crate) const MOST_ROWS: usize = 32;
+pub(crate) const MAX_ROWS: usize = 32;
 
 /// Pixels whose edge function, about a distance in pixels, is nearer to zero are not certain.
 pub(crate) const EDGE_ERROR: f32 = 3e-5;
@@ -53,9 +53,9 @@ pub(crate) const TRUSTED: f32 = 1e-5;
 pub(crate) const INVERSE_T_ROUNDING: f32 = 3e-7;
 
 /// Values of 1/t that differ by no more steps of the last place are for exact arithmetic to order.
-pub(crate) const CLOSE: i32 = 424;
+pub(crate) const CLOSE_ULPS: i32 = 424;
 
-/// What is behind a tile must be so by this factor: ten times [`CLOSE`].
+/// What is behind a tile must be so by this factor: ten times [`CLOSE_ULPS`].
 const BEHIND: f32 = 1.0 + 5e-4;
 
 /// Tiles of so many pixels, both ways, know the farthest that they see.
@@ -107,10 +107,10 @@ pub(crate) struct Chunk {
 
 /// The functions u, v and r of a chunk's columns and rows, and by what 1/t is multiplied in a row.
 #[derive(Clone, Copy)]
-pub(crate) struct Grid<'a> {
+pub(crate) struct ChunkGrid<'a> {
     pub(crate) u: &'a [f32; LANES],
     pub(crate) v: &'a [f32; LANES],
-    pub(crate) rows: &'a [f32; MOST_ROWS],
+    pub(crate) rows: &'a [f32; MAX_ROWS],
     /// How many rows there are; at least one.
     pub(crate) count: usize,
     /// One a row; nothing in perspective views.
@@ -120,7 +120,7 @@ pub(crate) struct Grid<'a> {
 /// A face that was drawn: half a line of the cache.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub(crate) struct Drawn {
+pub(crate) struct DrawnFace {
     /// 1/t as a function [a, b, c] of the pixel: with what a lens calls u and v of its column, level and rise of its row,
     /// a + c·rise + b·u in a perspective view, and c·rise + level·(a·u + b·v) in a panorama.
     pub(crate) inverse_t: [f64; 3],
@@ -187,13 +187,13 @@ pub(crate) struct Canvas {
     stale: Vec<bool>,
     tile_columns: usize,
     /// By slot; the first stands for no face.
-    drawn: Vec<Drawn>,
+    drawn: Vec<DrawnFace>,
     doubts: Vec<Doubt>,
     /// The pixels that see a face whose function is too poor: none but doubtful ones do.
     poor: Vec<u32>,
 }
 
-const NOTHING: Drawn = Drawn { inverse_t: [0.0; 3], face: NO_FACE, poor: false };
+const NOTHING: DrawnFace = DrawnFace { inverse_t: [0.0; 3], face: NO_FACE, poor: false };
 
 impl Canvas {
     /// Makes an empty window of a size.
@@ -223,7 +223,7 @@ impl Canvas {
 
     /// Enters a face and says under which number.
     #[inline(always)]
-    pub(crate) fn enter(&mut self, drawn: Drawn) -> u32 {
+    pub(crate) fn enter(&mut self, drawn: DrawnFace) -> u32 {
         self.drawn.push(drawn);
         self.drawn.len() as u32 - 1
     }
@@ -297,27 +297,34 @@ impl Canvas {
         self.stale[row * self.tile_columns + column] = true;
     }
 
-    /// Draws a chunk; with `CARE` where 1/t is not trusted all over it; `TURN` in panoramas.
+    /// Draws a chunk; with `CARE` where 1/t is not trusted all over it; `PANORAMA` in panoramas.
     #[inline(always)]
-    pub(crate) fn draw<L: Registers, const TURN: bool, const CARE: bool>(
+    pub(crate) fn draw<L: Registers, const PANORAMA: bool, const CARE: bool>(
         &mut self,
         l: L,
-        grid: &Grid<'_>,
+        grid: &ChunkGrid<'_>,
         chunk: &Chunk,
     ) {
         let at = chunk.row * self.pitch + chunk.column;
         let window = (&mut self.inverse_t[at..], &mut self.slots[at..], self.pitch);
-        let mut doubts = [0; MOST_ROWS];
-        let any = l.draw::<TURN, CARE>(window, grid, chunk, &mut doubts);
+        let mut doubts = [0; MAX_ROWS];
+        let any = l.draw::<PANORAMA, CARE>(window, grid, chunk, &mut doubts);
         if any {
-            self.doubt(&doubts, grid, chunk, TURN, CARE);
+            self.doubt(&doubts, grid, chunk, PANORAMA, CARE);
         }
     }
 
     /// Notes pixels of a chunk, by row, that may see its face.
     #[cold]
     #[inline(never)]
-    fn doubt(&mut self, doubts: &[u16; MOST_ROWS], grid: &Grid<'_>, chunk: &Chunk, turn: bool, care: bool) {
+    fn doubt(
+        &mut self,
+        doubts: &[u16; MAX_ROWS],
+        grid: &ChunkGrid<'_>,
+        chunk: &Chunk,
+        turn: bool,
+        care: bool,
+    ) {
         let f = &chunk.inverse_t;
         for (k, (&lanes, &row)) in doubts.iter().zip(grid.rows).take(grid.count).enumerate() {
             let mut lanes = lanes;
@@ -347,14 +354,17 @@ impl Canvas {
     /// Decides the doubtful pixels. `decide` is given a column, a row and what was drawn there and may be seen, and
     /// says which of these it is (its place in the list), and whether its function is too poor to give a depth there.
     #[inline(always)]
-    pub(crate) fn settle(&mut self, mut decide: impl FnMut(usize, usize, &[Drawn]) -> Option<(usize, bool)>) {
+    pub(crate) fn settle(
+        &mut self,
+        mut decide: impl FnMut(usize, usize, &[DrawnFace]) -> Option<(usize, bool)>,
+    ) {
         let mut doubts = std::mem::take(&mut self.doubts);
         doubts.sort_unstable_by_key(|d| (d.pixel, d.slot));
         let (mut slots, mut candidates) = (Vec::new(), Vec::new());
         for group in doubts.chunk_by(|a, b| a.pixel == b.pixel) {
             let pixel = group[0].pixel as usize;
             let best = self.inverse_t[pixel];
-            let reach = best.to_bits() as i32 - CLOSE;
+            let reach = best.to_bits() as i32 - CLOSE_ULPS;
             slots.clear();
             slots.extend(group.iter().filter(|d| d.inverse_t.to_bits() as i32 > reach).map(|d| d.slot));
             if slots.is_empty() {
@@ -378,10 +388,10 @@ impl Canvas {
     /// Writes faces and depths into `out`, whose first pixels are the window's and whose rows are `out_pitch` apart,
     /// and empties the window.
     ///
-    /// `u` and `v` of the columns come in groups, `line` gives level and rise of a row: see [`Drawn`]. `single` casts the
+    /// `u` and `v` of the columns come in groups, `line` gives level and rise of a row: see [`DrawnFace`]. `single` casts the
     /// ray of a pixel (column, row) to a face whose function is too poor.
     #[inline(always)]
-    pub(crate) fn finish<L: Registers, const TURN: bool>(
+    pub(crate) fn finish<L: Registers, const PANORAMA: bool>(
         &mut self,
         l: L,
         out: (&mut [u32], &mut [f32]),
@@ -402,12 +412,12 @@ impl Canvas {
             let (depths, last_depths) = depths.as_chunks_mut::<LANES>();
             let mut groups = slots.as_chunks::<LANES>().0.iter().zip(u.iter().zip(v));
             for ((faces, depths), (slots, (u, v))) in faces.iter_mut().zip(depths).zip(groups.by_ref()) {
-                l.resolve::<TURN>(slots, &Line { u, v, level, rise }, drawn, faces, depths);
+                l.resolve::<PANORAMA>(slots, &RowGroup { u, v, level, rise }, drawn, faces, depths);
             }
             // A last group that is not full.
             if let Some((slots, (u, v))) = groups.next() {
                 let (mut faces, mut depths) = ([NO_FACE; LANES], [0.0; LANES]);
-                l.resolve::<TURN>(slots, &Line { u, v, level, rise }, drawn, &mut faces, &mut depths);
+                l.resolve::<PANORAMA>(slots, &RowGroup { u, v, level, rise }, drawn, &mut faces, &mut depths);
                 last_faces.copy_from_slice(&faces[..last_faces.len()]);
                 last_depths.copy_from_slice(&depths[..last_depths.len()]);
             }

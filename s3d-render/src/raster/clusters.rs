@@ -7,13 +7,13 @@ use obvhs::bvh2::Bvh2;
 use s3d_geom::TriMesh;
 
 /// No group has more faces; so a corner's place in its group fits a byte.
-pub(crate) const MOST_FACES: usize = 64;
+pub(crate) const MAX_FACES: usize = 64;
 
 /// Corners are handled in packets of so many.
 pub(crate) const PACKET: usize = 8;
 
 /// No group has more corners, padding included.
-pub(crate) const MOST_CORNERS: usize = 3 * MOST_FACES;
+pub(crate) const MAX_CORNERS: usize = 3 * MAX_FACES;
 
 /// A node of the tree: a box, and what is in it.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,7 @@ pub(crate) enum Content {
 
 /// Where a group's faces and corners are in the lists of all groups.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct ClusterStart {
     first_face: u32,
     first_packet: u32,
 }
@@ -43,9 +43,9 @@ pub(crate) struct Clusters {
     /// The root is the first.
     nodes: Vec<Node>,
     /// One more than there are groups: each ends where the next begins.
-    places: Vec<Place>,
+    starts: Vec<ClusterStart>,
     corners: Vec<[[f32; PACKET]; 3]>,
-    /// The corners of a face, as places in its group; the fourth is nothing.
+    /// The corners of a face, as starts in its group; the fourth is nothing.
     faces: Vec<[u8; 4]>,
     ids: Vec<u32>,
 }
@@ -67,7 +67,7 @@ impl Clusters {
         let n = mesh.faces().len();
         let mut clusters = Self {
             nodes: Vec::new(),
-            places: Vec::new(),
+            starts: Vec::new(),
             corners: Vec::new(),
             faces: Vec::with_capacity(n),
             ids: Vec::with_capacity(n),
@@ -81,7 +81,7 @@ impl Clusters {
         let mut stack = vec![(0, 0)];
         while let Some((from, to)) = stack.pop() {
             let branch = &bvh.nodes[from as usize];
-            clusters.nodes[to].content = if counts[from as usize] <= MOST_FACES as u32 || branch.is_leaf() {
+            clusters.nodes[to].content = if counts[from as usize] <= MAX_FACES as u32 || branch.is_leaf() {
                 Content::Cluster(clusters.add(bvh, from, &mut gather))
             } else {
                 let first = clusters.nodes.len();
@@ -95,14 +95,16 @@ impl Clusters {
     }
 
     fn end(&mut self) {
-        self.places
-            .push(Place { first_face: self.faces.len() as u32, first_packet: self.corners.len() as u32 });
+        self.starts.push(ClusterStart {
+            first_face: self.faces.len() as u32,
+            first_packet: self.corners.len() as u32,
+        });
     }
 
     /// Adds the faces below a node of the tree as a group.
     fn add(&mut self, bvh: &Bvh2, branch: u32, gather: &mut Gather<'_>) -> u32 {
         self.end();
-        let index = self.places.len() as u32 - 1;
+        let index = self.starts.len() as u32 - 1;
         gather.begin(index);
         let mut stack = vec![branch];
         while let Some(index) = stack.pop() {
@@ -128,7 +130,7 @@ impl Clusters {
 
     #[inline(always)]
     pub(crate) fn cluster(&self, index: u32) -> Cluster<'_> {
-        let (at, end) = (self.places[index as usize], self.places[index as usize + 1]);
+        let (at, end) = (self.starts[index as usize], self.starts[index as usize + 1]);
         let faces = at.first_face as usize..end.first_face as usize;
         Cluster {
             corners: &self.corners[at.first_packet as usize..end.first_packet as usize],
@@ -215,7 +217,7 @@ mod tests {
             let Content::Cluster(index) = node.content else { continue };
             groups += 1;
             let cluster = clusters.cluster(index);
-            assert!(cluster.faces.len() <= MOST_FACES && cluster.faces.len() == cluster.ids.len());
+            assert!(cluster.faces.len() <= MAX_FACES && cluster.faces.len() == cluster.ids.len());
             for (&id, corners) in cluster.ids.iter().zip(cluster.faces) {
                 assert!(!std::mem::replace(&mut met[id as usize], true));
                 for (&corner, p) in corners.iter().zip(mesh.triangle(id)) {

@@ -17,18 +17,18 @@
 )]
 
 use crate::raster::canvas::{
-    Canvas, Chunk, Cover, Drawn, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED, half_of_tile,
-    part_of_tile,
+    Canvas, Chunk, ChunkGrid, Cover, DrawnFace, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TILE, TRUSTED,
+    half_of_tile, part_of_tile,
 };
-use crate::raster::clusters::{Cluster, MOST_CORNERS, Node, PACKET};
-use crate::raster::window::{Lens, Pixels, Spot, groups};
+use crate::raster::clusters::{Cluster, MAX_CORNERS, Node, PACKET};
+use crate::raster::window::{Pixels, ProjectionRaster, Window, groups};
 use crate::ray::cone::{Cone, Plane};
 use crate::simd::registers::{self, LANES, Registers, Work};
 use glam::DVec3;
 use s3d_geom::{Rays, TriMesh};
 use std::f64::consts::{PI, TAU};
 
-/// Faces that reach over a greater azimuth, in radians, are bounded by their latitude alone.
+/// Faces that bounds over a greater azimuth, in radians, are bounded by their latitude alone.
 const WIDE: f32 = 0.3;
 
 /// By how much [`turn_of`] may be off, in radians, and then some.
@@ -60,18 +60,18 @@ pub(crate) struct Panorama<'m> {
     scale: Vec<f32>,
     u: [f32; LANES],
     v: [f32; LANES],
-    projected: Box<Projected>,
+    projected: Box<PanoramaCorners>,
 }
 
 /// The corners of a cluster.
-struct Projected {
+struct PanoramaCorners {
     /// Relative to the camera.
-    x: [f64; MOST_CORNERS],
-    y: [f64; MOST_CORNERS],
-    z: [f64; MOST_CORNERS],
+    x: [f64; MAX_CORNERS],
+    y: [f64; MAX_CORNERS],
+    z: [f64; MAX_CORNERS],
     /// Azimuth from the window's middle, to the right, and latitude: to [`ANGLE_ERROR`].
-    turn: [f32; MOST_CORNERS],
-    latitude: [f32; MOST_CORNERS],
+    turn: [f32; MAX_CORNERS],
+    latitude: [f32; MAX_CORNERS],
 }
 
 impl<'m> Panorama<'m> {
@@ -79,24 +79,24 @@ impl<'m> Panorama<'m> {
     /// single rays.
     pub(crate) const WIDEST_STEP_RAD: f64 = 0.5 / (LANES - 1) as f64;
 
-    /// The window of `spot`, whose columns are no farther apart than that.
-    pub(crate) fn new(mesh: &'m TriMesh, spot: &Spot<'_>) -> Self {
-        let pixels = Pixels::new(spot);
+    /// The window of `window`, whose columns are no farther apart than that.
+    pub(crate) fn new(mesh: &'m TriMesh, window: &Window<'_>) -> Self {
+        let pixels = Pixels::new(window);
         let Rays::Equirectangular { columns, rows } = &pixels.rays else {
             unreachable!("a panorama has a panorama's rays")
         };
-        let pixel = |sample: usize| (spot.stride / 2 + spot.stride * sample as u32) as usize;
-        let columns: Vec<_> = (0..spot.width).map(|i| columns[pixel(spot.column + i)]).collect();
-        let rows: Vec<_> = (0..spot.height).map(|j| rows[pixel(spot.row + j)]).collect();
-        let step = TAU / f64::from(spot.camera.width) * f64::from(spot.stride);
-        let middle_column = 0.5 * (spot.width - 1) as f64;
+        let pixel = |sample: usize| (window.stride / 2 + window.stride * sample as u32) as usize;
+        let columns: Vec<_> = (0..window.width).map(|i| columns[pixel(window.column + i)]).collect();
+        let rows: Vec<_> = (0..window.height).map(|j| rows[pixel(window.row + j)]).collect();
+        let step = TAU / f64::from(window.camera.width) * f64::from(window.stride);
+        let middle_column = 0.5 * (window.width - 1) as f64;
         let middle = libm::atan2(columns[0].y, columns[0].x) - step * middle_column;
         let angle = |k: usize| libm::sincos(k as f64 * step);
         Self {
             mesh,
-            origin: spot.camera.pose.location,
-            width: spot.width,
-            height: spot.height,
+            origin: window.camera.pose.location,
+            width: window.width,
+            height: window.height,
             step,
             middle_sin_cos: (libm::sin(middle) as f32, libm::cos(middle) as f32),
             middle_column,
@@ -110,12 +110,12 @@ impl<'m> Panorama<'m> {
             u: std::array::from_fn(|k| (angle(k).1 - 1.0) as f32),
             v: std::array::from_fn(|k| angle(k).0 as f32),
             pixels,
-            projected: Box::new(Projected {
-                x: [0.0; MOST_CORNERS],
-                y: [0.0; MOST_CORNERS],
-                z: [0.0; MOST_CORNERS],
-                turn: [0.0; MOST_CORNERS],
-                latitude: [0.0; MOST_CORNERS],
+            projected: Box::new(PanoramaCorners {
+                x: [0.0; MAX_CORNERS],
+                y: [0.0; MAX_CORNERS],
+                z: [0.0; MAX_CORNERS],
+                turn: [0.0; MAX_CORNERS],
+                latitude: [0.0; MAX_CORNERS],
             }),
         }
     }
@@ -155,8 +155,8 @@ impl<'m> Panorama<'m> {
         let p = &self.projected;
         let c = [corners[0], corners[1], corners[2]].map(usize::from);
         let (turn, latitude) = (c.map(|k| p.turn[k]), c.map(|k| p.latitude[k]));
-        let low = |v: [f32; 3]| least(least(v[0], v[1]), v[2]);
-        let high = |v: [f32; 3]| most(most(v[0], v[1]), v[2]);
+        let low = |v: [f32; 3]| min(min(v[0], v[1]), v[2]);
+        let high = |v: [f32; 3]| max(max(v[0], v[1]), v[2]);
         let (first, last) = (low(turn), high(turn));
         let wide = last - first;
         let narrow = wide < WIDE;
@@ -176,7 +176,7 @@ impl<'m> Panorama<'m> {
             return;
         }
         let (left, right, top, bottom) = (left as usize, right as usize, top as usize, bottom as usize);
-        let small = right - left < LANES && bottom - top < MOST_ROWS;
+        let small = right - left < LANES && bottom - top < MAX_ROWS;
 
         let at = |k: usize| DVec3::new(p.x[k], p.y[k], p.z[k]);
         let [a, b, c] = c.map(at);
@@ -194,19 +194,19 @@ impl<'m> Panorama<'m> {
         for (k, (p, q)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
             let n = p.cross(q);
             let length = n.abs().element_sum();
-            off = most64(off, p.abs().element_sum() * q.abs().element_sum() / length);
+            off = max64(off, p.abs().element_sum() * q.abs().element_sum() / length);
             planes[k] = n * (sign / length);
         }
         let firm = off < 1e6;
         if !firm {
             return self.draw_in_space(canvas, face, (top, bottom));
         }
-        let planes = Planes { edges: planes, inverse_t: normal / offset, edge_off: 1e-15 * off };
-        let slot = canvas.enter(Drawn { inverse_t: planes.inverse_t.to_array(), face, poor: false });
-        let reach = Reach { left, right, top, bottom };
+        let planes = PanoramaPlanes { edges: planes, inverse_t: normal / offset, edge_off: 1e-15 * off };
+        let slot = canvas.enter(DrawnFace { inverse_t: planes.inverse_t.to_array(), face, poor: false });
+        let bounds = PanoramaBounds { left, right, top, bottom };
         if small {
             let rows = bottom - top + 1;
-            let mut tangents = [0.0; MOST_ROWS];
+            let mut tangents = [0.0; MAX_ROWS];
             let (grid, mut chunk) = self.chunk(&planes, left, top, rows, slot, &mut tangents);
             let (low, error) = self.trust(&chunk, &grid);
             let trusted = error < TRUSTED * low;
@@ -218,7 +218,8 @@ impl<'m> Panorama<'m> {
                 (false, false) => canvas.draw::<L, true, true>(l, &grid, &chunk),
             }
         } else {
-            Tiles { lens: self, canvas, planes: &planes, reach: &reach, slot, poor: false }.run(l);
+            PanoramaTiles { raster: self, canvas, planes: &planes, bounds: &bounds, slot, poor: false }
+                .run(l);
         }
     }
 
@@ -258,22 +259,29 @@ impl<'m> Panorama<'m> {
         // Near the plane of the face nothing but single rays can tell.
         let known = offset > 1e-7 * normal.length() * a.length();
         let inverse_t = if known { normal / offset } else { DVec3::ZERO };
-        let slot = canvas.enter(Drawn { inverse_t: inverse_t.to_array(), face, poor: !known });
-        let planes = Planes { edges, inverse_t, edge_off };
-        let reach = Reach { left: 0, right: self.width - 1, top, bottom };
-        registers::run(Tiles { lens: self, canvas, planes: &planes, reach: &reach, slot, poor: !known });
+        let slot = canvas.enter(DrawnFace { inverse_t: inverse_t.to_array(), face, poor: !known });
+        let planes = PanoramaPlanes { edges, inverse_t, edge_off };
+        let bounds = PanoramaBounds { left: 0, right: self.width - 1, top, bottom };
+        registers::run(PanoramaTiles {
+            raster: self,
+            canvas,
+            planes: &planes,
+            bounds: &bounds,
+            slot,
+            poor: !known,
+        });
     }
 
     #[inline(always)]
     fn chunk<'a>(
         &'a self,
-        planes: &Planes,
+        planes: &PanoramaPlanes,
         column: usize,
         row: usize,
         rows: usize,
         slot: u32,
-        tangents: &'a mut [f32; MOST_ROWS],
-    ) -> (Grid<'a>, Chunk) {
+        tangents: &'a mut [f32; MAX_ROWS],
+    ) -> (ChunkGrid<'a>, Chunk) {
         let (cos, sin) = (self.cos.as_flattened()[column], self.sin.as_flattened()[column]);
         let tan = self.tan[row];
         for (to, from) in tangents.iter_mut().zip(&self.tan[row..row + rows]) {
@@ -296,29 +304,29 @@ impl<'m> Panorama<'m> {
             let terms = f64::from(e.across.abs()) * reach_u
                 + f64::from(e.bend.abs()) * reach_v
                 + f64::from(e.down.abs()) * reach_t;
-            size = most64(size, terms);
+            size = max64(size, terms);
         }
         let edge_error = (EDGE_ROUNDING * size + planes.edge_off * away + 1e-12) as f32;
         let scale = &self.scale[row..row + rows];
-        let grid = Grid { u: &self.u, v: &self.v, rows: tangents, count: rows, scale };
+        let grid = ChunkGrid { u: &self.u, v: &self.v, rows: tangents, count: rows, scale };
         (grid, Chunk { column, row, edges, edge_error, inverse_t, slot, ..Chunk::default() })
     }
 
     /// The least 1/t of a chunk, as far as is known, and by how much any may be off.
     #[inline(always)]
-    fn trust(&self, chunk: &Chunk, grid: &Grid<'_>) -> (f32, f32) {
+    fn trust(&self, chunk: &Chunk, grid: &ChunkGrid<'_>) -> (f32, f32) {
         let (low, _, size) = self.range(&chunk.inverse_t, grid);
         let (first, last) = (grid.scale[0], grid.scale[grid.scale.len() - 1]);
         // cos φ is least at one of the ends.
-        let (least_cos, most_cos) = if first < last { (first, last) } else { (last, first) };
-        let most_cos = if grid.count > 1 { 1.0f32.min(most_cos * 1.5) } else { most_cos };
-        let low = if low > 0.0 { low * least_cos } else { low };
-        (low, INVERSE_T_ROUNDING * size * most_cos)
+        let (min_cos, max_cos) = if first < last { (first, last) } else { (last, first) };
+        let max_cos = if grid.count > 1 { 1.0f32.min(max_cos * 1.5) } else { max_cos };
+        let low = if low > 0.0 { low * min_cos } else { low };
+        (low, INVERSE_T_ROUNDING * size * max_cos)
     }
 
     /// Bounds of a function on a chunk, before it is multiplied by cos φ, and the sizes of its terms.
     #[inline(always)]
-    fn range(&self, f: &Linear, grid: &Grid<'_>) -> (f32, f32, f32) {
+    fn range(&self, f: &Linear, grid: &ChunkGrid<'_>) -> (f32, f32, f32) {
         let last = LANES - 1;
         let down = f.down * grid.rows[grid.count - 1];
         let (u, v) = (f.across * self.u[last], f.bend * self.v[last]);
@@ -326,14 +334,14 @@ impl<'m> Panorama<'m> {
         // Between its ends the function along a row bulges by the square of the angle over 8.
         let bulge =
             (f.across.abs() + f.bend.abs()) * (self.v[last] * self.v[last] - 2.0 * self.u[last]) * 0.125;
-        let low = f.at + least(along, 0.0) + least(down, 0.0) - bulge;
-        let high = f.at + most(along, 0.0) + most(down, 0.0) + bulge;
+        let low = f.at + min(along, 0.0) + min(down, 0.0) - bulge;
+        let high = f.at + max(along, 0.0) + max(down, 0.0) + bulge;
         (low, high, f.at.abs() + u.abs() + v.abs() + down.abs())
     }
 }
 
 /// Three edges' planes, inwards, and 1/t = `inverse_t` · d.
-struct Planes {
+struct PanoramaPlanes {
     edges: [DVec3; 3],
     inverse_t: DVec3,
     /// By how much the edges' values are off, for a direction of length 1.
@@ -341,7 +349,7 @@ struct Planes {
 }
 
 /// The pixels that a face may cover.
-struct Reach {
+struct PanoramaBounds {
     left: usize,
     right: usize,
     top: usize,
@@ -349,17 +357,17 @@ struct Reach {
 }
 
 #[inline(always)]
-fn least(a: f32, b: f32) -> f32 {
+fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-fn most(a: f32, b: f32) -> f32 {
+fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 #[inline(always)]
-fn most64(a: f64, b: f64) -> f64 {
+fn max64(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
@@ -377,28 +385,28 @@ fn turn_of(y: f32, x: f32) -> f32 {
 }
 
 /// A face on all the tiles that it may cover.
-struct Tiles<'a, 'm> {
-    lens: &'a Panorama<'m>,
+struct PanoramaTiles<'a, 'm> {
+    raster: &'a Panorama<'m>,
     canvas: &'a mut Canvas,
-    planes: &'a Planes,
-    reach: &'a Reach,
+    planes: &'a PanoramaPlanes,
+    bounds: &'a PanoramaBounds,
     slot: u32,
     poor: bool,
 }
 
-impl Work for Tiles<'_, '_> {
+impl Work for PanoramaTiles<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Registers>(self, l: L) {
-        let Self { lens, canvas, planes, reach, slot, poor } = self;
-        let mut tangents = [0.0; MOST_ROWS];
-        for tile_row in reach.top / TILE..=reach.bottom / TILE {
-            let (row, rows) = part_of_tile(tile_row, reach.top, reach.bottom);
-            for tile_column in reach.left / TILE..=reach.right / TILE {
-                let (column, narrow) = half_of_tile(tile_column, reach.left, reach.right);
-                let (grid, mut chunk) = lens.chunk(planes, column, row, rows, slot, &mut tangents);
-                if chunk.edges.iter().any(|e| lens.range(e, &grid).1 < -2.0 * chunk.edge_error - 1e-6) {
+        let Self { raster, canvas, planes, bounds, slot, poor } = self;
+        let mut tangents = [0.0; MAX_ROWS];
+        for tile_row in bounds.top / TILE..=bounds.bottom / TILE {
+            let (row, rows) = part_of_tile(tile_row, bounds.top, bounds.bottom);
+            for tile_column in bounds.left / TILE..=bounds.right / TILE {
+                let (column, narrow) = half_of_tile(tile_column, bounds.left, bounds.right);
+                let (grid, mut chunk) = raster.chunk(planes, column, row, rows, slot, &mut tangents);
+                if chunk.edges.iter().any(|e| raster.range(e, &grid).1 < -2.0 * chunk.edge_error - 1e-6) {
                     continue;
                 }
                 if poor {
@@ -407,8 +415,8 @@ impl Work for Tiles<'_, '_> {
                     canvas.draw::<L, true, true>(l, &grid, &chunk);
                     continue;
                 }
-                let high = lens.range(&chunk.inverse_t, &grid).1;
-                let (low, error) = lens.trust(&chunk, &grid);
+                let high = raster.range(&chunk.inverse_t, &grid).1;
+                let (low, error) = raster.trust(&chunk, &grid);
                 if high + error <= 0.0 || canvas.tile_hides(tile_column, tile_row, high + error) {
                     continue;
                 }
@@ -426,17 +434,17 @@ impl Work for Tiles<'_, '_> {
     }
 }
 
-impl Lens for Panorama<'_> {
+impl ProjectionRaster for Panorama<'_> {
     #[inline(always)]
     fn cover(&self, node: &Node) -> Option<Cover> {
         let o = self.origin.to_array();
         let lo = [0, 1, 2].map(|k| (f64::from(node.min[k]) - o[k]) as f32);
         let hi = [0, 1, 2].map(|k| (f64::from(node.max[k]) - o[k]) as f32);
         // What rounding may have moved.
-        let off = [0, 1, 2].map(|k| 1e-6 * most(lo[k].abs(), hi[k].abs()) + 1e-30);
+        let off = [0, 1, 2].map(|k| 1e-6 * max(lo[k].abs(), hi[k].abs()) + 1e-30);
         let (lo, hi) = ([0, 1, 2].map(|k| lo[k] - off[k]), [0, 1, 2].map(|k| hi[k] + off[k]));
-        let near = [0, 1, 2].map(|k| most(most(lo[k], -hi[k]), 0.0));
-        let far = [0, 1, 2].map(|k| most(lo[k].abs(), hi[k].abs()));
+        let near = [0, 1, 2].map(|k| max(max(lo[k], -hi[k]), 0.0));
+        let far = [0, 1, 2].map(|k| max(lo[k].abs(), hi[k].abs()));
         let flat = (near[0] * near[0] + near[1] * near[1]).sqrt();
         let flat_far = (far[0] * far[0] + far[1] * far[1]).sqrt();
         let distance = (flat * flat + near[2] * near[2]).sqrt() * (1.0 - 1e-6);
@@ -453,7 +461,7 @@ impl Lens for Panorama<'_> {
             let mut range = (0.0f32, 0.0f32);
             for (cx, cy) in [(lo[0], lo[1]), (hi[0], lo[1]), (lo[0], hi[1]), (hi[0], hi[1])] {
                 let turn = turn_of(cx * y - cy * x, cx * x + cy * y);
-                range = (least(range.0, turn), most(range.1, turn));
+                range = (min(range.0, turn), max(range.1, turn));
             }
             let (middle_column, per_rad) = (self.middle_column as f32, 1.0 / self.step as f32);
             let pad = 0.01 + 2.0 * ANGLE_ERROR * per_rad;
@@ -470,7 +478,7 @@ impl Lens for Panorama<'_> {
                 [false, true, false] => {}
                 _ => (first, last) = (left, right),
             }
-            (left, right) = (most(first, left), least(last, right));
+            (left, right) = (max(first, left), min(last, right));
         }
         Cover::new((left, right), rows, (self.width, self.height), 1.0 / distance)
     }
@@ -496,7 +504,7 @@ impl Lens for Panorama<'_> {
         canvas.finish::<L, true>(l, out, out_pitch, (&self.cos, &self.sin), line, single);
     }
 
-    fn inverse_t(&self, drawn: &Drawn, column: usize, row: usize) -> f64 {
+    fn inverse_t(&self, drawn: &DrawnFace, column: usize, row: usize) -> f64 {
         self.direction(column, row).dot(DVec3::from(drawn.inverse_t))
     }
 

@@ -3,18 +3,18 @@
 //! A corner p (relative to the camera) is in column x = (ρ·p)/(φ·p) and row y = (δ·p)/(φ·p) of the window, pixel centres
 //! at whole numbers, at the depth z = φ·p. For a corner that is no farther out than [`GUARD`] pixels x and y are good to
 //! 2⁻⁵³·8·GUARD < 2e-11 pixels, since |p|/z is then bounded by the angle of the guard band; so an edge function made
-//! from two corners at least 1e-3 apart is good to 1e-8 over a chunk. Faces that reach farther out, behind the camera,
-//! or have shorter edges, get their planes in space instead. The others are set up by [`Batch`], a cluster at a time.
+//! from two corners at least 1e-3 apart is good to 1e-8 over a chunk. Faces that bounds farther out, behind the camera,
+//! or have shorter edges, get their planes in space instead. The others are set up by [`FaceBatch`], a cluster at a time.
 
 #![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
 
-use crate::raster::batch::{Batch, Kind};
+use crate::raster::batch::{DrawKind, FaceBatch};
 use crate::raster::canvas::{
-    Canvas, Chunk, Cover, Drawn, EDGE_ERROR, Grid, INVERSE_T_ROUNDING, Linear, MOST_ROWS, TILE, TRUSTED,
-    half_of_tile, part_of_tile,
+    Canvas, Chunk, ChunkGrid, Cover, DrawnFace, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TILE,
+    TRUSTED, half_of_tile, part_of_tile,
 };
-use crate::raster::clusters::{Cluster, MOST_CORNERS, Node, PACKET};
-use crate::raster::window::{Lens, Pixels, Spot, groups};
+use crate::raster::clusters::{Cluster, MAX_CORNERS, Node, PACKET};
+use crate::raster::window::{Pixels, ProjectionRaster, Window, groups};
 use crate::ray::cone::Cone;
 use crate::simd::registers::{self, LANES, Registers, Work};
 use glam::DVec3;
@@ -24,10 +24,10 @@ use s3d_geom::{Rays, TriMesh};
 const GUARD: f64 = 16_384.0;
 
 /// 0, 1, 2 …: columns from the anchor, and rows.
-const COUNT: [f32; MOST_ROWS] = {
-    let mut count = [0.0; MOST_ROWS];
+const COUNT: [f32; MAX_ROWS] = {
+    let mut count = [0.0; MAX_ROWS];
     let mut k = 0;
-    while k < MOST_ROWS {
+    while k < MAX_ROWS {
         count[k] = k as f32;
         k += 1;
     }
@@ -44,13 +44,13 @@ const COLUMNS: [f32; LANES] = {
     count
 };
 
-fn grid(rows: usize) -> Grid<'static> {
-    Grid { u: &COLUMNS, v: &COLUMNS, rows: &COUNT, count: rows, scale: &[] }
+fn grid(rows: usize) -> ChunkGrid<'static> {
+    ChunkGrid { u: &COLUMNS, v: &COLUMNS, rows: &COUNT, count: rows, scale: &[] }
 }
 
 /// Three edge functions and 1/t: at + across·i + down·j.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Planes {
+pub(crate) struct PinholePlanes {
     pub(crate) at: [f64; 4],
     pub(crate) across: [f64; 4],
     pub(crate) down: [f64; 4],
@@ -72,38 +72,38 @@ pub(crate) struct Pinhole<'m> {
     width: usize,
     height: usize,
     columns: Vec<[f64; LANES]>,
-    projected: Box<Projected>,
-    batch: Box<Batch>,
+    projected: Box<PinholeCorners>,
+    batch: Box<FaceBatch>,
 }
 
 /// The corners of a cluster.
-pub(crate) struct Projected {
-    pub(crate) x: [f64; MOST_CORNERS],
-    pub(crate) y: [f64; MOST_CORNERS],
+pub(crate) struct PinholeCorners {
+    pub(crate) x: [f64; MAX_CORNERS],
+    pub(crate) y: [f64; MAX_CORNERS],
     /// 1/z; 0 for a corner that is behind the camera or too far out.
-    pub(crate) inverse_z: [f64; MOST_CORNERS],
+    pub(crate) inverse_z: [f64; MAX_CORNERS],
 }
 
-impl Projected {
+impl PinholeCorners {
     pub(crate) fn new() -> Self {
-        let none = [0.0; MOST_CORNERS];
+        let none = [0.0; MAX_CORNERS];
         Self { x: none, y: none, inverse_z: none }
     }
 }
 
 impl<'m> Pinhole<'m> {
-    /// The window of `spot` of a view with the axes `right`, `down` and `forward`.
-    pub(crate) fn new(mesh: &'m TriMesh, spot: &Spot<'_>) -> Self {
-        let camera = spot.camera;
-        let pixels = Pixels::new(spot);
+    /// The window of `window` of a view with the axes `right`, `down` and `forward`.
+    pub(crate) fn new(mesh: &'m TriMesh, window: &Window<'_>) -> Self {
+        let camera = window.camera;
+        let pixels = Pixels::new(window);
         let Rays::Perspective { x_step, y_step, origin } = pixels.rays else {
             unreachable!("a perspective camera has perspective rays")
         };
-        let (pose, stride) = (&camera.pose, f64::from(spot.stride));
+        let (pose, stride) = (&camera.pose, f64::from(window.stride));
         let focal = camera.focal_px() / stride;
         // Sample i of the window is pixel centre offset + stride · i.
-        let offset = |start: usize| f64::from(spot.stride / 2) + stride * start as f64 + 0.5;
-        let (x, y) = (offset(spot.column), offset(spot.row));
+        let offset = |start: usize| f64::from(window.stride / 2) + stride * start as f64 + 0.5;
+        let (x, y) = (offset(window.column), offset(window.row));
         let (cx, cy) = (0.5 * f64::from(camera.width) - x, 0.5 * f64::from(camera.height) - y);
         let forward = pose.forward();
         Self {
@@ -116,11 +116,11 @@ impl<'m> Pinhole<'m> {
             step_x: x_step * stride,
             step_y: y_step * stride,
             pixels,
-            width: spot.width,
-            height: spot.height,
-            columns: groups(&(0..spot.width).map(|i| i as f64).collect::<Vec<_>>()),
-            projected: Box::new(Projected::new()),
-            batch: Box::new(Batch::new()),
+            width: window.width,
+            height: window.height,
+            columns: groups(&(0..window.width).map(|i| i as f64).collect::<Vec<_>>()),
+            projected: Box::new(PinholeCorners::new()),
+            batch: Box::new(FaceBatch::new()),
         }
     }
 
@@ -154,7 +154,7 @@ impl<'m> Pinhole<'m> {
     #[inline(never)]
     fn draw_in_space(&self, canvas: &mut Canvas, face: u32) {
         let Some(cone) = Cone::new(self.mesh, face, self.origin) else { return };
-        let Some(reach) = self.reach_of(&cone) else { return };
+        let Some(bounds) = self.bounds_of(&cone) else { return };
         let [a, b, c] = cone.corners;
         let (mut at, mut across, mut down) = ([0.0; 4], [0.0; 4], [0.0; 4]);
         let farthest = self.first.length()
@@ -184,16 +184,16 @@ impl<'m> Pinhole<'m> {
             let n = plane.normal / plane.offset;
             (at[3], across[3], down[3]) = (n.dot(self.first), n.dot(self.step_x), n.dot(self.step_y));
         }
-        let planes = Planes { at, across, down };
+        let planes = PinholePlanes { at, across, down };
         let inverse_t = [at[3], across[3], down[3]];
-        let slot = canvas.enter(Drawn { inverse_t, face, poor: !known });
+        let slot = canvas.enter(DrawnFace { inverse_t, face, poor: !known });
         let edge_error = EDGE_ERROR + edge_error as f32;
-        let (planes, reach) = (&planes, &reach);
-        registers::run(Tiles { canvas, planes, reach, edge_error, slot, poor: !known });
+        let (planes, bounds) = (&planes, &bounds);
+        registers::run(PinholeTiles { canvas, planes, bounds, edge_error, slot, poor: !known });
     }
 
     /// The pixels that a face may cover; `None` if it is behind the camera or beside the window.
-    fn reach_of(&self, cone: &Cone) -> Option<Reach> {
+    fn bounds_of(&self, cone: &Cone) -> Option<PinholeBounds> {
         let infinite = f64::INFINITY;
         let (mut x, mut y) = ((infinite, -infinite), (infinite, -infinite));
         let mut q = (infinite, 0.0f64);
@@ -235,7 +235,7 @@ impl<'m> Pinhole<'m> {
         let right = (x.1 + 0.01).floor().min(self.width as f64 - 1.0);
         let top = (y.0 - 0.01).ceil().max(0.0);
         let bottom = (y.1 + 0.01).floor().min(self.height as f64 - 1.0);
-        (left <= right && top <= bottom).then_some(Reach {
+        (left <= right && top <= bottom).then_some(PinholeBounds {
             left: left as usize,
             right: right as usize,
             top: top as usize,
@@ -247,7 +247,7 @@ impl<'m> Pinhole<'m> {
 
 /// The pixels that a face may cover, and the least and greatest 1/t that it may have there.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Reach {
+pub(crate) struct PinholeBounds {
     pub(crate) left: usize,
     pub(crate) right: usize,
     pub(crate) top: usize,
@@ -255,7 +255,7 @@ pub(crate) struct Reach {
     pub(crate) inverse_t: (f64, f64),
 }
 
-impl Planes {
+impl PinholePlanes {
     #[inline(always)]
     fn chunk(&self, column: usize, row: usize, slot: u32, edge_error: f32) -> Chunk {
         let (i, j) = (column as f64, row as f64);
@@ -271,26 +271,26 @@ impl Planes {
 }
 
 /// A face on all the tiles that it may cover.
-struct Tiles<'a> {
+struct PinholeTiles<'a> {
     canvas: &'a mut Canvas,
-    planes: &'a Planes,
-    reach: &'a Reach,
+    planes: &'a PinholePlanes,
+    bounds: &'a PinholeBounds,
     edge_error: f32,
     slot: u32,
     poor: bool,
 }
 
-impl Work for Tiles<'_> {
+impl Work for PinholeTiles<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Registers>(self, l: L) {
-        let Self { canvas, planes, reach, edge_error, slot, poor } = self;
-        let nearest = (reach.inverse_t.1 * (1.0 + 1e-6)) as f32;
-        for tile_row in reach.top / TILE..=reach.bottom / TILE {
-            let (top, rows) = part_of_tile(tile_row, reach.top, reach.bottom);
-            for tile_column in reach.left / TILE..=reach.right / TILE {
-                let (column, narrow) = half_of_tile(tile_column, reach.left, reach.right);
+        let Self { canvas, planes, bounds, edge_error, slot, poor } = self;
+        let nearest = (bounds.inverse_t.1 * (1.0 + 1e-6)) as f32;
+        for tile_row in bounds.top / TILE..=bounds.bottom / TILE {
+            let (top, rows) = part_of_tile(tile_row, bounds.top, bounds.bottom);
+            for tile_column in bounds.left / TILE..=bounds.right / TILE {
+                let (column, narrow) = half_of_tile(tile_column, bounds.left, bounds.right);
                 let mut chunk = planes.chunk(column, top, slot, edge_error);
                 let last = ((if narrow { TILE / 2 } else { TILE }) - 1) as f32;
                 let last_row = (rows - 1) as f32;
@@ -330,7 +330,7 @@ impl Work for Tiles<'_> {
     }
 }
 
-impl Lens for Pinhole<'_> {
+impl ProjectionRaster for Pinhole<'_> {
     #[inline(always)]
     fn cover(&self, node: &Node) -> Option<Cover> {
         let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
@@ -389,22 +389,22 @@ impl Lens for Pinhole<'_> {
         self.batch.set_up(cluster.faces, &self.projected, self.width as f64, self.height as f64);
         let batch = &*self.batch;
         let enter = |canvas: &mut Canvas, i: usize| {
-            canvas.enter(Drawn { inverse_t: batch.inverse_t(i), face: cluster.ids[i], poor: false })
+            canvas.enter(DrawnFace { inverse_t: batch.inverse_t(i), face: cluster.ids[i], poor: false })
         };
-        for i in batch.faces(Kind::Large) {
+        for i in batch.faces(DrawKind::Large) {
             let slot = enter(canvas, i);
-            let (planes, reach) = (&batch.planes(i), &batch.reach(i));
-            Tiles { canvas, planes, reach, edge_error: EDGE_ERROR, slot, poor: false }.run(l);
+            let (planes, bounds) = (&batch.planes(i), &batch.bounds(i));
+            PinholeTiles { canvas, planes, bounds, edge_error: EDGE_ERROR, slot, poor: false }.run(l);
         }
-        for i in batch.faces(Kind::Narrow) {
+        for i in batch.faces(DrawKind::Narrow) {
             let (chunk, rows) = batch.chunk(i, enter(canvas, i));
             canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk);
         }
-        for i in batch.faces(Kind::Small) {
+        for i in batch.faces(DrawKind::Small) {
             let (chunk, rows) = batch.chunk(i, enter(canvas, i));
             canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
         }
-        for i in batch.faces(Kind::Wide) {
+        for i in batch.faces(DrawKind::Wide) {
             let (chunk, rows) = batch.chunk(i, enter(canvas, i));
             canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
             let (chunk, columns) = batch.second_chunk(i, &chunk);
@@ -414,11 +414,11 @@ impl Lens for Pinhole<'_> {
                 canvas.draw::<L, false, false>(l, &grid(rows), &chunk);
             }
         }
-        for i in batch.faces(Kind::Careful) {
+        for i in batch.faces(DrawKind::Careful) {
             let (chunk, rows) = batch.chunk(i, enter(canvas, i));
             canvas.draw::<L, false, true>(l, &grid(rows), &chunk);
         }
-        for i in batch.faces(Kind::InSpace) {
+        for i in batch.faces(DrawKind::InSpace) {
             self.draw_in_space(canvas, cluster.ids[i]);
         }
     }
@@ -436,7 +436,7 @@ impl Lens for Pinhole<'_> {
         canvas.finish::<L, false>(l, out, out_pitch, (&self.columns, &self.columns), line, single);
     }
 
-    fn inverse_t(&self, drawn: &Drawn, column: usize, row: usize) -> f64 {
+    fn inverse_t(&self, drawn: &DrawnFace, column: usize, row: usize) -> f64 {
         let [at, across, down] = drawn.inverse_t;
         at + across * column as f64 + down * row as f64
     }

@@ -3,7 +3,7 @@
 use crate::hits::{Hits, NO_FACE};
 use crate::raster::panorama::Panorama;
 use crate::raster::pinhole::Pinhole;
-use crate::raster::window::{self, Memory, Spot};
+use crate::raster::window::{self, Scratch, Window};
 use crate::ray::caster::RayCaster;
 use crate::scene::Scene;
 use s3d_geom::{Camera, Projection, Raster};
@@ -14,19 +14,19 @@ use std::f64::consts::TAU;
 /// Nothing but time depends on what was cast before.
 pub struct Caster<'s, 'm> {
     scene: &'s Scene<'m>,
-    memory: Memory,
+    scratch: Scratch,
 }
 
 /// The most pixels of a window that is cast at once: what a second-level cache and some of the third hold.
 const WINDOW: usize = 1 << 17;
 
 /// The most columns of a window, and rows: their numbers fit into 16 bits.
-const MOST_SIDE: usize = 1 << 14;
+const MAX_SIDE: usize = 1 << 14;
 
 impl<'s, 'm> Caster<'s, 'm> {
     /// A caster for a scene.
     pub fn new(scene: &'s Scene<'m>) -> Self {
-        Self { scene, memory: Memory::default() }
+        Self { scene, scratch: Scratch::default() }
     }
 
     /// The scene.
@@ -34,7 +34,7 @@ impl<'s, 'm> Caster<'s, 'm> {
         self.scene
     }
 
-    /// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Runs on the
+    /// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Spans on the
     /// calling thread alone.
     pub fn cast(&mut self, camera: &Camera) -> Hits {
         self.cast_strided(camera, 1)
@@ -73,28 +73,28 @@ impl<'s, 'm> Caster<'s, 'm> {
             return;
         }
         // A panorama is cast in sectors: what is opposite to a sector's middle is far from it.
-        let most_columns = match camera.projection {
-            Projection::Perspective { .. } => columns.min(MOST_SIDE),
-            Projection::Equirectangular => columns.div_ceil(4).min(MOST_SIDE),
+        let max_columns = match camera.projection {
+            Projection::Perspective { .. } => columns.min(MAX_SIDE),
+            Projection::Equirectangular => columns.div_ceil(4).min(MAX_SIDE),
         };
         // As many windows as it takes, of one height but for the last.
-        let windows = (rows * most_columns).div_ceil(WINDOW);
-        let most_rows = rows.div_ceil(windows).min(MOST_SIDE);
-        for row in (0..rows).step_by(most_rows) {
-            for column in (0..columns).step_by(most_columns) {
-                let (width, height) = (most_columns.min(columns - column), most_rows.min(rows - row));
-                let spot = Spot { camera, stride, column, row, width, height };
+        let windows = (rows * max_columns).div_ceil(WINDOW);
+        let max_rows = rows.div_ceil(windows).min(MAX_SIDE);
+        for row in (0..rows).step_by(max_rows) {
+            for column in (0..columns).step_by(max_columns) {
+                let (width, height) = (max_columns.min(columns - column), max_rows.min(rows - row));
+                let window = Window { camera, stride, column, row, width, height };
                 let first = row * columns + column;
                 let out = (&mut hits.face.pixels_mut()[first..], &mut hits.depth.pixels_mut()[first..]);
-                let (scene, origin, memory) = (self.scene, camera.pose.location, &mut self.memory);
+                let (scene, origin, scratch) = (self.scene, camera.pose.location, &mut self.scratch);
                 match camera.projection {
                     Projection::Perspective { .. } => {
-                        let lens = Pinhole::new(scene.mesh(), &spot);
-                        window::cast(scene, origin, lens, (width, height), memory, out, columns);
+                        let raster = Pinhole::new(scene.mesh(), &window);
+                        window::cast(scene, origin, raster, (width, height), scratch, out, columns);
                     }
                     Projection::Equirectangular => {
-                        let lens = Panorama::new(scene.mesh(), &spot);
-                        window::cast(scene, origin, lens, (width, height), memory, out, columns);
+                        let raster = Panorama::new(scene.mesh(), &window);
+                        window::cast(scene, origin, raster, (width, height), scratch, out, columns);
                     }
                 }
             }
@@ -102,7 +102,7 @@ impl<'s, 'm> Caster<'s, 'm> {
     }
 }
 
-/// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Runs on the
+/// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Spans on the
 /// calling thread alone. [`Caster`] keeps its memory for the next image.
 pub fn cast(scene: &Scene<'_>, camera: &Camera) -> Hits {
     Caster::new(scene).cast(camera)

@@ -1,6 +1,6 @@
 //! The visibility pass over a window of an image, whatever the projection.
 
-use crate::raster::canvas::{Canvas, Cover, Drawn};
+use crate::raster::canvas::{Canvas, Cover, DrawnFace};
 use crate::raster::clusters::{Cluster, Clusters, Content, Node};
 use crate::ray::caster::Nearest;
 use crate::ray::cone::Cone;
@@ -13,7 +13,7 @@ use std::collections::BinaryHeap;
 
 /// Samples of an image that are cast together: column `column` + i is pixel stride / 2 + stride · (`column` + i).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spot<'a> {
+pub(crate) struct Window<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) stride: u32,
     /// The window's first column and row among the samples, and its size.
@@ -32,10 +32,10 @@ pub(crate) struct Pixels {
 }
 
 impl Pixels {
-    pub(crate) fn new(spot: &Spot<'_>) -> Self {
-        let first = |sample: usize| spot.stride / 2 + spot.stride * sample as u32;
-        let (column, row) = (first(spot.column), first(spot.row));
-        Self { rays: spot.camera.rays(), stride: spot.stride, column, row }
+    pub(crate) fn new(window: &Window<'_>) -> Self {
+        let first = |sample: usize| window.stride / 2 + window.stride * sample as u32;
+        let (column, row) = (first(window.column), first(window.row));
+        Self { rays: window.camera.rays(), stride: window.stride, column, row }
     }
 
     /// The direction of a sample's ray, as single rays have it.
@@ -51,12 +51,12 @@ pub(crate) fn groups(values: &[f64]) -> Vec<[f64; LANES]> {
 }
 
 /// How a projection puts faces on a window.
-pub(crate) trait Lens {
+pub(crate) trait ProjectionRaster {
     /// The pixels that a box may cover; `None` if the window does not show it.
     fn cover(&self, node: &Node) -> Option<Cover>;
     /// Draws the faces of a group.
     fn draw<L: Registers>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>);
-    /// [`Canvas::finish`] with this lens's functions.
+    /// [`Canvas::finish`] with this raster's functions.
     fn finish<L: Registers>(
         &self,
         l: L,
@@ -66,18 +66,18 @@ pub(crate) trait Lens {
         single: impl Fn(u32, usize, usize) -> f64,
     );
     /// 1/t of what was drawn, at a pixel.
-    fn inverse_t(&self, drawn: &Drawn, column: usize, row: usize) -> f64;
+    fn inverse_t(&self, drawn: &DrawnFace, column: usize, row: usize) -> f64;
     /// The direction of the ray through the centre of a pixel.
     fn direction(&self, column: usize, row: usize) -> DVec3;
 }
 
 /// What waits to be drawn, the nearest first.
-struct Waiting {
+struct QueuedNode {
     node: u32,
     cover: Cover,
 }
 
-impl Ord for Waiting {
+impl Ord for QueuedNode {
     fn cmp(&self, other: &Self) -> Ordering {
         // For numbers from 0 on the bits have the order of the values.
         let key = |w: &Self| w.cover.inverse_t.to_bits();
@@ -85,111 +85,112 @@ impl Ord for Waiting {
     }
 }
 
-impl PartialOrd for Waiting {
+impl PartialOrd for QueuedNode {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Eq for Waiting {}
+impl Eq for QueuedNode {}
 
-impl PartialEq for Waiting {
+impl PartialEq for QueuedNode {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-/// The memory of the visibility pass, for one window after another.
+/// The scratch of the visibility pass, for one window after another.
 #[derive(Default)]
-pub(crate) struct Memory {
+pub(crate) struct Scratch {
     canvas: Canvas,
-    waiting: BinaryHeap<Waiting>,
+    queue: BinaryHeap<QueuedNode>,
 }
 
 /// Casts the rays of a window into `out`: faces and depths from its first pixel on, `pitch` from row to row.
-pub(crate) fn cast<T: Lens>(
+pub(crate) fn cast<T: ProjectionRaster>(
     scene: &Scene<'_>,
     origin: DVec3,
-    lens: T,
+    raster: T,
     size: (usize, usize),
-    memory: &mut Memory,
+    scratch: &mut Scratch,
     out: (&mut [u32], &mut [f32]),
     pitch: usize,
 ) {
-    registers::run(Pass { scene, origin, lens, size, memory, out, pitch });
+    registers::run(VisibilityKernel { scene, origin, raster, size, scratch, out, pitch });
 }
 
 /// As [`cast`], with registers that every processor has.
 #[cfg(test)]
-pub(crate) fn cast_portably<T: Lens>(
+pub(crate) fn cast_portably<T: ProjectionRaster>(
     scene: &Scene<'_>,
     origin: DVec3,
-    lens: T,
+    raster: T,
     size: (usize, usize),
-    memory: &mut Memory,
+    scratch: &mut Scratch,
     out: (&mut [u32], &mut [f32]),
     pitch: usize,
 ) {
-    Pass { scene, origin, lens, size, memory, out, pitch }.run(registers::Portable::<LANES>);
+    VisibilityKernel { scene, origin, raster, size, scratch, out, pitch }.run(registers::Portable::<LANES>);
 }
 
-struct Pass<'a, 'm, T> {
+struct VisibilityKernel<'a, 'm, T> {
     scene: &'a Scene<'m>,
     origin: DVec3,
-    lens: T,
+    raster: T,
     size: (usize, usize),
-    memory: &'a mut Memory,
+    scratch: &'a mut Scratch,
     out: (&'a mut [u32], &'a mut [f32]),
     pitch: usize,
 }
 
-impl<T: Lens> Work for Pass<'_, '_, T> {
+impl<T: ProjectionRaster> Work for VisibilityKernel<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Registers>(self, l: L) {
-        let Self { scene, origin, mut lens, size, memory, out, pitch } = self;
-        let Memory { canvas, waiting } = memory;
+        let Self { scene, origin, mut raster, size, scratch, out, pitch } = self;
+        let Scratch { canvas, queue } = scratch;
         canvas.begin(size.0, size.1);
-        draw_all(l, scene.clusters(), &mut lens, canvas, waiting);
+        draw_all(l, scene.clusters(), &mut raster, canvas, queue);
         let mesh = scene.mesh();
         canvas.settle(|column, row, candidates| {
-            let d = lens.direction(column, row);
+            let d = raster.direction(column, row);
             let (which, t) = nearest(mesh, origin, d, candidates)?;
             // The function and the exact ray say the same, unless the function is poor there.
-            let off = lens.inverse_t(&candidates[which], column, row) * t - 1.0;
+            let off = raster.inverse_t(&candidates[which], column, row) * t - 1.0;
             let good = off.abs() < 1e-6;
             Some((which, !good))
         });
-        let single =
-            |face: u32, column: usize, row: usize| distance(mesh, origin, lens.direction(column, row), face);
-        lens.finish(l, canvas, out, pitch, single);
+        let single = |face: u32, column: usize, row: usize| {
+            distance(mesh, origin, raster.direction(column, row), face)
+        };
+        raster.finish(l, canvas, out, pitch, single);
     }
 }
 
 #[inline(always)]
-fn draw_all<L: Registers, T: Lens>(
+fn draw_all<L: Registers, T: ProjectionRaster>(
     l: L,
     clusters: &Clusters,
-    lens: &mut T,
+    raster: &mut T,
     canvas: &mut Canvas,
-    waiting: &mut BinaryHeap<Waiting>,
+    queue: &mut BinaryHeap<QueuedNode>,
 ) {
     let nodes = clusters.nodes();
-    waiting.clear();
-    waiting.extend(lens.cover(&nodes[0]).map(|cover| Waiting { node: 0, cover }));
-    while let Some(Waiting { node, cover }) = waiting.pop() {
+    queue.clear();
+    queue.extend(raster.cover(&nodes[0]).map(|cover| QueuedNode { node: 0, cover }));
+    while let Some(QueuedNode { node, cover }) = queue.pop() {
         if canvas.hides(&cover) {
             continue;
         }
         match nodes[node as usize].content {
             Content::Children(first) => {
                 for node in [first, first + 1] {
-                    waiting.extend(lens.cover(&nodes[node as usize]).map(|cover| Waiting { node, cover }));
+                    queue.extend(raster.cover(&nodes[node as usize]).map(|cover| QueuedNode { node, cover }));
                 }
             }
             Content::Cluster(index) => {
-                lens.draw(l, canvas, &clusters.cluster(index));
+                raster.draw(l, canvas, &clusters.cluster(index));
                 canvas.touch(&cover);
             }
         }
@@ -198,7 +199,7 @@ fn draw_all<L: Registers, T: Lens>(
 
 /// The nearest of `candidates` that the ray along `d` hits, by the rules of single rays, and its distance.
 #[inline(never)]
-fn nearest(mesh: &TriMesh, origin: DVec3, d: DVec3, candidates: &[Drawn]) -> Option<(usize, f64)> {
+fn nearest(mesh: &TriMesh, origin: DVec3, d: DVec3, candidates: &[DrawnFace]) -> Option<(usize, f64)> {
     let mut nearest = Nearest::default();
     for candidate in candidates {
         nearest.meet(mesh, candidate.face, origin, d);
@@ -232,37 +233,37 @@ mod tests {
         ];
         for camera in &views {
             let (width, height) = ((camera.width / 2) as usize, camera.height as usize - 5);
-            let spot = Spot { camera, stride: 1, column: 60, row: 3, width, height };
+            let window = Window { camera, stride: 1, column: 60, row: 3, width, height };
             let mut images = [(); 2].map(|()| (vec![7; width * height], vec![7.0; width * height]));
             for (portable, (faces, depths)) in [true, false].into_iter().zip(&mut images) {
-                let (size, out, mut memory) =
-                    ((width, height), (&mut faces[..], &mut depths[..]), Memory::default());
+                let (size, out, mut scratch) =
+                    ((width, height), (&mut faces[..], &mut depths[..]), Scratch::default());
                 let origin = camera.pose.location;
                 let pinhole = camera.projection != s3d_geom::Projection::Equirectangular;
                 match (pinhole, portable) {
                     (true, true) => cast_portably(
                         &scene,
                         origin,
-                        Pinhole::new(&mesh, &spot),
+                        Pinhole::new(&mesh, &window),
                         size,
-                        &mut memory,
+                        &mut scratch,
                         out,
                         width,
                     ),
                     (true, false) => {
-                        cast(&scene, origin, Pinhole::new(&mesh, &spot), size, &mut memory, out, width)
+                        cast(&scene, origin, Pinhole::new(&mesh, &window), size, &mut scratch, out, width)
                     }
                     (false, true) => cast_portably(
                         &scene,
                         origin,
-                        Panorama::new(&mesh, &spot),
+                        Panorama::new(&mesh, &window),
                         size,
-                        &mut memory,
+                        &mut scratch,
                         out,
                         width,
                     ),
                     (false, false) => {
-                        cast(&scene, origin, Panorama::new(&mesh, &spot), size, &mut memory, out, width)
+                        cast(&scene, origin, Panorama::new(&mesh, &window), size, &mut scratch, out, width)
                     }
                 }
             }

@@ -20,7 +20,7 @@
 //! pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel in a texture of 4096.
 
 use crate::shade::patch::Patch;
-use crate::shade::wrap_mode::Fold;
+use crate::shade::texel_wrap::TexelWrap;
 use crate::simd::lanes::{LANES, Lanes, eight};
 use glam::DVec3;
 use s3d_geom::{Camera, Rays};
@@ -34,9 +34,9 @@ pub(crate) const DEEP: f32 = 16.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Attributes {
     /// α of each.
-    pub(crate) above: [DVec3; 3],
+    pub(crate) numerator: [DVec3; 3],
     /// ω.
-    pub(crate) whole: DVec3,
+    pub(crate) denominator: DVec3,
     /// Between what bounds each is: what rounding throws outside is brought back.
     pub(crate) bounds: [(f64, f64); 3],
 }
@@ -46,33 +46,33 @@ impl Attributes {
     #[inline(always)]
     pub(crate) fn new(patch: &Patch, values: [[f64; 3]; 3]) -> Self {
         let [p, q, r] = patch.weights_of_corners();
-        let (mut above, mut bounds) = ([DVec3::ZERO; 3], [(0.0, 0.0); 3]);
+        let (mut numerator, mut bounds) = ([DVec3::ZERO; 3], [(0.0, 0.0); 3]);
         for (k, [a, b, c]) in values.into_iter().enumerate() {
-            above[k] = p * a + q * b + r * c;
-            bounds[k] = (least(least(a, b), c), most(most(a, b), c));
+            numerator[k] = p * a + q * b + r * c;
+            bounds[k] = (min(min(a, b), c), max(max(a, b), c));
         }
-        Self { above, whole: patch.whole(), bounds }
+        Self { numerator, denominator: patch.denominator(), bounds }
     }
 }
 
 impl Attributes {
-    /// What [`Batch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face is along a ray, an
+    /// What [`AnchorBatch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face is along a ray, an
     /// attribute changes by (m − (a − a₀) ω / ω·e) · step / w where m = (α − a₀ω) / ω·e; and z is greatest at a corner.
     #[inline(always)]
     fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
-        let scale = self.whole.dot(e).recip();
-        let here = self.whole.dot(world[0] - origin) * scale;
+        let scale = self.denominator.dot(e).recip();
+        let here = self.denominator.dot(world[0] - origin) * scale;
         let mut far = 0.0;
         for corner in world {
-            far = most(far, (corner - origin).length_squared());
+            far = max(far, (corner - origin).length_squared());
         }
         // A ray's direction is at least 1 long: corners are no farther along rays than they are away.
         let mut sum = 0.0;
         for k in 0..2 {
             let (low, high) = self.bounds[k];
-            let value = least(most(self.above[k].dot(e) * scale, low), high);
+            let value = min(max(self.numerator[k].dot(e) * scale, low), high);
             for step in steps {
-                let (a, w) = (self.above[k].dot(step) * scale, self.whole.dot(step) * scale);
+                let (a, w) = (self.numerator[k].dot(step) * scale, self.denominator.dot(step) * scale);
                 let most = (a - w * value).abs() + (high - low) * w.abs();
                 sum += most * most;
             }
@@ -82,17 +82,17 @@ impl Attributes {
 }
 
 #[inline(always)]
-fn least(a: f64, b: f64) -> f64 {
+fn min(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-fn most(a: f64, b: f64) -> f64 {
+fn max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 /// The directions of an image's pixels, for anchors.
-pub(crate) struct Grid {
+pub(crate) struct RayGrid {
     rays: Rays,
     /// In a panorama δ, else 1.
     turn: f32,
@@ -104,7 +104,7 @@ pub(crate) struct Grid {
     versines: [f32; 2 * REACH as usize + LANES],
 }
 
-impl Grid {
+impl RayGrid {
     pub(crate) fn new(camera: &Camera) -> Self {
         let rays = camera.rays();
         let offset = |at: usize| at as f64 - f64::from(REACH);
@@ -127,7 +127,7 @@ impl Grid {
     }
 
     /// Whether it is a panorama's.
-    pub(crate) fn is_turn(&self) -> bool {
+    pub(crate) fn is_panorama(&self) -> bool {
         !self.rows.is_empty()
     }
 
@@ -156,33 +156,38 @@ struct Slopes {
     up: [f32; 4],
     /// The attributes at the anchor, and their bounds; folded.
     base: [f32; 3],
-    least: [f32; 3],
-    most: [f32; 3],
+    min: [f32; 3],
+    max: [f32; 3],
 }
 
 impl Slopes {
     /// Of attributes anchored at the direction `e`, where directions change by `steps`.
     #[inline(always)]
-    fn new<const TURN: bool>(attributes: &Attributes, folds: [Fold; 3], e: DVec3, steps: [DVec3; 2]) -> Self {
+    fn new<const PANORAMA: bool>(
+        attributes: &Attributes,
+        wraps: [TexelWrap; 3],
+        e: DVec3,
+        steps: [DVec3; 2],
+    ) -> Self {
         let mut slopes = Self::default();
-        let scale = attributes.whole.dot(e).recip();
-        slopes.set::<TURN>(3, attributes.whole * scale, steps);
-        for (k, fold) in folds.into_iter().enumerate() {
+        let scale = attributes.denominator.dot(e).recip();
+        slopes.set::<PANORAMA>(3, attributes.denominator * scale, steps);
+        for (k, fold) in wraps.into_iter().enumerate() {
             let (low, high) = attributes.bounds[k];
-            let value = least(most(attributes.above[k].dot(e) * scale, low), high);
-            let m = (attributes.above[k] - attributes.whole * value) * scale;
-            let (sign, shift) = fold.of(value);
-            slopes.set::<TURN>(k, m * sign, steps);
+            let value = min(max(attributes.numerator[k].dot(e) * scale, low), high);
+            let m = (attributes.numerator[k] - attributes.denominator * value) * scale;
+            let (sign, shift) = fold.sign_and_shift(value);
+            slopes.set::<PANORAMA>(k, m * sign, steps);
             slopes.base[k] = (value * sign + shift) as f32;
             let (low, high) = ((low * sign + shift) as f32, (high * sign + shift) as f32);
-            (slopes.least[k], slopes.most[k]) = if sign < 0.0 { (high, low) } else { (low, high) };
+            (slopes.min[k], slopes.max[k]) = if sign < 0.0 { (high, low) } else { (low, high) };
         }
         slopes
     }
 
     #[inline(always)]
-    fn set<const TURN: bool>(&mut self, k: usize, m: DVec3, [x, y]: [DVec3; 2]) {
-        if TURN {
+    fn set<const PANORAMA: bool>(&mut self, k: usize, m: DVec3, [x, y]: [DVec3; 2]) {
+        if PANORAMA {
             // Azimuth falls to the right.
             self.along[k] = (m.x * x.y - m.y * x.x) as f32;
             self.down[k] = (m.x * x.x + m.y * x.y) as f32;
@@ -210,16 +215,16 @@ impl Default for Anchor {
 impl Anchor {
     /// Anchors the attributes at a pixel, the values folded: an attribute with a period is brought between 0 and it,
     /// mirrored if its fold is. `false` if the face is seen edge-on there, or numbers are too large.
-    pub(crate) fn set<const TURN: bool>(
+    pub(crate) fn set<const PANORAMA: bool>(
         &mut self,
         attributes: &Attributes,
-        folds: [Fold; 3],
-        grid: &Grid,
+        wraps: [TexelWrap; 3],
+        grid: &RayGrid,
         i: usize,
         j: usize,
     ) -> bool {
         let (e, steps) = (grid.rays.at(i as u32, j as u32), grid.steps(i));
-        self.put(Slopes::new::<TURN>(attributes, folds, e, steps), i, j)
+        self.put(Slopes::new::<PANORAMA>(attributes, wraps, e, steps), i, j)
     }
 
     #[inline(always)]
@@ -246,8 +251,8 @@ impl Anchor {
 
     /// The row `j` of pixels.
     #[inline(always)]
-    pub(crate) fn line<'a, const TURN: bool>(&'a self, grid: &'a Grid, j: usize) -> Line<'a> {
-        let (level, rise, cos, sin) = if TURN {
+    pub(crate) fn line<'a, const PANORAMA: bool>(&'a self, grid: &'a RayGrid, j: usize) -> AnchoredRow<'a> {
+        let (level, rise, cos, sin) = if PANORAMA {
             let ([cos, sin], [cos_e, sin_e]) = (grid.rows[j], grid.rows[self.row as usize]);
             ((cos - cos_e) as f32, (sin - sin_e) as f32, cos as f32, sin as f32)
         } else {
@@ -256,31 +261,31 @@ impl Anchor {
         let mut start = [0.0; 4];
         for (k, start) in start.iter_mut().enumerate() {
             *start = level * self.slopes.down[k];
-            if TURN {
+            if PANORAMA {
                 *start += rise * self.slopes.up[k];
             }
         }
-        Line { anchor: self, grid, start, cos, sin }
+        AnchoredRow { anchor: self, grid, start, cos, sin }
     }
 }
 
 /// Faces to be anchored together: their numbers by lane.
-pub(crate) struct Batch {
+pub(crate) struct AnchorBatch {
     /// By corner and axis.
     corners: [[[f64; LANES]; 3]; 3],
     /// By attribute and corner.
     values: [[[f64; LANES]; 3]; 3],
     /// By attribute: divisor, period and half.
-    folds: [[[f64; LANES]; 3]; 3],
+    wraps: [[[f64; LANES]; 3]; 3],
     /// The direction, and the steps there.
     rays: [[[f64; LANES]; 3]; 3],
     at: [(usize, usize); LANES],
 }
 
-impl Batch {
+impl AnchorBatch {
     pub(crate) fn new() -> Self {
         let zeros = [[[0.0; LANES]; 3]; 3];
-        Self { corners: zeros, values: zeros, folds: zeros, rays: zeros, at: [(0, 0); LANES] }
+        Self { corners: zeros, values: zeros, wraps: zeros, rays: zeros, at: [(0, 0); LANES] }
     }
 
     /// Says what lane `k` is: the corners and the values there, as of [`Attributes::new`], and where it is anchored.
@@ -290,20 +295,20 @@ impl Batch {
         k: usize,
         corners: [glam::Vec3; 3],
         values: [[f64; 3]; 3],
-        folds: [Fold; 3],
-        grid: &Grid,
+        wraps: [TexelWrap; 3],
+        grid: &RayGrid,
         (i, j): (usize, usize),
     ) {
         let [x, y] = grid.steps(i);
         let rays = [grid.rays.at(i as u32, j as u32), x, y];
         for n in 0..3 {
-            let Fold { divisor, period, half } = folds[n];
+            let TexelWrap { divisor, period, half } = wraps[n];
             let fold = [divisor, period, half];
             let (corner, ray) = (corners[n].to_array(), rays[n].to_array());
             for m in 0..3 {
                 self.corners[n][m][k] = f64::from(corner[m]);
                 self.values[n][m][k] = values[n][m];
-                self.folds[n][m][k] = fold[m];
+                self.wraps[n][m][k] = fold[m];
                 self.rays[n][m][k] = ray[m];
             }
         }
@@ -311,15 +316,15 @@ impl Batch {
     }
 
     /// What [`Anchor::set`] makes of each lane; and of each a bound on how fast the first two attributes change: the sum
-    /// of the squares of what a column and a row add to them is nowhere on the face above it, and more than rounding
+    /// of the squares of what a column and a row add to them is nowhere on the face numerator it, and more than rounding
     /// below. Infinite in a panorama.
     #[inline(always)]
-    pub(crate) fn anchors<const TURN: bool>(&self, origin: DVec3) -> ([Anchor; LANES], [f32; LANES]) {
+    pub(crate) fn anchors<const PANORAMA: bool>(&self, origin: DVec3) -> ([Anchor; LANES], [f32; LANES]) {
         let mut fastest = [f32::INFINITY; LANES];
         let mut along = [[0.0f32; LANES]; 4];
         let (mut down, mut up) = (along, along);
         let mut base = [[0.0f32; LANES]; 3];
-        let (mut least, mut most) = (base, base);
+        let (mut min, mut max) = (base, base);
         // One face's arithmetic, written so that the compiler does it for several at once.
         for k in 0..LANES {
             let point = |v: &[[f64; LANES]; 3]| DVec3::new(v[0][k], v[1][k], v[2][k]);
@@ -327,19 +332,19 @@ impl Batch {
             let world = [point(&self.corners[0]), point(&self.corners[1]), point(&self.corners[2])];
             let values = [row(&self.values[0]), row(&self.values[1]), row(&self.values[2])];
             let fold = |n: usize| {
-                let [divisor, period, half] = row(&self.folds[n]);
-                Fold { divisor, period, half }
+                let [divisor, period, half] = row(&self.wraps[n]);
+                TexelWrap { divisor, period, half }
             };
             let [e, x, y] = [point(&self.rays[0]), point(&self.rays[1]), point(&self.rays[2])];
             let attributes = Attributes::new(&Patch::of(world, origin), values);
-            let slopes = Slopes::new::<TURN>(&attributes, [fold(0), fold(1), fold(2)], e, [x, y]);
+            let slopes = Slopes::new::<PANORAMA>(&attributes, [fold(0), fold(1), fold(2)], e, [x, y]);
             for n in 0..4 {
                 (along[n][k], down[n][k], up[n][k]) = (slopes.along[n], slopes.down[n], slopes.up[n]);
             }
             for n in 0..3 {
-                (base[n][k], least[n][k], most[n][k]) = (slopes.base[n], slopes.least[n], slopes.most[n]);
+                (base[n][k], min[n][k], max[n][k]) = (slopes.base[n], slopes.min[n], slopes.max[n]);
             }
-            if !TURN {
+            if !PANORAMA {
                 fastest[k] = attributes.fastest(world, origin, e, [x, y]) as f32;
             }
         }
@@ -352,8 +357,8 @@ impl Batch {
                 down: four(&down),
                 up: four(&up),
                 base: three(&base),
-                least: three(&least),
-                most: three(&most),
+                min: three(&min),
+                max: three(&max),
             };
             let (i, j) = self.at[k];
             anchor.put(slopes, i, j);
@@ -363,9 +368,9 @@ impl Batch {
 }
 
 /// A row of pixels near an anchor.
-pub(crate) struct Line<'a> {
+pub(crate) struct AnchoredRow<'a> {
     anchor: &'a Anchor,
-    grid: &'a Grid,
+    grid: &'a RayGrid,
     /// n and w − 1 in the anchor's column.
     start: [f32; 4],
     /// In a panorama the row's.
@@ -375,7 +380,7 @@ pub(crate) struct Line<'a> {
 
 /// Attributes of eight pixels.
 #[derive(Clone, Copy)]
-pub(crate) struct Seen<F, const N: usize> {
+pub(crate) struct Interpolated<F, const N: usize> {
     pub(crate) values: [F; N],
     /// What a column more adds to each.
     pub(crate) x: [F; N],
@@ -385,15 +390,19 @@ pub(crate) struct Seen<F, const N: usize> {
     pub(crate) doubtful: u32,
 }
 
-impl Line<'_> {
+impl AnchoredRow<'_> {
     /// The first `N` attributes of the eight pixels from column `i` on.
     #[inline(always)]
-    pub(crate) fn at<const TURN: bool, const N: usize, L: Lanes>(&self, lanes: L, i: usize) -> Seen<L::F, N> {
+    pub(crate) fn at<const PANORAMA: bool, const N: usize, L: Lanes>(
+        &self,
+        lanes: L,
+        i: usize,
+    ) -> Interpolated<L::F, N> {
         let l = lanes;
         let Self { anchor, grid, start, cos, sin } = *self;
         let k = (i as i32 - anchor.column + REACH) as usize;
         let s = eight(l, &grid.sines, k);
-        let v = if TURN { eight(l, &grid.versines, k) } else { s };
+        let v = if PANORAMA { eight(l, &grid.versines, k) } else { s };
         let cosine = l.sub(l.splat(1.0), v);
         // Loops and no closures: those would not be compiled for the lanes' instructions.
         let zero = l.splat(0.0);
@@ -403,7 +412,7 @@ impl Line<'_> {
                 continue;
             }
             let Slopes { along, down, up, .. } = &anchor.slopes;
-            if TURN {
+            if PANORAMA {
                 let change = l.sub(l.mul(l.splat(along[n] * cos), s), l.mul(l.splat(down[n] * cos), v));
                 values[n] = l.add(l.splat(start[n]), change);
                 let (level, rise) = (cos * grid.turn, sin * grid.turn);
@@ -419,12 +428,12 @@ impl Line<'_> {
         let w = l.add(l.splat(1.0), values[3]);
         let near = l.greater(w, l.splat(1.0 / DEEP)) & l.greater(l.splat(DEEP), w);
         let scale = l.div(l.splat(1.0), w);
-        let mut seen = Seen { values: [zero; N], x: [zero; N], y: [zero; N], doubtful: !near & 0xFF };
+        let mut seen = Interpolated { values: [zero; N], x: [zero; N], y: [zero; N], doubtful: !near & 0xFF };
         for n in 0..N {
             let offset = l.mul(values[n], scale);
             let value = l.add(l.splat(anchor.slopes.base[n]), offset);
             seen.values[n] =
-                l.min(l.max(value, l.splat(anchor.slopes.least[n])), l.splat(anchor.slopes.most[n]));
+                l.min(l.max(value, l.splat(anchor.slopes.min[n])), l.splat(anchor.slopes.max[n]));
             seen.x[n] = l.mul(l.sub(by_column[n], l.mul(offset, by_column[3])), scale);
             seen.y[n] = l.mul(l.sub(by_row[n], l.mul(offset, by_row[3])), scale);
         }
@@ -440,7 +449,7 @@ mod tests {
     use s3d_geom::{Pose, TriMesh};
 
     /// What eight pixels get, and what is exact in `f64`: values, change by column and by row.
-    fn check<const TURN: bool>(
+    fn check<const PANORAMA: bool>(
         camera: &Camera,
         corners: [[f32; 3]; 3],
         values: [[f64; 3]; 3],
@@ -453,17 +462,18 @@ mod tests {
         let mut attributes = Attributes::new(&patch, values);
         // No bounds: the plane is tested beyond the triangle, too.
         attributes.bounds = [(-1e9, 1e9); 3];
-        let (grid, mut anchor) = (Grid::new(camera), Anchor::default());
-        if !anchor.set::<TURN>(&attributes, [Fold::NOT; 3], &grid, at[0], at[1])
+        let (grid, mut anchor) = (RayGrid::new(camera), Anchor::default());
+        if !anchor.set::<PANORAMA>(&attributes, [TexelWrap::NONE; 3], &grid, at[0], at[1])
             || !anchor.reaches(to[0], to[1])
         {
             return;
         }
         let exact = |x: f64, y: f64, n: usize| {
             let d = camera.direction(x + 0.5, y + 0.5);
-            attributes.above[n].dot(d) / attributes.whole.dot(d)
+            attributes.numerator[n].dot(d) / attributes.denominator.dot(d)
         };
-        let seen: Seen<_, 3> = anchor.line::<TURN>(&grid, to[1]).at::<TURN, 3, _>(Plain, to[0]);
+        let seen: Interpolated<_, 3> =
+            anchor.line::<PANORAMA>(&grid, to[1]).at::<PANORAMA, 3, _>(Plain, to[0]);
         for k in 0..LANES {
             let (x, y) = ((to[0] + k) as f64, to[1] as f64);
             if seen.doubtful >> k & 1 == 1 || to[0] + k >= camera.width as usize {
@@ -512,10 +522,10 @@ mod tests {
             let steps = [DVec3::new(0.01, 0.0, 0.0), DVec3::new(0.0, 0.01, 0.0)];
             let fastest = attributes.fastest(world, origin, ray(p, q), steps);
             let (d, mut sum) = (ray(r, t), 0.0);
-            let scale = attributes.whole.dot(d).recip();
-            for above in &attributes.above[..2] {
+            let scale = attributes.denominator.dot(d).recip();
+            for numerator in &attributes.numerator[..2] {
                 for step in steps {
-                    let change = above.dot(step) - above.dot(d) * scale * attributes.whole.dot(step);
+                    let change = numerator.dot(step) - numerator.dot(d) * scale * attributes.denominator.dot(step);
                     sum += (change * scale) * (change * scale);
                 }
             }
@@ -530,10 +540,10 @@ mod tests {
         ) {
             let pose = Pose::level(DVec3::new(0.3, -0.2, 0.1), 0.4);
             let camera = if turn { Camera::equirectangular(pose, 64) } else { Camera::perspective(pose, 1.2, 64, 32) };
-            let (grid, mut batch) = (Grid::new(&camera), Batch::new());
-            let folds = [Fold::NOT, Fold::repeat(period), Fold::mirror(period)];
+            let (grid, mut batch) = (RayGrid::new(&camera), AnchorBatch::new());
+            let wraps = [TexelWrap::NONE, TexelWrap::repeat(period), TexelWrap::mirror(period)];
             for (k, corners) in corners.iter().enumerate() {
-                batch.put(k, corners.map(glam::Vec3::from), values, folds, &grid, (7 * k, 3 * k));
+                batch.put(k, corners.map(glam::Vec3::from), values, wraps, &grid, (7 * k, 3 * k));
             }
             let (together, _) = if turn { batch.anchors::<true>(pose.location) } else { batch.anchors::<false>(pose.location) };
             for (k, corners) in corners.iter().enumerate() {
@@ -541,9 +551,9 @@ mod tests {
                 let attributes = Attributes::new(&Patch::of(world, pose.location), values);
                 let mut alone = Anchor::default();
                 if turn {
-                    alone.set::<true>(&attributes, folds, &grid, 7 * k, 3 * k);
+                    alone.set::<true>(&attributes, wraps, &grid, 7 * k, 3 * k);
                 } else {
-                    alone.set::<false>(&attributes, folds, &grid, 7 * k, 3 * k);
+                    alone.set::<false>(&attributes, wraps, &grid, 7 * k, 3 * k);
                 }
                 prop_assert_eq!(format!("{alone:?}"), format!("{:?}", together[k]));
             }
@@ -563,10 +573,10 @@ mod tests {
 
         #[test]
         fn folds_bring_a_value_into_the_first_period(value in -1e6..1e6f64, period in 1.0..5000.0f64) {
-            let (sign, shift) = Fold::repeat(period).of(value);
+            let (sign, shift) = TexelWrap::repeat(period).sign_and_shift(value);
             prop_assert!(sign == 1.0 && (-1e-6..=period).contains(&(value + shift)));
             prop_assert!((shift / period - (shift / period).round()).abs() < 1e-9);
-            let (sign, shift) = Fold::mirror(period).of(value);
+            let (sign, shift) = TexelWrap::mirror(period).sign_and_shift(value);
             prop_assert!((-1e-6..=period).contains(&(sign * value + shift)), "{}", sign * value + shift);
             // The same place of a texture that is mirrored at every period.
             prop_assert!((shift / (2.0 * period) - (shift / (2.0 * period)).round()).abs() < 1e-9);

@@ -5,9 +5,9 @@
 
 use crate::hits::{Hits, NO_FACE};
 use crate::scene::Scene;
-use crate::shade::flat_painter::Stamps;
+use crate::shade::flat_painter::FlatPainter;
 use crate::shade::patch::{FaceCache, Patch};
-use crate::shade::spans::{Runs, band_rows};
+use crate::shade::spans::{Spans, band_rows};
 use crate::simd::lanes::{self, LANES, LaneWork, Lanes};
 use glam::{DMat3, DVec3, Vec3};
 use s3d_geom::{Camera, NormalAxes, Raster, TriMesh};
@@ -40,7 +40,7 @@ pub fn depth_image(hits: &Hits) -> Raster<u16> {
 /// As [`depth_image`], into an image that is used again.
 pub fn depth_image_into(hits: &Hits, out: &mut Raster<u16>) {
     fit(out, &hits.depth, 0);
-    lanes::run(Depths { depths: hits.depth.pixels(), out: out.pixels_mut() });
+    lanes::run(DepthKernel { depths: hits.depth.pixels(), out: out.pixels_mut() });
 }
 
 /// As [`depth_image_into`], in millimetres: [`MISSING_DEPTH`] where nothing is seen and beyond 65.534 m.
@@ -52,12 +52,12 @@ pub fn depth_image_mm_into(hits: &Hits, out: &mut Raster<u16>) {
     }
 }
 
-struct Depths<'a> {
+struct DepthKernel<'a> {
     depths: &'a [f32],
     out: &'a mut [u16],
 }
 
-impl LaneWork for Depths<'_> {
+impl LaneWork for DepthKernel<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -66,7 +66,7 @@ impl LaneWork for Depths<'_> {
     }
 }
 
-/// Depths in 512ths of a metre.
+/// DepthKernel in 512ths of a metre.
 #[inline(always)]
 pub(crate) fn depths(lanes: impl Lanes, depths: &[f32], out: &mut [u16]) {
     let (eights, rest) = depths.as_chunks::<LANES>();
@@ -209,9 +209,9 @@ fn shifted(n: DVec3) -> DVec3 {
 ///
 /// # Panics
 /// If there is not an index for each face that is seen, or one does not fit into 24 bits.
-pub fn index_image(hits: &Hits, per_face: &[u32]) -> Raster<[u8; 3]> {
+pub fn index_image(hits: &Hits, index_of_face: &[u32]) -> Raster<[u8; 3]> {
     let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
-    index_image_into(hits, per_face, &mut out);
+    index_image_into(hits, index_of_face, &mut out);
     out
 }
 
@@ -219,13 +219,13 @@ pub fn index_image(hits: &Hits, per_face: &[u32]) -> Raster<[u8; 3]> {
 ///
 /// # Panics
 /// As [`index_image`].
-pub fn index_image_into(hits: &Hits, per_face: &[u32], out: &mut Raster<[u8; 3]>) {
-    by_face(None, hits, MISSING_INDEX, out, |faces| faces.map(|face| index_color(per_face, face)));
+pub fn index_image_into(hits: &Hits, index_of_face: &[u32], out: &mut Raster<[u8; 3]>) {
+    by_face(None, hits, MISSING_INDEX, out, |faces| faces.map(|face| index_color(index_of_face, face)));
 }
 
 #[inline(always)]
-pub(crate) fn index_color(per_face: &[u32], face: u32) -> [u8; 3] {
-    let index = per_face[face as usize];
+pub(crate) fn index_color(index_of_face: &[u32], face: u32) -> [u8; 3] {
+    let index = index_of_face[face as usize];
     let [high, r, g, b] = index.to_be_bytes();
     assert!(high == 0, "the index {index} of face {face} does not fit into 24 bits");
     [r, g, b]
@@ -235,9 +235,9 @@ pub(crate) fn index_color(per_face: &[u32], face: u32) -> [u8; 3] {
 ///
 /// # Panics
 /// If there is not a colour for each face that is seen.
-pub fn color_per_face_image(hits: &Hits, per_face_colors: &[[u8; 3]]) -> Raster<[u8; 3]> {
+pub fn color_per_face_image(hits: &Hits, color_of_face: &[[u8; 3]]) -> Raster<[u8; 3]> {
     let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
-    color_per_face_image_into(hits, per_face_colors, &mut out);
+    color_per_face_image_into(hits, color_of_face, &mut out);
     out
 }
 
@@ -245,8 +245,8 @@ pub fn color_per_face_image(hits: &Hits, per_face_colors: &[[u8; 3]]) -> Raster<
 ///
 /// # Panics
 /// As [`color_per_face_image`].
-pub fn color_per_face_image_into(hits: &Hits, per_face_colors: &[[u8; 3]], out: &mut Raster<[u8; 3]>) {
-    by_face(None, hits, [0; 3], out, |faces| faces.map(|face| per_face_colors[face as usize]));
+pub fn color_per_face_image_into(hits: &Hits, color_of_face: &[[u8; 3]], out: &mut Raster<[u8; 3]>) {
+    by_face(None, hits, [0; 3], out, |faces| faces.map(|face| color_of_face[face as usize]));
 }
 
 /// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.
@@ -265,30 +265,35 @@ fn by_face(
 ) {
     fit(out, &hits.face, [0; 3]);
     let values = |faces: &[u32; LANES]| values(faces).map(|value| [value]);
-    lanes::run(ByFace { mesh: scene.map(Scene::mesh), hits, stamps: Stamps::new([missing], values), out });
+    lanes::run(ByFaceKernel {
+        mesh: scene.map(Scene::mesh),
+        hits,
+        flat: FlatPainter::new([missing], values),
+        out,
+    });
 }
 
-struct ByFace<'a, V> {
+struct ByFaceKernel<'a, V> {
     /// What values look at.
     mesh: Option<&'a TriMesh>,
     hits: &'a Hits,
-    stamps: Stamps<V, 1>,
+    flat: FlatPainter<V, 1>,
     out: &'a mut Raster<[u8; 3]>,
 }
 
-impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> LaneWork for ByFace<'_, V> {
+impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> LaneWork for ByFaceKernel<'_, V> {
     type Output = ();
 
     #[inline(always)]
     fn run(self, lanes: impl Lanes) {
-        let Self { mesh, hits, mut stamps, out } = self;
+        let Self { mesh, hits, mut flat, out } = self;
         let width = hits.face.width() as usize;
-        let (mut runs, band) = (Runs::new(width), (band_rows(width) * width).max(1));
+        let (mut spans, band) = (Spans::new(width), (band_rows(width) * width).max(1));
         for (faces, out) in hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band)) {
-            if runs.find(lanes, mesh, faces) {
-                stamps.forget();
+            if spans.find(lanes, mesh, faces) {
+                flat.forget();
             }
-            stamps.band(lanes, mesh, &runs, [out]);
+            flat.band(lanes, mesh, &spans, [out]);
         }
     }
 }

@@ -1,23 +1,23 @@
 //! The RGB image.
 //!
 //! Faces that a band of rows is the first to show are prepared eight at a time. Then each row is coloured in two passes. The
-//! first walks its runs of equal faces: [`crate::shade::anchor`] gives the texture coordinates of eight pixels at a time and their
-//! change from pixel to pixel, hence each pixel's footprint. The second walks the row regardless of runs and fetches the
+//! first walks its spans of equal faces: [`crate::shade::anchor`] gives the texture coordinates of eight pixels at a time and their
+//! change from pixel to pixel, hence each pixel's footprint. The second walks the row regardless of spans and fetches the
 //! textures, again eight pixels at a time ([`crate::shade::filter`]). What a pixel gets depends on no other pixel but through
 //! the anchor, whose rounding it takes over.
 
 use crate::hits::Hits;
 use crate::scene::Scene;
-use crate::shade::anchor::{Anchor, Attributes, Batch, Grid};
+use crate::shade::anchor::{Anchor, AnchorBatch, Attributes, RayGrid};
 use crate::shade::channels::{assert_size, fit, paint};
-use crate::shade::face_table::New;
-use crate::shade::filter::{Footprints, Sizes};
-use crate::shade::mip_maps::{Pyramids, TextureFilter};
+use crate::shade::face_table::NewFace;
+use crate::shade::filter::{Footprints, MipLevels};
+use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::shade::patch::{FaceCache, Patch};
 use crate::shade::pixel_color::PixelByPixel;
-use crate::shade::prefetch::Ahead;
-use crate::shade::spans::{Runs, band_rows};
-use crate::shade::wrap_mode::Fold;
+use crate::shade::prefetch::Prefetch;
+use crate::shade::spans::{Spans, band_rows};
+use crate::shade::texel_wrap::TexelWrap;
 use crate::simd::lanes::{self, LANES, LaneWork, Lanes};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, Raster};
@@ -29,9 +29,9 @@ use std::ops::Range;
 /// Near the seam of a texture atlas the footprint takes in what lies beside the seam, as with any mipmap.
 ///
 /// # Panics
-/// If the hits are not of the camera's size, or `pyramids` are another mesh's.
-pub fn rgb_image(scene: &Scene<'_>, pyramids: &Pyramids, hits: &Hits, camera: &Camera) -> Raster<[u8; 3]> {
-    rgb_image_with(scene, pyramids, hits, camera, &TextureFilter::default())
+/// If the hits are not of the camera's size, or `mip_maps` are another mesh's.
+pub fn rgb_image(scene: &Scene<'_>, mip_maps: &MipMaps, hits: &Hits, camera: &Camera) -> Raster<[u8; 3]> {
+    rgb_image_with(scene, mip_maps, hits, camera, &TextureFilter::default())
 }
 
 /// As [`rgb_image`], with a filter of choice.
@@ -40,13 +40,13 @@ pub fn rgb_image(scene: &Scene<'_>, pyramids: &Pyramids, hits: &Hits, camera: &C
 /// As [`rgb_image`].
 pub fn rgb_image_with(
     scene: &Scene<'_>,
-    pyramids: &Pyramids,
+    mip_maps: &MipMaps,
     hits: &Hits,
     camera: &Camera,
     filter: &TextureFilter,
 ) -> Raster<[u8; 3]> {
     let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
-    rgb_image_into(scene, pyramids, hits, camera, filter, &mut out);
+    rgb_image_into(scene, mip_maps, hits, camera, filter, &mut out);
     out
 }
 
@@ -56,7 +56,7 @@ pub fn rgb_image_with(
 /// As [`rgb_image`].
 pub fn rgb_image_into(
     scene: &Scene<'_>,
-    pyramids: &Pyramids,
+    mip_maps: &MipMaps,
     hits: &Hits,
     camera: &Camera,
     filter: &TextureFilter,
@@ -64,37 +64,37 @@ pub fn rgb_image_into(
 ) {
     assert_size(hits, camera);
     fit(out, &hits.face, [0; 3]);
-    lanes::run(Rgb { scene, pyramids, hits, camera, filter, out });
+    lanes::run(RgbKernel { scene, mip_maps, hits, camera, filter, out });
 }
 
-struct Rgb<'a> {
+struct RgbKernel<'a> {
     scene: &'a Scene<'a>,
-    pyramids: &'a Pyramids,
+    mip_maps: &'a MipMaps,
     hits: &'a Hits,
     camera: &'a Camera,
     filter: &'a TextureFilter,
     out: &'a mut Raster<[u8; 3]>,
 }
 
-impl LaneWork for Rgb<'_> {
+impl LaneWork for RgbKernel<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self, lanes: impl Lanes) {
-        let Self { scene, pyramids, hits, camera, filter, out } = self;
-        let grid = Grid::new(camera);
-        let mut painter = Painter::new(lanes, scene, pyramids, camera, filter);
+        let Self { scene, mip_maps, hits, camera, filter, out } = self;
+        let grid = RayGrid::new(camera);
+        let mut painter = RgbPainter::new(lanes, scene, mip_maps, camera, filter);
         let width = hits.face.width() as usize;
-        let (mut runs, band) = (Runs::new(width), (band_rows(width) * width).max(1));
+        let (mut spans, band) = (Spans::new(width), (band_rows(width) * width).max(1));
         let parts = hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band));
         for (k, (faces, out)) in parts.enumerate() {
-            if runs.find(lanes, Some(scene.mesh()), faces) {
+            if spans.find(lanes, Some(scene.mesh()), faces) {
                 painter.forget();
             }
-            if grid.is_turn() {
-                painter.band::<true>(&grid, &runs, k * band_rows(width), faces, out, &Ahead::default());
+            if grid.is_panorama() {
+                painter.band::<true>(&grid, &spans, k * band_rows(width), faces, out, &Prefetch::default());
             } else {
-                painter.band::<false>(&grid, &runs, k * band_rows(width), faces, out, &Ahead::default());
+                painter.band::<false>(&grid, &spans, k * band_rows(width), faces, out, &Prefetch::default());
             }
         }
     }
@@ -102,56 +102,56 @@ impl LaneWork for Rgb<'_> {
 
 /// Where a face has its colour from.
 #[derive(Clone, Copy)]
-enum Look {
+enum ColorSource {
     /// A tag.
     Texture(u32),
     Corners,
     Flat([u8; 3]),
     /// From [`PixelByPixel`] alone.
-    Singly,
+    PerPixel,
 }
 
 /// The attributes of a face's colour: what they are, their values at its corners, and how they repeat.
-type Colored = (Look, [[f64; 3]; 3], [Fold; 3]);
+type FaceColors = (ColorSource, [[f64; 3]; 3], [TexelWrap; 3]);
 
 #[inline(always)]
-fn colored(scene: &Scene<'_>, sizes: &[Sizes<'_>], face: u32) -> Colored {
-    let folds = [Fold::NOT; 3];
+fn colored(scene: &Scene<'_>, levels: &[MipLevels<'_>], face: u32) -> FaceColors {
+    let wraps = [TexelWrap::NONE; 3];
     match scene.mesh().color_of(face) {
         FaceColor::Texture(index, texture, uvs) => {
-            let sizes = &sizes[index as usize];
+            let levels = &levels[index as usize];
             let [w, h] = [texture.image.width(), texture.image.height()].map(f64::from);
             // In pixels of the full size, to the right and downwards.
             let x = uvs.map(|uv| f64::from(uv.x) * w);
             let y = uvs.map(|uv| (1.0 - f64::from(uv.y)) * h);
-            let look = if sizes.is_usable() { Look::Texture(index) } else { Look::Singly };
-            (look, [x, y, [0.0; 3]], sizes.folds())
+            let source = if levels.is_usable() { ColorSource::Texture(index) } else { ColorSource::PerPixel };
+            (source, [x, y, [0.0; 3]], levels.wraps())
         }
         FaceColor::Corners(colors) => {
             let channel = |k: usize| colors.map(|c| f64::from(c[k]));
-            (Look::Corners, [channel(0), channel(1), channel(2)], folds)
+            (ColorSource::Corners, [channel(0), channel(1), channel(2)], wraps)
         }
-        FaceColor::Flat([0, 0, 0]) => (Look::Flat([1; 3]), [[0.0; 3]; 3], folds),
-        FaceColor::Flat(color) => (Look::Flat(color), [[0.0; 3]; 3], folds),
+        FaceColor::Flat([0, 0, 0]) => (ColorSource::Flat([1; 3]), [[0.0; 3]; 3], wraps),
+        FaceColor::Flat(color) => (ColorSource::Flat(color), [[0.0; 3]; 3], wraps),
     }
 }
 
 /// A face, prepared.
 struct Prepared {
-    look: Look,
+    source: ColorSource,
     anchor: Anchor,
 }
 
 impl Prepared {
     /// What is missing is black.
     fn missing() -> Self {
-        Self { look: Look::Flat([0; 3]), anchor: Anchor::default() }
+        Self { source: ColorSource::Flat([0; 3]), anchor: Anchor::default() }
     }
 }
 
-/// A row between its two passes. Values are stored eight at a time, beyond the end of their run: the next run's go over
+/// A row between its two passes. Values are stored eight at a time, beyond the end of their span: the next span's go over
 /// them.
-struct Row {
+struct RowBuffer {
     width: usize,
     footprints: Footprints,
     /// By pixel: a texture, perhaps with [`NARROW`]; or [`DONE`].
@@ -163,7 +163,7 @@ const DONE: u32 = u32::MAX;
 /// Footprints are nowhere wider than a pixel of the texture.
 const NARROW: u32 = 1 << 31;
 
-impl Row {
+impl RowBuffer {
     fn new(width: usize) -> Self {
         let padded = width + 2 * LANES;
         Self { width, footprints: Footprints::new(padded), tags: vec![DONE; padded] }
@@ -171,41 +171,41 @@ impl Row {
 }
 
 /// Colours a view band by band.
-pub(crate) struct Painter<'a, L> {
+pub(crate) struct RgbPainter<'a, L> {
     lanes: L,
     scene: &'a Scene<'a>,
     /// By texture.
-    sizes: Vec<Sizes<'a>>,
+    levels: Vec<MipLevels<'a>>,
     origin: DVec3,
     max_taps: u32,
-    batch: Batch,
-    /// By the face's number in the [`Runs`].
+    batch: AnchorBatch,
+    /// By the face's number in the [`Spans`].
     prepared: Vec<Prepared>,
     /// Of faces that need one anchor after another.
     large: FaceCache<Attributes>,
     singly: PixelByPixel<'a>,
-    row: Row,
+    row: RowBuffer,
 }
 
-impl<'a, L: Lanes> Painter<'a, L> {
+impl<'a, L: Lanes> RgbPainter<'a, L> {
     pub(crate) fn new(
         lanes: L,
         scene: &'a Scene<'a>,
-        pyramids: &'a Pyramids,
+        mip_maps: &'a MipMaps,
         camera: &'a Camera,
         filter: &'a TextureFilter,
     ) -> Self {
         Self {
             lanes,
             scene,
-            sizes: scene.mesh().textures().iter().enumerate().map(|(k, t)| pyramids.sizes(k, t)).collect(),
+            levels: scene.mesh().textures().iter().enumerate().map(|(k, t)| mip_maps.levels(k, t)).collect(),
             origin: camera.pose.location,
             max_taps: filter.max_taps,
-            batch: Batch::new(),
+            batch: AnchorBatch::new(),
             prepared: vec![Prepared::missing()],
             large: FaceCache::new(),
-            singly: PixelByPixel::new(scene, pyramids, camera, filter),
-            row: Row::new(camera.width as usize),
+            singly: PixelByPixel::new(scene, mip_maps, camera, filter),
+            row: RowBuffer::new(camera.width as usize),
         }
     }
 
@@ -216,90 +216,90 @@ impl<'a, L: Lanes> Painter<'a, L> {
 
     /// Colours the band from row `first_row` on, which sees `faces`.
     #[inline(always)]
-    pub(crate) fn band<const TURN: bool>(
+    pub(crate) fn band<const PANORAMA: bool>(
         &mut self,
-        grid: &Grid,
-        runs: &Runs,
+        grid: &RayGrid,
+        spans: &Spans,
         first_row: usize,
         faces: &[u32],
         out: &mut [[u8; 3]],
-        ahead: &Ahead<'_>,
+        prefetch: &Prefetch<'_>,
     ) {
         let width = self.row.width;
-        for k in 0..runs.new_groups() {
-            let (group, count) = runs.new_group::<true>(self.lanes, Some(self.scene.mesh()), k);
-            self.prepare::<TURN>(grid, first_row, &group, count);
+        for k in 0..spans.new_groups() {
+            let (group, count) = spans.new_group::<true>(self.lanes, Some(self.scene.mesh()), k);
+            self.prepare::<PANORAMA>(grid, first_row, &group, count);
         }
         let (mut j, mut from) = (0, 0);
-        for pieces in runs.pieces().windows(2) {
+        for pieces in spans.pieces().windows(2) {
             let (start, end) = (pieces[0].start as usize, pieces[1].start as usize);
             if start == from + width {
-                self.fetch(&mut out[from..start], from, ahead);
+                self.fetch(&mut out[from..start], from, prefetch);
                 (j, from) = (j + 1, start);
             }
             let row = &mut out[from..from + width];
             let columns = start - from..end - from;
-            self.lay_out::<TURN>(grid, faces[start], pieces[0].number, first_row + j, columns, row);
+            self.lay_out::<PANORAMA>(grid, faces[start], pieces[0].number, first_row + j, columns, row);
         }
-        self.fetch(&mut out[from..], from, ahead);
+        self.fetch(&mut out[from..], from, prefetch);
     }
 
     /// Prepares the first `count` of some faces that the band from row `first_row` on is the first to show.
     #[inline(always)]
-    fn prepare<const TURN: bool>(
+    fn prepare<const PANORAMA: bool>(
         &mut self,
-        grid: &Grid,
+        grid: &RayGrid,
         first_row: usize,
-        faces: &[New; LANES],
+        faces: &[NewFace; LANES],
         count: usize,
     ) {
-        let mut looks = [Look::Singly; LANES];
-        for (k, &New { face, at }) in faces.iter().enumerate() {
-            let (look, values, folds) = colored(self.scene, &self.sizes, face);
-            looks[k] = look;
+        let mut sources = [ColorSource::PerPixel; LANES];
+        for (k, &NewFace { face, at }) in faces.iter().enumerate() {
+            let (source, values, wraps) = colored(self.scene, &self.levels, face);
+            sources[k] = source;
             let at = (at as usize % self.row.width, first_row + at as usize / self.row.width);
-            self.batch.put(k, self.scene.mesh().triangle(face), values, folds, grid, at);
+            self.batch.put(k, self.scene.mesh().triangle(face), values, wraps, grid, at);
         }
-        let (anchors, fastest) = self.batch.anchors::<TURN>(self.origin);
+        let (anchors, fastest) = self.batch.anchors::<PANORAMA>(self.origin);
         for k in 0..count {
-            let look = match looks[k] {
+            let source = match sources[k] {
                 // A footprint is wide where the sum is above 1.
-                Look::Texture(texture) if fastest[k] < 0.999 => Look::Texture(texture | NARROW),
-                look => look,
+                ColorSource::Texture(texture) if fastest[k] < 0.999 => ColorSource::Texture(texture | NARROW),
+                source => source,
             };
-            self.prepared.push(Prepared { look, anchor: anchors[k] });
+            self.prepared.push(Prepared { source, anchor: anchors[k] });
         }
     }
 
     /// Anchors a face once more, at pixel (i, j).
     #[inline(never)]
-    fn anchor_again<const TURN: bool>(
+    fn anchor_again<const PANORAMA: bool>(
         &mut self,
-        grid: &Grid,
+        grid: &RayGrid,
         face: u32,
         number: u32,
         i: usize,
         j: usize,
     ) -> bool {
-        let Self { scene, sizes, origin, large, prepared, .. } = self;
-        let Prepared { look, anchor } = &mut prepared[number as usize];
-        let folds = match look {
-            Look::Texture(tag) => sizes[(*tag & !NARROW) as usize].folds(),
-            Look::Corners => [Fold::NOT; 3],
-            Look::Flat(_) | Look::Singly => return false,
+        let Self { scene, levels, origin, large, prepared, .. } = self;
+        let Prepared { source, anchor } = &mut prepared[number as usize];
+        let wraps = match source {
+            ColorSource::Texture(tag) => levels[(*tag & !NARROW) as usize].wraps(),
+            ColorSource::Corners => [TexelWrap::NONE; 3],
+            ColorSource::Flat(_) | ColorSource::PerPixel => return false,
         };
         let attributes = large.get(face, || {
-            let (_, values, _) = colored(scene, sizes, face);
+            let (_, values, _) = colored(scene, levels, face);
             Attributes::new(&Patch::new(scene.mesh(), face, *origin), values)
         });
-        anchor.set::<TURN>(attributes, folds, grid, i, j)
+        anchor.set::<PANORAMA>(attributes, wraps, grid, i, j)
     }
 
     /// The first pass over the pixels `start` to `end` of row `j`, [`LANES`] at most, which all see `face`.
     #[inline(always)]
-    fn lay_out<const TURN: bool>(
+    fn lay_out<const PANORAMA: bool>(
         &mut self,
-        grid: &Grid,
+        grid: &RayGrid,
         face: u32,
         number: u32,
         j: usize,
@@ -307,15 +307,15 @@ impl<'a, L: Lanes> Painter<'a, L> {
         out: &mut [[u8; 3]],
     ) {
         let lanes = self.lanes;
-        let Prepared { look, anchor } = &self.prepared[number as usize];
-        let look = *look;
-        if let Look::Flat(color) = look {
+        let Prepared { source, anchor } = &self.prepared[number as usize];
+        let source = *source;
+        if let ColorSource::Flat(color) = source {
             self.row.tags[start..end].fill(DONE);
             return paint(out, start, end, color);
         }
         let mut anchor = anchor;
         if !anchor.reaches(start, j) {
-            if !self.anchor_again::<TURN>(grid, face, number, start, j) {
+            if !self.anchor_again::<PANORAMA>(grid, face, number, start, j) {
                 self.row.tags[start..end].fill(DONE);
                 for (i, color) in (start..).zip(&mut out[start..end]) {
                     *color = self.singly.color(face, i, j);
@@ -324,18 +324,18 @@ impl<'a, L: Lanes> Painter<'a, L> {
             }
             anchor = &self.prepared[number as usize].anchor;
         }
-        let line = anchor.line::<TURN>(grid, j);
+        let line = anchor.line::<PANORAMA>(grid, j);
         let row = &mut self.row;
         let mut doubtful;
-        if let Look::Texture(tag) = look {
-            let seen = line.at::<TURN, 2, L>(lanes, start);
+        if let ColorSource::Texture(tag) = source {
+            let seen = line.at::<PANORAMA, 2, L>(lanes, start);
             doubtful = seen.doubtful;
             row.footprints.store(lanes, start, &seen, tag & NARROW != 0);
             if let Some(tags) = row.tags[start..].first_chunk_mut() {
                 *tags = [tag; LANES];
             }
         } else {
-            let seen = line.at::<TURN, 3, L>(lanes, start);
+            let seen = line.at::<PANORAMA, 3, L>(lanes, start);
             doubtful = seen.doubtful;
             let mut channels = [[0; LANES]; 3];
             for (value, channel) in seen.values.into_iter().zip(&mut channels) {
@@ -358,13 +358,13 @@ impl<'a, L: Lanes> Painter<'a, L> {
 
     /// The second pass.
     #[inline(always)]
-    fn fetch(&mut self, out: &mut [[u8; 3]], from: usize, ahead: &Ahead<'_>) {
+    fn fetch(&mut self, out: &mut [[u8; 3]], from: usize, prefetch: &Prefetch<'_>) {
         let width = out.len();
-        let Self { lanes, sizes, row, max_taps, .. } = self;
+        let Self { lanes, levels, row, max_taps, .. } = self;
         row.tags[width..].fill(DONE);
         for i in (0..width).step_by(LANES) {
-            if i.is_multiple_of(Ahead::PIXELS) {
-                ahead.expect(*lanes, from + i);
+            if i.is_multiple_of(Prefetch::PIXELS) {
+                prefetch.fetch(*lanes, from + i);
             }
             let Some(tags) = row.tags[i..].first_chunk::<LANES>() else { return };
             // Mostly one texture, once; the others' pixels are left alone.
@@ -375,7 +375,7 @@ impl<'a, L: Lanes> Painter<'a, L> {
                 let maybe = if narrow == 0xFF { 0 } else { lanes.equal(tags, texture) };
                 let these = narrow | maybe;
                 let pixels = (these, maybe);
-                let colors = sizes[texture as usize].colors(*lanes, &row.footprints, i, pixels, *max_taps);
+                let colors = levels[texture as usize].colors(*lanes, &row.footprints, i, pixels, *max_taps);
                 let to = out[i..].as_flattened_mut().first_chunk_mut();
                 if let (0xFF, Some(to)) = (these, to) {
                     lanes.store_pixels(&colors, to);
@@ -409,7 +409,7 @@ mod tests {
     #[test]
     fn every_set_of_instructions_gives_the_same_bytes() {
         let mesh = scan_like(6_000, 3);
-        let (scene, pyramids) = (Scene::new(&mesh), Pyramids::new(&mesh));
+        let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
         let pose = Pose::level(glam::dvec3(3.0, 2.5, 1.5), 0.3);
         for camera in [
             Camera::perspective(pose.turned(0.3, -0.4), 1.2, 301, 203),
@@ -419,11 +419,11 @@ mod tests {
         ] {
             let hits = crate::cast(&scene, &camera);
             let filter = TextureFilter::default();
-            let fast = rgb_image_with(&scene, &pyramids, &hits, &camera, &filter);
+            let fast = rgb_image_with(&scene, &mip_maps, &hits, &camera, &filter);
             let mut plain = Raster::filled(camera.width, camera.height, [0; 3]);
-            let work = Rgb {
+            let work = RgbKernel {
                 scene: &scene,
-                pyramids: &pyramids,
+                mip_maps: &mip_maps,
                 hits: &hits,
                 camera: &camera,
                 filter: &filter,

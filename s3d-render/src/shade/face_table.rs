@@ -1,6 +1,6 @@
 //! Numbers for the faces that an image shows, row after row, so that what is prepared for a face is found again.
 //!
-//! A row's (or a block's) runs of pixels get their numbers first, and the faces that are new are listed: these can be
+//! A row's (or a block's) spans of pixels get their numbers first, and the faces that are new are listed: these can be
 //! prepared many at a time, which takes a fraction of what it takes one by one.
 
 use crate::hits::NO_FACE;
@@ -18,7 +18,7 @@ pub(crate) struct FaceTable {
 
 /// A face that is new.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct New {
+pub(crate) struct NewFace {
     pub(crate) face: u32,
     /// The first pixel that sees it.
     pub(crate) at: u32,
@@ -33,7 +33,7 @@ impl FaceTable {
         Self { places: vec![(NO_FACE, 0); Self::PLACES], count: 1, most: Self::PLACES + longest }
     }
 
-    /// Looks up the faces of a block's runs, which begin at `starts`: in `numbers` their numbers, in `new` those that had
+    /// Looks up the faces of a block's spans, which begin at `starts`: in `numbers` their numbers, in `new` those that had
     /// none and get the next ones. Whether all earlier numbers are forgotten. What `mesh`, if any, has of new faces
     /// themselves is fetched from memory.
     #[inline(always)]
@@ -44,7 +44,7 @@ impl FaceTable {
         faces: &[u32],
         starts: &[u32],
         numbers: &mut Vec<u32>,
-        new: &mut Vec<New>,
+        new: &mut Vec<NewFace>,
     ) -> bool {
         let forget = self.count + starts.len() > self.most;
         if forget {
@@ -64,9 +64,9 @@ impl FaceTable {
                     number = self.count as u32;
                     *place = (face, number);
                     self.count += 1;
-                    new.push(New { face, at });
+                    new.push(NewFace { face, at });
                     if let Some(mesh) = mesh {
-                        expect_face(lanes, mesh, face as usize);
+                        prefetch_face(lanes, mesh, face as usize);
                     }
                 }
             }
@@ -76,20 +76,20 @@ impl FaceTable {
     }
 }
 
-impl New {
+impl NewFace {
     /// Fetches what of a mesh is read to prepare these faces, besides what [`FaceTable::number`] has fetched: all at once,
     /// it comes many times as fast.
     #[inline(always)]
-    pub(crate) fn expect<const COLORS: bool>(new: &[Self], lanes: impl Lanes, mesh: &TriMesh) {
+    pub(crate) fn prefetch<const COLORS: bool>(new: &[Self], lanes: impl Lanes, mesh: &TriMesh) {
         let p = mesh.parts();
         for &Self { face, .. } in new {
             for vertex in p.faces[face as usize] {
-                lanes.expect(&p.positions[vertex as usize]);
+                lanes.prefetch(&p.positions[vertex as usize]);
             }
             if COLORS && let Some(corners) = p.face_uvs.get(face as usize) {
                 for &corner in corners {
                     if let Some(uv) = p.uvs.get(corner as usize) {
-                        lanes.expect(uv);
+                        lanes.prefetch(uv);
                     }
                 }
             }
@@ -99,14 +99,14 @@ impl New {
 
 /// Fetches what leads to a face's corners.
 #[inline(always)]
-fn expect_face(lanes: impl Lanes, mesh: &TriMesh, face: usize) {
+fn prefetch_face(lanes: impl Lanes, mesh: &TriMesh, face: usize) {
     let p = mesh.parts();
     if let Some(corners) = p.faces.get(face) {
-        lanes.expect(corners);
+        lanes.prefetch(corners);
     }
     if let (Some(uvs), Some(material)) = (p.face_uvs.get(face), p.face_materials.get(face)) {
-        lanes.expect(uvs);
-        lanes.expect(material);
+        lanes.prefetch(uvs);
+        lanes.prefetch(material);
     }
 }
 

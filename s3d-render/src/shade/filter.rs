@@ -1,13 +1,13 @@
 //! Textures fetched for eight pixels at a time.
 //!
-//! Gives what [`crate::shade::mip_maps::Pyramid::sample`] gives, in integers: places between a texture's pixels are kept in
+//! Gives what [`crate::shade::mip_maps::MipMap::sample`] gives, in integers: places between a texture's pixels are kept in
 //! 32768ths of a pixel, and so are the weights of all pixels that make a colour; their products are added without
 //! rounding. Before it is rounded to 8 bits a colour is off by less than 0.03 where one bilinear sample makes it. Where
 //! sixteen do, the weights of samples, rounded down, may darken it by 0.12. Samples of a footprint are steps of whole
 //! 32768ths apart, so that the last of eight is off by less than a 4000th of a pixel.
 
-use crate::shade::anchor::Seen;
-use crate::shade::wrap_mode::Fold;
+use crate::shade::anchor::Interpolated;
+use crate::shade::texel_wrap::TexelWrap;
 use crate::simd::lanes::{LANES, Lanes, Texels, eight, put};
 use s3d_geom::{Raster, Texture, Wrap};
 
@@ -28,7 +28,7 @@ impl Footprints {
 
     /// The eight pixels from column `i` on; their sides only if they are not all `narrow`.
     #[inline(always)]
-    pub(crate) fn store<L: Lanes>(&mut self, l: L, i: usize, seen: &Seen<L::F, 2>, narrow: bool) {
+    pub(crate) fn store<L: Lanes>(&mut self, l: L, i: usize, seen: &Interpolated<L::F, 2>, narrow: bool) {
         for n in 0..2 {
             put(l, &mut self.at[n], i, seen.values[n]);
         }
@@ -57,7 +57,7 @@ struct Taps<F> {
 
 /// A texture at one size.
 #[derive(Clone, Copy)]
-struct Size<'a> {
+struct MipLevel<'a> {
     image: &'a Raster<[u8; 3]>,
     texels: Texels<'a>,
     /// The last column and row, in 32768ths of a pixel.
@@ -70,7 +70,7 @@ struct Size<'a> {
 
 /// What is read around eight places, one by one: see [`Lanes::place`] and [`Lanes::quads_from`].
 #[derive(Default)]
-struct Places {
+struct GatheredQuads {
     at: [i32; LANES],
     x: [i16; LANES],
     y: [i16; LANES],
@@ -78,8 +78,8 @@ struct Places {
     lower: [u64; LANES],
 }
 
-/// Places in an image that go on in steps: 0 is the middle of the first pixel.
-struct Walk<L: Lanes> {
+/// GatheredQuads in an image that go on in steps: 0 is the middle of the first pixel.
+struct TapWalk<L: Lanes> {
     first: (L::F, L::F),
     step: (L::F, L::F),
     /// Where it has come to, and the step, in 32768ths.
@@ -87,17 +87,17 @@ struct Walk<L: Lanes> {
     fixed_step: (L::I, L::I),
 }
 
-impl<L: Lanes> Walk<L> {
+impl<L: Lanes> TapWalk<L> {
     #[inline(always)]
     fn at(l: L, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
         let (place, fixed_step) = ((l.fixed(first.0), l.fixed(first.1)), (l.fixed(step.0), l.fixed(step.1)));
         Self { first, step, place, fixed_step }
     }
 
-    /// In one of the sizes; given are places and steps in pixels of the full one.
+    /// In one of the levels; given are places and steps in pixels of the full one.
     #[inline(always)]
-    fn new(l: L, size: &Size<'_>, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
-        let (x, y, half) = (l.splat(size.x), l.splat(size.y), l.splat(0.5));
+    fn new(l: L, level: &MipLevel<'_>, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
+        let (x, y, half) = (l.splat(level.x), l.splat(level.y), l.splat(0.5));
         let first = (l.sub(l.mul(first.0, x), half), l.sub(l.mul(first.1, y), half));
         Self::at(l, first, (l.mul(step.0, x), l.mul(step.1, y)))
     }
@@ -109,18 +109,18 @@ impl<L: Lanes> Walk<L> {
     }
 }
 
-/// A texture at all its sizes.
-pub(crate) struct Sizes<'a> {
+/// A texture at all its levels.
+pub(crate) struct MipLevels<'a> {
     wrap: [Wrap; 2],
-    sizes: Vec<Size<'a>>,
+    levels: Vec<MipLevel<'a>>,
 }
 
-impl<'a> Sizes<'a> {
+impl<'a> MipLevels<'a> {
     pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
         let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)) as f32;
-        // Larger sizes are not used.
+        // Larger levels are not used.
         let last = |size: u32| (size.clamp(1, 1 << 15) - 1) << 15;
-        let size = |image: &'a Raster<[u8; 3]>| Size {
+        let size = |image: &'a Raster<[u8; 3]>| MipLevel {
             image,
             texels: Texels::new(image.pixels().as_flattened(), image.width() as i32 * 3),
             right: last(image.width()),
@@ -128,26 +128,26 @@ impl<'a> Sizes<'a> {
             x: ratio(image.width(), full.image.width()),
             y: ratio(image.height(), full.image.height()),
         };
-        Self { wrap: full.wrap, sizes: std::iter::once(&full.image).chain(reductions).map(size).collect() }
+        Self { wrap: full.wrap, levels: std::iter::once(&full.image).chain(reductions).map(size).collect() }
     }
 
     /// Whether places in it fit the numbers here.
     pub(crate) fn is_usable(&self) -> bool {
-        let image = self.sizes[0].image;
+        let image = self.levels[0].image;
         !image.is_empty()
             && image.width().max(image.height()) < 1 << 15
             && 3 * image.len() < i32::MAX as usize
     }
 
     /// How coordinates in pixels of the full size repeat.
-    pub(crate) fn folds(&self) -> [Fold; 3] {
-        let image = self.sizes[0].image;
+    pub(crate) fn wraps(&self) -> [TexelWrap; 3] {
+        let image = self.levels[0].image;
         let fold = |wrap, size: u32| match wrap {
-            Wrap::Repeat => Fold::repeat(f64::from(size)),
-            Wrap::Mirror => Fold::mirror(f64::from(size)),
-            Wrap::Clamp => Fold::NOT,
+            Wrap::Repeat => TexelWrap::repeat(f64::from(size)),
+            Wrap::Mirror => TexelWrap::mirror(f64::from(size)),
+            Wrap::Clamp => TexelWrap::NONE,
         };
-        [fold(self.wrap[0], image.width()), fold(self.wrap[1], image.height()), Fold::NOT]
+        [fold(self.wrap[0], image.width()), fold(self.wrap[1], image.height()), TexelWrap::NONE]
     }
 
     /// The colours of those of the eight pixels from `i` on that are among `these`, from at most `most` samples each. Of
@@ -178,8 +178,8 @@ impl<'a> Sizes<'a> {
             let (mean, half) = (l.mul(half_of, sum), l.mul(half_of, l.sub(a, c)));
             let root = l.sqrt(l.add(l.mul(half, half), l.mul(b, b)));
             let long = l.sqrt(l.add(mean, root));
-            let axis_x = l.by_sign(half, b, l.add(root, half));
-            let axis_y = l.by_sign(half, l.sub(root, half), b);
+            let axis_x = l.select_by_sign(half, b, l.add(root, half));
+            let axis_y = l.select_by_sign(half, l.sub(root, half), b);
             // What makes the axis as long as that. A round footprint has no axis, and one sample.
             let length_2 = l.add(l.mul(axis_x, axis_x), l.mul(axis_y, axis_y));
             let stretch = l.sqrt(l.div(l.add(mean, root), l.max(length_2, l.splat(1e-30))));
@@ -188,26 +188,26 @@ impl<'a> Sizes<'a> {
             let most = most.max(1) as f32;
             let width = l.max(l.max(minor, l.mul(long, l.splat(1.0 / most))), one);
             let count = l.min(l.max(l.add(l.div(long, width), half_of), one), l.splat(most));
-            let count = l.whole(count);
+            let count = l.truncate(count);
             let wide = maybe & (l.greater(width, one) | l.greater(count, one));
             if wide != 0 {
                 let part = l.div(one, count);
                 let step = l.mul(stretch, part);
                 let (level, fraction) = l.log2(width);
                 // Beyond the last size there is the last.
-                let last = (self.sizes.len() - 1) as f32;
+                let last = (self.levels.len() - 1) as f32;
                 let past = l.sub(level, l.splat(last));
-                let fraction = l.by_sign(past, fraction, zero);
+                let fraction = l.select_by_sign(past, fraction, zero);
                 let level = l.min(level, l.splat(last));
                 let share = l.mul(l.splat(-32768.0), part);
                 let next_weight = l.mul(share, fraction);
                 let taps = Taps {
-                    level: l.pick(wide, level, zero),
-                    weight: l.pick(wide, l.sub(share, next_weight), l.splat(-32768.0)),
-                    next_weight: l.pick(wide, next_weight, zero),
-                    count: l.pick(wide, count, one),
-                    step_x: l.pick(wide, l.mul(axis_x, step), zero),
-                    step_y: l.pick(wide, l.mul(axis_y, step), zero),
+                    level: l.select(wide, level, zero),
+                    weight: l.select(wide, l.sub(share, next_weight), l.splat(-32768.0)),
+                    next_weight: l.select(wide, next_weight, zero),
+                    count: l.select(wide, count, one),
+                    step_x: l.select(wide, l.mul(axis_x, step), zero),
+                    step_y: l.select(wide, l.mul(axis_y, step), zero),
                 };
                 return l.pixels(self.filtered(l, x, y, &taps, these));
             }
@@ -217,53 +217,53 @@ impl<'a> Sizes<'a> {
 
     #[inline(always)]
     fn magnified<L: Lanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
-        let (size, half, zero) = (&self.sizes[0], l.splat(0.5), l.splat(0.0));
-        let walk = Walk::at(l, (l.sub(x, half), l.sub(y, half)), (zero, zero));
-        l.pixels(self.add(l, l.no_mix(), size, &walk, zero, l.all(), these))
+        let (size, half, zero) = (&self.levels[0], l.splat(0.5), l.splat(0.0));
+        let walk = TapWalk::at(l, (l.sub(x, half), l.sub(y, half)), (zero, zero));
+        l.pixels(self.add(l, l.zero_sum(), size, &walk, zero, l.full_weights(), these))
     }
 
     #[inline(always)]
-    fn filtered<L: Lanes>(&self, l: L, x: L::F, y: L::F, taps: &Taps<L::F>, these: u32) -> L::Mix {
+    fn filtered<L: Lanes>(&self, l: L, x: L::F, y: L::F, taps: &Taps<L::F>, these: u32) -> L::ColorSum {
         let Taps { level, weight, next_weight, count, step_x, step_y } = *taps;
         let (zero, half, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
         let middle = l.mul(half, l.sub(count, one));
         let first = (l.sub(x, l.mul(middle, step_x)), l.sub(y, l.mul(middle, step_y)));
         let step = (step_x, step_y);
 
-        let mut mix = l.no_mix();
+        let mut sum = l.zero_sum();
         let mut levels = [0.0; LANES];
         l.store(level, &mut levels);
         let at = levels[these.trailing_zeros() as usize % LANES];
         let same = l.splat(at);
         if (l.greater(level, same) | l.greater(same, level)) & these == 0
             && l.greater(l.splat(-1.0), next_weight) & these != 0
-            && let Some([this, next]) = self.sizes.get(at as usize..).and_then(<[_]>::first_chunk)
+            && let Some([this, next]) = self.levels.get(at as usize..).and_then(<[_]>::first_chunk)
         {
-            // The same two sizes for all, as mostly: both in one loop, of which nobody can foretell when it ends.
-            let (mut a, mut b) = (Walk::new(l, this, first, step), Walk::new(l, next, first, step));
+            // The same two levels for all, as mostly: both in one loop, of which nobody can foretell when it ends.
+            let (mut a, mut b) = (TapWalk::new(l, this, first, step), TapWalk::new(l, next, first, step));
             let (weights, next_weights) = (l.weights(weight), l.weights(next_weight));
             let (mut active, mut tap) = (these, zero);
             while active != 0 {
-                mix = self.add(l, mix, this, &a, tap, l.only(active, weights), active);
-                mix = self.add(l, mix, next, &b, tap, l.only(active, next_weights), active);
+                sum = self.add(l, sum, this, &a, tap, l.masked(active, weights), active);
+                sum = self.add(l, sum, next, &b, tap, l.masked(active, next_weights), active);
                 a.go_on(l);
                 b.go_on(l);
                 tap = l.add(tap, one);
                 active &= l.greater(count, tap);
             }
-            return mix;
+            return sum;
         }
-        // Size after size, each for the pixels that need it.
+        // MipLevel after size, each for the pixels that need it.
         let mut left = these;
         let mut at = zero;
-        for of in &self.sizes {
+        for of in &self.levels {
             let here = left & !l.greater(level, at);
             // Weights of less than one part are none.
-            let weights = l.by_sign(l.sub(level, at), next_weight, weight);
+            let weights = l.select_by_sign(l.sub(level, at), next_weight, weight);
             let mut active = here & l.greater(l.splat(-1.0), weights);
-            let (weights, mut walk, mut tap) = (l.weights(weights), Walk::new(l, of, first, step), zero);
+            let (weights, mut walk, mut tap) = (l.weights(weights), TapWalk::new(l, of, first, step), zero);
             while active != 0 {
-                mix = self.add(l, mix, of, &walk, tap, l.only(active, weights), active);
+                sum = self.add(l, sum, of, &walk, tap, l.masked(active, weights), active);
                 walk.go_on(l);
                 tap = l.add(tap, one);
                 active &= l.greater(count, tap);
@@ -274,39 +274,39 @@ impl<'a> Sizes<'a> {
             }
             at = l.add(at, one);
         }
-        mix
+        sum
     }
 
-    /// `mix` and the weighted bilinear colours at those of the places that are among `these`, after `tap` steps of the walk.
+    /// `sum` and the weighted bilinear colours at those of the places that are among `these`, after `tap` steps of the walk.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "all of them in registers")]
     fn add<L: Lanes>(
         &self,
         l: L,
-        mix: L::Mix,
-        size: &Size<'a>,
-        walk: &Walk<L>,
+        sum: L::ColorSum,
+        level: &MipLevel<'a>,
+        walk: &TapWalk<L>,
         tap: L::F,
         weights: L::Weights,
         these: u32,
-    ) -> L::Mix {
+    ) -> L::ColorSum {
         let (x, y) = walk.place;
-        let inside = l.within(x, size.right) & l.within(y, size.bottom);
-        let (at, parts) = l.place(x, y, size.texels.stride(), these);
+        let inside = l.within(x, level.right) & l.within(y, level.bottom);
+        let (at, parts) = l.place(x, y, level.texels.stride(), these);
         if inside & these == these
-            && let Some(quads) = l.quads(&size.texels, at)
+            && let Some(quads) = l.quads(&level.texels, at)
         {
-            return l.add_weighted(mix, quads, l.corners(parts, weights));
+            return l.add_weighted(sum, quads, l.corners(parts, weights));
         }
         let (mut xs, mut ys) = ([0.0; LANES], [0.0; LANES]);
         l.store(l.add(walk.first.0, l.mul(tap, walk.step.0)), &mut xs);
         l.store(l.add(walk.first.1, l.mul(tap, walk.step.1)), &mut ys);
-        let mut places = Places::default();
+        let mut places = GatheredQuads::default();
         l.store_fixed(at, &mut places.at);
         l.store_parts(parts, &mut places.x, &mut places.y);
-        self.read_singly(size, &xs, &ys, inside, these, &mut places);
+        self.read_singly(level, &xs, &ys, inside, these, &mut places);
         let corners = l.corners(l.parts(&places.x, &places.y), weights);
-        l.add_weighted(mix, l.quads_from(&places.upper, &places.lower), corners)
+        l.add_weighted(sum, l.quads_from(&places.upper, &places.lower), corners)
     }
 
     /// Reads what is at those of the places that are among `these`; of them, those among `inside` are not at the image's
@@ -315,23 +315,23 @@ impl<'a> Sizes<'a> {
     #[inline(never)]
     fn read_singly(
         &self,
-        size: &Size<'a>,
+        level: &MipLevel<'a>,
         xs: &[f32; LANES],
         ys: &[f32; LANES],
         inside: u32,
         these: u32,
-        places: &mut Places,
+        places: &mut GatheredQuads,
     ) {
         for k in 0..LANES {
             if these >> k & 1 == 0 {
                 continue;
             }
             let begin = places.at[k] as usize;
-            let below = begin.wrapping_add(size.texels.stride() as usize);
-            match (word(size.texels.bytes(), begin), word(size.texels.bytes(), below)) {
+            let below = begin.wrapping_add(level.texels.stride() as usize);
+            match (word(level.texels.bytes(), begin), word(level.texels.bytes(), below)) {
                 (Some(a), Some(b)) if inside >> k & 1 == 1 => (places.upper[k], places.lower[k]) = (a, b),
                 _ => {
-                    let quad = self.at_the_edge(size, xs[k], ys[k]);
+                    let quad = self.at_the_edge(level, xs[k], ys[k]);
                     ((places.upper[k], places.lower[k]), (places.x[k], places.y[k])) = quad;
                 }
             }
@@ -339,8 +339,8 @@ impl<'a> Sizes<'a> {
     }
 
     /// The 2 × 2 pixels around a place of which some are not side by side, and the place's parts.
-    fn at_the_edge(&self, size: &Size<'a>, x: f32, y: f32) -> ((u64, u64), (i16, i16)) {
-        let image = size.image;
+    fn at_the_edge(&self, level: &MipLevel<'a>, x: f32, y: f32) -> ((u64, u64), (i16, i16)) {
+        let image = level.image;
         let split = |v: f32| {
             let v = if v.is_finite() { f64::from(v) } else { 0.0 };
             (v.floor() as i64, ((v - v.floor()) * 32768.0) as i16)

@@ -1,18 +1,18 @@
-//! Images that have one value all over a face, painted run by run.
+//! Images that have one value all over a face, painted span by span.
 
-use crate::shade::spans::Runs;
-use crate::simd::lanes::{LANES, Lanes, STAMP};
+use crate::shade::spans::Spans;
+use crate::simd::lanes::{COLOR_BLOCK, LANES, Lanes};
 use s3d_geom::TriMesh;
 
 /// `N` such images of a view, painted band by band.
-pub(crate) struct Stamps<V, const N: usize> {
+pub(crate) struct FlatPainter<V, const N: usize> {
     /// The colours of eight faces in each of the images.
     values: V,
     /// By a face's number, its colours, R in the lowest byte; 0 is for what is missing.
     colors: Vec<[u32; N]>,
 }
 
-impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> Stamps<V, N> {
+impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> FlatPainter<V, N> {
     pub(crate) fn new(missing: [[u8; 3]; N], values: V) -> Self {
         Self { values, colors: vec![missing.map(packed)] }
     }
@@ -28,11 +28,11 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> Stamps<V, N>
         &mut self,
         lanes: impl Lanes,
         mesh: Option<&TriMesh>,
-        runs: &Runs,
+        spans: &Spans,
         mut out: [&mut [[u8; 3]]; N],
     ) {
-        for k in 0..runs.new_groups() {
-            let (group, count) = runs.new_group::<false>(lanes, mesh, k);
+        for k in 0..spans.new_groups() {
+            let (group, count) = spans.new_group::<false>(lanes, mesh, k);
             let values = (self.values)(&group.map(|new| new.face));
             for value in &values[..count] {
                 let mut colors = [0; N];
@@ -42,9 +42,9 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> Stamps<V, N>
                 self.colors.push(colors);
             }
         }
-        for pieces in runs.pieces().windows(2) {
+        for pieces in spans.pieces().windows(2) {
             let (start, end) = (pieces[0].start as usize, pieces[1].start as usize);
-            print(lanes, &mut out, start, end, &self.colors[pieces[0].number as usize]);
+            fill(lanes, &mut out, start, end, &self.colors[pieces[0].number as usize]);
         }
     }
 }
@@ -55,9 +55,9 @@ fn packed([r, g, b]: [u8; 3]) -> u32 {
 }
 
 /// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow: no more pixels than
-/// a stamp has.
+/// a block has.
 #[inline(always)]
-fn print<const N: usize>(
+fn fill<const N: usize>(
     lanes: impl Lanes,
     images: &mut [&mut [[u8; 3]]; N],
     start: usize,
@@ -70,10 +70,10 @@ fn print<const N: usize>(
             Some(to) => lanes.store_repeated(color, to),
             // At the image's end.
             None => {
-                let mut stamp = [0; STAMP];
-                lanes.store_repeated(color, &mut stamp);
+                let mut block = [0; COLOR_BLOCK];
+                lanes.store_repeated(color, &mut block);
                 let most = 3 * (end - start);
-                bytes[..most].copy_from_slice(&stamp[..most]);
+                bytes[..most].copy_from_slice(&block[..most]);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Textures at every size that a pixel may need.
 
-use crate::shade::filter::Sizes;
+use crate::shade::filter::MipLevels;
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 use s3d_geom::{Raster, Texture, TriMesh, Wrap, sample_bilinear};
@@ -22,12 +22,12 @@ impl Default for TextureFilter {
 /// The textures of a mesh, each with its reductions to half, a quarter… down to one pixel: a third more memory. The
 /// full size stays in the mesh.
 #[derive(Clone, Debug)]
-pub struct Pyramids {
+pub struct MipMaps {
     /// By texture of the mesh; the first reduction is to half size.
     reductions: Vec<Vec<Raster<[u8; 3]>>>,
 }
 
-impl Pyramids {
+impl MipMaps {
     /// Reduces the textures of `mesh`, on all threads of the current pool.
     pub fn new(mesh: &TriMesh) -> Self {
         let reductions = mesh
@@ -43,14 +43,14 @@ impl Pyramids {
         self.reductions.iter().flatten().map(|level| 3 * level.len()).sum()
     }
 
-    /// All sizes of texture `texture` of the mesh, for the fast filter.
-    pub(crate) fn sizes<'a>(&'a self, texture: usize, full: &'a Texture) -> Sizes<'a> {
-        Sizes::new(full, &self.reductions[texture])
+    /// All levels of texture `texture` of the mesh, for the fast filter.
+    pub(crate) fn levels<'a>(&'a self, texture: usize, full: &'a Texture) -> MipLevels<'a> {
+        MipLevels::new(full, &self.reductions[texture])
     }
 
-    /// The sizes of texture `texture`, each half of the one before.
-    pub(crate) fn pyramid<'a>(&'a self, texture: u32, full: &'a Texture) -> Pyramid<'a> {
-        Pyramid { full, reductions: &self.reductions[texture as usize] }
+    /// The levels of texture `texture`, each half of the one before.
+    pub(crate) fn mip_map<'a>(&'a self, texture: u32, full: &'a Texture) -> MipMap<'a> {
+        MipMap { full, reductions: &self.reductions[texture as usize] }
     }
 }
 
@@ -101,14 +101,14 @@ fn shares(size: u32) -> Vec<Share> {
         .collect()
 }
 
-/// One texture at all its sizes.
+/// One texture at all its levels.
 #[derive(Clone, Copy)]
-pub(crate) struct Pyramid<'a> {
+pub(crate) struct MipMap<'a> {
     full: &'a Texture,
     reductions: &'a [Raster<[u8; 3]>],
 }
 
-impl<'a> Pyramid<'a> {
+impl<'a> MipMap<'a> {
     pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
         Self { full, reductions }
     }
@@ -120,7 +120,7 @@ impl<'a> Pyramid<'a> {
     pub(crate) fn sample(&self, uv: DVec2, x: DVec2, y: DVec2, filter: &TextureFilter) -> [f32; 3] {
         let size = DVec2::new(f64::from(self.full.image.width()), f64::from(self.full.image.height()));
         let (x, y) = ((x * size).as_vec2(), (y * size).as_vec2());
-        let mut sum = Sum::default();
+        let mut sum = ColorSum::default();
         let (major, short, taps) = taps(x, y, filter.max_taps);
         let (level, fraction) = level_of(short);
         if taps == 1 {
@@ -142,7 +142,7 @@ impl<'a> Pyramid<'a> {
     }
 
     #[inline(always)]
-    fn add_trilinear(&self, sum: &mut Sum, level: usize, fraction: f32, uv: DVec2, weight: f32) {
+    fn add_trilinear(&self, sum: &mut ColorSum, level: usize, fraction: f32, uv: DVec2, weight: f32) {
         if fraction == 0.0 || level >= self.reductions.len() {
             return sum.add_bilinear(self.level(level), self.full.wrap, uv, weight);
         }
@@ -203,9 +203,9 @@ fn axes(x: Vec2, y: Vec2) -> (Vec2, f32) {
 /// A weighted sum of colours. Two neighbours in a row are added at once, as they lie in memory: R G B R G B and two
 /// bytes that get no weight.
 #[derive(Clone, Copy, Default)]
-struct Sum([f32; 8]);
+struct ColorSum([f32; 8]);
 
-impl Sum {
+impl ColorSum {
     #[inline(always)]
     fn add_bilinear(&mut self, image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: DVec2, weight: f32) {
         let (w, h) = (image.width(), image.height());
@@ -287,7 +287,7 @@ mod tests {
             let full = image(w, h, |x, y| (x * 7919 + y * 104_729).wrapping_mul(seed | 1).rotate_left(9) as u8);
             let levels: Vec<_> = std::iter::successors(halved(&full), halved).collect();
             let bytes: usize = levels.iter().map(Raster::len).sum();
-            // Along a strip of one pixel sizes add up to as much again.
+            // Along a strip of one pixel levels add up to as much again.
             prop_assert!(3 * bytes <= full.len() + 2 * (w + h) as usize);
             let mean = full.pixels().iter().map(|p| f64::from(p[0])).sum::<f64>() / full.len() as f64;
             let last = levels.last().unwrap_or(&full);
@@ -301,10 +301,10 @@ mod tests {
             wrap in prop::sample::select(vec![Wrap::Repeat, Wrap::Mirror, Wrap::Clamp]),
         ) {
             let full = Texture { name: "t".into(), image: image(w, h, |x, y| (x * 31 + y * 77) as u8), wrap: [wrap; 2] };
-            let pyramid = Pyramid { full: &full, reductions: &[] };
+            let mip_map = MipMap { full: &full, reductions: &[] };
             let uv = vec2(u, v);
             let tiny = DVec2::splat(1e-9);
-            let got = pyramid.sample(uv.as_dvec2(), tiny, tiny, &TextureFilter::default());
+            let got = mip_map.sample(uv.as_dvec2(), tiny, tiny, &TextureFilter::default());
             let expected = full.sample(uv);
             for k in 0..3 {
                 prop_assert!((got[k] - expected[k]).abs() < 0.01, "{uv}: {got:?} {expected:?}");

@@ -12,5 +12,5 @@ pub(crate) mod pixel_color;
 pub(crate) mod points;
 pub(crate) mod prefetch;
 pub(crate) mod spans;
+pub(crate) mod texel_wrap;
 pub(crate) mod view;
-pub(crate) mod wrap_mode;

@@ -11,7 +11,7 @@ pub(crate) struct Patch {
     /// The normals of the planes through the origin and the edge opposite to each corner.
     weights: [DVec3; 3],
     /// Their sum: along the face's normal by its winding, twice as long as its area.
-    whole: DVec3,
+    denominator: DVec3,
 }
 
 impl Patch {
@@ -24,8 +24,8 @@ impl Patch {
     pub(crate) fn of(world: [DVec3; 3], origin: DVec3) -> Self {
         let [a, b, c] = [world[0] - origin, world[1] - origin, world[2] - origin];
         // The sum itself would lose a sliver's normal.
-        let whole = (world[1] - world[0]).cross(world[2] - world[0]);
-        Self { weights: [b.cross(c), c.cross(a), a.cross(b)], whole }
+        let denominator = (world[1] - world[0]).cross(world[2] - world[0]);
+        Self { weights: [b.cross(c), c.cross(a), a.cross(b)], denominator }
     }
 
     /// The functions w(k) of the three corners.
@@ -34,34 +34,34 @@ impl Patch {
     }
 
     /// The denominator, in place of the weights' sum.
-    pub(crate) fn whole(&self) -> DVec3 {
-        self.whole
+    pub(crate) fn denominator(&self) -> DVec3 {
+        self.denominator
     }
 
     /// The face's unit normal on the side that the origin sees, and whether that is its back.
     #[inline]
     pub(crate) fn normal_towards(&self, d: DVec3) -> (DVec3, bool) {
-        let away = self.whole.dot(d) > 0.0;
-        let normal = self.whole.normalize();
+        let away = self.denominator.dot(d) > 0.0;
+        let normal = self.denominator.normalize();
         (if away { -normal } else { normal }, away)
     }
 
     /// The corners' weights where the ray along `d` arrives; they add up to 1, and are never negative.
     #[inline(always)]
     pub(crate) fn weights(&self, d: DVec3) -> [f64; 3] {
-        let sign = if self.whole.dot(d) < 0.0 { -1.0 } else { 1.0 };
+        let sign = if self.denominator.dot(d) < 0.0 { -1.0 } else { 1.0 };
         let w = self.weights.map(|w| (sign * w.dot(d)).max(0.0));
         let sum = w[0] + w[1] + w[2];
         if sum > 0.0 { w.map(|w| w / sum) } else { [1.0 / 3.0; 3] }
     }
 }
 
-/// Texture coordinates over a face: uv(d) = (u·d, v·d) / (whole·d).
+/// Texture coordinates over a face: uv(d) = (u·d, v·d) / (denominator·d).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct UvPatch {
     u: DVec3,
     v: DVec3,
-    whole: DVec3,
+    denominator: DVec3,
     /// The coordinates' box: what rounding throws outside is brought back.
     min: DVec2,
     max: DVec2,
@@ -74,7 +74,7 @@ impl UvPatch {
         Self {
             u: mix(0),
             v: mix(1),
-            whole: patch.whole,
+            denominator: patch.denominator,
             min: uvs[0].min(uvs[1]).min(uvs[2]),
             max: uvs[0].max(uvs[1]).max(uvs[2]),
         }
@@ -84,9 +84,10 @@ impl UvPatch {
     /// first order.
     #[inline(always)]
     pub(crate) fn at(&self, d: DVec3, dx: DVec3, dy: DVec3) -> (DVec2, DVec2, DVec2) {
-        let scale = self.whole.dot(d).recip();
+        let scale = self.denominator.dot(d).recip();
         let uv = DVec2::new(self.u.dot(d), self.v.dot(d)) * scale;
-        let step = |s: DVec3| (DVec2::new(self.u.dot(s), self.v.dot(s)) - uv * self.whole.dot(s)) * scale;
+        let step =
+            |s: DVec3| (DVec2::new(self.u.dot(s), self.v.dot(s)) - uv * self.denominator.dot(s)) * scale;
         let (x, y) = (step(dx), step(dy));
         // `max` and `min` take a coordinate that is not a number (a face seen exactly edge-on) into the box, too.
         (uv.max(self.min).min(self.max), x, y)

@@ -4,7 +4,7 @@
 use crate::hits::{Hits, NO_FACE};
 use crate::scene::Scene;
 use crate::shade::channels::assert_size;
-use crate::shade::mip_maps::{Pyramid, Pyramids, TextureFilter};
+use crate::shade::mip_maps::{MipMap, MipMaps, TextureFilter};
 use crate::shade::patch::{FaceCache, Patch, UvPatch};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, Projection, Raster, Rays};
@@ -17,13 +17,13 @@ use s3d_geom::{Camera, FaceColor, Projection, Raster, Rays};
 /// As [`crate::rgb_image`].
 pub fn rgb_image_pixel_by_pixel(
     scene: &Scene<'_>,
-    pyramids: &Pyramids,
+    mip_maps: &MipMaps,
     hits: &Hits,
     camera: &Camera,
     filter: &TextureFilter,
 ) -> Raster<[u8; 3]> {
     assert_size(hits, camera);
-    let mut pixels = PixelByPixel::new(scene, pyramids, camera, filter);
+    let mut pixels = PixelByPixel::new(scene, mip_maps, camera, filter);
     let mut out = Vec::with_capacity(hits.face.len());
     for (j, faces) in hits.face.rows().enumerate() {
         out.extend(faces.iter().enumerate().map(|(i, &face)| match face {
@@ -39,10 +39,10 @@ pub fn rgb_image_pixel_by_pixel(
 /// pixel's centre.
 ///
 /// # Panics
-/// If there is no face `face`, or `pyramids` are another mesh's.
+/// If there is no face `face`, or `mip_maps` are another mesh's.
 pub fn rgb_of_ray(
     scene: &Scene<'_>,
-    pyramids: &Pyramids,
+    mip_maps: &MipMaps,
     camera: &Camera,
     direction: DVec3,
     face: u32,
@@ -51,45 +51,45 @@ pub fn rgb_of_ray(
     let steps = match camera.projection {
         Projection::Perspective { .. } => {
             let f = camera.focal_px();
-            Steps::Same(camera.pose.right() / f, -camera.pose.up() / f)
+            RayDifferentials::Same(camera.pose.right() / f, -camera.pose.up() / f)
         }
-        Projection::Equirectangular => Steps::Turn {
+        Projection::Equirectangular => RayDifferentials::Turn {
             rad_per_pixel: std::f64::consts::TAU / f64::from(camera.width),
             rows: vec![(direction.truncate().length(), direction.z)],
         },
     };
-    let paint = Paint::new(scene, pyramids, face, camera.pose.location);
+    let paint = FacePaint::new(scene, mip_maps, face, camera.pose.location);
     seen_color(paint.at(direction, 0, &steps, filter))
 }
 
 /// The colours of an image's pixels, one by one.
 pub(crate) struct PixelByPixel<'a> {
     scene: &'a Scene<'a>,
-    pyramids: &'a Pyramids,
+    mip_maps: &'a MipMaps,
     filter: &'a TextureFilter,
     origin: DVec3,
     rays: Rays,
-    steps: Steps,
+    steps: RayDifferentials,
     /// Made when the first pixel is asked for.
-    paints: Option<FaceCache<Paint<'a>>>,
+    paints: Option<FaceCache<FacePaint<'a>>>,
 }
 
 impl<'a> PixelByPixel<'a> {
     pub(crate) fn new(
         scene: &'a Scene<'a>,
-        pyramids: &'a Pyramids,
+        mip_maps: &'a MipMaps,
         camera: &Camera,
         filter: &'a TextureFilter,
     ) -> Self {
-        let (steps, rays) = (Steps::new(camera), camera.rays());
-        Self { scene, pyramids, filter, origin: camera.pose.location, rays, steps, paints: None }
+        let (steps, rays) = (RayDifferentials::new(camera), camera.rays());
+        Self { scene, mip_maps, filter, origin: camera.pose.location, rays, steps, paints: None }
     }
 
     /// What pixel (i, j), which sees `face`, shows of it.
     pub(crate) fn color(&mut self, face: u32, i: usize, j: usize) -> [u8; 3] {
-        let Self { scene, pyramids, origin, .. } = *self;
+        let Self { scene, mip_maps, origin, .. } = *self;
         let paints = self.paints.get_or_insert_with(FaceCache::new);
-        let paint = paints.get(face, || Paint::new(scene, pyramids, face, origin));
+        let paint = paints.get(face, || FacePaint::new(scene, mip_maps, face, origin));
         let d = self.rays.at(i as u32, j as u32);
         seen_color(paint.at(d, j, &self.steps, self.filter))
     }
@@ -104,18 +104,18 @@ fn seen_color(color: [f32; 3]) -> [u8; 3] {
 }
 
 /// How a face is coloured, prepared for the origin.
-enum Paint<'a> {
-    Texture(Pyramid<'a>, UvPatch),
+enum FacePaint<'a> {
+    Texture(MipMap<'a>, UvPatch),
     Corners(Patch, [[u8; 3]; 3]),
     Flat([u8; 3]),
 }
 
-impl<'a> Paint<'a> {
-    fn new(scene: &Scene<'a>, pyramids: &'a Pyramids, face: u32, origin: DVec3) -> Self {
+impl<'a> FacePaint<'a> {
+    fn new(scene: &Scene<'a>, mip_maps: &'a MipMaps, face: u32, origin: DVec3) -> Self {
         let patch = || Patch::new(scene.mesh(), face, origin);
         match scene.mesh().color_of(face) {
             FaceColor::Texture(index, texture, uvs) => {
-                Self::Texture(pyramids.pyramid(index, texture), UvPatch::new(&patch(), uvs))
+                Self::Texture(mip_maps.mip_map(index, texture), UvPatch::new(&patch(), uvs))
             }
             FaceColor::Corners(corners) => Self::Corners(patch(), corners),
             FaceColor::Flat(color) => Self::Flat(color),
@@ -124,12 +124,12 @@ impl<'a> Paint<'a> {
 
     /// The colour that the ray along `d`, in row `j` of the image, sees: 0 to 255 a channel.
     #[inline(always)]
-    fn at(&self, d: DVec3, j: usize, steps: &Steps, filter: &TextureFilter) -> [f32; 3] {
+    fn at(&self, d: DVec3, j: usize, steps: &RayDifferentials, filter: &TextureFilter) -> [f32; 3] {
         match self {
-            Self::Texture(pyramid, uv) => {
+            Self::Texture(mip_map, uv) => {
                 let (x, y) = steps.at(d, j);
                 let (uv, x, y) = uv.at(d, x, y);
-                pyramid.sample(uv, x, y, filter)
+                mip_map.sample(uv, x, y, filter)
             }
             Self::Corners(patch, corners) => {
                 let weights = patch.weights(d).map(|w| w as f32);
@@ -141,7 +141,7 @@ impl<'a> Paint<'a> {
 }
 
 /// What a pixel to the right and a pixel down add to a direction.
-enum Steps {
+enum RayDifferentials {
     Same(DVec3, DVec3),
     /// Radians a pixel: a panorama's pixels are squares on the sphere's map.
     Turn {
@@ -150,7 +150,7 @@ enum Steps {
     },
 }
 
-impl Steps {
+impl RayDifferentials {
     fn new(camera: &Camera) -> Self {
         match camera.rays() {
             Rays::Perspective { x_step, y_step, .. } => Self::Same(x_step, y_step),

@@ -51,52 +51,52 @@ pub fn xyz_image_half_into(hits: &Hits, camera: &Camera, out: &mut Raster<[f16; 
 pub(crate) trait Coordinate: Copy {
     const ZERO: Self;
     /// [`Lanes::points`] in this type.
-    fn points<const TURN: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]);
+    fn points<const PANORAMA: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]);
 }
 
 impl Coordinate for f32 {
     const ZERO: Self = 0.0;
     #[inline(always)]
-    fn points<const TURN: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]) {
-        lanes.points::<TURN>(rays, to);
+    fn points<const PANORAMA: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]) {
+        lanes.points::<PANORAMA>(rays, to);
     }
 }
 
 impl Coordinate for f16 {
     const ZERO: Self = f16::ZERO;
     #[inline(always)]
-    fn points<const TURN: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]) {
-        lanes.half_points::<TURN>(rays, to);
+    fn points<const PANORAMA: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]) {
+        lanes.half_points::<PANORAMA>(rays, to);
     }
 }
 
 fn points<T: Coordinate>(hits: &Hits, camera: &Camera, out: &mut Raster<[T; 3]>) {
     assert_size(hits, camera);
     match camera.projection {
-        Projection::Perspective { .. } => lanes::run(All::<T, false> { hits, camera, out }),
-        Projection::Equirectangular => lanes::run(All::<T, true> { hits, camera, out }),
+        Projection::Perspective { .. } => lanes::run(PointKernel::<T, false> { hits, camera, out }),
+        Projection::Equirectangular => lanes::run(PointKernel::<T, true> { hits, camera, out }),
     }
 }
 
-struct All<'a, T, const TURN: bool> {
+struct PointKernel<'a, T, const PANORAMA: bool> {
     hits: &'a Hits,
     camera: &'a Camera,
     out: &'a mut Raster<[T; 3]>,
 }
 
-impl<T: Coordinate, const TURN: bool> LaneWork for All<'_, T, TURN> {
+impl<T: Coordinate, const PANORAMA: bool> LaneWork for PointKernel<'_, T, PANORAMA> {
     type Output = ();
 
     #[inline(always)]
     fn run(self, lanes: impl Lanes) {
-        let directions = Directions::new(self.camera);
-        directions.points::<TURN, T>(lanes, 0, self.hits.depth.pixels(), self.out.pixels_mut());
+        let directions = RayTable::new(self.camera);
+        directions.points::<PANORAMA, T>(lanes, 0, self.hits.depth.pixels(), self.out.pixels_mut());
     }
 }
 
 /// The directions of an image's pixels. Each is made of a vector a column and one a row: their sum in a perspective view,
-/// their product axis by axis in a panorama (`TURN`). That is what [`Rays::at`] gives, to the last bit.
-pub(crate) struct Directions {
+/// their product axis by axis in a panorama (`PANORAMA`). That is what [`Rays::at`] gives, to the last bit.
+pub(crate) struct RayTable {
     /// In groups; the last filled up.
     columns: Vec<[f64; 3 * LANES]>,
     rows: Vec<DVec3>,
@@ -104,7 +104,7 @@ pub(crate) struct Directions {
     place: DVec3,
 }
 
-impl Directions {
+impl RayTable {
     pub(crate) fn new(camera: &Camera) -> Self {
         let (mut columns, rows): (Vec<DVec3>, Vec<DVec3>) = match camera.rays() {
             Rays::Perspective { x_step, y_step, origin } => (
@@ -125,7 +125,7 @@ impl Directions {
 
     /// The points that some rows see, from `first_row` on.
     #[inline(always)]
-    pub(crate) fn points<const TURN: bool, T: Coordinate>(
+    pub(crate) fn points<const PANORAMA: bool, T: Coordinate>(
         &self,
         lanes: impl Lanes,
         first_row: usize,
@@ -140,13 +140,13 @@ impl Directions {
             let (eights, rest) = depths.as_chunks::<LANES>();
             let (out, last) = out.as_flattened_mut().as_chunks_mut::<{ 3 * LANES }>();
             for ((depths, out), column) in eights.iter().zip(out).zip(&self.columns) {
-                T::points::<TURN>(lanes, &EightRays { column, row: &row, depths, place: &place }, out);
+                T::points::<PANORAMA>(lanes, &EightRays { column, row: &row, depths, place: &place }, out);
             }
             if let (false, Some(column)) = (rest.is_empty(), self.columns.last()) {
                 let (mut depths, mut points) = ([f32::INFINITY; LANES], [T::ZERO; 3 * LANES]);
                 depths[..rest.len()].copy_from_slice(rest);
                 let rays = EightRays { column, row: &row, depths: &depths, place: &place };
-                T::points::<TURN>(lanes, &rays, &mut points);
+                T::points::<PANORAMA>(lanes, &rays, &mut points);
                 last.copy_from_slice(&points[..last.len()]);
             }
         }

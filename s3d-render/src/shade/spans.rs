@@ -1,16 +1,16 @@
-//! The runs of equal faces in a band of rows.
+//! The spans of equal faces in a band of rows.
 //!
 //! Images are made from hits a band at a time: its hits, and what is made of them, stay in the cache from one modality to
-//! the next, and its runs are found once for all that have something to do with faces.
+//! the next, and its spans are found once for all that have something to do with faces.
 
-use crate::shade::face_table::{FaceTable, New};
+use crate::shade::face_table::{FaceTable, NewFace};
 use crate::simd::lanes::{LANES, Lanes};
 use s3d_geom::TriMesh;
 
 /// Pixels of a band, about.
 const BAND: usize = 1 << 13;
 
-/// New faces that are fetched from memory while as many are prepared.
+/// NewFace faces that are fetched from memory while as many are prepared.
 const AHEAD: usize = 4 * LANES;
 
 /// How many rows make a band of an image so wide.
@@ -18,21 +18,21 @@ pub(crate) fn band_rows(width: usize) -> usize {
     (BAND / width.max(1)).max(1)
 }
 
-/// The runs of a band. None reaches from row to row.
-pub(crate) struct Runs {
+/// The spans of a band. None reaches from row to row.
+pub(crate) struct Spans {
     table: FaceTable,
     width: usize,
-    /// Where runs start, ascending, from the band's first pixel on; and the band's end.
+    /// Where spans start, ascending, from the band's first pixel on; and the band's end.
     starts: Vec<u32>,
-    /// By run: its face's number in the table.
+    /// By span: its face's number in the table.
     numbers: Vec<u32>,
     /// The faces that got their number in this band.
-    new: Vec<New>,
-    /// See [`Runs::pieces`].
+    new: Vec<NewFace>,
+    /// See [`Spans::pieces`].
     pieces: Vec<Piece>,
 }
 
-/// Part of a run, of [`LANES`] pixels or, at the run's end, fewer.
+/// Part of a span, of [`LANES`] pixels or, at the span's end, fewer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
     /// Its first pixel.
@@ -41,7 +41,7 @@ pub(crate) struct Piece {
     pub(crate) number: u32,
 }
 
-impl Runs {
+impl Spans {
     /// Of no band yet.
     pub(crate) fn new(width: usize) -> Self {
         Self {
@@ -54,7 +54,7 @@ impl Runs {
         }
     }
 
-    /// Finds the runs of the next band. Whether faces have forgotten their numbers, which then begin with 1 again.
+    /// Finds the spans of the next band. Whether faces have forgotten their numbers, which then begin with 1 again.
     #[inline(always)]
     pub(crate) fn find(&mut self, lanes: impl Lanes, mesh: Option<&TriMesh>, faces: &[u32]) -> bool {
         self.starts.clear();
@@ -67,22 +67,22 @@ impl Runs {
         forgotten
     }
 
-    /// All runs in pieces, one after another, and one more that begins where the last one ends. None reaches from row to
+    /// All spans in pieces, one after another, and one more that begins where the last one ends. None reaches from row to
     /// row.
     #[inline(always)]
     pub(crate) fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
-    /// Cuts the runs. A loop for each piece of a run ends when nobody can foretell: here it is out of the way of those that
+    /// Cuts the spans. A loop for each piece of a span ends when nobody can foretell: here it is out of the way of those that
     /// have much to do.
     #[inline(always)]
     fn cut(&mut self) {
         const PIECE: u32 = LANES as u32;
         let Self { starts, numbers, pieces, .. } = self;
         pieces.clear();
-        for (run, &number) in starts.windows(2).zip(numbers.iter()) {
-            let (start, end) = (run[0], run[1]);
+        for (span, &number) in starts.windows(2).zip(numbers.iter()) {
+            let (start, end) = (span[0], span[1]);
             let at = pieces.len();
             pieces.extend([start, start + PIECE].map(|start| Piece { start, number }));
             if end - start > 2 * PIECE {
@@ -111,21 +111,21 @@ impl Runs {
         lanes: impl Lanes,
         mesh: Option<&TriMesh>,
         k: usize,
-    ) -> ([New; LANES], usize) {
+    ) -> ([NewFace; LANES], usize) {
         let first = k * LANES;
         let new = &self.new[..];
         if let Some(mesh) = mesh
             && first.is_multiple_of(AHEAD)
         {
             let from = if first == 0 { 0 } else { (first + AHEAD).min(new.len()) };
-            New::expect::<COLORS>(&new[from..(first + 2 * AHEAD).min(new.len())], lanes, mesh);
+            NewFace::prefetch::<COLORS>(&new[from..(first + 2 * AHEAD).min(new.len())], lanes, mesh);
         }
         let count = (new.len() - first).min(LANES);
         (std::array::from_fn(|n| new[first + n.min(count - 1)]), count)
     }
 }
 
-/// Adds to `starts` where each run of equal values of a row starts, `from` being the row's first pixel.
+/// Adds to `starts` where each span of equal values of a row starts, `from` being the row's first pixel.
 #[inline(always)]
 fn add_starts(lanes: impl Lanes, values: &[u32], from: usize, starts: &mut Vec<u32>) {
     if values.is_empty() {
@@ -167,23 +167,23 @@ mod tests {
             bands in prop::collection::vec(prop::collection::vec((0u32..50, 1usize..40), 1..60), 1..4),
         ) {
             let mesh = scan_like(3_000, 1);
-            let mut runs = Runs::new(width);
+            let mut spans = Spans::new(width);
             let mut things = vec![crate::NO_FACE];
             for band in bands {
                 let mut faces: Vec<u32> = band.iter().flat_map(|&(face, n)| std::iter::repeat_n(face, n)).collect();
                 faces.resize(faces.len().next_multiple_of(width), 7);
-                if runs.find(Plain, Some(&mesh), &faces) {
+                if spans.find(Plain, Some(&mesh), &faces) {
                     things.truncate(1);
                 }
-                for k in 0..runs.new_groups() {
-                    let (group, count) = runs.new_group::<true>(Plain, Some(&mesh), k);
+                for k in 0..spans.new_groups() {
+                    let (group, count) = spans.new_group::<true>(Plain, Some(&mesh), k);
                     for new in &group[..count] {
                         prop_assert_eq!(faces[new.at as usize], new.face);
                         things.push(new.face);
                     }
                 }
                 let mut next = 0;
-                for (piece, after) in runs.pieces().iter().zip(&runs.pieces()[1..]) {
+                for (piece, after) in spans.pieces().iter().zip(&spans.pieces()[1..]) {
                     let (start, end) = (piece.start as usize, after.start as usize);
                     prop_assert_eq!(start, next);
                     prop_assert!((1..=LANES).contains(&(end - start)) && start / width == (end - 1) / width);

@@ -5,16 +5,16 @@
 
 use crate::hits::Hits;
 use crate::scene::Scene;
-use crate::shade::anchor::Grid;
+use crate::shade::anchor::RayGrid;
 use crate::shade::channels::{
     MISSING_INDEX, MISSING_NORMAL, assert_size, depths, fit, flat_normals_of, index_color,
 };
-use crate::shade::color::Painter;
-use crate::shade::flat_painter::Stamps;
-use crate::shade::mip_maps::{Pyramids, TextureFilter};
-use crate::shade::points::Directions;
-use crate::shade::prefetch::Ahead;
-use crate::shade::spans::{Runs, band_rows};
+use crate::shade::color::RgbPainter;
+use crate::shade::flat_painter::FlatPainter;
+use crate::shade::mip_maps::{MipMaps, TextureFilter};
+use crate::shade::points::RayTable;
+use crate::shade::prefetch::Prefetch;
+use crate::shade::spans::{Spans, band_rows};
 use crate::simd::lanes::{self, LANES, LaneWork, Lanes};
 use half::f16;
 use s3d_geom::{Camera, NormalAxes, Raster};
@@ -26,15 +26,15 @@ pub struct Shading<'a> {
     /// The scene that was cast.
     pub scene: &'a Scene<'a>,
     /// Its textures.
-    pub pyramids: &'a Pyramids,
+    pub mip_maps: &'a MipMaps,
     /// How they are read.
     pub filter: TextureFilter,
     /// The axes of normals.
     pub normal_axes: NormalAxes,
     /// As [`crate::index_image`] takes them; may be empty if that is not made.
-    pub index_per_face: &'a [u32],
+    pub index_of_face: &'a [u32],
     /// As [`crate::color_per_face_image`] takes them; may be empty if that is not made.
-    pub color_per_face: &'a [[u8; 3]],
+    pub color_of_face: &'a [[u8; 3]],
 }
 
 /// Which images of a view are made; by default none.
@@ -129,10 +129,10 @@ pub fn view_images_into(
     if wanted.xyz {
         fit(xyz, &hits.face, [f16::ZERO; 3]);
     }
-    lanes::run(View { shading, hits, camera, wanted, out });
+    lanes::run(ViewKernel { shading, hits, camera, wanted, out });
 }
 
-struct View<'a> {
+struct ViewKernel<'a> {
     shading: &'a Shading<'a>,
     hits: &'a Hits,
     camera: &'a Camera,
@@ -140,13 +140,13 @@ struct View<'a> {
     out: &'a mut ViewImages,
 }
 
-impl LaneWork for View<'_> {
+impl LaneWork for ViewKernel<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self, lanes: impl Lanes) {
-        let grid = Grid::new(self.camera);
-        if grid.is_turn() {
+        let grid = RayGrid::new(self.camera);
+        if grid.is_panorama() {
             self.bands::<true>(lanes, &grid);
         } else {
             self.bands::<false>(lanes, &grid);
@@ -154,26 +154,26 @@ impl LaneWork for View<'_> {
     }
 }
 
-impl View<'_> {
+impl ViewKernel<'_> {
     #[inline(always)]
-    fn bands<const TURN: bool>(self, lanes: impl Lanes, grid: &Grid) {
+    fn bands<const PANORAMA: bool>(self, lanes: impl Lanes, grid: &RayGrid) {
         let Self { shading, hits, camera, wanted, out } = self;
-        let &Shading { scene, pyramids, ref filter, normal_axes, index_per_face, color_per_face } = shading;
+        let &Shading { scene, mip_maps, ref filter, normal_axes, index_of_face, color_of_face } = shading;
         let ViewImages { rgb, depth, faces: FaceImages { normal, index, color }, xyz } = out;
-        let mut painter = Painter::new(lanes, scene, pyramids, camera, filter);
+        let mut painter = RgbPainter::new(lanes, scene, mip_maps, camera, filter);
         let view = (camera.pose.location, camera.normal_axes_from_world(normal_axes));
         let values = |faces: &[u32; LANES]| {
             let normals = flat_normals_of(scene.mesh(), faces, view);
             std::array::from_fn(|k| {
                 let face = faces[k];
-                [normals[k], index_color(index_per_face, face), color_per_face[face as usize]]
+                [normals[k], index_color(index_of_face, face), color_of_face[face as usize]]
             })
         };
-        let mut stamps = Stamps::new([MISSING_NORMAL, MISSING_INDEX, [0; 3]], values);
-        let directions = Directions::new(camera);
+        let mut flat = FlatPainter::new([MISSING_NORMAL, MISSING_INDEX, [0; 3]], values);
+        let directions = RayTable::new(camera);
 
         let width = hits.face.width() as usize;
-        let (mut runs, rows) = (Runs::new(width), band_rows(width));
+        let (mut spans, rows) = (Spans::new(width), band_rows(width));
         let band = (rows * width).max(1);
         for (k, faces) in hits.face.pixels().chunks(band).enumerate() {
             let pixels = k * band..k * band + faces.len();
@@ -183,36 +183,36 @@ impl View<'_> {
             }
             if wanted.xyz {
                 let out = &mut xyz.pixels_mut()[pixels.clone()];
-                directions.points::<TURN, f16>(lanes, k * rows, distances, out);
+                directions.points::<PANORAMA, f16>(lanes, k * rows, distances, out);
             }
             if !wanted.rgb && !wanted.faces {
                 continue;
             }
-            if runs.find(lanes, Some(scene.mesh()), faces) {
+            if spans.find(lanes, Some(scene.mesh()), faces) {
                 painter.forget();
-                stamps.forget();
+                flat.forget();
             }
             if wanted.rgb {
                 let next = pixels.end..hits.face.len().min(pixels.end + band);
                 let (done, rest) = rgb.pixels_mut().split_at_mut(next.start);
                 let part = |of: &Range<usize>, wanted| if wanted { of.clone() } else { 0..0 };
-                let stamped = part(&pixels, wanted.faces);
-                let ahead = Ahead {
+                let painted = part(&pixels, wanted.faces);
+                let prefetch = Prefetch {
                     faces: &hits.face.pixels()[next.clone()],
                     distances: &hits.depth.pixels()[part(&next, wanted.depth || wanted.xyz)],
                     depth: &depth.pixels()[part(&next, wanted.depth)],
                     xyz: &xyz.pixels()[part(&next, wanted.xyz)],
                     rgb: &rest[..next.len()],
-                    stamps: [&*normal, &*index, &*color].map(|i| &i.pixels()[stamped.clone()]),
+                    flat: [&*normal, &*index, &*color].map(|i| &i.pixels()[painted.clone()]),
                 };
-                painter.band::<TURN>(grid, &runs, k * rows, faces, &mut done[pixels.start..], &ahead);
+                painter.band::<PANORAMA>(grid, &spans, k * rows, faces, &mut done[pixels.start..], &prefetch);
             }
             if wanted.faces {
                 let out =
                     [&mut *normal, &mut *index, &mut *color].map(|i| &mut i.pixels_mut()[pixels.clone()]);
                 // For colours the faces have been fetched already.
                 let mesh = (!wanted.rgb).then_some(scene.mesh());
-                stamps.band(lanes, mesh, &runs, out);
+                flat.band(lanes, mesh, &spans, out);
             }
         }
     }

@@ -5,7 +5,7 @@
 #![allow(unsafe_code)]
 
 use crate::simd::blend::Blend;
-use crate::simd::lanes::{EightRays, LANES, Lanes, STAMP, Texels};
+use crate::simd::lanes::{COLOR_BLOCK, EightRays, LANES, Lanes, Texels};
 use half::f16;
 use std::arch::x86_64::*;
 
@@ -24,7 +24,7 @@ impl<B: Blend> Lanes for Avx2<B> {
     type Weights = __m128i;
     type Corners = B::Corners;
     type Quads = B::Quads;
-    type Mix = B::Mix;
+    type ColorSum = B::ColorSum;
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m256 {
@@ -67,15 +67,15 @@ impl<B: Blend> Lanes for Avx2<B> {
         unsafe { _mm256_max_ps(a, b) }
     }
     #[inline(always)]
-    fn by_sign(self, of: __m256, negative: __m256, positive: __m256) -> __m256 {
+    fn select_by_sign(self, of: __m256, negative: __m256, positive: __m256) -> __m256 {
         unsafe { _mm256_blendv_ps(positive, negative, of) }
     }
     #[inline(always)]
-    fn pick(self, these: u32, yes: __m256, no: __m256) -> __m256 {
+    fn select(self, these: u32, yes: __m256, no: __m256) -> __m256 {
         unsafe { _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(lanes_of(these))) }
     }
     #[inline(always)]
-    fn whole(self, values: __m256) -> __m256 {
+    fn truncate(self, values: __m256) -> __m256 {
         unsafe { _mm256_cvtepi32_ps(_mm256_cvttps_epi32(values)) }
     }
     #[inline(always)]
@@ -165,7 +165,7 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn only(self, these: u32, weights: __m128i) -> __m128i {
+    fn masked(self, these: u32, weights: __m128i) -> __m128i {
         unsafe {
             let bits = _mm_setr_epi16(1, 2, 4, 8, 16, 32, 64, 128);
             let all = _mm_and_si128(_mm_set1_epi16(these as i16), bits);
@@ -173,7 +173,7 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn all(self) -> __m128i {
+    fn full_weights(self) -> __m128i {
         unsafe { _mm_set1_epi16(i16::MIN) }
     }
     #[inline(always)]
@@ -188,17 +188,17 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn no_mix(self) -> Self::Mix {
+    fn zero_sum(self) -> Self::ColorSum {
         self.0.none()
     }
     #[inline(always)]
-    fn add_weighted(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+    fn add_weighted(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
         self.0.add(sum, quads, corners)
     }
     #[inline(always)]
-    fn pixels(self, mix: Self::Mix) -> [u32; LANES] {
+    fn pixels(self, sum: Self::ColorSum) -> [u32; LANES] {
         unsafe {
-            let colors = self.0.bytes(mix);
+            let colors = self.0.bytes(sum);
             let black = _mm256_cmpeq_epi32(colors, _mm256_setzero_si256());
             let colors = _mm256_or_si256(colors, _mm256_and_si256(black, _mm256_set1_epi32(0x01_01_01)));
             let mut pixels = [0; LANES];
@@ -218,7 +218,7 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn store_repeated(self, packed: u32, to: &mut [u8; STAMP]) {
+    fn store_repeated(self, packed: u32, to: &mut [u8; COLOR_BLOCK]) {
         unsafe {
             let three = _mm256_setr_epi8(
                 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, //
@@ -230,7 +230,7 @@ impl<B: Blend> Lanes for Avx2<B> {
     }
 
     #[inline(always)]
-    fn expect<T>(self, thing: &T) {
+    fn prefetch<T>(self, thing: &T) {
         unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(thing).cast()) }
     }
     #[inline(always)]
@@ -258,18 +258,18 @@ impl<B: Blend> Lanes for Avx2<B> {
         }
     }
     #[inline(always)]
-    fn points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
+    fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
         unsafe {
-            let points = self.0.points::<TURN>(rays);
+            let points = self.0.points::<PANORAMA>(rays);
             for (k, eight) in points.iter().enumerate() {
                 _mm256_storeu_ps(to.as_mut_ptr().add(8 * k), *eight);
             }
         }
     }
     #[inline(always)]
-    fn half_points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
+    fn half_points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
         unsafe {
-            let points = self.0.points::<TURN>(rays);
+            let points = self.0.points::<PANORAMA>(rays);
             for (k, eight) in points.iter().enumerate() {
                 let eight = _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(*eight);
                 _mm_storeu_si128(to.as_mut_ptr().add(8 * k).cast(), eight);
@@ -329,7 +329,7 @@ fn lanes_of(these: u32) -> __m256i {
 /// See [`Blend::points`].
 #[inline]
 #[target_feature(enable = "avx2")]
-pub(crate) fn points<const TURN: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
+pub(crate) fn points<const PANORAMA: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
     let EightRays { column, row, depths, place } = *rays;
     // SAFETY: loads from references, of no more than they hold.
     let load = |from: &[f64], k: usize| unsafe { _mm256_loadu_pd(from[4 * k..4 * k + 4].as_ptr()) };
@@ -358,7 +358,7 @@ pub(crate) fn points<const TURN: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
         ];
         for k in 0..3 {
             let (column, row) = (load(column, 3 * half + k), load(row, k));
-            let direction = if TURN { _mm256_mul_pd(column, row) } else { _mm256_add_pd(column, row) };
+            let direction = if PANORAMA { _mm256_mul_pd(column, row) } else { _mm256_add_pd(column, row) };
             let point = _mm256_add_pd(load(place, k), _mm256_mul_pd(direction, times[k]));
             out[3 * half + k] = _mm_and_ps(_mm256_cvtpd_ps(point), masks[k]);
         }
@@ -399,18 +399,19 @@ mod tests {
         let quads = lanes.quads_from(upper, lower);
         let plain_quads = Plain.quads_from(upper, lower);
         let parts = (lanes.parts(x, y), Plain.parts(x, y));
-        let all = (lanes.corners(parts.0, lanes.all()), Plain.corners(parts.1, Plain.all()));
+        let all =
+            (lanes.corners(parts.0, lanes.full_weights()), Plain.corners(parts.1, Plain.full_weights()));
         let some = (lanes.weights(lanes.load(weights)), Plain.weights(*weights));
-        let some = (lanes.only(these, some.0), Plain.only(these, some.1));
+        let some = (lanes.masked(these, some.0), Plain.masked(these, some.1));
         let some = (lanes.corners(parts.0, some.0), Plain.corners(parts.1, some.1));
-        let (mut sum, mut plain) = (lanes.no_mix(), Plain.no_mix());
+        let (mut sum, mut plain) = (lanes.zero_sum(), Plain.zero_sum());
         for (corners, plain_corners) in [some, some, all] {
             sum = lanes.add_weighted(sum, quads, corners);
             plain = Plain.add_weighted(plain, plain_quads, plain_corners);
             prop_assert_eq!(lanes.pixels(sum), Plain.pixels(plain));
         }
-        let one = lanes.add_weighted(lanes.no_mix(), quads, all.0);
-        let plain = Plain.add_weighted(Plain.no_mix(), plain_quads, all.1);
+        let one = lanes.add_weighted(lanes.zero_sum(), quads, all.0);
+        let plain = Plain.add_weighted(Plain.zero_sum(), plain_quads, all.1);
         prop_assert_eq!(lanes.pixels(one), Plain.pixels(plain));
         Ok(())
     }
@@ -425,9 +426,9 @@ mod tests {
         let (quads, plain) = (lanes.quads(image, at), Plain.quads(image, plain_at));
         prop_assert_eq!(quads.is_some(), plain.is_some());
         if let (Some(quads), Some(plain)) = (quads, plain) {
-            let got = lanes.add_weighted(lanes.no_mix(), quads, lanes.corners(parts, lanes.all()));
-            let all = Plain.corners(plain_parts, Plain.all());
-            let want = Plain.add_weighted(Plain.no_mix(), plain, all);
+            let got = lanes.add_weighted(lanes.zero_sum(), quads, lanes.corners(parts, lanes.full_weights()));
+            let all = Plain.corners(plain_parts, Plain.full_weights());
+            let want = Plain.add_weighted(Plain.zero_sum(), plain, all);
             prop_assert_eq!(lanes.pixels(got), Plain.pixels(want));
         }
         Ok(())
@@ -465,9 +466,9 @@ mod tests {
             same!(min, x, a; y, b);
             same!(max, x, a; y, b);
             same!(sqrt, x, a);
-            same!(by_sign, x, a; y, b; z, c);
+            same!(select_by_sign, x, a; y, b; z, c);
             for these in [0, 0b1001_0110, 255] {
-                same!(pick, these, these; x, a; y, b);
+                same!(select, these, these; x, a; y, b);
             }
             let above_one = a.map(|v| if v.abs() >= 1.0 { v.abs() } else { 1.0 });
             let (whole, rest) = avx2.log2(avx2.load(&above_one));
@@ -501,7 +502,7 @@ mod tests {
             avx2.store_pixels(&packed, &mut got);
             Plain.store_pixels(&packed, &mut want);
             prop_assert_eq!(got, want);
-            let (mut got, mut want) = ([0; STAMP], [0; STAMP]);
+            let (mut got, mut want) = ([0; COLOR_BLOCK], [0; COLOR_BLOCK]);
             avx2.store_repeated(packed[0], &mut got);
             Plain.store_repeated(packed[0], &mut want);
             prop_assert_eq!(got, want);

@@ -18,7 +18,7 @@ pub(crate) trait Blend: Copy {
     /// The 2 × 2 pixels.
     type Quads: Copy;
     /// Weighted sums.
-    type Mix: Copy;
+    type ColorSum: Copy;
 
     fn detect() -> Option<Self>;
     /// Does `work`, compiled for these instructions throughout.
@@ -30,14 +30,14 @@ pub(crate) trait Blend: Copy {
     /// At every place, and `stride` bytes after it, are eight bytes.
     unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads;
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
-    fn none(self) -> Self::Mix;
-    fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix;
+    fn none(self) -> Self::ColorSum;
+    fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum;
     /// R, G, B and 0, rounded to bytes.
-    fn bytes(self, mix: Self::Mix) -> __m256i;
+    fn bytes(self, sum: Self::ColorSum) -> __m256i;
     /// See [`crate::simd::lanes::Lanes::changes`].
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
     /// What [`crate::simd::lanes::Lanes::points`] stores.
-    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3];
+    fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>) -> [__m256; 3];
 }
 
 /// The upper neighbours' R G B R G B as 16-bit numbers R R, G G, B B; and the lower ones'.
@@ -75,7 +75,7 @@ impl Blend for Half {
     /// Of the upper neighbours, as pixels in a register, and of the lower ones.
     type Corners = [__m256i; 2];
     type Quads = [__m256i; 4];
-    type Mix = [__m256i; 4];
+    type ColorSum = [__m256i; 4];
 
     fn detect() -> Option<Self> {
         (is_x86_feature_detected!("avx2")
@@ -122,13 +122,13 @@ impl Blend for Half {
         }
     }
     #[inline(always)]
-    fn none(self) -> Self::Mix {
+    fn none(self) -> Self::ColorSum {
         unsafe { [_mm256_setzero_si256(); 4] }
     }
     #[inline(always)]
-    fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+    fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
         unsafe {
-            let mut mix = sum;
+            let mut sum = sum;
             for (neighbors, corners) in NEIGHBORS.iter().zip(corners) {
                 let neighbors = _mm256_broadcastsi128_si256(_mm_loadu_si128(neighbors.as_ptr().cast()));
                 let weights = [
@@ -139,17 +139,17 @@ impl Blend for Half {
                 ];
                 for k in 0..4 {
                     let colors = _mm256_shuffle_epi8(quads[k], neighbors);
-                    mix[k] = _mm256_add_epi32(mix[k], _mm256_madd_epi16(colors, weights[k]));
+                    sum[k] = _mm256_add_epi32(sum[k], _mm256_madd_epi16(colors, weights[k]));
                 }
             }
-            mix
+            sum
         }
     }
     #[inline(always)]
-    fn bytes(self, mix: Self::Mix) -> __m256i {
+    fn bytes(self, sum: Self::ColorSum) -> __m256i {
         unsafe {
             let half = _mm256_set1_epi32(0x4000);
-            let mut whole = mix;
+            let mut whole = sum;
             for whole in &mut whole {
                 *whole = _mm256_srai_epi32::<15>(_mm256_sub_epi32(half, *whole));
             }
@@ -162,8 +162,8 @@ impl Blend for Half {
         unsafe { avx2::changes(values, from, to) }
     }
     #[inline(always)]
-    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
-        unsafe { avx2::points::<TURN>(rays) }
+    fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
+        unsafe { avx2::points::<PANORAMA>(rays) }
     }
 }
 
@@ -175,7 +175,7 @@ impl Blend for Full {
     /// By register, of the upper neighbours and of the lower ones.
     type Corners = [[__m512i; 2]; 2];
     type Quads = [__m512i; 2];
-    type Mix = [__m512i; 2];
+    type ColorSum = [__m512i; 2];
 
     fn detect() -> Option<Self> {
         (Half::detect().is_some()
@@ -231,27 +231,27 @@ impl Blend for Full {
         }
     }
     #[inline(always)]
-    fn none(self) -> Self::Mix {
+    fn none(self) -> Self::ColorSum {
         unsafe { [_mm512_setzero_si512(); 2] }
     }
     #[inline(always)]
-    fn add(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+    fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
         unsafe {
-            let mut mix = sum;
+            let mut sum = sum;
             for k in 0..2 {
                 for (neighbors, weights) in NEIGHBORS.iter().zip(corners[k]) {
                     let neighbors = _mm512_broadcast_i32x4(_mm_loadu_si128(neighbors.as_ptr().cast()));
-                    mix[k] = _mm512_dpwssd_epi32(mix[k], _mm512_shuffle_epi8(quads[k], neighbors), weights);
+                    sum[k] = _mm512_dpwssd_epi32(sum[k], _mm512_shuffle_epi8(quads[k], neighbors), weights);
                 }
             }
-            mix
+            sum
         }
     }
     #[inline(always)]
-    fn bytes(self, mix: Self::Mix) -> __m256i {
+    fn bytes(self, sum: Self::ColorSum) -> __m256i {
         unsafe {
             let half = _mm512_set1_epi32(0x4000);
-            let mut whole = mix;
+            let mut whole = sum;
             for whole in &mut whole {
                 *whole = _mm512_srai_epi32::<15>(_mm512_sub_epi32(half, *whole));
             }
@@ -276,7 +276,7 @@ impl Blend for Full {
         }
     }
     #[inline(always)]
-    fn points<const TURN: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
+    fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
         // Of the numbers 8k to 8k + 7: whose depth it is, and where x y z x y z… begins.
         const DEPTHS: [[i64; 8]; 3] =
             [[0, 0, 0, 1, 1, 1, 2, 2], [2, 3, 3, 3, 4, 4, 4, 5], [5, 5, 6, 6, 6, 7, 7, 7]];
@@ -291,7 +291,8 @@ impl Blend for Full {
             for k in 0..3 {
                 let depths = _mm512_permutexvar_pd(_mm512_loadu_si512(DEPTHS[k].as_ptr().cast()), all);
                 let (column, row) = (load(column, 8 * k), load(row, AXES[k]));
-                let direction = if TURN { _mm512_mul_pd(column, row) } else { _mm512_add_pd(column, row) };
+                let direction =
+                    if PANORAMA { _mm512_mul_pd(column, row) } else { _mm512_add_pd(column, row) };
                 let point = _mm512_add_pd(load(place, AXES[k]), _mm512_mul_pd(direction, depths));
                 let seen = !_mm512_fpclass_pd_mask::<MISSING>(depths);
                 points[k] = _mm512_maskz_cvtpd_ps(seen, point);

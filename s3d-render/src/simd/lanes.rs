@@ -11,7 +11,7 @@ use half::f16;
 pub(crate) const LANES: usize = 8;
 
 /// Bytes of a colour again and again, ten times and more.
-pub(crate) const STAMP: usize = 32;
+pub(crate) const COLOR_BLOCK: usize = 32;
 
 /// Operations on eight values.
 pub(crate) trait Lanes: Copy {
@@ -28,7 +28,7 @@ pub(crate) trait Lanes: Copy {
     /// The same of the 2 × 2 pixels of a texture around each of eight places.
     type Corners: Copy;
     /// Sums of weighted colours of eight pixels, in −32768ths of a step of 8 bits.
-    type Mix: Copy;
+    type ColorSum: Copy;
 
     fn splat(self, value: f32) -> Self::F;
     fn load(self, from: &[f32; LANES]) -> Self::F;
@@ -43,11 +43,11 @@ pub(crate) trait Lanes: Copy {
     /// The larger; `b` if one is not a number.
     fn max(self, a: Self::F, b: Self::F) -> Self::F;
     /// `negative` where the sign bit of `of` is set, else `positive`.
-    fn by_sign(self, of: Self::F, negative: Self::F, positive: Self::F) -> Self::F;
+    fn select_by_sign(self, of: Self::F, negative: Self::F, positive: Self::F) -> Self::F;
     /// `yes` in the lanes of `these`, else `no`.
-    fn pick(self, these: u32, yes: Self::F, no: Self::F) -> Self::F;
+    fn select(self, these: u32, yes: Self::F, no: Self::F) -> Self::F;
     /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
-    fn whole(self, values: Self::F) -> Self::F;
+    fn truncate(self, values: Self::F) -> Self::F;
     /// Bit k: whether a > b in lane k.
     fn greater(self, a: Self::F, b: Self::F) -> u32;
     /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
@@ -77,25 +77,25 @@ pub(crate) trait Lanes: Copy {
     /// Weights from −1 (0) to −32768 (1), rounded towards 0.
     fn weights(self, weights: Self::F) -> Self::Weights;
     /// `weights`, and none in lanes that are not among `these`.
-    fn only(self, these: u32, weights: Self::Weights) -> Self::Weights;
+    fn masked(self, these: u32, weights: Self::Weights) -> Self::Weights;
     /// Weights of 1.
-    fn all(self) -> Self::Weights;
+    fn full_weights(self) -> Self::Weights;
     /// Weights shared out to the 2 × 2 pixels around places, downwards and then to the right, by [`part`]: each is off by
     /// at most 1, and together they are what was shared out.
     fn corners(self, parts: Self::Parts, weights: Self::Weights) -> Self::Corners;
     /// No colour.
-    fn no_mix(self) -> Self::Mix;
+    fn zero_sum(self) -> Self::ColorSum;
     /// `sum` and weighted colours. Nothing is rounded.
-    fn add_weighted(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix;
+    fn add_weighted(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum;
     /// Rounded to bytes, R G B in the lowest three of each value; never black.
-    fn pixels(self, mix: Self::Mix) -> [u32; LANES];
+    fn pixels(self, sum: Self::ColorSum) -> [u32; LANES];
     /// The lowest three bytes of each value, one after another.
     fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]);
     /// The lowest three bytes of a value, again and again.
-    fn store_repeated(self, packed: u32, to: &mut [u8; STAMP]);
+    fn store_repeated(self, packed: u32, to: &mut [u8; COLOR_BLOCK]);
 
     /// Says that `thing` will be read soon.
-    fn expect<T>(self, thing: &T);
+    fn prefetch<T>(self, thing: &T);
     /// Bit k: whether `values[k]` is `value`.
     fn equal(self, values: &[u32; LANES], value: u32) -> u32;
     /// Where a value differs from the one before it, ascending, as `from` and the number of values in between: how many
@@ -103,10 +103,10 @@ pub(crate) trait Lanes: Copy {
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
     /// Depths in 512ths, rounded half up, at most 65,535.
     fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]);
-    /// Points place + direction × depth, rounded to `f32`; `TURN` says how a direction is made.
-    fn points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]);
+    /// Points place + direction × depth, rounded to `f32`; `PANORAMA` says how a direction is made.
+    fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]);
     /// As [`Lanes::points`], rounded once more to half floats.
-    fn half_points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]);
+    fn half_points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]);
 }
 
 /// An image's bytes, and up to where 2 × 2 pixels can be read at once.
@@ -203,7 +203,7 @@ impl Lanes for Plain {
     type Weights = [i16; LANES];
     /// By pixel: of the upper row left and right, and of the lower one.
     type Corners = [[[i16; 2]; 2]; LANES];
-    type Mix = [[i32; 3]; LANES];
+    type ColorSum = [[i32; 3]; LANES];
 
     #[inline(always)]
     fn splat(self, value: f32) -> Eight {
@@ -246,15 +246,15 @@ impl Lanes for Plain {
         each(|k| if a[k] > b[k] { a[k] } else { b[k] })
     }
     #[inline(always)]
-    fn by_sign(self, of: Eight, negative: Eight, positive: Eight) -> Eight {
+    fn select_by_sign(self, of: Eight, negative: Eight, positive: Eight) -> Eight {
         each(|k| if of[k].is_sign_negative() { negative[k] } else { positive[k] })
     }
     #[inline(always)]
-    fn pick(self, these: u32, yes: Eight, no: Eight) -> Eight {
+    fn select(self, these: u32, yes: Eight, no: Eight) -> Eight {
         each(|k| if these >> k & 1 == 1 { yes[k] } else { no[k] })
     }
     #[inline(always)]
-    fn whole(self, values: Eight) -> Eight {
+    fn truncate(self, values: Eight) -> Eight {
         values.map(|v| v as i32 as f32)
     }
     #[inline(always)]
@@ -330,11 +330,11 @@ impl Lanes for Plain {
         weights.map(|weight| weight as i16)
     }
     #[inline(always)]
-    fn only(self, these: u32, weights: [i16; LANES]) -> [i16; LANES] {
+    fn masked(self, these: u32, weights: [i16; LANES]) -> [i16; LANES] {
         std::array::from_fn(|k| if these >> k & 1 == 1 { weights[k] } else { 0 })
     }
     #[inline(always)]
-    fn all(self) -> [i16; LANES] {
+    fn full_weights(self) -> [i16; LANES] {
         [i16::MIN; LANES]
     }
     #[inline(always)]
@@ -348,11 +348,11 @@ impl Lanes for Plain {
         })
     }
     #[inline(always)]
-    fn no_mix(self) -> Self::Mix {
+    fn zero_sum(self) -> Self::ColorSum {
         [[0; 3]; LANES]
     }
     #[inline(always)]
-    fn add_weighted(self, sum: Self::Mix, quads: Self::Quads, corners: Self::Corners) -> Self::Mix {
+    fn add_weighted(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
         std::array::from_fn(|k| {
             let mut sum = sum[k];
             for (row, weights) in quads.iter().zip(corners[k]) {
@@ -367,8 +367,8 @@ impl Lanes for Plain {
         })
     }
     #[inline(always)]
-    fn pixels(self, mix: Self::Mix) -> [u32; LANES] {
-        mix.map(|color| {
+    fn pixels(self, sum: Self::ColorSum) -> [u32; LANES] {
+        sum.map(|color| {
             let [r, g, b] = color.map(|c| ((0x4000 - c) >> 15).clamp(0, 255) as u8);
             match u32::from_le_bytes([r, g, b, 0]) {
                 0 => 0x01_01_01,
@@ -384,12 +384,12 @@ impl Lanes for Plain {
         }
     }
     #[inline(always)]
-    fn store_repeated(self, packed: u32, to: &mut [u8; STAMP]) {
+    fn store_repeated(self, packed: u32, to: &mut [u8; COLOR_BLOCK]) {
         *to = std::array::from_fn(|k| packed.to_le_bytes()[k % 3]);
     }
 
     #[inline(always)]
-    fn expect<T>(self, _: &T) {}
+    fn prefetch<T>(self, _: &T) {}
     #[inline(always)]
     fn equal(self, values: &[u32; LANES], value: u32) -> u32 {
         (0..LANES).map(|k| u32::from(values[k] == value) << k).sum()
@@ -411,18 +411,18 @@ impl Lanes for Plain {
         *to = depths.map(|depth| (((depth * 1024.0).clamp(0.0, 131_070.0) as i32 + 1) >> 1) as u16);
     }
     #[inline(always)]
-    fn points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
+    fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
         let EightRays { column, row, depths, place } = *rays;
         *to = std::array::from_fn(|k| {
             let (axis, depth) = (k % 3, depths[k / 3]);
-            let direction = if TURN { column[k] * row[axis] } else { column[k] + row[axis] };
+            let direction = if PANORAMA { column[k] * row[axis] } else { column[k] + row[axis] };
             if depth.is_finite() { (place[axis] + direction * f64::from(depth)) as f32 } else { 0.0 }
         });
     }
     #[inline(always)]
-    fn half_points<const TURN: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
+    fn half_points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
         let mut points = [0.0; 3 * LANES];
-        self.points::<TURN>(rays, &mut points);
+        self.points::<PANORAMA>(rays, &mut points);
         *to = points.map(f16::from_f32);
     }
 }

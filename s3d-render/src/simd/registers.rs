@@ -9,7 +9,7 @@
 )]
 #![allow(unsafe_code)]
 
-use crate::raster::canvas::{CLOSE, Chunk, Drawn, Grid, Linear, MOST_ROWS};
+use crate::raster::canvas::{CLOSE_ULPS, Chunk, ChunkGrid, DrawnFace, Linear, MAX_ROWS};
 use std::slice::from_raw_parts_mut;
 
 /// Pixels in a register (or in as many registers as it takes).
@@ -34,51 +34,51 @@ pub(crate) trait Registers: Copy {
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
     fn min(self, a: Self::F, b: Self::F) -> Self::F;
     /// a > b; no for what is not a number.
-    fn above(self, a: Self::F, b: Self::F) -> Self::M;
-    /// The bits of `a`, as an integer, are above those of `b` plus `steps`: for numbers from 0 on, `a` is greater by
+    fn greater(self, a: Self::F, b: Self::F) -> Self::M;
+    /// The bits of `a`, as an integer, are above those of `b` plus `ulps`: for numbers from 0 on, `a` is greater by
     /// more than so many times the last place.
-    fn steps_above(self, a: Self::F, b: Self::F, steps: i32) -> Self::M;
+    fn greater_by_ulps(self, a: Self::F, b: Self::F, ulps: i32) -> Self::M;
     fn and(self, a: Self::M, b: Self::M) -> Self::M;
     /// One bit a lane, the first lane's the lowest.
     fn bits(self, m: Self::M) -> u16;
     /// Overwrites the lanes in `m`.
-    fn store_f32(self, to: &mut [f32], m: Self::M, x: Self::F);
+    fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F);
     /// Overwrites the lanes in `m`.
-    fn store_u32(self, to: &mut [u32], m: Self::M, x: u32);
+    fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32);
 
     /// Overwrites the first `N`.
-    fn put(self, to: &mut [f32], x: Self::F);
+    fn store(self, to: &mut [f32], x: Self::F);
 
     /// Draws a chunk: see [`Canvas::draw`](crate::raster::canvas::Canvas::draw). `best` and `slots` begin at its anchor, `pitch`
     /// is from row to row. Notes doubtful pixels by row, and says whether there are any: a call from row to row would
     /// take the registers.
     #[inline(always)]
-    fn draw<const TURN: bool, const CARE: bool>(
+    fn draw<const PANORAMA: bool, const CARE: bool>(
         self,
         (best, slots, pitch): (&mut [f32], &mut [u32], usize),
-        grid: &Grid<'_>,
+        grid: &ChunkGrid<'_>,
         chunk: &Chunk,
-        doubts: &mut [u16; MOST_ROWS],
+        doubts: &mut [u16; MAX_ROWS],
     ) -> bool {
         let l = self;
         let rows = grid.count;
-        assert!(0 < rows && rows <= MOST_ROWS && (!TURN || rows <= grid.scale.len()));
+        assert!(0 < rows && rows <= MAX_ROWS && (!PANORAMA || rows <= grid.scale.len()));
         let cells = pitch.saturating_mul(rows - 1).saturating_add(Self::N);
         assert!(cells <= best.len() && cells <= slots.len());
         let (u, v) = (l.load(grid.u), l.load(grid.v));
         let along = |f: &Linear| {
             let sum = l.add(l.mul(l.splat(f.across), u), l.splat(f.at));
-            if TURN { l.add(l.mul(l.splat(f.bend), v), sum) } else { sum }
+            if PANORAMA { l.add(l.mul(l.splat(f.bend), v), sum) } else { sum }
         };
         let [e0, e1, e2] = chunk.edges;
         let (a0, a1, a2, aq) = (along(&e0), along(&e1), along(&e2), along(&chunk.inverse_t));
         // What each row adds: from here the processor spreads a number over a register without a step of its own.
-        let mut down = [[0.0; MOST_ROWS]; 4];
+        let mut down = [[0.0; MAX_ROWS]; 4];
         for (down, f) in down.iter_mut().zip([&e0, &e1, &e2, &chunk.inverse_t]) {
             let step = l.splat(f.down);
             let mut k = 0;
             while k < rows {
-                l.put(&mut down[k..], l.mul(step, l.load(&grid.rows[k..])));
+                l.store(&mut down[k..], l.mul(step, l.load(&grid.rows[k..])));
                 k += Self::N;
             }
         }
@@ -94,20 +94,20 @@ pub(crate) trait Registers: Copy {
             let (r0, r1, r2) = (l.splat(down[0][k]), l.splat(down[1][k]), l.splat(down[2][k]));
             let inside = l.min(l.add(a0, r0), l.min(l.add(a1, r1), l.add(a2, r2)));
             let mut q = l.add(aq, l.splat(down[3][k]));
-            if TURN {
+            if PANORAMA {
                 q = l.mul(q, l.splat(grid.scale[k]));
             }
             let old = l.load(best);
-            let mut wins = l.and(l.above(inside, error), l.steps_above(q, old, CLOSE));
-            let mut rivals = l.above(inside, minus_error);
+            let mut wins = l.and(l.greater(inside, error), l.greater_by_ulps(q, old, CLOSE_ULPS));
+            let mut rivals = l.greater(inside, minus_error);
             if CARE {
-                wins = l.and(wins, l.above(q, trusted));
-                rivals = l.and(rivals, l.steps_above(l.add(q, off), old, -CLOSE));
+                wins = l.and(wins, l.greater(q, trusted));
+                rivals = l.and(rivals, l.greater_by_ulps(l.add(q, off), old, -CLOSE_ULPS));
             } else {
-                rivals = l.and(rivals, l.steps_above(q, old, -CLOSE));
+                rivals = l.and(rivals, l.greater_by_ulps(q, old, -CLOSE_ULPS));
             }
-            l.store_f32(best, wins, q);
-            l.store_u32(slots, wins, chunk.slot);
+            l.store_masked_f32(best, wins, q);
+            l.store_masked_u32(slots, wins, chunk.slot);
             doubts[k] = l.bits(rivals) & !l.bits(wins);
             any |= doubts[k];
         }
@@ -117,21 +117,21 @@ pub(crate) trait Registers: Copy {
     /// Depths and faces of [`LANES`] pixels that see the faces drawn in their slots. Every set of instructions gives the
     /// same bits. Panics if there is no such slot.
     #[inline(always)]
-    fn resolve<const TURN: bool>(
+    fn resolve<const PANORAMA: bool>(
         self,
         slots: &[u32; LANES],
-        line: &Line<'_>,
-        drawn: &[Drawn],
+        line: &RowGroup<'_>,
+        drawn: &[DrawnFace],
         faces: &mut [u32; LANES],
         depths: &mut [f32; LANES],
     ) {
         let mut values = [0.0; LANES];
         for k in 0..LANES {
-            let Drawn { inverse_t, face, .. } = drawn[slots[k] as usize];
+            let DrawnFace { inverse_t, face, .. } = drawn[slots[k] as usize];
             faces[k] = face;
-            let [at, across, bend] = along::<TURN>(inverse_t, line);
+            let [at, across, bend] = along::<PANORAMA>(inverse_t, line);
             values[k] = at + across * line.u[k];
-            if TURN {
+            if PANORAMA {
                 values[k] += bend * line.v[k];
             }
         }
@@ -141,20 +141,20 @@ pub(crate) trait Registers: Copy {
     }
 }
 
-/// [`LANES`] pixels of a row, as the functions of [`Drawn`] take them.
+/// [`LANES`] pixels of a row, as the functions of [`DrawnFace`] take them.
 #[derive(Clone, Copy)]
-pub(crate) struct Line<'a> {
+pub(crate) struct RowGroup<'a> {
     pub(crate) u: &'a [f64; LANES],
     pub(crate) v: &'a [f64; LANES],
-    /// See [`Drawn`].
+    /// See [`DrawnFace`].
     pub(crate) level: f64,
     pub(crate) rise: f64,
 }
 
-/// The function of a [`Drawn`] in a row: at + across·u + bend·v.
+/// The function of a [`DrawnFace`] in a row: at + across·u + bend·v.
 #[inline(always)]
-fn along<const TURN: bool>([a, b, c]: [f64; 3], line: &Line<'_>) -> [f64; 3] {
-    if TURN { [c * line.rise, a * line.level, b * line.level] } else { [a + c * line.rise, b, 0.0] }
+fn along<const PANORAMA: bool>([a, b, c]: [f64; 3], line: &RowGroup<'_>) -> [f64; 3] {
+    if PANORAMA { [c * line.rise, a * line.level, b * line.level] } else { [a + c * line.rise, b, 0.0] }
 }
 
 /// Work that is compiled for every set of instructions. `run` and what it calls in its loops are `#[inline(always)]`.
@@ -163,7 +163,7 @@ pub(crate) trait Work {
     fn run<L: Registers>(self, lanes: L) -> Self::Output;
 }
 
-/// Runs `work` with the widest registers of the processor.
+/// Spans `work` with the widest registers of the processor.
 pub(crate) fn run<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     {
@@ -212,7 +212,7 @@ impl<const N: usize> Registers for Portable<N> {
     }
 
     #[inline(always)]
-    fn put(self, to: &mut [f32], x: Self::F) {
+    fn store(self, to: &mut [f32], x: Self::F) {
         *to.first_chunk_mut().expect(SHORT) = x;
     }
 
@@ -232,14 +232,14 @@ impl<const N: usize> Registers for Portable<N> {
     }
 
     #[inline(always)]
-    fn above(self, a: Self::F, b: Self::F) -> Self::M {
+    fn greater(self, a: Self::F, b: Self::F) -> Self::M {
         std::array::from_fn(|k| if a[k] > b[k] { u32::MAX } else { 0 })
     }
 
     #[inline(always)]
-    fn steps_above(self, a: Self::F, b: Self::F, steps: i32) -> Self::M {
+    fn greater_by_ulps(self, a: Self::F, b: Self::F, ulps: i32) -> Self::M {
         std::array::from_fn(|k| {
-            let above = a[k].to_bits() as i32 > (b[k].to_bits() as i32).wrapping_add(steps);
+            let above = a[k].to_bits() as i32 > (b[k].to_bits() as i32).wrapping_add(ulps);
             if above { u32::MAX } else { 0 }
         })
     }
@@ -255,13 +255,13 @@ impl<const N: usize> Registers for Portable<N> {
     }
 
     #[inline(always)]
-    fn store_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
+    fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
         let to: &mut [f32; N] = to.first_chunk_mut().expect(SHORT);
         *to = std::array::from_fn(|k| if m[k] != 0 { x[k] } else { to[k] });
     }
 
     #[inline(always)]
-    fn store_u32(self, to: &mut [u32], m: Self::M, x: u32) {
+    fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32) {
         let to: &mut [u32; N] = to.first_chunk_mut().expect(SHORT);
         *to = std::array::from_fn(|k| if m[k] != 0 { x } else { to[k] });
     }
@@ -271,8 +271,8 @@ const SHORT: &str = "a slice as long as a register";
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{LANES, Line, Registers, SHORT, Work, along};
-    use crate::raster::canvas::Drawn;
+    use super::{LANES, Registers, RowGroup, SHORT, Work, along};
+    use crate::raster::canvas::DrawnFace;
     use std::arch::x86_64::*;
 
     #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -314,7 +314,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn put(self, to: &mut [f32], x: Self::F) {
+        fn store(self, to: &mut [f32], x: Self::F) {
             let to: &mut [f32; LANES] = to.first_chunk_mut().expect(SHORT);
             unsafe { _mm512_storeu_ps(to.as_mut_ptr(), x) }
         }
@@ -335,14 +335,14 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn above(self, a: Self::F, b: Self::F) -> Self::M {
+        fn greater(self, a: Self::F, b: Self::F) -> Self::M {
             unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(a, b) }
         }
 
         #[inline(always)]
-        fn steps_above(self, a: Self::F, b: Self::F, steps: i32) -> Self::M {
+        fn greater_by_ulps(self, a: Self::F, b: Self::F, ulps: i32) -> Self::M {
             unsafe {
-                let b = _mm512_add_epi32(_mm512_castps_si512(b), _mm512_set1_epi32(steps));
+                let b = _mm512_add_epi32(_mm512_castps_si512(b), _mm512_set1_epi32(ulps));
                 _mm512_cmpgt_epi32_mask(_mm512_castps_si512(a), b)
             }
         }
@@ -358,23 +358,23 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn store_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
+        fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
             let to: &mut [f32; LANES] = to.first_chunk_mut().expect(SHORT);
             unsafe { _mm512_mask_storeu_ps(to.as_mut_ptr(), m, x) }
         }
 
         #[inline(always)]
-        fn store_u32(self, to: &mut [u32], m: Self::M, x: u32) {
+        fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32) {
             let to: &mut [u32; LANES] = to.first_chunk_mut().expect(SHORT);
             unsafe { _mm512_mask_storeu_epi32(to.as_mut_ptr().cast(), m, _mm512_set1_epi32(x as i32)) }
         }
 
         #[inline(always)]
-        fn resolve<const TURN: bool>(
+        fn resolve<const PANORAMA: bool>(
             self,
             slots: &[u32; LANES],
-            line: &Line<'_>,
-            drawn: &[Drawn],
+            line: &RowGroup<'_>,
+            drawn: &[DrawnFace],
             faces: &mut [u32; LANES],
             depths: &mut [f32; LANES],
         ) {
@@ -384,22 +384,23 @@ mod x86 {
                 // Mostly there is one face, in a panorama one or two. (Perspective views with small faces are faster if
                 // their pairs count as a mixture.)
                 let these = _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(slots[0] as i32));
-                let other = if TURN { slots[these.trailing_ones() as usize % LANES] } else { slots[0] };
+                let other = if PANORAMA { slots[these.trailing_ones() as usize % LANES] } else { slots[0] };
                 if these | _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(other as i32)) != u16::MAX {
-                    return resolve::<TURN>(slots, line, drawn, faces, depths);
+                    return resolve::<PANORAMA>(slots, line, drawn, faces, depths);
                 }
                 let (one, other) = (&drawn[slots[0] as usize], &drawn[other as usize]);
                 let seen = _mm512_set1_epi32(other.face as i32);
                 let seen = _mm512_mask_set1_epi32(seen, these, one.face as i32);
                 _mm512_storeu_epi32(faces.as_mut_ptr().cast(), seen);
-                let (one, other) = (along::<TURN>(one.inverse_t, line), along::<TURN>(other.inverse_t, line));
+                let (one, other) =
+                    (along::<PANORAMA>(one.inverse_t, line), along::<PANORAMA>(other.inverse_t, line));
                 for (k, these) in [(0, these as u8), (8, (these >> 8) as u8)] {
                     let either = |n: usize| {
                         _mm512_mask_blend_pd(these, _mm512_set1_pd(other[n]), _mm512_set1_pd(one[n]))
                     };
                     let u = _mm512_loadu_pd(line.u.as_ptr().add(k));
                     let mut value = _mm512_add_pd(either(0), _mm512_mul_pd(either(1), u));
-                    if TURN {
+                    if PANORAMA {
                         let v = _mm512_loadu_pd(line.v.as_ptr().add(k));
                         value = _mm512_add_pd(value, _mm512_mul_pd(either(2), v));
                     }
@@ -410,9 +411,9 @@ mod x86 {
         }
     }
 
-    /// A half of each of two `Drawn`: two numbers, or one with a face.
+    /// A half of each of two `DrawnFace`: two numbers, or one with a face.
     #[inline(always)]
-    unsafe fn halves<const AT: usize>(p: &Drawn, r: &Drawn) -> __m256d {
+    unsafe fn halves<const AT: usize>(p: &DrawnFace, r: &DrawnFace) -> __m256d {
         // SAFETY: the caller has references to them; the processor has AVX2.
         unsafe {
             let p = std::ptr::from_ref(p).cast::<f64>().add(AT);
@@ -423,9 +424,9 @@ mod x86 {
 
     /// Depths of the four pixels from `k` on, which is at most twelve.
     #[inline(always)]
-    unsafe fn four_depths<const TURN: bool>(
+    unsafe fn four_depths<const PANORAMA: bool>(
         [a, b, c]: [__m256d; 3],
-        line: &Line<'_>,
+        line: &RowGroup<'_>,
         k: usize,
         depths: &mut [f32; LANES],
     ) {
@@ -433,7 +434,7 @@ mod x86 {
         unsafe {
             let (level, rise) = (_mm256_set1_pd(line.level), _mm256_set1_pd(line.rise));
             let u = _mm256_loadu_pd(line.u.as_ptr().add(k));
-            let value = if TURN {
+            let value = if PANORAMA {
                 let v = _mm256_loadu_pd(line.v.as_ptr().add(k));
                 let along = _mm256_mul_pd(_mm256_mul_pd(a, level), u);
                 let bend = _mm256_mul_pd(_mm256_mul_pd(b, level), v);
@@ -449,10 +450,10 @@ mod x86 {
     /// [`Registers::resolve`], four pixels at a time.
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn resolve<const TURN: bool>(
+    fn resolve<const PANORAMA: bool>(
         slots: &[u32; LANES],
-        line: &Line<'_>,
-        drawn: &[Drawn],
+        line: &RowGroup<'_>,
+        drawn: &[DrawnFace],
         faces: &mut [u32; LANES],
         depths: &mut [f32; LANES],
     ) {
@@ -466,7 +467,7 @@ mod x86 {
             let (pr, qs) = unsafe { (halves::<2>(p, r), halves::<2>(q, s)) };
             let c = _mm256_unpacklo_pd(pr, qs);
             // SAFETY: k is 0, 4, 8 or 12.
-            unsafe { four_depths::<TURN>([a, b, c], line, k, depths) };
+            unsafe { four_depths::<PANORAMA>([a, b, c], line, k, depths) };
             let low = _mm256_shuffle_ps::<0b10_00_10_00>(
                 _mm256_castpd_ps(_mm256_unpackhi_pd(pr, qs)),
                 _mm256_setzero_ps(),
@@ -509,7 +510,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn put(self, to: &mut [f32], x: Self::F) {
+        fn store(self, to: &mut [f32], x: Self::F) {
             let to = &mut to[..Self::N];
             for (k, x) in x.into_iter().enumerate() {
                 unsafe { _mm256_storeu_ps(to.as_mut_ptr().add(k * WIDE), x) };
@@ -532,14 +533,14 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn above(self, a: Self::F, b: Self::F) -> Self::M {
+        fn greater(self, a: Self::F, b: Self::F) -> Self::M {
             std::array::from_fn(|k| unsafe { _mm256_cmp_ps::<_CMP_GT_OQ>(a[k], b[k]) })
         }
 
         #[inline(always)]
-        fn steps_above(self, a: Self::F, b: Self::F, steps: i32) -> Self::M {
+        fn greater_by_ulps(self, a: Self::F, b: Self::F, ulps: i32) -> Self::M {
             std::array::from_fn(|k| unsafe {
-                let b = _mm256_add_epi32(_mm256_castps_si256(b[k]), _mm256_set1_epi32(steps));
+                let b = _mm256_add_epi32(_mm256_castps_si256(b[k]), _mm256_set1_epi32(ulps));
                 _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_castps_si256(a[k]), b))
             })
         }
@@ -555,7 +556,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn store_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
+        fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
             let to = &mut to[..Self::N];
             for k in 0..R {
                 unsafe {
@@ -566,7 +567,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn store_u32(self, to: &mut [u32], m: Self::M, x: u32) {
+        fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32) {
             let to = &mut to[..Self::N];
             for (k, m) in m.into_iter().enumerate() {
                 unsafe {
@@ -578,16 +579,16 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn resolve<const TURN: bool>(
+        fn resolve<const PANORAMA: bool>(
             self,
             slots: &[u32; LANES],
-            line: &Line<'_>,
-            drawn: &[Drawn],
+            line: &RowGroup<'_>,
+            drawn: &[DrawnFace],
             faces: &mut [u32; LANES],
             depths: &mut [f32; LANES],
         ) {
             // SAFETY: as above.
-            unsafe { resolve::<TURN>(slots, line, drawn, faces, depths) }
+            unsafe { resolve::<PANORAMA>(slots, line, drawn, faces, depths) }
         }
     }
 }

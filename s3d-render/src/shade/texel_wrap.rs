@@ -2,15 +2,15 @@
 
 /// How an attribute repeats: every `period`; beyond `half` of it, it is mirrored.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Fold {
+pub(crate) struct TexelWrap {
     pub(crate) divisor: f64,
     pub(crate) period: f64,
     pub(crate) half: f64,
 }
 
-impl Fold {
+impl TexelWrap {
     /// Not at all.
-    pub(crate) const NOT: Self = Self { divisor: 1.0, period: 0.0, half: f64::INFINITY };
+    pub(crate) const NONE: Self = Self { divisor: 1.0, period: 0.0, half: f64::INFINITY };
 
     pub(crate) fn repeat(period: f64) -> Self {
         Self { divisor: period, period, half: f64::INFINITY }
@@ -22,7 +22,7 @@ impl Fold {
 
     /// The sign and the shift that bring `value` between 0 and the period, or half of a mirrored one.
     #[inline(always)]
-    pub(crate) fn of(self, value: f64) -> (f64, f64) {
+    pub(crate) fn sign_and_shift(self, value: f64) -> (f64, f64) {
         let turn = (value / self.divisor).floor() * self.period;
         if value - turn > self.half { (-1.0, turn + self.period) } else { (1.0, -turn) }
     }
