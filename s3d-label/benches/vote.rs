@@ -50,8 +50,8 @@ fn bench(c: &mut Criterion) {
             b.iter(|| vote(black_box(points), faces));
         });
         group.throughput(Throughput::Elements(u64::from(faces)));
-        group.bench_with_input(BenchmarkId::new("face_labels", faces), &votes, |b, votes| {
-            b.iter(|| black_box(votes).face_labels());
+        group.bench_with_input(BenchmarkId::new("label_of_face", faces), &votes, |b, votes| {
+            b.iter(|| black_box(votes).label_of_face());
         });
     }
     group.finish();

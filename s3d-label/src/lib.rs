@@ -3,11 +3,13 @@
 //!
 //! The nouns: [`Class`], [`Room`] and [`Label`] with its name; the [`LabelTable`], which numbers the labels of a data
 //! set in the published order ([`LabelId`]); [`number_area`], which turns the numbers of an annotated tree into those of
-//! labels; [`Votes`], which counts labels by face, and the [`VoteReport`] on them; [`ClassCounts`] and [`RoomCounts`],
-//! the paper's tables of statistics.
+//! labels; the [`Labeler`], which takes labelled points block by block and gives the [`FaceLabels`] of a mesh (or
+//! [`vote`], for points that are all there), the [`Votes`] behind them and the [`VoteReport`] on these; [`ClassCounts`]
+//! and [`RoomCounts`], the paper's tables of statistics.
 //!
 //! ```
-//! use s3d_label::{Class, LabelId, LabelTable, Votes, number_area};
+//! use s3d_geom::{TriMesh, glam::{Vec3, vec3}};
+//! use s3d_label::{Class, LabelId, LabelTable, number_area, vote};
 //!
 //! // An annotated tree of one area: a wall and a chair of office_1, a chair of office_2.
 //! let office = |number| format!("office_{number}").parse().unwrap();
@@ -20,12 +22,13 @@
 //! );
 //!
 //! // Three points of the wall and one of a chair vote for a mesh of two faces.
+//! let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE];
+//! let mesh = TriMesh::from_faces(corners, vec![[0, 1, 2], [1, 3, 2]])?;
 //! let (wall, chair) = (LabelId(3), LabelId(1));
-//! let mut votes = Votes::new(2);
-//! for label in [wall, chair, wall, wall] {
-//!     votes.add(0, label, 0.002);
-//! }
-//! assert_eq!(votes.face_labels(), [wall, LabelId::NULL]);
+//! let points = [[0.1, 0.1], [0.2, 0.1], [0.1, 0.3], [0.3, 0.3]].map(|[x, y]| vec3(x, y, 0.002));
+//! let labels = vote(&mesh, &points, &[wall, chair, wall, wall])?;
+//! assert_eq!(labels.label_of_face(), [wall, LabelId::NULL]);
+//! assert_eq!(labels.report(&table)?.classes[Class::Wall.index()].1.points, 3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -43,24 +46,31 @@
 )]
 
 mod class;
+mod corners;
+mod face_labels;
 mod instance;
 mod label;
+mod labeler;
 mod numbering;
 mod report;
 mod room;
 mod statistics;
 mod table;
-mod vote;
+mod votes;
+mod wall_direction;
 
 pub use class::{Class, UnknownClass};
+pub use face_labels::FaceLabels;
 pub use instance::InstanceSummary;
 pub use label::{Label, LabelError, NULL_NAME, parse_name};
+pub use labeler::{Labeler, VoteError, vote};
 pub use numbering::{NumberedInstance, NumberingError, number_area};
 pub use report::{VoteReport, VoteRow};
 pub use room::{Room, RoomError, RoomType, UnknownRoomType};
 pub use statistics::{ClassCounts, RoomCounts};
 pub use table::{LabelId, LabelTable, MAX_LABELS, TableError};
-pub use vote::{PointTally, VoteOptions, Votes, Winner};
+pub use votes::{FaceVotes, PointTally, VoteOptions, Votes};
+pub use wall_direction::wall_directions_deg;
 
 /// The README's example, compiled.
 #[cfg(doctest)]

@@ -1,6 +1,6 @@
 //! How well the points of a scan vote for the faces of its mesh.
 
-use crate::{Class, LabelTable, Room, Votes};
+use crate::{Class, FaceVotes, LabelTable, Room, VoteError, Votes};
 use std::collections::BTreeMap;
 
 /// A row of a [`VoteReport`]: the votes of one room, one class, or all.
@@ -30,11 +30,11 @@ impl VoteRow {
         if self.faces == 0 { 0.0 } else { self.face_votes as f64 / self.faces as f64 }
     }
 
-    fn add_face(&mut self, winner: u64, votes: u64) {
+    fn add_face(&mut self, face: &FaceVotes) {
         self.faces += 1;
-        self.face_votes += votes;
+        self.face_votes += face.total;
         // u128: a share is compared without rounding, and no product overflows.
-        let (winner, votes) = (u128::from(winner), u128::from(votes));
+        let (winner, votes) = (u128::from(face.votes), u128::from(face.total));
         self.contested += u64::from(winner < votes);
         self.contested_below_three_quarters += u64::from(4 * winner < 3 * votes);
         self.contested_below_half += u64::from(2 * winner < votes);
@@ -42,6 +42,22 @@ impl VoteRow {
 }
 
 /// A summary of [`Votes`], by room and by class.
+///
+/// ```
+/// use s3d_label::{Class, LabelId, LabelTable, VoteReport, Votes};
+///
+/// let table = LabelTable::from_labels(["chair_1_office_1_1".parse()?, "wall_1_office_1_1".parse()?])?;
+/// let mut votes = Votes::new(2);
+/// votes.add(0, LabelId(2), 0.01);
+/// votes.add(0, LabelId(2), 0.07);
+/// votes.add(0, LabelId(1), 0.0);
+/// let report = VoteReport::new(&votes, &table)?;
+/// assert_eq!((report.total.points, report.total.far_points, report.faces_without_vote), (3, 1, 1));
+/// // The face is the wall's, by less than three quarters of its votes.
+/// let walls = report.classes[Class::Wall.index()].1;
+/// assert_eq!((walls.faces, walls.face_votes, walls.contested_below_three_quarters), (1, 3, 1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoteReport {
     /// The distance beyond which a point is far, in metres.
@@ -63,14 +79,15 @@ pub struct VoteReport {
 impl VoteReport {
     /// Sums up `votes` for labels of `table`.
     ///
-    /// # Panics
-    /// If there are votes for a label that is not in the table.
+    /// # Errors
+    /// [`VoteError::NoSuchLabel`] if there are votes for a label that is not in the table.
     #[expect(clippy::indexing_slicing, reason = "there is a row for each class")]
-    #[expect(clippy::expect_used, reason = "a caller's mistake, which was refused above: see Panics")]
-    pub fn new(votes: &Votes, table: &LabelTable) -> Self {
+    pub fn new(votes: &Votes, table: &LabelTable) -> Result<Self, VoteError> {
+        let no_such_label = |label| VoteError::NoSuchLabel { label, labels: table.len() };
         let largest = votes.largest_label();
-        assert!(largest.index() < table.len(), "votes for label {largest} of a table of {}", table.len());
-
+        if largest.index() >= table.len() {
+            return Err(no_such_label(largest));
+        }
         let mut total = VoteRow::default();
         let mut rooms: BTreeMap<(u32, Room), VoteRow> = BTreeMap::new();
         let mut classes = Class::ALL.map(|class| (class, VoteRow::default()));
@@ -84,17 +101,17 @@ impl VoteReport {
         }
         let mut faces_without_vote = 0;
         for face in 0..votes.face_count() as u32 {
-            let Some(winner) = votes.winner(face) else {
+            let Some(of_face) = votes.of_face(face) else {
                 faces_without_vote += 1;
                 continue;
             };
-            let label = table.get(winner.label).expect("no larger label was voted for");
+            let label = table.get(of_face.label).ok_or_else(|| no_such_label(of_face.label))?;
             let room = rooms.entry((label.area, label.room)).or_default();
             for row in [&mut total, room, &mut classes[label.class.index()].1] {
-                row.add_face(winner.votes, winner.face_votes);
+                row.add_face(&of_face);
             }
         }
-        Self {
+        Ok(Self {
             far_m: votes.options().far_m,
             face_count: votes.face_count() as u64,
             faces_without_vote,
@@ -102,7 +119,7 @@ impl VoteReport {
             total,
             rooms: rooms.into_iter().map(|((area, room), row)| (area, room, row)).collect(),
             classes,
-        }
+        })
     }
 }
 
@@ -137,7 +154,7 @@ mod tests {
         add(4, 2, 5, 0.01); // five sevenths
         add(4, 3, 2, 0.2);
         add(5, 0, 9, 0.01); // no label, no vote
-        let report = VoteReport::new(&votes, &table());
+        let report = VoteReport::new(&votes, &table()).unwrap();
 
         assert_eq!((report.face_count, report.faces_without_vote, report.unlabeled_points), (7, 2, 9));
         let total = VoteRow {
@@ -173,11 +190,11 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "label 5 of a table of 5")]
-    fn a_vote_for_a_label_outside_the_table_is_a_callers_mistake() {
+    fn a_vote_for_a_label_outside_the_table_is_refused() {
         let mut votes = Votes::new(1);
         votes.add(0, LabelId(5), 0.0);
-        let _ = VoteReport::new(&votes, &table());
+        let refused = VoteReport::new(&votes, &table()).unwrap_err();
+        assert_eq!(refused.to_string(), "label 5 of a table of 5");
     }
 
     proptest! {
@@ -189,7 +206,7 @@ mod tests {
             for &(face, label, distance_m) in &points {
                 votes.add(face, LabelId(label), distance_m);
             }
-            let report = VoteReport::new(&votes, &table());
+            let report = VoteReport::new(&votes, &table()).unwrap();
             let columns = |r: &VoteRow| {
                 [r.points, r.far_points, r.faces, r.face_votes, r.contested,
                  r.contested_below_three_quarters, r.contested_below_half]

@@ -182,7 +182,7 @@ pub(crate) fn annotate(
         return Err(Failure::Input(format!("{}: no room in it", area.path.display())));
     }
     let label = || {
-        let face_labels = votes.face_labels();
+        let face_labels = votes.label_of_face();
         let upright = || upright_faces(mesh, table, &face_labels);
         let (upright, report) = rayon::join(upright, || VoteReport::new(&votes, table));
         (face_labels, upright, report)
@@ -192,6 +192,7 @@ pub(crate) fn annotate(
     for room in &mut rooms {
         room.wall_direction_deg = upright.remove(&room.room).map_or(0, |faces| faces.direction_deg());
     }
+    let report = report.map_err(|e| Failure::Input(e.to_string()))?;
     Ok(Annotated { face_labels, report, rooms, points: total, skipped })
 }
 

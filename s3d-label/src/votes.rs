@@ -3,7 +3,7 @@
 #![expect(
     clippy::indexing_slicing,
     clippy::expect_used,
-    reason = "every point of a scan votes here: faces are a caller's (see Panics), entries are those that heads point to"
+    reason = "every point of a scan votes here: faces are a caller's (see Panics), heads point to entries"
 )]
 
 use crate::LabelId;
@@ -34,32 +34,80 @@ pub struct PointTally {
     pub far: u64,
 }
 
-/// A face's most frequent label, and how clearly it won.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Winner {
-    /// The label.
+/// How the vote for the label of one face went. There is at least one vote.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaceVotes {
+    /// The most frequent label, the smallest of equally frequent ones.
     pub label: LabelId,
     /// Its votes, at least 1.
     pub votes: u64,
-    /// The votes for any label of the face.
-    pub face_votes: u64,
+    /// The second most frequent label, the smallest of equally frequent ones; [`LabelId::NULL`] if all votes agree.
+    pub runner_up: LabelId,
+    /// Its votes, at most [`votes`](Self::votes); 0 if all votes agree.
+    pub runner_up_votes: u64,
+    /// The votes for all labels together.
+    pub total: u64,
+    /// How far the farthest voter is from the face, metres. Infinite if a distance was no number.
+    pub farthest_m: f32,
+    /// The mean distance of the voters from the face, metres. Distances are summed in whole nanometres, so that the sum
+    /// is the same for any order; infinite if the sum is above 1.8·10¹⁰ m.
+    pub mean_m: f32,
+}
+
+impl FaceVotes {
+    /// By how many votes the label won; 0 in a tie.
+    pub fn margin(&self) -> u64 {
+        self.votes - self.runner_up_votes
+    }
+
+    /// The winner's share of the votes, in (0, 1].
+    pub fn share(&self) -> f64 {
+        self.votes as f64 / self.total as f64
+    }
 }
 
 /// Counts, for each face of a mesh, the labels of the points to which it is the nearest.
 ///
 /// Points stream through [`Votes::add`], one at a time and in any order; nothing of them is kept but counts. Several
 /// counts over the same faces [`merge`](Votes::merge) into one. Every result is the same for any order of points and
-/// merges. Memory: 4 bytes a face, and 16 bytes for each pair of a face and a label that occurs. Source: formats.md,
-/// "Labels": voting.
+/// merges. Memory: 16 bytes a face, and 16 bytes for each pair of a face and a label that occurs. Source: formats.md,
+/// "Labels": voting. A [`Labeler`](crate::Labeler) finds the faces of points and counts them here.
+///
+/// ```
+/// use s3d_label::{LabelId, Votes};
+///
+/// let (wall, door) = (LabelId(3), LabelId(1));
+/// let mut votes = Votes::new(2);
+/// for (label, distance_m) in [(wall, 0.002), (door, 0.001), (wall, 0.006)] {
+///     votes.add(0, label, distance_m);
+/// }
+/// let face = votes.of_face(0).unwrap();
+/// assert_eq!((face.label, face.votes, face.runner_up, face.total), (wall, 2, door, 3));
+/// assert_eq!((face.margin(), face.farthest_m, face.mean_m), (1, 0.006, 0.003));
+/// assert_eq!(votes.label_of_face(), [wall, LabelId::NULL]);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Votes {
     options: VoteOptions,
-    /// Where each face's list of entries starts, or [`END`].
-    heads: Vec<u32>,
+    faces: Vec<Face>,
     entries: Vec<Entry>,
     /// By label index; as long as the largest index that occurred asks for.
     tallies: Vec<PointTally>,
     unlabeled: u64,
+}
+
+/// Where a face's list of entries starts, and how far its voters are.
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    /// The first entry, or [`END`].
+    head: u32,
+    farthest_m: f32,
+    /// In whole nanometres, as their sum is the same in any order; `u64::MAX` where that is too small.
+    sum_nm: u64,
+}
+
+impl Face {
+    const EMPTY: Self = Self { head: END, farthest_m: 0.0, sum_nm: 0 };
 }
 
 /// The votes for one label of one face, and where the next of that face is.
@@ -82,23 +130,34 @@ impl Votes {
     /// If `far_m` is not a number.
     pub fn with_options(face_count: usize, options: VoteOptions) -> Self {
         assert!(!options.far_m.is_nan(), "no distance is farther than {} m", options.far_m);
-        Self { options, heads: vec![END; face_count], entries: Vec::new(), tallies: Vec::new(), unlabeled: 0 }
+        Self {
+            options,
+            faces: vec![Face::EMPTY; face_count],
+            entries: Vec::new(),
+            tallies: Vec::new(),
+            unlabeled: 0,
+        }
     }
 
-    /// A point with `label` votes for `face`, which is `distance_m` away (a distance that is not a number is far).
-    /// A point without a label ([`LabelId::NULL`]) does not vote: it is only counted, in [`Votes::unlabeled_points`].
+    /// A point with `label` votes for `face`, which is `distance_m` metres away, at least 0 (a distance that is not a
+    /// number counts as infinite). A point without a label ([`LabelId::NULL`]) does not vote: it is only counted, in [`Votes::unlabeled_points`].
     ///
     /// # Panics
     /// If there is no face `face`, or above 2³² − 1 pairs of a face and a label.
     #[inline]
     pub fn add(&mut self, face: u32, label: LabelId, distance_m: f32) {
-        assert!((face as usize) < self.heads.len(), "face {face} of {}", self.heads.len());
+        assert!((face as usize) < self.faces.len(), "face {face} of {}", self.faces.len());
         if label.is_null() {
             self.unlabeled += 1;
             return;
         }
-        let far = u64::from(distance_m > self.options.far_m || distance_m.is_nan());
+        let distance_m = if distance_m.is_nan() { f32::INFINITY } else { distance_m };
+        let far = u64::from(distance_m > self.options.far_m);
         self.tally(label, PointTally { points: 1, far });
+        let of_face = &mut self.faces[face as usize];
+        of_face.farthest_m = of_face.farthest_m.max(distance_m);
+        // A cast takes what is too large for a u64 to the largest one.
+        of_face.sum_nm = of_face.sum_nm.saturating_add((f64::from(distance_m) * 1e9 + 0.5) as u64);
         self.count(face, label, 1);
     }
 
@@ -107,13 +166,16 @@ impl Votes {
     /// # Panics
     /// If `other` has another number of faces or other options.
     pub fn merge(&mut self, other: &Self) {
-        assert_eq!(self.heads.len(), other.heads.len(), "votes for meshes of different size");
+        assert_eq!(self.faces.len(), other.faces.len(), "votes for meshes of different size");
         assert_eq!(self.options, other.options, "votes counted under different options");
         self.unlabeled += other.unlabeled;
         for (label, &tally) in other.tallies.iter().enumerate() {
             self.tally(LabelId(label as u32), tally);
         }
-        for face in 0..other.heads.len() as u32 {
+        for (face, of_other) in (0u32..).zip(&other.faces) {
+            let of_face = &mut self.faces[face as usize];
+            of_face.farthest_m = of_face.farthest_m.max(of_other.farthest_m);
+            of_face.sum_nm = of_face.sum_nm.saturating_add(of_other.sum_nm);
             for entry in other.entries_of(face) {
                 self.count(face, entry.label, entry.votes);
             }
@@ -133,7 +195,7 @@ impl Votes {
     }
 
     fn count(&mut self, face: u32, label: LabelId, votes: u64) {
-        let head = self.heads[face as usize];
+        let head = self.faces[face as usize].head;
         let (mut before, mut at) = (END, head);
         while at != END {
             let entry = self.entries[at as usize];
@@ -143,25 +205,25 @@ impl Votes {
                     // To the front: points come instance by instance, so that the next one probably has this label.
                     self.entries[before as usize].next = entry.next;
                     self.entries[at as usize].next = head;
-                    self.heads[face as usize] = at;
+                    self.faces[face as usize].head = at;
                 }
                 return;
             }
             (before, at) = (at, entry.next);
         }
         let new = u32::try_from(self.entries.len()).ok().filter(|&i| i != END);
-        self.heads[face as usize] = new.expect("too many pairs of a face and a label");
+        self.faces[face as usize].head = new.expect("too many pairs of a face and a label");
         self.entries.push(Entry { votes, label, next: head });
     }
 
     fn entries_of(&self, face: u32) -> impl Iterator<Item = Entry> {
         let entry = |i: u32| (i != END).then(|| self.entries[i as usize]);
-        std::iter::successors(entry(self.heads[face as usize]), move |e| entry(e.next))
+        std::iter::successors(entry(self.faces[face as usize].head), move |e| entry(e.next))
     }
 
     /// Number of faces, those without a vote included.
     pub fn face_count(&self) -> usize {
-        self.heads.len()
+        self.faces.len()
     }
 
     /// The options that the votes are counted under.
@@ -194,27 +256,41 @@ impl Votes {
         votes
     }
 
-    /// A face's most frequent label, the smallest of equally frequent ones; `None` if nobody voted for the face.
+    /// How the vote for a face went; `None` if nobody voted for the face.
     ///
     /// # Panics
     /// If there is no face `face`.
-    pub fn winner(&self, face: u32) -> Option<Winner> {
-        let mut winner: Option<Winner> = None;
-        let mut face_votes = 0;
+    pub fn of_face(&self, face: u32) -> Option<FaceVotes> {
+        let is_before = |a: (u64, LabelId), b: (u64, LabelId)| a.0 > b.0 || (a.0 == b.0 && a.1 < b.1);
+        let none = (0, LabelId::NULL);
+        let (mut first, mut second, mut total) = (none, none, 0);
         for Entry { votes, label, .. } in self.entries_of(face) {
-            face_votes += votes;
-            if winner.is_none_or(|w| votes > w.votes || (votes == w.votes && label < w.label)) {
-                winner = Some(Winner { label, votes, face_votes: 0 });
+            total += votes;
+            let entry = (votes, label);
+            if is_before(entry, first) {
+                (first, second) = (entry, first);
+            } else if is_before(entry, second) {
+                second = entry;
             }
         }
-        winner.map(|w| Winner { face_votes, ..w })
+        let Face { farthest_m, sum_nm, .. } = self.faces[face as usize];
+        let mean_m = if sum_nm == u64::MAX { f64::INFINITY } else { sum_nm as f64 / total as f64 * 1e-9 };
+        (total > 0).then_some(FaceVotes {
+            label: first.1,
+            votes: first.0,
+            runner_up: second.1,
+            runner_up_votes: second.0,
+            total,
+            farthest_m,
+            mean_m: mean_m as f32,
+        })
     }
 
-    /// Each face's label: the most frequent among its votes, the smallest of equally frequent ones, and
+    /// The label of each face: the most frequent among its votes, the smallest of equally frequent ones, and
     /// [`LabelId::NULL`] without a vote.
-    pub fn face_labels(&self) -> Vec<LabelId> {
-        (0..self.heads.len() as u32)
-            .map(|face| self.winner(face).map_or(LabelId::NULL, |winner| winner.label))
+    pub fn label_of_face(&self) -> Vec<LabelId> {
+        (0..self.faces.len() as u32)
+            .map(|face| self.of_face(face).map_or(LabelId::NULL, |votes| votes.label))
             .collect()
     }
 }
@@ -241,7 +317,8 @@ mod tests {
     fn votes(face_count: usize, points: &[(u32, u32)]) -> Votes {
         let mut votes = Votes::new(face_count);
         for &(face, label) in points {
-            votes.add(face, LabelId(label), 0.0);
+            // Distances that no f32 sums without rounding.
+            votes.add(face, LabelId(label), 0.1 + 0.013 * (label + 7 * face) as f32);
         }
         votes
     }
@@ -249,9 +326,14 @@ mod tests {
     #[test]
     fn the_most_frequent_label_wins_and_the_smaller_of_two() {
         let votes = votes(5, &[(0, 9), (0, 4), (0, 9), (1, 7), (1, 3), (3, 2), (3, 0), (3, 0), (4, 0)]);
-        assert_eq!(votes.face_labels(), [9, 3, 0, 2, 0].map(LabelId));
-        assert_eq!(votes.winner(0), Some(Winner { label: LabelId(9), votes: 2, face_votes: 3 }));
-        assert_eq!(votes.winner(2), None);
+        assert_eq!(votes.label_of_face(), [9, 3, 0, 2, 0].map(LabelId));
+        let face = votes.of_face(0).unwrap();
+        assert_eq!((face.label, face.votes, face.total), (LabelId(9), 2, 3));
+        assert_eq!((face.runner_up, face.runner_up_votes, face.margin()), (LabelId(4), 1, 1));
+        assert_eq!(face.share(), 2.0 / 3.0);
+        let alone = votes.of_face(3).unwrap();
+        assert_eq!((alone.runner_up, alone.runner_up_votes, alone.margin()), (LabelId::NULL, 0, 1));
+        assert_eq!(votes.of_face(2), None);
         assert_eq!(votes.votes_of(1), [(LabelId(3), 1), (LabelId(7), 1)]);
         assert_eq!(votes.unlabeled_points(), 3);
         assert_eq!(votes.largest_label(), LabelId(9));
@@ -267,7 +349,21 @@ mod tests {
         assert_eq!(votes.points_of(LabelId(2)), PointTally { points: 5, far: 3 });
         assert_eq!(votes.points_of(LabelId(1)), PointTally { points: 1, far: 0 });
         assert_eq!(votes.points_of(LabelId(7)), PointTally::default());
-        assert_eq!(votes.face_labels(), [LabelId(2)]);
+        assert_eq!(votes.label_of_face(), [LabelId(2)]);
+    }
+
+    #[test]
+    fn distances_are_those_of_all_voters_of_a_face() {
+        let mut votes = Votes::new(3);
+        for (face, label, distance_m) in [(0, 1, 0.25), (0, 2, 0.5), (0, 0, 9.0), (0, 1, 0.0), (1, 1, 1e30)] {
+            votes.add(face, LabelId(label), distance_m);
+        }
+        votes.add(1, LabelId(2), 3.0);
+        votes.add(2, LabelId(2), f32::NAN);
+        let distances = |face| votes.of_face(face).map(|f| (f.farthest_m, f.mean_m)).unwrap();
+        assert_eq!(distances(0), (0.5, 0.25));
+        assert_eq!(distances(1), (1e30, f32::INFINITY));
+        assert_eq!(distances(2), (f32::INFINITY, f32::INFINITY));
     }
 
     #[test]
@@ -291,7 +387,7 @@ mod tests {
         ) {
             let expected = reference(6, &points);
             let whole = votes(6, &points);
-            prop_assert_eq!(whole.face_labels(), expected.clone());
+            prop_assert_eq!(whole.label_of_face(), expected.clone());
 
             let mut other = points.clone();
             other.rotate_left(turn % points.len().max(1));
@@ -299,7 +395,7 @@ mod tests {
             let (front, back) = other.split_at(cut.min(other.len()));
             let mut merged = votes(6, front);
             merged.merge(&votes(6, back));
-            prop_assert_eq!(merged.face_labels(), expected);
+            prop_assert_eq!(merged.label_of_face(), expected);
             prop_assert_eq!(merged.unlabeled_points(), whole.unlabeled_points());
             prop_assert_eq!(merged.largest_label(), whole.largest_label());
             for label in (0..5).map(LabelId) {
@@ -307,7 +403,7 @@ mod tests {
             }
             for face in 0..6 {
                 prop_assert_eq!(merged.votes_of(face), whole.votes_of(face));
-                prop_assert_eq!(merged.winner(face), whole.winner(face));
+                prop_assert_eq!(merged.of_face(face), whole.of_face(face));
             }
             prop_assert!(merged.entries.len() <= 6 * 4);
         }

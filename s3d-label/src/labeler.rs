@@ -1,0 +1,433 @@
+//! From labelled points to labels of faces.
+
+use crate::corners::Corners;
+use crate::{FaceLabels, LabelId, MAX_LABELS, VoteOptions, Votes};
+use s3d_geom::glam::Vec3;
+use s3d_geom::{Nearest, NearestFaces, TriMesh};
+use thiserror::Error;
+
+/// Points whose nearest faces are in memory at once: 20 MB.
+const CHUNK_POINTS: usize = 1 << 20;
+
+/// Why points cannot vote.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum VoteError {
+    /// A point is NaN or infinite: no face is nearest to it.
+    #[error("point {point} is not finite: {position}")]
+    NonFinite {
+        /// Its index in the block, from 0.
+        point: usize,
+        /// Where it is, world metres.
+        position: Vec3,
+    },
+    /// A point belongs to a face that the mesh has not.
+    #[error("a point is of face {face}; the mesh has {face_count}")]
+    NoSuchFace {
+        /// The index of the face, from 0.
+        face: u32,
+        /// How many faces the mesh has.
+        face_count: usize,
+    },
+    /// There is not one label a point.
+    #[error("{labels} labels for {points} points")]
+    Length {
+        /// How many points there are.
+        points: usize,
+        /// How many labels there are.
+        labels: usize,
+    },
+    /// A label is none of the table, or none that any table can have ([`MAX_LABELS`]).
+    #[error("label {label} of a table of {labels}")]
+    NoSuchLabel {
+        /// The label.
+        label: LabelId,
+        /// How many labels there are, the null label included.
+        labels: usize,
+    },
+}
+
+/// Labels the faces of a mesh by votes of labelled points, which come block by block.
+///
+/// Each point votes for its nearest face, and a face takes the label with the most votes. A block is of any size, the
+/// points of an instance may be spread over any number of blocks, and blocks may come in any order: the result is the
+/// same, for any number of threads too. Nothing is kept of a point but its vote, so a scan of any size needs little memory
+/// (see [`Votes`]; 20 bytes for each point of a block, 20 MB at most). Nearest faces are looked up on all threads of the
+/// current rayon pool; votes are counted on the thread that hands in the block.
+///
+/// A block that is refused has not voted. Points with the label [`LabelId::NULL`] do not vote; they are only counted.
+/// Source: formats.md, "Labels": voting.
+///
+/// ```
+/// use s3d_geom::{NearestFaces, TriMesh, glam::{Vec3, vec3}};
+/// use s3d_label::{LabelId, Labeler};
+///
+/// // Two triangles of a unit square, and two blocks of points around the first.
+/// let corners = vec![Vec3::ZERO, Vec3::X, vec3(1.0, 1.0, 0.0), Vec3::Y];
+/// let mesh = TriMesh::from_faces(corners, vec![[0, 1, 2], [0, 2, 3]])?;
+/// let nearest_faces = NearestFaces::new(&mesh);
+/// let (floor, chair) = (LabelId(2), LabelId(1));
+/// let mut labeler = Labeler::new(&nearest_faces);
+/// labeler.add_points(&[vec3(0.8, 0.2, 0.01), vec3(0.9, 0.5, 0.03)], floor)?;
+/// labeler.add_points(&[vec3(0.7, 0.1, 0.2)], chair)?;
+/// let labels = labeler.finish();
+///
+/// assert_eq!(labels.label_of_face(), [floor, LabelId::NULL]);
+/// let face = labels.votes_of(0).unwrap();
+/// assert_eq!((face.votes, face.runner_up, face.margin()), (2, chair, 1));
+/// assert!((face.mean_m - 0.08).abs() < 1e-6 && face.farthest_m == 0.2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone)]
+pub struct Labeler<'m> {
+    nearest_faces: &'m NearestFaces<'m>,
+    votes: Votes,
+    /// Made when the first vertices come.
+    corners: Option<Corners>,
+    /// Of a chunk of points, and the vertices among a chunk that are at no corner; kept for their memory.
+    nearest: Vec<Nearest>,
+    others: Vec<Vec3>,
+}
+
+impl<'m> Labeler<'m> {
+    /// Without a vote yet, for the mesh of `nearest_faces`.
+    pub fn new(nearest_faces: &'m NearestFaces<'m>) -> Self {
+        Self::with_options(nearest_faces, VoteOptions::default())
+    }
+
+    /// The same, with another distance from which on a point is far.
+    ///
+    /// # Panics
+    /// If `far_m` is not a number.
+    pub fn with_options(nearest_faces: &'m NearestFaces<'m>, options: VoteOptions) -> Self {
+        let votes = Votes::with_options(nearest_faces.mesh().faces().len(), options);
+        Self { nearest_faces, votes, corners: None, nearest: Vec::new(), others: Vec::new() }
+    }
+
+    /// Points (world metres) with the same label, such as those of an instance: each votes for its nearest face.
+    ///
+    /// # Errors
+    /// [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
+    pub fn add_points(&mut self, points: &[Vec3], label: LabelId) -> Result<(), VoteError> {
+        check_points(points)?;
+        check_label(label)?;
+        for points in points.chunks(CHUNK_POINTS) {
+            self.nearest_faces.nearest_many(points, &mut self.nearest);
+            self.nearest.iter().for_each(|n| self.votes.add(n.face, label, n.distance_m));
+        }
+        Ok(())
+    }
+
+    /// Points (world metres) with a label each: each votes for its nearest face.
+    ///
+    /// # Errors
+    /// [`VoteError::Length`], [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
+    pub fn add_labelled_points(
+        &mut self,
+        points: &[Vec3],
+        label_of_point: &[LabelId],
+    ) -> Result<(), VoteError> {
+        if points.len() != label_of_point.len() {
+            return Err(VoteError::Length { points: points.len(), labels: label_of_point.len() });
+        }
+        check_points(points)?;
+        label_of_point.iter().try_for_each(|label| check_label(*label))?;
+        for (points, labels) in points.chunks(CHUNK_POINTS).zip(label_of_point.chunks(CHUNK_POINTS)) {
+            self.nearest_faces.nearest_many(points, &mut self.nearest);
+            for (nearest, label) in self.nearest.iter().zip(labels) {
+                self.votes.add(nearest.face, *label, nearest.distance_m);
+            }
+        }
+        Ok(())
+    }
+
+    /// Annotations that are vertices of the mesh itself (world metres), with the same label: each votes for every face
+    /// that has a corner at exactly that place. All of them are equally near, and the smallest index alone would leave
+    /// the others without a vote. A point where no face has a corner votes for its nearest face.
+    ///
+    /// # Errors
+    /// [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
+    pub fn add_vertices(&mut self, vertices: &[Vec3], label: LabelId) -> Result<(), VoteError> {
+        check_points(vertices)?;
+        check_label(label)?;
+        let corners = self.corners.get_or_insert_with(|| Corners::new(self.nearest_faces.mesh()));
+        for vertices in vertices.chunks(CHUNK_POINTS) {
+            self.others.clear();
+            for vertex in vertices {
+                let mut is_corner = false;
+                for face in corners.faces_at(*vertex) {
+                    self.votes.add(face, label, 0.0);
+                    is_corner = true;
+                }
+                if !is_corner {
+                    self.others.push(*vertex);
+                }
+            }
+            self.nearest_faces.nearest_many(&self.others, &mut self.nearest);
+            self.nearest.iter().for_each(|n| self.votes.add(n.face, label, n.distance_m));
+        }
+        Ok(())
+    }
+
+    /// Points with the same label that are known to lie on faces, as the mesh's own labels do: each votes for its face, at
+    /// a distance of 0.
+    ///
+    /// # Errors
+    /// [`VoteError::NoSuchFace`] and [`VoteError::NoSuchLabel`].
+    pub fn add_points_on_faces(&mut self, face_of_point: &[u32], label: LabelId) -> Result<(), VoteError> {
+        check_label(label)?;
+        let face_count = self.votes.face_count();
+        if let Some(&face) = face_of_point.iter().find(|face| **face as usize >= face_count) {
+            return Err(VoteError::NoSuchFace { face, face_count });
+        }
+        face_of_point.iter().for_each(|face| self.votes.add(*face, label, 0.0));
+        Ok(())
+    }
+
+    /// The votes so far.
+    pub fn votes(&self) -> &Votes {
+        &self.votes
+    }
+
+    /// The labels of all faces, from the votes so far.
+    pub fn finish(self) -> FaceLabels {
+        FaceLabels::new(self.votes)
+    }
+}
+
+/// Labels the faces of `mesh` by the votes of `points` (world metres) with a label each, all at once.
+///
+/// # Errors
+/// [`VoteError::Length`], [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
+///
+/// ```
+/// use s3d_geom::{TriMesh, glam::{Vec3, vec3}};
+/// use s3d_label::{LabelId, vote};
+///
+/// let mesh = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]])?;
+/// let points = [vec3(0.1, 0.1, 0.02), vec3(0.2, 0.3, -0.01), vec3(0.3, 0.3, 0.0)];
+/// let labels = vote(&mesh, &points, &[7, 7, 4].map(LabelId))?;
+/// assert_eq!(labels.label_of_face(), [LabelId(7)]);
+/// assert_eq!(labels.votes_of(0).unwrap().margin(), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn vote(mesh: &TriMesh, points: &[Vec3], label_of_point: &[LabelId]) -> Result<FaceLabels, VoteError> {
+    let nearest_faces = NearestFaces::new(mesh);
+    let mut labeler = Labeler::new(&nearest_faces);
+    labeler.add_labelled_points(points, label_of_point)?;
+    Ok(labeler.finish())
+}
+
+fn check_points(points: &[Vec3]) -> Result<(), VoteError> {
+    match points.iter().position(|p| !p.is_finite()) {
+        Some(point) => {
+            let position = points.get(point).copied().unwrap_or_default();
+            Err(VoteError::NonFinite { point, position })
+        }
+        None => Ok(()),
+    }
+}
+
+/// A label beyond what a table can have would take memory for all labels before it.
+fn check_label(label: LabelId) -> Result<(), VoteError> {
+    if label.index() < MAX_LABELS {
+        Ok(())
+    } else {
+        Err(VoteError::NoSuchLabel { label, labels: MAX_LABELS })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::FaceVotes;
+    use proptest::prelude::*;
+    use s3d_geom::glam::vec3;
+    use s3d_geom::nearest_brute_force;
+    use std::collections::BTreeMap;
+
+    /// Triangles on a coarse lattice, so that they share corners and edges, and points are equally near to several.
+    fn any_mesh() -> impl Strategy<Value = TriMesh> {
+        let corner = || (0..4i8, 0..4i8, 0..3i8);
+        prop::collection::vec([corner(), corner(), corner()], 1..25).prop_filter_map("no area", |triangles| {
+            let at = |(x, y, z): (i8, i8, i8)| vec3(f32::from(x), f32::from(y), f32::from(z));
+            let positions: Vec<Vec3> = triangles.into_iter().flatten().map(at).collect();
+            let faces = (0..positions.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+            TriMesh::from_faces(positions, faces).ok()
+        })
+    }
+
+    /// Points, among them some on the lattice, with a label each.
+    fn any_points() -> impl Strategy<Value = Vec<(Vec3, LabelId)>> {
+        let any = (-1.0..5.0f32, -1.0..5.0f32, -1.0..4.0f32).prop_map(Vec3::from);
+        let lattice = (0..5i8, 0..5i8, 0..4i8).prop_map(|(x, y, z)| vec3(x.into(), y.into(), z.into()));
+        prop::collection::vec((prop_oneof![any, lattice], (0..5u32).prop_map(LabelId)), 0..80)
+    }
+
+    /// The votes of each face, by looking at all faces for each point and at all points for each face.
+    fn recount(mesh: &TriMesh, points: &[(Vec3, LabelId)]) -> Vec<Option<FaceVotes>> {
+        let voters: Vec<(LabelId, u32, f32)> = points
+            .iter()
+            .filter(|(_, label)| !label.is_null())
+            .map(|(point, label)| (*label, nearest_brute_force(mesh, *point)))
+            .map(|(label, nearest)| (label, nearest.face, nearest.distance_m))
+            .collect();
+        let of_face = |face: u32| {
+            let here: Vec<_> = voters.iter().filter(|(_, f, _)| *f == face).collect();
+            let mut counts: BTreeMap<LabelId, u64> = BTreeMap::new();
+            here.iter().for_each(|(label, ..)| *counts.entry(*label).or_default() += 1);
+            let mut ranking: Vec<(LabelId, u64)> = counts.into_iter().collect();
+            // Stable: equal ones stay in the order of their labels.
+            ranking.sort_by_key(|(_, votes)| std::cmp::Reverse(*votes));
+            let (label, votes) = *ranking.first()?;
+            let (runner_up, runner_up_votes) = ranking.get(1).copied().unwrap_or_default();
+            let sum_m: f64 = here.iter().map(|(.., distance_m)| f64::from(*distance_m)).sum();
+            Some(FaceVotes {
+                label,
+                votes,
+                runner_up,
+                runner_up_votes,
+                total: here.len() as u64,
+                farthest_m: here.iter().map(|(.., distance_m)| *distance_m).fold(0.0, f32::max),
+                mean_m: (sum_m / here.len() as f64) as f32,
+            })
+        };
+        (0..mesh.faces().len() as u32).map(of_face).collect()
+    }
+
+    fn votes_of_faces(labels: &FaceLabels) -> Vec<Option<FaceVotes>> {
+        (0..labels.len() as u32).map(|face| labels.votes_of(face)).collect()
+    }
+
+    fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+    }
+
+    proptest! {
+        #[test]
+        fn labels_are_those_of_a_recount(mesh in any_mesh(), points in any_points()) {
+            let (positions, labels): (Vec<Vec3>, Vec<LabelId>) = points.iter().copied().unzip();
+            let found = vote(&mesh, &positions, &labels).unwrap();
+            let expected = recount(&mesh, &points);
+            let rounded = |of_face: &Option<FaceVotes>| of_face.map(|f| FaceVotes { mean_m: 0.0, ..f });
+            prop_assert_eq!(
+                votes_of_faces(&found).iter().map(rounded).collect::<Vec<_>>(),
+                expected.iter().map(rounded).collect::<Vec<_>>()
+            );
+            for (found, expected) in votes_of_faces(&found).iter().zip(&expected) {
+                let mean_m = |of_face: &Option<FaceVotes>| of_face.map_or(0.0, |f| f.mean_m);
+                prop_assert!((mean_m(found) - mean_m(expected)).abs() < 1e-6);
+            }
+            let of_face = expected.iter().map(|f| f.map_or(LabelId::NULL, |f| f.label));
+            prop_assert_eq!(found.label_of_face(), of_face.collect::<Vec<_>>());
+            let null = labels.iter().filter(|label| label.is_null()).count() as u64;
+            prop_assert_eq!(found.votes().unlabeled_points(), null);
+        }
+
+        #[test]
+        fn blocks_their_order_and_threads_do_not_matter(
+            mesh in any_mesh(),
+            points in any_points(),
+            cuts in prop::collection::vec(0usize..80, 0..6),
+            threads in 1usize..5,
+        ) {
+            let (positions, labels): (Vec<Vec3>, Vec<LabelId>) = points.iter().copied().unzip();
+            let whole = vote(&mesh, &positions, &labels).unwrap();
+            let nearest_faces = NearestFaces::new(&mesh);
+            let mut cuts: Vec<usize> = cuts.into_iter().map(|cut| cut.min(points.len())).collect();
+            cuts.extend([0, points.len()]);
+            cuts.sort_unstable();
+            let mut labeler = Labeler::new(&nearest_faces);
+            let in_pieces = on_threads(threads, || {
+                // From the last block to the first, and of every other block one label after another.
+                for (i, cut) in cuts.windows(2).rev().enumerate() {
+                    let block = cut[0]..cut[1];
+                    if i % 2 == 0 {
+                        labeler.add_labelled_points(&positions[block.clone()], &labels[block]).unwrap();
+                        continue;
+                    }
+                    for label in (0..5).map(LabelId) {
+                        let of_label = points[block.clone()].iter().filter(|(_, l)| *l == label);
+                        labeler.add_points(&of_label.map(|(p, _)| *p).collect::<Vec<_>>(), label).unwrap();
+                    }
+                }
+                labeler.finish()
+            });
+            prop_assert_eq!(in_pieces.label_of_face(), whole.label_of_face());
+            prop_assert_eq!(votes_of_faces(&in_pieces), votes_of_faces(&whole));
+            for label in (0..5).map(LabelId) {
+                prop_assert_eq!(in_pieces.votes().points_of(label), whole.votes().points_of(label));
+            }
+            prop_assert_eq!(in_pieces.votes().unlabeled_points(), whole.votes().unlabeled_points());
+        }
+
+        #[test]
+        fn vertices_vote_for_all_faces_around_them(mesh in any_mesh(), points in any_points()) {
+            let nearest_faces = NearestFaces::new(&mesh);
+            let mut labeler = Labeler::new(&nearest_faces);
+            for (point, label) in &points {
+                labeler.add_vertices(&[*point], *label).unwrap();
+            }
+            let mut expected = Votes::new(mesh.faces().len());
+            for (point, label) in &points {
+                let here = |face: &u32| mesh.triangle(*face).contains(point);
+                let around: Vec<u32> = (0..mesh.faces().len() as u32).filter(here).collect();
+                around.iter().for_each(|face| expected.add(*face, *label, 0.0));
+                if around.is_empty() {
+                    let nearest = nearest_brute_force(&mesh, *point);
+                    expected.add(nearest.face, *label, nearest.distance_m);
+                }
+            }
+            for face in 0..mesh.faces().len() as u32 {
+                prop_assert_eq!(labeler.votes().votes_of(face), expected.votes_of(face));
+                prop_assert_eq!(labeler.votes().of_face(face), expected.of_face(face));
+            }
+        }
+    }
+
+    #[test]
+    fn points_on_faces_vote_for_these() {
+        let mesh = TriMesh::from_faces(
+            vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
+            vec![[0, 1, 2], [0, 1, 3], [0, 2, 3]],
+        )
+        .unwrap();
+        let nearest_faces = NearestFaces::new(&mesh);
+        let mut labeler = Labeler::new(&nearest_faces);
+        labeler.add_points_on_faces(&[0, 2, 2], LabelId(5)).unwrap();
+        labeler.add_points_on_faces(&[2], LabelId(3)).unwrap();
+        let labels = labeler.finish();
+        assert_eq!(labels.label_of_face(), [5, 0, 5].map(LabelId));
+        let face = labels.votes_of(2).unwrap();
+        assert_eq!((face.runner_up, face.margin(), face.farthest_m), (LabelId(3), 1, 0.0));
+    }
+
+    #[test]
+    fn a_block_that_is_refused_has_not_voted() {
+        let mesh = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
+        let nearest_faces = NearestFaces::new(&mesh);
+        let mut labeler = Labeler::new(&nearest_faces);
+        let (good, bad) = (Vec3::ONE, vec3(0.0, f32::NAN, 0.0));
+        for refused in
+            [labeler.add_points(&[good, bad], LabelId(1)), labeler.add_vertices(&[good, bad], LabelId(1))]
+        {
+            assert!(matches!(refused, Err(VoteError::NonFinite { point: 1, .. })), "{refused:?}");
+        }
+        assert_eq!(
+            labeler.add_labelled_points(&[good, good], &[LabelId(1)]),
+            Err(VoteError::Length { points: 2, labels: 1 })
+        );
+        let huge = LabelId(u32::MAX);
+        let no_label = Err(VoteError::NoSuchLabel { label: huge, labels: MAX_LABELS });
+        assert_eq!(labeler.add_points(&[good], huge), no_label);
+        assert_eq!(labeler.add_vertices(&[good], huge), no_label);
+        assert_eq!(labeler.add_points_on_faces(&[0], huge), no_label);
+        assert_eq!(labeler.add_labelled_points(&[good, good], &[LabelId(1), huge]), no_label);
+        assert_eq!(
+            labeler.add_points_on_faces(&[0, 1], LabelId(1)),
+            Err(VoteError::NoSuchFace { face: 1, face_count: 1 })
+        );
+        assert_eq!(labeler.votes().of_face(0), None);
+        assert_eq!(labeler.finish().label_of_face(), [LabelId::NULL]);
+    }
+}
