@@ -58,160 +58,63 @@
     )
 )]
 
-mod annotations;
-mod atomic;
-mod bounded_claims;
-mod cameras;
-mod checksum;
-mod cloud_columns;
-mod cloud_records;
-mod coco;
-mod colmap_images;
-mod colmap_write;
-mod compression;
-mod conventions;
-mod dataset;
-mod deflate;
-mod domain;
-mod e57_cloud;
+pub mod camera;
+pub mod cloud;
+pub mod dataset;
 mod error;
-mod exr;
-mod face_annotations;
-mod file_list;
-mod flat;
-mod flat_meaning;
-mod flat_rows;
-mod flat_store;
-mod gltf;
-mod gltf_accessor;
-mod gltf_builder;
-mod gltf_document;
-mod gltf_material;
+pub mod fs;
 mod guarded;
-mod hdf5;
-mod instance_arrays;
-mod instance_passes;
-mod instances;
-mod json;
-mod labelled_points;
-mod labels;
-mod las_cloud;
-mod layout;
-mod located_picture;
-mod mat_annotations;
-mod mat_read;
-mod mat_write;
-mod matterport;
-mod mesh_annotations;
-mod mesh_file;
-mod mesh_join;
-mod mesh_labels;
-mod mtl;
-mod nerfstudio_frames;
-mod nerfstudio_write;
-mod npy_cloud;
-mod npy_header;
-mod npy_write;
-mod obj;
-mod obj_diagnose;
-mod obj_lines;
-mod obj_looks;
-mod obj_plain;
-mod obj_write;
-mod parquet_index;
-mod ply;
-mod ply_batch;
-mod ply_cloud;
-mod ply_elements;
-mod ply_faces;
-mod ply_header;
-mod ply_labels;
-mod ply_mesh;
-mod ply_source;
-mod ply_vertices;
-mod png;
-mod png_filter;
-mod point_sample;
-mod pose;
-mod pose_locations;
-mod pretty;
-mod published;
+pub mod image;
+pub mod mesh;
+pub mod package;
 mod quote;
-mod rgb_source;
-mod s3dis;
-mod s3dis_points;
-mod s3dis_write;
-mod scan_locations;
-mod scannet_cloud;
-mod scene;
-mod scene_annotations;
-mod scene_cameras;
-mod splits;
-mod sync;
-mod tar;
-mod texture_file;
-mod voxel_members;
-mod webdataset;
+pub mod scene;
 
-pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, Skipped};
-pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
-pub use cameras::{ScanLocation, read_cameras};
-pub use checksum::{BadChecksum, Checksum, ChecksumOfParts, checksum_of_file};
-pub use coco::{
-    CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_category_id,
-    coco_panoptic, write_coco,
+pub use camera::{
+    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, PublishedLocation, ScanLocation, read_cameras,
+    read_capture_pose, read_intrinsics, read_matterport_locations, read_picture, read_picture_size,
+    read_scan_locations, uuid_from_name,
 };
-pub use colmap_write::{ColmapImage, write_colmap_binary, write_colmap_text};
-pub use compression::{Compression, UnknownCompression};
-pub use conventions::{Conventions, DepthUnits, UnknownWord, XyzType, read_conventions};
+pub use cloud::{
+    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, AnnotationTree, Annotations, InstanceFile,
+    InstancePasses, InstanceReader, LabelledPoint, LabelledPoints, MatArea, MatObject, MatRoom, MatWriter,
+    NpyWriter, OnFault, PlyPointWriter, PointPasses, PointReader, RoomFiles, S3disAreaWriter,
+    S3disInstanceWriter, S3disRoomWriter, Skipped, TreeOptions, read_ply_point_count, read_point_sample,
+    read_points, write_colored_points,
+};
 pub use dataset::{
-    DatasetImage, ViewRecord, check_images_complete, dataset_images, read_png_size, read_views,
+    Conventions, DatasetImage, DepthUnits, Domain, FileRecord, Frame, ImageName, InstanceArrays,
+    InstanceEntry, InstanceRecord, InstanceWriter, Layout, MAX_LABELS_OF_LOADERS, PADDED_LABELS, PROFILES,
+    PoseFile, Split, UnknownDomain, UnknownWord, ViewRecord, XyzType, check_images_complete, dataset_images,
+    image_stem, is_valid_room, is_valid_uuid, pad_labels, read_conventions, read_file_list,
+    read_instance_arrays, read_instance_members, read_instances, read_labels, read_png_size, read_pose,
+    read_splits, read_views, write_file_list, write_image_list, write_labels, write_splits,
 };
-pub use domain::{Domain, UnknownDomain};
 pub use error::{Error, Place, Result};
-pub use exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
-pub use file_list::{FileRecord, read_file_list, write_file_list};
-pub use guarded::panic_is_caught;
-pub use instance_arrays::{InstanceArrays, read_instance_arrays, read_instance_members};
-pub use instance_passes::{InstancePasses, InstanceReader, PointPasses};
-pub use instances::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};
-pub use json::{read_json, write_json};
-pub use labelled_points::{LabelledPoint, LabelledPoints};
-pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};
-pub use layout::{Frame, ImageName, Layout, PROFILES, image_stem, is_valid_room, is_valid_uuid};
-pub use located_picture::uuid_from_name;
-pub use mat_read::{MatArea, MatObject, MatRoom};
-pub use mat_write::MatWriter;
-pub use matterport::{
-    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, read_capture_pose, read_intrinsics,
-    read_matterport_locations, read_picture, read_picture_size,
+pub use fs::{
+    AtomicFile, BadChecksum, Checksum, ChecksumOfParts, SyncAhead, checksum_of_file, create_dir, read_json,
+    sync_data_set, sync_file, write_bytes, write_json, write_whole,
 };
-pub use mesh_file::{MeshFile, MeshOptions, UpAxis, read_mesh, read_mesh_with};
-pub use mesh_join::{MeshSource, read_meshes, read_meshes_with};
-pub use mesh_labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
-pub use nerfstudio_write::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
-pub use npy_write::NpyWriter;
-pub use obj_write::{TextureOut, write_rgb_obj, write_semantic_obj};
-pub use parquet_index::{ImageRow, SemanticRow, write_image_index};
-pub use ply::{PlyPointWriter, read_ply_point_count};
-pub use png::{Content, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
-pub use point_sample::{read_point_sample, write_colored_points};
-pub use pose::{PoseFile, read_pose};
-pub use pose_locations::PublishedLocation;
-pub use pretty::pretty_color;
-pub use published::{PublishedArea, PublishedMesh, PublishedOptions};
-pub use rgb_source::{PictureKind, PictureOptions, PictureSource, SkyBoxCaps, UnseenColor};
-pub use s3dis::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
-pub use s3dis_points::{PointReader, read_points};
-pub use s3dis_write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};
-pub use scan_locations::read_scan_locations;
-pub use scene::{SceneFile, read_scene};
-pub use scene_cameras::CameraSource;
-pub use splits::{Split, read_splits, write_image_list, write_splits};
-pub use sync::{SyncAhead, sync_data_set, sync_file};
-pub use tar::TarWriter;
-pub use texture_file::TextureFile;
-pub use webdataset::{ShardEntry, ShardLimits, plan_shards, sample_key, sample_member, write_shard_index};
+pub use guarded::panic_is_caught;
+pub use image::{
+    Compression, Content, TextureFile, UnknownCompression, encode_gray16, encode_rgb8, encode_xyz_float,
+    encode_xyz_half, pretty_color, read_gray16, read_rgb8, read_xyz, write_gray16, write_rgb8,
+    write_xyz_float, write_xyz_half,
+};
+pub use mesh::{
+    LabelColumn, LabelElement, MeshFile, MeshLabels, MeshOptions, MeshSource, NO_LABEL, TextureOut, UpAxis,
+    read_mesh, read_mesh_with, read_meshes, read_meshes_with, write_rgb_obj, write_semantic_obj,
+};
+pub use package::{
+    CocoCategory, CocoImage, CocoSegment, ColmapImage, ImageRow, NerfstudioCamera, NerfstudioFrame,
+    SemanticRow, ShardEntry, ShardLimits, TarWriter, UnknownLabelIndex, coco_categories, coco_category_id,
+    coco_panoptic, plan_shards, sample_key, sample_member, write_coco, write_colmap_binary,
+    write_colmap_text, write_image_index, write_nerfstudio, write_shard_index,
+};
+pub use scene::{
+    CameraSource, PictureKind, PictureOptions, PictureSource, PublishedArea, PublishedMesh, PublishedOptions,
+    SceneFile, SkyBoxCaps, UnseenColor, read_scene,
+};
 
 /// The README's example is compiled and run with the tests.
 #[cfg(doctest)]

@@ -1,0 +1,198 @@
+//! The pictures of a COLMAP model: `images.txt` or `images.bin`. Source: COLMAP's documentation, "Output Format".
+//!
+//! A picture's pose is world → camera in OpenCV's axes (x right, y down, z forward): a quaternion w x y z and a translation.
+
+use crate::camera::located::{LocatedPicture, pose_from_opencv};
+use crate::error::{Error, Result};
+use crate::image::texture::read_file;
+use crate::quote::quote;
+use s3d_geom::Pose;
+use s3d_geom::glam::{DMat3, DQuat, DVec3};
+use std::path::{Path, PathBuf};
+
+/// The file of pictures of the model in `dir`: itself, or in `0`, `sparse/0` or `sparse` below it.
+pub(crate) fn find(dir: &Path) -> Option<PathBuf> {
+    ["", "0", "sparse/0", "sparse"]
+        .iter()
+        .flat_map(|below| ["images.bin", "images.txt"].map(|name| dir.join(below).join(name)))
+        .find(|path| path.is_file())
+}
+
+/// Reads `images.txt` or `images.bin`; the ending says which.
+pub(crate) fn read(path: &Path) -> Result<Vec<LocatedPicture>> {
+    let bytes = read_file(path)?;
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin")) {
+        read_binary(path, &bytes)
+    } else {
+        read_text(path, &bytes)
+    }
+}
+
+/// Two lines a picture: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, and its points, which may be none.
+fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
+    const FORM: &str =
+        "a picture is IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, with a line of points after it";
+    let mut pictures = Vec::new();
+    let mut is_points = false;
+    for (line, text) in (1u64..).zip(bytes.split(|&b| b == b'\n')) {
+        let text = text.trim_ascii();
+        if std::mem::take(&mut is_points) {
+            continue;
+        }
+        if text.is_empty() || text.starts_with(b"#") {
+            continue;
+        }
+        let text = std::str::from_utf8(text).map_err(|_| Error::line(path, line, "is no text in UTF-8"))?;
+        let mut rest = text;
+        let mut fields = [""; 9];
+        for field in &mut fields {
+            let (head, tail) = rest
+                .split_once(|c: char| c.is_ascii_whitespace())
+                .ok_or_else(|| Error::line(path, line, format!("{}: {FORM}", quote(text.as_bytes()))))?;
+            (*field, rest) = (head, tail.trim_start());
+        }
+        let mut numbers = [0.0; 7];
+        for (number, field) in numbers.iter_mut().zip(&fields[1..8]) {
+            *number = field.parse().map_err(|_| {
+                Error::line(path, line, format!("{} is no number: {FORM}", quote(field.as_bytes())))
+            })?;
+        }
+        let pose = pose(numbers).map_err(|m| Error::line(path, line, m))?;
+        pictures.push(LocatedPicture { name: rest.to_owned(), pose, line });
+        is_points = true;
+    }
+    Ok(pictures)
+}
+
+/// Little-endian: a count; for each picture its id (4 bytes), seven numbers (8 each), its camera (4), a name that ends at
+/// a zero, a count of points (8) and 24 bytes each.
+fn read_binary(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
+    let mut rest = bytes;
+    let mut pictures = Vec::new();
+    let cut_off =
+        |n: u64| Error::format(path, format!("ends in picture {n}: it was cut off, or is no images.bin"));
+    let count = u64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(0))?);
+    for n in 1..=count {
+        let mut record = || -> Option<([f64; 7], &[u8])> {
+            take::<4>(&mut rest)?;
+            let mut numbers = [0.0; 7];
+            for number in &mut numbers {
+                *number = f64::from_le_bytes(take(&mut rest)?);
+            }
+            take::<4>(&mut rest)?;
+            let end = rest.iter().position(|&b| b == 0)?;
+            let (name, behind) = rest.split_at_checked(end)?;
+            rest = behind.get(1..)?;
+            let points = u64::from_le_bytes(take(&mut rest)?);
+            let length = usize::try_from(points).ok()?.checked_mul(24)?;
+            rest = rest.get(length..)?;
+            Some((numbers, name))
+        };
+        let (numbers, name) = record().ok_or_else(|| cut_off(n))?;
+        let name = String::from_utf8_lossy(name).into_owned();
+        let pose = pose(numbers).map_err(|m| Error::format(path, format!("picture {n}, {name:?}: {m}")))?;
+        pictures.push(LocatedPicture { name, pose, line: 0 });
+    }
+    Ok(pictures)
+}
+
+fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+    let (head, tail) = rest.split_first_chunk::<N>()?;
+    *rest = tail;
+    Some(*head)
+}
+
+fn pose([qw, qx, qy, qz, tx, ty, tz]: [f64; 7]) -> std::result::Result<Pose, String> {
+    if ![qw, qx, qy, qz, tx, ty, tz].iter().all(|v| v.is_finite()) {
+        return Err("a number of its pose is not finite".into());
+    }
+    let q =
+        s3d_geom::glam::DVec4::new(qx, qy, qz, qw).try_normalize().ok_or("the quaternion has no length")?;
+    let world_from_camera = DMat3::from_quat(DQuat::from_vec4(q)).transpose();
+    let location = -(world_from_camera * DVec3::new(tx, ty, tz));
+    let [right, down, forward] =
+        [world_from_camera.x_axis, world_from_camera.y_axis, world_from_camera.z_axis];
+    Ok(pose_from_opencv(location, right, down, forward))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The line of a picture whose camera has `pose`.
+    fn numbers(pose: &Pose) -> [f64; 7] {
+        let r = pose.opencv_from_world();
+        let q = DQuat::from_mat3(&r);
+        let t = -(r * pose.location);
+        [q.w, q.x, q.y, q.z, t.x, t.y, t.z]
+    }
+
+    fn some_pose(i: f64) -> Pose {
+        Pose::from_scanner(DVec3::new(i, 2.0 * i, 1.5), DQuat::from_rotation_z(0.4 * i)).turned(0.2, -0.3 * i)
+    }
+
+    fn is_same(a: &Pose, b: &Pose) -> bool {
+        a.location.abs_diff_eq(b.location, 1e-12)
+            && a.world_from_camera.abs_diff_eq(b.world_from_camera, 1e-12)
+    }
+
+    fn text(poses: &[Pose]) -> String {
+        let mut text = String::from("# Image list with two lines of data per image:\n");
+        for (i, pose) in poses.iter().enumerate() {
+            let n = numbers(pose).map(|v| v.to_string()).join(" ");
+            // The second line, of points, is empty for the first picture.
+            let points = if i == 0 { "" } else { "1.5 2.5 -1 3 4 17" };
+            text += &format!("{} {n} 1 scan {i}.jpg\n{points}\n", i + 1);
+        }
+        text
+    }
+
+    fn binary(poses: &[Pose]) -> Vec<u8> {
+        let mut bytes = (poses.len() as u64).to_le_bytes().to_vec();
+        for (i, pose) in poses.iter().enumerate() {
+            bytes.extend((i as u32 + 1).to_le_bytes());
+            numbers(pose).iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+            bytes.extend(1u32.to_le_bytes());
+            bytes.extend(format!("scan {i}.jpg\0").bytes());
+            bytes.extend((i as u64).to_le_bytes());
+            bytes.extend(vec![7; 24 * i]);
+        }
+        bytes
+    }
+
+    #[test]
+    fn both_forms_give_the_poses_back() {
+        let poses = [some_pose(0.0), some_pose(1.0), some_pose(-2.0)];
+        let from_text = read_text(Path::new("images.txt"), text(&poses).as_bytes()).unwrap();
+        let from_binary = read_binary(Path::new("images.bin"), &binary(&poses)).unwrap();
+        for read in [from_text, from_binary] {
+            assert_eq!(read.len(), 3);
+            for (i, (picture, pose)) in read.iter().zip(&poses).enumerate() {
+                assert!(is_same(&picture.pose, pose), "{:?} {pose:?}", picture.pose);
+                assert_eq!(picture.name, format!("scan {i}.jpg"));
+            }
+        }
+    }
+
+    #[test]
+    fn faults_have_their_place() {
+        let good = text(&[some_pose(1.0)]);
+        for (more, words) in [
+            ("2 1 0 0 0 0 0 0 1\n", "line 4: `2 1 0 0 0 0 0 0 1`: a picture is"),
+            ("2 1 0 0 x 0 0 0 1 a.jpg\n", "line 4: `x` is no number"),
+            ("2 0 0 0 0 0 0 0 1 a.jpg\n", "line 4: the quaternion"),
+            ("2 1 0 0 0 0 inf 0 1 a.jpg\n", "line 4: a number"),
+        ] {
+            let e = read_text(Path::new("images.txt"), (good.clone() + more).as_bytes()).err().unwrap();
+            assert!(e.to_string().contains(words), "{e}");
+        }
+        let bytes = binary(&[some_pose(0.0), some_pose(1.0)]);
+        for length in [0, 7, 8, 60, 80, bytes.len() - 1] {
+            let e = read_binary(Path::new("images.bin"), &bytes[..length]).err().unwrap();
+            assert!(e.to_string().contains("cut off"), "{e}");
+        }
+        let mut lying = bytes.clone();
+        lying[..8].copy_from_slice(&u64::MAX.to_le_bytes());
+        assert!(read_binary(Path::new("i"), &lying).err().unwrap().to_string().contains("picture 3"));
+    }
+}

@@ -1,0 +1,129 @@
+//! Pictures with a pose, as reconstruction programs list them, and the scan locations that they stand for.
+
+use crate::camera::table::{FARTHEST_M, ScanLocation};
+use crate::error::{Error, Result};
+use crate::quote::quote;
+use s3d_geom::Pose;
+use s3d_geom::glam::DVec3;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Two pictures of one location may be this far apart: the number of decimals that programs write.
+const SAME_PLACE_M: f64 = 0.01;
+
+/// A picture with its pose.
+pub(crate) struct LocatedPicture {
+    /// The name of its file, as the list has it.
+    pub(crate) name: String,
+    /// Where it was taken.
+    pub(crate) pose: Pose,
+    /// Its line in the list, from 1; 0 if the list has no lines.
+    pub(crate) line: u64,
+}
+
+/// The scan locations of a list of pictures. A location is where a picture was taken, its camera level and with the
+/// picture's heading, since views are drawn around the horizon. Its uuid is the first run of 32 hexadecimal digits in the
+/// picture's name, or else follows from the name; pictures of one uuid are one location, which has the first one's heading.
+pub(crate) fn locations_of(path: &Path, pictures: Vec<LocatedPicture>) -> Result<Vec<ScanLocation>> {
+    let mut locations: Vec<ScanLocation> = Vec::new();
+    let mut index: HashMap<String, usize> = HashMap::new();
+    for LocatedPicture { name, pose, line } in pictures {
+        let fault = |message: String| match line {
+            0 => Error::format(path, message),
+            _ => Error::line(path, line, message),
+        };
+        let at = pose.location;
+        if !at.is_finite() || at.abs().max_element() > FARTHEST_M {
+            let message =
+                format!("{}: {at} is more than {FARTHEST_M} m from the origin", quote(name.as_bytes()));
+            return Err(fault(message));
+        }
+        let uuid = uuid_in(&name).unwrap_or_else(|| uuid_from_name(&name));
+        match index.get(&uuid) {
+            None => {
+                index.insert(uuid.clone(), locations.len());
+                locations.push(ScanLocation { uuid, pose: pose.leveled(), line });
+            }
+            Some(&first) => {
+                let distance = locations.get(first).map_or(0.0, |first| first.pose.location.distance(at));
+                if distance > SAME_PLACE_M {
+                    return Err(fault(format!(
+                        "{}: uuid {uuid} is another picture's too, which was taken {distance:.3} m away",
+                        quote(name.as_bytes())
+                    )));
+                }
+            }
+        }
+    }
+    if locations.is_empty() {
+        return Err(Error::format(path, "lists no picture, so there is no scan location"));
+    }
+    Ok(locations)
+}
+
+/// The first run of exactly 32 hexadecimal digits, in lower case; hyphens of a uuid's usual form do not count.
+fn uuid_in(name: &str) -> Option<String> {
+    name.split(|c: char| !c.is_ascii_hexdigit() && c != '-')
+        .map(|run| run.replace('-', "").to_ascii_lowercase())
+        .find(|run| run.len() == 32)
+}
+
+/// A uuid of 32 hexadecimal digits that follows from a name alone (XXH3, 128 bits): the same on every machine.
+pub fn uuid_from_name(name: &str) -> String {
+    format!("{:032x}", xxhash_rust::xxh3::xxh3_128(name.as_bytes()))
+}
+
+/// A camera in OpenCV's axes (x right, y down, z forward) at `location`, from its three axes in the world.
+pub(crate) fn pose_from_opencv(location: DVec3, right: DVec3, down: DVec3, forward: DVec3) -> Pose {
+    Pose { location, world_from_camera: s3d_geom::glam::DMat3::from_cols(right, -down, -forward) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::{DQuat, dvec3};
+
+    fn picture(name: &str, x: f64, pitch: f64) -> LocatedPicture {
+        let pose = Pose::from_scanner(dvec3(x, 0.0, 1.5), DQuat::from_rotation_z(0.3)).turned(0.0, pitch);
+        LocatedPicture { name: name.into(), pose, line: 0 }
+    }
+
+    #[test]
+    fn names_give_uuids() {
+        let hex = "8eb9955b866b4b5f74abb1071416c628";
+        assert_eq!(uuid_in(&format!("rgb/camera_{hex}_office_1_frame_3_domain_rgb.png")).unwrap(), hex);
+        assert_eq!(
+            uuid_in("508160BA-5d80-a2e3-6560-9578a09bab8b.jpg").unwrap(),
+            "508160ba5d80a2e365609578a09bab8b"
+        );
+        assert_eq!(uuid_in(&format!("{hex}0.png")), None);
+        assert_eq!(uuid_in("IMG_0001.jpg"), None);
+        let made = uuid_from_name("IMG_0001.jpg");
+        assert!(
+            made.len() == 32 && made.bytes().all(|b| b.is_ascii_hexdigit()) && made != uuid_from_name("")
+        );
+        // Part of what a data set is named by: it never changes.
+        assert_eq!(uuid_from_name(""), "99aa06d3014798d86001c324468d497f");
+    }
+
+    #[test]
+    fn pictures_of_one_location_are_joined_and_leveled() {
+        let hex = "8eb9955b866b4b5f74abb1071416c628";
+        let a =
+            [picture("a.jpg", 0.0, 0.4), picture(hex, 2.0, 0.1), picture(&format!("{hex}_2"), 2.005, -0.7)];
+        let locations = locations_of(Path::new("p"), a.into()).unwrap();
+        assert_eq!(locations.len(), 2);
+        assert_eq!(locations[1].uuid, hex);
+        assert!(locations.iter().all(|l| l.pose.up().abs_diff_eq(DVec3::Z, 1e-12)));
+        assert!(locations[0].pose.forward().abs_diff_eq(dvec3(-libm::sin(0.3), libm::cos(0.3), 0.0), 1e-12));
+    }
+
+    #[test]
+    fn places_that_cannot_be_are_refused() {
+        let hex = "8eb9955b866b4b5f74abb1071416c628";
+        let message = |p: Vec<LocatedPicture>| locations_of(Path::new("p"), p).unwrap_err().to_string();
+        assert!(message(vec![picture(hex, 0.0, 0.0), picture(hex, 1.0, 0.0)]).contains("1.000 m away"));
+        assert!(message(vec![picture("a", f64::NAN, 0.0)]).contains("from the origin"));
+        assert!(message(vec![]).contains("no picture"));
+    }
+}

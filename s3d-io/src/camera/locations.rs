@@ -1,0 +1,148 @@
+//! Scan locations, from any list of cameras that is read.
+
+use crate::camera::matterport::{PictureFolder, read_matterport_locations};
+use crate::camera::table::{ScanLocation, read_cameras};
+use crate::camera::{colmap, located, nerfstudio, poses};
+use crate::error::{Error, Result};
+use s3d_geom::Pose;
+use s3d_geom::glam::{DAffine3, DMat3};
+use std::path::Path;
+
+/// What is read, for messages.
+const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files (*.json), the raw captures \
+                     of a Matterport, a COLMAP model (images.txt or images.bin) or a transforms.json";
+
+/// Reads the scan locations of `path`, a file or a folder:
+///
+/// - `.csv`, or any ending that is not named here: the table that [`read_cameras`] reads;
+/// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a COLMAP model;
+/// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and its kin;
+/// - a folder of pose files of images, as published: where the scanner stood and how it was turned;
+/// - a folder with the raw captures of a Matterport: see [`read_matterport_locations`].
+///
+/// The pictures of a COLMAP model and of a `transforms.json` give scan locations where they were taken: level, with the picture's heading, one for each
+/// uuid in their names. `world_from_file` takes the file's frame to the world (metres, Z-up): turns, shifts and scales.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these in it.
+pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocation>> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let turned = |mut pictures: Vec<located::LocatedPicture>| {
+        pictures.iter_mut().for_each(|p| p.pose = moved(&p.pose, world_from_file));
+        pictures
+    };
+    if path.is_dir() {
+        if let Some(images) = colmap::find(path) {
+            return located::locations_of(&images, turned(colmap::read(&images)?));
+        }
+        let transforms = path.join("transforms.json");
+        if transforms.is_file() {
+            return located::locations_of(&transforms, turned(nerfstudio::read(&transforms)?));
+        }
+        let found = poses::read(&[path.to_owned()], world_from_file)?;
+        if !found.is_empty() {
+            return Ok(found.into_iter().map(|(_, published)| published.location).collect());
+        }
+        if PictureFolder::open(path)?.uuids().is_empty() {
+            return Err(Error::unsupported(path, format!("holds no scan locations: {FORMS}")));
+        }
+        let mut locations = read_matterport_locations(path)?;
+        locations.iter_mut().for_each(|l| l.pose = moved(&l.pose, world_from_file));
+        // They have no lines.
+        locations.iter_mut().for_each(|l| l.line = 0);
+        return Ok(locations);
+    }
+    if name == "images.txt" || name == "images.bin" {
+        return located::locations_of(path, turned(colmap::read(path)?));
+    }
+    if name.ends_with(".json") {
+        return located::locations_of(path, turned(nerfstudio::read(path)?));
+    }
+    let mut locations = read_cameras(path)?;
+    locations.iter_mut().for_each(|l| l.pose = moved(&l.pose, world_from_file));
+    Ok(locations)
+}
+
+/// A pose of a file's frame in the world. The frame may be scaled, all axes alike.
+fn moved(pose: &Pose, world_from_file: &DAffine3) -> Pose {
+    if *world_from_file == DAffine3::IDENTITY {
+        return *pose;
+    }
+    let m = world_from_file.matrix3;
+    let scale = m.x_axis.length();
+    let turn = DMat3::from_cols(m.x_axis / scale, m.y_axis / scale, m.z_axis / scale);
+    Pose {
+        location: world_from_file.transform_point3(pose.location),
+        world_from_camera: turn * pose.world_from_camera,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::layout::Frame;
+    use crate::dataset::pose::PoseFile;
+    use s3d_geom::glam::{DQuat, DVec3, dvec3};
+    use std::fs;
+
+    const IMAGES: &str = "1 1 0 0 0 0 0 0 1 a.jpg\n\n";
+
+    #[test]
+    fn the_form_is_found_by_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |p: &str| dir.path().join(p);
+        fs::create_dir_all(at("colmap/sparse/0")).unwrap();
+        fs::create_dir(at("empty")).unwrap();
+        fs::write(at("colmap/sparse/0/images.txt"), IMAGES).unwrap();
+        let transforms =
+            r#"{"frames": [{"file_path": "a.jpg", "transform_matrix": [[1,0,0,0],[0,0,-1,0],[0,1,0,0]]}]}"#;
+        fs::write(at("transforms.json"), transforms).unwrap();
+        fs::write(at("cameras.csv"), "8eb9955b866b4b5f74abb1071416c628,1,2,3,0,0,0,1\n").unwrap();
+        let read = |p: &str| read_scan_locations(&at(p), &DAffine3::IDENTITY);
+        for p in ["colmap", "colmap/sparse", "colmap/sparse/0/images.txt"] {
+            // Looking along +z of the world, the picture's top towards −y.
+            let location = &read(p).unwrap()[0];
+            assert!(location.pose.forward().abs_diff_eq(DVec3::Y, 1e-12), "{p}: {:?}", location.pose);
+        }
+        for p in ["", "transforms.json"] {
+            assert!(read(p).unwrap()[0].pose.forward().abs_diff_eq(DVec3::Y, 1e-12));
+        }
+        assert_eq!(read("cameras.csv").unwrap()[0].pose.location, dvec3(1.0, 2.0, 3.0));
+        let pose = |uuid: &str| {
+            let pose = Pose::level(dvec3(1.0, -2.0, 1.5), 0.3);
+            let camera = s3d_geom::Camera::equirectangular(pose, 64);
+            PoseFile::new(&camera, &pose, uuid, "office_5_3", Frame::Panorama).to_json()
+        };
+        fs::create_dir(at("poses")).unwrap();
+        let uuids = ["8eb9955b866b4b5f74abb1071416c628", "508160ba5d80a2e365609578a09bab8b"];
+        for uuid in uuids {
+            fs::write(at(&format!("poses/{uuid}.json")), pose(uuid)).unwrap();
+        }
+        let poses = read("poses").unwrap();
+        assert_eq!((poses.len(), poses[0].uuid.as_str()), (2, uuids[1]));
+        assert!(poses[1].pose.location.abs_diff_eq(dvec3(1.0, -2.0, 1.5), 1e-12));
+        fs::create_dir(at("raw")).unwrap();
+        let capture = "1 0 0 7\n0 0 1 8\n0 -1 0 9\n0 0 0 1";
+        fs::write(at(&format!("raw/{}_pose_1_0.txt", uuids[0])), capture).unwrap();
+        let raw = read("raw").unwrap();
+        assert_eq!((raw.len(), raw[0].pose.location), (1, dvec3(7.0, 8.0, 9.0)));
+        let message = read("empty").unwrap_err().to_string();
+        assert!(message.contains("empty") && message.contains("images.txt"), "{message}");
+        assert!(matches!(read("gone"), Err(Error::Io { .. })));
+    }
+
+    #[test]
+    fn frames_are_turned_shifted_and_scaled() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("images.txt");
+        fs::write(&path, "1 1 0 0 0 0 0 -4 1 a.jpg\n\n").unwrap();
+        // A world with y down, twice as large: its −y is up, its z the world's y.
+        let turn = DMat3::from_cols(DVec3::X, -DVec3::Z, DVec3::Y);
+        let world = DAffine3::from_mat3_translation(turn * 0.5, dvec3(10.0, 0.0, 1.0));
+        let location = &read_scan_locations(&path, &world).unwrap()[0];
+        assert!(location.pose.location.abs_diff_eq(dvec3(10.0, 2.0, 1.0), 1e-12), "{:?}", location.pose);
+        assert!(location.pose.forward().abs_diff_eq(DVec3::Y, 1e-12));
+        let turned = moved(&Pose::level(DVec3::ZERO, 0.0), &DAffine3::from_quat(DQuat::from_rotation_z(0.5)));
+        assert!(turned.forward().abs_diff_eq(Pose::level(DVec3::ZERO, 0.5).forward(), 1e-12));
+    }
+}

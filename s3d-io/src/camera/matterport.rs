@@ -1,0 +1,531 @@
+//! The scanner's own pictures: raw Matterport captures, sky boxes and equirectangular photographs.
+//!
+//! Source: formats.md, "The scanner's own pictures". A folder's files are looked up in it and in the folders in it, as
+//! Matterport3D has colours, poses and intrinsics apart (`matterport_color_images/`…).
+
+use crate::camera::table::ScanLocation;
+use crate::error::{Error, Result};
+use crate::guarded::guarded;
+use crate::image::texture::{TextureFault, decode_texture, read_file};
+use glam::{DMat3, DVec2, DVec3};
+use image::ImageReader;
+use s3d_geom::{Lens, Pose, Raster};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// How far a matrix may be from a rotation, and its last row from 0 0 0 1: what eight digits leave, and scanners that
+/// round to four.
+const ROTATION_ERROR: f64 = 2e-3;
+
+/// Farther from the origin nothing was scanned, in metres.
+const FARTHEST_M: f64 = 1e7;
+
+/// The number of the camera that looks level; 0 looks up, 2 down.
+const LEVEL: u32 = 1;
+
+/// Captures of a location: three cameras at six stops.
+pub const CAPTURES_A_LOCATION: usize = 18;
+
+/// A folder of pictures, its files known by name. Nothing else of it is read.
+#[derive(Clone, Debug)]
+pub struct PictureFolder {
+    path: PathBuf,
+    /// By lower-case name; the first by path where several have one.
+    files: BTreeMap<String, PathBuf>,
+}
+
+/// A capture: its picture's file, and where and with which lens it was taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CaptureFile {
+    /// Which of the scanner's cameras: 0 looks up, 1 level, 2 down.
+    pub camera: u32,
+    /// Which stop of its turn, 0 to 5.
+    pub yaw: u32,
+    /// The picture.
+    pub color: PathBuf,
+    /// The camera's lens.
+    pub lens: Lens,
+    /// Where the camera was and how it was turned; in the project's axes (x right, y up, looking along −z).
+    pub pose: Pose,
+}
+
+impl CaptureFile {
+    /// Reads the picture.
+    ///
+    /// # Errors
+    /// As [`read_picture`]; [`Error::Format`] if it is not of the lens's size.
+    pub fn read(&self) -> Result<Raster<[u8; 3]>> {
+        let image = read_picture(&self.color)?;
+        check_size(&self.color, (image.width(), image.height()), &self.lens)?;
+        Ok(image)
+    }
+}
+
+fn check_size(path: &Path, (w, h): (u32, u32), lens: &Lens) -> Result<()> {
+    if (w, h) == (lens.width(), lens.height()) {
+        return Ok(());
+    }
+    Err(Error::format(
+        path,
+        format!(
+            "has {w} × {h} pixels, but the intrinsics of its camera are for {} × {}",
+            lens.width(),
+            lens.height()
+        ),
+    ))
+}
+
+/// Reads a PNG or JPEG file of any kind as 8-bit R G B.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if it is no such image or is damaged.
+pub fn read_picture(path: &Path) -> Result<Raster<[u8; 3]>> {
+    let texture = decode_texture(read_file(path)?).map_err(|fault| match fault {
+        TextureFault::TooLarge(message) => Error::unsupported(path, message),
+        TextureFault::Unreadable(message) => Error::format(path, message),
+    })?;
+    Ok(texture.image)
+}
+
+/// Width and height of a PNG or JPEG file, from its first bytes.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
+    let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
+    if !what.is_file() {
+        return Err(Error::format(path, "is no file"));
+    }
+    let open = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
+    let reader = open.map_err(|e| Error::io(path, "read", e))?;
+    let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
+    let size = guarded(|| reader.into_dimensions()).ok_or_else(|| failed("its header is damaged"))?;
+    size.map_err(|e| failed(&e.to_string()))
+}
+
+impl PictureFolder {
+    /// Lists a folder and the folders in it.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if one cannot be read.
+    pub fn open(path: &Path) -> Result<Self> {
+        let mut files = BTreeMap::new();
+        let mut folders = Vec::new();
+        for entry in list(path)? {
+            if entry.is_dir() { folders.push(entry) } else { remember(&mut files, entry) }
+        }
+        for folder in folders {
+            list(&folder)?.into_iter().filter(|e| !e.is_dir()).for_each(|e| remember(&mut files, e));
+        }
+        Ok(Self { path: path.to_owned(), files })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn find(&self, name: &str) -> Option<&PathBuf> {
+        self.files.get(&name.to_ascii_lowercase())
+    }
+
+    fn picture(&self, stem: &str) -> Option<PathBuf> {
+        ["jpg", "jpeg", "png"].iter().find_map(|e| self.find(&format!("{stem}.{e}"))).cloned()
+    }
+
+    /// The locations that have a level capture's pose, by name: 32 lower-case hexadecimal digits.
+    pub fn uuids(&self) -> Vec<String> {
+        let uuids = self.files.keys().filter_map(|name| {
+            let (uuid, rest) = name.split_at_checked(32)?;
+            let is_pose = rest.starts_with("_pose_") && rest.ends_with(".txt");
+            (is_pose && uuid.bytes().all(|b| b.is_ascii_hexdigit())).then(|| uuid.to_owned())
+        });
+        uuids.collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// The six pictures of a location's sky box, in their order: 0 up, 1 right, 2 back, 3 left, 4 front, 5 down. `Err`
+    /// names what is missing.
+    pub fn sky_box(&self, uuid: &str) -> std::result::Result<[PathBuf; 6], String> {
+        let stem = |k: usize| format!("{uuid}_skybox{k}_sami");
+        let found: [Option<PathBuf>; 6] = std::array::from_fn(|k| self.picture(&stem(k)));
+        let missing = found.iter().enumerate().filter(|(_, path)| path.is_none());
+        let missing: Vec<String> = missing.map(|(k, _)| format!("{}.jpg", stem(k))).collect();
+        if missing.is_empty() { Ok(found.map(Option::unwrap_or_default)) } else { Err(missing.join(", ")) }
+    }
+
+    /// A location's equirectangular photograph: `{uuid}.jpg` or `.png`, or as the data set was published,
+    /// `camera_{uuid}_…_frame_equirectangular_domain_rgb.png`. `Err` names what is missing.
+    pub fn panorama(&self, uuid: &str) -> std::result::Result<PathBuf, String> {
+        let published = || {
+            let from = format!("camera_{uuid}_");
+            let names = self.files.range(from.clone()..).take_while(|(name, _)| name.starts_with(&from));
+            let mut ours = names.filter(|(name, _)| name.contains("_frame_equirectangular_domain_rgb."));
+            ours.next().map(|(_, path)| path.clone())
+        };
+        self.picture(uuid).or_else(published).ok_or_else(|| {
+            format!("{uuid}.jpg, {uuid}.png or camera_{uuid}_…_frame_equirectangular_domain_rgb.png")
+        })
+    }
+
+    /// A location's captures, by camera and stop, with their poses and lenses; none if it has none.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Format`], with the line, for a pose that is no 4×4 matrix of a rotation and a translation and
+    /// for intrinsics that are not eleven numbers of a lens; for a picture without pose or intrinsics, for a pose without a
+    /// picture, and for a picture that is not of its lens's size.
+    pub fn captures(&self, uuid: &str) -> Result<Vec<CaptureFile>> {
+        let mut captures = Vec::new();
+        for camera in 0..3 {
+            let mut lens = None;
+            for yaw in 0..6 {
+                let color = self.picture(&format!("{uuid}_i{camera}_{yaw}"));
+                let pose_name = format!("{uuid}_pose_{camera}_{yaw}.txt");
+                let (color, pose) = match (color, self.find(&pose_name)) {
+                    (None, None) => continue,
+                    (Some(color), Some(pose)) => (color, pose),
+                    (Some(color), None) => {
+                        return Err(Error::format(&color, format!("has no pose: {pose_name} is not there")));
+                    }
+                    (None, Some(pose)) => {
+                        let name = format!("{uuid}_i{camera}_{yaw}.jpg");
+                        return Err(Error::format(pose, format!("has no picture: {name} is not there")));
+                    }
+                };
+                let lens = match lens {
+                    Some(lens) => lens,
+                    None => {
+                        let name = format!("{uuid}_intrinsics_{camera}.txt");
+                        let path = self.find(&name).ok_or_else(|| {
+                            Error::format(&color, format!("has no intrinsics: {name} is not there"))
+                        })?;
+                        *lens.insert(read_intrinsics(path)?)
+                    }
+                };
+                check_size(&color, read_picture_size(&color)?, &lens)?;
+                captures.push(CaptureFile { camera, yaw, color, lens, pose: read_capture_pose(pose)? });
+            }
+        }
+        Ok(captures)
+    }
+}
+
+fn list(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder).map_err(|e| Error::io(folder, "read", e))?;
+    let mut paths = entries
+        .map(|entry| entry.map(|e| e.path()).map_err(|e| Error::io(folder, "read", e)))
+        .collect::<Result<Vec<_>>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+fn remember(files: &mut BTreeMap<String, PathBuf>, path: PathBuf) {
+    if let Some(name) = path.file_name().and_then(|n| n.to_str()) {
+        files.entry(name.to_ascii_lowercase()).or_insert(path);
+    }
+}
+
+/// The numbers of a text file, each with its line.
+fn numbers(path: &Path) -> Result<Vec<(u64, f64)>> {
+    let text = String::from_utf8(read_file(path)?).map_err(|_| Error::format(path, "is no text"))?;
+    let mut numbers = Vec::new();
+    for (line, text) in (1..).zip(text.lines()) {
+        for word in text.split_ascii_whitespace() {
+            let number = word.parse::<f64>().ok().filter(|v| v.is_finite());
+            let number =
+                number.ok_or_else(|| Error::line(path, line, format!("{word:?} is no finite number")))?;
+            numbers.push((line, number));
+        }
+    }
+    Ok(numbers)
+}
+
+/// Reads the intrinsics of a camera: `width height fx fy cx cy k1 k2 p1 p2 k3`, OpenCV's model, origin at the picture's top
+/// left corner.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if they are not eleven numbers, or of no lens.
+pub fn read_intrinsics(path: &Path) -> Result<Lens> {
+    let numbers = numbers(path)?;
+    let Ok(lines_and_values) = <[(u64, f64); 11]>::try_from(numbers.as_slice()) else {
+        let line = numbers.last().map_or(1, |n| n.0);
+        let message =
+            format!("{} numbers; intrinsics are width height fx fy cx cy k1 k2 p1 p2 k3", numbers.len());
+        return Err(Error::line(path, line, message));
+    };
+    let lines = lines_and_values.map(|n| n.0);
+    let [width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3] = lines_and_values.map(|n| n.1);
+    let side = |v: f64| (v.fract() == 0.0 && (1.0..=65_535.0).contains(&v)).then_some(v as u32);
+    let (Some(w), Some(h)) = (side(width), side(height)) else {
+        return Err(Error::line(path, lines[0], format!("a picture of {width} × {height} pixels")));
+    };
+    Lens::new([w, h], DVec2::new(fx, fy), DVec2::new(cx, cy), [k1, k2, p1, p2, k3]).ok_or_else(|| {
+        let message = format!(
+            "no lens: fx {fx} fy {fy} cx {cx} cy {cy}, distortion {k1} {k2} {p1} {p2} {k3} (focal lengths are above 0, and the \
+             middle of the picture is seen)"
+        );
+        Error::line(path, lines[2], message)
+    })
+}
+
+/// Reads the pose of a capture: a 4×4 matrix, row by row, from the camera (x right, y down, z forward) to the world
+/// (metres, Z-up).
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`], with the line where it can tell one, if there are not sixteen numbers, the last row is
+/// not 0 0 0 1, the 3×3 part is no rotation, or the place is farther than 10,000 km away.
+pub fn read_capture_pose(path: &Path) -> Result<Pose> {
+    let numbers = numbers(path)?;
+    let Ok(lines_and_values) = <[(u64, f64); 16]>::try_from(numbers.as_slice()) else {
+        let line = numbers.last().map_or(1, |n| n.0);
+        return Err(Error::line(path, line, format!("{} numbers; a 4×4 matrix has 16", numbers.len())));
+    };
+    let (lines, m) = (lines_and_values.map(|n| n.0), lines_and_values.map(|n| n.1));
+    let last = [m[12], m[13], m[14], m[15] - 1.0];
+    if last.iter().any(|v| v.abs() > ROTATION_ERROR) {
+        let message = format!("the last row is {} {} {} {}, not 0 0 0 1", m[12], m[13], m[14], m[15]);
+        return Err(Error::line(path, lines[12], message));
+    }
+    let rows = [[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]].map(DVec3::from_array);
+    let turn = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
+    let square = turn.transpose() * turn;
+    let off = (0..3)
+        .flat_map(|k| (square.col(k) - DMat3::IDENTITY.col(k)).to_array())
+        .fold(0.0, |a: f64, v| a.max(v.abs()));
+    if off > ROTATION_ERROR {
+        let message = format!(
+            "the upper left 3×3 part is no rotation: its axes are off by {off:.4} of being square and of length 1"
+        );
+        return Err(Error::line(path, lines[0], message));
+    }
+    if turn.determinant() < 0.0 {
+        let message = "the upper left 3×3 part mirrors: its determinant is −1, a rotation's is 1";
+        return Err(Error::line(path, lines[0], message));
+    }
+    let location = DVec3::new(m[3], m[7], m[11]);
+    if location.abs().max_element() > FARTHEST_M {
+        let message = format!("the camera is at {location}: are these metres?");
+        return Err(Error::line(path, lines[3], message));
+    }
+    // What rounding left off a rotation is taken out: the viewing direction stays.
+    let forward = turn.z_axis.normalize();
+    let right = (turn.x_axis - forward * forward.dot(turn.x_axis)).normalize();
+    let down = forward.cross(right);
+    Ok(Pose { location, world_from_camera: DMat3::from_cols(right, -down, -forward) })
+}
+
+/// The scan locations of a folder of raw captures, by uuid: of each the mean place of its level camera (camera 1), and as
+/// E(original) that camera's pose at stop 0, tilt included. [`ScanLocation::line`] counts them from 1.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] for the folder if there is no location in it, for a pose as [`read_capture_pose`] says,
+/// and for a location whose `_pose_1_0.txt` is not there.
+pub fn read_matterport_locations(dir: &Path) -> Result<Vec<ScanLocation>> {
+    let folder = PictureFolder::open(dir)?;
+    let uuids = folder.uuids();
+    if uuids.is_empty() {
+        let message = "has no captures: no file is called {uuid}_pose_{camera}_{yaw}.txt";
+        return Err(Error::format(dir, message));
+    }
+    let mut locations = Vec::new();
+    for (line, uuid) in (1..).zip(uuids) {
+        let mut poses = Vec::new();
+        for yaw in 0..6 {
+            if let Some(path) = folder.find(&format!("{uuid}_pose_{LEVEL}_{yaw}.txt")) {
+                poses.push(read_capture_pose(path)?);
+            } else if yaw == 0 {
+                let message = format!(
+                    "location {uuid} has no {uuid}_pose_{LEVEL}_0.txt, from which its original camera would be taken"
+                );
+                return Err(Error::format(dir, message));
+            }
+        }
+        let center = poses.iter().map(|p| p.location).sum::<DVec3>() / poses.len() as f64;
+        // The first is there: without it there was an error.
+        let pose = poses.first().map(|first| Pose { location: center, ..*first });
+        locations.extend(pose.map(|pose| ScanLocation { uuid, pose, line }));
+    }
+    Ok(locations)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::png::codec::write_rgb8;
+    use glam::dvec3;
+
+    const UUID: &str = "0c5a7d1e93b84f62a1d7e0f4b2683c95";
+
+    struct Folder(tempfile::TempDir);
+
+    impl Folder {
+        fn new() -> Self {
+            Self(tempfile::tempdir().unwrap())
+        }
+        fn text(&self, name: &str, text: &str) -> PathBuf {
+            let path = self.0.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(&path, text).unwrap();
+            path
+        }
+        fn picture(&self, name: &str, w: u32, h: u32) {
+            let path = self.text(name, "");
+            write_rgb8(
+                &path,
+                &Raster::filled(w, h, [9, 8, 7]),
+                crate::image::png::codec::Content::Photo,
+                crate::image::compression::Compression::Fast,
+            )
+            .unwrap();
+        }
+        fn open(&self) -> PictureFolder {
+            PictureFolder::open(self.0.path()).unwrap()
+        }
+    }
+
+    /// A level camera that looks along +X: its right is −Y, its down −Z.
+    const ALONG_X: &str = "0 0 1 4.5\n-1 0 0 -2\n0 -1 0 1.5\n0 0 0 1\n";
+
+    #[test]
+    fn a_pose_in_the_files_axes_becomes_one_in_ours() {
+        let folder = Folder::new();
+        let pose = read_capture_pose(&folder.text("p.txt", ALONG_X)).unwrap();
+        assert_eq!(pose.location, dvec3(4.5, -2.0, 1.5));
+        assert_eq!((pose.forward(), pose.right(), pose.up()), (DVec3::X, -DVec3::Y, DVec3::Z));
+        // As files round them.
+        let rounded =
+            "0.1736 -0.0002 0.9848 1\n-0.9848 -0.0001 0.1736 2\n 0.0001 -1.0000 -0.0002 3\n 0 0 0 1";
+        let pose = read_capture_pose(&folder.text("p.txt", rounded)).unwrap();
+        let m = pose.world_from_camera;
+        assert!((m.transpose() * m).abs_diff_eq(DMat3::IDENTITY, 1e-14));
+        assert!(pose.forward().abs_diff_eq(dvec3(0.9848, 0.1736, -0.0002), 1e-4));
+    }
+
+    #[test]
+    fn poses_that_are_none_are_refused() {
+        let folder = Folder::new();
+        for (text, words) in [
+            ("", "line 1: 0 numbers; a 4×4"),
+            ("1 0 0 0\n0 1 0 0\n0 0 1 0\n", "line 3: 12 numbers"),
+            (&ALONG_X.replace("-2", "two"), "line 2: \"two\" is no"),
+            (&ALONG_X.replace("-2", "inf"), "line 2: \"inf\""),
+            (&ALONG_X.replace("0 0 0 1", "0 0 1 1"), "line 4: the last row is 0 0 1 1"),
+            (&ALONG_X.replace("-1 0 0", "-2 0 0"), "no rotation"),
+            (&ALONG_X.replace("0 -1 0", "0.1 -1 0"), "no rotation"),
+            (&ALONG_X.replace("0 -1 0", "0 1 0"), "mirrors"),
+            (&ALONG_X.replace("4.5", "4.5e9"), "metres?"),
+        ] {
+            let message = read_capture_pose(&folder.text("p.txt", text)).unwrap_err().to_string();
+            assert!(message.contains(words) && message.contains("p.txt"), "{text}: {message}");
+        }
+        fs::write(folder.0.path().join("p.txt"), [0xff, 0xfe]).unwrap();
+        assert!(
+            read_capture_pose(&folder.0.path().join("p.txt")).unwrap_err().to_string().contains("no text")
+        );
+    }
+
+    #[test]
+    fn intrinsics_are_checked() {
+        let folder = Folder::new();
+        let good = "1280 1024 1075.72 1075.66 636.877 515.013 0.1 -0.2 0.001 -0.002 0.03\n";
+        let lens = read_intrinsics(&folder.text("i.txt", good)).unwrap();
+        assert_eq!(
+            (lens.width(), lens.height(), lens.focal_px()),
+            (1280, 1024, DVec2::new(1075.72, 1075.66))
+        );
+        // OpenCV's projectPoints of (0.4, −0.3, 1.1) with these numbers.
+        assert!(
+            lens.project(dvec3(0.4, -0.3, 1.1)).unwrap().abs_diff_eq(DVec2::new(OPENCV[0], OPENCV[1]), 1e-9)
+        );
+        for (from, to, words) in [
+            (" 0.03", "", "10 numbers"),
+            ("1280", "1280.5", "a picture of 1280.5"),
+            ("1280", "0", "a picture of 0"),
+            ("1280", "-1280", "a picture of -1280"),
+            ("1075.72", "0", "no lens: fx 0"),
+            ("0.001", "x", "line 1: \"x\""),
+        ] {
+            let message =
+                read_intrinsics(&folder.text("i.txt", &good.replacen(from, to, 1))).unwrap_err().to_string();
+            assert!(message.contains(words) && message.contains("i.txt"), "{to}: {message}");
+        }
+    }
+    const OPENCV: [f64; 2] = [1031.6669137336373, 218.8259578271295];
+
+    #[test]
+    fn captures_are_found_wherever_they_lie_and_must_be_whole() {
+        let folder = Folder::new();
+        folder.picture(&format!("colors/{UUID}_i1_0.png"), 8, 6);
+        folder.text(&format!("poses/{UUID}_pose_1_0.txt"), ALONG_X);
+        let lens = folder.text(&format!("lenses/{UUID}_intrinsics_1.txt"), "8 6 5 5 4 3 0 0 0 0 0");
+        let captures = folder.open().captures(UUID).unwrap();
+        assert_eq!(captures.len(), 1);
+        assert_eq!((captures[0].camera, captures[0].yaw), (1, 0));
+        assert_eq!(captures[0].read().unwrap().at(3, 3), [9, 8, 7]);
+        assert_eq!(folder.open().uuids(), [UUID]);
+        assert_eq!(folder.open().captures(&"f".repeat(32)).unwrap(), []);
+        let fails = |words: &str| {
+            let message = folder.open().captures(UUID).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        };
+        fs::write(&lens, "8 7 5 5 4 3 0 0 0 0 0").unwrap();
+        fails("has 8 × 6 pixels, but the intrinsics of its camera are for 8 × 7");
+        fs::remove_file(lens).unwrap();
+        fails(&format!("has no intrinsics: {UUID}_intrinsics_1.txt"));
+        folder.text(&format!("poses/{UUID}_pose_0_5.txt"), ALONG_X);
+        fails(&format!("has no picture: {UUID}_i0_5.jpg"));
+        folder.picture(&format!("{UUID}_i0_5.png"), 8, 6);
+        fs::remove_file(folder.0.path().join(format!("poses/{UUID}_pose_0_5.txt"))).unwrap();
+        fails(&format!("has no pose: {UUID}_pose_0_5.txt"));
+        folder.text(&format!("poses/{UUID}_pose_0_5.txt"), ALONG_X);
+        folder.text(&format!("{UUID}_intrinsics_0.txt"), "8 6 5 5 4 3 0 0 0 0 0");
+        folder.text(&format!("{UUID}_i0_5.png"), "no picture");
+        fails("_i0_5.png");
+    }
+
+    #[test]
+    fn locations_stand_at_the_level_cameras_mean() {
+        let folder = Folder::new();
+        let message = |f: &Folder| read_matterport_locations(f.0.path()).unwrap_err().to_string();
+        assert!(message(&folder).contains("has no captures"));
+        let other = "ffffffffffffffffffffffffffffffff";
+        folder.text(&format!("{other}_pose_1_1.txt"), ALONG_X);
+        assert!(message(&folder).contains(&format!("{other}_pose_1_0.txt")));
+        folder.text(&format!("{other}_pose_1_0.txt"), "1 0 0 7\n0 0 1 8\n0 -1 0 9\n0 0 0 1");
+        folder.text(&format!("{UUID}_pose_1_0.txt"), ALONG_X);
+        for (yaw, x) in [(1, 4.6), (2, 4.7)] {
+            folder.text(&format!("{UUID}_pose_1_{yaw}.txt"), &ALONG_X.replace("4.5", &x.to_string()));
+        }
+        folder.text(&format!("{UUID}_pose_0_0.txt"), &ALONG_X.replace("1.5", "9"));
+        let locations = read_matterport_locations(folder.0.path()).unwrap();
+        assert_eq!(locations.len(), 2);
+        assert_eq!((locations[0].uuid.as_str(), locations[0].line), (UUID, 1));
+        assert!(locations[0].pose.location.abs_diff_eq(dvec3(4.6, -2.0, 1.5), 1e-12));
+        assert_eq!(locations[0].pose.forward(), DVec3::X);
+        assert!(locations[1].pose.location.abs_diff_eq(dvec3(5.75, 3.0, 5.25), 1e-12));
+        assert_eq!(locations[1].pose.forward(), DVec3::Y);
+    }
+
+    #[test]
+    fn sky_boxes_and_panoramas_are_found_or_named() {
+        let folder = Folder::new();
+        let missing = folder.open().panorama(UUID).unwrap_err();
+        assert!(missing.contains(&format!("{UUID}.jpg")), "{missing}");
+        let published = format!("camera_{UUID}_office_1_frame_equirectangular_domain_rgb.png");
+        folder.picture(&format!("rgb/{published}"), 8, 4);
+        folder.text(&format!("rgb/camera_{UUID}_office_1_frame_0_domain_rgb.png"), "");
+        assert!(folder.open().panorama(UUID).unwrap().ends_with(published));
+        folder.picture(&format!("{UUID}.png"), 8, 4);
+        assert!(folder.open().panorama(UUID).unwrap().ends_with(format!("{UUID}.png")));
+        assert_eq!(read_picture_size(&folder.open().panorama(UUID).unwrap()).unwrap(), (8, 4));
+        for k in [0, 1, 3, 4] {
+            folder.picture(&format!("{UUID}_skybox{k}_sami.png"), 4, 4);
+        }
+        let missing = folder.open().sky_box(UUID).unwrap_err();
+        assert_eq!(missing, format!("{UUID}_skybox2_sami.jpg, {UUID}_skybox5_sami.jpg"));
+        folder.picture(&format!("{UUID}_skybox2_sami.png"), 4, 4);
+        folder.picture(&format!("{}_skybox5_SAMI.PNG", UUID.to_uppercase()), 4, 4);
+        let paths = folder.open().sky_box(UUID).unwrap();
+        assert!(paths[4].ends_with(format!("{UUID}_skybox4_sami.png")));
+    }
+}

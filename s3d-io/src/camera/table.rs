@@ -1,0 +1,173 @@
+//! The table of scan locations.
+
+use crate::error::{Error, Result};
+use crate::image::texture::read_file;
+use csv::{ByteRecord, ReaderBuilder, Trim};
+use s3d_geom::Pose;
+use s3d_geom::glam::{DQuat, DVec3, DVec4};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// A location farther than this from the origin is no place in a building.
+pub(crate) const FARTHEST_M: f64 = 1e7;
+
+/// The columns of the table, in the order that they have without a header.
+const COLUMNS: [&str; 8] = ["uuid", "x", "y", "z", "qx", "qy", "qz", "qw"];
+
+/// A place from which the scanner looked around.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScanLocation {
+    /// Its name: 32 lower-case hexadecimal digits.
+    pub uuid: String,
+    /// Where it is, world metres, and how its camera is turned: E(original) of formats.md, "Cameras".
+    pub pose: Pose,
+    /// Its line in the table, from 1; 0 if it comes from a file without lines.
+    pub line: u64,
+}
+
+/// Reads a table of scan locations: CSV with the columns `uuid,x,y,z,qx,qy,qz,qw`, metres in the Z-up world and the
+/// scanner's rotation, of any length but zero, as a quaternion.
+///
+/// A first line of those eight names gives their order; without one it is that order. A uuid may be in upper case and
+/// hyphenated. Lines that start with `#` and empty lines do not count. Source: formats.md, "Cameras".
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a uuid that is not 32 hexadecimal
+/// digits or is there twice, a number that is not finite, a quaternion of zeros; for the file, if it has no location.
+pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
+    let bytes = read_file(path)?;
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    let mut locations = Vec::new();
+    let mut lines: HashMap<String, u64> = HashMap::new();
+    let mut order: [usize; 8] = std::array::from_fn(|i| i);
+    let mut is_first = true;
+    // Line by line: csv counts the comments and empty lines before a record to the record.
+    for (line, text) in (1..).zip(bytes.split(|&b| b == b'\n')) {
+        let text = text.trim_ascii();
+        if text.is_empty() || text.starts_with(b"#") {
+            continue;
+        }
+        let record = fields(text).map_err(|e| Error::line(path, line, e.to_string()))?;
+        if record.len() != COLUMNS.len() {
+            let message =
+                format!("{} fields; a location has {}: {}", record.len(), COLUMNS.len(), COLUMNS.join(","));
+            return Err(Error::line(path, line, message));
+        }
+        if std::mem::take(&mut is_first) && record.iter().any(|f| f.eq_ignore_ascii_case(b"uuid")) {
+            order = header(&record).map_err(|message| Error::line(path, line, message))?;
+            continue;
+        }
+        let location = location(&record, order, line).map_err(|message| Error::line(path, line, message))?;
+        if let Some(first) = lines.insert(location.uuid.clone(), line) {
+            return Err(Error::line(
+                path,
+                line,
+                format!("uuid {} is on line {first} already", location.uuid),
+            ));
+        }
+        locations.push(location);
+    }
+    if locations.is_empty() {
+        return Err(Error::format(path, format!("has no scan location; a line is {}", COLUMNS.join(","))));
+    }
+    Ok(locations)
+}
+
+/// The fields of a line, without white space around them.
+fn fields(text: &[u8]) -> csv::Result<ByteRecord> {
+    // Making a reader takes a hundred times as long as cutting a line without quotes.
+    if !text.contains(&b'"') {
+        return Ok(text.split(|b| *b == b',').map(<[u8]>::trim_ascii).collect());
+    }
+    let mut record = ByteRecord::new();
+    let mut reader = ReaderBuilder::new().has_headers(false).trim(Trim::All).from_reader(text);
+    reader.read_byte_record(&mut record)?;
+    Ok(record)
+}
+
+/// Where each of [`COLUMNS`] is.
+fn header(record: &ByteRecord) -> std::result::Result<[usize; 8], String> {
+    let mut order = [0; 8];
+    for (place, name) in order.iter_mut().zip(COLUMNS) {
+        *place = record
+            .iter()
+            .position(|field| field.eq_ignore_ascii_case(name.as_bytes()))
+            .ok_or_else(|| format!("the header has no column {name}; it needs {}", COLUMNS.join(",")))?;
+    }
+    Ok(order)
+}
+
+fn location(record: &ByteRecord, order: [usize; 8], line: u64) -> std::result::Result<ScanLocation, String> {
+    let fields = order.map(|at| String::from_utf8_lossy(record.get(at).unwrap_or_default()).into_owned());
+    let [written, fields @ ..] = fields;
+    let uuid: String = written.chars().filter(|&c| c != '-').map(|c| c.to_ascii_lowercase()).collect();
+    if uuid.len() != 32 || !uuid.bytes().all(|b| b.is_ascii_hexdigit()) {
+        return Err(format!("{written:?} is no uuid of 32 hexadecimal digits"));
+    }
+    let mut numbers = [0.0; 7];
+    for ((number, text), column) in numbers.iter_mut().zip(&fields).zip(&COLUMNS[1..]) {
+        *number = text
+            .parse()
+            .ok()
+            .filter(|v: &f64| v.is_finite())
+            .ok_or_else(|| format!("{column} is {text:?}, which is no finite number"))?;
+    }
+    let [x, y, z, qx, qy, qz, qw] = numbers;
+    if [x, y, z].iter().any(|c| c.abs() > FARTHEST_M) {
+        return Err(format!(
+            "({x}, {y}, {z}) is more than {FARTHEST_M} m from the origin: are these metres?"
+        ));
+    }
+    let rotation = DVec4::new(qx, qy, qz, qw).try_normalize().ok_or("the quaternion has no length")?;
+    let pose = Pose::from_scanner(DVec3::new(x, y, z), DQuat::from_vec4(rotation));
+    Ok(ScanLocation { uuid, pose, line })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::dvec3;
+
+    const A: &str = "8eb9955b866b4b5f74abb1071416c628";
+    const B: &str = "508160BA-5d80-a2e3-6560-9578a09bab8b";
+
+    fn read(text: &str) -> Result<Vec<ScanLocation>> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cameras.csv");
+        std::fs::write(&path, text).unwrap();
+        read_cameras(&path)
+    }
+
+    #[test]
+    fn locations_with_and_without_header() {
+        let plain = read(&format!("# a scan\n{A},1,2,3,0,0,0,1\r\n\n {B}, -1e0 ,0,0,0,0,2,0\n")).unwrap();
+        assert_eq!((plain[0].uuid.as_str(), plain[0].line), (A, 2));
+        assert_eq!(plain[0].pose, Pose::from_scanner(dvec3(1.0, 2.0, 3.0), DQuat::IDENTITY));
+        assert_eq!((plain[1].uuid.as_str(), plain[1].line), ("508160ba5d80a2e365609578a09bab8b", 4));
+        assert!(plain[1].pose.forward().abs_diff_eq(-DVec3::Y, 1e-12));
+        let header = read(&format!("\u{feff}X,y,z,uuid,qw,qx,qy,qz\n1,2,3,{A},1,0,0,0\n")).unwrap();
+        assert_eq!(header[0].pose, plain[0].pose);
+    }
+
+    #[test]
+    fn every_fault_has_its_line() {
+        let good = format!("{A},0,0,0,0,0,0,1\n");
+        for (text, words) in [
+            (format!("{A},0,0,0,0,0,1\n"), "line 2: 7 fields"),
+            (format!("{A},0,0,0,0,0,0,1\n"), "is on line 1 already"),
+            (format!("{B},0,nan,0,0,0,0,1\n"), "line 2: y is \"nan\""),
+            (format!("{B},0,0,0,0,0,0,1e999\n"), "qw is \"1e999\""),
+            (format!("{B},0,x,0,0,0,0,1\n"), "y is \"x\""),
+            (format!("{B},0,0,0,0,0,0,0\n"), "line 2: the quaternion"),
+            (format!("{},0,0,0,0,0,0,1\n", &B[1..]), "is no uuid"),
+            (format!("{}g,0,0,0,0,0,0,1\n", &B[..35]), "is no uuid"),
+        ] {
+            let message = read(&(good.clone() + &text)).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+        assert!(read("uuid,x,y,z,qx,qy,qz,w\n").unwrap_err().to_string().contains("no column qw"));
+        for empty in ["", "# nothing\n", "uuid,x,y,z,qx,qy,qz,qw\n"] {
+            assert!(read(empty).unwrap_err().to_string().contains("no scan location"));
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! LAS and LAZ files.
+
+mod bounded;
+pub(crate) mod read;

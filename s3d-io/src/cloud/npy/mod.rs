@@ -1,0 +1,7 @@
+//! numpy's arrays, NPY and NPZ.
+
+mod header;
+pub(crate) mod read;
+pub(crate) mod write;
+
+pub use write::NpyWriter;

@@ -1,0 +1,197 @@
+//! Annotated points in numpy's arrays: NPY, and NPZ with an array a column or a few.
+
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::npy::header::NpyHeader;
+use crate::cloud::table::read::{Cloud, ColorRange};
+use crate::cloud::table::records::{Field, Table, fill, rows_of_block};
+use crate::cloud::table::rows::{Reading, Tag};
+use crate::error::{Error, Result};
+use s3d_label::Class;
+use std::cell::Cell;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use zip::ZipArchive;
+
+/// The columns of a plain array, unless they are named.
+const PLAIN: [&str; 8] = ["x", "y", "z", "r", "g", "b", "class", "instance"];
+
+/// An `.npy` or `.npz` file.
+pub(crate) struct NpyCloud<'a> {
+    path: PathBuf,
+    options: &'a AnnotationOptions,
+    /// Whether numbers of classes are the 13's: a plain array, of which nothing is said.
+    s3dis_numbers: Cell<bool>,
+}
+
+impl<'a> NpyCloud<'a> {
+    pub(crate) fn new(path: &Path, options: &'a AnnotationOptions) -> Self {
+        Self { path: path.to_owned(), options, s3dis_numbers: Cell::new(false) }
+    }
+
+    fn is_npz(&self) -> bool {
+        self.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+    }
+
+    fn file(&self) -> Result<BufReader<File>> {
+        let file = File::open(&self.path).map_err(|e| Error::io(&self.path, "read", e))?;
+        Ok(BufReader::with_capacity(1 << 18, file))
+    }
+
+    fn read_npy(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+        let mut source = self.file()?;
+        let header = NpyHeader::read(&self.path, &mut source)?;
+        let table = self.table(header.fields, header.stride, header.is_structured, reading)?;
+        table.read(&self.path, source, header.rows, colors, reading)
+    }
+
+    /// The table of an array of its own.
+    fn table(
+        &self,
+        mut fields: Vec<Field>,
+        stride: usize,
+        is_structured: bool,
+        reading: &mut Reading<'_>,
+    ) -> Result<Table> {
+        if !is_structured {
+            self.name_plain(&mut fields)?;
+            if self.options.columns.is_empty() && self.options.classes.is_empty() {
+                self.s3dis_numbers.set(true);
+                let path = self.path.display();
+                reading.notes.push(format!(
+                    "{path}: a plain array: its columns are taken for {}, and class numbers for S3DIS's, 0 ceiling to 12 \
+                     clutter",
+                    fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(" ")
+                ));
+            }
+        }
+        Table::new(&self.path, fields, stride, self.options)
+    }
+
+    fn name_plain(&self, fields: &mut [Field]) -> Result<()> {
+        let usual = PLAIN.map(str::to_owned);
+        let named = &self.options.columns;
+        let names = match fields.len() {
+            7 | 8 if named.is_empty() => &usual[..],
+            n if n == named.len() => &named[..],
+            n => {
+                let said = match named.len() {
+                    0 => "they have no names: say what they are".to_owned(),
+                    m => format!("{m} are named"),
+                };
+                return Err(Error::format(
+                    &self.path,
+                    format!(
+                        "has {n} columns, and {said}, as in columns = [\"x\", \"y\", \"z\", \"r\", \"g\", \"b\", \"class\", \
+                         \"instance\"] in [annotations]"
+                    ),
+                ));
+            }
+        };
+        for (field, name) in fields.iter_mut().zip(names) {
+            field.name.clone_from(name);
+        }
+        Ok(())
+    }
+
+    fn read_npz(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+        let zipped = |e: zip::result::ZipError| match e {
+            zip::result::ZipError::Io(e) => Error::io(&self.path, "read", e),
+            e => Error::format(&self.path, format!("is no NPZ that can be read: {e}")),
+        };
+        let names: Vec<String> = {
+            let archive = ZipArchive::new(self.file()?).map_err(zipped)?;
+            archive
+                .file_names()
+                .flatten()
+                .filter(|n| n.ends_with(".npy"))
+                .map(std::borrow::Cow::into_owned)
+                .collect()
+        };
+        // An archive lends one member at a time: each array has one of its own. Few have more than a dozen.
+        if names.is_empty() || names.len() > 64 {
+            let message = format!("holds {} arrays: points are in 1 to 64 of them", names.len());
+            return Err(Error::format(&self.path, message));
+        }
+        let mut archives = Vec::new();
+        for _ in &names {
+            archives.push(ZipArchive::new(self.file()?).map_err(zipped)?);
+        }
+        let mut arrays = Vec::new();
+        for (archive, name) in archives.iter_mut().zip(&names) {
+            let mut member = archive.by_name(name).map_err(zipped)?;
+            let path = self.path.join(name);
+            let stem = name.trim_end_matches(".npy").to_owned();
+            match NpyHeader::read(&path, &mut member) {
+                Ok(header) => arrays.push((stem, header, member)),
+                // Another array than those of points may be of any kind.
+                Err(Error::Unsupported { .. }) if names.len() > 1 => {}
+                Err(e) => return Err(e),
+            }
+        }
+        if let [(_, header, member)] = &mut arrays[..] {
+            let fields = std::mem::take(&mut header.fields);
+            let table = self.table(fields, header.stride, header.is_structured, reading)?;
+            return table.read(&self.path, member, header.rows, colors, reading);
+        }
+        // All arrays that are as long as most are columns of one table; what is shorter says something of the whole.
+        let rows = arrays.iter().map(|(_, h, _)| h.rows).max().unwrap_or(0);
+        arrays.retain(|(_, h, _)| h.rows == rows && h.stride > 0);
+        let (mut fields, mut stride) = (Vec::new(), 0);
+        for (stem, header, _) in &arrays {
+            for field in &header.fields {
+                let name =
+                    if header.is_structured { field.name.clone() } else { format!("{stem}{}", field.name) };
+                fields.push(Field { name, at: field.at.saturating_add(stride), ..field.clone() });
+            }
+            stride = header.stride.saturating_add(stride);
+        }
+        let table = Table::new(&self.path, fields, stride, self.options)?;
+        // Rows may be as long as 64 KiB: what is in memory is a few MiB all the same.
+        let mut done = 0;
+        let (mut block, mut column) = (Vec::new(), Vec::new());
+        let mut texts = Default::default();
+        while let Some(n) = rows_of_block(rows, done, stride) {
+            block.resize(n.saturating_mul(stride), 0);
+            let mut at = 0usize;
+            for (_, header, member) in &mut arrays {
+                column.resize(n.saturating_mul(header.stride), 0);
+                fill(&self.path, member, &mut column, done, rows, header.stride)?;
+                for (record, piece) in block.chunks_exact_mut(stride).zip(column.chunks_exact(header.stride))
+                {
+                    let place = record.get_mut(at..).and_then(|r| r.get_mut(..piece.len()));
+                    place.into_iter().for_each(|place| place.copy_from_slice(piece));
+                }
+                at = at.saturating_add(header.stride);
+            }
+            for (record, number) in block.chunks_exact(stride).zip(done.saturating_add(1)..) {
+                if !table.push(number, record, colors, &mut texts, &self.path, reading)? {
+                    return Ok(false);
+                }
+            }
+            done = done.saturating_add(n as u64);
+        }
+        Ok(true)
+    }
+}
+
+impl Cloud for NpyCloud<'_> {
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn class_of(&self, tag: &Tag) -> Option<Class> {
+        match tag {
+            Tag::Number(n) if self.s3dis_numbers.get() => {
+                usize::try_from(*n).ok().and_then(|n| Class::ALL.get(n)).copied()
+            }
+            _ => None,
+        }
+    }
+
+    fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+        if self.is_npz() { self.read_npz(colors, reading) } else { self.read_npy(colors, reading) }
+    }
+}

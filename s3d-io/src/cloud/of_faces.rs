@@ -1,0 +1,177 @@
+//! The labels of a mesh's faces as a source of annotations.
+
+use crate::cloud::annotations::{AnnotatedInstance, AnnotatedRoom, Annotations, InstancePoints, Skipped};
+use crate::cloud::passes::PointBlocks;
+use crate::error::{Error, Result};
+use s3d_geom::glam::Vec3;
+use s3d_geom::{NO_INDEX, PointCloud, TriMesh};
+use s3d_label::{Class, Label, Room};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A face and its corners.
+type Face = (u32, [Vec3; 3]);
+
+/// Points stand no farther apart than this on a face, metres, as far as [`MOST_ROWS`] allows.
+const SPACING_M: f32 = 0.05;
+/// Parts that an edge is cut into.
+const MOST_ROWS: u32 = 256;
+
+impl Annotations {
+    /// The annotations that say of each face of `mesh` what `face_labels` does: its place in `labels`, or [`NO_INDEX`].
+    ///
+    /// The points of an instance are the corners of its faces and places about 5 cm apart on them, black, and each says
+    /// which face it is of ([`PointCloud::faces`]): no other face gets its vote. Instances are numbered in each room in the
+    /// order of their numbers in the area. `path` is the file that messages name.
+    ///
+    /// # Errors
+    /// [`Error::Format`] for `path` if no face has a label.
+    ///
+    /// # Panics
+    /// If `face_labels` has not one entry a face, or one that is no index into `labels`.
+    pub fn from_face_labels(
+        path: &Path,
+        mesh: &TriMesh,
+        labels: &[Label],
+        face_labels: &[u32],
+    ) -> Result<Self> {
+        let count = mesh.faces().len();
+        assert_eq!(face_labels.len(), count, "{count} faces need as many labels");
+        let mut faces: BTreeMap<(Room, Class, u32), Vec<Face>> = BTreeMap::new();
+        for (face, place) in (0u32..).zip(face_labels).filter(|(_, place)| **place != NO_INDEX) {
+            #[expect(
+                clippy::indexing_slicing,
+                reason = "the labels of faces are places in `labels`: see Panics"
+            )]
+            let label = labels[*place as usize];
+            let key = (label.room, label.class, label.instance);
+            faces.entry(key).or_default().push((face, mesh.triangle(face)));
+        }
+        let mut rooms: Vec<AnnotatedRoom> = Vec::new();
+        for ((room, class, instance), faces) in faces {
+            if rooms.last().is_none_or(|r| r.room != room) {
+                rooms.push(AnnotatedRoom { room, instances: Vec::new() });
+            }
+            let Some(AnnotatedRoom { instances, .. }) = rooms.last_mut() else { continue };
+            let number = instances.last().filter(|i| i.class == class).map_or(0, |i| i.number) + 1;
+            let part = format!("{class}_{instance}_{room}");
+            let points = FacePoints { path: path.to_owned(), part, faces };
+            instances.push(AnnotatedInstance::new(class, number, Arc::new(points)));
+        }
+        if rooms.is_empty() {
+            return Err(Error::format(path, "labels no face"));
+        }
+        Ok(Self { rooms, warnings: Vec::new() })
+    }
+}
+
+/// The faces of an instance.
+#[derive(Debug)]
+struct FacePoints {
+    path: PathBuf,
+    part: String,
+    faces: Vec<Face>,
+}
+
+impl InstancePoints for FacePoints {
+    fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
+        self.open()?.read_block(usize::MAX, out)?;
+        Ok(Skipped::default())
+    }
+
+    fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
+        Ok(Box::new(FaceBlocks { faces: &self.faces }))
+    }
+
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn part(&self) -> String {
+        self.part.clone()
+    }
+}
+
+/// The points of an instance's faces, block by block; all points of a face are in one, which may be longer by them.
+struct FaceBlocks<'a> {
+    /// The faces that are left.
+    faces: &'a [Face],
+}
+
+impl PointBlocks for FaceBlocks<'_> {
+    fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool> {
+        assert!(out.faces.len() == out.len(), "points with faces beside points without");
+        let end = out.len().saturating_add(points);
+        while let Some((&(face, corners), rest)) = self.faces.split_first() {
+            out.positions.extend(corners);
+            push_inner(corners, &mut out.positions);
+            out.faces.resize(out.positions.len(), face);
+            self.faces = rest;
+            if out.positions.len() >= end {
+                break;
+            }
+        }
+        out.colors.resize(out.positions.len(), [0; 3]);
+        Ok(!self.faces.is_empty())
+    }
+
+    fn skipped(&mut self) -> Skipped {
+        Skipped::default()
+    }
+}
+
+/// The middles of the n × n congruent triangles that a face is cut into.
+fn push_inner([a, b, c]: [Vec3; 3], positions: &mut Vec<Vec3>) {
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let rows = ((longest / SPACING_M).ceil() as u32).clamp(1, MOST_ROWS);
+    let (u, v) = ((b - a) / rows as f32, (c - a) / rows as f32);
+    for i in 0..rows {
+        for j in 0..rows - i {
+            let corner = a + u * i as f32 + v * j as f32;
+            positions.push(corner + (u + v) / 3.0);
+            // The one that points the other way, if there is place for it.
+            if i + j + 1 < rows {
+                positions.push(corner + (u + v) * (2.0 / 3.0));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::vec3;
+
+    #[test]
+    fn each_face_votes_for_itself() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, vec3(0.02, 0.0, 0.0), vec3(0.0, 0.02, 0.0)];
+        let mesh = TriMesh::from_faces(positions, vec![[0, 1, 2], [0, 3, 4], [1, 2, 3]]).unwrap();
+        let label =
+            |class, instance, room: &str| Label { class, instance, room: room.parse().unwrap(), area: 3 };
+        let labels = [
+            label(Class::Wall, 9, "office_2"),
+            label(Class::Wall, 4, "office_2"),
+            label(Class::Wall, 5, "WC_1"),
+        ];
+        let path = Path::new("semantic.obj");
+        let found = Annotations::from_face_labels(path, &mesh, &labels, &[0, 1, NO_INDEX]).unwrap();
+        assert_eq!((found.rooms.len(), found.rooms[0].instances.len()), (1, 2));
+        let [four, nine] = &found.rooms[0].instances[..] else { panic!() };
+        assert_eq!((four.number, nine.number), (1, 2));
+        assert_eq!(nine.source(), "semantic.obj, wall_9_office_2");
+        let mut cloud = PointCloud::default();
+        four.read(&mut cloud).unwrap();
+        assert_eq!((cloud.len(), &cloud.faces[..]), (4, &[1; 4][..]));
+        nine.read(&mut cloud).unwrap();
+        // √2 m in parts of 5 cm: 29 rows.
+        assert_eq!(cloud.len(), 4 + 3 + 29 * 29);
+        assert!(cloud.faces[4..].iter().all(|f| *f == 0) && cloud.colors.len() == cloud.len());
+        let inside = |p: &Vec3| p.x >= 0.0 && p.y >= 0.0 && p.x + p.y <= 1.0 + 1e-6 && p.z == 0.0;
+        assert!(cloud.positions.iter().all(inside));
+        let center = cloud.positions[7..].iter().sum::<Vec3>() / (29.0 * 29.0);
+        assert!(center.abs_diff_eq(vec3(1.0 / 3.0, 1.0 / 3.0, 0.0), 1e-5), "{center}");
+        let none = Annotations::from_face_labels(path, &mesh, &labels, &[NO_INDEX; 3]);
+        assert!(none.unwrap_err().to_string().contains("semantic.obj: labels no face"));
+    }
+}

@@ -1,0 +1,234 @@
+//! The labels that came with a mesh as a source of annotations.
+
+use crate::cloud::annotations::{AnnotationOptions, Annotations};
+use crate::cloud::table::meaning::{Group, Meaning};
+use crate::cloud::table::read::{Cloud, ColorRange};
+use crate::cloud::table::rows::{NO_INSTANCE, NO_TAG, Reading, Tags};
+use crate::error::{Error, Result};
+use crate::mesh::file::MeshFile;
+use crate::mesh::labels::{MeshLabels, NO_LABEL};
+use s3d_geom::NO_INDEX;
+use s3d_label::Label;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+impl Annotations {
+    /// The annotations that came with a mesh: see [`MeshLabels`].
+    ///
+    /// Numbers of faces or vertices mean what [`AnnotationOptions::classes`] says; the room is
+    /// [`AnnotationOptions::room`], or else that which the mesh's file is named after (`office_3.ply`). Faces of one room, class and object number are one
+    /// instance; those without a number are one a class and room. Without such numbers the names of materials are labels
+    /// (`chair_3_office_5_1`), if those of half the faces are. Points are those of [`Annotations::from_face_labels`].
+    ///
+    /// # Errors
+    /// [`Error::Format`] if the mesh has no labels, if there are none of classes, and for classes and rooms without a
+    /// meaning, unless they are to be skipped.
+    ///
+    /// # Panics
+    /// If the mesh has no [`MeshFile::sources`].
+    #[expect(clippy::indexing_slicing, reason = "a mesh of no file is a caller's mistake: see Panics")]
+    pub fn of_mesh(file: &MeshFile, options: &AnnotationOptions) -> Result<Self> {
+        let path = &file.sources[0].path;
+        let (labels, mut warnings) = match &file.labels {
+            Some(labels) => (labels.clone().into_faces(&file.mesh), Vec::new()),
+            None => MeshLabels::from_materials(&file.mesh).ok_or_else(|| {
+                Error::format(
+                    path,
+                    "came without labels: neither has it a column of classes of faces or vertices (name it with class = \"…\"), \
+                     nor are its materials named as labels, as in chair_3_office_5_1",
+                )
+            })?,
+        };
+        let (labels, faces) = match labels {
+            MeshLabels::Names { labels, faces } => (labels, faces),
+            MeshLabels::Numbers { class, instance, .. } => {
+                let Some(class) = class else {
+                    let message = "has a column of objects, but none of classes: name it with class = \"…\"";
+                    return Err(Error::format(path, message));
+                };
+                let instance = instance.map(|column| column.values);
+                of_numbers(file, &class.values, instance.as_deref(), options, &mut warnings)?
+            }
+        };
+        let mut found = Self::from_face_labels(path, &file.mesh, &labels, &faces)?;
+        found.warnings = warnings;
+        Ok(found)
+    }
+}
+
+/// What columns of numbers mean: labels, and for each face its place among them.
+#[expect(clippy::indexing_slicing, reason = "columns have an entry a face; groups are counted here")]
+fn of_numbers(
+    file: &MeshFile,
+    classes: &[i64],
+    instances: Option<&[i64]>,
+    options: &AnnotationOptions,
+    warnings: &mut Vec<String>,
+) -> Result<(Vec<Label>, Vec<u32>)> {
+    let clouds: Vec<Source> = file.sources.iter().map(|s| Source(s.path.clone())).collect();
+    let clouds: Vec<&dyn Cloud> = clouds.iter().map(|c| c as &dyn Cloud).collect();
+    let (mut class_tags, mut room_tags) = (Tags::new(), Tags::new());
+    let mut groups: Vec<Group> = Vec::new();
+    let mut index: HashMap<(u32, u32, i64), u32> = HashMap::new();
+    let mut group_of = vec![NO_INDEX; classes.len()];
+    for (source, cloud) in clouds.iter().enumerate() {
+        let path = cloud.path();
+        let too_many = || Error::format(path, "has too many different classes: is the column another one?");
+        let room = match options.room.or(cloud.room()) {
+            Some(room) => room_tags.name(&room.to_string()).ok_or_else(too_many)?,
+            None => NO_TAG,
+        };
+        for face in file.faces_of(source) {
+            let class = classes[face as usize];
+            if class == NO_LABEL {
+                continue;
+            }
+            let class = class_tags.number(class).ok_or_else(too_many)?;
+            let instance = instances.map_or(NO_LABEL, |column| column[face as usize]).max(NO_INSTANCE);
+            let group = *index.entry((room, class, instance)).or_insert_with(|| {
+                groups.push(Group { room, class, instance, file: source, points: 0 });
+                groups.len() as u32 - 1
+            });
+            groups[group as usize].points += 1;
+            group_of[face as usize] = group;
+        }
+    }
+    if groups.is_empty() {
+        return Err(Error::format(
+            &file.sources[0].path,
+            "has a column of classes, but no face with a class",
+        ));
+    }
+    let meaning = Meaning::new(&clouds, options, &groups, &class_tags, &room_tags, warnings)?;
+    // The area does not matter here: instances are numbered by room.
+    let labels = meaning
+        .instances
+        .iter()
+        .map(|i| Label { class: i.class, instance: i.number, room: i.room, area: 1 })
+        .collect();
+    let place = |group: u32| match group {
+        NO_INDEX => NO_INDEX,
+        group => meaning.instance_of[group as usize].map_or(NO_INDEX, |i| i as u32),
+    };
+    Ok((labels, group_of.into_iter().map(place).collect()))
+}
+
+/// A mesh's file, as what names its room and as what messages name.
+struct Source(PathBuf);
+
+impl Cloud for Source {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn read(&self, _colors: ColorRange, _reading: &mut Reading<'_>) -> Result<bool> {
+        Err(Error::unsupported(&self.0, "is a mesh and no cloud"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::file::{UpAxis, read_mesh};
+    use crate::mesh::join::read_meshes;
+    use s3d_geom::PointCloud;
+    use s3d_label::Class;
+    use std::fmt::Write as _;
+    use std::fs;
+
+    /// A strip of quads in the plane, each with a class and an object: a PLY file.
+    fn strip(labels: &[(i64, i64)], of_vertices: bool) -> String {
+        let n = labels.len();
+        let columns = "property int label\nproperty int instance\n";
+        let (v, f) = if of_vertices { (columns, "") } else { ("", columns) };
+        let mut ply = format!(
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n{v}\
+             element face {n}\nproperty list uchar int vertex_indices\n{f}end_header\n",
+            4 * n
+        );
+        for (i, (class, instance)) in labels.iter().enumerate() {
+            for (x, y) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
+                let _ = write!(ply, "{} {y} 0", 2 * i + x);
+                let _ = writeln!(
+                    ply,
+                    "{}",
+                    if of_vertices { format!(" {class} {instance}") } else { String::new() }
+                );
+            }
+        }
+        for (i, (class, instance)) in labels.iter().enumerate() {
+            let c = 4 * i;
+            let _ = write!(ply, "4 {c} {} {} {}", c + 1, c + 2, c + 3);
+            let _ =
+                writeln!(ply, "{}", if of_vertices { String::new() } else { format!(" {class} {instance}") });
+        }
+        ply
+    }
+
+    fn options() -> AnnotationOptions {
+        let classes = [("2", Some(Class::Floor)), ("5", Some(Class::Chair)), ("0", None)];
+        let classes = classes.map(|(key, class)| (key.to_owned(), class)).into();
+        AnnotationOptions { classes, room: "office_7".parse().ok(), ..Default::default() }
+    }
+
+    #[test]
+    fn numbers_of_faces_and_of_vertices_are_labels() {
+        let dir = tempfile::tempdir().unwrap();
+        for of_vertices in [false, true] {
+            let path = dir.path().join("scan.ply");
+            fs::write(&path, strip(&[(2, -1), (5, 40), (5, 3), (0, 1), (2, -1), (5, 40)], of_vertices))
+                .unwrap();
+            let file = read_mesh(&path, UpAxis::Z).unwrap();
+            let found = Annotations::of_mesh(&file, &options()).unwrap();
+            let [room] = &found.rooms[..] else { panic!("{found:?}") };
+            assert_eq!(room.room.to_string(), "office_7");
+            let seen: Vec<(Class, u32, Vec<u32>)> = room
+                .instances
+                .iter()
+                .map(|i| {
+                    let mut cloud = PointCloud::default();
+                    i.read(&mut cloud).unwrap();
+                    cloud.faces.dedup();
+                    (i.class, i.number, cloud.faces)
+                })
+                .collect();
+            let chairs = [(Class::Chair, 1, vec![4, 5]), (Class::Chair, 2, vec![2, 3, 10, 11])];
+            assert_eq!(seen[0], (Class::Floor, 1, vec![0, 1, 8, 9]));
+            assert_eq!(seen[1..], chairs);
+        }
+    }
+
+    #[test]
+    fn files_named_after_rooms_are_rooms() {
+        let dir = tempfile::tempdir().unwrap();
+        let paths = ["office_1.ply", "WC_2.ply"].map(|name| dir.path().join(name));
+        // The other lies a metre higher.
+        fs::write(&paths[0], strip(&[(2, 1), (5, 1)], false)).unwrap();
+        fs::write(&paths[1], strip(&[(2, 1), (5, 1)], false).replace(" 0\n", " 1\n")).unwrap();
+        let file = read_meshes(&paths, UpAxis::Z).unwrap();
+        let found = Annotations::of_mesh(&file, &AnnotationOptions { room: None, ..options() }).unwrap();
+        let rooms: Vec<String> = found.rooms.iter().map(|r| r.room.to_string()).collect();
+        assert_eq!(rooms.len(), 2);
+        assert!(rooms.contains(&"office_1".to_owned()) && rooms.contains(&"WC_2".to_owned()));
+    }
+
+    #[test]
+    fn what_has_no_meaning_is_told() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("scan.ply");
+        let message = |text: &str, options: &AnnotationOptions| {
+            fs::write(&path, text).unwrap();
+            Annotations::of_mesh(&read_mesh(&path, UpAxis::Z).unwrap(), options).unwrap_err().to_string()
+        };
+        let good = strip(&[(2, 1), (9, 1)], false);
+        assert!(message(&good, &options()).contains('9'));
+        let no_room = AnnotationOptions { room: None, ..options() };
+        assert!(message(&strip(&[(2, 1)], false), &no_room).contains("room"));
+        let plain =
+            strip(&[(2, 1)], false).replace("int label", "int foo").replace("int instance", "int bar");
+        assert!(message(&plain, &options()).contains("came without labels"));
+        let objects = strip(&[(2, 1)], false).replace("int label", "int foo");
+        assert!(message(&objects, &options()).contains("none of classes"));
+        assert!(message(&strip(&[(0, 1)], false), &options()).contains("unlabelled"));
+    }
+}

@@ -1,0 +1,115 @@
+//! Annotated points in PLY files: the element `vertex`, with properties for class and instance.
+
+use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::table::columns::Columns;
+use crate::cloud::table::read::{Cloud, ColorRange};
+use crate::cloud::table::records::{Color, color};
+use crate::cloud::table::rows::{Reading, Row, Value};
+use crate::error::{Error, Result};
+use crate::mesh::ply::batch::PlyBatch;
+use crate::mesh::ply::elements::PlyReader;
+use crate::mesh::ply::header::PlyElement;
+use s3d_geom::glam::dvec3;
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+
+/// A `.ply` file.
+pub(crate) struct PlyCloud<'a> {
+    path: PathBuf,
+    options: &'a AnnotationOptions,
+    has_faces: Cell<bool>,
+}
+
+impl<'a> PlyCloud<'a> {
+    pub(crate) fn new(path: &Path, options: &'a AnnotationOptions) -> Self {
+        Self { path: path.to_owned(), options, has_faces: Cell::new(false) }
+    }
+}
+
+/// Opens a PLY file at its vertices. The element, and whether the file is a mesh.
+pub(crate) fn open_vertices(path: &Path) -> Result<(PlyReader, PlyElement, bool)> {
+    let mut reader = PlyReader::open(path)?;
+    let has_faces = reader.header().element("face").is_some_and(|(_, face)| face.count > 0);
+    loop {
+        match reader.next_element()? {
+            Some(element) if element.name.eq_ignore_ascii_case("vertex") => {
+                return Ok((reader, element, has_faces));
+            }
+            Some(_) => {}
+            None => return Err(Error::format(path, "has no element \"vertex\": no points")),
+        }
+    }
+}
+
+/// The colour of a row, if it is one.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "the channels were found in the element, and are wanted of the batch"
+)]
+pub(crate) fn color_of(
+    element: &PlyElement,
+    batch: &PlyBatch,
+    channels: Option<[usize; 3]>,
+    row: usize,
+    range: ColorRange,
+) -> Color {
+    let Some(channels) = channels else { return Color::Rgb([0; 3]) };
+    let is_float = !element.properties[channels[0]].kind.is_integer();
+    color(channels.map(|c| batch.scalars(c)[row]), is_float, range)
+}
+
+impl Cloud for PlyCloud<'_> {
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn are_vertices(&self) -> bool {
+        self.has_faces.get()
+    }
+
+    #[expect(clippy::indexing_slicing, reason = "a batch has as many rows of each column that is wanted")]
+    fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+        let path = &self.path;
+        let (mut reader, element, has_faces) = open_vertices(path)?;
+        self.has_faces.set(has_faces);
+        // A list is no column; an empty name is none's.
+        let names: Vec<String> = element
+            .properties
+            .iter()
+            .map(|p| if p.is_list() { String::new() } else { p.name.clone() })
+            .collect();
+        let c = Columns::choose(path, &names, self.options)?;
+        let others = [Some(c.class), c.instance, c.room].into_iter().flatten();
+        reader.want(c.position.into_iter().chain(c.color.into_iter().flatten()).chain(others));
+        let mut batch = PlyBatch::default();
+        while reader.read_batch(&mut batch)? {
+            let [x, y, z] = c.position.map(|p| batch.scalars(p));
+            for row in 0..batch.len() {
+                let rgb = match color_of(&element, &batch, c.color, row, colors) {
+                    Color::Rgb(rgb) => rgb,
+                    Color::Wider => return Ok(false),
+                    Color::Beyond(channel) => {
+                        let p = c.color.map_or(0, |channels| channels[channel]);
+                        let v = batch.scalars(p)[row];
+                        let why = format!("{v} is no colour ({})", element.properties[p].name);
+                        reading.fault(reader.fail(&batch, row, why))?;
+                        continue;
+                    }
+                };
+                let value = |p: Option<usize>| p.map_or(Value::None, |p| Value::Float(batch.scalars(p)[row]));
+                let point = Row {
+                    position: dvec3(x[row], y[row], z[row]),
+                    color: rgb,
+                    class: value(Some(c.class)),
+                    instance: value(c.instance),
+                    room: value(c.room),
+                };
+                match batch.lines.get(row) {
+                    Some(line) => reading.push_line(*line, &point)?,
+                    None => reading.push(batch.first_row() + row as u64 + 1, &point)?,
+                }
+            }
+        }
+        Ok(true)
+    }
+}

@@ -1,0 +1,285 @@
+//! Some of the points of a large cloud.
+
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+use crate::error::{Error, Place, Result};
+use crate::fs::atomic::AtomicFile;
+use crate::image::texture::open_file;
+use s3d_geom::PointCloud;
+use s3d_geom::glam::Vec3;
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// A header that goes on for longer is none.
+const MAX_HEADER: u64 = 65_536;
+
+/// What is needed of a header: where things are in a point.
+struct Header {
+    bytes: u64,
+    count: u64,
+    stride: usize,
+    /// Offsets of x, y, z (float) and of red, green, blue (uchar).
+    position: [usize; 3],
+    color: Option<[usize; 3]>,
+}
+
+/// Reads up to `most` points of a binary little-endian PLY cloud such as `area_N/3d/pointcloud.ply`: all of them, or
+/// evenly spaced ones in the file's order. As the file is ordered by face, they cover the surface evenly. Their colours
+/// are black if the file has none; what else the file tells of them is left out.
+///
+/// Never more is in memory than the points that are returned.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if it is another kind of PLY file, if it is shorter than its header says, or if a
+/// coordinate is not finite.
+pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
+    let io = |e| Error::io(path, "read", e);
+    let file = open_file(path)?;
+    let size = file.metadata().map_err(io)?.len();
+    let mut reader = BufReader::with_capacity(1 << 18, file);
+    let header = read_header(path, &mut reader)?;
+    let needed = header.count.checked_mul(header.stride as u64).and_then(|b| b.checked_add(header.bytes));
+    if needed.is_none_or(|needed| needed > size) {
+        return Err(Error::format(
+            path,
+            format!(
+                "the header tells of {} points of {} bytes, but the file ends too early ({size} bytes)",
+                header.count, header.stride
+            ),
+        ));
+    }
+    reader.seek(SeekFrom::Start(header.bytes)).map_err(io)?;
+
+    let chosen = header.count.min(most as u64);
+    let mut cloud = PointCloud::default();
+    let mut point = vec![0; header.stride];
+    let mut at = 0u64;
+    for k in 0..chosen {
+        // The middle of the k-th of as many equal parts.
+        let i = middle_of_part(k, chosen, header.count);
+        let skipped = i.saturating_sub(at).saturating_mul(header.stride as u64);
+        reader.seek_relative(skipped.cast_signed()).map_err(io)?;
+        reader.read_exact(&mut point).map_err(io)?;
+        at = i.saturating_add(1);
+        let float = |o: usize| point.get(o..).and_then(<[u8]>::first_chunk).map(|b| f32::from_le_bytes(*b));
+        let position = header.position.map(|o| float(o).unwrap_or(f32::NAN));
+        if !position.iter().all(|c| c.is_finite()) {
+            return Err(Error::format(path, format!("point {i} (counted from 0) is at {position:?}")));
+        }
+        cloud.positions.push(Vec3::from_array(position));
+        let byte = |o: usize| point.get(o).copied().unwrap_or(0);
+        cloud.colors.push(header.color.map_or([0; 3], |offsets| offsets.map(byte)));
+    }
+    Ok(cloud)
+}
+
+/// The number of the element in the middle of the `k`th of `parts` parts of `count`, which are as many or more.
+fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
+    // u128, as counts may be anything.
+    let [k, parts, count] = [k, parts, count].map(u128::from);
+    let middle =
+        k.saturating_mul(2).saturating_add(1).saturating_mul(count).checked_div(parts.saturating_mul(2));
+    middle.and_then(|i| u64::try_from(i).ok()).unwrap_or(0)
+}
+
+/// Writes a cloud as a binary little-endian PLY file of positions (float) and colours (uchar, black if it has none), as
+/// viewers and Gaussian splatting read it, whole or not at all, and returns its size in bytes.
+///
+/// # Errors
+/// [`Error::Io`].
+///
+/// # Panics
+/// If it has colours, but not one a point.
+pub fn write_colored_points(path: &Path, cloud: &PointCloud) -> Result<u64> {
+    let n = cloud.len();
+    assert!(
+        cloud.colors.is_empty() || cloud.colors.len() == n,
+        "{} colours for {n} points",
+        cloud.colors.len()
+    );
+    let mut file = AtomicFile::create(path)?;
+    let header = format!(
+        "ply\n\
+         format binary_little_endian 1.0\n\
+         element vertex {n}\n\
+         property float x\n\
+         property float y\n\
+         property float z\n\
+         property uchar red\n\
+         property uchar green\n\
+         property uchar blue\n\
+         end_header\n"
+    );
+    file.put(header.as_bytes())?;
+    for (i, position) in cloud.positions.iter().enumerate() {
+        let mut point = [0; 15];
+        for (bytes, v) in point.as_chunks_mut().0.iter_mut().zip(position.to_array()) {
+            *bytes = v.to_le_bytes();
+        }
+        point[12..].copy_from_slice(cloud.colors.get(i).unwrap_or(&[0; 3]));
+        file.put(&point)?;
+    }
+    file.commit()
+}
+
+fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
+    let mut bytes = 0u64;
+    let (mut number, mut binary, mut in_vertex) = (0u64, false, false);
+    let (mut count, mut stride) = (None, 0usize);
+    let mut columns: Vec<(String, String, usize)> = Vec::new();
+    loop {
+        let mut line = Vec::new();
+        let read =
+            reader.take(MAX_HEADER).read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
+        bytes = bytes.saturating_add(read as u64);
+        number = number.saturating_add(1);
+        let text = String::from_utf8_lossy(&line);
+        let words: Vec<&str> = text.split_ascii_whitespace().collect();
+        let wrong =
+            |message: String| Error::Format { path: path.to_owned(), place: Place::Line(number), message };
+        if number == 1 && words != ["ply"] {
+            return Err(wrong("not a PLY file: it does not begin with \"ply\"".into()));
+        }
+        if read == 0 || bytes > MAX_HEADER {
+            return Err(wrong("the header of the PLY file has no end".into()));
+        }
+        match words[..] {
+            ["format", "binary_little_endian", _] => binary = true,
+            ["format", other, ..] => {
+                return Err(wrong(format!("the PLY file is {other}; only binary_little_endian is sampled")));
+            }
+            ["element", "vertex", n] if count.is_none() => {
+                in_vertex = true;
+                count = Some(n.parse().map_err(|_| wrong(format!("\"{n}\" is no number of points")))?);
+            }
+            ["element", ..] if count.is_none() => {
+                return Err(wrong("another element stands before the points".into()));
+            }
+            ["element", ..] => in_vertex = false,
+            ["property", "list", ..] if in_vertex => {
+                return Err(wrong("a point has a list as property".into()));
+            }
+            ["property", kind, name] if in_vertex => {
+                let size = match kind {
+                    "char" | "uchar" | "int8" | "uint8" => 1,
+                    "short" | "ushort" | "int16" | "uint16" => 2,
+                    "int" | "uint" | "float" | "int32" | "uint32" | "float32" => 4,
+                    "double" | "float64" => 8,
+                    other => return Err(wrong(format!("\"{other}\" is no type of a property"))),
+                };
+                columns.push((name.to_owned(), kind.to_owned(), stride));
+                stride = stride.saturating_add(size);
+            }
+            ["end_header"] => break,
+            _ => {}
+        }
+    }
+    let find = |names: [&str; 3], kinds: [&str; 2]| -> Option<[usize; 3]> {
+        let at =
+            |name: &str| columns.iter().find(|c| c.0 == name && kinds.contains(&c.1.as_str())).map(|c| c.2);
+        Some([at(names[0])?, at(names[1])?, at(names[2])?])
+    };
+    let position = find(["x", "y", "z"], ["float", "float32"]);
+    match (binary, count, position) {
+        (true, Some(count), Some(position)) => {
+            let color = find(["red", "green", "blue"], ["uchar", "uint8"]);
+            Ok(Header { bytes, count, stride, position, color })
+        }
+        _ => Err(Error::format(path, "not a PLY file of points with x, y and z as floats")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::ply::write::PlyPointWriter;
+    use crate::fs::atomic::write_bytes;
+    use s3d_geom::glam::vec3;
+
+    fn cloud(n: usize) -> PointCloud {
+        PointCloud {
+            positions: (0..n).map(|i| vec3(i as f32, 0.5, -1.0)).collect(),
+            colors: (0..n).map(|i| [i as u8, 2, 3]).collect(),
+            faces: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn evenly_spaced_points_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let all = cloud(20_000);
+        let mut writer = PlyPointWriter::create(&path, 20_000).unwrap();
+        writer.append(&all, &vec![7; 20_000]).unwrap();
+        writer.finish().unwrap();
+        for most in [0, 1, 3, 999, 20_000, 50_000] {
+            let sample = read_point_sample(&path, most).unwrap();
+            assert_eq!((sample.len(), sample.colors.len()), (most.min(20_000), most.min(20_000)));
+            for (k, p) in sample.positions.iter().enumerate() {
+                let i = p.x as usize;
+                assert_eq!((*p, sample.colors[k]), (all.positions[i], all.colors[i]));
+                // In the k-th of as many equal parts.
+                assert_eq!(i * sample.len() / 20_000, k);
+            }
+        }
+        assert_eq!(read_point_sample(&path, 20_000).unwrap().positions, all.positions);
+    }
+
+    #[test]
+    fn a_sample_comes_back_from_a_file_of_its_own() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let bytes = write_colored_points(&path, &cloud(300)).unwrap();
+        assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
+        assert_eq!(read_point_sample(&path, 300).unwrap(), cloud(300));
+    }
+
+    #[test]
+    fn other_columns_are_passed_over() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double t\nproperty float32 z\n\
+            property float32 y\nproperty float32 x\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n"
+            .to_vec();
+        bytes.extend(9f64.to_le_bytes());
+        [3f32, 2.0, 1.0].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+        write_bytes(&path, &bytes).unwrap();
+        let sample = read_point_sample(&path, 5).unwrap();
+        assert_eq!((sample.positions[0], sample.colors[0]), (vec3(1.0, 2.0, 3.0), [0; 3]));
+    }
+
+    #[test]
+    fn every_fault_is_told() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let head = |format: &str, rest: &str| format!("ply\nformat {format} 1.0\n{rest}end_header\n");
+        let xyz = "property float x\nproperty float y\nproperty float z\n";
+        let little = "binary_little_endian";
+        for (text, words) in [
+            ("solid x\n".into(), "line 1: not a PLY file"),
+            (String::new(), "line 1: not a PLY file"),
+            ("ply\nformat binary_little_endian 1.0\n".into(), "has no end"),
+            (format!("ply\n{}", "x".repeat(100_000)), "has no end"),
+            (head("ascii", ""), "line 2: the PLY file is ascii"),
+            (head(little, "element vertex many\n"), "line 3: \"many\" is no number"),
+            (head(little, "element face 1\nelement vertex 1\n"), "line 3: another element"),
+            (head(little, "element vertex 1\nproperty list uchar int x\n"), "line 4: a point has a list"),
+            (head(little, "element vertex 1\nproperty half x\n"), "line 4: \"half\" is no type"),
+            (
+                head(little, "element vertex 1\nproperty float x\nproperty float y\n"),
+                "not a PLY file of points",
+            ),
+            (head(little, &format!("element vertex 1000000000000\n{xyz}")), "ends too early"),
+            (head(little, &format!("element vertex {}\n{xyz}", u64::MAX)), "ends too early"),
+            (head(little, &format!("element vertex 1\n{xyz}")) + "12 bytes...", "ends too early"),
+        ] {
+            write_bytes(&path, text.as_bytes()).unwrap();
+            let e = read_point_sample(&path, 10).unwrap_err().to_string();
+            assert!(e.contains(words), "{text:?}: {e}");
+        }
+        let mut bytes = head(little, &format!("element vertex 1\n{xyz}")).into_bytes();
+        [1f32, f32::NAN, 2.0].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+        write_bytes(&path, &bytes).unwrap();
+        assert!(read_point_sample(&path, 10).unwrap_err().to_string().contains("point 0 (counted from 0)"));
+    }
+}

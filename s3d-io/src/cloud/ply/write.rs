@@ -1,0 +1,194 @@
+//! Labelled point clouds as binary PLY files.
+
+use crate::error::{Error, Result};
+use crate::fs::atomic::AtomicFile;
+use crate::image::texture::open_file;
+use s3d_geom::{NO_INDEX, PointCloud};
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// Bytes of one point: three floats, three bytes, two integers.
+const POINT_BYTES: usize = 3 * 4 + 3 + 2 * 4;
+
+/// Points that are turned into bytes before they are handed on.
+const BATCH: usize = 4096;
+
+/// Writes a point cloud of any size piece by piece as a binary little-endian PLY file, whole or not at all.
+///
+/// Columns: `x y z` (float, world metres, Z-up), `red green blue` (uchar; black if the cloud has no colours), `label`
+/// (uint, index into `semantic_labels.json`), `face` (uint, the face of the mesh that the point was drawn from;
+/// 4294967295 if unknown).
+#[derive(Debug)]
+pub struct PlyPointWriter {
+    file: AtomicFile,
+    promised: u64,
+    written: u64,
+    buffer: Vec<u8>,
+}
+
+impl PlyPointWriter {
+    /// Starts the file `path`, which will hold `count` points.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn create(path: &Path, count: u64) -> Result<Self> {
+        let mut file = AtomicFile::create(path)?;
+        let header = format!(
+            "ply\n\
+             format binary_little_endian 1.0\n\
+             comment x y z: metres, Z up, right-handed\n\
+             comment label: index into semantic_labels.json, 0 for the null label\n\
+             comment face: index of the face of the mesh that the point lies on, {NO_INDEX} if unknown\n\
+             element vertex {count}\n\
+             property float x\n\
+             property float y\n\
+             property float z\n\
+             property uchar red\n\
+             property uchar green\n\
+             property uchar blue\n\
+             property uint label\n\
+             property uint face\n\
+             end_header\n"
+        );
+        file.put(header.as_bytes())?;
+        Ok(Self { file, promised: count, written: 0, buffer: Vec::with_capacity(BATCH * POINT_BYTES) })
+    }
+
+    /// Appends the points of `cloud`, the label of each in `labels`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    ///
+    /// # Panics
+    /// If `labels`, or a column of the cloud that is not empty, has not one entry a point.
+    pub fn append(&mut self, cloud: &PointCloud, labels: &[u32]) -> Result<()> {
+        let n = cloud.len();
+        assert_eq!(labels.len(), n, "{n} points need as many labels");
+        assert!(
+            cloud.colors.is_empty() || cloud.colors.len() == n,
+            "{} colours for {n} points",
+            cloud.colors.len()
+        );
+        assert!(
+            cloud.faces.is_empty() || cloud.faces.len() == n,
+            "{} faces for {n} points",
+            cloud.faces.len()
+        );
+        let colors = cloud.colors.iter().copied().chain(std::iter::repeat([0; 3]));
+        let faces = cloud.faces.iter().copied().chain(std::iter::repeat(NO_INDEX));
+        let mut points = cloud.positions.iter().zip(labels).zip(colors).zip(faces).peekable();
+        while points.peek().is_some() {
+            self.buffer.clear();
+            for (((position, label), color), face) in points.by_ref().take(BATCH) {
+                for coordinate in position.to_array() {
+                    self.buffer.extend_from_slice(&coordinate.to_le_bytes());
+                }
+                self.buffer.extend_from_slice(&color);
+                self.buffer.extend_from_slice(&label.to_le_bytes());
+                self.buffer.extend_from_slice(&face.to_le_bytes());
+            }
+            self.file.put(&self.buffer)?;
+        }
+        self.written += n as u64;
+        Ok(())
+    }
+
+    /// Gives the file its name, and returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Format`] if not as many points came as were promised. Then there is no file.
+    pub fn finish(self) -> Result<u64> {
+        if self.written != self.promised {
+            let message = format!("{} points were promised, {} came", self.promised, self.written);
+            return Err(Error::format(self.file.path(), message));
+        }
+        self.file.commit()
+    }
+}
+
+/// The number of points that the header of the PLY file `path` states.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if it has no such header.
+pub fn read_ply_point_count(path: &Path) -> Result<u64> {
+    let file = open_file(path)?;
+    // A header is short; what goes on for longer is none.
+    for line in BufReader::new(file.take(65_536)).split(b'\n') {
+        let line = line.map_err(|e| Error::io(path, "read", e))?;
+        let text = String::from_utf8_lossy(&line);
+        if let Some(count) = text.trim().strip_prefix("element vertex ") {
+            let bad = |_| Error::format(path, format!("\"{count}\" is no number of points"));
+            return count.trim().parse().map_err(bad);
+        }
+        if text.trim() == "end_header" {
+            break;
+        }
+    }
+    Err(Error::format(path, "no \"element vertex\" in its header: not a PLY file of points"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::vec3;
+
+    /// A reader of exactly this kind of file, written from the specification of PLY.
+    fn read(path: &Path) -> (String, Vec<[u8; POINT_BYTES]>) {
+        let bytes = std::fs::read(path).unwrap();
+        let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+        let (points, rest) = bytes[end..].as_chunks();
+        assert!(rest.is_empty());
+        (String::from_utf8(bytes[..end].to_vec()).unwrap(), points.to_vec())
+    }
+
+    #[test]
+    fn points_come_back_from_several_pieces() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let n = 2 * BATCH + 7;
+        let cloud = PointCloud {
+            positions: (0..n).map(|i| vec3(i as f32, -0.5, 1e-3)).collect(),
+            colors: (0..n).map(|i| [i as u8, 2, 3]).collect(),
+            faces: (0..n as u32).rev().collect(),
+        };
+        let bare = PointCloud { positions: vec![vec3(7.0, 8.0, 9.0)], ..PointCloud::default() };
+        let labels: Vec<u32> = (0..n as u32).map(|i| i % 300).collect();
+        let mut writer = PlyPointWriter::create(&path, n as u64 + 1).unwrap();
+        writer.append(&cloud, &labels).unwrap();
+        writer.append(&PointCloud::default(), &[]).unwrap();
+        writer.append(&bare, &[9815]).unwrap();
+        let bytes = writer.finish().unwrap();
+        assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
+
+        let (header, points) = read(&path);
+        assert!(header.contains(&format!("element vertex {}\n", n + 1)));
+        assert!(header.lines().filter(|l| l.starts_with("property")).count() == 8);
+        let float = |p: &[u8; POINT_BYTES], at| f32::from_le_bytes(p[at..at + 4].try_into().unwrap());
+        let uint = |p: &[u8; POINT_BYTES], at| u32::from_le_bytes(p[at..at + 4].try_into().unwrap());
+        for (i, p) in points[..n].iter().enumerate() {
+            assert_eq!(vec3(float(p, 0), float(p, 4), float(p, 8)), cloud.positions[i]);
+            assert_eq!(
+                (&p[12..15], uint(p, 15), uint(p, 19)),
+                (&cloud.colors[i][..], labels[i], cloud.faces[i])
+            );
+        }
+        let last = &points[n];
+        assert_eq!(
+            (float(last, 0), &last[12..15], uint(last, 15), uint(last, 19)),
+            (7.0, &[0u8; 3][..], 9815, NO_INDEX)
+        );
+    }
+
+    #[test]
+    fn a_wrong_count_is_an_error_and_leaves_no_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let mut writer = PlyPointWriter::create(&path, 2).unwrap();
+        writer
+            .append(&PointCloud { positions: vec![vec3(0.0, 0.0, 0.0)], ..PointCloud::default() }, &[0])
+            .unwrap();
+        let e = writer.finish().unwrap_err();
+        assert!(e.to_string().ends_with("cloud.ply: 2 points were promised, 1 came"), "{e}");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    }
+}

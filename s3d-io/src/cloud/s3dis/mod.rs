@@ -1,0 +1,9 @@
+//! The S3DIS tree: folders of text files with points.
+
+pub(crate) mod points;
+pub(crate) mod tree;
+mod write;
+
+pub use points::{PointReader, read_points};
+pub use tree::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
+pub use write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};

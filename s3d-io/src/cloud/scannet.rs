@@ -1,0 +1,320 @@
+//! ScanNet's annotations: a mesh, a segment for each of its vertices (`*.segs.json`), and objects as lists of segments
+//! (`*.aggregation.json`). Source: ScanNet's README, "Data Organization".
+
+use crate::cloud::ply::read::{color_of, open_vertices};
+use crate::cloud::table::read::{Cloud, ColorRange};
+use crate::cloud::table::records::Color;
+use crate::cloud::table::rows::{Reading, Row, Tag, Value};
+use crate::error::{Error, Result};
+use crate::fs::json::read_json;
+use crate::mesh::ply::batch::PlyBatch;
+use crate::quote::quote;
+use s3d_geom::glam::DVec3;
+use s3d_label::Class;
+use serde::Deserialize;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// What the annotators' words mean. Words that are not here are none of the 13 classes.
+const CATEGORIES: [(Class, &[&str]); 12] = [
+    (Class::Ceiling, &["ceiling"]),
+    (Class::Floor, &["floor", "carpet", "rug", "mat", "doormat", "yoga mat"]),
+    (
+        Class::Wall,
+        &["wall", "closet wall", "closet walls", "shower wall", "shower walls", "divider", "room divider"],
+    ),
+    (Class::Beam, &["beam"]),
+    (Class::Column, &["column", "pillar", "structure column"]),
+    (Class::Window, &["window", "windows", "windowframe"]),
+    (
+        Class::Door,
+        &[
+            "door",
+            "doors",
+            "doorframe",
+            "door frame",
+            "closet door",
+            "closet doors",
+            "sliding door",
+            "shower door",
+            "closet doorframe",
+            "sliding wood door",
+            "glass doors",
+        ],
+    ),
+    (
+        Class::Table,
+        &[
+            "table",
+            "desk",
+            "coffee table",
+            "end table",
+            "dining table",
+            "side table",
+            "folded table",
+            "round table",
+            "conference table",
+            "foosball table",
+            "ping pong table",
+            "dinner table",
+            "massage table",
+            "pool table",
+            "folding table",
+            "computer desk",
+        ],
+    ),
+    (
+        Class::Chair,
+        &[
+            "chair",
+            "chairs",
+            "office chair",
+            "armchair",
+            "stool",
+            "folded chair",
+            "folded chairs",
+            "stack of chairs",
+            "lounge chair",
+            "beach chair",
+            "dining chair",
+            "folding chair",
+            "desk chair",
+            "high chair",
+            "rocking chair",
+            "bar stool",
+            "step stool",
+            "seat",
+            "footstool",
+        ],
+    ),
+    (Class::Sofa, &["sofa", "couch", "loveseat", "futon", "sofa chair", "sofa bed", "beanbag chair"]),
+    (
+        Class::Bookcase,
+        &[
+            "bookshelf",
+            "bookshelves",
+            "bookcase",
+            "shelf",
+            "shelves",
+            "book shelf",
+            "book rack",
+            "storage shelf",
+        ],
+    ),
+    (Class::Board, &["whiteboard", "whiteboards", "blackboard", "bulletin board", "board", "poster board"]),
+];
+
+/// The three files of a scan.
+#[derive(Debug)]
+pub(crate) struct ScannetCloud {
+    aggregation: PathBuf,
+    segments: PathBuf,
+    mesh: PathBuf,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Aggregation {
+    segments_file: Option<String>,
+    seg_groups: Vec<SegmentGroup>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct SegmentGroup {
+    object_id: Option<i64>,
+    /// The same number; some files have one of the two.
+    id: Option<i64>,
+    label: String,
+    segments: Vec<i64>,
+}
+
+impl SegmentGroup {
+    /// Its number, from 0.
+    fn object(&self) -> Option<i64> {
+        self.object_id.or(self.id).filter(|n| *n >= 0)
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Segments {
+    seg_indices: Vec<i64>,
+}
+
+/// Whether a folder is a scan of ScanNet.
+pub(crate) fn is_scannet(dir: &Path) -> bool {
+    aggregations(dir).is_some_and(|found| !found.is_empty())
+}
+
+fn aggregations(dir: &Path) -> Option<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(dir).ok()?.filter_map(|e| Some(e.ok()?.path()));
+    let mut found: Vec<PathBuf> = entries.filter(|p| name_of(p).ends_with(".aggregation.json")).collect();
+    found.sort();
+    Some(found)
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+impl ScannetCloud {
+    /// Finds the files of a scan by its folder or its `*.aggregation.json`.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if a file is missing, or the folder holds several scans.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let aggregation = if path.is_dir() {
+            let mut found = aggregations(path).unwrap_or_default();
+            // `X_vh_clean.aggregation.json` is of the finer mesh, if there are both: the coarser one is what ScanNet's own
+            // labels are on.
+            if found.len() > 1 {
+                found.retain(|p| !name_of(p).ends_with("_vh_clean.aggregation.json"));
+            }
+            match &found[..] {
+                [one] => one.clone(),
+                _ => {
+                    let message =
+                        "holds several *.aggregation.json: name the one, or give each scan a folder";
+                    return Err(Error::format(path, message));
+                }
+            }
+        } else {
+            path.to_owned()
+        };
+        let dir = aggregation.parent().unwrap_or(Path::new("")).to_owned();
+        let document: Aggregation = read_json(&aggregation)?;
+        // "scannet.scene0000_00_vh_clean_2.0.010000.segs.json"
+        let named = document.segments_file.as_deref().unwrap_or_default();
+        let named = named.rsplit(['/', '\\']).next().unwrap_or_default();
+        let candidates = [named, named.strip_prefix("scannet.").unwrap_or(named)];
+        let stem = name_of(&aggregation).replace(".aggregation.json", "");
+        let segments = candidates
+            .iter()
+            .map(|name| dir.join(name))
+            .find(|p| p.is_file())
+            .or_else(|| sole(&dir, |name| name.starts_with(&stem) && name.ends_with(".segs.json")))
+            .ok_or_else(|| {
+                Error::format(
+                    &aggregation,
+                    format!("the segments that it is about are not beside it: {named:?}"),
+                )
+            })?;
+        let segments_name = name_of(&segments);
+        let mesh = longest(&dir, |name| {
+            name.strip_suffix(".ply").is_some_and(|stem| segments_name.starts_with(stem))
+        })
+        .ok_or_else(|| {
+            let stem = segments_name.split(".").next().unwrap_or_default();
+            Error::format(&segments, format!("the mesh that it is about is not beside it: {stem}.ply"))
+        })?;
+        Ok(Self { aggregation, segments, mesh })
+    }
+}
+
+/// The only file with such a name.
+fn sole(dir: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
+    let mut all =
+        std::fs::read_dir(dir).ok()?.filter_map(|e| Some(e.ok()?.path())).filter(|p| fits(&name_of(p)));
+    let first = all.next()?;
+    all.next().is_none().then_some(first)
+}
+
+/// The file with the longest such name.
+fn longest(dir: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
+    let all = std::fs::read_dir(dir).ok()?.filter_map(|e| Some(e.ok()?.path())).filter(|p| fits(&name_of(p)));
+    all.max_by_key(|p| (name_of(p).len(), name_of(p)))
+}
+
+impl Cloud for ScannetCloud {
+    fn path(&self) -> &Path {
+        &self.aggregation
+    }
+
+    fn are_vertices(&self) -> bool {
+        true
+    }
+
+    fn class_of(&self, tag: &Tag) -> Option<Class> {
+        let Tag::Name(name) = tag else { return None };
+        CATEGORIES.iter().find(|(_, names)| names.contains(&name.as_str())).map(|(class, _)| *class)
+    }
+
+    fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+        let aggregation: Aggregation = read_json(&self.aggregation)?;
+        let segments = read_json::<Segments>(&self.segments)?.seg_indices;
+        let mut object_of: HashMap<i64, usize> = HashMap::new();
+        let mut twice = 0;
+        for (i, group) in aggregation.seg_groups.iter().enumerate() {
+            if group.object().is_none() {
+                let message = format!("has an object without a number from 0: {:?}", group.label);
+                return Err(Error::format(&self.aggregation, message));
+            }
+            for segment in &group.segments {
+                // As in ScanNet's own scripts, the last object has it.
+                twice += usize::from(object_of.insert(*segment, i).is_some_and(|other| other != i));
+            }
+        }
+        if twice > 0 {
+            reading.notes.push(format!(
+                "{}: {twice} segments belong to several objects; each is taken for the last one's",
+                self.aggregation.display()
+            ));
+        }
+        let (mut reader, element, _) = open_vertices(&self.mesh)?;
+        if element.count != segments.len() as u64 {
+            return Err(Error::format(
+                &self.segments,
+                format!(
+                    "has segments for {} vertices, {} has {}: they do not belong together",
+                    segments.len(),
+                    self.mesh.display(),
+                    element.count
+                ),
+            ));
+        }
+        let position = ["x", "y", "z"].map(|name| element.find_scalar(&[name]));
+        let [Some(x), Some(y), Some(z)] = position else {
+            return Err(Error::format(&self.mesh, "has no vertices with x, y and z"));
+        };
+        let rgb = match ["red", "green", "blue"].map(|name| element.find_scalar(&[name])) {
+            [Some(r), Some(g), Some(b)] => Some([r, g, b]),
+            _ => None,
+        };
+        reader.want([x, y, z].into_iter().chain(rgb.into_iter().flatten()));
+        let mut batch = PlyBatch::default();
+        while reader.read_batch(&mut batch)? {
+            for row in 0..batch.len() {
+                let vertex = batch.first_row() + row as u64;
+                let segment = usize::try_from(vertex).ok().and_then(|vertex| segments.get(vertex));
+                let object = segment.and_then(|segment| object_of.get(segment));
+                let Some(group) = object.and_then(|object| aggregation.seg_groups.get(*object)) else {
+                    continue;
+                };
+                let color = match color_of(&element, &batch, rgb, row, colors) {
+                    Color::Rgb(rgb) => rgb,
+                    Color::Wider => return Ok(false),
+                    Color::Beyond(_) => {
+                        reading.fault(reader.fail(&batch, row, "no colour"))?;
+                        continue;
+                    }
+                };
+                let number = |p: usize| batch.scalars(p).get(row).copied().unwrap_or(f64::NAN);
+                let point = Row {
+                    position: DVec3::from_array([x, y, z].map(number)),
+                    color,
+                    class: Value::Name(group.label.trim()),
+                    instance: group.object().map_or(Value::None, Value::Whole),
+                    room: Value::None,
+                };
+                reading.push(vertex + 1, &point)?;
+            }
+        }
+        if object_of.is_empty() {
+            let message =
+                format!("has no object: nothing of {} is annotated", quote(name_of(&self.mesh).as_bytes()));
+            return Err(Error::format(&self.aggregation, message));
+        }
+        Ok(true)
+    }
+}

@@ -1,0 +1,170 @@
+//! Which columns of a table of points hold what: by name, since every program has its own.
+
+use crate::cloud::annotations::AnnotationOptions;
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Names of coordinates, of one column each and of arrays of three.
+const POSITIONS: [[&str; 3]; 1] = [["x", "y", "z"]];
+const POSITION_ARRAYS: [&str; 9] =
+    ["xyz", "points", "point", "coord", "coords", "positions", "position", "pos", "vertices"];
+/// Names of colours.
+const COLORS: [[&str; 3]; 3] =
+    [["red", "green", "blue"], ["r", "g", "b"], ["diffuse_red", "diffuse_green", "diffuse_blue"]];
+const COLOR_ARRAYS: [&str; 6] = ["rgb", "colors", "color", "colours", "colour", "rgbs"];
+/// Names of classes, the surest first. `scalar_…` is CloudCompare's.
+pub(crate) const CLASSES: [&str; 19] = [
+    "class",
+    "semantic_class",
+    "class_id",
+    "semantic",
+    "semantic_label",
+    "semantic_labels",
+    "semantic_gt",
+    "sem_label",
+    "segment",
+    "label",
+    "labels",
+    "category",
+    "category_id",
+    "classification",
+    "classificationid",
+    "scalar_class",
+    "scalar_label",
+    "scalar_classification",
+    "object_class",
+];
+/// Names of instance numbers.
+pub(crate) const INSTANCES: [&str; 15] = [
+    "instance",
+    "instance_id",
+    "instance_label",
+    "instance_labels",
+    "instance_gt",
+    "instances",
+    "ins_label",
+    "instanceid",
+    "object_id",
+    "objectid",
+    "object",
+    "scalar_instance",
+    "scalar_instance_id",
+    "scalar_instance_label",
+    "track_id",
+];
+
+/// Where in a row things are: indices of columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Columns {
+    pub(crate) position: [usize; 3],
+    pub(crate) color: Option<[usize; 3]>,
+    pub(crate) class: usize,
+    pub(crate) instance: Option<usize>,
+    pub(crate) room: Option<usize>,
+}
+
+impl Columns {
+    /// Finds the columns: those that the options name, to the letter, and else those that are called as usual, in capitals or
+    /// not. An element of an array is a column `name[i]`.
+    ///
+    /// # Errors
+    /// [`Error::Format`] with the columns that there are if one is missing, or named and not there.
+    pub(crate) fn choose(path: &Path, names: &[String], options: &AnnotationOptions) -> Result<Self> {
+        let usual = |wanted: &[&str]| wanted.iter().find_map(|w| find(names, w));
+        let there = || {
+            let list: Vec<&str> = names.iter().map(String::as_str).collect();
+            format!("its columns are {}", list.join(" "))
+        };
+        let named = |key: &str, name: &str| {
+            names.iter().position(|n| n == name).ok_or_else(|| {
+                Error::format(path, format!("has no column {name:?} ({key} in [annotations]); {}", there()))
+            })
+        };
+        let three = |sets: &[[&str; 3]], arrays: &[&str]| {
+            let of_set =
+                |set: &[&str; 3]| Some([find(names, set[0])?, find(names, set[1])?, find(names, set[2])?]);
+            let of_array = |array: &&str| {
+                let at = |i: usize| find(names, &format!("{array}[{i}]"));
+                Some([at(0)?, at(1)?, at(2)?])
+            };
+            sets.iter().find_map(of_set).or_else(|| arrays.iter().find_map(of_array))
+        };
+        let position = three(&POSITIONS, &POSITION_ARRAYS).ok_or_else(|| {
+            Error::format(path, format!("has no columns of coordinates, such as x y z; {}", there()))
+        })?;
+        let class = match &options.class_column {
+            Some(name) => named("class", name)?,
+            None => usual(&CLASSES).ok_or_else(|| {
+                Error::format(
+                    path,
+                    format!(
+                        "has no column of classes; {}. If one of them is it, name it, as in class = \"label\" in \
+                         [annotations]; a cloud without labels cannot label a mesh",
+                        there()
+                    ),
+                )
+            })?,
+        };
+        let instance = match &options.instance_column {
+            Some(name) => Some(named("instance", name)?),
+            None => usual(&INSTANCES).filter(|i| *i != class),
+        };
+        let room = options.room_column.as_ref().map(|name| named("rooms", name)).transpose()?;
+        Ok(Self { position, color: three(&COLORS, &COLOR_ARRAYS), class, instance, room })
+    }
+}
+
+/// The column of this name, in capitals or not.
+fn find(names: &[String], name: &str) -> Option<usize> {
+    let exact = names.iter().position(|n| n == name);
+    exact.or_else(|| names.iter().position(|n| n.eq_ignore_ascii_case(name)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn choose(names: &str, options: &AnnotationOptions) -> Result<Columns> {
+        let names: Vec<String> = names.split(' ').map(str::to_owned).collect();
+        Columns::choose(Path::new("a.ply"), &names, options)
+    }
+
+    #[test]
+    fn usual_names_are_found() {
+        let found = |names| choose(names, &AnnotationOptions::default()).unwrap();
+        let full = found("Z Y X label red green blue instance_id");
+        assert_eq!((full.position, full.color), ([2, 1, 0], Some([4, 5, 6])));
+        assert_eq!((full.class, full.instance, full.room), (3, Some(7), None));
+        let arrays = found("coord[0] coord[1] coord[2] color[0] color[1] color[2] segment");
+        assert_eq!((arrays.position, arrays.color), ([0, 1, 2], Some([3, 4, 5])));
+        assert_eq!((arrays.class, arrays.instance), (6, None));
+        assert_eq!(found("x y z class label").class, 3);
+        assert_eq!(found("x y z Label label").class, 4);
+    }
+
+    #[test]
+    fn named_columns_win_and_must_be_there() {
+        let options = AnnotationOptions {
+            class_column: Some("kind".into()),
+            instance_column: Some("part".into()),
+            room_column: Some("place".into()),
+            ..AnnotationOptions::default()
+        };
+        let found = choose("x y z label instance kind part place", &options).unwrap();
+        assert_eq!((found.class, found.instance, found.room), (5, Some(6), Some(7)));
+        for (names, words) in [
+            (
+                "x y z label instance part place",
+                "no column \"kind\" (class in [annotations]); its columns are x y",
+            ),
+            ("x y z kind place", "no column \"part\" (instance"),
+            ("x y z kind part", "no column \"place\" (rooms"),
+            ("x y kind", "no columns of coordinates, such as x y z; its columns are x y kind"),
+        ] {
+            let message = choose(names, &options).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+        let message = choose("x y z nx", &AnnotationOptions::default()).unwrap_err().to_string();
+        assert!(message.contains("no column of classes; its columns are x y z nx."), "{message}");
+    }
+}

@@ -1,0 +1,273 @@
+//! The rows of a flat cloud, as every format's reader hands them on: one point each, with what it says of itself.
+
+use crate::cloud::annotations::{AnnotationOptions, Skipped};
+use crate::cloud::s3dis::tree::OnFault;
+use crate::error::{Error, Result};
+use s3d_geom::glam::{DVec3, Vec3};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// Rows that are handed on at a time.
+const BATCH: usize = 65_536;
+/// The most different classes or rooms that a cloud may name: beyond, the column is another one.
+const MAX_TAGS: usize = 10_000;
+/// Numbers that are looked up without hashing.
+const SMALL: usize = 4096;
+
+/// In place of an index into [`Tags`]: the file does not say.
+pub(crate) const NO_TAG: u32 = u32::MAX;
+/// In place of an instance number: the file does not say. So are all negative numbers.
+pub(crate) const NO_INSTANCE: i64 = -1;
+
+/// What a file calls a class or a room: a number or a name.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Tag {
+    Number(i64),
+    Name(String),
+}
+
+impl Tag {
+    /// The key of it in a table that a user writes.
+    pub(crate) fn key(&self) -> String {
+        match self {
+            Self::Number(n) => n.to_string(),
+            Self::Name(name) => name.clone(),
+        }
+    }
+}
+
+/// The tags that occurred, each with an index, in order of their first occurrence.
+#[derive(Debug)]
+pub(crate) struct Tags {
+    list: Vec<Tag>,
+    index: HashMap<Tag, u32>,
+    small: Vec<u32>,
+}
+
+impl Tags {
+    pub(crate) fn new() -> Self {
+        Self { list: Vec::new(), index: HashMap::new(), small: vec![NO_TAG; SMALL] }
+    }
+
+    /// The index of a number; `None` if there are too many different ones.
+    pub(crate) fn number(&mut self, number: i64) -> Option<u32> {
+        let small = usize::try_from(number).ok();
+        let known = small.and_then(|n| self.small.get(n));
+        if let Some(index) = known.filter(|index| **index != NO_TAG) {
+            return Some(*index);
+        }
+        let index = self.intern(Tag::Number(number))?;
+        if let Some(known) = small.and_then(|n| self.small.get_mut(n)) {
+            *known = index;
+        }
+        Some(index)
+    }
+
+    /// The index of a name; `None` if there are too many different ones.
+    pub(crate) fn name(&mut self, name: &str) -> Option<u32> {
+        self.intern(Tag::Name(name.to_owned()))
+    }
+
+    fn intern(&mut self, tag: Tag) -> Option<u32> {
+        if let Some(index) = self.index.get(&tag) {
+            return Some(*index);
+        }
+        if self.list.len() >= MAX_TAGS {
+            return None;
+        }
+        let index = self.list.len() as u32;
+        self.list.push(tag.clone());
+        self.index.insert(tag, index);
+        Some(index)
+    }
+
+    pub(crate) fn get(&self, index: u32) -> Option<&Tag> {
+        self.list.get(index as usize)
+    }
+}
+
+/// Some rows. Every column has an entry a row.
+#[derive(Debug, Default)]
+pub(crate) struct Rows {
+    /// World metres, less the offset.
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) colors: Vec<[u8; 3]>,
+    /// Indices into the tags of classes.
+    pub(crate) classes: Vec<u32>,
+    /// [`NO_INSTANCE`] if unknown.
+    pub(crate) instances: Vec<i64>,
+    /// Indices into the tags of rooms, or [`NO_TAG`].
+    pub(crate) rooms: Vec<u32>,
+}
+
+impl Rows {
+    pub(crate) fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    fn clear(&mut self) {
+        self.positions.clear();
+        self.colors.clear();
+        self.classes.clear();
+        self.instances.clear();
+        self.rooms.clear();
+    }
+}
+
+/// What a row says of its class, its instance or its room, as it stands in the file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Value<'a> {
+    /// Nothing: there is no such column.
+    None,
+    Whole(i64),
+    Float(f64),
+    Name(&'a str),
+}
+
+impl Value<'_> {
+    fn whole(self) -> std::result::Result<i64, String> {
+        match self {
+            Self::Whole(n) => Ok(n),
+            // All whole numbers up to 2^53 are exact.
+            Self::Float(v) if v.fract() == 0.0 && v.abs() < 9e15 => Ok(v as i64),
+            Self::Float(v) => Err(format!("{v} is no whole number")),
+            Self::Name(name) => Err(format!("{name:?} is no whole number")),
+            Self::None => Err("nothing is no whole number".to_owned()),
+        }
+    }
+}
+
+/// One row as a reader found it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row<'a> {
+    /// World metres, Z-up, as the file has them.
+    pub(crate) position: DVec3,
+    pub(crate) color: [u8; 3],
+    pub(crate) class: Value<'a>,
+    pub(crate) instance: Value<'a>,
+    pub(crate) room: Value<'a>,
+}
+
+/// What is done with some rows.
+pub(crate) type Sink<'a> = dyn FnMut(&Rows) -> Result<()> + 'a;
+
+/// The reading of one file: takes rows, checks them and hands them on in batches.
+pub(crate) struct Reading<'a> {
+    path: PathBuf,
+    on_fault: OnFault,
+    offset_m: DVec3,
+    /// The room of rows that name none.
+    room: u32,
+    pub(crate) classes: &'a mut Tags,
+    pub(crate) rooms: &'a mut Tags,
+    rows: Rows,
+    sink: &'a mut Sink<'a>,
+    pub(crate) skipped: Skipped,
+    /// The largest coordinate, in metres.
+    pub(crate) farthest_m: f64,
+    /// What the user should know of the file, as a sentence each.
+    pub(crate) notes: Vec<String>,
+}
+
+impl<'a> Reading<'a> {
+    pub(crate) fn new(
+        path: &Path,
+        options: &AnnotationOptions,
+        room: u32,
+        (classes, rooms): (&'a mut Tags, &'a mut Tags),
+        sink: &'a mut Sink<'a>,
+    ) -> Self {
+        Self {
+            path: path.to_owned(),
+            on_fault: options.on_fault,
+            offset_m: options.offset_m,
+            room,
+            classes,
+            rooms,
+            rows: Rows::default(),
+            sink,
+            skipped: Skipped::default(),
+            farthest_m: 0.0,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Takes the record `number` (from 1).
+    ///
+    /// # Errors
+    /// Those of the sink; [`Error::Format`] with the record's number if it is no point, unless faults are skipped.
+    pub(crate) fn push(&mut self, number: u64, row: &Row<'_>) -> Result<()> {
+        self.push_at(row, |path, why| Error::format(path, format!("record {number}: {why}")))
+    }
+
+    /// As [`Reading::push`], for a line of text (from 1).
+    pub(crate) fn push_line(&mut self, line: u64, row: &Row<'_>) -> Result<()> {
+        self.push_at(row, |path, why| Error::line(path, line, why))
+    }
+
+    fn push_at(&mut self, row: &Row<'_>, error: impl Fn(&Path, String) -> Error) -> Result<()> {
+        if let Err(why) = self.take(row) {
+            return self.fault(error(&self.path, why));
+        }
+        if self.rows.len() >= BATCH { self.flush() } else { Ok(()) }
+    }
+
+    /// Counts something that is no row, or stops at it.
+    pub(crate) fn fault(&mut self, error: Error) -> Result<()> {
+        if self.on_fault == OnFault::Stop {
+            return Err(error);
+        }
+        self.skipped.count += 1;
+        self.skipped.first.get_or_insert(error);
+        Ok(())
+    }
+
+    fn take(&mut self, row: &Row<'_>) -> std::result::Result<(), String> {
+        if !row.position.is_finite() {
+            let p = row.position;
+            return Err(format!("the coordinates {} {} {} are not finite", p.x, p.y, p.z));
+        }
+        let position = row.position - self.offset_m;
+        let farthest = position.abs().max_element();
+        if farthest > f64::from(f32::MAX) {
+            return Err(format!("a coordinate of {farthest:e} m is too large"));
+        }
+        let class = match row.class {
+            Value::Name(name) => self.classes.name(name),
+            value => self.classes.number(value.whole().map_err(|e| format!("class: {e}"))?),
+        };
+        let class = class.ok_or_else(|| too_many("classes"))?;
+        let instance = match row.instance {
+            Value::None => NO_INSTANCE,
+            value => value.whole().map_err(|e| format!("instance: {e}"))?.max(NO_INSTANCE),
+        };
+        let room = match row.room {
+            Value::None => self.room,
+            Value::Name(name) => self.rooms.name(name).ok_or_else(|| too_many("rooms"))?,
+            value => {
+                let number = value.whole().map_err(|e| format!("room: {e}"))?;
+                self.rooms.number(number).ok_or_else(|| too_many("rooms"))?
+            }
+        };
+        self.farthest_m = self.farthest_m.max(farthest);
+        self.rows.positions.push(position.as_vec3());
+        self.rows.colors.push(row.color);
+        self.rows.classes.push(class);
+        self.rows.instances.push(instance);
+        self.rows.rooms.push(room);
+        Ok(())
+    }
+
+    /// Hands on what is left; to be called at the end of the file.
+    pub(crate) fn flush(&mut self) -> Result<()> {
+        if self.rows.len() > 0 {
+            (self.sink)(&self.rows)?;
+            self.rows.clear();
+        }
+        Ok(())
+    }
+}
+
+fn too_many(what: &str) -> String {
+    format!("more than {MAX_TAGS} different {what}: is it the right column?")
+}

@@ -1,0 +1,288 @@
+//! `files.csv`: every file of a data set with its size and checksum.
+
+use crate::error::{Error, Result};
+use crate::fs::atomic::write_whole;
+use crate::fs::checksum::{Checksum, checksum_of_file};
+use crate::image::texture::open_file;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+/// The first line.
+const HEADER: &str = "path,bytes,xxh3_128";
+
+/// A longer line is none of ours.
+const LONGEST_LINE: u64 = 1 << 16;
+
+/// A file of a data set.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct FileRecord {
+    /// Its path from the data set's folder, with `/` between names.
+    pub path: String,
+    /// Its size.
+    pub bytes: u64,
+    /// The checksum of its content.
+    pub xxh3_128: Checksum,
+}
+
+impl FileRecord {
+    /// The record of the file `path` with this content, in a data set in `root`; the file itself is not looked at.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if the path does not lie below `root`, or is not in UTF-8, as no path of a data set is.
+    pub fn of_bytes(root: &Path, path: &Path, content: &[u8]) -> Result<Self> {
+        Ok(Self { path: relative(root, path)?, bytes: content.len() as u64, xxh3_128: Checksum::of(content) })
+    }
+
+    /// The record of a file that is there, which is read.
+    ///
+    /// # Errors
+    /// As [`FileRecord::of_bytes`]; [`Error::Io`].
+    pub fn of_file(root: &Path, path: &Path) -> Result<Self> {
+        let relative = relative(root, path)?;
+        let (bytes, xxh3_128) = checksum_of_file(path)?;
+        Ok(Self { path: relative, bytes, xxh3_128 })
+    }
+
+    /// Where the file lies in a data set in `root`.
+    pub fn path_in(&self, root: &Path) -> PathBuf {
+        root.join(&self.path)
+    }
+
+    /// Reads the file in the data set in `root`, and tells what is wrong with it: nothing, if it is the one that was
+    /// recorded.
+    pub fn fault(&self, root: &Path) -> Option<String> {
+        let path = self.path_in(root);
+        // A wrong size is told without reading.
+        match std::fs::metadata(&path) {
+            Err(e) => return Some(format!("{}: {e}", self.path)),
+            Ok(found) if found.len() != self.bytes => {
+                return Some(format!("{}: {} bytes instead of {}", self.path, found.len(), self.bytes));
+            }
+            Ok(_) => {}
+        }
+        match checksum_of_file(&path) {
+            Err(e) => Some(e.to_string()),
+            Ok((bytes, xxh3_128)) if (bytes, xxh3_128) == (self.bytes, self.xxh3_128) => None,
+            Ok(_) => Some(format!("{}: other content", self.path)),
+        }
+    }
+
+    /// Its line in the file, without the line feed.
+    pub fn to_line(&self) -> String {
+        format!("{},{},{}", self.path, self.bytes, self.xxh3_128)
+    }
+}
+
+/// The path of `path` below `root` as lists have it.
+fn relative(root: &Path, path: &Path) -> Result<String> {
+    let below = path.strip_prefix(root).ok().and_then(|p| {
+        let names: Option<Vec<&str>> = p.iter().map(|name| name.to_str()).collect();
+        names.map(|names| names.join("/"))
+    });
+    match below.as_deref().map(check_path) {
+        Some(Ok(())) => Ok(below.unwrap_or_default()),
+        Some(Err(why)) => Err(Error::format(path, why)),
+        None => Err(Error::format(path, format!("is no file in {} with a name in UTF-8", root.display()))),
+    }
+}
+
+/// Refuses what leads out of the folder, or cannot stand in a line.
+fn check_path(path: &str) -> std::result::Result<(), String> {
+    let fault = |why: &str| Err(format!("{path:?} is no path of a file in the folder: {why}"));
+    if path.is_empty() {
+        return fault("it is empty");
+    }
+    if path.contains([',', '"', '\\', ':']) || path.chars().any(char::is_control) {
+        return fault("it has a comma, a quote, a backslash, a colon or a control character in it");
+    }
+    if path.starts_with('/') {
+        return fault("it starts at the root");
+    }
+    if path.split('/').any(|name| matches!(name, "" | "." | "..")) {
+        return fault("a name in it is empty, . or ..");
+    }
+    Ok(())
+}
+
+/// Writes the list, sorted by path, and returns the list's own size and checksum.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if a path is there twice, or leads out of the folder.
+pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Checksum)> {
+    let mut sorted: Vec<&FileRecord> = records.iter().collect();
+    sorted.sort_by(|a, b| a.path.as_bytes().cmp(b.path.as_bytes()));
+    for record in &sorted {
+        check_path(&record.path).map_err(|why| Error::format(path, why))?;
+    }
+    if let Some([double, _]) = sorted.array_windows().find(|[a, b]| a.path == b.path) {
+        return Err(Error::format(path, format!("{:?} would be in it twice", double.path)));
+    }
+    let mut text = String::from(HEADER);
+    text.push('\n');
+    for record in sorted {
+        text += &record.to_line();
+        text.push('\n');
+    }
+    write_whole(path, |w| w.write_all(text.as_bytes()))?;
+    Ok((text.len() as u64, Checksum::of(text.as_bytes())))
+}
+
+/// Reads a list as [`write_file_list`] writes it, and nothing else.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] with the line: another header, a line that is no path, size and checksum, a path that
+/// leads out of the folder, one that does not sort behind the one before, a last line without a line feed.
+pub fn read_file_list(path: &Path) -> Result<Vec<FileRecord>> {
+    let failed = |e| Error::io(path, "read", e);
+    let mut lines = BufReader::new(open_file(path)?);
+    let mut records: Vec<FileRecord> = Vec::new();
+    let mut known: BTreeSet<String> = BTreeSet::new();
+    let mut line = Vec::new();
+    for number in 1u64.. {
+        let fault = |message: String| Err(Error::line(path, number, message));
+        line.clear();
+        let read =
+            std::io::Read::take(&mut lines, LONGEST_LINE).read_until(b'\n', &mut line).map_err(failed)?;
+        if read == 0 {
+            return if number == 1 { fault("is empty".to_owned()) } else { Ok(records) };
+        }
+        let Some(text) = line.strip_suffix(b"\n") else {
+            return fault("is cut off: it does not end with a line feed".to_owned());
+        };
+        let Ok(text) = std::str::from_utf8(text) else {
+            return fault("is no text in UTF-8".to_owned());
+        };
+        if number == 1 {
+            if text != HEADER {
+                return fault(format!("should be {HEADER:?}"));
+            }
+            continue;
+        }
+        let record = match parse_line(text) {
+            Ok(record) => record,
+            Err(message) => return fault(message),
+        };
+        if records.last().is_some_and(|last| last.path.as_bytes() >= record.path.as_bytes()) {
+            return fault(format!("{:?} does not sort behind the path before it", record.path));
+        }
+        // Two names that a file system without upper and lower case takes for one.
+        if !known.insert(record.path.to_lowercase()) {
+            return fault(format!(
+                "{:?} differs from an earlier path by upper and lower case alone",
+                record.path
+            ));
+        }
+        records.push(record);
+    }
+    Ok(records)
+}
+
+fn parse_line(text: &str) -> std::result::Result<FileRecord, String> {
+    let mut fields = text.split(',');
+    let (Some(path), Some(bytes), Some(sum), None) =
+        (fields.next(), fields.next(), fields.next(), fields.next())
+    else {
+        return Err(format!("has {} fields instead of path, bytes and checksum", text.split(',').count()));
+    };
+    check_path(path)?;
+    let plain = !bytes.is_empty() && bytes.bytes().all(|b| b.is_ascii_digit());
+    let size = if plain { bytes.parse().ok() } else { None };
+    let size = size.ok_or_else(|| format!("{bytes:?} is no number of bytes"))?;
+    let xxh3_128 = sum.parse().map_err(|e: crate::fs::checksum::BadChecksum| e.to_string())?;
+    Ok(FileRecord { path: path.to_owned(), bytes: size, xxh3_128 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fs::atomic::{create_dir, write_bytes};
+
+    fn record(path: &str, content: &[u8]) -> FileRecord {
+        FileRecord { path: path.into(), bytes: content.len() as u64, xxh3_128: Checksum::of(content) }
+    }
+
+    #[test]
+    fn a_list_is_sorted_by_bytes_and_comes_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("files.csv");
+        let mut records =
+            vec![record("b", b"1"), record("a/z.png", b""), record("a b.txt", b"22"), record("Z", b"")];
+        let (bytes, sum) = write_file_list(&path, &records).unwrap();
+        assert_eq!(checksum_of_file(&path).unwrap(), (bytes, sum));
+        records.sort();
+        assert_eq!(
+            records.iter().map(|r| r.path.as_str()).collect::<Vec<_>>(),
+            ["Z", "a b.txt", "a/z.png", "b"]
+        );
+        assert_eq!(read_file_list(&path).unwrap(), records);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("path,bytes,xxh3_128\nZ,0,99aa06d3014798d86001c324468d497f\n"), "{text}");
+        write_file_list(&path, &[]).unwrap();
+        assert_eq!(read_file_list(&path).unwrap(), []);
+        records.push(record("Z", b""));
+        assert!(
+            write_file_list(&path, &records).unwrap_err().to_string().contains("\"Z\" would be in it twice")
+        );
+        assert!(write_file_list(&path, &[record("../x", b"")]).is_err());
+    }
+
+    #[test]
+    fn records_are_of_files_below_the_folder_and_tell_what_is_wrong() {
+        let dir = tempfile::tempdir().unwrap();
+        let root = dir.path();
+        create_dir(&root.join("a/b")).unwrap();
+        let path = root.join("a/b/c.txt");
+        write_bytes(&path, b"content").unwrap();
+        let record = FileRecord::of_file(root, &path).unwrap();
+        assert_eq!(record, FileRecord::of_bytes(root, &path, b"content").unwrap());
+        assert_eq!((record.path.as_str(), record.path_in(root)), ("a/b/c.txt", path.clone()));
+        assert_eq!(record.fault(root), None);
+        write_bytes(&path, b"contend").unwrap();
+        assert_eq!(record.fault(root).unwrap(), "a/b/c.txt: other content");
+        write_bytes(&path, b"conten").unwrap();
+        assert_eq!(record.fault(root).unwrap(), "a/b/c.txt: 6 bytes instead of 7");
+        std::fs::remove_file(&path).unwrap();
+        assert!(record.fault(root).unwrap().starts_with("a/b/c.txt: "));
+        for (root, path) in [("x", "y"), ("x", "x"), ("x", "x/../y"), ("x", "x/a,b")] {
+            assert!(FileRecord::of_bytes(Path::new(root), Path::new(path), b"").is_err(), "{path}");
+        }
+    }
+
+    #[test]
+    fn every_fault_is_named_with_its_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("files.csv");
+        let good = "a,0,99aa06d3014798d86001c324468d497f";
+        for (text, words) in [
+            (String::new(), "line 1: is empty"),
+            ("path,bytes\n".into(), "line 1: should be"),
+            (format!("{HEADER}\n{good}"), "line 2: is cut off"),
+            (format!("{HEADER}\n{good}\n\n"), "line 3: has 1 fields"),
+            (format!("{HEADER}\n{good},7\n"), "line 2: has 4 fields"),
+            (format!("{HEADER}\n{good}\n{good}\n"), "line 3: \"a\" does not sort"),
+            (format!("{HEADER}\n{}\n{good}\n", good.replace("a,", "A,")), "line 3: \"a\" differs"),
+            (format!("{HEADER}\n{}\n", good.replace(",0,", ",-1,")), "line 2: \"-1\" is no number"),
+            (
+                format!("{HEADER}\n{}\n", good.replace(",0,", ",99999999999999999999,")),
+                "is no number of bytes",
+            ),
+            (format!("{HEADER}\n{}\n", good.replace("9", "x")), "line 2: \"xxaa"),
+            (format!("{HEADER}\n../{good}\n"), "line 2: \"../a\" is no path"),
+            (format!("{HEADER}\na/../../{good}\n"), "a name in it is empty, . or .."),
+            (format!("{HEADER}\n/{good}\n"), "starts at the root"),
+            (format!("{HEADER}\nC:/{good}\n"), "a colon"),
+            (format!("{HEADER}\nb\\{good}\n"), "a backslash"),
+            (format!("{HEADER}\nb\0{good}\n"), "a control character"),
+            (format!("{HEADER}\n{}\n", "b".repeat(70_000)), "line 2: is cut off"),
+        ] {
+            write_bytes(&path, text.as_bytes()).unwrap();
+            let message = read_file_list(&path).unwrap_err().to_string();
+            assert!(message.contains(words) && message.contains("files.csv"), "{text:?}: {message}");
+        }
+        write_bytes(&path, b"path,bytes,xxh3_128\n\xff,0,0\n").unwrap();
+        assert!(read_file_list(&path).unwrap_err().to_string().contains("line 2: is no text"));
+        assert!(matches!(read_file_list(&dir.path().join("gone")), Err(Error::Io { .. })));
+    }
+}

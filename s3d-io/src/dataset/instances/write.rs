@@ -1,0 +1,518 @@
+//! Boxes and voxels of an area's instances: `instances.json` to read, `instances.npz` for numpy.
+//!
+//! They hold what the published `pointcloud.mat` does beside the points: per instance its tightest box, split in 6 × 6 × 6
+//! equal voxels, each with its occupancy and its points. Voxel (ix, iy, iz), counted from the box's smallest corner, has
+//! the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "Labels".
+
+use crate::cloud::npy::write::npy_header;
+use crate::cloud::passes::PointPasses;
+use crate::dataset::instances::members::VoxelMembers;
+use crate::error::{Error, Result};
+use crate::fs::atomic::{AtomicFile, write_whole};
+use crate::fs::json::read_json;
+use s3d_geom::{Aabb, VoxelGrid, Voxels};
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+/// Voxels of an instance.
+const CELLS: usize = VoxelGrid::CELLS;
+
+/// One instance but its points, as [`InstanceWriter::push`] takes it.
+#[derive(Clone, Copy, Debug)]
+pub struct InstanceRecord<'a> {
+    /// Its label: "chair_3_office_5_1".
+    pub label: &'a str,
+    /// The index of the label in `semantic_labels.json`.
+    pub label_index: u32,
+    /// Its class: "chair".
+    pub class: &'a str,
+    /// Type and number of its room: "office_5".
+    pub room: &'a str,
+    /// The tightest box of its points, world metres.
+    pub bbox: Aabb,
+}
+
+/// One instance, as `instances.json` holds it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InstanceEntry {
+    /// Its label: "chair_3_office_5_1".
+    pub label: String,
+    /// The index of the label in `semantic_labels.json`.
+    pub label_index: u32,
+    /// Its class: "chair".
+    pub class: String,
+    /// Type and number of its room: "office_5".
+    pub room: String,
+    /// How many points it has.
+    pub points: u64,
+    /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, world metres.
+    pub bbox: [f32; 6],
+    /// 216 times 1 (the voxel holds a point) or 0.
+    pub voxel_occupancy: Vec<u8>,
+    /// 216 counts.
+    pub points_per_voxel: Vec<u32>,
+}
+
+/// Writes `instances.json` and `instances.npz` of an area, instance by instance, each whole or not at all.
+///
+/// The archive holds these arrays, for n instances with N points together:
+///
+/// | name | type, shape | |
+/// |---|---|---|
+/// | `labels` | text, n | "chair_3_office_5_1" |
+/// | `label_index` | u32, n | index into `semantic_labels.json` |
+/// | `bbox` | f32, n × 6 | smallest x y z, largest x y z, metres |
+/// | `voxel_occupancy` | u8, n × 6 × 6 × 6 | 1 where the voxel \[ix, iy, iz\] holds a point |
+/// | `points_per_voxel` | u32, n × 6 × 6 × 6 | how many |
+/// | `point_start` | u64, n + 1 | the points of instance i are `point_index[point_start[i]:point_start[i+1]]` |
+/// | `point_index` | u32, N | points of an instance (from 0, in the order of its file in the S3DIS tree), voxel after voxel |
+///
+/// Memory: about 1.3 kilobytes an instance, whatever its points. Point indices wait in a nameless temporary file.
+#[derive(Debug)]
+pub struct InstanceWriter {
+    json: PathBuf,
+    npz: AtomicFile,
+    entries: Vec<InstanceEntry>,
+    point_index: BufWriter<File>,
+}
+
+impl InstanceWriter {
+    /// Starts the two files. Their folders must be there.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn create(json: &Path, npz: &Path) -> Result<Self> {
+        let folder = npz.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let spool = tempfile::tempfile_in(folder).map_err(|e| Error::io(npz, "write", e))?;
+        Ok(Self {
+            json: json.to_owned(),
+            npz: AtomicFile::create(npz)?,
+            entries: Vec::new(),
+            point_index: BufWriter::with_capacity(1 << 18, spool),
+        })
+    }
+
+    /// Appends an instance, whose points are in the order of its file in the S3DIS tree. Those that are not in memory are
+    /// gone through twice, once to count them by voxel and once to write their indices, which takes 14 MB.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Format`] for more points than `u32` can number; those of the points' own file.
+    ///
+    /// # Panics
+    /// If it has no point; if the box of points in memory is another than theirs.
+    pub fn push(&mut self, instance: &InstanceRecord<'_>, points: &mut dyn PointPasses) -> Result<()> {
+        let label = instance.label;
+        assert!(!points.is_empty(), "{label} has no point");
+        if u32::try_from(points.len()).is_err() {
+            let message = format!(
+                "{label} has {} points; point_index can number {} of an instance: annotate it in parts",
+                points.len(),
+                u32::MAX
+            );
+            return Err(Error::format(self.npz.path(), message));
+        }
+        let grid = VoxelGrid { bbox: instance.bbox };
+        let points_per_voxel = match points.in_memory().and_then(Voxels::from_points) {
+            Some(voxels) => {
+                assert_eq!(voxels.grid, grid, "the box of {label} is not that of its points");
+                self.put(&voxels.members)?;
+                voxels.starts.array_windows().map(|[start, end]| end - start).collect()
+            }
+            None => self.put_in_passes(grid, points)?,
+        };
+        self.entries.push(InstanceEntry {
+            label: label.to_owned(),
+            label_index: instance.label_index,
+            class: instance.class.to_owned(),
+            room: instance.room.to_owned(),
+            points: points.len(),
+            bbox: instance.bbox.to_array(),
+            voxel_occupancy: points_per_voxel.iter().map(|&n| u8::from(n > 0)).collect(),
+            points_per_voxel,
+        });
+        Ok(())
+    }
+
+    /// Appends indices of points.
+    fn put(&mut self, members: &[u32]) -> Result<()> {
+        let failed = |e| Error::io(self.npz.path(), "write", e);
+        members.iter().try_for_each(|m| self.point_index.write_all(&m.to_le_bytes())).map_err(failed)
+    }
+
+    /// Appends the indices of points that are not in memory, and returns how many are in each voxel.
+    fn put_in_passes(&mut self, grid: VoxelGrid, points: &mut dyn PointPasses) -> Result<Vec<u32>> {
+        let failed = |e| Error::io(self.npz.path(), "write", e);
+        let mut counts = vec![0u32; CELLS];
+        let mut cells = Vec::new();
+        points.pass(&mut |block| {
+            grid.cells_of(block, &mut cells);
+            for cell in &cells {
+                if let Some(count) = counts.get_mut(usize::from(*cell)) {
+                    *count += 1;
+                }
+            }
+            Ok(())
+        })?;
+        self.point_index.flush().map_err(failed)?;
+        let mut members = VoxelMembers::new(self.point_index.get_mut(), &counts).map_err(failed)?;
+        points.pass(&mut |block| {
+            grid.cells_of(block, &mut cells);
+            members.add(&cells).map_err(failed)
+        })?;
+        members.finish().map_err(failed)?;
+        Ok(counts)
+    }
+
+    /// Gives both files their names, and returns their size in bytes.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn finish(self) -> Result<u64> {
+        let Self { json, npz, entries, point_index } = self;
+        let path = npz.path().to_owned();
+        let io = |e| Error::io(&path, "write", e);
+        let mut spool = point_index.into_inner().map_err(|e| io(e.into_error()))?;
+        spool.seek(SeekFrom::Start(0)).map_err(io)?;
+        let npz = write_arrays(npz, &entries, spool).map_err(io)?;
+        let bytes = npz.commit()?;
+        Ok(bytes + write_json(&json, &entries)?)
+    }
+}
+
+/// One instance a line.
+fn write_json(path: &Path, entries: &[InstanceEntry]) -> Result<u64> {
+    write_whole(path, |w| {
+        w.write_all(b"{\"instances\":[")?;
+        for (i, entry) in entries.iter().enumerate() {
+            w.write_all(if i == 0 { b"\n" } else { b",\n" })?;
+            serde_json::to_writer(&mut *w, entry)?;
+        }
+        w.write_all(b"\n]}\n")
+    })
+}
+
+/// Reads `instances.json`.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if it is something else, or an instance has not 216 voxels.
+pub fn read_instances(path: &Path) -> Result<Vec<InstanceEntry>> {
+    #[derive(Deserialize)]
+    struct Instances {
+        instances: Vec<InstanceEntry>,
+    }
+    let Instances { instances } = read_json(path)?;
+    for i in &instances {
+        if i.voxel_occupancy.len() != CELLS || i.points_per_voxel.len() != CELLS {
+            return Err(Error::format(path, format!("{} has not {CELLS} voxels", i.label)));
+        }
+    }
+    Ok(instances)
+}
+
+fn write_arrays(file: AtomicFile, entries: &[InstanceEntry], spool: File) -> io::Result<AtomicFile> {
+    let mut archive = Archive { zip: ZipWriter::new(file) };
+    let n = entries.len() as u64;
+
+    // Text of a fixed width, UTF-32, padded with zeros: numpy's own form, which needs no pickle.
+    let width = entries.iter().map(|e| e.label.chars().count()).max().unwrap_or(0).max(1);
+    let label = |e: &InstanceEntry| {
+        let mut units: Vec<u32> = e.label.chars().map(u32::from).collect();
+        units.resize(width, 0);
+        units
+    };
+    archive.array(
+        "labels",
+        &format!("<U{width}"),
+        &[n],
+        bytes(entries.iter().flat_map(label), u32::to_le_bytes),
+    )?;
+    let indices = entries.iter().map(|e| e.label_index);
+    archive.array("label_index", "<u4", &[n], bytes(indices, u32::to_le_bytes))?;
+    let boxes = entries.iter().flat_map(|e| e.bbox);
+    archive.array("bbox", "<f4", &[n, 6], bytes(boxes, f32::to_le_bytes))?;
+    let occupancy = entries.iter().flat_map(|e| e.voxel_occupancy.iter().copied());
+    archive.array("voxel_occupancy", "|u1", &[n, 6, 6, 6], occupancy.collect::<Vec<_>>().as_slice())?;
+    let counts = entries.iter().flat_map(|e| e.points_per_voxel.iter().copied());
+    archive.array("points_per_voxel", "<u4", &[n, 6, 6, 6], bytes(counts, u32::to_le_bytes))?;
+    let starts = point_starts(entries);
+    let total = starts.last().copied().unwrap_or(0);
+    archive.array("point_start", "<u8", &[n + 1], bytes(starts.into_iter(), u64::to_le_bytes))?;
+    archive.stream(
+        "point_index",
+        "<u4",
+        &[total],
+        4 * total,
+        &mut BufReader::with_capacity(1 << 18, spool),
+    )?;
+    Ok(archive.zip.finish()?)
+}
+
+/// Where the points of each instance start among those of all, and where they end.
+fn point_starts(entries: &[InstanceEntry]) -> Vec<u64> {
+    let ends = entries.iter().scan(0, |sum, e| {
+        *sum += e.points;
+        Some(*sum)
+    });
+    std::iter::once(0).chain(ends).collect()
+}
+
+fn bytes<T, const N: usize>(values: impl Iterator<Item = T>, to_le_bytes: impl Fn(T) -> [u8; N]) -> Vec<u8> {
+    values.flat_map(to_le_bytes).collect()
+}
+
+/// An `.npz` file: an archive of `.npy` files, stored as they are.
+struct Archive<W: Write + Seek> {
+    zip: ZipWriter<W>,
+}
+
+impl<W: Write + Seek> Archive<W> {
+    fn array(&mut self, name: &str, kind: &str, shape: &[u64], data: impl AsRef<[u8]>) -> io::Result<()> {
+        let mut data = data.as_ref();
+        self.stream(name, kind, shape, data.len() as u64, &mut data)
+    }
+
+    /// Starts an array of about `size` bytes. Beyond 4 GiB its header needs room for 64 bits.
+    fn start(&mut self, name: &str, size: u64) -> io::Result<()> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .last_modified_time(DateTime::default())
+            .large_file(size > 0xf000_0000);
+        Ok(self.zip.start_file(format!("{name}.npy"), options)?)
+    }
+
+    fn stream(
+        &mut self,
+        name: &str,
+        kind: &str,
+        shape: &[u64],
+        size: u64,
+        data: &mut dyn io::Read,
+    ) -> io::Result<()> {
+        self.start(name, size)?;
+        self.zip.write_all(&npy_header(kind, shape))?;
+        let copied = io::copy(data, &mut self.zip)?;
+        if copied != size {
+            return Err(io::Error::other(format!("{copied} of {size} bytes of {name} are left")));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::{Vec3, vec3};
+    use std::io::Read;
+
+    const CHAIR: Aabb = Aabb { min: vec3(0.1, -2.0, 0.0), max: vec3(1.5, -1.25, 0.9) };
+    const WALL: Aabb = Aabb { min: Vec3::splat(5.0), max: Vec3::splat(5.0) };
+
+    /// Points of the chair in the voxels 215, 0, 215, 0 and (0, 1, 1).
+    fn chair_points() -> [Vec3; 5] {
+        let size = CHAIR.size();
+        [
+            CHAIR.max,
+            CHAIR.min,
+            CHAIR.max - 0.1 * size,
+            CHAIR.min + 0.1 * size,
+            CHAIR.min + size * vec3(0.1, 0.2, 0.2),
+        ]
+    }
+
+    fn record(label: &str) -> InstanceRecord<'_> {
+        match label {
+            "chair_3_office_5_1" => {
+                InstanceRecord { label, label_index: 9, class: "chair", room: "office_5", bbox: CHAIR }
+            }
+            _ => InstanceRecord { label, label_index: 40, class: "wall", room: "WC_2", bbox: WALL },
+        }
+    }
+
+    /// Points that pretend to be on a disk: they come two by two.
+    struct OnDisk<'a>(&'a [Vec3]);
+
+    impl PointPasses for OnDisk<'_> {
+        fn len(&self) -> u64 {
+            self.0.len() as u64
+        }
+
+        fn in_memory(&self) -> Option<&[Vec3]> {
+            None
+        }
+
+        fn pass(&mut self, each: &mut dyn FnMut(&[Vec3]) -> Result<()>) -> Result<()> {
+            self.0.chunks(2).try_for_each(each)
+        }
+    }
+
+    fn write(dir: &Path) -> Vec<InstanceEntry> {
+        let (json, npz) = (dir.join("instances.json"), dir.join("instances.npz"));
+        let mut writer = InstanceWriter::create(&json, &npz).unwrap();
+        writer.push(&record("chair_3_office_5_1"), &mut &chair_points()[..]).unwrap();
+        writer.push(&record("wall_1_WC_2_1"), &mut &[WALL.min][..]).unwrap();
+        let bytes = writer.finish().unwrap();
+        let size = |path: &Path| std::fs::metadata(path).unwrap().len();
+        assert_eq!(bytes, size(&json) + size(&npz));
+        assert_eq!(std::fs::read_dir(dir).unwrap().count(), 2);
+        read_instances(&json).unwrap()
+    }
+
+    #[test]
+    fn the_list_comes_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let entries = write(dir.path());
+        assert_eq!(entries.len(), 2);
+        let chair = &entries[0];
+        assert_eq!((chair.label.as_str(), chair.label_index, chair.points), ("chair_3_office_5_1", 9, 5));
+        assert_eq!((chair.class.as_str(), chair.room.as_str()), ("chair", "office_5"));
+        assert_eq!(chair.bbox, [0.1, -2.0, 0.0, 1.5, -1.25, 0.9]);
+        let counts = &chair.points_per_voxel;
+        assert_eq!((counts[0], counts[7], counts[215], counts.iter().sum::<u32>()), (2, 1, 2, 5));
+        assert!(counts.iter().zip(&chair.voxel_occupancy).all(|(&n, &o)| o == u8::from(n > 0)));
+    }
+
+    /// The archive through the reader of npyz, which knows numpy's types.
+    #[test]
+    fn the_arrays_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let entries = write(dir.path());
+        let file = File::open(dir.path().join("instances.npz")).unwrap();
+        let mut zip = zip::ZipArchive::new(file).unwrap();
+        let mut array = |name: &str| {
+            let mut bytes = Vec::new();
+            zip.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+            bytes
+        };
+        fn read<T: npyz::Deserialize>(bytes: &[u8]) -> (Vec<u64>, Vec<T>) {
+            let npy = npyz::NpyFile::new(bytes).unwrap();
+            (npy.shape().to_vec(), npy.into_vec().unwrap())
+        }
+        assert_eq!(
+            read::<String>(&array("labels")),
+            (vec![2], entries.iter().map(|e| e.label.clone()).collect())
+        );
+        assert_eq!(read::<u32>(&array("label_index")), (vec![2], vec![9, 40]));
+        assert_eq!(read::<f32>(&array("bbox")), (vec![2, 6], entries.iter().flat_map(|e| e.bbox).collect()));
+        let occupancy = entries.iter().flat_map(|e| e.voxel_occupancy.clone()).collect();
+        assert_eq!(read::<u8>(&array("voxel_occupancy")), (vec![2, 6, 6, 6], occupancy));
+        let counts = entries.iter().flat_map(|e| e.points_per_voxel.clone()).collect();
+        assert_eq!(read::<u32>(&array("points_per_voxel")), (vec![2, 6, 6, 6], counts));
+        assert_eq!(read::<u64>(&array("point_start")), (vec![3], vec![0, 5, 6]));
+        assert_eq!(read::<u32>(&array("point_index")), (vec![6], vec![1, 3, 4, 0, 2, 0]));
+    }
+
+    #[test]
+    fn an_area_without_instances_and_the_same_bytes_twice() {
+        let dir = tempfile::tempdir().unwrap();
+        let (json, npz) = (dir.path().join("i.json"), dir.path().join("i.npz"));
+        InstanceWriter::create(&json, &npz).unwrap().finish().unwrap();
+        assert_eq!(read_instances(&json).unwrap(), []);
+        let others = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        for other in &others {
+            write(other.path());
+        }
+        for name in ["instances.json", "instances.npz"] {
+            let [a, b] = others.each_ref().map(|d| std::fs::read(d.path().join(name)).unwrap());
+            assert_eq!(a, b);
+        }
+    }
+
+    #[test]
+    fn points_on_the_disk_give_the_same_bytes() {
+        let points: Vec<Vec3> =
+            (0..70_000).map(|i| vec3((i % 251) as f32, (i % 13) as f32, (i / 9000) as f32)).collect();
+        let bbox = Aabb::from_points(points.iter().copied());
+        let written = |on_disk: bool| {
+            let dir = tempfile::tempdir().unwrap();
+            let (json, npz) = (dir.path().join("i.json"), dir.path().join("i.npz"));
+            let mut writer = InstanceWriter::create(&json, &npz).unwrap();
+            for label in ["chair_3_office_5_1", "wall_1_WC_2_1"] {
+                let record = InstanceRecord { bbox, ..record(label) };
+                match on_disk {
+                    true => writer.push(&record, &mut OnDisk(&points)).unwrap(),
+                    false => writer.push(&record, &mut &points[..]).unwrap(),
+                }
+            }
+            writer.push(&record("chair_3_office_5_1"), &mut &chair_points()[..]).unwrap();
+            writer.finish().unwrap();
+            [json, npz].map(|path| std::fs::read(path).unwrap())
+        };
+        assert!(written(true) == written(false));
+    }
+
+    /// As many points as are asked for, none of which is ever read.
+    struct Claimed(u64);
+
+    impl PointPasses for Claimed {
+        fn len(&self) -> u64 {
+            self.0
+        }
+
+        fn in_memory(&self) -> Option<&[Vec3]> {
+            None
+        }
+
+        fn pass(&mut self, _each: &mut dyn FnMut(&[Vec3]) -> Result<()>) -> Result<()> {
+            panic!("the points are read")
+        }
+    }
+
+    #[test]
+    fn more_points_than_indices_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut writer =
+            InstanceWriter::create(&dir.path().join("i.json"), &dir.path().join("i.npz")).unwrap();
+        let message = writer.push(&record("wall_1_WC_2_1"), &mut Claimed(1 << 32)).unwrap_err().to_string();
+        assert!(message.contains("wall_1_WC_2_1 has 4294967296 points"), "{message}");
+        assert!(message.contains("i.npz") && message.ends_with("annotate it in parts"), "{message}");
+    }
+
+    #[test]
+    fn totals_go_beyond_32_bits() {
+        let entry = |points| InstanceEntry {
+            label: "wall_1_WC_2_1".to_owned(),
+            label_index: 1,
+            class: "wall".to_owned(),
+            room: "WC_2".to_owned(),
+            points,
+            bbox: [0.0; 6],
+            voxel_occupancy: vec![0; CELLS],
+            points_per_voxel: vec![0; CELLS],
+        };
+        let entries = [entry(u64::from(u32::MAX)), entry(7)];
+        assert_eq!(point_starts(&entries), [0, u64::from(u32::MAX), (1 << 32) + 6]);
+    }
+
+    #[test]
+    fn an_array_beyond_4_gib_has_a_header_of_64_bits() {
+        for (size, is_large) in [(1 << 33, true), (1 << 20, false)] {
+            let mut archive = Archive { zip: ZipWriter::new(io::Cursor::new(Vec::new())) };
+            archive.start("point_index", size).unwrap();
+            archive.zip.write_all(b"abc").unwrap();
+            let bytes = archive.zip.finish().unwrap().into_inner();
+            // The local header: version 4.5 is needed, the sizes are elsewhere, namely in an extra field of the kind 1.
+            assert_eq!(bytes[..4], *b"PK\x03\x04");
+            let extra = 30 + "point_index.npy".len();
+            let sizes = if is_large { [0xff; 8] } else { [3, 0, 0, 0, 3, 0, 0, 0] };
+            assert_eq!((bytes[4] == 45, &bytes[18..26]), (is_large, &sizes[..]));
+            assert_eq!(bytes[extra..].starts_with(&[1, 0, 16, 0, 3, 0, 0, 0]), is_large);
+            let mut zip = zip::ZipArchive::new(io::Cursor::new(bytes)).unwrap();
+            let mut text = String::new();
+            zip.by_name("point_index.npy").unwrap().read_to_string(&mut text).unwrap();
+            assert_eq!(text, "abc");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "wall_1_WC_2_1 has no point")]
+    fn an_instance_without_points_is_a_callers_mistake() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut writer =
+            InstanceWriter::create(&dir.path().join("i.json"), &dir.path().join("i.npz")).unwrap();
+        let _ = writer.push(&record("wall_1_WC_2_1"), &mut &[][..]);
+    }
+}

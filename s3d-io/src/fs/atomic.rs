@@ -1,0 +1,193 @@
+//! Files that are there whole or not at all.
+
+use crate::error::{Error, Result};
+use std::fs::Permissions;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Bytes that are collected before the system is called.
+const BUFFER: usize = 1 << 18;
+
+/// A file that takes its name only when it is complete.
+///
+/// It is written under a temporary name (a dot and random letters) in the folder of the final one, and
+/// [`AtomicFile::commit`] renames it, over an older file if there is one. Dropped without that, it leaves nothing behind.
+/// Nobody who lists the folder meets half a file under the final name, even when the process is killed; a crash of the
+/// whole machine is not guarded against (nothing is synced to the disk).
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    writer: BufWriter<NamedTempFile>,
+}
+
+impl AtomicFile {
+    /// Starts the file that will be `path`. Its folder must be there.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with `path` if no file can be made in its folder, or a device or pipe has its name.
+    pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
+        let path = path.into();
+        if std::fs::metadata(&path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+            let source = io::Error::new(io::ErrorKind::InvalidInput, "it is a device or a pipe, no file");
+            return Err(Error::io(&path, "replace", source));
+        }
+        let folder = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".s3d-").suffix(".part");
+        let usual = usual_permissions();
+        if let Some(permissions) = &usual {
+            builder.permissions(permissions.clone());
+        }
+        let temporary = builder.tempfile_in(folder).map_err(|e| Error::io(&path, "write", e))?;
+        Ok(Self { path, writer: BufWriter::with_capacity(BUFFER, temporary) })
+    }
+
+    /// The final name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Gives the file its final name, and returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the rest cannot be written or the file cannot be renamed; it is removed then.
+    pub fn commit(self) -> Result<u64> {
+        let Self { path, writer } = self;
+        let io = |e| Error::io(&path, "write", e);
+        let temporary = writer.into_inner().map_err(|e| io(e.into_error()))?;
+        let bytes = temporary.as_file().metadata().map_err(io)?.len();
+        temporary
+            .persist(&path)
+            .map_err(|e| Error::io(&path, "rename the finished file to this name", e.error))?;
+        Ok(bytes)
+    }
+
+    /// Writes `bytes`; as [`Write::write_all`], but the error names the file.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn put(&mut self, bytes: &[u8]) -> Result<()> {
+        self.writer.write_all(bytes).map_err(|e| Error::io(&self.path, "write", e))
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.writer.seek(to)
+    }
+}
+
+/// Temporary files are made for their owner alone; these become ordinary files, which the umask decides about.
+#[cfg(unix)]
+fn usual_permissions() -> Option<Permissions> {
+    use std::os::unix::fs::PermissionsExt;
+    Some(Permissions::from_mode(0o666))
+}
+
+#[cfg(not(unix))]
+fn usual_permissions() -> Option<Permissions> {
+    None
+}
+
+/// Writes a file through `write`, whole or not at all, and returns its size in bytes.
+///
+/// # Errors
+/// [`Error::Io`] with `path`, for an error of `write` too.
+pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<u64> {
+    let mut file = AtomicFile::create(path)?;
+    write(&mut file).map_err(|e| Error::io(path, "write", e))?;
+    file.commit()
+}
+
+/// Writes `bytes` as the file `path`, whole or not at all, and returns their number.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<u64> {
+    write_whole(path, |w| w.write_all(bytes))
+}
+
+/// Makes the folder `path` and those above it. It may be there already.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn create_dir(path: &Path) -> Result<()> {
+    std::fs::create_dir_all(path).map_err(|e| Error::io(path, "create the folder", e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(dir: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_appears_whole_and_replaces_an_older_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        assert_eq!(write_bytes(&path, b"old").unwrap(), 3);
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.put(b"____new").unwrap();
+        file.seek(SeekFrom::Start(0)).unwrap();
+        file.put(b"very").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(file.commit().unwrap(), 7);
+        assert_eq!(std::fs::read(&path).unwrap(), b"verynew");
+        assert_eq!(names(dir.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_failure_leaves_nothing_behind_and_names_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        let e = write_whole(&path, |w| {
+            w.write_all(&[7; 1 << 20])?;
+            Err(io::Error::other("the disk is on fire"))
+        })
+        .unwrap_err();
+        assert_eq!(e.path(), path);
+        assert!(e.to_string().ends_with("a.txt: cannot write: the disk is on fire"), "{e}");
+        assert!(names(dir.path()).is_empty());
+        drop(AtomicFile::create(&path).unwrap());
+        assert!(names(dir.path()).is_empty());
+
+        let e = write_bytes(&dir.path().join("none/a.txt"), b"").unwrap_err();
+        assert!(matches!(&e, Error::Io { path, .. } if path.ends_with("none/a.txt")), "{e}");
+        create_dir(&dir.path().join("x/y")).unwrap();
+        create_dir(&dir.path().join("x/y")).unwrap();
+        // A folder cannot be replaced by a file.
+        assert!(write_bytes(&dir.path().join("x"), b"").is_err());
+        assert_eq!(names(dir.path()), ["x"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_are_those_of_any_other_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let (ours, plain) = (dir.path().join("ours"), dir.path().join("plain"));
+        write_bytes(&ours, b"").unwrap();
+        std::fs::write(&plain, b"").unwrap();
+        let mode = |path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+}

@@ -1,0 +1,43 @@
+//! JSON files: pretty-printed, keys in the order of the struct, a line feed at the end.
+
+use crate::error::{Error, Result};
+use crate::fs::atomic::write_bytes;
+use crate::image::texture::read_file;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+/// Writes `value` as a JSON file and returns the file's size in bytes.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if `value` holds what JSON cannot say.
+pub fn write_json<T: Serialize + ?Sized>(path: &Path, value: &T) -> Result<u64> {
+    let mut json = serde_json::to_vec_pretty(value).map_err(|e| Error::format(path, e.to_string()))?;
+    json.push(b'\n');
+    write_bytes(path, &json)
+}
+
+/// Reads a whole JSON file as a `T`.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] with the line if the file is no JSON or no `T`.
+pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
+    let bytes = read_file(path)?;
+    serde_json::from_slice(&bytes).map_err(|e| Error::line(path, e.line() as u64, e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_back_exactly_and_errors_name_the_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("numbers.json");
+        let numbers = vec![0.1, 1e-300, -7.000000000000001];
+        write_json(&path, &numbers).unwrap();
+        assert_eq!(read_json::<Vec<f64>>(&path).unwrap(), numbers);
+        let wrong = read_json::<Vec<String>>(&path).unwrap_err().to_string();
+        assert!(wrong.contains("numbers.json, line 2"), "{wrong}");
+    }
+}

@@ -1,0 +1,372 @@
+//! OpenEXR images of world coordinates.
+//!
+//! The `exr` crate writes the header and the table of blocks. Blocks are prepared and compressed here, since its own way
+//! takes several times as long: same format (ZIP, 16 lines a block), and no larger than OpenEXR makes it.
+
+use crate::error::{Error, Result};
+use crate::fs::atomic::write_bytes;
+use crate::guarded::guarded;
+use crate::image::compression::Compression;
+use crate::image::deflate::{Candidates, Deflater, Search, Work, wide};
+use crate::image::texture::read_file;
+use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
+use exr::block::writer::ChunksWriter;
+use exr::compression::Compression as Method;
+use exr::meta::BlockDescription;
+use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType};
+use exr::meta::header::{Header, LayerAttributes};
+use half::f16;
+use s3d_geom::Raster;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Lines in a block of the compression "ZIP". It is the format's number.
+const BLOCK_LINES: u32 = 16;
+
+/// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
+const MAX_PIXELS: usize = 1 << 30;
+/// The most pixels that a byte of a file stands for: deflate, which shrinks best of the format's ways, makes 1,032 of it,
+/// and a pixel has three samples of two bytes at least.
+const MAX_PIXELS_PER_BYTE: usize = 1032 / 6;
+
+/// World coordinates as the bytes of an OpenEXR file of half floats: channels R G B = X Y Z in metres, (0, 0, 0) where
+/// there is nothing; scan lines from the top, ZIP. Source: formats.md, "Images".
+///
+/// # Panics
+/// If the image has no pixel.
+pub fn encode_xyz_half(image: &Raster<[f16; 3]>, compression: Compression) -> Vec<u8> {
+    encode(image, SampleType::F16, f16::to_le_bytes, compression)
+}
+
+/// As [`encode_xyz_half`], but of 32-bit floats: exact, and some twenty times as large on surfaces that halves turn into
+/// steps.
+///
+/// # Panics
+/// If the image has no pixel.
+pub fn encode_xyz_float(image: &Raster<[f32; 3]>, compression: Compression) -> Vec<u8> {
+    encode(image, SampleType::F32, f32::to_le_bytes, compression)
+}
+
+/// Writes an OpenEXR file of half floats, whole or not at all, and returns its size in bytes; see [`encode_xyz_half`].
+///
+/// # Errors
+/// [`Error::Io`].
+///
+/// # Panics
+/// If the image has no pixel.
+pub fn write_xyz_half(path: &Path, image: &Raster<[f16; 3]>, compression: Compression) -> Result<u64> {
+    write_bytes(path, &encode_xyz_half(image, compression))
+}
+
+/// Writes an OpenEXR file of 32-bit floats, whole or not at all, and returns its size in bytes; see
+/// [`encode_xyz_float`].
+///
+/// # Errors
+/// [`Error::Io`].
+///
+/// # Panics
+/// If the image has no pixel.
+pub fn write_xyz_float(path: &Path, image: &Raster<[f32; 3]>, compression: Compression) -> Result<u64> {
+    write_bytes(path, &encode_xyz_float(image, compression))
+}
+
+#[expect(clippy::expect_used, reason = "a writer, into memory")]
+fn encode<T: Copy, const N: usize>(
+    image: &Raster<[T; 3]>,
+    sample_type: SampleType,
+    to_le_bytes: impl Fn(T) -> [u8; N],
+    compression: Compression,
+) -> Vec<u8> {
+    assert!(!image.is_empty(), "an OpenEXR image needs pixels: {} × {}", image.width(), image.height());
+    let size = (image.width() as usize, image.height() as usize);
+    // Channels are stored in the order of their names.
+    let channels = ["B", "G", "R"].map(|name| ChannelDescription::named(name, sample_type));
+    let header = Header::new("".into(), size, channels.into_iter().collect())
+        .with_attributes(LayerAttributes::default())
+        .with_encoding(Method::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing);
+
+    let mut file = Cursor::new(Vec::with_capacity(image.len() * 2));
+    let written =
+        exr::block::writer::write_chunks_with(&mut file, [header].into_iter().collect(), true, |_, out| {
+            let mut block = Block::new(image.width() as usize, N, compression);
+            let width = image.width() as usize;
+            for (index, pixels) in image.pixels().chunks(width * BLOCK_LINES as usize).enumerate() {
+                let y = index as u32 * BLOCK_LINES;
+                let compressed_pixels_le = block.compress(pixels, width, &to_le_bytes);
+                let line = CompressedScanLineBlock { y_coordinate: y as i32, compressed_pixels_le };
+                out.write_chunk(
+                    index,
+                    Chunk { layer_index: 0, compressed_block: CompressedBlock::ScanLine(line) },
+                )?;
+            }
+            Ok(())
+        });
+    written.expect("memory takes any bytes, and the blocks are those of the header");
+    file.into_inner()
+}
+
+/// Buffers for one block of lines, reused for all of an image.
+struct Block {
+    /// One line, channel by channel.
+    line: Vec<u8>,
+    /// The samples' bytes, line by line and channel by channel: those at even places, then those at odd places.
+    sorted: Vec<u8>,
+    /// The same, each but the first as the difference to the one before.
+    prepared: Vec<u8>,
+    compressed: Vec<u8>,
+    deflater: Deflater,
+}
+
+impl Block {
+    /// For lines of `width` pixels with three samples of `sample` bytes.
+    fn new(width: usize, sample: usize, compression: Compression) -> Self {
+        let line = 3 * sample * width;
+        let bytes = line * BLOCK_LINES as usize;
+        let balanced = Search {
+            candidates: Candidates::Nearby,
+            // Even and odd bytes are apart, so a line comes back after half its bytes.
+            line: line / 2,
+            sample: sample / 2,
+            hash_bytes: 4,
+            lazy: 6,
+            nice: 32,
+            remember: 32,
+            patience: 8,
+        };
+        let search = match compression {
+            Compression::Fast | Compression::Balanced => balanced,
+            Compression::Small => {
+                Search { candidates: Candidates::Many, lazy: 258, nice: 258, remember: 258, ..balanced }
+            }
+        };
+        Self {
+            line: vec![0; line],
+            sorted: vec![0; bytes],
+            prepared: vec![0; bytes],
+            compressed: Vec::new(),
+            deflater: Deflater::new(search),
+        }
+    }
+
+    /// The contents of the block of whole rows of `width` pixels (R G B), compressed unless that makes it longer.
+    #[expect(clippy::indexing_slicing, reason = "a writer: a block has no more lines than its buffers")]
+    fn compress<T: Copy, const N: usize>(
+        &mut self,
+        pixels: &[[T; 3]],
+        width: usize,
+        to_le_bytes: impl Fn(T) -> [u8; N],
+    ) -> Vec<u8> {
+        let n = 3 * N * pixels.len();
+        let (sorted, prepared) = (&mut self.sorted[..n], &mut self.prepared[..n]);
+        wide(Prepare { pixels, width, to_le_bytes, line: &mut self.line, sorted, prepared });
+        let (sorted, prepared) = (&*sorted, &*prepared);
+
+        self.compressed.clear();
+        self.deflater.zlib(prepared, n / 2, &mut self.compressed);
+        if self.compressed.len() < n {
+            return self.compressed.clone();
+        }
+        // A block that is not shorter is stored as it is.
+        let (even, odd) = sorted.split_at(n / 2);
+        even.iter().zip(odd).flat_map(|(even, odd)| [*even, *odd]).collect()
+    }
+}
+
+/// Sorts the samples' bytes and takes their differences.
+struct Prepare<'a, T, F> {
+    pixels: &'a [[T; 3]],
+    width: usize,
+    to_le_bytes: F,
+    line: &'a mut [u8],
+    sorted: &'a mut [u8],
+    prepared: &'a mut [u8],
+}
+
+impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Work for Prepare<'_, T, F> {
+    type Output = ();
+
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "a writer: buffers are as long as lines, blocks not empty")]
+    fn run(self) {
+        let Self { pixels, width, to_le_bytes, line, sorted, prepared } = self;
+        let half = 3 * N / 2 * width;
+        let (even, odd) = sorted.split_at_mut(sorted.len() / 2);
+        let lines = even.chunks_exact_mut(half).zip(odd.chunks_exact_mut(half));
+        for (row, (even, odd)) in pixels.chunks_exact(width).zip(lines) {
+            // First the three channels, then one byte in two: simple steps that are done for many at once.
+            let (blue, rest) = line.as_chunks_mut::<N>().0.split_at_mut(width);
+            let (green, red) = rest.split_at_mut(width);
+            for (((pixel, b), g), r) in row.iter().zip(blue).zip(green).zip(red) {
+                *r = to_le_bytes(pixel[0]);
+                *g = to_le_bytes(pixel[1]);
+                *b = to_le_bytes(pixel[2]);
+            }
+            for ((even, odd), pair) in even.iter_mut().zip(odd).zip(line.as_chunks::<2>().0) {
+                [*even, *odd] = *pair;
+            }
+        }
+        prepared[0] = sorted[0];
+        for ((difference, byte), before) in prepared[1..].iter_mut().zip(&sorted[1..]).zip(&*sorted) {
+            // 128 stands for no difference.
+            *difference = byte.wrapping_sub(*before).wrapping_add(128);
+        }
+    }
+}
+
+/// Reads world coordinates from an OpenEXR file: the channels R G B of any sample type and compression.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if it is no OpenEXR file, damaged, or has no channels R G B.
+pub fn read_xyz(path: &Path) -> Result<Raster<[f32; 3]>> {
+    let bytes = read_file(path)?;
+    let failed =
+        |e: exr::error::Error| Error::format(path, format!("no readable OpenEXR file of R G B: {e}"));
+    let too_large = |width: usize, height: usize| {
+        Error::unsupported(path, format!("{width} × {height} pixels are more than {MAX_PIXELS}"))
+    };
+    let meta = exr::meta::MetaData::read_from_buffered(bytes.as_slice(), false).map_err(failed)?;
+    for header in &meta.headers {
+        let (width, height) = (header.layer_size.x(), header.layer_size.y());
+        if width.checked_mul(height).is_none_or(|n| n > MAX_PIXELS) {
+            return Err(too_large(width, height));
+        }
+        if width * height > bytes.len().saturating_mul(MAX_PIXELS_PER_BYTE) {
+            let message = format!("claims {width} × {height} pixels in {} bytes", bytes.len());
+            return Err(Error::format(path, message));
+        }
+    }
+    use exr::prelude::{ReadChannels, ReadLayers, Vec2};
+    let read = || {
+        exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .rgb_channels(
+                |size: Vec2<usize>, _| {
+                    // The header was checked: its sides fit.
+                    let [width, height] = [size.x(), size.y()].map(|side| u32::try_from(side).unwrap_or(0));
+                    Raster::filled(width, height, [0f32; 3])
+                },
+                |image, at, (r, g, b): (f32, f32, f32)| {
+                    let line = (image.width() as usize).checked_mul(at.y());
+                    let index = line.and_then(|line| line.checked_add(at.x()));
+                    if let Some(pixel) = index.and_then(|index| image.pixels_mut().get_mut(index)) {
+                        *pixel = [r, g, b];
+                    }
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_buffered(Cursor::new(bytes))
+    };
+    let damaged = || Error::format(path, "no readable OpenEXR file of R G B: its blocks are damaged");
+    let image = guarded(read).ok_or_else(damaged)?.map_err(failed)?;
+    Ok(image.layer_data.channel_data.pixels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn in_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("image.exr");
+        write_bytes(&path, bytes).unwrap();
+        read(&path)
+    }
+
+    /// The plain way: the crate's own writer.
+    fn reference_half(image: &Raster<[f16; 3]>) -> Vec<u8> {
+        use exr::prelude::*;
+        let at = |p: Vec2<usize>| {
+            let [r, g, b] = image.at(p.x() as u32, p.y() as u32);
+            (r, g, b)
+        };
+        let encoding = Encoding {
+            compression: Method::ZIP16,
+            blocks: Blocks::ScanLines,
+            line_order: LineOrder::Increasing,
+        };
+        let size = (image.width() as usize, image.height() as usize);
+        let layer = Layer::new(size, LayerAttributes::default(), encoding, SpecificChannels::rgb(at));
+        let mut file = Cursor::new(Vec::new());
+        Image::from_layer(layer).write().non_parallel().to_buffered(&mut file).unwrap();
+        file.into_inner()
+    }
+
+    /// A floor and a wall, in metres.
+    fn room(width: u32, height: u32) -> Raster<[f32; 3]> {
+        let pixel = |i: u32| {
+            let (x, y) = ((i % width) as f32 / width as f32, (i / width) as f32 / height as f32);
+            if y < 0.5 { [4.0 * x - 2.0, 3.0, 2.8 - 3.0 * y] } else { [x / y, 1.5 / y, 0.0] }
+        };
+        Raster::from_vec(width, height, (0..width * height).map(pixel).collect())
+    }
+
+    #[test]
+    fn halves_and_floats_come_back_exactly() {
+        for (w, h) in [(1, 1), (3, 16), (5, 17), (64, 40), (31, 33), (9000, 18)] {
+            let floats = room(w, h);
+            let halves = floats.map(|p| p.map(f16::from_f32));
+            for compression in Compression::ALL {
+                assert_eq!(in_file(&encode_xyz_float(&floats, compression), read_xyz).unwrap(), floats);
+                let read = in_file(&encode_xyz_half(&halves, compression), read_xyz).unwrap();
+                assert_eq!(read, halves.map(|p| p.map(f16::to_f32)));
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        /// Noise does not compress: such blocks are stored as they are.
+        #[test]
+        fn any_values_come_back((w, h, data) in (1u32..40, 1u32..40).prop_flat_map(|(w, h)| {
+            (Just(w), Just(h), proptest::collection::vec(any::<[u16; 3]>(), (w * h) as usize))
+        })) {
+            let number = |bits| Some(f16::from_bits(bits)).filter(|v| !v.is_nan()).unwrap_or(f16::ONE);
+            let image = Raster::from_vec(w, h, data.into_iter().map(|p| p.map(number)).collect());
+            for compression in Compression::ALL {
+                let read = in_file(&encode_xyz_half(&image, compression), read_xyz).unwrap();
+                prop_assert_eq!(read, image.map(|p| p.map(f16::to_f32)));
+            }
+        }
+    }
+
+    #[test]
+    fn the_header_is_what_the_plain_writer_makes() {
+        let image = room(100, 50).map(|p| p.map(f16::from_f32));
+        let (ours, plain) = (encode_xyz_half(&image, Compression::Balanced), reference_half(&image));
+        let header = |bytes: &[u8]| {
+            let meta = exr::meta::MetaData::read_from_buffered(bytes, true).unwrap();
+            let [header] = meta.headers.as_slice() else { panic!("one layer") };
+            header.clone()
+        };
+        let (a, b) = (header(&ours), header(&plain));
+        assert_eq!(a.channels, b.channels);
+        assert_eq!(a.channels.list.iter().map(|c| c.name.to_string()).collect::<Vec<_>>(), ["B", "G", "R"]);
+        assert_eq!((a.compression, a.line_order, a.blocks), (b.compression, b.line_order, b.blocks));
+        assert_eq!((a.layer_size, a.chunk_count), (b.layer_size, b.chunk_count));
+        assert_eq!(a.shared_attributes.display_window, b.shared_attributes.display_window);
+        assert_eq!(in_file(&plain, read_xyz).unwrap(), in_file(&ours, read_xyz).unwrap());
+    }
+
+    #[test]
+    fn more_time_makes_smaller_files_no_larger_than_the_plain_writers() {
+        let image = room(700, 300).map(|p| p.map(f16::from_f32));
+        let [fast, balanced, small] = Compression::ALL.map(|c| encode_xyz_half(&image, c).len());
+        let plain = reference_half(&image).len();
+        assert!(fast >= balanced && balanced >= small, "{fast}, {balanced}, {small}");
+        assert!(balanced <= plain, "{balanced}, the plain writer makes {plain}");
+    }
+
+    #[test]
+    fn broken_files_are_format_errors() {
+        let whole = encode_xyz_half(&room(20, 20).map(|p| p.map(f16::from_f32)), Compression::Balanced);
+        for bytes in [&b"not an image"[..], b"", &whole[..30], &whole[..whole.len() / 2]] {
+            let e = in_file(bytes, read_xyz).unwrap_err();
+            assert!(matches!(e, Error::Format { .. }), "{e}");
+        }
+        assert!(matches!(read_xyz(Path::new("/nowhere/a.exr")), Err(Error::Io { action: "read", .. })));
+    }
+}

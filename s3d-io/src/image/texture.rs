@@ -1,0 +1,324 @@
+//! Texture images: PNG and JPEG files to 8-bit colour.
+
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+use crate::error::{Error, Result};
+use crate::guarded::guarded;
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use rayon::prelude::*;
+use s3d_geom::Raster;
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+/// The longest side of a texture in pixels.
+const MAX_SIDE: u32 = 65_535;
+/// The most pixels of a texture: 32,768 × 16,384, twice what graphics cards take, and 1.6 GB once it is decoded. A file
+/// of half a megabyte can claim seven times as many.
+const MAX_PIXELS: u64 = 1 << 29;
+/// The most pixels of all textures of a file together, 26 GB of them: 2,048 textures of 2,048 × 2,048.
+const MAX_PIXELS_TOGETHER: u64 = 1 << 33;
+/// No PNG or JPEG holds more pixels than this in a byte: deflate shrinks at most 1,032 times, a pixel of a bit or more.
+const MAX_PIXELS_PER_BYTE: u64 = 8 * 1_032;
+
+/// The encoded image of a texture as it was found, so that an export can copy it unchanged.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TextureFile {
+    /// What it is, told by its content and not by its name: `"png"` or `"jpg"`.
+    pub extension: &'static str,
+    /// The file's bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// A decoded texture beside the bytes that it was decoded from.
+#[derive(Clone, Debug)]
+pub(crate) struct LoadedTexture {
+    pub(crate) image: Raster<[u8; 3]>,
+    pub(crate) file: TextureFile,
+}
+
+/// Why an image is not decoded: a sentence, to follow its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum TextureFault {
+    /// It is none, or damaged. A mesh can be drawn without it.
+    Unreadable(String),
+    /// It, or all images of the mesh together, would take more memory than any do.
+    TooLarge(String),
+}
+
+impl std::fmt::Display for TextureFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (Self::Unreadable(message) | Self::TooLarge(message)) = self;
+        f.write_str(message)
+    }
+}
+
+/// Decodes a PNG or JPEG of any kind — gray, palette, with alpha, 16 bits — to 8-bit R G B. Alpha is left out.
+pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTexture, TextureFault> {
+    let (format, extension, size) = size_of_texture(&bytes)?;
+    // The decoders are not ours: some panic at what is damaged.
+    let image = guarded(|| decode(&bytes, format, size))
+        .unwrap_or_else(|| Err("its content is damaged".into()))
+        .map_err(|e| TextureFault::Unreadable(format!("cannot be decoded: {e}")))?;
+    Ok(LoadedTexture { image, file: TextureFile { extension, bytes } })
+}
+
+fn decode(
+    bytes: &[u8],
+    format: ImageFormat,
+    [width, height]: [u32; 2],
+) -> std::result::Result<Raster<[u8; 3]>, String> {
+    let undecodable = |e: image::ImageError| e.to_string();
+    let pixels = u64::from(width).saturating_mul(u64::from(height));
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    // The size is plausible by now; the library's own limit would refuse textures of 16,384² pixels.
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(pixels.saturating_mul(16).saturating_add(64 << 20));
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(undecodable)?;
+    let rgb = if decoder.color_type() == ColorType::Rgb8 {
+        // Most are: they are decoded to where they stay.
+        let count = usize::try_from(pixels).map_err(|_| format!("has {pixels} pixels, too many"))?;
+        let mut rgb = vec![[0; 3]; count];
+        decoder.read_image(rgb.as_flattened_mut()).map_err(undecodable)?;
+        rgb
+    } else {
+        let rgb = DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgb8();
+        rgb.into_raw().as_chunks().0.to_vec()
+    };
+    Ok(Raster::from_vec(width, height, rgb))
+}
+
+/// What an image is and how large, by its first bytes; the size is one that the file can hold.
+fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static str, [u32; 2]), TextureFault> {
+    let (format, extension) = match image::guess_format(bytes) {
+        Ok(ImageFormat::Png) => (ImageFormat::Png, "png"),
+        Ok(ImageFormat::Jpeg) => (ImageFormat::Jpeg, "jpg"),
+        Ok(other) => {
+            let message = format!("is a {} image; only PNG and JPEG are read", name_of(other));
+            return Err(TextureFault::Unreadable(message));
+        }
+        Err(_) => return Err(TextureFault::Unreadable("is no PNG or JPEG image".into())),
+    };
+    let size = guarded(|| ImageReader::with_format(Cursor::new(bytes), format).into_dimensions());
+    let (width, height) = match size {
+        Some(Ok(size)) => size,
+        Some(Err(e)) => return Err(TextureFault::Unreadable(format!("cannot be decoded: {e}"))),
+        None => return Err(TextureFault::Unreadable("cannot be decoded: its header is damaged".into())),
+    };
+    let pixels = u64::from(width).saturating_mul(u64::from(height));
+    if pixels == 0 || width > MAX_SIDE || height > MAX_SIDE {
+        let message = format!("is {width} × {height} pixels large; a side has 1 to {MAX_SIDE}");
+        return Err(TextureFault::Unreadable(message));
+    }
+    if pixels > MAX_PIXELS {
+        return Err(TextureFault::TooLarge(format!(
+            "is {width} × {height} pixels large, and a texture has {MAX_PIXELS} at most (32,768 × 16,384): scale it down, or \
+             cut it in parts"
+        )));
+    }
+    if pixels > (bytes.len() as u64).saturating_mul(MAX_PIXELS_PER_BYTE) {
+        let message = format!("claims {width} × {height} pixels in {} bytes", bytes.len());
+        return Err(TextureFault::Unreadable(message));
+    }
+    Ok((format, extension, [width, height]))
+}
+
+fn name_of(format: ImageFormat) -> &'static str {
+    format.extensions_str().first().copied().unwrap_or("different")
+}
+
+/// Reads and decodes image files, in parallel, each as [`decode_texture`] does. Beside each its fault, if it has one that
+/// a mesh can be drawn with.
+///
+/// # Errors
+/// [`Error::Unsupported`] for an image that is too large, and if they are together.
+pub(crate) fn read_textures(paths: &[PathBuf]) -> Result<Vec<std::result::Result<LoadedTexture, String>>> {
+    // One at a time: sizes differ, and a thread that is done takes the next. The files' bytes stay, so they are all read
+    // before the first image is decoded.
+    let read = |path: &PathBuf| match read_file(path) {
+        Ok(bytes) => Ok((size_of_texture(&bytes), bytes)),
+        Err(Error::Io { source, .. }) => Err(format!("cannot be read: {source}")),
+        Err(other) => Err(other.to_string()),
+    };
+    let files: Vec<_> = paths.par_iter().with_max_len(1).map(read).collect();
+    let mut together = Together::default();
+    for (path, file) in paths.iter().zip(&files) {
+        let size = match file {
+            Ok((Ok((_, _, [width, height])), _)) => together.add(*width, *height),
+            Ok((Err(TextureFault::TooLarge(message)), _)) => Err(message.clone()),
+            Ok((Err(TextureFault::Unreadable(_)), _)) | Err(_) => Ok(()),
+        };
+        size.map_err(|message| Error::unsupported(path, message))?;
+    }
+    let decode = |file: std::result::Result<(_, Vec<u8>), String>| {
+        decode_texture(file?.1).map_err(|fault| fault.to_string())
+    };
+    Ok(files.into_par_iter().with_max_len(1).map(decode).collect())
+}
+
+/// How many pixels the textures of a file have.
+#[derive(Default)]
+pub(crate) struct Together {
+    pixels: u64,
+    textures: usize,
+}
+
+impl Together {
+    /// Adds a texture, before there is memory for it; a sentence if that makes too many.
+    pub(crate) fn add(&mut self, width: u32, height: u32) -> std::result::Result<(), String> {
+        self.pixels = self.pixels.saturating_add(u64::from(width).saturating_mul(u64::from(height)));
+        self.textures = self.textures.saturating_add(1);
+        if self.pixels <= MAX_PIXELS_TOGETHER {
+            return Ok(());
+        }
+        Err(format!(
+            "is the texture that makes {} of them with {} pixels: all textures of a file have {MAX_PIXELS_TOGETHER} at most; \
+             scale them down, or cut the scene in parts",
+            self.textures, self.pixels
+        ))
+    }
+}
+
+/// The content of a regular file. Devices and pipes are refused: reading one may never end.
+pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
+    let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
+    if !what.is_file() {
+        return Err(Error::format(
+            path,
+            if what.is_dir() { "is a folder, not a file" } else { "is no file" },
+        ));
+    }
+    fs::read(path).map_err(|e| Error::io(path, "read", e))
+}
+
+/// Opens a regular file. Devices and pipes are refused before they are opened: even that may never end.
+pub(crate) fn open_file(path: &Path) -> Result<fs::File> {
+    let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
+    if !what.is_file() {
+        return Err(Error::format(
+            path,
+            if what.is_dir() { "is a folder, not a file" } else { "is no file" },
+        ));
+    }
+    fs::File::open(path).map_err(|e| Error::io(path, "read", e))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use image::{ImageBuffer, Luma, LumaA, Rgb, Rgba};
+
+    pub(crate) fn png_of(image: DynamicImage) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        image.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).unwrap();
+        bytes
+    }
+
+    /// A 2 × 1 PNG: the colours `a` and `b`.
+    pub(crate) fn two_pixels(a: [u8; 3], b: [u8; 3]) -> Vec<u8> {
+        png_of(ImageBuffer::from_fn(2, 1, |x, _| Rgb(if x == 0 { a } else { b })).into())
+    }
+
+    fn pixels(bytes: Vec<u8>) -> Vec<[u8; 3]> {
+        decode_texture(bytes).unwrap().image.into_vec()
+    }
+
+    #[test]
+    fn every_kind_of_png_becomes_rgb() {
+        assert_eq!(pixels(two_pixels([1, 2, 3], [250, 0, 9])), [[1, 2, 3], [250, 0, 9]]);
+        assert_eq!(pixels(png_of(ImageBuffer::from_pixel(1, 1, Luma([7u8])).into())), [[7; 3]]);
+        assert_eq!(pixels(png_of(ImageBuffer::from_pixel(1, 1, LumaA([7u8, 0])).into())), [[7; 3]]);
+        assert_eq!(pixels(png_of(ImageBuffer::from_pixel(1, 1, Rgba([7u8, 8, 9, 0])).into())), [[7, 8, 9]]);
+        let deep = ImageBuffer::from_pixel(1, 1, Rgb([0xffffu16, 0x8080, 0x0101]));
+        assert_eq!(pixels(png_of(deep.into())), [[255, 128, 1]]);
+    }
+
+    #[test]
+    fn jpeg_is_told_by_its_content_and_its_bytes_are_kept() {
+        let mut bytes = Vec::new();
+        let image = DynamicImage::from(ImageBuffer::from_pixel(16, 16, Rgb([200u8, 100, 50])));
+        image.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Jpeg).unwrap();
+        let loaded = decode_texture(bytes.clone()).unwrap();
+        assert_eq!(loaded.file, TextureFile { extension: "jpg", bytes });
+        let close = |p: &[u8; 3]| p.iter().zip([200, 100, 50]).all(|(a, b): (&u8, u8)| a.abs_diff(b) <= 3);
+        assert!(loaded.image.pixels().iter().all(close));
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused() {
+        let fault = |bytes: Vec<u8>| decode_texture(bytes).unwrap_err().to_string();
+        assert!(fault(b"v 0 0 0".to_vec()).contains("no PNG or JPEG"));
+        assert!(fault(b"GIF89a\x01\0\x01\0".to_vec()).contains("gif"));
+        let mut cut = two_pixels([1; 3], [2; 3]);
+        cut.truncate(cut.len() - 20);
+        assert!(fault(cut).contains("cannot be decoded"));
+        assert!(fault(claim(20_000)).contains("claims 20000 × 20000"));
+    }
+
+    /// A header that claims this number of pixels a side (with its checksum), and next to nothing behind it.
+    fn claim(side: u32) -> Vec<u8> {
+        let mut claim = two_pixels([1; 3], [2; 3]);
+        claim[16..20].copy_from_slice(&side.to_be_bytes());
+        claim[20..24].copy_from_slice(&side.to_be_bytes());
+        let crc = crc32(&claim[12..29]);
+        claim[29..33].copy_from_slice(&crc.to_be_bytes());
+        claim
+    }
+
+    #[test]
+    fn textures_that_are_too_large_are_errors_whatever_is_behind_their_header() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("wall.png");
+        for (side, fits) in [(23_170, true), (23_171, false), (60_000, false)] {
+            fs::write(&path, claim(side)).unwrap();
+            let read = read_textures(std::slice::from_ref(&path));
+            assert_eq!(read.is_ok(), fits, "{side}");
+            if let Err(e) = read {
+                let expected =
+                    format!("wall.png: is {side} × {side} pixels large, and a texture has 536870912");
+                assert!(e.to_string().contains(&expected), "{e}");
+            }
+        }
+    }
+
+    #[test]
+    fn textures_are_counted_together() {
+        let mut together = Together::default();
+        for _ in 0..2048 {
+            together.add(2048, 2048).unwrap();
+        }
+        assert!(together.add(1, 1).unwrap_err().starts_with("is the texture that makes 2049 of them"));
+        assert!(Together { pixels: u64::MAX, textures: 1 }.add(9, 9).is_err());
+    }
+
+    fn crc32(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(!0u32, |crc, &b| {
+            (0..8).fold(crc ^ u32::from(b), |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 })
+        })
+    }
+
+    #[test]
+    fn a_folder_is_no_file() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(read_file(dir.path()).unwrap_err().to_string().contains("is a folder"));
+        assert!(read_file(&dir.path().join("gone")).unwrap_err().to_string().contains("cannot read"));
+    }
+
+    #[test]
+    #[expect(clippy::print_stderr, reason = "a skipped test says so")]
+    fn the_png_suite_decodes_or_is_refused() {
+        let suite = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/hard-inputs/pngsuite/png");
+        let Ok(entries) = fs::read_dir(&suite) else {
+            eprintln!("skipped: {} is not there", suite.display());
+            return;
+        };
+        let mut paths: Vec<PathBuf> = entries.map(|e| e.unwrap().path()).collect();
+        paths.sort();
+        for (path, texture) in paths.iter().zip(read_textures(&paths).unwrap()) {
+            // Names of the suite that start with x are broken on purpose.
+            let broken = path.file_name().unwrap().to_str().unwrap().starts_with('x');
+            assert_eq!(texture.is_err(), broken, "{}: {:?}", path.display(), texture.map(|_| ()));
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! Meshes with their textures, from any format that is read.
+
+use crate::error::{Error, Result};
+use crate::image::texture::TextureFile;
+use crate::mesh::gltf::read as gltf;
+use crate::mesh::join::MeshSource;
+use crate::mesh::labels::MeshLabels;
+use crate::mesh::obj::read as obj;
+use crate::mesh::ply::read as ply_mesh;
+use crate::quote::count;
+use s3d_geom::glam::{Vec3, vec3};
+use s3d_geom::{MeshError, MeshParts, TriMesh};
+use std::path::{Path, PathBuf};
+
+/// The axis of a file that points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum UpAxis {
+    /// +Y, as in glTF and in the published OBJ files: (x, y, z) of the file is (x, −z, y) of the world.
+    Y,
+    /// +Z, as in the world.
+    Z,
+}
+
+impl UpAxis {
+    /// A point or direction of the file in the world's axes (Z-up).
+    pub fn world_from_file(self, v: Vec3) -> Vec3 {
+        match self {
+            Self::Y => vec3(v.x, -v.z, v.y),
+            Self::Z => v,
+        }
+    }
+}
+
+/// A mesh as it was read, in world metres, Z-up.
+#[derive(Clone, Debug)]
+pub struct MeshFile {
+    /// The mesh. Its faces stand in the order of the file.
+    pub mesh: TriMesh,
+    /// For each texture of the mesh its encoded image, or `None` if the decoded one was altered.
+    pub texture_files: Vec<Option<TextureFile>>,
+    /// What was mended, left out or replaced: a sentence each, for the user.
+    pub warnings: Vec<String>,
+    /// Labels that the file gives its faces or vertices, if it does; aligned with those of `mesh`.
+    pub labels: Option<MeshLabels>,
+    /// The files that the mesh comes from, and where in it each begins.
+    pub sources: Vec<MeshSource>,
+    /// The other files that were read for it: libraries of materials, textures, buffers. Those that it names and that are
+    /// not there are not among them.
+    pub companions: Vec<PathBuf>,
+    /// How many faces of the file had more than three corners.
+    pub polygons_triangulated: usize,
+    /// How many faces were left out because an earlier one has the same corners.
+    pub repeated_faces: usize,
+}
+
+impl MeshFile {
+    /// A mesh of the file `path`, with nothing else to say about it.
+    pub(crate) fn new(path: &Path, mesh: TriMesh) -> Self {
+        let (texture_files, warnings, labels, companions) = Default::default();
+        let sources = vec![MeshSource { path: path.to_owned(), first_face: 0, first_vertex: 0 }];
+        let (polygons_triangulated, repeated_faces) = (0, 0);
+        Self {
+            mesh,
+            texture_files,
+            warnings,
+            labels,
+            sources,
+            companions,
+            polygons_triangulated,
+            repeated_faces,
+        }
+    }
+
+    /// Leaves out the faces that repeat an earlier one; labels follow the tags of the mesh, which are returned.
+    pub(crate) fn tidy(mut self) -> (Self, Vec<u32>) {
+        let (mut mesh, repeated) = self.mesh.without_repeated_faces();
+        let tags = mesh.take_face_tags();
+        if let Some(labels) = self.labels.as_mut().filter(|_| !tags.is_empty()) {
+            labels.pick_faces(&tags);
+        }
+        self.mesh = mesh;
+        self.repeated_faces += repeated;
+        if repeated > 0 {
+            let n = count(repeated, "face");
+            self.warnings.push(format!("{n} left out: earlier faces have the same corners"));
+        }
+        (self, tags)
+    }
+}
+
+/// How a mesh is read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MeshOptions {
+    /// The property of a PLY file's faces or vertices that tells what they are; by default one of the names that
+    /// scanners and data sets use, such as `label`, `class` and `category_id`, if it is there.
+    pub class_column: Option<String>,
+    /// The property that tells which object they belong to; by default one such as `object_id` and `instance`, if it is
+    /// there.
+    pub instance_column: Option<String>,
+}
+
+/// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf`, `.glb` or `.ply`, in any case.
+///
+/// A texture that is missing or cannot be decoded, a face without area, of fewer than three corners or with the corners
+/// of an earlier one and the like do not stop it: they become [`MeshFile::warnings`].
+///
+/// # Errors
+/// [`Error::Unsupported`] for any other ending and for features of a format that are not read, [`Error::Io`],
+/// [`Error::Format`] with the place, and [`Error::Mesh`] if no face is left.
+pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
+    read_mesh_with(path, up, &MeshOptions::default())
+}
+
+/// As [`read_mesh`], with the names of the columns of labels. Only PLY files have such columns.
+///
+/// # Errors
+/// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that is not
+/// whole.
+pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let file = match ending.as_str() {
+        "obj" => obj::read(path, up),
+        "gltf" | "glb" => gltf::read(path, up),
+        "ply" => ply_mesh::read(path, up, options),
+        "" => Err(Error::unsupported(path, "has no ending; meshes are read from .obj, .gltf, .glb and .ply")),
+        _ => {
+            let message = format!(".{ending} is not read; meshes are .obj, .gltf, .glb or .ply");
+            Err(Error::unsupported(path, message))
+        }
+    }?;
+    Ok(file.tidy().0)
+}
+
+/// Makes the mesh, and tells in `warnings` what was mended.
+pub(crate) fn checked_mesh(
+    parts: MeshParts,
+    warnings: &mut Vec<String>,
+) -> std::result::Result<TriMesh, MeshError> {
+    let mesh = TriMesh::new(parts)?;
+    let report = mesh.report();
+    if report.zero_area_faces > 0 {
+        warnings.push(format!("{} of zero area left out", count(report.zero_area_faces, "face")));
+    }
+    if report.non_finite_attributes > 0 {
+        let faces = count(report.non_finite_attributes, "face");
+        warnings.push(format!(
+            "normals or texture coordinates of {faces} left out: not finite, or without length"
+        ));
+    }
+    Ok(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn y_up_files_are_turned() {
+        assert_eq!(UpAxis::Y.world_from_file(vec3(1.0, 2.0, 3.0)), vec3(1.0, -3.0, 2.0));
+        assert_eq!(UpAxis::Y.world_from_file(Vec3::Y), Vec3::Z);
+        assert_eq!(UpAxis::Z.world_from_file(vec3(1.0, 2.0, 3.0)), vec3(1.0, 2.0, 3.0));
+    }
+
+    #[test]
+    fn other_formats_are_refused_by_name() {
+        for (name, word) in [("scan.fbx", ".fbx"), ("scan", "no ending"), ("a.b/scan.PLYX", ".ply")] {
+            let message = read_mesh(Path::new(name), UpAxis::Y).unwrap_err().to_string();
+            assert!(message.contains(word) && message.contains(".obj, .gltf"), "{message}");
+        }
+        assert!(matches!(read_mesh(Path::new("gone.OBJ"), UpAxis::Y), Err(Error::Io { .. })));
+    }
+}

@@ -1,0 +1,415 @@
+//! The parts of a glTF file: its JSON, its buffers and the bytes that its images are made of.
+
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+use crate::error::{Error, Result};
+use crate::image::texture::read_file;
+use base64::Engine;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use gltf::json;
+use serde::Deserialize;
+use std::borrow::Cow;
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Extensions that change nothing that is read, beside all whose names start with `KHR_materials_`: those change
+/// reflections and transparency.
+const HARMLESS: [&str; 5] = [
+    "KHR_texture_transform",
+    "KHR_mesh_quantization",
+    "KHR_lights_punctual",
+    "KHR_xmp_json_ld",
+    "KHR_animation_pointer",
+];
+
+/// What to do about extensions that are not read.
+const WAYS_OUT: [(&str, &str); 6] = [
+    (
+        "KHR_draco_mesh_compression",
+        "export without Draco compression, or run `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "EXT_meshopt_compression",
+        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "KHR_meshopt_compression",
+        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "KHR_texture_basisu",
+        "export PNG or JPEG textures instead of KTX2, or run `gltf-transform ktxdecompress in.glb out.glb`",
+    ),
+    ("EXT_texture_webp", "export PNG or JPEG textures, or run `gltf-transform png in.glb out.glb`"),
+    ("EXT_mesh_gpu_instancing", "export instances as nodes of their own"),
+];
+
+/// A glTF file with its buffers in memory.
+#[derive(Debug)]
+pub(crate) struct GltfDocument {
+    path: PathBuf,
+    /// The JSON. Its indices are not checked; [`GltfDocument::get`] does.
+    pub(crate) root: json::Root,
+    buffers: Vec<Vec<u8>>,
+}
+
+/// What must be known before the JSON is read in full.
+#[derive(Deserialize)]
+struct Head {
+    #[serde(default)]
+    asset: serde_json::Value,
+    #[serde(default, rename = "extensionsRequired")]
+    required: Vec<String>,
+}
+
+impl GltfDocument {
+    /// Reads a `.gltf` or `.glb` file, told apart by its content, and its buffers.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let mut bytes = read_file(path)?;
+        let (text, blob) =
+            if bytes.starts_with(b"glTF") { split_glb(path, &bytes)? } else { (&bytes[..], None) };
+        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+        let is_text = blob.is_none() && !bytes.starts_with(b"glTF");
+        let json_error = |e: serde_json::Error| match is_text {
+            true if e.line() > 0 => Error::line(path, e.line() as u64, format!("is no valid glTF 2.0: {e}")),
+            true => Error::format(path, format!("is no valid glTF 2.0: {e}")),
+            false => Error::format(path, format!("its JSON is no valid glTF 2.0: {e}")),
+        };
+        let head: Head = serde_json::from_slice(text).map_err(json_error)?;
+        check_version(path, &head.asset)?;
+        check_extensions(path, &head.required)?;
+        let root = json::Root::from_slice(text).map_err(json_error)?;
+        let mut document = Self { path: path.to_owned(), root, buffers: Vec::new() };
+        // The chunk stays where it was read to: it is most of the file.
+        let blob = blob.map(|blob| {
+            bytes.truncate(blob.end);
+            bytes.drain(..blob.start);
+            bytes
+        });
+        document.buffers = document.load_buffers(blob)?;
+        Ok(document)
+    }
+
+    /// An error about this file.
+    pub(crate) fn fail(&self, message: impl Into<String>) -> Error {
+        Error::format(&self.path, message)
+    }
+
+    /// The object that `index` points to; `who` and `what` are for the message: "mesh 3", "accessor".
+    pub(crate) fn get<T>(&self, index: json::Index<T>, who: &str, what: &str) -> Result<&T>
+    where
+        json::Root: json::root::Get<T>,
+    {
+        self.root
+            .get(index)
+            .ok_or_else(|| self.fail(format!("{who} points to {what} {index}, which is not there")))
+    }
+
+    /// The bytes of a buffer view.
+    pub(crate) fn view(&self, index: json::Index<json::buffer::View>, who: &str) -> Result<&[u8]> {
+        let view = self.get(index, who, "buffer view")?;
+        self.get(view.buffer, &format!("buffer view {index}"), "buffer")?;
+        let buffer = self.buffers.get(view.buffer.value()).map_or(&[][..], Vec::as_slice);
+        let start = view.byte_offset.map_or(0, |o| o.0);
+        let range = usize::try_from(start).ok().zip(start.checked_add(view.byte_length.0));
+        range.and_then(|(start, end)| buffer.get(start..usize::try_from(end).ok()?)).ok_or_else(|| {
+            self.fail(format!(
+                "buffer view {index} takes {} bytes from {start}, but buffer {} has {}",
+                view.byte_length.0,
+                view.buffer,
+                buffer.len()
+            ))
+        })
+    }
+
+    /// The encoded bytes of an image, and a name for it.
+    ///
+    /// # Errors
+    /// A sentence that follows the image's name: images that are missing do not stop the reading of a mesh.
+    pub(crate) fn image(&self, image: usize) -> (String, std::result::Result<Vec<u8>, String>) {
+        let Some(json) = self.root.images.get(image) else {
+            return (format!("image {image}"), Err("is not there".into()));
+        };
+        let uri = json.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
+        let name = match (uri, &json.name) {
+            (Some(uri), _) => percent_decode(uri).rsplit('/').next().unwrap_or_default().to_owned(),
+            (None, Some(name)) => name.clone(),
+            (None, None) => format!("image_{image}"),
+        };
+        let bytes = match (json.buffer_view, &json.uri) {
+            (Some(view), _) => {
+                self.view(view, &format!("image {image}")).map(<[u8]>::to_vec).map_err(|e| e.to_string())
+            }
+            (None, Some(uri)) => self.resource(uri),
+            (None, None) => Err("has neither a URI nor a buffer view".into()),
+        };
+        (name, bytes)
+    }
+
+    fn load_buffers(&self, mut blob: Option<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
+        let mut buffers = Vec::new();
+        for (i, json) in self.root.buffers.iter().enumerate() {
+            let bytes = match (&json.uri, blob.take_if(|_| i == 0 && json.uri.is_none())) {
+                (Some(uri), _) => self.resource(uri).map_err(|why| {
+                    let name = if uri.starts_with("data:") { "the data URI" } else { uri };
+                    self.fail(format!("buffer {i}: {name} {why}"))
+                })?,
+                (None, Some(blob)) => blob,
+                (None, _) => {
+                    // What an extension compresses may have a buffer that is not there.
+                    let meshopt =
+                        self.root.extensions_used.iter().find(|e| e.ends_with("_meshopt_compression"));
+                    let why = meshopt.map_or_else(String::new, |e| {
+                        format!(": its data are in the extension {e}, which is not read; {}", way_out(e))
+                    });
+                    return Err(self.fail(format!("buffer {i} has neither a URI nor a chunk of a .glb{why}")));
+                }
+            };
+            if (bytes.len() as u64) < json.byte_length.0 {
+                let (is, should) = (bytes.len(), json.byte_length.0);
+                return Err(
+                    self.fail(format!("buffer {i} should have {should} bytes and has {is}; it is cut off"))
+                );
+            }
+            buffers.push(bytes);
+        }
+        Ok(buffers)
+    }
+
+    /// The file that a URI names.
+    fn beside(&self, uri: &str) -> PathBuf {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        // Some exporters do not encode what they write.
+        let written = folder.join(uri);
+        if fs::exists(&written).unwrap_or(false) {
+            written
+        } else {
+            folder.join(percent_decode(uri).as_ref())
+        }
+    }
+
+    /// The files beside this one that its buffers and images are in, those that are there.
+    pub(crate) fn companions(&self) -> Vec<PathBuf> {
+        let buffers = self.root.buffers.iter().filter_map(|b| b.uri.as_deref());
+        let images = self.root.images.iter().filter_map(|i| i.uri.as_deref());
+        let files = buffers.chain(images).filter(|uri| !uri.starts_with("data:") && !uri.contains("://"));
+        files.map(|uri| self.beside(uri)).filter(|path| path.is_file()).collect()
+    }
+
+    /// What a URI stands for: data in itself, or a file beside this one.
+    fn resource(&self, uri: &str) -> std::result::Result<Vec<u8>, String> {
+        if let Some(data) = uri.strip_prefix("data:") {
+            let (kind, data) = data.split_once(',').ok_or("has no data")?;
+            if !kind.ends_with(";base64") {
+                return Ok(percent_decode(data).into_owned().into_bytes());
+            }
+            let config = GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);
+            return GeneralPurpose::new(&STANDARD, config)
+                .decode(data)
+                .map_err(|e| format!("is no base64: {e}"));
+        }
+        if uri.contains("://") {
+            return Err("is on the network; only files beside the mesh are read".into());
+        }
+        let path = self.beside(uri);
+        read_file(&path).map_err(|e| match e {
+            Error::Io { source, .. } => {
+                format!("cannot be read ({source}); it belongs at {}", path.display())
+            }
+            other => other.to_string(),
+        })
+    }
+}
+
+/// The JSON of a `.glb` file, and where its binary chunk is.
+fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Range<usize>>)> {
+    let cut = || {
+        Error::format(path, format!("is cut off: a .glb of {} bytes does not hold its chunks", bytes.len()))
+    };
+    // "glTF", the version and the length of the file; then chunks of a length, a kind and data.
+    let (_, rest) = bytes.split_first_chunk::<4>().ok_or_else(cut)?;
+    let (version, rest) = rest.split_first_chunk().ok_or_else(cut)?;
+    match u32::from_le_bytes(*version) {
+        2 => {}
+        1 => return Err(old_version(path, "1.0")),
+        other => {
+            return Err(Error::unsupported(path, format!("is binary glTF of version {other}; 2 is read")));
+        }
+    }
+    let mut chunks = [const { None }; 2];
+    let (_, mut rest) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
+    // Chunks beyond the second belong to extensions.
+    for (chunk, kind) in chunks.iter_mut().zip([*b"JSON", *b"BIN\0"]) {
+        if rest.is_empty() {
+            break;
+        }
+        let (length, after) = rest.split_first_chunk().ok_or_else(cut)?;
+        let (found, after) = after.split_first_chunk().ok_or_else(cut)?;
+        if *found != kind {
+            break;
+        }
+        let length = usize::try_from(u32::from_le_bytes(*length)).ok();
+        let (data, after) = length.and_then(|n| after.split_at_checked(n)).ok_or_else(cut)?;
+        let start = bytes.len().saturating_sub(data.len().saturating_add(after.len()));
+        *chunk = Some(start..start.saturating_add(data.len()));
+        rest = after;
+    }
+    let [json, blob] = chunks;
+    let json = json.and_then(|json| bytes.get(json));
+    Ok((json.ok_or_else(|| Error::format(path, "is a .glb without a JSON chunk"))?, blob))
+}
+
+fn check_version(path: &Path, asset: &serde_json::Value) -> Result<()> {
+    let version = |key: &str| asset.get(key).and_then(serde_json::Value::as_str);
+    match version("version") {
+        Some(v) if v.starts_with("2.") => {}
+        Some(v) if v.starts_with("1.") || v.starts_with("0.") => return Err(old_version(path, v)),
+        Some(v) => return Err(Error::unsupported(path, format!("is glTF {v}; 2.0 is read"))),
+        None => return Err(Error::format(path, "is no glTF: asset.version is missing")),
+    }
+    match version("minVersion") {
+        Some(v) if v != "2.0" => {
+            Err(Error::unsupported(path, format!("needs a reader of glTF {v}; 2.0 is read")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn old_version(path: &Path, version: &str) -> Error {
+    let way_out = "convert it, for example by importing it into Blender and exporting glTF 2.0";
+    Error::unsupported(path, format!("is glTF {version}, which differs from 2.0 and is not read; {way_out}"))
+}
+
+fn check_extensions(path: &Path, required: &[String]) -> Result<()> {
+    let known = |e: &str| HARMLESS.contains(&e) || e.starts_with("KHR_materials_");
+    let Some(extension) = required.iter().find(|e| !known(e)) else { return Ok(()) };
+    let way_out = way_out(extension);
+    Err(Error::unsupported(path, format!("requires the extension {extension}, which is not read; {way_out}")))
+}
+
+/// What to do about an extension that is not read.
+pub(crate) fn way_out(extension: &str) -> &'static str {
+    WAYS_OUT.iter().find(|(name, _)| *name == extension).map_or("export without it", |(_, way)| *way)
+}
+
+/// `text` with `%20` and the like replaced. What is not an escape stays.
+fn percent_decode(text: &str) -> Cow<'_, str> {
+    if !text.contains('%') {
+        return Cow::Borrowed(text);
+    }
+    let escape = |rest: &[u8]| {
+        let [high, low] = *rest.first_chunk()?;
+        let digits = [high, low].iter().all(u8::is_ascii_hexdigit).then_some([high, low])?;
+        u8::from_str_radix(std::str::from_utf8(&digits).ok()?, 16).ok()
+    };
+    let (mut out, mut rest) = (Vec::new(), text.as_bytes());
+    while let Some((&byte, after)) = rest.split_first() {
+        let escaped = Some(after).filter(|_| byte == b'%').and_then(escape);
+        out.push(escaped.unwrap_or(byte));
+        rest = if escaped.is_some() { after.get(2..).unwrap_or_default() } else { after };
+    }
+    String::from_utf8(out).map_or(Cow::Borrowed(text), Cow::Owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn open(name: &str, bytes: &[u8]) -> Result<GltfDocument> {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("two words.bin"), [1, 2, 3, 4]).unwrap();
+        let path = dir.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        GltfDocument::open(&path)
+    }
+
+    fn error(json: &str) -> String {
+        open("a.gltf", json.as_bytes()).unwrap_err().to_string()
+    }
+
+    fn glb(version: u32, json: &str, bin: &[u8]) -> Vec<u8> {
+        let mut out = b"glTF".to_vec();
+        for word in [version, 0, json.len() as u32] {
+            out.extend(word.to_le_bytes());
+        }
+        out.extend(b"JSON");
+        out.extend(json.bytes());
+        out.extend((bin.len() as u32).to_le_bytes());
+        out.extend(b"BIN\0");
+        out.extend(bin);
+        out
+    }
+
+    #[test]
+    fn buffers_come_from_uris_files_and_the_chunk() {
+        let json = r#"{"asset": {"version": "2.0"}, "buffers": [
+            {"byteLength": 3, "uri": "data:application/octet-stream;base64,BQYH"},
+            {"byteLength": 4, "uri": "two%20words.bin"}, {"byteLength": 1, "uri": "data:,%41"}]}"#;
+        let document = open("a.gltf", json.as_bytes()).unwrap();
+        assert_eq!(document.buffers, [vec![5, 6, 7], vec![1, 2, 3, 4], vec![65]]);
+        let json = r#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 2}]}"#;
+        assert_eq!(open("a.glb", &glb(2, json, &[8, 9])).unwrap().buffers, [vec![8, 9]]);
+    }
+
+    #[test]
+    fn views_stay_inside_their_buffer() {
+        let json = r#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 3, "uri": "data:;base64,BQYH"}],
+            "bufferViews": [{"buffer": 0, "byteOffset": 1, "byteLength": 2}, {"buffer": 0, "byteLength": 4},
+            {"buffer": 0, "byteOffset": 18446744073709551615, "byteLength": 2}, {"buffer": 7, "byteLength": 1}]}"#;
+        let document = open("a.gltf", json.as_bytes()).unwrap();
+        assert_eq!(document.view(json::Index::new(0), "x").unwrap(), [6, 7]);
+        for (view, words) in [
+            (1, "takes 4 bytes from 0, but buffer 0 has 3"),
+            (2, "takes 2"),
+            (3, "buffer 7"),
+            (4, "buffer view 4"),
+        ] {
+            let message = document.view(json::Index::new(view), "x").unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_read_is_refused_by_name() {
+        let required =
+            |e: &str| error(&format!(r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["{e}"]}}"#));
+        assert!(required("KHR_draco_mesh_compression").contains("without Draco"));
+        assert!(required("XYZ_thing").contains("XYZ_thing, which is not read"));
+        assert!(error(r#"{"asset": {"version": "1.0"}, "meshes": {}}"#).contains("is glTF 1.0"));
+        assert!(
+            error(r#"{"asset": {"version": "2.1", "minVersion": "2.1"}}"#).contains("reader of glTF 2.1")
+        );
+        assert!(error("{}").contains("asset.version is missing"));
+        assert!(error("{\n\"asset\": ]").contains("line 2"));
+        let harmless = r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_materials_unlit"]}"#;
+        assert!(open("a.gltf", harmless.as_bytes()).is_ok());
+    }
+
+    #[test]
+    fn broken_containers_are_refused() {
+        let whole = glb(2, r#"{"asset": {"version": "2.0"}}"#, &[1, 2, 3]);
+        for length in [4, 8, 15, 19, 30, whole.len() - 1] {
+            let message = open("a.glb", &whole[..length]).unwrap_err().to_string();
+            assert!(message.contains("cut off") || message.contains("JSON chunk"), "{length}: {message}");
+        }
+        assert!(open("a.glb", &glb(1, "{}", &[])).unwrap_err().to_string().contains("glTF 1.0"));
+        let buffer = |b: &str| {
+            error(&format!(r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 9, {b}}}]}}"#))
+        };
+        assert!(buffer(r#""uri": "gone.bin""#).contains("gone.bin cannot be read"));
+        assert!(buffer(r#""uri": "https://a.b/c.bin""#).contains("on the network"));
+        assert!(buffer(r#""uri": "data:;base64,!!""#).contains("no base64"));
+        assert!(buffer(r#""uri": "two%20words.bin""#).contains("should have 9 bytes and has 4"));
+        assert!(buffer(r#""name": "x""#).contains("neither"));
+    }
+
+    #[test]
+    fn escapes() {
+        assert_eq!(percent_decode("a%20b%C3%A4"), "a bä");
+        assert_eq!(percent_decode("100%"), "100%");
+        assert_eq!(percent_decode("%zz%4"), "%zz%4");
+        assert_eq!(percent_decode("%ff"), "%ff");
+    }
+}

@@ -1,0 +1,264 @@
+//! Meshes in several files, joined to one.
+
+use crate::error::{Error, Result};
+use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, read_mesh_with};
+use crate::mesh::labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
+use s3d_geom::{NO_INDEX, TriMesh};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// A file that a mesh comes from. Its faces and vertices go on to where those of the next file begin.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Its first face in the mesh.
+    pub first_face: u32,
+    /// Its first vertex in the mesh.
+    pub first_vertex: u32,
+}
+
+impl MeshFile {
+    /// The faces that come from `sources[source]`. Numbers of objects may mean different objects in different files.
+    ///
+    /// # Panics
+    /// If there is no such source.
+    #[expect(clippy::indexing_slicing, reason = "another source is a caller's mistake: see Panics")]
+    pub fn faces_of(&self, source: usize) -> Range<u32> {
+        let end = self.sources.get(source + 1).map_or(self.mesh.faces().len() as u32, |next| next.first_face);
+        self.sources[source].first_face..end
+    }
+}
+
+/// Reads the meshes of `paths` and joins them in this order: vertices, faces, materials and textures of the first file,
+/// then those of the second… Each texture stays one of its own, whatever its name. Warnings name their file, if there
+/// are several.
+///
+/// A column that only some files have is filled up as [`s3d_geom::MeshParts::append`] tells; vertex labels become labels of faces
+/// if other files label faces, and what a file does not label has [`NO_LABEL`].
+///
+/// # Errors
+/// As [`read_mesh_with`] for each file; [`Error::Format`] if `paths` is empty or the meshes have too many vertices
+/// together.
+pub fn read_meshes(paths: &[PathBuf], up: UpAxis) -> Result<MeshFile> {
+    read_meshes_with(paths, up, &MeshOptions::default())
+}
+
+/// As [`read_meshes`], with the names of the columns of labels.
+///
+/// # Errors
+/// As [`read_meshes`].
+pub fn read_meshes_with(paths: &[PathBuf], up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
+    let Some((first, others)) = paths.split_first() else {
+        return Err(Error::format(Path::new(""), "a scene needs at least one mesh"));
+    };
+    let mut joined = read_mesh_with(first, up, options)?;
+    if others.is_empty() {
+        return Ok(joined);
+    }
+    name_warnings(&mut joined.warnings, first);
+    for path in others {
+        let mut next = read_mesh_with(path, up, options)?;
+        name_warnings(&mut next.warnings, path);
+        joined = join(joined, next)?;
+    }
+    let faces = joined.mesh.faces().len() as u32;
+    joined.mesh = joined.mesh.with_face_tags((0..faces).collect());
+    let (mut joined, kept) = joined.tidy();
+    for source in &mut joined.sources {
+        source.first_face = kept.partition_point(|&face| face < source.first_face) as u32;
+    }
+    Ok(joined)
+}
+
+/// The mesh `next` behind `joined`.
+fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
+    let sizes =
+        |m: &TriMesh| [m.positions().len(), m.parts().uvs.len(), m.parts().normals.len(), m.faces().len()];
+    let together = sizes(&joined.mesh).into_iter().zip(sizes(&next.mesh)).map(|(a, b)| a + b);
+    if together.max() >= Some(NO_INDEX as usize) {
+        let path = next.sources.first().map_or(Path::new(""), |s| &s.path);
+        let message = "makes more vertices or faces than 32 bits count, with the meshes before it; cut the scene in parts";
+        return Err(Error::format(path, message));
+    }
+    let [first_face, first_vertex] = [joined.mesh.faces().len() as u32, joined.mesh.positions().len() as u32];
+    let labels = match (joined.labels, next.labels) {
+        (None, None) => None,
+        (a, b) => Some(joined_labels((a, &joined.mesh), (b, &next.mesh))),
+    };
+    let mut sources = joined.sources;
+    sources.extend(next.sources.into_iter().map(|s| MeshSource {
+        path: s.path,
+        first_face: first_face + s.first_face,
+        first_vertex: first_vertex + s.first_vertex,
+    }));
+    Ok(MeshFile {
+        mesh: joined.mesh.join(next.mesh),
+        texture_files: [joined.texture_files, next.texture_files].concat(),
+        warnings: [joined.warnings, next.warnings].concat(),
+        labels,
+        sources,
+        companions: [joined.companions, next.companions].concat(),
+        polygons_triangulated: joined.polygons_triangulated + next.polygons_triangulated,
+        repeated_faces: joined.repeated_faces + next.repeated_faces,
+    })
+}
+
+type Labelled<'a> = (Option<MeshLabels>, &'a TriMesh);
+
+/// The labels of two meshes, one behind the other: of vertices where both have them for vertices, else of faces. Files
+/// have numbers, never names.
+fn joined_labels(a: Labelled<'_>, b: Labelled<'_>) -> MeshLabels {
+    let of_faces =
+        |labels: &Option<MeshLabels>| labels.as_ref().is_some_and(|l| l.element() == LabelElement::Face);
+    let element = if of_faces(&a.0) || of_faces(&b.0) { LabelElement::Face } else { LabelElement::Vertex };
+    let columns = |(labels, mesh): Labelled<'_>| {
+        let (n, labels) = match element {
+            LabelElement::Face => (mesh.faces().len(), labels.map(|l| l.into_faces(mesh))),
+            LabelElement::Vertex => (mesh.positions().len(), labels),
+        };
+        match labels {
+            Some(MeshLabels::Numbers { class, instance, .. }) => (n, [class, instance]),
+            _ => (n, [None, None]),
+        }
+    };
+    let ((n, a), (m, b)) = (columns(a), columns(b));
+    let join = |a: Option<LabelColumn>, b: Option<LabelColumn>| {
+        let name = a.as_ref().or(b.as_ref())?.name.clone();
+        let mut values = a.map_or_else(|| vec![NO_LABEL; n], |c| c.values);
+        values.extend(b.map_or_else(|| vec![NO_LABEL; m], |c| c.values));
+        Some(LabelColumn { name, values })
+    };
+    let ([class_a, instance_a], [class_b, instance_b]) = (a, b);
+    MeshLabels::Numbers { element, class: join(class_a, class_b), instance: join(instance_a, instance_b) }
+}
+
+fn name_warnings(warnings: &mut [String], path: &Path) {
+    let shown = path.display().to_string();
+    for warning in warnings {
+        // Those about a library name a file already.
+        if !warning.starts_with(&shown) {
+            *warning = format!("{shown}: {warning}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::texture::tests::two_pixels;
+    use s3d_geom::FaceColor;
+    use std::fs;
+
+    const HEAD: &str =
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+    const SQUARE: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+
+    /// A square whose two faces have classes and objects.
+    fn labelled_faces() -> String {
+        format!(
+            "{HEAD}element face 2\nproperty list uchar int vertex_indices\nproperty int category_id\n\
+             property int object_id\nend_header\n{SQUARE}3 0 1 2 4 40\n3 0 2 3 5 50\n"
+        )
+    }
+
+    /// A square, two metres higher, whose vertices have classes.
+    fn labelled_vertices() -> String {
+        let square = SQUARE.replace(" 0\n", " 2 7\n").replacen(" 7", " 6", 1);
+        format!(
+            "{HEAD}property uchar label\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n{square}4 0 1 2 3\n"
+        )
+    }
+
+    fn values(column: &Option<LabelColumn>) -> (&str, Vec<i64>) {
+        column.as_ref().map(|c| (c.name.as_str(), c.values.clone())).unwrap()
+    }
+
+    #[test]
+    fn files_are_joined_in_order_with_their_textures_and_warnings() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut paths = Vec::new();
+        for (folder, z, color) in [("a", 0, [9, 8, 7]), ("b", 1, [1, 2, 3])] {
+            let folder = dir.path().join(folder);
+            fs::create_dir(&folder).unwrap();
+            fs::write(folder.join("wall.png"), two_pixels(color, color)).unwrap();
+            fs::write(folder.join("wall.mtl"), "newmtl wall\nmap_Kd wall.png\n").unwrap();
+            // The third face repeats the first, and so does the only one of the last file.
+            let obj = format!(
+                "mtllib wall.mtl\nv 0 0 {z}\nv 1 0 {z}\nv 0 1 {z}\nv 1 1 {z}\nvt 0 0\nusemtl wall\n\
+                 f 1/1 2/1 3/1\nf 2/1 4/1 3/1\nf 3/1 2/1 1/1\n"
+            );
+            paths.push(folder.join("mesh.obj"));
+            fs::write(&paths[paths.len() - 1], obj).unwrap();
+        }
+        paths.push(dir.path().join("c.obj"));
+        fs::write(&paths[2], "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\nf 1 2 4\n").unwrap();
+
+        let file = read_meshes(&paths, UpAxis::Z).unwrap();
+        assert_eq!(file.mesh.faces(), [[0, 1, 2], [1, 3, 2], [4, 5, 6], [5, 7, 6], [8, 9, 11]]);
+        for (face, pixel) in [(0, [9, 8, 7]), (1, [9, 8, 7]), (2, [1, 2, 3]), (3, [1, 2, 3])] {
+            let FaceColor::Texture(_, texture, _) = file.mesh.color_of(face) else { panic!() };
+            assert_eq!((texture.name.as_str(), texture.image.pixels()[0]), ("wall.png", pixel));
+        }
+        assert!(matches!(file.mesh.color_of(4), FaceColor::Flat(_)));
+        assert_eq!(file.texture_files.iter().flatten().count(), 2);
+        assert_eq!((0..3).map(|s| file.faces_of(s)).collect::<Vec<_>>(), [0..2, 2..4, 4..5]);
+        assert_eq!(file.sources.iter().map(|s| s.first_vertex).collect::<Vec<_>>(), [0, 4, 8]);
+        assert_eq!(file.repeated_faces, 3);
+        for (warning, path) in file.warnings.iter().zip(&paths) {
+            let words = format!("{}: 1 face left out: earlier faces", path.display());
+            assert!(warning.starts_with(&words) || path.ends_with("c.obj"), "{warning}");
+        }
+        assert_eq!(file.warnings.len(), 3);
+    }
+
+    #[test]
+    fn labels_of_faces_and_vertices_are_joined() {
+        let dir = tempfile::tempdir().unwrap();
+        let paths: Vec<PathBuf> = [
+            ("faces.ply", labelled_faces()),
+            ("vertices.ply", labelled_vertices()),
+            ("none.obj", "v 0 0 9\nv 1 0 9\nv 1 1 9\nf 1 2 3\n".into()),
+        ]
+        .map(|(name, text)| {
+            fs::write(dir.path().join(name), text).unwrap();
+            dir.path().join(name)
+        })
+        .to_vec();
+        let file = read_meshes(&paths, UpAxis::Z).unwrap();
+        let Some(MeshLabels::Numbers { element: LabelElement::Face, class, instance }) = &file.labels else {
+            panic!()
+        };
+        assert_eq!(values(class), ("category_id", vec![4, 5, 7, 7, NO_LABEL]));
+        assert_eq!(values(instance), ("object_id", vec![40, 50, NO_LABEL, NO_LABEL, NO_LABEL]));
+        assert!(file.warnings.is_empty(), "{:?}", file.warnings);
+
+        // The second time all its faces repeat earlier ones.
+        let twice = [paths[1].clone(), paths[2].clone(), paths[1].clone()];
+        let file = read_meshes(&twice, UpAxis::Z).unwrap();
+        let Some(MeshLabels::Numbers { element: LabelElement::Vertex, class, instance: None }) = &file.labels
+        else {
+            panic!("{:?}", file.labels)
+        };
+        let none = NO_LABEL;
+        assert_eq!(values(class).1, [6, 7, 7, 7, none, none, none, 6, 7, 7, 7]);
+        assert_eq!((0..3).map(|s| file.faces_of(s)).collect::<Vec<_>>(), [0..2, 2..3, 3..3]);
+
+        // Faces that go take their labels along.
+        let file = read_meshes(&[paths[0].clone(), paths[2].clone(), paths[0].clone()], UpAxis::Z).unwrap();
+        let Some(MeshLabels::Numbers { class, .. }) = &file.labels else { panic!() };
+        assert_eq!((values(class).1, file.mesh.faces().len()), (vec![4, 5, none], 3));
+    }
+
+    #[test]
+    fn one_file_is_as_read_mesh_reads_it_and_none_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.ply");
+        fs::write(&path, labelled_faces().replace("3 0 2 3 5 50", "3 2 1 0 5 50")).unwrap();
+        let file = read_meshes(std::slice::from_ref(&path), UpAxis::Z).unwrap();
+        assert_eq!(file.warnings, ["1 face left out: earlier faces have the same corners"]);
+        assert!(read_meshes(&[], UpAxis::Z).unwrap_err().to_string().contains("at least one mesh"));
+        let gone = dir.path().join("gone.obj");
+        assert!(read_meshes(&[path, gone], UpAxis::Z).unwrap_err().to_string().contains("gone.obj"));
+    }
+}

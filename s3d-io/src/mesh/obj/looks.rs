@@ -1,0 +1,297 @@
+//! How the faces of an OBJ file look: its libraries and the images that they name.
+
+use crate::error::Result;
+use crate::image::texture::{TextureFile, read_file, read_textures};
+use crate::mesh::obj::lines::{after, logical_lines, text};
+use crate::mesh::obj::mtl::{MtlMaterial, parse_mtl};
+use crate::quote::{count, quote};
+use s3d_geom::{DEFAULT_COLOR, Material, Raster, Texture, Wrap};
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+/// The names in an OBJ file, found ahead of everything else in it: with them its images can be decoded while it is read.
+#[derive(Default)]
+pub(crate) struct ObjNames {
+    /// Those that `usemtl` gives, in the order of their first use.
+    pub(crate) materials: Vec<String>,
+    /// The lines and names of `mtllib`.
+    libraries: Vec<(u64, String)>,
+}
+
+impl ObjNames {
+    /// Finds them in the content of a file.
+    pub(crate) fn find(bytes: &[u8]) -> Self {
+        let mut names = Self::default();
+        let mut known = HashSet::new();
+        for (number, line) in logical_lines(bytes) {
+            // Most lines are of vertices and faces.
+            if !matches!(line.first(), Some(b'u' | b'm')) {
+                continue;
+            }
+            let keyword = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+            let name = text(after(&line, keyword).trim_ascii());
+            match keyword {
+                b"usemtl" if known.insert(name.clone()) => names.materials.push(name),
+                b"mtllib" => names.libraries.push((number, name)),
+                _ => {}
+            }
+        }
+        names
+    }
+}
+
+/// Materials and textures of the faces.
+#[derive(Default)]
+pub(crate) struct ObjLooks {
+    /// In the order of [`ObjNames::materials`].
+    pub(crate) materials: Vec<Material>,
+    pub(crate) textures: Vec<Texture>,
+    /// One a texture.
+    pub(crate) files: Vec<Option<TextureFile>>,
+    /// The libraries and images that were read.
+    pub(crate) companions: Vec<PathBuf>,
+}
+
+/// A material of a library, and the library's folder and name for messages.
+struct Found {
+    material: MtlMaterial,
+    library: PathBuf,
+}
+
+impl ObjLooks {
+    /// Reads the libraries that the file at `path` has `names` of, and the images of the materials that it uses.
+    ///
+    /// # Errors
+    /// For images that are too large.
+    pub(crate) fn load(path: &Path, names: &ObjNames, warnings: &mut Vec<String>) -> Result<Self> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut looks = Self::default();
+        let library = load_libraries(folder, &names.libraries, &mut looks.companions, warnings);
+        let mut wanted: Vec<PathBuf> = Vec::new();
+        let mut place_of: HashMap<PathBuf, usize> = HashMap::new();
+        let mut unknown: Vec<&str> = Vec::new();
+        // For each material the image, into `wanted`, and how it repeats.
+        let mut maps: Vec<Option<(usize, [Wrap; 2])>> = Vec::new();
+        for name in &names.materials {
+            let found = library.get(name.as_str());
+            let color = found.map_or(DEFAULT_COLOR, |f| f.material.color);
+            looks.materials.push(Material { name: name.clone(), color, texture: None });
+            let mut map = None;
+            if let Some((f, m)) = found.and_then(|f| Some((f, f.material.map.as_ref()?))) {
+                match find_image(&m.file, f.library.parent().unwrap_or(folder), folder) {
+                    Some((image, exact)) => {
+                        if !exact {
+                            let (image, written) = (image.display(), quote(m.file.as_bytes()));
+                            let line = m.line;
+                            warnings.push(format!(
+                                "{}, line {line}: {written} is not there; {image} is used",
+                                f.library.display()
+                            ));
+                        }
+                        let at = *place_of.entry(image.clone()).or_insert(wanted.len());
+                        if at == wanted.len() {
+                            wanted.push(image);
+                        }
+                        map = Some((at, m.wrap));
+                    }
+                    None => warnings.push(format!(
+                        "{}, line {}: texture {} is not there; material {} has its colour instead",
+                        f.library.display(),
+                        m.line,
+                        quote(m.file.as_bytes()),
+                        quote(name.as_bytes())
+                    )),
+                }
+            }
+            maps.push(map);
+            if found.is_none() {
+                unknown.push(name);
+            }
+        }
+        if let Some(first) = unknown.first() {
+            let n = count(unknown.len(), "material");
+            warnings
+                .push(format!("{n} in no library and drawn gray, the first is {}", quote(first.as_bytes())));
+        }
+        looks.load_images(&wanted, &maps, warnings)?;
+        looks.companions.append(&mut wanted);
+        Ok(looks)
+    }
+
+    /// Decodes the images and lays them on their materials: a texture for each way in which an image repeats.
+    fn load_images(
+        &mut self,
+        wanted: &[PathBuf],
+        maps: &[Option<(usize, [Wrap; 2])>],
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        for ((at, loaded), image) in read_textures(wanted)?.into_iter().enumerate().zip(wanted) {
+            let users = maps.iter().enumerate().filter_map(|(m, map)| Some((m, (*map)?)));
+            let users: Vec<(usize, [Wrap; 2])> =
+                users.filter(|(_, (i, _))| *i == at).map(|(m, (_, wrap))| (m, wrap)).collect();
+            let mut texture = match loaded {
+                Ok(texture) => texture,
+                Err(why) => {
+                    let materials = count(users.len(), "material");
+                    warnings.push(format!(
+                        "texture {} {why}; {materials} drawn in their colour",
+                        image.display()
+                    ));
+                    continue;
+                }
+            };
+            let mut wraps: Vec<[Wrap; 2]> = Vec::new();
+            for &(material, wrap) in &users {
+                let place = wraps.iter().position(|w| *w == wrap).unwrap_or_else(|| {
+                    wraps.push(wrap);
+                    wraps.len() - 1
+                });
+                if let Some(material) = self.materials.get_mut(material) {
+                    material.texture = Some((self.textures.len() + place) as u32);
+                }
+            }
+            let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            while let Some((&wrap, more)) = wraps.split_first() {
+                // The last takes the image: most have no second.
+                let (pixels, file) = if more.is_empty() {
+                    let pixels = std::mem::replace(&mut texture.image, Raster::from_vec(0, 0, Vec::new()));
+                    (pixels, std::mem::take(&mut texture.file.bytes))
+                } else {
+                    (texture.image.clone(), texture.file.bytes.clone())
+                };
+                self.textures.push(Texture { name: name.clone(), image: pixels, wrap });
+                self.files.push(Some(TextureFile { extension: texture.file.extension, bytes: file }));
+                wraps.remove(0);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// All materials of all libraries by name; of two with one name the later counts.
+fn load_libraries(
+    folder: &Path,
+    libraries: &[(u64, String)],
+    read: &mut Vec<PathBuf>,
+    warnings: &mut Vec<String>,
+) -> HashMap<String, Found> {
+    let mut found = HashMap::new();
+    for (line, names) in libraries {
+        // A name may hold spaces, and a line may hold several names.
+        let whole = resolve(folder, names);
+        let files: Vec<PathBuf> = if whole.is_file() || names.split_whitespace().count() < 2 {
+            vec![whole]
+        } else {
+            names.split_whitespace().map(|name| resolve(folder, name)).collect()
+        };
+        for library in files {
+            match read_file(&library) {
+                Ok(bytes) => {
+                    if !read.contains(&library) {
+                        read.push(library.clone());
+                    }
+                    let (materials, complaints) = parse_mtl(&bytes);
+                    warnings.extend(complaints.iter().map(|c| format!("{}, {c}", library.display())));
+                    for material in materials {
+                        found.insert(material.name.clone(), Found { material, library: library.clone() });
+                    }
+                }
+                Err(e) => warnings.push(format!("line {line}: the materials of {names:?} are missing: {e}")),
+            }
+        }
+    }
+    found
+}
+
+/// `name` as a path below `folder`, with either slash.
+fn resolve(folder: &Path, name: &str) -> PathBuf {
+    let as_written = folder.join(name);
+    if as_written.is_file() { as_written } else { folder.join(name.replace('\\', "/")) }
+}
+
+/// Where the image `name` is: below the library's folder, below the OBJ file's, or, as other machines' paths are
+/// worth nothing here, by its last part beside either. `true` if it is where `name` says.
+pub(crate) fn find_image(name: &str, library: &Path, folder: &Path) -> Option<(PathBuf, bool)> {
+    let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    [(name, library, true), (name, folder, true), (last, library, false), (last, folder, false)]
+        .into_iter()
+        .map(|(name, folder, exact)| (resolve(folder, name), exact))
+        .find(|(path, _)| path.is_file())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::texture::tests::two_pixels;
+    use crate::mesh::file::{MeshFile, UpAxis};
+    use s3d_geom::FaceColor;
+    use std::fs;
+
+    /// Reads `obj` in a folder that holds `files` too.
+    fn read_with(obj: &str, files: &[(&str, &[u8])]) -> MeshFile {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, bytes) in files {
+            let path = dir.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, bytes).unwrap();
+        }
+        let path = dir.path().join("a.obj");
+        fs::write(&path, obj).unwrap();
+        crate::mesh::obj::read::read(&path, UpAxis::Z).unwrap()
+    }
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n";
+
+    const LIBRARY: &[u8] = b"newmtl a\nKd 1 0 0\nmap_Kd -clamp on tex\\two words.png\nnewmtl b\nKd 0 1 0\nmap_Kd tex/two words.png\nnewmtl c\nKd 0 0 1\nmap_Kd gone.png\nnewmtl d\nKd 0 0.2 0\nmap_Kd bad.png\n";
+
+    #[test]
+    fn materials_and_textures() {
+        let obj = format!(
+            "mtllib no lib.mtl\nmtllib lib.mtl other.mtl\n{SQUARE}usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\nusemtl c\nf 1/1 2/2 3/3\n\
+            usemtl d\nf 1/1 2/2 3/3\nusemtl e\nf 1/1 2/2 3/3\nusemtl a\nf 1 2 3\nusemtl f\nf 1 2 3\n"
+        );
+        let png = two_pixels([10, 20, 30], [40, 50, 60]);
+        let files: [(&str, &[u8]); 4] = [
+            ("lib.mtl", LIBRARY),
+            ("other.mtl", b"newmtl e\nKd 1 1 1\n"),
+            ("tex/two words.png", &png),
+            ("bad.png", b"no image"),
+        ];
+        let file = read_with(&obj, &files);
+        let mesh = &file.mesh;
+        let textures: Vec<_> =
+            mesh.textures().iter().map(|t| (t.name.as_str(), t.wrap[0], t.image.len())).collect();
+        assert_eq!(textures, [("two words.png", Wrap::Clamp, 2), ("two words.png", Wrap::Repeat, 2)]);
+        let read: Vec<&str> =
+            file.companions.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(read, ["lib.mtl", "other.mtl", "two words.png", "bad.png"]);
+        let kept = TextureFile { extension: "png", bytes: png.clone() };
+        assert_eq!(file.texture_files, [Some(kept.clone()), Some(kept)]);
+        assert!(matches!(mesh.color_of(0), FaceColor::Texture(0, ..)));
+        assert!(matches!(mesh.color_of(1), FaceColor::Texture(1, ..)));
+        for (face, color) in
+            [(2, [0, 0, 255]), (3, [0, 51, 0]), (4, [255; 3]), (5, [255, 0, 0]), (6, DEFAULT_COLOR)]
+        {
+            assert!(matches!(mesh.color_of(face), FaceColor::Flat(c) if c == color), "{face}");
+        }
+        let told = file.warnings.join("\n");
+        for words in [
+            "line 1: the materials of \"no lib.mtl\" are missing",
+            "lib.mtl, line 9: texture `gone.png` is not there; material `c`",
+            "bad.png is no PNG or JPEG image; 1 material",
+            "1 material in no library and drawn gray, the first is `f`",
+        ] {
+            assert!(told.contains(words), "{words}: {told}");
+        }
+    }
+
+    #[test]
+    fn a_texture_of_another_machine_is_found_by_its_last_part() {
+        let mtl = b"newmtl a\nmap_Kd C:\\scans\\out\\t.png\n";
+        let png = two_pixels([1; 3], [2; 3]);
+        let obj = format!("mtllib lib/a.mtl\n{SQUARE}usemtl a\nf 1/1 2/2 3/3\n");
+        let file = read_with(&obj, &[("lib/a.mtl", mtl), ("t.png", &png)]);
+        assert_eq!(file.mesh.textures().len(), 1);
+        assert!(file.warnings[0].contains("is not there") && file.warnings[0].contains("t.png is used"));
+    }
+}

@@ -1,0 +1,178 @@
+//! Material libraries of OBJ files: the three statements that say how a face looks, `newmtl`, `Kd` and `map_Kd`.
+//!
+//! tobj reads these files too, but panics on a `Kd` of fewer than three numbers, gives up a whole library for one
+//! malformed line of no interest, and takes the options of `map_Kd` for a part of the file's name.
+
+use crate::mesh::obj::lines::{after, logical_lines, parse_f32, text, without_comment, words};
+use crate::mesh::obj::write::{WRAP_COMMENT, wrap_name};
+use crate::quote::quote;
+use s3d_geom::{DEFAULT_COLOR, Wrap};
+
+/// A material as its library describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MtlMaterial {
+    pub(crate) name: String,
+    /// `Kd`, as encoded.
+    pub(crate) color: [u8; 3],
+    pub(crate) map: Option<MtlMap>,
+}
+
+/// What `map_Kd` says.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MtlMap {
+    /// The image's name as written.
+    pub(crate) file: String,
+    pub(crate) wrap: [Wrap; 2],
+    pub(crate) line: u64,
+}
+
+/// The materials of a library in its order, and warnings, each starting with its line.
+pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
+    let mut materials: Vec<MtlMaterial> = Vec::new();
+    let mut warnings = Vec::new();
+    // What a comment of ours says of the texture to come.
+    let mut wrap = None;
+    for (number, line) in logical_lines(bytes) {
+        let line = &*line;
+        let Some(keyword) = words(line).next() else { continue };
+        let rest = after(line, keyword).trim_ascii();
+        if keyword.eq_ignore_ascii_case(b"newmtl") {
+            materials.push(MtlMaterial { name: text(rest), color: DEFAULT_COLOR, map: None });
+            continue;
+        }
+        if let Some(words) = line.strip_prefix(WRAP_COMMENT.as_bytes()) {
+            wrap = parse_wrap(words);
+            continue;
+        }
+        let Some(material) = materials.last_mut() else { continue };
+        if keyword == b"Kd" {
+            match parse_color(rest) {
+                Some(color) => material.color = color,
+                None => warnings.push(format!("line {number}: {} is no colour", quote(line))),
+            }
+        } else if keyword.eq_ignore_ascii_case(b"map_Kd") {
+            let (mut map, ignored) = parse_map(rest, number);
+            if let (Some(map), Some(wrap)) = (&mut map, wrap.take()) {
+                map.wrap = wrap;
+            }
+            if let Some(option) = ignored {
+                warnings.push(format!("line {number}: {} is not applied to the texture", quote(option)));
+            }
+            if map.is_none() {
+                warnings.push(format!("line {number}: {} names no file", quote(line)));
+            }
+            material.map = map;
+        }
+    }
+    (materials, warnings)
+}
+
+/// Two words, for u and v.
+fn parse_wrap(rest: &[u8]) -> Option<[Wrap; 2]> {
+    let wrap = |word: &[u8]| {
+        [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp].into_iter().find(|w| wrap_name(*w).as_bytes() == word)
+    };
+    let mut words = words(rest);
+    Some([wrap(words.next()?)?, wrap(words.next()?)?])
+}
+
+/// Up to three numbers from 0 to 1; one stands for all three. `None` if it is something else, such as `Kd spectral …`.
+fn parse_color(rest: &[u8]) -> Option<[u8; 3]> {
+    let values: Option<Vec<f32>> = words(without_comment(rest)).take(3).map(parse_f32).collect();
+    let to_byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+    match values?.as_slice() {
+        [r, g, b] => Some([r, g, b].map(|&v| to_byte(v))),
+        [gray] => Some([to_byte(*gray); 3]),
+        _ => None,
+    }
+}
+
+/// Takes the options from the front of a `map_Kd` line; the rest is the file's name, spaces included. Beside it the
+/// first option that moves or scales the image, which is not applied.
+fn parse_map(mut rest: &[u8], line: u64) -> (Option<MtlMap>, Option<&[u8]>) {
+    let mut wrap = Wrap::Repeat;
+    let mut ignored = None;
+    while rest.first() == Some(&b'-') {
+        let option = words(rest).next().unwrap_or_default();
+        let (fewest, most) = match option {
+            b"-o" | b"-s" | b"-t" => (1, 3),
+            b"-mm" => (2, 2),
+            b"-blendu" | b"-blendv" | b"-boost" | b"-cc" | b"-clamp" | b"-texres" | b"-bm" | b"-imfchan"
+            | b"-type" | b"-colorspace" => (1, 1),
+            _ => break,
+        };
+        let mut behind = after(rest, option).trim_ascii_start();
+        let mut values = Vec::new();
+        while values.len() < most {
+            let Some(word) = words(behind).next() else { break };
+            if values.len() >= fewest && parse_f32(word).is_none() {
+                break;
+            }
+            values.push(word);
+            behind = after(behind, word).trim_ascii_start();
+        }
+        let neutral = if option == b"-s" { 1.0 } else { 0.0 };
+        match option {
+            b"-clamp" if values.first() == Some(&&b"on"[..]) => wrap = Wrap::Clamp,
+            b"-s" | b"-o" if ignored.is_none() && values.iter().any(|v| parse_f32(v) != Some(neutral)) => {
+                ignored = rest.strip_suffix(behind).map(<[u8]>::trim_ascii_end);
+            }
+            _ => {}
+        }
+        rest = behind;
+    }
+    let name = rest.strip_prefix(b"\"").and_then(|r| r.strip_suffix(b"\"")).unwrap_or(rest);
+    ((!name.is_empty()).then(|| MtlMap { file: text(name), wrap: [wrap; 2], line }), ignored)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_and_maps() {
+        let (m, warnings) = parse_mtl(
+            b"# head\nKd 1 1 1\nnewmtl a b \n\tKd 0.5 0 2 # note\n map_Kd  my photo #1.jpg \r\nnewmtl\nKd 1\nillum x\n",
+        );
+        assert!(warnings.is_empty(), "{warnings:?}");
+        assert_eq!(m[0].name, "a b");
+        assert_eq!(m[0].color, [128, 0, 255]);
+        let map = m[0].map.as_ref().unwrap();
+        assert_eq!((map.file.as_str(), map.line), ("my photo #1.jpg", 5));
+        assert_eq!((m[1].name.as_str(), m[1].color), ("", [255; 3]));
+    }
+
+    #[test]
+    fn options_are_taken_from_the_name() {
+        let map = |line: &str| {
+            let (m, warnings) = parse_mtl(format!("newmtl m\nmap_Kd {line}").as_bytes());
+            (m[0].map.as_ref().map(|m| (m.file.clone(), m.wrap[0])), warnings.len())
+        };
+        let found = |file: &str, wrap| Some((file.to_owned(), wrap));
+        assert_eq!(map("-s 1 1 1 -o 0 0 a.png"), (found("a.png", Wrap::Repeat), 0));
+        assert_eq!(map("-clamp on -mm 0 1 a b.png"), (found("a b.png", Wrap::Clamp), 0));
+        assert_eq!(map("-s 2 2 a.png"), (found("a.png", Wrap::Repeat), 1));
+        assert_eq!(map("-s 1 1.png"), (found("1.png", Wrap::Repeat), 0));
+        assert_eq!(map("-odd.png"), (found("-odd.png", Wrap::Repeat), 0));
+        assert_eq!(map("\"C:\\my scans\\a.png\""), (found("C:\\my scans\\a.png", Wrap::Repeat), 0));
+        assert_eq!(map("-clamp on"), (None, 1));
+    }
+
+    #[test]
+    fn a_comment_of_ours_tells_how_a_texture_goes_on() {
+        let (m, warnings) = parse_mtl(
+            b"newmtl a\n# s3d wrap mirror clamp\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n# s3d wrap odd clamp\nmap_Kd c.png\n",
+        );
+        assert!(warnings.is_empty());
+        let wraps: Vec<_> = m.iter().map(|m| m.map.as_ref().unwrap().wrap).collect();
+        assert_eq!(wraps, [[Wrap::Mirror, Wrap::Clamp], [Wrap::Repeat; 2]]);
+    }
+
+    #[test]
+    fn a_bad_line_costs_only_itself() {
+        let (m, warnings) = parse_mtl(b"newmtl a\nKd 0.5 x\nKd spectral file.rfl 1\nnewmtl b\nKd 0 0 1\n");
+        assert_eq!(m[0].color, DEFAULT_COLOR);
+        assert_eq!(m[1].color, [0, 0, 255]);
+        assert!(warnings[0].starts_with("line 2: `Kd 0.5 x`") && warnings[1].starts_with("line 3"));
+    }
+}

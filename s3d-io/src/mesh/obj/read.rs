@@ -1,0 +1,469 @@
+//! Wavefront OBJ with its material libraries.
+//!
+//! [`PlainObj`] understands the dialects and reads the numbers, [`crate::mesh::obj::diagnose`] finds the line of a bad one,
+//! [`ObjNames`] and [`ObjLooks`] the libraries and images; here the parts become a mesh.
+
+use crate::error::{Error, Result};
+use crate::image::texture::read_file;
+use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
+use crate::mesh::obj::diagnose::{number_error, vertex_error};
+use crate::mesh::obj::looks::{ObjLooks, ObjNames};
+use crate::mesh::obj::plain::PlainObj;
+use crate::quote::count;
+use s3d_geom::glam::{Vec2, Vec3};
+use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Reads an OBJ file, the libraries that it names and their `map_Kd` images.
+///
+/// Vertices keep the file's order and number; faces its order.
+///
+/// # Errors
+/// As [`crate::read_mesh`].
+pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
+    let bytes = read_file(path)?;
+    // Decoding images takes as long as all else, and needs nothing of it but names.
+    let (mut warnings, mut remarks) = (Vec::new(), Vec::new());
+    let (geometry, looks) = rayon::join(
+        || Geometry::read(path, &bytes),
+        || ObjLooks::load(path, &ObjNames::find(&bytes), &mut remarks),
+    );
+    let (Geometry { plain, columns, faces }, looks) = (geometry?, looks?);
+    let polygons_triangulated = faces.polygons;
+    if faces.triangles.is_empty() {
+        let reason =
+            faces.refused.map_or_else(String::new, |(line, why, _)| format!(", as on line {line}: {why}"));
+        return Err(Error::format(path, format!("has no face that can be used{reason}")));
+    }
+    if let Some((line, why, n)) = &faces.refused {
+        warnings.push(format!("{} left out: the first, on line {line}, {why}", count(*n, "polygon")));
+    }
+    if let Some(first) = plain.elements.short_faces.first() {
+        let n = count(plain.elements.short_faces.len(), "face");
+        warnings.push(format!("{n} with fewer than three corners left out, the first on line {first}"));
+    }
+    let colors = vertex_colors(&plain, &mut warnings);
+    warnings.append(&mut remarks);
+    let parts = MeshParts {
+        positions: plain.values.positions.iter().map(|&p| up.world_from_file(p)).collect(),
+        faces: faces.triangles,
+        colors,
+        uvs: columns.uvs,
+        face_uvs: faces.uvs,
+        normals: columns.normals.into_iter().map(|n| up.world_from_file(n)).collect(),
+        face_normals: faces.normals,
+        materials: looks.materials,
+        face_materials: faces.materials,
+        textures: looks.textures,
+        ..MeshParts::default()
+    };
+    let mesh = checked_mesh(parts, &mut warnings).map_err(|e| match e {
+        MeshError::NonFinite { vertex, position } => vertex_error(path, &bytes, vertex, position),
+        source => Error::Mesh { path: path.to_owned(), source },
+    })?;
+    let (texture_files, companions) = (looks.files, looks.companions);
+    Ok(MeshFile { texture_files, warnings, companions, polygons_triangulated, ..MeshFile::new(path, mesh) })
+}
+
+/// What an OBJ file holds itself.
+struct Geometry {
+    plain: PlainObj,
+    columns: Columns,
+    faces: Triangles,
+}
+
+impl Geometry {
+    fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let plain = PlainObj::parse(path, bytes)?;
+        if plain.elements.faces.is_empty() {
+            return Err(Error::format(path, no_faces(&plain)));
+        }
+        if plain.values.has_bad_number {
+            return Err(number_error(path, bytes));
+        }
+        let columns = Columns::new(&plain);
+        let faces = Triangles::new(&plain, &columns)
+            .map_err(|(vertex, position)| vertex_error(path, bytes, vertex, position))?;
+        Ok(Self { plain, columns, faces })
+    }
+}
+
+fn no_faces(plain: &PlainObj) -> String {
+    let mut message = format!("has no face, only {}", count(plain.values.positions.len(), "vertex"));
+    if plain.elements.points_and_lines > 0 {
+        message += &format!(" and {}", count(plain.elements.points_and_lines, "point and line element"));
+    }
+    if let Some(line) = plain.elements.short_faces.first() {
+        message += &format!("; faces need three corners, the first that has fewer is on line {line}");
+    }
+    message + "; a mesh is needed"
+}
+
+/// Texture coordinates and normals that corners use, the first of the file and then in the order of their first use, and
+/// the corners' indices into them, both empty if the file has none.
+struct Columns {
+    uvs: Vec<Vec2>,
+    face_uvs: Vec<u32>,
+    /// Unit normals; not finite where the file's has no length.
+    normals: Vec<Vec3>,
+    face_normals: Vec<u32>,
+}
+
+impl Columns {
+    fn new(plain: &PlainObj) -> Self {
+        let ((uvs, face_uvs), (normals, face_normals)) = rayon::join(
+            || used(&plain.values.uvs, &plain.elements.corners[1]),
+            || used(&plain.values.normals, &plain.elements.corners[2]),
+        );
+        let normals = normals.into_iter().map(|n| n / n.length()).collect();
+        Self { uvs, face_uvs, normals, face_normals }
+    }
+}
+
+/// The first entry of a column and those that `corners` name, in the order of their first use, and `corners` with indices
+/// into them.
+fn used<T: Copy>(column: &[T], corners: &[u32]) -> (Vec<T>, Vec<u32>) {
+    let Some(&first) = column.first() else { return Default::default() };
+    let mut out = vec![first];
+    let mut new_index = vec![NO_INDEX; column.len()];
+    if let Some(new) = new_index.first_mut() {
+        *new = 0;
+    }
+    let corners = corners.iter().map(|&corner| {
+        // Indices are in range, or NO_INDEX.
+        let old = corner as usize;
+        let Some((new, value)) = new_index.get_mut(old).zip(column.get(old)) else { return NO_INDEX };
+        if *new == NO_INDEX {
+            *new = out.len() as u32;
+            out.push(*value);
+        }
+        *new
+    });
+    let corners = corners.collect();
+    (out, corners)
+}
+
+/// The faces of a file, polygons cut into triangles.
+#[derive(Default)]
+struct Triangles {
+    triangles: Vec<[u32; 3]>,
+    uvs: Vec<[u32; 3]>,
+    normals: Vec<[u32; 3]>,
+    materials: Vec<u32>,
+    /// Polygons that were cut.
+    polygons: usize,
+    /// Polygons that cannot be cut: line and reason of the first, and their number.
+    refused: Option<(u64, String, usize)>,
+}
+
+impl Triangles {
+    /// A vertex of a polygon that is not finite is the error.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "PlainObj checked indices and counts of corners; cuts index their polygon"
+    )]
+    fn new(plain: &PlainObj, columns: &Columns) -> std::result::Result<Self, (u32, Vec3)> {
+        let mut out = Self::default();
+        let mut start = 0;
+        let (vertices, uvs, normals) = (&plain.elements.corners[0], &columns.face_uvs, &columns.face_normals);
+        for face in &plain.elements.faces {
+            let n = face.corners as usize;
+            let corners = start..start + n;
+            start += n;
+            let polygon = &vertices[corners.clone()];
+            let cut = if n == 3 {
+                Cow::Borrowed(&[[0, 1, 2]][..])
+            } else {
+                let points: Vec<Vec3> = polygon.iter().map(|&v| plain.values.positions[v as usize]).collect();
+                if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
+                    return Err((polygon[bad], points[bad]));
+                }
+                match triangulate_face(&points) {
+                    Ok(cut) => {
+                        out.polygons += 1;
+                        Cow::Owned(cut)
+                    }
+                    Err(e) => {
+                        out.refused.get_or_insert_with(|| (face.line, e.to_string(), 0)).2 += 1;
+                        continue;
+                    }
+                }
+            };
+            let uvs = (face.has_uv && !uvs.is_empty()).then(|| &uvs[corners.clone()]);
+            let normals = (face.has_normal && !normals.is_empty()).then(|| &normals[corners]);
+            for triangle in cut.iter() {
+                let pick = |column: &[u32]| triangle.map(|c| column[c as usize]);
+                out.triangles.push(pick(polygon));
+                out.uvs.push(uvs.map_or([NO_INDEX; 3], pick));
+                out.normals.push(normals.map_or([NO_INDEX; 3], pick));
+                out.materials.push(face.material);
+            }
+        }
+        for column in [&mut out.uvs, &mut out.normals] {
+            if column.iter().all(|c| *c == [NO_INDEX; 3]) {
+                column.clear();
+            }
+        }
+        if !plain.elements.has_materials {
+            out.materials.clear();
+        }
+        Ok(out)
+    }
+}
+
+/// One colour a vertex if any has one. Files write them from 0 to 1, some from 0 to 255: the largest tells, with room for
+/// what is a little too bright.
+fn vertex_colors(plain: &PlainObj, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
+    if plain.values.colors.is_empty() {
+        return Vec::new();
+    }
+    let largest = plain.values.colors.iter().flat_map(|(_, c)| c).fold(0.0f32, |a, &b| a.max(b));
+    let scale = if largest > 2.0 { 1.0 } else { 255.0 };
+    let mut colors = vec![DEFAULT_COLOR; plain.values.positions.len()];
+    for (vertex, color) in &plain.values.colors {
+        if let Some(slot) = colors.get_mut(*vertex as usize) {
+            *slot = color.map(|c| (c * scale).round().clamp(0.0, 255.0) as u8);
+        }
+    }
+    let without = plain.values.positions.len() - plain.values.colors.len();
+    if without > 0 {
+        warnings.push(format!(
+            "{without} of {} vertices have no colour and are made gray",
+            plain.values.positions.len()
+        ));
+    }
+    colors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use s3d_geom::glam::vec3;
+    use std::fs;
+
+    /// Reads `obj`, Z up.
+    fn read_obj(obj: &str) -> Result<MeshFile> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.obj");
+        fs::write(&path, obj).unwrap();
+        read(&path, UpAxis::Z)
+    }
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n";
+
+    #[test]
+    fn vertices_and_faces_keep_the_files_order() {
+        let obj = format!("v 9 9 9\n{SQUARE}v 1 0 0\no x\nf 5 4 3\ng y\nf 4 2 3\nf 2 6 5\n");
+        let file = read_obj(&obj).unwrap();
+        // The first vertex is in no face, the last has the place of the third: both stay.
+        assert_eq!(file.mesh.positions().len(), 6);
+        assert_eq!(file.mesh.positions()[0], vec3(9.0, 9.0, 9.0));
+        assert_eq!(file.mesh.faces(), [[4, 3, 2], [3, 1, 2], [1, 5, 4]]);
+        assert!(file.warnings.is_empty() && file.mesh.parts().face_uvs.is_empty());
+    }
+
+    #[test]
+    fn files_of_one_two_and_three_vertices_are_no_special_case() {
+        for (n, obj) in [(1, "v 0 0 0\nf 1 1 1\n"), (2, "v 0 0 0\nv 1 0 0\nf 1 2 2\n")] {
+            let message = read_obj(obj).unwrap_err().to_string();
+            assert!(message.contains("no face with an area (1 faces"), "{n}: {message}");
+        }
+        assert_eq!(read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 3 1 2\n").unwrap().mesh.faces(), [[2, 0, 1]]);
+    }
+
+    #[test]
+    fn axes_turn_positions_and_normals() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.obj");
+        fs::write(&path, "v 0 0 0\nv 0 0 1\nv 1 0 0\nvn 0 3 0\nf 1//1 2//1 3//1\n").unwrap();
+        let mesh = read(&path, UpAxis::Y).unwrap().mesh;
+        assert_eq!(mesh.positions()[1], vec3(0.0, -1.0, 0.0));
+        assert_eq!(mesh.normal(0), Vec3::Z);
+        assert_eq!(mesh.corner_normals(0), Some([Vec3::Z; 3]));
+    }
+
+    #[test]
+    fn polygons_are_cut_with_their_attributes() {
+        // An L, concave at its fourth corner, then a square that repeats its outline, then a triangle.
+        let obj = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nvt 0 0\nvt 2 0\nvt 2 1\nvt 1 1\nvt 1 2\nvt 0 2\n\
+            usemtl l\nf 1/1 2/2 3/3 4/4 5/5 6/6\nusemtl bad\nf 1 4 2 3 1 4\nusemtl t\nf 1/1 2/2 3/3\n";
+        let file = read_obj(obj).unwrap();
+        assert_eq!((file.polygons_triangulated, file.mesh.faces().len()), (1, 5));
+        assert_eq!(file.mesh.total_area(), 3.0 + 1.0);
+        for face in 0..5 {
+            let corners = file.mesh.triangle(face).map(|p| p.truncate());
+            assert_eq!(
+                file.mesh.parts().face_uvs[face as usize].map(|i| file.mesh.parts().uvs[i as usize]),
+                corners
+            );
+            assert_eq!(file.mesh.normal(face), Vec3::Z);
+            assert_eq!(file.mesh.material_of(face), Some(if face < 4 { 0 } else { 2 }));
+        }
+        assert!(
+            file.warnings[0].starts_with("1 polygon left out: the first, on line 16, "),
+            "{:?}",
+            file.warnings
+        );
+    }
+
+    #[test]
+    fn what_is_left_out_is_told() {
+        let file =
+            read_obj(&format!("{SQUARE}f 1 2 3\nf 1 2\nf 1 1 2\nf\nl 1 2 3\nvn 0 0 0\nf 1//1 3//1 4//1\n"))
+                .unwrap();
+        assert_eq!(file.mesh.faces(), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(file.mesh.corner_normals(1), None);
+        let told = file.warnings.join("\n");
+        for words in [
+            "2 faces with fewer than three corners left out, the first on line 9",
+            "1 face of zero area",
+            "1 face left out: not finite",
+        ] {
+            assert!(told.contains(words), "{told}");
+        }
+    }
+
+    #[test]
+    fn vertex_colours_of_both_scales_and_of_some_vertices() {
+        let colors = |obj: &str| {
+            let file = read_obj(obj).unwrap();
+            (file.mesh.parts().colors.clone(), file.warnings.len())
+        };
+        let all = "v 0 0 0 1 0.5 0\nv 1 0 0 0 0 0\nv 0 1 0 0 0 1\nf 1 2 3\n";
+        assert_eq!(colors(all), (vec![[255, 128, 0], [0; 3], [0, 0, 255]], 0));
+        let bytes = "v 0 0 0 255 128 0\nv 1 0 0 0 0 1\nv 0 1 0 0 0 300\nf 1 2 3\n";
+        assert_eq!(colors(bytes), (vec![[255, 128, 0], [0, 0, 1], [0, 0, 255]], 0));
+        let some = "v 0 0 0\nv 1 0 0 0 0 1\nv 0 1 0\nf 1 2 3\n";
+        assert_eq!(colors(some), (vec![DEFAULT_COLOR, [0, 0, 255], DEFAULT_COLOR], 1));
+    }
+
+    #[test]
+    fn bad_numbers_are_named_with_their_line() {
+        for (obj, words) in [
+            ("v 0 0 0\nv 1 x 0\nv 0 1 0\nf 1 2 3\n", "a.obj, line 2: `x` is no number: `v 1 x 0`"),
+            (
+                "v 0 0 0\nv 1 inf 0\nv 0 1 0\nf 1 2 3\n",
+                "a.obj, line 2: a face uses a vertex that is not finite",
+            ),
+            ("v 0 0 0\nv 1 0 0\nv 0 1e40 0\nv 0 1 1\nf 1 2 3 4\n", "a.obj, line 3: a face uses a vertex"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 1 2", "a.obj, line 5: a vertex has three"),
+        ] {
+            let message = read_obj(obj).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+        // A vertex that no face uses may be anything but malformed.
+        assert!(read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan nan nan\nf 1 2 3\n").is_ok());
+        assert!(
+            read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan 0\nf 1/1 2/1 3/1\n").unwrap().mesh.parts().face_uvs
+                [0]
+                == [NO_INDEX; 3]
+        );
+    }
+
+    #[test]
+    fn files_without_faces_say_what_they_hold() {
+        for (obj, words) in [
+            ("", "a.obj: has no face, only 0 vertices; a mesh"),
+            ("v 0 0 0\np 1\n", "only 1 vertex and 1 point and line element"),
+            ("v 0 0 0\nf 1 1\n", "the first that has fewer is on line 2"),
+            ("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nf 1 2 3 4\n", "no face that can be used, as on line 5: "),
+        ] {
+            let message = read_obj(obj).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+    }
+
+    #[test]
+    fn columns_keep_what_is_used_in_the_order_of_its_use() {
+        let corners = [3, NO_INDEX, 1, 3, 1];
+        assert_eq!(used(&['a', 'b', 'c', 'd'], &corners), (vec!['a', 'd', 'b'], vec![1, NO_INDEX, 2, 1, 2]));
+        assert_eq!(used(&['a', 'b'], &[NO_INDEX, 0]), (vec!['a'], vec![NO_INDEX, 0]));
+        assert_eq!(used::<char>(&[], &[NO_INDEX]), (vec![], vec![]));
+    }
+
+    #[test]
+    fn a_line_of_many_megabytes_is_read() {
+        let n = 16_000;
+        let mut obj = String::from("# ");
+        obj.extend(std::iter::repeat_n('x', 5_000_000));
+        obj.push('\n');
+        for i in 0..n {
+            // A saw of n corners along a line, closed by its first and last corner.
+            obj += &format!("v {i} {} 0\n", if i % (n - 1) == 0 { 0 } else { 1 + i % 2 });
+        }
+        obj.push('f');
+        (1..=n).rev().for_each(|i| obj += &format!(" {i}"));
+        let file = read_obj(&obj).unwrap();
+        assert_eq!((file.polygons_triangulated, file.mesh.faces().len()), (1, n - 2));
+    }
+
+    proptest! {
+        #[test]
+        fn any_words_load_or_are_refused(words in proptest::collection::vec(proptest::sample::select(vec![
+            "v", "vt", "vn", "f", "l", "usemtl", "mtllib", "#", "\\", "\n", "\n", "\nf", "\nv", "\nv 1 2 3\n", "\nf 1 2 3\n",
+            "\nvt 0 0\n", "0", "1", "2", "3", "-1", "-2", "1/1", "-1/-1/-1", "2//1", "1/", "//", "1.5", "nan", "inf", "1e99",
+            "-9223372036854775808", "9223372036854775807", "4294967296", "x", "\u{e4}", "0.5", "\r",
+        ]), 0..60)) {
+            let _ = read_obj(&words.join(" "));
+        }
+
+        #[test]
+        fn corners_are_what_tobj_reads(
+            numbers in proptest::collection::vec((-1000.0..1000.0f32, 0usize..9, any::<bool>()), 30..90),
+            picks in proptest::collection::vec(any::<[[proptest::sample::Index; 3]; 3]>(), 1..20),
+        ) {
+            let word = |i: usize| {
+                let (value, decimals, e) = numbers[i];
+                if e { format!("{value:.decimals$e}") } else { format!("{value:.decimals$}") }
+            };
+            let n = numbers.len() / 3;
+            let mut obj = String::new();
+            for i in 0..n {
+                let [x, y, z] = std::array::from_fn(|k| word(3 * i + k));
+                obj += &format!("v {x} {y} {z}\nvt {z} {x}\nvn {y} {x} 1\n");
+            }
+            for face in &picks {
+                let corner = |c: usize| face[c].map(|i| (i.index(n) + 1).to_string()).join("/");
+                obj += &format!("f {} {} {}\n", corner(0), corner(1), corner(2));
+            }
+            let options = tobj::LoadOptions::default();
+            let (models, _) = tobj::load_obj_buf(&mut obj.as_bytes(), &options, |_| Err(tobj::LoadError::GenericFailure)).unwrap();
+            let theirs = &models[0].mesh;
+            let plain = PlainObj::parse(Path::new("a.obj"), obj.as_bytes()).unwrap();
+            let columns = Columns::new(&plain);
+            for corner in 0..3 * picks.len() {
+                let [v, t, n] = [&theirs.indices, &theirs.texcoord_indices, &theirs.normal_indices].map(|i| i[corner] as usize);
+                let position = plain.values.positions[plain.elements.corners[0][corner] as usize];
+                prop_assert_eq!(&position.to_array()[..], &theirs.positions[3 * v..3 * v + 3]);
+                let uv = columns.uvs[columns.face_uvs[corner] as usize];
+                prop_assert_eq!(&uv.to_array()[..], &theirs.texcoords[2 * t..2 * t + 2]);
+                let normal = columns.normals[columns.face_normals[corner] as usize];
+                let expected = Vec3::from_slice(&theirs.normals[3 * n..3 * n + 3]);
+                prop_assert_eq!(normal, expected / expected.length());
+            }
+        }
+
+        #[test]
+        fn triangles_come_back(positions in proptest::collection::vec(any::<[i16; 3]>(), 3..20), picks in
+            proptest::collection::vec(any::<[proptest::sample::Index; 3]>(), 1..30)) {
+            let faces: Vec<[usize; 3]> = picks.iter().map(|f| f.map(|i| i.index(positions.len()))).collect();
+            let mut obj = String::new();
+            positions.iter().for_each(|p| obj += &format!("v {} {} {}\n", p[0], p[1], p[2]));
+            faces.iter().for_each(|f| obj += &format!("f {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1));
+            let expected = s3d_geom::TriMesh::from_faces(
+                positions.iter().map(|p| Vec3::from_array(p.map(f32::from))).collect(),
+                faces.iter().map(|f| f.map(|i| i as u32)).collect(),
+            );
+            match (read_obj(&obj), expected) {
+                (Ok(file), Ok(mesh)) => {
+                    prop_assert_eq!(file.mesh.positions(), mesh.positions());
+                    prop_assert_eq!(file.mesh.faces(), mesh.faces());
+                }
+                (Err(Error::Mesh { source, .. }), Err(e)) => prop_assert_eq!(source, e),
+                (found, expected) => prop_assert!(false, "{:?} {:?}", found.map(|_| ()), expected.map(|_| ())),
+            }
+        }
+    }
+}

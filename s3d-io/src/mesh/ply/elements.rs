@@ -1,0 +1,579 @@
+//! The rows of a PLY file, a batch at a time: memory does not grow with the file.
+//!
+//! ```text
+//! let mut reader = PlyReader::open(path)?;
+//! while let Some(element) = reader.next_element()? {         // in the order of the file
+//!     if element.name == "vertex" {
+//!         let x = element.find_scalar(&["x"]).ok_or(…)?;
+//!         reader.want([x]);                                  // the others are passed over
+//!         let mut batch = PlyBatch::default();
+//!         while reader.read_batch(&mut batch)? {
+//!             for &x in batch.scalars(x) { … }
+//!         }
+//!     }
+//! }
+//! ```
+//!
+//! Numbers come as `f64`, which holds every type of PLY exactly; [`crate::mesh::ply::batch::integer`] makes whole ones of them.
+
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+use crate::error::{Error, Result};
+use crate::mesh::ply::batch::PlyBatch;
+use crate::mesh::ply::header::{MAX_HEADER, PlyElement, PlyEncoding, PlyHeader, PlyProperty, PlyType};
+use crate::mesh::ply::source::{BUFFER, Fault, Outcome, Source, column_of, decode, number, parse_f64};
+use crate::quote::quote;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// The most rows of a batch.
+const BATCH_ROWS: u64 = 4096;
+/// A batch ends early when its lists hold this many numbers.
+const BATCH_VALUES: usize = 1 << 18;
+/// The most numbers of one list. Strips of the largest published scans have a tenth of it.
+const MAX_LIST: usize = 1 << 26;
+
+/// Reads the elements of a PLY file one after the other.
+#[derive(Debug)]
+pub(crate) struct PlyReader {
+    path: PathBuf,
+    header: PlyHeader,
+    source: Source,
+    bytes: u64,
+    /// The element whose rows come now, and how many are read of it; before the first one `None`.
+    at: Option<(usize, u64)>,
+    wanted: Vec<bool>,
+    /// The line of the next byte, in ASCII files.
+    line: u64,
+    /// The line on which the row before ended.
+    row_end: u64,
+}
+
+impl PlyReader {
+    /// Opens a file and reads its header.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Format`] with the line.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let io = |e| Error::io(path, "read", e);
+        let what = std::fs::metadata(path).map_err(io)?;
+        if !what.is_file() {
+            // Reading a device or a pipe may never end.
+            let message = if what.is_dir() { "is a folder, not a file" } else { "is no file" };
+            return Err(Error::format(path, message));
+        }
+        let mut source = Source::new(File::open(path).map_err(io)?);
+        // A header is nearly always in the first bytes: more are read only where they are missing.
+        let mut size = 4096usize;
+        let header = loop {
+            let complete = source.need(size).map_err(io)?;
+            match PlyHeader::parse(path, source.bytes()) {
+                Err(_) if complete && size < MAX_HEADER => size = size.saturating_mul(4),
+                other => break other?,
+            }
+        };
+        source.pass(header.bytes);
+        let line = header.lines.saturating_add(1);
+        Ok(Self {
+            path: path.to_owned(),
+            header,
+            source,
+            bytes: what.len(),
+            at: None,
+            wanted: Vec::new(),
+            line,
+            row_end: 0,
+        })
+    }
+
+    /// What the file says about itself.
+    pub(crate) fn header(&self) -> &PlyHeader {
+        &self.header
+    }
+
+    /// How many rows of `element` the file can hold by its size: what may be reserved for them.
+    pub(crate) fn plausible_rows(&self, element: &PlyElement) -> usize {
+        let row = element.min_row_bytes(self.header.encoding).max(1) as u64;
+        usize::try_from(self.bytes.checked_div(row).unwrap_or(0).min(element.count)).unwrap_or(0)
+    }
+
+    /// Goes to the next element, whose rows follow, over what is left of the last one. Nothing is wanted of it yet.
+    ///
+    /// # Errors
+    /// As [`PlyReader::read_batch`], for the rows that are passed over.
+    pub(crate) fn next_element(&mut self) -> Result<Option<PlyElement>> {
+        if self.at.is_some() {
+            self.want([]);
+            let mut rest = PlyBatch::default();
+            while self.read_batch(&mut rest)? {}
+        }
+        let next = self.at.map_or(0, |(element, _)| element.saturating_add(1));
+        let Some(element) = self.header.elements.get(next).cloned() else { return Ok(None) };
+        self.at = Some((next, 0));
+        self.wanted = vec![false; element.properties.len()];
+        Ok(Some(element))
+    }
+
+    /// Says which properties of the element the next batches hold, by their places; the others are passed over.
+    ///
+    /// # Panics
+    /// If there is no element, or no such property.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "places are found in the element; any other is a caller's mistake"
+    )]
+    pub(crate) fn want(&mut self, properties: impl IntoIterator<Item = usize>) {
+        self.wanted.fill(false);
+        for property in properties {
+            self.wanted[property] = true;
+        }
+    }
+
+    /// Reads the next rows of the element into `batch`, whose memory is used again; `false` if there are no more, or before
+    /// the first [`PlyReader::next_element`].
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Format`] with the line or the row: the file ends too soon, a word is no number or does not
+    /// fit its property's type, a line holds more than a row, a list has a negative length.
+    pub(crate) fn read_batch(&mut self, batch: &mut PlyBatch) -> Result<bool> {
+        let Some((element, done)) = self.at else { return Ok(false) };
+        let Some(current) = self.header.elements.get_mut(element) else { return Ok(false) };
+        let (properties, count) = (std::mem::take(&mut current.properties), current.count);
+        batch.clear(done, properties.len());
+        let read = if properties.is_empty() {
+            Ok(())
+        } else {
+            let rows = count.saturating_sub(done).min(BATCH_ROWS);
+            match self.header.encoding {
+                PlyEncoding::Ascii => self.ascii_rows(&properties, rows, batch),
+                _ if properties.iter().any(PlyProperty::is_list) => {
+                    self.binary_rows(&properties, rows, batch)
+                }
+                _ => self.fixed_rows(&properties, rows, batch),
+            }
+        };
+        if let Some(current) = self.header.elements.get_mut(element) {
+            current.properties = properties;
+        }
+        let done = done.saturating_add(batch.rows as u64);
+        self.at = Some((element, done));
+        read.map_err(|fault| self.fault(fault, done))?;
+        Ok(batch.rows > 0)
+    }
+
+    /// Whether anything but space is left behind the last element, to be called after it.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn has_more(&mut self) -> Result<bool> {
+        let ascii = self.header.encoding == PlyEncoding::Ascii;
+        loop {
+            let rest = self.source.bytes();
+            if rest.iter().any(|b| !(ascii && b.is_ascii_whitespace())) {
+                return Ok(true);
+            }
+            self.source.start = self.source.end;
+            if !self.source.need(1).map_err(|e| Error::io(&self.path, "read", e))? {
+                return Ok(false);
+            }
+        }
+    }
+
+    /// An error about row `row` of a batch that was just read.
+    pub(crate) fn fail(&self, batch: &PlyBatch, row: usize, message: impl std::fmt::Display) -> Error {
+        let (name, number) = (self.row_name(), batch.first_row().saturating_add(row as u64));
+        let message = format!("{name} {number}: {message}");
+        match batch.lines.get(row) {
+            Some(&line) => Error::line(&self.path, line, message),
+            None => Error::format(&self.path, format!("{message} (counted from 0)")),
+        }
+    }
+
+    /// The element whose rows come now.
+    fn element(&self) -> Option<&PlyElement> {
+        self.header.elements.get(self.at?.0)
+    }
+
+    fn row_name(&self) -> &str {
+        self.element().map_or("row", |element| &element.name)
+    }
+
+    fn fault(&self, fault: Fault, row: u64) -> Error {
+        let name = self.row_name();
+        let count = self.element().map_or(0, |element| element.count);
+        match fault {
+            Fault::Io(e) => Error::io(&self.path, "read", e),
+            Fault::End => Error::format(
+                &self.path,
+                format!(
+                    "is cut off: its header claims {count} rows of the element \"{name}\", and it ends after {row}"
+                ),
+            ),
+            Fault::Line(line, message) => Error::line(&self.path, line, format!("{name} {row}: {message}")),
+            Fault::Row(message) => {
+                Error::format(&self.path, format!("{name} {row}: {message} (counted from 0)"))
+            }
+        }
+    }
+
+    /// Rows of a fixed size: column by column.
+    fn fixed_rows(&mut self, properties: &[PlyProperty], rows: u64, batch: &mut PlyBatch) -> Outcome {
+        let size: usize = properties.iter().map(|p| p.kind.size()).sum();
+        if rows == 0 {
+            return Ok(());
+        }
+        if !self.source.need(size)? {
+            return Err(Fault::End);
+        }
+        let bytes = self.source.bytes();
+        let there = bytes.len().checked_div(size).unwrap_or(0);
+        let rows = usize::try_from(rows).map_or(there, |rows| rows.min(there));
+        let bytes = bytes.get(..rows.saturating_mul(size)).unwrap_or_default();
+        let big = self.header.encoding == PlyEncoding::BigEndian;
+        let mut offset = 0usize;
+        for ((property, wanted), column) in properties.iter().zip(&self.wanted).zip(&mut batch.columns) {
+            if *wanted {
+                column_of(bytes, size, offset, property.kind, big, &mut column.values);
+            }
+            offset = offset.saturating_add(property.kind.size());
+        }
+        batch.rows = rows;
+        let read = bytes.len();
+        self.source.pass(read);
+        Ok(())
+    }
+
+    /// Rows with lists, whose size is known when they are read.
+    fn binary_rows(&mut self, properties: &[PlyProperty], rows: u64, batch: &mut PlyBatch) -> Outcome {
+        let big = self.header.encoding == PlyEncoding::BigEndian;
+        let mut values = 0usize;
+        for _ in 0..rows {
+            for ((property, wanted), column) in properties.iter().zip(&self.wanted).zip(&mut batch.columns) {
+                let column = wanted.then_some(column);
+                let n = match property.list {
+                    None => 1,
+                    Some(kind) => {
+                        let length = number(self.source.take(kind.size())?, kind, big);
+                        list_length(length, column.is_some(), property).map_err(Fault::Row)?
+                    }
+                };
+                let size = property.kind.size();
+                let Some(column) = column else {
+                    self.source.skip((n as u64).saturating_mul(size as u64))?;
+                    continue;
+                };
+                let mut rest = n.saturating_mul(size);
+                while rest > 0 {
+                    let bytes = self.source.take(rest.min(BUFFER / 2))?;
+                    decode(bytes, property.kind, big, &mut column.values);
+                    rest = rest.saturating_sub(bytes.len());
+                }
+                if property.is_list() {
+                    column.ends.push(column.values.len());
+                    values = values.saturating_add(n);
+                }
+            }
+            batch.rows = batch.rows.saturating_add(1);
+            if values > BATCH_VALUES {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Rows of words. A row starts on a line of its own; it may go on on the next.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "what is wanted, and the batch's columns, have an entry a property"
+    )]
+    fn ascii_rows(&mut self, properties: &[PlyProperty], rows: u64, batch: &mut PlyBatch) -> Outcome {
+        let mut values = 0usize;
+        for _ in 0..rows {
+            for (p, property) in properties.iter().enumerate() {
+                let wanted = self.wanted[p];
+                let n = match property.list {
+                    None => 1,
+                    Some(kind) => {
+                        let length = self.ascii_number(kind, property)?;
+                        self.check_row_start(p == 0, batch)?;
+                        list_length(length, wanted, property).map_err(|m| Fault::Line(self.line, m))?
+                    }
+                };
+                for k in 0..n {
+                    let value = self.ascii_number(property.kind, property)?;
+                    self.check_row_start(p == 0 && k == 0 && !property.is_list(), batch)?;
+                    if wanted {
+                        batch.columns[p].values.push(value);
+                    }
+                }
+                if wanted && property.is_list() {
+                    let column = &mut batch.columns[p];
+                    column.ends.push(column.values.len());
+                    values = values.saturating_add(n);
+                }
+            }
+            self.row_end = self.line;
+            batch.rows = batch.rows.saturating_add(1);
+            if values > BATCH_VALUES {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_row_start(&self, first: bool, batch: &mut PlyBatch) -> Outcome {
+        if !first {
+            return Ok(());
+        }
+        if self.line == self.row_end {
+            let message = "this line has more numbers than the row before needs; are properties missing in the header, \
+                or numbers on the line before?";
+            return Err(Fault::Line(self.line, message.into()));
+        }
+        batch.lines.push(self.line);
+        Ok(())
+    }
+
+    /// The number that the next word spells.
+    fn ascii_number(&mut self, kind: PlyType, property: &PlyProperty) -> std::result::Result<f64, Fault> {
+        let word = self.source.word(self.header.line_end, &mut self.line)?;
+        let Some(value) = parse_f64(word) else {
+            return Err(Fault::Line(
+                self.line,
+                format!("{} is no number, but {} is", quote(word), property.name),
+            ));
+        };
+        if kind.is_integer() {
+            let (least, most) = kind.range();
+            if value.fract() != 0.0 || !(least..=most).contains(&value) {
+                let (word, name, kind) = (quote(word), &property.name, kind.name());
+                return Err(Fault::Line(self.line, format!("{word} does not fit {name}, which is a {kind}")));
+            }
+        }
+        Ok(value)
+    }
+}
+
+fn list_length(length: f64, wanted: bool, property: &PlyProperty) -> std::result::Result<usize, String> {
+    if length < 0.0 {
+        return Err(format!("the list {} has a length of {length}", property.name));
+    }
+    if wanted && length > MAX_LIST as f64 {
+        return Err(format!("the list {} has {length} entries; up to {MAX_LIST} are read", property.name));
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "a whole number of at most 32 bits")]
+    Ok(length as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file with all types, once as words and once as bytes.
+    const ROWS: [[f64; 8]; 3] = [
+        [-128.0, 255.0, -32_768.0, 65_535.0, -2_147_483_648.0, 4_294_967_295.0, 0.5, 1e-300],
+        [0.0; 8],
+        [127.0, 1.0, 32_767.0, 2.0, 2_147_483_647.0, 3.0, -1.25, 12_345_678.875],
+    ];
+
+    fn header(format: &str) -> String {
+        format!(
+            "ply\nformat {format} 1.0\nelement a 3\nproperty char p0\nproperty uchar p1\nproperty short p2\n\
+             property ushort p3\nproperty int p4\nproperty uint p5\nproperty float p6\nproperty double p7\n\
+             element empty 9\nelement b 2\nproperty list uchar short s\nproperty uchar k\nproperty list uint double d\n\
+             end_header\n"
+        )
+    }
+
+    fn bytes(big: bool) -> Vec<u8> {
+        let mut out = header(if big { "binary_big_endian" } else { "binary_little_endian" }).into_bytes();
+        let mut put = |le: &[u8]| {
+            let mut le = le.to_vec();
+            if big {
+                le.reverse();
+            }
+            out.extend(le);
+        };
+        for r in ROWS {
+            put(&(r[0] as i8).to_le_bytes());
+            put(&(r[1] as u8).to_le_bytes());
+            put(&(r[2] as i16).to_le_bytes());
+            put(&(r[3] as u16).to_le_bytes());
+            put(&(r[4] as i32).to_le_bytes());
+            put(&(r[5] as u32).to_le_bytes());
+            put(&(r[6] as f32).to_le_bytes());
+            put(&r[7].to_le_bytes());
+        }
+        put(&[2]);
+        put(&(-3i16).to_le_bytes());
+        put(&4i16.to_le_bytes());
+        put(&[7]);
+        put(&0u32.to_le_bytes());
+        put(&[0]);
+        put(&[8]);
+        put(&1u32.to_le_bytes());
+        put(&0.1f64.to_le_bytes());
+        out
+    }
+
+    fn ascii() -> String {
+        let mut out = header("ascii");
+        for r in ROWS {
+            out += &r.map(|v| v.to_string()).join(" ");
+            out += "\n";
+        }
+        // A row that goes on on the next line, an empty line.
+        out + "2 -3\r\n  4\t7 0\n\n0 8 1 0.1"
+    }
+
+    fn open(bytes: &[u8]) -> Result<PlyReader> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.ply");
+        std::fs::write(&path, bytes).unwrap();
+        PlyReader::open(&path)
+    }
+
+    /// Every row of every element as text, `wanted` properties of each.
+    fn all(bytes: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Vec<String>> {
+        let mut reader = open(bytes)?;
+        let (mut out, mut batch) = (Vec::new(), PlyBatch::default());
+        while let Some(element) = reader.next_element()? {
+            let wanted: Vec<usize> = (0..element.properties.len()).filter(|&p| wanted(p)).collect();
+            reader.want(wanted.iter().copied());
+            while reader.read_batch(&mut batch)? {
+                for row in 0..batch.len() {
+                    let values: Vec<String> = wanted
+                        .iter()
+                        .map(|&p| match element.properties[p].is_list() {
+                            true => format!("{:?}", batch.list(p, row)),
+                            false => batch.scalars(p)[row].to_string(),
+                        })
+                        .collect();
+                    out.push(format!(
+                        "{} {}: {}",
+                        element.name,
+                        batch.first_row() + row as u64,
+                        values.join(" ")
+                    ));
+                }
+            }
+        }
+        assert!(!reader.has_more()?);
+        Ok(out)
+    }
+
+    #[test]
+    fn all_encodings_say_the_same() {
+        let mut expected: Vec<String> =
+            (0..3).map(|r| format!("a {r}: {}", ROWS[r].map(|v| v.to_string()).join(" "))).collect();
+        expected.extend(["b 0: [-3.0, 4.0] 7 []".to_owned(), "b 1: [] 8 [0.1]".to_owned()]);
+        assert_eq!(all(ascii().as_bytes(), |_| true).unwrap(), expected);
+        assert_eq!(all(&bytes(false), |_| true).unwrap(), expected);
+        assert_eq!(all(&bytes(true), |_| true).unwrap(), expected);
+        let some = ["a 0: 255", "a 1: 0", "a 2: 1", "b 0: 7", "b 1: 8"];
+        for file in [ascii().into_bytes(), bytes(false), bytes(true)] {
+            assert_eq!(all(&file, |p| p == 1).unwrap(), some);
+        }
+    }
+
+    #[test]
+    fn every_cut_is_noticed() {
+        for (file, last) in [(bytes(false), 1), (bytes(true), 1), (ascii().into_bytes(), 3)] {
+            for length in 0..file.len() {
+                let outcome = all(&file[..length], |_| true);
+                // The last number of an ASCII file may lose digits.
+                if length + last <= file.len() && length < file.len() - 2 {
+                    let message = outcome.unwrap_err().to_string();
+                    let known = ["cut off", "no PLY", "`-` is no number"];
+                    assert!(known.iter().any(|words| message.contains(words)), "{length}: {message}");
+                }
+            }
+        }
+        let claims = header("binary_little_endian").replace("element a 3", "element a 18446744073709551615");
+        let message = all(claims.as_bytes(), |_| true).unwrap_err().to_string();
+        assert!(
+            message.ends_with("18446744073709551615 rows of the element \"a\", and it ends after 0"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn faults_of_rows_are_named() {
+        let file = |rows: &str| {
+            format!(
+                "ply\nformat ascii 1.0\nelement v 2\nproperty float x\nproperty uchar c\nproperty list char int l\nend_header\n{rows}"
+            )
+        };
+        for (rows, words) in [
+            ("1 2 0\nx 2 0\n", "a.ply, line 9: v 1: `x` is no number, but x is"),
+            ("1 2 0\n1 256 0\n", "line 9: v 1: `256` does not fit c, which is a uchar"),
+            ("1 2 0\n1 -1 0\n", "`-1` does not fit c"),
+            ("1 0.5 0\n1 1 0\n", "line 8: v 0: `0.5` does not fit c"),
+            ("1 nan 0\n1 1 0\n", "`nan` does not fit c"),
+            ("1 2 -1\n1 2 0\n", "line 8: v 0: the list l has a length of -1"),
+            ("1 2 0 7\n1 2 0\n", "line 8: v 1: this line has more numbers than the row before needs"),
+            // A number is missing: the row takes one from the next line.
+            ("1 2\n0 3 0\n", "line 9: v 1: this line has more numbers"),
+            ("1 2 1 1.5\n", "`1.5` does not fit l, which is a int"),
+            (&format!("1 2 0\n{}", "1".repeat(5000)), "line 9: v 1: a word of more than 4096 characters"),
+        ] {
+            let message = all(file(rows).as_bytes(), |_| true).unwrap_err().to_string();
+            assert!(message.contains(words), "{rows:?}: {message}");
+        }
+        assert!(
+            all(file("-NaN(ind) 255.0 0\ninf 2e1 0\n").as_bytes(), |_| true).unwrap()[0]
+                .starts_with("v 0: NaN")
+        );
+        let mut reader = open(file("1 2 0\n1 2 0\n 3").as_bytes()).unwrap();
+        while reader.next_element().unwrap().is_some() {}
+        assert!(reader.has_more().unwrap());
+
+        let negative =
+            b"ply\nformat binary_little_endian 1.0\nelement v 1\nproperty list char int l\nend_header\n\xff";
+        assert!(
+            all(negative, |_| true).unwrap_err().to_string().contains("v 0: the list l has a length of -1")
+        );
+        let huge = b"ply\nformat binary_little_endian 1.0\nelement v 1\nproperty list uint int l\nend_header\n\xff\xff\xff\xff";
+        assert!(all(huge, |_| true).unwrap_err().to_string().contains("4294967295 entries"));
+        assert!(all(huge, |_| false).unwrap_err().to_string().contains("cut off"));
+    }
+
+    #[test]
+    fn rows_beyond_one_batch_and_one_buffer() {
+        let n = 3 * BATCH_ROWS as usize + 5;
+        let mut file = format!(
+            "ply\nformat binary_big_endian 1.0\nelement f {n}\nproperty list ushort uint l\nend_header\n"
+        )
+        .into_bytes();
+        let mut ascii =
+            format!("ply\nformat ascii 1.0\nelement f {n}\nproperty list ushort uint l\nend_header\n");
+        for i in 0..n {
+            let length = if i == 100 { 60_000 } else { i % 5 };
+            file.extend((length as u16).to_be_bytes());
+            ascii += &length.to_string();
+            for k in 0..length {
+                file.extend(((i + k) as u32).to_be_bytes());
+                ascii += &format!(" {}", i + k);
+            }
+            ascii += "\n";
+        }
+        for file in [file, ascii.into_bytes()] {
+            let mut reader = open(&file).unwrap();
+            let element = reader.next_element().unwrap().unwrap();
+            assert!(reader.plausible_rows(&element) >= n);
+            reader.want([0]);
+            let (mut batch, mut row) = (PlyBatch::default(), 0);
+            while reader.read_batch(&mut batch).unwrap() {
+                for r in 0..batch.len() {
+                    let length = if row == 100 { 60_000 } else { row % 5 };
+                    let list = batch.list(0, r);
+                    assert!(
+                        list.len() == length && list.iter().enumerate().all(|(k, &v)| v == (row + k) as f64)
+                    );
+                    row += 1;
+                }
+            }
+            assert_eq!(row, n);
+        }
+    }
+}

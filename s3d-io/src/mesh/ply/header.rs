@@ -1,0 +1,343 @@
+//! The header of a PLY file: its encoding, and which elements of which properties follow.
+//!
+//! PLY has no standard beyond Greg Turk's description of 1994. What is read here is what files hold: both families of type
+//! names (`uchar` and `uint8`), lines that end in LF, CR LF or CR, comments anywhere, any elements in any order.
+
+#![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+use crate::error::{Error, Result};
+use crate::quote::quote;
+use std::path::Path;
+
+/// The most bytes of a header. Files with hundreds of properties and a story in their comments stay far below.
+pub(crate) const MAX_HEADER: usize = 1 << 20;
+
+/// How the numbers of a file are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PlyEncoding {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+/// The type of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PlyType {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl PlyType {
+    fn parse(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// The size of a number in bytes.
+    pub(crate) fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    pub(crate) fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// The smallest and the largest number of an integer type; everything for the others.
+    pub(crate) fn range(self) -> (f64, f64) {
+        match self {
+            Self::I8 => (f64::from(i8::MIN), f64::from(i8::MAX)),
+            Self::U8 => (0.0, f64::from(u8::MAX)),
+            Self::I16 => (f64::from(i16::MIN), f64::from(i16::MAX)),
+            Self::U16 => (0.0, f64::from(u16::MAX)),
+            Self::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
+            Self::U32 => (0.0, f64::from(u32::MAX)),
+            Self::F32 | Self::F64 => (f64::NEG_INFINITY, f64::INFINITY),
+        }
+    }
+
+    /// Its older name, for messages.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::I8 => "char",
+            Self::U8 => "uchar",
+            Self::I16 => "short",
+            Self::U16 => "ushort",
+            Self::I32 => "int",
+            Self::U32 => "uint",
+            Self::F32 => "float",
+            Self::F64 => "double",
+        }
+    }
+}
+
+/// A property of an element: a number a row, or a list of numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct PlyProperty {
+    pub(crate) name: String,
+    pub(crate) kind: PlyType,
+    /// The type of a list's length; `None` if the property is a single number.
+    pub(crate) list: Option<PlyType>,
+}
+
+impl PlyProperty {
+    pub(crate) fn is_list(&self) -> bool {
+        self.list.is_some()
+    }
+
+    /// The fewest bytes that a row takes for it.
+    fn min_bytes(&self, encoding: PlyEncoding) -> usize {
+        match encoding {
+            // A digit and a space.
+            PlyEncoding::Ascii => 2,
+            _ => self.list.unwrap_or(self.kind).size(),
+        }
+    }
+}
+
+/// An element of the header: so many rows of such properties.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct PlyElement {
+    pub(crate) name: String,
+    /// The rows that the header claims; what the file holds is known when they are read.
+    pub(crate) count: u64,
+    pub(crate) properties: Vec<PlyProperty>,
+}
+
+impl PlyElement {
+    /// The place among the properties of the first of `names` that is one, upper and lower case being the same. A name
+    /// earlier in `names` goes before one later.
+    pub(crate) fn find(&self, names: &[&str]) -> Option<usize> {
+        names.iter().find_map(|name| self.properties.iter().position(|p| p.name.eq_ignore_ascii_case(name)))
+    }
+
+    /// As [`PlyElement::find`], among the properties that are single numbers.
+    pub(crate) fn find_scalar(&self, names: &[&str]) -> Option<usize> {
+        names.iter().find_map(|name| {
+            self.properties.iter().position(|p| !p.is_list() && p.name.eq_ignore_ascii_case(name))
+        })
+    }
+
+    /// As [`PlyElement::find`], among the properties that are lists.
+    pub(crate) fn find_list(&self, names: &[&str]) -> Option<usize> {
+        names.iter().find_map(|name| {
+            self.properties.iter().position(|p| p.is_list() && p.name.eq_ignore_ascii_case(name))
+        })
+    }
+
+    /// The fewest bytes of a row.
+    pub(crate) fn min_row_bytes(&self, encoding: PlyEncoding) -> usize {
+        self.properties.iter().map(|p| p.min_bytes(encoding)).sum()
+    }
+}
+
+/// What a PLY file says about itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct PlyHeader {
+    pub(crate) encoding: PlyEncoding,
+    /// What stands behind `comment` and `obj_info`, in the order of the file.
+    pub(crate) comments: Vec<String>,
+    pub(crate) elements: Vec<PlyElement>,
+    /// Its length in bytes: the rows start here.
+    pub(crate) bytes: usize,
+    /// Its lines; the first row of an ASCII file is on the next.
+    pub(crate) lines: u64,
+    /// The byte that ends a line: LF, or CR in files that know no LF.
+    pub(crate) line_end: u8,
+}
+
+impl PlyHeader {
+    /// Reads the header at the front of `bytes`: of the whole file, or its first [`MAX_HEADER`] bytes.
+    ///
+    /// # Errors
+    /// [`Error::Format`] with the line.
+    pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let head = bytes.get(..MAX_HEADER).unwrap_or(bytes);
+        let mut lines = head.split(|b| matches!(b, b'\n' | b'\r'));
+        let first = lines.next().unwrap_or_default();
+        if first.trim_ascii_end() != b"ply" {
+            return Err(Error::format(path, "is no PLY file: it does not start with the line \"ply\""));
+        }
+        let line_end = match head.get(first.len()..) {
+            Some([b'\r', rest @ ..]) if rest.first() != Some(&b'\n') => b'\r',
+            _ => b'\n',
+        };
+        let mut header = Self {
+            encoding: PlyEncoding::Ascii,
+            comments: Vec::new(),
+            elements: Vec::new(),
+            bytes: 0,
+            lines: 0,
+            line_end,
+        };
+        let mut encoding = None;
+        // The last piece has no end.
+        let pieces = head.split_inclusive(|&b| b == line_end).filter(|piece| piece.ends_with(&[line_end]));
+        for piece in pieces {
+            let line = piece.trim_ascii();
+            header.bytes = header.bytes.saturating_add(piece.len());
+            header.lines = header.lines.saturating_add(1);
+            let fail = |message: String| {
+                let shown = quote(line);
+                Error::line(path, header.lines, format!("{message}: {shown}"))
+            };
+            let text = String::from_utf8_lossy(line);
+            let mut words = text.split_ascii_whitespace();
+            let keyword = words.next().unwrap_or_default();
+            let rest: Vec<&str> = words.collect();
+            match (keyword, rest.as_slice()) {
+                ("", _) => {}
+                ("ply", []) if header.lines == 1 => {}
+                ("comment" | "obj_info", _) => {
+                    header.comments.push(text.strip_prefix(keyword).unwrap_or(&text).trim().to_owned());
+                }
+                ("format", [name, ..]) => {
+                    encoding = Some(match *name {
+                        "ascii" => PlyEncoding::Ascii,
+                        "binary_little_endian" => PlyEncoding::LittleEndian,
+                        "binary_big_endian" => PlyEncoding::BigEndian,
+                        _ => return Err(fail("an unknown format".into())),
+                    });
+                }
+                ("element", [name, count]) => {
+                    let count = count.parse().map_err(|_| fail("not a number of rows".into()))?;
+                    let (name, properties) = ((*name).to_owned(), Vec::new());
+                    header.elements.push(PlyElement { name, count, properties });
+                }
+                ("property", words) => {
+                    let property = property(words).map_err(fail)?;
+                    match header.elements.last_mut() {
+                        Some(element) => element.properties.push(property),
+                        None => return Err(fail("a property before the first element".into())),
+                    }
+                }
+                ("end_header", _) => {
+                    let Some(encoding) = encoding else {
+                        return Err(fail("the header names no format".into()));
+                    };
+                    header.encoding = encoding;
+                    return Ok(header);
+                }
+                _ => return Err(fail("no line of a PLY header".into())),
+            }
+        }
+        Err(Error::format(
+            path,
+            if head.len() < MAX_HEADER {
+                format!("is cut off in its header, after line {}: there is no \"end_header\"", header.lines)
+            } else {
+                "has no \"end_header\" in its first 1,048,576 bytes".to_owned()
+            },
+        ))
+    }
+
+    /// The element `name` and its place.
+    pub(crate) fn element(&self, name: &str) -> Option<(usize, &PlyElement)> {
+        self.elements.iter().enumerate().find(|(_, e)| e.name.eq_ignore_ascii_case(name))
+    }
+}
+
+/// A property from the words behind `property`.
+fn property(words: &[&str]) -> std::result::Result<PlyProperty, String> {
+    let kind = |name: &str| PlyType::parse(name).ok_or_else(|| format!("`{name}` is no type of PLY"));
+    match words {
+        ["list", length, value, name] => {
+            let length = kind(length)?;
+            if !length.is_integer() {
+                return Err("the length of a list is an integer".into());
+            }
+            Ok(PlyProperty { name: (*name).to_owned(), kind: kind(value)?, list: Some(length) })
+        }
+        ["list", ..] => Err("a list property has two types and a name".into()),
+        [value, name] => Ok(PlyProperty { name: (*name).to_owned(), kind: kind(value)?, list: None }),
+        _ => Err("a property has a type and a name".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> std::result::Result<PlyHeader, String> {
+        PlyHeader::parse(Path::new("a.ply"), text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn both_families_of_type_names_and_every_part() {
+        let text = "ply\nformat binary_big_endian 1.0\ncomment  made by hand \nobj_info n 1\nelement vertex 3\n\
+            property char a\nproperty uint8 b\nproperty short c\nproperty uint16 d\nproperty int e\nproperty uint32 f\n\
+            comment between\nproperty float g\nproperty float64 h\nelement face 18446744073709551615\n\
+            property list uchar int Vertex_Indices\nelement none 0\nend_header\nrest";
+        let header = parse(text).unwrap();
+        assert_eq!(header.encoding, PlyEncoding::BigEndian);
+        assert_eq!(header.comments, ["made by hand", "n 1", "between"]);
+        assert_eq!((header.bytes, header.lines), (text.len() - 4, 18));
+        let kinds: Vec<PlyType> = header.elements[0].properties.iter().map(|p| p.kind).collect();
+        use PlyType::*;
+        assert_eq!(kinds, [I8, U8, I16, U16, I32, U32, F32, F64]);
+        assert_eq!(header.elements[0].min_row_bytes(PlyEncoding::BigEndian), 1 + 1 + 2 + 2 + 4 + 4 + 4 + 8);
+        let (place, face) = header.element("face").unwrap();
+        assert_eq!((place, face.count), (1, u64::MAX));
+        assert_eq!(face.find(&["vertex_index", "vertex_indices"]), Some(0));
+        assert_eq!(
+            (face.find_scalar(&["vertex_indices"]), face.find_list(&["vertex_indices"])),
+            (None, Some(0))
+        );
+        assert_eq!(header.element("none").unwrap().1.properties, []);
+    }
+
+    #[test]
+    fn lines_end_in_three_ways() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n";
+        for (end, mark) in [("\n", b'\n'), ("\r\n", b'\n'), ("\r", b'\r'), (" \t\n", b'\n')] {
+            let header = parse(&text.replace('\n', end)).unwrap();
+            assert_eq!((header.line_end, header.lines, header.elements.len()), (mark, 5, 1), "{end:?}");
+        }
+        // Rows of a binary file may start with the byte of a line's end.
+        let header = parse("ply\nformat binary_little_endian 1.0\nend_header\n\n\n").unwrap();
+        assert_eq!(header.bytes, 47);
+    }
+
+    #[test]
+    fn faults_have_their_line() {
+        for (text, words) in [
+            ("", "is no PLY file"),
+            ("plywood\n", "is no PLY file"),
+            ("ply\nformat ascii 1.0\nelement vertex 1\n", "cut off in its header, after line 3"),
+            ("ply\nend_header\n", "line 2: the header names no format"),
+            ("ply\nformat text 1.0\n", "line 2: an unknown format: `format text 1.0`"),
+            ("ply\nelement vertex -1\n", "line 2: not a number of rows"),
+            ("ply\nelement vertex\n", "line 2: no line of a PLY header: `element vertex`"),
+            ("ply\nproperty float x\n", "line 2: a property before the first element"),
+            ("ply\nelement v 1\nproperty int64 x\n", "line 3: `int64` is no type of PLY"),
+            ("ply\nelement v 1\nproperty list float int x\n", "line 3: the length of a list is an integer"),
+            ("ply\nelement v 1\nproperty list uchar x\n", "line 3: a list property has two types and a name"),
+            ("ply\nelement v 1\nproperty float\n", "line 3: a property has a type and a name"),
+            ("ply\nhello\u{1}\n", "line 2: no line of a PLY header: `hello\u{fffd}`"),
+        ] {
+            let message = parse(text).unwrap_err();
+            assert!(message.starts_with("a.ply") && message.contains(words), "{text:?}: {message}");
+        }
+        let endless = format!("ply\ncomment {}\n", "x".repeat(MAX_HEADER));
+        assert!(parse(&endless).unwrap_err().contains("in its first 1,048,576 bytes"));
+    }
+}

@@ -1,0 +1,131 @@
+//! The vertices of a PLY mesh.
+
+use crate::error::{Error, Result};
+use crate::mesh::file::UpAxis;
+use crate::mesh::ply::batch::PlyBatch;
+use crate::mesh::ply::elements::PlyReader;
+use crate::mesh::ply::header::{PlyElement, PlyType};
+use crate::mesh::ply::labels::PlyLabels;
+use s3d_geom::glam::{Vec2, Vec3, vec2, vec3};
+use std::path::Path;
+
+/// Columns of the element `vertex`, in the world's axes; those that the file lacks are empty.
+#[derive(Debug, Default)]
+pub(crate) struct PlyVertices {
+    pub(crate) positions: Vec<Vec3>,
+    /// Of length 1; NaN where the file's has no length.
+    pub(crate) normals: Vec<Vec3>,
+    pub(crate) colors: Vec<[u8; 3]>,
+    pub(crate) uvs: Vec<Vec2>,
+}
+
+/// Names of two or three columns that go together, in the order in which they are looked for.
+const POSITIONS: [[&str; 3]; 1] = [["x", "y", "z"]];
+const NORMALS: [[&str; 3]; 2] = [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
+const COLORS: [[&str; 3]; 3] =
+    [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]];
+const UVS: [[&str; 2]; 4] = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
+
+/// The places of the first of `names` of which all are there.
+fn places<const N: usize>(element: &PlyElement, names: &[[&str; N]]) -> Option<[usize; N]> {
+    names.iter().find_map(|names| {
+        let mut places = [0; N];
+        for (place, name) in places.iter_mut().zip(names) {
+            *place = element.find_scalar(&[name])?;
+        }
+        Some(places)
+    })
+}
+
+impl PlyVertices {
+    /// Reads the element that comes now; its labels too, if they belong to vertices.
+    ///
+    /// # Errors
+    /// As [`PlyReader::read_batch`]; [`Error::Format`] without coordinates.
+    pub(crate) fn read(
+        path: &Path,
+        reader: &mut PlyReader,
+        element: &PlyElement,
+        up: UpAxis,
+        mut labels: Option<&mut PlyLabels>,
+    ) -> Result<Self> {
+        let Some(xyz) = places(element, &POSITIONS) else {
+            return Err(Error::format(path, "its vertices have no x, y and z"));
+        };
+        let (normal, color, uv) =
+            (places(element, &NORMALS), places(element, &COLORS), places(element, &UVS));
+        let wanted = xyz.into_iter().chain(normal.into_iter().flatten()).chain(color.into_iter().flatten());
+        let wanted = wanted.chain(uv.into_iter().flatten());
+        reader.want(wanted.chain(labels.iter().flat_map(|l| l.properties())));
+
+        let mut out = Self::default();
+        out.positions.reserve_exact(reader.plausible_rows(element));
+        let mut colors = color.map(|places| Colors::new(element, places));
+        let mut batch = PlyBatch::default();
+        while reader.read_batch(&mut batch)? {
+            out.positions.extend(vectors(&batch, xyz).map(|v| up.world_from_file(v)));
+            if let Some(places) = normal {
+                out.normals.extend(vectors(&batch, places).map(|n| up.world_from_file(n / n.length())));
+            }
+            if let Some([u, v]) = uv {
+                let pairs = batch.scalars(u).iter().zip(batch.scalars(v));
+                out.uvs.extend(pairs.map(|(&u, &v)| vec2(u as f32, v as f32)));
+            }
+            if let Some(colors) = &mut colors {
+                colors.add(&batch);
+            }
+            if let Some(labels) = labels.as_deref_mut() {
+                labels.add(reader, &batch)?;
+            }
+        }
+        out.colors = colors.map_or_else(Vec::new, Colors::finish);
+        Ok(out)
+    }
+}
+
+fn vectors(batch: &PlyBatch, [x, y, z]: [usize; 3]) -> impl Iterator<Item = Vec3> {
+    let (x, y, z) = (batch.scalars(x), batch.scalars(y), batch.scalars(z));
+    x.iter().zip(y).zip(z).map(|((&x, &y), &z)| vec3(x as f32, y as f32, z as f32))
+}
+
+/// Colours while they are read: bytes as bytes, other types as they are until the largest is known.
+struct Colors {
+    places: [usize; 3],
+    kind: PlyType,
+    bytes: Vec<[u8; 3]>,
+    numbers: Vec<[f32; 3]>,
+}
+
+impl Colors {
+    fn new(element: &PlyElement, places: [usize; 3]) -> Self {
+        let [r, g, b] = places.map(|p| element.properties.get(p).map(|p| p.kind));
+        // Three types that differ are read as numbers.
+        let kind = r.filter(|_| r == g && g == b).unwrap_or(PlyType::F32);
+        Self { places, kind, bytes: Vec::new(), numbers: Vec::new() }
+    }
+
+    fn add(&mut self, batch: &PlyBatch) {
+        let [r, g, b] = self.places.map(|p| batch.scalars(p));
+        let rows = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]);
+        match self.kind {
+            PlyType::U8 => self.bytes.extend(rows.map(|c| c.map(|v| v as u8))),
+            _ => self.numbers.extend(rows.map(|c| c.map(|v| v as f32))),
+        }
+    }
+
+    /// Numbers of floating point run from 0 to 1, in some files from 0 to 255: the largest tells, with room for what is a
+    /// little too bright. Those of 16 bits run to 65,535 if one is larger than 255.
+    fn finish(self) -> Vec<[u8; 3]> {
+        if self.kind == PlyType::U8 {
+            return self.bytes;
+        }
+        let largest = self.numbers.iter().flatten().fold(0.0f32, |a, &b| a.max(b));
+        let scale = match self.kind.is_integer() {
+            true if largest > 255.0 => 255.0 / 65_535.0,
+            false if largest <= 2.0 => 255.0,
+            _ => 1.0,
+        };
+        let byte = |v: f32| (v * scale).round().clamp(0.0, 255.0) as u8;
+        self.numbers.into_iter().map(|c| c.map(byte)).collect()
+    }
+}

@@ -1,0 +1,339 @@
+//! COCO's panoptic annotations: an image of segment numbers, and a list of what each segment is.
+
+#![expect(
+    clippy::indexing_slicing,
+    reason = "a writer: it counts the rows and labels of images that were read, and checked, before"
+)]
+
+use crate::error::Result;
+use crate::fs::atomic::write_whole;
+use s3d_geom::Raster;
+use s3d_label::{Class, LabelId, LabelTable};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use thiserror::Error;
+
+/// What is no pixel of a surface in a semantic image. Source: formats.md, "Images".
+const MISSING: [u8; 3] = [13; 3];
+
+/// Segments that stand for all of a class in an image have numbers from here on, above those of all labels.
+const FIRST_STUFF_ID: u32 = 0x00ff_0000;
+
+/// The category of a class: 1 to 13, in the order of [`Class::ALL`].
+pub fn coco_category_id(class: Class) -> u32 {
+    class.index() as u32 + 1
+}
+
+/// A category. The fields bear the file's names.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct CocoCategory {
+    /// See [`coco_category_id`].
+    pub id: u32,
+    /// The class's name.
+    pub name: &'static str,
+    /// "structure" for what a building is made of, "furniture", or "clutter".
+    pub supercategory: &'static str,
+    /// 1 if each instance is a segment, 0 if all of the class in an image is one.
+    pub isthing: u8,
+    /// For looking at.
+    pub color: [u8; 3],
+}
+
+/// The 13 categories; `stuff` are the classes whose instances are not told apart.
+pub fn coco_categories(stuff: &[Class]) -> Vec<CocoCategory> {
+    let supercategory = |class| match class {
+        Class::Ceiling
+        | Class::Floor
+        | Class::Wall
+        | Class::Beam
+        | Class::Column
+        | Class::Window
+        | Class::Door => "structure",
+        Class::Table | Class::Chair | Class::Sofa | Class::Bookcase | Class::Board => "furniture",
+        Class::Clutter => "clutter",
+    };
+    let category = |class: Class| CocoCategory {
+        id: coco_category_id(class),
+        name: class.name(),
+        supercategory: supercategory(class),
+        isthing: u8::from(!stuff.contains(&class)),
+        color: crate::image::pretty::pretty_color(coco_category_id(class)),
+    };
+    Class::ALL.map(category).into()
+}
+
+/// A segment of an image. The fields bear the file's names.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct CocoSegment {
+    /// Its number in the image: the index of its label, which is the same in all images of the data set; of a class that is
+    /// stuff 16,711,680 and its category.
+    pub id: u32,
+    /// See [`coco_category_id`].
+    pub category_id: u32,
+    /// Its pixels.
+    pub area: u64,
+    /// x, y, width and height of the box around its pixels.
+    pub bbox: [u32; 4],
+    /// 0.
+    pub iscrowd: u8,
+}
+
+/// A pixel whose label is in no table.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("pixel ({x}, {y}) has label {index}, but there are {labels} labels")]
+pub struct UnknownLabelIndex {
+    /// Column.
+    pub x: u32,
+    /// Row.
+    pub y: u32,
+    /// The index.
+    pub index: u32,
+    /// The labels that there are.
+    pub labels: usize,
+}
+
+/// The panoptic image of a semantic image, a segment's number as R + 256·G + 65536·B (which is not the order of our
+/// semantic images) and 0 where nothing was seen or what was seen has no label; and its segments, by number.
+///
+/// # Errors
+/// [`UnknownLabelIndex`].
+pub fn coco_panoptic(
+    semantic: &Raster<[u8; 3]>,
+    table: &LabelTable,
+    stuff: &[Class],
+) -> std::result::Result<(Raster<[u8; 3]>, Vec<CocoSegment>), UnknownLabelIndex> {
+    let width = semantic.width() as usize;
+    let mut segments: BTreeMap<u32, Extent> = BTreeMap::new();
+    let mut pixels = Vec::with_capacity(semantic.len());
+    // A label's segment; labels repeat from row to row.
+    let mut known: BTreeMap<[u8; 3], Option<(u32, Class)>> = BTreeMap::from([(MISSING, None)]);
+    for (y, row) in semantic.pixels().chunks(width.max(1)).enumerate() {
+        let mut x = 0;
+        for run in row.chunk_by(|a, b| a == b) {
+            let label = run[0];
+            let segment = match known.get(&label) {
+                Some(segment) => *segment,
+                None => {
+                    let index = u32::from_be_bytes([0, label[0], label[1], label[2]]);
+                    if index as usize >= table.len() {
+                        let (x, y, labels) = (x as u32, y as u32, table.len());
+                        return Err(UnknownLabelIndex { x, y, index, labels });
+                    }
+                    let segment = table.class_of(LabelId(index)).map(|class| {
+                        let whole = FIRST_STUFF_ID + coco_category_id(class);
+                        (if stuff.contains(&class) { whole } else { index }, class)
+                    });
+                    known.insert(label, segment);
+                    segment
+                }
+            };
+            if let Some((id, class)) = segment {
+                segments.entry(id).or_insert_with(|| Extent::new(class)).add(
+                    x as u32,
+                    y as u32,
+                    run.len() as u32,
+                );
+            }
+            let [r, g, b, _] = segment.map_or(0, |s| s.0).to_le_bytes();
+            pixels.resize(pixels.len() + run.len(), [r, g, b]);
+            x += run.len();
+        }
+    }
+    let image = Raster::from_vec(semantic.width(), semantic.height(), pixels);
+    Ok((image, segments.into_iter().map(|(id, extent)| extent.segment(id)).collect()))
+}
+
+/// What a segment covers.
+struct Extent {
+    class: Class,
+    area: u64,
+    x: (u32, u32),
+    y: (u32, u32),
+}
+
+impl Extent {
+    fn new(class: Class) -> Self {
+        Self { class, area: 0, x: (u32::MAX, 0), y: (u32::MAX, 0) }
+    }
+
+    /// Adds pixels of a row.
+    fn add(&mut self, x: u32, y: u32, count: u32) {
+        self.area += u64::from(count);
+        self.x = (self.x.0.min(x), self.x.1.max(x + count));
+        self.y = (self.y.0.min(y), self.y.1.max(y + 1));
+    }
+
+    fn segment(&self, id: u32) -> CocoSegment {
+        let bbox = [self.x.0, self.y.0, self.x.1 - self.x.0, self.y.1 - self.y.0];
+        CocoSegment { id, category_id: coco_category_id(self.class), area: self.area, bbox, iscrowd: 0 }
+    }
+}
+
+/// An image and its annotation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CocoImage {
+    /// Number of the image, in the data set.
+    pub id: u32,
+    /// The image below the folder of images, and the panoptic image below its own: COCO gives both the same name.
+    pub file_name: String,
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Its segments.
+    pub segments: Vec<CocoSegment>,
+}
+
+/// Writes a panoptic annotation file (`info`, `images`, `annotations`, `categories`) and returns its size in bytes.
+///
+/// # Errors
+/// [`crate::Error::Io`].
+pub fn write_coco(
+    path: &Path,
+    description: &str,
+    images: &[CocoImage],
+    categories: &[CocoCategory],
+) -> Result<u64> {
+    #[derive(Serialize)]
+    struct Info<'a> {
+        description: &'a str,
+    }
+    #[derive(Serialize)]
+    struct Image<'a> {
+        id: u32,
+        file_name: &'a str,
+        width: u32,
+        height: u32,
+    }
+    #[derive(Serialize)]
+    struct Annotation<'a> {
+        image_id: u32,
+        file_name: &'a str,
+        segments_info: &'a [CocoSegment],
+    }
+    #[derive(Serialize)]
+    struct File<'a> {
+        info: Info<'a>,
+        images: Vec<Image<'a>>,
+        annotations: Vec<Annotation<'a>>,
+        categories: &'a [CocoCategory],
+    }
+    let file = File {
+        info: Info { description },
+        images: images
+            .iter()
+            .map(|i| Image { id: i.id, file_name: &i.file_name, width: i.width, height: i.height })
+            .collect(),
+        annotations: images
+            .iter()
+            .map(|i| Annotation { image_id: i.id, file_name: &i.file_name, segments_info: &i.segments })
+            .collect(),
+        categories,
+    };
+    write_whole(path, |out| {
+        serde_json::to_writer(&mut *out, &file)?;
+        out.write_all(b"\n")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn table() -> LabelTable {
+        let names = [
+            "<UNK>_0_<UNK>_0_0",
+            "ceiling_1_office_1_1",
+            "chair_1_office_1_1",
+            "chair_2_office_1_1",
+            "wall_1_office_1_1",
+            "wall_2_office_1_1",
+        ];
+        LabelTable::from_names(&names.map(String::from)).unwrap()
+    }
+
+    fn pixel(index: u32) -> [u8; 3] {
+        let [_, r, g, b] = index.to_be_bytes();
+        [r, g, b]
+    }
+
+    fn id_of([r, g, b]: [u8; 3]) -> u32 {
+        u32::from(r) + 256 * u32::from(g) + 65_536 * u32::from(b)
+    }
+
+    #[test]
+    fn segments_cover_their_pixels() {
+        let [m, w, v, c] = [MISSING, pixel(4), pixel(5), pixel(2)];
+        let semantic = Raster::from_vec(4, 3, vec![m, w, w, v, c, [0; 3], w, c, m, m, c, c]);
+        let (image, segments) = coco_panoptic(&semantic, &table(), &[Class::Wall]).unwrap();
+        let wall = FIRST_STUFF_ID + 3;
+        let ids: Vec<u32> = image.pixels().iter().map(|p| id_of(*p)).collect();
+        assert_eq!(ids, [0, wall, wall, wall, 2, 0, wall, 2, 0, 0, 2, 2]);
+        let segment = |id, category_id, area, bbox| CocoSegment { id, category_id, area, bbox, iscrowd: 0 };
+        assert_eq!(segments, [segment(2, 9, 4, [0, 1, 4, 2]), segment(wall, 3, 4, [1, 0, 3, 2])]);
+        // Each wall by itself.
+        let (_, segments) = coco_panoptic(&semantic, &table(), &[]).unwrap();
+        assert_eq!(segments.iter().map(|s| (s.id, s.area)).collect::<Vec<_>>(), [(2, 4), (4, 3), (5, 1)]);
+    }
+
+    #[test]
+    fn a_label_beyond_the_table_is_told() {
+        let semantic = Raster::from_vec(2, 2, vec![[0; 3], [0; 3], [0; 3], pixel(6)]);
+        let e = coco_panoptic(&semantic, &table(), &[]).unwrap_err();
+        assert_eq!(e.to_string(), "pixel (1, 1) has label 6, but there are 6 labels");
+    }
+
+    proptest! {
+        #[test]
+        fn areas_and_boxes_are_those_of_the_image(
+            labels in prop::collection::vec(0u32..7, 1..200),
+            width in 1usize..20,
+        ) {
+            let height = labels.len().div_ceil(width);
+            let mut pixels: Vec<[u8; 3]> =
+                labels.iter().map(|l| if *l == 6 { MISSING } else { pixel(*l) }).collect();
+            pixels.resize(width * height, MISSING);
+            let semantic = Raster::from_vec(width as u32, height as u32, pixels);
+            let (image, segments) = coco_panoptic(&semantic, &table(), &[Class::Wall]).unwrap();
+            let mut seen = 0;
+            for s in &segments {
+                let at: Vec<(u32, u32)> = (0..image.height())
+                    .flat_map(|y| (0..image.width()).map(move |x| (x, y)))
+                    .filter(|(x, y)| id_of(image.at(*x, *y)) == s.id)
+                    .collect();
+                let (x0, x1) = (at.iter().map(|p| p.0).min().unwrap(), at.iter().map(|p| p.0).max().unwrap());
+                let (y0, y1) = (at.iter().map(|p| p.1).min().unwrap(), at.iter().map(|p| p.1).max().unwrap());
+                prop_assert_eq!((s.area, s.bbox), (at.len() as u64, [x0, y0, x1 - x0 + 1, y1 - y0 + 1]));
+                seen += s.area;
+            }
+            let void = image.pixels().iter().filter(|p| id_of(**p) == 0).count() as u64;
+            prop_assert_eq!(seen + void, image.len() as u64);
+            prop_assert!(segments.is_sorted_by_key(|s| s.id));
+        }
+    }
+
+    #[test]
+    fn the_file_has_cocos_keys() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("panoptic.json");
+        let segment = CocoSegment { id: 2, category_id: 9, area: 4, bbox: [0, 1, 4, 2], iscrowd: 0 };
+        let image =
+            CocoImage { id: 1, file_name: "a.png".into(), width: 4, height: 3, segments: vec![segment] };
+        let categories = coco_categories(&[Class::Wall, Class::Floor]);
+        write_coco(&path, "demo", &[image], &categories).unwrap();
+        let json: serde_json::Value = crate::fs::json::read_json(&path).unwrap();
+        assert_eq!(json["images"][0]["file_name"], json["annotations"][0]["file_name"]);
+        assert_eq!(json["annotations"][0]["segments_info"][0]["bbox"], serde_json::json!([0, 1, 4, 2]));
+        let things: Vec<u64> =
+            json["categories"].as_array().unwrap().iter().map(|c| c["isthing"].as_u64().unwrap()).collect();
+        assert_eq!(things, [1, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
+        assert_eq!(
+            (&json["categories"][8]["name"], &json["categories"][8]["id"]),
+            (&"chair".into(), &9.into())
+        );
+        // Stuff has numbers that no label has, and that fit three bytes.
+        assert!(FIRST_STUFF_ID as usize > s3d_label::MAX_LABELS && FIRST_STUFF_ID + 13 < 1 << 24);
+    }
+}

@@ -1,0 +1,358 @@
+//! A table of all images of a data set as one Parquet file.
+
+#![expect(clippy::indexing_slicing, reason = "a writer: its columns are its own")]
+
+use crate::dataset::domain::Domain;
+use crate::error::{Error, Result};
+use crate::fs::atomic::AtomicFile;
+use parquet::basic::Compression;
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use parquet::schema::parser::parse_message_type;
+use s3d_label::Class;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Rows that are in one piece of the file, and in memory as columns.
+const GROUP: usize = 1 << 16;
+
+/// An image, a row of the table. What is not known of it is null there.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImageRow {
+    /// Number of its area.
+    pub area: u32,
+    /// The scan location.
+    pub camera_uuid: String,
+    /// Such as "office_3".
+    pub room: String,
+    /// Such as "office".
+    pub room_type: String,
+    /// Such as 3.
+    pub room_number: u32,
+    /// The number of a view; `None` for a panorama.
+    pub frame_num: Option<u32>,
+    /// Its files below the root of the data set, in the order of [`Domain::ALL`].
+    pub files: [Option<String>; 7],
+    /// Width and height in pixels.
+    pub size: Option<[u32; 2]>,
+    /// The angle of view; π/2 for a panorama, as in its pose file.
+    pub fov_rad: Option<f64>,
+    /// Heading and elevation of a view, relative to the scanner's camera.
+    pub yaw_pitch_rad: Option<[f64; 2]>,
+    /// Where the camera is: world metres.
+    pub location: Option<[f64; 3]>,
+    /// Focal lengths and principal point in pixels, row by row.
+    pub k: Option<[f64; 9]>,
+    /// World → camera in OpenCV's axes, 3 × 4, row by row.
+    pub rt: Option<[f64; 12]>,
+    /// The entropy by which a view was selected, nats.
+    pub selection_entropy: Option<f64>,
+    /// The share of pixels in which something was seen.
+    pub coverage: Option<f64>,
+    /// What the pixels of its semantic image show.
+    pub semantic: Option<SemanticRow>,
+    /// The least, the mean and the greatest depth, metres, of the pixels that have one.
+    pub depth_m: Option<[f64; 3]>,
+}
+
+/// What the pixels of an image show.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SemanticRow {
+    /// The share of pixels of each class, in the order of [`Class::ALL`].
+    pub shares: [f64; 13],
+    /// The share of pixels in which something without a label was seen.
+    pub unlabelled: f64,
+    /// Shannon entropy of the classes, nats.
+    pub entropy: f64,
+    /// How many instances are seen.
+    pub instances: u32,
+}
+
+/// A column: its name, and the values of some rows.
+enum Column {
+    Int(Vec<Option<i32>>),
+    Float(Vec<Option<f64>>),
+    Text(Vec<Option<ByteArray>>),
+    List(Vec<Option<Vec<f64>>>),
+}
+
+/// The columns of some rows. Those that are never null are `required`.
+fn columns(rows: &[ImageRow]) -> Vec<(String, bool, Column)> {
+    let mut all = Vec::new();
+    macro_rules! column {
+        ($name:expr, $required:expr, $kind:ident, $value:expr) => {
+            all.push(($name, $required, Column::$kind(rows.iter().map($value).collect())))
+        };
+    }
+    let text = |t: &str| ByteArray::from(t.as_bytes().to_vec());
+    let int = |v: u32| v as i32;
+    column!("area".to_owned(), true, Int, |r| Some(int(r.area)));
+    column!("camera_uuid".to_owned(), true, Text, |r| Some(text(&r.camera_uuid)));
+    column!("room".to_owned(), true, Text, |r| Some(text(&r.room)));
+    column!("room_type".to_owned(), true, Text, |r| Some(text(&r.room_type)));
+    column!("room_number".to_owned(), true, Int, |r| Some(int(r.room_number)));
+    column!("kind".to_owned(), true, Text, |r| {
+        Some(text(if r.frame_num.is_some() { "view" } else { "panorama" }))
+    });
+    column!("frame_num".to_owned(), false, Int, |r| r.frame_num.map(int));
+    for (i, domain) in Domain::ALL.into_iter().enumerate() {
+        column!(domain.folder().to_owned(), false, Text, |r| r.files[i].as_deref().map(text));
+    }
+    for (i, name) in ["width", "height"].into_iter().enumerate() {
+        column!(name.to_owned(), false, Int, |r| r.size.map(|s| int(s[i])));
+    }
+    column!("fov_rad".to_owned(), false, Float, |r| r.fov_rad);
+    for (i, name) in ["yaw_rad", "pitch_rad"].into_iter().enumerate() {
+        column!(name.to_owned(), false, Float, |r| r.yaw_pitch_rad.map(|v| v[i]));
+    }
+    for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
+        column!(name.to_owned(), false, Float, |r| r.location.map(|v| v[i]));
+    }
+    column!("k".to_owned(), false, List, |r| r.k.map(|m| m.to_vec()));
+    column!("rt".to_owned(), false, List, |r| r.rt.map(|m| m.to_vec()));
+    column!("selection_entropy".to_owned(), false, Float, |r| r.selection_entropy);
+    column!("entropy".to_owned(), false, Float, |r| r.semantic.as_ref().map(|s| s.entropy));
+    column!("coverage".to_owned(), false, Float, |r| r.coverage);
+    for class in Class::ALL {
+        column!(format!("share_{class}"), false, Float, |r| {
+            r.semantic.as_ref().map(|s| s.shares[class.index()])
+        });
+    }
+    column!("share_unlabelled".to_owned(), false, Float, |r| r.semantic.as_ref().map(|s| s.unlabelled));
+    column!("instances".to_owned(), false, Int, |r| r.semantic.as_ref().map(|s| int(s.instances)));
+    for (i, name) in ["depth_min_m", "depth_mean_m", "depth_max_m"].into_iter().enumerate() {
+        column!(name.to_owned(), false, Float, |r| r.depth_m.map(|v| v[i]));
+    }
+    all
+}
+
+/// The schema, in Parquet's own words.
+fn schema(columns: &[(String, bool, Column)]) -> String {
+    let mut text = String::from("message images {\n");
+    for (name, required, column) in columns {
+        let repetition = if *required { "required" } else { "optional" };
+        let _ = match column {
+            Column::Int(_) => writeln!(text, "{repetition} int32 {name};"),
+            Column::Float(_) => writeln!(text, "{repetition} double {name};"),
+            Column::Text(_) => writeln!(text, "{repetition} binary {name} (STRING);"),
+            Column::List(_) => writeln!(
+                text,
+                "{repetition} group {name} (LIST) {{ repeated group list {{ required double element; }} }}"
+            ),
+        };
+    }
+    text.push('}');
+    text
+}
+
+/// Writes the table of images, a row an image in the order given, and returns the file's size in bytes. Columns:
+///
+/// `area`, `camera_uuid`, `room`, `room_type`, `room_number`, `kind` ("view" or "panorama"), `frame_num` (null for
+/// panoramas); the path of each modality below the data set's folder, named as its folder (`rgb`, `depth`, `normal`, …); `width`,
+/// `height`, `fov_rad`, `yaw_rad`, `pitch_rad`, `x`, `y`, `z`; `k` (9 numbers) and `rt` (12), row by row;
+/// `selection_entropy`, `entropy`, `coverage`, `share_ceiling` … `share_clutter`, `share_unlabelled` (with the 13 they make
+/// the coverage), `instances`; `depth_min_m`, `depth_mean_m`, `depth_max_m`. See [`ImageRow`].
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_image_index(path: &Path, rows: &[ImageRow]) -> Result<u64> {
+    let failed = |e: ParquetError| match e {
+        ParquetError::External(e) => match e.downcast::<std::io::Error>() {
+            Ok(e) => Error::io(path, "write", *e),
+            Err(e) => Error::io(path, "write", std::io::Error::other(e)),
+        },
+        e => Error::io(path, "write", std::io::Error::other(e)),
+    };
+    let about =
+        "A row an image. Paths are below the data set's folder; metres, radians, nats; shares of all pixels.";
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::SNAPPY)
+        .set_created_by(concat!("s3d version ", env!("CARGO_PKG_VERSION")).to_owned())
+        .set_key_value_metadata(Some(vec![KeyValue::new("description".to_owned(), about.to_owned())]))
+        .build();
+    let schema = parse_message_type(&schema(&columns(&[]))).map_err(failed)?;
+    let mut file = AtomicFile::create(path)?;
+    let mut writer =
+        SerializedFileWriter::new(&mut file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
+    for rows in rows.chunks(GROUP) {
+        let mut group = writer.next_row_group().map_err(failed)?;
+        for (_, required, column) in columns(rows) {
+            let fewer = || failed(ParquetError::General("the schema has fewer columns".to_owned()));
+            let mut out = group.next_column().map_err(failed)?.ok_or_else(fewer)?;
+            write_column(&mut out, required, column).map_err(failed)?;
+            out.close().map_err(failed)?;
+        }
+        group.close().map_err(failed)?;
+    }
+    writer.close().map_err(failed)?;
+    file.commit()
+}
+
+/// Writes the values of a column that are there, and the levels that say which those are.
+fn write_column(
+    out: &mut SerializedColumnWriter<'_>,
+    required: bool,
+    column: Column,
+) -> std::result::Result<(), ParquetError> {
+    fn split<T>(values: Vec<Option<T>>) -> (Vec<i16>, Vec<T>) {
+        (values.iter().map(|v| i16::from(v.is_some())).collect(), values.into_iter().flatten().collect())
+    }
+    let levels = |levels: &Vec<i16>| (!required).then(|| levels.clone());
+    match column {
+        Column::Int(values) => {
+            let (there, values) = split(values);
+            out.typed::<Int32Type>().write_batch(&values, levels(&there).as_deref(), None)?;
+        }
+        Column::Float(values) => {
+            let (there, values) = split(values);
+            out.typed::<DoubleType>().write_batch(&values, levels(&there).as_deref(), None)?;
+        }
+        Column::Text(values) => {
+            let (there, values) = split(values);
+            out.typed::<ByteArrayType>().write_batch(&values, levels(&there).as_deref(), None)?;
+        }
+        Column::List(lists) => {
+            // Definition 0: no list, 1: an empty one, 2: an element. Repetition 0 begins a list.
+            let (mut definition, mut repetition, mut values) = (Vec::new(), Vec::new(), Vec::new());
+            for list in lists {
+                let list_definition = i16::from(list.is_some());
+                let list = list.unwrap_or_default();
+                definition.extend(if list.is_empty() { vec![list_definition] } else { vec![2; list.len()] });
+                repetition.extend((0..list.len().max(1)).map(|i| i16::from(i > 0)));
+                values.extend(list);
+            }
+            out.typed::<DoubleType>().write_batch(&values, Some(&definition), Some(&repetition))?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::{Field, Row};
+    use std::fs::File;
+
+    fn row(i: u32) -> ImageRow {
+        ImageRow {
+            area: 1 + i / 1000,
+            camera_uuid: format!("{i:032x}"),
+            room: "office_3".into(),
+            room_type: "office".into(),
+            room_number: 3,
+            frame_num: Some(i),
+            files: Domain::ALL.map(|d| Some(format!("area_1/data/{d}/{i}"))),
+            size: Some([1080, 540]),
+            fov_rad: Some(1.1),
+            yaw_pitch_rad: Some([f64::from(i), -0.5]),
+            location: Some([1.0, 2.0, f64::from(i)]),
+            k: Some(std::array::from_fn(|k| k as f64 + f64::from(i))),
+            rt: Some(std::array::from_fn(|k| -(k as f64))),
+            selection_entropy: Some(0.25),
+            coverage: Some(0.75),
+            semantic: Some(SemanticRow {
+                shares: std::array::from_fn(|k| k as f64 / 100.0),
+                unlabelled: 0.125,
+                entropy: 1.5,
+                instances: 17,
+            }),
+            depth_m: Some([0.5, 2.0, 9.0]),
+        }
+    }
+
+    fn bare() -> ImageRow {
+        ImageRow { area: 7, camera_uuid: "a".into(), room: "WC_1".into(), ..ImageRow::default() }
+    }
+
+    fn read(path: &Path) -> (Vec<String>, Vec<Row>) {
+        let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
+        let names = reader
+            .metadata()
+            .file_metadata()
+            .schema()
+            .get_fields()
+            .iter()
+            .map(|f| f.name().to_owned())
+            .collect();
+        (names, reader.get_row_iter(None).unwrap().map(|r| r.unwrap()).collect())
+    }
+
+    fn field<'a>((names, rows): &'a (Vec<String>, Vec<Row>), i: usize, name: &str) -> &'a Field {
+        let at = names.iter().position(|n| n == name).unwrap_or_else(|| panic!("no column {name}"));
+        rows[i].get_column_iter().nth(at).unwrap().1
+    }
+
+    #[test]
+    fn rows_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("images.parquet");
+        let rows = [row(5), bare(), row(2000)];
+        let bytes = write_image_index(&path, &rows).unwrap();
+        assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
+        let table = read(&path);
+        assert_eq!((table.0.len(), table.1.len()), (7 + 7 + 2 + 1 + 2 + 3 + 2 + 3 + 13 + 2 + 3, 3));
+        let text = |t: &str| Field::Str(t.to_owned());
+        for (i, row) in rows.iter().enumerate() {
+            assert_eq!(*field(&table, i, "area"), Field::Int(row.area as i32));
+            assert_eq!(*field(&table, i, "camera_uuid"), text(&row.camera_uuid));
+            let kind = if i == 1 { "panorama" } else { "view" };
+            assert_eq!(*field(&table, i, "kind"), text(kind));
+            assert_eq!(
+                *field(&table, i, "frame_num"),
+                row.frame_num.map_or(Field::Null, |n| Field::Int(n as i32))
+            );
+            for (file, domain) in row.files.iter().zip(Domain::ALL) {
+                assert_eq!(*field(&table, i, domain.folder()), file.as_deref().map_or(Field::Null, text));
+            }
+            let float = |v: Option<f64>| v.map_or(Field::Null, Field::Double);
+            assert_eq!(*field(&table, i, "z"), float(row.location.map(|l| l[2])));
+            assert_eq!(*field(&table, i, "pitch_rad"), float(row.yaw_pitch_rad.map(|v| v[1])));
+            assert_eq!(*field(&table, i, "coverage"), float(row.coverage));
+            let shares = row.semantic.as_ref().map(|s| s.shares);
+            assert_eq!(*field(&table, i, "share_chair"), float(shares.map(|s| s[Class::Chair.index()])));
+            assert_eq!(*field(&table, i, "depth_max_m"), float(row.depth_m.map(|d| d[2])));
+            for (name, list) in [("k", row.k.map(|k| k.to_vec())), ("rt", row.rt.map(|m| m.to_vec()))] {
+                match (field(&table, i, name), list) {
+                    (Field::ListInternal(found), Some(list)) => {
+                        let list: Vec<Field> = list.into_iter().map(Field::Double).collect();
+                        assert_eq!(found.elements(), list);
+                    }
+                    (found, list) => assert_eq!((found, list), (&Field::Null, None)),
+                }
+            }
+        }
+        assert_eq!(*field(&table, 0, "height"), Field::Int(540));
+        assert_eq!(*field(&table, 2, "instances"), Field::Int(17));
+    }
+
+    #[test]
+    fn many_rows_are_in_several_groups_and_the_bytes_are_the_same() {
+        let dir = tempfile::tempdir().unwrap();
+        let rows: Vec<ImageRow> =
+            (0..GROUP as u32 + 10).map(|i| if i % 7 == 0 { bare() } else { row(i) }).collect();
+        let (a, b) = (dir.path().join("a.parquet"), dir.path().join("b.parquet"));
+        write_image_index(&a, &rows).unwrap();
+        write_image_index(&b, &rows).unwrap();
+        assert_eq!(std::fs::read(&a).unwrap(), std::fs::read(&b).unwrap());
+        let reader = SerializedFileReader::new(File::open(&a).unwrap()).unwrap();
+        assert_eq!(reader.num_row_groups(), 2);
+        let table = read(&a);
+        assert_eq!(table.1.len(), rows.len());
+        assert_eq!(*field(&table, GROUP + 8, "frame_num"), Field::Int(GROUP as i32 + 8));
+    }
+
+    #[test]
+    fn no_rows_and_no_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.parquet");
+        write_image_index(&path, &[]).unwrap();
+        assert!(read(&path).1.is_empty());
+        let e = write_image_index(&dir.path().join("no/a.parquet"), &[]).unwrap_err();
+        assert!(e.to_string().contains("a.parquet: cannot write"), "{e}");
+    }
+}

@@ -1,0 +1,230 @@
+//! Tape archives (POSIX ustar), as far as training data needs them: plain files, one after another.
+
+#![expect(clippy::indexing_slicing, reason = "a writer: the fields of a header of 512 bytes")]
+
+use crate::error::Result;
+use crate::fs::atomic::AtomicFile;
+use std::path::Path;
+
+/// Headers and contents are filled up to a multiple of this.
+const BLOCK: u64 = 512;
+
+/// Two empty blocks end an archive.
+const END: u64 = 2 * BLOCK;
+
+/// Sizes from here on do not fit the header's eleven octal digits.
+const MAX_OCTAL: u64 = 1 << 33;
+
+/// Writes a tar archive of plain files, whole or not at all. It depends on nothing but what is appended: owner 0, mode
+/// 644, time 0.
+///
+/// Names of up to 100 bytes, or 256 with a `/` at a good place, stand in the header; longer ones, and sizes from 8 GiB on,
+/// in an extended header before it (POSIX pax), which tar programs and Python's `tarfile` read.
+#[derive(Debug)]
+pub struct TarWriter {
+    file: AtomicFile,
+}
+
+impl TarWriter {
+    /// Starts the archive `path`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn create(path: &Path) -> Result<Self> {
+        Ok(Self { file: AtomicFile::create(path)? })
+    }
+
+    /// Appends the file `name` (folders with `/`, no leading one) that holds `bytes`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    ///
+    /// # Panics
+    /// If `name` is empty, holds a NUL or begins with `/`.
+    pub fn append(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        assert!(
+            !name.is_empty() && !name.contains('\0') && !name.starts_with('/'),
+            "a file's name: {name:?}"
+        );
+        let size = bytes.len() as u64;
+        let records = pax_records(name, size);
+        if !records.is_empty() {
+            self.file.put(&header("pax", records.len() as u64, b'x'))?;
+            self.fill(records.as_bytes())?;
+        }
+        self.file.put(&header(name, size, b'0'))?;
+        self.fill(bytes)
+    }
+
+    /// Writes bytes and fills their last block.
+    fn fill(&mut self, bytes: &[u8]) -> Result<()> {
+        self.file.put(bytes)?;
+        let rest = bytes.len() as u64 % BLOCK;
+        if rest == 0 { Ok(()) } else { self.file.put(&[0; BLOCK as usize][rest as usize..]) }
+    }
+
+    /// Ends the archive, gives it its name, and returns its size in bytes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn finish(mut self) -> Result<u64> {
+        self.file.put(&[0; END as usize])?;
+        self.file.commit()
+    }
+
+    /// The bytes that an archive takes besides its files.
+    pub const EMPTY_BYTES: u64 = END;
+
+    /// The bytes that a file of this name and size takes in an archive.
+    pub fn entry_bytes(name: &str, size: u64) -> u64 {
+        let records = pax_records(name, size).len() as u64;
+        let extended = if records == 0 { 0 } else { BLOCK + records.next_multiple_of(BLOCK) };
+        extended + BLOCK + size.next_multiple_of(BLOCK)
+    }
+}
+
+/// The extended header of a file, if it needs one: "LENGTH key=value\n" for each of what does not fit.
+fn pax_records(name: &str, size: u64) -> String {
+    let mut records = String::new();
+    let mut push = |key: &str, value: &str| {
+        let rest = key.len() + value.len() + 3;
+        // The length counts its own digits.
+        let mut length = rest + 1;
+        while length != rest + length.to_string().len() {
+            length = rest + length.to_string().len();
+        }
+        records.push_str(&format!("{length} {key}={value}\n"));
+    };
+    if split_name(name).is_none() {
+        push("path", name);
+    }
+    if size >= MAX_OCTAL {
+        push("size", &size.to_string());
+    }
+    records
+}
+
+/// A name as the header's two fields take it: up to 155 bytes of folders, and up to 100 after a `/`. `None` if it does not
+/// fit.
+fn split_name(name: &str) -> Option<(&str, &str)> {
+    if name.len() <= 100 {
+        return Some(("", name));
+    }
+    let mut slashes =
+        name.match_indices('/').filter_map(|(at, _)| Some((name.get(..at)?, name.get(at + 1..)?)));
+    slashes.find(|(folders, rest)| folders.len() <= 155 && (1..=100).contains(&rest.len()))
+}
+
+/// The header of a file, or of an extended header (`kind` b'x').
+fn header(name: &str, size: u64, kind: u8) -> [u8; BLOCK as usize] {
+    let mut block = [0; BLOCK as usize];
+    let mut put = |at: usize, bytes: &[u8]| block[at..at + bytes.len()].copy_from_slice(bytes);
+    // What does not fit stands in the extended header; its beginning is here for programs that read none.
+    let beginning =
+        name.split_at_checked(name.floor_char_boundary(100)).map_or("", |(beginning, _)| beginning);
+    let (folders, rest) = split_name(name).unwrap_or(("", beginning));
+    put(0, rest.as_bytes());
+    put(100, b"0000644\0");
+    put(108, b"0000000\0");
+    put(116, b"0000000\0");
+    put(124, format!("{:011o}\0", size % MAX_OCTAL).as_bytes());
+    put(136, b"00000000000\0");
+    put(148, b"        ");
+    put(156, &[kind]);
+    put(257, b"ustar\x0000");
+    put(329, b"0000000\0");
+    put(337, b"0000000\0");
+    put(345, folders.as_bytes());
+    let sum: u32 = block.iter().map(|b| u32::from(*b)).sum();
+    block[148..156].copy_from_slice(format!("{sum:06o}\0 ").as_bytes());
+    block
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A reader written from POSIX's description: names and contents.
+    fn read(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
+        let (mut at, mut files, mut long) = (0, Vec::new(), None);
+        loop {
+            let block = &bytes[at..at + 512];
+            if block.iter().all(|b| *b == 0) {
+                assert_eq!(bytes.len(), at + 1024);
+                assert!(bytes[at..].iter().all(|b| *b == 0));
+                return files;
+            }
+            let text = |range: std::ops::Range<usize>| {
+                String::from_utf8(block[range].split(|b| *b == 0).next().unwrap().to_vec()).unwrap()
+            };
+            let octal = |range| u64::from_str_radix(text(range).trim(), 8).unwrap();
+            let mut plain = block.to_vec();
+            plain[148..156].fill(b' ');
+            assert_eq!(octal(148..156), plain.iter().map(|b| u64::from(*b)).sum::<u64>());
+            assert_eq!((&block[257..265], octal(136..148)), (&b"ustar\x0000"[..], 0));
+            let size = octal(124..136) as usize;
+            let data = bytes[at + 512..at + 512 + size].to_vec();
+            at += 512 + size.next_multiple_of(512);
+            if block[156] == b'x' {
+                let record = String::from_utf8(data).unwrap();
+                let (length, rest) = record.split_once(' ').unwrap();
+                assert_eq!(length.parse(), Ok(record.len()));
+                long = Some(rest.strip_prefix("path=").unwrap().strip_suffix('\n').unwrap().to_owned());
+            } else {
+                assert_eq!(block[156], b'0');
+                let folders = text(345..500);
+                let name =
+                    if folders.is_empty() { text(0..100) } else { format!("{folders}/{}", text(0..100)) };
+                files.push((long.take().unwrap_or(name), data));
+            }
+        }
+    }
+
+    #[test]
+    fn files_of_any_size_and_name_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.tar");
+        let names = [
+            "a".to_owned(),
+            "x".repeat(100),
+            "x".repeat(101),
+            format!("{}/{}", "f".repeat(155), "n".repeat(100)),
+            format!("{}/{}", "f".repeat(156), "n".repeat(100)),
+            format!("area_1/{}", "y".repeat(98)),
+            "ä".repeat(60),
+        ];
+        let mut writer = TarWriter::create(&path).unwrap();
+        let mut expected = Vec::new();
+        let mut bytes = TarWriter::EMPTY_BYTES;
+        for (i, name) in names.iter().enumerate() {
+            for size in [0, 1, 511, 512, 513] {
+                let data: Vec<u8> = (0..size).map(|k| (k + i) as u8).collect();
+                writer.append(name, &data).unwrap();
+                bytes += TarWriter::entry_bytes(name, size as u64);
+                expected.push((name.clone(), data));
+            }
+        }
+        assert_eq!(writer.finish().unwrap(), bytes);
+        let archive = std::fs::read(&path).unwrap();
+        assert_eq!(archive.len() as u64, bytes);
+        assert_eq!(read(&archive), expected);
+    }
+
+    #[test]
+    fn lengths_of_extended_headers_count_themselves() {
+        for length in 150..1100 {
+            let name = "x".repeat(length);
+            let records = pax_records(&name, 0);
+            assert_eq!(records.split(' ').next().unwrap().parse(), Ok(records.len()));
+        }
+        assert_eq!(pax_records("a", MAX_OCTAL), "19 size=8589934592\n");
+        assert_eq!(pax_records("a", MAX_OCTAL - 1), "");
+    }
+
+    #[test]
+    #[should_panic(expected = "a file's name")]
+    fn an_absolute_name_is_a_mistake() {
+        let dir = tempfile::tempdir().unwrap();
+        let _ = TarWriter::create(&dir.path().join("a.tar")).unwrap().append("/etc/x", b"");
+    }
+}

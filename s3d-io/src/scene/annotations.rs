@@ -1,0 +1,71 @@
+//! The table `[annotations]` of a `scene.toml`.
+
+use crate::cloud::annotations::AnnotationOptions;
+use s3d_geom::glam::DVec3;
+use s3d_label::{Class, Room};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct AnnotationTable {
+    path: Option<PathBuf>,
+    paths: Option<Vec<PathBuf>>,
+    #[serde(default)]
+    mesh: bool,
+    class: Option<String>,
+    instance: Option<String>,
+    room: Option<String>,
+    rooms: Option<String>,
+    #[serde(default)]
+    columns: Vec<String>,
+    #[serde(default)]
+    offset_m: [f64; 3],
+    #[serde(default)]
+    unknown_as_clutter: bool,
+    #[serde(default)]
+    classes: BTreeMap<String, String>,
+}
+
+impl AnnotationTable {
+    /// The key that names files, and the files as they are written; none if the mesh's own labels are meant.
+    pub(crate) fn paths(&self) -> std::result::Result<(&'static str, &[PathBuf]), String> {
+        match (&self.path, &self.paths, self.mesh) {
+            (Some(path), None, false) => Ok(("annotations.path", std::slice::from_ref(path))),
+            (None, Some(paths), false) if !paths.is_empty() => Ok(("annotations.paths", paths)),
+            (None, None, true) => Ok(("annotations.mesh", &[])),
+            _ => Err("annotations needs one of path, paths (a list of at least one) and mesh = true (its own labels)".into()),
+        }
+    }
+
+    /// How they are read.
+    pub(crate) fn options(&self) -> std::result::Result<AnnotationOptions, String> {
+        let room: Option<Room> = match &self.room {
+            Some(name) => Some(name.parse().map_err(|e| format!("annotations.room: {e}"))?),
+            None => None,
+        };
+        let mut classes = BTreeMap::new();
+        for (key, word) in &self.classes {
+            let class: Option<Class> = match word.as_str() {
+                "" => None,
+                word => Some(word.parse().map_err(|e| format!("annotations.classes.{key:?}: {e}"))?),
+            };
+            classes.insert(key.clone(), class);
+        }
+        if !self.offset_m.iter().all(|v| v.is_finite()) {
+            return Err(format!("annotations.offset_m = {:?} is not finite", self.offset_m));
+        }
+        Ok(AnnotationOptions {
+            unknown_as_clutter: self.unknown_as_clutter,
+            classes,
+            room,
+            class_column: self.class.clone(),
+            instance_column: self.instance.clone(),
+            room_column: self.rooms.clone(),
+            columns: self.columns.clone(),
+            offset_m: DVec3::from_array(self.offset_m),
+            ..AnnotationOptions::default()
+        })
+    }
+}
