@@ -4,7 +4,7 @@
 
 use crate::camera::located::{LocatedPicture, pose_from_opencv};
 use crate::error::{Error, Result};
-use crate::image::texture::read_file;
+use crate::fs::open::read_file;
 use crate::quote::quote;
 use s3d_geom::Pose;
 use s3d_geom::glam::{DMat3, DQuat, DVec3};

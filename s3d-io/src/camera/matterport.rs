@@ -5,8 +5,9 @@
 
 use crate::camera::table::ScanLocation;
 use crate::error::{Error, Result};
+use crate::fs::open::read_file;
 use crate::guarded::guarded;
-use crate::image::texture::{TextureFault, decode_texture, read_file};
+use crate::image::texture::{TextureFault, decode_texture};
 use glam::{DMat3, DVec2, DVec3};
 use image::ImageReader;
 use s3d_geom::{Lens, Pose, Raster};

@@ -1,7 +1,7 @@
 //! The table of scan locations.
 
 use crate::error::{Error, Result};
-use crate::image::texture::read_file;
+use crate::fs::open::read_file;
 use csv::{ByteRecord, ReaderBuilder, Trim};
 use s3d_geom::Pose;
 use s3d_geom::glam::{DQuat, DVec3, DVec4};

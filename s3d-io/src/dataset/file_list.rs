@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_whole;
 use crate::fs::checksum::{Checksum, checksum_of_file};
-use crate::image::texture::open_file;
+use crate::fs::open::open_file;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};

@@ -4,7 +4,7 @@ use crate::dataset::domain::Domain;
 use crate::dataset::layout::{Frame, ImageName, Layout, image_stem};
 use crate::error::{Error, Result};
 use crate::fs::json::read_json;
-use crate::image::texture::open_file;
+use crate::fs::open::open_file;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_bytes;
-use crate::image::texture::read_file;
+use crate::fs::open::read_file;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;

@@ -3,6 +3,7 @@
 pub(crate) mod atomic;
 pub(crate) mod checksum;
 pub(crate) mod json;
+pub(crate) mod open;
 mod sync;
 
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};

@@ -5,10 +5,10 @@
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_bytes;
+use crate::fs::open::read_file;
 use crate::guarded::guarded;
 use crate::image::compression::Compression;
 use crate::image::deflate::{Candidates, Deflater, Search, Work, wide};
-use crate::image::texture::read_file;
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::block::writer::ChunksWriter;
 use exr::compression::Compression as Method;

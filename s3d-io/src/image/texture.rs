@@ -3,13 +3,13 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::error::{Error, Result};
+use crate::fs::open::read_file;
 use crate::guarded::guarded;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 use s3d_geom::Raster;
-use std::fs;
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The longest side of a texture in pixels.
 const MAX_SIDE: u32 = 65_535;
@@ -180,34 +180,12 @@ impl Together {
     }
 }
 
-/// The content of a regular file. Devices and pipes are refused: reading one may never end.
-pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
-    let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
-    if !what.is_file() {
-        return Err(Error::format(
-            path,
-            if what.is_dir() { "is a folder, not a file" } else { "is no file" },
-        ));
-    }
-    fs::read(path).map_err(|e| Error::io(path, "read", e))
-}
-
-/// Opens a regular file. Devices and pipes are refused before they are opened: even that may never end.
-pub(crate) fn open_file(path: &Path) -> Result<fs::File> {
-    let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
-    if !what.is_file() {
-        return Err(Error::format(
-            path,
-            if what.is_dir() { "is a folder, not a file" } else { "is no file" },
-        ));
-    }
-    fs::File::open(path).map_err(|e| Error::io(path, "read", e))
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
     use image::{ImageBuffer, Luma, LumaA, Rgb, Rgba};
+    use std::fs;
+    use std::path::Path;
 
     pub(crate) fn png_of(image: DynamicImage) -> Vec<u8> {
         let mut bytes = Vec::new();

@@ -2,7 +2,7 @@
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::error::{Error, Result};
-use crate::image::texture::read_file;
+use crate::fs::open::read_file;
 use crate::mesh::file::UpAxis;
 use crate::scene::annotations::AnnotationTable;
 use crate::scene::cameras::{CameraSource, CamerasTable, similarity};

@@ -4,7 +4,7 @@
 
 use crate::error::{Error, Place, Result};
 use crate::fs::atomic::AtomicFile;
-use crate::image::texture::open_file;
+use crate::fs::open::open_file;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::Vec3;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};

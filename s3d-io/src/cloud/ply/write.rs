@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
-use crate::image::texture::open_file;
+use crate::fs::open::open_file;
 use s3d_geom::{NO_INDEX, PointCloud};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;

@@ -2,10 +2,10 @@
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_bytes;
+use crate::fs::open::open_file;
 use crate::image::compression::Compression;
 use crate::image::deflate::{Candidates, Deflater, Search};
 use crate::image::png::filter::{Filter, filtered};
-use crate::image::texture::open_file;
 use png::{BitDepth, ColorType};
 use s3d_geom::Raster;
 use std::io::BufReader;

@@ -1,7 +1,8 @@
 //! How the faces of an OBJ file look: its libraries and the images that they name.
 
 use crate::error::Result;
-use crate::image::texture::{TextureFile, read_file, read_textures};
+use crate::fs::open::read_file;
+use crate::image::texture::{TextureFile, read_textures};
 use crate::mesh::obj::lines::{after, logical_lines, text};
 use crate::mesh::obj::mtl::{MtlMaterial, parse_mtl};
 use crate::quote::{count, quote};

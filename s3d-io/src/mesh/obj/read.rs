@@ -4,7 +4,7 @@
 //! [`ObjNames`] and [`ObjLooks`] the libraries and images; here the parts become a mesh.
 
 use crate::error::{Error, Result};
-use crate::image::texture::read_file;
+use crate::fs::open::read_file;
 use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
 use crate::mesh::obj::diagnose::{number_error, vertex_error};
 use crate::mesh::obj::looks::{ObjLooks, ObjNames};

@@ -5,7 +5,7 @@
 use super::header::Header;
 use super::{SIGNATURE, UNDEFINED, chunks, group};
 use crate::error::{Error, Result};
-use crate::image::texture::open_file;
+use crate::fs::open::open_file;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
