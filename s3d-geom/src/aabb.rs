@@ -3,6 +3,15 @@
 use glam::Vec3;
 
 /// An axis-aligned box in world metres; `min` ≤ `max` on each axis unless it is [`Aabb::EMPTY`].
+///
+/// ```
+/// use s3d_geom::{Aabb, glam::vec3};
+///
+/// let bbox = Aabb::from_points([vec3(0.0, 2.0, 1.0), vec3(3.0, 0.0, 1.5)]);
+/// assert_eq!((bbox.min, bbox.size()), (vec3(0.0, 0.0, 1.0), vec3(3.0, 2.0, 0.5)));
+/// assert!(bbox.contains(vec3(1.0, 1.0, 1.0)) && Aabb::EMPTY.is_empty());
+/// assert_eq!(Aabb::EMPTY.union(bbox), bbox);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// The corner of the smallest coordinates.
@@ -55,6 +64,37 @@ impl Aabb {
     /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, as the data set writes a box.
     pub fn to_array(&self) -> [f32; 6] {
         [self.min.x, self.min.y, self.min.z, self.max.x, self.max.y, self.max.z]
+    }
+}
+
+/// As data: its corners, or nothing if it is empty, since JSON has no infinite numbers.
+#[cfg(feature = "serde")]
+mod as_data {
+    use super::Aabb;
+    use glam::Vec3;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename = "Aabb")]
+    struct Corners {
+        min: Vec3,
+        max: Vec3,
+    }
+
+    impl Serialize for Aabb {
+        fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            let corners = (!self.is_empty()).then_some(Corners { min: self.min, max: self.max });
+            corners.serialize(serializer)
+        }
+    }
+
+    impl<'de> Deserialize<'de> for Aabb {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            match Option::<Corners>::deserialize(deserializer)?.map(|c| Aabb { min: c.min, max: c.max }) {
+                Some(bbox) if bbox.is_empty() => Err(de::Error::custom("min of a box is above its max")),
+                bbox => Ok(bbox.unwrap_or(Aabb::EMPTY)),
+            }
+        }
     }
 }
 

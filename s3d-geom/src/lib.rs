@@ -13,6 +13,11 @@
 //! let (pixel, depth) = camera.project(dvec3(0.0, 4.0, 1.5)).unwrap();
 //! assert!((pixel.x - 540.0).abs() < 1e-9 && (depth - 4.0).abs() < 1e-9);
 //! ```
+//!
+//! With the cargo feature `serde`, the vocabulary is data: boxes, poses, cameras, lenses, outlines, polygons, voxels,
+//! point clouds. What is read is checked as it is by constructors (a pose's matrix and a polygon's corners are taken as
+//! they are), and a number that JSON can hold comes back to the bit where the reader rounds correctly (serde_json's
+//! `float_roundtrip`). Meshes, textures and images have their own files.
 
 // Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what a constructor checked.
 #![cfg_attr(

@@ -1,6 +1,14 @@
 //! Row-major images of any pixel type.
 
 /// A `width` × `height` image, row-major, its origin at the top left: pixel (x, y) is `data[y * width + x]`.
+///
+/// ```
+/// use s3d_geom::Raster;
+///
+/// let depth = Raster::from_vec(3, 2, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+/// assert_eq!((depth.at(2, 0), depth.row(1)), (3.0, &[4.0, 5.0, 6.0][..]));
+/// assert_eq!(depth.map(|metres| metres < 2.5).pixels(), [true, true, false, false, false, false]);
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Raster<T> {
     width: u32,

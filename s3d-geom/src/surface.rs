@@ -12,6 +12,7 @@ use std::ops::Range;
 
 /// How many points to draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Density {
     /// Points a square metre of the sampled faces; the total is rounded to the nearest whole number, half up.
     PerM2(f64),

@@ -11,6 +11,11 @@ use glam::Vec3;
 /// between two voxels belongs to the upper one, a point on the upper face of the box to the last voxel; along an axis
 /// without extent there is one layer, index 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "as_data::VoxelGrid")
+)]
 pub struct VoxelGrid {
     /// The box, world metres; not empty.
     pub bbox: Aabb,
@@ -78,6 +83,20 @@ fn cell_between(planes: &Planes, point: Vec3) -> usize {
 
 /// The points of an instance by voxel of their tightest box.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "as_data::Voxels")
+)]
+///
+/// ```
+/// use s3d_geom::{VoxelGrid, Voxels, glam::{Vec3, vec3}};
+///
+/// let voxels = Voxels::from_points(&[Vec3::ZERO, vec3(0.1, 0.1, 0.1), Vec3::splat(6.0)]).unwrap();
+/// assert_eq!((voxels.members_of(0), voxels.count(VoxelGrid::CELLS - 1)), (&[0, 1][..], 1));
+/// assert_eq!(voxels.occupancy().iter().filter(|&&occupied| occupied).count(), 2);
+/// assert_eq!(voxels.grid.voxel_aabb(0).size(), Vec3::ONE);
+/// ```
 pub struct Voxels {
     /// The tightest box of the points, and its voxels.
     pub grid: VoxelGrid,
@@ -134,6 +153,51 @@ impl Voxels {
     /// Indices of the points in voxel `cell`, ascending.
     pub fn members_of(&self, cell: usize) -> &[u32] {
         &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+}
+
+#[cfg(feature = "serde")]
+mod as_data {
+    use crate::Aabb;
+
+    /// A grid before it is checked.
+    #[derive(serde::Deserialize)]
+    pub(super) struct VoxelGrid {
+        bbox: Aabb,
+    }
+
+    impl TryFrom<VoxelGrid> for super::VoxelGrid {
+        type Error = &'static str;
+
+        fn try_from(VoxelGrid { bbox }: VoxelGrid) -> Result<Self, &'static str> {
+            if bbox.is_empty() { Err("voxels of an empty box") } else { Ok(Self { bbox }) }
+        }
+    }
+
+    /// Voxels before they are checked.
+    #[derive(serde::Deserialize)]
+    pub(super) struct Voxels {
+        grid: super::VoxelGrid,
+        starts: Vec<u32>,
+        members: Vec<u32>,
+    }
+
+    impl TryFrom<Voxels> for super::Voxels {
+        type Error = &'static str;
+
+        fn try_from(Voxels { grid, starts, members }: Voxels) -> Result<Self, &'static str> {
+            let is_whole = starts.len() == super::VoxelGrid::CELLS + 1
+                && starts.first() == Some(&0)
+                && starts.last().is_some_and(|end| *end as usize == members.len())
+                && starts.is_sorted();
+            if !is_whole {
+                return Err("where voxels start does not fit their number and their points");
+            }
+            if members.iter().any(|point| *point as usize >= members.len()) {
+                return Err("a point of a voxel that is not there");
+            }
+            Ok(Self { grid, starts, members })
+        }
     }
 }
 

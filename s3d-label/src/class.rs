@@ -5,6 +5,14 @@ use std::str::FromStr;
 use thiserror::Error;
 
 /// A class of object. The order is that of formats.md, "Labels"; [`Class::index`] counts along it.
+///
+/// ```
+/// use s3d_label::Class;
+///
+/// assert_eq!("chair".parse(), Ok(Class::Chair));
+/// assert_eq!((Class::Chair.index(), Class::ALL.len()), (8, 13));
+/// assert!("stairs".parse::<Class>().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Class {

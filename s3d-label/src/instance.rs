@@ -5,7 +5,18 @@ use glam::Vec3;
 use s3d_geom::Aabb;
 
 /// One annotated instance, summed up.
+///
+/// ```
+/// use s3d_geom::glam::{Vec3, vec3};
+/// use s3d_label::{Class, InstanceSummary, LabelId, LabelTable};
+///
+/// let table = LabelTable::from_labels(["sofa_1_lounge_2_4".parse()?])?;
+/// let sofa = InstanceSummary::from_points(&table, LabelId(1), [Vec3::ZERO, vec3(2.0, 0.9, 0.8)]).unwrap();
+/// assert_eq!((sofa.class, sofa.points, sofa.bbox), (Class::Sofa, 2, [0.0, 0.0, 0.0, 2.0, 0.9, 0.8]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InstanceSummary {
     /// Its index in the label table.
     pub label: LabelId,

@@ -15,6 +15,16 @@ pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 ///
 /// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, the underscore included, so that
 /// `beam_10_…` stands before `beam_1_…`; then by room, which only matters between two labels of the same instance.
+///
+/// ```
+/// use s3d_label::{Class, Label, LabelError};
+///
+/// let label: Label = "board_3_hallway_4_6".parse()?;
+/// assert_eq!((label.class, label.instance, label.area), (Class::Board, 3, 6));
+/// assert_eq!((label.room.to_string(), label.to_string()), ("hallway_4".into(), "board_3_hallway_4_6".into()));
+/// assert!(matches!("board_3_hallway_4".parse::<Label>(), Err(LabelError::Fields { count: 4, .. })));
+/// # Ok::<(), LabelError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Label {
     /// What it is.

@@ -31,6 +31,10 @@
 //! assert_eq!(labels.report(&table)?.classes[Class::Wall.index()].1.points, 3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! With the cargo feature `serde`, classes, rooms and labels are data by their names, a table is the list of its names, and
+//! votes, reports, summaries and statistics are structs of their fields. What is read is checked: a name that is none, or
+//! a table out of order, is refused.
 
 // Nothing panics but what a caller did wrong, which "Panics" tells: names and numbers come from files.
 #![cfg_attr(
@@ -54,6 +58,8 @@ mod labeler;
 mod numbering;
 mod report;
 mod room;
+#[cfg(feature = "serde")]
+mod serde_names;
 mod statistics;
 mod table;
 mod votes;

@@ -5,6 +5,7 @@ use thiserror::Error;
 
 /// An annotated instance with the label that it gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NumberedInstance {
     /// The room that it is in.
     pub room: Room,
@@ -44,6 +45,16 @@ pub enum NumberingError {
 ///
 /// # Errors
 /// [`NumberingError::Duplicate`] if an instance is there twice.
+///
+/// ```
+/// use s3d_label::{Class, number_area};
+///
+/// let room = |name: &str| name.parse().unwrap();
+/// let found = [(room("office_2"), Class::Chair, 1), (room("lobby_1"), Class::Chair, 4)];
+/// let labels = number_area(3, found)?.iter().map(|i| i.label.to_string()).collect::<Vec<_>>();
+/// assert_eq!(labels, ["chair_1_lobby_1_3", "chair_2_office_2_3"]);
+/// # Ok::<(), s3d_label::NumberingError>(())
+/// ```
 pub fn number_area(
     area: u32,
     instances: impl IntoIterator<Item = (Room, Class, u32)>,

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 ///
 /// A point belongs to the room and class of its own label, a face to those of the label that won it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VoteRow {
     /// Points that voted.
     pub points: u64,
@@ -59,6 +60,7 @@ impl VoteRow {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VoteReport {
     /// The distance beyond which a point is far, in metres.
     pub far_m: f32,
@@ -73,6 +75,7 @@ pub struct VoteReport {
     /// Every room of the table with its area, in the order of (area, room).
     pub rooms: Vec<(u32, Room, VoteRow)>,
     /// Every class, each at its [`Class::index`].
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "as_data::classes"))]
     pub classes: [(Class, VoteRow); 13],
 }
 
@@ -120,6 +123,23 @@ impl VoteReport {
             rooms: rooms.into_iter().map(|((area, room), row)| (area, room, row)).collect(),
             classes,
         })
+    }
+}
+
+#[cfg(feature = "serde")]
+mod as_data {
+    use super::{Class, VoteRow};
+    use serde::{Deserialize, Deserializer, de::Error};
+
+    pub(super) fn classes<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<[(Class, VoteRow); 13], D::Error> {
+        let rows = <[(Class, VoteRow); 13]>::deserialize(deserializer)?;
+        if rows.iter().map(|(class, _)| *class).eq(Class::ALL) {
+            Ok(rows)
+        } else {
+            Err(D::Error::custom("the classes of a report are not in their order"))
+        }
     }
 }
 

@@ -39,6 +39,15 @@ pub enum RoomType {
 /// A room of an area: its type and its number among the area's rooms of that type. Written `office_3`.
 ///
 /// `Ord`: by type (see [`RoomType`]), then by number.
+///
+/// ```
+/// use s3d_label::{Room, RoomError, RoomType};
+///
+/// let room: Room = "copyRoom_1".parse()?;
+/// assert_eq!(room, Room { room_type: RoomType::CopyRoom, number: 1 });
+/// assert!(matches!("kitchen_1".parse::<Room>(), Err(RoomError::Type { .. })));
+/// # Ok::<(), RoomError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Room {
     /// What kind of room it is.

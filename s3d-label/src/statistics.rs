@@ -7,7 +7,18 @@ use std::collections::{BTreeMap, BTreeSet};
 ///
 /// The paper's table of object classes; it counts every cell one higher than the published labels do (formats.md,
 /// "Labels").
+///
+/// ```
+/// use s3d_label::{Class, ClassCounts, LabelTable};
+///
+/// let names = ["chair_1_office_1_1", "chair_2_office_1_1", "chair_1_office_1_2"];
+/// let table = LabelTable::from_labels(names.map(|name| name.parse().unwrap()))?;
+/// let counts = ClassCounts::from_table(&table);
+/// assert_eq!((counts.of(1, Class::Chair), counts.total()[Class::Chair.index()]), (2, 3));
+/// # Ok::<(), s3d_label::TableError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClassCounts {
     /// Each area with its counts, by area; a count stands at its class's [`Class::index`].
     pub areas: Vec<(u32, [u64; 13])>,
@@ -40,6 +51,7 @@ impl ClassCounts {
 ///
 /// The paper's table of rooms; its total of area 5 (55) is not the sum of its row (68; formats.md, "Labels").
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoomCounts {
     /// Each area with its counts, by area; a count stands at its type's [`RoomType::index`].
     pub areas: Vec<(u32, [u64; 11])>,

@@ -13,6 +13,7 @@ pub const MAX_LABELS: usize = 13 * 65_536 + 13 * 256 + 13;
 
 /// An index into a label table: what a semantic image stores, and what a point votes for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
 pub struct LabelId(pub u32);
 
 impl LabelId {
@@ -38,6 +39,17 @@ impl fmt::Display for LabelId {
 
 /// The labels of a data set in the published order: index 0 is the null label, the rest is sorted as [`Label`]'s `Ord`
 /// sorts. Source: formats.md, "Labels".
+///
+/// ```
+/// use s3d_label::{Class, LabelId, LabelTable, NULL_NAME};
+///
+/// let table = LabelTable::from_labels(["wall_1_office_1_5".parse()?, "chair_1_office_1_5".parse()?])?;
+/// assert_eq!(table.names(), [NULL_NAME, "chair_1_office_1_5", "wall_1_office_1_5"]);
+/// assert_eq!(table.class_of(LabelId(2)), Some(Class::Wall));
+/// assert_eq!(table.get(LabelId::NULL), None);
+/// assert_eq!(LabelTable::from_names(&table.names())?, table);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LabelTable {
     /// Sorted; the label of index i is at i − 1.

@@ -13,8 +13,10 @@ const END: u32 = u32::MAX;
 
 /// What is counted beside the votes themselves.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VoteOptions {
     /// A point farther from its nearest face than this, in metres, is counted as far. It votes all the same.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "as_data::number"))]
     pub far_m: f32,
 }
 
@@ -27,6 +29,7 @@ impl Default for VoteOptions {
 
 /// The points of one label, wherever they voted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PointTally {
     /// How many there are.
     pub points: u64,
@@ -36,6 +39,7 @@ pub struct PointTally {
 
 /// How the vote for the label of one face went. There is at least one vote.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FaceVotes {
     /// The most frequent label, the smallest of equally frequent ones.
     pub label: LabelId,
@@ -292,6 +296,17 @@ impl Votes {
         (0..self.faces.len() as u32)
             .map(|face| self.of_face(face).map_or(LabelId::NULL, |votes| votes.label))
             .collect()
+    }
+}
+
+#[cfg(feature = "serde")]
+mod as_data {
+    use serde::{Deserialize, Deserializer, de::Error};
+
+    /// Formats other than JSON have numbers that are none.
+    pub(super) fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+        let number = f32::deserialize(deserializer)?;
+        if number.is_nan() { Err(D::Error::custom("a distance that is not a number")) } else { Ok(number) }
     }
 }
 

@@ -11,6 +11,17 @@ use std::collections::BTreeMap;
 ///
 /// # Panics
 /// If `label_of_face` has not one label a face.
+///
+/// ```
+/// use s3d_geom::{TriMesh, glam::{Vec3, vec3}};
+/// use s3d_label::{LabelId, LabelTable, wall_directions_deg};
+///
+/// let wall = "wall_1_office_1_1".parse()?;
+/// let table = LabelTable::from_labels([wall])?;
+/// let mesh = TriMesh::from_faces(vec![Vec3::ZERO, vec3(2.0, 2.0, 0.0), Vec3::Z], vec![[0, 1, 2]])?;
+/// assert_eq!(wall_directions_deg(&mesh, &table, &[LabelId(1)])[&wall.room], 45);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn wall_directions_deg(
     mesh: &TriMesh,
     table: &LabelTable,

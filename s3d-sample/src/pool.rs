@@ -8,6 +8,14 @@ use std::str::FromStr;
 use thiserror::Error;
 
 /// Which views compete with each other. Source: formats.md, "Sampling of views".
+///
+/// ```
+/// use s3d_sample::Pool;
+///
+/// assert_eq!("area".parse(), Ok(Pool::Area));
+/// assert_eq!(Pool::default().to_string(), "dataset");
+/// assert!("building".parse::<Pool>().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Pool {
     /// All of the data set: the paper's, by its counts.

@@ -4,6 +4,15 @@ use crate::stream::{stream, uniform_above_zero};
 use thiserror::Error;
 
 /// What shares of a pool to keep. Source: formats.md, "Sampling of views".
+///
+/// ```
+/// use s3d_sample::Selection;
+///
+/// let paper = Selection::default();
+/// assert!((paper.share() - 0.725).abs() < 1e-12);
+/// assert_eq!(paper.discarded(20), 3);
+/// assert!(Selection { discard: 0.6, ..paper }.check().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
     /// The share with the lowest scores, which goes.
@@ -98,6 +107,16 @@ const WEIGHT_SIGMA: f64 = 0.5;
 ///
 /// # Panics
 /// If a score is negative or not finite, or [`Selection::check`] fails.
+///
+/// ```
+/// use s3d_sample::{Selection, select};
+///
+/// // Of ten views, the lowest score goes and the six highest stay, as does one of the three between.
+/// let scores: Vec<f64> = (0..10).map(|i| 0.2 * f64::from(i)).collect();
+/// let stays = select(&scores, &Selection::default(), 42);
+/// assert!(!stays[0] && stays[4..].iter().all(|stays| *stays));
+/// assert_eq!(stays[1..4].iter().filter(|stays| **stays).count(), 1);
+/// ```
 #[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
 pub fn select(scores: &[f64], options: &Selection, seed: u64) -> Vec<bool> {
     if let Err(error) = options.check() {

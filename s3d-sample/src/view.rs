@@ -9,6 +9,15 @@ use thiserror::Error;
 pub const CANDIDATES_PER_LOCATION: u32 = 72;
 
 /// From what views are drawn. The yaw is always uniform, the roll always 0. Source: formats.md, "Sampling of views".
+///
+/// ```
+/// use s3d_sample::ViewDistribution;
+///
+/// let narrow = ViewDistribution { fov_max_deg: 40.0, ..ViewDistribution::default() };
+/// assert!(narrow.check().is_ok());
+/// let none = ViewDistribution { fov_min_deg: 80.0, ..ViewDistribution::default() };
+/// assert_eq!(none.check().unwrap_err().to_string().split(':').next(), Some("angles of view from 80 to 75 degrees"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewDistribution {
     /// The deviation of the pitch, whose mean is 0; 0 to 360 degrees.
@@ -91,6 +100,15 @@ pub struct View {
 ///
 /// # Panics
 /// If [`ViewDistribution::check`] fails.
+///
+/// ```
+/// use s3d_sample::{ViewDistribution, draw_view};
+///
+/// let draw = |number| draw_view(&ViewDistribution::default(), 42, "8eb9955b866b4b5f74abb1071416c628", number);
+/// assert_eq!(draw(3), draw(3));
+/// assert_ne!(draw(3), draw(4));
+/// assert!((10f64.to_radians()..=75f64.to_radians()).contains(&draw(3).fov_rad));
+/// ```
 #[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
 pub fn draw_view(dist: &ViewDistribution, seed: u64, location: &str, number: u32) -> View {
     if let Err(error) = dist.check() {

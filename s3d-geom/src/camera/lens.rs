@@ -14,6 +14,21 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 /// and comes to the pixel (fx·x' + cx, fy·y' + cy). The picture's top left corner is (0, 0) and the centre of pixel (i, j)
 /// is at (i + ½, j + ½), as everywhere. Source: OpenCV's `projectPoints`; formats.md, "The scanner's own pictures".
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "as_data::Lens")
+)]
+///
+/// ```
+/// use s3d_geom::{Lens, glam::{dvec2, dvec3}};
+///
+/// // k₁ < 0 draws what is off the axis to the middle.
+/// let lens = Lens::new([640, 480], dvec2(500.0, 500.0), dvec2(320.0, 240.0), [-0.1, 0.0, 0.0, 0.0, 0.0]).unwrap();
+/// let pixel = lens.project(dvec3(1.0, 0.0, 2.0)).unwrap();
+/// assert!(pixel.x < 320.0 + 500.0 * 0.5 && (pixel.y - 240.0).abs() < 1e-9);
+/// assert!(lens.direction(pixel).unwrap().abs_diff_eq(dvec3(0.5, 0.0, 1.0), 1e-9));
+/// ```
 pub struct Lens {
     /// Width and height of the picture in pixels.
     size: [u32; 2],
@@ -22,6 +37,7 @@ pub struct Lens {
     /// k₁ k₂ p₁ p₂ k₃.
     distortion: [f64; 5],
     /// The r² from which on q·r falls: what is farther out would be seen in the wrong place.
+    #[cfg_attr(feature = "serde", serde(skip_serializing))]
     last_r2: f64,
 }
 
@@ -127,6 +143,28 @@ impl Lens {
             let t = f64::from(k) / f64::from(steps);
             [dvec2(t, 0.0), dvec2(1.0, t), dvec2(1.0 - t, 1.0), dvec2(0.0, 1.0 - t)].map(|p| p * size)
         })
+    }
+}
+
+#[cfg(feature = "serde")]
+mod as_data {
+    use glam::DVec2;
+
+    /// A lens before it is checked.
+    #[derive(serde::Deserialize)]
+    pub(super) struct Lens {
+        size: [u32; 2],
+        focal_px: DVec2,
+        center_px: DVec2,
+        distortion: [f64; 5],
+    }
+
+    impl TryFrom<Lens> for super::Lens {
+        type Error = &'static str;
+
+        fn try_from(Lens { size, focal_px, center_px, distortion }: Lens) -> Result<Self, &'static str> {
+            Self::new(size, focal_px, center_px, distortion).ok_or("a lens that comes to no picture")
+        }
     }
 }
 

@@ -14,6 +14,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// How a camera maps directions to pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Projection {
     /// A pinhole with square pixels and its centre in the middle.
     Perspective {
@@ -28,6 +29,7 @@ pub enum Projection {
 
 /// The axes in which normals are written. Source: formats.md, "Images".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum NormalAxes {
     /// As in the paper: right, down and towards the camera, so that what faces the camera is (0, 0, 1).
     #[default]
@@ -54,6 +56,24 @@ impl NormalAxes {
 
 /// A pose, a projection and an image size.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "as_data::Camera")
+)]
+///
+/// ```
+/// use s3d_geom::{Camera, Pose, glam::dvec3};
+///
+/// // It looks along +Y: a point ahead and to the right (+X) is right of the middle, whatever lies behind is nowhere.
+/// let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 90f64.to_radians(), 200, 100);
+/// let (pixel, depth) = camera.project(dvec3(1.0, 2.0, 1.5)).unwrap();
+/// assert!((pixel.x - 150.0).abs() < 1e-9 && (pixel.y - 50.0).abs() < 1e-9 && (depth - 2.0).abs() < 1e-9);
+/// assert_eq!(camera.project(dvec3(1.0, -2.0, 1.5)), None);
+/// // A ray through the pixel leads back to the point.
+/// let back = camera.pose.location + depth * camera.direction(pixel.x, pixel.y);
+/// assert!(back.abs_diff_eq(dvec3(1.0, 2.0, 1.5), 1e-9));
+/// ```
 pub struct Camera {
     /// Where the camera is and how it is turned.
     pub pose: Pose,
@@ -230,6 +250,36 @@ impl Rays {
             Rays::Equirectangular { columns, rows } => {
                 let (c, r) = (columns[i as usize], rows[j as usize]);
                 dvec3(r.x * c.x, r.x * c.y, r.y)
+            }
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+mod as_data {
+    use super::{PI, Pose, Projection};
+
+    /// A camera before it is checked.
+    #[derive(serde::Deserialize)]
+    pub(super) struct Camera {
+        pose: Pose,
+        projection: Projection,
+        width: u32,
+        height: u32,
+    }
+
+    impl TryFrom<Camera> for super::Camera {
+        type Error = String;
+
+        fn try_from(Camera { pose, projection, width, height }: Camera) -> Result<Self, String> {
+            if width == 0 || height == 0 {
+                return Err(format!("an image of {width} × {height} pixels"));
+            }
+            match projection {
+                Projection::Perspective { fov_rad } if !(fov_rad > 0.0 && fov_rad < PI) => {
+                    Err(format!("an angle of view of {fov_rad} rad"))
+                }
+                _ => Ok(Self { pose, projection, width, height }),
             }
         }
     }

@@ -27,7 +27,22 @@ pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
 }
 
 /// The place and direction of a camera.
+///
+/// ```
+/// use s3d_geom::{Pose, euler_from_rotation, glam::{DVec3, dvec3}};
+/// use std::f64::consts::FRAC_PI_2;
+///
+/// let north = Pose::level(dvec3(1.0, 2.0, 1.5), 0.0);
+/// assert!(north.forward().abs_diff_eq(DVec3::Y, 1e-12) && north.up().abs_diff_eq(DVec3::Z, 1e-12));
+/// let west_and_up = north.turned(FRAC_PI_2, 0.3);
+/// assert!(west_and_up.forward().abs_diff_eq(dvec3(-0.3f64.cos(), 0.0, 0.3f64.sin()), 1e-12));
+/// let (yaw_rad, pitch_rad) = north.yaw_pitch_to(&west_and_up);
+/// assert!((yaw_rad - FRAC_PI_2).abs() < 1e-12 && (pitch_rad - 0.3).abs() < 1e-12);
+/// // The angles that a pose file states.
+/// assert!(euler_from_rotation(north.world_from_camera).abs_diff_eq(dvec3(FRAC_PI_2, 0.0, 0.0), 1e-12));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// Where the camera is, world metres, Z-up.
     pub location: DVec3,

@@ -60,6 +60,7 @@ pub struct MeshParts {
 
 /// What [`TriMesh::new`] mended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MeshReport {
     /// Faces of zero area, which were dropped.
     pub zero_area_faces: usize,
@@ -123,6 +124,25 @@ pub enum FaceColor<'a> {
 /// A textured triangle mesh: at least one face, every face with an area, every index in range, every number finite.
 ///
 /// World frame: metres, Z-up, right-handed.
+///
+/// ```
+/// use s3d_geom::{FaceColor, MeshError, MeshParts, TriMesh, glam::{Vec3, vec3}};
+///
+/// // Columns of three faces, of which the last has no area and is dropped.
+/// let mesh = TriMesh::new(MeshParts {
+///     positions: vec![Vec3::ZERO, Vec3::X, vec3(1.0, 1.0, 0.0), Vec3::Y],
+///     faces: vec![[0, 1, 2], [0, 2, 3], [0, 0, 1]],
+///     colors: vec![[255, 0, 0]; 4],
+///     ..MeshParts::default()
+/// })?;
+/// assert_eq!((mesh.faces().len(), mesh.report().zero_area_faces), (2, 1));
+/// assert_eq!((mesh.total_area(), mesh.normal(1)), (1.0, Vec3::Z));
+/// assert!(matches!(mesh.color_of(0), FaceColor::Corners([[255, 0, 0], ..])));
+///
+/// let missing = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X], vec![[0, 1, 2]]);
+/// assert!(matches!(missing, Err(MeshError::OutOfRange { index: 2, count: 2, .. })));
+/// # Ok::<(), MeshError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct TriMesh {
     parts: MeshParts,

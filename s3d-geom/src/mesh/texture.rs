@@ -61,6 +61,15 @@ fn remainder(i: i64, n: i64) -> i64 {
 ///
 /// Coordinates are OBJ's: (0, 0) is the **bottom** left corner of the image, (1, 1) the top right. Colours are
 /// interpolated as they are encoded (sRGB), as the viewers of the field do.
+///
+/// ```
+/// use s3d_geom::{Raster, Texture, Wrap, glam::vec2};
+///
+/// let image = Raster::from_vec(2, 1, vec![[0, 0, 0], [200, 100, 0]]);
+/// let texture = Texture { name: "wood.png".into(), image, wrap: [Wrap::Clamp; 2] };
+/// assert_eq!(texture.sample(vec2(0.75, 0.5)), [200.0, 100.0, 0.0]);
+/// assert_eq!(texture.sample(vec2(0.5, 0.5)), [100.0, 50.0, 0.0]);
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
     /// A name for messages and files, such as the source file's.

@@ -21,6 +21,7 @@ use triangle::SortedTriangle;
 
 /// The face of a mesh nearest to a point, and the point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Nearest {
     /// The face; the smallest index among equally near ones. [`NO_INDEX`] for a point that is not finite.
     pub face: u32,

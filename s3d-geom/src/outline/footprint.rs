@@ -14,6 +14,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 /// How a footprint is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FootprintOptions {
     /// Points are thinned to a few in each cell of a square grid this wide, in metres.
     pub cell_m: f64,
@@ -155,6 +156,7 @@ impl FootprintBuilder {
 
 /// The floor of a room, seen from above.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Footprint {
     /// Its connected parts in world x and y, metres. Outer rings run counter-clockwise, holes clockwise; each starts with
     /// its smallest corner by (x, y), by which rings and parts are sorted as well.

@@ -53,7 +53,19 @@ pub enum PolygonError {
 
 /// A polygon with holes, in a plane. A hole lies within the outer ring and outside of the other holes; rings may touch
 /// in corners. The closing edge, from the last corner to the first, goes without saying.
+///
+/// ```
+/// use s3d_geom::{Polygon, PolygonError, glam::{DVec2, dvec2}};
+///
+/// let square = |min: f64, max: f64| vec![dvec2(min, min), dvec2(max, min), dvec2(max, max), dvec2(min, max)];
+/// let ring = Polygon { outer: square(0.0, 3.0), holes: vec![square(1.0, 2.0)] };
+/// assert_eq!((ring.area(), ring.triangulate()?.len()), (8.0, 8));
+/// assert!(ring.contains(dvec2(0.5, 0.5)) && !ring.contains(dvec2(1.5, 1.5)));
+/// assert_eq!(ring.distance(dvec2(4.0, 1.5)), 1.0);
+/// # Ok::<(), PolygonError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Polygon {
     /// The outer ring, in either direction.
     pub outer: Vec<DVec2>,

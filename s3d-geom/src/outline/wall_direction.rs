@@ -12,6 +12,17 @@ const STEEPEST: f32 = 0.3;
 /// Walls that meet at a right angle count as one direction. The peak of a histogram keeps clutter out; around the peak
 /// the mean by area refines it. Faces whose normal is not finite or whose area is not positive are left out. Source:
 /// formats.md, "S3DIS tree" (the alignment angle).
+///
+/// ```
+/// use s3d_geom::{dominant_wall_direction_deg, glam::Vec3};
+///
+/// // Two walls that meet at a right angle, and a floor.
+/// let (sin, cos) = 20f32.to_radians().sin_cos();
+/// let walls = [(Vec3::new(cos, sin, 0.0), 8.0), (Vec3::new(-sin, cos, 0.0), 6.0), (Vec3::Z, 12.0)];
+/// let direction_deg = dominant_wall_direction_deg(walls.into_iter()).unwrap();
+/// assert!((direction_deg - 20.0).abs() < 1e-4);
+/// assert_eq!(dominant_wall_direction_deg([(Vec3::Z, 12.0)].into_iter()), None);
+/// ```
 pub fn dominant_wall_direction_deg(walls: impl Iterator<Item = (Vec3, f64)>) -> Option<f64> {
     let walls: Vec<(f64, f64)> = walls
         .filter(|(n, area)| n.is_finite() && n.z.abs() < STEEPEST && area.is_finite() && *area > 0.0)
