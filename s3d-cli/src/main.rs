@@ -4,7 +4,6 @@ mod arg_values;
 mod args;
 mod commands;
 mod console;
-mod demo;
 mod event;
 mod failure;
 mod hint;

@@ -2,14 +2,15 @@
 
 use super::on_threads;
 use crate::args::{DemoArgs, ExportOptions, FormatOptions};
-use crate::demo::{is_demo_scan, write_scan};
 use crate::failure::{Failure, Outcome};
 use crate::pipeline::{Target, export, output};
+use crate::stop;
 use s3d_io::{Domain, Error, Layout};
 use s3d_sample::Pool;
+use s3d_synth::{ScanError, is_demo_scan};
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tracing::info;
 
 /// Folder of the scene's own files in OUT.
@@ -62,6 +63,17 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         );
         Ok(())
     })
+}
+
+fn write_scan(folder: &Path) -> Outcome<PathBuf> {
+    match s3d_synth::write_scan(folder, || !stop::requested()) {
+        Ok(scene) => Ok(scene),
+        Err(ScanError::File(e)) => Err(e.into()),
+        Err(e) => {
+            stop::check()?;
+            Err(Failure::Input(e.to_string()))
+        }
+    }
 }
 
 /// Gives the scene its place. One that is there already, of a demo that was stopped, may stay if it is the same to the

@@ -106,7 +106,7 @@ fn board_white(x: f32, y: f32) -> Color {
 }
 
 /// The name in red, an arrow to the right of it, a sketch of a room with a camera in it, and notes.
-pub(super) fn whiteboard() -> Raster<[u8; 3]> {
+pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
     let mut c = Canvas::new(512, 280, board_white);
     for (letter, x) in [(S, 40.0), (THREE, 100.0), (D, 158.0)] {
         c.line(letter, [x, 34.0], 76.0, 7.0, RED);
@@ -152,7 +152,7 @@ pub(super) fn whiteboard() -> Raster<[u8; 3]> {
 }
 
 /// A second board: a floor plan and its arrow to the north.
-pub(super) fn plan() -> Raster<[u8; 3]> {
+pub(crate) fn plan() -> Raster<[u8; 3]> {
     let mut c = Canvas::new(400, 240, board_white);
     c.line(&[[40., 40.], [280., 40.], [280., 200.], [40., 200.], [40., 40.]], [0.0; 2], 1.0, 4.0, INK);
     c.line(&[[40., 130.], [110., 130.]], [0.0; 2], 1.0, 4.0, INK);
@@ -171,7 +171,7 @@ pub(super) fn plan() -> Raster<[u8; 3]> {
 }
 
 /// A cork board with sheets of paper and notes.
-pub(super) fn cork() -> Raster<[u8; 3]> {
+pub(crate) fn cork() -> Raster<[u8; 3]> {
     let mut c = Canvas::new(420, 270, |x, y| {
         let grain = 46.0 * (hash(x as u32 / 2, y as u32 / 2, 19) - 0.5);
         tint([188.0, 146.0, 98.0], grain + 24.0 * (fractal(x / 30.0, y / 30.0, 64, 20) - 0.5))
@@ -202,7 +202,7 @@ pub(super) fn cork() -> Raster<[u8; 3]> {
 }
 
 /// A poster with an arrow upwards, a bar on its left and lines of text below.
-pub(super) fn poster() -> Raster<[u8; 3]> {
+pub(crate) fn poster() -> Raster<[u8; 3]> {
     let mut c = Canvas::new(200, 280, |_, y| mix([244.0, 196.0, 84.0], [232.0, 112.0, 70.0], y / 280.0));
     c.rect([0.0, 0.0], [22.0, 280.0], [40.0, 62.0, 96.0]);
     c.disc([112.0, 110.0], 66.0, [250.0, 240.0, 214.0]);
@@ -215,7 +215,7 @@ pub(super) fn poster() -> Raster<[u8; 3]> {
 }
 
 /// Mountains over a lake: soft noise as in a photograph.
-pub(super) fn landscape() -> Raster<[u8; 3]> {
+pub(crate) fn landscape() -> Raster<[u8; 3]> {
     image(384, 256, |x, y| {
         let sky = mix([120.0, 164.0, 212.0], [248.0, 214.0, 176.0], smooth(y / 130.0));
         let clouds = smooth((fractal(x / 90.0, y / 36.0, 64, 31) - 0.5) * 4.0);
@@ -243,7 +243,7 @@ pub(super) fn landscape() -> Raster<[u8; 3]> {
 }
 
 /// What is seen through a window: sky, clouds, and roofs that rise to the right.
-pub(super) fn sky() -> Raster<[u8; 3]> {
+pub(crate) fn sky() -> Raster<[u8; 3]> {
     image(320, 256, |x, y| {
         let blue = mix([112.0, 168.0, 232.0], [206.0, 228.0, 248.0], smooth(y / 200.0));
         let cloud = smooth((fractal(x / 80.0, y / 34.0, 64, 61) - 0.48) * 4.5);
@@ -263,7 +263,7 @@ pub(super) fn sky() -> Raster<[u8; 3]> {
 }
 
 /// A text editor: a bar on the left, coloured lines.
-pub(super) fn editor() -> Raster<[u8; 3]> {
+pub(crate) fn editor() -> Raster<[u8; 3]> {
     let mut c = Canvas::new(240, 150, |_, _| [34.0, 38.0, 50.0]);
     c.rect([0.0, 0.0], [240.0, 9.0], [70.0, 78.0, 98.0]);
     c.rect([0.0, 9.0], [34.0, 150.0], [46.0, 52.0, 68.0]);
@@ -281,7 +281,7 @@ pub(super) fn editor() -> Raster<[u8; 3]> {
 }
 
 /// A slide: bars that grow to the right.
-pub(super) fn chart() -> Raster<[u8; 3]> {
+pub(crate) fn chart() -> Raster<[u8; 3]> {
     let mut c = Canvas::new(320, 180, |_, y| mix([24.0, 40.0, 74.0], [38.0, 62.0, 106.0], y / 180.0));
     c.rect([20.0, 16.0], [170.0, 28.0], [240.0, 244.0, 250.0]);
     c.rect([20.0, 34.0], [120.0, 40.0], [150.0, 172.0, 210.0]);
@@ -296,7 +296,7 @@ pub(super) fn chart() -> Raster<[u8; 3]> {
 }
 
 /// Rows of keys, the long one in the lowest row.
-pub(super) fn keyboard() -> Raster<[u8; 3]> {
+pub(crate) fn keyboard() -> Raster<[u8; 3]> {
     image(180, 60, |x, y| {
         let row = (y / 12.0) as u32;
         let shift = [0.0, 3.0, 5.0, 8.0, 2.0][row as usize % 5];

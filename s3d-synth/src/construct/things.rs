@@ -2,15 +2,15 @@
 //! origin on the wall, at its foot.
 
 use super::builder::{Builder, Side};
-use super::materials::*;
-use super::noise::hash;
-use super::textures::Pattern;
+use crate::look::materials::*;
+use crate::look::noise::hash;
+use crate::look::textures::Pattern;
 use s3d_geom::glam::{Vec2, Vec3, vec3};
 
 use Side::{Back, Bottom, Front, Left, Right, Top};
 
 /// Something flat on a wall, 2 cm off it, in a frame: from the floor up `z`, with `picture` on it.
-pub(super) fn hanging(
+pub(crate) fn hanging(
     b: &mut Builder,
     class: &'static str,
     width: f32,
@@ -35,7 +35,7 @@ pub(super) fn hanging(
 }
 
 /// The tray of a whiteboard whose lower edge is at `z`, with pens.
-pub(super) fn pen_tray(b: &mut Builder, width: f32, z: f32) {
+pub(crate) fn pen_tray(b: &mut Builder, width: f32, z: f32) {
     b.cuboid([-0.5 * width, -0.11, z - 0.02], [0.5 * width, -0.02, z - 0.005], STEEL, &[]);
     for (k, color) in [RED, TEAL, BLACK].into_iter().enumerate() {
         let x = -0.2 + 0.17 * k as f32;
@@ -44,7 +44,7 @@ pub(super) fn pen_tray(b: &mut Builder, width: f32, z: f32) {
 }
 
 /// A screen on a foot, on a table top.
-pub(super) fn monitor(b: &mut Builder, picture: Pattern) {
+pub(crate) fn monitor(b: &mut Builder, picture: Pattern) {
     b.begin("clutter");
     b.cuboid([-0.12, -0.02, 0.0], [0.12, 0.14, 0.012], BLACK, &[Bottom]);
     b.cuboid([-0.02, 0.05, 0.012], [0.02, 0.07, 0.2], BLACK, &[Bottom]);
@@ -67,13 +67,13 @@ fn screen(b: &mut Builder, half: f32, y: f32, z: [f32; 2], picture: Pattern) {
 }
 
 /// A large screen on a wall, 3 cm off it.
-pub(super) fn wall_screen(b: &mut Builder, width: f32, z: [f32; 2]) {
+pub(crate) fn wall_screen(b: &mut Builder, width: f32, z: [f32; 2]) {
     b.begin("clutter");
     b.cuboid([-0.5 * width, -0.08, z[0]], [0.5 * width, -0.03, z[1]], BLACK, &[Front]);
     screen(b, 0.5 * width, -0.08, z, Pattern::Chart);
 }
 
-pub(super) fn keyboard(b: &mut Builder) {
+pub(crate) fn keyboard(b: &mut Builder) {
     b.begin("clutter");
     b.cuboid([-0.22, -0.075, 0.0], [0.22, 0.075, 0.018], BLACK, &[Bottom, Top]);
     let corners = [[-0.22, -0.075], [0.22, -0.075], [0.22, 0.075], [-0.22, 0.075]];
@@ -81,7 +81,7 @@ pub(super) fn keyboard(b: &mut Builder) {
 }
 
 /// An open laptop.
-pub(super) fn laptop(b: &mut Builder) {
+pub(crate) fn laptop(b: &mut Builder) {
     b.begin("clutter");
     b.cuboid([-0.17, -0.12, 0.0], [0.17, 0.12, 0.018], STEEL, &[Bottom, Top]);
     let keys = [[-0.17, -0.12], [0.17, -0.12], [0.17, 0.12], [-0.17, 0.12]];
@@ -102,7 +102,7 @@ pub(super) fn laptop(b: &mut Builder) {
     b.panel([corners[0], corners[1], corners[5], corners[4]], Look::Fitted(Pattern::Editor));
 }
 
-pub(super) fn mug(b: &mut Builder, look: Look) {
+pub(crate) fn mug(b: &mut Builder, look: Look) {
     b.begin("clutter");
     b.stump([0.0, 0.0, 0.0], [0.036, 0.042], 0.095, 14, look, &[Top, Bottom]);
     b.disc([0.0, 0.0, 0.095], 0.042, 14, COFFEE);
@@ -110,7 +110,7 @@ pub(super) fn mug(b: &mut Builder, look: Look) {
 }
 
 /// Sheets of paper, one a little askew.
-pub(super) fn papers(b: &mut Builder) {
+pub(crate) fn papers(b: &mut Builder) {
     b.begin("clutter");
     b.cuboid([-0.105, -0.15, 0.0], [0.105, 0.15, 0.012], PAPER, &[Bottom]);
     b.place(vec3(0.02, 0.01, 0.012), 14.0, |b| {
@@ -119,7 +119,7 @@ pub(super) fn papers(b: &mut Builder) {
 }
 
 /// A lamp for a desk: a foot, an arm and a cone.
-pub(super) fn desk_lamp(b: &mut Builder) {
+pub(crate) fn desk_lamp(b: &mut Builder) {
     b.begin("clutter");
     b.stump([0.0, 0.0, 0.0], [0.08, 0.075], 0.02, 20, RED, &[Bottom]);
     b.stump([0.0, 0.0, 0.02], [0.01; 2], 0.37, 8, STEEL, &[Top, Bottom]);
@@ -128,7 +128,7 @@ pub(super) fn desk_lamp(b: &mut Builder) {
 }
 
 /// A lamp that stands on the floor.
-pub(super) fn floor_lamp(b: &mut Builder) {
+pub(crate) fn floor_lamp(b: &mut Builder) {
     b.begin("clutter");
     b.stump([0.0, 0.0, 0.0], [0.16, 0.15], 0.02, 24, BLACK, &[Bottom]);
     b.stump([0.0, 0.0, 0.02], [0.014; 2], 1.4, 8, BLACK, &[Bottom]);
@@ -136,7 +136,7 @@ pub(super) fn floor_lamp(b: &mut Builder) {
 }
 
 /// A plant in a pot: leaves in all directions, the lower ones longer.
-pub(super) fn plant(b: &mut Builder, height: f32, pot: Look) {
+pub(crate) fn plant(b: &mut Builder, height: f32, pot: Look) {
     b.begin("clutter");
     b.stump([0.0, 0.0, 0.0], [0.13, 0.17], 0.3, 20, pot, &[Bottom]);
     b.stump([0.0, 0.0, 0.301], [0.15; 2], 0.006, 20, SOIL, &[Bottom]);
@@ -152,20 +152,20 @@ pub(super) fn plant(b: &mut Builder, height: f32, pot: Look) {
 }
 
 /// A closed cardboard box.
-pub(super) fn carton(b: &mut Builder, size: [f32; 3]) {
+pub(crate) fn carton(b: &mut Builder, size: [f32; 3]) {
     b.begin("clutter");
     let [x, y, z] = size;
     b.cuboid([-0.5 * x, -0.5 * y, 0.0], [0.5 * x, 0.5 * y, z], CARDBOARD, &[Bottom]);
 }
 
-pub(super) fn bin(b: &mut Builder, look: Look) {
+pub(crate) fn bin(b: &mut Builder, look: Look) {
     b.begin("clutter");
     b.stump([0.0, 0.0, 0.0], [0.11, 0.14], 0.3, 20, look, &[Top, Bottom]);
     b.disc([0.0, 0.0, 0.3], 0.14, 20, SOIL);
 }
 
 /// A radiator under a window; its origin is on the wall.
-pub(super) fn radiator(b: &mut Builder, width: f32) {
+pub(crate) fn radiator(b: &mut Builder, width: f32) {
     b.begin("clutter");
     let x = 0.5 * width;
     b.cuboid([-x, -0.09, 0.14], [x, -0.03, 0.66], WHITE, &[]);
@@ -177,7 +177,7 @@ pub(super) fn radiator(b: &mut Builder, width: f32) {
 }
 
 /// A copier: a cabinet with trays, a lid and a panel.
-pub(super) fn copier(b: &mut Builder) {
+pub(crate) fn copier(b: &mut Builder) {
     b.begin("clutter");
     let grey = Look::Plain("copier_grey", [214, 216, 216]);
     b.cuboid([-0.32, -0.3, 0.04], [0.32, 0.3, 0.92], grey, &[]);
@@ -193,7 +193,7 @@ pub(super) fn copier(b: &mut Builder) {
 }
 
 /// A fire extinguisher on the wall.
-pub(super) fn extinguisher(b: &mut Builder) {
+pub(crate) fn extinguisher(b: &mut Builder) {
     b.begin("clutter");
     b.stump([0.0, -0.1, 0.62], [0.075; 2], 0.42, 18, RED, &[Top]);
     b.stump([0.0, -0.1, 1.04], [0.075, 0.03], 0.07, 18, RED, &[Bottom]);
@@ -202,7 +202,7 @@ pub(super) fn extinguisher(b: &mut Builder) {
 }
 
 /// A rug of 2.5 m × 2.1 m.
-pub(super) fn rug(b: &mut Builder) {
+pub(crate) fn rug(b: &mut Builder) {
     b.begin("clutter");
     let edge = Look::Plain("rug_edge", [198, 184, 158]);
     b.cuboid([-1.25, -1.05, 0.0], [1.25, 1.05, 0.012], edge, &[Bottom, Top]);
@@ -211,7 +211,7 @@ pub(super) fn rug(b: &mut Builder) {
 }
 
 /// A beam under a ceiling from `from` to `to`, which are on the ceiling: `half` its width to either side, `depth` down.
-pub(super) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32, look: Look) {
+pub(crate) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32, look: Look) {
     b.begin("beam");
     // The ends touch walls, and the top the ceiling.
     let side = (to - from).cross(Vec3::Z).normalize() * half;
@@ -226,7 +226,7 @@ pub(super) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32,
 }
 
 /// A column against a wall (the origin is on it), up to the ceiling.
-pub(super) fn column(b: &mut Builder, width: f32, depth: f32, height: f32) {
+pub(crate) fn column(b: &mut Builder, width: f32, depth: f32, height: f32) {
     b.begin("column");
     b.cuboid([-0.5 * width, -depth, 0.0], [0.5 * width, 0.0, height], CONCRETE, &[Top, Bottom, Back]);
 }

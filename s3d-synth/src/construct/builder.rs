@@ -1,16 +1,16 @@
 //! Puts surfaces together: places them, cuts them into cells, notes whose they are and bakes a light into their looks.
 
-use super::DemoInstance;
 use super::light::Light;
-use super::materials::Look;
-use super::textures::{Pattern, scaled};
+use crate::look::materials::Look;
+use crate::look::textures::{Pattern, scaled};
+use crate::scene::DemoInstance;
 use glam::{Vec2, Vec3};
 use s3d_geom::{Aabb, Material, MeshParts, Texture, TriMesh, Wrap, glam, grid};
 use std::collections::BTreeMap;
 
 /// A side of a body in its own frame: x to the right, y away from who looks at its front, z up.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
+pub(crate) enum Side {
     Front,
     Right,
     Back,
@@ -45,7 +45,7 @@ impl Frame {
 }
 
 /// The scene under construction. Coordinates are the building's own, metres; [`Builder::finish`] moves it.
-pub(super) struct Builder {
+pub(crate) struct Builder {
     parts: MeshParts,
     face_instances: Vec<Option<u32>>,
     instances: Vec<DemoInstance>,
@@ -57,7 +57,7 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             parts: MeshParts::default(),
             face_instances: Vec::new(),
@@ -71,23 +71,23 @@ impl Builder {
     }
 
     /// From here on everything belongs to `room`, lit by `light`.
-    pub(super) fn enter(&mut self, room: &'static str, light: Light) {
+    pub(crate) fn enter(&mut self, room: &'static str, light: Light) {
         (self.room, self.light) = (room, light);
     }
 
     /// The light of the room, with all that was built in it since as obstacles.
-    pub(super) fn light(&self) -> &Light {
+    pub(crate) fn light(&self) -> &Light {
         &self.light
     }
 
     /// From here on every face belongs to a new instance of `class` in this room.
-    pub(super) fn begin(&mut self, class: &'static str) {
+    pub(crate) fn begin(&mut self, class: &'static str) {
         let number = 1 + self.instances.iter().filter(|i| i.class == class && i.room == self.room).count();
         self.instances.push(DemoInstance { class, number: number as u32, room: self.room });
     }
 
     /// Runs `build` in a frame with its origin at `origin`, turned by `yaw_deg` counter-clockwise seen from above.
-    pub(super) fn place(&mut self, origin: Vec3, yaw_deg: f32, build: impl FnOnce(&mut Self)) {
+    pub(crate) fn place(&mut self, origin: Vec3, yaw_deg: f32, build: impl FnOnce(&mut Self)) {
         let outer = self.frame;
         self.frame = outer.then(origin, yaw_deg);
         build(self);
@@ -95,7 +95,7 @@ impl Builder {
     }
 
     /// The box between two corners, without the sides `omit`: those that lie on something else.
-    pub(super) fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], look: Look, omit: &[Side]) {
+    pub(crate) fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], look: Look, omit: &[Side]) {
         let ([x0, y0, z0], [x1, y1, z1]) = (low, high);
         let plan = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
         let corner = |i: usize| Vec3::new(plan[i % 4][0], plan[i % 4][1], if i < 4 { z0 } else { z1 });
@@ -104,7 +104,7 @@ impl Builder {
 
     /// A body of six sides: the corners of its bottom counter-clockwise seen from above, from the front left one, then
     /// those of its top.
-    pub(super) fn hexahedron(&mut self, corners: [Vec3; 8], look: Look, omit: &[Side]) {
+    pub(crate) fn hexahedron(&mut self, corners: [Vec3; 8], look: Look, omit: &[Side]) {
         let sides = [
             (Side::Front, [0, 1, 5, 4]),
             (Side::Right, [1, 2, 6, 5]),
@@ -122,12 +122,12 @@ impl Builder {
     }
 
     /// A four-sided surface, its corners counter-clockwise seen from the front, from the texture's bottom left.
-    pub(super) fn panel(&mut self, corners: [Vec3; 4], look: Look) {
+    pub(crate) fn panel(&mut self, corners: [Vec3; 4], look: Look) {
         self.shifted_panel(corners, look, 0.0);
     }
 
     /// As [`Builder::panel`], its texture starting at `shift` of its width.
-    pub(super) fn shifted_panel(&mut self, corners: [Vec3; 4], look: Look, shift: f32) {
+    pub(crate) fn shifted_panel(&mut self, corners: [Vec3; 4], look: Look, shift: f32) {
         let [a, b, c, d] = corners.map(|p| self.frame.apply(p));
         let (width, height) = (a.distance(b).max(d.distance(c)), a.distance(d).max(b.distance(c)));
         let cells = [width, height].map(|m| ((m / look.cell_m() - 0.01).ceil() as u32).max(1));
@@ -170,7 +170,7 @@ impl Builder {
 
     /// An upright cone stump of `sides` sides from radius `radii[0]` at `foot` to `radii[1]` at `foot` + `height`, with
     /// lids unless `omit` has its top or bottom.
-    pub(super) fn stump(
+    pub(crate) fn stump(
         &mut self,
         foot: [f32; 3],
         radii: [f32; 2],
@@ -197,13 +197,13 @@ impl Builder {
     }
 
     /// A round surface that looks up: the lid of a stump that is of something else.
-    pub(super) fn disc(&mut self, center: [f32; 3], radius: f32, sides: u32, look: Look) {
+    pub(crate) fn disc(&mut self, center: [f32; 3], radius: f32, sides: u32, look: Look) {
         let center = Vec3::from_array(center);
         self.fan(center, &ring(center, radius, sides), look);
     }
 
     /// A leaf: a flat spindle from `base` to `tip`, `width` metres wide.
-    pub(super) fn leaf(&mut self, base: Vec3, tip: Vec3, width: f32, look: Look) {
+    pub(crate) fn leaf(&mut self, base: Vec3, tip: Vec3, width: f32, look: Look) {
         let along = tip - base;
         let across = along.cross(Vec3::Z).normalize() * 0.5 * width;
         let over = across.cross(along).normalize() * 0.1 * width;
@@ -214,7 +214,7 @@ impl Builder {
     }
 
     /// Adds what comes in building coordinates with coordinates of its own into a texture of its own.
-    pub(super) fn baked(&mut self, parts: MeshParts, texture: u32) {
+    pub(crate) fn baked(&mut self, parts: MeshParts, texture: u32) {
         let first = self.parts.materials.iter().position(|m| m.texture == Some(texture));
         let material = first.unwrap_or_else(|| {
             let name = self.parts.textures[texture as usize].name.clone();
@@ -225,7 +225,7 @@ impl Builder {
     }
 
     /// Adds a texture to be used once, and returns its index.
-    pub(super) fn texture(&mut self, name: String, image: s3d_geom::Raster<[u8; 3]>, wrap: Wrap) -> u32 {
+    pub(crate) fn texture(&mut self, name: String, image: s3d_geom::Raster<[u8; 3]>, wrap: Wrap) -> u32 {
         self.parts.textures.push(Texture { name, image, wrap: [wrap; 2] });
         (self.parts.textures.len() - 1) as u32
     }
@@ -262,7 +262,7 @@ impl Builder {
     }
 
     /// The mesh, moved by `offset`, and whose its faces are.
-    pub(super) fn finish(mut self, offset: Vec3) -> (TriMesh, Vec<Option<u32>>, Vec<DemoInstance>) {
+    pub(crate) fn finish(mut self, offset: Vec3) -> (TriMesh, Vec<Option<u32>>, Vec<DemoInstance>) {
         self.parts.positions.iter_mut().for_each(|p| *p += offset);
         let mesh = TriMesh::new(self.parts).expect("the demo scene is a mesh");
         assert_eq!(mesh.report().zero_area_faces, 0, "every face of the demo scene has an area");

@@ -2,14 +2,14 @@
 //! back goes to a wall.
 
 use super::builder::{Builder, Side};
-use super::materials::*;
-use super::noise::hash;
+use crate::look::materials::*;
+use crate::look::noise::hash;
 use s3d_geom::glam::{Vec3, vec3};
 
 use Side::{Back, Bottom, Front, Left, Right, Top};
 
 /// A table: a top on four legs.
-pub(super) fn table(b: &mut Builder, width: f32, depth: f32, height: f32, top: Look) {
+pub(crate) fn table(b: &mut Builder, width: f32, depth: f32, height: f32, top: Look) {
     b.begin("table");
     let (x, y) = (0.5 * width, 0.5 * depth);
     b.cuboid([-x, -y, height - 0.035], [x, y, height], top, &[]);
@@ -25,7 +25,7 @@ pub(super) fn table(b: &mut Builder, width: f32, depth: f32, height: f32, top: L
 }
 
 /// A desk: a table with a panel at its back and a chest of drawers under its right end.
-pub(super) fn desk(b: &mut Builder, width: f32, depth: f32) {
+pub(crate) fn desk(b: &mut Builder, width: f32, depth: f32) {
     table(b, width, depth, 0.74, OAK);
     let (x, y) = (0.5 * width, 0.5 * depth);
     b.cuboid([-x + 0.1, y - 0.05, 0.3], [x - 0.1, y - 0.03, 0.7], WHITE, &[]);
@@ -38,7 +38,7 @@ pub(super) fn desk(b: &mut Builder, width: f32, depth: f32) {
 }
 
 /// A round table on one foot.
-pub(super) fn round_table(b: &mut Builder, radius: f32, height: f32, top: Look) {
+pub(crate) fn round_table(b: &mut Builder, radius: f32, height: f32, top: Look) {
     b.begin("table");
     b.stump([0.0, 0.0, height - 0.03], [radius; 2], 0.03, 32, top, &[]);
     b.stump([0.0, 0.0, 0.02], [0.035; 2], height - 0.05, 12, STEEL, &[Top, Bottom]);
@@ -46,7 +46,7 @@ pub(super) fn round_table(b: &mut Builder, radius: f32, height: f32, top: Look) 
 }
 
 /// An office chair on a star of five feet.
-pub(super) fn office_chair(b: &mut Builder, fabric: Look) {
+pub(crate) fn office_chair(b: &mut Builder, fabric: Look) {
     b.begin("chair");
     for arm in 0..5 {
         b.place(vec3(0.0, 0.0, 0.0), 72.0 * arm as f32 + 18.0, |b| {
@@ -79,7 +79,7 @@ fn tilted_back(b: &mut Builder, half_width: f32, y: f32, span: [f32; 2], lean: f
 }
 
 /// A chair with four wooden legs.
-pub(super) fn chair(b: &mut Builder, fabric: Look) {
+pub(crate) fn chair(b: &mut Builder, fabric: Look) {
     b.begin("chair");
     for (x, y) in [(-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)] {
         b.cuboid([x - 0.02, y - 0.02, 0.0], [x + 0.02, y + 0.02, 0.42], WALNUT, &[Top, Bottom]);
@@ -92,7 +92,7 @@ pub(super) fn chair(b: &mut Builder, fabric: Look) {
 }
 
 /// A bar stool.
-pub(super) fn stool(b: &mut Builder, seat: Look) {
+pub(crate) fn stool(b: &mut Builder, seat: Look) {
     b.begin("chair");
     b.stump([0.0, 0.0, 0.0], [0.2, 0.17], 0.025, 20, STEEL, &[Bottom]);
     b.stump([0.0, 0.0, 0.025], [0.025; 2], 0.675, 10, STEEL, &[Top, Bottom]);
@@ -101,7 +101,7 @@ pub(super) fn stool(b: &mut Builder, seat: Look) {
 }
 
 /// A sofa for `seats` people.
-pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
+pub(crate) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
     b.begin("sofa");
     let half = 0.5 * 0.66 * seats as f32;
     for (x, y) in [(-half, -0.36), (half, -0.36), (half, 0.36), (-half, 0.36)] {
@@ -157,7 +157,7 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
 }
 
 /// A bookcase with `shelves` rows of books; which books depends on `seed`.
-pub(super) fn bookcase(b: &mut Builder, width: f32, shelves: u32, wood: Look, seed: u32) {
+pub(crate) fn bookcase(b: &mut Builder, width: f32, shelves: u32, wood: Look, seed: u32) {
     const ROW: f32 = 0.36;
     const BOARD: f32 = 0.025;
     const DEPTH: f32 = 0.3;

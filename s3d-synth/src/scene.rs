@@ -4,22 +4,8 @@
 //! opaque surfaces, doors that stand open, a slanted ceiling, and a place that was not captured (a tile of the conference
 //! room's ceiling).
 
-mod builder;
-mod finishes;
-mod furniture;
-mod light;
-mod materials;
-mod noise;
-mod openings;
-mod pictures;
-mod rooms;
-mod scan;
-mod shell;
-mod textures;
-mod things;
-
-pub(crate) use scan::{is_demo_scan, write_scan};
-
+use crate::building::demo;
+use crate::construct::builder::Builder;
 use s3d_geom::{
     TriMesh,
     glam::{DVec3, Vec3, dvec3},
@@ -29,7 +15,7 @@ use s3d_geom::{
 const OFFSET: Vec3 = Vec3::new(10.0, 5.0, 0.0);
 
 /// A scene with its annotation and its scan locations.
-pub(crate) struct DemoScene {
+pub struct DemoScene {
     /// Its surface with textures, metres, Z-up.
     pub mesh: TriMesh,
     /// Per face: index into `instances`, or `None` where nothing is annotated.
@@ -42,7 +28,7 @@ pub(crate) struct DemoScene {
 
 /// An annotated object.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct DemoInstance {
+pub struct DemoInstance {
     /// One of the 13 classes.
     pub class: &'static str,
     /// Counts the objects of a class in a room, from 1.
@@ -53,7 +39,7 @@ pub(crate) struct DemoInstance {
 
 /// A place from which the scene was captured.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct DemoLocation {
+pub struct DemoLocation {
     /// 32 lower-case hexadecimal digits.
     pub uuid: String,
     /// World metres.
@@ -63,9 +49,9 @@ pub(crate) struct DemoLocation {
 }
 
 /// Builds the scene: the same at every call.
-pub(crate) fn demo_scene() -> DemoScene {
-    let mut builder = builder::Builder::new();
-    rooms::build(&mut builder);
+pub fn demo_scene() -> DemoScene {
+    let mut builder = Builder::new();
+    demo::build(&mut builder);
     let (mesh, face_instances, instances) = builder.finish(OFFSET);
     let locations = LOCATIONS.iter().map(|&(uuid, [x, y, z], yaw_deg)| DemoLocation {
         uuid: uuid.to_owned(),

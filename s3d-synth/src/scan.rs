@@ -1,13 +1,10 @@
 //! The built-in scene as files, as a scanner and an annotator would have left them.
 
-use super::{DemoScene, demo_scene};
-use crate::failure::Outcome;
-use crate::stop;
-use glam::DQuat;
-use rand::RngExt;
+use crate::error::ScanError;
+use crate::scene::{DemoScene, demo_scene};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use s3d_geom::{Density, PointCloud, SurfaceSampler};
+use s3d_geom::{Density, PointCloud, SurfaceSampler, glam::DQuat};
 use s3d_io::{S3disAreaWriter, create_dir, write_bytes, write_rgb_obj};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -29,17 +26,22 @@ const SEED: u64 = 20170203;
 const MARK: &str = "# The built-in scene of s3d";
 
 /// Whether `dir` holds the built-in scene, and may be written again.
-pub(crate) fn is_demo_scan(dir: &Path) -> bool {
+pub fn is_demo_scan(dir: &Path) -> bool {
     std::fs::read_to_string(dir.join(SCENE_FILE)).is_ok_and(|text| text.starts_with(MARK))
 }
 
 /// Writes the scene into `dir`: textured mesh, annotated points, scan locations, and the scene file that ties them
 /// together, whose path is returned.
-pub(crate) fn write_scan(dir: &Path) -> Outcome<PathBuf> {
+///
+/// `go_on` is asked before each room; where it says no, what was written so far stays.
+///
+/// # Errors
+/// [`ScanError`].
+pub fn write_scan(dir: &Path, mut go_on: impl FnMut() -> bool) -> Result<PathBuf, ScanError> {
     let scene = demo_scene();
     create_dir(dir)?;
     write_rgb_obj(dir, &scene.mesh, &[])?;
-    write_annotations(&dir.join(format!("Area_{AREA}")), &scene)?;
+    write_annotations(&dir.join(format!("Area_{AREA}")), &scene, &mut go_on)?;
     write_bytes(&dir.join("cameras.csv"), camera_table(&scene).as_bytes())?;
     let toml = format!(
         "{MARK}: three rooms and a hallway.\narea = {AREA}\n\n\
@@ -53,13 +55,19 @@ pub(crate) fn write_scan(dir: &Path) -> Outcome<PathBuf> {
 }
 
 /// The annotated points, with the noise of a scanner.
-fn write_annotations(dir: &Path, scene: &DemoScene) -> Outcome<()> {
+fn write_annotations(
+    dir: &Path,
+    scene: &DemoScene,
+    go_on: &mut dyn FnMut() -> bool,
+) -> Result<(), ScanError> {
     let tree = S3disAreaWriter::create(dir)?;
     let rooms: BTreeSet<&str> = scene.instances.iter().map(|i| i.room).collect();
     let mut noise = ChaCha8Rng::seed_from_u64(SEED);
     let mut cloud = PointCloud::default();
     for room in &rooms {
-        stop::check()?;
+        if !go_on() {
+            return Err(ScanError::Cancelled);
+        }
         let mut files = tree.room(room)?;
         for (index, instance) in scene.instances.iter().enumerate().filter(|(_, i)| i.room == *room) {
             let faces: Vec<u32> = (0u32..)

@@ -1,13 +1,13 @@
 //! What stands where: a hallway with an office and a conference room to its south and a lounge under a slanted roof to
 //! its north. Building coordinates: metres, x to the east, y to the north.
 
-use super::builder::Builder;
-use super::finishes::{Ceiling, Floor, Paint};
-use super::furniture::*;
-use super::materials::*;
-use super::shell::{Filling, Opening, Shell, Wall};
-use super::textures::{OAK as OAK_WOOD, Pattern, WALNUT as WALNUT_WOOD};
-use super::things::*;
+use crate::construct::builder::Builder;
+use crate::construct::furniture::*;
+use crate::construct::shell::{Filling, Opening, Shell, Wall};
+use crate::construct::things::*;
+use crate::look::finishes::{Ceiling, Floor, Paint};
+use crate::look::materials::*;
+use crate::look::textures::{OAK as OAK_WOOD, Pattern, WALNUT as WALNUT_WOOD};
 use s3d_geom::glam::{vec2, vec3};
 
 const WALL_M: f32 = 0.15;
@@ -34,7 +34,7 @@ fn room(b: &mut Builder, name: &'static str, shell: &Shell, furnish: impl FnOnce
 }
 
 /// All rooms.
-pub(super) fn build(b: &mut Builder) {
+pub(crate) fn build(b: &mut Builder) {
     office(b);
     conference_room(b);
     lounge(b);

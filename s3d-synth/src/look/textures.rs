@@ -6,7 +6,7 @@ use s3d_geom::Raster;
 
 /// An image that several surfaces may wear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Pattern {
+pub(crate) enum Pattern {
     Oak,
     Walnut,
     BlueFabric,
@@ -30,7 +30,7 @@ pub(super) enum Pattern {
 
 impl Pattern {
     /// A name for materials and texture files.
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Pattern::Oak => "oak",
             Pattern::Walnut => "walnut",
@@ -55,7 +55,7 @@ impl Pattern {
     }
 
     /// The size after which it repeats, metres.
-    pub(super) fn tile_m(self) -> [f32; 2] {
+    pub(crate) fn tile_m(self) -> [f32; 2] {
         match self {
             Pattern::Oak | Pattern::Walnut => [1.0, 0.5],
             Pattern::Books => [1.0, 0.3],
@@ -65,7 +65,7 @@ impl Pattern {
         }
     }
 
-    pub(super) fn image(self) -> Raster<[u8; 3]> {
+    pub(crate) fn image(self) -> Raster<[u8; 3]> {
         match self {
             Pattern::Oak => wood(&OAK),
             Pattern::Walnut => wood(&WALNUT),
@@ -94,32 +94,32 @@ impl Pattern {
 }
 
 /// An image from the colour of each pixel, 0 to 255, x to the right and y down.
-pub(super) fn image(width: u32, height: u32, color: impl Fn(f32, f32) -> [f32; 3]) -> Raster<[u8; 3]> {
+pub(crate) fn image(width: u32, height: u32, color: impl Fn(f32, f32) -> [f32; 3]) -> Raster<[u8; 3]> {
     let pixels = (0..width * height).map(|i| to_bytes(color((i % width) as f32, (i / width) as f32)));
     Raster::from_vec(width, height, pixels.collect())
 }
 
-pub(super) fn to_bytes(color: [f32; 3]) -> [u8; 3] {
+pub(crate) fn to_bytes(color: [f32; 3]) -> [u8; 3] {
     color.map(|c| (c + 0.5).clamp(1.0, 255.0) as u8)
 }
 
 /// `image` made brighter or darker.
-pub(super) fn scaled(image: &Raster<[u8; 3]>, factor: f32) -> Raster<[u8; 3]> {
+pub(crate) fn scaled(image: &Raster<[u8; 3]>, factor: f32) -> Raster<[u8; 3]> {
     image.map(|pixel| to_bytes(pixel.map(|c| f32::from(c) * factor)))
 }
 
 /// The colours of a wood: between its rings, and of them.
-pub(super) struct Wood {
-    pub(super) light: [f32; 3],
-    pub(super) dark: [f32; 3],
+pub(crate) struct Wood {
+    pub(crate) light: [f32; 3],
+    pub(crate) dark: [f32; 3],
 }
 
-pub(super) const OAK: Wood = Wood { light: [214.0, 178.0, 130.0], dark: [178.0, 136.0, 88.0] };
-pub(super) const WALNUT: Wood = Wood { light: [142.0, 98.0, 66.0], dark: [92.0, 60.0, 40.0] };
+pub(crate) const OAK: Wood = Wood { light: [214.0, 178.0, 130.0], dark: [178.0, 136.0, 88.0] };
+pub(crate) const WALNUT: Wood = Wood { light: [142.0, 98.0, 66.0], dark: [92.0, 60.0, 40.0] };
 
 impl Wood {
     /// The colour at `along` and `across` the grain, metres; repeats after 1 m along and 0.5 m across.
-    pub(super) fn at(&self, along: f32, across: f32, seed: u32) -> [f32; 3] {
+    pub(crate) fn at(&self, along: f32, across: f32, seed: u32) -> [f32; 3] {
         // Rings cut lengthwise: waves across the grain, bent by slow noise along it.
         let slow = value(along * 4.0, across * 8.0, 4, seed);
         let bend = 4.0 * slow + 1.2 * fractal(along * 8.0, across * 16.0, 8, seed + 3);

@@ -1,7 +1,7 @@
 //! Noise and colour arithmetic for the textures; the same on every platform.
 
 /// A number in [0, 1) that looks random, for a place on a lattice.
-pub(super) fn hash(x: u32, y: u32, seed: u32) -> f32 {
+pub(crate) fn hash(x: u32, y: u32, seed: u32) -> f32 {
     let mut h = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77) ^ seed.wrapping_mul(0xc2b2_ae3d);
     for factor in [0x7feb_352d, 0x846c_a68b] {
         h = (h ^ (h >> 15)).wrapping_mul(factor);
@@ -10,7 +10,7 @@ pub(super) fn hash(x: u32, y: u32, seed: u32) -> f32 {
 }
 
 /// Smooth noise in [0, 1): lattice values blended; repeats every `period` cells in x and y.
-pub(super) fn value(x: f32, y: f32, period: u32, seed: u32) -> f32 {
+pub(crate) fn value(x: f32, y: f32, period: u32, seed: u32) -> f32 {
     let (xf, yf) = (x.floor(), y.floor());
     let wrap = |v: f32| (v as i64).rem_euclid(i64::from(period)) as u32;
     let (x0, x1, y0, y1) = (wrap(xf), wrap(xf + 1.0), wrap(yf), wrap(yf + 1.0));
@@ -20,7 +20,7 @@ pub(super) fn value(x: f32, y: f32, period: u32, seed: u32) -> f32 {
 }
 
 /// Four octaves of [`value`], in [0, 1); repeats every `period` units.
-pub(super) fn fractal(x: f32, y: f32, period: u32, seed: u32) -> f32 {
+pub(crate) fn fractal(x: f32, y: f32, period: u32, seed: u32) -> f32 {
     let octave = |k: u32| {
         let n = 1 << k;
         value(x * n as f32, y * n as f32, period * n, seed + k) / (2 * n) as f32
@@ -29,18 +29,18 @@ pub(super) fn fractal(x: f32, y: f32, period: u32, seed: u32) -> f32 {
 }
 
 /// 0 below 0, 1 above 1, smooth in between.
-pub(super) fn smooth(t: f32) -> f32 {
+pub(crate) fn smooth(t: f32) -> f32 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
 /// From `a` (`t` = 0) to `b` (`t` = 1).
-pub(super) fn mix(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
+pub(crate) fn mix(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t)
 }
 
 /// `color` brighter by `amount` of 255.
-pub(super) fn tint(color: [f32; 3], amount: f32) -> [f32; 3] {
+pub(crate) fn tint(color: [f32; 3], amount: f32) -> [f32; 3] {
     color.map(|c| c + amount)
 }
 

@@ -1,8 +1,8 @@
 //! What fills the openings of walls: windows and doors.
 
 use super::builder::{Builder, Side};
-use super::materials::{Look, OAK, STEEL, WHITE};
-use super::textures::Pattern;
+use crate::look::materials::{Look, OAK, STEEL, WHITE};
+use crate::look::textures::Pattern;
 use s3d_geom::glam::vec3;
 
 /// The four inner faces of an opening, `depth` metres into the wall.
@@ -20,7 +20,7 @@ fn reveal(b: &mut Builder, width: f32, [z0, z1]: [f32; 2], depth: f32, look: Loo
 
 /// A window `heights` above the floor: its pane behind the wall, its board before it. The frame is the wall's, from the
 /// opening's left edge.
-pub(super) fn window(b: &mut Builder, width: f32, heights: [f32; 2]) {
+pub(crate) fn window(b: &mut Builder, width: f32, heights: [f32; 2]) {
     const DEPTH: f32 = 0.16;
     const BAR: f32 = 0.05;
     let [z0, z1] = heights;
@@ -45,7 +45,7 @@ pub(super) fn window(b: &mut Builder, width: f32, heights: [f32; 2]) {
 }
 
 /// The lining and the frame of a doorway `depth` metres deep; what follows belongs to the same door.
-pub(super) fn doorway(b: &mut Builder, width: f32, height: f32, depth: f32) {
+pub(crate) fn doorway(b: &mut Builder, width: f32, height: f32, depth: f32) {
     const TRIM: f32 = 0.06;
     use Side::{Back, Bottom};
     b.begin("door");
@@ -56,7 +56,7 @@ pub(super) fn doorway(b: &mut Builder, width: f32, height: f32, depth: f32) {
 }
 
 /// A door leaf along x from the hinge at the origin, 4 cm thick towards −y.
-pub(super) fn leaf(b: &mut Builder, width: f32, height: f32) {
+pub(crate) fn leaf(b: &mut Builder, width: f32, height: f32) {
     let (w, h) = (width - 0.02, height - 0.02);
     let wood = Look::Fitted(Pattern::Door);
     let edge = Look::Plain("door_edge", [186, 140, 96]);
@@ -68,7 +68,7 @@ pub(super) fn leaf(b: &mut Builder, width: f32, height: f32) {
 }
 
 /// A handle on a leaf whose front is at `y`.
-pub(super) fn handle(b: &mut Builder, x: f32, y: f32) {
+pub(crate) fn handle(b: &mut Builder, x: f32, y: f32) {
     b.cuboid([x - 0.01, y - 0.05, 1.02], [x + 0.01, y, 1.04], STEEL, &[Side::Front, Side::Back]);
     b.cuboid([x - 0.12, y - 0.06, 1.015], [x + 0.01, y - 0.05, 1.045], STEEL, &[]);
 }

@@ -5,37 +5,37 @@ use s3d_geom::{Aabb, glam::Vec3};
 
 /// A small shining surface.
 #[derive(Clone, Copy)]
-pub(super) struct Lamp {
+pub(crate) struct Lamp {
     /// Its middle, building metres.
-    pub(super) center: Vec3,
+    pub(crate) center: Vec3,
     /// Where it shines to; a unit vector.
-    pub(super) normal: Vec3,
+    pub(crate) normal: Vec3,
     /// Its area in m² times its brightness.
-    pub(super) power: f32,
+    pub(crate) power: f32,
 }
 
 /// The lamps of a room and what keeps their light off.
 #[derive(Clone, Default)]
-pub(super) struct Light {
+pub(crate) struct Light {
     /// Windows and lamps.
-    pub(super) lamps: Vec<Lamp>,
+    pub(crate) lamps: Vec<Lamp>,
     /// The height of the room, which its ceiling's brightness depends on.
-    pub(super) height_m: f32,
+    pub(crate) height_m: f32,
     blockers: Vec<Aabb>,
 }
 
 impl Light {
-    pub(super) fn new(lamps: Vec<Lamp>, height_m: f32) -> Self {
+    pub(crate) fn new(lamps: Vec<Lamp>, height_m: f32) -> Self {
         Self { lamps, height_m, blockers: Vec::new() }
     }
 
     /// Adds a body that darkens what is near it.
-    pub(super) fn block(&mut self, body: Aabb) {
+    pub(crate) fn block(&mut self, body: Aabb) {
         self.blockers.push(body);
     }
 
     /// The brightness, about 1 where it is bright, of a surface at `p` with the unit normal `n`, with nothing in between.
-    pub(super) fn open(&self, p: Vec3, n: Vec3) -> f32 {
+    pub(crate) fn open(&self, p: Vec3, n: Vec3) -> f32 {
         // The floor throws light back to the ceiling, but not to the undersides of tables.
         let height = (p.z / self.height_m.max(0.1)).min(1.0);
         let ambient = if n.z < -0.5 { 0.46 + 0.42 * height * height } else { 0.74 + 0.04 * n.z };
@@ -55,7 +55,7 @@ impl Light {
     }
 
     /// As [`Light::open`], darkened by what stands close.
-    pub(super) fn at(&self, p: Vec3, n: Vec3) -> f32 {
+    pub(crate) fn at(&self, p: Vec3, n: Vec3) -> f32 {
         let axis = n.abs().max_position();
         let shade: f32 = self
             .blockers

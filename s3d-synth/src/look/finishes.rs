@@ -7,17 +7,17 @@ type Color = [f32; 3];
 
 /// What covers a wall.
 #[derive(Clone, Copy)]
-pub(super) struct Paint {
+pub(crate) struct Paint {
     /// Above the skirting.
-    pub(super) color: Color,
+    pub(crate) color: Color,
     /// A band around the room, if any: from, to (metres above the floor) and its colour.
-    pub(super) band: Option<(f32, f32, Color)>,
-    pub(super) skirting: Color,
+    pub(crate) band: Option<(f32, f32, Color)>,
+    pub(crate) skirting: Color,
 }
 
 impl Paint {
     /// The colour `along` the wall and `up` from the floor.
-    pub(super) fn at(&self, along: f32, up: f32) -> Color {
+    pub(crate) fn at(&self, along: f32, up: f32) -> Color {
         const SKIRTING_M: f32 = 0.09;
         let noise =
             9.0 * (fractal(along * 1.3, up * 1.3, 64, 81) - 0.5) + 5.0 * (hash_at(along, up, 40.0) - 0.5);
@@ -35,7 +35,7 @@ impl Paint {
 
 /// What covers a floor.
 #[derive(Clone, Copy)]
-pub(super) enum Floor {
+pub(crate) enum Floor {
     /// Square carpet tiles whose pile runs along and across in turn.
     CarpetTiles(Color),
     /// Planks along x.
@@ -48,7 +48,7 @@ pub(super) enum Floor {
 
 impl Floor {
     /// The colour at (x, y) of the building.
-    pub(super) fn at(self, x: f32, y: f32) -> Color {
+    pub(crate) fn at(self, x: f32, y: f32) -> Color {
         match self {
             Floor::CarpetTiles(color) => {
                 let (i, j) = ((x * 2.0).floor(), (y * 2.0).floor());
@@ -101,7 +101,7 @@ fn planks(wood: &Wood, along: f32, across: f32) -> Color {
 
 /// What covers a ceiling.
 #[derive(Clone, Copy)]
-pub(super) enum Ceiling {
+pub(crate) enum Ceiling {
     /// Mineral tiles of 0.6 m between rails, counted from the room's smallest corner.
     Tiles,
     Plaster,
@@ -111,7 +111,7 @@ pub(super) enum Ceiling {
 
 impl Ceiling {
     /// The colour at (x, y) metres from the room's smallest corner.
-    pub(super) fn at(self, x: f32, y: f32) -> Color {
+    pub(crate) fn at(self, x: f32, y: f32) -> Color {
         match self {
             Ceiling::Tiles => {
                 let (i, j) = ((x / 0.6).floor(), (y / 0.6).floor());

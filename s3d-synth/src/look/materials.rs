@@ -8,7 +8,7 @@ use s3d_geom::{
 
 /// How a surface looks before light falls on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Look {
+pub(crate) enum Look {
     /// One colour.
     Plain(&'static str, [u8; 3]),
     /// One colour that shines by itself.
@@ -19,31 +19,31 @@ pub(super) enum Look {
     Fitted(Pattern),
 }
 
-pub(super) const STEEL: Look = Look::Plain("steel", [168, 172, 178]);
-pub(super) const BLACK: Look = Look::Plain("black_plastic", [44, 45, 50]);
-pub(super) const WHITE: Look = Look::Plain("white_lacquer", [246, 245, 240]);
-pub(super) const LEAF: Look = Look::Plain("leaf", [74, 122, 58]);
-pub(super) const SOIL: Look = Look::Plain("soil", [74, 54, 42]);
-pub(super) const COFFEE: Look = Look::Plain("coffee", [70, 44, 30]);
-pub(super) const CLAY: Look = Look::Plain("clay", [190, 104, 70]);
-pub(super) const RED: Look = Look::Plain("red_lacquer", [196, 40, 34]);
-pub(super) const TEAL: Look = Look::Plain("teal_glaze", [38, 128, 134]);
-pub(super) const YELLOW: Look = Look::Plain("yellow_glaze", [232, 178, 52]);
-pub(super) const PAPER: Look = Look::Plain("paper", [250, 248, 240]);
-pub(super) const CONCRETE: Look = Look::Tiled(Pattern::Concrete);
-pub(super) const LAMP: Look = Look::Glow("lamp", [255, 252, 240]);
-pub(super) const SHADE: Look = Look::Glow("lamp_shade", [250, 226, 178]);
-pub(super) const OAK: Look = Look::Tiled(Pattern::Oak);
-pub(super) const WALNUT: Look = Look::Tiled(Pattern::Walnut);
-pub(super) const BLUE_FABRIC: Look = Look::Tiled(Pattern::BlueFabric);
-pub(super) const GREY_FABRIC: Look = Look::Tiled(Pattern::GreyFabric);
-pub(super) const RUST_FABRIC: Look = Look::Tiled(Pattern::RustFabric);
-pub(super) const CARDBOARD: Look = Look::Tiled(Pattern::Cardboard);
-pub(super) const BOOKS: Look = Look::Tiled(Pattern::Books);
+pub(crate) const STEEL: Look = Look::Plain("steel", [168, 172, 178]);
+pub(crate) const BLACK: Look = Look::Plain("black_plastic", [44, 45, 50]);
+pub(crate) const WHITE: Look = Look::Plain("white_lacquer", [246, 245, 240]);
+pub(crate) const LEAF: Look = Look::Plain("leaf", [74, 122, 58]);
+pub(crate) const SOIL: Look = Look::Plain("soil", [74, 54, 42]);
+pub(crate) const COFFEE: Look = Look::Plain("coffee", [70, 44, 30]);
+pub(crate) const CLAY: Look = Look::Plain("clay", [190, 104, 70]);
+pub(crate) const RED: Look = Look::Plain("red_lacquer", [196, 40, 34]);
+pub(crate) const TEAL: Look = Look::Plain("teal_glaze", [38, 128, 134]);
+pub(crate) const YELLOW: Look = Look::Plain("yellow_glaze", [232, 178, 52]);
+pub(crate) const PAPER: Look = Look::Plain("paper", [250, 248, 240]);
+pub(crate) const CONCRETE: Look = Look::Tiled(Pattern::Concrete);
+pub(crate) const LAMP: Look = Look::Glow("lamp", [255, 252, 240]);
+pub(crate) const SHADE: Look = Look::Glow("lamp_shade", [250, 226, 178]);
+pub(crate) const OAK: Look = Look::Tiled(Pattern::Oak);
+pub(crate) const WALNUT: Look = Look::Tiled(Pattern::Walnut);
+pub(crate) const BLUE_FABRIC: Look = Look::Tiled(Pattern::BlueFabric);
+pub(crate) const GREY_FABRIC: Look = Look::Tiled(Pattern::GreyFabric);
+pub(crate) const RUST_FABRIC: Look = Look::Tiled(Pattern::RustFabric);
+pub(crate) const CARDBOARD: Look = Look::Tiled(Pattern::Cardboard);
+pub(crate) const BOOKS: Look = Look::Tiled(Pattern::Books);
 
 impl Look {
     /// A name for materials and texture files.
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Look::Plain(name, _) | Look::Glow(name, _) => name,
             Look::Tiled(pattern) | Look::Fitted(pattern) => pattern.name(),
@@ -51,14 +51,14 @@ impl Look {
     }
 
     /// Its colour where it has no pattern.
-    pub(super) fn color(self) -> [u8; 3] {
+    pub(crate) fn color(self) -> [u8; 3] {
         match self {
             Look::Plain(_, color) | Look::Glow(_, color) => color,
             Look::Tiled(_) | Look::Fitted(_) => [255; 3],
         }
     }
 
-    pub(super) fn pattern(self) -> Option<Pattern> {
+    pub(crate) fn pattern(self) -> Option<Pattern> {
         match self {
             Look::Plain(..) | Look::Glow(..) => None,
             Look::Tiled(pattern) | Look::Fitted(pattern) => Some(pattern),
@@ -66,16 +66,16 @@ impl Look {
     }
 
     /// Whether it has a direction that follows the piece.
-    pub(super) fn has_grain(self) -> bool {
+    pub(crate) fn has_grain(self) -> bool {
         matches!(self, Look::Tiled(Pattern::Oak | Pattern::Walnut))
     }
 
-    pub(super) fn wrap(self) -> Wrap {
+    pub(crate) fn wrap(self) -> Wrap {
         if matches!(self, Look::Fitted(_)) { Wrap::Clamp } else { Wrap::Repeat }
     }
 
     /// Texture coordinates at the far corner of a surface of `size` metres.
-    pub(super) fn uv_scale(self, size: Vec2) -> Vec2 {
+    pub(crate) fn uv_scale(self, size: Vec2) -> Vec2 {
         match self {
             Look::Plain(..) | Look::Glow(..) => size,
             Look::Tiled(pattern) => {
@@ -87,7 +87,7 @@ impl Look {
     }
 
     /// The edge of the cells into which such a surface is cut, metres.
-    pub(super) fn cell_m(self) -> f32 {
+    pub(crate) fn cell_m(self) -> f32 {
         match self {
             Look::Plain(..) | Look::Glow(..) => 0.3,
             Look::Tiled(_) => 0.25,
@@ -96,7 +96,7 @@ impl Look {
     }
 
     /// The step of brightness nearest to `lit`; textures come in few steps, as each is an image of its own.
-    pub(super) fn level(self, lit: f32) -> u32 {
+    pub(crate) fn level(self, lit: f32) -> u32 {
         match self {
             Look::Glow(..) => self.steps(),
             _ => (lit * self.steps() as f32).round().max(1.0) as u32,
@@ -104,7 +104,7 @@ impl Look {
     }
 
     /// The brightness of a level.
-    pub(super) fn factor(self, level: u32) -> f32 {
+    pub(crate) fn factor(self, level: u32) -> f32 {
         level as f32 / self.steps() as f32
     }
 

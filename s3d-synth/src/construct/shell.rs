@@ -1,11 +1,11 @@
 //! The shell of a room: floor, walls with openings, ceiling; and what fills the openings.
 
 use super::builder::Builder;
-use super::finishes::{Ceiling, Floor, Paint};
 use super::light::{Lamp, Light};
-use super::materials::{LAMP, Look};
 use super::openings::{doorway, handle, leaf, window};
-use super::textures::{Pattern, to_bytes};
+use crate::look::finishes::{Ceiling, Floor, Paint};
+use crate::look::materials::{LAMP, Look};
+use crate::look::textures::{Pattern, to_bytes};
 use s3d_geom::{
     MeshParts, NO_INDEX, Raster, Wrap,
     glam::{Vec2, Vec3, vec2, vec3},
@@ -13,7 +13,7 @@ use s3d_geom::{
 
 /// A wall of a room, by where it stands; in the order in which they pass when one turns right.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wall {
+pub(crate) enum Wall {
     South,
     West,
     North,
@@ -39,7 +39,7 @@ impl Wall {
     }
 
     /// Turns a frame so that it looks at the wall.
-    pub(super) fn yaw_deg(self) -> f32 {
+    pub(crate) fn yaw_deg(self) -> f32 {
         match self {
             Wall::South => 180.0,
             Wall::West => 90.0,
@@ -55,7 +55,7 @@ impl Wall {
 
 /// What fills an opening.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Filling {
+pub(crate) enum Filling {
     Window,
     /// A doorway through a wall so thick; its leaf hangs on the left or right and stands open.
     Door {
@@ -71,29 +71,29 @@ pub(super) enum Filling {
 
 /// A rectangle cut out of a wall: coordinates along x or y of the building, and heights.
 #[derive(Clone, Copy)]
-pub(super) struct Opening {
-    pub(super) wall: Wall,
-    pub(super) span: [f32; 2],
-    pub(super) heights: [f32; 2],
-    pub(super) filling: Filling,
+pub(crate) struct Opening {
+    pub(crate) wall: Wall,
+    pub(crate) span: [f32; 2],
+    pub(crate) heights: [f32; 2],
+    pub(crate) filling: Filling,
 }
 
 /// A room's floor plan and surfaces. Building coordinates, metres.
-pub(super) struct Shell {
-    pub(super) low: Vec2,
-    pub(super) high: Vec2,
+pub(crate) struct Shell {
+    pub(crate) low: Vec2,
+    pub(crate) high: Vec2,
     /// Height of the ceiling at the smallest and the largest y.
-    pub(super) heights: [f32; 2],
-    pub(super) openings: Vec<Opening>,
+    pub(crate) heights: [f32; 2],
+    pub(crate) openings: Vec<Opening>,
     /// A rectangle of the ceiling that is not there.
-    pub(super) hole: Option<[Vec2; 2]>,
+    pub(crate) hole: Option<[Vec2; 2]>,
     /// Middles and lengths along x and y of the lamps under the ceiling.
-    pub(super) lamps: Vec<[f32; 4]>,
-    pub(super) paint: Paint,
+    pub(crate) lamps: Vec<[f32; 4]>,
+    pub(crate) paint: Paint,
     /// One wall may be painted otherwise.
-    pub(super) accent: Option<(Wall, Paint)>,
-    pub(super) floor: Floor,
-    pub(super) ceiling: Ceiling,
+    pub(crate) accent: Option<(Wall, Paint)>,
+    pub(crate) floor: Floor,
+    pub(crate) ceiling: Ceiling,
 }
 
 /// Below it walls are upright and openings end; above it a slanted ceiling squeezes them.
@@ -103,7 +103,7 @@ const CELL_M: f32 = 0.25;
 
 impl Shell {
     /// The light of its windows, doorways and lamps.
-    pub(super) fn light(&self) -> Light {
+    pub(crate) fn light(&self) -> Light {
         let windows = self.openings.iter().map(|o| {
             let ([a, b], [z0, z1]) = (o.span, o.heights);
             let brightness = if o.filling == Filling::Window { 1.5 } else { 0.25 };
@@ -123,7 +123,7 @@ impl Shell {
     }
 
     /// The height of the ceiling at y: where a beam goes.
-    pub(super) fn ceiling_at(&self, y: f32) -> f32 {
+    pub(crate) fn ceiling_at(&self, y: f32) -> f32 {
         self.height(y)
     }
 
@@ -138,12 +138,12 @@ impl Shell {
 
     /// Runs `build` in a frame on `wall`: x to the right for who looks at it, y into the wall, the origin at its foot,
     /// at `along` (x or y of the building).
-    pub(super) fn at_wall(&self, b: &mut Builder, wall: Wall, along: f32, build: impl FnOnce(&mut Builder)) {
+    pub(crate) fn at_wall(&self, b: &mut Builder, wall: Wall, along: f32, build: impl FnOnce(&mut Builder)) {
         b.place(self.on_wall(wall, along).extend(0.0), wall.yaw_deg(), build);
     }
 
     /// Fills the openings and hangs the lamps. Before the furniture or after it.
-    pub(super) fn fill(&self, b: &mut Builder) {
+    pub(crate) fn fill(&self, b: &mut Builder) {
         for o in &self.openings {
             let [a, c] = o.span;
             let left = if matches!(o.wall, Wall::South | Wall::East) { c } else { a };
@@ -182,7 +182,7 @@ impl Shell {
     }
 
     /// Floor, walls and ceiling, lit and shaded by all that the builder holds of this room.
-    pub(super) fn build(&self, b: &mut Builder, name: &str) {
+    pub(crate) fn build(&self, b: &mut Builder, name: &str) {
         let top = self.heights[0].max(self.heights[1]);
         let mut cuts: [Vec<f32>; 3] =
             [vec![self.low.x, self.high.x], vec![self.low.y, self.high.y], vec![0.0, top]];

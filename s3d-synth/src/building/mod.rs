@@ -1,0 +1,3 @@
+//! Buildings.
+
+pub(crate) mod demo;
