@@ -1,110 +1,102 @@
-//! The built-in scene as files, as a scanner and an annotator would have left them.
+//! The points that a scanner would have measured on a scene, instance by instance.
 
-use crate::error::ScanError;
-use crate::scene::{DemoScene, demo_scene};
+use crate::{AnnotatedScene, RangeError};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use s3d_geom::{Density, PointCloud, SurfaceSampler, glam::DQuat};
-use s3d_io::{S3disAreaWriter, create_dir, write_bytes, write_rgb_obj};
-use std::collections::BTreeSet;
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use s3d_geom::{Density, PointCloud, SurfaceSampler};
 
-const AREA: u32 = 1;
-
-const SCENE_FILE: &str = "scene.toml";
-
-/// Annotated points a square metre: about what S3DIS has.
-const POINTS_PER_M2: f64 = 3000.0;
-
-/// How far points lie off the surface, at most, in metres.
-const NOISE_M: f32 = 0.003;
-
-const SEED: u64 = 20170203;
-
-/// How the scene file begins: what tells the scene from a user's own.
-const MARK: &str = "# The built-in scene of s3d";
-
-/// Whether `dir` holds the built-in scene, and may be written again.
-pub fn is_demo_scan(dir: &Path) -> bool {
-    std::fs::read_to_string(dir.join(SCENE_FILE)).is_ok_and(|text| text.starts_with(MARK))
+/// How a scene is scanned. Its `Default` is that of the demo: 3,000 points a square metre, about what S3DIS has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScanOptions {
+    /// Points a square metre of every instance: at most 1e6.
+    pub points_per_m2: f64,
+    /// How far points lie off the surface, at most, in metres: up to 0.1.
+    pub noise_m: f32,
+    /// From which all randomness comes.
+    pub seed: u64,
+    /// The number of the area in files.
+    pub area: u32,
 }
 
-/// Writes the scene into `dir`: textured mesh, annotated points, scan locations, and the scene file that ties them
-/// together, whose path is returned.
-///
-/// `go_on` is asked before each room; where it says no, what was written so far stays.
-///
-/// # Errors
-/// [`ScanError`].
-pub fn write_scan(dir: &Path, mut go_on: impl FnMut() -> bool) -> Result<PathBuf, ScanError> {
-    let scene = demo_scene();
-    create_dir(dir)?;
-    write_rgb_obj(dir, &scene.mesh, &[])?;
-    write_annotations(&dir.join(format!("Area_{AREA}")), &scene, &mut go_on)?;
-    write_bytes(&dir.join("cameras.csv"), camera_table(&scene).as_bytes())?;
-    let toml = format!(
-        "{MARK}: three rooms and a hallway.\narea = {AREA}\n\n\
-         [mesh]\npath = \"rgb.obj\"\nup   = \"y\"\n\n\
-         [annotations]\npath = \"Area_{AREA}\"\n\n\
-         [cameras]\npath = \"cameras.csv\"\n"
-    );
-    let path = dir.join(SCENE_FILE);
-    write_bytes(&path, toml.as_bytes())?;
-    Ok(path)
+impl Default for ScanOptions {
+    fn default() -> Self {
+        Self { points_per_m2: 3000.0, noise_m: 0.003, seed: 20170203, area: 1 }
+    }
 }
 
-/// The annotated points, with the noise of a scanner.
-fn write_annotations(
-    dir: &Path,
-    scene: &DemoScene,
-    go_on: &mut dyn FnMut() -> bool,
-) -> Result<(), ScanError> {
-    let tree = S3disAreaWriter::create(dir)?;
-    let rooms: BTreeSet<&str> = scene.instances.iter().map(|i| i.room).collect();
-    let mut noise = ChaCha8Rng::seed_from_u64(SEED);
-    let mut cloud = PointCloud::default();
-    for room in &rooms {
-        if !go_on() {
-            return Err(ScanError::Cancelled);
-        }
-        let mut files = tree.room(room)?;
-        for (index, instance) in scene.instances.iter().enumerate().filter(|(_, i)| i.room == *room) {
-            let faces: Vec<u32> = (0u32..)
-                .zip(&scene.face_instances)
-                .filter_map(|(face, of)| (*of == Some(index as u32)).then_some(face))
-                .collect();
-            let sampler = SurfaceSampler::over_faces(
-                &scene.mesh,
-                faces,
-                Density::PerM2(POINTS_PER_M2),
-                SEED + index as u64,
-            );
-            sampler.sample(0..sampler.len(), &mut cloud);
-            for (position, face) in cloud.positions.iter_mut().zip(&cloud.faces) {
-                *position += scene.mesh.normal(*face) * noise.random_range(-NOISE_M..NOISE_M);
+/// The points of a scene's instances: yields the index of an instance and its points, in the order of the rooms' names
+/// and in a room in that of the instances. See [`AnnotatedScene::scan`].
+#[derive(Clone, Debug)]
+pub struct Scan<'a> {
+    scene: &'a AnnotatedScene,
+    options: ScanOptions,
+    faces_of: Vec<Vec<u32>>,
+    /// Instances that are still to come, the next one last.
+    rest: Vec<usize>,
+    noise: ChaCha8Rng,
+}
+
+impl AnnotatedScene {
+    /// Scans every instance: uniformly drawn points with colours, each with the face that it lies on, off its surface by a
+    /// uniform noise. An instance gets one point at least. World metres.
+    ///
+    /// ```
+    /// use s3d_synth::{Building, ScanOptions};
+    ///
+    /// let scene = Building { texture_scale: 0.1, ..Building::demo() }.build()?;
+    /// let options = ScanOptions { points_per_m2: 10.0, ..ScanOptions::default() };
+    /// for (instance, points) in scene.scan(&options)? {
+    ///     assert!(points.faces.iter().all(|&f| scene.instance_of_face[f as usize] as usize == instance));
+    /// }
+    /// assert_eq!(scene.scan(&options)?.count(), scene.instances.len());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`RangeError`] for a number that is out of its range.
+    pub fn scan(&self, options: &ScanOptions) -> Result<Scan<'_>, RangeError> {
+        RangeError::check(options.points_per_m2, [0.0, 1e6], || "points a square metre".to_owned())?;
+        RangeError::check(options.noise_m, [0.0, 0.1], || "the noise of points".to_owned())?;
+        let mut faces_of = vec![Vec::new(); self.instances.len()];
+        for (face, &instance) in (0..).zip(&self.instance_of_face) {
+            if let Some(faces) = faces_of.get_mut(instance as usize) {
+                faces.push(face);
             }
-            let mut file = files.instance(instance.class, instance.number)?;
-            file.append(&cloud.positions, &cloud.colors)?;
-            file.finish()?;
         }
-        files.finish()?;
+        let names: Vec<String> = self.instances.iter().map(|i| i.room.to_string()).collect();
+        let mut rest: Vec<usize> = (0..self.instances.len()).collect();
+        rest.sort_by(|&a, &b| names[a].cmp(&names[b]).then(a.cmp(&b)).reverse());
+        let noise = ChaCha8Rng::seed_from_u64(options.seed);
+        Ok(Scan { scene: self, options: options.clone(), faces_of, rest, noise })
     }
-    let angles: Vec<(String, u32)> = rooms.iter().map(|r| ((*r).to_owned(), 0)).collect();
-    tree.alignment(&angles)?;
-    Ok(())
 }
 
-/// `uuid,x,y,z,qx,qy,qz,qw` a line.
-fn camera_table(scene: &DemoScene) -> String {
-    let mut text = String::new();
-    for l in &scene.locations {
-        let (p, q) = (l.position, DQuat::from_rotation_z(l.yaw_rad));
-        let _ = writeln!(
-            text,
-            "{},{:.6},{:.6},{:.6},{:.9},{:.9},{:.9},{:.9}",
-            l.uuid, p.x, p.y, p.z, q.x, q.y, q.z, q.w
-        );
+impl Iterator for Scan<'_> {
+    type Item = (usize, PointCloud);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let instance = self.rest.pop()?;
+        let (mesh, faces) = (&self.scene.mesh, std::mem::take(&mut self.faces_of[instance]));
+        let seed = self.options.seed.wrapping_add(instance as u64);
+        let sampler = |density| SurfaceSampler::over_faces(mesh, faces.clone(), density, seed);
+        let mut points = sampler(Density::PerM2(self.options.points_per_m2));
+        if points.is_empty() {
+            points = sampler(Density::Total(1));
+        }
+        let mut cloud = PointCloud::default();
+        points.sample(0..points.len(), &mut cloud);
+        let noise_m = self.options.noise_m;
+        if noise_m > 0.0 {
+            for (position, face) in cloud.positions.iter_mut().zip(&cloud.faces) {
+                *position += mesh.normal(*face) * self.noise.random_range(-noise_m..noise_m);
+            }
+        }
+        Some((instance, cloud))
     }
-    text
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (self.rest.len(), Some(self.rest.len()))
+    }
 }
+
+impl ExactSizeIterator for Scan<'_> {}

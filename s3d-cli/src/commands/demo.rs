@@ -7,7 +7,7 @@ use crate::pipeline::{Target, export, output};
 use crate::stop;
 use s3d_io::{Domain, Error, Layout};
 use s3d_sample::Pool;
-use s3d_synth::{ScanError, is_demo_scan};
+use s3d_synth::{Building, ScanError, ScanOptions, is_demo_scan};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -66,7 +66,8 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
 }
 
 fn write_scan(folder: &Path) -> Outcome<PathBuf> {
-    match s3d_synth::write_scan(folder, || !stop::requested()) {
+    let scene = Building::demo().build().map_err(|e| Failure::Input(e.to_string()))?;
+    match scene.write_scan(folder, &ScanOptions::default(), || !stop::requested()) {
         Ok(scene) => Ok(scene),
         Err(ScanError::File(e)) => Err(e.into()),
         Err(e) => {

@@ -1,3 +1,227 @@
-//! Buildings.
+//! Buildings as plain data: rooms with their openings and finishes, what stands in them, and where a scanner stood.
+//!
+//! A [`Building`] says what is where and nothing of triangles; [`Building::build`] makes an
+//! [`AnnotatedScene`](crate::AnnotatedScene) of it. Its coordinates are the building's own: metres, x to the east, y to
+//! the north, z up. The walls of rooms are parallel to the axes.
 
-pub(crate) mod demo;
+mod check;
+mod demo;
+mod item;
+
+pub use item::{Beam, Item, Thing};
+
+use crate::look::{CeilingFinish, FloorFinish, Paint};
+use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};
+use s3d_label::Room;
+
+/// A building: what [`Building::build`] makes a scene of. Its `Default` is [`Building::demo`].
+///
+/// ```
+/// use s3d_geom::glam::vec2;
+/// use s3d_synth::Building;
+///
+/// // The building of the demo without its furniture, its office a metre wider to the west.
+/// let mut building = Building { texture_scale: 0.1, ..Building::demo() };
+/// building.rooms.iter_mut().for_each(|room| room.items.clear());
+/// building.rooms[0].low = vec2(-1.0, 0.0);
+/// let scene = building.build()?;
+/// assert_eq!(scene.mesh.aabb().min.x, building.origin.x - 1.0);
+/// assert!(!scene.instances.iter().any(|i| i.class == s3d_label::Class::Chair));
+/// # Ok::<(), s3d_synth::BuildingError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Building {
+    /// What it is called: a line of text, the first of the scene file.
+    pub title: String,
+    /// Where the origin of its coordinates lies in the world, metres.
+    pub origin: Vec3,
+    /// Its rooms; no two of them meet. The faces of the scene follow in their order.
+    pub rooms: Vec<RoomPlan>,
+    /// Where the scanner stood, each place in a room.
+    pub locations: Vec<ScanLocation>,
+    /// How fine the images of floors, walls and ceilings are: at 1 a floor has 100 texels a metre.
+    pub texture_scale: f32,
+}
+
+/// A room: a box with openings in its walls, finishes, and what is in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoomPlan {
+    /// Its type and number; no other room of the building has both.
+    pub room: Room,
+    /// Its smallest corner in the plan.
+    pub low: Vec2,
+    /// Its largest corner in the plan.
+    pub high: Vec2,
+    /// Height of the floor in the building. Every other height is counted from there.
+    pub floor_m: f32,
+    /// Height of the ceiling at the smallest and at the largest y. Where they differ the ceiling is slanted; openings then
+    /// end at 2.1 m at the highest.
+    pub heights_m: [f32; 2],
+    /// What is cut out of the walls.
+    pub openings: Vec<Opening>,
+    /// A rectangle of the ceiling that is not there, as if it had not been captured: its smallest and largest corner.
+    pub ceiling_hole: Option<[Vec2; 2]>,
+    /// Lamps under the ceiling: x and y of the middle, and the lengths along x and y.
+    pub lamps: Vec<[f32; 4]>,
+    /// What covers the walls.
+    pub paint: Paint,
+    /// One wall may be painted otherwise.
+    pub accent: Option<(Wall, Paint)>,
+    /// What covers the floor.
+    pub floor: FloorFinish,
+    /// What covers the ceiling.
+    pub ceiling: CeilingFinish,
+    /// Furniture, structure and all else. Instances of a class are numbered in this order, after those of openings and
+    /// lamps.
+    pub items: Vec<Item>,
+}
+
+/// A wall of a room, by where it stands; in the order in which they pass when one turns right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wall {
+    /// At the smallest y.
+    South,
+    /// At the smallest x.
+    West,
+    /// At the largest y.
+    North,
+    /// At the largest x.
+    East,
+}
+
+/// A rectangle cut out of a wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Opening {
+    /// In which wall.
+    pub wall: Wall,
+    /// From where to where along it: x or y of the building.
+    pub span: [f32; 2],
+    /// From which height to which.
+    pub heights: [f32; 2],
+    /// What it holds.
+    pub filling: Filling,
+}
+
+/// What fills an opening.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Filling {
+    /// A window with an opaque pane, 16 cm behind the wall.
+    Window,
+    /// A doorway with a door that stands open into the room.
+    Door {
+        /// How deep the doorway is: the thickness of the wall, metres.
+        thickness_m: f32,
+        /// Whether the door hangs on the left for who looks at the wall, or else on the right.
+        hinge_left: bool,
+        /// How far it stands open, degrees.
+        open_deg: f32,
+    },
+    /// A door that is shut.
+    ShutDoor,
+    /// Nothing: the doorway belongs to the room on the other side.
+    Nothing,
+}
+
+/// A place from which a scene was captured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScanLocation {
+    /// 32 lower-case hexadecimal digits.
+    pub uuid: String,
+    /// The scanner: metres, in the building's coordinates in a [`Building`] and in the world's in a scene.
+    pub position: DVec3,
+    /// Heading of the level camera in [0, 2π) or any other turn: 0 along +Y, growing to the left.
+    pub yaw_rad: f64,
+}
+
+impl Default for Building {
+    fn default() -> Self {
+        Self::demo()
+    }
+}
+
+impl Wall {
+    /// All four, each after the one to its left for who stands in the room.
+    pub const ALL: [Self; 4] = [Self::South, Self::West, Self::North, Self::East];
+
+    /// The direction in the plan that is to the right for who looks at the wall.
+    pub fn right(self) -> Vec2 {
+        match self {
+            Self::South => Vec2::NEG_X,
+            Self::West => Vec2::Y,
+            Self::North => Vec2::X,
+            Self::East => Vec2::NEG_Y,
+        }
+    }
+
+    /// The unit vector into the room.
+    pub fn normal(self) -> Vec3 {
+        -self.right().perp().extend(0.0)
+    }
+
+    /// By how much a frame is turned so that it looks at the wall: degrees, counter-clockwise seen from above.
+    pub fn yaw_deg(self) -> f32 {
+        match self {
+            Self::South => 180.0,
+            Self::West => 90.0,
+            Self::North => 0.0,
+            Self::East => 270.0,
+        }
+    }
+
+    /// Whether it runs along x, or else along y.
+    pub fn along_x(self) -> bool {
+        matches!(self, Self::South | Self::North)
+    }
+}
+
+impl RoomPlan {
+    /// The height of the ceiling at `y`, from the room's floor, metres.
+    pub fn ceiling_at(&self, y: f32) -> f32 {
+        let t = (y - self.low.y) / (self.high.y - self.low.y);
+        self.heights_m[0] + (self.heights_m[1] - self.heights_m[0]) * t
+    }
+
+    /// The greatest height of the ceiling.
+    pub(crate) fn top(&self) -> f32 {
+        self.heights_m[0].max(self.heights_m[1])
+    }
+
+    /// The point of the plan on `wall` at `along`, its x or y.
+    pub(crate) fn on_wall(&self, wall: Wall, along: f32) -> Vec2 {
+        match wall {
+            Wall::South => vec2(along, self.low.y),
+            Wall::West => vec2(self.low.x, along),
+            Wall::North => vec2(along, self.high.y),
+            Wall::East => vec2(self.high.x, along),
+        }
+    }
+
+    /// How long `wall` is, metres.
+    pub(crate) fn length(&self, wall: Wall) -> f32 {
+        let size = self.high - self.low;
+        if wall.along_x() { size.x } else { size.y }
+    }
+
+    /// Whether `p`, in building coordinates, is in the room, below its ceiling.
+    pub fn contains(&self, p: DVec3) -> bool {
+        let plan = p.truncate().as_vec2();
+        let height = p.z as f32 - self.floor_m;
+        plan.cmpge(self.low).all()
+            && plan.cmple(self.high).all()
+            && (0.0..=self.ceiling_at(plan.y)).contains(&height)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_frame_of_a_wall_looks_at_it() {
+        for wall in Wall::ALL {
+            let turn = Vec2::from_angle(wall.yaw_deg().to_radians());
+            assert!(turn.distance(wall.right()) < 1e-6);
+            assert!((turn.perp().extend(0.0) + wall.normal()).length() < 1e-6);
+        }
+    }
+}

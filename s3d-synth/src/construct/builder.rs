@@ -1,12 +1,13 @@
 //! Puts surfaces together: places them, cuts them into cells, notes whose they are and bakes a light into their looks.
 
 use super::light::Light;
-use crate::look::materials::Look;
-use crate::look::textures::{Pattern, scaled};
-use crate::scene::DemoInstance;
+use crate::BuildingError;
+use crate::look::{Look, Pattern, scaled};
+use crate::scene::Instance;
 use glam::{Vec2, Vec3};
-use s3d_geom::{Aabb, Material, MeshParts, Texture, TriMesh, Wrap, glam, grid};
-use std::collections::BTreeMap;
+use s3d_geom::{Aabb, Material, MeshParts, Raster, Texture, TriMesh, Wrap, glam, grid};
+use s3d_label::{Class, Room, RoomType};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A side of a body in its own frame: x to the right, y away from who looks at its front, z up.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -47,32 +48,40 @@ impl Frame {
 /// The scene under construction. Coordinates are the building's own, metres; [`Builder::finish`] moves it.
 pub(crate) struct Builder {
     parts: MeshParts,
-    face_instances: Vec<Option<u32>>,
-    instances: Vec<DemoInstance>,
-    room: &'static str,
+    instance_of_face: Vec<u32>,
+    instances: Vec<Instance>,
+    room: Room,
+    /// Height of the room's floor. Frames, light and what is added are counted from there.
+    floor_m: f32,
     light: Light,
     frame: Frame,
     materials: BTreeMap<(Look, u32), u32>,
-    images: BTreeMap<Pattern, s3d_geom::Raster<[u8; 3]>>,
+    images: BTreeMap<Pattern, Raster<[u8; 3]>>,
+    /// Of materials and textures.
+    names: BTreeSet<String>,
+    texture_scale: f32,
 }
 
 impl Builder {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(texture_scale: f32) -> Self {
         Self {
             parts: MeshParts::default(),
-            face_instances: Vec::new(),
+            instance_of_face: Vec::new(),
             instances: Vec::new(),
-            room: "",
+            room: Room { room_type: RoomType::Office, number: 0 },
+            floor_m: 0.0,
             light: Light::default(),
             frame: Frame { origin: Vec3::ZERO, x_axis: Vec2::X },
             materials: BTreeMap::new(),
             images: BTreeMap::new(),
+            names: BTreeSet::new(),
+            texture_scale,
         }
     }
 
-    /// From here on everything belongs to `room`, lit by `light`.
-    pub(crate) fn enter(&mut self, room: &'static str, light: Light) {
-        (self.room, self.light) = (room, light);
+    /// From here on everything belongs to `room`, whose floor is at `floor_m`, lit by `light`.
+    pub(crate) fn enter(&mut self, room: Room, floor_m: f32, light: Light) {
+        (self.room, self.floor_m, self.light) = (room, floor_m, light);
     }
 
     /// The light of the room, with all that was built in it since as obstacles.
@@ -80,10 +89,15 @@ impl Builder {
         &self.light
     }
 
+    /// How fine the images of floors, walls and ceilings are.
+    pub(crate) fn texture_scale(&self) -> f32 {
+        self.texture_scale
+    }
+
     /// From here on every face belongs to a new instance of `class` in this room.
-    pub(crate) fn begin(&mut self, class: &'static str) {
+    pub(crate) fn begin(&mut self, class: Class) {
         let number = 1 + self.instances.iter().filter(|i| i.class == class && i.room == self.room).count();
-        self.instances.push(DemoInstance { class, number: number as u32, room: self.room });
+        self.instances.push(Instance { class, number: number as u32, room: self.room });
     }
 
     /// Runs `build` in a frame with its origin at `origin`, turned by `yaw_deg` counter-clockwise seen from above.
@@ -225,7 +239,12 @@ impl Builder {
     }
 
     /// Adds a texture to be used once, and returns its index.
-    pub(crate) fn texture(&mut self, name: String, image: s3d_geom::Raster<[u8; 3]>, wrap: Wrap) -> u32 {
+    pub(crate) fn texture(&mut self, name: String, image: Raster<[u8; 3]>, wrap: Wrap) -> u32 {
+        let name = self.unique(name);
+        self.push_texture(name, image, wrap)
+    }
+
+    fn push_texture(&mut self, name: String, image: Raster<[u8; 3]>, wrap: Wrap) -> u32 {
         self.parts.textures.push(Texture { name, image, wrap: [wrap; 2] });
         (self.parts.textures.len() - 1) as u32
     }
@@ -235,13 +254,13 @@ impl Builder {
         let material = match self.materials.get(&(look, level)) {
             Some(&known) => known,
             None => {
-                let name = format!("{}_{level:02}", look.name());
+                let name = self.unique(format!("{}_{level:02}", look.name()));
                 let factor = look.factor(level);
                 let texture = look.pattern().map(|pattern| {
                     let image = scaled(self.images.entry(pattern).or_insert_with(|| pattern.image()), factor);
-                    self.texture(name.clone(), image, look.wrap())
+                    self.push_texture(name.clone(), image, look.wrap())
                 });
-                let color = scaled(&s3d_geom::Raster::filled(1, 1, look.color()), factor).at(0, 0);
+                let color = scaled(&Raster::filled(1, 1, look.color()), factor).at(0, 0);
                 self.parts.materials.push(Material { name, color, texture });
                 let new = (self.parts.materials.len() - 1) as u32;
                 self.materials.insert((look, level), new);
@@ -251,22 +270,52 @@ impl Builder {
         self.push(parts, material);
     }
 
+    /// `name`, or if something else has it a name that begins so. Names are written into files: words without spaces.
+    fn unique(&mut self, name: String) -> String {
+        let name = name.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
+        let mut unique = name.clone();
+        for n in 2.. {
+            if self.names.insert(unique.clone()) {
+                break;
+            }
+            unique = format!("{name}_{n}");
+        }
+        unique
+    }
+
     fn push(&mut self, mut parts: MeshParts, material: u32) {
+        parts.positions.iter_mut().for_each(|p| p.z += self.floor_m);
         // Onto a lattice of 61 µm: what touches by design then touches in the last bit, also after `finish`.
         parts.positions.iter_mut().for_each(|p| *p = (*p * 16384.0).round() / 16384.0);
         self.parts.append(parts);
         let n = self.parts.faces.len();
-        self.parts.face_materials.resize(self.face_instances.len(), material);
+        self.parts.face_materials.resize(self.instance_of_face.len(), material);
         self.parts.face_materials.resize(n, material);
-        self.face_instances.resize(n, self.instances.len().checked_sub(1).map(|i| i as u32));
+        // Something was begun before anything is added.
+        self.instance_of_face.resize(n, self.instances.len().saturating_sub(1) as u32);
     }
 
-    /// The mesh, moved by `offset`, and whose its faces are.
-    pub(crate) fn finish(mut self, offset: Vec3) -> (TriMesh, Vec<Option<u32>>, Vec<DemoInstance>) {
+    /// The corners of what was added since there were `first` of them, in building coordinates.
+    pub(crate) fn positions_since(&self, first: usize) -> &[Vec3] {
+        self.parts.positions.get(first..).unwrap_or_default()
+    }
+
+    /// How many corners were added so far.
+    pub(crate) fn position_count(&self) -> usize {
+        self.parts.positions.len()
+    }
+
+    /// The mesh, moved by `offset`, the instance of each of its faces, and the instances.
+    pub(crate) fn finish(
+        mut self,
+        offset: Vec3,
+    ) -> Result<(TriMesh, Vec<u32>, Vec<Instance>), BuildingError> {
         self.parts.positions.iter_mut().for_each(|p| *p += offset);
-        let mesh = TriMesh::new(self.parts).expect("the demo scene is a mesh");
-        assert_eq!(mesh.report().zero_area_faces, 0, "every face of the demo scene has an area");
-        (mesh, self.face_instances, self.instances)
+        let mesh = TriMesh::new(self.parts)?;
+        match mesh.report().zero_area_faces {
+            0 => Ok((mesh, self.instance_of_face, self.instances)),
+            faces => Err(BuildingError::NoArea { faces }),
+        }
     }
 }
 

@@ -1,8 +1,8 @@
-//! From what stands where to annotated surfaces.
+//! From what stands where to annotated surfaces with the light in their looks.
 
 pub(crate) mod builder;
-pub(crate) mod furniture;
+mod furniture;
 mod light;
 mod openings;
 pub(crate) mod shell;
-pub(crate) mod things;
+mod things;

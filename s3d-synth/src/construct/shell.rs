@@ -3,107 +3,61 @@
 use super::builder::Builder;
 use super::light::{Lamp, Light};
 use super::openings::{doorway, handle, leaf, window};
-use crate::look::finishes::{Ceiling, Floor, Paint};
-use crate::look::materials::{LAMP, Look};
-use crate::look::textures::{Pattern, to_bytes};
+use super::things::{beam, construct_thing};
+use crate::BuildingError;
+use crate::building::{Beam, Filling, Item, Opening, RoomPlan, Wall};
+use crate::look::{LAMP, Look, Pattern, to_bytes};
 use s3d_geom::{
     MeshParts, NO_INDEX, Raster, Wrap,
     glam::{Vec2, Vec3, vec2, vec3},
 };
-
-/// A wall of a room, by where it stands; in the order in which they pass when one turns right.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Wall {
-    South,
-    West,
-    North,
-    East,
-}
-
-const WALLS: [Wall; 4] = [Wall::South, Wall::West, Wall::North, Wall::East];
-
-impl Wall {
-    /// To the right for who looks at it, in the plan.
-    fn right(self) -> Vec2 {
-        match self {
-            Wall::South => Vec2::NEG_X,
-            Wall::West => Vec2::Y,
-            Wall::North => Vec2::X,
-            Wall::East => Vec2::NEG_Y,
-        }
-    }
-
-    /// Into the room.
-    fn normal(self) -> Vec3 {
-        -self.right().perp().extend(0.0)
-    }
-
-    /// Turns a frame so that it looks at the wall.
-    pub(crate) fn yaw_deg(self) -> f32 {
-        match self {
-            Wall::South => 180.0,
-            Wall::West => 90.0,
-            Wall::North => 0.0,
-            Wall::East => 270.0,
-        }
-    }
-
-    fn along_x(self) -> bool {
-        matches!(self, Wall::South | Wall::North)
-    }
-}
-
-/// What fills an opening.
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Filling {
-    Window,
-    /// A doorway through a wall so thick; its leaf hangs on the left or right and stands open.
-    Door {
-        thickness: f32,
-        hinge_left: bool,
-        open_deg: f32,
-    },
-    /// A door that is shut.
-    ShutDoor,
-    /// Nothing: the room on the other side has the door.
-    Nothing,
-}
-
-/// A rectangle cut out of a wall: coordinates along x or y of the building, and heights.
-#[derive(Clone, Copy)]
-pub(crate) struct Opening {
-    pub(crate) wall: Wall,
-    pub(crate) span: [f32; 2],
-    pub(crate) heights: [f32; 2],
-    pub(crate) filling: Filling,
-}
-
-/// A room's floor plan and surfaces. Building coordinates, metres.
-pub(crate) struct Shell {
-    pub(crate) low: Vec2,
-    pub(crate) high: Vec2,
-    /// Height of the ceiling at the smallest and the largest y.
-    pub(crate) heights: [f32; 2],
-    pub(crate) openings: Vec<Opening>,
-    /// A rectangle of the ceiling that is not there.
-    pub(crate) hole: Option<[Vec2; 2]>,
-    /// Middles and lengths along x and y of the lamps under the ceiling.
-    pub(crate) lamps: Vec<[f32; 4]>,
-    pub(crate) paint: Paint,
-    /// One wall may be painted otherwise.
-    pub(crate) accent: Option<(Wall, Paint)>,
-    pub(crate) floor: Floor,
-    pub(crate) ceiling: Ceiling,
-}
+use s3d_label::Class;
 
 /// Below it walls are upright and openings end; above it a slanted ceiling squeezes them.
-const KNEE_M: f32 = 2.1;
+pub(crate) const KNEE_M: f32 = 2.1;
+/// How far things may reach into a wall: what touches it does so to within rounding.
+const SLACK_M: f32 = 1e-3;
 /// Edge of the cells, metres.
 const CELL_M: f32 = 0.25;
+/// Texels a metre of the images of floors, ceilings and walls, at a scale of 1.
+const FLOOR_PER_M: f32 = 100.0;
+const CEILING_PER_M: f32 = 60.0;
+const WALL_PER_M: f32 = 72.0;
 
-impl Shell {
+impl RoomPlan {
+    /// Builds the room: what is in it first, so that it throws its shade on the shell.
+    ///
+    /// # Errors
+    /// [`BuildingError::Outside`] for an item that leaves the room.
+    pub(crate) fn construct(&self, b: &mut Builder) -> Result<(), BuildingError> {
+        b.enter(self.room, self.floor_m, self.light());
+        self.fill(b);
+        let low = self.low.extend(self.floor_m) - SLACK_M;
+        let high = self.high.extend(self.floor_m + self.top()) + SLACK_M;
+        for (index, item) in self.items.iter().enumerate() {
+            let first = b.position_count();
+            match item {
+                Item::Standing { thing, position, yaw_deg } => {
+                    b.place(*position, *yaw_deg, |b| construct_thing(b, thing));
+                }
+                Item::OnWall { thing, wall, along } => {
+                    self.at_wall(b, *wall, *along, |b| construct_thing(b, thing));
+                }
+                Item::Beam(Beam { from, to, half_width_m, depth_m, look }) => {
+                    let [from, to] = [from, to].map(|end| end.extend(self.ceiling_at(end.y)));
+                    beam(b, from, to, *half_width_m, *depth_m, *look);
+                }
+            }
+            if !b.positions_since(first).iter().all(|p| p.cmpge(low).all() && p.cmple(high).all()) {
+                return Err(BuildingError::Outside { room: self.room, what: "item", index });
+            }
+        }
+        self.enclose(b, &self.room.to_string());
+        Ok(())
+    }
+
     /// The light of its windows, doorways and lamps.
-    pub(crate) fn light(&self) -> Light {
+    fn light(&self) -> Light {
         let windows = self.openings.iter().map(|o| {
             let ([a, b], [z0, z1]) = (o.span, o.heights);
             let brightness = if o.filling == Filling::Window { 1.5 } else { 0.25 };
@@ -111,47 +65,28 @@ impl Shell {
             Lamp { center, normal: o.wall.normal(), power: brightness * (b - a) * (z1 - z0) }
         });
         let lamps = self.lamps.iter().map(|&[x, y, length, width]| {
-            let center = vec3(x, y, self.height(y) - 0.06);
+            let center = vec3(x, y, self.ceiling_at(y) - 0.06);
             Lamp { center, normal: -Vec3::Z, power: 2.6 * length * width + 0.5 }
         });
-        Light::new(windows.chain(lamps).collect(), self.heights[0].max(self.heights[1]))
-    }
-
-    fn height(&self, y: f32) -> f32 {
-        let t = (y - self.low.y) / (self.high.y - self.low.y);
-        self.heights[0] + (self.heights[1] - self.heights[0]) * t
-    }
-
-    /// The height of the ceiling at y: where a beam goes.
-    pub(crate) fn ceiling_at(&self, y: f32) -> f32 {
-        self.height(y)
-    }
-
-    fn on_wall(&self, wall: Wall, along: f32) -> Vec2 {
-        match wall {
-            Wall::South => vec2(along, self.low.y),
-            Wall::West => vec2(self.low.x, along),
-            Wall::North => vec2(along, self.high.y),
-            Wall::East => vec2(self.high.x, along),
-        }
+        Light::new(windows.chain(lamps).collect(), self.top())
     }
 
     /// Runs `build` in a frame on `wall`: x to the right for who looks at it, y into the wall, the origin at its foot,
     /// at `along` (x or y of the building).
-    pub(crate) fn at_wall(&self, b: &mut Builder, wall: Wall, along: f32, build: impl FnOnce(&mut Builder)) {
+    fn at_wall(&self, b: &mut Builder, wall: Wall, along: f32, build: impl FnOnce(&mut Builder)) {
         b.place(self.on_wall(wall, along).extend(0.0), wall.yaw_deg(), build);
     }
 
     /// Fills the openings and hangs the lamps. Before the furniture or after it.
-    pub(crate) fn fill(&self, b: &mut Builder) {
+    fn fill(&self, b: &mut Builder) {
         for o in &self.openings {
             let [a, c] = o.span;
             let left = if matches!(o.wall, Wall::South | Wall::East) { c } else { a };
             let width = c - a;
             self.at_wall(b, o.wall, left, |b| match o.filling {
                 Filling::Window => window(b, width, o.heights),
-                Filling::Door { thickness, hinge_left, open_deg } => {
-                    doorway(b, width, o.heights[1], thickness);
+                Filling::Door { thickness_m, hinge_left, open_deg } => {
+                    doorway(b, width, o.heights[1], thickness_m);
                     // The leaf opens into the room; its thickness lies on the side away from the opening.
                     let (x, yaw, y) =
                         if hinge_left { (0.0, -open_deg, 0.0) } else { (width, 180.0 + open_deg, 0.04) };
@@ -174,47 +109,52 @@ impl Shell {
             });
         }
         for &[x, y, length, width] in &self.lamps {
-            b.begin("clutter");
-            let z = self.height(y) - 0.02;
+            b.begin(Class::Clutter);
+            let z = self.ceiling_at(y) - 0.02;
             let (l, w) = (0.5 * length, 0.5 * width);
             b.cuboid([x - l, y - w, z - 0.05], [x + l, y + w, z], LAMP, &[]);
         }
     }
 
     /// Floor, walls and ceiling, lit and shaded by all that the builder holds of this room.
-    pub(crate) fn build(&self, b: &mut Builder, name: &str) {
-        let top = self.heights[0].max(self.heights[1]);
+    fn enclose(&self, b: &mut Builder, name: &str) {
+        let (top, scale) = (self.top(), b.texture_scale());
         let mut cuts: [Vec<f32>; 3] =
             [vec![self.low.x, self.high.x], vec![self.low.y, self.high.y], vec![0.0, top]];
         for o in &self.openings {
             cuts[usize::from(!o.wall.along_x())].extend(o.span);
             cuts[2].extend(o.heights);
         }
-        if self.heights[0] != self.heights[1] {
+        if self.heights_m[0] != self.heights_m[1] {
             cuts[2].push(KNEE_M);
         }
-        for corner in self.hole.iter().flatten() {
+        for corner in self.ceiling_hole.iter().flatten() {
             cuts[0].push(corner.x);
             cuts[1].push(corner.y);
         }
         let [xs, ys, zs] = cuts.map(subdivided);
 
         let inside = |p: Vec2| (p - self.low) / (self.high - self.low);
-        b.begin("floor");
-        let floor =
-            self.bake_level(b.light(), |p| p.extend(0.0), Vec3::Z, 100.0, |p| self.floor.at(p.x, p.y));
+        b.begin(Class::Floor);
+        let floor = self.bake_level(
+            b.light(),
+            |p| p.extend(0.0),
+            Vec3::Z,
+            FLOOR_PER_M * scale,
+            |p| self.floor.at(p.x, p.y),
+        );
         let floor = b.texture(format!("{name}_floor"), floor, Wrap::Clamp);
         b.baked(lattice(&xs, &ys, |x, y| (vec3(x, y, 0.0), inside(vec2(x, y))), |_| true), floor);
 
-        b.begin("ceiling");
-        let slope = (self.heights[1] - self.heights[0]) / (self.high.y - self.low.y);
+        b.begin(Class::Ceiling);
+        let slope = (self.heights_m[1] - self.heights_m[0]) / (self.high.y - self.low.y);
         let normal = vec3(0.0, slope, -1.0).normalize();
-        let height = |p: Vec2| p.extend(self.height(p.y));
-        let ceiling = self.bake_level(b.light(), height, normal, 60.0, |p| {
+        let height = |p: Vec2| p.extend(self.ceiling_at(p.y));
+        let ceiling = self.bake_level(b.light(), height, normal, CEILING_PER_M * scale, |p| {
             self.ceiling.at(p.x - self.low.x, p.y - self.low.y)
         });
         let ceiling = b.texture(format!("{name}_ceiling"), ceiling, Wrap::Clamp);
-        let there = |p: Vec2| !self.hole.is_some_and(|[a, c]| p.cmpgt(a).all() && p.cmplt(c).all());
+        let there = |p: Vec2| !self.ceiling_hole.is_some_and(|[a, c]| p.cmpgt(a).all() && p.cmplt(c).all());
         // Rows from large to small y, so that the front is below.
         let rows: Vec<f32> = ys.iter().rev().copied().collect();
         let place = |x, y| (vec3(x, y, self.squeezed(y, top)), inside(vec2(x, y)));
@@ -224,24 +164,22 @@ impl Shell {
     }
 
     fn build_walls(&self, b: &mut Builder, name: &str, [xs, ys, zs]: [&[f32]; 3]) {
-        const PER_M: f32 = 72.0;
-        let top = self.heights[0].max(self.heights[1]);
-        let rows = (top * PER_M) as u32;
-        let length =
-            |wall: Wall| if wall.along_x() { self.high.x - self.low.x } else { self.high.y - self.low.y };
-        let columns = WALLS.map(|wall| (length(wall) * PER_M) as u32);
+        let top = self.top();
+        let texels = |length_m: f32| texels(length_m, WALL_PER_M * b.texture_scale());
+        let rows = texels(top);
+        let columns = Wall::ALL.map(|wall| texels(self.length(wall)));
         let all: u32 = columns.iter().sum();
         let mut image = Raster::filled(all, rows, [0; 3]);
         let mut first = 0;
         let mut offsets = [0; 4];
-        for (k, wall) in WALLS.into_iter().enumerate() {
+        for (k, wall) in Wall::ALL.into_iter().enumerate() {
             offsets[k] = first;
             let start = self
                 .on_wall(wall, if matches!(wall, Wall::South | Wall::East) { f32::MAX } else { f32::MIN });
             let start = start.clamp(self.low, self.high);
             let paint = self.accent.filter(|(w, _)| *w == wall).map_or(self.paint, |(_, paint)| paint);
             let band = bake(b.light(), [columns[k], rows], |u, v| {
-                let (along, up) = (u * length(wall), (1.0 - v) * top);
+                let (along, up) = (u * self.length(wall), (1.0 - v) * top);
                 let p = (start + wall.right() * along).extend(up);
                 (p, wall.normal(), paint.at(along, up))
             });
@@ -252,7 +190,7 @@ impl Shell {
             first += columns[k];
         }
         let texture = b.texture(format!("{name}_walls"), image, Wrap::Clamp);
-        for (k, wall) in WALLS.into_iter().enumerate() {
+        for (k, wall) in Wall::ALL.into_iter().enumerate() {
             let mut along = if wall.along_x() { xs.to_vec() } else { ys.to_vec() };
             if matches!(wall, Wall::South | Wall::East) {
                 along.reverse();
@@ -261,25 +199,25 @@ impl Shell {
             let place = |s: f32, z: f32| {
                 let foot = self.on_wall(wall, s);
                 let z = self.squeezed(foot.y, z);
-                let u = offsets[k] as f32 + (s - start).abs() / length(wall) * columns[k] as f32;
+                let u = offsets[k] as f32 + (s - start).abs() / self.length(wall) * columns[k] as f32;
                 (foot.extend(z), vec2(u / all as f32, z / top))
             };
             let open = |o: &Opening, p: Vec2| {
                 let (s, z) = (o.span, o.heights);
                 o.wall == wall && p.x > s[0] && p.x < s[1] && p.y > z[0] && p.y < z[1]
             };
-            b.begin("wall");
+            b.begin(Class::Wall);
             b.baked(lattice(&along, zs, place, |p| !self.openings.iter().any(|o| open(o, p))), texture);
         }
     }
 
     /// Where the height `z` of the unslanted room comes to lie at `y`.
     fn squeezed(&self, y: f32, z: f32) -> f32 {
-        let top = self.heights[0].max(self.heights[1]);
-        if z <= KNEE_M || self.heights[0] == self.heights[1] {
+        let top = self.top();
+        if z <= KNEE_M || self.heights_m[0] == self.heights_m[1] {
             z
         } else {
-            KNEE_M + (z - KNEE_M) * (self.height(y) - KNEE_M) / (top - KNEE_M)
+            KNEE_M + (z - KNEE_M) * (self.ceiling_at(y) - KNEE_M) / (top - KNEE_M)
         }
     }
 
@@ -292,11 +230,16 @@ impl Shell {
         color: impl Fn(Vec2) -> [f32; 3],
     ) -> Raster<[u8; 3]> {
         let size = self.high - self.low;
-        bake(light, [(size.x * per_m) as u32, (size.y * per_m) as u32], |u, v| {
+        bake(light, [texels(size.x, per_m), texels(size.y, per_m)], |u, v| {
             let p = self.low + size * vec2(u, 1.0 - v);
             (place(p), normal, color(p))
         })
     }
+}
+
+/// How many texels so many metres get, at least one.
+fn texels(length_m: f32, per_m: f32) -> u32 {
+    ((length_m * per_m) as u32).max(1)
 }
 
 /// An image of a surface: `surface` gives place, normal and unlit colour for (u, v) in 0..1, v downwards.
@@ -381,14 +324,5 @@ mod tests {
         let all = subdivided(vec![4.5, 0.0, 1.3, 0.0, 1.5]);
         assert!([0.0, 1.3, 1.5, 4.5].iter().all(|c| all.contains(c)));
         assert!(all.windows(2).all(|p| p[1] > p[0] && p[1] - p[0] <= CELL_M + 1e-6));
-    }
-
-    #[test]
-    fn the_frame_of_a_wall_looks_at_it() {
-        for wall in WALLS {
-            let turn = Vec2::from_angle(wall.yaw_deg().to_radians());
-            assert!(turn.distance(wall.right()) < 1e-6);
-            assert!((turn.perp().extend(0.0) + wall.normal()).length() < 1e-6);
-        }
     }
 }

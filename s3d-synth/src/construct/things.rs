@@ -2,22 +2,55 @@
 //! origin on the wall, at its foot.
 
 use super::builder::{Builder, Side};
-use crate::look::materials::*;
-use crate::look::noise::hash;
-use crate::look::textures::Pattern;
+use super::furniture::*;
+use crate::building::Thing;
+use crate::look::*;
 use s3d_geom::glam::{Vec2, Vec3, vec3};
+use s3d_label::Class;
 
 use Side::{Back, Bottom, Front, Left, Right, Top};
 
+/// Builds a thing in the frame that holds.
+pub(super) fn construct_thing(b: &mut Builder, thing: &Thing) {
+    match *thing {
+        Thing::Table { width_m, depth_m, height_m, top } => table(b, width_m, depth_m, height_m, top),
+        Thing::Desk { width_m, depth_m } => desk(b, width_m, depth_m),
+        Thing::RoundTable { radius_m, height_m, top } => round_table(b, radius_m, height_m, top),
+        Thing::OfficeChair(fabric) => office_chair(b, fabric),
+        Thing::Chair(fabric) => chair(b, fabric),
+        Thing::Stool(seat) => stool(b, seat),
+        Thing::Sofa { seats, fabric, cushion } => sofa(b, seats, fabric, cushion),
+        Thing::Bookcase { width_m, shelves, wood, seed } => bookcase(b, width_m, shelves, wood, seed),
+        Thing::Board { width_m, heights_m, picture, frame, tray_m } => {
+            hanging(b, Class::Board, width_m, heights_m, picture, frame);
+            if let Some(tray_m) = tray_m {
+                pen_tray(b, tray_m, heights_m[0]);
+            }
+        }
+        Thing::Picture { width_m, heights_m, picture, frame } => {
+            hanging(b, Class::Clutter, width_m, heights_m, picture, frame);
+        }
+        Thing::WallScreen { width_m, heights_m } => wall_screen(b, width_m, heights_m),
+        Thing::Monitor(picture) => monitor(b, picture),
+        Thing::Keyboard => keyboard(b),
+        Thing::Laptop => laptop(b),
+        Thing::Mug(look) => mug(b, look),
+        Thing::Papers => papers(b),
+        Thing::DeskLamp => desk_lamp(b),
+        Thing::FloorLamp => floor_lamp(b),
+        Thing::Plant { height_m, pot } => plant(b, height_m, pot),
+        Thing::Carton { size_m } => carton(b, size_m),
+        Thing::Bin(look) => bin(b, look),
+        Thing::Radiator { width_m } => radiator(b, width_m),
+        Thing::Copier => copier(b),
+        Thing::Extinguisher => extinguisher(b),
+        Thing::Rug => rug(b),
+        Thing::Column { width_m, depth_m, height_m } => column(b, width_m, depth_m, height_m),
+    }
+}
+
 /// Something flat on a wall, 2 cm off it, in a frame: from the floor up `z`, with `picture` on it.
-pub(crate) fn hanging(
-    b: &mut Builder,
-    class: &'static str,
-    width: f32,
-    z: [f32; 2],
-    picture: Pattern,
-    frame: Look,
-) {
+fn hanging(b: &mut Builder, class: Class, width: f32, z: [f32; 2], picture: Pattern, frame: Look) {
     const EDGE: f32 = 0.03;
     b.begin(class);
     let (x, [z0, z1]) = (0.5 * width, z);
@@ -35,7 +68,7 @@ pub(crate) fn hanging(
 }
 
 /// The tray of a whiteboard whose lower edge is at `z`, with pens.
-pub(crate) fn pen_tray(b: &mut Builder, width: f32, z: f32) {
+fn pen_tray(b: &mut Builder, width: f32, z: f32) {
     b.cuboid([-0.5 * width, -0.11, z - 0.02], [0.5 * width, -0.02, z - 0.005], STEEL, &[]);
     for (k, color) in [RED, TEAL, BLACK].into_iter().enumerate() {
         let x = -0.2 + 0.17 * k as f32;
@@ -44,8 +77,8 @@ pub(crate) fn pen_tray(b: &mut Builder, width: f32, z: f32) {
 }
 
 /// A screen on a foot, on a table top.
-pub(crate) fn monitor(b: &mut Builder, picture: Pattern) {
-    b.begin("clutter");
+fn monitor(b: &mut Builder, picture: Pattern) {
+    b.begin(Class::Clutter);
     b.cuboid([-0.12, -0.02, 0.0], [0.12, 0.14, 0.012], BLACK, &[Bottom]);
     b.cuboid([-0.02, 0.05, 0.012], [0.02, 0.07, 0.2], BLACK, &[Bottom]);
     b.cuboid([-0.3, 0.015, 0.13], [0.3, 0.05, 0.49], BLACK, &[Front]);
@@ -67,22 +100,22 @@ fn screen(b: &mut Builder, half: f32, y: f32, z: [f32; 2], picture: Pattern) {
 }
 
 /// A large screen on a wall, 3 cm off it.
-pub(crate) fn wall_screen(b: &mut Builder, width: f32, z: [f32; 2]) {
-    b.begin("clutter");
+fn wall_screen(b: &mut Builder, width: f32, z: [f32; 2]) {
+    b.begin(Class::Clutter);
     b.cuboid([-0.5 * width, -0.08, z[0]], [0.5 * width, -0.03, z[1]], BLACK, &[Front]);
     screen(b, 0.5 * width, -0.08, z, Pattern::Chart);
 }
 
-pub(crate) fn keyboard(b: &mut Builder) {
-    b.begin("clutter");
+fn keyboard(b: &mut Builder) {
+    b.begin(Class::Clutter);
     b.cuboid([-0.22, -0.075, 0.0], [0.22, 0.075, 0.018], BLACK, &[Bottom, Top]);
     let corners = [[-0.22, -0.075], [0.22, -0.075], [0.22, 0.075], [-0.22, 0.075]];
     b.panel(corners.map(|[x, y]| vec3(x, y, 0.018)), Look::Fitted(Pattern::Keyboard));
 }
 
 /// An open laptop.
-pub(crate) fn laptop(b: &mut Builder) {
-    b.begin("clutter");
+fn laptop(b: &mut Builder) {
+    b.begin(Class::Clutter);
     b.cuboid([-0.17, -0.12, 0.0], [0.17, 0.12, 0.018], STEEL, &[Bottom, Top]);
     let keys = [[-0.17, -0.12], [0.17, -0.12], [0.17, 0.12], [-0.17, 0.12]];
     b.panel(keys.map(|[x, y]| vec3(x, y, 0.018)), Look::Fitted(Pattern::Keyboard));
@@ -102,16 +135,16 @@ pub(crate) fn laptop(b: &mut Builder) {
     b.panel([corners[0], corners[1], corners[5], corners[4]], Look::Fitted(Pattern::Editor));
 }
 
-pub(crate) fn mug(b: &mut Builder, look: Look) {
-    b.begin("clutter");
+fn mug(b: &mut Builder, look: Look) {
+    b.begin(Class::Clutter);
     b.stump([0.0, 0.0, 0.0], [0.036, 0.042], 0.095, 14, look, &[Top, Bottom]);
     b.disc([0.0, 0.0, 0.095], 0.042, 14, COFFEE);
     b.cuboid([0.036, -0.008, 0.02], [0.07, 0.008, 0.08], look, &[Left]);
 }
 
 /// Sheets of paper, one a little askew.
-pub(crate) fn papers(b: &mut Builder) {
-    b.begin("clutter");
+fn papers(b: &mut Builder) {
+    b.begin(Class::Clutter);
     b.cuboid([-0.105, -0.15, 0.0], [0.105, 0.15, 0.012], PAPER, &[Bottom]);
     b.place(vec3(0.02, 0.01, 0.012), 14.0, |b| {
         b.cuboid([-0.1, -0.14, 0.0], [0.1, 0.14, 0.004], PAPER, &[Bottom]);
@@ -119,8 +152,8 @@ pub(crate) fn papers(b: &mut Builder) {
 }
 
 /// A lamp for a desk: a foot, an arm and a cone.
-pub(crate) fn desk_lamp(b: &mut Builder) {
-    b.begin("clutter");
+fn desk_lamp(b: &mut Builder) {
+    b.begin(Class::Clutter);
     b.stump([0.0, 0.0, 0.0], [0.08, 0.075], 0.02, 20, RED, &[Bottom]);
     b.stump([0.0, 0.0, 0.02], [0.01; 2], 0.37, 8, STEEL, &[Top, Bottom]);
     b.cuboid([-0.01, -0.2, 0.38], [0.01, 0.02, 0.4], STEEL, &[]);
@@ -128,16 +161,16 @@ pub(crate) fn desk_lamp(b: &mut Builder) {
 }
 
 /// A lamp that stands on the floor.
-pub(crate) fn floor_lamp(b: &mut Builder) {
-    b.begin("clutter");
+fn floor_lamp(b: &mut Builder) {
+    b.begin(Class::Clutter);
     b.stump([0.0, 0.0, 0.0], [0.16, 0.15], 0.02, 24, BLACK, &[Bottom]);
     b.stump([0.0, 0.0, 0.02], [0.014; 2], 1.4, 8, BLACK, &[Bottom]);
     b.stump([0.0, 0.0, 1.36], [0.24, 0.15], 0.3, 24, SHADE, &[]);
 }
 
 /// A plant in a pot: leaves in all directions, the lower ones longer.
-pub(crate) fn plant(b: &mut Builder, height: f32, pot: Look) {
-    b.begin("clutter");
+fn plant(b: &mut Builder, height: f32, pot: Look) {
+    b.begin(Class::Clutter);
     b.stump([0.0, 0.0, 0.0], [0.13, 0.17], 0.3, 20, pot, &[Bottom]);
     b.stump([0.0, 0.0, 0.301], [0.15; 2], 0.006, 20, SOIL, &[Bottom]);
     b.stump([0.0, 0.0, 0.307], [0.016, 0.01], 0.45 * height, 8, WALNUT, &[Bottom]);
@@ -152,21 +185,21 @@ pub(crate) fn plant(b: &mut Builder, height: f32, pot: Look) {
 }
 
 /// A closed cardboard box.
-pub(crate) fn carton(b: &mut Builder, size: [f32; 3]) {
-    b.begin("clutter");
+fn carton(b: &mut Builder, size: [f32; 3]) {
+    b.begin(Class::Clutter);
     let [x, y, z] = size;
     b.cuboid([-0.5 * x, -0.5 * y, 0.0], [0.5 * x, 0.5 * y, z], CARDBOARD, &[Bottom]);
 }
 
-pub(crate) fn bin(b: &mut Builder, look: Look) {
-    b.begin("clutter");
+fn bin(b: &mut Builder, look: Look) {
+    b.begin(Class::Clutter);
     b.stump([0.0, 0.0, 0.0], [0.11, 0.14], 0.3, 20, look, &[Top, Bottom]);
     b.disc([0.0, 0.0, 0.3], 0.14, 20, SOIL);
 }
 
 /// A radiator under a window; its origin is on the wall.
-pub(crate) fn radiator(b: &mut Builder, width: f32) {
-    b.begin("clutter");
+fn radiator(b: &mut Builder, width: f32) {
+    b.begin(Class::Clutter);
     let x = 0.5 * width;
     b.cuboid([-x, -0.09, 0.14], [x, -0.03, 0.66], WHITE, &[]);
     let ribs = (width / 0.1) as u32;
@@ -177,8 +210,8 @@ pub(crate) fn radiator(b: &mut Builder, width: f32) {
 }
 
 /// A copier: a cabinet with trays, a lid and a panel.
-pub(crate) fn copier(b: &mut Builder) {
-    b.begin("clutter");
+fn copier(b: &mut Builder) {
+    b.begin(Class::Clutter);
     let grey = Look::Plain("copier_grey", [214, 216, 216]);
     b.cuboid([-0.32, -0.3, 0.04], [0.32, 0.3, 0.92], grey, &[]);
     for tray in 0..3 {
@@ -193,8 +226,8 @@ pub(crate) fn copier(b: &mut Builder) {
 }
 
 /// A fire extinguisher on the wall.
-pub(crate) fn extinguisher(b: &mut Builder) {
-    b.begin("clutter");
+fn extinguisher(b: &mut Builder) {
+    b.begin(Class::Clutter);
     b.stump([0.0, -0.1, 0.62], [0.075; 2], 0.42, 18, RED, &[Top]);
     b.stump([0.0, -0.1, 1.04], [0.075, 0.03], 0.07, 18, RED, &[Bottom]);
     b.cuboid([-0.02, -0.14, 1.105], [0.02, -0.03, 1.16], BLACK, &[]);
@@ -202,8 +235,8 @@ pub(crate) fn extinguisher(b: &mut Builder) {
 }
 
 /// A rug of 2.5 m × 2.1 m.
-pub(crate) fn rug(b: &mut Builder) {
-    b.begin("clutter");
+fn rug(b: &mut Builder) {
+    b.begin(Class::Clutter);
     let edge = Look::Plain("rug_edge", [198, 184, 158]);
     b.cuboid([-1.25, -1.05, 0.0], [1.25, 1.05, 0.012], edge, &[Bottom, Top]);
     let corners = [[-1.25, -1.05], [1.25, -1.05], [1.25, 1.05], [-1.25, 1.05]];
@@ -211,8 +244,8 @@ pub(crate) fn rug(b: &mut Builder) {
 }
 
 /// A beam under a ceiling from `from` to `to`, which are on the ceiling: `half` its width to either side, `depth` down.
-pub(crate) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32, look: Look) {
-    b.begin("beam");
+pub(super) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32, look: Look) {
+    b.begin(Class::Beam);
     // The ends touch walls, and the top the ceiling.
     let side = (to - from).cross(Vec3::Z).normalize() * half;
     let down = Vec3::Z * depth;
@@ -226,7 +259,7 @@ pub(crate) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32,
 }
 
 /// A column against a wall (the origin is on it), up to the ceiling.
-pub(crate) fn column(b: &mut Builder, width: f32, depth: f32, height: f32) {
-    b.begin("column");
+fn column(b: &mut Builder, width: f32, depth: f32, height: f32) {
+    b.begin(Class::Column);
     b.cuboid([-0.5 * width, -depth, 0.0], [0.5 * width, 0.0, height], CONCRETE, &[Top, Bottom, Back]);
 }

@@ -6,13 +6,14 @@ use super::textures::Wood;
 type Color = [f32; 3];
 
 /// What covers a wall.
-#[derive(Clone, Copy)]
-pub(crate) struct Paint {
-    /// Above the skirting.
-    pub(crate) color: Color,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Paint {
+    /// Above the skirting: red, green and blue, 0 to 255.
+    pub color: [f32; 3],
     /// A band around the room, if any: from, to (metres above the floor) and its colour.
-    pub(crate) band: Option<(f32, f32, Color)>,
-    pub(crate) skirting: Color,
+    pub band: Option<(f32, f32, [f32; 3])>,
+    /// The lowest 9 cm.
+    pub skirting: [f32; 3],
 }
 
 impl Paint {
@@ -34,23 +35,24 @@ impl Paint {
 }
 
 /// What covers a floor.
-#[derive(Clone, Copy)]
-pub(crate) enum Floor {
-    /// Square carpet tiles whose pile runs along and across in turn.
-    CarpetTiles(Color),
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum FloorFinish {
+    /// Square carpet tiles of a colour (0 to 255) whose pile runs along and across in turn.
+    CarpetTiles([f32; 3]),
     /// Planks along x.
-    PlanksAlongX(&'static Wood),
+    PlanksAlongX(Wood),
     /// Planks along y.
-    PlanksAlongY(&'static Wood),
+    PlanksAlongY(Wood),
     /// Stone tiles with a coloured one now and then.
     Terrazzo,
 }
 
-impl Floor {
+impl FloorFinish {
     /// The colour at (x, y) of the building.
     pub(crate) fn at(self, x: f32, y: f32) -> Color {
         match self {
-            Floor::CarpetTiles(color) => {
+            FloorFinish::CarpetTiles(color) => {
                 let (i, j) = ((x * 2.0).floor(), (y * 2.0).floor());
                 let (fx, fy) = (x * 2.0 - i, y * 2.0 - j);
                 let along = (i as i64 + j as i64) % 2 == 0;
@@ -64,9 +66,9 @@ impl Floor {
                 let tile = 12.0 * (hash(i as u32, j as u32, 84) - 0.5) + if along { 5.0 } else { -5.0 };
                 tint(color, tile + seam + 26.0 * (ribs - 0.5) + 14.0 * (hash_at(x, y, 100.0) - 0.5))
             }
-            Floor::PlanksAlongX(wood) => planks(wood, x, y),
-            Floor::PlanksAlongY(wood) => planks(wood, y, x),
-            Floor::Terrazzo => {
+            FloorFinish::PlanksAlongX(wood) => planks(&wood, x, y),
+            FloorFinish::PlanksAlongY(wood) => planks(&wood, y, x),
+            FloorFinish::Terrazzo => {
                 let (i, j) = ((x / 0.45).floor(), (y / 0.45).floor());
                 let edge = (x / 0.45 - i).min(y / 0.45 - j);
                 let chip = value(x * 45.0, y * 45.0, 4096, 85);
@@ -100,20 +102,22 @@ fn planks(wood: &Wood, along: f32, across: f32) -> Color {
 }
 
 /// What covers a ceiling.
-#[derive(Clone, Copy)]
-pub(crate) enum Ceiling {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CeilingFinish {
     /// Mineral tiles of 0.6 m between rails, counted from the room's smallest corner.
     Tiles,
+    /// White plaster.
     Plaster,
     /// Painted boards along x.
     Boards,
 }
 
-impl Ceiling {
+impl CeilingFinish {
     /// The colour at (x, y) metres from the room's smallest corner.
     pub(crate) fn at(self, x: f32, y: f32) -> Color {
         match self {
-            Ceiling::Tiles => {
+            CeilingFinish::Tiles => {
                 let (i, j) = ((x / 0.6).floor(), (y / 0.6).floor());
                 let edge = {
                     let (fx, fy) = (x / 0.6 - i, y / 0.6 - j);
@@ -126,8 +130,8 @@ impl Ceiling {
                     _ => tint([236.0, 235.0, 228.0], pore + 8.0 * (hash(i as u32, j as u32, 92) - 0.5)),
                 }
             }
-            Ceiling::Plaster => tint([242.0, 240.0, 233.0], 8.0 * (fractal(x, y, 64, 93) - 0.5)),
-            Ceiling::Boards => {
+            CeilingFinish::Plaster => tint([242.0, 240.0, 233.0], 8.0 * (fractal(x, y, 64, 93) - 0.5)),
+            CeilingFinish::Boards => {
                 let row = (y / 0.12).floor();
                 let groove = if y / 0.12 - row < 0.1 { -36.0 } else { 0.0 };
                 let grain = value(x * 3.0, y * 130.0, 4096, 94);

@@ -8,10 +8,10 @@ use s3d_geom::{
 
 /// How a surface looks before light falls on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Look {
-    /// One colour.
+pub enum Look {
+    /// One colour, and what its material is called.
     Plain(&'static str, [u8; 3]),
-    /// One colour that shines by itself.
+    /// One colour that shines by itself, and what its material is called.
     Glow(&'static str, [u8; 3]),
     /// A pattern that repeats every so many metres.
     Tiled(Pattern),
@@ -19,27 +19,48 @@ pub(crate) enum Look {
     Fitted(Pattern),
 }
 
-pub(crate) const STEEL: Look = Look::Plain("steel", [168, 172, 178]);
-pub(crate) const BLACK: Look = Look::Plain("black_plastic", [44, 45, 50]);
-pub(crate) const WHITE: Look = Look::Plain("white_lacquer", [246, 245, 240]);
-pub(crate) const LEAF: Look = Look::Plain("leaf", [74, 122, 58]);
-pub(crate) const SOIL: Look = Look::Plain("soil", [74, 54, 42]);
-pub(crate) const COFFEE: Look = Look::Plain("coffee", [70, 44, 30]);
-pub(crate) const CLAY: Look = Look::Plain("clay", [190, 104, 70]);
-pub(crate) const RED: Look = Look::Plain("red_lacquer", [196, 40, 34]);
-pub(crate) const TEAL: Look = Look::Plain("teal_glaze", [38, 128, 134]);
-pub(crate) const YELLOW: Look = Look::Plain("yellow_glaze", [232, 178, 52]);
-pub(crate) const PAPER: Look = Look::Plain("paper", [250, 248, 240]);
-pub(crate) const CONCRETE: Look = Look::Tiled(Pattern::Concrete);
-pub(crate) const LAMP: Look = Look::Glow("lamp", [255, 252, 240]);
-pub(crate) const SHADE: Look = Look::Glow("lamp_shade", [250, 226, 178]);
-pub(crate) const OAK: Look = Look::Tiled(Pattern::Oak);
-pub(crate) const WALNUT: Look = Look::Tiled(Pattern::Walnut);
-pub(crate) const BLUE_FABRIC: Look = Look::Tiled(Pattern::BlueFabric);
-pub(crate) const GREY_FABRIC: Look = Look::Tiled(Pattern::GreyFabric);
-pub(crate) const RUST_FABRIC: Look = Look::Tiled(Pattern::RustFabric);
-pub(crate) const CARDBOARD: Look = Look::Tiled(Pattern::Cardboard);
-pub(crate) const BOOKS: Look = Look::Tiled(Pattern::Books);
+/// Bare steel.
+pub const STEEL: Look = Look::Plain("steel", [168, 172, 178]);
+/// Black plastic.
+pub const BLACK: Look = Look::Plain("black_plastic", [44, 45, 50]);
+/// White lacquer.
+pub const WHITE: Look = Look::Plain("white_lacquer", [246, 245, 240]);
+/// The leaves of plants.
+pub const LEAF: Look = Look::Plain("leaf", [74, 122, 58]);
+/// The soil in pots.
+pub const SOIL: Look = Look::Plain("soil", [74, 54, 42]);
+/// What is in mugs.
+pub const COFFEE: Look = Look::Plain("coffee", [70, 44, 30]);
+/// Fired clay.
+pub const CLAY: Look = Look::Plain("clay", [190, 104, 70]);
+/// Red lacquer.
+pub const RED: Look = Look::Plain("red_lacquer", [196, 40, 34]);
+/// A teal glaze.
+pub const TEAL: Look = Look::Plain("teal_glaze", [38, 128, 134]);
+/// A yellow glaze.
+pub const YELLOW: Look = Look::Plain("yellow_glaze", [232, 178, 52]);
+/// White paper.
+pub const PAPER: Look = Look::Plain("paper", [250, 248, 240]);
+/// Bare concrete.
+pub const CONCRETE: Look = Look::Tiled(Pattern::Concrete);
+/// The shining side of a lamp.
+pub const LAMP: Look = Look::Glow("lamp", [255, 252, 240]);
+/// A lamp shade with the light behind it.
+pub const SHADE: Look = Look::Glow("lamp_shade", [250, 226, 178]);
+/// Oak.
+pub const OAK: Look = Look::Tiled(Pattern::Oak);
+/// Walnut.
+pub const WALNUT: Look = Look::Tiled(Pattern::Walnut);
+/// Blue fabric.
+pub const BLUE_FABRIC: Look = Look::Tiled(Pattern::BlueFabric);
+/// Grey fabric.
+pub const GREY_FABRIC: Look = Look::Tiled(Pattern::GreyFabric);
+/// Fabric of the colour of rust.
+pub const RUST_FABRIC: Look = Look::Tiled(Pattern::RustFabric);
+/// Cardboard.
+pub const CARDBOARD: Look = Look::Tiled(Pattern::Cardboard);
+/// The spines of books.
+pub const BOOKS: Look = Look::Tiled(Pattern::Books);
 
 impl Look {
     /// A name for materials and texture files.

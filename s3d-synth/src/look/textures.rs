@@ -4,27 +4,47 @@ use super::noise::{fractal, hash, mix, smooth, tint, value};
 use super::pictures;
 use s3d_geom::Raster;
 
-/// An image that several surfaces may wear.
+/// An image that several surfaces may wear: a pattern that repeats, or a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Pattern {
+#[non_exhaustive]
+pub enum Pattern {
+    /// Oak, cut lengthwise; repeats.
     Oak,
+    /// Walnut, cut lengthwise; repeats.
     Walnut,
+    /// Woven, blue; repeats.
     BlueFabric,
+    /// Woven, grey; repeats.
     GreyFabric,
+    /// Woven, rust; repeats.
     RustFabric,
+    /// Cardboard with a strip of tape; repeats.
     Cardboard,
+    /// A row of spines; repeats.
     Books,
+    /// Concrete; repeats.
     Concrete,
+    /// A door leaf.
     Door,
+    /// A rug with a border.
     Rug,
+    /// What one sees through a window.
     Sky,
+    /// A whiteboard that was written on.
     Whiteboard,
+    /// A floor plan on a whiteboard.
     Plan,
+    /// A cork board with notes.
     Cork,
+    /// A poster.
     Poster,
+    /// Mountains over a lake.
     Landscape,
+    /// A screen with lines of code.
     Editor,
+    /// A screen with a chart.
     Chart,
+    /// The keys of a keyboard.
     Keyboard,
 }
 
@@ -67,8 +87,8 @@ impl Pattern {
 
     pub(crate) fn image(self) -> Raster<[u8; 3]> {
         match self {
-            Pattern::Oak => wood(&OAK),
-            Pattern::Walnut => wood(&WALNUT),
+            Pattern::Oak => wood(&Wood::OAK),
+            Pattern::Walnut => wood(&Wood::WALNUT),
             Pattern::BlueFabric => fabric([62.0, 96.0, 146.0]),
             Pattern::GreyFabric => fabric([112.0, 116.0, 122.0]),
             Pattern::RustFabric => fabric([186.0, 92.0, 58.0]),
@@ -109,15 +129,20 @@ pub(crate) fn scaled(image: &Raster<[u8; 3]>, factor: f32) -> Raster<[u8; 3]> {
 }
 
 /// The colours of a wood: between its rings, and of them.
-pub(crate) struct Wood {
-    pub(crate) light: [f32; 3],
-    pub(crate) dark: [f32; 3],
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wood {
+    /// Between its rings: red, green and blue, 0 to 255.
+    pub light: [f32; 3],
+    /// Of its rings.
+    pub dark: [f32; 3],
 }
 
-pub(crate) const OAK: Wood = Wood { light: [214.0, 178.0, 130.0], dark: [178.0, 136.0, 88.0] };
-pub(crate) const WALNUT: Wood = Wood { light: [142.0, 98.0, 66.0], dark: [92.0, 60.0, 40.0] };
-
 impl Wood {
+    /// Oak.
+    pub const OAK: Self = Self { light: [214.0, 178.0, 130.0], dark: [178.0, 136.0, 88.0] };
+    /// Walnut.
+    pub const WALNUT: Self = Self { light: [142.0, 98.0, 66.0], dark: [92.0, 60.0, 40.0] };
+
     /// The colour at `along` and `across` the grain, metres; repeats after 1 m along and 0.5 m across.
     pub(crate) fn at(&self, along: f32, across: f32, seed: u32) -> [f32; 3] {
         // Rings cut lengthwise: waves across the grain, bent by slow noise along it.

@@ -1,0 +1,221 @@
+//! What is impossible in a building, found before it is built. What things leave their room is found while they are built.
+
+use super::{Beam, Building, Filling, Item, Opening, RoomPlan, Thing};
+use crate::construct::shell::KNEE_M;
+use crate::{BuildingError, RangeError};
+use s3d_geom::glam::Vec2;
+use std::collections::BTreeSet;
+
+/// How far numbers that should be equal may be apart: rooms that share a wall's plane do not overlap.
+const SLACK_M: f32 = 1e-3;
+/// The longest side of a room, and the farthest that anything may be from the origin.
+const LONGEST_M: f64 = 150.0;
+const FARTHEST_M: f64 = 10_000.0;
+/// The lowest ceiling: doors are 2.1 m high.
+pub(crate) const LOWEST_CEILING_M: f64 = 2.2;
+const HIGHEST_CEILING_M: f64 = 30.0;
+
+impl Building {
+    /// What [`Building::build`] finds before it builds.
+    pub(crate) fn check(&self) -> Result<(), BuildingError> {
+        let far = |axis: &str| format!("the origin's {axis}");
+        for (value, axis) in self.origin.to_array().into_iter().zip(["x", "y", "z"]) {
+            RangeError::check(value, [-1e6, 1e6], || far(axis))?;
+        }
+        RangeError::check(self.texture_scale, [0.01, 2.0], || "the scale of textures".to_owned())?;
+        if self.rooms.is_empty() {
+            return Err(BuildingError::NoRoom);
+        }
+        let mut names = BTreeSet::new();
+        for (index, room) in self.rooms.iter().enumerate() {
+            room.check()?;
+            if !names.insert(room.room) {
+                return Err(BuildingError::SameRoom { room: room.room });
+            }
+            if let Some(other) = self.rooms.iter().take(index).find(|other| other.overlaps(room)) {
+                return Err(BuildingError::RoomsOverlap { first: other.room, second: room.room });
+            }
+        }
+        let mut uuids = BTreeSet::new();
+        for location in &self.locations {
+            let uuid = &location.uuid;
+            let is_hex = uuid.len() == 32 && uuid.bytes().all(|c| matches!(c, b'0'..=b'9' | b'a'..=b'f'));
+            if !is_hex || !uuids.insert(uuid) {
+                return Err(BuildingError::Uuid { uuid: uuid.clone() });
+            }
+            RangeError::check(location.yaw_rad, [-1e3, 1e3], || format!("the heading of {uuid}"))?;
+            if !self.rooms.iter().any(|room| room.contains(location.position)) {
+                return Err(BuildingError::LocationOutside {
+                    uuid: uuid.clone(),
+                    position: location.position,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl RoomPlan {
+    fn check(&self) -> Result<(), BuildingError> {
+        let range = |value: f32, range: [f64; 2], what: &str| {
+            RangeError::check(value, range, || format!("{}: {what}", self.room))
+        };
+        let far = [-FARTHEST_M, FARTHEST_M];
+        range(self.low.x, far, "the smallest x")?;
+        range(self.low.y, far, "the smallest y")?;
+        range(self.high.x - self.low.x, [0.5, LONGEST_M], "the length along x")?;
+        range(self.high.y - self.low.y, [0.5, LONGEST_M], "the length along y")?;
+        range(self.floor_m, far, "the height of the floor")?;
+        for height in self.heights_m {
+            range(height, [LOWEST_CEILING_M, HIGHEST_CEILING_M], "the height of the ceiling")?;
+        }
+        for (index, opening) in self.openings.iter().enumerate() {
+            self.check_opening(opening)?;
+            if self.openings.iter().take(index).any(|other| other.overlaps(opening)) {
+                let (wall, span) = (opening.wall, opening.span);
+                return Err(BuildingError::OpeningsOverlap { room: self.room, wall, span });
+            }
+        }
+        let inside = |p: Vec2| p.cmpge(self.low).all() && p.cmple(self.high).all();
+        let outside = |what, index| BuildingError::Outside { room: self.room, what, index };
+        if let Some([low, high]) = self.ceiling_hole
+            && !(inside(low) && inside(high) && low.cmplt(high).all())
+        {
+            return Err(outside("ceiling hole", 0));
+        }
+        for (index, &[x, y, length, width]) in self.lamps.iter().enumerate() {
+            range(length.min(width), [0.05, LONGEST_M], "the length of a lamp")?;
+            let (middle, half) = (Vec2::new(x, y), 0.5 * Vec2::new(length, width));
+            if !(inside(middle - half) && inside(middle + half)) {
+                return Err(outside("lamp", index));
+            }
+        }
+        self.items.iter().try_for_each(|item| Ok(item.check(&range)?))
+    }
+
+    fn check_opening(&self, opening: &Opening) -> Result<(), BuildingError> {
+        let Opening { wall, span: [from, to], heights: [low, high], filling } = *opening;
+        let (start, end) = if wall.along_x() { (self.low.x, self.high.x) } else { (self.low.y, self.high.y) };
+        // Under a slanted ceiling walls are upright up to the knee only.
+        let top = if self.heights_m[0] == self.heights_m[1] { self.top() } else { KNEE_M };
+        let is_door = filling != Filling::Window;
+        // Bars and linings need room.
+        let fits = from >= start
+            && to <= end
+            && to - from >= 0.3
+            && low >= 0.0
+            && high <= top
+            && high - low >= if is_door { 1.5 } else { 0.65 }
+            && (!is_door || low == 0.0);
+        if !fits {
+            return Err(BuildingError::OpeningOutside { room: self.room, wall, span: [from, to] });
+        }
+        if let Filling::Door { thickness_m, open_deg, .. } = filling {
+            let what = |what: &str| format!("{}: {what}", self.room);
+            RangeError::check(thickness_m, [0.01, 5.0], || what("the thickness of a doorway"))?;
+            RangeError::check(open_deg, [0.0, 180.0], || what("how far a door is open"))?;
+        }
+        Ok(())
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        let apart = |a: [f32; 2], b: [f32; 2]| a[1] <= b[0] + SLACK_M || b[1] <= a[0] + SLACK_M;
+        let x = |r: &Self| [r.low.x, r.high.x];
+        let y = |r: &Self| [r.low.y, r.high.y];
+        let z = |r: &Self| [r.floor_m, r.floor_m + r.top()];
+        !(apart(x(self), x(other)) || apart(y(self), y(other)) || apart(z(self), z(other)))
+    }
+}
+
+impl Opening {
+    fn overlaps(&self, other: &Self) -> bool {
+        let apart = |a: [f32; 2], b: [f32; 2]| a[1] <= b[0] || b[1] <= a[0];
+        self.wall == other.wall && !apart(self.span, other.span) && !apart(self.heights, other.heights)
+    }
+}
+
+type Range<'a> = &'a dyn Fn(f32, [f64; 2], &str) -> Result<(), RangeError>;
+
+/// The longest that a thing may be.
+const LARGE_M: f64 = 50.0;
+
+impl Item {
+    fn check(&self, range: Range<'_>) -> Result<(), RangeError> {
+        let far = [-FARTHEST_M, FARTHEST_M];
+        match self {
+            Self::Standing { thing, position, yaw_deg } => {
+                position.to_array().into_iter().try_for_each(|p| range(p, far, "the place of a thing"))?;
+                range(*yaw_deg, [-1e4, 1e4], "the turn of a thing")?;
+                thing.check(range)
+            }
+            Self::OnWall { thing, along, .. } => {
+                range(*along, far, "the place of a thing")?;
+                thing.check(range)
+            }
+            Self::Beam(Beam { from, to, half_width_m, depth_m, .. }) => {
+                range(from.distance(*to), [0.05, LARGE_M], "the length of a beam")?;
+                range(*half_width_m, [0.01, LARGE_M], "half the width of a beam")?;
+                range(*depth_m, [0.01, LARGE_M], "the depth of a beam")
+            }
+        }
+    }
+}
+
+impl Thing {
+    /// Whether its parts have a size, whatever its measures are.
+    fn check(&self, range: Range<'_>) -> Result<(), RangeError> {
+        let hanging = |width: f32, [low, high]: [f32; 2], what: &str| {
+            range(width, [0.1, LARGE_M], &format!("the width of {what}"))?;
+            range(low, [0.0, LARGE_M], &format!("the lower edge of {what}"))?;
+            range(high - low, [0.1, LARGE_M], &format!("the height of {what}"))
+        };
+        match *self {
+            Self::Table { width_m, depth_m, height_m, .. } => {
+                range(width_m.min(depth_m), [0.2, LARGE_M], "the width or depth of a table")?;
+                range(width_m.max(depth_m), [0.2, LARGE_M], "the width or depth of a table")?;
+                range(height_m, [0.1, LARGE_M], "the height of a table")
+            }
+            Self::Desk { width_m, depth_m } => {
+                range(width_m, [1.0, LARGE_M], "the width of a desk")?;
+                range(depth_m, [0.4, LARGE_M], "the depth of a desk")
+            }
+            Self::RoundTable { radius_m, height_m, .. } => {
+                range(radius_m, [0.3, LARGE_M], "the radius of a table")?;
+                range(height_m, [0.1, LARGE_M], "the height of a table")
+            }
+            Self::Sofa { seats, .. } => range(seats as f32, [1.0, 20.0], "the seats of a sofa"),
+            Self::Bookcase { width_m, shelves, .. } => {
+                range(width_m, [0.3, LARGE_M], "the width of a bookcase")?;
+                range(shelves as f32, [1.0, 20.0], "the shelves of a bookcase")
+            }
+            Self::Board { width_m, heights_m, tray_m, .. } => {
+                hanging(width_m, heights_m, "a board")?;
+                tray_m.map_or(Ok(()), |tray| range(tray, [0.6, LARGE_M], "the width of a tray of pens"))
+            }
+            Self::Picture { width_m, heights_m, .. } => hanging(width_m, heights_m, "a picture"),
+            Self::WallScreen { width_m, heights_m } => hanging(width_m, heights_m, "a screen"),
+            Self::Plant { height_m, .. } => range(height_m, [0.3, 5.0], "the height of a plant"),
+            Self::Carton { size_m } => {
+                size_m.into_iter().try_for_each(|m| range(m, [0.02, LARGE_M], "the side of a box"))
+            }
+            Self::Radiator { width_m } => range(width_m, [0.3, LARGE_M], "the width of a radiator"),
+            Self::Column { width_m, depth_m, height_m } => [width_m, depth_m, height_m]
+                .into_iter()
+                .try_for_each(|m| range(m, [0.05, LARGE_M], "the side of a column")),
+            Self::OfficeChair(_)
+            | Self::Chair(_)
+            | Self::Stool(_)
+            | Self::Monitor(_)
+            | Self::Keyboard
+            | Self::Laptop
+            | Self::Mug(_)
+            | Self::Papers
+            | Self::DeskLamp
+            | Self::FloorLamp
+            | Self::Bin(_)
+            | Self::Copier
+            | Self::Extinguisher
+            | Self::Rug => Ok(()),
+        }
+    }
+}
