@@ -1,7 +1,6 @@
 //! Images: PNG, OpenEXR, textures.
 
 pub(crate) mod compression;
-mod deflate;
 mod exr;
 pub(crate) mod png;
 pub(crate) mod pretty;

@@ -2,18 +2,18 @@
 
 /// Up to 48 bits and their number, in one word: the number in its lowest byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Bits(u64);
+pub(crate) struct Bits(u64);
 
 impl Bits {
     /// The lowest `count` bits of `value`; the others are 0.
     #[inline(always)]
-    pub(super) const fn new(value: u64, count: u32) -> Self {
+    pub(crate) const fn new(value: u64, count: u32) -> Self {
         Self(value << 8 | count as u64)
     }
 
     /// These, and then the next.
     #[inline(always)]
-    pub(super) fn then(self, next: Self) -> Self {
+    pub(crate) fn then(self, next: Self) -> Self {
         let count = (self.0 & 0xff) + (next.0 & 0xff);
         Self((self.value() | next.value() << self.shift()) << 8 | count)
     }
@@ -34,7 +34,7 @@ impl Bits {
 const MOST: u64 = 56;
 
 /// Appends bits to a vector of bytes.
-pub(super) struct BitWriter<'a> {
+pub(crate) struct BitWriter<'a> {
     out: &'a mut Vec<u8>,
     /// Where the next whole bytes go; what follows in `out` is room.
     end: usize,
@@ -43,13 +43,13 @@ pub(super) struct BitWriter<'a> {
 }
 
 impl<'a> BitWriter<'a> {
-    pub(super) fn new(out: &'a mut Vec<u8>) -> Self {
+    pub(crate) fn new(out: &'a mut Vec<u8>) -> Self {
         let end = out.len();
         Self { out, end, bits: 0, count: 0 }
     }
 
     /// Makes room for `bits` more bits.
-    pub(super) fn reserve(&mut self, bits: u64) {
+    pub(crate) fn reserve(&mut self, bits: u64) {
         let len = self.end + (bits / 8) as usize + 24;
         if self.out.len() < len {
             self.out.resize(len, 0);
@@ -58,19 +58,19 @@ impl<'a> BitWriter<'a> {
 
     /// Adds the lowest `count` bits; the others are 0. At most [`MOST`] bits may be added between two flushes.
     #[inline(always)]
-    pub(super) fn add(&mut self, bits: u64, count: u32) {
+    pub(crate) fn add(&mut self, bits: u64, count: u32) {
         self.bits |= bits << self.count;
         self.count += count;
     }
 
     /// As [`add`](Self::add).
-    pub(super) fn append(&mut self, bits: Bits) {
+    pub(crate) fn append(&mut self, bits: Bits) {
         self.add(bits.value(), bits.shift() as u32);
     }
 
     /// Stores the whole bytes.
     #[inline(always)]
-    pub(super) fn flush(&mut self) {
+    pub(crate) fn flush(&mut self) {
         self.out[self.end..self.end + 8].copy_from_slice(&self.bits.to_le_bytes());
         self.end += (self.count / 8) as usize;
         // At most 63 bits are there, so the shift is by 56 at most.
@@ -81,7 +81,7 @@ impl<'a> BitWriter<'a> {
     /// Adds the bits that `table` has for each of `indices`, modulo its length; if `FIT`, any four are [`MOST`] at most. There
     /// is room for them.
     #[inline(always)]
-    pub(super) fn all<I: Copy + Into<usize>, const N: usize, const FIT: bool>(
+    pub(crate) fn all<I: Copy + Into<usize>, const N: usize, const FIT: bool>(
         &mut self,
         indices: &[[I; 4]],
         table: &[Bits; N],
@@ -116,20 +116,20 @@ impl<'a> BitWriter<'a> {
     }
 
     /// Fills the last byte with zeros.
-    pub(super) fn align(&mut self) {
+    pub(crate) fn align(&mut self) {
         self.count = self.count.next_multiple_of(8);
         self.flush();
     }
 
     /// Whole bytes after an [`align`](Self::align).
-    pub(super) fn bytes(&mut self, bytes: &[u8]) {
+    pub(crate) fn bytes(&mut self, bytes: &[u8]) {
         debug_assert_eq!(self.count, 0);
         self.out[self.end..self.end + bytes.len()].copy_from_slice(bytes);
         self.end += bytes.len();
     }
 
     /// Ends after whole bytes.
-    pub(super) fn finish(mut self) {
+    pub(crate) fn finish(mut self) {
         self.align();
         self.out.truncate(self.end);
     }

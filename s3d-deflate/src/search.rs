@@ -1,34 +1,35 @@
 //! Data to tokens: which bytes are written as they are, and which as repetitions.
 
-use super::bits::BitWriter;
-use super::block::{LONGEST, Prices, write_block};
-use super::finder::{Finder, WINDOW};
-use super::nearby::{Anywhere, Compare, Nearby};
-use super::tokens::{BLOCK, Tokens};
+use crate::bits::BitWriter;
+use crate::block::{LONGEST, Prices, write_block};
+use crate::finder::{Finder, WINDOW};
+use crate::nearby::{Anywhere, Compare, Nearby};
+use crate::tokens::{BLOCK, Tokens};
 
 /// How hard and where repetitions are looked for.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Search {
-    pub(crate) candidates: Candidates,
+pub struct Search {
+    /// Which earlier places a place is compared with.
+    pub candidates: Candidates,
     /// Bytes from one line to the next.
-    pub(crate) line: usize,
+    pub line: usize,
     /// Bytes from one sample of a line to the next.
-    pub(crate) sample: usize,
+    pub sample: usize,
     /// Bytes, 4 to 8, of which a repetition consists at least, but those a line back.
-    pub(crate) hash_bytes: u32,
+    pub hash_bytes: u32,
     /// A repetition shorter than this is dropped if the next place has a better one.
-    pub(crate) lazy: usize,
+    pub lazy: usize,
     /// A repetition as long as this is taken at once.
-    pub(crate) nice: usize,
+    pub nice: usize,
     /// Every place in a repetition as long as this is remembered; of longer ones, and of runs, a few at the end.
-    pub(crate) remember: usize,
+    pub remember: usize,
     /// After 2ⁿ bytes without a repetition, places are passed over, more and more.
-    pub(crate) patience: u32,
+    pub patience: u32,
 }
 
 /// Which earlier places a place is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Candidates {
+pub enum Candidates {
     /// The last of its hash, at every third byte: for noisy pixels of three bytes.
     Noise,
     /// The two last of its hash and that a line back, at every third byte: for pixels of three bytes in patches.
@@ -37,7 +38,7 @@ pub(crate) enum Candidates {
     Steps,
     /// The sixteen last of its hash and those around a line back.
     Many,
-    /// Those at the 64 distances of [`Nearby`](super::nearby::Nearby), at every byte: for smooth surfaces. Of all else, only
+    /// Those at the 64 distances of [`Nearby`](crate::nearby::Nearby), at every byte: for smooth surfaces. Of all else, only
     /// the line matters to it.
     Nearby,
     /// The same, but only long repetitions, and not at every byte: where bytes as they are cost little.
@@ -57,13 +58,15 @@ const LONG_STEPS: (usize, usize) = (2, 4);
 const TAIL: usize = LONGEST + 8;
 
 /// Loops over bytes. `run` is `#[inline(always)]`, so that it is compiled once for any processor and once for wide registers.
-pub(crate) trait Work {
+pub trait Work {
+    /// What they make.
     type Output;
+    /// Makes it.
     fn run(self) -> Self::Output;
 }
 
 /// Does `work` in registers of 32 bytes where the processor has them; integers give the same anywhere.
-pub(crate) fn wide<W: Work>(work: W) -> W::Output {
+pub fn wide<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has what was just asked for.
@@ -115,19 +118,19 @@ impl Compare for Avx512 {
 }
 
 /// One pass over data.
-pub(super) struct Parser<'a> {
-    pub(super) finder: &'a mut Finder,
-    pub(super) nearby: &'a mut Nearby,
-    pub(super) tokens: &'a mut Tokens,
-    pub(super) prices: &'a mut Prices,
-    pub(super) search: Search,
+pub(crate) struct Parser<'a> {
+    pub(crate) finder: &'a mut Finder,
+    pub(crate) nearby: &'a mut Nearby,
+    pub(crate) tokens: &'a mut Tokens,
+    pub(crate) prices: &'a mut Prices,
+    pub(crate) search: Search,
     /// A place where a block ends, as the data is of another kind after it.
-    pub(super) boundary: usize,
+    pub(crate) boundary: usize,
 }
 
 impl Parser<'_> {
     /// Writes `data` as blocks.
-    pub(super) fn run(self, data: &[u8], out: &mut BitWriter<'_>) {
+    pub(crate) fn run(self, data: &[u8], out: &mut BitWriter<'_>) {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2")
             && std::arch::is_x86_feature_detected!("bmi1")
@@ -168,7 +171,7 @@ impl Parser<'_> {
 
     /// The same, compiled for any processor of the kind.
     #[inline(always)]
-    pub(super) fn run_as<C: Compare>(self, data: &[u8], out: &mut BitWriter<'_>) {
+    pub(crate) fn run_as<C: Compare>(self, data: &[u8], out: &mut BitWriter<'_>) {
         let line = self.search.line;
         // Lines seen at an angle are shifted against each other by a sample or two.
         let s = self.search.sample;

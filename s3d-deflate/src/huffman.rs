@@ -8,7 +8,7 @@
 ///
 /// # Panics
 /// If there are more symbols than codes of `limit` bits.
-pub(super) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
+pub(crate) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
     lengths.fill(0);
     // Symbol in the low bits: a sort by number, then by symbol.
     let mut keys = [0u64; 288];
@@ -79,7 +79,7 @@ pub(super) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
 }
 
 /// The canonical codes of these lengths, first bit lowest, as they are written.
-pub(super) fn canonical_codes(lengths: &[u8], codes: &mut [u16]) {
+pub(crate) fn canonical_codes(lengths: &[u8], codes: &mut [u16]) {
     let mut next = [0u32; 16];
     for &length in lengths {
         next[usize::from(length)] += 1;

@@ -1,18 +1,18 @@
 //! Blocks: what was found becomes bits, in whichever of the three forms of RFC 1951 is shortest.
 
-use super::bits::{BitWriter, Bits};
-use super::huffman::{canonical_codes, code_lengths};
-use super::nearby::{LANES, Repeated};
-use super::tokens::{Tokens, count_bytes};
+use crate::bits::{BitWriter, Bits};
+use crate::huffman::{canonical_codes, code_lengths};
+use crate::nearby::{LANES, Repeated};
+use crate::tokens::{Tokens, count_bytes};
 use std::array::from_fn;
 use std::ops::Range;
 
 /// The longest repetition.
-pub(super) const LONGEST: usize = 258;
+pub(crate) const LONGEST: usize = 258;
 
 const END_OF_BLOCK: usize = 256;
 const LITERALS_AND_LENGTHS: usize = 286;
-pub(super) const DISTANCES: usize = 30;
+pub(crate) const DISTANCES: usize = 30;
 /// The order in which the lengths of the code for code lengths are written.
 const LENGTHS_ORDER: [usize; 19] = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
 /// The longest code of a symbol, in bits: one less than the format allows, so that four are written in one step.
@@ -36,7 +36,7 @@ const fn length_symbol(length: usize) -> (usize, u32) {
 
 /// The symbol of a distance of 1 to 32,768 and its number of extra bits.
 #[inline(always)]
-pub(super) const fn distance_symbol(distance: usize) -> (usize, u32) {
+pub(crate) const fn distance_symbol(distance: usize) -> (usize, u32) {
     let d = distance - 1;
     // The first four have symbols of their own, as if they had a bit more.
     let extra = (d | 2).ilog2() - 1;
@@ -44,7 +44,7 @@ pub(super) const fn distance_symbol(distance: usize) -> (usize, u32) {
 }
 
 /// Symbol and number of extra bits by length − 3.
-pub(super) const LENGTH_SYMBOLS: [(u8, u8); 256] = {
+pub(crate) const LENGTH_SYMBOLS: [(u8, u8); 256] = {
     let mut table = [(0, 0); 256];
     let mut i = 0;
     while i < 256 {
@@ -56,7 +56,7 @@ pub(super) const LENGTH_SYMBOLS: [(u8, u8); 256] = {
 };
 
 /// What things cost in bits, as far as is known when they are chosen: by the code of the block before.
-pub(super) struct Prices {
+pub(crate) struct Prices {
     literals: [u8; 256],
     /// By length − 3, with its extra bits.
     lengths: [u8; 256],
@@ -68,7 +68,7 @@ pub(super) struct Prices {
 
 impl Prices {
     /// Before there was a block: literals as they are distributed in `data`.
-    pub(super) fn guess(data: &[u8], tokens: &Tokens) -> Self {
+    pub(crate) fn guess(data: &[u8], tokens: &Tokens) -> Self {
         let mut codes = Codes { litlen: [0; 288], distance: [5; 32] };
         let mut counts = [0; 256];
         count_bytes(data, &mut counts);
@@ -94,19 +94,19 @@ impl Prices {
     }
 
     #[inline(always)]
-    pub(super) fn literal(&self, byte: u8) -> u32 {
+    pub(crate) fn literal(&self, byte: u8) -> u32 {
         self.literals[usize::from(byte)].into()
     }
 
     #[inline(always)]
-    pub(super) fn repetition(&self, length: usize, distance: usize) -> u32 {
+    pub(crate) fn repetition(&self, length: usize, distance: usize) -> u32 {
         u32::from(self.lengths[length - 3]) + u32::from(self.distances[distance.ilog2() as usize & 15])
     }
 
     /// Whether a repetition of what is at `at`, of `SHORTEST` bytes at least, costs less than its bytes as they are. Only the
     /// first `PRICED` of them are asked.
     #[inline(always)]
-    pub(super) fn pays<const PRICED: usize, const SHORTEST: usize>(
+    pub(crate) fn pays<const PRICED: usize, const SHORTEST: usize>(
         &self,
         data: &[u8],
         at: usize,
@@ -166,11 +166,11 @@ fn values<const N: usize>(lengths: &[u8; N]) -> [Bits; N] {
 }
 
 /// How often each symbol occurs.
-pub(super) struct Counts {
-    pub(super) litlen: [u32; 288],
-    pub(super) distance: [u32; 32],
+pub(crate) struct Counts {
+    pub(crate) litlen: [u32; 288],
+    pub(crate) distance: [u32; 32],
     /// Extra bits of lengths and distances.
-    pub(super) extra: u64,
+    pub(crate) extra: u64,
 }
 
 /// The lengths of both codes, themselves coded.
@@ -252,7 +252,7 @@ impl Description {
 
 /// Writes what is in `place` of `data` as one block, as `tokens` take it apart, and learns what things cost.
 #[inline(always)]
-pub(super) fn write_block(
+pub(crate) fn write_block(
     data: &[u8],
     place: Range<usize>,
     tokens: &mut Tokens,

@@ -5,20 +5,20 @@
 //! compared with those at all 64 distances, which takes two comparisons of registers. The answers are the bits of a word,
 //! and a repetition lasts as long as the words of the places that follow have a bit in common.
 
-use super::block::LONGEST;
-use super::finder::WINDOW;
+use crate::block::LONGEST;
+use crate::finder::WINDOW;
 use std::array::from_fn;
 use std::hint::select_unpredictable;
 
 /// Distances of each of the two kinds.
-pub(super) const LANES: usize = 32;
+pub(crate) const LANES: usize = 32;
 /// Places of which the words are there at a time: as much as the fastest memory takes.
 const TILE: usize = 2048;
 /// Words that a repetition's end may ask for.
 const AHEAD: usize = LONGEST + 4;
 
 /// Compares bytes, in registers where the processor has wide ones.
-pub(super) trait Compare {
+pub(crate) trait Compare {
     /// Which bytes of `window` are `byte`: a bit for each, the first lowest.
     fn equal(window: &[u8; LANES], byte: u8) -> u32;
 
@@ -30,7 +30,7 @@ pub(super) trait Compare {
 }
 
 /// For any processor.
-pub(super) struct Anywhere;
+pub(crate) struct Anywhere;
 
 impl Compare for Anywhere {
     #[inline(always)]
@@ -49,7 +49,7 @@ impl Compare for Anywhere {
 }
 
 /// Which distances agree at the places of a piece of the data.
-pub(super) struct Nearby {
+pub(crate) struct Nearby {
     /// The highest bit for the distance 1, the 32nd for 32; the lower 32 for those from a line less 15 to a line and 16.
     words: Vec<u64>,
     /// The first place of `words`.
@@ -61,26 +61,26 @@ pub(super) struct Nearby {
 
 /// A repetition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Repeated {
+pub(crate) struct Repeated {
     /// 3 to [`LONGEST`].
-    pub(super) length: usize,
+    pub(crate) length: usize,
     /// Which of the distances: see [`lanes`].
-    pub(super) lane: usize,
+    pub(crate) lane: usize,
 }
 
 /// The distances that are asked for: the 32 smallest, and 32 around a line.
-pub(super) fn lanes(line: usize) -> [usize; 2 * LANES] {
+pub(crate) fn lanes(line: usize) -> [usize; 2 * LANES] {
     from_fn(|lane| if lane < LANES { lane + 1 } else { (line + lane + 1).saturating_sub(LANES + LANES / 2) })
 }
 
 impl Nearby {
     /// For lines of `line` bytes.
-    pub(super) fn new(line: usize) -> Self {
+    pub(crate) fn new(line: usize) -> Self {
         Self { words: Vec::new(), start: 0, end: 0, line }
     }
 
     /// Begins with other data.
-    pub(super) fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.words.resize(TILE + AHEAD, 0);
         (self.start, self.end) = (0, 0);
     }
@@ -88,7 +88,7 @@ impl Nearby {
     /// Sees to it that the words of `at`, which does not go back, and of those ahead are there; up to which place, it
     /// returns.
     #[inline(always)]
-    pub(super) fn reach<C: Compare>(&mut self, data: &[u8], at: usize) -> usize {
+    pub(crate) fn reach<C: Compare>(&mut self, data: &[u8], at: usize) -> usize {
         if at + AHEAD > self.end && self.end < data.len() {
             self.advance::<C>(data, at);
         }
@@ -133,14 +133,14 @@ impl Nearby {
 
     /// The places that have been [`reach`](Self::reach)ed.
     #[inline(always)]
-    pub(super) fn places(&self) -> Places<'_> {
+    pub(crate) fn places(&self) -> Places<'_> {
         Places { words: &self.words, start: self.start }
     }
 }
 
 /// The words of some places.
 #[derive(Clone, Copy)]
-pub(super) struct Places<'a> {
+pub(crate) struct Places<'a> {
     words: &'a [u64],
     /// The first of them.
     start: usize,
@@ -149,14 +149,14 @@ pub(super) struct Places<'a> {
 impl Places<'_> {
     /// The first place from `at` to `until` at which there is a repetition of three bytes; `until` if there is none.
     #[inline(always)]
-    pub(super) fn next(self, at: usize, until: usize) -> usize {
+    pub(crate) fn next(self, at: usize, until: usize) -> usize {
         let words = &self.words[at - self.start..until + 2 - self.start];
         at + words.array_windows().take_while(|[a, b, c]| a & b & c == 0).count()
     }
 
     /// The longest repetition at `at`, which has been [`reach`](Nearby::reach)ed: the nearest of several.
     #[inline(always)]
-    pub(super) fn longest<const SHORTEST: usize>(self, at: usize) -> Option<Repeated> {
+    pub(crate) fn longest<const SHORTEST: usize>(self, at: usize) -> Option<Repeated> {
         const { assert!(SHORTEST >= 3 && (LONGEST - SHORTEST) % 4 >= 2, "only a third byte more may be too many") };
         let words: &[u64; AHEAD] = self.words[at - self.start..].first_chunk().expect("they were reached");
         let mut agree = words[..SHORTEST].iter().fold(u64::MAX, |agree, word| agree & word);

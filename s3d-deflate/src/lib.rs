@@ -24,10 +24,11 @@ mod block;
 mod finder;
 mod huffman;
 mod nearby;
+pub mod png;
 mod search;
 mod tokens;
 
-pub(crate) use search::{Candidates, Search, Work, wide};
+pub use search::{Candidates, Search, Work, wide};
 
 use bits::BitWriter;
 use block::Prices;
@@ -38,7 +39,7 @@ use tokens::Tokens;
 
 /// Compresses one stream after the other. What one of them taught about costs serves the next, so a stream's bytes
 /// depend on those before: make a new one for each file.
-pub(crate) struct Deflater {
+pub struct Deflater {
     search: Search,
     finder: Finder,
     nearby: Nearby,
@@ -50,7 +51,8 @@ pub(crate) struct Deflater {
 const SAMPLE: usize = 1 << 15;
 
 impl Deflater {
-    pub(crate) fn new(search: Search) -> Self {
+    /// With its own memory.
+    pub fn new(search: Search) -> Self {
         let finder = Finder::new(search.hash_bytes, search.nice);
         let nearby = Nearby::new(search.line);
         let tokens = Tokens::new(nearby::lanes(search.line));
@@ -58,7 +60,7 @@ impl Deflater {
     }
 
     /// Appends `data` to `out`, compressed. At `boundary` (0 for none) begins data of another kind.
-    pub(crate) fn zlib(&mut self, data: &[u8], boundary: usize, out: &mut Vec<u8>) {
+    pub fn zlib(&mut self, data: &[u8], boundary: usize, out: &mut Vec<u8>) {
         // Deflate, 32 KiB back; no claim about the effort; divisible by 31.
         out.extend([0x78, 0x01]);
         let (finder, nearby, tokens) = (&mut self.finder, &mut self.nearby, &mut self.tokens);

@@ -3,13 +3,13 @@
 //! All of them are counted and written in the same way, without a question of which kind is next: a processor would
 //! guess the answer wrong. Only many bytes as they are stay where they lie, and are counted and written from there.
 
-use super::bits::{BitWriter, Bits};
-use super::block::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST, distance_symbol};
-use super::finder::WINDOW;
-use super::nearby::LANES;
+use crate::bits::{BitWriter, Bits};
+use crate::block::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST, distance_symbol};
+use crate::finder::WINDOW;
+use crate::nearby::LANES;
 
 /// Symbols in a block; only steps over several bytes make it a few more.
-pub(super) const BLOCK: usize = 16_000;
+pub(crate) const BLOCK: usize = 16_000;
 /// Tokens in a block at most: a repetition takes four.
 const ROOM: usize = 4 * (BLOCK + 4 * LONGEST);
 
@@ -17,7 +17,7 @@ const ROOM: usize = 4 * (BLOCK + 4 * LONGEST);
 const LENGTH: usize = 256;
 /// then one for each symbol of distances, without its extra bits;
 const DISTANCE: usize = LENGTH + LONGEST - 2;
-/// one for each of the distances of [`Nearby`](super::nearby::Nearby), with them;
+/// one for each of the distances of [`Nearby`](crate::nearby::Nearby), with them;
 const LANE: usize = DISTANCE + DISTANCES;
 /// and those for bits alone: the empty one, the two of one bit, the four of two, up to those of [`MOST_BITS`].
 const BITS: usize = LANE + 2 * LANES;
@@ -49,12 +49,12 @@ const ALONE: [Bits; KINDS - BITS] = {
 };
 
 /// The tokens of a block.
-pub(super) struct Tokens {
+pub(crate) struct Tokens {
     tokens: Box<[u16; ROOM]>,
     len: usize,
     runs: Vec<Run>,
     /// The distance of each lane.
-    pub(super) lanes: [usize; 2 * LANES],
+    pub(crate) lanes: [usize; 2 * LANES],
 }
 
 /// Many bytes as they are.
@@ -68,21 +68,21 @@ struct Run {
 
 impl Tokens {
     /// None as yet; `lanes` are the distances that [`repetition_in`](Self::repetition_in) means.
-    pub(super) fn new(lanes: [usize; 2 * LANES]) -> Self {
+    pub(crate) fn new(lanes: [usize; 2 * LANES]) -> Self {
         let lanes = lanes.map(|distance| distance.clamp(1, WINDOW));
         let tokens = vec![0; ROOM].try_into().expect("as many");
         Self { tokens, len: 0, runs: Vec::new(), lanes }
     }
 
     /// Forgets them.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.len = 0;
         self.runs.clear();
     }
 
     /// Adds the bytes of `data` in `from..to` as they are.
     #[inline(always)]
-    pub(super) fn literals(&mut self, data: &[u8], mut from: usize, to: usize) {
+    pub(crate) fn literals(&mut self, data: &[u8], mut from: usize, to: usize) {
         const FEW: usize = 16;
         if to - from >= LONG {
             from = self.run(from, to);
@@ -121,7 +121,7 @@ impl Tokens {
 
     /// Adds a repetition of 3 to 258 bytes from 1 to 32,768 bytes back.
     #[inline(always)]
-    pub(super) fn repetition(&mut self, length: usize, distance: usize) {
+    pub(crate) fn repetition(&mut self, length: usize, distance: usize) {
         let (symbol, extra) = distance_symbol(distance);
         let value = (distance - 1) & ((1 << extra) - 1);
         let first = extra.min(MOST_BITS);
@@ -135,7 +135,7 @@ impl Tokens {
 
     /// Adds a repetition of 3 to 258 bytes at the distance of a lane.
     #[inline(always)]
-    pub(super) fn repetition_in(&mut self, lane: usize, length: usize) {
+    pub(crate) fn repetition_in(&mut self, lane: usize, length: usize) {
         self.push([(LENGTH + length - 3) as u16, (LANE + lane) as u16]);
     }
 
@@ -146,7 +146,7 @@ impl Tokens {
     }
 
     /// How often each symbol occurs; `data` are the bytes that [`literals`](Self::literals) was told of.
-    pub(super) fn count(&mut self, data: &[u8]) -> Counts {
+    pub(crate) fn count(&mut self, data: &[u8]) -> Counts {
         self.pad();
         // Four tables: equal tokens in a row would wait for each other.
         let mut tables = [[0u16; SLOTS]; 4];
@@ -189,7 +189,7 @@ impl Tokens {
 
     /// Writes them; there is [room](BitWriter::reserve) for that.
     #[inline(always)]
-    pub(super) fn write(
+    pub(crate) fn write(
         &self,
         data: &[u8],
         litlen: &[Bits; 288],
@@ -224,7 +224,7 @@ impl Tokens {
 }
 
 /// Adds how often each byte occurs.
-pub(super) fn count_bytes(data: &[u8], counts: &mut [u32]) {
+pub(crate) fn count_bytes(data: &[u8], counts: &mut [u32]) {
     // Four tables: equal bytes in a row would wait for each other.
     let mut tables = [[0u32; 256]; 4];
     let (fours, rest) = data.as_chunks::<4>();
@@ -241,8 +241,8 @@ pub(super) fn count_bytes(data: &[u8], counts: &mut [u32]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::nearby::lanes;
     use super::*;
+    use crate::nearby::lanes;
     use proptest::prelude::*;
 
     /// A table in which each token has bits of its own, as a reader takes them apart.

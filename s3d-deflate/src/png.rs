@@ -2,11 +2,11 @@
 
 #![expect(clippy::indexing_slicing, reason = "a writer: lines are of the length that was asked for")]
 
-use crate::image::deflate::{Work, wide};
+use crate::search::{Work, wide};
 
 /// What a byte is expected to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Filter {
+pub enum Filter {
     /// Nothing is expected: the bytes stay.
     None,
     /// As the pixel above.
@@ -20,7 +20,7 @@ pub(crate) enum Filter {
 ///
 /// # Panics
 /// If `bytes` are not whole lines.
-pub(crate) fn filtered(bytes: &[u8], line: usize, pixel: usize, filter: Filter) -> Vec<u8> {
+pub fn filtered(bytes: &[u8], line: usize, pixel: usize, filter: Filter) -> Vec<u8> {
     assert!(line > 0 && bytes.len().is_multiple_of(line), "{} bytes in lines of {line}", bytes.len());
     wide(Filtering { bytes, line, pixel, filter })
 }

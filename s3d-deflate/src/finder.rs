@@ -1,10 +1,10 @@
 //! Repetitions: where the bytes at a place occurred before.
 
-use super::block::{LONGEST, Prices};
+use crate::block::{LONGEST, Prices};
 use std::array::from_fn;
 
 /// How far back a repetition may be.
-pub(super) const WINDOW: usize = 1 << 15;
+pub(crate) const WINDOW: usize = 1 << 15;
 /// Bits of the hash.
 const HASH_BITS: u32 = 13;
 /// Bytes of a repetition whose price as literals is asked for.
@@ -13,7 +13,7 @@ const PRICED: usize = 32;
 const PLACES: usize = 4;
 
 /// The last places of each hash, newest first. All are compared, without a branch: noise would make it guess wrong.
-pub(super) struct Finder {
+pub(crate) struct Finder {
     /// Rows of words; in a word four places modulo 2¹⁶. Words, as a row just stored is loaded again at once in runs.
     table: Vec<u64>,
     hash_bytes: u32,
@@ -23,11 +23,11 @@ pub(super) struct Finder {
 
 /// A repetition.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Match {
-    pub(super) length: usize,
-    pub(super) distance: usize,
+pub(crate) struct Match {
+    pub(crate) length: usize,
+    pub(crate) distance: usize,
     /// Bits that it saves over literals, by the prices; at most 0 if there is none.
-    pub(super) gain: i32,
+    pub(crate) gain: i32,
 }
 
 #[inline(always)]
@@ -52,19 +52,19 @@ fn common(data: &[u8], a: usize, b: usize, most: usize) -> usize {
 
 impl Finder {
     /// Places are found by a hash of 4 to 8 bytes.
-    pub(super) fn new(hash_bytes: u32, nice: usize) -> Self {
+    pub(crate) fn new(hash_bytes: u32, nice: usize) -> Self {
         Self { table: Vec::new(), hash_bytes, nice }
     }
 
     /// Forgets everything, and makes rows of `WORDS`.
-    pub(super) fn begin<const WORDS: usize>(&mut self) {
+    pub(crate) fn begin<const WORDS: usize>(&mut self) {
         self.table.clear();
         self.table.resize(WORDS << HASH_BITS, 0);
     }
 
     /// Remembers the place `at`, and gives those of the same hash.
     #[inline(always)]
-    pub(super) fn insert<const WORDS: usize>(&mut self, data: &[u8], at: usize) -> [u64; WORDS] {
+    pub(crate) fn insert<const WORDS: usize>(&mut self, data: &[u8], at: usize) -> [u64; WORDS] {
         let hash = (word(data, at) << (64 - 8 * self.hash_bytes)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let row = &mut self.table.as_chunks_mut::<WORDS>().0[(hash >> (64 - HASH_BITS)) as usize];
         let before = *row;
@@ -76,7 +76,7 @@ impl Finder {
     /// The longest repetition of what is at `at` among `places` and at the distances `rows`, the nearest place of equally
     /// long ones. There are 8 bytes and more after it, and it is not the first place.
     #[inline(always)]
-    pub(super) fn best<const WORDS: usize, const WAYS: usize, const ROWS: usize>(
+    pub(crate) fn best<const WORDS: usize, const WAYS: usize, const ROWS: usize>(
         &self,
         data: &[u8],
         at: usize,
