@@ -1,8 +1,8 @@
 //! Annotated points of E57 files: several scans, each with its pose. Source: ASTM E2807.
 
 use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::Columns;
-use crate::cloud::table::read::{Cloud, ColorRange};
 use crate::cloud::table::records::{Color, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};

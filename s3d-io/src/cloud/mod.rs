@@ -7,6 +7,7 @@ mod mat;
 pub(crate) mod npy;
 mod of_faces;
 mod of_mesh;
+mod open;
 pub(crate) mod passes;
 mod ply;
 mod s3dis;

@@ -1,7 +1,8 @@
 //! The labels of a mesh's faces as a source of annotations.
 
-use crate::cloud::annotations::{AnnotatedInstance, AnnotatedRoom, Annotations, InstancePoints, Skipped};
-use crate::cloud::passes::PointBlocks;
+use crate::cloud::annotations::{
+    AnnotatedInstance, AnnotatedRoom, Annotations, InstancePoints, PointBlocks, Skipped,
+};
 use crate::error::{Error, Result};
 use s3d_geom::glam::Vec3;
 use s3d_geom::{NO_INDEX, PointCloud, TriMesh};

@@ -1,8 +1,8 @@
 //! The labels that came with a mesh as a source of annotations.
 
 use crate::cloud::annotations::{AnnotationOptions, Annotations};
+use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::meaning::{Group, Meaning};
-use crate::cloud::table::read::{Cloud, ColorRange};
 use crate::cloud::table::rows::{NO_INSTANCE, NO_TAG, Reading, Tags};
 use crate::error::{Error, Result};
 use crate::mesh::file::MeshFile;
@@ -129,8 +129,9 @@ impl Cloud for Source {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::file::{UpAxis, read_mesh};
+    use crate::mesh::file::UpAxis;
     use crate::mesh::join::read_meshes;
+    use crate::mesh::read::read_mesh;
     use s3d_geom::PointCloud;
     use s3d_label::Class;
     use std::fmt::Write as _;

@@ -1,6 +1,6 @@
 //! The points of an instance, gone through several times in blocks, so that an instance of any size needs little memory.
 
-use crate::cloud::annotations::{AnnotatedInstance, Skipped};
+use crate::cloud::annotations::{AnnotatedInstance, PointBlocks, Skipped};
 use crate::error::{Error, Result};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{Vec3, vec3};
@@ -40,16 +40,6 @@ impl PointPasses for &[Vec3] {
     fn pass(&mut self, each: &mut dyn FnMut(&[Vec3]) -> Result<()>) -> Result<()> {
         each(self)
     }
-}
-
-/// The points of an instance as their source reads them.
-pub(crate) trait PointBlocks: Send {
-    /// Appends the next points to `out`: about as many as asked for, or fewer if there are no more. `false`: these were the
-    /// last.
-    fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool>;
-
-    /// What was left out so far.
-    fn skipped(&mut self) -> Skipped;
 }
 
 /// Reads the points of instances in blocks, one instance after another. It holds three blocks, whose memory it keeps.

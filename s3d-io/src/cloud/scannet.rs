@@ -2,7 +2,7 @@
 //! (`*.aggregation.json`). Source: ScanNet's README, "Data Organization".
 
 use crate::cloud::ply::read::{color_of, open_vertices};
-use crate::cloud::table::read::{Cloud, ColorRange};
+use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::records::Color;
 use crate::cloud::table::rows::{Reading, Row, Tag, Value};
 use crate::error::{Error, Result};

@@ -1,15 +1,11 @@
-//! Meshes with their textures, from any format that is read.
+//! A mesh as it was read, with its textures and labels.
 
-use crate::error::{Error, Result};
 use crate::image::texture::TextureFile;
-use crate::mesh::gltf::read as gltf;
-use crate::mesh::join::MeshSource;
 use crate::mesh::labels::MeshLabels;
-use crate::mesh::obj::read as obj;
-use crate::mesh::ply::read as ply_mesh;
 use crate::quote::count;
 use s3d_geom::glam::{Vec3, vec3};
 use s3d_geom::{MeshError, MeshParts, TriMesh};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// The axis of a file that points up.
@@ -72,6 +68,16 @@ impl MeshFile {
         }
     }
 
+    /// The faces that come from `sources[source]`. Numbers of objects may mean different objects in different files.
+    ///
+    /// # Panics
+    /// If there is no such source.
+    #[expect(clippy::indexing_slicing, reason = "another source is a caller's mistake: see Panics")]
+    pub fn faces_of(&self, source: usize) -> Range<u32> {
+        let end = self.sources.get(source + 1).map_or(self.mesh.faces().len() as u32, |next| next.first_face);
+        self.sources[source].first_face..end
+    }
+
     /// Leaves out the faces that repeat an earlier one; labels follow the tags of the mesh, which are returned.
     pub(crate) fn tidy(mut self) -> (Self, Vec<u32>) {
         let (mut mesh, repeated) = self.mesh.without_repeated_faces();
@@ -89,6 +95,17 @@ impl MeshFile {
     }
 }
 
+/// A file that a mesh comes from. Its faces and vertices go on to where those of the next file begin.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshSource {
+    /// The file.
+    pub path: PathBuf,
+    /// Its first face in the mesh.
+    pub first_face: u32,
+    /// Its first vertex in the mesh.
+    pub first_vertex: u32,
+}
+
 /// How a mesh is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MeshOptions {
@@ -98,38 +115,6 @@ pub struct MeshOptions {
     /// The property that tells which object they belong to; by default one such as `object_id` and `instance`, if it is
     /// there.
     pub instance_column: Option<String>,
-}
-
-/// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf`, `.glb` or `.ply`, in any case.
-///
-/// A texture that is missing or cannot be decoded, a face without area, of fewer than three corners or with the corners
-/// of an earlier one and the like do not stop it: they become [`MeshFile::warnings`].
-///
-/// # Errors
-/// [`Error::Unsupported`] for any other ending and for features of a format that are not read, [`Error::Io`],
-/// [`Error::Format`] with the place, and [`Error::Mesh`] if no face is left.
-pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
-    read_mesh_with(path, up, &MeshOptions::default())
-}
-
-/// As [`read_mesh`], with the names of the columns of labels. Only PLY files have such columns.
-///
-/// # Errors
-/// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that is not
-/// whole.
-pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let file = match ending.as_str() {
-        "obj" => obj::read(path, up),
-        "gltf" | "glb" => gltf::read(path, up),
-        "ply" => ply_mesh::read(path, up, options),
-        "" => Err(Error::unsupported(path, "has no ending; meshes are read from .obj, .gltf, .glb and .ply")),
-        _ => {
-            let message = format!(".{ending} is not read; meshes are .obj, .gltf, .glb or .ply");
-            Err(Error::unsupported(path, message))
-        }
-    }?;
-    Ok(file.tidy().0)
 }
 
 /// Makes the mesh, and tells in `warnings` what was mended.
@@ -160,14 +145,5 @@ mod tests {
         assert_eq!(UpAxis::Y.world_from_file(vec3(1.0, 2.0, 3.0)), vec3(1.0, -3.0, 2.0));
         assert_eq!(UpAxis::Y.world_from_file(Vec3::Y), Vec3::Z);
         assert_eq!(UpAxis::Z.world_from_file(vec3(1.0, 2.0, 3.0)), vec3(1.0, 2.0, 3.0));
-    }
-
-    #[test]
-    fn other_formats_are_refused_by_name() {
-        for (name, word) in [("scan.fbx", ".fbx"), ("scan", "no ending"), ("a.b/scan.PLYX", ".ply")] {
-            let message = read_mesh(Path::new(name), UpAxis::Y).unwrap_err().to_string();
-            assert!(message.contains(word) && message.contains(".obj, .gltf"), "{message}");
-        }
-        assert!(matches!(read_mesh(Path::new("gone.OBJ"), UpAxis::Y), Err(Error::Io { .. })));
     }
 }

@@ -1,34 +1,11 @@
 //! Meshes in several files, joined to one.
 
 use crate::error::{Error, Result};
-use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, read_mesh_with};
+use crate::mesh::file::{MeshFile, MeshOptions, MeshSource, UpAxis};
 use crate::mesh::labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
+use crate::mesh::read::read_mesh_with;
 use s3d_geom::{NO_INDEX, TriMesh};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-
-/// A file that a mesh comes from. Its faces and vertices go on to where those of the next file begin.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MeshSource {
-    /// The file.
-    pub path: PathBuf,
-    /// Its first face in the mesh.
-    pub first_face: u32,
-    /// Its first vertex in the mesh.
-    pub first_vertex: u32,
-}
-
-impl MeshFile {
-    /// The faces that come from `sources[source]`. Numbers of objects may mean different objects in different files.
-    ///
-    /// # Panics
-    /// If there is no such source.
-    #[expect(clippy::indexing_slicing, reason = "another source is a caller's mistake: see Panics")]
-    pub fn faces_of(&self, source: usize) -> Range<u32> {
-        let end = self.sources.get(source + 1).map_or(self.mesh.faces().len() as u32, |next| next.first_face);
-        self.sources[source].first_face..end
-    }
-}
 
 /// Reads the meshes of `paths` and joins them in this order: vertices, faces, materials and textures of the first file,
 /// then those of the second… Each texture stays one of its own, whatever its name. Warnings name their file, if there

@@ -4,8 +4,8 @@
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::las::bounded::BoundedClaims;
+use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::{CLASSES, INSTANCES};
-use crate::cloud::table::read::{Cloud, ColorRange};
 use crate::cloud::table::records::{Color, Field, Kind, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};

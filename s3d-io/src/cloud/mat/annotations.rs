@@ -1,10 +1,9 @@
 //! `pointcloud.mat` as a source of annotations.
 
 use crate::cloud::annotations::{
-    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, Skipped,
+    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
 use crate::cloud::mat::read::{MatArea, MatObject, MatRoom};
-use crate::cloud::passes::PointBlocks;
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
 use crate::quote::quote;

@@ -3,7 +3,8 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::annotations::Skipped;
-use crate::cloud::mat::hdf5::read::{Dataset, Hdf5File, Kind, Object};
+use crate::cloud::mat::hdf5::file::{Dataset, Hdf5File, Kind};
+use crate::cloud::mat::hdf5::read::Object;
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
 use s3d_geom::PointCloud;

@@ -4,7 +4,7 @@
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::npy::header::NpyHeader;
-use crate::cloud::table::read::{Cloud, ColorRange};
+use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::records::{Field, Table, fill, rows_of_block};
 use crate::cloud::table::rows::{Reading, Tag};
 use crate::error::{Error, Result};

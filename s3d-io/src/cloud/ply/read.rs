@@ -1,8 +1,8 @@
 //! Annotated points in PLY files: the element `vertex`, with properties for class and instance.
 
 use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::Columns;
-use crate::cloud::table::read::{Cloud, ColorRange};
 use crate::cloud::table::records::{Color, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};

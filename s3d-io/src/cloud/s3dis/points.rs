@@ -1,7 +1,6 @@
 //! The points of the S3DIS tree: `x y z r g b` a line.
 
-use crate::cloud::annotations::Skipped;
-use crate::cloud::passes::PointBlocks;
+use crate::cloud::annotations::{PointBlocks, Skipped};
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;

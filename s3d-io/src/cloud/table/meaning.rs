@@ -2,7 +2,7 @@
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::s3dis::tree::OnFault;
-use crate::cloud::table::read::Cloud;
+use crate::cloud::table::cloud::Cloud;
 use crate::cloud::table::rows::{NO_INSTANCE, NO_TAG, Tag, Tags};
 use crate::error::{Error, Result};
 use s3d_label::{Class, Room};

@@ -6,16 +6,15 @@
 //! files are read a second time, and every point goes to its place in a temporary file.
 
 use crate::cloud::annotations::{
-    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, Skipped,
+    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
-use crate::cloud::passes::PointBlocks;
+use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::meaning::{Group, Meaning};
 use crate::cloud::table::rows::{NO_TAG, Reading, Rows, Sink, Tags};
 use crate::cloud::table::store::{FlatStore, SpoolWriter};
 use crate::error::{Error, Result};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::Vec3;
-use s3d_label::{Class, Room};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,49 +23,6 @@ use std::sync::Arc;
 const MAX_GROUPS: usize = 1_000_000;
 /// Farther from the origin than this, metres as `f32` step by a millimetre.
 const FAR_M: f64 = 10_000.0;
-
-/// What a format's colours are taken for. Where a format leaves it open, the narrow range is tried first.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum ColorRange {
-    /// 16-bit numbers up to 255, or floats from 0 to 1.
-    #[default]
-    Narrow,
-    /// 16-bit numbers up to 65,535, or floats from 0 to 255.
-    Wide,
-}
-
-/// A file of rows that can be read several times.
-pub(crate) trait Cloud {
-    fn path(&self) -> &Path;
-
-    /// The room that the file itself names, by its own name for instance.
-    fn room(&self) -> Option<Room> {
-        room_of_name(self.path())
-    }
-
-    /// The class that a tag means in this kind of file, where the user says nothing.
-    fn class_of(&self, _tag: &crate::cloud::table::rows::Tag) -> Option<Class> {
-        None
-    }
-
-    /// Whether its points are the vertices of a mesh; known once it is read.
-    fn are_vertices(&self) -> bool {
-        false
-    }
-
-    /// Reads all rows. `false`: colours go beyond the narrow range, and the rows must be read again with the wide one.
-    fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool>;
-}
-
-/// The room that a file is named after: `office_3.ply`, `Area_1_office_3.npy`.
-fn room_of_name(path: &Path) -> Option<Room> {
-    let stem = path.file_stem()?.to_str()?;
-    let name = match stem.strip_prefix("Area_").and_then(|rest| rest.split_once('_')) {
-        Some((area, name)) if area.bytes().all(|b| b.is_ascii_digit()) => name,
-        _ => stem,
-    };
-    name.parse().ok()
-}
 
 /// The points that are found and what they say, before it is known what that means.
 #[derive(Default)]
@@ -352,6 +308,7 @@ mod tests {
     use crate::cloud::table::rows::{Row, Value};
     use proptest::prelude::*;
     use s3d_geom::glam::DVec3;
+    use s3d_label::{Class, Room};
     use std::collections::BTreeMap;
 
     /// A row: class, instance, room (0: none). Its place in the list is its x coordinate and its colour.

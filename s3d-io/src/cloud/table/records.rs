@@ -3,8 +3,8 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::table::cloud::ColorRange;
 use crate::cloud::table::columns::Columns;
-use crate::cloud::table::read::ColorRange;
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};
 use s3d_geom::glam::dvec3;

@@ -541,7 +541,7 @@ mod tests {
             let dir = tempfile::tempdir().unwrap();
             write_rgb_obj(dir.path(), &TriMesh::new(parts).unwrap(), &[]).unwrap();
             let mesh =
-                crate::mesh::file::read_mesh(&dir.path().join("rgb.obj"), crate::mesh::file::UpAxis::Y)
+                crate::mesh::read::read_mesh(&dir.path().join("rgb.obj"), crate::mesh::file::UpAxis::Y)
                     .unwrap()
                     .mesh;
             assert!(

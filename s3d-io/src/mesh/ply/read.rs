@@ -247,8 +247,8 @@ fn lay_textures(
 mod tests {
     use super::*;
     use crate::image::texture::tests::two_pixels;
-    use crate::mesh::file::read_mesh_with;
     use crate::mesh::labels::{LabelColumn, MeshLabels, NO_LABEL};
+    use crate::mesh::read::read_mesh_with;
     use s3d_geom::FaceColor;
     use s3d_geom::glam::{Vec3, vec2, vec3};
 

@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use super::UNDEFINED;
-use super::read::{Cursor, Dataset, Filter, Hdf5File};
+use super::file::{Cursor, Dataset, Filter, Hdf5File};
 use crate::error::Result;
 
 /// What deflate can make of a byte at most.

@@ -2,9 +2,9 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
+use super::file::{Cursor, Hdf5File};
 use super::header::Header;
 use super::message::until_zero;
-use super::read::{Cursor, Hdf5File};
 use crate::error::Result;
 
 /// Levels of a B-tree: with two children a node that is more than any file has.

@@ -2,8 +2,8 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
+use super::file::{Cursor, Dataset, Filter, Hdf5File, Kind, Layout};
 use super::message::{self, AttributeValue};
-use super::read::{Cursor, Dataset, Filter, Hdf5File, Kind, Layout};
 use crate::error::Result;
 
 /// Blocks that a header may be continued in.

@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use super::UNDEFINED;
-use super::read::{Cursor, Filter, Kind, Layout};
+use super::file::{Cursor, Filter, Kind, Layout};
 
 /// Axes of an array: the library's own limit.
 const MAX_AXES: usize = 32;

@@ -12,6 +12,7 @@
 //! Source: "HDF5 File Format Specification Version 3.0", The HDF Group.
 
 mod chunks;
+pub(crate) mod file;
 mod group;
 mod header;
 mod message;

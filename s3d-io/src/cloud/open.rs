@@ -1,0 +1,285 @@
+//! Annotations, from any files that are read.
+
+use crate::cloud::annotations::{
+    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
+};
+use crate::cloud::e57::E57Cloud;
+use crate::cloud::las::read::LasCloud;
+use crate::cloud::npy::read::NpyCloud;
+use crate::cloud::ply::read::PlyCloud;
+use crate::cloud::s3dis::points::PointReader;
+use crate::cloud::s3dis::tree::{AnnotationTree, OnFault, TreeOptions};
+use crate::cloud::scannet::{ScannetCloud, is_scannet};
+use crate::cloud::table::cloud::Cloud;
+use crate::cloud::table::read::read_flat;
+use crate::error::{Error, Result};
+use s3d_geom::PointCloud;
+use s3d_geom::glam::DVec3;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+impl Annotations {
+    /// Finds the annotated instances of an area in `paths`: what is found in several of them is put together.
+    ///
+    /// | path | annotations |
+    /// |---|---|
+    /// | a folder | the S3DIS tree of an area, as [`AnnotationTree`] takes it |
+    /// | `….mat` | the `pointcloud.mat` of a published area, as [`MatArea`](crate::MatArea) takes it |
+    /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh, by object |
+    /// | `.ply` | vertices with properties for class and instance; ASCII or binary |
+    /// | `.npy` | a structured array, or a plain one of rows and columns, see [`AnnotationOptions::columns`] |
+    /// | `.npz` | one such array, or an array a column (`xyz`, `rgb`, `label`…), or a few |
+    /// | `.las`, `.laz` | `classification`, and `point_source_id` as instance; extra dimensions by name |
+    /// | `.e57` | several scans with their poses; attributes of extensions for classes and instances |
+    ///
+    /// The points of a tree are read when they are asked for, an instance at a time. All other files hold *clouds*: rows of
+    /// points, each of which says what it belongs to. All clouds of an area are read as one, and grouped:
+    ///
+    /// - **class**: [`AnnotationOptions::classes`] tells what a number or a name means; names of the 13 classes mean
+    ///   themselves, and the usual words of ScanNet's annotators the nearest of the 13. The numbers of a plain NPY array are
+    ///   S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes are named. A class without a meaning stops with a
+    ///   list of them.
+    /// - **instance**: points of one room and class with one number are one. Two classes of the file that mean the same are
+    ///   kept apart, since many files number per class. Points without a number, or with a negative one, are one instance a
+    ///   class and room. Instances are numbered per class and room from 1 in the order of their numbers in the file.
+    /// - **room**: what the column says (a name, or the number of a room of [`AnnotationOptions::room`]'s type), or else
+    ///   [`AnnotationOptions::room`], or else the room that a file is named after: `office_3.ply`, `Area_1_office_3.npy`, or
+    ///   an E57 scan.
+    ///
+    /// Colours of 16 bits or as floats become 8 bits: 16-bit numbers count as 8-bit ones if no number in the file is above
+    /// 255, floats from 0 to 1 if none is above 1.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Format`] for a path of another kind, for what the kind's reader finds wrong, for a room that
+    /// two sources tell of, and if no room is found. With [`OnFault::Skip`] single names, lines and classes are left out
+    /// instead and [`Annotations::warnings`] tells of them.
+    ///
+    /// # Panics
+    /// If `paths` is empty.
+    pub fn open(paths: &[PathBuf], options: &AnnotationOptions) -> Result<Self> {
+        assert!(!paths.is_empty(), "no path of annotations");
+        let mut all = Self { rooms: Vec::new(), warnings: Vec::new() };
+        let mut clouds: Vec<Box<dyn Cloud + '_>> = Vec::new();
+        for path in paths {
+            if path.is_dir() && !is_scannet(path) {
+                all.join(Self::from_tree(path, options)?)?;
+            } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) {
+                all.join(Self::from_mat(path, options)?)?;
+            } else {
+                clouds.push(open_cloud(path, options)?);
+            }
+        }
+        if !clouds.is_empty() {
+            let clouds: Vec<&dyn Cloud> = clouds.iter().map(|c| &**c).collect();
+            all.join(read_flat(&clouds, options)?)?;
+        }
+        Ok(all)
+    }
+
+    /// Adds the rooms of another source.
+    fn join(&mut self, other: Self) -> Result<()> {
+        for room in other.rooms {
+            match self.rooms.binary_search_by_key(&room.room, |r| r.room) {
+                Ok(i) => {
+                    let source = |r: &AnnotatedRoom| r.instances.first().map(AnnotatedInstance::source);
+                    let first = self.rooms.get(i).and_then(source).unwrap_or_default();
+                    let second = source(&room).unwrap_or_default();
+                    let path = room.instances.first().map_or(Path::new(""), AnnotatedInstance::path);
+                    let message = format!("{} is in two sources, {first} and {second}", room.room);
+                    return Err(Error::format(path, message));
+                }
+                Err(i) => self.rooms.insert(i, room),
+            }
+        }
+        self.warnings.extend(other.warnings);
+        Ok(())
+    }
+
+    /// The S3DIS tree of an area.
+    fn from_tree(dir: &Path, options: &AnnotationOptions) -> Result<Self> {
+        let columns = [&options.class_column, &options.instance_column, &options.room_column];
+        if columns.iter().any(|c| c.is_some()) || options.room.is_some() || options.offset_m != DVec3::ZERO {
+            return Err(Error::format(
+                dir,
+                "is a folder: its rooms, classes and instances are named by its files; columns, a room and an offset are \
+                 for clouds",
+            ));
+        }
+        let on_fault = options.on_fault;
+        let spool_dir = options.spool_dir.clone().map(Arc::new);
+        let tree = AnnotationTree::open_with(
+            dir,
+            &TreeOptions {
+                on_fault,
+                unknown_as_clutter: options.unknown_as_clutter,
+                classes: options.classes.clone(),
+            },
+        )?;
+        let rooms = tree.rooms.into_iter().map(|room| AnnotatedRoom {
+            room: room.room,
+            instances: room
+                .instances
+                .into_iter()
+                .map(|i| {
+                    let points = TextPoints { path: i.path, on_fault, spool_dir: spool_dir.clone() };
+                    AnnotatedInstance::new(i.class, i.number, Arc::new(points))
+                })
+                .collect(),
+        });
+        Ok(Self { rooms: rooms.collect(), warnings: tree.warnings })
+    }
+}
+
+/// The reader of a cloud, by the file's name.
+fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn Cloud + 'a>> {
+    let what = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    if what.is_dir() || name.ends_with(".aggregation.json") {
+        return Ok(Box::new(ScannetCloud::open(path)?));
+    }
+    if !what.is_file() {
+        return Err(Error::format(path, "is no file"));
+    }
+    Ok(match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
+        "ply" => Box::new(PlyCloud::new(path, options)),
+        "npy" | "npz" => Box::new(NpyCloud::new(path, options)),
+        "las" | "laz" => Box::new(LasCloud::new(path, options)),
+        "e57" => Box::new(E57Cloud::new(path, options)),
+        _ => {
+            return Err(Error::unsupported(
+                path,
+                "is no kind of annotations that is read: an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, or \
+                 ScanNet's .aggregation.json",
+            ));
+        }
+    })
+}
+
+/// A file of the S3DIS tree.
+#[derive(Debug)]
+struct TextPoints {
+    path: PathBuf,
+    on_fault: OnFault,
+    /// See [`AnnotationOptions::spool_dir`].
+    spool_dir: Option<Arc<PathBuf>>,
+}
+
+impl InstancePoints for TextPoints {
+    fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
+        let mut reader = PointReader::open_with(&self.path, self.on_fault)?;
+        while reader.read_chunk(usize::MAX, out)? > 0 {}
+        Ok(reader.into_skipped())
+    }
+
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn part(&self) -> String {
+        String::new()
+    }
+
+    fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
+        Ok(Box::new(PointReader::open_with(&self.path, self.on_fault)?))
+    }
+
+    fn copy_to(&self) -> Option<PathBuf> {
+        Some(self.spool_dir.as_ref().map_or_else(std::env::temp_dir, |dir| (**dir).clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_label::Class;
+    use std::collections::BTreeMap;
+    use std::fs;
+
+    fn tree(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        for (file, text) in files {
+            let path = dir.path().join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        dir
+    }
+
+    fn open(dirs: &[&tempfile::TempDir], options: &AnnotationOptions) -> Result<Annotations> {
+        let paths: Vec<PathBuf> = dirs.iter().map(|d| d.path().to_owned()).collect();
+        Annotations::open(&paths, options)
+    }
+
+    /// Each instance's name and points.
+    fn contents(annotations: &Annotations) -> Vec<(String, usize)> {
+        let mut all = Vec::new();
+        for room in &annotations.rooms {
+            for i in &room.instances {
+                let mut cloud = PointCloud::default();
+                i.read(&mut cloud).unwrap();
+                all.push((format!("{} {}_{}", room.room, i.class, i.number), cloud.len()));
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn trees_are_put_together() {
+        let a = tree(&[("office_2/Annotations/wall_1.txt", "1 2 3 4 5 6\n")]);
+        let b = tree(&[
+            ("office_1/Annotations/wall_2.txt", "1 2 3 4 5 6\n7 8 9 10 11 12.0\n"),
+            ("office_1/notes.md", ""),
+        ]);
+        let both = open(&[&a, &b], &AnnotationOptions::default()).unwrap();
+        assert_eq!(contents(&both), [("office_1 wall_2".into(), 2), ("office_2 wall_1".into(), 1)]);
+        let wall = &both.rooms[0].instances[0];
+        assert!(wall.path().ends_with("office_1/Annotations/wall_2.txt"));
+        assert_eq!(wall.source(), wall.path().display().to_string());
+        let message = open(&[&a, &a], &AnnotationOptions::default()).unwrap_err().to_string();
+        assert!(
+            message.contains("office_2 is in two sources") && message.ends_with("Annotations/wall_1.txt"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn lines_that_are_skipped_are_counted_with_the_first_place() {
+        let a = tree(&[("WC_1/Annotations/wall_1.txt", "1 2 3 4 5 6\n1 2 3\x10 4 5 6\nx\n1 1 1 1 1 1\n")]);
+        let strict = open(&[&a], &AnnotationOptions::default()).unwrap();
+        let message = strict.rooms[0].instances[0].read(&mut PointCloud::default()).unwrap_err().to_string();
+        assert!(message.contains("wall_1.txt, line 2"), "{message}");
+        let skip = AnnotationOptions { on_fault: OnFault::Skip, ..AnnotationOptions::default() };
+        let lenient = open(&[&a], &skip).unwrap();
+        let mut cloud = PointCloud::default();
+        let skipped = lenient.rooms[0].instances[0].read(&mut cloud).unwrap();
+        assert_eq!((cloud.len(), skipped.count), (2, 2));
+        assert!(skipped.first.unwrap().to_string().contains("line 2"));
+    }
+
+    #[test]
+    fn words_of_a_tree_can_be_given_a_class() {
+        let a = tree(&[
+            ("WC_1/Annotations/stairs_1.txt", "1 2 3 4 5 6\n"),
+            ("WC_1/Annotations/floor_1.txt", "1 2 3 4 5 6\n"),
+            ("WC_1/Annotations/person_1.txt", "1 2 3 4 5 6\n"),
+        ]);
+        let classes = [("stairs".to_owned(), Some(Class::Floor)), ("person".to_owned(), None)];
+        let options = AnnotationOptions { classes: BTreeMap::from(classes), ..AnnotationOptions::default() };
+        let found = open(&[&a], &options).unwrap();
+        assert_eq!(contents(&found), [("WC_1 floor_1".into(), 1), ("WC_1 floor_2".into(), 1)]);
+        assert!(found.rooms[0].instances[1].source().ends_with("stairs_1.txt"));
+    }
+
+    #[test]
+    fn options_of_clouds_are_refused_for_a_tree() {
+        let a = tree(&[("WC_1/Annotations/wall_1.txt", "1 2 3 4 5 6\n")]);
+        let with_class = AnnotationOptions { class_column: Some("label".into()), ..Default::default() };
+        let with_offset = AnnotationOptions { offset_m: DVec3::X, ..Default::default() };
+        for options in [with_class, with_offset] {
+            let message = open(&[&a], &options).unwrap_err().to_string();
+            assert!(message.contains("are for clouds"), "{message}");
+        }
+        let gone = Annotations::open(&[a.path().join("gone")], &AnnotationOptions::default());
+        assert!(matches!(gone, Err(Error::Io { .. })));
+    }
+}
