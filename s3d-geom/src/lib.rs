@@ -18,6 +18,9 @@
 //! point clouds. What is read is checked as it is by constructors (a pose's matrix and a polygon's corners are taken as
 //! they are), and a number that JSON can hold comes back to the bit where the reader rounds correctly (serde_json's
 //! `float_roundtrip`). Meshes, textures and images have their own files.
+//!
+//! The features `nearest` ([`NearestFaces`]) and `sampling` ([`SurfaceSampler`]) are on by default; without them, the
+//! crate builds from half as many packages.
 
 // Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what a constructor checked.
 #![cfg_attr(
@@ -29,12 +32,16 @@ mod aabb;
 mod camera;
 mod cloud;
 mod mesh;
+#[cfg(feature = "nearest")]
 mod nearest;
 mod outline;
+#[cfg(feature = "sampling")]
 mod primitives;
 mod raster;
+#[cfg(feature = "sampling")]
 mod surface;
 mod voxel;
+#[cfg(any(feature = "nearest", feature = "sampling"))]
 mod wide;
 
 pub use aabb::Aabb;
@@ -47,13 +54,16 @@ pub use mesh::{
     DEFAULT_COLOR, FaceColor, Material, MeshError, MeshParts, MeshReport, NO_INDEX, Texture, TriMesh, Wrap,
     sample_bilinear,
 };
+#[cfg(feature = "nearest")]
 pub use nearest::{Nearest, NearestFaces, nearest_brute_force};
 pub use outline::{
     Footprint, FootprintBuilder, FootprintOptions, Polygon, PolygonError, dominant_wall_direction_deg,
     triangulate_face,
 };
+#[cfg(feature = "sampling")]
 pub use primitives::{cuboid, cylinder, furnished_room, grid, quad, room, scan_like, scan_like_rooms};
 pub use raster::Raster;
+#[cfg(feature = "sampling")]
 pub use surface::{Density, SurfaceSampler};
 pub use voxel::{VoxelGrid, Voxels};
 

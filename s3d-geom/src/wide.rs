@@ -26,18 +26,21 @@ fn run_avx2<W: Work>(work: W) -> W::Output {
 }
 
 /// The larger, `b` if one is NaN: a single instruction, unlike [`f32::max`].
+#[cfg(feature = "nearest")]
 #[inline(always)]
 pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 /// The smaller, `b` if one is NaN.
+#[cfg(feature = "nearest")]
 #[inline(always)]
 pub(crate) fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 /// The lanes whose value is at most `bound`, as bits.
+#[cfg(feature = "nearest")]
 #[inline(always)]
 pub(crate) fn at_most(values: &[f32; 8], bound: f32) -> u32 {
     let mut bits = [0; 8];
@@ -48,6 +51,7 @@ pub(crate) fn at_most(values: &[f32; 8], bound: f32) -> u32 {
 }
 
 /// The smallest of values that are no NaN.
+#[cfg(feature = "nearest")]
 #[inline(always)]
 pub(crate) fn least(values: &[f32; 8]) -> f32 {
     let mut four = [0.0; 4];

@@ -34,7 +34,7 @@
 //!
 //! With the cargo feature `serde`, classes, rooms and labels are data by their names, a table is the list of its names, and
 //! votes, reports, summaries and statistics are structs of their fields. What is read is checked: a name that is none, or
-//! a table out of order, is refused.
+//! a table out of order, is refused. The feature `vote`, on by default, is the [`Labeler`] with what belongs to it.
 
 // Nothing panics but what a caller did wrong, which "Panics" tells: names and numbers come from files.
 #![cfg_attr(
@@ -50,31 +50,40 @@
 )]
 
 mod class;
+#[cfg(feature = "vote")]
 mod corners;
+#[cfg(feature = "vote")]
 mod face_labels;
 mod instance;
 mod label;
+#[cfg(feature = "vote")]
 mod labeler;
 mod numbering;
+#[cfg(feature = "vote")]
 mod report;
 mod room;
 #[cfg(feature = "serde")]
 mod serde_names;
 mod statistics;
 mod table;
+#[cfg(feature = "vote")]
 mod votes;
 mod wall_direction;
 
 pub use class::{Class, UnknownClass};
+#[cfg(feature = "vote")]
 pub use face_labels::FaceLabels;
 pub use instance::InstanceSummary;
 pub use label::{Label, LabelError, NULL_NAME, parse_name};
+#[cfg(feature = "vote")]
 pub use labeler::{Labeler, VoteError, vote};
 pub use numbering::{NumberedInstance, NumberingError, number_area};
+#[cfg(feature = "vote")]
 pub use report::{VoteReport, VoteRow};
 pub use room::{Room, RoomError, RoomType, UnknownRoomType};
 pub use statistics::{ClassCounts, RoomCounts};
 pub use table::{LabelId, LabelTable, MAX_LABELS, TableError};
+#[cfg(feature = "vote")]
 pub use votes::{FaceVotes, PointTally, VoteOptions, Votes};
 pub use wall_direction::wall_directions_deg;
 
