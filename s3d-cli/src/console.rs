@@ -1,19 +1,20 @@
 //! What is written to standard error while a command runs: log lines, and progress with rate and time left; for a person,
 //! or as a JSON object a line.
 
-use crate::event::{Event, emit};
 use clap::ValueEnum;
 use indicatif::{
     HumanFloatCount, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle,
 };
+use s3d_dataset::{Event, Level, Task, UnitTally};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 use tracing::field::{Field, Visit};
-use tracing::{Level, Metadata, Subscriber, info};
+use tracing::level_filters::LevelFilter;
+use tracing::{Subscriber, debug, info, warn};
 use tracing_subscriber::fmt::format::{FormatEvent, FormatFields, Writer};
 use tracing_subscriber::fmt::{FmtContext, MakeWriter};
 use tracing_subscriber::registry::LookupSpan;
@@ -25,7 +26,8 @@ const LOG_EVERY: Duration = Duration::from_secs(15);
 const EVENT_EVERY: Duration = Duration::from_secs(3);
 
 static CONSOLE: OnceLock<Console> = OnceLock::new();
-static WARNINGS: AtomicU64 = AtomicU64::new(0);
+/// What is under way, by the id of its task.
+static TASKS: Mutex<BTreeMap<u64, Progress>> = Mutex::new(BTreeMap::new());
 
 /// For whom standard error is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -48,9 +50,9 @@ struct Console {
 /// the log is for a person.
 pub(crate) fn start(verbose: bool, quiet: bool, format: LogFormat) {
     let level = match (verbose, quiet) {
-        (true, _) => Level::DEBUG,
-        (_, true) => Level::WARN,
-        _ => Level::INFO,
+        (true, _) => LevelFilter::DEBUG,
+        (_, true) => LevelFilter::WARN,
+        _ => LevelFilter::INFO,
     };
     let json = format == LogFormat::Json;
     let terminal = io::stderr().is_terminal() && !json;
@@ -66,13 +68,8 @@ pub(crate) fn start(verbose: bool, quiet: bool, format: LogFormat) {
     if json { log.event_format(JsonLines).init() } else { log.init() }
 }
 
-/// How many warnings there were so far.
-pub(crate) fn warnings() -> u64 {
-    WARNINGS.load(Ordering::Relaxed)
-}
-
 /// Whether standard error is for a program.
-pub(crate) fn is_json() -> bool {
+fn is_json() -> bool {
     CONSOLE.get().is_some_and(|c| c.json)
 }
 
@@ -87,32 +84,117 @@ fn bars() -> Option<&'static MultiProgress> {
     CONSOLE.get()?.bars.as_ref()
 }
 
-/// An event as a line on standard error; those of work under way only if the caller did not ask for quiet.
-pub(crate) fn write_json(event: &Event<'_>) {
-    let essential = matches!(event, Event::Log { .. } | Event::Summary(_) | Event::Finished { .. });
-    if essential || !CONSOLE.get().is_some_and(|c| c.quiet) {
-        let _ = LineAboveBars.write(json_line(event).as_bytes());
+/// A line of JSON that no call of the library tells of.
+#[derive(Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Line<'a> {
+    /// The first: the command has begun.
+    Started {
+        version: &'a str,
+        /// The command line.
+        command: &'a [String],
+    },
+    /// What else is a log line.
+    Log {
+        /// `error`, `warning`, `info` or `debug`.
+        level: &'a str,
+        message: &'a str,
+    },
+    /// How far a piece of long work is.
+    Progress {
+        /// What is done: "rendering".
+        what: &'a str,
+        /// To what: "images".
+        unit: &'a str,
+        done: u64,
+        total: u64,
+        /// Units a second since it began.
+        rate: f64,
+        /// At that rate; null before the first is done.
+        seconds_left: Option<f64>,
+    },
+    /// The last: the command ends with this exit code.
+    Finished { exit_code: u8 },
+}
+
+/// The command with these words has begun.
+pub(crate) fn started(command: &[String]) {
+    write_json(&Line::Started { version: env!("CARGO_PKG_VERSION"), command }, false);
+}
+
+/// The command ends with this exit code.
+pub(crate) fn finished(exit_code: u8) {
+    write_json(&Line::Finished { exit_code }, true);
+}
+
+/// Tells of what happens during a call: as lines of JSON with `--log json`; else what a person wants to know of it is a log
+/// line or a bar.
+pub(crate) fn observe(event: &Event<'_>) {
+    match event {
+        Event::Message { level: Level::Warning, text } => warn!("{text}"),
+        Event::Message { level: Level::Info, text } => info!("{text}"),
+        Event::Message { text, .. } => debug!("{text}"),
+        Event::TaskStarted { task } => {
+            tasks().insert(task.id, Progress::new(task));
+        }
+        Event::TaskAdvanced { task, done } => {
+            if let Some(progress) = tasks().get_mut(&task.id) {
+                progress.advance(task, *done);
+            }
+        }
+        Event::TaskEnded { task } => {
+            // Its bar goes once nobody else waits for the lock.
+            let ended = tasks().remove(&task.id);
+            drop(ended);
+        }
+        Event::StageStarted { .. } => {}
+        event if is_json() => write_json(event, matches!(event, Event::Summary(_))),
+        Event::UnitFinished { unit, area, location, tally, seconds } => {
+            let location = location.map_or_else(String::new, |l| format!(" {l}"));
+            let UnitTally { files, bytes, .. } = tally;
+            debug!("area {area}: {unit}{location} done: {files} files, {bytes} bytes ({seconds:.1} s)");
+        }
+        Event::UnitsTaken { units, tally, seconds } => {
+            debug!("{units} units of an earlier run are whole: {} files ({seconds:.1} s)", tally.files);
+        }
+        Event::StageFinished { stage, area, seconds } => match area {
+            Some(area) => debug!("area {area}: {} done ({seconds:.1} s)", stage.name()),
+            None => debug!("{} done ({seconds:.1} s)", stage.name()),
+        },
+        Event::Summary(summary) => summary.lines().iter().for_each(|line| info!("{line}")),
+        _ => {}
     }
 }
 
-/// The event with the time of the process, and the end of the line.
-fn json_line(event: &Event<'_>) -> String {
+fn tasks() -> MutexGuard<'static, BTreeMap<u64, Progress>> {
+    TASKS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A line on standard error with `--log json`; one of work under way only if the caller did not ask for quiet.
+fn write_json(line: &impl Serialize, essential: bool) {
+    if is_json() && (essential || !CONSOLE.get().is_some_and(|c| c.quiet)) {
+        let _ = LineAboveBars.write(json_line(line).as_bytes());
+    }
+}
+
+/// The line with the time of the process, and its end.
+fn json_line(line: &impl Serialize) -> String {
     #[derive(Serialize)]
-    struct Line<'a> {
+    struct Timed<'a, T> {
         #[serde(flatten)]
-        event: &'a Event<'a>,
+        line: &'a T,
         at_seconds: f64,
     }
     let at_seconds = CONSOLE.get().map_or(0.0, |c| c.started.elapsed().as_secs_f64());
-    // Nothing in an event can fail to be JSON: keys are texts, and numbers that are none become null.
-    let mut line = serde_json::to_string(&Line { event, at_seconds: thousandths(at_seconds) })
+    // Nothing in a line can fail to be JSON: keys are texts, and numbers that are none become null.
+    let mut text = serde_json::to_string(&Timed { line, at_seconds: thousandths(at_seconds) })
         .unwrap_or_else(|_| String::from("{\"event\":\"unknown\"}"));
-    line.push('\n');
-    line
+    text.push('\n');
+    text
 }
 
 /// A number of seconds, rounded to what is worth telling.
-pub(crate) fn thousandths(seconds: f64) -> f64 {
+fn thousandths(seconds: f64) -> f64 {
     (1000.0 * seconds).round() / 1000.0
 }
 
@@ -133,12 +215,12 @@ where
         let mut message = Message(String::new());
         event.record(&mut message);
         let level = match *event.metadata().level() {
-            Level::ERROR => "error",
-            Level::WARN => "warning",
-            Level::INFO => "info",
+            tracing::Level::ERROR => "error",
+            tracing::Level::WARN => "warning",
+            tracing::Level::INFO => "info",
             _ => "debug",
         };
-        writer.write_str(&json_line(&Event::Log { level, message: &message.0 }))
+        writer.write_str(&json_line(&Line::Log { level, message: &message.0 }))
     }
 }
 
@@ -153,20 +235,13 @@ impl Visit for Message {
     }
 }
 
-/// Writes log lines to standard error, above any progress bar that is drawn there, and counts the warnings.
+/// Writes log lines to standard error, above any progress bar that is drawn there.
 struct AboveBars;
 
 impl MakeWriter<'_> for AboveBars {
     type Writer = LineAboveBars;
 
     fn make_writer(&self) -> LineAboveBars {
-        LineAboveBars
-    }
-
-    fn make_writer_for(&self, metadata: &Metadata<'_>) -> LineAboveBars {
-        if *metadata.level() == Level::WARN {
-            WARNINGS.fetch_add(1, Ordering::Relaxed);
-        }
         LineAboveBars
     }
 }
@@ -190,25 +265,18 @@ impl Write for LineAboveBars {
 }
 
 /// The progress of one piece of long work: a bar on a terminal, a log line now and then elsewhere.
-pub(crate) struct Progress {
-    what: &'static str,
-    unit: &'static str,
-    total: u64,
+struct Progress {
     bar: Option<ProgressBar>,
     started: Instant,
-    state: Mutex<State>,
-}
-
-struct State {
+    /// The most that was told.
     done: u64,
     said: Instant,
 }
 
 impl Progress {
-    /// Begins `total` units of work, named by what is done ("rendering") to what ("images").
-    pub(crate) fn new(what: &'static str, unit: &'static str, total: u64) -> Self {
+    fn new(task: &Task) -> Self {
         let bar = bars().map(|bars| {
-            let bar = bars.add(ProgressBar::new(total));
+            let bar = bars.add(ProgressBar::new(task.total));
             let template = "{prefix:>12} [{bar:40}] {human_pos}/{human_len} {msg}, {rate}, {eta} left";
             if let Ok(style) = ProgressStyle::with_template(template) {
                 let rate = |state: &ProgressState, out: &mut dyn fmt::Write| {
@@ -216,41 +284,36 @@ impl Progress {
                 };
                 bar.set_style(style.with_key("rate", rate).progress_chars("=> "));
             }
-            bar.set_prefix(what);
-            bar.set_message(unit);
+            bar.set_prefix(task.what);
+            bar.set_message(task.unit);
             bar.enable_steady_tick(Duration::from_millis(250));
             bar
         });
         let now = Instant::now();
-        Self { what, unit, total, bar, started: now, state: Mutex::new(State { done: 0, said: now }) }
+        Self { bar, started: now, done: 0, said: now }
     }
 
-    /// `n` more units are done.
-    pub(crate) fn add(&self, n: u64) {
+    /// So much of it is done. Threads tell in any order.
+    fn advance(&mut self, task: &Task, done: u64) {
+        self.done = self.done.max(done);
         if let Some(bar) = &self.bar {
-            return bar.inc(n);
+            return bar.set_position(self.done);
         }
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        state.done += n;
         let json = is_json();
-        let ended = state.done >= self.total;
-        let due = state.said.elapsed() >= if json { EVENT_EVERY } else { LOG_EVERY };
+        let ended = self.done >= task.total;
+        let due = self.said.elapsed() >= if json { EVENT_EVERY } else { LOG_EVERY };
         if if json { due || ended } else { due && !ended } {
-            state.said = Instant::now();
-            let rate = state.done as f64 / self.started.elapsed().as_secs_f64();
-            let left = self.total.saturating_sub(state.done) as f64 / rate;
+            self.said = Instant::now();
+            let rate = self.done as f64 / self.started.elapsed().as_secs_f64();
+            let left = task.total.saturating_sub(self.done) as f64 / rate;
+            let Task { what, unit, total, .. } = *task;
             if json {
-                emit(&Event::Progress {
-                    what: self.what,
-                    unit: self.unit,
-                    done: state.done,
-                    total: self.total,
-                    rate: thousandths(rate),
-                    seconds_left: left.is_finite().then(|| thousandths(left)),
-                });
+                let seconds_left = left.is_finite().then(|| thousandths(left));
+                let rate = thousandths(rate);
+                write_json(&Line::Progress { what, unit, done: self.done, total, rate, seconds_left }, false);
                 return;
             }
-            info!("{} {}/{} {}, {rate:.1}/s, {left:.0} s left", self.what, state.done, self.total, self.unit);
+            info!("{what} {}/{total} {unit}, {rate:.1}/s, {left:.0} s left", self.done);
         }
     }
 }

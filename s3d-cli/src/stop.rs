@@ -1,18 +1,17 @@
 //! Ending early in good order: SIGINT and SIGTERM stop the work at the next file, and the call can be made again.
 //!
-//! The first signal sets a flag, which long work looks at between files, chunks of points and instances
-//! ([`check`]). Where none looks at it within [`GRACE`] — inside one call of a library, such as the parsing of a large
+//! The first signal [cancels](Cancel) the call, whose work looks at that between files, chunks of points and instances. Where none looks at it within [`GRACE`] — inside one call of a library, such as the parsing of a large
 //! mesh — the process ends all the same, by [`watch`]: what is on the disk is whole at every moment, so that this loses no
 //! more than the piece of work at hand. A second signal kills at once, with the status of a process that the signal killed.
 
 use crate::console;
-use crate::event::{Event, emit};
-use crate::failure::{Failure, Outcome, TRY_AGAIN};
+use crate::failure::{Failure, TRY_AGAIN};
+use s3d_dataset::{Cancel, Error};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::{flag, low_level};
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 use tracing::{error, info, warn};
@@ -23,21 +22,22 @@ const GRACE: Duration = Duration::from_secs(5);
 /// How often [`watch`] looks.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-static REQUESTED: AtomicBool = AtomicBool::new(false);
+/// Set by the first signal.
+static REQUESTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 /// The signal that asked first or last.
-static SIGNAL: AtomicUsize = AtomicUsize::new(0);
+static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 /// Whether somebody has claimed to end the process. Locked while something is said of the end, so that the last word is
 /// the last.
 static ENDING: Mutex<bool> = Mutex::new(false);
 
-/// From now on SIGINT (Ctrl-C) and SIGTERM ask for an end instead of making it. For commands whose long work [`check`]s;
-/// others are better ended by the system.
+/// From now on SIGINT (Ctrl-C) and SIGTERM ask for an end instead of making it. For commands whose calls can be
+/// cancelled; others are better ended by the system.
 pub(crate) fn install() {
     for signal in [SIGINT, SIGTERM] {
         // The order matters: the first signal finds the flag unset, and sets it after that.
-        let installed = flag::register_conditional_default(signal, &REQUESTED)
-            .and_then(|_| flag::register_usize(signal, &SIGNAL, signal as usize))
-            .and_then(|_| flag::register(signal, &REQUESTED));
+        let installed = flag::register_conditional_default(signal, Arc::clone(&REQUESTED))
+            .and_then(|_| flag::register_usize(signal, Arc::clone(&SIGNAL), signal as usize))
+            .and_then(|_| flag::register(signal, Arc::clone(&REQUESTED)));
         if let Err(e) = installed {
             warn!("{} will end the command at once: {e}", name(signal));
         }
@@ -48,17 +48,18 @@ pub(crate) fn install() {
 }
 
 /// Whether a signal has asked for an end.
-pub(crate) fn requested() -> bool {
+fn requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)
 }
 
-/// Between two pieces of work: an error that ends the command if a signal has asked for it.
-pub(crate) fn check() -> Outcome<()> {
-    if requested() { Err(stopped()) } else { Ok(()) }
+/// What ends calls when a signal asks for it.
+pub(crate) fn cancel() -> Cancel {
+    Cancel::from(Arc::clone(&REQUESTED))
 }
 
-fn stopped() -> Failure {
-    Failure::Again(format!("stopped by {}", name(SIGNAL.load(Ordering::Relaxed) as i32)))
+/// The signal that asked for an end.
+pub(crate) fn signal_name() -> &'static str {
+    name(SIGNAL.load(Ordering::Relaxed) as i32)
 }
 
 fn name(signal: i32) -> &'static str {
@@ -83,8 +84,8 @@ fn watch() {
     thread::sleep(GRACE);
     if claim_end() {
         console::clear();
-        error!("{}", stopped());
-        emit(&Event::Finished { exit_code: TRY_AGAIN });
+        error!("{}", Failure::from(Error::Cancelled));
+        console::finished(TRY_AGAIN);
         process::exit(i32::from(TRY_AGAIN));
     }
 }

@@ -1,12 +1,12 @@
 //! `s3d demo`: the built-in scene, written as ordinary input files and exported like any other.
 
 use super::on_threads;
-use crate::args::{DemoArgs, ExportOptions, FormatOptions};
-use crate::failure::{Failure, Outcome};
-use crate::pipeline::{Target, export, output};
-use crate::stop;
-use s3d_io::{Domain, Error, Layout};
-use s3d_sample::Pool;
+use crate::args::Threads;
+use crate::failure::Outcome;
+use crate::values::{even_width, parsed, positive};
+use clap::{Args, value_parser};
+use s3d_dataset::{Cancel, Error, Export, ExportOptions, Result};
+use s3d_io::{Compression, Error as FileError, Layout};
 use s3d_synth::{Building, ScanError, ScanOptions, is_demo_scan};
 use std::fs;
 use std::io;
@@ -19,83 +19,112 @@ const SCAN: &str = "scan";
 /// The same while they are written.
 const SCAN_PART: &str = ".s3d-scan.part";
 
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// The folder to make; the scene's own files come to OUT/scan.
+    #[arg(short, long, value_name = "OUT", default_value = "s3d-demo")]
+    pub(crate) output: PathBuf,
+    /// Replace an earlier data set in OUT.
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    #[command(flatten)]
+    pub(crate) options: SizeArgs,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+/// The demo's options are the export's, at a reduced size.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SizeArgs {
+    /// Candidate views a scan location.
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = value_parser!(u32).range(0..=100_000))]
+    pub(crate) views: u32,
+    /// Width and height of a view in pixels.
+    #[arg(long, value_name = "PX", default_value_t = 540, value_parser = value_parser!(u32).range(8..=16_384))]
+    pub(crate) size: u32,
+    /// Width of a panorama in pixels, even; it is half as high.
+    #[arg(long, value_name = "PX", default_value_t = 2048, value_parser = even_width)]
+    pub(crate) pano_width: u32,
+    /// Everything random comes from it.
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Density of the point cloud.
+    #[arg(long, value_name = "N", default_value_t = 2500.0, value_parser = positive)]
+    pub(crate) points_per_m2: f64,
+    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make them) or small
+    /// (slowest). The pixels are the same.
+    #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
+    pub(crate) compression: Compression,
+}
+
 pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
-    let layout = Layout::new(args.output.clone());
-    output::check(&layout, args.overwrite, &[SCAN, SCAN_PART])?;
-    let o = args.options;
+    let SizeArgs { views, size, pano_width, seed, points_per_m2, compression } = args.options;
     let options = ExportOptions {
-        views: o.views,
-        size: o.size,
-        pano_width: o.pano_width,
-        seed: o.seed,
-        pool: Pool::Dataset,
-        points_per_m2: o.points_per_m2,
-        place_cameras: None,
-        entropy_stride: 4,
-        modalities: Domain::ALL.to_vec(),
-        keep_all: false,
-        only: Vec::new(),
-        smooth_normals: false,
-        lenient: false,
-        compression: o.compression,
-        format: FormatOptions::default(),
+        views,
+        size,
+        pano_width,
+        seed,
+        points_per_m2,
+        compression,
+        ..ExportOptions::default()
     };
-    let scan = args.output.join(SCAN);
-    if scan.exists() && !is_demo_scan(&scan) {
-        return Err(Failure::Call(format!(
-            "{} is there and is not the built-in scene: choose another folder",
-            scan.display()
-        )));
-    }
-    on_threads(args.threads, || {
-        let part = args.output.join(SCAN_PART);
+    let output = args.output;
+    let scan = output.join(SCAN);
+    let export = Export::new([scan.join("scene.toml")])
+        .options(options)
+        .overwrite(args.overwrite)
+        .allow(SCAN)
+        .allow(SCAN_PART);
+    on_threads(args.threads, |context| {
+        export.check_output(&output, context)?;
+        if scan.exists() && !is_demo_scan(&scan) {
+            return Err(Error::Usage(format!(
+                "{} is there and is not the built-in scene: choose another folder",
+                scan.display()
+            )));
+        }
+        let part = output.join(SCAN_PART);
         remove(&part)?;
-        let written = write_scan(&part)?;
-        put(&part, &scan, args.overwrite)?;
-        let scene = scan.join(written.file_name().unwrap_or_default());
+        write_scan(&part, &context.cancel)?;
+        put(&part, &scan, args.overwrite, &context.cancel)?;
         info!("the built-in scene is in {}", scan.display());
-        let target = Target { layout: layout.clone(), overwrite: args.overwrite, allowed: &[SCAN] };
-        export(&[scene], &target, &options, None)?;
-        info!(
-            "look at {} and {}",
-            layout.area_dir(1).join("pano").display(),
-            layout.statistics_md().display()
-        );
+        export.run(&output, context)?;
+        let layout = Layout::new(output);
+        let (pano, tables) = (layout.area_dir(1).join("pano"), layout.statistics_md());
+        info!("look at {} and {}", pano.display(), tables.display());
         Ok(())
     })
 }
 
-fn write_scan(folder: &Path) -> Outcome<PathBuf> {
-    let scene = Building::demo().build().map_err(|e| Failure::Input(e.to_string()))?;
-    match scene.write_scan(folder, &ScanOptions::default(), || !stop::requested()) {
-        Ok(scene) => Ok(scene),
-        Err(ScanError::File(e)) => Err(e.into()),
-        Err(e) => {
-            stop::check()?;
-            Err(Failure::Input(e.to_string()))
-        }
-    }
+fn write_scan(folder: &Path, cancel: &Cancel) -> Result<PathBuf> {
+    let scene = Building::demo().build().map_err(|e| Error::Input(e.to_string()))?;
+    scene.write_scan(folder, &ScanOptions::default(), || !cancel.is_cancelled()).map_err(|e| match e {
+        ScanError::File(e) => e.into(),
+        ScanError::Cancelled => Error::Cancelled,
+        other => Error::Input(other.to_string()),
+    })
 }
 
 /// Gives the scene its place. One that is there already, of a demo that was stopped, may stay if it is the same to the
 /// byte: somebody may have changed it since.
-fn put(part: &Path, scan: &Path, overwrite: bool) -> Outcome<()> {
+fn put(part: &Path, scan: &Path, overwrite: bool, cancel: &Cancel) -> Result<()> {
     if scan.exists() {
-        if same(part, scan).map_err(|e| Error::io(scan, "read", e))? {
+        if same(part, scan).map_err(|e| FileError::io(scan, "read", e))? {
             return remove(part);
         }
         if !overwrite {
             remove(part)?;
-            return Err(Failure::Call(format!(
+            return Err(Error::Usage(format!(
                 "{} is there and differs from the built-in scene: choose another folder, or replace it with --overwrite",
                 scan.display()
             )));
         }
         // Whatever else is in it stays.
         remove(part)?;
-        return write_scan(scan).map(drop);
+        write_scan(scan, cancel)?;
+        return Ok(());
     }
-    Ok(fs::rename(part, scan).map_err(|e| Error::io(scan, "move the scene to", e))?)
+    Ok(fs::rename(part, scan).map_err(|e| FileError::io(scan, "move the scene to", e))?)
 }
 
 /// Whether every file and folder of `a` is in `b` with the same bytes.
@@ -112,9 +141,9 @@ fn same(a: &Path, b: &Path) -> io::Result<bool> {
     Ok(true)
 }
 
-fn remove(folder: &Path) -> Outcome<()> {
+fn remove(folder: &Path) -> Result<()> {
     match fs::remove_dir_all(folder) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(Error::io(folder, "remove", e).into()),
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(FileError::io(folder, "remove", e).into()),
         _ => Ok(()),
     }
 }

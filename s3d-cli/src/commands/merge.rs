@@ -1,12 +1,28 @@
 //! `s3d merge`: shards to one data set.
 
 use super::on_threads;
-use crate::args::MergeArgs;
+use crate::args::Threads;
 use crate::failure::Outcome;
-use crate::pipeline::{Target, merge};
-use s3d_io::Layout;
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(crate) struct MergeArgs {
+    /// The folders that shards of the same export wrote into, in any order; OUT may be one of them.
+    #[arg(required = true, value_name = "SHARD")]
+    pub(crate) shards: Vec<PathBuf>,
+    /// The data set's folder.
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Write into an OUT that holds something: an earlier data set there is replaced, other files stay.
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
 
 pub(crate) fn run(args: MergeArgs) -> Outcome<()> {
-    let target = Target { layout: Layout::new(args.output), overwrite: args.overwrite, allowed: &[] };
-    on_threads(args.threads, || merge(&args.shards, &target))
+    on_threads(args.threads, |context| {
+        s3d_dataset::merge(&args.shards, args.output, args.overwrite, context).map(drop)
+    })
 }

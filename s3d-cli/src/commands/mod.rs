@@ -1,4 +1,4 @@
-//! One file a subcommand.
+//! One file a subcommand: its words, and the call that they mean.
 
 pub(crate) mod demo;
 pub(crate) mod export;
@@ -14,21 +14,21 @@ pub(crate) mod verify;
 pub(crate) mod xyz;
 
 use crate::args::Threads;
-use crate::failure::{Failure, Outcome, passes};
-use s3d_io::Error;
-use std::io::{ErrorKind, Write, stdout};
-use std::path::Path;
+use crate::console;
+use crate::failure::Outcome;
+use crate::stop;
+use s3d_dataset::{Context, Error, Result};
+use s3d_io::Error as FileError;
+use std::io::{self, ErrorKind, Write, stdout};
 
-/// Runs `work` on a pool of the threads asked for.
-fn on_threads<T: Send>(threads: Threads, work: impl FnOnce() -> Outcome<T> + Send) -> Outcome<T> {
+/// Makes a call on a pool of the threads asked for. It tells the console, and a signal cancels it.
+fn on_threads<T: Send>(threads: Threads, call: impl FnOnce(&Context) -> Result<T> + Send) -> Outcome<T> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.threads.map_or(0, usize::from))
         .build()
-        .map_err(|e| {
-            let message = format!("cannot start threads: {e}");
-            if passes(&e) { Failure::Again(message) } else { Failure::Input(message) }
-        })?;
-    pool.install(work)
+        .map_err(|e| FileError::io("threads".as_ref(), "start", io::Error::other(e)))?;
+    let context = Context::default().cancelled_by(stop::cancel()).observed_by(console::observe);
+    Ok(pool.install(|| call(&context))?)
 }
 
 /// Writes the answer of a command to standard output.
@@ -36,19 +36,8 @@ fn print(text: &str) -> Outcome<()> {
     match stdout().write_all(text.as_bytes()) {
         // Whoever reads may stop early: `s3d stats OUT | head`.
         Err(e) if e.kind() != ErrorKind::BrokenPipe => {
-            Err(Error::io("standard output".as_ref(), "write", e).into())
+            Err(Error::from(FileError::io("standard output".as_ref(), "write", e)).into())
         }
         _ => Ok(()),
-    }
-}
-
-/// Refuses to replace a file unless that was asked for.
-pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Outcome<()> {
-    match path.try_exists() {
-        Ok(true) if !overwrite => {
-            Err(Failure::Call(format!("{} is there already: replace it with --overwrite", path.display())))
-        }
-        Ok(_) => Ok(()),
-        Err(e) => Err(Error::io(path, "look for", e).into()),
     }
 }

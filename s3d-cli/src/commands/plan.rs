@@ -1,13 +1,57 @@
 //! `s3d plan`: labels and scores, for the shards of an export.
 
 use super::on_threads;
-use crate::args::PlanArgs;
+use crate::args::Threads;
 use crate::failure::Outcome;
-use crate::pipeline::deal::Shard;
-use crate::pipeline::plan::make;
+use crate::values::{parsed, positive};
+use clap::{Args, value_parser};
+use s3d_dataset::{ExportOptions, Shard};
+use std::path::PathBuf;
 
-pub(crate) fn run(args: &PlanArgs) -> Outcome<()> {
-    let options = args.export_options();
-    let shard = args.shard.unwrap_or(Shard::ALL);
-    on_threads(args.threads, || make(&args.scenes, &args.output, &options, shard))
+#[derive(Debug, Args)]
+pub(crate) struct PlanArgs {
+    /// Scene files, or folders of published areas, one an area.
+    #[arg(required = true, value_name = "SCENE.toml")]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// The plan's folder; called again, what is missing in it is made.
+    #[arg(short, long, value_name = "PLAN")]
+    pub(crate) output: PathBuf,
+    /// Make the first, second, ... of N parts of the plan; the parts may be made anywhere, in any order.
+    #[arg(long, value_name = "i/N", value_parser = parsed::<Shard>)]
+    pub(crate) shard: Option<Shard>,
+    /// Candidate views a scan location.
+    #[arg(long, value_name = "N", default_value_t = 72, value_parser = value_parser!(u32).range(0..=100_000))]
+    views: u32,
+    /// Width and height of a view in pixels.
+    #[arg(long, value_name = "PX", default_value_t = 1080, value_parser = value_parser!(u32).range(8..=16_384))]
+    size: u32,
+    /// Everything random comes from it.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Put scan locations on the floor of every room, no two of a room nearer than this.
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    place_cameras: Option<f64>,
+    /// Count the classes of a candidate view on every Nth pixel of both axes.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = value_parser!(u32).range(1..=64))]
+    entropy_stride: u32,
+    /// Skip and count what is not as it should be in the annotations.
+    #[arg(long)]
+    lenient: bool,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+pub(crate) fn run(args: PlanArgs) -> Outcome<()> {
+    let options = ExportOptions {
+        views: args.views,
+        size: args.size,
+        seed: args.seed,
+        place_cameras: args.place_cameras,
+        entropy_stride: args.entropy_stride,
+        lenient: args.lenient,
+        ..ExportOptions::default()
+    };
+    on_threads(args.threads, |context| {
+        s3d_dataset::plan(&args.scenes, &args.output, &options, args.shard, context)
+    })
 }

@@ -1,14 +1,17 @@
 //! `s3d stats`: the tables of statistics of a data set, counted from its files.
 
 use super::print;
-use crate::args::StatsArgs;
 use crate::failure::Outcome;
-use crate::pipeline::manifest::Head;
-use crate::pipeline::statistics::Statistics;
-use s3d_io::Layout;
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(crate) struct StatsArgs {
+    /// The data set's folder.
+    #[arg(value_name = "OUT")]
+    pub(crate) output: PathBuf,
+}
 
 pub(crate) fn run(args: &StatsArgs) -> Outcome<()> {
-    let layout = Layout::new(args.output.clone());
-    let head = Head::require(&layout)?;
-    print(&Statistics::count(&layout, &head.area_numbers)?.to_markdown())
+    print(&s3d_dataset::statistics(&args.output)?.to_markdown())
 }

@@ -1,27 +1,34 @@
 //! `s3d verify`: whether a data set is what its manifest and its own files say.
 
 use super::{on_threads, print};
-use crate::args::VerifyArgs;
+use crate::args::Threads;
 use crate::failure::{Failure, Outcome};
-use crate::verify::verify;
-use s3d_io::Layout;
+use clap::Args;
+use s3d_dataset::{Error, VerifyOptions};
+use std::path::PathBuf;
 
-pub(crate) fn run(args: &VerifyArgs) -> Outcome<()> {
-    let layout = Layout::new(args.output.clone());
-    if !layout.manifest().is_file() {
-        return Err(Failure::Call(format!(
-            "{}: no data set is there (no manifest.json): give the folder of one",
-            layout.root().display()
-        )));
-    }
-    let report = on_threads(args.threads, || verify(&layout, args.full))?;
-    print(&report.text())?;
-    if let Some(why) = report.again() {
-        return Err(Failure::Again(why));
-    }
-    match report.faults() {
-        0 => Ok(()),
-        1 => Err(Failure::Input(format!("{}: 1 fault", layout.root().display()))),
-        n => Err(Failure::Input(format!("{}: {n} faults", layout.root().display()))),
+#[derive(Debug, Args)]
+pub(crate) struct VerifyArgs {
+    /// The data set's folder.
+    #[arg(value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point cloud. Every
+    /// pixel of every image is compared in either case.
+    #[arg(long)]
+    pub(crate) full: bool,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+pub(crate) fn run(args: VerifyArgs) -> Outcome<()> {
+    let options = VerifyOptions { full: args.full };
+    let report = on_threads(args.threads, |context| s3d_dataset::verify(&args.output, &options, context))?;
+    print(&report.to_string())?;
+    let root = args.output.display();
+    match (report.unread.clone(), report.fault_count()) {
+        (Some(why), _) => Err(Error::Temporary(why).into()),
+        (None, 0) => Ok(()),
+        (None, 1) => Err(Failure::Answer(format!("{root}: 1 fault"))),
+        (None, n) => Err(Failure::Answer(format!("{root}: {n} faults"))),
     }
 }

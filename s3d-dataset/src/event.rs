@@ -1,0 +1,159 @@
+//! What an observer is told while a call runs.
+
+use crate::context::Task;
+use crate::tables::summary::{Summary, UnitTally};
+use serde::Serialize;
+use std::fmt;
+
+/// One thing that happened.
+#[derive(Clone, Debug, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Event<'a> {
+    /// A sentence for a person.
+    #[serde(skip)]
+    Message {
+        /// How much it matters.
+        level: Level,
+        /// The sentence, in English.
+        text: &'a str,
+    },
+    /// Long work whose end can be foreseen begins.
+    #[serde(skip)]
+    TaskStarted {
+        /// What it is.
+        task: Task,
+    },
+    /// More of it is done.
+    #[serde(skip)]
+    TaskAdvanced {
+        /// What it is.
+        task: Task,
+        /// Units done so far. Threads may tell out of order.
+        done: u64,
+    },
+    /// It has ended, done or not.
+    #[serde(skip)]
+    TaskEnded {
+        /// What it is.
+        task: Task,
+    },
+    /// A unit of work is done and on the disk: what is done again if everything stops now is the rest.
+    UnitFinished {
+        /// Its kind.
+        unit: UnitKind,
+        /// The number of its area.
+        area: u32,
+        /// The camera's uuid, if the unit is a scan location.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        location: Option<&'a str>,
+        /// What it wrote.
+        #[serde(flatten)]
+        tally: &'a UnitTally,
+        /// How long it took.
+        seconds: f64,
+    },
+    /// Units that an earlier run finished were found to be whole.
+    UnitsTaken {
+        /// How many.
+        units: u64,
+        /// What they had written.
+        #[serde(flatten)]
+        tally: &'a UnitTally,
+        /// How long the check took.
+        seconds: f64,
+    },
+    /// A stage of a call begins.
+    #[serde(skip)]
+    StageStarted {
+        /// Which.
+        stage: Stage,
+        /// The area that goes through it; `None` if all do together.
+        area: Option<u32>,
+    },
+    /// A stage of a call is done. A stage that several areas go through comes once for each.
+    StageFinished {
+        /// Which.
+        stage: Stage,
+        /// The area that went through it; `None` if all did together.
+        area: Option<u32>,
+        /// How long it took.
+        seconds: f64,
+    },
+    /// What an export has made.
+    Summary(&'a Summary),
+}
+
+/// How much a message matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Something may be wrong with the input or the result.
+    Warning,
+    /// What a person wants to know.
+    Info,
+    /// Details.
+    Debug,
+}
+
+/// A kind of a unit of work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum UnitKind {
+    /// The labels of an area: instances, rooms, votes.
+    Labels,
+    /// All images of a scan location.
+    Location,
+    /// The meshes and points of an area.
+    #[serde(rename = "rest")]
+    Assets,
+}
+
+/// A stage of an export. Meshes and points are written beside the images, by one of the threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Stage {
+    /// Inputs are read and checked.
+    Load,
+    /// Points vote for faces.
+    Label,
+    /// Candidate views are drawn and scored.
+    Score,
+    /// Images are rendered and written.
+    Render,
+    /// Meshes are written.
+    Meshes,
+    /// Points are sampled and written.
+    Points,
+    /// Of shards: their files come into one folder.
+    Merge,
+    /// What is made of all areas together.
+    Tables,
+}
+
+impl Stage {
+    /// Its name in logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Load => "load",
+            Self::Label => "label",
+            Self::Score => "score",
+            Self::Render => "render",
+            Self::Meshes => "meshes",
+            Self::Points => "points",
+            Self::Merge => "merge",
+            Self::Tables => "tables",
+        }
+    }
+}
+
+impl fmt::Display for UnitKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Labels => "labels",
+            Self::Location => "location",
+            Self::Assets => "rest",
+        })
+    }
+}

@@ -1,0 +1,489 @@
+//! One area of an export: labelled, scored, rendered, with its meshes and points.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::event::{Stage as Step, UnitKind};
+use crate::export::annotate::{Annotated, annotate, hidden_instances, label_doubts};
+use crate::export::area_plan::{AreaPlan, RoomNames};
+use crate::export::images::{ImageJob, WrittenLocation, write_images};
+use crate::export::inputs::{AreaInput, Cameras};
+use crate::export::location::{Outlook, room_of};
+use crate::export::modality::Look;
+use crate::export::overlap::overlap_doubts;
+use crate::export::pictures::Pictures;
+use crate::export::points::write_points;
+use crate::export::views::{Candidate, Scoring, score_area};
+use crate::options::ExportOptions;
+use crate::place::{Ground, Located, Placement, place_locations};
+use crate::shard::plan::Plan;
+use crate::store::journal::{Done, Journal, LabelsDone, LocationDone, RestDone, ScoresDone, Unit, tally_of};
+use crate::tables::listing;
+use crate::tables::manifest::{AreaEntry, XyzLoss};
+use crate::tables::records;
+use crate::tables::summary::Account;
+use rayon::prelude::*;
+use s3d_geom::{Density, NearestFaces};
+use s3d_io::{
+    Compression, Content, FileRecord, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation,
+    TextureOut, create_dir, encode_rgb8,
+};
+use s3d_label::{LabelTable, Room};
+use s3d_render::{MipMaps, Scene};
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What all areas share.
+#[derive(Clone, Copy)]
+pub(crate) struct Common<'a> {
+    pub(crate) table: &'a LabelTable,
+    pub(crate) layout: &'a Layout,
+    pub(crate) options: &'a ExportOptions,
+    pub(crate) journal: &'a Journal,
+    pub(crate) account: &'a Account<'a>,
+    /// Where labelled areas are kept, a folder each.
+    pub(crate) cache: &'a Path,
+    /// Which units this process writes.
+    pub(crate) is_ours: &'a (dyn Fn(&Unit) -> bool + Sync),
+}
+
+impl Common<'_> {
+    /// The folder of a labelled area.
+    fn cache_of(&self, area: u32) -> PathBuf {
+        self.cache.join(format!("area_{area}"))
+    }
+}
+
+/// With more faces than this, what is only needed while two hierarchies are built, 200 bytes a face each, should not be in
+/// memory twice.
+const LARGE_MESH: usize = 2_000_000;
+
+/// A mesh that is ready for rays.
+pub(crate) struct Stage<'m> {
+    file: &'m MeshFile,
+    scene: Scene<'m>,
+}
+
+impl<'m> Stage<'m> {
+    /// Prepares the mesh, and its nearest faces (at the same time, unless it is large), which are needed for its labels only.
+    pub(crate) fn new(file: &'m MeshFile) -> (Self, NearestFaces<'m>) {
+        let (scene, nearest) = match file.mesh.faces().len() {
+            0..=LARGE_MESH => rayon::join(|| Scene::new(&file.mesh), || NearestFaces::new(&file.mesh)),
+            _ => (Scene::new(&file.mesh), NearestFaces::new(&file.mesh)),
+        };
+        (Self { file, scene }, nearest)
+    }
+
+    /// Prepares the mesh, with its nearest faces if they are needed.
+    pub(crate) fn prepare(file: &'m MeshFile, with_nearest: bool) -> (Self, Option<NearestFaces<'m>>) {
+        if !with_nearest {
+            return (Self::for_rays(file), None);
+        }
+        let (stage, nearest) = Self::new(file);
+        (stage, Some(nearest))
+    }
+
+    /// The mesh's nearest faces.
+    pub(crate) fn nearest(&self) -> NearestFaces<'m> {
+        NearestFaces::new(&self.file.mesh)
+    }
+
+    /// Prepares the mesh for rays alone.
+    pub(crate) fn for_rays(file: &'m MeshFile) -> Self {
+        Self { file, scene: Scene::new(&file.mesh) }
+    }
+}
+
+/// An area's scan locations, each with its room: those that are listed, or some that are placed.
+pub(crate) fn locate(
+    ctx: &Context,
+    area: &AreaInput,
+    scene: &Scene<'_>,
+    nearest: &NearestFaces<'_>,
+    annotated: &Annotated,
+    table: &LabelTable,
+    seed: u64,
+) -> Result<Located> {
+    match &area.cameras {
+        Cameras::Listed(locations, rooms) => {
+            let is_known = |room: &Room| annotated.rooms.iter().any(|r| r.room == *room);
+            let room = |l: &ScanLocation, told: Option<Room>| {
+                told.filter(is_known).unwrap_or_else(|| room_of(&annotated.rooms, l.pose.location))
+            };
+            Ok(locations.iter().zip(rooms).map(|(l, told)| (l.clone(), room(l, *told))).collect())
+        }
+        Cameras::Placed(distance_m) => {
+            let ground = Ground {
+                area: area.number,
+                scene,
+                nearest,
+                face_labels: &annotated.face_labels,
+                table,
+                rooms: &annotated.rooms,
+            };
+            let (placed, warnings) = place_locations(&ground, Placement { distance_m: *distance_m, seed })?;
+            warnings.iter().for_each(|w| ctx.warn(w));
+            ctx.info(format_args!("area {}: {} scan locations placed", area.number, placed.len()));
+            Ok(placed)
+        }
+    }
+}
+
+/// The files of an area's labels.
+fn label_files(layout: &Layout, area: u32) -> [PathBuf; 5] {
+    [
+        layout.instances_json(area),
+        layout.instances_npz(area),
+        layout.rooms_json(area),
+        layout.votes_json(area),
+        layout.instance_numbers_json(area),
+    ]
+}
+
+/// An area that was labelled before, if it can be taken as it is: not where the files of its labels are still to be written.
+pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<AreaPlan> {
+    let ctx = common.account.ctx;
+    let unit = Unit::Labels(area);
+    let folder = common.cache_of(area);
+    let writes = (common.is_ours)(&unit) && !common.journal.finished().has(&unit);
+    if writes || !AreaPlan::is_in(&folder) {
+        return None;
+    }
+    match AreaPlan::read(&folder, area) {
+        Ok(plan) => Some(plan),
+        Err(e) => {
+            ctx.warn(format_args!("{e}; the area is labelled again"));
+            None
+        }
+    }
+}
+
+/// Labels an area, keeps what is known then, and writes the files of its labels, if that is ours and was not done before.
+pub(crate) fn label_area(
+    area: &AreaInput,
+    stage: &Stage<'_>,
+    nearest: NearestFaces<'_>,
+    common: Common<'_>,
+) -> Result<AreaPlan> {
+    let ctx = common.account.ctx;
+    let Common { table, layout, options, journal, account, is_ours, .. } = common;
+    let number = area.number;
+    let Stage { file, scene } = stage;
+
+    let labelling = account.stage(Step::Label, Some(number));
+    let started = Instant::now();
+    let unit = Unit::Labels(number);
+    let writes = !journal.finished().has(&unit) && is_ours(&unit);
+    let paths = label_files(layout, number);
+    let [json, npz, ..] = &paths;
+    let mut instances = None;
+    if writes {
+        create_dir(&layout.mesh_dir(number))?;
+        instances = Some(InstanceWriter::create(json, npz)?);
+    }
+    let annotated = annotate(ctx, area, &nearest, table, |i| {
+        let Some(instances) = &mut instances else { return Ok(()) };
+        let record = InstanceRecord {
+            label: &i.label.to_string(),
+            label_index: i.id.0,
+            class: i.label.class.name(),
+            room: &i.label.room.to_string(),
+            bbox: i.bbox,
+        };
+        Ok(instances.push(&record, i.points)?)
+    })?;
+    tell_labels(ctx, &annotated, started);
+    if let Some(w) = annotated.skipped.sentence() {
+        ctx.warn(w);
+    }
+    if let Some(w) = hidden_instances(area, &annotated.face_labels, table) {
+        ctx.warn(w);
+    }
+    overlap_doubts(&annotated.rooms).iter().for_each(|w| ctx.warn(w));
+    let located = locate(ctx, area, scene, &nearest, &annotated, table, options.seed)?;
+    drop(nearest);
+    let (locations, location_rooms): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();
+    let plan = AreaPlan {
+        area: number,
+        annotated,
+        names: RoomNames::of(&area.rooms),
+        locations,
+        location_rooms,
+        mesh_box: file.mesh.aabb(),
+        mesh_area_m2: file.mesh.total_area(),
+        faces_left_out: file.mesh.report().zero_area_faces + file.repeated_faces,
+    };
+    let write = || -> Result<()> {
+        plan.write(&common.cache_of(number))?;
+        let Some(instances) = instances else { return Ok(()) };
+        instances.finish()?;
+        records::write_rooms(layout, number, &plan.annotated)?;
+        records::write_votes(layout, number, &plan.annotated.report)?;
+        records::write_instance_numbers(layout, number, &plan.names)?;
+        let files = listing::records(ctx, layout, &paths)?;
+        let tally = tally_of(&files);
+        journal.write(Done::Labels(labels_done(area, &plan, options, files)))?;
+        account.unit_finished(UnitKind::Labels, number, None, &tally, started);
+        Ok(())
+    };
+    let (doubts, written) = rayon::join(|| location_doubts(ctx, scene, &plan.locations), write);
+    doubts?.iter().for_each(|w| ctx.warn(w));
+    written?;
+    know_labels(area, &plan, &common);
+    labelling.end();
+    Ok(plan)
+}
+
+/// What looks wrong about scan locations, as a sentence each.
+fn location_doubts(ctx: &Context, scene: &Scene<'_>, locations: &[ScanLocation]) -> Result<Vec<String>> {
+    let doubts = locations.par_iter().map(|location| -> Result<Vec<String>> {
+        ctx.check()?;
+        Ok(Outlook::of(scene, location).warnings(location))
+    });
+    Ok(doubts.collect::<Result<Vec<_>>>()?.concat())
+}
+
+/// Tells the journal of an area's labels, if it does not know of them: their files are another's work.
+pub(crate) fn know_labels(area: &AreaInput, plan: &AreaPlan, common: &Common<'_>) {
+    if !common.journal.finished().has(&Unit::Labels(area.number)) {
+        common.journal.know(Done::Labels(labels_done(area, plan, common.options, Vec::new())));
+    }
+}
+
+/// Takes an area's labels and scores from a plan: their files if they are ours, and the scores that are.
+pub(crate) fn take_from_plan(area: &AreaInput, from: &Plan, common: &Common<'_>) -> Result<AreaPlan> {
+    let Common { layout, options, journal, account, is_ours, .. } = *common;
+    let started = Instant::now();
+    let number = area.number;
+    let plan = from.area(number)?;
+    let unit = Unit::Labels(number);
+    if !journal.finished().has(&unit) && is_ours(&unit) {
+        let files = from.bring_labels(number, layout)?;
+        let tally = tally_of(&files);
+        journal.write(Done::Labels(labels_done(area, &plan, options, files)))?;
+        account.unit_finished(UnitKind::Labels, number, None, &tally, started);
+    }
+    know_labels(area, &plan, common);
+    for location in &plan.locations {
+        let unit = Unit::Scores(number, location.uuid.clone());
+        if journal.finished().has(&unit) {
+            continue;
+        }
+        let scores = from.scores(number, &location.uuid)?;
+        if is_ours(&unit) { journal.write(scores)? } else { journal.know(scores) }
+    }
+    Ok(plan)
+}
+
+fn labels_done(
+    area: &AreaInput,
+    plan: &AreaPlan,
+    options: &ExportOptions,
+    files: Vec<FileRecord>,
+) -> LabelsDone {
+    let locations = plan.locations.iter().map(|l| l.uuid.clone()).collect();
+    LabelsDone { entry: area_entry(area, plan, options), locations, files }
+}
+
+/// The locations of an area whose candidates are ours to score and are not scored yet.
+fn unscored<'p>(plan: &'p AreaPlan, common: &Common<'_>) -> Vec<&'p ScanLocation> {
+    let unit = |l: &ScanLocation| Unit::Scores(plan.area, l.uuid.clone());
+    let mut todo: Vec<&ScanLocation> = {
+        let finished = common.journal.finished();
+        plan.locations.iter().filter(|l| !finished.has(&unit(l))).collect()
+    };
+    // Whose they are may depend on the journal itself, which must not be held then.
+    todo.retain(|l| (common.is_ours)(&unit(l)));
+    todo
+}
+
+/// Whether something of an area is still to be scored.
+pub(crate) fn is_unscored(plan: &AreaPlan, common: &Common<'_>) -> bool {
+    !unscored(plan, common).is_empty()
+}
+
+/// Scores the candidates of those locations of an area that are ours and not scored yet.
+pub(crate) fn score(plan: &AreaPlan, stage: &Stage<'_>, common: Common<'_>) -> Result<()> {
+    let ctx = common.account.ctx;
+    let Common { table, options, journal, account, .. } = common;
+    let number = plan.area;
+    check_faces(plan, stage)?;
+    let missing = unscored(plan, &common);
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let step = account.stage(Step::Score, Some(number));
+    let scoring = Scoring {
+        views: options.views,
+        size: options.size,
+        stride: options.entropy_stride,
+        seed: options.seed,
+    };
+    let (labels, scene) = (&plan.annotated.face_labels, &stage.scene);
+    score_area(ctx, number, &missing, scene, labels, table, scoring, |uuid, entropies| {
+        journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))
+    })?;
+    step.end();
+    ctx.debug(format_args!("area {number}: {} of {} locations scored", missing.len(), plan.locations.len()));
+    Ok(())
+}
+
+/// Refuses labels of another mesh.
+fn check_faces(plan: &AreaPlan, stage: &Stage<'_>) -> Result<()> {
+    let (labels, faces) = (plan.annotated.face_labels.len(), stage.file.mesh.faces().len());
+    if labels == faces {
+        return Ok(());
+    }
+    Err(Error::Input(format!("area {}: {labels} faces are labelled, and the mesh has {faces}", plan.area)))
+}
+
+/// What the manifest tells of an area that is labelled.
+fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> AreaEntry {
+    AreaEntry {
+        area: area.number,
+        faces: plan.annotated.face_labels.len(),
+        faces_left_out: plan.faces_left_out,
+        points: 0,
+        annotated_points: plan.annotated.points,
+        rooms: plan.annotated.rooms.len(),
+        locations: plan.locations.len(),
+        panoramas: 0,
+        views: 0,
+        xyz: XyzLoss::of(plan.mesh_box, options.xyz),
+        rgb: area.pictures.as_ref().map_or("texture", |p| p.kind.name()).to_owned(),
+        place_cameras: match area.cameras {
+            Cameras::Placed(distance_m) => Some(distance_m),
+            Cameras::Listed(..) => None,
+        },
+        inputs: Vec::new(),
+    }
+}
+
+/// Writes an area's meshes and points, all but its images.
+fn write_rest(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common: Common<'_>) -> Result<()> {
+    let ctx = common.account.ctx;
+    let Common { table, layout, options, journal, account, .. } = common;
+    let (number, started) = (area.number, Instant::now());
+    let meshes = account.stage(Step::Meshes, Some(number));
+    let mesh_dir = layout.mesh_dir(number);
+    let per_face: Vec<u32> = plan.annotated.face_labels.iter().map(|l| l.0).collect();
+    write_colored_mesh(&mesh_dir, file, options.compression)?;
+    s3d_io::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
+    meshes.end();
+    ctx.check()?;
+    let sampling = account.stage(Step::Points, Some(number));
+    let density = Density::PerM2(options.points_per_m2);
+    let points = write_points(ctx, layout, &file.mesh, plan, table, density, options.seed)?;
+    let mut paths = listing::walk(&mesh_dir)?;
+    let labels = label_files(layout, number);
+    paths.retain(|path| !labels.contains(path));
+    paths.extend(listing::walk(&layout.s3dis_area_dir(number))?);
+    let files = listing::records(ctx, layout, &paths)?;
+    let tally = tally_of(&files);
+    journal.write(Done::Rest(RestDone { area: number, points, files }))?;
+    sampling.end();
+    account.unit_finished(UnitKind::Assets, number, None, &tally, started);
+    Ok(())
+}
+
+/// Writes the mesh with its textures: their files as they were found, where they were used as they are.
+fn write_colored_mesh(dir: &Path, file: &MeshFile, compression: Compression) -> Result<()> {
+    let files: Vec<(String, Cow<'_, [u8]>)> = file
+        .mesh
+        .textures()
+        .iter()
+        .zip(&file.texture_files)
+        .map(|(texture, found)| {
+            let stem = Path::new(&texture.name).file_stem().unwrap_or_default().to_string_lossy();
+            match found {
+                Some(f) => (format!("{stem}.{}", f.extension), Cow::Borrowed(&f.bytes[..])),
+                None => {
+                    let png = encode_rgb8(&texture.image, Content::Photo, compression);
+                    (format!("{stem}.png"), Cow::Owned(png))
+                }
+            }
+        })
+        .collect();
+    let textures: Vec<TextureOut<'_>> =
+        files.iter().map(|(name, bytes)| TextureOut { name, bytes }).collect();
+    s3d_io::write_rgb_obj(dir, &file.mesh, &textures)?;
+    Ok(())
+}
+
+fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
+    let total = &annotated.report.total;
+    let faces = annotated.face_labels.len();
+    ctx.info(format_args!(
+        "{} annotated points labelled {} of {faces} faces ({:.1} s)",
+        annotated.points,
+        total.faces,
+        started.elapsed().as_secs_f64()
+    ));
+    for (_, room, row) in &annotated.report.rooms {
+        ctx.debug(format_args!(
+            "{room}: {} points, {} faces, {} of them contested",
+            row.points, row.faces, row.contested
+        ));
+    }
+    label_doubts(&annotated.report).iter().for_each(|w| ctx.warn(w));
+}
+
+/// Renders those locations of an area that are to be done, and beside them writes its meshes and points if they are.
+pub(crate) fn render_area(
+    area: &AreaInput,
+    stage: &Stage<'_>,
+    plan: &AreaPlan,
+    pictures: Option<&Pictures>,
+    common: Common<'_>,
+    candidates: &[Candidate],
+    todo: &BTreeSet<&Unit>,
+) -> Result<()> {
+    let ctx = common.account.ctx;
+    let Common { layout, options, journal, account, .. } = common;
+    let AreaPlan { annotated, locations, location_rooms, .. } = plan;
+    let Stage { file, scene } = stage;
+    let number = area.number;
+    check_faces(plan, stage)?;
+    create_dir(&layout.mesh_dir(number))?;
+    let textures = MipMaps::new(&file.mesh);
+    let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
+    let pretty_per_face: Vec<[u8; 3]> = label_per_face.iter().map(|l| s3d_io::pretty_color(*l)).collect();
+    let chosen: Vec<bool> =
+        locations.iter().map(|l| todo.contains(&Unit::Location(number, l.uuid.clone()))).collect();
+    let finish_location = |written: WrittenLocation| {
+        let WrittenLocation { location, tally, files, started } = written;
+        let uuid = &locations[location].uuid;
+        journal.write(Done::Location(LocationDone { area: number, location: uuid.clone(), tally, files }))?;
+        account.unit_finished(UnitKind::Location, number, Some(uuid), &tally, started);
+        Ok(())
+    };
+    let job = ImageJob {
+        layout,
+        area: number,
+        look: Look {
+            scene,
+            textures: &textures,
+            pictures: None,
+            normals: options.normals,
+            label_per_face: &label_per_face,
+            pretty_per_face: &pretty_per_face,
+            compression: options.compression,
+            conventions: options.conventions(),
+        },
+        pictures,
+        locations,
+        rooms: location_rooms,
+        chosen: &chosen,
+        modalities: &options.modalities,
+        size: options.size,
+        pano_width: options.pano_width,
+        each: &finish_location,
+    };
+    let rendering = account.stage(Step::Render, Some(number));
+    let rest = || write_rest(area, file, plan, common);
+    let writes_rest = todo.contains(&Unit::Rest(number));
+    write_images(ctx, &job, candidates, if writes_rest { Some(&rest) } else { None })?;
+    rendering.end();
+    Ok(())
+}

@@ -1,0 +1,153 @@
+//! The end of an export: what is made of all areas together, once every unit is done. It needs nothing but the files on
+//! the disk, the request and what the journals tell.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::views::select_requested;
+use crate::profile::{self};
+use crate::store::journal::{Finished, Unit};
+use crate::store::request::Request;
+use crate::tables::listing;
+use crate::tables::manifest::{AreaEntry, Manifest};
+use crate::tables::records;
+use crate::tables::statistics::Statistics;
+use crate::tables::summary::{UnitTally, ViewTally};
+use s3d_io::{Error as FileError, Frame, Layout, SyncAhead, create_dir, sync_data_set, sync_file};
+use s3d_sample::folds;
+use std::fs;
+use std::path::PathBuf;
+
+/// What an export has made.
+pub(crate) struct Made {
+    /// All files, the manifest too.
+    pub(crate) files: u64,
+    pub(crate) bytes: u64,
+    pub(crate) locations: usize,
+    /// What became of the candidate views.
+    pub(crate) views: ViewTally,
+}
+
+/// The units that are still to be done of a request, as far as they are known: those of an area's locations only once its
+/// labels are done.
+pub(crate) fn missing_units(request: &Request, finished: &Finished) -> Vec<Unit> {
+    let mut missing = Vec::new();
+    for area in request.numbers() {
+        let Some(labels) = finished.labels(area) else {
+            missing.push(Unit::Labels(area));
+            continue;
+        };
+        for uuid in &labels.locations {
+            missing.push(Unit::Scores(area, uuid.clone()));
+            if is_chosen(request, uuid) {
+                missing.push(Unit::Location(area, uuid.clone()));
+            }
+        }
+        missing.push(Unit::Rest(area));
+    }
+    missing.retain(|unit| !finished.has(unit));
+    missing
+}
+
+/// Whether a location's images are asked for.
+pub(crate) fn is_chosen(request: &Request, uuid: &str) -> bool {
+    let only = &request.options.only;
+    only.is_empty() || only.iter().any(|o| o == uuid)
+}
+
+/// Writes the tables, the list of files and, when all of it is on the disk, the manifest that says that the data set is
+/// complete. Beside the units' files there must be `assets` and `conventions.json`. `manifest` is the one that was written
+/// when the export began; `disk` what brings the units' files to the disk, if something does.
+///
+/// # Errors
+/// [`Error::Input`] if a unit is missing.
+pub(crate) fn finish(
+    ctx: &Context,
+    layout: &Layout,
+    request: &Request,
+    manifest: Manifest,
+    finished: &Finished,
+    disk: Option<SyncAhead>,
+) -> Result<Made> {
+    if let Some(unit) = missing_units(request, finished).first() {
+        return Err(Error::Input(format!("{}: {unit:?} is missing", layout.root().display())));
+    }
+    let areas = request.numbers();
+    let (candidates, views) = select_requested(request, finished)?;
+    let (mut entries, mut files, mut locations) = (Vec::new(), Vec::new(), 0);
+    for requested in &request.areas {
+        let area = requested.area;
+        records::write_views(layout, area, &candidates)?;
+        let Some(labels) = finished.labels(area) else { continue };
+        let tally: UnitTally = finished.locations(area).map(|done| done.tally).sum();
+        locations += labels.locations.len();
+        entries.push(AreaEntry {
+            points: finished.rest(area).map_or(0, |rest| rest.points),
+            panoramas: tally.panoramas.images,
+            views: tally.views.images,
+            inputs: requested.inputs.clone(),
+            ..labels.entry.clone()
+        });
+    }
+    for done in finished.iter().filter(|done| areas.contains(&done.unit().area())) {
+        files.extend_from_slice(done.files());
+    }
+    // A merge makes none for images that no shard has.
+    for &domain in &request.options.modalities {
+        for (area, frame) in areas.iter().flat_map(|area| [(*area, Frame::Panorama), (*area, Frame::View(0))])
+        {
+            create_dir(&layout.image_dir(area, frame, domain))?;
+        }
+    }
+    ctx.check()?;
+    let folds = folds(&areas);
+    records::write_splits(layout, &folds)?;
+    records::write_lists(ctx, layout, &areas, &folds)?;
+    write_profiles(ctx, layout, request, &areas)?;
+    Statistics::count(layout, &areas)?.write(layout)?;
+
+    ctx.check()?;
+    let tables = listing::records(ctx, layout, &table_files(layout, &areas)?)?;
+    files.extend_from_slice(&tables);
+    let list = listing::write(layout, &files)?;
+    let (count, listed) = (list.count, list.bytes);
+    // A manifest that says "complete" on a disk that lost what it tells of would be a lie.
+    let paths: Vec<PathBuf> = files.iter().map(|f| f.path_in(layout.root())).collect();
+    disk.map_or(Ok(()), SyncAhead::end)?;
+    sync_data_set(layout.root(), &paths)?;
+    manifest.complete(layout, entries, list)?;
+    sync_file(&layout.manifest())?;
+    let own = [layout.file_list(), layout.manifest()].map(|p| fs::metadata(p).map_or(0, |found| found.len()));
+    Ok(Made { files: count + 2, bytes: listed + own.iter().sum::<u64>(), locations, views })
+}
+
+/// Writes the profiles that are asked for, anew: some of their files are second names of files of the tree, which must not
+/// be written to.
+fn write_profiles(ctx: &Context, layout: &Layout, request: &Request, areas: &[u32]) -> Result<()> {
+    let wanted = &request.options.profiles;
+    for profile in wanted {
+        let dir = layout.profile_dir(profile.name());
+        match fs::remove_dir_all(&dir) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                return Err(FileError::io(&dir, "remove", e).into());
+            }
+            _ => {}
+        }
+    }
+    profile::write(ctx, layout, areas, wanted)
+}
+
+/// The files of a data set that no unit wrote.
+fn table_files(layout: &Layout, areas: &[u32]) -> Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> = areas.iter().map(|area| layout.views_json(*area)).collect();
+    for entry in layout.entries(&[]) {
+        if entry == layout.manifest() || entry == layout.file_list() {
+            continue;
+        }
+        if entry.is_dir() {
+            files.extend(listing::walk(&entry)?);
+        } else if entry.exists() {
+            files.push(entry);
+        }
+    }
+    Ok(files)
+}

@@ -1,0 +1,211 @@
+//! The images of an area: each view cast once, every modality from the same hits, each file written whole.
+
+use crate::context::{Context, Progress};
+use crate::error::Result;
+use crate::export::modality::{Image, Look, Prints};
+use crate::export::pictures::Pictures;
+use crate::export::views::Candidate;
+use crate::export::work::for_each_in_order;
+use crate::tables::summary::{ImageTally, UnitTally};
+use s3d_geom::Camera;
+use s3d_io::{Domain, FileRecord, Frame, Layout, PoseFile, ScanLocation, create_dir, write_bytes};
+use s3d_label::Room;
+use s3d_render::{Caster, Hits, NO_FACE};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// What is rendered, and where it goes.
+#[derive(Clone, Copy)]
+pub(crate) struct ImageJob<'a> {
+    pub(crate) layout: &'a Layout,
+    pub(crate) area: u32,
+    pub(crate) look: Look<'a>,
+    /// Where colours come from, if not from the mesh.
+    pub(crate) pictures: Option<&'a Pictures>,
+    pub(crate) locations: &'a [ScanLocation],
+    /// The room of each location.
+    pub(crate) rooms: &'a [Room],
+    /// Whether a location's images are to be written.
+    pub(crate) chosen: &'a [bool],
+    pub(crate) modalities: &'a [Domain],
+    pub(crate) size: u32,
+    pub(crate) pano_width: u32,
+    /// Told of every location whose images are all there, by whichever thread wrote the last.
+    pub(crate) each: &'a (dyn Fn(WrittenLocation) -> Result<()> + Sync),
+}
+
+/// A location all of whose images are there.
+pub(crate) struct WrittenLocation {
+    /// Its index.
+    pub(crate) location: usize,
+    pub(crate) tally: UnitTally,
+    /// Sorted.
+    pub(crate) files: Vec<FileRecord>,
+    /// When its first image was begun.
+    pub(crate) started: Instant,
+}
+
+/// A location some of whose images are not there yet.
+#[derive(Default)]
+struct OpenLocation {
+    /// Images that are still to be written.
+    left: usize,
+    tally: UnitTally,
+    files: Vec<FileRecord>,
+    started: Option<Instant>,
+}
+
+/// One image in all its modalities.
+struct Shot {
+    location: usize,
+    frame: Frame,
+    camera: Camera,
+}
+
+/// What else is to be written of an area: one thread's work, which the others need not wait for.
+type Rest<'a> = &'a (dyn Fn() -> Result<()> + Sync);
+
+/// One piece of an area's work.
+enum Work<'a> {
+    Rest(Rest<'a>),
+    Shot(&'a Shot),
+}
+
+/// Renders and writes the panoramas of the chosen locations and their kept views. `rest` is done once, by one of the
+/// threads, meanwhile; none if it is done already.
+pub(crate) fn write_images(
+    ctx: &Context,
+    job: &ImageJob<'_>,
+    candidates: &[Candidate],
+    rest: Option<Rest<'_>>,
+) -> Result<()> {
+    let shots = shots(job, candidates);
+    let mut open: Vec<OpenLocation> = job.locations.iter().map(|_| OpenLocation::default()).collect();
+    for shot in &shots {
+        open[shot.location].left += 1;
+    }
+    let open: Vec<Mutex<OpenLocation>> = open.into_iter().map(Mutex::new).collect();
+    for domain in job.modalities {
+        for frame in [Frame::Panorama, Frame::View(0)] {
+            create_dir(&job.layout.image_dir(job.area, frame, *domain))?;
+        }
+    }
+    let progress = ctx.progress("rendering", "images", shots.len() as u64);
+    let Some(pictures) = job.pictures else {
+        return write_shots(ctx, job, &shots, &open, rest, &progress);
+    };
+    // A location after another: one cube map is in memory, and all threads work with it.
+    let mut rest = rest;
+    for shots in shots.chunk_by(|a, b| a.location == b.location) {
+        let location = shots[0].location;
+        let cube = pictures.cube(ctx, location, &job.locations[location], job.look.scene)?;
+        let look = Look { pictures: cube.as_ref().map(|cube| pictures.colors(cube)), ..job.look };
+        write_shots(ctx, &ImageJob { look, ..*job }, shots, &open, rest.take(), &progress)?;
+    }
+    rest.map_or(Ok(()), |rest| rest())
+}
+
+fn write_shots(
+    ctx: &Context,
+    job: &ImageJob<'_>,
+    shots: &[Shot],
+    open: &[Mutex<OpenLocation>],
+    rest: Option<Rest<'_>>,
+    progress: &Progress<'_>,
+) -> Result<()> {
+    let memory =
+        || Memory { caster: Caster::new(job.look.scene), hits: Hits::default(), prints: Prints::default() };
+    let works: Vec<Work<'_>> = rest.map(Work::Rest).into_iter().chain(shots.iter().map(Work::Shot)).collect();
+    for_each_in_order(ctx, &works, memory, |memory, work| match work {
+        Work::Rest(rest) => rest(),
+        Work::Shot(shot) => {
+            let started = Instant::now();
+            let written = write_shot(job, shot, memory)?;
+            progress.add(1);
+            let mut location = open[shot.location].lock().unwrap_or_else(PoisonError::into_inner);
+            location.add(shot.frame, written, started);
+            if location.left > 0 {
+                return Ok(());
+            }
+            let OpenLocation { tally, mut files, started, .. } = std::mem::take(&mut *location);
+            drop(location);
+            files.sort();
+            let started = started.unwrap_or_else(Instant::now);
+            (job.each)(WrittenLocation { location: shot.location, tally, files, started })
+        }
+    })
+}
+
+/// The images to take: of each location its panorama, which takes longest, and then its views.
+fn shots(job: &ImageJob<'_>, candidates: &[Candidate]) -> Vec<Shot> {
+    let mut shots = Vec::new();
+    let mut views = candidates.iter().filter(|c| c.area == job.area).peekable();
+    for (location, scan) in job.locations.iter().enumerate() {
+        if job.chosen[location] {
+            let camera = Camera::equirectangular(scan.pose, job.pano_width);
+            shots.push(Shot { location, frame: Frame::Panorama, camera });
+        }
+        while let Some(c) = views.next_if(|c| c.location == location) {
+            if let (true, Some(number)) = (job.chosen[location], c.frame_num) {
+                shots.push(Shot { location, frame: Frame::View(number), camera: c.camera(scan, job.size) });
+            }
+        }
+    }
+    shots
+}
+
+/// What a thread keeps from image to image.
+struct Memory<'s> {
+    caster: Caster<'s, 's>,
+    hits: Hits,
+    prints: Prints,
+}
+
+/// What was written of a shot.
+#[derive(Default)]
+struct WrittenShot {
+    files: Vec<FileRecord>,
+    pixels: u64,
+    pixels_missing: u64,
+}
+
+impl OpenLocation {
+    fn add(&mut self, frame: Frame, shot: WrittenShot, started: Instant) {
+        self.left -= 1;
+        self.started = Some(self.started.map_or(started, |first| first.min(started)));
+        self.tally.files += shot.files.len() as u64;
+        self.tally.bytes += shot.files.iter().map(|f| f.bytes).sum::<u64>();
+        let kind = if frame == Frame::Panorama { &mut self.tally.panoramas } else { &mut self.tally.views };
+        *kind += ImageTally { images: 1, pixels: shot.pixels, pixels_missing: shot.pixels_missing };
+        self.files.extend(shot.files);
+    }
+}
+
+fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Result<WrittenShot> {
+    let Memory { caster, hits, prints } = memory;
+    let scan = &job.locations[shot.location];
+    let room = job.rooms[shot.location].to_string();
+    let mut written = WrittenShot::default();
+    let write = |domain: Domain, bytes: &[u8]| -> Result<FileRecord> {
+        let path = job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain);
+        write_bytes(&path, bytes)?;
+        Ok(FileRecord::of_bytes(job.layout.root(), &path, bytes)?)
+    };
+    let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
+    // Poses alone need no rays.
+    if !images.is_empty() {
+        caster.cast_into(&shot.camera, 1, hits);
+        let each = |image: Image, file: Vec<u8>| write(image.domain(), &file);
+        written.files = job.look.encode(&images, hits, &shot.camera, prints, each)?;
+    }
+    if job.modalities.contains(&Domain::Pose) {
+        let room = format!("{room}_{}", job.area);
+        let pose = PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame);
+        written.files.push(write(Domain::Pose, &pose.to_json())?);
+    }
+    if !images.is_empty() {
+        written.pixels = hits.face.len() as u64;
+        written.pixels_missing = hits.face.pixels().iter().filter(|face| **face == NO_FACE).count() as u64;
+    }
+    Ok(written)
+}

@@ -1,0 +1,442 @@
+//! Everything that an export reads, found and checked before anything is written.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::tables::manifest::half_step;
+use glam::DAffine3;
+use s3d_geom::TriMesh;
+use s3d_io::{
+    AnnotatedInstance, Annotations, CameraSource, Error as FileError, MeshFile, MeshOptions, OnFault,
+    PictureSource, PublishedArea, PublishedOptions, ScanLocation, SceneFile, UpAxis,
+};
+use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The largest number that a half float can hold.
+const LARGEST_HALF_M: f32 = 65_504.0;
+
+/// One area: its files, annotations and scan locations.
+pub(crate) struct AreaInput {
+    /// Its number, from 1.
+    pub(crate) number: u32,
+    /// What the user named: a scene file, or the folder of a published area.
+    pub(crate) path: PathBuf,
+    source: MeshSource,
+    /// The scanner's pictures, if colours are taken from them.
+    pub(crate) pictures: Option<PictureSource>,
+    /// The rooms, in the order of their names, each with its annotated instances.
+    pub(crate) rooms: Vec<RoomInput>,
+    /// The scan locations.
+    pub(crate) cameras: Cameras,
+    /// The list that they come from, for messages.
+    pub(crate) cameras_path: PathBuf,
+    /// What was odd in the annotations, as a sentence each.
+    pub(crate) warnings: Vec<String>,
+    /// Whether what is not as it should be in the annotations is skipped and counted.
+    pub(crate) lenient: bool,
+    /// All files and folders that it is made from: the data set must not lie on them.
+    pub(crate) files: Vec<PathBuf>,
+    /// Those that are read, and whose bytes decide those of the data set; but for what its mesh names.
+    pub(crate) sources: Vec<PathBuf>,
+    /// Those among them that are annotations and nothing else.
+    pub(crate) annotations: Vec<PathBuf>,
+}
+
+/// What of an area is opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Opened {
+    All,
+    /// All but its annotations, which a plan stands for: it has no rooms then.
+    NoAnnotations,
+}
+
+/// Where an area's mesh comes from.
+enum MeshSource {
+    Files { paths: Vec<PathBuf>, up: UpAxis, options: MeshOptions },
+    Published(Box<PublishedArea>),
+}
+
+/// Where an area is looked at from.
+pub(crate) enum Cameras {
+    /// At these scan locations, in the order of their list, each with its room if the list tells.
+    Listed(Vec<ScanLocation>, Vec<Option<Room>>),
+    /// At places that are chosen once its rooms are known, no two of a room nearer than this, metres.
+    Placed(f64),
+}
+
+impl Cameras {
+    /// The locations that are known before the area is labelled.
+    pub(crate) fn listed(&self) -> &[ScanLocation] {
+        match self {
+            Self::Listed(locations, _) => locations,
+            Self::Placed(_) => &[],
+        }
+    }
+}
+
+/// One room of an area.
+pub(crate) struct RoomInput {
+    pub(crate) room: Room,
+    pub(crate) instances: Vec<InstanceInput>,
+}
+
+/// One annotated instance: its points and the name that the data set gives it.
+pub(crate) struct InstanceInput {
+    pub(crate) label: Label,
+    pub(crate) number_in_room: u32,
+    pub(crate) points: AnnotatedInstance,
+}
+
+/// All areas, and the table of all their labels.
+pub(crate) struct Inputs {
+    pub(crate) areas: Vec<AreaInput>,
+    pub(crate) table: LabelTable,
+}
+
+impl Inputs {
+    /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan locations,
+    /// instead of which locations are placed if `place_m` says how far apart.
+    pub(crate) fn open(scenes: &[PathBuf], place_m: Option<f64>, lenient: bool) -> Result<Self> {
+        let mut areas = Self::open_areas(scenes, place_m, lenient, Opened::All)?;
+        let table = label_table(&mut areas)?;
+        Ok(Self { areas, table })
+    }
+
+    /// The same without the annotations, for which a plan stands that has this table: rooms are not known then.
+    pub(crate) fn open_planned(
+        scenes: &[PathBuf],
+        place_m: Option<f64>,
+        lenient: bool,
+        table: LabelTable,
+    ) -> Result<Self> {
+        let areas = Self::open_areas(scenes, place_m, lenient, Opened::NoAnnotations)?;
+        Ok(Self { areas, table })
+    }
+
+    fn open_areas(
+        scenes: &[PathBuf],
+        place_m: Option<f64>,
+        lenient: bool,
+        opened: Opened,
+    ) -> Result<Vec<AreaInput>> {
+        let mut areas: Vec<AreaInput> = Vec::new();
+        let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
+        let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
+        for path in scenes {
+            let area = if path.is_dir() {
+                AreaInput::published(path, None, place_m, opened)?
+            } else {
+                let mut scene = s3d_io::read_scene(path)?;
+                let options = &mut scene.annotation_options;
+                options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
+                // Areas wait beside one another.
+                options.points_in_memory /= scenes.len() as u64;
+                AreaInput::open(scene, place_m, opened)?
+            };
+            if let Some(other) = area_of.insert(area.number, path.clone()) {
+                return Err(Error::Input(format!(
+                    "{} and {} are both area {}: give each scene an area of its own",
+                    other.display(),
+                    path.display(),
+                    area.number
+                )));
+            }
+            let list = &area.cameras_path;
+            for location in area.cameras.listed() {
+                // Files of two uuids that differ by case alone would be one on many file systems.
+                if let Some(other) = location_of.insert(location.uuid.to_ascii_lowercase(), list.clone()) {
+                    let message = format!("uuid {} is also in {}", location.uuid, other.display());
+                    return Err(match location.line {
+                        0 => FileError::format(list, message),
+                        line => FileError::line(list, line, message),
+                    }
+                    .into());
+                }
+            }
+            areas.push(area);
+        }
+        areas.sort_by_key(|a| a.number);
+        Ok(areas)
+    }
+
+    /// The numbers of the areas, ascending.
+    pub(crate) fn numbers(&self) -> Vec<u32> {
+        self.areas.iter().map(|a| a.number).collect()
+    }
+}
+
+impl AreaInput {
+    fn open(scene: SceneFile, place_m: Option<f64>, opened: Opened) -> Result<Self> {
+        if let Some(folder) = &scene.published {
+            let folder = folder.clone();
+            return Self::published(&folder, Some(scene), place_m, opened);
+        }
+        let options = &scene.annotation_options;
+        let source = MeshSource::Files {
+            paths: scene.mesh.clone(),
+            up: scene.up,
+            // The columns that are named are those of the annotations.
+            options: if scene.annotations.is_empty() {
+                MeshOptions {
+                    class_column: options.class_column.clone(),
+                    instance_column: options.instance_column.clone(),
+                }
+            } else {
+                MeshOptions::default()
+            },
+        };
+        let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
+        if opened == Opened::All {
+            let mut annotations = if scene.annotations.is_empty() {
+                Annotations::of_mesh(&source.read()?, options)?
+            } else {
+                Annotations::open(&scene.annotations, options)?
+            };
+            warnings = std::mem::take(&mut annotations.warnings);
+            let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
+            rooms = number(scene.area, annotations)
+                .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
+        }
+        let Some((cameras, cameras_path)) = listed_cameras(&scene, place_m)? else {
+            return Err(FileError::format(
+                &scene.path,
+                "has no scan locations: add [cameras] with a path, or place some with --place-cameras 2 (metres)",
+            )
+            .into());
+        };
+        Ok(Self {
+            number: scene.area,
+            source,
+            rooms,
+            cameras,
+            warnings,
+            lenient: scene.annotation_options.on_fault == OnFault::Skip,
+            files: files_of(&scene),
+            sources: files_of(&scene),
+            annotations: scene.annotations,
+            cameras_path,
+            pictures: scene.pictures,
+            path: scene.path,
+        })
+    }
+
+    /// Opens the folder of a published area; `scene` is what names it, if that is no command line.
+    fn published(
+        folder: &Path,
+        scene: Option<SceneFile>,
+        place_m: Option<f64>,
+        opened: Opened,
+    ) -> Result<Self> {
+        let options = PublishedOptions {
+            area: scene.as_ref().map(|s| s.area),
+            world_from_area: scene.as_ref().map_or(DAffine3::IDENTITY, |s| s.world_from_published),
+        };
+        let mut area = PublishedArea::open_with(folder, &options)?;
+        let mut warnings = std::mem::take(&mut area.warnings);
+        let mut rooms = Vec::new();
+        if opened == Opened::All {
+            let mut mesh = area.read_mesh()?;
+            for label in &mut mesh.labels {
+                label.area = area.area;
+            }
+            let mut annotations = area.annotations(&mesh)?;
+            warnings.append(&mut annotations.warnings);
+            rooms = published_numbers(&mesh.labels, annotations);
+        }
+        let listed = match &scene {
+            Some(scene) => listed_cameras(scene, place_m)?,
+            None => place_m.map(|distance_m| (Cameras::Placed(distance_m), folder.to_owned())),
+        };
+        let (cameras, cameras_path) = listed.unwrap_or_else(|| {
+            let (locations, rooms) =
+                std::mem::take(&mut area.locations).into_iter().map(|l| (l.location, l.room)).unzip();
+            (Cameras::Listed(locations, rooms), folder.to_owned())
+        });
+        let mut files = vec![folder.to_owned()];
+        let mut sources = vec![area.mesh.clone(), area.semantic_mesh.clone()];
+        sources.extend(area.labels.clone());
+        let poses = ["data/pose", "pano/pose"].map(|name| folder.join(name));
+        sources.extend(poses.into_iter().filter(|path| path.is_dir()));
+        if let Some(scene) = &scene {
+            files.extend(files_of(scene));
+            sources.extend(files_of(scene).into_iter().filter(|path| path != folder));
+        }
+        Ok(Self {
+            number: area.area,
+            path: scene.as_ref().map_or(folder, |s| &s.path).to_owned(),
+            source: MeshSource::Published(Box::new(area)),
+            pictures: scene.and_then(|s| s.pictures),
+            rooms,
+            cameras,
+            cameras_path,
+            warnings,
+            lenient: false,
+            files,
+            sources,
+            annotations: Vec::new(),
+        })
+    }
+
+    /// Reads the mesh.
+    pub(crate) fn read_mesh(&self) -> Result<MeshFile> {
+        self.source.read()
+    }
+
+    /// The data set's list of labels that the area's folder came with.
+    fn published_labels(&self) -> Option<&PathBuf> {
+        match &self.source {
+            MeshSource::Published(area) => area.labels.as_ref(),
+            MeshSource::Files { .. } => None,
+        }
+    }
+
+    /// Logs what the area's mesh is, and what was odd in mesh and annotations.
+    pub(crate) fn tell_mesh(&self, ctx: &Context, file: &MeshFile) {
+        self.warnings.iter().chain(&file.warnings).for_each(|w| ctx.warn(w));
+        mesh_doubts(&file.mesh).iter().for_each(|w| ctx.warn(w));
+        ctx.info(format_args!(
+            "{}: {} faces, {} vertices, {} textures, {:.1} m²",
+            self.source.describe(),
+            file.mesh.faces().len(),
+            file.mesh.positions().len(),
+            file.mesh.textures().len(),
+            file.mesh.total_area()
+        ));
+    }
+}
+
+/// What looks wrong about the place and size of a mesh, as a sentence each.
+pub(crate) fn mesh_doubts(mesh: &TriMesh) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let bbox = mesh.aabb();
+    let (length, farthest) = (bbox.size().max_element(), bbox.min.abs().max(bbox.max.abs()).max_element());
+    if length > 1000.0 {
+        doubts.push(format!("the mesh is {length:.0} m long: is it in metres?"));
+    }
+    if length < 0.5 {
+        doubts.push(format!("the mesh is only {:.1} cm long: is it in metres?", 100.0 * length));
+    }
+    if farthest > LARGEST_HALF_M {
+        doubts.push(format!(
+            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates end at 65504; move mesh, \
+             points and cameras nearer to it"
+        ));
+    } else if farthest > 1000.0 {
+        doubts.push(format!(
+            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates step by {} m there; move \
+             mesh, points and cameras nearer to it",
+            half_step(farthest)
+        ));
+    }
+    doubts
+}
+
+impl MeshSource {
+    fn read(&self) -> Result<MeshFile> {
+        Ok(match self {
+            Self::Files { paths, up, options } => s3d_io::read_meshes_with(paths, *up, options)?,
+            Self::Published(area) => area.read_mesh()?.file,
+        })
+    }
+
+    fn describe(&self) -> String {
+        match self {
+            Self::Published(area) => area.mesh.display().to_string(),
+            Self::Files { paths, .. } => {
+                let more = paths.len() - 1;
+                let first = paths[0].display();
+                if more == 0 { first.to_string() } else { format!("{first} and {more} more") }
+            }
+        }
+    }
+}
+
+/// The scan locations that a scene file names, or that are to be placed, and where they come from.
+fn listed_cameras(scene: &SceneFile, place_m: Option<f64>) -> Result<Option<(Cameras, PathBuf)>> {
+    Ok(match (place_m, &scene.cameras) {
+        (Some(distance_m), _) => Some((Cameras::Placed(distance_m), scene.path.clone())),
+        (None, Some(CameraSource::Placed { distance_m })) => {
+            Some((Cameras::Placed(*distance_m), scene.path.clone()))
+        }
+        (None, Some(CameraSource::Listed { path, world_from_file })) => {
+            let locations = s3d_io::read_scan_locations(path, world_from_file)?;
+            let rooms = vec![None; locations.len()];
+            Some((Cameras::Listed(locations, rooms), path.clone()))
+        }
+        (None, None) => None,
+    })
+}
+
+/// What a scene file names, and itself.
+fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
+    let mut files = vec![scene.path.clone()];
+    files.extend(scene.mesh.iter().chain(&scene.annotations).chain(&scene.published).cloned());
+    if let Some(CameraSource::Listed { path, .. }) = &scene.cameras {
+        files.push(path.clone());
+    }
+    files.extend(scene.pictures.iter().map(|p| p.path.clone()));
+    files
+}
+
+/// The table of all labels. That of a published data set is kept whole if it has them all, so that an index means the same
+/// in its images and in ours; else it is made of the labels at hand.
+fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
+    let labels: Vec<Label> =
+        areas.iter().flat_map(|a| &a.rooms).flat_map(|r| &r.instances).map(|i| i.label).collect();
+    for area in areas.iter_mut() {
+        let Some(path) = area.published_labels().cloned() else { continue };
+        let names = s3d_io::read_labels(&path)?;
+        match LabelTable::from_names(&names) {
+            Ok(table) if labels.iter().all(|l| table.id_of(l).is_some()) => return Ok(table),
+            Ok(_) => area.warnings.push(format!(
+                "{}: has not every label of the meshes; the table is made anew, so that indices differ from it",
+                path.display()
+            )),
+            Err(e) => area.warnings.push(format!("{}: {e}; the table is made anew", path.display())),
+        }
+    }
+    LabelTable::from_labels(labels).map_err(|e| Error::Input(e.to_string()))
+}
+
+/// Gives every instance, whose numbers run per room, its number in the area.
+fn number(area: u32, annotations: Annotations) -> Result<Vec<RoomInput>, NumberingError> {
+    let keys = annotations.rooms.iter().flat_map(|r| r.instances.iter().map(|i| (r.room, i.class, i.number)));
+    let numbered = number_area(area, keys)?;
+    let labels = numbered.into_iter().map(|n| ((n.room, n.class, n.number_in_room), n.label)).collect();
+    Ok(named(annotations, &labels))
+}
+
+/// Gives every instance the label that it was published with: those of a class and room were numbered there in the order
+/// of their labels.
+fn published_numbers(labels: &[Label], annotations: Annotations) -> Vec<RoomInput> {
+    let mut sorted: Vec<Label> = labels.to_vec();
+    sorted.sort_by_key(|l| (l.room, l.class, l.instance));
+    sorted.dedup();
+    let mut names: BTreeMap<(Room, Class, u32), Label> = BTreeMap::new();
+    for same in sorted.chunk_by(|a, b| (a.room, a.class) == (b.room, b.class)) {
+        names.extend((1..).zip(same).map(|(number, label)| ((label.room, label.class, number), *label)));
+    }
+    named(annotations, &names)
+}
+
+fn named(annotations: Annotations, labels: &BTreeMap<(Room, Class, u32), Label>) -> Vec<RoomInput> {
+    let mut rooms: Vec<RoomInput> = annotations
+        .rooms
+        .into_iter()
+        .map(|r| RoomInput {
+            room: r.room,
+            instances: r
+                .instances
+                .into_iter()
+                .filter_map(|i| {
+                    let label = *labels.get(&(r.room, i.class, i.number))?;
+                    Some(InstanceInput { label, number_in_room: i.number, points: i })
+                })
+                .collect(),
+        })
+        .collect();
+    rooms.iter_mut().for_each(|r| r.instances.sort_by_key(|i| (i.label.class, i.number_in_room)));
+    rooms.sort_by_key(|r| r.room);
+    rooms
+}

@@ -1,0 +1,117 @@
+//! What a scan location sees, and in which room it stands.
+
+use crate::export::annotate::SurveyedRoom;
+use glam::DVec3;
+use s3d_geom::Camera;
+use s3d_io::ScanLocation;
+use s3d_label::Room;
+use s3d_render::{NO_FACE, Scene, cast};
+
+/// Width of the small panorama that tells what a location sees.
+const PROBE_WIDTH: u32 = 256;
+
+/// A location that sees less of the mesh than this is told of.
+pub(crate) const LOW_COVERAGE: f64 = 0.5;
+
+/// A location that sees more back sides than this is told of.
+const MANY_BACK_SIDES: f64 = 0.5;
+
+/// A location nearer to a surface than this is told of, in metres.
+const VERY_NEAR_M: f32 = 0.1;
+
+/// What a location sees of the mesh, by solid angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Outlook {
+    /// Share of all directions in which there is a surface.
+    pub(crate) coverage: f64,
+    /// Share of those in which its back side is seen.
+    pub(crate) back_sides: f64,
+    /// The nearest surface seen, metres; infinite if there is none.
+    pub(crate) nearest_m: f32,
+}
+
+impl Outlook {
+    /// Looks around from `location`.
+    pub(crate) fn of(scene: &Scene<'_>, location: &ScanLocation) -> Self {
+        let camera = Camera::equirectangular(location.pose, PROBE_WIDTH);
+        let (hits, rays) = (cast(scene, &camera), camera.rays());
+        let (mut all, mut seen, mut back, mut nearest_m) = (0.0, 0.0, 0.0, f32::INFINITY);
+        for y in 0..camera.height {
+            for x in 0..camera.width {
+                let direction = rays.at(x, y);
+                // A row's pixels cover the sphere in proportion to the cosine of its latitude.
+                let weight = (direction.x * direction.x + direction.y * direction.y).sqrt();
+                all += weight;
+                let face = hits.face.at(x, y);
+                if face == NO_FACE {
+                    continue;
+                }
+                seen += weight;
+                nearest_m = nearest_m.min(hits.depth.at(x, y));
+                if scene.mesh().normal(face).as_dvec3().dot(direction) > 0.0 {
+                    back += weight;
+                }
+            }
+        }
+        Self { coverage: seen / all, back_sides: if seen > 0.0 { back / seen } else { 0.0 }, nearest_m }
+    }
+
+    /// What looks wrong about it, as a sentence for each.
+    pub(crate) fn warnings(&self, location: &ScanLocation) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let name = &location.uuid;
+        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+        if self.coverage == 0.0 {
+            warnings.push(format!(
+                "location {name} sees nothing of the mesh (coverage 0 %): is it in the mesh's frame?"
+            ));
+        } else if self.coverage < LOW_COVERAGE {
+            warnings.push(format!(
+                "location {name} sees the mesh in only part of its panorama (coverage {}): it may stand outside, or near a \
+                 hole",
+                percent(self.coverage)
+            ));
+        }
+        if self.back_sides > MANY_BACK_SIDES {
+            warnings.push(format!(
+                "location {name} sees back sides in {} of what it sees (coverage {}): it may stand inside something \
+                 solid, or the faces are wound the other way",
+                percent(self.back_sides),
+                percent(self.coverage)
+            ));
+        }
+        if self.nearest_m < VERY_NEAR_M {
+            warnings.push(format!(
+                "location {name} is {:.0} mm from a surface (coverage {}): it may stand inside a wall or a thing",
+                1000.0 * self.nearest_m,
+                percent(self.coverage)
+            ));
+        }
+        warnings
+    }
+}
+
+/// The room in which a point stands: the one whose floor outline holds it, or else the nearest outline; the first by
+/// name where several do. A room with too few points for an outline has its points' box instead. A building of one
+/// storey an area is assumed, as in the data set.
+///
+/// # Panics
+/// If there is no room.
+pub(crate) fn room_of(rooms: &[SurveyedRoom], point: DVec3) -> Room {
+    let mut best = (f64::INFINITY, rooms[0].room);
+    for r in rooms {
+        let (min, max) = (r.bbox.min.as_dvec3().truncate(), r.bbox.max.as_dvec3().truncate());
+        let mut distance = point.truncate().distance(point.truncate().clamp(min, max));
+        // An outline lies in the box: it is no nearer, but for rounding.
+        if distance > 1.000_001 * best.0 {
+            continue;
+        }
+        if !r.footprint.polygons.is_empty() {
+            distance = r.footprint.distance(point.x, point.y);
+        }
+        if distance < best.0 {
+            best = (distance, r.room);
+        }
+    }
+    best.1
+}

@@ -1,0 +1,193 @@
+//! Hits to the bytes of an image file, one function for every modality.
+
+use crate::export::pictures::PictureColors;
+use rayon::prelude::*;
+use s3d_geom::{Camera, Raster};
+use s3d_io::{
+    Compression, Content, Conventions, DepthUnits, Domain, XyzType, encode_gray16, encode_rgb8,
+    encode_xyz_float, encode_xyz_half,
+};
+use s3d_render::{
+    Hits, MipMaps, Modalities, Normals, Scene, Shading, TextureFilter, ViewImages, color_per_face_image_into,
+    depth_image_into, depth_image_mm_into, index_image_into, normal_image_into, rgb_image_into,
+    view_images_into, xyz_image_half_into, xyz_image_into,
+};
+
+/// What images of a mesh are made from.
+#[derive(Clone, Copy)]
+pub(crate) struct Look<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) textures: &'a MipMaps,
+    /// Colours that are not the textures'.
+    pub(crate) pictures: Option<PictureColors<'a>>,
+    pub(crate) normals: Normals,
+    /// The label index of each face; may be empty if no semantic image is asked for.
+    pub(crate) label_per_face: &'a [u32],
+    /// The colour of each face in pretty images; may be empty likewise.
+    pub(crate) pretty_per_face: &'a [[u8; 3]],
+    /// How much time their files may take.
+    pub(crate) compression: Compression,
+    /// Units of depth, axes of normals, type of coordinates (of which none counts as half: it is not asked for then).
+    pub(crate) conventions: Conventions,
+}
+
+/// A domain that is an image: all but the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Image {
+    Rgb,
+    Depth,
+    Normal,
+    Semantic,
+    SemanticPretty,
+    GlobalXyz,
+}
+
+impl Image {
+    /// The image that a domain is.
+    pub(crate) fn of(domain: Domain) -> Option<Self> {
+        Some(match domain {
+            Domain::Rgb => Self::Rgb,
+            Domain::Depth => Self::Depth,
+            Domain::Normal => Self::Normal,
+            Domain::Semantic => Self::Semantic,
+            Domain::SemanticPretty => Self::SemanticPretty,
+            Domain::GlobalXyz => Self::GlobalXyz,
+            Domain::Pose => return None,
+        })
+    }
+
+    /// The domain that it is.
+    pub(crate) fn domain(self) -> Domain {
+        match self {
+            Self::Rgb => Domain::Rgb,
+            Self::Depth => Domain::Depth,
+            Self::Normal => Domain::Normal,
+            Self::Semantic => Domain::Semantic,
+            Self::SemanticPretty => Domain::SemanticPretty,
+            Self::GlobalXyz => Domain::GlobalXyz,
+        }
+    }
+}
+
+/// Memory of the images of a view, for one view after another.
+pub(crate) struct Prints {
+    images: ViewImages,
+    xyz_float: Raster<[f32; 3]>,
+    /// Which of `images` are those of the view at hand.
+    made: Modalities,
+}
+
+impl Prints {
+    /// A view's memory may stay. A panorama's, eight times as large and rarer, should not.
+    const MOST_PIXELS: usize = 1 << 22;
+}
+
+impl Default for Prints {
+    fn default() -> Self {
+        let xyz_float = Raster::filled(0, 0, [0.0; 3]);
+        Self { images: ViewImages::default(), xyz_float, made: Modalities::default() }
+    }
+}
+
+impl Look<'_> {
+    /// What `each` makes of the files of some images of a view, from the view's hits, in the order of `images`. Threads of the
+    /// current rayon pool that have nothing else to do take part. Nothing but time depends on what `prints` were used for
+    /// before.
+    ///
+    /// # Errors
+    /// That of `each`, which is given every file.
+    pub(crate) fn encode<T: Send, E: Send>(
+        &self,
+        images: &[Image],
+        hits: &Hits,
+        camera: &Camera,
+        prints: &mut Prints,
+        each: impl Fn(Image, Vec<u8>) -> Result<T, E> + Sync,
+    ) -> Result<Vec<T>, E> {
+        let large = hits.face.len() > Prints::MOST_PIXELS;
+        prints.made = if large { Modalities::default() } else { self.together(images) };
+        if prints.made != Modalities::default() {
+            let shading = Shading {
+                scene: self.scene,
+                mip_maps: self.textures,
+                filter: TextureFilter::default(),
+                normal_axes: self.conventions.normal_axes,
+                index_of_face: self.label_per_face,
+                color_of_face: self.pretty_per_face,
+            };
+            view_images_into(&shading, hits, camera, prints.made, &mut prints.images);
+        }
+        let mut done = Vec::new();
+        for &image in images {
+            self.draw(image, hits, camera, prints);
+            if large {
+                done.push(each(image, self.file(image, prints))?);
+                *prints = Prints::default();
+            }
+        }
+        if !large {
+            let files = images.par_iter().with_max_len(1);
+            done = files.map(|&image| each(image, self.file(image, prints))).collect::<Result<_, E>>()?;
+        }
+        Ok(done)
+    }
+
+    /// The images that are made in one walk over the hits.
+    fn together(&self, images: &[Image]) -> Modalities {
+        let wants = |image| images.contains(&image);
+        let Conventions { depth_units, xyz, .. } = self.conventions;
+        let flat = self.normals == Normals::Flat;
+        Modalities {
+            rgb: wants(Image::Rgb) && self.pictures.is_none(),
+            depth: wants(Image::Depth) && depth_units == DepthUnits::Per512,
+            faces: flat && [Image::Normal, Image::Semantic, Image::SemanticPretty].into_iter().all(wants),
+            xyz: wants(Image::GlobalXyz) && xyz != XyzType::Float,
+        }
+    }
+
+    /// Draws an image that is not made yet.
+    fn draw(&self, image: Image, hits: &Hits, camera: &Camera, prints: &mut Prints) {
+        let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
+        let Prints { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made } = prints;
+        match image {
+            Image::Rgb if !made.rgb => match &self.pictures {
+                Some(pictures) => pictures.image_into(self, hits, camera, rgb),
+                None => {
+                    let filter = TextureFilter::default();
+                    rgb_image_into(self.scene, self.textures, hits, camera, &filter, rgb);
+                }
+            },
+            Image::Depth if !made.depth => match depth_units {
+                DepthUnits::Per512 => depth_image_into(hits, depth),
+                DepthUnits::Millimetres => depth_image_mm_into(hits, depth),
+            },
+            Image::Normal if !made.faces => {
+                normal_image_into(self.scene, hits, camera, self.normals, normal_axes, &mut faces.normal);
+            }
+            Image::Semantic if !made.faces => index_image_into(hits, self.label_per_face, &mut faces.index),
+            Image::SemanticPretty if !made.faces => {
+                color_per_face_image_into(hits, self.pretty_per_face, &mut faces.color);
+            }
+            Image::GlobalXyz if xyz_type == XyzType::Float => xyz_image_into(hits, camera, xyz_float),
+            Image::GlobalXyz if !made.xyz => xyz_image_half_into(hits, camera, xyz),
+            _ => {}
+        }
+    }
+
+    /// The file of an image that is drawn.
+    fn file(&self, image: Image, prints: &Prints) -> Vec<u8> {
+        let compression = self.compression;
+        let Prints { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, .. } = prints;
+        match image {
+            Image::Rgb => encode_rgb8(rgb, Content::Photo, compression),
+            Image::Depth => encode_gray16(depth, compression),
+            Image::Normal => encode_rgb8(&faces.normal, Content::Normals, compression),
+            Image::Semantic => encode_rgb8(&faces.index, Content::Labels, compression),
+            Image::SemanticPretty => encode_rgb8(&faces.color, Content::Labels, compression),
+            Image::GlobalXyz if self.conventions.xyz == XyzType::Float => {
+                encode_xyz_float(xyz_float, compression)
+            }
+            Image::GlobalXyz => encode_xyz_half(xyz, compression),
+        }
+    }
+}

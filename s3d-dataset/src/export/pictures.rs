@@ -1,0 +1,247 @@
+//! The scanner's pictures as the source of colours: found and checked before anything is written, and made into one cube
+//! map at a time.
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::inputs::{AreaInput, Cameras};
+use crate::export::modality::Look;
+use s3d_geom::{Camera, Raster};
+use s3d_io::{
+    CAPTURES_A_LOCATION, CaptureFile, Error as FileError, PictureFolder, PictureKind, PictureSource,
+    ScanLocation, SkyBoxCaps, UnseenColor, read_picture, read_picture_size,
+};
+use s3d_render::{
+    Capture, CubeMap, Hits, Scene, SkyBoxTurn, StitchOptions, TextureFilter, Unseen, picture_image_into,
+    stitch,
+};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// How many locations without pictures are named in a message.
+const MOST_NAMED: usize = 20;
+
+/// An area's pictures.
+pub(crate) struct Pictures {
+    source: PictureSource,
+    /// By location; `None` where no image is asked for.
+    found: Vec<Option<Found>>,
+    /// What was odd about them, as a sentence each.
+    pub(crate) warnings: Vec<String>,
+}
+
+/// The pictures of a location.
+enum Found {
+    SkyBox([PathBuf; 6]),
+    Captures(Vec<CaptureFile>),
+    Panorama(PathBuf),
+}
+
+impl Pictures {
+    /// Finds the pictures of an area's locations, if it has a source of pictures, and looks at their sizes. Locations that
+    /// `is_asked` is false for need none.
+    ///
+    /// # Errors
+    /// For what is missing, all of it; for the first picture that is not what it should be.
+    pub(crate) fn open(area: &AreaInput, is_asked: impl Fn(&ScanLocation) -> bool) -> Result<Option<Self>> {
+        let Some(source) = &area.pictures else { return Ok(None) };
+        if matches!(area.cameras, Cameras::Placed(_)) {
+            return Err(FileError::format(
+                &area.path,
+                format!(
+                    "takes colours from {} pictures, but its scan locations are placed where none was taken: give it the \
+                     locations of the pictures, or rgb = \"texture\"",
+                    source.kind
+                ),
+            )
+            .into());
+        }
+        let folder = PictureFolder::open(&source.path)?;
+        let (mut found, mut missing, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+        for location in area.cameras.listed() {
+            let uuid = &location.uuid;
+            let of_location = if is_asked(location) { Some(find(&folder, source.kind, uuid)?) } else { None };
+            found.push(match of_location {
+                Some(Ok(pictures)) => {
+                    pictures.check()?;
+                    if let Found::Captures(captures) = &pictures
+                        && captures.len() < CAPTURES_A_LOCATION
+                    {
+                        warnings.push(format!(
+                            "location {uuid} has {} captures of {CAPTURES_A_LOCATION}: what none sees is taken from elsewhere",
+                            captures.len()
+                        ));
+                    }
+                    Some(pictures)
+                }
+                Some(Err(names)) => {
+                    missing.push(names);
+                    None
+                }
+                None => None,
+            });
+        }
+        if !missing.is_empty() {
+            let (count, of) = (missing.len(), area.cameras.listed().len());
+            let more = count.saturating_sub(MOST_NAMED);
+            missing.truncate(MOST_NAMED);
+            let mut names = missing.join("; ");
+            if more > 0 {
+                names += &format!("; and those of {more} more");
+            }
+            let message = format!(
+                "pictures of {count} of {of} locations are missing (rgb = \"{}\" in {}): {names}",
+                source.kind,
+                area.path.display()
+            );
+            return Err(FileError::format(&source.path, message).into());
+        }
+        Ok(Some(Self { source: source.clone(), found, warnings }))
+    }
+
+    /// What they are, in a line.
+    pub(crate) fn summary(&self) -> String {
+        let locations = self.found.iter().flatten().count();
+        format!("{} of {locations} locations in {}", self.source.kind, self.source.path.display())
+    }
+
+    /// Makes a location's cube map, on all threads. `None` if it was not asked for.
+    pub(crate) fn cube(
+        &self,
+        ctx: &Context,
+        index: usize,
+        location: &ScanLocation,
+        scene: &Scene<'_>,
+    ) -> Result<Option<CubeMap>> {
+        let Some(found) = &self.found[index] else { return Ok(None) };
+        let started = Instant::now();
+        let (options, pose) = (&self.source.options, &location.pose);
+        let cube = match found {
+            Found::SkyBox(paths) => {
+                let pictures = read_all(paths)?;
+                let turn = match options.caps {
+                    SkyBoxCaps::Detect => SkyBoxTurn::Detect,
+                    SkyBoxCaps::Front => SkyBoxTurn::Front,
+                    SkyBoxCaps::Right => SkyBoxTurn::Right,
+                    SkyBoxCaps::Back => SkyBoxTurn::Back,
+                    SkyBoxCaps::Left => SkyBoxTurn::Left,
+                };
+                let pictures: [&Raster<[u8; 3]>; 6] = std::array::from_fn(|k| &pictures[k]);
+                check_sky_box(&paths[0], pictures.map(|p| (p.width(), p.height())))?;
+                CubeMap::from_sky_box(pictures, turn, pose, options.size)
+            }
+            Found::Panorama(path) => {
+                let photo = read_picture(path)?;
+                CubeMap::from_equirectangular(&photo, options.yaw_deg.to_radians(), pose, options.size)
+            }
+            Found::Captures(files) => {
+                let mut captures = Vec::new();
+                for read in in_parallel(files, CaptureFile::read) {
+                    let file = &files[captures.len()];
+                    captures.push(Capture { image: read?, lens: file.lens, pose: file.pose });
+                }
+                let scene = options.parallax.then_some(scene);
+                stitch(captures, pose, scene, &StitchOptions { size: options.size, gains: options.gains })
+            }
+        };
+        ctx.debug(format_args!(
+            "{}: a cube map of 6 × {}² pixels, {:.1} % of it seen ({:.2} s)",
+            location.uuid,
+            cube.size(),
+            100.0 * cube.coverage(),
+            started.elapsed().as_secs_f64()
+        ));
+        Ok(Some(cube))
+    }
+
+    /// The colours that a cube map gives.
+    pub(crate) fn colors<'a>(&self, cube: &'a CubeMap) -> PictureColors<'a> {
+        PictureColors { cube, unseen: self.source.options.unseen }
+    }
+}
+
+/// Does `work` on every item at once; results in the items' order.
+fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+    use rayon::prelude::*;
+    items.par_iter().map(work).collect()
+}
+
+fn read_all(paths: &[PathBuf]) -> Result<Vec<Raster<[u8; 3]>>> {
+    Ok(in_parallel(paths, |path| read_picture(path)).into_iter().collect::<s3d_io::Result<_>>()?)
+}
+
+/// The pictures of a location, or the names of those that are missing.
+fn find(folder: &PictureFolder, kind: PictureKind, uuid: &str) -> s3d_io::Result<Result<Found, String>> {
+    Ok(match kind {
+        PictureKind::SkyBox => folder.sky_box(uuid).map(Found::SkyBox),
+        PictureKind::Panorama => folder.panorama(uuid).map(Found::Panorama),
+        PictureKind::Captures => match folder.captures(uuid)? {
+            captures if captures.is_empty() => Err(format!("{uuid}_i0_0.jpg to {uuid}_i2_5.jpg")),
+            captures => Ok(Found::Captures(captures)),
+        },
+    })
+}
+
+impl Found {
+    /// Looks at the sizes, without reading whole pictures.
+    fn check(&self) -> Result<()> {
+        match self {
+            Self::SkyBox(paths) => {
+                let mut sizes = [(0, 0); 6];
+                for (size, path) in sizes.iter_mut().zip(paths) {
+                    *size = read_picture_size(path)?;
+                }
+                check_sky_box(&paths[0], sizes)
+            }
+            Self::Panorama(path) => {
+                let (w, h) = read_picture_size(path)?;
+                if w.abs_diff(h.saturating_mul(2)) > 1 {
+                    let message = format!(
+                        "has {w} × {h} pixels: an equirectangular photograph is twice as wide as high"
+                    );
+                    return Err(FileError::format(path, message).into());
+                }
+                Ok(())
+            }
+            // Those were looked at when they were found.
+            Self::Captures(_) => Ok(()),
+        }
+    }
+}
+
+fn check_sky_box(first: &Path, sizes: [(u32, u32); 6]) -> Result<()> {
+    let side = sizes[0].0;
+    match sizes.iter().zip(0..).find(|(size, _)| **size != (side, side)) {
+        None => Ok(()),
+        Some(((w, h), k)) => {
+            let message = format!(
+                "has {} × {} pixels, and picture {k} of its sky box {w} × {h}: six are square and of one size",
+                sizes[0].0, sizes[0].1
+            );
+            Err(FileError::format(first, message).into())
+        }
+    }
+}
+
+/// Colours from a cube map.
+#[derive(Clone, Copy)]
+pub(crate) struct PictureColors<'a> {
+    cube: &'a CubeMap,
+    unseen: UnseenColor,
+}
+
+impl PictureColors<'_> {
+    /// The RGB image of a view.
+    pub(crate) fn image_into(
+        &self,
+        look: &Look<'_>,
+        hits: &Hits,
+        camera: &Camera,
+        out: &mut Raster<[u8; 3]>,
+    ) {
+        let unseen = match self.unseen {
+            UnseenColor::Mesh => Unseen::Mesh(look.scene, look.textures),
+            UnseenColor::Nearby => Unseen::Nearby,
+        };
+        picture_image_into(self.cube, unseen, hits, camera, &TextureFilter::default(), out);
+    }
+}

@@ -1,0 +1,166 @@
+//! The dense labelled point cloud: a PLY file, and by room and instance the S3DIS tree that loaders read and
+//! `pointcloud.mat`.
+
+use crate::context::{Context, Progress};
+use crate::error::{Error, Result};
+use crate::export::area_plan::AreaPlan;
+use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
+use s3d_io::{Layout, MatWriter, PlyPointWriter, S3disAreaWriter};
+use s3d_label::{LabelId, LabelTable, Room};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// Points drawn at a time: what is in memory of a cloud of any size.
+const CHUNK: u64 = 1 << 18;
+
+/// More points than this in one cloud are taken for a slip: 150 times the largest area of the published data set.
+const MAX_POINTS: f64 = 1e11;
+
+/// Refuses a density that would draw points without end.
+pub(crate) fn check_density(mesh: &TriMesh, points_per_m2: f64) -> Result<()> {
+    let (area, points) = (mesh.total_area(), mesh.total_area() * points_per_m2);
+    if points <= MAX_POINTS {
+        return Ok(());
+    }
+    Err(Error::Input(format!(
+        "{points_per_m2} points a m² on {area:.1} m² are {points:.1e} points, more than {MAX_POINTS:.0e}: is the mesh in \
+         metres? or lower --points-per-m2"
+    )))
+}
+
+/// Room of every label of an area, and the instance's number there.
+type Places = BTreeMap<LabelId, (Room, u32)>;
+
+/// Samples the labelled mesh and writes the points, grouped by room and instance: those of faces without a label come
+/// last, and into the PLY file only. Returns how many there are.
+pub(crate) fn write_points(
+    ctx: &Context,
+    layout: &Layout,
+    mesh: &TriMesh,
+    plan: &AreaPlan,
+    table: &LabelTable,
+    density: Density,
+    seed: u64,
+) -> Result<u64> {
+    // Number in the room of every label of this area: the tree's files are named by it.
+    let mut place = Places::new();
+    let annotated = &plan.annotated;
+    for room in &plan.names {
+        for instance in &room.instances {
+            if let Some(id) = table.id_of(&instance.label) {
+                place.insert(id, (room.room, instance.number_in_room));
+            }
+        }
+    }
+    let key = |face: &u32| {
+        let label = annotated.face_labels[*face as usize];
+        (place.get(&label).map_or((true, None), |(room, _)| (false, Some(*room))), label)
+    };
+    let mut faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
+    faces.sort_by_cached_key(key);
+    let rooms: Vec<(Option<Room>, Vec<Run>)> = runs(&faces, &annotated.face_labels, &place);
+
+    let number = plan.area;
+    let sampler = SurfaceSampler::over_faces(mesh, faces, density, seed);
+    let mut sink = Sink {
+        ply: PlyPointWriter::create(&layout.point_cloud(number), sampler.len())?,
+        progress: ctx.progress("sampling", "points", sampler.len()),
+        sampler: &sampler,
+        cloud: PointCloud::default(),
+    };
+    let tree = S3disAreaWriter::create(&layout.s3dis_area_dir(number))?;
+    let mut mat = MatWriter::create(&layout.point_cloud_mat(number), &format!("Area_{number}"))?;
+    let angle_of: BTreeMap<Room, u32> =
+        annotated.rooms.iter().map(|r| (r.room, r.wall_direction_deg)).collect();
+    let mut in_tree = BTreeSet::new();
+    for (room, runs) in rooms {
+        // A room that no point was drawn in stands nowhere in the tree: loaders stop at one without annotations.
+        let has_points =
+            runs.iter().any(|r| sampler.points_before(r.faces.start) < sampler.points_before(r.faces.end));
+        let room = room.filter(|_| has_points);
+        in_tree.extend(room);
+        let mut files = room.map(|room| tree.room(&room.to_string())).transpose()?;
+        if let Some(room) = room {
+            mat.room(&room.to_string(), angle_of.get(&room).copied().unwrap_or(0))?;
+        }
+        for run in runs {
+            let points = sampler.points_before(run.faces.start)..sampler.points_before(run.faces.end);
+            match (&mut files, table.get(run.label)) {
+                (Some(files), Some(label)) if !points.is_empty() => {
+                    let (class, number) = (label.class.name(), run.number_in_room);
+                    let mut instance = files.instance(class, number)?;
+                    mat.object(&format!("{class}_{number}"), &label.to_string())?;
+                    sink.write(points, run.label, |cloud| {
+                        instance.append(&cloud.positions, &cloud.colors)?;
+                        mat.append(&cloud.positions, &cloud.colors)
+                    })?;
+                    instance.finish()?;
+                }
+                _ => sink.write(points, run.label, |_| Ok(()))?,
+            }
+        }
+        if let Some(files) = files {
+            files.finish()?;
+        }
+    }
+    sink.ply.finish()?;
+    mat.finish()?;
+    let surveyed = annotated.rooms.iter().filter(|r| in_tree.contains(&r.room));
+    let angles: Vec<(String, u32)> = surveyed.map(|r| (r.room.to_string(), r.wall_direction_deg)).collect();
+    tree.alignment(&angles)?;
+    Ok(sampler.len())
+}
+
+/// Consecutive faces of one label, as positions in the sampler's order.
+struct Run {
+    faces: Range<usize>,
+    label: LabelId,
+    number_in_room: u32,
+}
+
+/// The runs of ordered faces, by room; faces without a label have no room.
+fn runs(faces: &[u32], face_labels: &[LabelId], place: &Places) -> Vec<(Option<Room>, Vec<Run>)> {
+    let mut rooms: Vec<(Option<Room>, Vec<Run>)> = Vec::new();
+    let mut start = 0;
+    for run in faces.chunk_by(|a, b| face_labels[*a as usize] == face_labels[*b as usize]) {
+        let label = face_labels[run[0] as usize];
+        let (room, number_in_room) =
+            place.get(&label).map_or((None, 0), |(room, number)| (Some(*room), *number));
+        let run = Run { faces: start..start + run.len(), label, number_in_room };
+        start = run.faces.end;
+        match rooms.last_mut() {
+            Some((last, runs)) if *last == room => runs.push(run),
+            _ => rooms.push((room, vec![run])),
+        }
+    }
+    rooms
+}
+
+/// Where the points go: all into the PLY file, and each chunk to whoever else wants it.
+struct Sink<'a> {
+    ply: PlyPointWriter,
+    progress: Progress<'a>,
+    sampler: &'a SurfaceSampler<'a>,
+    cloud: PointCloud,
+}
+
+impl Sink<'_> {
+    fn write(
+        &mut self,
+        points: Range<u64>,
+        label: LabelId,
+        mut also: impl FnMut(&PointCloud) -> s3d_io::Result<()>,
+    ) -> Result<()> {
+        let mut at = points.start;
+        while at < points.end {
+            self.progress.context.check()?;
+            let end = points.end.min(at + CHUNK);
+            self.sampler.sample(at..end, &mut self.cloud);
+            self.ply.append(&self.cloud, &vec![label.0; self.cloud.len()])?;
+            also(&self.cloud)?;
+            self.progress.add(end - at);
+            at = end;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,229 @@
+//! Which views are taken: candidates at every location, their entropies, the selection, and their numbers.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::work::for_each_in_order;
+use crate::store::journal::Finished;
+use crate::store::request::Request;
+use crate::tables::summary::ViewTally;
+use s3d_geom::Camera;
+use s3d_io::ScanLocation;
+use s3d_label::{Class, LabelId, LabelTable};
+use s3d_render::{Caster, Hits, NO_FACE, Scene};
+use s3d_sample::{Pool, PoolItem, Selection, View, ViewDistribution, draw_view, entropy, select_pooled};
+use serde::Serialize;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// A candidate view of a scan location.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Candidate {
+    /// Number of its area.
+    #[serde(skip)]
+    pub(crate) area: u32,
+    /// Index of its location in the area's camera table.
+    #[serde(skip)]
+    pub(crate) location: usize,
+    pub(crate) camera_uuid: String,
+    /// From 0: what its draw is keyed by.
+    pub(crate) candidate: u32,
+    pub(crate) yaw_rad: f64,
+    pub(crate) pitch_rad: f64,
+    pub(crate) fov_rad: f64,
+    /// Shannon entropy of the classes of its pixels, nats.
+    pub(crate) entropy: f64,
+    /// The number in its files' names, if it is kept: kept views of a location count from 0.
+    pub(crate) frame_num: Option<u32>,
+}
+
+impl Candidate {
+    /// The camera that takes it, `size` × `size` pixels.
+    pub(crate) fn camera(&self, location: &ScanLocation, size: u32) -> Camera {
+        let pose = location.pose.turned(self.yaw_rad, self.pitch_rad);
+        Camera::perspective(pose, self.fov_rad, size, size)
+    }
+}
+
+/// How candidates are drawn and scored.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scoring {
+    /// Candidates a location.
+    pub(crate) views: u32,
+    /// Image size in pixels.
+    pub(crate) size: u32,
+    /// Every which pixel of both axes is looked at.
+    pub(crate) stride: u32,
+    pub(crate) seed: u64,
+}
+
+/// Draws the candidates of a location; `entropies` are theirs, if they are scored already.
+fn draw(
+    area: u32,
+    location: usize,
+    uuid: &str,
+    views: u32,
+    seed: u64,
+    entropies: Option<&[f64]>,
+) -> Vec<Candidate> {
+    let distribution = ViewDistribution::default();
+    let candidate = |candidate| {
+        let View { yaw_rad, pitch_rad, fov_rad } = draw_view(&distribution, seed, uuid, candidate);
+        Candidate {
+            area,
+            location,
+            camera_uuid: uuid.to_owned(),
+            candidate,
+            yaw_rad,
+            pitch_rad,
+            fov_rad,
+            entropy: entropies.and_then(|e| e.get(candidate as usize)).copied().unwrap_or(0.0),
+            frame_num: None,
+        }
+    };
+    (0..views).map(candidate).collect()
+}
+
+/// Draws the candidates of those locations of an area that are asked for, and scores each by the entropy of what it sees.
+/// What is done goes to `each`, a location at a time, by whichever thread: its uuid, and the entropies of its candidates.
+pub(crate) fn score_area(
+    ctx: &Context,
+    area: u32,
+    locations: &[&ScanLocation],
+    scene: &Scene<'_>,
+    face_labels: &[LabelId],
+    table: &LabelTable,
+    scoring: Scoring,
+    each: impl Fn(&str, Vec<f64>) -> Result<()> + Sync,
+) -> Result<()> {
+    let mut candidates = Vec::with_capacity(locations.len() * scoring.views as usize);
+    for (index, location) in locations.iter().enumerate() {
+        candidates.extend(draw(area, index, &location.uuid, scoring.views, scoring.seed, None));
+    }
+    if scoring.views == 0 {
+        return locations.iter().try_for_each(|location| each(&location.uuid, Vec::new()));
+    }
+    let left: Vec<AtomicU32> = locations.iter().map(|_| AtomicU32::new(scoring.views)).collect();
+    let classes: Vec<Option<Class>> = face_labels.iter().map(|l| table.class_of(*l)).collect();
+    let progress = ctx.progress("scoring", "views", candidates.len() as u64);
+    let scores: Vec<OnceLock<f64>> = candidates.iter().map(|_| OnceLock::new()).collect();
+    let items: Vec<usize> = (0..candidates.len()).collect();
+    let memory = || (Caster::new(scene), Hits::default());
+    for_each_in_order(ctx, &items, memory, |(caster, hits), &i| {
+        let c = &candidates[i];
+        let camera = c.camera(locations[c.location], scoring.size);
+        caster.cast_into(&camera, scoring.stride, hits);
+        let mut histogram = [0u64; 13];
+        for &face in hits.face.pixels() {
+            if face != NO_FACE
+                && let Some(class) = classes[face as usize]
+            {
+                histogram[class.index()] += 1;
+            }
+        }
+        let _ = scores[i].set(entropy(&histogram));
+        progress.add(1);
+        // Whoever scores the last of a location hands it on.
+        if left[c.location].fetch_sub(1, Ordering::AcqRel) == 1 {
+            let views = scoring.views as usize;
+            let of_location = scores.iter().skip(c.location * views).take(views);
+            let entropies = of_location.map(|score| score.get().copied().unwrap_or(0.0)).collect();
+            each(&c.camera_uuid, entropies)?;
+        }
+        Ok(())
+    })
+}
+
+/// All candidates of a request whose areas are labelled and whose locations are scored, with the selection made, and what
+/// became of them.
+///
+/// # Errors
+/// [`Error::Input`] if something of that is missing.
+pub(crate) fn select_requested(
+    request: &Request,
+    finished: &Finished,
+) -> Result<(Vec<Candidate>, ViewTally)> {
+    let options = &request.options;
+    let mut candidates = Vec::new();
+    for area in request.numbers() {
+        let missing = |what: &str| Error::Input(format!("area {area}: {what} missing"));
+        let labels = finished.labels(area).ok_or_else(|| missing("its labels are"))?;
+        for (index, uuid) in labels.locations.iter().enumerate() {
+            let entropies = finished.scores(area, uuid);
+            let entropies = entropies.ok_or_else(|| missing(&format!("the scores of {uuid} are")))?;
+            // No more is drawn than was scored, whatever a request claims.
+            if entropies.len() != options.views as usize {
+                return Err(Error::Input(format!(
+                    "area {area}: location {uuid} has {} scores instead of {}, one a candidate view",
+                    entropies.len(),
+                    options.views
+                )));
+            }
+            candidates.extend(draw(area, index, uuid, options.views, request.seed, Some(entropies)));
+        }
+    }
+    let pool = options.pool;
+    select(&mut candidates, pool, options.keep_all, request.seed);
+    let tally = ViewTally::of(&candidates, pool, options.keep_all, &options.only);
+    Ok((candidates, tally))
+}
+
+/// Selects views over the pool, or all of them, and numbers the kept ones of each location from 0.
+pub(crate) fn select(candidates: &mut [Candidate], pool: Pool, keep_all: bool, seed: u64) {
+    let kept = if keep_all {
+        vec![true; candidates.len()]
+    } else {
+        let items: Vec<PoolItem<'_>> = candidates
+            .iter()
+            .map(|c| PoolItem { area: c.area, location: &c.camera_uuid, view: c.candidate, score: c.entropy })
+            .collect();
+        select_pooled(&items, pool, &Selection::default(), seed)
+    };
+    let mut of_location = (u32::MAX, usize::MAX);
+    let mut next = 0;
+    for (c, kept) in candidates.iter_mut().zip(kept) {
+        if of_location != (c.area, c.location) {
+            of_location = (c.area, c.location);
+            next = 0;
+        }
+        if kept {
+            c.frame_num = Some(next);
+            next += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::journal::{Done, LabelsDone, ScoresDone};
+    use crate::store::request::tests::request;
+
+    #[test]
+    fn as_many_views_are_drawn_as_were_scored() {
+        let mut request = request();
+        request.areas.truncate(1);
+        request.options.views = 3;
+        let area = request.areas[0].area;
+        let entry = serde_json::json!({
+            "area": area, "faces": 0, "faces_left_out": 0, "points": 0, "annotated_points": 0, "rooms": 0,
+            "locations": 1, "panoramas": 0, "views": 0, "rgb": "texture", "place_cameras": null,
+            "xyz": { "type": "half", "largest_coordinate_m": 0.0, "largest_step_m": null },
+        });
+        let mut finished = Finished::default();
+        finished.insert(Done::Labels(LabelsDone {
+            entry: serde_json::from_value(entry).unwrap(),
+            locations: vec!["a".into()],
+            files: Vec::new(),
+        }));
+        let scores = |n| Done::Scores(ScoresDone { area, location: "a".into(), entropies: vec![1.0; n] });
+        finished.insert(scores(3));
+        assert_eq!(select_requested(&request, &finished).unwrap().0.len(), 3);
+        for n in [2, 4] {
+            finished.insert(scores(n));
+            let e = select_requested(&request, &finished).unwrap_err().to_string();
+            assert!(e.contains(&format!("{n} scores instead of 3")), "{e}");
+        }
+        request.options.views = u32::MAX;
+        assert!(select_requested(&request, &finished).is_err());
+    }
+}

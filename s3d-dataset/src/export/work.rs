@@ -1,0 +1,80 @@
+//! Many independent pieces of work on all threads.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// Does `work` on every item, on every thread of the current pool. Items are handed out one at a time and in order, so
+/// that a slow one delays nobody else; at most one an item a thread is under way. After a failure, or a signal that asks for
+/// an end, no further item is begun, and the failure of the first item (by order) that failed is returned. Each thread works with a state of its
+/// own, which `state` makes: memory to be used again, nothing that a result depends on.
+pub(crate) fn for_each_in_order<T: Sync, S>(
+    ctx: &Context,
+    items: &[T],
+    state: impl Fn() -> S + Sync,
+    work: impl Fn(&mut S, &T) -> Result<()> + Sync,
+) -> Result<()> {
+    let next = AtomicUsize::new(0);
+    let ended = AtomicBool::new(false);
+    let failure: Mutex<Option<(usize, Error)>> = Mutex::new(None);
+    rayon::scope(|scope| {
+        for _ in 0..rayon::current_num_threads().min(items.len()) {
+            scope.spawn(|_| {
+                let mut state = state();
+                while !ended.load(Ordering::Relaxed) {
+                    let i = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(item) = items.get(i) else { break };
+                    if let Err(e) = ctx.check().and_then(|()| work(&mut state, item)) {
+                        ended.store(true, Ordering::Relaxed);
+                        let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
+                        if first.as_ref().is_none_or(|(j, _)| i < *j) {
+                            *first = Some((i, e));
+                        }
+                    }
+                }
+            });
+        }
+    });
+    match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some((_, e)) => Err(e),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicU64;
+
+    #[test]
+    fn every_item_is_done_once() {
+        let items: Vec<u64> = (0..1000).collect();
+        let sum = AtomicU64::new(0);
+        for_each_in_order(
+            &Context::default(),
+            &items,
+            || (),
+            |(), i| {
+                sum.fetch_add(*i, Ordering::Relaxed);
+                Ok(())
+            },
+        )
+        .unwrap();
+        assert_eq!(sum.into_inner(), 499_500);
+    }
+
+    #[test]
+    fn the_first_failure_is_told() {
+        let items: Vec<u64> = (0..1000).collect();
+        let e = for_each_in_order(
+            &Context::default(),
+            &items,
+            || (),
+            |(), i| {
+                if *i == 7 { Err(Error::Input(format!("item {i}"))) } else { Ok(()) }
+            },
+        );
+        assert_eq!(e.unwrap_err().to_string(), "item 7");
+    }
+}

@@ -1,0 +1,251 @@
+//! What a scene holds, and what looks wrong in it.
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::annotate::{Annotated, annotate, hidden_instances, label_doubts};
+use crate::export::inputs::{AreaInput, Inputs, mesh_doubts};
+use crate::export::locate;
+use crate::export::location::Outlook;
+use crate::export::overlap::overlap_doubts;
+use crate::export::pictures::Pictures;
+use s3d_geom::{Aabb, NearestFaces, TriMesh};
+use s3d_io::ScanLocation;
+use s3d_label::{Class, Room};
+use s3d_render::Scene;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+/// How a scene is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InfoOptions {
+    /// Show the scan locations that an export would put on the floor, no two of a room nearer than this, metres.
+    pub place_cameras: Option<f64>,
+    /// The seed by which they would be placed.
+    pub seed: u64,
+    /// Skip and count what is not as it should be in the annotations, as in an export that is lenient.
+    pub lenient: bool,
+}
+
+/// What a scene holds. Displayed, it is the text that `s3d info` prints.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct SceneInfo {
+    /// The number of its area.
+    pub area: u32,
+    /// Its mesh.
+    pub mesh: MeshInfo,
+    /// Its rooms, by name.
+    pub rooms: Vec<RoomInfo>,
+    /// Annotated points.
+    pub points: u64,
+    /// Faces that get a label, and those of them that labels dispute.
+    pub labelled_faces: u64,
+    /// Faces for which several labels have votes.
+    pub contested_faces: u64,
+    /// Points farther than 5 cm from every face.
+    pub far_points: u64,
+    /// The pictures that colours come from, in a sentence; `None` if they are the mesh's own, or cannot be used.
+    pub pictures: Option<String>,
+    /// Its scan locations.
+    pub locations: Vec<LocationInfo>,
+    /// What looks wrong, a sentence each.
+    pub doubts: Vec<String>,
+}
+
+/// A mesh.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct MeshInfo {
+    /// Number of faces.
+    pub faces: usize,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of materials.
+    pub materials: usize,
+    /// Names of its textures, with width and height in pixels.
+    pub textures: Vec<(String, u32, u32)>,
+    /// Square metres.
+    pub area_m2: f64,
+    /// Its box, world metres, Z-up.
+    pub bounds: Aabb,
+}
+
+/// A room.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct RoomInfo {
+    /// Its name.
+    pub room: Room,
+    /// Its annotated points.
+    pub points: u64,
+    /// Square metres of floor.
+    pub floor_m2: f64,
+    /// The direction of its walls, degrees from +X, in [0, 90).
+    pub wall_direction_deg: u32,
+    /// How many instances it has of each class.
+    pub instances: BTreeMap<Class, u32>,
+}
+
+/// A scan location.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct LocationInfo {
+    /// Where it is.
+    pub location: ScanLocation,
+    /// Its room.
+    pub room: Room,
+    /// The share of directions in which it sees the mesh, 0 to 1.
+    pub coverage: f64,
+    /// The distance to the nearest of what it sees, metres.
+    pub nearest_m: f32,
+}
+
+/// Looks at a scene file, or the folder of a published area. All of the scene is read, and labelled as an export would.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be exported;
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn info(scene: &Path, options: &InfoOptions, ctx: &Context) -> Result<SceneInfo> {
+    let inputs = Inputs::open(&[scene.to_owned()], options.place_cameras, options.lenient)?;
+    let area = &inputs.areas[0];
+    let file = area.read_mesh()?;
+    let mut doubts: Vec<String> = area.warnings.iter().chain(&file.warnings).cloned().collect();
+    let mesh = &file.mesh;
+    let nearest = NearestFaces::new(mesh);
+    let annotated = annotate(ctx, area, &nearest, &inputs.table, |_| Ok(()))?;
+    let scene = Scene::new(mesh);
+    let pictures = match Pictures::open(area, |_| true) {
+        Ok(pictures) => pictures.map(|pictures| {
+            let summary = pictures.summary();
+            doubts.extend(pictures.warnings);
+            summary
+        }),
+        Err(e) => {
+            doubts.push(e.to_string());
+            None
+        }
+    };
+    let located = locate(ctx, area, &scene, &nearest, &annotated, &inputs.table, options.seed)?;
+    let mut locations = Vec::with_capacity(located.len());
+    for (location, room) in located {
+        let outlook = Outlook::of(&scene, &location);
+        doubts.extend(outlook.warnings(&location));
+        let (coverage, nearest_m) = (outlook.coverage, outlook.nearest_m);
+        locations.push(LocationInfo { location, room, coverage, nearest_m });
+    }
+    doubts.extend(annotated.skipped.sentence());
+    doubts.extend(mesh_doubts(mesh));
+    doubts.extend(label_doubts(&annotated.report));
+    doubts.extend(overlap_doubts(&annotated.rooms));
+    doubts.extend(hidden_instances(area, &annotated.face_labels, &inputs.table));
+    let total = &annotated.report.total;
+    Ok(SceneInfo {
+        area: area.number,
+        mesh: MeshInfo::of(mesh),
+        rooms: rooms(area, &annotated),
+        points: annotated.points,
+        labelled_faces: total.faces,
+        contested_faces: total.contested,
+        far_points: total.far_points,
+        pictures,
+        locations,
+        doubts,
+    })
+}
+
+fn rooms(area: &AreaInput, annotated: &Annotated) -> Vec<RoomInfo> {
+    let rooms = annotated.rooms.iter().zip(&area.rooms).map(|(surveyed, room)| {
+        let mut instances: BTreeMap<Class, u32> = BTreeMap::new();
+        room.instances.iter().for_each(|i| *instances.entry(i.label.class).or_default() += 1);
+        RoomInfo {
+            room: surveyed.room,
+            points: surveyed.points,
+            floor_m2: surveyed.footprint.area_m2,
+            wall_direction_deg: surveyed.wall_direction_deg,
+            instances,
+        }
+    });
+    rooms.collect()
+}
+
+impl MeshInfo {
+    fn of(mesh: &TriMesh) -> Self {
+        let textures = mesh.textures().iter().map(|t| (t.name.clone(), t.image.width(), t.image.height()));
+        Self {
+            faces: mesh.faces().len(),
+            vertices: mesh.positions().len(),
+            materials: mesh.materials().len(),
+            textures: textures.collect(),
+            area_m2: mesh.total_area(),
+            bounds: mesh.aabb(),
+        }
+    }
+}
+
+impl fmt::Display for SceneInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "area {}\n\n{}", self.area, self.mesh)?;
+        writeln!(f, "annotations: {} points, {} rooms", self.points, self.rooms.len())?;
+        self.rooms.iter().try_for_each(|room| writeln!(f, "{room}"))?;
+        writeln!(
+            f,
+            "  {} of {} faces get a label, {} of them contested; {} points are farther than 5 cm from every face",
+            self.labelled_faces, self.mesh.faces, self.contested_faces, self.far_points
+        )?;
+        if let Some(pictures) = &self.pictures {
+            writeln!(f, "\ncolours: {pictures}")?;
+        }
+        writeln!(f, "\nscan locations: {}", self.locations.len())?;
+        for LocationInfo { location, room, coverage, nearest_m } in &self.locations {
+            let (uuid, at) = (&location.uuid, location.pose.location);
+            writeln!(
+                f,
+                "  {uuid}  ({:.2}, {:.2}, {:.2})  {room}  sees the mesh in {:.0} %, the nearest of it at {nearest_m:.2} m",
+                at.x,
+                at.y,
+                at.z,
+                100.0 * coverage
+            )?;
+        }
+        let verdict = if self.doubts.is_empty() { "nothing looks wrong" } else { "what looks wrong:" };
+        writeln!(f, "\n{verdict}")?;
+        self.doubts.iter().try_for_each(|doubt| writeln!(f, "  {doubt}"))
+    }
+}
+
+impl fmt::Display for MeshInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (b, s) = (self.bounds, self.bounds.size());
+        writeln!(
+            f,
+            "mesh: {} faces, {} vertices, {} materials, {} textures, {:.1} m²",
+            self.faces,
+            self.vertices,
+            self.materials,
+            self.textures.len(),
+            self.area_m2
+        )?;
+        writeln!(
+            f,
+            "  {:.2} × {:.2} × {:.2} m, from ({:.2}, {:.2}, {:.2}) to ({:.2}, {:.2}, {:.2}), Z-up",
+            s.x, s.y, s.z, b.min.x, b.min.y, b.min.z, b.max.x, b.max.y, b.max.z
+        )?;
+        self.textures.iter().try_for_each(|(name, width, height)| writeln!(f, "  {name} {width} × {height}"))
+    }
+}
+
+impl fmt::Display for RoomInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let instances: Vec<String> = self.instances.iter().map(|(class, n)| format!("{n} {class}")).collect();
+        write!(
+            f,
+            "  {}: {} points, {:.1} m² of floor, walls along {}°: {}",
+            self.room,
+            self.points,
+            self.floor_m2,
+            self.wall_direction_deg,
+            instances.join(", ")
+        )
+    }
+}

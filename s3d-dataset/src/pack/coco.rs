@@ -1,0 +1,66 @@
+//! `s3d pack --to coco`: panoptic annotations.
+
+use super::destination::Destination;
+use super::map_in_order;
+use super::options::SpecificOptions;
+use super::source::Source;
+use crate::context::Context;
+use crate::error::Result;
+use s3d_io::{
+    CocoImage, Content, DatasetImage, Domain, Error as FileError, coco_categories, coco_panoptic, create_dir,
+    encode_rgb8, read_rgb8, write_bytes, write_coco,
+};
+use std::path::Path;
+
+/// The folder of panoptic images, and the file about them.
+const FOLDER: &str = "panoptic";
+const FILE: &str = "panoptic.json";
+
+pub(super) fn pack(
+    ctx: &Context,
+    source: &Source,
+    destination: &Destination,
+    options: &SpecificOptions,
+) -> Result<Vec<String>> {
+    source.require(Domain::Rgb, "COCO")?;
+    source.require(Domain::Semantic, "COCO")?;
+    let table = source.labels()?;
+    let stuff = options.stuff.clone().unwrap_or_default().0;
+    let compression = options.compression.unwrap_or_default();
+    let folder = destination.path().join(FOLDER);
+    for image in &source.images {
+        let below = image.relative_path(Domain::Rgb);
+        Path::new(&below).parent().map_or(Ok(()), |parent| create_dir(&folder.join(parent)))?;
+    }
+    let progress = ctx.progress("packing", "images", source.images.len() as u64);
+    let numbered: Vec<(u32, &DatasetImage)> = (1..).zip(&source.images).collect();
+    let images = map_in_order(
+        ctx,
+        &numbered,
+        || (),
+        |(), (id, image)| {
+            let path = image.path(&source.layout, Domain::Semantic);
+            let semantic = read_rgb8(&path)?;
+            let (panoptic, segments) = coco_panoptic(&semantic, &table, &stuff).map_err(|e| {
+                FileError::format(&path, format!("{e} in {}", source.layout.labels_json().display()))
+            })?;
+            let file_name = image.relative_path(Domain::Rgb);
+            write_bytes(&folder.join(&file_name), &encode_rgb8(&panoptic, Content::Labels, compression))?;
+            progress.add(1);
+            Ok(CocoImage { id: *id, file_name, width: semantic.width(), height: semantic.height(), segments })
+        },
+    )?;
+    write_coco(
+        &destination.path().join(FILE),
+        "2D-3D-Semantic data set, exported by s3d",
+        &images,
+        &coco_categories(&stuff),
+    )?;
+    Ok(vec![
+        format!(
+            "images are below the data set's folder, and their panoptic images, of the same names, below {FOLDER}"
+        ),
+        "a segment's id is its label's index, or 16711680 + category of a class that is stuff; 0 is void"
+            .into(),
+    ])
+}

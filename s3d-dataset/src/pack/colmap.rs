@@ -1,0 +1,65 @@
+//! `s3d pack --to colmap`: a model of cameras, images and points for each area.
+
+use super::destination::Destination;
+use super::options::SpecificOptions;
+use super::source::Source;
+use super::{area_points, copy, map_in_order};
+use crate::context::Context;
+use crate::error::Result;
+use s3d_io::{ColmapImage, Domain, create_dir, write_colmap_binary, write_colmap_text};
+
+pub(super) fn pack(
+    ctx: &Context,
+    source: &Source,
+    destination: &Destination,
+    options: &SpecificOptions,
+) -> Result<Vec<String>> {
+    source.require(Domain::Rgb, "COLMAP")?;
+    source.require(Domain::Pose, "COLMAP")?;
+    let progress = ctx.progress("packing", "images", source.images.len() as u64);
+    let mut notes = Vec::new();
+    for &area in &source.areas {
+        let images = source.of_area(area);
+        let Some(first) = images.first() else {
+            ctx.warn(format_args!("area {area} has no views: it is left out"));
+            continue;
+        };
+        let folder = destination.path().join(format!("area_{area}"));
+        let copies = folder.join("images");
+        if options.copy_images {
+            create_dir(&copies)?;
+        }
+        let models = map_in_order(
+            ctx,
+            &images,
+            || (),
+            |(), image| {
+                let (pose, (width, height)) = (source.pose(image)?, source.size(image)?);
+                let rgb = image.path(&source.layout, Domain::Rgb);
+                let name = format!("{}_domain_rgb.png", image.stem());
+                if options.copy_images {
+                    copy(&rgb, &copies.join(&name))?;
+                }
+                progress.add(1);
+                Ok(ColmapImage { name, width, height, k: pose.camera_k_matrix, rt: pose.camera_rt_matrix })
+            },
+        )?;
+        let points = area_points(source, area, options.points)?;
+        let model = folder.join("sparse").join("0");
+        if options.binary {
+            write_colmap_binary(&model, &models, &points)?;
+        } else {
+            write_colmap_text(&model, &models, &points)?;
+        }
+        let images = if options.copy_images {
+            format!("area_{area}/images")
+        } else {
+            let folder = source.layout.image_dir(area, first.frame, Domain::Rgb);
+            let below = folder.strip_prefix(source.layout.root()).unwrap_or(&folder).display().to_string();
+            format!("{below} of the data set")
+        };
+        notes.push(format!("the model area_{area}/sparse/0 is of the images in {images}"));
+    }
+    notes.push("panoramas are not in it; points have no tracks".into());
+    Ok(notes)
+}

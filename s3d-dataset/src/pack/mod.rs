@@ -1,0 +1,155 @@
+//! Packages for trainers, each made from the files of a data set.
+
+mod coco;
+mod colmap;
+mod destination;
+mod nerfstudio;
+mod options;
+mod parquet;
+mod source;
+mod webdataset;
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::work::for_each_in_order;
+use crate::store::refuse_existing;
+use destination::{About, Destination, check_apart, parent_of, resolved};
+pub use options::{
+    ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions,
+};
+use s3d_geom::PointCloud;
+use s3d_io::{Error as FileError, create_dir};
+use source::Source;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::time::Instant;
+
+/// Points of an area's cloud in a package, if nothing else is said.
+const POINTS: u32 = 100_000;
+
+/// Makes a package of the data set in the folder `dataset`, in which nothing is altered. Returns where it is.
+///
+/// # Errors
+/// [`Error::Usage`] if options exclude each other or something is in the way; [`Error::Input`] if the data set lacks what the
+/// package needs; [`Error::File`]; [`Error::Cancelled`]; [`Error::Temporary`]. No half of a package is left behind.
+pub fn pack(dataset: &Path, kind: PackageKind, options: &PackOptions, ctx: &Context) -> Result<PathBuf> {
+    let started = Instant::now();
+    options.specific.check(kind)?;
+    let which = which_images(ctx, kind, options.images)?;
+    let source = Source::open(dataset, &options.areas, which)?;
+    let place = match &options.output {
+        Some(place) => place.clone(),
+        None => default_place(dataset, kind)?,
+    };
+    if kind == PackageKind::Parquet {
+        check_apart(&place, dataset)?;
+        refuse_existing(&place, options.overwrite)?;
+        create_dir(&parent_of(&place))?;
+        parquet::pack(ctx, &source, &place)?;
+    } else {
+        let destination = Destination::begin(&place, dataset, options.overwrite)?;
+        let notes = match kind {
+            PackageKind::Webdataset => webdataset::pack(ctx, &source, &destination, &options.specific)?,
+            PackageKind::Colmap => colmap::pack(ctx, &source, &destination, &options.specific)?,
+            PackageKind::Nerfstudio => nerfstudio::pack(ctx, &source, &destination, &options.specific)?,
+            _ => coco::pack(ctx, &source, &destination, &options.specific)?,
+        };
+        notes.iter().for_each(|note| ctx.info(note));
+        let about = About::new(kind.to_string(), &source.areas, source.images.len(), notes);
+        destination.finish(&about)?;
+    }
+    ctx.info(format_args!(
+        "{}: {} images for {} in {:.1} s",
+        place.display(),
+        source.images.len(),
+        kind,
+        started.elapsed().as_secs_f64()
+    ));
+    Ok(place)
+}
+
+/// The images that a package holds.
+fn which_images(ctx: &Context, kind: PackageKind, images: Option<PackedImages>) -> Result<PackedImages> {
+    match (kind, images) {
+        (PackageKind::Colmap, Some(PackedImages::Panoramas)) => Err(Error::Usage(
+            "--images panoramas: COLMAP's cameras are pinholes, and panoramas are none: take --to nerfstudio"
+                .into(),
+        )),
+        (PackageKind::Colmap, which) => {
+            if which == Some(PackedImages::All) {
+                ctx.warn(format_args!("panoramas are left out: COLMAP's cameras are pinholes"));
+            }
+            Ok(PackedImages::Views)
+        }
+        (_, which) => Ok(which.unwrap_or(PackedImages::All)),
+    }
+}
+
+/// Where a package goes if nothing is said: beside the data set, named after it.
+fn default_place(dataset: &Path, kind: PackageKind) -> Result<PathBuf> {
+    // The name of "." is that of the folder it is.
+    let named = match dataset.file_name() {
+        Some(_) => dataset.to_owned(),
+        None => resolved(dataset).map_err(|e| FileError::io(dataset, "look for", e))?,
+    };
+    let mut name = named.file_name().unwrap_or("dataset".as_ref()).to_owned();
+    if kind == PackageKind::Parquet {
+        name.push("_images.parquet");
+    } else {
+        name.push(format!("_{kind}"));
+    }
+    Ok(named.with_file_name(name))
+}
+
+/// `work` on every item on all threads; the results in the order of the items.
+fn map_in_order<T: Sync, S, R: Send + Sync>(
+    ctx: &Context,
+    items: &[T],
+    state: impl Fn() -> S + Sync,
+    work: impl Fn(&mut S, &T) -> Result<R> + Sync,
+) -> Result<Vec<R>> {
+    let results: Vec<OnceLock<R>> = items.iter().map(|_| OnceLock::new()).collect();
+    let jobs: Vec<(&T, &OnceLock<R>)> = items.iter().zip(&results).collect();
+    for_each_in_order(ctx, &jobs, state, |state, (item, result)| {
+        let _ = result.set(work(state, item)?);
+        Ok(())
+    })?;
+    Ok(results.into_iter().map(|r| r.into_inner().expect("every item was done")).collect())
+}
+
+/// Some points of an area's cloud; none if none are asked for.
+fn area_points(source: &Source, area: u32, most: Option<u32>) -> Result<PointCloud> {
+    match most.unwrap_or(POINTS) {
+        0 => Ok(PointCloud::default()),
+        most => Ok(s3d_io::read_point_sample(&source.layout.point_cloud(area), most as usize)?),
+    }
+}
+
+/// Copies a file of the data set.
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    let bytes = fs::read(from).map_err(|e| FileError::io(from, "read", e))?;
+    Ok(s3d_io::write_bytes(to, &bytes).map(drop)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_lies_beside_the_data_set() {
+        let place = |path: &str, kind| default_place(Path::new(path), kind).unwrap();
+        assert_eq!(place("a/data", PackageKind::Colmap), Path::new("a/data_colmap"));
+        assert_eq!(place("data/", PackageKind::Parquet), Path::new("data_images.parquet"));
+        let here = std::env::current_dir().unwrap();
+        let name = format!("{}_coco", here.file_name().unwrap().to_str().unwrap());
+        assert_eq!(place(".", PackageKind::Coco), here.canonicalize().unwrap().with_file_name(name));
+    }
+
+    #[test]
+    fn results_are_in_order() {
+        let items: Vec<u32> = (0..500).collect();
+        let squares = map_in_order(&Context::default(), &items, || (), |(), i| Ok(i * i)).unwrap();
+        assert!(squares.iter().enumerate().all(|(i, s)| *s as usize == i * i));
+    }
+}

@@ -1,0 +1,182 @@
+//! `s3d pack --to nerfstudio`: `transforms.json` for each area, another for its panoramas, and a cloud to begin from.
+
+use super::destination::{Destination, relative_path, resolved};
+use super::options::{DepthFiles, SpecificOptions};
+use super::source::{DEPTH_MISSING, Source};
+use super::{area_points, copy, map_in_order};
+use crate::context::Context;
+use crate::error::Result;
+use s3d_geom::Raster;
+use s3d_io::{
+    DatasetImage, Domain, Error as FileError, Frame, NerfstudioCamera, NerfstudioFrame, create_dir,
+    encode_gray16, read_gray16, write_bytes, write_colored_points, write_nerfstudio,
+};
+use std::path::{Path, PathBuf};
+
+const PLY: &str = "points.ply";
+
+pub(super) fn pack(
+    ctx: &Context,
+    source: &Source,
+    destination: &Destination,
+    options: &SpecificOptions,
+) -> Result<Vec<String>> {
+    source.require(Domain::Rgb, "nerfstudio")?;
+    source.require(Domain::Pose, "nerfstudio")?;
+    let depth = match options.depth {
+        Some(DepthFiles::None) => DepthFiles::None,
+        Some(asked) => {
+            source.require(Domain::Depth, "--depth")?;
+            asked
+        }
+        None if source.has(Domain::Depth) => DepthFiles::Millimetres,
+        None => DepthFiles::None,
+    };
+    let progress = ctx.progress("packing", "images", source.images.len() as u64);
+    let mut notes = Vec::new();
+    for &area in &source.areas {
+        let images = source.of_area(area);
+        if images.is_empty() {
+            continue;
+        }
+        let below = format!("area_{area}");
+        let job = Job::new(source, destination, &below, depth, options)?;
+        let points = area_points(source, area, options.points)?;
+        let ply = (!points.is_empty()).then_some(PLY);
+        if ply.is_some() {
+            write_colored_points(&job.folder.join(PLY), &points)?;
+        }
+        let (panoramas, views): (Vec<_>, Vec<_>) =
+            images.into_iter().partition(|image| image.frame == Frame::Panorama);
+        for (images, camera, name) in [
+            (views, NerfstudioCamera::Perspective, "transforms.json"),
+            (panoramas, NerfstudioCamera::Equirectangular, "transforms_panoramas.json"),
+        ] {
+            if images.is_empty() {
+                continue;
+            }
+            let frames = map_in_order(
+                ctx,
+                &images,
+                || (),
+                |(), image| {
+                    let frame = job.frame(image, camera)?;
+                    progress.add(1);
+                    Ok(frame)
+                },
+            )?;
+            write_nerfstudio(&job.folder.join(name), camera, ply, &frames)?;
+            notes.push(format!("ns-train … --data {below}/{name}"));
+        }
+    }
+    match depth {
+        DepthFiles::Millimetres => {
+            notes.push("depth is in millimetres, 0 where missing: nerfstudio's default".into());
+        }
+        DepthFiles::Original => notes.push(format!(
+            "depth needs --depth-unit-scale-factor {}; missing pixels seem to be {:.0} m away",
+            1.0 / source.depth_units_per_m,
+            f64::from(DEPTH_MISSING) / source.depth_units_per_m
+        )),
+        DepthFiles::None => {}
+    }
+    Ok(notes)
+}
+
+/// What the frames of an area need.
+struct Job<'a> {
+    source: &'a Source,
+    /// The area's folder while it is written.
+    folder: PathBuf,
+    /// The same folder as it will be, and the data set; absolute.
+    place: PathBuf,
+    root: PathBuf,
+    depth: DepthFiles,
+    options: &'a SpecificOptions,
+}
+
+impl<'a> Job<'a> {
+    fn new(
+        source: &'a Source,
+        destination: &Destination,
+        below: &str,
+        depth: DepthFiles,
+        options: &'a SpecificOptions,
+    ) -> Result<Self> {
+        let absolute = |path: &Path| resolved(path).map_err(|e| FileError::io(path, "look for", e));
+        let folder = destination.path().join(below);
+        create_dir(&folder)?;
+        if options.copy_images {
+            create_dir(&folder.join("images"))?;
+        }
+        if depth == DepthFiles::Millimetres || depth == DepthFiles::Original && options.copy_images {
+            create_dir(&folder.join("depths"))?;
+        }
+        let (place, root) = (absolute(destination.place())?.join(below), absolute(source.layout.root())?);
+        Ok(Self { source, folder, place, root, depth, options })
+    }
+
+    /// Writes what belongs to an image, and tells of it.
+    fn frame(&self, image: &DatasetImage, camera: NerfstudioCamera) -> Result<NerfstudioFrame> {
+        let (pose, size) = (self.source.pose(image)?, self.source.size(image)?);
+        let rgb = self.file(image, Domain::Rgb, "images")?;
+        let mut frame = match camera {
+            NerfstudioCamera::Perspective => NerfstudioFrame::perspective(rgb, &pose, size),
+            NerfstudioCamera::Equirectangular => {
+                if size.0 != 2 * size.1 {
+                    let message = format!("a panorama of {} × {}, not twice as wide as high", size.0, size.1);
+                    return Err(
+                        FileError::format(&image.path(&self.source.layout, Domain::Rgb), message).into()
+                    );
+                }
+                NerfstudioFrame::equirectangular(rgb, &pose, size)
+            }
+        };
+        frame.depth_file_path = match self.depth {
+            DepthFiles::None => None,
+            DepthFiles::Original => Some(self.file(image, Domain::Depth, "depths")?),
+            DepthFiles::Millimetres => {
+                let depth = read_gray16(&image.path(&self.source.layout, Domain::Depth))?;
+                let file = encode_gray16(
+                    &millimetres(&depth, self.source.depth_units_per_m),
+                    self.options.compression.unwrap_or_default(),
+                );
+                let name = format!("depths/{}_depth.png", image.stem());
+                write_bytes(&self.folder.join(&name), &file)?;
+                Some(name)
+            }
+        };
+        Ok(frame)
+    }
+
+    /// The path of an image's file from the area's folder: the data set's, or a copy in `copies`.
+    fn file(&self, image: &DatasetImage, domain: Domain, copies: &str) -> Result<String> {
+        if !self.options.copy_images {
+            return Ok(relative_path(&self.place, &self.root.join(image.relative_path(domain))));
+        }
+        let name = format!("{copies}/{}_{domain}.png", image.stem());
+        copy(&image.path(&self.source.layout, domain), &self.folder.join(&name))?;
+        Ok(name)
+    }
+}
+
+/// Depth in millimetres, rounded; 0 where there is none or where it is beyond 65.535 m.
+fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
+    let convert = |v: &u16| {
+        let mm = (f64::from(*v) * (1000.0 / units_per_m)).round();
+        if *v == DEPTH_MISSING || mm > f64::from(u16::MAX) { 0 } else { mm as u16 }
+    };
+    Raster::from_vec(depth.width(), depth.height(), depth.pixels().iter().map(convert).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_in_millimetres() {
+        let depth = Raster::from_vec(3, 2, vec![0, 512, 1, 65_535, 33_553, 33_555]);
+        assert_eq!(millimetres(&depth, 512.0).pixels(), [0, 1000, 2, 0, 65_533, 0]);
+        assert_eq!(millimetres(&depth, 1000.0).pixels(), [0, 512, 1, 0, 33_553, 33_555]);
+    }
+}

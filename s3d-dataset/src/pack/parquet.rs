@@ -1,0 +1,208 @@
+//! `s3d pack --to parquet`: a table of all images, with what their pixels show.
+
+use super::map_in_order;
+use super::source::{DEPTH_MISSING, Source};
+use crate::context::Context;
+use crate::error::Result;
+use s3d_geom::Raster;
+use s3d_io::{
+    DatasetImage, Domain, Error as FileError, Frame, ImageRow, SemanticRow, ViewRecord, read_gray16,
+    read_rgb8, read_views, write_image_index,
+};
+use s3d_label::{LabelId, LabelTable, Room, RoomError};
+use s3d_sample::entropy;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What is no pixel of a surface in a semantic image.
+const MISSING: [u8; 3] = [13; 3];
+
+/// Kept views, by scan location and number.
+type Views = BTreeMap<(String, u32), ViewRecord>;
+
+pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
+    let mut views: BTreeMap<u32, Views> = BTreeMap::new();
+    for &area in &source.areas {
+        let path = source.layout.views_json(area);
+        let kept = read_views(&path)?.into_iter().filter_map(|v| {
+            let number = v.frame_num?;
+            Some(((v.camera_uuid.clone(), number), v))
+        });
+        views.insert(area, kept.collect());
+    }
+    let table = source.labels()?;
+    let progress = ctx.progress("packing", "images", source.images.len() as u64);
+    let rows = map_in_order(
+        ctx,
+        &source.images,
+        || vec![0u64; table.len()],
+        |counts, image| {
+            let row = row(source, image, &views[&image.area], &table, counts)?;
+            progress.add(1);
+            Ok(row)
+        },
+    )?;
+    write_image_index(place, &rows)?;
+    Ok(())
+}
+
+fn row(
+    source: &Source,
+    image: &DatasetImage,
+    views: &Views,
+    table: &LabelTable,
+    counts: &mut [u64],
+) -> Result<ImageRow> {
+    let path = |domain| image.path(&source.layout, domain);
+    // The walk takes any word for a room's type; the data set has eleven.
+    let room: Room = image.room.parse().map_err(|e: RoomError| {
+        FileError::format(&path(image.domains[0]), format!("in the file's name: {e}"))
+    })?;
+    let mut row = ImageRow {
+        area: image.area,
+        camera_uuid: image.uuid.clone(),
+        room: image.room.clone(),
+        room_type: room.room_type.name().to_owned(),
+        room_number: room.number,
+        files: Domain::ALL.map(|d| image.has(d).then(|| image.relative_path(d))),
+        size: image.size(&source.layout)?.map(|(w, h)| [w, h]),
+        ..ImageRow::default()
+    };
+    let view = match image.frame {
+        Frame::View(number) => {
+            row.frame_num = Some(number);
+            views.get(&(image.uuid.clone(), number))
+        }
+        Frame::Panorama => None,
+    };
+    if image.has(Domain::Pose) {
+        let pose = source.pose(image)?;
+        row.fov_rad = Some(pose.field_of_view_rads);
+        row.location = Some(pose.camera_location);
+        row.k = Some(flat(&pose.camera_k_matrix));
+        row.rt = Some(flat(&pose.camera_rt_matrix));
+        if row.frame_num.is_some() {
+            let (yaw, pitch) = pose.original().yaw_pitch_to(&pose.pose());
+            row.yaw_pitch_rad = Some([yaw, pitch]);
+        }
+    }
+    if let Some(view) = view {
+        row.fov_rad = Some(view.fov_rad);
+        row.yaw_pitch_rad = Some([view.yaw_rad, view.pitch_rad]);
+        row.selection_entropy = Some(view.entropy);
+    }
+    if image.has(Domain::Depth) {
+        let (coverage, depth_m) = depth_row(&read_gray16(&path(Domain::Depth))?, source.depth_units_per_m);
+        (row.coverage, row.depth_m) = (Some(coverage), depth_m);
+    } else if image.has(Domain::Rgb) && !image.has(Domain::Semantic) {
+        row.coverage = Some(share(&read_rgb8(&path(Domain::Rgb))?, |p| *p != [0; 3]));
+    }
+    if image.has(Domain::Semantic) {
+        // Depth misses what is beyond 128 m; labels do not.
+        let semantic = read_rgb8(&path(Domain::Semantic))?;
+        row.coverage = Some(share(&semantic, |p| *p != MISSING));
+        let known = semantic_row(&semantic, table, counts).map_err(|index| {
+            let labels = source.layout.labels_json();
+            let message =
+                format!("a pixel has label {index}, but {} holds {} labels", labels.display(), table.len());
+            FileError::format(&path(Domain::Semantic), message)
+        })?;
+        row.semantic = Some(known);
+    }
+    Ok(row)
+}
+
+fn flat<const N: usize, const M: usize, const L: usize>(matrix: &[[f64; N]; M]) -> [f64; L] {
+    let flat = matrix.as_flattened();
+    std::array::from_fn(|i| flat[i])
+}
+
+fn share<T: Copy>(image: &Raster<T>, is: impl Fn(&T) -> bool) -> f64 {
+    image.pixels().iter().filter(|p| is(p)).count() as f64 / image.len() as f64
+}
+
+/// The share of pixels with a depth, and the least, mean and greatest of them in metres.
+fn depth_row(depth: &Raster<u16>, units_per_m: f64) -> (f64, Option<[f64; 3]>) {
+    let (mut least, mut most, mut sum, mut count) = (u16::MAX, 0, 0u64, 0u64);
+    for &v in depth.pixels().iter().filter(|v| **v != DEPTH_MISSING) {
+        (least, most) = (least.min(v), most.max(v));
+        sum += u64::from(v);
+        count += 1;
+    }
+    let metres = |units: f64| units / units_per_m;
+    let depth_m =
+        (count > 0).then(|| [f64::from(least), sum as f64 / count as f64, f64::from(most)].map(metres));
+    (count as f64 / depth.len() as f64, depth_m)
+}
+
+/// What the pixels of a semantic image show. `counts` has an entry a label, all 0, and is left so. The error is a label that
+/// is not in the table.
+fn semantic_row(
+    semantic: &Raster<[u8; 3]>,
+    table: &LabelTable,
+    counts: &mut [u64],
+) -> Result<SemanticRow, u32> {
+    let mut seen: Vec<u32> = Vec::new();
+    let mut unknown = None;
+    for run in semantic.pixels().chunk_by(|a, b| a == b) {
+        let [r, g, b] = run[0];
+        let index = u32::from_be_bytes([0, r, g, b]);
+        match counts.get_mut(index as usize) {
+            _ if run[0] == MISSING => {}
+            Some(count) => {
+                if *count == 0 {
+                    seen.push(index);
+                }
+                *count += run.len() as u64;
+            }
+            None => unknown = unknown.or(Some(index)),
+        }
+    }
+    let (mut histogram, mut unlabelled, mut instances) = ([0u64; 13], 0, 0);
+    for index in seen {
+        let count = std::mem::take(&mut counts[index as usize]);
+        match table.class_of(LabelId(index)) {
+            Some(class) => {
+                histogram[class.index()] += count;
+                instances += 1;
+            }
+            None => unlabelled += count,
+        }
+    }
+    if let Some(index) = unknown {
+        return Err(index);
+    }
+    let share = |count: u64| count as f64 / semantic.len() as f64;
+    let shares = histogram.map(share);
+    Ok(SemanticRow { shares, unlabelled: share(unlabelled), entropy: entropy(&histogram), instances })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_are_counted() {
+        let names = ["<UNK>_0_<UNK>_0_0", "chair_1_office_1_1", "chair_2_office_1_1", "wall_1_office_1_1"];
+        let table = LabelTable::from_names(&names.map(String::from)).unwrap();
+        let mut counts = vec![0; table.len()];
+        let [m, n, a, b, w] = [MISSING, [0; 3], [0, 0, 1], [0, 0, 2], [0, 0, 3]];
+        let semantic = Raster::from_vec(4, 2, vec![m, n, a, a, b, w, w, a]);
+        let row = semantic_row(&semantic, &table, &mut counts).unwrap();
+        assert_eq!((row.shares[8], row.shares[2], row.unlabelled, row.instances), (0.5, 0.25, 0.125, 3));
+        let mut histogram = [0; 13];
+        (histogram[8], histogram[2]) = (4, 2);
+        assert_eq!((row.entropy, share(&semantic, |p| *p != m)), (entropy(&histogram), 0.875));
+        assert!(counts.iter().all(|c| *c == 0));
+        let semantic = Raster::from_vec(2, 1, vec![a, [0, 0, 4]]);
+        assert_eq!(semantic_row(&semantic, &table, &mut counts), Err(4));
+        assert!(counts.iter().all(|c| *c == 0));
+    }
+
+    #[test]
+    fn depths_are_in_metres() {
+        let depth = Raster::from_vec(2, 2, vec![512, DEPTH_MISSING, 1024, 0]);
+        assert_eq!(depth_row(&depth, 512.0), (0.75, Some([0.0, 1.0, 2.0])));
+        assert_eq!(depth_row(&Raster::filled(2, 2, DEPTH_MISSING), 1000.0), (0.0, None));
+    }
+}

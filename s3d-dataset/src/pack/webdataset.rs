@@ -1,0 +1,134 @@
+//! `s3d pack --to webdataset`: tar shards, one sample an image.
+
+use super::destination::Destination;
+use super::map_in_order;
+use super::options::{ShardPrefix, SpecificOptions};
+use super::source::Source;
+use crate::context::Context;
+use crate::error::Result;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use s3d_io::{
+    DatasetImage, Domain, Error as FileError, Frame, ShardEntry, ShardLimits, TarWriter, plan_shards,
+    sample_key, sample_member, write_shard_index,
+};
+use std::fs;
+
+/// A shard to write: its file, and the samples that go into it.
+struct Shard<'a> {
+    url: String,
+    images: Vec<&'a DatasetImage>,
+}
+
+pub(super) fn pack(
+    ctx: &Context,
+    source: &Source,
+    destination: &Destination,
+    options: &SpecificOptions,
+) -> Result<Vec<String>> {
+    let domains = match &options.modalities {
+        Some(asked) => {
+            asked.iter().try_for_each(|d| source.require(*d, "the package"))?;
+            Domain::ALL.into_iter().filter(|d| asked.contains(d)).collect()
+        }
+        None => Domain::ALL.to_vec(),
+    };
+    let limits = ShardLimits {
+        max_bytes: options.max_size.map_or(ShardLimits::default().max_bytes, |mb| u64::from(mb) * 1_000_000),
+        max_samples: options.max_count.map_or(ShardLimits::default().max_samples, |n| n as usize),
+    };
+    let mut shards = Vec::new();
+    let mut names = Vec::new();
+    for (name, mut images) in series(source, options) {
+        if let Some(seed) = options.shuffle {
+            shuffle(&mut images, seed);
+        }
+        let sizes = map_in_order(ctx, &images, || (), |(), image| sample_bytes(source, image, &domains))?;
+        let plan = plan_shards(&sizes, limits);
+        names.push(match plan.len() {
+            1 => format!("{name}-000000.tar"),
+            n => format!("{name}-{{000000..{:06}}}.tar", n - 1),
+        });
+        shards.extend(
+            plan.into_iter().enumerate().map(|(i, range)| Shard {
+                url: format!("{name}-{i:06}.tar"),
+                images: images[range].to_vec(),
+            }),
+        );
+    }
+
+    let progress = ctx.progress("packing", "images", source.images.len() as u64);
+    let entries = map_in_order(
+        ctx,
+        &shards,
+        || (),
+        |(), shard| {
+            let mut tar = TarWriter::create(&destination.path().join(&shard.url))?;
+            for image in &shard.images {
+                let key = sample_key(image);
+                for domain in present(image, &domains) {
+                    let path = image.path(&source.layout, domain);
+                    let bytes = fs::read(&path).map_err(|e| FileError::io(&path, "read", e))?;
+                    tar.append(&sample_member(&key, domain), &bytes)?;
+                }
+                progress.add(1);
+            }
+            let filesize = tar.finish()?;
+            Ok(ShardEntry { url: shard.url.clone(), nsamples: shard.images.len(), filesize })
+        },
+    )?;
+    write_shard_index(&destination.path().join("shards.json"), "s3d", &entries)?;
+    let mut notes: Vec<String> = names.iter().map(|n| format!("webdataset.WebDataset(\"{n}\")")).collect();
+    notes.push(
+        "a sample's key is area_N/camera_UUID_ROOM_frame_J, its fields are rgb.png, depth.png, normals.png, … pose.json; \
+         the number of samples of each shard is in shards.json"
+            .into(),
+    );
+    notes.push(
+        "decode(\"pil\") makes 8-bit RGB of every image: give depth.png (16 bits) and global_xyz.exr decoders of their own, \
+         before it, with webdataset.autodecode.handle_extension"
+            .into(),
+    );
+    Ok(notes)
+}
+
+/// The series of shards: of each area its views and its panoramas, or one of all images under the user's name.
+fn series<'a>(source: &'a Source, options: &SpecificOptions) -> Vec<(String, Vec<&'a DatasetImage>)> {
+    if let Some(prefix) = options.prefix.as_ref().map(ShardPrefix::as_str) {
+        return vec![(prefix.to_owned(), source.images.iter().collect())];
+    }
+    let mut series = Vec::new();
+    for area in &source.areas {
+        let (panoramas, views): (Vec<_>, Vec<_>) =
+            source.of_area(*area).into_iter().partition(|image| image.frame == Frame::Panorama);
+        series.push((format!("area_{area}_views"), views));
+        series.push((format!("area_{area}_panoramas"), panoramas));
+    }
+    series.retain(|(_, images)| !images.is_empty());
+    series
+}
+
+/// Puts images in a random order that `seed` decides.
+fn shuffle(images: &mut [&DatasetImage], seed: u64) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut drawn: Vec<(u64, &DatasetImage)> = images.iter().map(|i| (random.next_u64(), *i)).collect();
+    drawn.sort_by_key(|(number, _)| *number);
+    images.iter_mut().zip(drawn).for_each(|(place, (_, image))| *place = image);
+}
+
+/// The domains of an image's sample.
+fn present(image: &DatasetImage, domains: &[Domain]) -> impl Iterator<Item = Domain> {
+    domains.iter().copied().filter(|d| image.has(*d))
+}
+
+/// What a sample takes in a shard.
+fn sample_bytes(source: &Source, image: &DatasetImage, domains: &[Domain]) -> Result<u64> {
+    let key = sample_key(image);
+    let mut bytes = 0;
+    for domain in present(image, domains) {
+        let path = image.path(&source.layout, domain);
+        let size = fs::metadata(&path).map_err(|e| FileError::io(&path, "read", e))?.len();
+        bytes += TarWriter::entry_bytes(&sample_member(&key, domain), size);
+    }
+    Ok(bytes)
+}

@@ -1,0 +1,105 @@
+//! PointNet and mmdetection3d: a room's points in numpy arrays.
+//!
+//! **PointNet** (`sem_seg/indoor3d_util.py`, and the many that took it over) makes of each room of the tree
+//! `stanford_indoor3d/Area_1_office_3.npy`: float64, N × 7, a row `x y z r g b label`, the room moved so that its least
+//! coordinates are 0. The label is the class: ceiling 0, floor 1, wall 2, beam 3, column 4, window 5, door 6, table 7,
+//! chair 8, sofa 9, bookcase 10, board 11, clutter 12. Lists in `meta/` name the rooms: `anno_paths.txt` and
+//! `all_data_label.txt` take the place of those that come with the loader, which name the 272 published rooms.
+//!
+//! **mmdetection3d** (`data/s3dis/indoor3d_util.py`) makes of it, in `s3dis_data/`, `Area_1_office_3_point.npy` (float32,
+//! N × 6, moved likewise), `…_sem_label.npy` (int64, N, the same classes) and `…_ins_label.npy` (int64, N, instances from
+//! 1, 0 for none). Its `create_data.py s3dis` then lists the rooms by the folders of
+//! `Stanford3dDataset_v1.2_Aligned_Version/Area_{1..6}`, all six of which must be there: they are made, with an empty
+//! folder a room; the points are in the arrays. The loader numbers instances in the order in which the system lists files;
+//! here it is that of their names.
+//!
+//! Colours are the tree's, 0 to 255.
+
+use super::room::{TreeRoom, as_written, count_and_least, for_each_piece};
+use super::{AREAS_OF_LOADERS, for_each_room, write_lines};
+use crate::context::Context;
+use crate::error::Result;
+use s3d_io::{NpyWriter, create_dir};
+use std::path::Path;
+
+/// The points of a room's instances, and the least coordinates of all.
+fn survey(ctx: &Context, room: &TreeRoom) -> Result<(Vec<u64>, [f64; 3])> {
+    let mut counts = Vec::new();
+    let mut least = [f64::INFINITY; 3];
+    for instance in &room.instances {
+        let (count, corner) = count_and_least(ctx, &instance.path)?;
+        counts.push(count);
+        least = std::array::from_fn(|k| least[k].min(corner[k]));
+    }
+    Ok((counts, least))
+}
+
+/// Writes the arrays and lists of PointNet.
+pub(super) fn write_pointnet(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
+    let (arrays, meta) = (dir.join("stanford_indoor3d"), dir.join("meta"));
+    create_dir(&arrays)?;
+    create_dir(&meta)?;
+    write_lines(&meta.join("anno_paths.txt"), rooms.iter().map(TreeRoom::annotations))?;
+    write_lines(&meta.join("all_data_label.txt"), rooms.iter().map(|r| format!("{}.npy", r.stem())))?;
+    for_each_room(ctx, rooms, |room| {
+        let (counts, least) = survey(ctx, room)?;
+        let path = arrays.join(format!("{}.npy", room.stem()));
+        let mut array = NpyWriter::create(&path, "<f8", &[counts.iter().sum(), 7])?;
+        let mut bytes = Vec::new();
+        for instance in &room.instances {
+            let class = instance.class.index() as f64;
+            for_each_piece(ctx, &instance.path, |piece| {
+                bytes.clear();
+                for (p, color) in piece.positions.iter().zip(&piece.colors) {
+                    let place = std::array::from_fn::<f64, 3, _>(|k| as_written(p[k]) - least[k]);
+                    let row = place.into_iter().chain(color.map(f64::from)).chain([class]);
+                    bytes.extend(row.flat_map(f64::to_le_bytes));
+                }
+                Ok(array.put(&bytes)?)
+            })?;
+        }
+        array.finish()?;
+        Ok(())
+    })
+}
+
+/// Writes the arrays, lists and folders of mmdetection3d.
+pub(super) fn write_mmdet3d(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
+    let (arrays, meta) = (dir.join("s3dis_data"), dir.join("meta_data"));
+    let tree = dir.join("Stanford3dDataset_v1.2_Aligned_Version");
+    create_dir(&arrays)?;
+    create_dir(&meta)?;
+    for area in AREAS_OF_LOADERS {
+        create_dir(&tree.join(format!("Area_{area}")))?;
+    }
+    for room in rooms {
+        create_dir(&tree.join(format!("Area_{}", room.area)).join(&room.name))?;
+    }
+    write_lines(&meta.join("anno_paths.txt"), rooms.iter().map(TreeRoom::annotations))?;
+    for_each_room(ctx, rooms, |room| {
+        let (counts, least) = survey(ctx, room)?;
+        let total = counts.iter().sum();
+        let path = |kind: &str| arrays.join(format!("{}_{kind}.npy", room.stem()));
+        let mut points = NpyWriter::create(&path("point"), "<f4", &[total, 6])?;
+        let mut classes = NpyWriter::create(&path("sem_label"), "<i8", &[total])?;
+        let mut numbers = NpyWriter::create(&path("ins_label"), "<i8", &[total])?;
+        let mut bytes = Vec::new();
+        for (number, instance) in (1i64..).zip(&room.instances) {
+            let class = instance.class.index() as i64;
+            for_each_piece(ctx, &instance.path, |piece| {
+                bytes.clear();
+                for (p, color) in piece.positions.iter().zip(&piece.colors) {
+                    let place = std::array::from_fn::<f32, 3, _>(|k| (as_written(p[k]) - least[k]) as f32);
+                    bytes.extend(place.into_iter().chain(color.map(f32::from)).flat_map(f32::to_le_bytes));
+                }
+                points.put(&bytes)?;
+                classes.put(&class.to_le_bytes().repeat(piece.len()))?;
+                Ok(numbers.put(&number.to_le_bytes().repeat(piece.len()))?)
+            })?;
+        }
+        points.finish()?;
+        classes.finish()?;
+        numbers.finish()?;
+        Ok(())
+    })
+}

@@ -1,0 +1,150 @@
+//! Open3D-ML: a room's points and boxes in a pickle.
+//!
+//! Its `S3DIS` data set (`ml3d/datasets/s3dis.py`) reads `original_pkl/*.pkl` if there is that folder. Otherwise it makes
+//! it from a list of the 272 published rooms that comes with it, and stops at the first that is not there: so another
+//! data set can only come as pickles. `Area_1_office_3.pkl` is a list of two: the points, float64, N × 7, a row
+//! `x y z r g b label` in world metres (not moved; classes as PointNet's), and the boxes, a list of
+//! `[class, x, y, z, w, h, l, yaw]` an instance: the middle; the extents along the two principal axes of its points seen
+//! from above (w, l) and upwards (h); and the angle of the first of these axes, in radians.
+//! Here the first axis is the longer spread; the loader takes whichever its linear algebra gives first.
+//!
+//! `dataset_path` is the profile's folder; `test_area_idx` picks the area to test on.
+
+use super::for_each_room;
+use super::pickle::Pickle;
+use super::room::{TreeInstance, TreeRoom, as_written, for_each_piece};
+use crate::context::Context;
+use crate::error::Result;
+use glam::{DMat2, DVec2, DVec3, dvec2, dvec3};
+use s3d_io::create_dir;
+use std::path::Path;
+
+/// Writes the pickles.
+pub(super) fn write(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
+    let dir = dir.join("original_pkl");
+    create_dir(&dir)?;
+    for_each_room(ctx, rooms, |room| {
+        let boxes = room.instances.iter().map(|i| OrientedBox::of(ctx, i)).collect::<Result<Vec<_>>>()?;
+        let mut pickle = Pickle::create(&dir.join(format!("{}.pkl", room.stem())))?;
+        pickle.list(|pickle| {
+            pickle.begin_array(boxes.iter().map(|b| b.points).sum(), 7)?;
+            let mut bytes = Vec::new();
+            for instance in &room.instances {
+                let class = instance.class.index() as f64;
+                for_each_piece(ctx, &instance.path, |piece| {
+                    bytes.clear();
+                    for (p, color) in piece.positions.iter().zip(&piece.colors) {
+                        let row = p
+                            .to_array()
+                            .map(as_written)
+                            .into_iter()
+                            .chain(color.map(f64::from))
+                            .chain([class]);
+                        bytes.extend(row.flat_map(f64::to_le_bytes));
+                    }
+                    Ok(pickle.put(&bytes)?)
+                })?;
+            }
+            pickle.end_array()?;
+            pickle.list(|pickle| {
+                for (instance, b) in room.instances.iter().zip(&boxes) {
+                    pickle.list(|pickle| {
+                        pickle.text(instance.class.name())?;
+                        Ok(b.numbers().into_iter().try_for_each(|n| pickle.float(n))?)
+                    })?;
+                }
+                Ok(())
+            })
+        })?;
+        pickle.finish()?;
+        Ok(())
+    })
+}
+
+/// The box of an instance along the principal axes of its points seen from above.
+struct OrientedBox {
+    points: u64,
+    middle: DVec3,
+    /// Along the first axis, the second, and upwards.
+    extent: DVec3,
+    yaw_rad: f64,
+}
+
+impl OrientedBox {
+    fn of(ctx: &Context, instance: &TreeInstance) -> Result<Self> {
+        // Sums of what lies around the first point, so that little is lost.
+        let (mut points, mut origin) = (0u64, DVec2::ZERO);
+        let (mut sum, mut xx, mut xy, mut yy) = (DVec2::ZERO, 0.0, 0.0, 0.0);
+        let place = |p: &glam::Vec3| dvec3(as_written(p.x), as_written(p.y), as_written(p.z));
+        for_each_piece(ctx, &instance.path, |piece| {
+            for p in &piece.positions {
+                let p = place(p).truncate();
+                if points == 0 {
+                    origin = p;
+                }
+                let d = p - origin;
+                points += 1;
+                sum += d;
+                (xx, xy, yy) = (xx + d.x * d.x, xy + d.x * d.y, yy + d.y * d.y);
+            }
+            Ok(())
+        })?;
+        let mean = sum / points.max(1) as f64;
+        let n = points as f64;
+        let (xx, xy, yy) = (xx - n * mean.x * mean.x, xy - n * mean.x * mean.y, yy - n * mean.y * mean.y);
+        let yaw_rad = if points > 1 { 0.5 * libm::atan2(2.0 * xy, xx - yy) } else { 0.0 };
+        let (sin, cos) = libm::sincos(yaw_rad);
+        let axes = DMat2::from_cols(dvec2(cos, sin), dvec2(-sin, cos));
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for_each_piece(ctx, &instance.path, |piece| {
+            for p in &piece.positions {
+                let p = place(p);
+                let turned = (axes.transpose() * p.truncate()).extend(p.z);
+                (low, high) = (low.min(turned), high.max(turned));
+            }
+            Ok(())
+        })?;
+        let middle = 0.5 * (low + high);
+        let middle = (axes * middle.truncate()).extend(middle.z);
+        Ok(Self { points, middle, extent: high - low, yaw_rad })
+    }
+
+    /// x y z w h l yaw.
+    fn numbers(&self) -> [f64; 7] {
+        let (m, e) = (self.middle, self.extent);
+        [m.x, m.y, m.z, e.x, e.z, e.y, self.yaw_rad]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_label::Class;
+
+    #[test]
+    fn a_turned_table_has_its_own_axes() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("table_1.txt");
+        let (sin, cos) = libm::sincos(0.5);
+        let mut text = String::new();
+        for i in -50..=50 {
+            for j in -20..=20 {
+                let (u, v) = (f64::from(i) * 0.02, f64::from(j) * 0.02);
+                let (x, y) = (4.0 + u * cos - v * sin, -3.0 + u * sin + v * cos);
+                text += &format!("{x:.3} {y:.3} 0.7 0 0 0\n{x:.3} {y:.3} 0.75 0 0 0\n");
+            }
+        }
+        std::fs::write(&path, text).unwrap();
+        let b =
+            OrientedBox::of(&Context::default(), &TreeInstance { class: Class::Table, path: path.clone() })
+                .unwrap();
+        assert_eq!(b.points, 2 * 101 * 41);
+        let expected = [4.0, -3.0, 0.725, 2.0, 0.05, 0.8, 0.5];
+        for (got, expected) in b.numbers().into_iter().zip(expected) {
+            assert!((got - expected).abs() < 0.002, "{:?}", b.numbers());
+        }
+        std::fs::write(&path, "1 2 3 4 5 6\n").unwrap();
+        let b = OrientedBox::of(&Context::default(), &TreeInstance { class: Class::Table, path }).unwrap();
+        assert_eq!(b.numbers(), [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
+    }
+}

@@ -1,0 +1,112 @@
+//! Pointcept: the S3DIS tree as its preprocessing wants it.
+//!
+//! `preprocess_s3dis.py --dataset_root profiles/pointcept` reads, for each k from 1 to 6,
+//! `Area_k/Area_k_alignmentAngle.txt` with `numpy.loadtxt`, and of every room that it names all
+//! `Area_k/ROOM/Annotations/*.txt`, with `numpy.loadtxt` too. So it stops
+//! - where one of the six areas has no angle file: areas that are not in the data set get one without rooms;
+//! - at an angle file with one room, since its two words are no table: the room is named twice, and processed twice with
+//!   the same result;
+//! - at a room of the angle file without points: it is not named;
+//! - at an instance of one point, whose numbers are no table: the point stands twice.
+//!
+//! All but these are second names of the files in `s3dis/` (copies where the file system has none).
+//!
+//! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `area_k/3d/rgb.obj`, and for area 5
+//! `area_5a` and `area_5b`, moving 5b: area 5 of a data set is in one frame already and comes as `area_5a` alone.
+
+use super::room::{TreeRoom, count_and_least};
+use super::{AREAS_OF_LOADERS, link, write_lines};
+use crate::context::Context;
+use crate::error::Result;
+use s3d_io::{Error as FileError, Layout, create_dir, write_bytes};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// Writes the tree.
+pub(super) fn write(
+    ctx: &Context,
+    dir: &Path,
+    layout: &Layout,
+    areas: &[u32],
+    rooms: &[TreeRoom],
+) -> Result<()> {
+    for area in areas.iter().filter(|a| !AREAS_OF_LOADERS.contains(*a)) {
+        ctx.warn(format_args!("area {area}: Pointcept's preprocessing reads areas 1 to 6 only"));
+    }
+    for area in AREAS_OF_LOADERS {
+        let tree = dir.join(format!("Area_{area}"));
+        create_dir(&tree)?;
+        let mut named = Vec::new();
+        if areas.contains(&area) {
+            let angles = read_angles(layout, area)?;
+            for room in rooms.iter().filter(|r| r.area == area) {
+                write_room(ctx, &tree.join(&room.name), layout, room)?;
+                named.push(format!("{} {}", room.name, angles.get(&room.name).map_or("0", String::as_str)));
+            }
+            link_mesh(layout, area, &dir.join("raw"))?;
+        }
+        if let [only] = &named[..] {
+            ctx.warn(format_args!(
+                "area {area} has one room: Pointcept's preprocessing stops at such an area, so its angle file in {} names \
+                 the room twice",
+                dir.display()
+            ));
+            named.push(only.clone());
+        }
+        let header = [
+            format!("## Global alignment angle per disjoint space in Area_{area} ##"),
+            "## Disjoint Space Name Global Alignment Angle ##".to_owned(),
+        ];
+        write_lines(&tree.join(format!("Area_{area}_alignmentAngle.txt")), header.into_iter().chain(named))?;
+    }
+    Ok(())
+}
+
+/// The angle of each room, as it is written.
+fn read_angles(layout: &Layout, area: u32) -> Result<BTreeMap<String, String>> {
+    let path = layout.s3dis_area_dir(area).join(format!("Area_{area}_alignmentAngle.txt"));
+    let text = fs::read_to_string(&path).map_err(|e| FileError::io(&path, "read", e))?;
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    Ok(lines.filter_map(|l| l.split_once(' ')).map(|(room, deg)| (room.into(), deg.into())).collect())
+}
+
+fn write_room(ctx: &Context, dir: &Path, layout: &Layout, room: &TreeRoom) -> Result<()> {
+    create_dir(&dir.join("Annotations"))?;
+    let name = format!("{}.txt", room.name);
+    link(&layout.s3dis_area_dir(room.area).join(&room.name).join(&name), &dir.join(&name))?;
+    for instance in &room.instances {
+        let to = dir.join("Annotations").join(instance.path.file_name().unwrap_or_default());
+        // A line is at most some hundred bytes.
+        let size = fs::metadata(&instance.path).map_err(|e| FileError::io(&instance.path, "read", e))?.len();
+        if size < 1024 && count_and_least(ctx, &instance.path)?.0 == 1 {
+            let line = fs::read(&instance.path).map_err(|e| FileError::io(&instance.path, "read", e))?;
+            write_bytes(&to, &line.repeat(2))?;
+        } else {
+            link(&instance.path, &to)?;
+        }
+    }
+    Ok(())
+}
+
+/// The mesh of an area with its materials and textures, where the preprocessing looks for it.
+fn link_mesh(layout: &Layout, area: u32, raw: &Path) -> Result<()> {
+    let from = layout.mesh_dir(area);
+    let name = if area == 5 { "area_5a".to_owned() } else { format!("area_{area}") };
+    let to = raw.join(name).join("3d");
+    create_dir(&to)?;
+    for name in ["rgb.obj", "rgb.mtl"] {
+        if from.join(name).exists() {
+            link(&from.join(name), &to.join(name))?;
+        }
+    }
+    let textures = from.join("rgb_textures");
+    if textures.is_dir() {
+        create_dir(&to.join("rgb_textures"))?;
+        for entry in fs::read_dir(&textures).map_err(|e| FileError::io(&textures, "read", e))? {
+            let entry = entry.map_err(|e| FileError::io(&textures, "read", e))?;
+            link(&entry.path(), &to.join("rgb_textures").join(entry.file_name()))?;
+        }
+    }
+    Ok(())
+}

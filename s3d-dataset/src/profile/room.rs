@@ -1,0 +1,114 @@
+//! The rooms of an S3DIS tree, and their points as numpy would read them.
+
+use crate::context::Context;
+use crate::error::Result;
+use s3d_geom::PointCloud;
+use s3d_io::{AnnotationTree, Layout, PointReader};
+use s3d_label::Class;
+use std::path::{Path, PathBuf};
+
+/// Points that are read at a time.
+const CHUNK: usize = 1 << 16;
+
+/// A room of the tree.
+pub(super) struct TreeRoom {
+    pub(super) area: u32,
+    /// Such as `office_3`.
+    pub(super) name: String,
+    /// Its instances, in the order of their file names as strings: `chair_10` before `chair_2`, as `sorted(glob(…))`
+    /// gives them.
+    pub(super) instances: Vec<TreeInstance>,
+}
+
+/// An instance of a room.
+pub(super) struct TreeInstance {
+    pub(super) class: Class,
+    pub(super) path: PathBuf,
+}
+
+impl TreeRoom {
+    /// `Area_1_office_3`: how loaders call it.
+    pub(super) fn stem(&self) -> String {
+        format!("Area_{}_{}", self.area, self.name)
+    }
+
+    /// `Area_1/office_3/Annotations`: how their lists call it.
+    pub(super) fn annotations(&self) -> String {
+        format!("Area_{}/{}/Annotations", self.area, self.name)
+    }
+}
+
+/// The rooms of an area that hold points, by type and number.
+pub(super) fn rooms_of(layout: &Layout, area: u32) -> Result<Vec<TreeRoom>> {
+    let dir = layout.s3dis_area_dir(area);
+    let is_empty = std::fs::read_dir(&dir).is_ok_and(|mut e| !e.any(|e| e.is_ok_and(|e| e.path().is_dir())));
+    if is_empty {
+        return Ok(Vec::new());
+    }
+    let tree = AnnotationTree::open(&dir)?;
+    let rooms = tree.rooms.into_iter().map(|room| {
+        let mut instances: Vec<TreeInstance> =
+            room.instances.into_iter().map(|i| TreeInstance { class: i.class, path: i.path }).collect();
+        instances.sort_by(|a, b| a.path.cmp(&b.path));
+        TreeRoom { area, name: room.room.to_string(), instances }
+    });
+    Ok(rooms.collect())
+}
+
+/// Hands out the points of a file, some at a time.
+pub(super) fn for_each_piece(
+    ctx: &Context,
+    path: &Path,
+    mut each: impl FnMut(&PointCloud) -> Result<()>,
+) -> Result<()> {
+    let mut reader = PointReader::open(path)?;
+    let mut piece = PointCloud::default();
+    while reader.read_chunk(CHUNK, &mut piece)? > 0 {
+        ctx.check()?;
+        each(&piece)?;
+        piece.clear();
+    }
+    Ok(())
+}
+
+/// The number that stands in the file, as the nearest `f64`. Files hold millimetres, and a coordinate in them is the
+/// nearest `f32`, so that the whole millimetre next to it is what stood there, or nothing lies between the two.
+pub(super) fn as_written(coordinate: f32) -> f64 {
+    (f64::from(coordinate) * 1000.0).round() / 1000.0
+}
+
+/// The number of points of an instance, and their least coordinates.
+pub(super) fn count_and_least(ctx: &Context, path: &Path) -> Result<(u64, [f64; 3])> {
+    let (mut count, mut least) = (0, [f64::INFINITY; 3]);
+    for_each_piece(ctx, path, |piece| {
+        count += piece.len() as u64;
+        for p in &piece.positions {
+            for (least, c) in least.iter_mut().zip(p.to_array()) {
+                *least = least.min(as_written(c));
+            }
+        }
+        Ok(())
+    })?;
+    Ok((count, least))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn millimetres_are_read_as_numpy_reads_them() {
+        for millimetres in (-9_000_000i32..9_000_000).step_by(997) {
+            let text = format!(
+                "{}{}.{:03}",
+                if millimetres < 0 { "-" } else { "" },
+                millimetres.abs() / 1000,
+                millimetres.abs() % 1000
+            );
+            let (single, double): (f32, f64) = (text.parse().unwrap(), text.parse().unwrap());
+            if f64::from(single.abs().next_up() - single.abs()) < 0.001 {
+                assert_eq!(as_written(single), double, "{text}");
+            }
+        }
+    }
+}

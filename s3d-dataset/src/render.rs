@@ -1,0 +1,140 @@
+//! One view of a mesh, without any annotation.
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::modality::{Image, Look, Prints};
+use crate::store::refuse_existing;
+use s3d_geom::{Camera, Projection};
+use s3d_io::{Compression, Content, Conventions, UpAxis, create_dir, encode_rgb8, write_bytes, write_json};
+use s3d_render::{Hits, MipMaps, NO_FACE, Normals, Scene, cast, coverage};
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// Colours for faces: all but (255, 255, 255), which means that nothing is seen.
+const FACES_IN_COLORS: usize = 0xff_ffff;
+
+/// What `camera.json` tells: enough to put the images back into the world.
+#[derive(Serialize)]
+struct View {
+    width: u32,
+    height: u32,
+    projection: &'static str,
+    camera_location: [f64; 3],
+    /// Row by row; a panorama has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera_k_matrix: Option<[[f64; 3]; 3]>,
+    /// World → camera, OpenCV axes, 3 × 4.
+    camera_rt_matrix: [[f64; 4]; 3],
+    field_of_view_rads: f64,
+}
+
+/// One view of a mesh.
+#[derive(Clone, Debug)]
+pub struct RenderOptions {
+    /// Which axis of the mesh's file points up.
+    pub up: UpAxis,
+    /// The faces' normals, or those interpolated from the mesh's own where it has some.
+    pub normals: Normals,
+    /// How much time the images' files may take.
+    pub compression: Compression,
+    /// Replace images that are there.
+    pub overwrite: bool,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self { up: UpAxis::Y, normals: Normals::Flat, compression: Compression::default(), overwrite: false }
+    }
+}
+
+/// Renders what a camera sees of a mesh's file, in every modality that needs no annotation: `rgb.png`, `depth.png`,
+/// `normals.png`, `global_xyz.exr`, `faces.png` (indices of faces as R·65536 + G·256 + B; 255, 255, 255 where nothing is
+/// seen) and `camera.json` in the folder `output`.
+///
+/// # Errors
+/// [`Error::Usage`] if one of them is there and not to be replaced; [`Error::File`].
+pub fn render(
+    mesh: &Path,
+    camera: &Camera,
+    output: &Path,
+    options: &RenderOptions,
+    ctx: &Context,
+) -> Result<()> {
+    let images = [
+        (Image::Rgb, "rgb.png"),
+        (Image::Depth, "depth.png"),
+        (Image::Normal, "normals.png"),
+        (Image::GlobalXyz, "global_xyz.exr"),
+    ];
+    let names = images.iter().map(|(_, name)| *name).chain(["faces.png", "camera.json"]);
+    names.into_iter().try_for_each(|name| refuse_existing(&output.join(name), options.overwrite))?;
+
+    let file = s3d_io::read_mesh(mesh, options.up)?;
+    file.warnings.iter().for_each(|w| ctx.warn(w));
+    let scene = Scene::new(&file.mesh);
+    let textures = MipMaps::new(&file.mesh);
+    let started = Instant::now();
+    let hits = cast(&scene, camera);
+    let cast_seconds = started.elapsed().as_secs_f64();
+    if coverage(&hits) == 0.0 {
+        let b = file.mesh.aabb();
+        ctx.warn(format_args!(
+            "nothing is seen from {}: the mesh lies between {} and {} (Z-up metres)",
+            camera.pose.location, b.min, b.max
+        ));
+    }
+    let look = Look {
+        scene: &scene,
+        textures: &textures,
+        pictures: None,
+        normals: options.normals,
+        label_per_face: &[],
+        pretty_per_face: &[],
+        compression: options.compression,
+        conventions: Conventions::default(),
+    };
+    create_dir(output)?;
+    let kinds = images.map(|(image, _)| image);
+    look.encode(&kinds, &hits, camera, &mut Prints::default(), |image, file| {
+        let name = images.iter().find(|(other, _)| *other == image).map_or("image", |(_, name)| name);
+        write_bytes(&output.join(name), &file).map(drop)
+    })?;
+    if file.mesh.faces().len() < FACES_IN_COLORS {
+        write_bytes(&output.join("faces.png"), &face_image(&hits, options.compression))?;
+    } else {
+        ctx.warn(format_args!(
+            "no faces.png: {} faces are more than 24 bits can tell apart",
+            file.mesh.faces().len()
+        ));
+    }
+    let is_panorama = camera.projection == Projection::Equirectangular;
+    let view = View {
+        width: camera.width,
+        height: camera.height,
+        projection: if is_panorama { "equirectangular" } else { "perspective" },
+        camera_location: camera.pose.location.to_array(),
+        camera_k_matrix: (!is_panorama).then(|| camera.k_matrix()),
+        camera_rt_matrix: camera.pose.rt_matrix(),
+        field_of_view_rads: camera.fov_rad(),
+    };
+    write_json(&output.join("camera.json"), &view)?;
+    ctx.info(format_args!(
+        "{}: {} × {} pixels, {:.1} % of them see the mesh ({:.2} s to cast)",
+        output.display(),
+        camera.width,
+        camera.height,
+        100.0 * coverage(&hits),
+        cast_seconds
+    ));
+    Ok(())
+}
+
+/// Face indices as colours, R·65536 + G·256 + B; (255, 255, 255) where nothing is seen.
+fn face_image(hits: &Hits, compression: Compression) -> Vec<u8> {
+    let image = hits.face.map(|face| {
+        let [_, r, g, b] = if face == NO_FACE { [255; 4] } else { face.to_be_bytes() };
+        [r, g, b]
+    });
+    encode_rgb8(&image, Content::Labels, compression)
+}

@@ -1,0 +1,71 @@
+//! A mesh's file to a dense coloured point cloud.
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::points::check_density;
+use crate::store::refuse_existing;
+use s3d_geom::{Density, PointCloud, SurfaceSampler};
+use s3d_io::{PlyPointWriter, UpAxis};
+use std::path::Path;
+use std::time::Instant;
+
+/// Points drawn at a time: what is in memory of a cloud of any size.
+const CHUNK: u64 = 1 << 20;
+
+/// How a mesh is sampled.
+#[derive(Clone, Debug)]
+pub struct SampleOptions {
+    /// Which axis of the mesh's file points up.
+    pub up: UpAxis,
+    /// How many points there are.
+    pub density: Density,
+    /// Everything random comes from it.
+    pub seed: u64,
+    /// Replace the file if it is there.
+    pub overwrite: bool,
+}
+
+impl Default for SampleOptions {
+    fn default() -> Self {
+        Self { up: UpAxis::Y, density: Density::PerM2(10_000.0), seed: 0, overwrite: false }
+    }
+}
+
+/// Samples a mesh's file densely and uniformly into the PLY file `output`: world metres, Z-up, with colours. Returns the
+/// number of points.
+///
+/// # Errors
+/// [`Error::Usage`](crate::Error::Usage) if the file is there and not to be replaced, or the points are too many;
+/// [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
+    refuse_existing(output, options.overwrite)?;
+    let file = s3d_io::read_mesh(mesh, options.up)?;
+    ctx.warn_each(&file.warnings);
+    if let Density::PerM2(points_per_m2) = options.density {
+        check_density(&file.mesh, points_per_m2)?;
+    }
+    let started = Instant::now();
+    let sampler = SurfaceSampler::new(&file.mesh, options.density, options.seed);
+    let mut ply = PlyPointWriter::create(output, sampler.len())?;
+    let progress = ctx.progress("sampling", "points", sampler.len());
+    let mut cloud = PointCloud::default();
+    let mut at = 0;
+    while at < sampler.len() {
+        ctx.check()?;
+        let end = sampler.len().min(at + CHUNK);
+        sampler.sample(at..end, &mut cloud);
+        ply.append(&cloud, &vec![0; cloud.len()])?;
+        progress.add(end - at);
+        at = end;
+    }
+    ply.finish()?;
+    drop(progress);
+    ctx.info(format_args!(
+        "{}: {} points on {:.1} m² in {:.1} s",
+        output.display(),
+        sampler.len(),
+        file.mesh.total_area(),
+        started.elapsed().as_secs_f64()
+    ));
+    Ok(sampler.len())
+}

@@ -1,0 +1,315 @@
+//! Which shard does what: units of work dealt by their cost, the same way in every process.
+
+use crate::error::Result;
+use crate::store::checked::{read_checked, write_checked};
+use crate::store::journal::Unit;
+use crate::tables::listing::walk;
+use s3d_io::{Layout, create_dir};
+use serde::{Deserialize, Serialize};
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// One of several processes among which the units of an export are dealt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1.
+    pub(crate) number: u32,
+    /// How many there are.
+    pub(crate) of: u32,
+}
+
+/// More shards than this are taken for a slip.
+const MOST_SHARDS: u32 = 1_000_000;
+
+impl Shard {
+    /// The one process that does everything.
+    pub(crate) const ALL: Self = Self { number: 1, of: 1 };
+
+    /// Which thing of every so many this shard does, if things come one after another and cost alike.
+    pub(crate) fn takes(self, position: usize) -> bool {
+        position % self.of as usize == self.number as usize - 1
+    }
+
+    /// Its part in an area of so many, if it has one: the shards are spread over the areas, so that each opens as few as can
+    /// be, and areas over the shards where there are more of them.
+    pub(crate) fn within(self, position: usize, areas: usize) -> Option<Self> {
+        let (index, of) = (self.number as usize - 1, self.of as usize);
+        if of <= areas {
+            return self.takes(position).then_some(Self::ALL);
+        }
+        // Shards `position`, `position + areas`, ... serve the area.
+        let group = (of - position).div_ceil(areas);
+        let part = Self { number: (index / areas) as u32 + 1, of: group as u32 };
+        (index % areas == position).then_some(part)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').map(|(i, n)| (i.trim().parse(), n.trim().parse()));
+        match numbers {
+            Some((Ok(number), Ok(of))) if 1 <= number && number <= of && of <= MOST_SHARDS => {
+                Ok(Self { number, of })
+            }
+            Some((Ok(0), Ok(_))) => Err("shards count from 1, as in 1/4 to 4/4".to_owned()),
+            _ => Err(format!("must be i/N with i from 1 to N, as in 2/4, and N at most {MOST_SHARDS}")),
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+/// Deals units with these costs among `shards`: the dearest first, each to the shard with the least so far, the first
+/// by number where several have as little. Returns the number of each unit's shard, from 1.
+///
+/// No shard gets more than 4/3 of what the best dealing would give to its fullest (Graham, "Bounds on multiprocessing
+/// timing anomalies", 1969, whose bound is 4/3 − 1/3N). The result depends on nothing but the arguments.
+///
+/// # Panics
+/// If there is no shard.
+pub(crate) fn deal(costs: &[u64], shards: u32) -> Vec<u32> {
+    assert!(shards > 0, "units need a shard");
+    let mut order: Vec<usize> = (0..costs.len()).collect();
+    // Stable, so that equal costs stay in the order of the units.
+    order.sort_by_key(|i| Reverse(costs[*i]));
+    // More shards than units stay empty; the heap holds no more than are needed.
+    let needed = shards.min(u32::try_from(costs.len()).unwrap_or(u32::MAX));
+    let mut least: BinaryHeap<Reverse<(u128, u32)>> = (1..=needed).map(|n| Reverse((0, n))).collect();
+    let mut dealt = vec![0; costs.len()];
+    for i in order {
+        if let Some(mut top) = least.peek_mut() {
+            // A unit costs something, or else one shard might get all that cost nothing.
+            top.0.0 += u128::from(costs[i].max(1));
+            dealt[i] = top.0.1;
+        }
+    }
+    dealt
+}
+
+/// How long units take, in nanoseconds of one core: measured on the built-in scene on a machine of 2026, and rounded. Their
+/// ratios matter alone. A pixel is cast, shaded in every modality, compressed and written, in views as in panoramas.
+const NS_PER_PIXEL: u64 = 55;
+/// A face is written to two OBJ files.
+const NS_PER_FACE: u64 = 1_000;
+/// A point is drawn, and written to a PLY file, a text file and two arrays.
+const NS_PER_POINT: u64 = 110;
+
+/// The cost of a scan location: its panorama and its kept views.
+pub(crate) fn location_cost(pano_width: u32, size: u32, kept_views: u64) -> u64 {
+    let panorama = u64::from(pano_width) * u64::from(pano_width / 2);
+    let view = u64::from(size) * u64::from(size);
+    let views = NS_PER_PIXEL.saturating_mul(view).saturating_mul(kept_views);
+    NS_PER_PIXEL.saturating_mul(panorama).saturating_add(views)
+}
+
+/// The cost of an area's meshes and points.
+pub(crate) fn rest_cost(faces: u64, points: u64) -> u64 {
+    NS_PER_FACE.saturating_mul(faces).saturating_add(NS_PER_POINT.saturating_mul(points))
+}
+
+/// Who does which units, among a number of shards: kept in the folder in which they work, so that a merge can tell which of
+/// them is to be run again, and a shard that is run again knows at once what is its own.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct Deal {
+    shards: u32,
+    /// Each unit, with the number of its shard.
+    units: Vec<(Unit, u32)>,
+}
+
+impl Deal {
+    /// Deals units, each with its cost.
+    pub(crate) fn new(units: Vec<(Unit, u64)>, shards: u32) -> Self {
+        let costs: Vec<u64> = units.iter().map(|(_, cost)| *cost).collect();
+        let dealt = deal(&costs, shards);
+        Self { shards, units: units.into_iter().map(|(unit, _)| unit).zip(dealt).collect() }
+    }
+
+    /// Gives a unit that does not count to a shard.
+    pub(crate) fn assign(&mut self, unit: Unit, number: u32) {
+        self.units.push((unit, number));
+    }
+
+    /// How many shards there are.
+    pub(crate) fn shards(&self) -> u32 {
+        self.shards
+    }
+
+    /// The units of a shard.
+    pub(crate) fn own(&self, number: u32) -> BTreeSet<Unit> {
+        self.units.iter().filter(|(_, of)| *of == number).map(|(unit, _)| unit.clone()).collect()
+    }
+
+    /// The numbers of the shards that have some of these units, ascending.
+    pub(crate) fn shards_of(&self, units: &[Unit]) -> BTreeSet<u32> {
+        let wanted: BTreeSet<&Unit> = units.iter().collect();
+        self.units.iter().filter(|(unit, _)| wanted.contains(unit)).map(|(_, number)| *number).collect()
+    }
+
+    /// Writes it into the folder of an unfinished export.
+    pub(crate) fn write(&self, layout: &Layout) -> Result<()> {
+        create_dir(&Self::folder(layout))?;
+        write_checked(&Self::path(layout, self.shards), self)
+    }
+
+    /// That among so many shards, if it was written and is whole.
+    pub(crate) fn read(layout: &Layout, shards: u32) -> Option<Self> {
+        read_checked(&Self::path(layout, shards)).ok()
+    }
+
+    /// Those among any number of shards.
+    pub(crate) fn read_all(layout: &Layout) -> Result<Vec<Self>> {
+        let files = walk(&Self::folder(layout))?;
+        Ok(files.iter().filter_map(|path| read_checked(path).ok()).collect())
+    }
+
+    fn folder(layout: &Layout) -> PathBuf {
+        layout.work_dir().join("deals")
+    }
+
+    fn path(layout: &Layout, shards: u32) -> PathBuf {
+        Self::folder(layout).join(format!("{shards}.jsonl"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn loads(costs: &[u64], dealt: &[u32], shards: u32) -> Vec<u64> {
+        let mut loads = vec![0; shards as usize];
+        costs.iter().zip(dealt).for_each(|(cost, shard)| loads[*shard as usize - 1] += cost);
+        loads
+    }
+
+    proptest! {
+        #[test]
+        fn every_unit_goes_to_exactly_one_shard(
+            costs in prop::collection::vec(prop_oneof![0u64..10, 1u64..1_000_000, Just(u64::MAX)], 0..80),
+            shards in 1u32..100,
+        ) {
+            let mut owners = vec![0; costs.len()];
+            let units: Vec<(Unit, u64)> =
+                costs.iter().enumerate().map(|(i, cost)| (Unit::Scores(1, i.to_string()), *cost)).collect();
+            let all: Vec<Unit> = units.iter().map(|(unit, _)| unit.clone()).collect();
+            for number in 1..=shards {
+                // As each shard finds it by itself.
+                let deal = Deal::new(units.clone(), shards);
+                for unit in deal.own(number) {
+                    owners[all.iter().position(|u| *u == unit).unwrap()] += 1;
+                    prop_assert_eq!(deal.shards_of(&[unit]), [number].into());
+                }
+            }
+            prop_assert!(owners.iter().all(|n| *n == 1));
+        }
+
+        #[test]
+        fn every_location_of_every_area_goes_to_exactly_one_shard(
+            counts in prop::collection::vec(0usize..20, 1..8),
+            shards in 1u32..30,
+        ) {
+            let mut owners: Vec<Vec<u32>> = counts.iter().map(|n| vec![0; *n]).collect();
+            let mut opened = vec![0; counts.len()];
+            for number in 1..=shards {
+                for (position, owners) in owners.iter_mut().enumerate() {
+                    let Some(part) = (Shard { number, of: shards }).within(position, counts.len()) else { continue };
+                    opened[position] += 1;
+                    prop_assert!(part.number >= 1 && part.number <= part.of);
+                    owners.iter_mut().enumerate().filter(|(i, _)| part.takes(*i)).for_each(|(_, n)| *n += 1);
+                }
+            }
+            prop_assert!(owners.iter().flatten().all(|n| *n == 1));
+            let most = (shards as usize).div_ceil(counts.len());
+            prop_assert!(opened.iter().all(|n| (1..=most).contains(n)));
+        }
+
+        #[test]
+        fn no_shard_gets_more_than_the_bound(
+            costs in prop::collection::vec(1u64..1_000, 1..80),
+            shards in 1u32..20,
+        ) {
+            let dealt = deal(&costs, shards);
+            let fullest = *loads(&costs, &dealt, shards).iter().max().unwrap();
+            // What even the best dealing cannot go below: the mean, and the dearest unit; the bound of any list
+            // scheduling follows from them.
+            let (sum, dearest) = (costs.iter().sum::<u64>(), *costs.iter().max().unwrap());
+            let n = u64::from(shards);
+            prop_assert!(n * fullest <= sum + (n - 1) * dearest);
+        }
+
+        #[test]
+        fn against_the_best_dealing(costs in prop::collection::vec(1u64..50, 1..9), shards in 1u32..4) {
+            let fullest = *loads(&costs, &deal(&costs, shards), shards).iter().max().unwrap();
+            let all = u64::from(shards).pow(costs.len() as u32);
+            let best = (0..all)
+                .map(|code| {
+                    let mut code = code;
+                    let dealt: Vec<u32> = costs.iter().map(|_| {
+                        let shard = (code % u64::from(shards)) as u32 + 1;
+                        code /= u64::from(shards);
+                        shard
+                    }).collect();
+                    loads(&costs, &dealt, shards).into_iter().max().unwrap()
+                })
+                .min()
+                .unwrap();
+            let n = u64::from(shards);
+            prop_assert!(3 * n * fullest <= (4 * n - 1) * best, "{fullest} against {best}");
+        }
+
+        #[test]
+        fn a_shards_name_goes_both_ways(number in 1u32..1000, more in 0u32..1000) {
+            let shard = Shard { number, of: number + more };
+            prop_assert_eq!(shard.to_string().parse(), Ok(shard));
+        }
+    }
+
+    #[test]
+    fn a_deal_comes_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let layout = Layout::new(dir.path());
+        let units = vec![(Unit::Rest(3), 5), (Unit::Location(3, "a".into()), 9), (Unit::Labels(3), 1)];
+        Deal::new(units.clone(), 2).write(&layout).unwrap();
+        Deal::new(units, 40).write(&layout).unwrap();
+        let back = Deal::read(&layout, 2).unwrap();
+        assert_eq!(
+            (back.own(1), back.own(2)),
+            ([Unit::Location(3, "a".into())].into(), [Unit::Labels(3), Unit::Rest(3)].into())
+        );
+        assert_eq!(Deal::read_all(&layout).unwrap().len(), 2);
+        assert!(Deal::read(&layout, 3).is_none());
+    }
+
+    #[test]
+    fn units_that_cost_nothing_are_spread_too() {
+        assert_eq!(deal(&[0; 6], 3), [1, 2, 3, 1, 2, 3]);
+        assert_eq!(deal(&[5, 1, 1, 1, 1, 1], 2), [1, 2, 2, 2, 2, 2]);
+        assert_eq!(deal(&[], 1_000_000), [0u32; 0]);
+        assert_eq!(deal(&[3, 4], 1_000_000), [2, 1]);
+    }
+
+    #[test]
+    fn only_i_of_n_is_a_shard() {
+        for bad in ["", "1", "/", "1/", "0/4", "5/4", "-1/4", "1/0", "a/b", "1/2/3", "1/99999999"] {
+            assert!(bad.parse::<Shard>().is_err(), "{bad}");
+        }
+        assert_eq!(" 2/ 4".parse(), Ok(Shard { number: 2, of: 4 }));
+        assert!("0/4".parse::<Shard>().unwrap_err().contains("from 1"));
+    }
+
+    #[test]
+    fn dearer_work_costs_more() {
+        assert!(location_cost(4096, 1080, 1) < location_cost(4096, 1080, 2));
+        assert_eq!(location_cost(u32::MAX, u32::MAX, u64::MAX), u64::MAX);
+        assert_eq!(rest_cost(u64::MAX, 1), u64::MAX);
+    }
+}

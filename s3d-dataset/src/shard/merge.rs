@@ -1,0 +1,326 @@
+//! Shards of an export to one data set: the files of all units linked or copied into one folder, each checked, and the
+//! tables written.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::event::Stage;
+use crate::export::finish::{finish, missing_units};
+use crate::export::transfer::bring;
+use crate::export::work::for_each_in_order;
+use crate::export::{Target, summarize};
+use crate::shard::assignment::Deal;
+use crate::store::journal::{Done, Finished, Unit};
+use crate::store::lock::{Lock, Sharing};
+use crate::store::output::{self, Begin};
+use crate::store::request::Request;
+use crate::tables::assets;
+use crate::tables::label_list::LabelList;
+use crate::tables::manifest::Manifest;
+use crate::tables::summary::{Account, Summary, UnitTally};
+use s3d_io::{Error as FileError, Layout};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// Most units that a message names.
+const MOST_NAMED: usize = 8;
+
+/// What a shard has left in its folder.
+struct Part {
+    layout: Layout,
+    request: Request,
+    finished: Finished,
+    /// Who does what, for each number of shards that worked in this folder.
+    deals: Vec<Deal>,
+}
+
+/// Makes one data set of the folders of shards, in any order; OUT may be one of them.
+///
+/// # Errors
+/// [`Error::Usage`] if they are of different calls, or OUT holds another data set; [`Error::Input`] with the shards
+/// that are to be run again if something is missing or damaged; [`Error::Temporary`] if a shard is still at work.
+pub fn merge(
+    folders: &[PathBuf],
+    output: impl Into<PathBuf>,
+    overwrite: bool,
+    ctx: &Context,
+) -> Result<Option<Summary>> {
+    let target = Target { layout: Layout::new(output.into()), overwrite, allowed: Vec::new() };
+    let account = Account::new(ctx);
+    let layout = &target.layout;
+    let folders = distinct(folders)?;
+    if is_done(&folders, layout)? {
+        ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
+        return Ok(None);
+    }
+    let stage = account.stage(Stage::Load, None);
+    // OUT's own lock is taken again when the merge begins in it; until then nobody may be at work there either.
+    let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        folders.iter().partition(|folder| is_same(folder, layout.root()));
+    let _locks = apart.into_iter().map(|folder| lock(ctx, folder)).collect::<Result<Vec<_>>>()?;
+    let own_lock = inside.into_iter().map(|folder| lock(ctx, folder)).collect::<Result<Vec<_>>>()?;
+    let parts = folders.iter().map(|folder| Part::read(ctx, folder)).collect::<Result<Vec<Part>>>()?;
+    drop(own_lock);
+    let Some(first) = parts.first() else {
+        return Err(Error::Usage("there is no shard to merge".to_owned()));
+    };
+    let request = &first.request;
+    refuse_mixed(&parts)?;
+    refuse_other_version(first)?;
+    let mut all = Finished::default();
+    parts.iter().flat_map(|part| part.finished.iter()).for_each(|done| all.insert(done.clone()));
+    let missing = missing_units(request, &all);
+    if !missing.is_empty() {
+        return Err(told_missing(&parts, &missing, "is missing"));
+    }
+    let labels = label_list(&parts)?;
+    stage.end();
+
+    output::check(ctx, layout, target.overwrite, &target.allowed)?;
+    let manifest = Manifest::begin(request, labels.len());
+    let session = match output::begin(layout, target.overwrite, request, &manifest, &account)? {
+        Begin::NothingToDo => {
+            ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
+            return Ok(None);
+        }
+        Begin::Session(session) => session,
+    };
+    let merged = || {
+        let stage = account.stage(Stage::Merge, None);
+        // Should this OUT be merged again, or gone on with.
+        labels.write(&LabelList::path(layout))?;
+        gather(layout, &parts, &all, &session, &account)?;
+        stage.end();
+        let stage = account.stage(Stage::Tables, None);
+        let options = &request.options;
+        assets::write(layout, labels.names().to_vec(), manifest.labels_padded_to(), options.conventions())?;
+        let made = finish(ctx, layout, request, manifest, &session.journal.finished(), None)?;
+        stage.end();
+        Ok(made)
+    };
+    let merged = merged();
+    let works_in_out = parts.iter().any(|part| is_same(part.layout.root(), layout.root()));
+    let made = match merged {
+        // What its shards have done stays.
+        Err(e) if works_in_out => return Err(e),
+        merged => session.end(ctx, merged)?,
+    };
+    Ok(Some(summarize(account, layout, request, &made)))
+}
+
+/// Whether OUT, one of the folders, holds what they make already: they were merged before.
+fn is_done(folders: &[PathBuf], layout: &Layout) -> Result<bool> {
+    let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        folders.iter().partition(|folder| is_same(folder, layout.root()));
+    if inside.is_empty() || output::read_request(layout)?.is_some() {
+        return Ok(false);
+    }
+    let Ok(manifest) = Manifest::read(layout) else { return Ok(false) };
+    for folder in apart {
+        let of = output::read_request(&Layout::new(folder))?;
+        if !of.is_some_and(|of| manifest.differences(&of).is_empty()) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The label table, from the first that has it whole: a shard that was killed early has none, nor has an export that was
+/// begun without shards.
+fn label_list(parts: &[Part]) -> Result<LabelList> {
+    let found = parts.iter().find_map(|part| LabelList::read(&LabelList::path(&part.layout)).ok());
+    found.ok_or_else(|| {
+        Error::Input(
+            "none of the folders has the label table: run any of the shards again, and merge then".to_owned(),
+        )
+    })
+}
+
+/// The folders, each once, as they are on the disk.
+fn distinct(folders: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut distinct: Vec<PathBuf> = Vec::new();
+    for folder in folders {
+        if !folder.is_dir() {
+            let source = std::io::Error::from(ErrorKind::NotFound);
+            return Err(FileError::io(folder, "read the folder of a shard", source).into());
+        }
+        if !distinct.iter().any(|other| is_same(other, folder)) {
+            distinct.push(folder.clone());
+        }
+    }
+    Ok(distinct)
+}
+
+/// Whether two paths lead to the same folder.
+fn is_same(a: &Path, b: &Path) -> bool {
+    match (fs::canonicalize(a), fs::canonicalize(b)) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => a == b,
+    }
+}
+
+/// Holds a shard's folder, so that nobody is at work in it; one that cannot be written to holds still by itself.
+fn lock(ctx: &Context, folder: &Path) -> Result<Option<Lock>> {
+    let layout = Layout::new(folder);
+    if !layout.lock().exists() {
+        return Ok(None);
+    }
+    match Lock::take(ctx, &layout, Sharing::Alone) {
+        Ok(lock) => Ok(Some(lock)),
+        Err(Error::File(FileError::Io { source, .. }))
+            if matches!(source.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) =>
+        {
+            Ok(None)
+        }
+        Err(e) => Err(e),
+    }
+}
+
+impl Part {
+    fn read(ctx: &Context, folder: &Path) -> Result<Self> {
+        let layout = Layout::new(folder);
+        let Some(request) = output::read_request(&layout)? else {
+            if let Some(version) = output::begun_by_other_version(&layout)? {
+                return Err(other_version(folder, &version));
+            }
+            let message = if Manifest::read(&layout).is_ok() {
+                "is a complete data set, and no shard of one"
+            } else {
+                "holds no shard of an export: give the folders that `s3d export --shard` wrote"
+            };
+            return Err(FileError::format(folder, message).into());
+        };
+        let finished = Finished::read(ctx, &layout)?;
+        let deals = Deal::read_all(&layout)?;
+        Ok(Self { layout, request, finished, deals })
+    }
+}
+
+/// Refuses shards of different calls.
+fn refuse_mixed(parts: &[Part]) -> Result<()> {
+    let Some((first, others)) = parts.split_first() else { return Ok(()) };
+    for other in others {
+        let differences = first.request.differences(&other.request);
+        if !differences.is_empty() {
+            return Err(Error::Usage(format!(
+                "{} and {} are shards of different calls: {} (\"there\" is {}, \"now\" is {})",
+                first.layout.root().display(),
+                other.layout.root().display(),
+                differences.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("; "),
+                first.layout.root().display(),
+                other.layout.root().display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses shards of another version of s3d, whose tables would be others.
+fn refuse_other_version(part: &Part) -> Result<()> {
+    let there = &part.request.version;
+    if there == env!("CARGO_PKG_VERSION") {
+        return Ok(());
+    }
+    Err(other_version(part.layout.root(), there))
+}
+
+fn other_version(folder: &Path, there: &str) -> Error {
+    Error::Usage(format!(
+        "{} is a shard by version {there} of s3d, and this is {}: merge with that version",
+        folder.display(),
+        env!("CARGO_PKG_VERSION")
+    ))
+}
+
+/// What is to be done about units that are not there.
+fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
+    let named: Vec<String> = missing.iter().take(MOST_NAMED).map(Unit::to_string).collect();
+    let more = match missing.len() - named.len() {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    // By number of shards, which of them are to be run.
+    let mut shards: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    for deal in parts.iter().flat_map(|part| &part.deals) {
+        shards.entry(deal.shards()).or_default().extend(deal.shards_of(missing));
+    }
+    let calls = shards.into_iter().filter(|(_, numbers)| !numbers.is_empty()).map(|(of, numbers)| {
+        let calls: Vec<String> = numbers.iter().map(|i| format!("--shard {i}/{of}")).collect();
+        calls.join(", ")
+    });
+    let calls: Vec<String> = calls.collect();
+    let calls = if calls.is_empty() { "every shard".to_owned() } else { calls.join(", or ") };
+    Error::Input(format!("{}{more} {what}: run again {calls}, and merge then", named.join(", ")))
+}
+
+/// Brings the files of all units that OUT has not yet into it, and checks each there.
+fn gather(
+    layout: &Layout,
+    parts: &[Part],
+    all: &Finished,
+    session: &output::Session,
+    account: &Account<'_>,
+) -> Result<()> {
+    let ctx = account.ctx;
+    let started = Instant::now();
+    let units: Vec<Unit> =
+        all.iter().map(Done::unit).filter(|u| !session.journal.finished().has(u)).collect();
+    let tally: UnitTally = units.iter().filter_map(|unit| all.get(unit)).map(Done::tally).sum();
+    let files: usize = units.iter().filter_map(|unit| all.get(unit)).map(|done| done.files().len()).sum();
+    let progress = ctx.progress("merging", "files", files as u64);
+    let faults: Mutex<Vec<(Unit, String)>> = Mutex::new(Vec::new());
+    for_each_in_order(
+        ctx,
+        &units,
+        || (),
+        |(), unit| {
+            let mut fault = None;
+            for part in parts {
+                // OUT's own were looked at when the merge began, and this one is not among those that are whole.
+                let Some(done) =
+                    part.finished.get(unit).filter(|_| !is_same(part.layout.root(), layout.root()))
+                else {
+                    continue;
+                };
+                match bring_unit(ctx, layout, part, done)? {
+                    None => {
+                        progress.add(done.files().len() as u64);
+                        return session.journal.write(done.clone());
+                    }
+                    Some(found) => {
+                        fault = fault.or(Some(format!("{}/{found}", part.layout.root().display())))
+                    }
+                }
+            }
+            let fault = fault.unwrap_or_else(|| format!("{}: {unit} is damaged", layout.root().display()));
+            faults.lock().unwrap_or_else(PoisonError::into_inner).push((unit.clone(), fault));
+            Ok(())
+        },
+    )?;
+    let mut faults = faults.into_inner().unwrap_or_else(PoisonError::into_inner);
+    faults.sort();
+    match faults.first() {
+        None => {
+            account.units_taken(units.len() as u64, &tally, started);
+            Ok(())
+        }
+        Some((_, first)) => {
+            let units: Vec<Unit> = faults.iter().map(|(unit, _)| unit.clone()).collect();
+            Err(told_missing(parts, &units, &format!("is damaged ({first})")))
+        }
+    }
+}
+
+/// Brings the files of a unit into OUT; tells what is wrong with the first that is not the one that was written.
+fn bring_unit(ctx: &Context, layout: &Layout, part: &Part, done: &Done) -> Result<Option<String>> {
+    for record in done.files() {
+        ctx.check()?;
+        if let Some(fault) = bring(record, part.layout.root(), layout.root())? {
+            return Ok(Some(fault));
+        }
+    }
+    Ok(None)
+}

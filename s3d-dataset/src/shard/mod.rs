@@ -1,0 +1,163 @@
+//! A shard: one of several processes, on any machines, that share the work of an export. Each finds by itself what is its
+//! own, and does that.
+
+pub(crate) mod assignment;
+pub(crate) mod merge;
+pub(crate) mod plan;
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::finish::is_chosen;
+use crate::export::views::{Candidate, select_requested};
+use crate::export::{Job, Labelled, Scope, Target};
+use crate::options::ExportOptions;
+use crate::shard::assignment::{Deal, Shard, location_cost, rest_cost};
+use crate::shard::plan::Plan;
+use crate::store::journal::{Done, Journal, Unit};
+use crate::store::output::{self, Begin};
+use crate::tables::label_list::LabelList;
+use crate::tables::summary::{Account, Summary, UnitTally, ViewTally};
+use s3d_io::{Checksum, Layout};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Does a shard's part of an export into OUT, which other shards may share. It is no data set until it is merged.
+pub(crate) fn export_shard(
+    ctx: &Context,
+    scenes: &[PathBuf],
+    target: &Target<'_>,
+    options: &ExportOptions,
+    shard: Shard,
+    plan: Option<&Plan>,
+) -> Result<Option<Summary>> {
+    let account = Account::new(ctx);
+    let layout = &target.layout;
+    output::check(ctx, layout, target.overwrite, &target.allowed)?;
+    let job = Job::open(scenes, layout, options, plan, &account)?;
+    let manifest = job.manifest();
+    let session = match output::begin_shard(ctx, layout, target.overwrite, &job.request, &manifest)? {
+        Begin::NothingToDo => {
+            ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
+            return Ok(None);
+        }
+        Begin::Session(session) => session,
+    };
+    let root = layout.root().display();
+    let Some(views) = job.run_shard(layout, &session.journal, &account, shard)? else {
+        ctx.info(format_args!("{root}: shard {shard} was done before; nothing to do"));
+        return Ok(None);
+    };
+    let locations = session.journal.finished().count_locations(&job.request.numbers());
+    drop(session);
+    ctx.info(format_args!("{root}: shard {shard} is done; when all are, `s3d merge` makes the data set"));
+    Ok(Some(account.summarize(&root.to_string(), job.request.areas.len(), locations, views)))
+}
+
+impl Job<'_> {
+    /// Does the units of a shard that are not done yet, and tells what became of the candidate views of the whole; nothing
+    /// if all of the shard's units are done.
+    fn run_shard(
+        &self,
+        layout: &Layout,
+        journal: &Journal,
+        account: &Account<'_>,
+        shard: Shard,
+    ) -> Result<Option<ViewTally>> {
+        let ctx = account.ctx;
+        // A shard that is run again knows its own before anything is labelled.
+        if let Some(deal) = Deal::read(layout, shard.of) {
+            let own = deal.own(shard.number);
+            journal.check(ctx, layout, |unit| own.contains(unit))?;
+            let finished = journal.finished();
+            if own.iter().all(|unit| finished.has(unit)) {
+                return Ok(None);
+            }
+        }
+        let cache = layout.work_dir();
+        LabelList::of(&self.inputs.table).write(&LabelList::path(layout))?;
+        let positions: BTreeMap<u32, usize> = self.request.numbers().into_iter().zip(0..).collect();
+        let labels_are_ours =
+            |unit: &Unit| positions.get(&unit.area()).is_some_and(|position| shard.takes(*position));
+        // With a plan every shard writes down its share of the scores, for the merge; else every one has made them all.
+        let is_ours = |unit: &Unit| match unit {
+            Unit::Labels(_) => labels_are_ours(unit),
+            Unit::Scores(_, uuid) => self.plan.is_none() || keeper(uuid, shard.of) == shard.number,
+            Unit::Location(..) | Unit::Rest(_) => false,
+        };
+        journal.check(ctx, layout, |unit| matches!(unit, Unit::Labels(_)) && is_ours(unit))?;
+        let labelled = self.label(self.common(layout, journal, account, &cache, &is_ours), Scope::All)?;
+        let (candidates, views) = select_requested(&self.request, &journal.finished())?;
+        let deal = self.deal(&labelled, &candidates, shard.of);
+        deal.write(layout)?;
+        let own = deal.own(shard.number);
+        take_own(layout, journal, account, &own)?;
+        let is_ours = |unit: &Unit| own.contains(unit);
+        self.render(self.common(layout, journal, account, &cache, &is_ours), &labelled, &candidates)?;
+        Ok(Some(views))
+    }
+
+    /// Who does what among so many shards: the same in each of them.
+    fn deal(&self, labelled: &Labelled<'_>, candidates: &[Candidate], shards: u32) -> Deal {
+        let options = &self.request.options;
+        let mut kept: BTreeMap<(u32, &str), u64> = BTreeMap::new();
+        for c in candidates.iter().filter(|c| c.frame_num.is_some()) {
+            *kept.entry((c.area, c.camera_uuid.as_str())).or_default() += 1;
+        }
+        let plans = || labelled.areas.iter().flatten();
+        let mut units = Vec::new();
+        for plan in plans() {
+            let points = (plan.mesh_area_m2 * options.points_per_m2) as u64;
+            let faces = plan.annotated.face_labels.len() as u64;
+            units.push((Unit::Rest(plan.area), rest_cost(faces, points)));
+            for location in plan.locations.iter().filter(|l| is_chosen(&self.request, &l.uuid)) {
+                let views = kept.get(&(plan.area, location.uuid.as_str())).copied().unwrap_or(0);
+                let cost = location_cost(options.pano_width, options.size, views);
+                units.push((Unit::Location(plan.area, location.uuid.clone()), cost));
+            }
+        }
+        let mut deal = Deal::new(units, shards);
+        for (position, plan) in plans().enumerate() {
+            deal.assign(Unit::Labels(plan.area), (position % shards as usize) as u32 + 1);
+            for location in &plan.locations {
+                deal.assign(Unit::Scores(plan.area, location.uuid.clone()), keeper(&location.uuid, shards));
+            }
+        }
+        deal
+    }
+}
+
+/// Which of so many shards keeps the scores of a location.
+fn keeper(uuid: &str, shards: u32) -> u32 {
+    (Checksum::of(uuid.as_bytes()).0 % u128::from(shards)) as u32 + 1
+}
+
+/// Checks what an earlier run of this shard, or another, has done of its own, and takes it as it is.
+fn take_own(layout: &Layout, journal: &Journal, account: &Account<'_>, own: &BTreeSet<Unit>) -> Result<()> {
+    let ctx = account.ctx;
+    let started = Instant::now();
+    let is_own = |unit: &Unit| own.contains(unit) && !matches!(unit, Unit::Scores(..));
+    journal.check(ctx, layout, is_own)?;
+    let finished = journal.finished();
+    let taken: Vec<&Done> = finished.iter().filter(|done| is_own(&done.unit())).collect();
+    let tally: UnitTally = taken.iter().map(|done| done.tally()).sum();
+    if !taken.is_empty() {
+        account.units_taken(taken.len() as u64, &tally, started);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scores_are_kept_by_every_shard_alike() {
+        let mut kept = [0; 7];
+        for i in 0..700u32 {
+            kept[keeper(&format!("{i:032x}"), 7) as usize - 1] += 1;
+        }
+        assert!(kept.iter().all(|n| (50..150).contains(n)), "{kept:?}");
+        assert_eq!(keeper("a", 1), 1);
+    }
+}

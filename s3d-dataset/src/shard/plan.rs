@@ -1,0 +1,252 @@
+//! A plan: labels and scores, made before an export and shared by its shards.
+//!
+//! PLAN holds `plan.jsonl` (what it is for, and the label table), `area_N` (the area as [`AreaPlan`] has it, and in
+//! `area_N/3d` the files of its labels as the data set has them), and journals of labels and scores in `.s3d/journal`, a file
+//! for each process that worked at it. Processes need not know of one another: each labels the areas that it scores in, if
+//! nobody has, and scores its share of their locations.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::Job;
+use crate::export::area_plan::AreaPlan;
+use crate::export::transfer::bring;
+use crate::options::ExportOptions;
+use crate::shard::assignment::Shard;
+use crate::store::checked::{read_checked, write_checked};
+use crate::store::journal::{Done, Finished, Journal, Unit};
+use crate::store::output;
+use crate::store::request::Request;
+use crate::tables::label_list::LabelList;
+use crate::tables::summary::Account;
+use s3d_io::{Domain, Error as FileError, FileRecord, Layout, create_dir};
+use s3d_label::LabelTable;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Most units that a message names.
+const MOST_NAMED: usize = 4;
+
+/// A plan that was made.
+pub(crate) struct Plan {
+    layout: Layout,
+    file: PlanFile,
+    finished: Finished,
+}
+
+/// `plan.jsonl`.
+#[derive(Serialize, Deserialize)]
+struct PlanFile {
+    /// What it is for; of the options those that labels and scores depend on.
+    request: Request,
+    labels: LabelList,
+}
+
+/// Whether a folder holds a plan.
+pub(crate) fn is_in(folder: &Path) -> bool {
+    plan_file(folder).exists()
+}
+
+fn plan_file(folder: &Path) -> PathBuf {
+    folder.join("plan.jsonl")
+}
+
+fn read_plan_file(path: &Path) -> Result<PlanFile> {
+    // Without it, nobody knows what the rest of the folder is for.
+    let again = "remove the folder, and call `s3d plan` again";
+    read_checked(path).map_err(|e| match e {
+        Error::File(FileError::Format { .. }) => {
+            FileError::format(path, format!("is damaged, or of another version of s3d: {again}")).into()
+        }
+        other => other,
+    })
+}
+
+fn area_folder(folder: &Path, area: u32) -> PathBuf {
+    folder.join(format!("area_{area}"))
+}
+
+impl Plan {
+    /// Opens the plan in a folder.
+    ///
+    /// # Errors
+    /// If there is none, or it is damaged.
+    pub(crate) fn open(ctx: &Context, folder: &Path) -> Result<Self> {
+        let path = plan_file(folder);
+        if !is_in(folder) {
+            return Err(FileError::format(folder, "holds no plan: make one with `s3d plan`").into());
+        }
+        let file = read_plan_file(&path)?;
+        let layout = Layout::new(folder);
+        let finished = Finished::read(ctx, &layout)?;
+        Ok(Self { layout, file, finished })
+    }
+
+    /// The label table.
+    pub(crate) fn table(&self) -> Result<LabelTable> {
+        self.file.labels.table(&plan_file(self.layout.root()))
+    }
+
+    /// What it was made for.
+    pub(crate) fn request(&self) -> &Request {
+        &self.file.request
+    }
+
+    /// Refuses an export that it was not made for.
+    pub(crate) fn refuse_other(&self, request: &Request) -> Result<()> {
+        refuse_other(self.layout.root(), &self.file.request, request)
+    }
+
+    /// Refuses a plan that is not complete.
+    pub(crate) fn require_complete(&self) -> Result<()> {
+        let mut missing = Vec::new();
+        for area in self.file.request.numbers() {
+            let labels = self.finished.labels(area);
+            match labels.filter(|_| AreaPlan::is_in(&area_folder(self.layout.root(), area))) {
+                Some(labels) => {
+                    missing.extend(labels.locations.iter().map(|uuid| Unit::Scores(area, uuid.clone())));
+                }
+                None => missing.push(Unit::Labels(area)),
+            }
+        }
+        missing.retain(|unit| matches!(unit, Unit::Labels(_)) || !self.finished.has(unit));
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let named: Vec<String> = missing.iter().take(MOST_NAMED).map(Unit::to_string).collect();
+        let more = if missing.len() > MOST_NAMED { " and more" } else { "" };
+        Err(Error::Input(format!(
+            "{} is not complete: {}{more} missing; call `s3d plan` again, each shard of it if it has some",
+            self.layout.root().display(),
+            named.join(", ")
+        )))
+    }
+
+    /// A labelled area.
+    pub(crate) fn area(&self, area: u32) -> Result<AreaPlan> {
+        AreaPlan::read(&area_folder(self.layout.root(), area), area)
+    }
+
+    /// Brings the files of an area's labels into a data set.
+    pub(crate) fn bring_labels(&self, area: u32, to: &Layout) -> Result<Vec<FileRecord>> {
+        let files = self.finished.labels(area).map_or(Vec::new(), |labels| labels.files.clone());
+        for record in &files {
+            if let Some(fault) = bring(record, self.layout.root(), to.root())? {
+                return Err(Error::Input(format!(
+                    "{}/{fault}: call `s3d plan` again, and it is made anew",
+                    self.layout.root().display()
+                )));
+            }
+        }
+        Ok(files)
+    }
+
+    /// The scores of a location.
+    pub(crate) fn scores(&self, area: u32, uuid: &str) -> Result<Done> {
+        let done = self.finished.get(&Unit::Scores(area, uuid.to_owned()));
+        done.cloned().ok_or_else(|| {
+            let root = self.layout.root().display();
+            Error::Input(format!("{root}: the scores of location {uuid} of area {area} are missing"))
+        })
+    }
+}
+
+fn refuse_other(folder: &Path, there: &Request, now: &Request) -> Result<()> {
+    let differences = there.differences(&now.of_plan());
+    if differences.is_empty() {
+        return Ok(());
+    }
+    let root = folder.display();
+    Err(Error::Usage(format!("{root} is a plan of another call ({})", differences.join("; "))))
+}
+
+/// Makes a plan of scenes in a folder, or a shard's part of it; what is there already is not made again.
+///
+/// # Errors
+/// [`Error::Usage`] if the folder holds something else, or a plan of another call.
+pub fn plan(
+    scenes: &[PathBuf],
+    folder: &Path,
+    options: &ExportOptions,
+    shard: Option<Shard>,
+    ctx: &Context,
+) -> Result<()> {
+    let shard = shard.unwrap_or(Shard::ALL);
+    let options = &ExportOptions {
+        views: options.views,
+        size: options.size,
+        seed: options.seed,
+        place_cameras: options.place_cameras,
+        entropy_stride: options.entropy_stride,
+        lenient: options.lenient,
+        modalities: vec![Domain::Pose],
+        // Of panoramas and points nothing is asked.
+        pano_width: 8,
+        points_per_m2: f64::MIN_POSITIVE,
+        ..ExportOptions::default()
+    };
+    let options = &options.canonical()?;
+    let account = Account::new(ctx);
+    let layout = Layout::new(folder);
+    refuse_foreign(folder)?;
+    let job = Job::open(scenes, &layout, options, None, &account)?;
+    let path = plan_file(folder);
+    if path.exists() {
+        let there = read_plan_file(&path)?;
+        refuse_other(folder, &there.request, &job.request)?;
+    } else {
+        create_dir(folder)?;
+        let labels = LabelList::of(&job.inputs.table);
+        write_checked(&path, &PlanFile { request: job.request.of_plan(), labels })?;
+    }
+    let journal = Journal::begin(&layout, Finished::default())?;
+    let areas = &job.inputs.areas;
+    for (position, area) in areas.iter().enumerate() {
+        ctx.check()?;
+        let Some(part) = shard.within(position, areas.len()) else { continue };
+        let number = area.number;
+        // What others have done meanwhile counts too.
+        let there = Finished::read(ctx, &layout)?
+            .checked_where(ctx, &layout, |unit| *unit == Unit::Labels(number))?;
+        there.iter().for_each(|done| journal.know(done.clone()));
+        let position_of = |uuid: &str| -> Option<usize> {
+            let finished = journal.finished();
+            finished.labels(number)?.locations.iter().position(|other| other == uuid)
+        };
+        let is_ours = |unit: &Unit| match unit {
+            Unit::Scores(_, uuid) => position_of(uuid).is_some_and(|position| part.takes(position)),
+            Unit::Labels(_) => true,
+            Unit::Location(..) | Unit::Rest(_) => false,
+        };
+        job.plan_area(area, &layout, &journal, &account, &is_ours)?;
+    }
+    let done = match shard {
+        Shard::ALL => "complete".to_owned(),
+        shard => format!("shard {shard} is done"),
+    };
+    ctx.info(format_args!("{}: the plan's {done}", folder.display()));
+    Ok(())
+}
+
+/// Refuses a folder that holds something, and no plan.
+fn refuse_foreign(folder: &Path) -> Result<()> {
+    let entries = match fs::read_dir(folder) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(|e| FileError::io(folder, "use as the folder of a plan", e))?,
+    };
+    if plan_file(folder).exists() {
+        return Ok(());
+    }
+    for entry in entries {
+        let name = entry.map_err(|e| FileError::io(folder, "read", e))?.file_name();
+        // Another shard may be about to begin.
+        if !output::is_working_name(&name) && !plan_file(folder).exists() {
+            let root = folder.display();
+            return Err(Error::Usage(format!(
+                "{root} holds {}, and no plan: choose another folder",
+                name.display()
+            )));
+        }
+    }
+    Ok(())
+}

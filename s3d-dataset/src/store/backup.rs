@@ -1,0 +1,184 @@
+//! Moves in OUT: an earlier data set set aside and brought back, and what a killed export left brought to a state that has
+//! one meaning. The states are those of [`output`](super::output).
+
+use crate::error::{Error, Result};
+use crate::store::output::{begun_by_other_version, read_request};
+use crate::tables::manifest::Head;
+use s3d_io::{Error as FileError, Layout, create_dir};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// Folders in OUT: an earlier data set while it is set aside, when it is, and when it goes.
+pub(super) const MOVING: &str = ".s3d-previous.part";
+pub(super) const ASIDE: &str = ".s3d-previous";
+pub(super) const TRASH: &str = ".s3d-trash";
+
+/// Brings a folder in which an export was killed to a state that has only one meaning.
+pub(super) fn recover(layout: &Layout) -> Result<()> {
+    let inside = |name: &str| layout.root().join(name);
+    remove(&inside(TRASH))?;
+    let moving = Layout::new(inside(MOVING));
+    if moving.root().exists() {
+        // The manifest moves last: it is in one of the two.
+        let mut head = Head::read(&moving.manifest())?;
+        if head.is_none() {
+            head = Head::read(&layout.manifest())?;
+        }
+        take_back(&moving, layout, head)?;
+    }
+    if Head::read(&layout.manifest())?.is_some_and(|head| head.is_complete()) {
+        clear(layout)?;
+        if inside(ASIDE).exists() {
+            discard(layout)?;
+        }
+    } else if inside(ASIDE).exists()
+        && read_request(layout)?.is_none()
+        && begun_by_other_version(layout)?.is_none()
+    {
+        restore(layout)?;
+    }
+    Ok(())
+}
+
+/// Removes what an export keeps while it is unfinished, all but the lock.
+pub(super) fn clear(layout: &Layout) -> Result<()> {
+    remove(&layout.request())?;
+    remove(&layout.journal_dir())?;
+    remove(&layout.failed())?;
+    for path in children(&layout.work_dir())? {
+        if path != layout.lock() {
+            remove(&path)?;
+        }
+    }
+    Ok(())
+}
+
+fn children(folder: &Path) -> Result<Vec<PathBuf>> {
+    let failed = |e| FileError::io(folder, "read the folder", e);
+    match fs::read_dir(folder) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
+        entries => {
+            let entries = entries.map_err(failed)?;
+            Ok(entries.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>().map_err(failed)?)
+        }
+    }
+}
+
+/// Removes the data set that lies aside. It goes by one rename, so that half of it is never taken for whole.
+pub(super) fn discard(layout: &Layout) -> Result<()> {
+    let trash = layout.root().join(TRASH);
+    rename(&layout.root().join(ASIDE), &trash)?;
+    remove(&trash)
+}
+
+/// Puts the data set that lies aside back in its place, instead of what was begun there.
+pub(super) fn restore(layout: &Layout) -> Result<()> {
+    let aside = Layout::new(layout.root().join(ASIDE));
+    let head = Head::read(&aside.manifest())?;
+    let mut begun = read_request(layout)?.map(|request| request.numbers());
+    // Without a request nobody goes on with what was begun, whatever of it is still there.
+    clear(layout)?;
+    if begun.is_none() {
+        begun = Head::read(&layout.manifest())?.map(|head| head.area_numbers);
+    }
+    if let (Some(_), Some(areas)) = (&head, begun) {
+        layout.entries(&areas).iter().try_for_each(|path| remove(path))?;
+    }
+    take_back(&aside, layout, head)
+}
+
+/// Moves the data set of a folder in OUT back into OUT, and removes the folder; what is in it is never removed unless its
+/// manifest tells that it is all in its place.
+fn take_back(from: &Layout, layout: &Layout, head: Option<Head>) -> Result<()> {
+    let Some(head) = head else {
+        return match fs::remove_dir(from.root()) {
+            Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::Input(format!(
+                "{} holds an earlier data set, or a part of it, without its manifest: move it to another folder",
+                from.root().display()
+            ))),
+            _ => Ok(()),
+        };
+    };
+    move_entries(from, layout, &head.area_numbers)?;
+    remove(from.root())
+}
+
+/// Moves a data set's entries, those that are there, from one folder to another.
+pub(super) fn move_entries(from: &Layout, to: &Layout, areas: &[u32]) -> Result<()> {
+    create_dir(to.root())?;
+    for (source, target) in from.entries(areas).iter().zip(to.entries(areas)) {
+        if is_there(source)? {
+            target.parent().map_or(Ok(()), create_dir)?;
+            rename(source, &target)?;
+        }
+    }
+    // The folders that hold nothing now.
+    for folder in from.shared_dirs() {
+        let _ = fs::remove_dir(folder);
+    }
+    Ok(())
+}
+
+/// Whether something has this name. What cannot be looked at now is not taken for gone.
+fn is_there(path: &Path) -> Result<bool> {
+    match fs::symlink_metadata(path) {
+        Ok(_) => Ok(true),
+        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(false),
+        Err(e) => Err(FileError::io(path, "look for", e).into()),
+    }
+}
+
+pub(super) fn rename(from: &Path, to: &Path) -> Result<()> {
+    fs::rename(from, to).map_err(|e| FileError::io(from, "move", e).into())
+}
+
+pub(super) fn remove(path: &Path) -> Result<()> {
+    let gone = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    match gone {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(FileError::io(path, "remove", e).into()),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MANIFEST: &str = r#"{"generator":"s3d","status":"complete","area_numbers":[3]}"#;
+
+    /// A folder with a data set, or what is left of it, in one of the folders aside.
+    fn interrupted(aside: &str, manifest: Option<&str>) -> (tempfile::TempDir, Layout) {
+        let dir = tempfile::tempdir().unwrap();
+        let moved = Layout::new(dir.path().join(aside));
+        create_dir(&moved.area_dir(3)).unwrap();
+        fs::write(moved.area_dir(3).join("image.png"), "image").unwrap();
+        if let Some(text) = manifest {
+            fs::write(moved.manifest(), text).unwrap();
+        }
+        let layout = Layout::new(dir.path());
+        (dir, layout)
+    }
+
+    #[test]
+    fn a_data_set_aside_comes_back_or_stays_but_is_never_lost() {
+        for aside in [ASIDE, MOVING] {
+            let (dir, layout) = interrupted(aside, Some(MANIFEST));
+            recover(&layout).unwrap();
+            assert!(layout.area_dir(3).join("image.png").exists() && layout.manifest().exists());
+            assert!(!dir.path().join(aside).exists());
+            // A manifest that cannot be read, or was lost, tells nothing of what is there.
+            for manifest in [None, Some("{\"generator\":\"s3"), Some("")] {
+                let (dir, layout) = interrupted(aside, manifest);
+                let message = recover(&layout).unwrap_err().to_string();
+                assert!(message.contains("holds an earlier data set"), "{message}");
+                assert!(dir.path().join(aside).join("area_3/image.png").exists());
+            }
+        }
+        // Made, and nothing moved into it yet.
+        let dir = tempfile::tempdir().unwrap();
+        create_dir(&dir.path().join(MOVING)).unwrap();
+        recover(&Layout::new(dir.path())).unwrap();
+        assert!(!dir.path().join(MOVING).exists());
+    }
+}

@@ -1,0 +1,23 @@
+//! The folder of a data set: what state it is in, what is done of an export, and who may write to it.
+
+pub(crate) mod backup;
+pub(crate) mod checked;
+pub(crate) mod journal;
+pub(crate) mod lock;
+pub(crate) mod output;
+pub(crate) mod request;
+
+use crate::error::{Error, Result};
+use s3d_io::Error as FileError;
+use std::path::Path;
+
+/// Refuses to replace a file unless that was asked for.
+pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<()> {
+    match path.try_exists() {
+        Ok(true) if !overwrite => {
+            Err(Error::Usage(format!("{} is there already: replace it with --overwrite", path.display())))
+        }
+        Ok(_) => Ok(()),
+        Err(e) => Err(FileError::io(path, "look for", e).into()),
+    }
+}

@@ -1,0 +1,507 @@
+//! The folder of a data set: what is in it, whether it may be written to, what becomes of an earlier data set in it, and
+//! how an export that was killed goes on.
+//!
+//! While an export is unfinished, `.s3d/request.json` says what was asked for, `.s3d/journal` what is done of it, and the
+//! manifest says "running". An earlier data set that is replaced lies aside in `.s3d-previous` until the new one is
+//! complete. Every step from one state to the next is one rename or one file, so that whoever comes after a kill finds one
+//! of these:
+//!
+//! | `request.json` | manifest | `.s3d-previous` | |
+//! |---|---|---|---|
+//! | – | – | – | nothing |
+//! | any | complete | any | a complete data set; what else is there is to be cleaned away |
+//! | there | – or running | any | an unfinished export, to go on with |
+//! | – | – or running | there | the new one had not begun, or failed for good: the earlier one comes back |
+//! | – | running | – | the rest of an export of a version without a journal: nobody's |
+
+use crate::context::Context;
+use crate::error::{Error, Result, passes};
+use crate::export::inputs::Inputs;
+use crate::store::backup::{
+    ASIDE, MOVING, TRASH, clear, discard, move_entries, recover, remove, rename, restore,
+};
+use crate::store::journal::{Done, Finished, Journal};
+use crate::store::lock::{Lock, Sharing};
+use crate::store::request::Request;
+use crate::tables::listing::remove_parts;
+use crate::tables::manifest::{Head, Manifest, if_there};
+use crate::tables::summary::Account;
+use s3d_io::{
+    Error as FileError, Layout, read_file_list, read_json, sync_data_set, sync_file, write_bytes, write_json,
+};
+use serde::Deserialize;
+use std::fs;
+use std::time::{Duration, Instant};
+
+/// How many differences are named in a message.
+const MOST_NAMED: usize = 8;
+
+/// Refuses an OUT that holds something of somebody else, unless it may be overwritten or is one of the `allowed` names;
+/// looks only, changes nothing.
+pub(crate) fn check(ctx: &Context, layout: &Layout, overwrite: bool, allowed: &[&str]) -> Result<()> {
+    let root = layout.root();
+    if layout.root_misleads_loaders() {
+        ctx.warn(format_args!(
+            "{}: \"rgb\" in the folder's name misleads loaders that swap it for another modality in whole paths",
+            root.display()
+        ));
+    }
+    // Its journals would be taken for those of an export.
+    if crate::shard::plan::is_in(root) {
+        return Err(Error::Usage(format!("{} holds a plan: choose another folder", root.display())));
+    }
+    match fs::read_dir(root) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(e) => Err(FileError::io(root, "use as the output folder", e).into()),
+        Ok(entries) => {
+            let head = Head::read(&layout.manifest())?;
+            let is_ours = head.as_ref().is_some_and(Head::is_complete) || read_request(layout)?.is_some();
+            if overwrite || is_ours {
+                return Ok(());
+            }
+            // What an export left that did not finish is nobody's.
+            let begun = head.map_or(Vec::new(), |head| layout.entries(&head.area_numbers));
+            for entry in entries {
+                let path = entry.map_err(|e| FileError::io(root, "read", e))?.path();
+                let name = path.file_name().unwrap_or_default();
+                let ours = begun.iter().any(|b| b.starts_with(&path)) || is_working_name(name);
+                if !ours && !allowed.iter().any(|a| name == *a) {
+                    return Err(Error::Usage(format!(
+                        "{} already holds {}: choose another folder, or write into this one with --overwrite",
+                        root.display(),
+                        name.display()
+                    )));
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+/// Whether a name in OUT is one of those that an export makes for the time being.
+pub(crate) fn is_working_name(name: &std::ffi::OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name == ".s3d" || name.starts_with(".s3d-")
+}
+
+/// Refuses an OUT in which the data set, or an earlier one that it replaces, would lie on its own input, or in its
+/// annotations.
+pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Result<()> {
+    let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
+    // Those of a data set that is there go, too, if it has other areas.
+    let mut areas = inputs.numbers();
+    areas.extend(Head::read(&layout.manifest())?.map_or(Vec::new(), |head| head.area_numbers));
+    areas.extend(read_request(layout)?.map_or(Vec::new(), |request| request.numbers()));
+    let mut entries = Layout::new(&root).entries(&areas);
+    entries.push(root.join(ASIDE));
+    for area in &inputs.areas {
+        for path in &area.files {
+            let Ok(input) = fs::canonicalize(path) else { continue };
+            if entries.iter().any(|entry| input.starts_with(entry))
+                || input.is_dir() && root.starts_with(&input)
+            {
+                return Err(Error::Usage(format!(
+                    "{}: the data set would be written over its own input {}: choose another folder",
+                    layout.root().display(),
+                    path.display()
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What is in OUT.
+#[derive(Debug)]
+enum Found {
+    /// Nothing of ours.
+    Nothing,
+    /// A complete data set, and in what it differs from what is asked for.
+    Complete { differences: Vec<String> },
+    /// An unfinished export of these areas, and in what it differs.
+    Unfinished { areas: Vec<u32>, differences: Vec<String>, failed: bool },
+    /// What is left of an unfinished export that nobody can go on with, of these areas.
+    Leftover { areas: Vec<u32> },
+}
+
+fn find(layout: &Layout, request: &Request) -> Result<Found> {
+    let head = Head::read(&layout.manifest())?;
+    if head.as_ref().is_some_and(Head::is_complete) {
+        let differences = match Manifest::read(layout) {
+            Ok(manifest) => manifest.differences(request),
+            Err(e) if e.is_temporary() => return Err(e),
+            // Of another version.
+            Err(e) => vec![e.to_string()],
+        };
+        return Ok(Found::Complete { differences });
+    }
+    Ok(match (read_request(layout)?, head) {
+        (Some(begun), _) => Found::Unfinished {
+            areas: begun.numbers(),
+            differences: begun.differences(request),
+            failed: layout.failed().exists(),
+        },
+        (None, Some(head)) => match begun_by_other_version(layout)? {
+            Some(there) => Found::Unfinished {
+                areas: head.area_numbers,
+                differences: vec![format!("version {there} of s3d there, {} now", request.version)],
+                failed: layout.failed().exists(),
+            },
+            None => Found::Leftover { areas: head.area_numbers },
+        },
+        (None, None) => Found::Nothing,
+    })
+}
+
+/// The request of an unfinished export, if there is one.
+///
+/// # Errors
+/// It cannot be read now: as [`if_there`].
+pub(crate) fn read_request(layout: &Layout) -> Result<Option<Request>> {
+    if_there(read_json(&layout.request()))
+}
+
+/// The version of s3d that began an unfinished export whose request this one cannot read, for it has other options.
+pub(crate) fn begun_by_other_version(layout: &Layout) -> Result<Option<String>> {
+    #[derive(Deserialize)]
+    struct Of {
+        version: String,
+    }
+    let of: Option<Of> = if_there(read_json(&layout.request()))?;
+    Ok(of.map(|of| of.version).filter(|version| version != env!("CARGO_PKG_VERSION")))
+}
+
+/// How an export begins.
+pub(crate) enum Begin {
+    /// There is something to do.
+    Session(Session),
+    /// The data set is there already.
+    NothingToDo,
+}
+
+/// An export that holds the lock of its folder. What is on the disk can be gone on with at any moment until
+/// [`Session::end`].
+pub(crate) struct Session {
+    layout: Layout,
+    lock: Lock,
+    /// What is done, by earlier runs too.
+    pub(crate) journal: Journal,
+}
+
+/// Begins an export into OUT, or goes on with it. `manifest` is written if it begins.
+///
+/// # Errors
+/// [`Error::Usage`] if OUT holds a data set or an unfinished export of another request, and `overwrite` is not set, or
+/// something that is in the way and not ours; [`Error::Temporary`] if another process exports into it.
+pub(crate) fn begin(
+    layout: &Layout,
+    overwrite: bool,
+    request: &Request,
+    manifest: &Manifest,
+    account: &Account<'_>,
+) -> Result<Begin> {
+    let ctx = account.ctx;
+    // What is refused is refused before anything changes, and what is complete may lie where nothing can be changed.
+    let leftovers = [ASIDE, MOVING, TRASH].map(|name| layout.root().join(name));
+    if !leftovers.iter().any(|path| path.exists()) {
+        let found = find(layout, request)?;
+        refuse(layout, &found, overwrite)?;
+        if matches!(&found, Found::Complete { differences } if differences.is_empty())
+            && !layout.work_dir().exists()
+            && is_intact(ctx, layout, overwrite)?
+        {
+            return Ok(Begin::NothingToDo);
+        }
+    }
+    let lock = Lock::take(ctx, layout, Sharing::Alone)?;
+    match begin_locked(layout, overwrite, request, manifest, account) {
+        Ok(Some(finished)) => {
+            let journal = Journal::begin(layout, finished)?;
+            Ok(Begin::Session(Session { layout: layout.clone(), lock, journal }))
+        }
+        Ok(None) => {
+            lock.abandon();
+            Ok(Begin::NothingToDo)
+        }
+        Err(e) => {
+            // An earlier data set that was set aside for nothing comes back.
+            if matches!(read_request(layout), Ok(None))
+                && let Err(e) = recover(layout)
+            {
+                ctx.warn(e);
+            }
+            lock.abandon();
+            Err(e)
+        }
+    }
+}
+
+/// How often a shard looks whether it may begin, and how long in all.
+const BEGIN_EVERY: Duration = Duration::from_millis(100);
+const BEGIN_WITHIN: Duration = Duration::from_secs(60);
+
+/// Begins a shard's work in OUT, or goes on with it; other shards of the same request may be at work there. Nothing of what
+/// is done is checked yet.
+///
+/// # Errors
+/// As [`begin`]; [`Error::Temporary`] if somebody merges or exports into it alone.
+pub(crate) fn begin_shard(
+    ctx: &Context,
+    layout: &Layout,
+    overwrite: bool,
+    request: &Request,
+    manifest: &Manifest,
+) -> Result<Begin> {
+    let started = Instant::now();
+    loop {
+        // Whoever comes first begins, alone for that moment.
+        match Lock::take(ctx, layout, Sharing::Alone) {
+            Ok(lock) => {
+                let begun = begin_alone(ctx, layout, overwrite, request, manifest);
+                lock.abandon();
+                if !begun? {
+                    return Ok(Begin::NothingToDo);
+                }
+            }
+            Err(Error::Temporary(_)) => {}
+            Err(e) => return Err(e),
+        }
+        match Lock::take(ctx, layout, Sharing::Shards) {
+            Ok(lock) => {
+                let found = find(layout, request)?;
+                if let Err(e) = refuse(layout, &found, overwrite) {
+                    lock.abandon();
+                    return Err(e);
+                }
+                if matches!(&found, Found::Unfinished { differences, .. } if differences.is_empty()) {
+                    let journal = Journal::begin(layout, Finished::read(ctx, layout)?)?;
+                    return Ok(Begin::Session(Session { layout: layout.clone(), lock, journal }));
+                }
+                lock.abandon();
+                if started.elapsed() > BEGIN_WITHIN {
+                    return Err(Error::Temporary(format!(
+                        "{}: shards of another call are at work in it",
+                        layout.root().display()
+                    )));
+                }
+            }
+            Err(e @ Error::Temporary(_)) if started.elapsed() > BEGIN_WITHIN => return Err(e),
+            Err(Error::Temporary(_)) => {}
+            Err(e) => return Err(e),
+        }
+        ctx.check()?;
+        std::thread::sleep(BEGIN_EVERY);
+    }
+}
+
+/// Brings OUT to where shards can work; whether there is something to do.
+fn begin_alone(
+    ctx: &Context,
+    layout: &Layout,
+    overwrite: bool,
+    request: &Request,
+    manifest: &Manifest,
+) -> Result<bool> {
+    recover(layout)?;
+    match find(layout, request)? {
+        // Files that are being written stay: where locks hold on one machine alone, others may be at work.
+        Found::Unfinished { differences, .. } if differences.is_empty() => {
+            remove(&layout.failed())?;
+            manifest.write(layout)?;
+            Ok(true)
+        }
+        _ => Ok(begin_locked(layout, overwrite, request, manifest, &Account::new(ctx))?.is_some()),
+    }
+}
+
+/// What is done of an unfinished export, by what its journals and files tell.
+fn go_on(layout: &Layout, account: &Account<'_>) -> Result<Finished> {
+    let ctx = account.ctx;
+    let started = Instant::now();
+    let finished = Finished::read(ctx, layout)?.checked(ctx, layout)?;
+    let tally = finished.iter().map(Done::tally).sum();
+    account.units_taken(finished.len() as u64, &tally, started);
+    ctx.info(format_args!(
+        "{}: goes on where it stopped; {} units of work are done",
+        layout.root().display(),
+        finished.len()
+    ));
+    Ok(finished)
+}
+
+fn refuse(layout: &Layout, found: &Found, overwrite: bool) -> Result<()> {
+    let (what, differences) = match found {
+        Found::Complete { differences } => ("a data set", differences),
+        Found::Unfinished { differences, failed: false, .. } => ("an unfinished export", differences),
+        _ => return Ok(()),
+    };
+    if overwrite || differences.is_empty() {
+        return Ok(());
+    }
+    let mut named = differences.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("; ");
+    if differences.len() > MOST_NAMED {
+        named += &format!("; and {} more", differences.len() - MOST_NAMED);
+    }
+    Err(Error::Usage(format!(
+        "{} already holds {what} of another call ({named}): choose another folder, or replace it with --overwrite",
+        layout.root().display()
+    )))
+}
+
+/// Brings OUT to where work can go on, and returns what is done already; `None` if all is.
+fn begin_locked(
+    layout: &Layout,
+    overwrite: bool,
+    request: &Request,
+    manifest: &Manifest,
+    account: &Account<'_>,
+) -> Result<Option<Finished>> {
+    let ctx = account.ctx;
+    recover(layout)?;
+    let found = find(layout, request)?;
+    refuse(layout, &found, overwrite)?;
+    // Whatever the state, what a killed process was writing is of no use. The folders of areas are looked at, or
+    // removed, below.
+    remove_parts(layout.root(), false)?;
+    remove_parts(&layout.work_dir(), true)?;
+    for folder in layout.shared_dirs() {
+        remove_parts(&folder, false)?;
+    }
+    match found {
+        Found::Complete { differences } if differences.is_empty() && is_intact(ctx, layout, overwrite)? => {
+            return Ok(None);
+        }
+        Found::Unfinished { areas, differences, .. } if differences.is_empty() => {
+            remove(&layout.failed())?;
+            for folder in layout.entries(&areas).iter().filter(|entry| entry.is_dir()) {
+                remove_parts(folder, true)?;
+            }
+            // It may not have been written yet, or lost its bytes.
+            manifest.write(layout)?;
+            return go_on(layout, account).map(Some);
+        }
+        Found::Nothing => {
+            refuse_in_the_way(layout, request, &[])?;
+            clear(layout)?;
+        }
+        Found::Complete { .. } => {
+            let head = Head::read(&layout.manifest())?;
+            let areas = head.map_or(Vec::new(), |head| head.area_numbers);
+            refuse_in_the_way(layout, request, &areas)?;
+            let moving = Layout::new(layout.root().join(MOVING));
+            move_entries(layout, &moving, &areas)?;
+            rename(moving.root(), &layout.root().join(ASIDE))?;
+            sync_data_set(layout.root(), &[])?;
+        }
+        Found::Unfinished { areas, .. } | Found::Leftover { areas } => {
+            refuse_in_the_way(layout, request, &areas)?;
+            ctx.info(format_args!(
+                "{}: what an earlier export left there is replaced",
+                layout.root().display()
+            ));
+            // From here on there is nothing to go on with; the lock stays where it is.
+            clear(layout)?;
+            layout.entries(&areas).iter().try_for_each(|path| remove(path))?;
+        }
+    }
+    write_json(&layout.request(), request)?;
+    // Files of an export without a request that tells of them would be nobody's.
+    sync_file(&layout.request())?;
+    manifest.write(layout)?;
+    Ok(Some(Finished::default()))
+}
+
+/// Whether all files of a complete data set are there, by their sizes, or `exactly`, by their content.
+fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
+    let records = match read_file_list(&layout.file_list()) {
+        Ok(records) => records,
+        Err(e) if passes(&e) => return Err(e.into()),
+        Err(_) if exactly => return Ok(false),
+        Err(e) => return Err(Error::Input(format!("{e}; make the data set again with --overwrite"))),
+    };
+    let faults = if exactly {
+        let files: Vec<_> = records.iter().collect();
+        crate::tables::listing::faults(ctx, layout, &files)?.into_iter().map(|(_, fault)| fault).collect()
+    } else {
+        let wrong = |r: &&s3d_io::FileRecord| {
+            fs::metadata(r.path_in(layout.root())).map_or(true, |found| found.len() != r.bytes)
+        };
+        records.iter().filter(wrong).map(|r| r.path.clone()).collect::<Vec<String>>()
+    };
+    let Some(first) = faults.first() else { return Ok(true) };
+    if exactly {
+        ctx.warn(format_args!(
+            "{}: {} files are not as they were written, the first: {first}; all is made again",
+            layout.root().display(),
+            faults.len()
+        ));
+        return Ok(false);
+    }
+    Err(Error::Input(format!(
+        "{}: the data set was complete, but {} of its files are missing or cut, the first: {first}; make it again with \
+         --overwrite",
+        layout.root().display(),
+        faults.len()
+    )))
+}
+
+/// Refuses what is in the way of the data set that is asked for, unless it is of one of these areas, which is ours.
+fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Result<()> {
+    let ours = if areas.is_empty() { Vec::new() } else { layout.entries(areas) };
+    for path in layout.entries(&request.numbers()) {
+        if path.exists() && !ours.contains(&path) {
+            return Err(Error::Usage(format!(
+                "{} is in the way, and was not written by s3d: move it, or choose another folder",
+                path.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+impl Session {
+    /// Ends the export as `outcome` says. Complete, the data set takes the place of an earlier one. After a failure that
+    /// trying again may mend, everything stays as it is, to go on with; after any other an earlier data set comes back, or,
+    /// where there is none, what is done stays, but does not stand in the way of another call.
+    ///
+    /// A shard's work ends by dropping it: what is done stays, whatever became of the rest.
+    pub(crate) fn end<T>(self, ctx: &Context, outcome: Result<T>) -> Result<T> {
+        let Self { layout, lock, journal } = self;
+        drop(journal);
+        let ended = match &outcome {
+            Ok(_) => end_complete(&layout),
+            Err(e) if e.is_temporary() => Ok(()),
+            Err(_) if layout.root().join(ASIDE).exists() => {
+                match restore(&layout) {
+                    Ok(()) => {
+                        ctx.info(format_args!(
+                            "{}: the earlier data set is back in place",
+                            layout.root().display()
+                        ));
+                    }
+                    Err(e) => {
+                        ctx.warn(format_args!(
+                            "the earlier data set is kept in {}: {e}",
+                            layout.root().join(ASIDE).display()
+                        ));
+                    }
+                }
+                Ok(())
+            }
+            Err(_) => {
+                // On a full disk it may not be possible, and is no reason to say anything else than what failed.
+                let _ = write_bytes(&layout.failed(), b"");
+                Ok(())
+            }
+        };
+        lock.abandon();
+        ended.and(outcome)
+    }
+}
+
+fn end_complete(layout: &Layout) -> Result<()> {
+    if layout.root().join(ASIDE).exists() {
+        discard(layout)?;
+    }
+    clear(layout)
+}

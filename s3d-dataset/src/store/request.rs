@@ -1,0 +1,421 @@
+//! What decides the bytes of a data set: the version of s3d, the options, the input. Two exports of equal requests write
+//! the same files, so that one can go on where the other was killed.
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::inputs::{AreaInput, Cameras};
+use crate::export::work::for_each_in_order;
+use crate::options::ExportOptions;
+use crate::tables::listing::walk;
+use s3d_io::{Checksum, ChecksumOfParts, Error as FileError, FileRecord, checksum_of_file};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// What is asked for. It names neither threads nor folders of the machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Request {
+    /// Of s3d.
+    pub(crate) version: String,
+    pub(crate) seed: u64,
+    /// Without the seed and the distance of placed locations, which stand above and below.
+    pub(crate) options: ExportOptions,
+    /// The areas, by number.
+    pub(crate) areas: Vec<RequestedArea>,
+}
+
+/// An area that is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RequestedArea {
+    pub(crate) area: u32,
+    /// How far apart scan locations are placed, metres; null if the scene has its own.
+    pub(crate) place_cameras: Option<f64>,
+    /// What is read.
+    pub(crate) inputs: Vec<InputRecord>,
+}
+
+/// A file or folder of the input.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct InputRecord {
+    /// From the folder of the scene file; of what is named by a whole path its last part alone. That of a folder ends with
+    /// `/`.
+    pub(crate) path: String,
+    /// Its size; of a folder that of all files in it.
+    pub(crate) bytes: u64,
+    /// The checksum of its content; of a folder that of a list of its files, a line `path,bytes,xxh3_128` each, paths from
+    /// the folder and sorted.
+    pub(crate) xxh3_128: Checksum,
+}
+
+/// What differs between options, a sentence each.
+fn option_differences(there: &ExportOptions, now: &ExportOptions) -> Vec<String> {
+    let fields = |options: &ExportOptions| match serde_json::to_value(options) {
+        Ok(Value::Object(fields)) => fields,
+        _ => serde_json::Map::new(),
+    };
+    let (there, now) = (fields(there), fields(now));
+    let differ = there.iter().filter_map(|(name, before)| {
+        let after = now.get(name)?;
+        (before != after).then(|| difference(&flag(name), before, after))
+    });
+    differ.collect()
+}
+
+/// The option on the command line that a key stands for.
+fn flag(name: &str) -> String {
+    match name {
+        "normals" => "--smooth-normals".to_owned(),
+        "profiles" => "--profile".to_owned(),
+        _ => format!("--{}", name.replace('_', "-")),
+    }
+}
+
+fn difference(flag: &str, there: &Value, now: &Value) -> String {
+    let smooth = |value: &Value| value == "smooth";
+    match (there, now) {
+        (Value::Bool(true), _) => format!("{flag} there, not now"),
+        (Value::Bool(false), _) => format!("{flag} now, not there"),
+        (a, b) if flag == "--smooth-normals" && smooth(a) != smooth(b) => {
+            difference(flag, &Value::Bool(smooth(a)), &Value::Null)
+        }
+        _ => format!("{flag} {} there, {} now", words(there), words(now)),
+    }
+}
+
+fn words(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(items) if items.is_empty() => "none".to_owned(),
+        Value::Array(items) => items.iter().map(words).collect::<Vec<_>>().join(","),
+        other => other.to_string(),
+    }
+}
+
+impl Request {
+    /// What is asked for by these options of areas with this input.
+    pub(crate) fn new(options: &ExportOptions, areas: Vec<RequestedArea>) -> Self {
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        let stored = ExportOptions { seed: 0, place_cameras: None, ..options.clone() };
+        Self { version, seed: options.seed, options: stored, areas }
+    }
+
+    /// The numbers of the areas.
+    pub(crate) fn numbers(&self) -> Vec<u32> {
+        self.areas.iter().map(|a| a.area).collect()
+    }
+
+    /// What is known of a file or folder of an area's input, by its name.
+    fn input(&self, area: u32, name: &str) -> Option<&InputRecord> {
+        let area = self.areas.iter().find(|a| a.area == area)?;
+        area.inputs.iter().find(|i| i.path.strip_suffix('/').unwrap_or(&i.path) == name)
+    }
+
+    /// The same request with nothing asked for but labels and scores: what a plan is made for.
+    pub(crate) fn of_plan(&self) -> Self {
+        let ExportOptions { views, size, lenient, entropy_stride, .. } = self.options;
+        let options = ExportOptions {
+            views,
+            size,
+            lenient,
+            entropy_stride,
+            modalities: Vec::new(),
+            ..ExportOptions::default()
+        };
+        Self { options, ..self.clone() }
+    }
+
+    /// What is asked for `now` that was not asked for here, and the other way round, a sentence each; none if the two
+    /// make the same bytes.
+    pub(crate) fn differences(&self, now: &Self) -> Vec<String> {
+        let mut differences = Vec::new();
+        if self.version != now.version {
+            differences.push(format!("version {} of s3d there, {} now", self.version, now.version));
+        }
+        if self.seed != now.seed {
+            differences.push(format!("--seed {} there, {} now", self.seed, now.seed));
+        }
+        differences.extend(option_differences(&self.options, &now.options));
+        let by_number = |areas: &[RequestedArea]| -> BTreeMap<u32, RequestedArea> {
+            areas.iter().map(|a| (a.area, a.clone())).collect()
+        };
+        let (there, now) = (by_number(&self.areas), by_number(&now.areas));
+        for (number, before) in &there {
+            match now.get(number) {
+                Some(after) => differences.extend(before.differences(after)),
+                None => differences.push(format!("area {number} there, not now")),
+            }
+        }
+        let more = now.keys().filter(|number| !there.contains_key(number));
+        differences.extend(more.map(|number| format!("area {number} now, not there")));
+        differences
+    }
+}
+
+impl RequestedArea {
+    fn differences(&self, now: &Self) -> Vec<String> {
+        let mut differences = Vec::new();
+        if self.place_cameras != now.place_cameras {
+            let words =
+                |distance: Option<f64>| distance.map_or("none".to_owned(), |m| format!("{m} m apart"));
+            differences.push(format!(
+                "placed scan locations of area {}: {} there, {} now",
+                self.area,
+                words(self.place_cameras),
+                words(now.place_cameras)
+            ));
+        }
+        let by_path = |inputs: &[InputRecord]| -> BTreeMap<String, Vec<(u64, Checksum)>> {
+            let mut map: BTreeMap<String, Vec<(u64, Checksum)>> = BTreeMap::new();
+            for input in inputs {
+                map.entry(input.path.clone()).or_default().push((input.bytes, input.xxh3_128));
+            }
+            map
+        };
+        let (there, after) = (by_path(&self.inputs), by_path(&now.inputs));
+        for (path, before) in &there {
+            match after.get(path) {
+                Some(now) if now == before => {}
+                Some(_) => differences.push(format!("{path}: other bytes")),
+                None => differences.push(format!("{path}: input there, not now")),
+            }
+        }
+        let more = after.keys().filter(|path| !there.contains_key(*path));
+        differences.extend(more.map(|path| format!("{path}: input now, not there")));
+        // The same files in another order are another input: meshes are joined in the order of the scene file.
+        if differences.is_empty() && self.inputs != now.inputs {
+            differences.push(format!("area {}: its input in another order", self.area));
+        }
+        differences
+    }
+}
+
+/// What each area asks for. All files that they read are read once, on all threads. `companions` are the files that
+/// their meshes were read from besides. Of annotations and folders that are `known` from a plan, and have as many bytes as
+/// then, the checksum is taken from there.
+pub(crate) fn requested_areas(
+    ctx: &Context,
+    areas: &[AreaInput],
+    companions: &[Vec<PathBuf>],
+    known: Option<&Request>,
+) -> Result<Vec<RequestedArea>> {
+    let paths: Vec<Vec<PathBuf>> =
+        areas.iter().zip(companions).map(|(area, besides)| [&area.sources[..], besides].concat()).collect();
+    // The files of each path: itself, or what is in it; and what a plan knows of the path.
+    let mut files: Vec<Vec<Vec<PathBuf>>> = Vec::new();
+    let mut taken: BTreeMap<(u32, &Path), InputRecord> = BTreeMap::new();
+    for (area, of_area) in areas.iter().zip(&paths) {
+        let mut listed = Vec::new();
+        for path in of_area {
+            let files = if path.is_dir() { walk(path)? } else { vec![path.clone()] };
+            let record = known.and_then(|known| known.input(area.number, &name_of(&area.path, path)));
+            if (path.is_dir() || area.annotations.contains(path))
+                && let Some(record) = record
+                && total_bytes(&files)? == record.bytes
+            {
+                taken.insert((area.number, path), record.clone());
+                listed.push(Vec::new());
+            } else {
+                listed.push(files);
+            }
+        }
+        files.push(listed);
+    }
+    let mut all: Vec<&PathBuf> = files.iter().flatten().flatten().collect();
+    all.sort();
+    all.dedup();
+    let sums = checksums(ctx, &all)?;
+    let record = |area: &AreaInput, path: &Path, files: &[PathBuf]| -> Result<InputRecord> {
+        if let Some(record) = taken.get(&(area.number, path)) {
+            return Ok(record.clone());
+        }
+        let name = name_of(&area.path, path);
+        if !path.is_dir() {
+            let (bytes, xxh3_128) = sums.get(path).copied().unwrap_or((0, Checksum::of(b"")));
+            return Ok(InputRecord { path: name, bytes, xxh3_128 });
+        }
+        let mut lines = ChecksumOfParts::default();
+        let mut total = 0;
+        let mut listed: Vec<(String, u64, Checksum)> = Vec::new();
+        for file in files {
+            let (bytes, sum) = sums.get(file.as_path()).copied().unwrap_or((0, Checksum::of(b"")));
+            listed.push((below(path, file), bytes, sum));
+            total += bytes;
+        }
+        listed.sort();
+        for (path, bytes, xxh3_128) in listed {
+            lines.add(FileRecord { path, bytes, xxh3_128 }.to_line().as_bytes());
+            lines.add(b"\n");
+        }
+        let (_, xxh3_128) = lines.finish();
+        Ok(InputRecord { path: format!("{name}/"), bytes: total, xxh3_128 })
+    };
+    let mut requested = Vec::new();
+    for ((area, paths), files) in areas.iter().zip(&paths).zip(&files) {
+        let inputs = paths.iter().zip(files).map(|(path, files)| record(area, path, files));
+        requested.push(RequestedArea {
+            area: area.number,
+            place_cameras: match area.cameras {
+                Cameras::Placed(distance_m) => Some(distance_m),
+                Cameras::Listed(..) => None,
+            },
+            inputs: inputs.collect::<Result<_>>()?,
+        });
+    }
+    Ok(requested)
+}
+
+/// How many bytes some files have, without reading them.
+fn total_bytes(files: &[PathBuf]) -> Result<u64> {
+    let mut total = 0;
+    for file in files {
+        total += std::fs::metadata(file).map_err(|e| FileError::io(file, "read", e))?.len();
+    }
+    Ok(total)
+}
+
+/// Size and checksum of each file.
+fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<BTreeMap<&'a Path, (u64, Checksum)>> {
+    let sums = Mutex::new(BTreeMap::new());
+    let progress = ctx.progress("reading", "input files", files.len() as u64);
+    for_each_in_order(
+        ctx,
+        files,
+        || (),
+        |(), path| {
+            // Devices and pipes are refused: reading one may never end.
+            let what = std::fs::metadata(path).map_err(|e| FileError::io(path, "read", e))?;
+            if !what.is_file() {
+                return Err(FileError::format(path, "is no file").into());
+            }
+            let sum = checksum_of_file(path)?;
+            sums.lock().unwrap_or_else(PoisonError::into_inner).insert(path.as_path(), sum);
+            progress.add(1);
+            Ok(())
+        },
+    )?;
+    Ok(sums.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// What an input is called: its path from the folder of what the user named, or else its last part.
+fn name_of(scene: &Path, path: &Path) -> String {
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    match path.strip_prefix(folder) {
+        Ok(below) if below.is_relative() && below.components().next().is_some() => slashed(below),
+        _ => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+    }
+}
+
+fn below(folder: &Path, file: &Path) -> String {
+    slashed(file.strip_prefix(folder).unwrap_or(file))
+}
+
+fn slashed(path: &Path) -> String {
+    path.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join("/")
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::options::PadLabels;
+    use crate::profile::Profile;
+    use s3d_io::{Domain, XyzType};
+    use s3d_render::Normals;
+    use s3d_sample::Pool;
+
+    pub(crate) fn request() -> Request {
+        Request {
+            version: "1.2.3".into(),
+            seed: 0,
+            options: ExportOptions {
+                modalities: vec![Domain::Rgb, Domain::Depth],
+                pad_labels: PadLabels(0),
+                ..ExportOptions::default()
+            },
+            areas: vec![area(1), area(3)],
+        }
+    }
+
+    fn area(area: u32) -> RequestedArea {
+        let input = |path: &str| InputRecord { path: path.into(), bytes: 7, xxh3_128: Checksum(7) };
+        RequestedArea {
+            area,
+            place_cameras: None,
+            inputs: vec![input("scene.toml"), input("rgb.obj"), input("Area_1/")],
+        }
+    }
+
+    #[test]
+    fn equal_requests_have_no_differences_and_come_back_from_json() {
+        let text = serde_json::to_string(&request()).unwrap();
+        let back: Request = serde_json::from_str(&text).unwrap();
+        assert_eq!(back, request());
+        assert!(request().differences(&back).is_empty());
+    }
+
+    #[test]
+    fn each_difference_is_told_in_words() {
+        let changed = |change: &dyn Fn(&mut Request)| {
+            let mut now = request();
+            change(&mut now);
+            assert_ne!(now, request());
+            request().differences(&now)
+        };
+        assert_eq!(changed(&|r| r.seed = 7), ["--seed 0 there, 7 now"]);
+        assert_eq!(changed(&|r| r.version = "2.0.0".into()), ["version 1.2.3 of s3d there, 2.0.0 now"]);
+        assert_eq!(changed(&|r| r.options.pano_width = 64), ["--pano-width 4096 there, 64 now"]);
+        assert_eq!(changed(&|r| r.options.keep_all = true), ["--keep-all now, not there"]);
+        assert_eq!(changed(&|r| r.options.normals = Normals::Smooth), ["--smooth-normals now, not there"]);
+        assert_eq!(
+            changed(&|r| r.options.only = vec!["a".into(), "b".into()]),
+            ["--only none there, a,b now"]
+        );
+        assert_eq!(
+            changed(&|r| r.options.profiles = vec![Profile::PointNet]),
+            ["--profile none there, pointnet now"]
+        );
+        assert_eq!(changed(&|r| r.areas[1].inputs[1].xxh3_128 = Checksum(8)), ["rgb.obj: other bytes"]);
+        assert_eq!(changed(&|r| drop(r.areas[0].inputs.remove(2))), ["Area_1/: input there, not now"]);
+        assert_eq!(changed(&|r| r.areas[0].inputs.swap(0, 1)), ["area 1: its input in another order"]);
+        assert_eq!(
+            changed(&|r| r.areas[0].place_cameras = Some(2.5)),
+            ["placed scan locations of area 1: none there, 2.5 m apart now"]
+        );
+        assert_eq!(changed(&|r| drop(r.areas.remove(1))), ["area 3 there, not now"]);
+        assert_eq!(changed(&|r| r.areas[1].area = 4), ["area 3 there, not now", "area 4 now, not there"]);
+    }
+
+    #[test]
+    fn a_plan_is_for_any_images_of_the_same_scores() {
+        let changed = |change: &dyn Fn(&mut Request)| {
+            let mut now = request();
+            change(&mut now);
+            request().of_plan().differences(&now.of_plan())
+        };
+        let other_images = |r: &mut Request| {
+            r.options.pano_width = 64;
+            r.options.pool = Pool::Area;
+            r.options.only = vec!["a".into()];
+            r.options.xyz = XyzType::None;
+        };
+        assert!(changed(&other_images).is_empty());
+        assert_eq!(changed(&|r| r.options.size = 64), ["--size 1080 there, 64 now"]);
+        assert_eq!(changed(&|r| r.options.lenient = true), ["--lenient now, not there"]);
+        assert_eq!(changed(&|r| r.seed = 7), ["--seed 0 there, 7 now"]);
+        let known = request();
+        assert_eq!(known.input(3, "Area_1").map(|i| i.path.as_str()), Some("Area_1/"));
+        assert!(known.input(1, "rgb.obj").is_some() && known.input(2, "rgb.obj").is_none());
+    }
+
+    #[test]
+    fn inputs_are_named_from_the_scenes_folder() {
+        let name = |scene: &str, path: &str| name_of(Path::new(scene), Path::new(path));
+        assert_eq!(name("scan/scene.toml", "scan/Area_1"), "Area_1");
+        assert_eq!(name("scan/scene.toml", "scan/../shared/a.obj"), "../shared/a.obj");
+        assert_eq!(name("scan/scene.toml", "/data/a.obj"), "a.obj");
+        assert_eq!(name("scene.toml", "a/b.obj"), "a/b.obj");
+        assert_eq!(name("scene.toml", "/data/b.obj"), "b.obj");
+        assert_eq!(name("sets/area_3", "sets/area_3/3d/rgb.obj"), "area_3/3d/rgb.obj");
+    }
+}

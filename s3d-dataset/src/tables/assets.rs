@@ -1,0 +1,38 @@
+//! What a data set tells of itself: conventions, schemas, and a Python module that reads it.
+
+use crate::error::Result;
+use s3d_io::{Conventions, Layout, create_dir, write_bytes};
+use std::path::PathBuf;
+
+/// Reads every kind of file of a data set, in Python.
+const UTILS_PY: &str = include_str!("../../assets/utils.py");
+const POSE_SCHEMA: &str = include_str!("../../assets/pose.schema.json");
+const MANIFEST_SCHEMA: &str = include_str!("../../assets/manifest.schema.json");
+
+/// Writes the names of a label table, padded to as many as `pad_labels` if there are fewer, `conventions.json`,
+/// `assets/utils.py` and `assets/schema`.
+pub(crate) fn write(
+    layout: &Layout,
+    mut names: Vec<String>,
+    pad_labels: usize,
+    conventions: Conventions,
+) -> Result<()> {
+    create_dir(&layout.assets_dir())?;
+    s3d_io::pad_labels(&mut names, pad_labels);
+    s3d_io::write_labels(&layout.labels_json(), &names)?;
+    conventions.write(&layout.conventions())?;
+    create_dir(&layout.schema_dir())?;
+    for (path, text) in texts(layout) {
+        write_bytes(&path, text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// The assets that are the same in every data set: where they lie, and what they hold.
+pub(crate) fn texts(layout: &Layout) -> [(PathBuf, &'static str); 3] {
+    [
+        (layout.utils_py(), UTILS_PY),
+        (layout.pose_schema(), POSE_SCHEMA),
+        (layout.manifest_schema(), MANIFEST_SCHEMA),
+    ]
+}

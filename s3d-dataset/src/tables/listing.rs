@@ -1,0 +1,138 @@
+//! The files of a data set: found, recorded, and listed in `files.csv`.
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::work::for_each_in_order;
+use crate::tables::manifest::{FileList, Manifest};
+use s3d_io::{Error as FileError, FileRecord, Layout, read_file_list, write_file_list};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// Whether a file is one that some process is writing, or was when it was killed: see [`s3d_io::AtomicFile`].
+pub(crate) fn is_part(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with(".s3d-") && name.ends_with(".part")
+}
+
+/// All files in a folder and those below it, sorted; none if there is no such folder. What is being written is no file yet.
+pub(crate) fn walk(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        let failed = |e| FileError::io(&folder, "read the folder", e);
+        let entries = match fs::read_dir(&folder) {
+            Err(e) if e.kind() == ErrorKind::NotFound => continue,
+            entries => entries.map_err(failed)?,
+        };
+        for entry in entries {
+            let path = entry.map_err(failed)?.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if !is_part(&path) {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Removes the files that a killed process was writing in a folder, and if asked for in those below it.
+pub(crate) fn remove_parts(folder: &Path, below: bool) -> Result<()> {
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        let failed = |e| FileError::io(&folder, "read the folder", e);
+        let entries = match fs::read_dir(&folder) {
+            Err(e) if e.kind() == ErrorKind::NotFound => continue,
+            entries => entries.map_err(failed)?,
+        };
+        for entry in entries {
+            let entry = entry.map_err(failed)?;
+            let path = entry.path();
+            if entry.file_type().map_err(failed)?.is_dir() {
+                if below {
+                    folders.push(path);
+                }
+            } else if is_part(&path) {
+                fs::remove_file(&path).map_err(|e| FileError::io(&path, "remove", e))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The records of files that are there, sorted. They are read, on all threads.
+pub(crate) fn records(ctx: &Context, layout: &Layout, paths: &[PathBuf]) -> Result<Vec<FileRecord>> {
+    let records = Mutex::new(Vec::with_capacity(paths.len()));
+    for_each_in_order(
+        ctx,
+        paths,
+        || (),
+        |(), path| {
+            let record = FileRecord::of_file(layout.root(), path)?;
+            records.lock().unwrap_or_else(PoisonError::into_inner).push(record);
+            Ok(())
+        },
+    )?;
+    let mut records = records.into_inner().unwrap_or_else(PoisonError::into_inner);
+    records.sort();
+    Ok(records)
+}
+
+/// What is wrong with files that were recorded, a sentence each, with the index of the file. They are read, on all
+/// threads.
+pub(crate) fn faults(ctx: &Context, layout: &Layout, files: &[&FileRecord]) -> Result<Vec<(usize, String)>> {
+    let faults = Mutex::new(Vec::new());
+    let progress = ctx.progress("checking", "files", files.len() as u64);
+    let numbered: Vec<(usize, &FileRecord)> = files.iter().copied().enumerate().collect();
+    for_each_in_order(
+        ctx,
+        &numbered,
+        || (),
+        |(), (index, record)| {
+            if let Some(fault) = record.fault(layout.root()) {
+                faults.lock().unwrap_or_else(PoisonError::into_inner).push((*index, fault));
+            }
+            progress.add(1);
+            Ok(())
+        },
+    )?;
+    let mut faults = faults.into_inner().unwrap_or_else(PoisonError::into_inner);
+    faults.sort();
+    Ok(faults)
+}
+
+/// Writes `files.csv`, and returns what the manifest tells of it.
+pub(crate) fn write(layout: &Layout, records: &[FileRecord]) -> Result<FileList> {
+    let path = layout.file_list();
+    let (_, xxh3_128) = write_file_list(&path, records)?;
+    Ok(FileList {
+        list: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        count: records.len() as u64,
+        bytes: records.iter().map(|r| r.bytes).sum(),
+        xxh3_128,
+    })
+}
+
+/// Brings `files.csv` and the manifest of a complete data set up to date, after the files of `changed` were written
+/// and all others for which `is_gone` holds were removed. A data set that never had a list gets none.
+pub(crate) fn update(
+    layout: &Layout,
+    manifest: &mut Manifest,
+    changed: Vec<FileRecord>,
+    is_gone: impl Fn(&str) -> bool,
+) -> Result<()> {
+    if manifest.files.is_some() {
+        let mut all: std::collections::BTreeMap<String, FileRecord> = read_file_list(&layout.file_list())?
+            .into_iter()
+            .filter(|record| !is_gone(&record.path))
+            .map(|record| (record.path.clone(), record))
+            .collect();
+        all.extend(changed.into_iter().map(|record| (record.path.clone(), record)));
+        let all: Vec<FileRecord> = all.into_values().collect();
+        manifest.files = Some(write(layout, &all)?);
+    }
+    manifest.write(layout)
+}

@@ -1,0 +1,219 @@
+//! The tables beside the images: rooms, votes, instance numbers, views, splits. Each is a JSON file that says what its
+//! keys mean by their names.
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::annotate::Annotated;
+use crate::export::area_plan::RoomNames;
+use crate::export::views::Candidate;
+use s3d_io::{Domain, Error as FileError, Frame, ImageName, Layout, Split, create_dir, write_json};
+use s3d_label::{VoteReport, VoteRow};
+use s3d_sample::Fold;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs;
+
+/// A room of `rooms.json`.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct RoomRecord {
+    /// Such as `office_3`.
+    pub(crate) room: String,
+    /// Annotated points.
+    pub(crate) points: u64,
+    pub(crate) floor_m2: f64,
+    /// The dominant horizontal direction of the walls, whole degrees in [0, 90).
+    pub(crate) wall_direction_deg: u32,
+    /// The floor outline: polygons, each a ring around it (counter-clockwise) and rings around its holes (clockwise), of
+    /// world x and y in metres.
+    pub(crate) outline: Vec<OutlineRecord>,
+}
+
+/// One polygon of an outline.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct OutlineRecord {
+    outer: Vec<[f64; 2]>,
+    holes: Vec<Vec<[f64; 2]>>,
+}
+
+/// Writes `area_N/3d/rooms.json`.
+pub(crate) fn write_rooms(layout: &Layout, area: u32, annotated: &Annotated) -> Result<()> {
+    let ring = |points: &[glam::DVec2]| points.iter().map(|p| p.to_array()).collect::<Vec<_>>();
+    let rooms: Vec<RoomRecord> = annotated
+        .rooms
+        .iter()
+        .map(|r| RoomRecord {
+            room: r.room.to_string(),
+            points: r.points,
+            floor_m2: r.footprint.area_m2,
+            wall_direction_deg: r.wall_direction_deg,
+            outline: r
+                .footprint
+                .polygons
+                .iter()
+                .map(|p| OutlineRecord {
+                    outer: ring(&p.outer),
+                    holes: p.holes.iter().map(|h| ring(h)).collect(),
+                })
+                .collect(),
+        })
+        .collect();
+    write_json(&layout.rooms_json(area), &rooms)?;
+    Ok(())
+}
+
+#[derive(Serialize)]
+struct VoteRecord {
+    points: u64,
+    points_farther_than_5_cm: u64,
+    faces_voted: u64,
+    votes_per_voted_face: f64,
+    faces_contested: u64,
+    faces_won_with_less_than_three_quarters: u64,
+    faces_won_with_less_than_half: u64,
+}
+
+impl From<&VoteRow> for VoteRecord {
+    fn from(row: &VoteRow) -> Self {
+        Self {
+            points: row.points,
+            points_farther_than_5_cm: row.far_points,
+            faces_voted: row.faces,
+            votes_per_voted_face: row.mean_votes_per_face(),
+            faces_contested: row.contested,
+            faces_won_with_less_than_three_quarters: row.contested_below_three_quarters,
+            faces_won_with_less_than_half: row.contested_below_half,
+        }
+    }
+}
+
+/// Writes `area_N/3d/votes.json`: the report on the voting, in all, per room and per class.
+pub(crate) fn write_votes(layout: &Layout, area: u32, report: &VoteReport) -> Result<()> {
+    #[derive(Serialize)]
+    struct Named {
+        name: String,
+        #[serde(flatten)]
+        row: VoteRecord,
+    }
+    #[derive(Serialize)]
+    struct Votes {
+        faces: u64,
+        faces_without_votes: u64,
+        total: VoteRecord,
+        rooms: Vec<Named>,
+        classes: Vec<Named>,
+    }
+    let votes = Votes {
+        faces: report.face_count,
+        faces_without_votes: report.faces_without_vote,
+        total: (&report.total).into(),
+        rooms: report
+            .rooms
+            .iter()
+            // The table has the rooms of all areas.
+            .filter(|(of, ..)| *of == area)
+            .map(|(_, r, row)| Named { name: r.to_string(), row: row.into() })
+            .collect(),
+        classes: report
+            .classes
+            .iter()
+            .map(|(c, row)| Named { name: c.to_string(), row: row.into() })
+            .collect(),
+    };
+    write_json(&layout.votes_json(area), &votes)?;
+    Ok(())
+}
+
+/// Writes `area_N/3d/instance_numbers.json`: which label each instance of the annotation tree, whose numbers run per
+/// room, has in the area.
+pub(crate) fn write_instance_numbers(layout: &Layout, area: u32, rooms: &[RoomNames]) -> Result<()> {
+    #[derive(Serialize)]
+    struct Mapping {
+        room: String,
+        class: &'static str,
+        number_in_room: u32,
+        label: String,
+    }
+    let mappings: Vec<Mapping> = rooms
+        .iter()
+        .flat_map(|r| &r.instances)
+        .map(|i| Mapping {
+            room: i.label.room.to_string(),
+            class: i.label.class.name(),
+            number_in_room: i.number_in_room,
+            label: i.label.to_string(),
+        })
+        .collect();
+    write_json(&layout.instance_numbers_json(area), &mappings)?;
+    Ok(())
+}
+
+/// Writes `area_N/views.json`: every candidate view with its draw, its entropy and, if it was kept, its frame number.
+pub(crate) fn write_views(layout: &Layout, area: u32, candidates: &[Candidate]) -> Result<()> {
+    let of_area: Vec<&Candidate> = candidates.iter().filter(|c| c.area == area).collect();
+    write_json(&layout.views_json(area), &of_area)?;
+    Ok(())
+}
+
+/// Writes `splits.json`: the folds that the present areas allow.
+pub(crate) fn write_splits(layout: &Layout, folds: &[Fold]) -> Result<()> {
+    let splits: Vec<Split> = folds
+        .iter()
+        .map(|f| Split { fold: f.number, train_areas: f.train.clone(), test_areas: f.test.clone() })
+        .collect();
+    s3d_io::write_splits(&layout.splits(), &splits)?;
+    Ok(())
+}
+
+/// Writes the lists of panoramas that depth loaders read: of all areas, and of both sides of each fold. A data set
+/// without panoramas, or without their colour or depth, has none.
+pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: &[Fold]) -> Result<()> {
+    let mut pairs = Vec::new();
+    for area in areas {
+        let (colors, depths) =
+            (panoramas(layout, *area, Domain::Rgb)?, panoramas(layout, *area, Domain::Depth)?);
+        let both = colors.intersection(&depths).map(|name| (*area, name.clone()));
+        pairs.extend(both.collect::<Vec<_>>());
+    }
+    if pairs.is_empty() {
+        return Ok(());
+    }
+    create_dir(&layout.lists_dir())?;
+    let path = |area: u32, name: &ImageName, domain: Domain| {
+        let name = ImageName { domain, ..name.clone() };
+        format!("area_{area}/{}/{}/{name}", name.frame.folder(), domain.folder())
+    };
+    let of = |areas: &[u32]| -> Vec<(String, String)> {
+        let listed = pairs.iter().filter(|(area, _)| areas.contains(area));
+        listed.map(|(a, name)| (path(*a, name, Domain::Rgb), path(*a, name, Domain::Depth))).collect()
+    };
+    s3d_io::write_image_list(&layout.list_of_all(), &of(areas))?;
+    for fold in folds {
+        for (train, areas) in [(true, &fold.train), (false, &fold.test)] {
+            s3d_io::write_image_list(&layout.list_of_fold(fold.number, train), &of(areas))?;
+        }
+    }
+    if folds.is_empty() {
+        ctx.info(format_args!(
+            "these areas leave every fold without its training or its test areas: splits/ lists all panoramas only"
+        ));
+    }
+    Ok(())
+}
+
+/// The names of an area's panoramas that are there in a domain, with the domain left at colour so that they compare.
+fn panoramas(layout: &Layout, area: u32, domain: Domain) -> Result<BTreeSet<ImageName>> {
+    let dir = layout.image_dir(area, Frame::Panorama, domain);
+    let entries = match fs::read_dir(&dir) {
+        Ok(entries) => entries,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
+        Err(e) => return Err(FileError::io(&dir, "read", e).into()),
+    };
+    let mut names = BTreeSet::new();
+    for entry in entries {
+        let entry = entry.map_err(|e| FileError::io(&dir, "read", e))?;
+        if let Some(name) = entry.file_name().to_str().and_then(ImageName::parse) {
+            names.insert(ImageName { domain: Domain::Rgb, ..name });
+        }
+    }
+    Ok(names)
+}

@@ -1,0 +1,201 @@
+//! The paper's tables of statistics, counted from the files of a data set.
+
+use crate::error::Result;
+use crate::tables::manifest::Head;
+use crate::tables::records::RoomRecord;
+use s3d_io::{Domain, Error as FileError, Frame, Layout, read_json, read_labels, write_bytes, write_json};
+use s3d_label::{Class, ClassCounts, LabelTable, Room, RoomError, RoomType};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+/// The tables, an entry an area.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Statistics {
+    /// By number.
+    pub areas: Vec<AreaStatistics>,
+}
+
+/// What an area holds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct AreaStatistics {
+    /// Its number.
+    pub area: u32,
+    /// Points of the sampled cloud.
+    pub points: u64,
+    /// Faces of the mesh.
+    pub faces: u64,
+    /// Perspective views, however many modalities each has.
+    pub regular_images: u64,
+    /// Panoramas likewise.
+    pub panoramas: u64,
+    /// Square metres of all rooms.
+    pub floor_m2: f64,
+    /// Instances by class.
+    pub instances_per_class: BTreeMap<&'static str, u64>,
+    /// Rooms by type.
+    pub rooms_per_type: BTreeMap<&'static str, RoomTypeStatistics>,
+}
+
+/// What rooms of a type there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct RoomTypeStatistics {
+    /// How many.
+    pub rooms: u64,
+    /// Square metres of all of them.
+    pub floor_m2: f64,
+}
+
+/// Counts what a data set in the folder `root` holds, from its files.
+///
+/// # Errors
+/// [`Error::File`](crate::Error::File) if there is no complete data set, or a file cannot be read.
+pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
+    let layout = Layout::new(root.into());
+    let head = Head::require(&layout)?;
+    Statistics::count(&layout, &head.area_numbers)
+}
+
+impl Statistics {
+    /// Counts what lies in the folders of a data set of these areas.
+    pub(crate) fn count(layout: &Layout, areas: &[u32]) -> Result<Self> {
+        let path = layout.labels_json();
+        let table = LabelTable::from_names(&read_labels(&path)?)
+            .map_err(|e| FileError::format(&path, e.to_string()))?;
+        let classes = ClassCounts::from_table(&table);
+        let areas =
+            areas.iter().map(|n| AreaStatistics::count(layout, *n, &classes)).collect::<Result<_>>()?;
+        Ok(Self { areas })
+    }
+
+    /// Writes the tables as JSON and as Markdown.
+    pub(crate) fn write(&self, layout: &Layout) -> Result<()> {
+        write_json(&layout.statistics_json(), self)?;
+        write_bytes(&layout.statistics_md(), self.to_markdown().as_bytes())?;
+        Ok(())
+    }
+
+    /// The tables as Markdown: a column an area, and their sum.
+    pub fn to_markdown(&self) -> String {
+        let mut text = String::from("# Statistics\n");
+        self.table(
+            &mut text,
+            "Data",
+            &[
+                ("points", &|a| a.points as f64),
+                ("faces", &|a| a.faces as f64),
+                ("regular images", &|a| a.regular_images as f64),
+                ("panoramas", &|a| a.panoramas as f64),
+                ("floor, m²", &|a| a.floor_m2),
+            ],
+        );
+        let class_rows: Vec<_> = Class::ALL
+            .map(|c| (c.name(), move |a: &AreaStatistics| a.instances_per_class[c.name()] as f64))
+            .into();
+        self.table(&mut text, "Instances of each class", &rows(&class_rows));
+        let room_rows: Vec<_> = RoomType::ALL
+            .map(|t| (t.name(), move |a: &AreaStatistics| a.rooms_per_type[t.name()].rooms as f64))
+            .into();
+        self.table(&mut text, "Rooms of each type", &rows(&room_rows));
+        let floor_rows: Vec<_> = RoomType::ALL
+            .map(|t| (t.name(), move |a: &AreaStatistics| a.rooms_per_type[t.name()].floor_m2))
+            .into();
+        self.table(&mut text, "Floor of each room type, m²", &rows(&floor_rows));
+        text
+    }
+
+    fn table(&self, text: &mut String, title: &str, rows: &[Row<'_>]) {
+        let _ = write!(text, "\n## {title}\n\n| |");
+        self.areas.iter().for_each(|a| {
+            let _ = write!(text, " area {} |", a.area);
+        });
+        let _ = writeln!(text, " total |\n|---|{}", "---:|".repeat(self.areas.len() + 1));
+        let with_total = |value: &dyn Fn(&AreaStatistics) -> f64| -> Vec<f64> {
+            let mut cells: Vec<f64> = self.areas.iter().map(value).collect();
+            cells.push(cells.iter().sum());
+            cells
+        };
+        let is_count = |cell: &f64| cell.fract() == 0.0;
+        for (name, value) in rows {
+            let cells = with_total(value);
+            let digits = if cells.iter().all(is_count) && !title.contains("m²") && !name.contains("m²") {
+                0
+            } else {
+                1
+            };
+            let _ = write!(text, "| {name} |");
+            for cell in cells {
+                let _ = write!(text, " {cell:.digits$} |");
+            }
+            text.push('\n');
+        }
+    }
+}
+
+type Row<'a> = (&'a str, &'a dyn Fn(&AreaStatistics) -> f64);
+
+fn rows<'a, F: Fn(&AreaStatistics) -> f64>(rows: &'a [(&'static str, F)]) -> Vec<Row<'a>> {
+    rows.iter().map(|(name, f)| (*name, f as &dyn Fn(&AreaStatistics) -> f64)).collect()
+}
+
+impl AreaStatistics {
+    fn count(layout: &Layout, area: u32, classes: &ClassCounts) -> Result<Self> {
+        let mut rooms_per_type: BTreeMap<_, RoomTypeStatistics> =
+            RoomType::ALL.map(|t| (t.name(), RoomTypeStatistics::default())).into();
+        let rooms: Vec<RoomRecord> = read_json(&layout.rooms_json(area))?;
+        for record in &rooms {
+            let room: Room = record
+                .room
+                .parse()
+                .map_err(|e: RoomError| FileError::format(&layout.rooms_json(area), e.to_string()))?;
+            let row = rooms_per_type.entry(room.room_type.name()).or_default();
+            row.rooms += 1;
+            row.floor_m2 += record.floor_m2;
+        }
+        Ok(Self {
+            area,
+            points: s3d_io::read_ply_point_count(&layout.point_cloud(area))?,
+            faces: count_faces(&layout.semantic_obj(area))?,
+            regular_images: count_images(layout, area, Frame::View(0))?,
+            panoramas: count_images(layout, area, Frame::Panorama)?,
+            floor_m2: rooms.iter().map(|r| r.floor_m2).sum(),
+            instances_per_class: Class::ALL.map(|c| (c.name(), classes.of(area, c))).into(),
+            rooms_per_type,
+        })
+    }
+}
+
+/// The number of faces in an OBJ file.
+fn count_faces(path: &Path) -> Result<u64> {
+    let file = File::open(path).map_err(|e| FileError::io(path, "read", e))?;
+    let mut reader = BufReader::new(file);
+    let mut line = Vec::new();
+    let mut faces = 0;
+    loop {
+        line.clear();
+        if reader.read_until(b'\n', &mut line).map_err(|e| FileError::io(path, "read", e))? == 0 {
+            return Ok(faces);
+        }
+        faces += u64::from(line.starts_with(b"f "));
+    }
+}
+
+/// The number of images of a kind: of the modality that has most, since some may not have been asked for.
+fn count_images(layout: &Layout, area: u32, frame: Frame) -> Result<u64> {
+    let mut most = 0;
+    for domain in Domain::ALL {
+        let dir = layout.image_dir(area, frame, domain);
+        match fs::read_dir(&dir) {
+            Ok(entries) => most = most.max(entries.count() as u64),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+            Err(e) => return Err(FileError::io(&dir, "read", e).into()),
+        }
+    }
+    Ok(most)
+}

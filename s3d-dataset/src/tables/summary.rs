@@ -1,0 +1,359 @@
+//! What an export has made: files, bytes, images, missing pixels, views that were dropped, time per stage.
+
+use crate::context::Context;
+use crate::event::{Event, Stage, UnitKind};
+use crate::export::views::Candidate;
+use s3d_sample::{Pool, Selection};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::iter::Sum;
+use std::ops::AddAssign;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// Images of one kind, and what of them was cast.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ImageTally {
+    /// Panoramas or views, however many modalities each has.
+    pub images: u64,
+    /// Pixels that were cast: none where only poses are asked for.
+    pub pixels: u64,
+    /// Those among them whose ray meets no face: missing in every modality.
+    pub pixels_missing: u64,
+}
+
+/// What a unit of work wrote. Kept in the journal, so that a run that goes on can tell of the whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UnitTally {
+    /// Files.
+    pub files: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// Panoramas among them.
+    pub panoramas: ImageTally,
+    /// Perspective views among them.
+    pub views: ImageTally,
+}
+
+impl AddAssign for ImageTally {
+    fn add_assign(&mut self, other: Self) {
+        self.images += other.images;
+        self.pixels += other.pixels;
+        self.pixels_missing += other.pixels_missing;
+    }
+}
+
+impl AddAssign for UnitTally {
+    fn add_assign(&mut self, other: Self) {
+        self.files += other.files;
+        self.bytes += other.bytes;
+        self.panoramas += other.panoramas;
+        self.views += other.views;
+    }
+}
+
+impl Sum for UnitTally {
+    fn sum<I: Iterator<Item = Self>>(tallies: I) -> Self {
+        tallies.fold(Self::default(), |mut sum, tally| {
+            sum += tally;
+            sum
+        })
+    }
+}
+
+/// What became of the candidate views.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ViewTally {
+    /// All that were drawn.
+    pub candidates: u64,
+    /// Those that were selected.
+    pub kept: u64,
+    /// Dropped since their entropies are the lowest of their pool.
+    pub dropped_lowest: u64,
+    /// Dropped since they were not drawn from the middle of their pool.
+    pub dropped_not_drawn: u64,
+    /// Kept, but of scan locations that `--only` leaves out: not written.
+    pub not_asked: u64,
+}
+
+impl ViewTally {
+    /// Counts candidates after their selection; those of an area, and of a location in it, follow each other. `only` are
+    /// the locations whose images are asked for, all if it is empty.
+    pub(crate) fn of(candidates: &[Candidate], pool: Pool, keep_all: bool, only: &[String]) -> Self {
+        let kept: Vec<&Candidate> = candidates.iter().filter(|c| c.frame_num.is_some()).collect();
+        let same_pool = |a: &Candidate, b: &Candidate| match pool {
+            Pool::Dataset => true,
+            Pool::Area => a.area == b.area,
+            Pool::Location => (a.area, a.location) == (b.area, b.location),
+        };
+        let discarded = |pool: &[Candidate]| Selection::default().discarded(pool.len()) as u64;
+        let pools = candidates.chunk_by(same_pool);
+        let dropped_lowest = if keep_all { 0 } else { pools.map(discarded).sum() };
+        let asked = |c: &&&Candidate| only.is_empty() || only.contains(&c.camera_uuid);
+        Self {
+            candidates: candidates.len() as u64,
+            kept: kept.len() as u64,
+            dropped_lowest,
+            dropped_not_drawn: (candidates.len() - kept.len()) as u64 - dropped_lowest,
+            not_asked: (kept.len() - kept.iter().filter(asked).count()) as u64,
+        }
+    }
+}
+
+/// What an export has made, all areas together, earlier runs of the same export included.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// The data set's folder.
+    pub output: String,
+    /// Number of areas.
+    pub areas: u64,
+    /// Number of scan locations.
+    pub locations: u64,
+    /// All files of the data set, and its images.
+    #[serde(flatten)]
+    pub tally: UnitTally,
+    /// What became of the candidate views.
+    pub candidate_views: ViewTally,
+    /// Warnings of this run.
+    pub warnings: u64,
+    /// Of this run, by stage.
+    pub stage_seconds: BTreeMap<Stage, f64>,
+    /// Of this run, in all.
+    pub seconds: f64,
+}
+
+impl Summary {
+    /// What it says to a person, a few lines.
+    pub fn lines(&self) -> Vec<String> {
+        let Self { output, locations, tally, candidate_views: views, .. } = self;
+        let mut lines = vec![
+            format!(
+                "{output}: {} panoramas and {} views of {locations} locations in {:.1} s",
+                tally.panoramas.images, tally.views.images, self.seconds
+            ),
+            format!("{} files, {}", tally.files, size(tally.bytes)),
+        ];
+        let stages: Vec<String> =
+            self.stage_seconds.iter().map(|(stage, s)| format!("{} {s:.1} s", stage.name())).collect();
+        if !stages.is_empty() {
+            lines.push(format!("{} (meshes and points are written beside the images)", stages.join(", ")));
+        }
+        let missing: Vec<String> = [("panoramas", tally.panoramas), ("views", tally.views)]
+            .iter()
+            .filter_map(|(kind, t)| Some(format!("{} of the pixels of {kind}", percent(t.share_missing()?))))
+            .collect();
+        if !missing.is_empty() {
+            lines.push(format!("missing, for no face is there: {}", missing.join(", ")));
+        }
+        if views.candidates > views.kept {
+            lines.push(format!(
+                "{} of {} candidate views dropped: {} for the lowest entropies of their pool, {} not drawn from its middle",
+                views.candidates - views.kept,
+                views.candidates,
+                views.dropped_lowest,
+                views.dropped_not_drawn
+            ));
+        }
+        if views.not_asked > 0 {
+            lines.push(format!("{} kept views are of locations that --only leaves out", views.not_asked));
+        }
+        if self.warnings > 0 {
+            lines.push(format!("{} warnings above", self.warnings));
+        }
+        lines
+    }
+}
+
+impl ImageTally {
+    /// The share of missing pixels, if any was cast.
+    fn share_missing(&self) -> Option<f64> {
+        (self.pixels > 0).then(|| self.pixels_missing as f64 / self.pixels as f64)
+    }
+}
+
+/// "0 %" is none at all, and "100 %" all.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if share > 0.0 && percent < 0.01 {
+        "less than 0.01 %".to_owned()
+    } else if share < 1.0 && percent > 99.99 {
+        "more than 99.99 %".to_owned()
+    } else if share == 0.0 || share == 1.0 {
+        format!("{percent:.0} %")
+    } else {
+        format!("{percent:.2} %")
+    }
+}
+
+/// Bytes in powers of 1000, as disks are sold.
+fn size(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["bytes", "kB", "MB", "GB"] {
+        // What would be rounded up to 1000 is of the next unit.
+        if value < 999.95 {
+            return if unit == "bytes" { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") };
+        }
+        value /= 1000.0;
+    }
+    format!("{value:.1} TB")
+}
+
+/// The account of an export while it runs: stages are timed and units counted in it, by any thread, and whoever watches is
+/// told.
+pub(crate) struct Account<'c> {
+    pub(crate) ctx: &'c Context,
+    warnings_before: u64,
+    started: Instant,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    stage_seconds: BTreeMap<Stage, f64>,
+    tally: UnitTally,
+}
+
+impl<'c> Account<'c> {
+    /// Opens it: the export begins.
+    pub(crate) fn new(ctx: &'c Context) -> Self {
+        Self { ctx, warnings_before: ctx.warnings(), started: Instant::now(), state: Mutex::default() }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins a stage, of one area or of all together.
+    pub(crate) fn stage(&self, stage: Stage, area: Option<u32>) -> StageTimer<'_> {
+        self.ctx.tell(&Event::StageStarted { stage, area });
+        StageTimer { account: self, stage, area, started: Instant::now() }
+    }
+
+    /// A unit of work is on the disk.
+    pub(crate) fn unit_finished(
+        &self,
+        unit: UnitKind,
+        area: u32,
+        location: Option<&str>,
+        tally: &UnitTally,
+        started: Instant,
+    ) {
+        self.state().tally += *tally;
+        let seconds = thousandths(started.elapsed().as_secs_f64());
+        self.ctx.tell(&Event::UnitFinished { unit, area, location, tally, seconds });
+    }
+
+    /// Units that an earlier run finished were checked and are taken as they are.
+    pub(crate) fn units_taken(&self, units: u64, tally: &UnitTally, started: Instant) {
+        self.state().tally += *tally;
+        let seconds = thousandths(started.elapsed().as_secs_f64());
+        self.ctx.tell(&Event::UnitsTaken { units, tally, seconds });
+    }
+
+    /// Takes the count of all files of the complete data set, those that belong to no unit too.
+    pub(crate) fn set_files(&self, files: u64, bytes: u64) {
+        let mut state = self.state();
+        state.tally = UnitTally { files, bytes, ..state.tally };
+    }
+
+    /// Closes it: the export is complete, and its summary is told.
+    pub(crate) fn summarize(
+        self,
+        output: &str,
+        areas: usize,
+        locations: usize,
+        candidate_views: ViewTally,
+    ) -> Summary {
+        let State { stage_seconds, tally } = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let summary = Summary {
+            output: output.to_owned(),
+            areas: areas as u64,
+            locations: locations as u64,
+            tally,
+            candidate_views,
+            warnings: self.ctx.warnings() - self.warnings_before,
+            stage_seconds: stage_seconds.into_iter().map(|(stage, s)| (stage, thousandths(s))).collect(),
+            seconds: thousandths(self.started.elapsed().as_secs_f64()),
+        };
+        self.ctx.tell(&Event::Summary(&summary));
+        summary
+    }
+}
+
+/// A stage under way. One that is dropped without [`StageTimer::end`] failed, and is not told of.
+#[must_use = "a stage is counted when it ends"]
+pub(crate) struct StageTimer<'a> {
+    account: &'a Account<'a>,
+    stage: Stage,
+    area: Option<u32>,
+    started: Instant,
+}
+
+impl StageTimer<'_> {
+    /// The stage is done.
+    pub(crate) fn end(self) {
+        let Self { account, stage, area, started } = self;
+        let seconds = started.elapsed().as_secs_f64();
+        *account.state().stage_seconds.entry(stage).or_default() += seconds;
+        account.ctx.tell(&Event::StageFinished { stage, area, seconds: thousandths(seconds) });
+    }
+}
+
+/// A number of seconds, rounded to what is worth telling.
+fn thousandths(seconds: f64) -> f64 {
+    (1000.0 * seconds).round() / 1000.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_shares_as_a_person_reads_them() {
+        let sizes = [0, 999, 1000, 999_949, 999_950, 1_500_000_000, 2_000_000_000_000].map(size);
+        assert_eq!(sizes, ["0 bytes", "999 bytes", "1.0 kB", "999.9 kB", "1.0 MB", "1.5 GB", "2.0 TB"]);
+        let shares = [0.0, 1e-9, 0.1234, 0.999_999_9, 1.0].map(percent);
+        assert_eq!(shares, ["0 %", "less than 0.01 %", "12.34 %", "more than 99.99 %", "100 %"]);
+    }
+
+    #[test]
+    fn tallies_add_up_and_come_back_from_json() {
+        let views = ImageTally { images: 3, pixels: 300, pixels_missing: 30 };
+        let a = UnitTally { files: 9, bytes: 1000, views, ..UnitTally::default() };
+        let b = UnitTally { files: 1, panoramas: views, ..UnitTally::default() };
+        let sum: UnitTally = [a, b, a].into_iter().sum();
+        assert_eq!((sum.files, sum.bytes, sum.views.images, sum.panoramas.pixels), (19, 2000, 6, 300));
+        assert_eq!(sum.views.share_missing(), Some(0.1));
+        let text = serde_json::to_string(&sum).unwrap();
+        assert_eq!(serde_json::from_str::<UnitTally>(&text).unwrap(), sum);
+    }
+
+    #[test]
+    fn a_summary_says_what_there_is_to_say() {
+        let mut summary = Summary {
+            output: "out".to_owned(),
+            areas: 1,
+            locations: 2,
+            tally: UnitTally { files: 4, bytes: 2500, ..UnitTally::default() },
+            candidate_views: ViewTally::default(),
+            warnings: 0,
+            stage_seconds: BTreeMap::new(),
+            seconds: 1.25,
+        };
+        let lines = summary.lines();
+        assert_eq!(lines, ["out: 0 panoramas and 0 views of 2 locations in 1.2 s", "4 files, 2.5 kB"]);
+        summary.tally.views = ImageTally { images: 7, pixels: 1000, pixels_missing: 1 };
+        summary.candidate_views =
+            ViewTally { candidates: 20, kept: 15, dropped_lowest: 3, dropped_not_drawn: 2, not_asked: 8 };
+        summary.stage_seconds = [(Stage::Render, 0.5), (Stage::Load, 0.25)].into();
+        let text = summary.lines().join("\n");
+        for part in [
+            "load 0.2 s, render 0.5 s",
+            "0.10 % of the pixels of views",
+            "5 of 20 candidate views dropped: 3 for the lowest entropies of their pool, 2 not drawn",
+            "8 kept views are of locations",
+        ] {
+            assert!(text.contains(part), "{part:?} in {text}");
+        }
+    }
+}

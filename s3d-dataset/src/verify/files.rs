@@ -1,0 +1,171 @@
+//! The files of a data set against the list of them: which there are, their sizes and checksums.
+
+use super::report::{Report, Topic};
+use super::told::Told;
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::work::for_each_in_order;
+use s3d_io::{
+    Domain, Error as FileError, FileRecord, Frame, ImageName, Layout, checksum_of_file, read_file_list,
+};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+const LIST: (Topic, &str) = (Topic::Files, "the list of files");
+const BYTES: (Topic, &str) = (Topic::Files, "sizes and checksums");
+const EXTRA: (Topic, &str) = (Topic::Files, "files that no list names");
+
+/// The list of files, if the data set has one.
+pub(crate) struct Files {
+    /// By path, and whether it was looked at.
+    listed: Option<BTreeMap<String, (FileRecord, AtomicBool)>>,
+}
+
+impl Files {
+    /// Reads the list, and holds it against the manifest.
+    pub(crate) fn read(layout: &Layout, told: &Told, report: &Report) -> Self {
+        let path = layout.file_list();
+        if told.files.is_none() && !path.exists() {
+            report.note("no files.csv: sizes and checksums of files were not compared");
+            return Self { listed: None };
+        }
+        let records = report.read(Topic::Files, read_file_list(&path));
+        if let (Some(told), Some((bytes, sum))) =
+            (&told.files, report.read(Topic::Files, checksum_of_file(&path)))
+        {
+            let checks = report.of(LIST, &path);
+            checks.check(sum == told.xxh3_128, || {
+                format!("{bytes} bytes with the checksum {sum}, and the manifest tells of {}", told.xxh3_128)
+            });
+            if let Some(records) = &records {
+                let (count, bytes) = (records.len() as u64, records.iter().map(|r| r.bytes).sum::<u64>());
+                checks.check((count, bytes) == (told.count, told.bytes), || {
+                    format!(
+                        "{count} files of {bytes} bytes, and the manifest tells of {} of {}",
+                        told.count, told.bytes
+                    )
+                });
+            }
+        }
+        let listed = |r: FileRecord| (r.path.clone(), (r, AtomicBool::new(false)));
+        Self { listed: records.map(|records| records.into_iter().map(listed).collect()) }
+    }
+
+    /// Checks the size and checksum of a file that is there.
+    pub(crate) fn check(&self, path: &Path, report: &Report) {
+        report.looked_at(1);
+        let entry = self.listed.as_ref().and_then(|l| l.get(&report.relative(path)));
+        if let Some((record, looked_at)) = entry {
+            looked_at.store(true, Ordering::Relaxed);
+            check_record(record, path, report);
+        }
+    }
+
+    /// Checks all that was not looked at yet, and tells of files that are not listed.
+    pub(crate) fn check_rest(
+        &self,
+        ctx: &Context,
+        layout: &Layout,
+        told: &Told,
+        report: &Report,
+    ) -> Result<()> {
+        let there = all_files(layout, &told.area_numbers, report);
+        let Some(listed) = &self.listed else {
+            for path in &there {
+                let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+                let is_image = is_in_images(layout, &told.area_numbers, path);
+                report.check(!is_image || ImageName::parse(name).is_some(), EXTRA, path, || {
+                    "is no file of a data set".to_owned()
+                });
+            }
+            return Ok(());
+        };
+        for path in &there {
+            report.check(listed.contains_key(&report.relative(path)), EXTRA, path, || {
+                "files.csv does not name it".to_owned()
+            });
+        }
+        let mut left: Vec<&FileRecord> =
+            listed.values().filter(|(_, seen)| !seen.load(Ordering::Relaxed)).map(|(r, _)| r).collect();
+        // The largest first, so that no thread is left with one at the end.
+        left.sort_by_key(|r| std::cmp::Reverse(r.bytes));
+        let progress = ctx.progress("reading", "files", left.len() as u64);
+        for_each_in_order(
+            ctx,
+            &left,
+            || (),
+            |(), record| {
+                let path = record.path_in(layout.root());
+                report.looked_at(1);
+                check_record(record, &path, report);
+                progress.add(1);
+                Ok(())
+            },
+        )
+    }
+}
+
+fn check_record(record: &FileRecord, path: &Path, report: &Report) {
+    let size = fs::metadata(path).map(|m| m.len()).map_err(|e| FileError::io(path, "read", e));
+    let Some(size) = report.read(Topic::Files, size) else { return };
+    let same = report.check(size == record.bytes, BYTES, path, || {
+        format!("{size} bytes, and files.csv tells of {}", record.bytes)
+    });
+    if same && let Some((_, sum)) = report.read(Topic::Files, checksum_of_file(path)) {
+        report.check(sum == record.xxh3_128, BYTES, path, || {
+            format!(
+                "other content than was written: checksum {sum}, and files.csv tells of {}",
+                record.xxh3_128
+            )
+        });
+    }
+}
+
+/// All files of the data set but its manifest and list, sorted.
+fn all_files(layout: &Layout, areas: &[u32], report: &Report) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in layout.entries(areas).into_iter().chain(layout.shared_dirs()) {
+        if entry.is_dir() {
+            files.extend(walk(&entry, report));
+        } else if entry.exists() {
+            files.push(entry);
+        }
+    }
+    files.sort();
+    files.dedup();
+    files.retain(|f| *f != layout.manifest() && *f != layout.file_list());
+    files
+}
+
+/// Whether a file lies where images do.
+fn is_in_images(layout: &Layout, areas: &[u32], path: &Path) -> bool {
+    areas.iter().any(|a| {
+        [Frame::Panorama, Frame::View(0)].into_iter().any(|frame| {
+            Domain::ALL.into_iter().any(|d| path.parent() == Some(&*layout.image_dir(*a, frame, d)))
+        })
+    })
+}
+
+/// All files below a folder, sorted; none if it is not there.
+pub(crate) fn walk(folder: &Path, report: &Report) -> Vec<PathBuf> {
+    let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        let entries = match fs::read_dir(&folder) {
+            Ok(entries) => entries,
+            Err(e) if e.kind() == ErrorKind::NotFound => continue,
+            Err(e) => {
+                report.unreadable(Topic::Files, &FileError::io(&folder, "read", e));
+                continue;
+            }
+        };
+        for entry in entries.flatten() {
+            let path = entry.path();
+            if entry.file_type().is_ok_and(|t| t.is_dir()) { folders.push(path) } else { files.push(path) }
+        }
+    }
+    files.sort();
+    files
+}

@@ -1,0 +1,275 @@
+//! Reading a data set back: is it what its manifest says, does it contradict itself, and do its images show its mesh?
+//!
+//! Nothing here stops at a fault. What is found goes to a [`Report`]; only what keeps everything else from being checked,
+//! such as a manifest that cannot be read, ends it early.
+//!
+//! Images are rendered again from the exported mesh. Its files hold every coordinate to the bit and every face in order,
+//! and pose files the rotation: so every pixel of every image must be equal to the bit, colours included. That costs less
+//! than reading the files, so nothing is left to a sample. With `full` candidate views are scored again too, and the points
+//! are read in all their forms.
+
+mod files;
+mod images;
+mod instances;
+mod labels;
+mod mesh;
+mod pixels;
+mod points;
+mod pose;
+mod rays;
+mod report;
+mod scores;
+mod shade;
+mod suspects;
+mod tables;
+mod told;
+mod views;
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::work::for_each_in_order;
+use files::Files;
+use images::{ImageCheck, Memory, Odd, Stage};
+use labels::Labels;
+use mesh::{LabelledMesh, NOT_IN_TABLE};
+pub use report::{FaultGroup, VerifyReport};
+use report::{Report, Topic};
+use s3d_geom::Camera;
+use s3d_io::{DatasetImage, Domain, Layout, dataset_images, pretty_color};
+use s3d_render::{MipMaps, Scene};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+use told::Told;
+use views::Views;
+
+/// So many files of a domain that differ from the mesh get a second look at what they look like.
+const MOST_LOOKS: usize = 25;
+
+/// How a data set is checked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VerifyOptions {
+    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point cloud. Every
+    /// pixel of every image is compared in either case.
+    pub full: bool,
+}
+
+/// What all areas share.
+struct Common<'a> {
+    ctx: &'a Context,
+    layout: &'a Layout,
+    told: &'a Told,
+    labels: Option<&'a Labels>,
+    views: &'a Views,
+    files: &'a Files,
+    full: bool,
+    report: &'a Report,
+}
+
+/// Checks the data set of this layout.
+///
+/// # Errors
+/// [`Error::Usage`] if no data set is there; [`Error::Cancelled`]. Faults are no error.
+pub fn verify(root: impl Into<PathBuf>, options: &VerifyOptions, ctx: &Context) -> Result<VerifyReport> {
+    let layout = &Layout::new(root.into());
+    if !layout.manifest().is_file() {
+        return Err(Error::Usage(format!(
+            "{}: no data set is there (no manifest.json): give the folder of one",
+            layout.root().display()
+        )));
+    }
+    check_all(ctx, layout, options.full).map(Report::finish)
+}
+
+fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
+    let report = Report::new(layout);
+    let Some(told) = Told::read(layout, &report) else { return Ok(report) };
+    let labels = Labels::read(layout, &told, &report);
+    tables::conventions(layout, &told, &report);
+    let views = Views::read(layout, &told, &report);
+    let files = Files::read(layout, &told, &report);
+    let common = Common {
+        ctx,
+        layout,
+        told: &told,
+        labels: labels.as_ref(),
+        views: &views,
+        files: &files,
+        full,
+        report: &report,
+    };
+    let mut all = Vec::new();
+    for &area in &told.area_numbers {
+        let images = report.read(Topic::Images, dataset_images(layout, area)).unwrap_or_default();
+        check_area(&common, area, &images)?;
+        all.extend(images);
+    }
+    views.check_images(layout, &told, &all, &report);
+    tables::splits(layout, &told, &all, &report);
+    tables::statistics(layout, &told, &report);
+    files.check_rest(ctx, layout, &told, &report)?;
+    Ok(report)
+}
+
+fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result<()> {
+    let Common { layout, told, labels, report, .. } = *common;
+    tables::rooms(layout, area, told, report);
+    let mesh = labels.and_then(|labels| {
+        instances::check(layout, area, told, labels, report);
+        mesh::read_and_check(layout, area, told, labels, report)
+    });
+    let (Some(labels), Some(mesh)) = (labels, &mesh) else {
+        report.note(format!("area {area}: images were not held against the mesh, which cannot be used"));
+        return check_images(common, area, images, None);
+    };
+    let scene = Scene::new(&mesh.file.mesh);
+    let textures = MipMaps::new(&mesh.file.mesh);
+    let pretty = |label: &u32| if *label == NOT_IN_TABLE { [0; 3] } else { pretty_color(*label) };
+    let pretty_per_face: Vec<[u8; 3]> = mesh.labels.iter().map(pretty).collect();
+    let source = told.area(area).map_or("texture", |a| a.rgb.as_str());
+    let domains = told.domains();
+    if source != "texture" && domains.contains(&Domain::Rgb) {
+        report.note(format!(
+            "area {area}: the colours of its images come from pictures ({source}), which are not in the data set; they were \
+             not compared"
+        ));
+    }
+    if !domains.is_empty() && !domains.contains(&Domain::Pose) {
+        report.note(format!("area {area}: images were not held against the mesh: they have no poses"));
+    }
+    let stage = Stage {
+        layout,
+        told,
+        labels,
+        mesh,
+        scene: &scene,
+        textures: &textures,
+        pretty_per_face: &pretty_per_face,
+        rgb_from_mesh: source == "texture",
+        report,
+    };
+    check_images(common, area, images, Some((&stage, mesh, labels)))
+}
+
+/// One piece of an area's work.
+#[derive(Clone, Copy)]
+enum Work {
+    Points,
+    Image(usize),
+}
+
+fn check_images(
+    common: &Common<'_>,
+    area: u32,
+    images: &[DatasetImage],
+    stage: Option<(&Stage<'_>, &LabelledMesh, &Labels)>,
+) -> Result<()> {
+    let ctx = common.ctx;
+    let Common { layout, told, labels, views, files, full, report, .. } = *common;
+    let (odd, cameras) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
+    let domains = told.domains();
+    let check = ImageCheck {
+        layout,
+        told,
+        labels,
+        views,
+        files,
+        stage: stage.map(|(stage, ..)| stage),
+        report,
+        domains: &domains,
+        odd: &odd,
+        cameras: &cameras,
+    };
+    let progress = ctx.progress("verifying", "images", images.len() as u64);
+    let works: Vec<Work> = std::iter::once(Work::Points).chain((0..images.len()).map(Work::Image)).collect();
+    for_each_in_order(
+        ctx,
+        &works,
+        || Memory::new(check.stage),
+        |memory, work| {
+            match *work {
+                Work::Points => {
+                    if let Some((_, mesh, labels)) = stage {
+                        points::check(layout, area, told, mesh, labels, full, report);
+                    }
+                }
+                Work::Image(index) => {
+                    check.check(index, &images[index], memory);
+                    progress.add(1);
+                }
+            }
+            Ok(())
+        },
+    )?;
+    drop(progress);
+    let unlocked = |e: PoisonError<_>| e.into_inner();
+    let mut cameras = cameras.into_inner().unwrap_or_else(unlocked);
+    cameras.sort_by_key(|(index, _)| *index);
+    let Some((stage, ..)) = stage else { return Ok(()) };
+    if full {
+        scores::check(ctx, stage, area, images, &cameras, views)?;
+    }
+    look_again(ctx, stage, images, &cameras, odd.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// Tells of the files that differ from the mesh, and what they look like.
+fn look_again(
+    ctx: &Context,
+    stage: &Stage<'_>,
+    images: &[DatasetImage],
+    cameras: &[(usize, Camera)],
+    mut odd: Vec<Odd>,
+) -> Result<()> {
+    let report = stage.report;
+    odd.sort_by_key(|o| (o.domain, o.image));
+    let mut looks: BTreeMap<Domain, usize> = BTreeMap::new();
+    let chosen: Vec<bool> = odd
+        .iter()
+        .map(|o| {
+            let n = looks.entry(o.domain).or_default();
+            *n += 1;
+            *n <= MOST_LOOKS
+        })
+        .collect();
+    let works: Vec<usize> = (0..odd.len()).collect();
+    let guesses: Mutex<BTreeMap<usize, Vec<Option<String>>>> = Mutex::default();
+    let progress = ctx.progress("looking again", "files", odd.len() as u64);
+    for_each_in_order(
+        ctx,
+        &works,
+        || (),
+        |(), &i| {
+            let (o, image) = (&odd[i], &images[odd[i].image]);
+            let guess = if chosen[i] { suspects::look(stage, images, cameras, o) } else { None };
+            let mut sentence = o.difference.sentence("what the mesh shows there");
+            if let Some(guess) = &guess {
+                sentence += &format!("; {guess}");
+            }
+            let kind = o.domain.folder();
+            report.fault(Topic::Rays, kind, &image.path(stage.layout, o.domain), sentence);
+            let mut all = guesses.lock().unwrap_or_else(PoisonError::into_inner);
+            all.entry(o.image).or_default().push(guess);
+            progress.add(1);
+            Ok(())
+        },
+    )?;
+    // Where all files of an image say the same of its camera, it is the pose that is wrong.
+    for (image, guesses) in guesses.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        let image = &images[image];
+        let files = image
+            .domains
+            .iter()
+            .filter(|d| **d != Domain::Pose && (stage.rgb_from_mesh || **d != Domain::Rgb));
+        if let Some(Some(first)) = guesses.first()
+            && guesses.len() == files.count()
+            && guesses.iter().all(|g| g.as_ref() == Some(first))
+        {
+            let path = image.path(stage.layout, Domain::Pose);
+            let message = format!(
+                "all images of it differ from the mesh in the same way: {first}; is it the pose that is wrong?"
+            );
+            report.fault(Topic::Poses, "poses that do not fit their images", &path, message);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,94 @@
+//! What the mesh shows: the pixels that a file should have.
+
+use super::images::{Memory, Stage};
+use super::pixels::{Difference, Pixels};
+use super::pose::CheckedPose;
+use crate::xyz;
+use half::f16;
+use s3d_geom::{Camera, Raster};
+use s3d_io::{DepthUnits, Domain, XyzType};
+use s3d_render::{
+    MISSING_INDEX, TextureFilter, color_per_face_image_into, depth_image_into, depth_image_mm_into,
+    index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into, xyz_image_into,
+};
+
+/// How a file differs from what the mesh shows: exactly, for the meshes of an export are those that it was rendered from, to
+/// the bit.
+pub(super) fn difference(
+    stage: &Stage<'_>,
+    domain: Domain,
+    pixels: &Pixels,
+    pose: &CheckedPose,
+    depth_file: &Option<Raster<u16>>,
+    memory: &mut Memory<'_>,
+) -> Option<Difference> {
+    let Memory { hits, images, xyz, .. } = memory;
+    let (camera, conventions) = (&pose.camera, stage.conventions());
+    let colors = |found: &Raster<[u8; 3]>, expected: &Raster<[u8; 3]>| {
+        Difference::of(found, expected, |a, b| a == b, |c| format!("{c:?}"), |c| format!("{c:?}"))
+    };
+    match pixels {
+        Pixels::Color(found) => match domain {
+            Domain::Rgb => {
+                let filter = TextureFilter::default();
+                rgb_image_into(stage.scene, stage.textures, hits, camera, &filter, &mut images.rgb);
+                colors(found, &images.rgb)
+            }
+            Domain::Normal => {
+                let (normals, axes) = (stage.told.normals(), conventions.normal_axes);
+                let out = &mut images.faces.normal;
+                normal_image_into(stage.scene, hits, camera, normals, axes, out);
+                colors(found, out)
+            }
+            Domain::Semantic => {
+                index_image_into(hits, &stage.mesh.labels, &mut images.faces.index);
+                let index = |c: [u8; 3]| u32::from_be_bytes([0, c[0], c[1], c[2]]);
+                let text = |c: [u8; 3]| match c {
+                    MISSING_INDEX => "nothing".to_owned(),
+                    c => format!("{} ({})", index(c), stage.labels.name_of(index(c))),
+                };
+                Difference::of(found, &images.faces.index, |a, b| a == b, text, text)
+            }
+            _ => {
+                color_per_face_image_into(hits, stage.pretty_per_face, &mut images.faces.color);
+                colors(found, &images.faces.color)
+            }
+        },
+        Pixels::Depth(found) => {
+            match conventions.depth_units {
+                DepthUnits::Per512 => depth_image_into(hits, &mut images.depth),
+                DepthUnits::Millimetres => depth_image_mm_into(hits, &mut images.depth),
+            }
+            Difference::of(found, &images.depth, |a, b| a == b, |d| d.to_string(), |d| d.to_string())
+        }
+        Pixels::Xyz(found) => {
+            let text = |p: [f32; 3]| format!("{p:?}");
+            let same = |a: [f32; 3], b: [f32; 3]| a == b;
+            let rounded = |p: [f16; 3]| p.map(f16::to_f32);
+            let is_half = conventions.xyz != XyzType::Float;
+            if stage.told.xyz_from_depth.is_some() {
+                // Made by `s3d xyz`: from the pose as its angles give it.
+                let camera = Camera { pose: pose.file.pose(), ..*camera };
+                let points = xyz::points(&camera, depth_file.as_ref()?, conventions.depth_units);
+                if is_half {
+                    let points = points.map(|p| p.map(f16::from_f32));
+                    return Difference::of(
+                        found,
+                        &points,
+                        |a, b| a == rounded(b),
+                        text,
+                        |p| text(rounded(p)),
+                    );
+                }
+                return Difference::of(found, &points, same, text, text);
+            }
+            if is_half {
+                xyz_image_half_into(hits, camera, &mut images.xyz);
+                let same = |a: [f32; 3], b: [f16; 3]| a == rounded(b);
+                return Difference::of(found, &images.xyz, same, text, |p| text(rounded(p)));
+            }
+            xyz_image_into(hits, camera, xyz);
+            Difference::of(found, xyz, same, text, text)
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! What was checked and what is wrong: faults by topic and kind, few lines of each.
+
+use crate::error::passes;
+use s3d_io::{Error as FileError, Layout, Place};
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Lines of one kind of fault; the rest is counted.
+const MOST_LINES: usize = 20;
+
+/// What a fault is about; the report is grouped by it, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Topic {
+    Files,
+    Manifest,
+    Tables,
+    Labels,
+    Mesh,
+    Instances,
+    Points,
+    Views,
+    Poses,
+    Images,
+    Rays,
+}
+
+impl Topic {
+    fn title(self) -> &'static str {
+        match self {
+            Self::Files => "files",
+            Self::Manifest => "manifest",
+            Self::Tables => "tables",
+            Self::Labels => "labels",
+            Self::Mesh => "meshes",
+            Self::Instances => "instances",
+            Self::Points => "points",
+            Self::Views => "views",
+            Self::Poses => "poses",
+            Self::Images => "images",
+            Self::Rays => "images against the mesh",
+        }
+    }
+}
+
+/// Faults of one kind: the first by path and message, and how many there are.
+#[derive(Debug, Default)]
+struct Kind {
+    first: BTreeSet<(String, String)>,
+    count: u64,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    faults: BTreeMap<(Topic, &'static str), Kind>,
+    notes: BTreeSet<String>,
+    /// What kept a file from being read, and may not the next time.
+    again: Option<String>,
+}
+
+/// Collects faults from any number of threads. What it says depends on what is found and not on when.
+#[derive(Debug)]
+pub(crate) struct Report {
+    root: PathBuf,
+    state: Mutex<State>,
+    checks: AtomicU64,
+    files: AtomicU64,
+}
+
+impl Report {
+    /// Nothing found yet in the data set of this layout.
+    pub(crate) fn new(layout: &Layout) -> Self {
+        Self {
+            root: layout.root().to_owned(),
+            state: Mutex::default(),
+            checks: AtomicU64::new(0),
+            files: AtomicU64::new(0),
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A file's path below the data set's folder, with `/`.
+    pub(crate) fn relative(&self, path: &Path) -> String {
+        let inside = path.strip_prefix(&self.root).unwrap_or(path);
+        let parts: Vec<_> = inside.components().map(|c| c.as_os_str().to_string_lossy()).collect();
+        parts.join("/")
+    }
+
+    /// Something is wrong with the file `path`. Faults of one `kind` share a limit of lines.
+    pub(crate) fn fault(&self, topic: Topic, kind: &'static str, path: &Path, message: impl Into<String>) {
+        let line = (self.relative(path), message.into());
+        let mut state = self.state();
+        let kind = state.faults.entry((topic, kind)).or_default();
+        kind.count += 1;
+        kind.first.insert(line);
+        if kind.first.len() > MOST_LINES {
+            kind.first.pop_last();
+        }
+    }
+
+    /// One check, and the fault that it is if it does not hold.
+    pub(crate) fn check(
+        &self,
+        holds: bool,
+        (topic, kind): (Topic, &'static str),
+        path: &Path,
+        message: impl FnOnce() -> String,
+    ) -> bool {
+        self.checked(1);
+        if !holds {
+            self.fault(topic, kind, path, message());
+        }
+        holds
+    }
+
+    /// Checks of one file.
+    pub(crate) fn of<'a>(&'a self, fault: (Topic, &'static str), path: &'a Path) -> OfFile<'a> {
+        OfFile { report: self, fault, path, all_hold: Cell::new(true) }
+    }
+
+    /// What could be read; what could not is a fault of its file.
+    pub(crate) fn read<T>(&self, topic: Topic, result: Result<T, FileError>) -> Option<T> {
+        self.checked(1);
+        result.map_err(|e| self.unreadable(topic, &e)).ok()
+    }
+
+    /// A file that cannot be read: a fault of it, or of the system if it may do better the next time.
+    pub(crate) fn unreadable(&self, topic: Topic, error: &FileError) {
+        if passes(error) {
+            self.state().again.get_or_insert_with(|| error.to_string());
+            return;
+        }
+        let message = match error {
+            FileError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
+                "missing".to_owned()
+            }
+            FileError::Io { source, action, .. } => format!("cannot {action}: {source}"),
+            FileError::Format { message, place: Place::Line(line), .. } => format!("line {line}: {message}"),
+            FileError::Format { message, .. } | FileError::Unsupported { message, .. } => message.clone(),
+            FileError::Mesh { source, .. } => source.to_string(),
+            other => other.to_string(),
+        };
+        self.fault(topic, "cannot be read", error.path(), message);
+    }
+
+    /// Something that was left out, and why.
+    pub(crate) fn note(&self, note: impl Into<String>) {
+        self.state().notes.insert(note.into());
+    }
+
+    /// So many checks were made.
+    pub(crate) fn checked(&self, checks: u64) {
+        self.checks.fetch_add(checks, Ordering::Relaxed);
+    }
+
+    /// So many files were looked at.
+    pub(crate) fn looked_at(&self, files: u64) {
+        self.files.fetch_add(files, Ordering::Relaxed);
+    }
+
+    /// What was found.
+    pub(crate) fn finish(self) -> VerifyReport {
+        let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let groups = state.faults.into_iter().map(|((topic, kind), faults)| FaultGroup {
+            topic: topic.title(),
+            kind,
+            first: faults.first.into_iter().collect(),
+            count: faults.count,
+        });
+        VerifyReport {
+            faults: groups.collect(),
+            notes: state.notes.into_iter().collect(),
+            files: self.files.into_inner(),
+            checks: self.checks.into_inner(),
+            unread: state.again,
+        }
+    }
+}
+
+/// Faults of one kind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct FaultGroup {
+    /// What they are about, such as "images against the mesh".
+    pub topic: &'static str,
+    /// What they have in common, such as a modality.
+    pub kind: &'static str,
+    /// The first twenty by path: the file, from the folder of the data set, and what is wrong with it.
+    pub first: Vec<(String, String)>,
+    /// How many there are.
+    pub count: u64,
+}
+
+/// What [`verify`](crate::verify()) found in a data set.
+///
+/// Displayed, it is the text that `s3d verify` prints.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct VerifyReport {
+    /// Those of one topic follow each other.
+    pub faults: Vec<FaultGroup>,
+    /// What was left out, and why, a sentence each.
+    pub notes: Vec<String>,
+    /// Files that were looked at.
+    pub files: u64,
+    /// Checks that were made.
+    pub checks: u64,
+    /// What kept a file from being read that may be read the next time: the report is not complete.
+    pub unread: Option<String>,
+}
+
+impl VerifyReport {
+    /// How many faults there are.
+    pub fn fault_count(&self) -> u64 {
+        self.faults.iter().map(|group| group.count).sum()
+    }
+}
+
+impl fmt::Display for VerifyReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut topic = None;
+        for group in &self.faults {
+            if topic != Some(group.topic) {
+                topic = Some(group.topic);
+                writeln!(f, "{}", group.topic)?;
+            }
+            for (path, message) in &group.first {
+                writeln!(f, "  {path}: {message}")?;
+            }
+            let more = group.count.saturating_sub(group.first.len() as u64);
+            if more > 0 {
+                writeln!(f, "  … and {more} more like this ({})", group.kind)?;
+            }
+        }
+        for note in &self.notes {
+            writeln!(f, "note: {note}")?;
+        }
+        let count = |n: u64, noun: &str| format!("{n} {noun}{}", if n == 1 { "" } else { "s" });
+        let (files, checks) = (count(self.files, "file"), count(self.checks, "check"));
+        writeln!(f, "{files}, {checks}, {}", count(self.fault_count(), "fault"))
+    }
+}
+
+/// The checks of one file.
+pub(crate) struct OfFile<'a> {
+    report: &'a Report,
+    fault: (Topic, &'static str),
+    path: &'a Path,
+    all_hold: Cell<bool>,
+}
+
+impl OfFile<'_> {
+    /// One check, and the fault that it is if it does not hold.
+    pub(crate) fn check(&self, holds: bool, message: impl FnOnce() -> String) -> bool {
+        if !self.report.check(holds, self.fault, self.path, message) {
+            self.all_hold.set(false);
+        }
+        holds
+    }
+
+    /// Whether all checks held so far.
+    pub(crate) fn all_hold(&self) -> bool {
+        self.all_hold.get()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_grouped_sorted_and_limited() {
+        let report = Report::new(&Layout::new("out"));
+        for i in (0..50).rev() {
+            report.fault(Topic::Files, "bytes", &Path::new("out/a").join(format!("{i:02}")), "other bytes");
+        }
+        report.check(false, (Topic::Manifest, "counts"), Path::new("out/manifest.json"), || "wrong".into());
+        report.check(true, (Topic::Manifest, "counts"), Path::new("out/manifest.json"), || "never".into());
+        report.note("RGB was not checked");
+        report.looked_at(2);
+        let report = report.finish();
+        assert_eq!((report.fault_count(), report.checks), (51, 2));
+        let text = report.to_string();
+        assert!(text.starts_with("files\n  a/00: other bytes\n  a/01: "), "{text}");
+        assert!(text.contains(
+            "a/19: other bytes\n  … and 30 more like this (bytes)\nmanifest\n  manifest.json: wrong\n"
+        ));
+        assert!(text.ends_with("note: RGB was not checked\n2 files, 2 checks, 51 faults\n"), "{text}");
+    }
+}

@@ -1,0 +1,57 @@
+//! Entropies of candidate views, scored again.
+
+use super::images::Stage;
+use super::report::Topic;
+use super::views::Views;
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::views::{Scoring, score_area};
+use s3d_geom::{Camera, Projection};
+use s3d_io::{DatasetImage, ScanLocation};
+use s3d_label::{LabelId, LabelTable};
+
+const ENTROPIES: (Topic, &str) = (Topic::Views, "entropies");
+
+/// Scores the candidates of each location whose panorama tells exactly where it is, and holds them against `views.json`.
+pub(crate) fn check(
+    ctx: &Context,
+    stage: &Stage<'_>,
+    area: u32,
+    images: &[DatasetImage],
+    cameras: &[(usize, Camera)],
+    views: &Views,
+) -> Result<()> {
+    let Ok(table) = LabelTable::from_names(&stage.labels.names) else { return Ok(()) };
+    if stage.mesh.labels.iter().any(|l| *l as usize >= table.len()) {
+        return Ok(());
+    }
+    let located: Vec<ScanLocation> = cameras
+        .iter()
+        .filter(|(_, camera)| camera.projection == Projection::Equirectangular)
+        .map(|(i, camera)| ScanLocation { uuid: images[*i].uuid.clone(), pose: camera.pose, line: 0 })
+        .collect();
+    // Every location of a data set has the same number of candidates.
+    let Some(candidates) = views.candidates_of_a_location(area) else { return Ok(()) };
+    let options = &stage.told.options;
+    let scoring = Scoring {
+        views: candidates,
+        size: options.size,
+        stride: options.entropy_stride,
+        seed: stage.told.seed,
+    };
+    let labels: Vec<LabelId> = stage.mesh.labels.iter().map(|l| LabelId(*l)).collect();
+    let path = stage.layout.views_json(area);
+    let locations: Vec<&ScanLocation> = located.iter().collect();
+    score_area(ctx, area, &locations, stage.scene, &labels, &table, scoring, |uuid, scores| {
+        let checks = stage.report.of(ENTROPIES, &path);
+        for (record, score) in views.of_location(area, uuid).zip(scores) {
+            checks.check(record.entropy == score, || {
+                format!(
+                    "candidate {} of {uuid} has the entropy {}, and {score} when it is scored again",
+                    record.candidate, record.entropy
+                )
+            });
+        }
+        Ok(())
+    })
+}

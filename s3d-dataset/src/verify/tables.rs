@@ -1,0 +1,220 @@
+//! The tables beside the images: rooms, folds, lists, statistics, conventions.
+
+use super::report::{Report, Topic};
+use super::told::Told;
+use crate::tables::assets;
+use crate::tables::statistics::Statistics;
+use s3d_io::{DatasetImage, Domain, Frame, Layout, read_conventions, read_json, read_splits};
+use s3d_label::Room;
+use s3d_sample::folds;
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+const CONVENTIONS: (Topic, &str) = (Topic::Tables, "conventions, assets and profiles");
+const ROOMS: (Topic, &str) = (Topic::Tables, "rooms");
+const SPLITS: (Topic, &str) = (Topic::Tables, "folds and lists");
+const STATISTICS: (Topic, &str) = (Topic::Tables, "statistics");
+
+/// Holds `conventions.json` against the options, and what is the same in every data set of this version against that; profiles
+/// that are told of are there.
+pub(crate) fn conventions(layout: &Layout, told: &Told, report: &Report) {
+    let path = layout.conventions();
+    if let Some(found) = report.read(Topic::Tables, read_conventions(&path)) {
+        report.check(found == told.conventions(), CONVENTIONS, &path, || {
+            let text = |c: s3d_io::Conventions| {
+                format!(
+                    "depth units {}, normal axes {}, coordinates {}",
+                    c.depth_units,
+                    c.normal_axes.name(),
+                    c.xyz
+                )
+            };
+            format!("{}; the manifest tells of {}", text(found), text(told.conventions()))
+        });
+    }
+    for name in told.profiles() {
+        let dir = layout.profile_dir(name);
+        report.check(dir.is_dir(), CONVENTIONS, &dir, || {
+            "missing: the manifest tells of this profile".to_owned()
+        });
+    }
+    if !told.is_of_this_version() {
+        report.note(format!(
+            "written by s3d {}: draws, selection and assets were not compared with those of this version",
+            told.version
+        ));
+        return;
+    }
+    for (path, text) in assets::texts(layout) {
+        let found = std::fs::read(&path).map_err(|e| s3d_io::Error::io(&path, "read", e));
+        if let Some(found) = report.read(Topic::Tables, found) {
+            report.check(found == text.as_bytes(), CONVENTIONS, &path, || {
+                "is not what s3d writes there".to_owned()
+            });
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct Outline {
+    outer: Vec<[f64; 2]>,
+    holes: Vec<Vec<[f64; 2]>>,
+}
+
+#[derive(Deserialize)]
+struct RoomRecord {
+    room: String,
+    floor_m2: f64,
+    wall_direction_deg: u32,
+    outline: Vec<Outline>,
+}
+
+/// Checks `rooms.json` of an area, and the angles of its S3DIS tree.
+pub(crate) fn rooms(layout: &Layout, area: u32, told: &Told, report: &Report) {
+    let path = layout.rooms_json(area);
+    let Some(rooms) = report.read(Topic::Tables, read_json::<Vec<RoomRecord>>(&path)) else { return };
+    let checks = report.of(ROOMS, &path);
+    if let Some(told) = told.area(area) {
+        checks.check(rooms.len() == told.rooms, || {
+            format!("{} rooms, and the manifest tells of {}", rooms.len(), told.rooms)
+        });
+    }
+    let mut names = BTreeSet::new();
+    for r in &rooms {
+        checks.check(r.room.parse::<Room>().is_ok(), || format!("{:?} is no room", r.room));
+        checks.check(names.insert(&r.room), || format!("{} stands there twice", r.room));
+        checks.check(r.wall_direction_deg < 90, || {
+            format!("{}: wall_direction_deg {}", r.room, r.wall_direction_deg)
+        });
+        let area_of = |ring: &[[f64; 2]]| {
+            // About the first corner, so that numbers are small.
+            let Some(&[x, y]) = ring.first() else { return 0.0 };
+            let twice = |p: [f64; 2], q: [f64; 2]| (p[0] - x) * (q[1] - y) - (q[0] - x) * (p[1] - y);
+            ring.windows(2).map(|w| 0.5 * twice(w[0], w[1])).sum::<f64>()
+        };
+        let inside =
+            r.outline.iter().map(|o| area_of(&o.outer) + o.holes.iter().map(|h| area_of(h)).sum::<f64>());
+        let inside: f64 = inside.sum();
+        checks.check((inside - r.floor_m2).abs() <= 1e-6 * (1.0 + inside), || {
+            format!("{}: floor_m2 is {}, and the outline holds {inside}", r.room, r.floor_m2)
+        });
+    }
+    let tree = layout.s3dis_area_dir(area);
+    let list = tree.join(format!("Area_{area}_alignmentAngle.txt"));
+    let text = std::fs::read_to_string(&list).map_err(|e| s3d_io::Error::io(&list, "read", e));
+    let Some(text) = report.read(Topic::Tables, text) else { return };
+    let checks = report.of(ROOMS, &list);
+    let mut listed = BTreeSet::new();
+    for line in text.lines().filter(|l| !l.starts_with('#')) {
+        let known = line.split_once(' ').and_then(|(room, angle)| {
+            let r = rooms.iter().find(|r| r.room == room)?;
+            listed.insert(room.to_owned());
+            (r.wall_direction_deg.to_string() == angle).then_some(())
+        });
+        checks.check(known.is_some(), || format!("{line:?} is not in rooms.json"));
+    }
+    let entries = std::fs::read_dir(&tree).into_iter().flatten().flatten();
+    for folder in entries.filter(|e| e.path().is_dir()) {
+        let name = folder.file_name().to_string_lossy().into_owned();
+        checks.check(listed.contains(&name), || format!("the room {name} of the tree has no angle"));
+    }
+}
+
+/// Checks `splits.json` and the lists of panoramas: what they name is there, and all that is there is named.
+pub(crate) fn splits(layout: &Layout, told: &Told, images: &[DatasetImage], report: &Report) {
+    let (areas, path) = (&told.area_numbers, layout.splits());
+    let expected = folds(areas);
+    if let Some(splits) = report.read(Topic::Tables, read_splits(&path)) {
+        let same = splits.len() == expected.len()
+            && splits
+                .iter()
+                .zip(&expected)
+                .all(|(s, f)| (s.fold, &s.train_areas, &s.test_areas) == (f.number, &f.train, &f.test));
+        report.check(same, SPLITS, &path, || format!("its folds are not those of the areas {areas:?}"));
+    }
+    let is_listed =
+        |i: &&DatasetImage| i.frame == Frame::Panorama && i.has(Domain::Rgb) && i.has(Domain::Depth);
+    if !images.iter().any(|i| is_listed(&i)) {
+        return;
+    }
+    let list = |path: &Path, areas: &[u32]| {
+        let text = std::fs::read_to_string(path).map_err(|e| s3d_io::Error::io(path, "read", e));
+        let Some(text) = report.read(Topic::Tables, text) else { return };
+        let checks = report.of(SPLITS, path);
+        let pair =
+            |i: &DatasetImage| format!("{} {}", i.relative_path(Domain::Rgb), i.relative_path(Domain::Depth));
+        let mut left: BTreeSet<String> =
+            images.iter().filter(|i| is_listed(i) && areas.contains(&i.area)).map(pair).collect();
+        for (n, line) in (1..).zip(text.lines()) {
+            checks.check(left.remove(line), || {
+                let missing = line.split(' ').find(|name| !layout.root().join(name).is_file());
+                match missing {
+                    Some(name) => format!("line {n}: {name:?} is not there"),
+                    None => {
+                        format!("line {n}: {line:?} is no panorama of these areas, or stands there twice")
+                    }
+                }
+            });
+        }
+        checks.check(left.is_empty(), || {
+            let first = left.iter().next().cloned().unwrap_or_default();
+            format!("{} panoramas are not listed, the first is {first:?}", left.len())
+        });
+    };
+    list(&layout.list_of_all(), areas);
+    for fold in &expected {
+        list(&layout.list_of_fold(fold.number, true), &fold.train);
+        list(&layout.list_of_fold(fold.number, false), &fold.test);
+    }
+}
+
+/// Holds the statistics against what is counted from the files.
+pub(crate) fn statistics(layout: &Layout, told: &Told, report: &Report) {
+    let counted = match Statistics::count(layout, &told.area_numbers) {
+        Ok(counted) => counted,
+        Err(e) => {
+            report.fault(
+                STATISTICS.0,
+                STATISTICS.1,
+                &layout.statistics_json(),
+                format!("cannot be counted: {e}"),
+            );
+            return;
+        }
+    };
+    let path = layout.statistics_json();
+    if let (Some(found), Ok(expected)) =
+        (report.read(Topic::Tables, read_json::<Value>(&path)), serde_json::to_value(&counted))
+    {
+        let mut differences = Vec::new();
+        differ(&found, &expected, "", &mut differences);
+        report.check(differences.is_empty(), STATISTICS, &path, || {
+            format!("not what is counted from the files: {}", differences.join("; "))
+        });
+    }
+    let path = layout.statistics_md();
+    let text = std::fs::read_to_string(&path).map_err(|e| s3d_io::Error::io(&path, "read", e));
+    if let Some(text) = report.read(Topic::Tables, text) {
+        let expected = counted.to_markdown();
+        report.check(text == expected, STATISTICS, &path, || {
+            let pair = text.lines().zip(expected.lines()).find(|(a, b)| a != b).unwrap_or_default();
+            format!("not what is counted from the files: {:?} for {:?}", pair.0, pair.1)
+        });
+    }
+}
+
+/// Where two documents differ.
+fn differ(found: &Value, expected: &Value, place: &str, out: &mut Vec<String>) {
+    match (found, expected) {
+        (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
+            a.iter().zip(b.values()).for_each(|((key, a), b)| differ(a, b, &format!("{place}/{key}"), out));
+        }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            a.iter().zip(b).enumerate().for_each(|(i, (a, b))| differ(a, b, &format!("{place}/{i}"), out));
+        }
+        _ if found == expected => {}
+        _ => out.push(format!("{place} is {found}, counted are {expected}")),
+    }
+}

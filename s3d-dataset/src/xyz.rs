@@ -1,0 +1,216 @@
+//! `s3d xyz`: the world coordinates of a data set's images, from depth and pose.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::work::for_each_in_order;
+use crate::store::lock::Lock;
+use crate::tables::listing;
+use crate::tables::manifest::{Head, Manifest};
+use half::f16;
+use s3d_geom::{Camera, Raster};
+use s3d_io::{
+    Compression, Conventions, DepthUnits, Domain, Error as FileError, FileRecord, Frame, ImageName, Layout,
+    XyzType, create_dir, encode_xyz_float, encode_xyz_half, read_conventions, read_gray16, read_pose,
+    write_bytes,
+};
+use std::fs;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+/// How world coordinates are made again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct XyzOptions {
+    /// [`XyzType::Half`] or [`XyzType::Float`].
+    pub xyz: XyzType,
+    /// Replace coordinates that are there, though they may be more exact.
+    pub overwrite: bool,
+    /// How much time the images' files may take.
+    pub compression: Compression,
+}
+
+impl Default for XyzOptions {
+    fn default() -> Self {
+        Self { xyz: XyzType::Half, overwrite: false, compression: Compression::default() }
+    }
+}
+
+/// Makes the world coordinates of a data set's images again, from depth and pose: off by half of a step of depth along the
+/// ray. Returns the number of images.
+///
+/// # Errors
+/// [`Error::Usage`] if coordinates are there and not to be replaced; [`Error::File`] if there is no data set, or no image
+/// with both depth and pose; [`Error::Cancelled`]; [`Error::Temporary`].
+pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Result<usize> {
+    if options.xyz == XyzType::None {
+        return Err(Error::Usage("world coordinates are made as half or float".to_owned()));
+    }
+    let layout = &Layout::new(root.into());
+    Head::require(layout)?;
+    // Nobody may replace the data set meanwhile.
+    Lock::during(ctx, layout, || make(ctx, layout, options))
+}
+
+/// The files of one image.
+struct Work {
+    pose: PathBuf,
+    depth: PathBuf,
+    xyz: PathBuf,
+    frame: Frame,
+}
+
+fn make(ctx: &Context, layout: &Layout, args: &XyzOptions) -> Result<usize> {
+    let head = Head::require(layout)?;
+    let mut manifest = Manifest::read(layout)?;
+    let conventions = read_conventions(&layout.conventions())?;
+    let mut work = Vec::new();
+    for area in &head.area_numbers {
+        for kind in [Frame::Panorama, Frame::View(0)] {
+            work.extend(images(layout, *area, kind)?);
+        }
+    }
+    if work.is_empty() {
+        return Err(FileError::format(layout.root(), "no image with both depth and pose: export them").into());
+    }
+    if let Some(there) = work.iter().find(|w| w.xyz.exists() && !args.overwrite) {
+        return Err(Error::Usage(format!(
+            "{} is there already, and what export writes is more exact: replace it with --overwrite",
+            there.xyz.display()
+        )));
+    }
+    for area in &head.area_numbers {
+        for kind in [Frame::Panorama, Frame::View(0)] {
+            create_dir(&layout.image_dir(*area, kind, Domain::GlobalXyz))?;
+        }
+    }
+    let progress = ctx.progress("coordinates", "images", work.len() as u64);
+    let changed = Mutex::new(Vec::with_capacity(work.len() + 1));
+    let made = for_each_in_order(
+        ctx,
+        &work,
+        || (),
+        |(), work| {
+            let file = make_one(work, conventions.depth_units, args.xyz, args.compression)?;
+            write_bytes(&work.xyz, &file)?;
+            let record = FileRecord::of_bytes(layout.root(), &work.xyz, &file)?;
+            changed.lock().unwrap_or_else(PoisonError::into_inner).push(record);
+            progress.add(1);
+            Ok(())
+        },
+    );
+    drop(progress);
+    let mut changed = changed.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Err(e) = made {
+        // Files that are in no list would stand in the way of the same call.
+        if !args.overwrite {
+            changed.iter().for_each(|record| drop(fs::remove_file(record.path_in(layout.root()))));
+        }
+        return Err(e);
+    }
+    Conventions { xyz: args.xyz, ..conventions }.write(&layout.conventions())?;
+    changed.push(FileRecord::of_file(layout.root(), &layout.conventions())?);
+    manifest.xyz_from_depth(args.xyz, conventions.depth_units);
+    listing::update(layout, &mut manifest, changed, |_| false)?;
+    ctx.info(format_args!(
+        "{}: world coordinates of {} images from depth and pose",
+        layout.root().display(),
+        work.len()
+    ));
+    Ok(work.len())
+}
+
+/// The images of an area that have depth and pose, by name.
+fn images(layout: &Layout, area: u32, kind: Frame) -> Result<Vec<Work>> {
+    let dir = layout.image_dir(area, kind, Domain::Depth);
+    let entries = match fs::read_dir(&dir) {
+        Ok(entries) => entries,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) => return Err(FileError::io(&dir, "read", e).into()),
+    };
+    let mut names = Vec::new();
+    for entry in entries {
+        let entry = entry.map_err(|e| FileError::io(&dir, "read", e))?;
+        names.extend(entry.file_name().to_str().and_then(ImageName::parse));
+    }
+    names.sort();
+    let works = names.into_iter().map(|name| {
+        let path = |domain| layout.image_path(area, &name.uuid, &name.room, name.frame, domain);
+        let [pose, depth, xyz] = [Domain::Pose, Domain::Depth, Domain::GlobalXyz].map(path);
+        Work { pose, depth, xyz, frame: name.frame }
+    });
+    Ok(works.filter(|w| w.pose.exists()).collect())
+}
+
+/// The file of an image's world coordinates.
+fn make_one(work: &Work, units: DepthUnits, kind: XyzType, compression: Compression) -> Result<Vec<u8>> {
+    let pose = read_pose(&work.pose)?;
+    let depth = read_gray16(&work.depth)?;
+    let camera = if work.frame == Frame::Panorama {
+        if depth.width() != 2 * depth.height() {
+            let size =
+                format!("{} × {} pixels: a panorama is twice as wide as high", depth.width(), depth.height());
+            return Err(FileError::format(&work.depth, size).into());
+        }
+        Camera::equirectangular(pose.pose(), depth.width())
+    } else {
+        let fov = pose.field_of_view_rads;
+        if !(fov > 0.0 && fov < std::f64::consts::PI) {
+            let message = format!("field_of_view_rads {fov} is no angle of view");
+            return Err(FileError::format(&work.pose, message).into());
+        }
+        Camera::perspective(pose.pose(), fov, depth.width(), depth.height())
+    };
+    let points = points(&camera, &depth, units);
+    Ok(match kind {
+        XyzType::Float => encode_xyz_float(&points, compression),
+        _ => encode_xyz_half(&points.map(|p| p.map(f16::from_f32)), compression),
+    })
+}
+
+/// location + direction × depth, the direction through the middle of the pixel; 0 where depth is missing.
+pub(crate) fn points(camera: &Camera, depth: &Raster<u16>, units: DepthUnits) -> Raster<[f32; 3]> {
+    let rays = camera.rays();
+    let mut points = Raster::filled(depth.width(), depth.height(), [0.0; 3]);
+    let mut pixels = depth.pixels().iter().zip(points.pixels_mut());
+    for j in 0..depth.height() {
+        for i in 0..depth.width() {
+            let Some((depth, point)) = pixels.next() else { break };
+            if let Some(metres) = units.metres(*depth) {
+                *point = (camera.pose.location + rays.at(i, j) * metres).as_vec3().to_array();
+            }
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec3, dvec3};
+    use s3d_geom::Pose;
+
+    #[test]
+    fn points_project_back_to_their_pixels_at_their_depth() {
+        let pose = Pose::level(dvec3(3.0, -2.0, 1.5), 0.4).turned(0.3, -0.2);
+        for camera in [Camera::perspective(pose, 1.1, 8, 8), Camera::equirectangular(pose, 16)] {
+            let mut depth = Raster::filled(camera.width, camera.height, 2000u16);
+            depth.pixels_mut()[5] = u16::MAX;
+            for (units, metres) in [(DepthUnits::Per512, 3.90625), (DepthUnits::Millimetres, 2.0)] {
+                let points = points(&camera, &depth, units);
+                for j in 0..camera.height {
+                    for i in 0..camera.width {
+                        let p = points.at(i, j);
+                        if depth.at(i, j) == u16::MAX {
+                            assert_eq!(p, [0.0; 3]);
+                            continue;
+                        }
+                        let p = DVec3::from_array(p.map(f64::from));
+                        let (pixel, depth) = camera.project(p).unwrap();
+                        assert!((pixel.x - f64::from(i) - 0.5).abs() < 1e-4, "{pixel}");
+                        assert!((pixel.y - f64::from(j) - 0.5).abs() < 1e-4, "{pixel}");
+                        assert!((depth - metres).abs() < 1e-5);
+                    }
+                }
+            }
+        }
+    }
+}
