@@ -87,6 +87,12 @@ impl Error {
         Self::Unsupported { path: path.to_owned(), message: message.into() }
     }
 
+    /// An [`Error::Unsupported`] for a format whose reader was left out of this build.
+    pub(crate) fn not_built_in(path: &Path, feature: &str) -> Self {
+        let message = format!("is read by s3d-io's cargo feature `{feature}`, which this build is without");
+        Self::unsupported(path, message)
+    }
+
     /// The file that it is about.
     pub fn path(&self) -> &Path {
         match self {

@@ -21,6 +21,22 @@
 //!
 //! What a file holds is decided by formats.md; the docs here name its section.
 //!
+//! Each format is a cargo feature, and all are on by default. A file whose format was left out is refused with the name
+//! of the feature that reads it. With `default-features = false, features = ["obj"]` the crate reads textured OBJ meshes
+//! and builds from 43 packages instead of 110.
+//!
+//! | features | what they bring |
+//! |---|---|
+//! | `obj`, `gltf`, `ply` | meshes; OBJ is written too, with `png` |
+//! | `cloud` | annotated points: the S3DIS tree, and labels of meshes |
+//! | `las`, `e57`, `npy`, `scannet`, `mat`, `ply` | annotated points of these formats |
+//! | `camera` | scan locations, the scanner's pictures |
+//! | `png`, `exr` | the images of a data set |
+//! | `dataset` | what else it is made of: poses, labels, instances, splits, lists, conventions |
+//! | `toml` | scenes: `scene.toml`, published areas |
+//! | `webdataset`, `colmap`, `nerfstudio`, `coco`, `parquet` | packages |
+//! | `mesh`, `texture`, `json`, `write` | what others have in common, no format of its own |
+//!
 //! ```
 //! use s3d_geom::Raster;
 //! use s3d_io::{Compression, Domain, Frame, ImageName, Layout, create_dir, read_gray16, write_gray16};
@@ -45,6 +61,8 @@
 //! # }
 //! ```
 
+// What formats have in common is not all used where some are left out.
+#![cfg_attr(not(feature = "default"), allow(dead_code))]
 // Whatever a file holds, reading it must not panic. What may index says so, and why.
 #![cfg_attr(
     not(test),
@@ -58,63 +76,51 @@
     )
 )]
 
+#[cfg(feature = "camera")]
 pub mod camera;
+#[cfg(feature = "cloud")]
 pub mod cloud;
 pub mod dataset;
 mod error;
 pub mod fs;
 mod guarded;
 pub mod image;
+#[cfg(feature = "mesh")]
 pub mod mesh;
+#[cfg(any(
+    feature = "webdataset",
+    feature = "colmap",
+    feature = "nerfstudio",
+    feature = "coco",
+    feature = "parquet"
+))]
 pub mod package;
 mod quote;
+#[cfg(feature = "toml")]
 pub mod scene;
 
-pub use camera::{
-    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, PublishedLocation, ScanLocation, read_cameras,
-    read_capture_pose, read_intrinsics, read_matterport_locations, read_picture, read_picture_size,
-    read_scan_locations, uuid_from_name,
-};
-pub use cloud::{
-    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, AnnotationTree, Annotations, InstanceFile,
-    InstancePasses, InstanceReader, LabelledPoint, LabelledPoints, MatArea, MatObject, MatRoom, MatWriter,
-    NpyWriter, OnFault, PlyPointWriter, PointPasses, PointReader, RoomFiles, S3disAreaWriter,
-    S3disInstanceWriter, S3disRoomWriter, Skipped, TreeOptions, read_ply_point_count, read_point_sample,
-    read_points, write_colored_points,
-};
-pub use dataset::{
-    Conventions, DatasetImage, DepthUnits, Domain, FileRecord, Frame, ImageName, InstanceArrays,
-    InstanceEntry, InstanceRecord, InstanceWriter, Layout, MAX_LABELS_OF_LOADERS, PADDED_LABELS, PROFILES,
-    PoseFile, Split, UnknownDomain, UnknownWord, ViewRecord, XyzType, check_images_complete, dataset_images,
-    image_stem, is_valid_room, is_valid_uuid, pad_labels, read_conventions, read_file_list,
-    read_instance_arrays, read_instance_members, read_instances, read_labels, read_png_size, read_pose,
-    read_splits, read_views, write_file_list, write_image_list, write_labels, write_splits,
-};
+#[cfg(feature = "camera")]
+pub use camera::*;
+#[cfg(feature = "cloud")]
+pub use cloud::*;
+pub use dataset::*;
 pub use error::{Error, Place, Result};
-pub use fs::{
-    AtomicFile, BadChecksum, Checksum, ChecksumOfParts, SyncAhead, checksum_of_file, create_dir, read_json,
-    sync_data_set, sync_file, write_bytes, write_json, write_whole,
-};
+#[cfg(any(feature = "write", feature = "json"))]
+pub use fs::*;
 pub use guarded::panic_is_caught;
-pub use image::{
-    Compression, Content, TextureFile, UnknownCompression, encode_gray16, encode_rgb8, encode_xyz_float,
-    encode_xyz_half, pretty_color, read_gray16, read_rgb8, read_xyz, write_gray16, write_rgb8,
-    write_xyz_float, write_xyz_half,
-};
-pub use mesh::{
-    LabelColumn, LabelElement, MeshFile, MeshLabels, MeshOptions, MeshSource, NO_LABEL, TextureOut, UpAxis,
-    read_mesh, read_mesh_with, read_meshes, read_meshes_with, write_rgb_obj, write_semantic_obj,
-};
-pub use package::{
-    CocoCategory, CocoImage, CocoSegment, ColmapImage, ImageRow, NerfstudioCamera, NerfstudioFrame,
-    SemanticRow, ShardEntry, ShardLimits, TarWriter, UnknownLabelIndex, coco_categories, coco_category_id,
-    coco_panoptic, plan_shards, sample_key, sample_member, write_coco, write_colmap_binary,
-    write_colmap_text, write_image_index, write_nerfstudio, write_shard_index,
-};
-pub use scene::{
-    CameraSource, PictureKind, PictureOptions, PictureSource, PublishedArea, PublishedMesh, PublishedOptions,
-    SceneFile, SkyBoxCaps, UnseenColor, read_scene,
-};
+pub use image::*;
+#[cfg(feature = "mesh")]
+pub use mesh::*;
+#[cfg(any(
+    feature = "webdataset",
+    feature = "colmap",
+    feature = "nerfstudio",
+    feature = "coco",
+    feature = "parquet"
+))]
+pub use package::*;
+#[cfg(feature = "toml")]
+pub use scene::*;
 
 /// The README's example is compiled and run with the tests.
 #[cfg(doctest)]

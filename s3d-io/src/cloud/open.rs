@@ -3,13 +3,8 @@
 use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
-use crate::cloud::e57::E57Cloud;
-use crate::cloud::las::read::LasCloud;
-use crate::cloud::npy::read::NpyCloud;
-use crate::cloud::ply::read::PlyCloud;
 use crate::cloud::s3dis::points::PointReader;
 use crate::cloud::s3dis::tree::{AnnotationTree, OnFault, TreeOptions};
-use crate::cloud::scannet::{ScannetCloud, is_scannet};
 use crate::cloud::table::cloud::Cloud;
 use crate::cloud::table::read::read_flat;
 use crate::error::{Error, Result};
@@ -64,7 +59,10 @@ impl Annotations {
             if path.is_dir() && !is_scannet(path) {
                 all.join(Self::from_tree(path, options)?)?;
             } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) {
+                #[cfg(feature = "mat")]
                 all.join(Self::from_mat(path, options)?)?;
+                #[cfg(not(feature = "mat"))]
+                return Err(Error::not_built_in(path, "mat"));
             } else {
                 clouds.push(open_cloud(path, options)?);
             }
@@ -131,28 +129,55 @@ impl Annotations {
 }
 
 /// The reader of a cloud, by the file's name.
+#[cfg_attr(
+    not(any(feature = "ply", feature = "npy", feature = "las", feature = "e57")),
+    allow(unused_variables)
+)]
 fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn Cloud + 'a>> {
     let what = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     if what.is_dir() || name.ends_with(".aggregation.json") {
-        return Ok(Box::new(ScannetCloud::open(path)?));
+        #[cfg(feature = "scannet")]
+        return Ok(Box::new(crate::cloud::scannet::ScannetCloud::open(path)?));
+        #[cfg(not(feature = "scannet"))]
+        return Err(Error::not_built_in(path, "scannet"));
     }
     if !what.is_file() {
         return Err(Error::format(path, "is no file"));
     }
-    Ok(match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
-        "ply" => Box::new(PlyCloud::new(path, options)),
-        "npy" | "npz" => Box::new(NpyCloud::new(path, options)),
-        "las" | "laz" => Box::new(LasCloud::new(path, options)),
-        "e57" => Box::new(E57Cloud::new(path, options)),
-        _ => {
-            return Err(Error::unsupported(
-                path,
-                "is no kind of annotations that is read: an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, or \
-                 ScanNet's .aggregation.json",
-            ));
-        }
-    })
+    match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
+        #[cfg(feature = "ply")]
+        "ply" => Ok(Box::new(crate::cloud::ply::read::PlyCloud::new(path, options))),
+        #[cfg(feature = "npy")]
+        "npy" | "npz" => Ok(Box::new(crate::cloud::npy::read::NpyCloud::new(path, options))),
+        #[cfg(feature = "las")]
+        "las" | "laz" => Ok(Box::new(crate::cloud::las::read::LasCloud::new(path, options))),
+        #[cfg(feature = "e57")]
+        "e57" => Ok(Box::new(crate::cloud::e57::E57Cloud::new(path, options))),
+        extension if let Some(feature) = feature_of(extension) => Err(Error::not_built_in(path, feature)),
+        _ => Err(Error::unsupported(
+            path,
+            "is no kind of annotations that is read: an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, or \
+             ScanNet's .aggregation.json",
+        )),
+    }
+}
+
+/// The feature that reads clouds with this ending.
+fn feature_of(extension: &str) -> Option<&'static str> {
+    match extension {
+        "ply" => Some("ply"),
+        "npy" | "npz" => Some("npy"),
+        "las" | "laz" => Some("las"),
+        "e57" => Some("e57"),
+        _ => None,
+    }
+}
+
+/// Whether a folder is a scan of ScanNet, and no S3DIS tree.
+fn is_scannet(dir: &Path) -> bool {
+    let named = |e: std::fs::DirEntry| e.file_name().to_string_lossy().ends_with(".aggregation.json");
+    std::fs::read_dir(dir).is_ok_and(|entries| entries.flatten().any(named))
 }
 
 /// A file of the S3DIS tree.

@@ -142,11 +142,6 @@ struct Segments {
     seg_indices: Vec<i64>,
 }
 
-/// Whether a folder is a scan of ScanNet.
-pub(crate) fn is_scannet(dir: &Path) -> bool {
-    aggregations(dir).is_some_and(|found| !found.is_empty())
-}
-
 fn aggregations(dir: &Path) -> Option<Vec<PathBuf>> {
     let entries = std::fs::read_dir(dir).ok()?.filter_map(|e| Some(e.ok()?.path()));
     let mut found: Vec<PathBuf> = entries.filter(|p| name_of(p).ends_with(".aggregation.json")).collect();

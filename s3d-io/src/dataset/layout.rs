@@ -5,6 +5,7 @@
 //! stands (besides `3d/rgb.obj` and its fellows, which are named as published), and no part holds an underscore.
 
 use crate::dataset::domain::Domain;
+#[cfg(feature = "json")]
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -39,6 +40,7 @@ impl fmt::Display for Frame {
     }
 }
 
+#[cfg(feature = "json")]
 impl Serialize for Frame {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
@@ -48,6 +50,7 @@ impl Serialize for Frame {
     }
 }
 
+#[cfg(feature = "json")]
 impl<'de> Deserialize<'de> for Frame {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Visitor;

@@ -1,9 +1,7 @@
 //! JSON files: pretty-printed, keys in the order of the struct, a line feed at the end.
 
 use crate::error::{Error, Result};
-use crate::fs::atomic::write_bytes;
 use crate::fs::open::read_file;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
@@ -11,10 +9,11 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if `value` holds what JSON cannot say.
-pub fn write_json<T: Serialize + ?Sized>(path: &Path, value: &T) -> Result<u64> {
+#[cfg(feature = "write")]
+pub fn write_json<T: serde::Serialize + ?Sized>(path: &Path, value: &T) -> Result<u64> {
     let mut json = serde_json::to_vec_pretty(value).map_err(|e| Error::format(path, e.to_string()))?;
     json.push(b'\n');
-    write_bytes(path, &json)
+    crate::fs::atomic::write_bytes(path, &json)
 }
 
 /// Reads a whole JSON file as a `T`.

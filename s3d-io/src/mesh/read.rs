@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis};
-use crate::mesh::{gltf, obj, ply};
 use std::path::Path;
 
 /// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf`, `.glb` or `.ply`, in any case.
@@ -22,19 +21,34 @@ pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
 /// # Errors
 /// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that is not
 /// whole.
+#[cfg_attr(not(feature = "ply"), allow(unused_variables))]
 pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let file = match ending.as_str() {
-        "obj" => obj::read::read(path, up),
-        "gltf" | "glb" => gltf::read::read(path, up),
-        "ply" => ply::read::read(path, up, options),
+    let file: Result<MeshFile> = match ending.as_str() {
+        #[cfg(feature = "obj")]
+        "obj" => crate::mesh::obj::read::read(path, up),
+        #[cfg(feature = "gltf")]
+        "gltf" | "glb" => crate::mesh::gltf::read::read(path, up),
+        #[cfg(feature = "ply")]
+        "ply" => crate::mesh::ply::read::read(path, up, options),
         "" => Err(Error::unsupported(path, "has no ending; meshes are read from .obj, .gltf, .glb and .ply")),
+        _ if let Some(feature) = feature_of(&ending) => Err(Error::not_built_in(path, feature)),
         _ => {
             let message = format!(".{ending} is not read; meshes are .obj, .gltf, .glb or .ply");
             Err(Error::unsupported(path, message))
         }
-    }?;
-    Ok(file.tidy().0)
+    };
+    Ok(file?.tidy().0)
+}
+
+/// The feature that reads files with this ending.
+fn feature_of(ending: &str) -> Option<&'static str> {
+    match ending {
+        "obj" => Some("obj"),
+        "gltf" | "glb" => Some("gltf"),
+        "ply" => Some("ply"),
+        _ => None,
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::cloud::annotations::{PointBlocks, Skipped};
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
-use crate::mesh::obj::lines::{number, words};
+use crate::fs::text::{number, words};
 use crate::quote::quote;
 use memchr::{memchr, memrchr};
 use rayon::prelude::*;

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::fs::open::read_file;
+use crate::image::find::{find_image, resolve};
 use crate::image::texture::{TextureFile, read_textures};
 use crate::mesh::obj::lines::{after, logical_lines, text};
 use crate::mesh::obj::mtl::{MtlMaterial, parse_mtl};
@@ -202,22 +203,6 @@ fn load_libraries(
         }
     }
     found
-}
-
-/// `name` as a path below `folder`, with either slash.
-fn resolve(folder: &Path, name: &str) -> PathBuf {
-    let as_written = folder.join(name);
-    if as_written.is_file() { as_written } else { folder.join(name.replace('\\', "/")) }
-}
-
-/// Where the image `name` is: below the library's folder, below the OBJ file's, or, as other machines' paths are
-/// worth nothing here, by its last part beside either. `true` if it is where `name` says.
-pub(crate) fn find_image(name: &str, library: &Path, folder: &Path) -> Option<(PathBuf, bool)> {
-    let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
-    [(name, library, true), (name, folder, true), (last, library, false), (last, folder, false)]
-        .into_iter()
-        .map(|(name, folder, exact)| (resolve(folder, name), exact))
-        .find(|(path, _)| path.is_file())
 }
 
 #[cfg(test)]

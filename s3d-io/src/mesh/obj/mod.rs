@@ -1,11 +1,13 @@
 //! Wavefront OBJ with its material libraries.
 
 mod diagnose;
-pub(crate) mod lines;
-pub(crate) mod looks;
+mod lines;
+mod looks;
 mod mtl;
 mod plain;
 pub(crate) mod read;
+#[cfg(feature = "png")]
 mod write;
 
+#[cfg(feature = "png")]
 pub use write::{TextureOut, write_rgb_obj, write_semantic_obj};

@@ -4,9 +4,21 @@
 //! malformed line of no interest, and takes the options of `map_Kd` for a part of the file's name.
 
 use crate::mesh::obj::lines::{after, logical_lines, parse_f32, text, without_comment, words};
-use crate::mesh::obj::write::{WRAP_COMMENT, wrap_name};
 use crate::quote::quote;
 use s3d_geom::{DEFAULT_COLOR, Wrap};
+
+/// Starts a comment that tells our own reader how the next texture goes on beyond its edges, where MTL files cannot say it,
+/// or do not for the sake of other readers.
+pub(crate) const WRAP_COMMENT: &str = "# s3d wrap";
+
+/// The word for a wrap in such a comment.
+pub(crate) const fn wrap_name(wrap: Wrap) -> &'static str {
+    match wrap {
+        Wrap::Repeat => "repeat",
+        Wrap::Mirror => "mirror",
+        Wrap::Clamp => "clamp",
+    }
+}
 
 /// A material as its library describes it.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,6 +11,7 @@ use crate::fs::atomic::{create_dir, write_bytes, write_whole};
 use crate::image::compression::Compression;
 use crate::image::png::codec::{Content, encode_rgb8};
 use crate::image::pretty::pretty_color;
+use crate::mesh::obj::mtl::{WRAP_COMMENT, wrap_name};
 use s3d_geom::glam::{Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, NO_INDEX, TriMesh, Wrap};
 use std::collections::HashSet;
@@ -203,19 +204,6 @@ fn write_face(
         }
     }
     w.write_all(b"\n")
-}
-
-/// Starts a comment that tells our own reader how the next texture goes on beyond its edges, where MTL files cannot say it,
-/// or do not for the sake of other readers.
-pub(crate) const WRAP_COMMENT: &str = "# s3d wrap";
-
-/// The word for a wrap in such a comment.
-pub(crate) const fn wrap_name(wrap: Wrap) -> &'static str {
-    match wrap {
-        Wrap::Repeat => "repeat",
-        Wrap::Mirror => "mirror",
-        Wrap::Clamp => "clamp",
-    }
 }
 
 /// The texture of a material.

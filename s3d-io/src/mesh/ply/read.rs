@@ -4,10 +4,10 @@
 //! mesh. Texture images are named by comments, as MeshLab writes them: `comment TextureFile wall.png`.
 
 use crate::error::{Error, Result};
+use crate::image::find::find_image;
 use crate::image::texture::{TextureFile, read_textures};
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
 use crate::mesh::labels::LabelElement;
-use crate::mesh::obj::looks::find_image;
 use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::faces::{PlyFaces, PlyTriangles};
 use crate::mesh::ply::header::PlyHeader;
