@@ -10,7 +10,7 @@
 
 use s3d_geom::Raster;
 use s3d_geom::glam::{Vec3, vec3};
-use s3d_io::{Compression, Content, encode_rgb8};
+use s3d_io::image::{Compression, Content, encode_rgb8};
 use std::error::Error;
 use std::fmt::Write as _;
 use std::fs::{self, File};

@@ -5,7 +5,7 @@ use crate::console::LogFormat;
 use crate::failure::Outcome;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, value_parser};
-use s3d_io::UpAxis;
+use s3d_io::mesh::UpAxis;
 use std::path::PathBuf;
 
 /// From an annotated scan to a registered 2D-3D-Semantic data set.
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
     use clap::CommandFactory;
     use s3d_dataset::{ExportOptions, Profile};
-    use s3d_io::Domain;
+    use s3d_io::dataset::Domain;
 
     #[test]
     fn the_command_line_is_consistent() {

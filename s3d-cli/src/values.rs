@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use s3d_geom::NormalAxes;
-use s3d_io::XyzType;
+use s3d_io::dataset::XyzType;
 
 pub(crate) fn normal_axes(word: &str) -> Result<NormalAxes, String> {
     NormalAxes::from_name(word).ok_or_else(|| "must be paper or opencv".to_owned())

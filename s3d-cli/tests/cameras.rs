@@ -3,7 +3,7 @@
 mod common;
 
 use common::{files, s3d, s3d_fails, s3d_ok, text, write_scan};
-use s3d_io::{PoseFile, read_pose};
+use s3d_io::dataset::{PoseFile, read_pose};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

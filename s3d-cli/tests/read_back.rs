@@ -5,10 +5,10 @@ mod common;
 use common::{copyroom, s3d, s3d_ok, text};
 use glam::{DMat3, DVec3};
 use s3d_geom::{Camera, Pose, rotation_from_euler};
-use s3d_io::{
-    Checksum, Domain, Frame, ImageName, Layout, UpAxis, read_file_list, read_gray16, read_labels, read_mesh,
-    read_pose, read_rgb8, read_xyz,
-};
+use s3d_io::dataset::{Domain, Frame, ImageName, Layout, read_file_list, read_labels, read_pose};
+use s3d_io::fs::Checksum;
+use s3d_io::image::{read_gray16, read_rgb8, read_xyz};
+use s3d_io::mesh::{UpAxis, read_mesh};
 use s3d_label::{Class, LabelId, LabelTable};
 use s3d_render::{Scene, cast_ray};
 use std::collections::BTreeSet;
@@ -234,7 +234,7 @@ fn one_view_of_a_mesh_needs_no_annotation() {
 
     let cloud = dir.path().join("cloud.ply");
     s3d_ok(&["sample", text(&mesh), "-o", text(&cloud), "--points", "1234"]);
-    assert_eq!(s3d_io::read_ply_point_count(&cloud).unwrap(), 1234);
+    assert_eq!(s3d_io::cloud::read_ply_point_count(&cloud).unwrap(), 1234);
     common::s3d_fails(&["sample", text(&mesh), "-o", text(&cloud)], 2, &["--overwrite"]);
 }
 

@@ -4,7 +4,7 @@ mod common;
 
 use common::{UUID_A, UUID_B, files, s3d, s3d_fails, s3d_ok, text, write_scan};
 use s3d_geom::Raster;
-use s3d_io::{Compression, Content, write_rgb8};
+use s3d_io::image::{Compression, Content, write_rgb8};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -37,7 +37,8 @@ fn an_export_is_exported_again_as_published_areas_are() {
     for (path, bytes) in &a {
         // Poses go through Euler angles once more.
         if path.extension().is_some_and(|e| e == "json") {
-            let pose = |bytes: &[u8]| serde_json::from_slice::<s3d_io::PoseFile>(bytes).unwrap().pose();
+            let pose =
+                |bytes: &[u8]| serde_json::from_slice::<s3d_io::dataset::PoseFile>(bytes).unwrap().pose();
             let (a, b) = (pose(bytes), pose(&b[path]));
             assert!(a.location.abs_diff_eq(b.location, 1e-9), "{}", path.display());
             assert!(a.world_from_camera.abs_diff_eq(b.world_from_camera, 1e-9), "{}", path.display());
@@ -65,7 +66,7 @@ fn an_export_is_exported_again_as_published_areas_are() {
     let pose = |out: &Path, area: u32| {
         let folder = out.join(format!("area_{area}/pano/pose"));
         let (name, _) = files(&folder).into_iter().next().unwrap();
-        s3d_io::read_pose(&folder.join(name)).unwrap().pose().location
+        s3d_io::dataset::read_pose(&folder.join(name)).unwrap().pose().location
     };
     let (a, b) = (pose(&first, 3), pose(&moved, 5));
     assert!((b.x - (7.0 - a.y)).abs() < 1e-9 && (b.y - a.x).abs() < 1e-9, "{a} {b}");

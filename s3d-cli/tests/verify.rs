@@ -5,11 +5,13 @@ mod common;
 use common::{UUID_A, s3d, s3d_ok, text, write_scan};
 use glam::DMat3;
 use s3d_geom::{Camera, Pose, Raster};
-use s3d_io::{
-    Compression, Content, DatasetImage, Domain, FileRecord, Frame, Layout, PoseFile, UpAxis, create_dir,
-    dataset_images, encode_rgb8, read_gray16, read_labels, read_mesh, read_pose, read_rgb8, write_bytes,
-    write_file_list, write_gray16, write_labels, write_rgb8,
+use s3d_io::dataset::{
+    DatasetImage, Domain, FileRecord, Frame, Layout, PoseFile, dataset_images, read_labels, read_pose,
+    write_file_list, write_labels,
 };
+use s3d_io::fs::{create_dir, write_bytes};
+use s3d_io::image::{Compression, Content, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
+use s3d_io::mesh::{UpAxis, read_mesh};
 use s3d_render::{Scene, cast_ray};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,8 @@
 mod common;
 
 use common::{UUID_A, files, s3d, s3d_ok, text, write_scan};
-use s3d_io::{Domain, Frame, Layout, read_gray16};
+use s3d_io::dataset::{Domain, Frame, Layout};
+use s3d_io::image::read_gray16;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

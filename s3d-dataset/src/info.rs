@@ -9,7 +9,7 @@ use crate::export::location::Outlook;
 use crate::export::overlap::overlap_doubts;
 use crate::export::pictures::Pictures;
 use s3d_geom::{Aabb, NearestFaces, TriMesh};
-use s3d_io::ScanLocation;
+use s3d_io::camera::ScanLocation;
 use s3d_label::{Class, Room};
 use s3d_render::Scene;
 use std::collections::BTreeMap;

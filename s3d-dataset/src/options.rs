@@ -3,7 +3,8 @@
 use crate::error::{Error, Result};
 use crate::profile::Profile;
 use s3d_geom::NormalAxes;
-use s3d_io::{Compression, Conventions, DepthUnits, Domain, PADDED_LABELS, XyzType};
+use s3d_io::dataset::{Conventions, DepthUnits, Domain, PADDED_LABELS, XyzType};
+use s3d_io::image::Compression;
 use s3d_render::Normals;
 use s3d_sample::Pool;
 use serde::{Deserialize, Serialize};

@@ -5,7 +5,10 @@ use crate::error::Result;
 use crate::export::modality::{Image, Look, Prints};
 use crate::store::refuse_existing;
 use s3d_geom::{Camera, Projection};
-use s3d_io::{Compression, Content, Conventions, UpAxis, create_dir, encode_rgb8, write_bytes, write_json};
+use s3d_io::dataset::Conventions;
+use s3d_io::fs::{create_dir, write_bytes, write_json};
+use s3d_io::image::{Compression, Content, encode_rgb8};
+use s3d_io::mesh::UpAxis;
 use s3d_render::{Hits, MipMaps, NO_FACE, Normals, Scene, cast, coverage};
 use serde::Serialize;
 use std::path::Path;
@@ -70,7 +73,7 @@ pub fn render(
     let names = images.iter().map(|(_, name)| *name).chain(["faces.png", "camera.json"]);
     names.into_iter().try_for_each(|name| refuse_existing(&output.join(name), options.overwrite))?;
 
-    let file = s3d_io::read_mesh(mesh, options.up)?;
+    let file = s3d_io::mesh::read_mesh(mesh, options.up)?;
     file.warnings.iter().for_each(|w| ctx.warn(w));
     let scene = Scene::new(&file.mesh);
     let textures = MipMaps::new(&file.mesh);

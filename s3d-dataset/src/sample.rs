@@ -5,7 +5,8 @@ use crate::error::Result;
 use crate::export::points::check_density;
 use crate::store::refuse_existing;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
-use s3d_io::{PlyPointWriter, UpAxis};
+use s3d_io::cloud::PlyPointWriter;
+use s3d_io::mesh::UpAxis;
 use std::path::Path;
 use std::time::Instant;
 
@@ -39,7 +40,7 @@ impl Default for SampleOptions {
 /// [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
     refuse_existing(output, options.overwrite)?;
-    let file = s3d_io::read_mesh(mesh, options.up)?;
+    let file = s3d_io::mesh::read_mesh(mesh, options.up)?;
     ctx.warn_each(&file.warnings);
     if let Density::PerM2(points_per_m2) = options.density {
         check_density(&file.mesh, points_per_m2)?;

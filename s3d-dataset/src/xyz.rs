@@ -8,11 +8,13 @@ use crate::tables::listing;
 use crate::tables::manifest::{Head, Manifest};
 use half::f16;
 use s3d_geom::{Camera, Raster};
-use s3d_io::{
-    Compression, Conventions, DepthUnits, Domain, Error as FileError, FileRecord, Frame, ImageName, Layout,
-    XyzType, create_dir, encode_xyz_float, encode_xyz_half, read_conventions, read_gray16, read_pose,
-    write_bytes,
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{
+    Conventions, DepthUnits, Domain, FileRecord, Frame, ImageName, Layout, XyzType, read_conventions,
+    read_pose,
 };
+use s3d_io::fs::{create_dir, write_bytes};
+use s3d_io::image::{Compression, encode_xyz_float, encode_xyz_half, read_gray16};
 use std::fs;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};

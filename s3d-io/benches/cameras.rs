@@ -6,7 +6,8 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{DAffine3, DQuat, dvec3};
 use s3d_geom::{Camera, Pose};
-use s3d_io::{Frame, PoseFile, read_scan_locations};
+use s3d_io::camera::read_scan_locations;
+use s3d_io::dataset::{Frame, PoseFile};
 use std::fmt::Write;
 use std::fs;
 use std::hint::black_box;

@@ -5,7 +5,7 @@
 #![allow(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use s3d_io::{AnnotationOptions, Annotations};
+use s3d_io::cloud::{AnnotationOptions, Annotations};
 use s3d_label::Class;
 use std::hint::black_box;
 use std::io::Write;

@@ -14,10 +14,12 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use half::f16;
 use s3d_geom::glam::{DVec3, Vec3, vec3};
 use s3d_geom::{Aabb, Camera, PointCloud, Pose, Raster, TriMesh};
-use s3d_io::{
-    Compression, Content, Frame, InstanceRecord, InstanceWriter, PlyPointWriter, PoseFile, S3disAreaWriter,
-    encode_gray16, encode_rgb8, encode_xyz_float, encode_xyz_half, pretty_color, write_semantic_obj,
+use s3d_io::cloud::{PlyPointWriter, S3disAreaWriter};
+use s3d_io::dataset::{Frame, InstanceRecord, InstanceWriter, PoseFile};
+use s3d_io::image::{
+    Compression, Content, encode_gray16, encode_rgb8, encode_xyz_float, encode_xyz_half, pretty_color,
 };
+use s3d_io::mesh::write_semantic_obj;
 use std::hint::black_box;
 
 const SIZE: u32 = 1080;

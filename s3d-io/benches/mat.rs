@@ -4,7 +4,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{Vec3, vec3};
-use s3d_io::{MatArea, MatWriter};
+use s3d_io::cloud::{MatArea, MatWriter};
 use std::hint::black_box;
 use std::path::Path;
 

@@ -8,10 +8,12 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{DQuat, dvec3, vec3};
 use s3d_geom::{Camera, PointCloud, Pose, Raster};
-use s3d_io::{
-    CocoImage, ColmapImage, Domain, Frame, ImageRow, NerfstudioCamera, NerfstudioFrame, NpyWriter, PoseFile,
-    SemanticRow, TarWriter, coco_categories, coco_panoptic, read_point_sample, write_coco,
-    write_colmap_binary, write_colmap_text, write_colored_points, write_image_index, write_nerfstudio,
+use s3d_io::cloud::{NpyWriter, read_point_sample, write_colored_points};
+use s3d_io::dataset::{Domain, Frame, PoseFile};
+use s3d_io::package::{
+    CocoImage, ColmapImage, ImageRow, NerfstudioCamera, NerfstudioFrame, SemanticRow, TarWriter,
+    coco_categories, coco_panoptic, write_coco, write_colmap_binary, write_colmap_text, write_image_index,
+    write_nerfstudio,
 };
 use s3d_label::{Class, Label, LabelTable};
 use std::hint::black_box;

@@ -8,7 +8,8 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use image::{ImageBuffer, Rgb};
 use s3d_geom::PointCloud;
-use s3d_io::{PointReader, UpAxis, read_mesh, read_points};
+use s3d_io::cloud::{PointReader, read_points};
+use s3d_io::mesh::{UpAxis, read_mesh};
 use std::fmt::Write;
 use std::fs;
 use std::hint::black_box;

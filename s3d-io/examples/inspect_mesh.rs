@@ -3,7 +3,7 @@
 //! `cargo run --release -p s3d-io --example inspect_mesh -- scan/rgb.obj [y|z]`, the axis that points up: y unless said.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for the terminal")]
 
-use s3d_io::{UpAxis, read_mesh};
+use s3d_io::mesh::{UpAxis, read_mesh};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;

@@ -4,7 +4,7 @@
 //! `cargo run --release -p s3d-io --example load_mesh -- scan/rgb.obj`; `RAYON_NUM_THREADS` sets the threads.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
-use s3d_io::{UpAxis, read_mesh};
+use s3d_io::mesh::{UpAxis, read_mesh};
 use std::path::Path;
 use std::time::Instant;
 

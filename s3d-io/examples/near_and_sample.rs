@@ -7,7 +7,7 @@
 
 use s3d_geom::glam::Vec3;
 use s3d_geom::{Density, FaceColor, Nearest, NearestFaces, PointCloud, SurfaceSampler, TriMesh, scan_like};
-use s3d_io::{UpAxis, read_mesh};
+use s3d_io::mesh::{UpAxis, read_mesh};
 use std::error::Error;
 use std::fs;
 use std::path::Path;

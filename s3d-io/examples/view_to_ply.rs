@@ -7,7 +7,10 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use s3d_geom::{PointCloud, glam::Vec3};
-use s3d_io::{Domain, ImageName, PlyPointWriter, Result, read_rgb8, read_xyz};
+use s3d_io::Result;
+use s3d_io::cloud::PlyPointWriter;
+use s3d_io::dataset::{Domain, ImageName};
+use s3d_io::image::{read_rgb8, read_xyz};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

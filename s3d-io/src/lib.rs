@@ -1,23 +1,19 @@
 //! Readers and writers of scans and of the 2D-3D-S data set.
 //!
 //! Files on one side, the vocabulary of `s3d-geom` (meshes, clouds, cameras, rasters) on the other; nothing is computed
-//! here. Every file is written **whole or not at all** ([`AtomicFile`]), the same input gives the same bytes, and every
-//! [`Error`] names the file.
+//! here. Every file is written **whole or not at all** ([`fs::AtomicFile`]), the same input gives the same bytes, and
+//! every [`Error`] names the file.
 //!
-//! - names: [`Layout`] knows where everything lies, [`ImageName`] takes a file name apart, [`Domain`] and [`Frame`] are
-//!   its parts;
-//! - images: [`encode_rgb8`] and [`encode_gray16`] (PNG), [`encode_xyz_half`] and [`encode_xyz_float`] (OpenEXR), with a
-//!   [`Compression`] to choose, and their readers;
-//! - cameras: [`PoseFile`];
-//! - meshes: [`read_mesh`] and [`read_meshes`] (OBJ, glTF, PLY), with [`MeshLabels`]; [`write_rgb_obj`], [`write_semantic_obj`];
-//! - scans: [`read_scene`], [`read_scan_locations`], [`Annotations`], [`AnnotationTree`], [`PointReader`];
-//! - the scanner's pictures: [`PictureFolder`], [`CaptureFile`], [`read_matterport_locations`];
-//! - points: [`PlyPointWriter`], [`S3disAreaWriter`], [`InstanceWriter`], which take them piece by piece;
-//! - what is there: [`FileRecord`], [`write_file_list`], [`Checksum`], [`sync_data_set`];
-//! - lists: [`write_labels`], [`write_splits`], [`write_image_list`]; arrays: [`NpyWriter`];
-//! - what the numbers of a data set mean: [`Conventions`];
-//! - packages for loaders, from the images of a data set ([`dataset_images`]): [`TarWriter`] (WebDataset),
-//!   [`write_colmap_text`], [`write_nerfstudio`], [`write_coco`], [`write_image_index`] (Parquet).
+//! | module | the files |
+//! |---|---|
+//! | [`mesh`] | OBJ, glTF and PLY with textures and labels: [`mesh::read_mesh`]; the data set's OBJ files |
+//! | [`cloud`] | annotated points of any format: [`cloud::Annotations`]; writers of points: PLY, the S3DIS tree, `pointcloud.mat`, NPY |
+//! | [`camera`] | scan locations of any list of cameras: [`camera::read_scan_locations`]; the scanner's pictures |
+//! | [`image`] | the images of a data set, 8- and 16-bit PNG and OpenEXR: [`image::encode_rgb8`]; [`image::Compression`] |
+//! | [`dataset`] | names and folders: [`dataset::Layout`], [`dataset::ImageName`]; poses, labels, instances, splits, lists |
+//! | [`package`] | WebDataset, COLMAP, nerfstudio, COCO, Parquet, from the images of a data set |
+//! | [`scene`] | `scene.toml`: [`scene::read_scene`]; published areas as scenes |
+//! | [`fs`] | files written whole or not at all, brought to the disk, checked by their checksums; JSON |
 //!
 //! What a file holds is decided by formats.md; the docs here name its section.
 //!
@@ -39,7 +35,9 @@
 //!
 //! ```
 //! use s3d_geom::Raster;
-//! use s3d_io::{Compression, Domain, Frame, ImageName, Layout, create_dir, read_gray16, write_gray16};
+//! use s3d_io::dataset::{Domain, Frame, ImageName, Layout};
+//! use s3d_io::fs::create_dir;
+//! use s3d_io::image::{Compression, read_gray16, write_gray16};
 //!
 //! # fn main() -> s3d_io::Result<()> {
 //! # let folder = tempfile::tempdir().unwrap();
@@ -99,28 +97,8 @@ mod quote;
 #[cfg(feature = "toml")]
 pub mod scene;
 
-#[cfg(feature = "camera")]
-pub use camera::*;
-#[cfg(feature = "cloud")]
-pub use cloud::*;
-pub use dataset::*;
 pub use error::{Error, Place, Result};
-#[cfg(any(feature = "write", feature = "json"))]
-pub use fs::*;
 pub use guarded::panic_is_caught;
-pub use image::*;
-#[cfg(feature = "mesh")]
-pub use mesh::*;
-#[cfg(any(
-    feature = "webdataset",
-    feature = "colmap",
-    feature = "nerfstudio",
-    feature = "coco",
-    feature = "parquet"
-))]
-pub use package::*;
-#[cfg(feature = "toml")]
-pub use scene::*;
 
 /// The README's example is compiled and run with the tests.
 #[cfg(doctest)]

@@ -2,10 +2,9 @@
 #![allow(clippy::print_stderr, reason = "says why it measures nothing")]
 
 use s3d_geom::Aabb;
-use s3d_io::{
-    AnnotationOptions, Annotations, Error, InstanceReader, InstanceRecord, InstanceWriter, PointPasses,
-    read_instances,
-};
+use s3d_io::Error;
+use s3d_io::cloud::{AnnotationOptions, Annotations, InstanceReader, PointPasses};
+use s3d_io::dataset::{InstanceRecord, InstanceWriter, read_instances};
 use s3d_label::Class;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};

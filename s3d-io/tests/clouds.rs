@@ -2,7 +2,8 @@
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{DVec3, Vec3, vec3};
-use s3d_io::{AnnotationOptions, Annotations, Error, OnFault, Result};
+use s3d_io::cloud::{AnnotationOptions, Annotations, OnFault};
+use s3d_io::{Error, Result};
 use s3d_label::Class;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -43,7 +44,7 @@ fn expected(offset: DVec3) -> BTreeMap<(usize, u32), PointCloud> {
 fn contents(annotations: &Annotations, room: &str) -> BTreeMap<(usize, u32), PointCloud> {
     assert_eq!(annotations.rooms.len(), 1, "{annotations:?}");
     assert_eq!(annotations.rooms[0].room.to_string(), room);
-    let read = |i: &s3d_io::AnnotatedInstance| {
+    let read = |i: &s3d_io::cloud::AnnotatedInstance| {
         let mut cloud = PointCloud::default();
         assert_eq!(i.read(&mut cloud).unwrap().count, 0);
         // The pose of an E57 scan is a product of rounded numbers: what should be 0 is 1e-16.

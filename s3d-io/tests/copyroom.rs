@@ -3,7 +3,10 @@
 
 use s3d_geom::glam::{DVec3, Vec3};
 use s3d_geom::{FaceColor, PointCloud};
-use s3d_io::{AnnotationTree, CameraSource, UpAxis, read_mesh, read_points, read_scan_locations, read_scene};
+use s3d_io::camera::read_scan_locations;
+use s3d_io::cloud::{AnnotationTree, read_points};
+use s3d_io::mesh::{UpAxis, read_mesh};
+use s3d_io::scene::{CameraSource, read_scene};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 

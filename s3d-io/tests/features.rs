@@ -2,7 +2,7 @@
 //! runs it so; where all is built in, nothing is left to test.
 #![cfg(all(feature = "obj", not(any(feature = "gltf", feature = "ply"))))]
 
-use s3d_io::mesh::{UpAxis, read_mesh};
+use s3d_io::{mesh::UpAxis, mesh::read_mesh};
 use std::fs;
 
 /// A pixel: 200, 100, 50.

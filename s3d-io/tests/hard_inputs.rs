@@ -2,7 +2,7 @@
 //! `hard_inputs.txt` says, soon, and without a panic.
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
-use s3d_io::{MeshFile, UpAxis, read_mesh};
+use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::thread;

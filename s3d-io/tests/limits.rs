@@ -1,7 +1,10 @@
 //! Headers that claim more than their files can hold, each in an otherwise sound file: an error that says so, at once.
 
 use s3d_geom::Raster;
-use s3d_io::*;
+use s3d_io::Result;
+use s3d_io::cloud::*;
+use s3d_io::image::*;
+use s3d_io::mesh::*;
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -5,8 +5,9 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use s3d_geom::glam::{Vec2, Vec3, vec2, vec3};
 use s3d_geom::{FaceColor, TriMesh};
-use s3d_io::{
-    LabelColumn, LabelElement, MeshFile, MeshLabels, MeshOptions, Result, UpAxis, read_mesh, read_mesh_with,
+use s3d_io::Result;
+use s3d_io::mesh::{
+    LabelColumn, LabelElement, MeshFile, MeshLabels, MeshOptions, UpAxis, read_mesh, read_mesh_with,
 };
 use std::fs;
 use std::path::Path;

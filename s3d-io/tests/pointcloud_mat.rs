@@ -3,7 +3,8 @@
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{Vec3, vec3};
-use s3d_io::{Error, MatArea, MatWriter};
+use s3d_io::Error;
+use s3d_io::cloud::{MatArea, MatWriter};
 use std::path::{Path, PathBuf};
 
 fn fixture(name: &str) -> PathBuf {

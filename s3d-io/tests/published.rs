@@ -2,7 +2,8 @@
 
 use s3d_geom::glam::{DAffine3, DQuat, DVec3, Vec3, dvec3, vec3};
 use s3d_geom::{Camera, NO_INDEX, PointCloud, Pose, TriMesh};
-use s3d_io::{Domain, Frame, Layout, PoseFile, PublishedArea, PublishedOptions};
+use s3d_io::dataset::{Domain, Frame, Layout, PoseFile};
+use s3d_io::scene::{PublishedArea, PublishedOptions};
 use std::fs;
 use std::path::Path;
 
@@ -37,9 +38,9 @@ fn pose(layout: &Layout, uuid: &str, n: f64, frame: Frame, room: &str) {
 fn area(dir: &Path) {
     let layout = Layout::new(dir);
     fs::create_dir_all(layout.mesh_dir(3)).unwrap();
-    s3d_io::write_rgb_obj(&layout.mesh_dir(3), &mesh(), &[]).unwrap();
+    s3d_io::mesh::write_rgb_obj(&layout.mesh_dir(3), &mesh(), &[]).unwrap();
     let names = NAMES.map(str::to_owned);
-    s3d_io::write_semantic_obj(&layout.mesh_dir(3), &mesh(), &[1, 1, 2, 2, 0], &names).unwrap();
+    s3d_io::mesh::write_semantic_obj(&layout.mesh_dir(3), &mesh(), &[1, 1, 2, 2, 0], &names).unwrap();
     for i in 0..3 {
         pose(&layout, A, 1.0, Frame::View(i), "office_5_3");
     }
@@ -154,10 +155,11 @@ fn labels_of_another_mesh_are_refused() {
     area(dir.path());
     let folder = dir.path().join("area_3");
     let other = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Z], vec![[0, 1, 2]]).unwrap();
-    s3d_io::write_semantic_obj(&folder.join("3d"), &other, &[1], &NAMES.map(str::to_owned)).unwrap();
+    s3d_io::mesh::write_semantic_obj(&folder.join("3d"), &other, &[1], &NAMES.map(str::to_owned)).unwrap();
     let message = PublishedArea::open(&folder).unwrap().read_mesh().unwrap_err().to_string();
     assert!(message.contains("5 of the 5 faces") && message.contains("semantic.obj"), "{message}");
-    s3d_io::write_semantic_obj(&folder.join("3d"), &mesh(), &[0; 5], &NAMES.map(str::to_owned)).unwrap();
+    s3d_io::mesh::write_semantic_obj(&folder.join("3d"), &mesh(), &[0; 5], &NAMES.map(str::to_owned))
+        .unwrap();
     let message = PublishedArea::open(&folder).unwrap().read_mesh().unwrap_err().to_string();
     assert!(message.contains("no material of a face is a label"), "{message}");
 }

@@ -2,7 +2,9 @@
 
 use crate::{AnnotatedScene, ScanError, ScanOptions};
 use s3d_geom::glam::DQuat;
-use s3d_io::{S3disAreaWriter, create_dir, write_bytes, write_rgb_obj};
+use s3d_io::cloud::S3disAreaWriter;
+use s3d_io::fs::{create_dir, write_bytes};
+use s3d_io::mesh::write_rgb_obj;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -8,7 +8,8 @@ use clap::{Args, value_parser};
 use s3d_dataset::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions,
 };
-use s3d_io::{Compression, Domain};
+use s3d_io::dataset::Domain;
+use s3d_io::image::Compression;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ use clap::{Args, value_parser};
 use glam::DVec3;
 use s3d_dataset::{Error, RenderOptions};
 use s3d_geom::{Camera, Pose};
-use s3d_io::Compression;
+use s3d_io::image::Compression;
 use s3d_render::Normals;
 use std::path::PathBuf;
 

@@ -8,7 +8,8 @@ use s3d_geom::{
     Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh,
     dominant_wall_direction_deg,
 };
-use s3d_io::{Error as FileError, InstanceReader, PointPasses};
+use s3d_io::Error as FileError;
+use s3d_io::cloud::{InstanceReader, PointPasses};
 use s3d_label::{Class, Label, LabelId, LabelTable, Room, VoteReport, Votes};
 use std::collections::BTreeMap;
 

@@ -23,10 +23,11 @@ use crate::tables::records;
 use crate::tables::summary::Account;
 use rayon::prelude::*;
 use s3d_geom::{Density, NearestFaces};
-use s3d_io::{
-    Compression, Content, FileRecord, InstanceRecord, InstanceWriter, Layout, MeshFile, ScanLocation,
-    TextureOut, create_dir, encode_rgb8,
-};
+use s3d_io::camera::ScanLocation;
+use s3d_io::dataset::{FileRecord, InstanceRecord, InstanceWriter, Layout};
+use s3d_io::fs::create_dir;
+use s3d_io::image::{Compression, Content, encode_rgb8};
+use s3d_io::mesh::{MeshFile, TextureOut};
 use s3d_label::{LabelTable, Room};
 use s3d_render::{MipMaps, Scene};
 use std::borrow::Cow;
@@ -369,7 +370,7 @@ fn write_rest(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common: Common
     let mesh_dir = layout.mesh_dir(number);
     let per_face: Vec<u32> = plan.annotated.face_labels.iter().map(|l| l.0).collect();
     write_colored_mesh(&mesh_dir, file, options.compression)?;
-    s3d_io::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
+    s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
     meshes.end();
     ctx.check()?;
     let sampling = account.stage(Step::Points, Some(number));
@@ -407,7 +408,7 @@ fn write_colored_mesh(dir: &Path, file: &MeshFile, compression: Compression) -> 
         .collect();
     let textures: Vec<TextureOut<'_>> =
         files.iter().map(|(name, bytes)| TextureOut { name, bytes }).collect();
-    s3d_io::write_rgb_obj(dir, &file.mesh, &textures)?;
+    s3d_io::mesh::write_rgb_obj(dir, &file.mesh, &textures)?;
     Ok(())
 }
 
@@ -448,7 +449,8 @@ pub(crate) fn render_area(
     create_dir(&layout.mesh_dir(number))?;
     let textures = MipMaps::new(&file.mesh);
     let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
-    let pretty_per_face: Vec<[u8; 3]> = label_per_face.iter().map(|l| s3d_io::pretty_color(*l)).collect();
+    let pretty_per_face: Vec<[u8; 3]> =
+        label_per_face.iter().map(|l| s3d_io::image::pretty_color(*l)).collect();
     let chosen: Vec<bool> =
         locations.iter().map(|l| todo.contains(&Unit::Location(number, l.uuid.clone()))).collect();
     let finish_location = |written: WrittenLocation| {

@@ -5,10 +5,11 @@ use crate::error::{Error, Result};
 use crate::tables::manifest::half_step;
 use glam::DAffine3;
 use s3d_geom::TriMesh;
-use s3d_io::{
-    AnnotatedInstance, Annotations, CameraSource, Error as FileError, MeshFile, MeshOptions, OnFault,
-    PictureSource, PublishedArea, PublishedOptions, ScanLocation, SceneFile, UpAxis,
-};
+use s3d_io::Error as FileError;
+use s3d_io::camera::ScanLocation;
+use s3d_io::cloud::{AnnotatedInstance, Annotations, OnFault};
+use s3d_io::mesh::{MeshFile, MeshOptions, UpAxis};
+use s3d_io::scene::{CameraSource, PictureSource, PublishedArea, PublishedOptions, SceneFile};
 use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -127,7 +128,7 @@ impl Inputs {
             let area = if path.is_dir() {
                 AreaInput::published(path, None, place_m, opened)?
             } else {
-                let mut scene = s3d_io::read_scene(path)?;
+                let mut scene = s3d_io::scene::read_scene(path)?;
                 let options = &mut scene.annotation_options;
                 options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
                 // Areas wait beside one another.
@@ -335,7 +336,7 @@ pub(crate) fn mesh_doubts(mesh: &TriMesh) -> Vec<String> {
 impl MeshSource {
     fn read(&self) -> Result<MeshFile> {
         Ok(match self {
-            Self::Files { paths, up, options } => s3d_io::read_meshes_with(paths, *up, options)?,
+            Self::Files { paths, up, options } => s3d_io::mesh::read_meshes_with(paths, *up, options)?,
             Self::Published(area) => area.read_mesh()?.file,
         })
     }
@@ -360,7 +361,7 @@ fn listed_cameras(scene: &SceneFile, place_m: Option<f64>) -> Result<Option<(Cam
             Some((Cameras::Placed(*distance_m), scene.path.clone()))
         }
         (None, Some(CameraSource::Listed { path, world_from_file })) => {
-            let locations = s3d_io::read_scan_locations(path, world_from_file)?;
+            let locations = s3d_io::camera::read_scan_locations(path, world_from_file)?;
             let rooms = vec![None; locations.len()];
             Some((Cameras::Listed(locations, rooms), path.clone()))
         }
@@ -386,7 +387,7 @@ fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
         areas.iter().flat_map(|a| &a.rooms).flat_map(|r| &r.instances).map(|i| i.label).collect();
     for area in areas.iter_mut() {
         let Some(path) = area.published_labels().cloned() else { continue };
-        let names = s3d_io::read_labels(&path)?;
+        let names = s3d_io::dataset::read_labels(&path)?;
         match LabelTable::from_names(&names) {
             Ok(table) if labels.iter().all(|l| table.id_of(l).is_some()) => return Ok(table),
             Ok(_) => area.warnings.push(format!(

@@ -3,7 +3,7 @@
 use crate::export::annotate::SurveyedRoom;
 use glam::DVec3;
 use s3d_geom::Camera;
-use s3d_io::ScanLocation;
+use s3d_io::camera::ScanLocation;
 use s3d_label::Room;
 use s3d_render::{NO_FACE, Scene, cast};
 

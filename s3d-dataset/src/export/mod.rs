@@ -40,7 +40,9 @@ use inputs::{AreaInput, Cameras, Inputs};
 use pictures::Pictures;
 use points::check_density;
 use s3d_geom::NearestFaces;
-use s3d_io::{Domain, Layout, MeshFile, SyncAhead};
+use s3d_io::dataset::{Domain, Layout};
+use s3d_io::fs::SyncAhead;
+use s3d_io::mesh::MeshFile;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use views::{Candidate, select_requested};
@@ -409,13 +411,13 @@ fn area_pictures(ctx: &Context, area: &AreaInput, options: &ExportOptions) -> Re
 
 /// Refuses more labels than loaders of the data set can tell apart.
 fn check_label_count(labels: usize) -> Result<()> {
-    if labels <= s3d_io::MAX_LABELS_OF_LOADERS {
+    if labels <= s3d_io::dataset::MAX_LABELS_OF_LOADERS {
         return Ok(());
     }
     Err(Error::Input(format!(
         "{labels} labels are more than {}: loaders of the data set take a label's index from G and B of a pixel alone, and a \
          pixel with an R for one without a label; export the areas in several data sets",
-        s3d_io::MAX_LABELS_OF_LOADERS
+        s3d_io::dataset::MAX_LABELS_OF_LOADERS
     )))
 }
 

@@ -3,10 +3,8 @@
 use crate::export::pictures::PictureColors;
 use rayon::prelude::*;
 use s3d_geom::{Camera, Raster};
-use s3d_io::{
-    Compression, Content, Conventions, DepthUnits, Domain, XyzType, encode_gray16, encode_rgb8,
-    encode_xyz_float, encode_xyz_half,
-};
+use s3d_io::dataset::{Conventions, DepthUnits, Domain, XyzType};
+use s3d_io::image::{Compression, Content, encode_gray16, encode_rgb8, encode_xyz_float, encode_xyz_half};
 use s3d_render::{
     Hits, MipMaps, Modalities, Normals, Scene, Shading, TextureFilter, ViewImages, color_per_face_image_into,
     depth_image_into, depth_image_mm_into, index_image_into, normal_image_into, rgb_image_into,

@@ -6,10 +6,11 @@ use crate::error::Result;
 use crate::export::inputs::{AreaInput, Cameras};
 use crate::export::modality::Look;
 use s3d_geom::{Camera, Raster};
-use s3d_io::{
-    CAPTURES_A_LOCATION, CaptureFile, Error as FileError, PictureFolder, PictureKind, PictureSource,
-    ScanLocation, SkyBoxCaps, UnseenColor, read_picture, read_picture_size,
+use s3d_io::Error as FileError;
+use s3d_io::camera::{
+    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, ScanLocation, read_picture, read_picture_size,
 };
+use s3d_io::scene::{PictureKind, PictureSource, SkyBoxCaps, UnseenColor};
 use s3d_render::{
     Capture, CubeMap, Hits, Scene, SkyBoxTurn, StitchOptions, TextureFilter, Unseen, picture_image_into,
     stitch,

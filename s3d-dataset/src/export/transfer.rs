@@ -1,7 +1,9 @@
 //! Recorded files from one folder to another.
 
 use crate::error::Result;
-use s3d_io::{AtomicFile, Error as FileError, FileRecord, create_dir};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::FileRecord;
+use s3d_io::fs::{AtomicFile, create_dir};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
 use std::path::Path;

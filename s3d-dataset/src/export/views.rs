@@ -7,7 +7,7 @@ use crate::store::journal::Finished;
 use crate::store::request::Request;
 use crate::tables::summary::ViewTally;
 use s3d_geom::Camera;
-use s3d_io::ScanLocation;
+use s3d_io::camera::ScanLocation;
 use s3d_label::{Class, LabelId, LabelTable};
 use s3d_render::{Caster, Hits, NO_FACE, Scene};
 use s3d_sample::{Pool, PoolItem, Selection, View, ViewDistribution, draw_view, entropy, select_pooled};

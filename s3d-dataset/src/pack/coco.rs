@@ -6,10 +6,11 @@ use super::options::SpecificOptions;
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
-use s3d_io::{
-    CocoImage, Content, DatasetImage, Domain, Error as FileError, coco_categories, coco_panoptic, create_dir,
-    encode_rgb8, read_rgb8, write_bytes, write_coco,
-};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{DatasetImage, Domain};
+use s3d_io::fs::{create_dir, write_bytes};
+use s3d_io::image::{Content, encode_rgb8, read_rgb8};
+use s3d_io::package::{CocoImage, coco_categories, coco_panoptic, write_coco};
 use std::path::Path;
 
 /// The folder of panoptic images, and the file about them.

@@ -6,7 +6,9 @@ use super::source::Source;
 use super::{area_points, copy, map_in_order};
 use crate::context::Context;
 use crate::error::Result;
-use s3d_io::{ColmapImage, Domain, create_dir, write_colmap_binary, write_colmap_text};
+use s3d_io::dataset::Domain;
+use s3d_io::fs::create_dir;
+use s3d_io::package::{ColmapImage, write_colmap_binary, write_colmap_text};
 
 pub(super) fn pack(
     ctx: &Context,

@@ -1,7 +1,8 @@
 //! Where a package goes: whole, or not at all.
 
 use crate::error::{Error, Result};
-use s3d_io::{Error as FileError, create_dir, read_json, write_json};
+use s3d_io::Error as FileError;
+use s3d_io::fs::{create_dir, read_json, write_json};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::fs;

@@ -18,7 +18,8 @@ pub use options::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions,
 };
 use s3d_geom::PointCloud;
-use s3d_io::{Error as FileError, create_dir};
+use s3d_io::Error as FileError;
+use s3d_io::fs::create_dir;
 use source::Source;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -122,14 +123,14 @@ fn map_in_order<T: Sync, S, R: Send + Sync>(
 fn area_points(source: &Source, area: u32, most: Option<u32>) -> Result<PointCloud> {
     match most.unwrap_or(POINTS) {
         0 => Ok(PointCloud::default()),
-        most => Ok(s3d_io::read_point_sample(&source.layout.point_cloud(area), most as usize)?),
+        most => Ok(s3d_io::cloud::read_point_sample(&source.layout.point_cloud(area), most as usize)?),
     }
 }
 
 /// Copies a file of the data set.
 fn copy(from: &Path, to: &Path) -> Result<()> {
     let bytes = fs::read(from).map_err(|e| FileError::io(from, "read", e))?;
-    Ok(s3d_io::write_bytes(to, &bytes).map(drop)?)
+    Ok(s3d_io::fs::write_bytes(to, &bytes).map(drop)?)
 }
 
 #[cfg(test)]

@@ -7,10 +7,12 @@ use super::{area_points, copy, map_in_order};
 use crate::context::Context;
 use crate::error::Result;
 use s3d_geom::Raster;
-use s3d_io::{
-    DatasetImage, Domain, Error as FileError, Frame, NerfstudioCamera, NerfstudioFrame, create_dir,
-    encode_gray16, read_gray16, write_bytes, write_colored_points, write_nerfstudio,
-};
+use s3d_io::Error as FileError;
+use s3d_io::cloud::write_colored_points;
+use s3d_io::dataset::{DatasetImage, Domain, Frame};
+use s3d_io::fs::{create_dir, write_bytes};
+use s3d_io::image::{encode_gray16, read_gray16};
+use s3d_io::package::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 use std::path::{Path, PathBuf};
 
 const PLY: &str = "points.ply";

@@ -1,7 +1,8 @@
 //! PackedImages package is made of which images, and what belongs to each.
 
 use crate::error::{Error, Result};
-use s3d_io::{Compression, Domain};
+use s3d_io::dataset::Domain;
+use s3d_io::image::Compression;
 use s3d_label::Class;
 use std::fmt;
 use std::path::PathBuf;

@@ -5,10 +5,10 @@ use super::source::{DEPTH_MISSING, Source};
 use crate::context::Context;
 use crate::error::Result;
 use s3d_geom::Raster;
-use s3d_io::{
-    DatasetImage, Domain, Error as FileError, Frame, ImageRow, SemanticRow, ViewRecord, read_gray16,
-    read_rgb8, read_views, write_image_index,
-};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{DatasetImage, Domain, Frame, ViewRecord, read_views};
+use s3d_io::image::{read_gray16, read_rgb8};
+use s3d_io::package::{ImageRow, SemanticRow, write_image_index};
 use s3d_label::{LabelId, LabelTable, Room, RoomError};
 use s3d_sample::entropy;
 use std::collections::BTreeMap;

@@ -3,10 +3,12 @@
 use super::options::PackedImages;
 use crate::error::{Error, Result};
 use crate::tables::manifest::Head;
-use s3d_io::{
-    DatasetImage, Domain, Error as FileError, Frame, Layout, PoseFile, check_images_complete, dataset_images,
-    read_json, read_labels, read_pose,
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{
+    DatasetImage, Domain, Frame, Layout, PoseFile, check_images_complete, dataset_images, read_labels,
+    read_pose,
 };
+use s3d_io::fs::read_json;
 use s3d_label::LabelTable;
 use serde::Deserialize;
 use std::path::Path;

@@ -8,9 +8,10 @@ use crate::context::Context;
 use crate::error::Result;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use s3d_io::{
-    DatasetImage, Domain, Error as FileError, Frame, ShardEntry, ShardLimits, TarWriter, plan_shards,
-    sample_key, sample_member, write_shard_index,
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{DatasetImage, Domain, Frame};
+use s3d_io::package::{
+    ShardEntry, ShardLimits, TarWriter, plan_shards, sample_key, sample_member, write_shard_index,
 };
 use std::fs;
 

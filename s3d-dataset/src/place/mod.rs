@@ -5,7 +5,7 @@ use crate::export::annotate::SurveyedRoom;
 use crate::export::location::{LOW_COVERAGE, Outlook};
 use glam::{DVec3, Vec3, dvec3};
 use s3d_geom::{Density, NearestFaces, PointCloud, Pose, SurfaceSampler, TriMesh};
-use s3d_io::{ScanLocation, uuid_from_name};
+use s3d_io::camera::{ScanLocation, uuid_from_name};
 use s3d_label::{Class, LabelId, LabelTable, Room};
 use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk;

@@ -19,7 +19,8 @@ use super::room::{TreeRoom, as_written, count_and_least, for_each_piece};
 use super::{AREAS_OF_LOADERS, for_each_room, write_lines};
 use crate::context::Context;
 use crate::error::Result;
-use s3d_io::{NpyWriter, create_dir};
+use s3d_io::cloud::NpyWriter;
+use s3d_io::fs::create_dir;
 use std::path::Path;
 
 /// The points of a room's instances, and the least coordinates of all.

@@ -16,7 +16,9 @@ use crate::store::lock::Lock;
 use crate::tables::listing;
 use crate::tables::manifest::{Head, Manifest};
 use room::{TreeRoom, rooms_of};
-use s3d_io::{Error as FileError, Layout, create_dir, write_whole};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Layout;
+use s3d_io::fs::{create_dir, write_whole};
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -193,7 +195,7 @@ mod tests {
 
     #[test]
     fn names_are_those_of_the_folders() {
-        assert_eq!(Profile::ALL.map(Profile::name), s3d_io::PROFILES);
+        assert_eq!(Profile::ALL.map(Profile::name), s3d_io::dataset::PROFILES);
         for profile in Profile::ALL {
             assert_eq!(profile.name().parse(), Ok(profile));
         }

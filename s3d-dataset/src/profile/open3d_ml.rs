@@ -16,7 +16,7 @@ use super::room::{TreeInstance, TreeRoom, as_written, for_each_piece};
 use crate::context::Context;
 use crate::error::Result;
 use glam::{DMat2, DVec2, DVec3, dvec2, dvec3};
-use s3d_io::create_dir;
+use s3d_io::fs::create_dir;
 use std::path::Path;
 
 /// Writes the pickles.

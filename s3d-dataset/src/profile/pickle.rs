@@ -5,7 +5,8 @@
 //! numpy's own pickles name internal ones. It is read-only when read, as is any array that views bytes.
 
 use crate::error::Result as DatasetResult;
-use s3d_io::{AtomicFile, Result};
+use s3d_io::Result;
+use s3d_io::fs::AtomicFile;
 use std::path::Path;
 
 /// Writes one object, piece by piece.

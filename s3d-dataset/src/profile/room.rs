@@ -3,7 +3,8 @@
 use crate::context::Context;
 use crate::error::Result;
 use s3d_geom::PointCloud;
-use s3d_io::{AnnotationTree, Layout, PointReader};
+use s3d_io::cloud::{AnnotationTree, PointReader};
+use s3d_io::dataset::Layout;
 use s3d_label::Class;
 use std::path::{Path, PathBuf};
 

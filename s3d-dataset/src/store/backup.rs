@@ -4,7 +4,9 @@
 use crate::error::{Error, Result};
 use crate::store::output::{begun_by_other_version, read_request};
 use crate::tables::manifest::Head;
-use s3d_io::{Error as FileError, Layout, create_dir};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Layout;
+use s3d_io::fs::create_dir;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,8 @@
 //! Small JSON files that say of themselves whether they are whole: the value on one line, its checksum on the next.
 
 use crate::error::Result;
-use s3d_io::{Checksum, Error as FileError, write_bytes};
+use s3d_io::Error as FileError;
+use s3d_io::fs::{Checksum, write_bytes};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

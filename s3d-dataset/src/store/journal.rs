@@ -10,7 +10,9 @@ use crate::error::Result;
 use crate::tables::listing::faults;
 use crate::tables::manifest::AreaEntry;
 use crate::tables::summary::UnitTally;
-use s3d_io::{Checksum, Error as FileError, FileRecord, Layout, create_dir};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{FileRecord, Layout};
+use s3d_io::fs::{Checksum, create_dir};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -334,7 +336,7 @@ impl Journal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_io::write_bytes;
+    use s3d_io::fs::write_bytes;
 
     fn scores(location: &str) -> Done {
         let entropies = vec![0.1, 1.7e-300, 2.564_949_357_461_536_7];

@@ -2,7 +2,9 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use s3d_io::{Error as FileError, Layout, create_dir};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Layout;
+use s3d_io::fs::create_dir;
 use std::fs::{self, File, TryLockError};
 
 /// The lock of a folder, held until it is dropped or the process ends, however it ends.

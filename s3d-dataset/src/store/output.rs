@@ -26,9 +26,9 @@ use crate::store::request::Request;
 use crate::tables::listing::remove_parts;
 use crate::tables::manifest::{Head, Manifest, if_there};
 use crate::tables::summary::Account;
-use s3d_io::{
-    Error as FileError, Layout, read_file_list, read_json, sync_data_set, sync_file, write_bytes, write_json,
-};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{Layout, read_file_list};
+use s3d_io::fs::{read_json, sync_data_set, sync_file, write_bytes, write_json};
 use serde::Deserialize;
 use std::fs;
 use std::time::{Duration, Instant};
@@ -423,7 +423,7 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
         let files: Vec<_> = records.iter().collect();
         crate::tables::listing::faults(ctx, layout, &files)?.into_iter().map(|(_, fault)| fault).collect()
     } else {
-        let wrong = |r: &&s3d_io::FileRecord| {
+        let wrong = |r: &&s3d_io::dataset::FileRecord| {
             fs::metadata(r.path_in(layout.root())).map_or(true, |found| found.len() != r.bytes)
         };
         records.iter().filter(wrong).map(|r| r.path.clone()).collect::<Vec<String>>()

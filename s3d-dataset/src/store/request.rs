@@ -7,7 +7,9 @@ use crate::export::inputs::{AreaInput, Cameras};
 use crate::export::work::for_each_in_order;
 use crate::options::ExportOptions;
 use crate::tables::listing::walk;
-use s3d_io::{Checksum, ChecksumOfParts, Error as FileError, FileRecord, checksum_of_file};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::FileRecord;
+use s3d_io::fs::{Checksum, ChecksumOfParts, checksum_of_file};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -320,7 +322,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::options::PadLabels;
     use crate::profile::Profile;
-    use s3d_io::{Domain, XyzType};
+    use s3d_io::dataset::{Domain, XyzType};
     use s3d_render::Normals;
     use s3d_sample::Pool;
 

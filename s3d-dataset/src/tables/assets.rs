@@ -1,7 +1,8 @@
 //! What a data set tells of itself: conventions, schemas, and a Python module that reads it.
 
 use crate::error::Result;
-use s3d_io::{Conventions, Layout, create_dir, write_bytes};
+use s3d_io::dataset::{Conventions, Layout};
+use s3d_io::fs::{create_dir, write_bytes};
 use std::path::PathBuf;
 
 /// Reads every kind of file of a data set, in Python.
@@ -18,8 +19,8 @@ pub(crate) fn write(
     conventions: Conventions,
 ) -> Result<()> {
     create_dir(&layout.assets_dir())?;
-    s3d_io::pad_labels(&mut names, pad_labels);
-    s3d_io::write_labels(&layout.labels_json(), &names)?;
+    s3d_io::dataset::pad_labels(&mut names, pad_labels);
+    s3d_io::dataset::write_labels(&layout.labels_json(), &names)?;
     conventions.write(&layout.conventions())?;
     create_dir(&layout.schema_dir())?;
     for (path, text) in texts(layout) {

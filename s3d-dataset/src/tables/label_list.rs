@@ -2,7 +2,9 @@
 
 use crate::error::Result;
 use crate::store::checked::{read_checked, write_checked};
-use s3d_io::{Error as FileError, Layout, create_dir};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Layout;
+use s3d_io::fs::create_dir;
 use s3d_label::LabelTable;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

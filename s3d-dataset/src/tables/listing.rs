@@ -4,13 +4,14 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::export::work::for_each_in_order;
 use crate::tables::manifest::{FileList, Manifest};
-use s3d_io::{Error as FileError, FileRecord, Layout, read_file_list, write_file_list};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{FileRecord, Layout, read_file_list, write_file_list};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Whether a file is one that some process is writing, or was when it was killed: see [`s3d_io::AtomicFile`].
+/// Whether a file is one that some process is writing, or was when it was killed: see [`s3d_io::fs::AtomicFile`].
 pub(crate) fn is_part(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.starts_with(".s3d-") && name.ends_with(".part")

@@ -6,7 +6,9 @@ use crate::error::Result;
 use crate::export::annotate::Annotated;
 use crate::export::area_plan::RoomNames;
 use crate::export::views::Candidate;
-use s3d_io::{Domain, Error as FileError, Frame, ImageName, Layout, Split, create_dir, write_json};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{Domain, Frame, ImageName, Layout, Split};
+use s3d_io::fs::{create_dir, write_json};
 use s3d_label::{VoteReport, VoteRow};
 use s3d_sample::Fold;
 use serde::{Deserialize, Serialize};
@@ -160,7 +162,7 @@ pub(crate) fn write_splits(layout: &Layout, folds: &[Fold]) -> Result<()> {
         .iter()
         .map(|f| Split { fold: f.number, train_areas: f.train.clone(), test_areas: f.test.clone() })
         .collect();
-    s3d_io::write_splits(&layout.splits(), &splits)?;
+    s3d_io::dataset::write_splits(&layout.splits(), &splits)?;
     Ok(())
 }
 
@@ -186,10 +188,10 @@ pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: 
         let listed = pairs.iter().filter(|(area, _)| areas.contains(area));
         listed.map(|(a, name)| (path(*a, name, Domain::Rgb), path(*a, name, Domain::Depth))).collect()
     };
-    s3d_io::write_image_list(&layout.list_of_all(), &of(areas))?;
+    s3d_io::dataset::write_image_list(&layout.list_of_all(), &of(areas))?;
     for fold in folds {
         for (train, areas) in [(true, &fold.train), (false, &fold.test)] {
-            s3d_io::write_image_list(&layout.list_of_fold(fold.number, train), &of(areas))?;
+            s3d_io::dataset::write_image_list(&layout.list_of_fold(fold.number, train), &of(areas))?;
         }
     }
     if folds.is_empty() {

@@ -3,7 +3,9 @@
 use crate::error::Result;
 use crate::tables::manifest::Head;
 use crate::tables::records::RoomRecord;
-use s3d_io::{Domain, Error as FileError, Frame, Layout, read_json, read_labels, write_bytes, write_json};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{Domain, Frame, Layout, read_labels};
+use s3d_io::fs::{read_json, write_bytes, write_json};
 use s3d_label::{Class, ClassCounts, LabelTable, Room, RoomError, RoomType};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -160,7 +162,7 @@ impl AreaStatistics {
         }
         Ok(Self {
             area,
-            points: s3d_io::read_ply_point_count(&layout.point_cloud(area))?,
+            points: s3d_io::cloud::read_ply_point_count(&layout.point_cloud(area))?,
             faces: count_faces(&layout.semantic_obj(area))?,
             regular_images: count_images(layout, area, Frame::View(0))?,
             panoramas: count_images(layout, area, Frame::Panorama)?,

@@ -5,9 +5,9 @@ use super::told::Told;
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::work::for_each_in_order;
-use s3d_io::{
-    Domain, Error as FileError, FileRecord, Frame, ImageName, Layout, checksum_of_file, read_file_list,
-};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{Domain, FileRecord, Frame, ImageName, Layout, read_file_list};
+use s3d_io::fs::checksum_of_file;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;

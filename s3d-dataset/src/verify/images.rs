@@ -10,7 +10,7 @@ use super::report::{Report, Topic};
 use super::told::Told;
 use super::views::Views;
 use s3d_geom::{Camera, Raster};
-use s3d_io::{Conventions, DatasetImage, Domain, Frame, Layout, XyzType};
+use s3d_io::dataset::{Conventions, DatasetImage, Domain, Frame, Layout, XyzType};
 use s3d_render::{Caster, Hits, MISSING_INDEX, MipMaps, Scene, ViewImages};
 use std::path::Path;
 use std::sync::Mutex;

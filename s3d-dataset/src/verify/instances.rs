@@ -3,9 +3,8 @@
 use super::labels::Labels;
 use super::report::{OfFile, Report, Topic};
 use super::told::Told;
-use s3d_io::{
-    InstanceArrays, Layout, read_instance_arrays, read_instance_members, read_instances, read_json,
-};
+use s3d_io::dataset::{InstanceArrays, Layout, read_instance_arrays, read_instance_members, read_instances};
+use s3d_io::fs::read_json;
 use s3d_label::parse_name;
 use serde::Deserialize;
 use std::collections::BTreeSet;

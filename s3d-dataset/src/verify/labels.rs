@@ -2,7 +2,8 @@
 
 use super::report::{Report, Topic};
 use super::told::Told;
-use s3d_io::{Layout, pretty_color, read_labels};
+use s3d_io::dataset::{Layout, read_labels};
+use s3d_io::image::pretty_color;
 use s3d_label::{LabelTable, NULL_NAME};
 use std::collections::HashMap;
 

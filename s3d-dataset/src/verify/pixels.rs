@@ -1,7 +1,9 @@
 //! The files of one image: what each should hold, and where it does not.
 
 use s3d_geom::Raster;
-use s3d_io::{Domain, Result, read_gray16, read_rgb8, read_xyz};
+use s3d_io::Result;
+use s3d_io::dataset::Domain;
+use s3d_io::image::{read_gray16, read_rgb8, read_xyz};
 use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
 use std::path::Path;
 

@@ -3,7 +3,8 @@
 use super::report::{OfFile, Report, Topic};
 use glam::{DMat3, DVec3};
 use s3d_geom::{Camera, Pose, euler_from_rotation, rotation_from_euler};
-use s3d_io::{DatasetImage, Domain, Frame, Layout, PoseFile, ViewRecord, read_json};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, PoseFile, ViewRecord};
+use s3d_io::fs::read_json;
 use serde_json::Value;
 use std::path::Path;
 
@@ -213,7 +214,7 @@ pub(crate) fn check_draw(pose: &CheckedPose, draw: Option<&ViewRecord>, path: &P
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_io::create_dir;
+    use s3d_io::fs::create_dir;
 
     const UUID: &str = "00112233445566778899aabbccddeeff";
 

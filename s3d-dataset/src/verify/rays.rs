@@ -6,7 +6,7 @@ use super::pose::CheckedPose;
 use crate::xyz;
 use half::f16;
 use s3d_geom::{Camera, Raster};
-use s3d_io::{DepthUnits, Domain, XyzType};
+use s3d_io::dataset::{DepthUnits, Domain, XyzType};
 use s3d_render::{
     MISSING_INDEX, TextureFilter, color_per_face_image_into, depth_image_into, depth_image_mm_into,
     index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into, xyz_image_into,

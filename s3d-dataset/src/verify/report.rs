@@ -1,7 +1,8 @@
 //! What was checked and what is wrong: faults by topic and kind, few lines of each.
 
 use crate::error::passes;
-use s3d_io::{Error as FileError, Layout, Place};
+use s3d_io::dataset::Layout;
+use s3d_io::{Error as FileError, Place};
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

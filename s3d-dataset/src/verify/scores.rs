@@ -7,7 +7,8 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::export::views::{Scoring, score_area};
 use s3d_geom::{Camera, Projection};
-use s3d_io::{DatasetImage, ScanLocation};
+use s3d_io::camera::ScanLocation;
+use s3d_io::dataset::DatasetImage;
 use s3d_label::{LabelId, LabelTable};
 
 const ENTROPIES: (Topic, &str) = (Topic::Views, "entropies");

@@ -3,7 +3,7 @@
 use super::images::Stage;
 use glam::DVec3;
 use s3d_geom::Camera;
-use s3d_io::Domain;
+use s3d_io::dataset::Domain;
 use s3d_render::{Hit, MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, TextureFilter, rgb_of_ray};
 
 /// The values of a domain.

@@ -8,7 +8,7 @@ use super::pixels::Pixels;
 use super::shade::Shade;
 use glam::{DMat3, DVec3};
 use s3d_geom::{Camera, Pose, Projection};
-use s3d_io::{DatasetImage, DepthUnits, Domain, Frame};
+use s3d_io::dataset::{DatasetImage, DepthUnits, Domain, Frame};
 use s3d_render::{Hit, MISSING_DEPTH, cast_ray};
 
 /// Pixels that a suspect is tried on, of those that differ and of all.

@@ -4,7 +4,8 @@ use super::report::{Report, Topic};
 use super::told::Told;
 use crate::tables::assets;
 use crate::tables::statistics::Statistics;
-use s3d_io::{DatasetImage, Domain, Frame, Layout, read_conventions, read_json, read_splits};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, read_conventions, read_splits};
+use s3d_io::fs::read_json;
 use s3d_label::Room;
 use s3d_sample::folds;
 use serde::Deserialize;
@@ -23,7 +24,7 @@ pub(crate) fn conventions(layout: &Layout, told: &Told, report: &Report) {
     let path = layout.conventions();
     if let Some(found) = report.read(Topic::Tables, read_conventions(&path)) {
         report.check(found == told.conventions(), CONVENTIONS, &path, || {
-            let text = |c: s3d_io::Conventions| {
+            let text = |c: s3d_io::dataset::Conventions| {
                 format!(
                     "depth units {}, normal axes {}, coordinates {}",
                     c.depth_units,

@@ -2,7 +2,8 @@
 
 use super::report::{Report, Topic};
 use s3d_geom::NormalAxes;
-use s3d_io::{Checksum, Conventions, DepthUnits, Domain, Layout, XyzType, read_json};
+use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType};
+use s3d_io::fs::{Checksum, read_json};
 use s3d_render::Normals;
 use serde::Deserialize;
 

@@ -3,7 +3,7 @@
 use super::report::{Report, Topic};
 use super::told::Told;
 use crate::export::views::{Candidate, select};
-use s3d_io::{DatasetImage, Domain, Frame, Layout, ViewRecord, read_views};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, ViewRecord, read_views};
 use s3d_sample::{Pool, View, ViewDistribution, draw_view};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -19,7 +19,7 @@ impl Annotations {
     /// | path | annotations |
     /// |---|---|
     /// | a folder | the S3DIS tree of an area, as [`AnnotationTree`] takes it |
-    /// | `….mat` | the `pointcloud.mat` of a published area, as [`MatArea`](crate::MatArea) takes it |
+    /// | `….mat` | the `pointcloud.mat` of a published area, as [`MatArea`](crate::cloud::MatArea) takes it |
     /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh, by object |
     /// | `.ply` | vertices with properties for class and instance; ASCII or binary |
     /// | `.npy` | a structured array, or a plain one of rows and columns, see [`AnnotationOptions::columns`] |

@@ -49,7 +49,8 @@ impl PointPasses for &[Vec3] {
 /// # let folder = dir.path().join("office_1/Annotations");
 /// # std::fs::create_dir_all(&folder)?;
 /// # std::fs::write(folder.join("chair_1.txt"), "1 2 3 4 5 6\n7 8 9 10 11 12\n")?;
-/// use s3d_io::{Annotations, Error, InstanceReader, PointPasses};
+/// use s3d_io::cloud::{Annotations, InstanceReader, PointPasses};
+/// use s3d_io::Error;
 ///
 /// let area = Annotations::open(&[dir.path().to_owned()], &Default::default())?;
 /// let mut reader = InstanceReader::new(1);

@@ -55,7 +55,7 @@ impl MeshLabels {
     ///
     /// ```
     /// use s3d_geom::{Material, MeshParts, TriMesh, glam::Vec3};
-    /// use s3d_io::MeshLabels;
+    /// use s3d_io::mesh::MeshLabels;
     /// let mesh = TriMesh::new(MeshParts {
     ///     positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
     ///     faces: vec![[0, 1, 2]],

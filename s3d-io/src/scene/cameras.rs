@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Where an area's scan locations come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraSource {
-    /// A list of them: see [`read_scan_locations`](crate::read_scan_locations).
+    /// A list of them: see [`read_scan_locations`](crate::camera::read_scan_locations).
     Listed {
         /// The file or folder.
         path: PathBuf,

@@ -20,7 +20,7 @@ pub struct SceneFile {
     /// The number of the area, from 1.
     pub area: u32,
     /// The folder of a published area that mesh, labels and scan locations come from; then `mesh` and `annotations` are
-    /// empty. See [`PublishedArea`](crate::PublishedArea).
+    /// empty. See [`PublishedArea`](crate::scene::PublishedArea).
     pub published: Option<PathBuf>,
     /// Takes that area's frame to the world's: turns, shifts and scales. For one of 5a and 5b.
     pub world_from_published: DAffine3,
@@ -28,8 +28,8 @@ pub struct SceneFile {
     pub mesh: Vec<PathBuf>,
     /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published OBJ files.
     pub up: UpAxis,
-    /// The annotated points: files and folders, see [`Annotations::open`](crate::Annotations::open). None: the
-    /// labels that came with the mesh, see [`Annotations::of_mesh`](crate::Annotations::of_mesh).
+    /// The annotated points: files and folders, see [`Annotations::open`](crate::cloud::Annotations::open). None: the
+    /// labels that came with the mesh, see [`Annotations::of_mesh`](crate::cloud::Annotations::of_mesh).
     pub annotations: Vec<PathBuf>,
     /// How they are read. Faults stop.
     pub annotation_options: AnnotationOptions,
@@ -112,7 +112,7 @@ struct MeshTable {
 /// transform = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]   # to the frame of 5a; may be left out
 /// ```
 ///
-/// Further keys of `[rgb]` are those of [`crate::PictureOptions`].
+/// Further keys of `[rgb]` are those of [`crate::scene::PictureOptions`].
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value; without

@@ -6,7 +6,13 @@
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DAffine3;
-use s3d_io::*;
+use s3d_io::Result;
+use s3d_io::camera::*;
+use s3d_io::cloud::*;
+use s3d_io::dataset::*;
+use s3d_io::image::*;
+use s3d_io::mesh::*;
+use s3d_io::scene::*;
 use s3d_label::Class;
 use std::fs;
 use std::path::{Path, PathBuf};

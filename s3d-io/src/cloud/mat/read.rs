@@ -1,4 +1,4 @@
-//! Reading `pointcloud.mat`, as MATLAB saved the published ones and as [`MatWriter`](crate::MatWriter) writes it.
+//! Reading `pointcloud.mat`, as MATLAB saved the published ones and as [`MatWriter`](crate::cloud::MatWriter) writes it.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -21,7 +21,7 @@ const LONGEST_NAME: u64 = 4096;
 /// What a `pointcloud.mat` holds: names, and where the points are.
 ///
 /// The file is a MAT-file of version 7.3 with a variable `Area` (or of any other name, if there is one alone with a field
-/// `Disjoint_Space`), in which [`MatWriter`](crate::MatWriter) tells what is. Of an area only `Disjoint_Space` is needed,
+/// `Disjoint_Space`), in which [`MatWriter`](crate::cloud::MatWriter) tells what is. Of an area only `Disjoint_Space` is needed,
 /// of a room `name` and `object`, of an object `name` and `points`; other fields may be there. Struct arrays may be cells
 /// of structs; names may be in cells; numbers may be of any class. `points` and `RGB_color` may be of 3 × N instead of
 /// N × 3.

@@ -60,13 +60,13 @@ fn user_block() -> [u8; 512] {
 /// # let path = dir.path().join("pointcloud.mat");
 /// use s3d_geom::glam::Vec3;
 ///
-/// let mut mat = s3d_io::MatWriter::create(&path, "Area_1")?;
+/// let mut mat = s3d_io::cloud::MatWriter::create(&path, "Area_1")?;
 /// mat.room("office_1", 45)?;
 /// mat.object("chair_3", "chair_17_office_1_1")?;
 /// mat.append(&[Vec3::ZERO, Vec3::ONE], &[[255, 0, 0]; 2])?;
 /// mat.finish()?;
 ///
-/// let area = s3d_io::MatArea::open(&path)?;
+/// let area = s3d_io::cloud::MatArea::open(&path)?;
 /// assert_eq!(area.rooms[0].objects[0].name, "chair_3");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -9,7 +9,7 @@ use std::path::Path;
 /// ```
 /// # let dir = tempfile::tempdir().unwrap();
 /// # let path = dir.path().join("points.npy");
-/// let mut array = s3d_io::NpyWriter::create(&path, "<f8", &[2, 3])?;
+/// let mut array = s3d_io::cloud::NpyWriter::create(&path, "<f8", &[2, 3])?;
 /// for row in [[1.0f64, 2.0, 3.0], [4.0, 5.0, 6.0]] {
 ///     array.put(&row.map(f64::to_le_bytes).concat())?;
 /// }

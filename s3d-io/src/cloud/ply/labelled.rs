@@ -1,4 +1,4 @@
-//! Reads back the point clouds that [`PlyPointWriter`](crate::PlyPointWriter) writes.
+//! Reads back the point clouds that [`PlyPointWriter`](crate::cloud::PlyPointWriter) writes.
 
 use crate::error::{Error, Result};
 use s3d_geom::glam::Vec3;

@@ -34,7 +34,7 @@ const MARK: &[u8] = b"\xef\xbb\xbf";
 /// # let dir = tempfile::tempdir()?;
 /// # let path = dir.path().join("chair_1.txt");
 /// # std::fs::write(&path, "1 2 3 4 5 6\n7 8 9 10.000 11 12\n")?;
-/// let mut reader = s3d_io::PointReader::open(&path)?;
+/// let mut reader = s3d_io::cloud::PointReader::open(&path)?;
 /// let mut piece = s3d_geom::PointCloud::default();
 /// let mut points = 0;
 /// while reader.read_chunk(1_000_000, &mut piece)? > 0 {

@@ -7,7 +7,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use zip::ZipArchive;
 
-/// The arrays of `instances.npz`; see [`InstanceWriter`](crate::InstanceWriter) for their shapes.
+/// The arrays of `instances.npz`; see [`InstanceWriter`](crate::dataset::InstanceWriter) for their shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstanceArrays {
     /// The label of each instance.
@@ -82,7 +82,7 @@ fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, shape: &[u64
     Err(Error::format(path, format!("the array {name:?} is not of type {kind} and shape {shape:?}")))
 }
 
-/// Reads the arrays that [`InstanceWriter`](crate::InstanceWriter) wrote, but for the members of voxels, which
+/// Reads the arrays that [`InstanceWriter`](crate::dataset::InstanceWriter) wrote, but for the members of voxels, which
 /// [`read_instance_members`] reads: a few kilobytes an instance.
 ///
 /// # Errors

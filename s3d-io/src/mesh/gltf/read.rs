@@ -27,7 +27,7 @@ pub(crate) struct Instance {
 /// Reads the default scene of a glTF file; without one its first, and without any all nodes that are no one's child.
 ///
 /// # Errors
-/// As [`crate::read_mesh`].
+/// As [`crate::mesh::read_mesh`].
 pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
     let document = GltfDocument::open(path)?;
     let instances = instances(&document)?;

@@ -20,7 +20,7 @@ use std::path::Path;
 /// Vertices keep the file's order and number; faces its order.
 ///
 /// # Errors
-/// As [`crate::read_mesh`].
+/// As [`crate::mesh::read_mesh`].
 pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
     let bytes = read_file(path)?;
     // Decoding images takes as long as all else, and needs nothing of it but names.

@@ -36,7 +36,7 @@ pub struct TextureOut<'a> {
 /// `textures` holds the image files of [`TriMesh::textures`], one each; if it is empty, PNG files are made from the
 /// textures' pixels. Positions, texture coordinates, normals and vertex colours are those of the mesh; what is not finite
 /// (unused, so) is written as 0. Faces without a material get one called `default`. OBJ cannot say that a texture is
-/// mirrored beyond its edge: it is repeated then, but for [`read_mesh`](crate::read_mesh), which is told in a comment.
+/// mirrored beyond its edge: it is repeated then, but for [`read_mesh`](crate::mesh::read_mesh), which is told in a comment.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// Reads a PLY file: vertices keep its order and number, faces its order.
 ///
 /// # Errors
-/// As [`crate::read_mesh_with`].
+/// As [`crate::mesh::read_mesh_with`].
 pub(crate) fn read(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let mut reader = PlyReader::open(path)?;
     let header = reader.header().clone();
