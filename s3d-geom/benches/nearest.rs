@@ -4,7 +4,8 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::vec3;
-use s3d_geom::{Density, Nearest, NearestFaces, PointCloud, SurfaceSampler, TriMesh, scan_like};
+use s3d_geom::{Density, Nearest, NearestFaces, PointCloud, SurfaceSampler, TriMesh};
+use s3d_synth::scenes::scan_like;
 
 /// A bumpy square of 2·n² faces, each about 10 cm large.
 fn ground(n: u32) -> TriMesh {

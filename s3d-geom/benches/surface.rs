@@ -3,9 +3,8 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{Vec3, vec2, vec3};
-use s3d_geom::{
-    Density, Material, MeshParts, PointCloud, Raster, SurfaceSampler, Texture, TriMesh, scan_like,
-};
+use s3d_geom::{Density, Material, MeshParts, PointCloud, Raster, SurfaceSampler, Texture, TriMesh};
+use s3d_synth::scenes::scan_like;
 use std::hint::black_box;
 
 /// A bumpy 12.8 m square of 2 × 128² faces under a 2048 × 2048 texture that repeats four times.

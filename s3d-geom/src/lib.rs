@@ -35,8 +35,7 @@ mod mesh;
 #[cfg(feature = "nearest")]
 mod nearest;
 mod outline;
-#[cfg(feature = "sampling")]
-mod primitives;
+pub mod primitives;
 mod raster;
 #[cfg(feature = "sampling")]
 mod surface;
@@ -60,8 +59,6 @@ pub use outline::{
     Footprint, FootprintBuilder, FootprintOptions, Polygon, PolygonError, dominant_wall_direction_deg,
     triangulate_face,
 };
-#[cfg(feature = "sampling")]
-pub use primitives::{cuboid, cylinder, furnished_room, grid, quad, room, scan_like, scan_like_rooms};
 pub use raster::Raster;
 #[cfg(feature = "sampling")]
 pub use surface::{Density, SurfaceSampler};

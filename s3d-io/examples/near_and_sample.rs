@@ -6,8 +6,9 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for the terminal")]
 
 use s3d_geom::glam::Vec3;
-use s3d_geom::{Density, FaceColor, Nearest, NearestFaces, PointCloud, SurfaceSampler, TriMesh, scan_like};
+use s3d_geom::{Density, FaceColor, Nearest, NearestFaces, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::mesh::{UpAxis, read_mesh};
+use s3d_synth::scenes::scan_like;
 use std::error::Error;
 use std::fs;
 use std::path::Path;

@@ -7,8 +7,9 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::dvec3;
-use s3d_geom::{Camera, Pose, TriMesh, scan_like_rooms};
+use s3d_geom::{Camera, Pose, TriMesh};
 use s3d_render::{Caster, Hits, Scene};
+use s3d_synth::scenes::scan_like_rooms;
 
 /// A dozen views all around.
 fn views() -> Vec<Camera> {

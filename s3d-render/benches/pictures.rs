@@ -38,9 +38,9 @@ fn captures(pose: &Pose) -> Vec<Capture> {
 }
 
 fn pictures(c: &mut Criterion) {
-    let mesh = common::furnished_room(285_000);
+    let mesh = s3d_synth::scenes::classroom(285_000);
     let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
-    let pose = Pose::level(common::room_location(), 0.13);
+    let pose = Pose::level(s3d_synth::scenes::CLASSROOM_LOCATION, 0.13);
     let mut group = c.benchmark_group("pictures");
     group.sample_size(10);
 

@@ -8,13 +8,14 @@ mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{DVec3, dvec3};
-use s3d_geom::{Camera, Pose, TriMesh, scan_like};
+use s3d_geom::{Camera, Pose, TriMesh};
 use s3d_render::{Caster, Hits, MipMaps, Normals, Scene};
+use s3d_synth::scenes::scan_like;
 use std::path::Path;
 
 fn meshes() -> Vec<(String, TriMesh, DVec3)> {
     let mut meshes = vec![
-        ("room".to_owned(), common::furnished_room(250_000), common::room_location()),
+        ("room".to_owned(), s3d_synth::scenes::classroom(250_000), s3d_synth::scenes::CLASSROOM_LOCATION),
         ("scan-like".to_owned(), scan_like(300_000, 1), dvec3(3.0, 2.5, 1.5)),
     ];
     if let Some((path, location)) = common::real_scan() {

@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         |k: usize| -> Result<f64, Box<dyn Error>> { Ok(args.get(k).ok_or("X Y Z are missing")?.parse()?) };
     let (mesh, location): (_, DVec3) = match args.get(1) {
         Some(path) => (common::read_obj(Path::new(path)), dvec3(number(2)?, number(3)?, number(4)?)),
-        None => (common::furnished_room(100_000), common::room_location()),
+        None => (s3d_synth::scenes::classroom(100_000), s3d_synth::scenes::CLASSROOM_LOCATION),
     };
     let yaw = if args.len() > 5 { number(5)?.to_radians() } else { 0.0 };
     std::fs::create_dir_all(folder)?;

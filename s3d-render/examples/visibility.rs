@@ -24,8 +24,9 @@
 mod common;
 
 use s3d_geom::glam::{DVec2, DVec3, Vec3, dvec3};
-use s3d_geom::{Camera, Pose, Rays, scan_like};
+use s3d_geom::{Camera, Pose, Rays};
 use s3d_render::{Caster, Hits, Scene};
+use s3d_synth::scenes::scan_like;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};

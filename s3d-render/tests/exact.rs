@@ -3,8 +3,9 @@
 
 use proptest::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3, dvec3, vec3};
-use s3d_geom::{Camera, MeshParts, Pose, TriMesh, scan_like};
+use s3d_geom::{Camera, MeshParts, Pose, TriMesh};
 use s3d_render::{Caster, Hits, NO_FACE, Scene, cast_ray_brute_force, cast_ray_by_ray};
+use s3d_synth::scenes::scan_like;
 use std::path::Path;
 
 /// The same face everywhere, and a depth at most one step of the last place away.

@@ -39,8 +39,8 @@ fn around(location: DVec3, size: u32) -> Vec<Camera> {
 
 #[test]
 fn a_furnished_room() {
-    let mesh = common::furnished_room(20_000);
-    check(&mesh, &around(common::room_location(), 200), 1);
+    let mesh = s3d_synth::scenes::classroom(20_000);
+    check(&mesh, &around(s3d_synth::scenes::CLASSROOM_LOCATION, 200), 1);
     check(&mesh, &around(dvec3(0.3, 5.7, 0.9), 200), 1);
 }
 
@@ -75,10 +75,13 @@ fn odd_cameras(location: DVec3) -> Vec<Camera> {
 
 #[test]
 fn odd_cameras_in_a_room() {
-    let mesh = common::furnished_room(2_000);
-    for location in
-        [common::room_location(), dvec3(4.0, 3.0, 0.0), dvec3(0.0, 0.0, 0.0), dvec3(-5.0, 1.0, 9.0)]
-    {
+    let mesh = s3d_synth::scenes::classroom(2_000);
+    for location in [
+        s3d_synth::scenes::CLASSROOM_LOCATION,
+        dvec3(4.0, 3.0, 0.0),
+        dvec3(0.0, 0.0, 0.0),
+        dvec3(-5.0, 1.0, 9.0),
+    ] {
         for stride in [1, 2, 5, 200] {
             check(&mesh, &odd_cameras(location), stride);
         }
@@ -87,7 +90,7 @@ fn odd_cameras_in_a_room() {
 
 #[test]
 fn a_camera_on_a_face_and_just_off_it() {
-    let mesh = common::furnished_room(500);
+    let mesh = s3d_synth::scenes::classroom(500);
     let [a, b, c] = mesh.triangle(37).map(|p| p.as_dvec3());
     let normal = (b - a).cross(c - a).normalize();
     let on = (a + b + c) / 3.0;
@@ -100,11 +103,11 @@ fn a_camera_on_a_face_and_just_off_it() {
 
 #[test]
 fn far_from_the_worlds_origin() {
-    let mut parts = common::furnished_room(3_000).into_parts();
+    let mut parts = s3d_synth::scenes::classroom(3_000).into_parts();
     let far = vec3(1000.0, -2000.0, 300.0);
     parts.positions.iter_mut().for_each(|p| *p += far);
     let mesh = TriMesh::new(parts).unwrap();
-    check(&mesh, &around(common::room_location() + far.as_dvec3(), 96), 1);
+    check(&mesh, &around(s3d_synth::scenes::CLASSROOM_LOCATION + far.as_dvec3(), 96), 1);
 }
 
 #[test]
@@ -142,18 +145,18 @@ fn triangles_at_random() {
 
 #[test]
 fn a_closed_room_has_no_holes() {
-    let mesh = common::furnished_room(20_000);
+    let mesh = s3d_synth::scenes::classroom(20_000);
     let scene = Scene::new(&mesh);
-    for camera in around(common::room_location(), 512) {
+    for camera in around(s3d_synth::scenes::CLASSROOM_LOCATION, 512) {
         assert!(cast(&scene, &camera).face.pixels().iter().all(|&face| face != NO_FACE));
     }
 }
 
 #[test]
 fn strides_pick_pixels_of_the_whole_image() {
-    let mesh = common::furnished_room(2_000);
+    let mesh = s3d_synth::scenes::classroom(2_000);
     let scene = Scene::new(&mesh);
-    let camera = Camera::perspective(Pose::level(common::room_location(), 0.2), 1.2, 50, 37);
+    let camera = Camera::perspective(Pose::level(s3d_synth::scenes::CLASSROOM_LOCATION, 0.2), 1.2, 50, 37);
     let all = cast(&scene, &camera);
     for stride in [1, 2, 3, 8, 36] {
         let some = cast_strided(&scene, &camera, stride);
@@ -172,7 +175,7 @@ fn strides_pick_pixels_of_the_whole_image() {
 
 #[test]
 fn a_camera_that_is_nowhere_sees_nothing() {
-    let mesh = common::furnished_room(500);
+    let mesh = s3d_synth::scenes::classroom(500);
     let scene = Scene::new(&mesh);
     let camera = Camera::perspective(Pose::level(DVec3::NAN, 0.2), 1.2, 20, 20);
     assert!(cast(&scene, &camera).face.pixels().iter().all(|&face| face == NO_FACE));

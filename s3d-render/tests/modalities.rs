@@ -466,7 +466,7 @@ fn colours_of_corners_are_what_single_pixels_give() {
 
 #[test]
 fn rgb_of_scans_is_what_single_pixels_give() {
-    let mesh = s3d_geom::scan_like(20_000, 5);
+    let mesh = s3d_synth::scenes::scan_like(20_000, 5);
     for camera in all_kinds(dvec3(3.0, 2.5, 1.5)) {
         close(&mesh, &camera, 8);
     }
@@ -484,7 +484,7 @@ fn rgb_of_scans_is_what_single_pixels_give() {
 /// What formats.md says of the other images, a pixel at a time.
 #[test]
 fn images_are_what_single_pixels_give() {
-    let mesh = s3d_geom::scan_like(20_000, 5);
+    let mesh = s3d_synth::scenes::scan_like(20_000, 5);
     let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
     let faces = mesh.faces().len() as u32;
     let index: Vec<u32> = (0..faces).map(|f| f * 631 % (1 << 24)).collect();

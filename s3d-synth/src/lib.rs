@@ -26,6 +26,7 @@ mod files;
 pub mod look;
 mod scan;
 mod scene;
+pub mod scenes;
 
 pub use building::Building;
 #[cfg(feature = "files")]

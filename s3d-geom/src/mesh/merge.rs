@@ -108,45 +108,8 @@ fn append_column<T: Clone>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FaceColor, cuboid, furnished_room, quad};
+    use crate::primitives::{cuboid, quad};
     use glam::Vec3;
-
-    #[test]
-    fn parts_keep_their_attributes_when_they_are_merged() {
-        let textured = furnished_room(7).into_parts();
-        let mut colored = quad([Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y]);
-        colored.colors = vec![[1; 3], [2; 3], [3; 3], [4; 3]];
-        (colored.face_uvs, colored.uvs) = (vec![], vec![]);
-        colored.normals = vec![Vec3::Z];
-        colored.face_normals = vec![[0; 3]; 2];
-        colored.face_tags = vec![4; 2];
-        let plain = cuboid(Vec3::ZERO, Vec3::ONE);
-        let [n, m] = [textured.faces.len() as u32, colored.faces.len() as u32];
-        let all = MeshParts::merge([textured.clone(), colored.clone(), plain, textured.clone()]);
-        let tag = |f: u32| all.face_tags[f as usize];
-        assert_eq!([tag(n - 1), tag(n), tag(n + 1), tag(n + m)], [NO_INDEX, 4, 4, NO_INDEX]);
-        let all = TriMesh::new(all).unwrap();
-        assert_eq!(all.faces().len() as u32, 2 * n + m + 12);
-
-        let first = TriMesh::new(textured).unwrap();
-        for f in 0..n {
-            for g in [f, n + m + 12 + f] {
-                assert_eq!(all.triangle(g), first.triangle(f));
-                match (first.color_of(f), all.color_of(g)) {
-                    (FaceColor::Texture(_, a, uvs), FaceColor::Texture(_, b, same)) => {
-                        assert_eq!((a, uvs), (b, same));
-                    }
-                    (FaceColor::Flat(a), FaceColor::Corners(b)) => assert_eq!([a; 3], b),
-                    other => panic!("{other:?}"),
-                }
-            }
-        }
-        assert!(matches!(all.color_of(n + 1), FaceColor::Corners([[1, ..], [3, ..], [4, ..]])));
-        assert_eq!(all.corner_normals(n), Some([Vec3::Z; 3]));
-        assert_eq!(all.corner_normals(n + m), None);
-        // The box's own material: the first of three, its floor's colour on no face but its own.
-        assert!(all.material_of(n).is_none() && all.material_of(n + m).is_some());
-    }
 
     #[test]
     fn joined_meshes_keep_what_was_mended() {

@@ -71,12 +71,4 @@ mod tests {
         assert_eq!(mesh.take_face_tags(), [10, 12, 14]);
         assert_eq!((0..3).map(|f| mesh.material_of(f).unwrap()).collect::<Vec<_>>(), [0, 2, 4]);
     }
-
-    #[test]
-    fn a_mesh_without_such_faces_is_as_it_was() {
-        let mesh = crate::furnished_room(1);
-        let before = mesh.faces().to_vec();
-        let (mesh, repeated) = mesh.without_repeated_faces();
-        assert_eq!((repeated, mesh.faces()), (0, &before[..]));
-    }
 }

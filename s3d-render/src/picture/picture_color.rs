@@ -360,7 +360,8 @@ mod tests {
     use super::*;
     use crate::simd::lanes::Plain;
     use glam::dvec3;
-    use s3d_geom::{Pose, TriMesh, furnished_room};
+    use s3d_geom::{Pose, TriMesh};
+    use s3d_synth::scenes::furnished_room;
 
     fn pose() -> Pose {
         Pose::from_scanner(

@@ -379,7 +379,7 @@ mod tests {
     /// Cameras beside the centre, and a thing in the room: with the mesh each pixel is where the mesh has it.
     #[test]
     fn parallax_is_taken_out_with_the_mesh() {
-        let mesh = s3d_geom::furnished_room(5);
+        let mesh = s3d_synth::scenes::furnished_room(5);
         let (scene, mip_maps) = (Scene::new(&mesh), crate::MipMaps::new(&mesh));
         let center = Pose::from_scanner(dvec3(2.2, 2.1, 1.4), DQuat::from_rotation_z(0.4));
         let lens = Lens::new([320, 256], dvec2(215.0, 215.0), dvec2(160.0, 128.0), [0.0; 5]).unwrap();

@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn every_face_is_in_one_group_inside_its_box() {
-        let mesh = s3d_geom::scan_like(5000, 3);
+        let mesh = s3d_synth::scenes::scan_like(5000, 3);
         let scene = Scene::new(&mesh);
         let clusters = scene.clusters();
         let mut met = vec![false; mesh.faces().len()];

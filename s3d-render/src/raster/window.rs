@@ -219,7 +219,8 @@ mod tests {
     use super::*;
     use crate::raster::panorama::Panorama;
     use crate::raster::pinhole::Pinhole;
-    use s3d_geom::{Pose, scan_like};
+    use s3d_geom::Pose;
+    use s3d_synth::scenes::scan_like;
 
     #[test]
     fn registers_of_any_width_give_the_same_bits() {

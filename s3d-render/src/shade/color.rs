@@ -404,7 +404,8 @@ fn put_some(colors: &[u32; LANES], these: u32, to: &mut [[u8; 3]]) {
 mod tests {
     use super::*;
     use crate::simd::lanes::Plain;
-    use s3d_geom::{Pose, scan_like};
+    use s3d_geom::Pose;
+    use s3d_synth::scenes::scan_like;
 
     #[test]
     fn every_set_of_instructions_gives_the_same_bytes() {

@@ -158,7 +158,7 @@ mod tests {
     use super::*;
     use crate::simd::lanes::Plain;
     use proptest::prelude::*;
-    use s3d_geom::scan_like;
+    use s3d_synth::scenes::scan_like;
 
     proptest! {
         #[test]

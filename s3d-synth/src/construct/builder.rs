@@ -5,7 +5,7 @@ use crate::BuildingError;
 use crate::look::{Look, Pattern, scaled};
 use crate::scene::Instance;
 use glam::{Vec2, Vec3};
-use s3d_geom::{Aabb, Material, MeshParts, Raster, Texture, TriMesh, Wrap, glam, grid};
+use s3d_geom::{Aabb, Material, MeshParts, Raster, Texture, TriMesh, Wrap, glam, primitives::grid};
 use s3d_label::{Class, Room, RoomType};
 use std::collections::{BTreeMap, BTreeSet};
 

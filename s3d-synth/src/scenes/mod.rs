@@ -1,0 +1,27 @@
+//! Scenes of benches and tests: meshes of any size without an annotation, made in a moment, the same for the same numbers.
+//!
+//! [`furnished_room`] is small and closed, [`classroom`] has a fine texture, [`scan_like`] is as untidy as a scan. Their
+//! first corner is the origin; metres, Z-up.
+//!
+//! ```
+//! use s3d_synth::scenes::{furnished_room, scan_like};
+//!
+//! assert_eq!(scan_like(20_000, 7).faces().len(), 20_000);
+//! assert!(furnished_room(7).aabb().max.z < 3.0);
+//! ```
+
+mod classroom;
+mod furnished_room;
+mod scan_like;
+mod shell;
+
+pub use classroom::{CLASSROOM_LOCATION, classroom};
+pub use furnished_room::furnished_room;
+pub use scan_like::{scan_like, scan_like_rooms};
+
+use s3d_geom::{MeshParts, TriMesh};
+
+#[expect(clippy::expect_used, reason = "fixtures are made here, of finite corners and faces with an area")]
+pub(super) fn checked(parts: MeshParts) -> TriMesh {
+    TriMesh::new(parts).expect("a fixture is a mesh")
+}
