@@ -241,7 +241,7 @@ mod tests {
         assert_eq!(record.fault(root), None);
         write_bytes(&path, b"contend").unwrap();
         assert_eq!(record.fault(root).unwrap(), "a/b/c.txt: other content");
-        write_bytes(&path, b"conten").unwrap();
+        write_bytes(&path, b"parcel").unwrap();
         assert_eq!(record.fault(root).unwrap(), "a/b/c.txt: 6 bytes instead of 7");
         std::fs::remove_file(&path).unwrap();
         assert!(record.fault(root).unwrap().starts_with("a/b/c.txt: "));
