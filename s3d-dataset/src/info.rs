@@ -2,6 +2,7 @@
 
 use crate::context::Context;
 use crate::error::Result;
+use crate::export::SceneSource;
 use crate::export::annotate::{Annotated, annotate, hidden_instances, label_doubts};
 use crate::export::inputs::{AreaInput, Inputs, mesh_doubts};
 use crate::export::locate;
@@ -14,7 +15,6 @@ use s3d_label::{Class, Room};
 use s3d_render::Scene;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::Path;
 
 /// How a scene is looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -106,8 +106,8 @@ pub struct LocationInfo {
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be exported;
 /// [`Error::Cancelled`](crate::Error::Cancelled).
-pub fn info(scene: &Path, options: &InfoOptions, ctx: &Context) -> Result<SceneInfo> {
-    let inputs = Inputs::open(&[scene.to_owned()], options.place_cameras, options.lenient)?;
+pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context) -> Result<SceneInfo> {
+    let inputs = Inputs::open(&[scene.into()], options.place_cameras, options.lenient)?;
     let area = &inputs.areas[0];
     let file = area.read_mesh()?;
     let mut doubts: Vec<String> = area.warnings.iter().chain(&file.warnings).cloned().collect();

@@ -20,7 +20,7 @@ mod xyz;
 pub use context::{Cancel, Context, Observer, Task};
 pub use error::{Error, Result};
 pub use event::{Event, Level, Stage, UnitKind};
-pub use export::Export;
+pub use export::{Export, MemoryScene, SceneSource, SharedScene};
 pub use info::{InfoOptions, LocationInfo, MeshInfo, RoomInfo, SceneInfo, info};
 pub use options::{ExportOptions, PadLabels, canonical_uuid};
 pub use pack::{

@@ -2,6 +2,8 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::export::memory::{SceneSource, SharedScene};
+use crate::store::request::InputRecord;
 use crate::tables::manifest::half_step;
 use glam::DAffine3;
 use s3d_geom::TriMesh;
@@ -13,6 +15,7 @@ use s3d_io::scene::{CameraSource, PictureSource, PublishedArea, PublishedOptions
 use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The largest number that a half float can hold.
 const LARGEST_HALF_M: f32 = 65_504.0;
@@ -42,6 +45,8 @@ pub(crate) struct AreaInput {
     pub(crate) sources: Vec<PathBuf>,
     /// Those among them that are annotations and nothing else.
     pub(crate) annotations: Vec<PathBuf>,
+    /// What it is made from that is no file.
+    pub(crate) records: Vec<InputRecord>,
 }
 
 /// What of an area is opened.
@@ -56,6 +61,7 @@ enum Opened {
 enum MeshSource {
     Files { paths: Vec<PathBuf>, up: UpAxis, options: MeshOptions },
     Published(Box<PublishedArea>),
+    Memory(Arc<MeshFile>),
 }
 
 /// Where an area is looked at from.
@@ -98,7 +104,7 @@ pub(crate) struct Inputs {
 impl Inputs {
     /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan locations,
     /// instead of which locations are placed if `place_m` says how far apart.
-    pub(crate) fn open(scenes: &[PathBuf], place_m: Option<f64>, lenient: bool) -> Result<Self> {
+    pub(crate) fn open(scenes: &[SceneSource], place_m: Option<f64>, lenient: bool) -> Result<Self> {
         let mut areas = Self::open_areas(scenes, place_m, lenient, Opened::All)?;
         let table = label_table(&mut areas)?;
         Ok(Self { areas, table })
@@ -106,7 +112,7 @@ impl Inputs {
 
     /// The same without the annotations, for which a plan stands that has this table: rooms are not known then.
     pub(crate) fn open_planned(
-        scenes: &[PathBuf],
+        scenes: &[SceneSource],
         place_m: Option<f64>,
         lenient: bool,
         table: LabelTable,
@@ -116,7 +122,7 @@ impl Inputs {
     }
 
     fn open_areas(
-        scenes: &[PathBuf],
+        scenes: &[SceneSource],
         place_m: Option<f64>,
         lenient: bool,
         opened: Opened,
@@ -124,17 +130,22 @@ impl Inputs {
         let mut areas: Vec<AreaInput> = Vec::new();
         let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
-        for path in scenes {
-            let area = if path.is_dir() {
-                AreaInput::published(path, None, place_m, opened)?
-            } else {
-                let mut scene = s3d_io::scene::read_scene(path)?;
-                let options = &mut scene.annotation_options;
-                options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
-                // Areas wait beside one another.
-                options.points_in_memory /= scenes.len() as u64;
-                AreaInput::open(scene, place_m, opened)?
+        for scene in scenes {
+            let area = match scene {
+                SceneSource::Memory(scene) => AreaInput::in_memory(scene, place_m, opened)?,
+                SceneSource::Path(path) if path.is_dir() => {
+                    AreaInput::published(path, None, place_m, opened)?
+                }
+                SceneSource::Path(path) => {
+                    let mut scene = s3d_io::read_scene(path)?;
+                    let options = &mut scene.annotation_options;
+                    options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
+                    // Areas wait beside one another.
+                    options.points_in_memory /= scenes.len() as u64;
+                    AreaInput::open(scene, place_m, opened)?
+                }
             };
+            let path = &area.path;
             if let Some(other) = area_of.insert(area.number, path.clone()) {
                 return Err(Error::Input(format!(
                     "{} and {} are both area {}: give each scene an area of its own",
@@ -190,7 +201,7 @@ impl AreaInput {
         let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
         if opened == Opened::All {
             let mut annotations = if scene.annotations.is_empty() {
-                Annotations::of_mesh(&source.read()?, options)?
+                Annotations::of_mesh(source.read()?.as_ref(), options)?
             } else {
                 Annotations::open(&scene.annotations, options)?
             };
@@ -216,9 +227,45 @@ impl AreaInput {
             files: files_of(&scene),
             sources: files_of(&scene),
             annotations: scene.annotations,
+            records: Vec::new(),
             cameras_path,
             pictures: scene.pictures,
             path: scene.path,
+        })
+    }
+
+    /// Takes an area that is no file.
+    fn in_memory(scene: &SharedScene, place_m: Option<f64>, opened: Opened) -> Result<Self> {
+        scene.check()?;
+        let name = scene.name();
+        let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
+        if opened == Opened::All {
+            let mut annotations = scene.annotations.clone();
+            warnings = std::mem::take(&mut annotations.warnings);
+            rooms = number(scene.area, annotations)
+                .map_err(|e| Error::Input(format!("{}: {e}", name.display())))?;
+        }
+        let cameras = match place_m {
+            Some(distance_m) => Cameras::Placed(distance_m),
+            None if scene.locations.is_empty() => {
+                return Err(Error::Input(format!("{}: has no scan locations", name.display())));
+            }
+            None => Cameras::Listed(scene.locations.clone(), vec![None; scene.locations.len()]),
+        };
+        Ok(Self {
+            number: scene.area,
+            source: MeshSource::Memory(Arc::clone(&scene.mesh)),
+            pictures: None,
+            rooms,
+            cameras,
+            cameras_path: name.clone(),
+            path: name,
+            warnings,
+            lenient: false,
+            files: Vec::new(),
+            sources: Vec::new(),
+            annotations: Vec::new(),
+            records: scene.records()?,
         })
     }
 
@@ -276,11 +323,12 @@ impl AreaInput {
             files,
             sources,
             annotations: Vec::new(),
+            records: Vec::new(),
         })
     }
 
     /// Reads the mesh.
-    pub(crate) fn read_mesh(&self) -> Result<MeshFile> {
+    pub(crate) fn read_mesh(&self) -> Result<Arc<MeshFile>> {
         self.source.read()
     }
 
@@ -288,7 +336,7 @@ impl AreaInput {
     fn published_labels(&self) -> Option<&PathBuf> {
         match &self.source {
             MeshSource::Published(area) => area.labels.as_ref(),
-            MeshSource::Files { .. } => None,
+            MeshSource::Files { .. } | MeshSource::Memory(_) => None,
         }
     }
 
@@ -334,16 +382,21 @@ pub(crate) fn mesh_doubts(mesh: &TriMesh) -> Vec<String> {
 }
 
 impl MeshSource {
-    fn read(&self) -> Result<MeshFile> {
-        Ok(match self {
-            Self::Files { paths, up, options } => s3d_io::mesh::read_meshes_with(paths, *up, options)?,
+    fn read(&self) -> Result<Arc<MeshFile>> {
+        let file = match self {
+            Self::Memory(file) => return Ok(Arc::clone(file)),
+            Self::Files { paths, up, options } => s3d_io::read_meshes_with(paths, *up, options)?,
             Self::Published(area) => area.read_mesh()?.file,
-        })
+        };
+        Ok(Arc::new(file))
     }
 
     fn describe(&self) -> String {
         match self {
             Self::Published(area) => area.mesh.display().to_string(),
+            Self::Memory(file) => {
+                file.sources.first().map_or_else(String::new, |s| s.path.display().to_string())
+            }
             Self::Files { paths, .. } => {
                 let more = paths.len() - 1;
                 let first = paths[0].display();

@@ -10,6 +10,7 @@ pub(crate) mod finish;
 pub(crate) mod images;
 pub(crate) mod inputs;
 pub(crate) mod location;
+pub(crate) mod memory;
 pub(crate) mod modality;
 pub(crate) mod overlap;
 pub(crate) mod pictures;
@@ -36,6 +37,8 @@ use crate::tables::summary::{Account, Summary};
 use area::{Common, Stage};
 use area_plan::AreaPlan;
 use finish::{Made, finish, missing_units};
+pub use memory::{MemoryScene, SceneSource, SharedScene};
+
 use inputs::{AreaInput, Cameras, Inputs};
 use pictures::Pictures;
 use points::check_density;
@@ -45,12 +48,13 @@ use s3d_io::fs::SyncAhead;
 use s3d_io::mesh::MeshFile;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use views::{Candidate, select_requested};
 
 /// An export: scenes to a data set. See the crate's page for an example.
 #[derive(Clone, Debug)]
 pub struct Export {
-    scenes: Vec<PathBuf>,
+    scenes: Vec<SceneSource>,
     options: ExportOptions,
     overwrite: bool,
     allowed: Vec<String>,
@@ -59,8 +63,9 @@ pub struct Export {
 }
 
 impl Export {
-    /// Of these scene files (`scene.toml`) or folders of published areas (`area_3`), one an area.
-    pub fn new<P: Into<PathBuf>>(scenes: impl IntoIterator<Item = P>) -> Self {
+    /// Of these scenes, one an area: paths of scene files (`scene.toml`) or of folders of published areas (`area_3`), or
+    /// [values in memory](MemoryScene).
+    pub fn new<S: Into<SceneSource>>(scenes: impl IntoIterator<Item = S>) -> Self {
         Self {
             scenes: scenes.into_iter().map(Into::into).collect(),
             options: ExportOptions::default(),
@@ -149,7 +154,7 @@ pub(crate) struct Job<'a> {
     /// The pictures of each area, if colours are taken from some.
     pictures: Vec<Option<Pictures>>,
     /// The mesh, if there is one area.
-    single: Option<MeshFile>,
+    single: Option<Arc<MeshFile>>,
     /// Where labels and scores come from, if they were made before.
     pub(crate) plan: Option<&'a Plan>,
 }
@@ -171,7 +176,7 @@ pub(crate) enum Scope {
 /// Turns scenes into a data set; with a plan, labels and scores are taken from there.
 fn export(
     ctx: &Context,
-    scenes: &[PathBuf],
+    scenes: &[SceneSource],
     target: &Target<'_>,
     options: &ExportOptions,
     plan: Option<&Plan>,
@@ -207,7 +212,7 @@ pub(crate) fn summarize(account: Account<'_>, layout: &Layout, request: &Request
 impl<'a> Job<'a> {
     /// Opens the input of an export into `layout`, and refuses what cannot be exported. Nothing is written.
     pub(crate) fn open(
-        scenes: &[PathBuf],
+        scenes: &[SceneSource],
         layout: &Layout,
         options: &'a ExportOptions,
         plan: Option<&'a Plan>,
@@ -230,7 +235,7 @@ impl<'a> Job<'a> {
         }
         // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a single area is
         // kept from then on; several are read again where they are needed, so that they never share memory.
-        let mut single: Option<MeshFile> = None;
+        let mut single: Option<Arc<MeshFile>> = None;
         let mut companions = Vec::new();
         for area in &inputs.areas {
             ctx.check()?;

@@ -9,7 +9,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::export::finish::is_chosen;
 use crate::export::views::{Candidate, select_requested};
-use crate::export::{Job, Labelled, Scope, Target};
+use crate::export::{Job, Labelled, SceneSource, Scope, Target};
 use crate::options::ExportOptions;
 use crate::shard::assignment::{Deal, Shard, location_cost, rest_cost};
 use crate::shard::plan::Plan;
@@ -20,13 +20,12 @@ use crate::tables::summary::{Account, Summary, UnitTally, ViewTally};
 use s3d_io::dataset::Layout;
 use s3d_io::fs::Checksum;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
 use std::time::Instant;
 
 /// Does a shard's part of an export into OUT, which other shards may share. It is no data set until it is merged.
 pub(crate) fn export_shard(
     ctx: &Context,
-    scenes: &[PathBuf],
+    scenes: &[SceneSource],
     target: &Target<'_>,
     options: &ExportOptions,
     shard: Shard,

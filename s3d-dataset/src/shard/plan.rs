@@ -7,9 +7,9 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::Job;
 use crate::export::area_plan::AreaPlan;
 use crate::export::transfer::bring;
+use crate::export::{Job, SceneSource};
 use crate::options::ExportOptions;
 use crate::shard::assignment::Shard;
 use crate::store::checked::{read_checked, write_checked};
@@ -166,8 +166,8 @@ fn refuse_other(folder: &Path, there: &Request, now: &Request) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`] if the folder holds something else, or a plan of another call.
-pub fn plan(
-    scenes: &[PathBuf],
+pub fn plan<S: Clone + Into<SceneSource>>(
+    scenes: &[S],
     folder: &Path,
     options: &ExportOptions,
     shard: Option<Shard>,
@@ -191,7 +191,8 @@ pub fn plan(
     let account = Account::new(ctx);
     let layout = Layout::new(folder);
     refuse_foreign(folder)?;
-    let job = Job::open(scenes, &layout, options, None, &account)?;
+    let scenes: Vec<SceneSource> = scenes.iter().cloned().map(Into::into).collect();
+    let job = Job::open(&scenes, &layout, options, None, &account)?;
     let path = plan_file(folder);
     if path.exists() {
         let there = read_plan_file(&path)?;

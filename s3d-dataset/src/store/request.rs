@@ -262,7 +262,7 @@ pub(crate) fn requested_areas(
                 Cameras::Placed(distance_m) => Some(distance_m),
                 Cameras::Listed(..) => None,
             },
-            inputs: inputs.collect::<Result<_>>()?,
+            inputs: inputs.chain(area.records.iter().cloned().map(Ok)).collect::<Result<_>>()?,
         });
     }
     Ok(requested)

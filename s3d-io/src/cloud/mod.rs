@@ -10,6 +10,7 @@ mod mat;
 #[cfg(feature = "npy")]
 pub(crate) mod npy;
 mod of_faces;
+mod of_memory;
 #[cfg(feature = "mesh")]
 mod of_mesh;
 mod open;
@@ -26,6 +27,7 @@ pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annot
 pub use mat::{MatArea, MatObject, MatRoom, MatWriter};
 #[cfg(feature = "npy")]
 pub use npy::NpyWriter;
+pub use of_memory::AnnotatedPoints;
 pub use passes::{InstancePasses, InstanceReader, PointPasses};
 #[cfg(feature = "ply")]
 pub use ply::{

@@ -51,6 +51,12 @@ pub struct MeshFile {
 }
 
 impl MeshFile {
+    /// A mesh that no file holds, under the name that messages and the manifest call it.
+    pub fn in_memory(name: &str, mesh: TriMesh) -> Self {
+        let texture_files = vec![None; mesh.textures().len()];
+        Self { texture_files, ..Self::new(Path::new(name), mesh) }
+    }
+
     /// A mesh of the file `path`, with nothing else to say about it.
     pub(crate) fn new(path: &Path, mesh: TriMesh) -> Self {
         let (texture_files, warnings, labels, companions) = Default::default();

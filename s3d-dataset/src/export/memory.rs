@@ -1,0 +1,176 @@
+//! An area that is not read from files.
+
+use crate::error::{Error, Result};
+use crate::store::request::InputRecord;
+use s3d_geom::{MeshParts, PointCloud, TriMesh, Wrap};
+use s3d_io::cloud::Annotations;
+use s3d_io::{ChecksumOfParts, MeshFile, ScanLocation};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What the mesh of a [`MemoryScene`] is called in messages and the manifest.
+const MESH: &str = "mesh in memory";
+
+/// One area whose mesh, annotations and scan locations the caller has at hand.
+#[derive(Clone, Debug)]
+pub struct MemoryScene {
+    /// Its number, from 1.
+    pub area: u32,
+    /// Its surface, world metres, Z-up. No two faces may have the same corners
+    /// ([`TriMesh::without_repeated_faces`]).
+    pub mesh: TriMesh,
+    /// What its surface is.
+    pub annotations: Annotations,
+    /// Where images are rendered, each with a uuid of its own; may be empty with
+    /// [`ExportOptions::place_cameras`](crate::ExportOptions::place_cameras).
+    pub locations: Vec<ScanLocation>,
+}
+
+/// One area of an export: a scene file (`scene.toml`) or the folder of a published area (`area_3`), by its path, or values
+/// in memory.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum SceneSource {
+    /// Read from this path.
+    Path(PathBuf),
+    /// At hand.
+    Memory(Arc<SharedScene>),
+}
+
+impl<P: Into<PathBuf>> From<P> for SceneSource {
+    fn from(path: P) -> Self {
+        Self::Path(path.into())
+    }
+}
+
+impl From<MemoryScene> for SceneSource {
+    fn from(scene: MemoryScene) -> Self {
+        let MemoryScene { area, mesh, annotations, locations } = scene;
+        let mesh = Arc::new(MeshFile::in_memory(MESH, mesh));
+        Self::Memory(Arc::new(SharedScene { area, mesh, annotations, locations }))
+    }
+}
+
+/// A [`MemoryScene`] that several exports may share.
+#[derive(Debug)]
+pub struct SharedScene {
+    pub(crate) area: u32,
+    pub(crate) mesh: Arc<MeshFile>,
+    pub(crate) annotations: Annotations,
+    pub(crate) locations: Vec<ScanLocation>,
+}
+
+impl SharedScene {
+    /// What messages call it.
+    pub(crate) fn name(&self) -> PathBuf {
+        format!("area {} in memory", self.area).into()
+    }
+
+    /// Refuses what files could not hold.
+    pub(crate) fn check(&self) -> Result<()> {
+        let name = self.name();
+        let refuse = |what: String| Err(Error::Input(format!("{}: {what}", name.display())));
+        if self.area == 0 {
+            return refuse("areas count from 1".to_owned());
+        }
+        let (_, repeated) = self.mesh.mesh.clone().without_repeated_faces();
+        if repeated > 0 {
+            return refuse(format!(
+                "{repeated} faces have the corners of earlier ones: leave them out (TriMesh::without_repeated_faces)"
+            ));
+        }
+        for location in &self.locations {
+            if crate::canonical_uuid(&location.uuid).ok().as_deref() != Some(&location.uuid) {
+                return refuse(format!("uuid {:?} is not 32 lower-case hexadecimal digits", location.uuid));
+            }
+        }
+        Ok(())
+    }
+
+    /// Its parts by name with the checksums of their values, by which the same call goes on.
+    pub(crate) fn records(&self) -> Result<Vec<InputRecord>> {
+        let mut record = Vec::new();
+        let mut push = |name: &str, sum: ChecksumOfParts| {
+            let (bytes, xxh3_128) = sum.finish();
+            record.push(InputRecord { path: format!("memory:{name}"), bytes, xxh3_128 });
+        };
+        push("mesh", sum_of_mesh(self.mesh.mesh.parts()));
+        push("annotations", self.sum_of_annotations()?);
+        push("locations", self.sum_of_locations());
+        Ok(record)
+    }
+
+    fn sum_of_annotations(&self) -> Result<ChecksumOfParts> {
+        let mut sum = ChecksumOfParts::default();
+        let mut cloud = PointCloud::default();
+        for room in &self.annotations.rooms {
+            for instance in &room.instances {
+                let name = format!("{} {}_{}\n", room.room, instance.class, instance.number);
+                sum.add(name.as_bytes());
+                cloud.clear();
+                instance.read(&mut cloud)?;
+                add(&mut sum, &cloud.positions, |p| p.to_array().map(f32::to_le_bytes));
+                add(&mut sum, &cloud.colors, |c| [*c]);
+                add(&mut sum, &cloud.faces, |f| [f.to_le_bytes()]);
+            }
+        }
+        Ok(sum)
+    }
+
+    fn sum_of_locations(&self) -> ChecksumOfParts {
+        let mut sum = ChecksumOfParts::default();
+        for location in &self.locations {
+            sum.add(location.uuid.as_bytes());
+            let (at, rt) = (location.pose.location.to_array(), location.pose.rt_matrix());
+            let numbers = at.into_iter().chain(rt.into_iter().flatten());
+            numbers.for_each(|number| sum.add(&number.to_le_bytes()));
+        }
+        sum
+    }
+}
+
+/// The length of a column, and its elements.
+fn add<T, const N: usize, const M: usize>(
+    sum: &mut ChecksumOfParts,
+    column: &[T],
+    bytes: impl Fn(&T) -> [[u8; M]; N],
+) {
+    sum.add(&(column.len() as u64).to_le_bytes());
+    let mut block = Vec::with_capacity(N * M * column.len().min(1 << 12));
+    for part in column.chunks(1 << 12) {
+        block.clear();
+        part.iter().for_each(|element| block.extend_from_slice(bytes(element).as_flattened()));
+        sum.add(&block);
+    }
+}
+
+fn sum_of_mesh(parts: &MeshParts) -> ChecksumOfParts {
+    let mut sum = ChecksumOfParts::default();
+    let triple = |t: &[u32; 3]| t.map(u32::to_le_bytes);
+    add(&mut sum, &parts.positions, |p| p.to_array().map(f32::to_le_bytes));
+    add(&mut sum, &parts.faces, triple);
+    add(&mut sum, &parts.colors, |c| [*c]);
+    add(&mut sum, &parts.uvs, |p| p.to_array().map(f32::to_le_bytes));
+    add(&mut sum, &parts.face_uvs, triple);
+    add(&mut sum, &parts.normals, |p| p.to_array().map(f32::to_le_bytes));
+    add(&mut sum, &parts.face_normals, triple);
+    add(&mut sum, &parts.face_materials, |m| [m.to_le_bytes()]);
+    for material in &parts.materials {
+        sum.add(material.name.as_bytes());
+        sum.add(&[0]);
+        sum.add(&material.color);
+        sum.add(&material.texture.map_or(u64::MAX, u64::from).to_le_bytes());
+    }
+    for texture in &parts.textures {
+        sum.add(texture.name.as_bytes());
+        sum.add(&[0]);
+        sum.add(&texture.image.width().to_le_bytes());
+        add(&mut sum, texture.image.pixels(), |p| [*p]);
+        sum.add(&texture.wrap.map(|wrap| match wrap {
+            Wrap::Repeat => 0,
+            Wrap::Mirror => 1,
+            Wrap::Clamp => 2,
+        }));
+    }
+    sum
+}
