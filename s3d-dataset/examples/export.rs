@@ -1,5 +1,7 @@
 //! A whole export with its progress: `cargo run --release -p s3d-dataset --example export SCENE.toml OUT`.
 
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
 use s3d_dataset::{Context, Event, Export};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -1,6 +1,8 @@
 //! A data set of a mesh, labels and a camera that are made here: no file is read.
 //! `cargo run --release -p s3d-dataset --example in_memory OUT`
 
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
 use s3d_dataset::{Context, Export, ExportOptions, MemoryScene};
 use s3d_geom::glam::{Vec3, dvec3, vec3};
 use s3d_geom::{Pose, TriMesh};

@@ -1,5 +1,7 @@
 //! Checks a data set: `cargo run --release -p s3d-dataset --example verify OUT`.
 
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
 use s3d_dataset::{Context, VerifyOptions, verify};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

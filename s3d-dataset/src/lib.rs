@@ -1,4 +1,41 @@
-//! The data set as a whole.
+//! 2D-3D-Semantic data sets as a whole.
+//!
+//! - [`Export`] turns scenes, from files or [in memory](MemoryScene), into a data set under the published names, with
+//!   [`ExportOptions`]. An export that was stopped, cancelled or killed goes on when the same call is made again, and ends
+//!   with the same bytes. [`plan`], [`Shard`] and [`merge`] share one among many machines.
+//! - [`verify`] reads a data set back, every pixel of it, and returns a [`VerifyReport`]; [`statistics`] counts it; [`info`]
+//!   tells what a scene holds before it is exported.
+//! - [`pack`] makes packages for trainers of it, [`profile`] what loaders of point clouds want; [`xyz`] makes its world
+//!   coordinates again. [`render`] and [`sample`] need a mesh alone.
+//!
+//! Every call is handed a [`Context`]: a [`Cancel`] that ends it early, from any thread, and an [`Observer`] that is told
+//! [what happens](Event). Nothing here prints, reads the command line, handles signals or exits; several calls may run in one
+//! process at the same time. Work is done on the current rayon pool. World frame everywhere: metres, Z-up, right-handed.
+//!
+//! ```
+//! use s3d_dataset::{Context, Export, ExportOptions, VerifyOptions};
+//! use s3d_synth::{Building, ScanOptions};
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let folder = folder.path();
+//! // A scene: here the built-in one, as files.
+//! let scene = Building::demo().build()?.write_scan(&folder.join("scan"), &ScanOptions::default(), || true)?;
+//!
+//! let out = folder.join("dataset");
+//! let options = ExportOptions { views: 2, size: 64, pano_width: 128, points_per_m2: 20.0, ..ExportOptions::default() };
+//! let export = Export::new([scene]).options(options);
+//! let summary = export.run(&out, &Context::default())?.expect("a new folder");
+//! assert_eq!((summary.areas, summary.tally.panoramas.images), (1, summary.locations));
+//!
+//! // Called again, there is nothing left to do.
+//! assert!(export.run(&out, &Context::default())?.is_none());
+//! let report = s3d_dataset::verify(&out, &VerifyOptions::default(), &Context::default())?;
+//! assert_eq!(report.fault_count(), 0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+// What a file holds must not make it panic; loops index by what was checked.
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 mod context;
 mod error;
@@ -36,3 +73,8 @@ pub use tables::statistics::{AreaStatistics, RoomTypeStatistics, Statistics, sta
 pub use tables::summary::{ImageTally, Summary, UnitTally, ViewTally};
 pub use verify::{FaultGroup, VerifyOptions, VerifyReport, verify};
 pub use xyz::{XyzOptions, xyz};
+
+/// The README's example, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

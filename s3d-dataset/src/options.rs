@@ -139,7 +139,7 @@ impl ExportOptions {
             ("size", (8..=16_384).contains(&self.size), "from 8 to 16384"),
             (
                 "pano_width",
-                (8..=32_768).contains(&self.pano_width) && self.pano_width % 2 == 0,
+                (8..=32_768).contains(&self.pano_width) && self.pano_width.is_multiple_of(2),
                 "an even number from 8 to 32768",
             ),
             ("points_per_m2", positive(self.points_per_m2), "above 0"),

@@ -89,7 +89,9 @@ fn an_export_that_is_cancelled_half_way_goes_on_to_the_same_bytes() {
     // Another call is refused, the same one goes on.
     let other = Export::new([&scene]).options(options(4)).run(&stopped, &Context::default());
     assert!(matches!(other, Err(Error::Usage(_))));
+    assert!(cancel.is_cancelled());
     cancel.reset();
+    let context = Context::default().cancelled_by(cancel);
     assert!(export.run(&stopped, &context).unwrap().is_some());
     assert_same(&whole, &stopped);
     assert!(export.run(&stopped, &context).unwrap().is_none(), "nothing is left to do");

@@ -316,13 +316,14 @@ pub(crate) fn score(plan: &AreaPlan, stage: &Stage<'_>, common: Common<'_>) -> R
     }
     let step = account.stage(Step::Score, Some(number));
     let scoring = Scoring {
+        area: number,
         views: options.views,
         size: options.size,
         stride: options.entropy_stride,
         seed: options.seed,
     };
     let (labels, scene) = (&plan.annotated.face_labels, &stage.scene);
-    score_area(ctx, number, &missing, scene, labels, table, scoring, |uuid, entropies| {
+    score_area(ctx, &missing, scene, labels, table, scoring, |uuid, entropies| {
         journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))
     })?;
     step.end();

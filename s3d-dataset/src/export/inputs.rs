@@ -137,7 +137,7 @@ impl Inputs {
                     AreaInput::published(path, None, place_m, opened)?
                 }
                 SceneSource::Path(path) => {
-                    let mut scene = s3d_io::read_scene(path)?;
+                    let mut scene = s3d_io::scene::read_scene(path)?;
                     let options = &mut scene.annotation_options;
                     options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
                     // Areas wait beside one another.
@@ -385,7 +385,7 @@ impl MeshSource {
     fn read(&self) -> Result<Arc<MeshFile>> {
         let file = match self {
             Self::Memory(file) => return Ok(Arc::clone(file)),
-            Self::Files { paths, up, options } => s3d_io::read_meshes_with(paths, *up, options)?,
+            Self::Files { paths, up, options } => s3d_io::mesh::read_meshes_with(paths, *up, options)?,
             Self::Published(area) => area.read_mesh()?.file,
         };
         Ok(Arc::new(file))

@@ -3,8 +3,10 @@
 use crate::error::{Error, Result};
 use crate::store::request::InputRecord;
 use s3d_geom::{MeshParts, PointCloud, TriMesh, Wrap};
+use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::Annotations;
-use s3d_io::{ChecksumOfParts, MeshFile, ScanLocation};
+use s3d_io::fs::ChecksumOfParts;
+use s3d_io::mesh::MeshFile;
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -47,6 +47,8 @@ impl Candidate {
 /// How candidates are drawn and scored.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scoring {
+    /// The area of the locations.
+    pub(crate) area: u32,
     /// Candidates a location.
     pub(crate) views: u32,
     /// Image size in pixels.
@@ -87,7 +89,6 @@ fn draw(
 /// What is done goes to `each`, a location at a time, by whichever thread: its uuid, and the entropies of its candidates.
 pub(crate) fn score_area(
     ctx: &Context,
-    area: u32,
     locations: &[&ScanLocation],
     scene: &Scene<'_>,
     face_labels: &[LabelId],
@@ -97,7 +98,7 @@ pub(crate) fn score_area(
 ) -> Result<()> {
     let mut candidates = Vec::with_capacity(locations.len() * scoring.views as usize);
     for (index, location) in locations.iter().enumerate() {
-        candidates.extend(draw(area, index, &location.uuid, scoring.views, scoring.seed, None));
+        candidates.extend(draw(scoring.area, index, &location.uuid, scoring.views, scoring.seed, None));
     }
     if scoring.views == 0 {
         return locations.iter().try_for_each(|location| each(&location.uuid, Vec::new()));

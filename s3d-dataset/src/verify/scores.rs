@@ -35,6 +35,7 @@ pub(crate) fn check(
     let Some(candidates) = views.candidates_of_a_location(area) else { return Ok(()) };
     let options = &stage.told.options;
     let scoring = Scoring {
+        area,
         views: candidates,
         size: options.size,
         stride: options.entropy_stride,
@@ -43,7 +44,7 @@ pub(crate) fn check(
     let labels: Vec<LabelId> = stage.mesh.labels.iter().map(|l| LabelId(*l)).collect();
     let path = stage.layout.views_json(area);
     let locations: Vec<&ScanLocation> = located.iter().collect();
-    score_area(ctx, area, &locations, stage.scene, &labels, &table, scoring, |uuid, scores| {
+    score_area(ctx, &locations, stage.scene, &labels, &table, scoring, |uuid, scores| {
         let checks = stage.report.of(ENTROPIES, &path);
         for (record, score) in views.of_location(area, uuid).zip(scores) {
             checks.check(record.entropy == score, || {

@@ -144,8 +144,11 @@ mod tests {
 
     #[test]
     fn points_come_back_in_blocks_and_whole() {
-        let given =
-            [instance("office_2", Class::Wall, 1, 3), instance("WC_1", Class::Floor, 1, 1), instance("office_2", Class::Chair, 7, 5)];
+        let given = [
+            instance("office_2", Class::Wall, 1, 3),
+            instance("WC_1", Class::Floor, 1, 1),
+            instance("office_2", Class::Chair, 7, 5),
+        ];
         let found = Annotations::from_points(given).unwrap();
         let names: Vec<String> = found.rooms.iter().map(|r| r.room.to_string()).collect();
         assert_eq!(names.len(), 2);
