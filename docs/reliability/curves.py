@@ -2,7 +2,7 @@
 """How time and memory of `s3d export` grow with a scan: makes scans of growing size with the example `large_scene`,
 exports each, and writes `large.csv` and `large.svg` beside itself.
 
-    cargo build --release -p s3d-cli --bin s3d --example large_scene
+    cargo build --release -p s3d-cli -p s3d-synth --bin s3d --example large_scene
     docs/reliability/curves.py --work /somewhere/with/25/GB [--only points,tree,faces,materials,locations,labels] [--most N]
 
 Measured are the process's wall clock, its user and system time and its peak memory (getrusage of the child), beside the

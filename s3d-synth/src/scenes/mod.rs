@@ -1,7 +1,7 @@
 //! Scenes of benches and tests: meshes of any size without an annotation, made in a moment, the same for the same numbers.
 //!
 //! [`furnished_room`] is small and closed, [`classroom`] has a fine texture, [`scan_like`] is as untidy as a scan. Their
-//! first corner is the origin; metres, Z-up.
+//! first corner is the origin; metres, Z-up. `LargeScan` writes the files of a scan of any size.
 //!
 //! ```
 //! use s3d_synth::scenes::{furnished_room, scan_like};
@@ -12,11 +12,15 @@
 
 mod classroom;
 mod furnished_room;
+#[cfg(feature = "files")]
+mod large;
 mod scan_like;
 mod shell;
 
 pub use classroom::{CLASSROOM_LOCATION, classroom};
 pub use furnished_room::furnished_room;
+#[cfg(feature = "files")]
+pub use large::{LargeScan, LargeScanSummary, PointFormat};
 pub use scan_like::{scan_like, scan_like_rooms};
 
 use s3d_geom::{MeshParts, TriMesh};
