@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::modality::{Image, Look, Prints};
+use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::store::refuse_existing;
 use s3d_geom::{Camera, Projection};
 use s3d_io::dataset::Conventions;
@@ -87,7 +87,7 @@ pub fn render(
             camera.pose.location, b.min, b.max
         ));
     }
-    let look = Look {
+    let channels = Channels {
         scene: &scene,
         textures: &textures,
         pictures: None,
@@ -99,7 +99,7 @@ pub fn render(
     };
     create_dir(output)?;
     let kinds = images.map(|(image, _)| image);
-    look.encode(&kinds, &hits, camera, &mut Prints::default(), |image, file| {
+    channels.encode(&kinds, &hits, camera, &mut ImageBuffers::default(), |image, file| {
         let name = images.iter().find(|(other, _)| *other == image).map_or("image", |(_, name)| name);
         write_bytes(&output.join(name), &file).map(drop)
     })?;

@@ -2,13 +2,13 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::event::{Stage as Step, UnitKind};
+use crate::event::{Stage, UnitKind};
 use crate::export::annotate::{Annotated, annotate, hidden_instances, label_doubts};
 use crate::export::area_plan::{AreaPlan, RoomNames};
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
 use crate::export::inputs::{AreaInput, Cameras};
 use crate::export::location::{Outlook, room_of};
-use crate::export::modality::Look;
+use crate::export::modality::Channels;
 use crate::export::overlap::overlap_doubts;
 use crate::export::pictures::Pictures;
 use crate::export::points::write_points;
@@ -16,7 +16,9 @@ use crate::export::views::{Candidate, Scoring, score_area};
 use crate::options::ExportOptions;
 use crate::place::{Ground, Located, Placement, place_locations};
 use crate::shard::plan::Plan;
-use crate::store::journal::{Done, Journal, LabelsDone, LocationDone, RestDone, ScoresDone, Unit, tally_of};
+use crate::store::journal::{
+    AssetsDone, Done, Journal, LabelsDone, LocationDone, ScoresDone, Unit, tally_of,
+};
 use crate::tables::listing;
 use crate::tables::manifest::{AreaEntry, XyzLoss};
 use crate::tables::records;
@@ -61,12 +63,12 @@ impl Common<'_> {
 const LARGE_MESH: usize = 2_000_000;
 
 /// A mesh that is ready for rays.
-pub(crate) struct Stage<'m> {
+pub(crate) struct PreparedMesh<'m> {
     file: &'m MeshFile,
     scene: Scene<'m>,
 }
 
-impl<'m> Stage<'m> {
+impl<'m> PreparedMesh<'m> {
     /// Prepares the mesh, and its nearest faces (at the same time, unless it is large), which are needed for its labels only.
     pub(crate) fn new(file: &'m MeshFile) -> (Self, NearestFaces<'m>) {
         let (scene, nearest) = match file.mesh.faces().len() {
@@ -81,8 +83,8 @@ impl<'m> Stage<'m> {
         if !with_nearest {
             return (Self::for_rays(file), None);
         }
-        let (stage, nearest) = Self::new(file);
-        (stage, Some(nearest))
+        let (prepared, nearest) = Self::new(file);
+        (prepared, Some(nearest))
     }
 
     /// The mesh's nearest faces.
@@ -163,16 +165,16 @@ pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<AreaPlan
 /// Labels an area, keeps what is known then, and writes the files of its labels, if that is ours and was not done before.
 pub(crate) fn label_area(
     area: &AreaInput,
-    stage: &Stage<'_>,
+    prepared: &PreparedMesh<'_>,
     nearest: NearestFaces<'_>,
     common: Common<'_>,
 ) -> Result<AreaPlan> {
     let ctx = common.account.ctx;
     let Common { table, layout, options, journal, account, is_ours, .. } = common;
     let number = area.number;
-    let Stage { file, scene } = stage;
+    let PreparedMesh { file, scene } = prepared;
 
-    let labelling = account.stage(Step::Label, Some(number));
+    let labelling = account.stage(Stage::Label, Some(number));
     let started = Instant::now();
     let unit = Unit::Labels(number);
     let writes = !journal.finished().has(&unit) && is_ours(&unit);
@@ -305,16 +307,16 @@ pub(crate) fn is_unscored(plan: &AreaPlan, common: &Common<'_>) -> bool {
 }
 
 /// Scores the candidates of those locations of an area that are ours and not scored yet.
-pub(crate) fn score(plan: &AreaPlan, stage: &Stage<'_>, common: Common<'_>) -> Result<()> {
+pub(crate) fn score(plan: &AreaPlan, prepared: &PreparedMesh<'_>, common: Common<'_>) -> Result<()> {
     let ctx = common.account.ctx;
     let Common { table, options, journal, account, .. } = common;
     let number = plan.area;
-    check_faces(plan, stage)?;
+    check_faces(plan, prepared)?;
     let missing = unscored(plan, &common);
     if missing.is_empty() {
         return Ok(());
     }
-    let step = account.stage(Step::Score, Some(number));
+    let step = account.stage(Stage::Score, Some(number));
     let scoring = Scoring {
         area: number,
         views: options.views,
@@ -322,7 +324,7 @@ pub(crate) fn score(plan: &AreaPlan, stage: &Stage<'_>, common: Common<'_>) -> R
         stride: options.entropy_stride,
         seed: options.seed,
     };
-    let (labels, scene) = (&plan.annotated.face_labels, &stage.scene);
+    let (labels, scene) = (&plan.annotated.face_labels, &prepared.scene);
     score_area(ctx, &missing, scene, labels, table, scoring, |uuid, entropies| {
         journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))
     })?;
@@ -332,8 +334,8 @@ pub(crate) fn score(plan: &AreaPlan, stage: &Stage<'_>, common: Common<'_>) -> R
 }
 
 /// Refuses labels of another mesh.
-fn check_faces(plan: &AreaPlan, stage: &Stage<'_>) -> Result<()> {
-    let (labels, faces) = (plan.annotated.face_labels.len(), stage.file.mesh.faces().len());
+fn check_faces(plan: &AreaPlan, prepared: &PreparedMesh<'_>) -> Result<()> {
+    let (labels, faces) = (plan.annotated.face_labels.len(), prepared.file.mesh.faces().len());
     if labels == faces {
         return Ok(());
     }
@@ -363,18 +365,18 @@ fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> Are
 }
 
 /// Writes an area's meshes and points, all but its images.
-fn write_rest(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common: Common<'_>) -> Result<()> {
+fn write_area_assets(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common: Common<'_>) -> Result<()> {
     let ctx = common.account.ctx;
     let Common { table, layout, options, journal, account, .. } = common;
     let (number, started) = (area.number, Instant::now());
-    let meshes = account.stage(Step::Meshes, Some(number));
+    let meshes = account.stage(Stage::Meshes, Some(number));
     let mesh_dir = layout.mesh_dir(number);
     let per_face: Vec<u32> = plan.annotated.face_labels.iter().map(|l| l.0).collect();
     write_colored_mesh(&mesh_dir, file, options.compression)?;
     s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
     meshes.end();
     ctx.check()?;
-    let sampling = account.stage(Step::Points, Some(number));
+    let sampling = account.stage(Stage::Points, Some(number));
     let density = Density::PerM2(options.points_per_m2);
     let points = write_points(ctx, layout, &file.mesh, plan, table, density, options.seed)?;
     let mut paths = listing::walk(&mesh_dir)?;
@@ -383,7 +385,7 @@ fn write_rest(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common: Common
     paths.extend(listing::walk(&layout.s3dis_area_dir(number))?);
     let files = listing::records(ctx, layout, &paths)?;
     let tally = tally_of(&files);
-    journal.write(Done::Rest(RestDone { area: number, points, files }))?;
+    journal.write(Done::Assets(AssetsDone { area: number, points, files }))?;
     sampling.end();
     account.unit_finished(UnitKind::Assets, number, None, &tally, started);
     Ok(())
@@ -434,7 +436,7 @@ fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
 /// Renders those locations of an area that are to be done, and beside them writes its meshes and points if they are.
 pub(crate) fn render_area(
     area: &AreaInput,
-    stage: &Stage<'_>,
+    prepared: &PreparedMesh<'_>,
     plan: &AreaPlan,
     pictures: Option<&Pictures>,
     common: Common<'_>,
@@ -444,9 +446,9 @@ pub(crate) fn render_area(
     let ctx = common.account.ctx;
     let Common { layout, options, journal, account, .. } = common;
     let AreaPlan { annotated, locations, location_rooms, .. } = plan;
-    let Stage { file, scene } = stage;
+    let PreparedMesh { file, scene } = prepared;
     let number = area.number;
-    check_faces(plan, stage)?;
+    check_faces(plan, prepared)?;
     create_dir(&layout.mesh_dir(number))?;
     let textures = MipMaps::new(&file.mesh);
     let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
@@ -464,7 +466,7 @@ pub(crate) fn render_area(
     let job = ImageJob {
         layout,
         area: number,
-        look: Look {
+        channels: Channels {
             scene,
             textures: &textures,
             pictures: None,
@@ -483,10 +485,10 @@ pub(crate) fn render_area(
         pano_width: options.pano_width,
         each: &finish_location,
     };
-    let rendering = account.stage(Step::Render, Some(number));
-    let rest = || write_rest(area, file, plan, common);
-    let writes_rest = todo.contains(&Unit::Rest(number));
-    write_images(ctx, &job, candidates, if writes_rest { Some(&rest) } else { None })?;
+    let rendering = account.stage(Stage::Render, Some(number));
+    let assets = || write_area_assets(area, file, plan, common);
+    let writes_assets = todo.contains(&Unit::Assets(number));
+    write_images(ctx, &job, candidates, if writes_assets { Some(&assets) } else { None })?;
     rendering.end();
     Ok(())
 }

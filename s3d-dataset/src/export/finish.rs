@@ -20,7 +20,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// What an export has made.
-pub(crate) struct Made {
+pub(crate) struct Totals {
     /// All files, the manifest too.
     pub(crate) files: u64,
     pub(crate) bytes: u64,
@@ -44,7 +44,7 @@ pub(crate) fn missing_units(request: &Request, finished: &Finished) -> Vec<Unit>
                 missing.push(Unit::Location(area, uuid.clone()));
             }
         }
-        missing.push(Unit::Rest(area));
+        missing.push(Unit::Assets(area));
     }
     missing.retain(|unit| !finished.has(unit));
     missing
@@ -69,7 +69,7 @@ pub(crate) fn finish(
     manifest: Manifest,
     finished: &Finished,
     disk: Option<SyncAhead>,
-) -> Result<Made> {
+) -> Result<Totals> {
     if let Some(unit) = missing_units(request, finished).first() {
         return Err(Error::Input(format!("{}: {unit:?} is missing", layout.root().display())));
     }
@@ -83,7 +83,7 @@ pub(crate) fn finish(
         let tally: UnitTally = finished.locations(area).map(|done| done.tally).sum();
         locations += labels.locations.len();
         entries.push(AreaEntry {
-            points: finished.rest(area).map_or(0, |rest| rest.points),
+            points: finished.assets(area).map_or(0, |assets| assets.points),
             panoramas: tally.panoramas.images,
             views: tally.views.images,
             inputs: requested.inputs.clone(),
@@ -119,7 +119,7 @@ pub(crate) fn finish(
     manifest.complete(layout, entries, list)?;
     sync_file(&layout.manifest())?;
     let own = [layout.file_list(), layout.manifest()].map(|p| fs::metadata(p).map_or(0, |found| found.len()));
-    Ok(Made { files: count + 2, bytes: listed + own.iter().sum::<u64>(), locations, views })
+    Ok(Totals { files: count + 2, bytes: listed + own.iter().sum::<u64>(), locations, views })
 }
 
 /// Writes the profiles that are asked for, anew: some of their files are second names of files of the tree, which must not

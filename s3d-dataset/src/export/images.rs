@@ -2,7 +2,7 @@
 
 use crate::context::{Context, Progress};
 use crate::error::Result;
-use crate::export::modality::{Image, Look, Prints};
+use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::export::pictures::Pictures;
 use crate::export::views::Candidate;
 use crate::export::work::for_each_in_order;
@@ -21,7 +21,7 @@ use std::time::Instant;
 pub(crate) struct ImageJob<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) area: u32,
-    pub(crate) look: Look<'a>,
+    pub(crate) channels: Channels<'a>,
     /// Where colours come from, if not from the mesh.
     pub(crate) pictures: Option<&'a Pictures>,
     pub(crate) locations: &'a [ScanLocation],
@@ -32,7 +32,7 @@ pub(crate) struct ImageJob<'a> {
     pub(crate) modalities: &'a [Domain],
     pub(crate) size: u32,
     pub(crate) pano_width: u32,
-    /// Told of every location whose images are all there, by whichever thread wrote the last.
+    /// ReadManifest of every location whose images are all there, by whichever thread wrote the last.
     pub(crate) each: &'a (dyn Fn(WrittenLocation) -> Result<()> + Sync),
 }
 
@@ -65,21 +65,21 @@ struct Shot {
 }
 
 /// What else is to be written of an area: one thread's work, which the others need not wait for.
-type Rest<'a> = &'a (dyn Fn() -> Result<()> + Sync);
+type AssetsWriter<'a> = &'a (dyn Fn() -> Result<()> + Sync);
 
 /// One piece of an area's work.
 enum Work<'a> {
-    Rest(Rest<'a>),
+    Assets(AssetsWriter<'a>),
     Shot(&'a Shot),
 }
 
-/// Renders and writes the panoramas of the chosen locations and their kept views. `rest` is done once, by one of the
+/// Renders and writes the panoramas of the chosen locations and their kept views. `assets` is done once, by one of the
 /// threads, meanwhile; none if it is done already.
 pub(crate) fn write_images(
     ctx: &Context,
     job: &ImageJob<'_>,
     candidates: &[Candidate],
-    rest: Option<Rest<'_>>,
+    assets: Option<AssetsWriter<'_>>,
 ) -> Result<()> {
     let shots = shots(job, candidates);
     let mut open: Vec<OpenLocation> = job.locations.iter().map(|_| OpenLocation::default()).collect();
@@ -94,17 +94,17 @@ pub(crate) fn write_images(
     }
     let progress = ctx.progress("rendering", "images", shots.len() as u64);
     let Some(pictures) = job.pictures else {
-        return write_shots(ctx, job, &shots, &open, rest, &progress);
+        return write_shots(ctx, job, &shots, &open, assets, &progress);
     };
     // A location after another: one cube map is in memory, and all threads work with it.
-    let mut rest = rest;
+    let mut assets = assets;
     for shots in shots.chunk_by(|a, b| a.location == b.location) {
         let location = shots[0].location;
-        let cube = pictures.cube(ctx, location, &job.locations[location], job.look.scene)?;
-        let look = Look { pictures: cube.as_ref().map(|cube| pictures.colors(cube)), ..job.look };
-        write_shots(ctx, &ImageJob { look, ..*job }, shots, &open, rest.take(), &progress)?;
+        let cube = pictures.cube(ctx, location, &job.locations[location], job.channels.scene)?;
+        let channels = Channels { pictures: cube.as_ref().map(|cube| pictures.colors(cube)), ..job.channels };
+        write_shots(ctx, &ImageJob { channels, ..*job }, shots, &open, assets.take(), &progress)?;
     }
-    rest.map_or(Ok(()), |rest| rest())
+    assets.map_or(Ok(()), |assets| assets())
 }
 
 fn write_shots(
@@ -112,14 +112,18 @@ fn write_shots(
     job: &ImageJob<'_>,
     shots: &[Shot],
     open: &[Mutex<OpenLocation>],
-    rest: Option<Rest<'_>>,
+    assets: Option<AssetsWriter<'_>>,
     progress: &Progress<'_>,
 ) -> Result<()> {
-    let memory =
-        || Memory { caster: Caster::new(job.look.scene), hits: Hits::default(), prints: Prints::default() };
-    let works: Vec<Work<'_>> = rest.map(Work::Rest).into_iter().chain(shots.iter().map(Work::Shot)).collect();
+    let memory = || Memory {
+        caster: Caster::new(job.channels.scene),
+        hits: Hits::default(),
+        buffers: ImageBuffers::default(),
+    };
+    let works: Vec<Work<'_>> =
+        assets.map(Work::Assets).into_iter().chain(shots.iter().map(Work::Shot)).collect();
     for_each_in_order(ctx, &works, memory, |memory, work| match work {
-        Work::Rest(rest) => rest(),
+        Work::Assets(assets) => assets(),
         Work::Shot(shot) => {
             let started = Instant::now();
             let written = write_shot(job, shot, memory)?;
@@ -160,7 +164,7 @@ fn shots(job: &ImageJob<'_>, candidates: &[Candidate]) -> Vec<Shot> {
 struct Memory<'s> {
     caster: Caster<'s, 's>,
     hits: Hits,
-    prints: Prints,
+    buffers: ImageBuffers,
 }
 
 /// What was written of a shot.
@@ -184,7 +188,7 @@ impl OpenLocation {
 }
 
 fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Result<WrittenShot> {
-    let Memory { caster, hits, prints } = memory;
+    let Memory { caster, hits, buffers } = memory;
     let scan = &job.locations[shot.location];
     let room = job.rooms[shot.location].to_string();
     let mut written = WrittenShot::default();
@@ -198,7 +202,7 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
     if !images.is_empty() {
         caster.cast_into(&shot.camera, 1, hits);
         let each = |image: Image, file: Vec<u8>| write(image.domain(), &file);
-        written.files = job.look.encode(&images, hits, &shot.camera, prints, each)?;
+        written.files = job.channels.encode(&images, hits, &shot.camera, buffers, each)?;
     }
     if job.modalities.contains(&Domain::Pose) {
         let room = format!("{room}_{}", job.area);

@@ -23,7 +23,7 @@ pub(crate) use area::locate;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::event::Stage as Step;
+use crate::event::Stage;
 use crate::options::ExportOptions;
 use crate::shard::assignment::Shard;
 use crate::shard::export_shard;
@@ -34,9 +34,9 @@ use crate::store::request::{Request, requested_areas};
 use crate::tables::assets;
 use crate::tables::manifest::Manifest;
 use crate::tables::summary::{Account, Summary};
-use area::{Common, Stage};
+use area::{Common, PreparedMesh};
 use area_plan::AreaPlan;
-use finish::{Made, finish, missing_units};
+use finish::{Totals, finish, missing_units};
 pub use memory::{MemoryScene, SceneSource, SharedScene};
 
 use inputs::{AreaInput, Cameras, Inputs};
@@ -161,7 +161,7 @@ pub(crate) struct Job<'a> {
 
 /// What is known after labelling: by area, unless all of it was done before.
 pub(crate) struct Labelled<'j> {
-    single: Option<Stage<'j>>,
+    single: Option<PreparedMesh<'j>>,
     pub(crate) areas: Vec<Option<AreaPlan>>,
 }
 
@@ -194,7 +194,7 @@ fn export(
         Begin::Session(session) => session,
     };
     let made = job.run(layout, &session.journal, &account).and_then(|disk| {
-        let tables = account.stage(Step::Tables, None);
+        let tables = account.stage(Stage::Tables, None);
         let made = finish(ctx, layout, &job.request, manifest, &session.journal.finished(), Some(disk))?;
         tables.end();
         Ok(made)
@@ -204,7 +204,7 @@ fn export(
 }
 
 /// Tells what a complete data set holds.
-pub(crate) fn summarize(account: Account<'_>, layout: &Layout, request: &Request, made: &Made) -> Summary {
+pub(crate) fn summarize(account: Account<'_>, layout: &Layout, request: &Request, made: &Totals) -> Summary {
     account.set_files(made.files, made.bytes);
     account.summarize(&layout.root().display().to_string(), request.areas.len(), made.locations, made.views)
 }
@@ -219,7 +219,7 @@ impl<'a> Job<'a> {
         account: &Account<'_>,
     ) -> Result<Self> {
         let ctx = account.ctx;
-        let loading = account.stage(Step::Load, None);
+        let loading = account.stage(Stage::Load, None);
         ctx.debug(format_args!("{options:?}"));
         let (place, lenient) = (options.place_cameras, options.lenient);
         let inputs = match plan {
@@ -323,7 +323,7 @@ impl<'a> Job<'a> {
         &'j self,
         area: &AreaInput,
         common: Common<'_>,
-        single: &mut Option<Stage<'j>>,
+        single: &mut Option<PreparedMesh<'j>>,
     ) -> Result<AreaPlan> {
         let before = area::labelled_before(area.number, &common);
         if let Some(plan) = &before {
@@ -334,26 +334,26 @@ impl<'a> Job<'a> {
             before => before,
         };
         let is_labelled = before.is_some();
-        let finish = |stage: &Stage<'_>, nearest: Option<NearestFaces<'_>>| {
+        let finish = |prepared: &PreparedMesh<'_>, nearest: Option<NearestFaces<'_>>| {
             let plan = match (before, nearest) {
                 (Some(plan), _) => plan,
-                (None, Some(nearest)) => area::label_area(area, stage, nearest, common)?,
-                (None, None) => area::label_area(area, stage, stage.nearest(), common)?,
+                (None, Some(nearest)) => area::label_area(area, prepared, nearest, common)?,
+                (None, None) => area::label_area(area, prepared, prepared.nearest(), common)?,
             };
-            area::score(&plan, stage, common)?;
+            area::score(&plan, prepared, common)?;
             Ok(plan)
         };
         if let Some(file) = &self.single {
-            let (stage, nearest) = Stage::prepare(file, !is_labelled);
-            let plan = finish(&stage, nearest)?;
-            *single = Some(stage);
+            let (prepared, nearest) = PreparedMesh::prepare(file, !is_labelled);
+            let plan = finish(&prepared, nearest)?;
+            *single = Some(prepared);
             return Ok(plan);
         }
-        let loading = common.account.stage(Step::Load, Some(area.number));
+        let loading = common.account.stage(Stage::Load, Some(area.number));
         let file = area.read_mesh()?;
-        let (stage, nearest) = Stage::prepare(&file, !is_labelled);
+        let (prepared, nearest) = PreparedMesh::prepare(&file, !is_labelled);
         loading.end();
-        finish(&stage, nearest)
+        finish(&prepared, nearest)
     }
 
     /// The part of a plan that an area is: its labels and those scores that are ours.
@@ -382,18 +382,18 @@ impl<'a> Job<'a> {
             let todo: BTreeSet<&Unit> =
                 missing.iter().filter(|unit| unit.area() == area.number && (common.is_ours)(unit)).collect();
             let Some(plan) = plan.as_ref().filter(|_| !todo.is_empty()) else { continue };
-            let render = |stage: &Stage<'_>| {
-                area::render_area(area, stage, plan, pictures.as_ref(), common, candidates, &todo)
+            let render = |prepared: &PreparedMesh<'_>| {
+                area::render_area(area, prepared, plan, pictures.as_ref(), common, candidates, &todo)
             };
             match (single, &self.single) {
-                (Some(stage), _) => render(stage)?,
-                (None, Some(file)) => render(&Stage::for_rays(file))?,
+                (Some(prepared), _) => render(prepared)?,
+                (None, Some(file)) => render(&PreparedMesh::for_rays(file))?,
                 (None, None) => {
-                    let loading = common.account.stage(Step::Load, Some(area.number));
+                    let loading = common.account.stage(Stage::Load, Some(area.number));
                     let file = area.read_mesh()?;
-                    let stage = Stage::for_rays(&file);
+                    let prepared = PreparedMesh::for_rays(&file);
                     loading.end();
-                    render(&stage)?;
+                    render(&prepared)?;
                 }
             }
         }

@@ -13,7 +13,7 @@ use s3d_render::{
 
 /// What images of a mesh are made from.
 #[derive(Clone, Copy)]
-pub(crate) struct Look<'a> {
+pub(crate) struct Channels<'a> {
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) textures: &'a MipMaps,
     /// Colours that are not the textures'.
@@ -68,26 +68,26 @@ impl Image {
 }
 
 /// Memory of the images of a view, for one view after another.
-pub(crate) struct Prints {
+pub(crate) struct ImageBuffers {
     images: ViewImages,
     xyz_float: Raster<[f32; 3]>,
     /// Which of `images` are those of the view at hand.
     made: Modalities,
 }
 
-impl Prints {
+impl ImageBuffers {
     /// A view's memory may stay. A panorama's, eight times as large and rarer, should not.
-    const MOST_PIXELS: usize = 1 << 22;
+    const MAX_PIXELS: usize = 1 << 22;
 }
 
-impl Default for Prints {
+impl Default for ImageBuffers {
     fn default() -> Self {
         let xyz_float = Raster::filled(0, 0, [0.0; 3]);
         Self { images: ViewImages::default(), xyz_float, made: Modalities::default() }
     }
 }
 
-impl Look<'_> {
+impl Channels<'_> {
     /// What `each` makes of the files of some images of a view, from the view's hits, in the order of `images`. Threads of the
     /// current rayon pool that have nothing else to do take part. Nothing but time depends on what `prints` were used for
     /// before.
@@ -99,12 +99,12 @@ impl Look<'_> {
         images: &[Image],
         hits: &Hits,
         camera: &Camera,
-        prints: &mut Prints,
+        buffers: &mut ImageBuffers,
         each: impl Fn(Image, Vec<u8>) -> Result<T, E> + Sync,
     ) -> Result<Vec<T>, E> {
-        let large = hits.face.len() > Prints::MOST_PIXELS;
-        prints.made = if large { Modalities::default() } else { self.together(images) };
-        if prints.made != Modalities::default() {
+        let large = hits.face.len() > ImageBuffers::MAX_PIXELS;
+        buffers.made = if large { Modalities::default() } else { self.together(images) };
+        if buffers.made != Modalities::default() {
             let shading = Shading {
                 scene: self.scene,
                 mip_maps: self.textures,
@@ -113,19 +113,19 @@ impl Look<'_> {
                 index_of_face: self.label_per_face,
                 color_of_face: self.pretty_per_face,
             };
-            view_images_into(&shading, hits, camera, prints.made, &mut prints.images);
+            view_images_into(&shading, hits, camera, buffers.made, &mut buffers.images);
         }
         let mut done = Vec::new();
         for &image in images {
-            self.draw(image, hits, camera, prints);
+            self.draw(image, hits, camera, buffers);
             if large {
-                done.push(each(image, self.file(image, prints))?);
-                *prints = Prints::default();
+                done.push(each(image, self.file(image, buffers))?);
+                *buffers = ImageBuffers::default();
             }
         }
         if !large {
             let files = images.par_iter().with_max_len(1);
-            done = files.map(|&image| each(image, self.file(image, prints))).collect::<Result<_, E>>()?;
+            done = files.map(|&image| each(image, self.file(image, buffers))).collect::<Result<_, E>>()?;
         }
         Ok(done)
     }
@@ -144,9 +144,9 @@ impl Look<'_> {
     }
 
     /// Draws an image that is not made yet.
-    fn draw(&self, image: Image, hits: &Hits, camera: &Camera, prints: &mut Prints) {
+    fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
-        let Prints { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made } = prints;
+        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made } = buffers;
         match image {
             Image::Rgb if !made.rgb => match &self.pictures {
                 Some(pictures) => pictures.image_into(self, hits, camera, rgb),
@@ -173,9 +173,9 @@ impl Look<'_> {
     }
 
     /// The file of an image that is drawn.
-    fn file(&self, image: Image, prints: &Prints) -> Vec<u8> {
+    fn file(&self, image: Image, buffers: &ImageBuffers) -> Vec<u8> {
         let compression = self.compression;
-        let Prints { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, .. } = prints;
+        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, .. } = buffers;
         match image {
             Image::Rgb => encode_rgb8(rgb, Content::Photo, compression),
             Image::Depth => encode_gray16(depth, compression),

@@ -18,7 +18,7 @@ pub(crate) fn overlap_doubts(rooms: &[SurveyedRoom]) -> Vec<String> {
             if share > MUCH {
                 doubts.push(format!(
                     "rooms {} and {} overlap: {:.0} % of the floor of {} is in {} too; a face there is of the room with \
-                     the most points on it",
+                     the max points on it",
                     a.room,
                     b.room,
                     100.0 * share,
@@ -37,8 +37,8 @@ fn shared(small: &SurveyedRoom, large: &SurveyedRoom) -> f64 {
     let low = small.bbox.min.max(large.bbox.min);
     let high = small.bbox.max.min(large.bbox.max);
     let both = Aabb { min: low, max: high };
-    let least = height(&small.bbox).min(height(&large.bbox));
-    if low.x >= high.x || low.y >= high.y || height(&both) <= MUCH * least {
+    let min = height(&small.bbox).min(height(&large.bbox));
+    if low.x >= high.x || low.y >= high.y || height(&both) <= MUCH * min {
         return 0.0;
     }
     let (mut of_small, mut of_both) = (0u32, 0u32);

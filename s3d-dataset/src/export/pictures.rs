@@ -4,7 +4,7 @@
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::inputs::{AreaInput, Cameras};
-use crate::export::modality::Look;
+use crate::export::modality::Channels;
 use s3d_geom::{Camera, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::camera::{
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// How many locations without pictures are named in a message.
-const MOST_NAMED: usize = 20;
+const MAX_NAMED: usize = 20;
 
 /// An area's pictures.
 pub(crate) struct Pictures {
@@ -83,8 +83,8 @@ impl Pictures {
         }
         if !missing.is_empty() {
             let (count, of) = (missing.len(), area.cameras.listed().len());
-            let more = count.saturating_sub(MOST_NAMED);
-            missing.truncate(MOST_NAMED);
+            let more = count.saturating_sub(MAX_NAMED);
+            missing.truncate(MAX_NAMED);
             let mut names = missing.join("; ");
             if more > 0 {
                 names += &format!("; and those of {more} more");
@@ -234,13 +234,13 @@ impl PictureColors<'_> {
     /// The RGB image of a view.
     pub(crate) fn image_into(
         &self,
-        look: &Look<'_>,
+        channels: &Channels<'_>,
         hits: &Hits,
         camera: &Camera,
         out: &mut Raster<[u8; 3]>,
     ) {
         let unseen = match self.unseen {
-            UnseenColor::Mesh => Unseen::Mesh(look.scene, look.textures),
+            UnseenColor::Mesh => Unseen::Mesh(channels.scene, channels.textures),
             UnseenColor::Nearby => Unseen::Nearby,
         };
         picture_image_into(self.cube, unseen, hits, camera, &TextureFilter::default(), out);

@@ -120,10 +120,10 @@ fn map_in_order<T: Sync, S, R: Send + Sync>(
 }
 
 /// Some points of an area's cloud; none if none are asked for.
-fn area_points(source: &Source, area: u32, most: Option<u32>) -> Result<PointCloud> {
-    match most.unwrap_or(POINTS) {
+fn area_points(source: &Source, area: u32, max: Option<u32>) -> Result<PointCloud> {
+    match max.unwrap_or(POINTS) {
         0 => Ok(PointCloud::default()),
-        most => Ok(s3d_io::cloud::read_point_sample(&source.layout.point_cloud(area), most as usize)?),
+        max => Ok(s3d_io::cloud::read_point_sample(&source.layout.point_cloud(area), max as usize)?),
     }
 }
 

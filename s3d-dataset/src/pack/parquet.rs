@@ -123,15 +123,15 @@ fn share<T: Copy>(image: &Raster<T>, is: impl Fn(&T) -> bool) -> f64 {
 
 /// The share of pixels with a depth, and the least, mean and greatest of them in metres.
 fn depth_row(depth: &Raster<u16>, units_per_m: f64) -> (f64, Option<[f64; 3]>) {
-    let (mut least, mut most, mut sum, mut count) = (u16::MAX, 0, 0u64, 0u64);
+    let (mut min, mut max, mut sum, mut count) = (u16::MAX, 0, 0u64, 0u64);
     for &v in depth.pixels().iter().filter(|v| **v != DEPTH_MISSING) {
-        (least, most) = (least.min(v), most.max(v));
+        (min, max) = (min.min(v), max.max(v));
         sum += u64::from(v);
         count += 1;
     }
     let metres = |units: f64| units / units_per_m;
     let depth_m =
-        (count > 0).then(|| [f64::from(least), sum as f64 / count as f64, f64::from(most)].map(metres));
+        (count > 0).then(|| [f64::from(min), sum as f64 / count as f64, f64::from(max)].map(metres));
     (count as f64 / depth.len() as f64, depth_m)
 }
 

@@ -15,7 +15,7 @@
 //!
 //! Colours are the tree's, 0 to 255.
 
-use super::room::{TreeRoom, as_written, count_and_least, for_each_piece};
+use super::room::{TreeRoom, as_written, count_and_min, for_each_piece};
 use super::{AREAS_OF_LOADERS, for_each_room, write_lines};
 use crate::context::Context;
 use crate::error::Result;
@@ -26,13 +26,13 @@ use std::path::Path;
 /// The points of a room's instances, and the least coordinates of all.
 fn survey(ctx: &Context, room: &TreeRoom) -> Result<(Vec<u64>, [f64; 3])> {
     let mut counts = Vec::new();
-    let mut least = [f64::INFINITY; 3];
+    let mut min = [f64::INFINITY; 3];
     for instance in &room.instances {
-        let (count, corner) = count_and_least(ctx, &instance.path)?;
+        let (count, corner) = count_and_min(ctx, &instance.path)?;
         counts.push(count);
-        least = std::array::from_fn(|k| least[k].min(corner[k]));
+        min = std::array::from_fn(|k| min[k].min(corner[k]));
     }
-    Ok((counts, least))
+    Ok((counts, min))
 }
 
 /// Writes the arrays and lists of PointNet.
@@ -43,7 +43,7 @@ pub(super) fn write_pointnet(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> R
     write_lines(&meta.join("anno_paths.txt"), rooms.iter().map(TreeRoom::annotations))?;
     write_lines(&meta.join("all_data_label.txt"), rooms.iter().map(|r| format!("{}.npy", r.stem())))?;
     for_each_room(ctx, rooms, |room| {
-        let (counts, least) = survey(ctx, room)?;
+        let (counts, min) = survey(ctx, room)?;
         let path = arrays.join(format!("{}.npy", room.stem()));
         let mut array = NpyWriter::create(&path, "<f8", &[counts.iter().sum(), 7])?;
         let mut bytes = Vec::new();
@@ -52,7 +52,7 @@ pub(super) fn write_pointnet(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> R
             for_each_piece(ctx, &instance.path, |piece| {
                 bytes.clear();
                 for (p, color) in piece.positions.iter().zip(&piece.colors) {
-                    let place = std::array::from_fn::<f64, 3, _>(|k| as_written(p[k]) - least[k]);
+                    let place = std::array::from_fn::<f64, 3, _>(|k| as_written(p[k]) - min[k]);
                     let row = place.into_iter().chain(color.map(f64::from)).chain([class]);
                     bytes.extend(row.flat_map(f64::to_le_bytes));
                 }
@@ -78,7 +78,7 @@ pub(super) fn write_mmdet3d(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Re
     }
     write_lines(&meta.join("anno_paths.txt"), rooms.iter().map(TreeRoom::annotations))?;
     for_each_room(ctx, rooms, |room| {
-        let (counts, least) = survey(ctx, room)?;
+        let (counts, min) = survey(ctx, room)?;
         let total = counts.iter().sum();
         let path = |kind: &str| arrays.join(format!("{}_{kind}.npy", room.stem()));
         let mut points = NpyWriter::create(&path("point"), "<f4", &[total, 6])?;
@@ -90,7 +90,7 @@ pub(super) fn write_mmdet3d(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Re
             for_each_piece(ctx, &instance.path, |piece| {
                 bytes.clear();
                 for (p, color) in piece.positions.iter().zip(&piece.colors) {
-                    let place = std::array::from_fn::<f32, 3, _>(|k| (as_written(p[k]) - least[k]) as f32);
+                    let place = std::array::from_fn::<f32, 3, _>(|k| (as_written(p[k]) - min[k]) as f32);
                     bytes.extend(place.into_iter().chain(color.map(f32::from)).flat_map(f32::to_le_bytes));
                 }
                 points.put(&bytes)?;

@@ -14,7 +14,7 @@
 //! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `area_k/3d/rgb.obj`, and for area 5
 //! `area_5a` and `area_5b`, moving 5b: area 5 of a data set is in one frame already and comes as `area_5a` alone.
 
-use super::room::{TreeRoom, count_and_least};
+use super::room::{TreeRoom, count_and_min};
 use super::{AREAS_OF_LOADERS, link, write_lines};
 use crate::context::Context;
 use crate::error::Result;
@@ -81,7 +81,7 @@ fn write_room(ctx: &Context, dir: &Path, layout: &Layout, room: &TreeRoom) -> Re
         let to = dir.join("Annotations").join(instance.path.file_name().unwrap_or_default());
         // A line is at most some hundred bytes.
         let size = fs::metadata(&instance.path).map_err(|e| FileError::io(&instance.path, "read", e))?.len();
-        if size < 1024 && count_and_least(ctx, &instance.path)?.0 == 1 {
+        if size < 1024 && count_and_min(ctx, &instance.path)?.0 == 1 {
             let line = fs::read(&instance.path).map_err(|e| FileError::io(&instance.path, "read", e))?;
             write_bytes(&to, &line.repeat(2))?;
         } else {

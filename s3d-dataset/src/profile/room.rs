@@ -79,18 +79,18 @@ pub(super) fn as_written(coordinate: f32) -> f64 {
 }
 
 /// The number of points of an instance, and their least coordinates.
-pub(super) fn count_and_least(ctx: &Context, path: &Path) -> Result<(u64, [f64; 3])> {
-    let (mut count, mut least) = (0, [f64::INFINITY; 3]);
+pub(super) fn count_and_min(ctx: &Context, path: &Path) -> Result<(u64, [f64; 3])> {
+    let (mut count, mut min) = (0, [f64::INFINITY; 3]);
     for_each_piece(ctx, path, |piece| {
         count += piece.len() as u64;
         for p in &piece.positions {
-            for (least, c) in least.iter_mut().zip(p.to_array()) {
-                *least = least.min(as_written(c));
+            for (min, c) in min.iter_mut().zip(p.to_array()) {
+                *min = min.min(as_written(c));
             }
         }
         Ok(())
     })?;
-    Ok((count, least))
+    Ok((count, min))
 }
 
 #[cfg(test)]

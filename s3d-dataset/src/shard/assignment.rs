@@ -1,4 +1,4 @@
-//! Which shard does what: units of work dealt by their cost, the same way in every process.
+//! Which shard does what: units of work assigned by their cost, the same way in every process.
 
 use crate::error::Result;
 use crate::store::checked::{read_checked, write_checked};
@@ -13,7 +13,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// One of several processes among which the units of an export are dealt.
+/// One of several processes among which the units of an export are shared out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 1.
@@ -23,7 +23,7 @@ pub struct Shard {
 }
 
 /// More shards than this are taken for a slip.
-const MOST_SHARDS: u32 = 1_000_000;
+const MAX_SHARDS: u32 = 1_000_000;
 
 impl Shard {
     /// The one process that does everything.
@@ -54,11 +54,11 @@ impl FromStr for Shard {
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/').map(|(i, n)| (i.trim().parse(), n.trim().parse()));
         match numbers {
-            Some((Ok(number), Ok(of))) if 1 <= number && number <= of && of <= MOST_SHARDS => {
+            Some((Ok(number), Ok(of))) if 1 <= number && number <= of && of <= MAX_SHARDS => {
                 Ok(Self { number, of })
             }
             Some((Ok(0), Ok(_))) => Err("shards count from 1, as in 1/4 to 4/4".to_owned()),
-            _ => Err(format!("must be i/N with i from 1 to N, as in 2/4, and N at most {MOST_SHARDS}")),
+            _ => Err(format!("must be i/N with i from 1 to N, as in 2/4, and N at most {MAX_SHARDS}")),
         }
     }
 }
@@ -72,12 +72,12 @@ impl fmt::Display for Shard {
 /// Deals units with these costs among `shards`: the dearest first, each to the shard with the least so far, the first
 /// by number where several have as little. Returns the number of each unit's shard, from 1.
 ///
-/// No shard gets more than 4/3 of what the best dealing would give to its fullest (Graham, "Bounds on multiprocessing
+/// No shard gets more than 4/3 of what the best assignment would give to its fullest (Graham, "Bounds on multiprocessing
 /// timing anomalies", 1969, whose bound is 4/3 − 1/3N). The result depends on nothing but the arguments.
 ///
 /// # Panics
 /// If there is no shard.
-pub(crate) fn deal(costs: &[u64], shards: u32) -> Vec<u32> {
+pub(crate) fn assign_by_cost(costs: &[u64], shards: u32) -> Vec<u32> {
     assert!(shards > 0, "units need a shard");
     let mut order: Vec<usize> = (0..costs.len()).collect();
     // Stable, so that equal costs stay in the order of the units.
@@ -85,15 +85,15 @@ pub(crate) fn deal(costs: &[u64], shards: u32) -> Vec<u32> {
     // More shards than units stay empty; the heap holds no more than are needed.
     let needed = shards.min(u32::try_from(costs.len()).unwrap_or(u32::MAX));
     let mut least: BinaryHeap<Reverse<(u128, u32)>> = (1..=needed).map(|n| Reverse((0, n))).collect();
-    let mut dealt = vec![0; costs.len()];
+    let mut assigned = vec![0; costs.len()];
     for i in order {
         if let Some(mut top) = least.peek_mut() {
             // A unit costs something, or else one shard might get all that cost nothing.
             top.0.0 += u128::from(costs[i].max(1));
-            dealt[i] = top.0.1;
+            assigned[i] = top.0.1;
         }
     }
-    dealt
+    assigned
 }
 
 /// How long units take, in nanoseconds of one core: measured on the built-in scene on a machine of 2026, and rounded. Their
@@ -113,25 +113,25 @@ pub(crate) fn location_cost(pano_width: u32, size: u32, kept_views: u64) -> u64 
 }
 
 /// The cost of an area's meshes and points.
-pub(crate) fn rest_cost(faces: u64, points: u64) -> u64 {
+pub(crate) fn assets_cost(faces: u64, points: u64) -> u64 {
     NS_PER_FACE.saturating_mul(faces).saturating_add(NS_PER_POINT.saturating_mul(points))
 }
 
 /// Who does which units, among a number of shards: kept in the folder in which they work, so that a merge can tell which of
 /// them is to be run again, and a shard that is run again knows at once what is its own.
 #[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct Deal {
+pub(crate) struct Assignment {
     shards: u32,
     /// Each unit, with the number of its shard.
     units: Vec<(Unit, u32)>,
 }
 
-impl Deal {
+impl Assignment {
     /// Deals units, each with its cost.
     pub(crate) fn new(units: Vec<(Unit, u64)>, shards: u32) -> Self {
         let costs: Vec<u64> = units.iter().map(|(_, cost)| *cost).collect();
-        let dealt = deal(&costs, shards);
-        Self { shards, units: units.into_iter().map(|(unit, _)| unit).zip(dealt).collect() }
+        let assigned = assign_by_cost(&costs, shards);
+        Self { shards, units: units.into_iter().map(|(unit, _)| unit).zip(assigned).collect() }
     }
 
     /// Gives a unit that does not count to a shard.
@@ -173,7 +173,7 @@ impl Deal {
     }
 
     fn folder(layout: &Layout) -> PathBuf {
-        layout.work_dir().join("deals")
+        layout.work_dir().join("assignments")
     }
 
     fn path(layout: &Layout, shards: u32) -> PathBuf {
@@ -186,9 +186,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn loads(costs: &[u64], dealt: &[u32], shards: u32) -> Vec<u64> {
+    fn loads(costs: &[u64], assigned: &[u32], shards: u32) -> Vec<u64> {
         let mut loads = vec![0; shards as usize];
-        costs.iter().zip(dealt).for_each(|(cost, shard)| loads[*shard as usize - 1] += cost);
+        costs.iter().zip(assigned).for_each(|(cost, shard)| loads[*shard as usize - 1] += cost);
         loads
     }
 
@@ -204,10 +204,10 @@ mod tests {
             let all: Vec<Unit> = units.iter().map(|(unit, _)| unit.clone()).collect();
             for number in 1..=shards {
                 // As each shard finds it by itself.
-                let deal = Deal::new(units.clone(), shards);
-                for unit in deal.own(number) {
+                let assignment = Assignment::new(units.clone(), shards);
+                for unit in assignment.own(number) {
                     owners[all.iter().position(|u| *u == unit).unwrap()] += 1;
-                    prop_assert_eq!(deal.shards_of(&[unit]), [number].into());
+                    prop_assert_eq!(assignment.shards_of(&[unit]), [number].into());
                 }
             }
             prop_assert!(owners.iter().all(|n| *n == 1));
@@ -238,9 +238,9 @@ mod tests {
             costs in prop::collection::vec(1u64..1_000, 1..80),
             shards in 1u32..20,
         ) {
-            let dealt = deal(&costs, shards);
-            let fullest = *loads(&costs, &dealt, shards).iter().max().unwrap();
-            // What even the best dealing cannot go below: the mean, and the dearest unit; the bound of any list
+            let assigned = assign_by_cost(&costs, shards);
+            let fullest = *loads(&costs, &assigned, shards).iter().max().unwrap();
+            // What even the best assignment cannot go below: the mean, and the dearest unit; the bound of any list
             // scheduling follows from them.
             let (sum, dearest) = (costs.iter().sum::<u64>(), *costs.iter().max().unwrap());
             let n = u64::from(shards);
@@ -248,18 +248,18 @@ mod tests {
         }
 
         #[test]
-        fn against_the_best_dealing(costs in prop::collection::vec(1u64..50, 1..9), shards in 1u32..4) {
-            let fullest = *loads(&costs, &deal(&costs, shards), shards).iter().max().unwrap();
+        fn against_the_best_assignment(costs in prop::collection::vec(1u64..50, 1..9), shards in 1u32..4) {
+            let fullest = *loads(&costs, &assign_by_cost(&costs, shards), shards).iter().max().unwrap();
             let all = u64::from(shards).pow(costs.len() as u32);
             let best = (0..all)
                 .map(|code| {
                     let mut code = code;
-                    let dealt: Vec<u32> = costs.iter().map(|_| {
+                    let assigned: Vec<u32> = costs.iter().map(|_| {
                         let shard = (code % u64::from(shards)) as u32 + 1;
                         code /= u64::from(shards);
                         shard
                     }).collect();
-                    loads(&costs, &dealt, shards).into_iter().max().unwrap()
+                    loads(&costs, &assigned, shards).into_iter().max().unwrap()
                 })
                 .min()
                 .unwrap();
@@ -275,27 +275,27 @@ mod tests {
     }
 
     #[test]
-    fn a_deal_comes_back() {
+    fn an_assignment_comes_back() {
         let dir = tempfile::tempdir().unwrap();
         let layout = Layout::new(dir.path());
-        let units = vec![(Unit::Rest(3), 5), (Unit::Location(3, "a".into()), 9), (Unit::Labels(3), 1)];
-        Deal::new(units.clone(), 2).write(&layout).unwrap();
-        Deal::new(units, 40).write(&layout).unwrap();
-        let back = Deal::read(&layout, 2).unwrap();
+        let units = vec![(Unit::Assets(3), 5), (Unit::Location(3, "a".into()), 9), (Unit::Labels(3), 1)];
+        Assignment::new(units.clone(), 2).write(&layout).unwrap();
+        Assignment::new(units, 40).write(&layout).unwrap();
+        let back = Assignment::read(&layout, 2).unwrap();
         assert_eq!(
             (back.own(1), back.own(2)),
-            ([Unit::Location(3, "a".into())].into(), [Unit::Labels(3), Unit::Rest(3)].into())
+            ([Unit::Location(3, "a".into())].into(), [Unit::Labels(3), Unit::Assets(3)].into())
         );
-        assert_eq!(Deal::read_all(&layout).unwrap().len(), 2);
-        assert!(Deal::read(&layout, 3).is_none());
+        assert_eq!(Assignment::read_all(&layout).unwrap().len(), 2);
+        assert!(Assignment::read(&layout, 3).is_none());
     }
 
     #[test]
     fn units_that_cost_nothing_are_spread_too() {
-        assert_eq!(deal(&[0; 6], 3), [1, 2, 3, 1, 2, 3]);
-        assert_eq!(deal(&[5, 1, 1, 1, 1, 1], 2), [1, 2, 2, 2, 2, 2]);
-        assert_eq!(deal(&[], 1_000_000), [0u32; 0]);
-        assert_eq!(deal(&[3, 4], 1_000_000), [2, 1]);
+        assert_eq!(assign_by_cost(&[0; 6], 3), [1, 2, 3, 1, 2, 3]);
+        assert_eq!(assign_by_cost(&[5, 1, 1, 1, 1, 1], 2), [1, 2, 2, 2, 2, 2]);
+        assert_eq!(assign_by_cost(&[], 1_000_000), [0u32; 0]);
+        assert_eq!(assign_by_cost(&[3, 4], 1_000_000), [2, 1]);
     }
 
     #[test]
@@ -311,6 +311,6 @@ mod tests {
     fn dearer_work_costs_more() {
         assert!(location_cost(4096, 1080, 1) < location_cost(4096, 1080, 2));
         assert_eq!(location_cost(u32::MAX, u32::MAX, u64::MAX), u64::MAX);
-        assert_eq!(rest_cost(u64::MAX, 1), u64::MAX);
+        assert_eq!(assets_cost(u64::MAX, 1), u64::MAX);
     }
 }

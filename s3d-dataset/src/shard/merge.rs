@@ -8,7 +8,7 @@ use crate::export::finish::{finish, missing_units};
 use crate::export::transfer::bring;
 use crate::export::work::for_each_in_order;
 use crate::export::{Target, summarize};
-use crate::shard::assignment::Deal;
+use crate::shard::assignment::Assignment;
 use crate::store::journal::{Done, Finished, Unit};
 use crate::store::lock::{Lock, Sharing};
 use crate::store::output::{self, Begin};
@@ -27,7 +27,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Most units that a message names.
-const MOST_NAMED: usize = 8;
+const MAX_NAMED: usize = 8;
 
 /// What a shard has left in its folder.
 struct Part {
@@ -35,7 +35,7 @@ struct Part {
     request: Request,
     finished: Finished,
     /// Who does what, for each number of shards that worked in this folder.
-    deals: Vec<Deal>,
+    assignments: Vec<Assignment>,
 }
 
 /// Makes one data set of the folders of shards, in any order; OUT may be one of them.
@@ -195,8 +195,8 @@ impl Part {
             return Err(FileError::format(folder, message).into());
         };
         let finished = Finished::read(ctx, &layout)?;
-        let deals = Deal::read_all(&layout)?;
-        Ok(Self { layout, request, finished, deals })
+        let assignments = Assignment::read_all(&layout)?;
+        Ok(Self { layout, request, finished, assignments })
     }
 }
 
@@ -210,7 +210,7 @@ fn refuse_mixed(parts: &[Part]) -> Result<()> {
                 "{} and {} are shards of different calls: {} (\"there\" is {}, \"now\" is {})",
                 first.layout.root().display(),
                 other.layout.root().display(),
-                differences.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("; "),
+                differences.iter().take(MAX_NAMED).cloned().collect::<Vec<_>>().join("; "),
                 first.layout.root().display(),
                 other.layout.root().display()
             )));
@@ -238,15 +238,15 @@ fn other_version(folder: &Path, there: &str) -> Error {
 
 /// What is to be done about units that are not there.
 fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
-    let named: Vec<String> = missing.iter().take(MOST_NAMED).map(Unit::to_string).collect();
+    let named: Vec<String> = missing.iter().take(MAX_NAMED).map(Unit::to_string).collect();
     let more = match missing.len() - named.len() {
         0 => String::new(),
         n => format!(" and {n} more"),
     };
     // By number of shards, which of them are to be run.
     let mut shards: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
-    for deal in parts.iter().flat_map(|part| &part.deals) {
-        shards.entry(deal.shards()).or_default().extend(deal.shards_of(missing));
+    for assignment in parts.iter().flat_map(|part| &part.assignments) {
+        shards.entry(assignment.shards()).or_default().extend(assignment.shards_of(missing));
     }
     let calls = shards.into_iter().filter(|(_, numbers)| !numbers.is_empty()).map(|(of, numbers)| {
         let calls: Vec<String> = numbers.iter().map(|i| format!("--shard {i}/{of}")).collect();

@@ -11,7 +11,7 @@ use crate::export::finish::is_chosen;
 use crate::export::views::{Candidate, select_requested};
 use crate::export::{Job, Labelled, SceneSource, Scope, Target};
 use crate::options::ExportOptions;
-use crate::shard::assignment::{Deal, Shard, location_cost, rest_cost};
+use crate::shard::assignment::{Assignment, Shard, assets_cost, location_cost};
 use crate::shard::plan::Plan;
 use crate::store::journal::{Done, Journal, Unit};
 use crate::store::output::{self, Begin};
@@ -66,8 +66,8 @@ impl Job<'_> {
     ) -> Result<Option<ViewTally>> {
         let ctx = account.ctx;
         // A shard that is run again knows its own before anything is labelled.
-        if let Some(deal) = Deal::read(layout, shard.of) {
-            let own = deal.own(shard.number);
+        if let Some(assignment) = Assignment::read(layout, shard.of) {
+            let own = assignment.own(shard.number);
             journal.check(ctx, layout, |unit| own.contains(unit))?;
             let finished = journal.finished();
             if own.iter().all(|unit| finished.has(unit)) {
@@ -83,14 +83,14 @@ impl Job<'_> {
         let is_ours = |unit: &Unit| match unit {
             Unit::Labels(_) => labels_are_ours(unit),
             Unit::Scores(_, uuid) => self.plan.is_none() || keeper(uuid, shard.of) == shard.number,
-            Unit::Location(..) | Unit::Rest(_) => false,
+            Unit::Location(..) | Unit::Assets(_) => false,
         };
         journal.check(ctx, layout, |unit| matches!(unit, Unit::Labels(_)) && is_ours(unit))?;
         let labelled = self.label(self.common(layout, journal, account, &cache, &is_ours), Scope::All)?;
         let (candidates, views) = select_requested(&self.request, &journal.finished())?;
-        let deal = self.deal(&labelled, &candidates, shard.of);
-        deal.write(layout)?;
-        let own = deal.own(shard.number);
+        let assignment = self.assignment(&labelled, &candidates, shard.of);
+        assignment.write(layout)?;
+        let own = assignment.own(shard.number);
         take_own(layout, journal, account, &own)?;
         let is_ours = |unit: &Unit| own.contains(unit);
         self.render(self.common(layout, journal, account, &cache, &is_ours), &labelled, &candidates)?;
@@ -98,7 +98,7 @@ impl Job<'_> {
     }
 
     /// Who does what among so many shards: the same in each of them.
-    fn deal(&self, labelled: &Labelled<'_>, candidates: &[Candidate], shards: u32) -> Deal {
+    fn assignment(&self, labelled: &Labelled<'_>, candidates: &[Candidate], shards: u32) -> Assignment {
         let options = &self.request.options;
         let mut kept: BTreeMap<(u32, &str), u64> = BTreeMap::new();
         for c in candidates.iter().filter(|c| c.frame_num.is_some()) {
@@ -109,21 +109,22 @@ impl Job<'_> {
         for plan in plans() {
             let points = (plan.mesh_area_m2 * options.points_per_m2) as u64;
             let faces = plan.annotated.face_labels.len() as u64;
-            units.push((Unit::Rest(plan.area), rest_cost(faces, points)));
+            units.push((Unit::Assets(plan.area), assets_cost(faces, points)));
             for location in plan.locations.iter().filter(|l| is_chosen(&self.request, &l.uuid)) {
                 let views = kept.get(&(plan.area, location.uuid.as_str())).copied().unwrap_or(0);
                 let cost = location_cost(options.pano_width, options.size, views);
                 units.push((Unit::Location(plan.area, location.uuid.clone()), cost));
             }
         }
-        let mut deal = Deal::new(units, shards);
+        let mut assignment = Assignment::new(units, shards);
         for (position, plan) in plans().enumerate() {
-            deal.assign(Unit::Labels(plan.area), (position % shards as usize) as u32 + 1);
+            assignment.assign(Unit::Labels(plan.area), (position % shards as usize) as u32 + 1);
             for location in &plan.locations {
-                deal.assign(Unit::Scores(plan.area, location.uuid.clone()), keeper(&location.uuid, shards));
+                assignment
+                    .assign(Unit::Scores(plan.area, location.uuid.clone()), keeper(&location.uuid, shards));
             }
         }
-        deal
+        assignment
     }
 }
 

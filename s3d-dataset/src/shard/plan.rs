@@ -27,7 +27,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Most units that a message names.
-const MOST_NAMED: usize = 4;
+const MAX_NAMED: usize = 4;
 
 /// A plan that was made.
 pub(crate) struct Plan {
@@ -115,8 +115,8 @@ impl Plan {
         if missing.is_empty() {
             return Ok(());
         }
-        let named: Vec<String> = missing.iter().take(MOST_NAMED).map(Unit::to_string).collect();
-        let more = if missing.len() > MOST_NAMED { " and more" } else { "" };
+        let named: Vec<String> = missing.iter().take(MAX_NAMED).map(Unit::to_string).collect();
+        let more = if missing.len() > MAX_NAMED { " and more" } else { "" };
         Err(Error::Input(format!(
             "{} is not complete: {}{more} missing; call `s3d plan` again, each shard of it if it has some",
             self.layout.root().display(),
@@ -219,7 +219,7 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         let is_ours = |unit: &Unit| match unit {
             Unit::Scores(_, uuid) => position_of(uuid).is_some_and(|position| part.takes(position)),
             Unit::Labels(_) => true,
-            Unit::Location(..) | Unit::Rest(_) => false,
+            Unit::Location(..) | Unit::Assets(_) => false,
         };
         job.plan_area(area, &layout, &journal, &account, &is_ours)?;
     }

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Folders in OUT: an earlier data set while it is set aside, when it is, and when it goes.
 pub(super) const MOVING: &str = ".s3d-previous.part";
-pub(super) const ASIDE: &str = ".s3d-previous";
+pub(super) const BACKUP: &str = ".s3d-previous";
 pub(super) const TRASH: &str = ".s3d-trash";
 
 /// Brings a folder in which an export was killed to a state that has only one meaning.
@@ -31,10 +31,10 @@ pub(super) fn recover(layout: &Layout) -> Result<()> {
     }
     if Head::read(&layout.manifest())?.is_some_and(|head| head.is_complete()) {
         clear(layout)?;
-        if inside(ASIDE).exists() {
+        if inside(BACKUP).exists() {
             discard(layout)?;
         }
-    } else if inside(ASIDE).exists()
+    } else if inside(BACKUP).exists()
         && read_request(layout)?.is_none()
         && begun_by_other_version(layout)?.is_none()
     {
@@ -70,13 +70,13 @@ fn children(folder: &Path) -> Result<Vec<PathBuf>> {
 /// Removes the data set that lies aside. It goes by one rename, so that half of it is never taken for whole.
 pub(super) fn discard(layout: &Layout) -> Result<()> {
     let trash = layout.root().join(TRASH);
-    rename(&layout.root().join(ASIDE), &trash)?;
+    rename(&layout.root().join(BACKUP), &trash)?;
     remove(&trash)
 }
 
 /// Puts the data set that lies aside back in its place, instead of what was begun there.
 pub(super) fn restore(layout: &Layout) -> Result<()> {
-    let aside = Layout::new(layout.root().join(ASIDE));
+    let aside = Layout::new(layout.root().join(BACKUP));
     let head = Head::read(&aside.manifest())?;
     let mut begun = read_request(layout)?.map(|request| request.numbers());
     // Without a request nobody goes on with what was begun, whatever of it is still there.
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn a_data_set_aside_comes_back_or_stays_but_is_never_lost() {
-        for aside in [ASIDE, MOVING] {
+        for aside in [BACKUP, MOVING] {
             let (dir, layout) = interrupted(aside, Some(MANIFEST));
             recover(&layout).unwrap();
             assert!(layout.area_dir(3).join("image.png").exists() && layout.manifest().exists());
@@ -177,7 +177,7 @@ mod tests {
                 assert!(dir.path().join(aside).join("area_3/image.png").exists());
             }
         }
-        // Made, and nothing moved into it yet.
+        // Totals, and nothing moved into it yet.
         let dir = tempfile::tempdir().unwrap();
         create_dir(&dir.path().join(MOVING)).unwrap();
         recover(&Layout::new(dir.path())).unwrap();

@@ -32,14 +32,16 @@ pub(crate) enum Unit {
     /// All images of a scan location: area, uuid.
     Location(u32, String),
     /// The meshes and points of an area.
-    Rest(u32),
+    Assets(u32),
 }
 
 impl Unit {
     /// The area that it is of.
     pub(crate) fn area(&self) -> u32 {
         match self {
-            Self::Labels(area) | Self::Scores(area, _) | Self::Location(area, _) | Self::Rest(area) => *area,
+            Self::Labels(area) | Self::Scores(area, _) | Self::Location(area, _) | Self::Assets(area) => {
+                *area
+            }
         }
     }
 }
@@ -50,7 +52,7 @@ impl fmt::Display for Unit {
             Self::Labels(area) => write!(f, "labels of area {area}"),
             Self::Scores(area, uuid) => write!(f, "scores of location {uuid} of area {area}"),
             Self::Location(area, uuid) => write!(f, "images of location {uuid} of area {area}"),
-            Self::Rest(area) => write!(f, "meshes and points of area {area}"),
+            Self::Assets(area) => write!(f, "meshes and points of area {area}"),
         }
     }
 }
@@ -62,7 +64,7 @@ pub(crate) enum Done {
     Labels(LabelsDone),
     Scores(ScoresDone),
     Location(LocationDone),
-    Rest(RestDone),
+    Assets(AssetsDone),
 }
 
 /// An area is labelled.
@@ -95,7 +97,7 @@ pub(crate) struct LocationDone {
 
 /// The meshes and points of an area are there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct RestDone {
+pub(crate) struct AssetsDone {
     pub(crate) area: u32,
     /// Sampled points.
     pub(crate) points: u64,
@@ -109,7 +111,7 @@ impl Done {
             Self::Labels(done) => Unit::Labels(done.entry.area),
             Self::Scores(done) => Unit::Scores(done.area, done.location.clone()),
             Self::Location(done) => Unit::Location(done.area, done.location.clone()),
-            Self::Rest(done) => Unit::Rest(done.area),
+            Self::Assets(done) => Unit::Assets(done.area),
         }
     }
 
@@ -119,7 +121,7 @@ impl Done {
             Self::Labels(done) => &done.files,
             Self::Scores(_) => &[],
             Self::Location(done) => &done.files,
-            Self::Rest(done) => &done.files,
+            Self::Assets(done) => &done.files,
         }
     }
 
@@ -209,9 +211,9 @@ impl Finished {
     }
 
     /// The meshes and points of an area.
-    pub(crate) fn rest(&self, area: u32) -> Option<&RestDone> {
-        match self.units.get(&Unit::Rest(area)) {
-            Some(Done::Rest(done)) => Some(done),
+    pub(crate) fn assets(&self, area: u32) -> Option<&AssetsDone> {
+        match self.units.get(&Unit::Assets(area)) {
+            Some(Done::Assets(done)) => Some(done),
             _ => None,
         }
     }

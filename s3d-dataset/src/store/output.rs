@@ -18,7 +18,7 @@ use crate::context::Context;
 use crate::error::{Error, Result, passes};
 use crate::export::inputs::Inputs;
 use crate::store::backup::{
-    ASIDE, MOVING, TRASH, clear, discard, move_entries, recover, remove, rename, restore,
+    BACKUP, MOVING, TRASH, clear, discard, move_entries, recover, remove, rename, restore,
 };
 use crate::store::journal::{Done, Finished, Journal};
 use crate::store::lock::{Lock, Sharing};
@@ -34,7 +34,7 @@ use std::fs;
 use std::time::{Duration, Instant};
 
 /// How many differences are named in a message.
-const MOST_NAMED: usize = 8;
+const MAX_NAMED: usize = 8;
 
 /// Refuses an OUT that holds something of somebody else, unless it may be overwritten or is one of the `allowed` names;
 /// looks only, changes nothing.
@@ -93,7 +93,7 @@ pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Result<()> {
     areas.extend(Head::read(&layout.manifest())?.map_or(Vec::new(), |head| head.area_numbers));
     areas.extend(read_request(layout)?.map_or(Vec::new(), |request| request.numbers()));
     let mut entries = Layout::new(&root).entries(&areas);
-    entries.push(root.join(ASIDE));
+    entries.push(root.join(BACKUP));
     for area in &inputs.areas {
         for path in &area.files {
             let Ok(input) = fs::canonicalize(path) else { continue };
@@ -202,7 +202,7 @@ pub(crate) fn begin(
 ) -> Result<Begin> {
     let ctx = account.ctx;
     // What is refused is refused before anything changes, and what is complete may lie where nothing can be changed.
-    let leftovers = [ASIDE, MOVING, TRASH].map(|name| layout.root().join(name));
+    let leftovers = [BACKUP, MOVING, TRASH].map(|name| layout.root().join(name));
     if !leftovers.iter().any(|path| path.exists()) {
         let found = find(layout, request)?;
         refuse(layout, &found, overwrite)?;
@@ -338,9 +338,9 @@ fn refuse(layout: &Layout, found: &Found, overwrite: bool) -> Result<()> {
     if overwrite || differences.is_empty() {
         return Ok(());
     }
-    let mut named = differences.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("; ");
-    if differences.len() > MOST_NAMED {
-        named += &format!("; and {} more", differences.len() - MOST_NAMED);
+    let mut named = differences.iter().take(MAX_NAMED).cloned().collect::<Vec<_>>().join("; ");
+    if differences.len() > MAX_NAMED {
+        named += &format!("; and {} more", differences.len() - MAX_NAMED);
     }
     Err(Error::Usage(format!(
         "{} already holds {what} of another call ({named}): choose another folder, or replace it with --overwrite",
@@ -390,7 +390,7 @@ fn begin_locked(
             refuse_in_the_way(layout, request, &areas)?;
             let moving = Layout::new(layout.root().join(MOVING));
             move_entries(layout, &moving, &areas)?;
-            rename(moving.root(), &layout.root().join(ASIDE))?;
+            rename(moving.root(), &layout.root().join(BACKUP))?;
             sync_data_set(layout.root(), &[])?;
         }
         Found::Unfinished { areas, .. } | Found::Leftover { areas } => {
@@ -471,7 +471,7 @@ impl Session {
         let ended = match &outcome {
             Ok(_) => end_complete(&layout),
             Err(e) if e.is_temporary() => Ok(()),
-            Err(_) if layout.root().join(ASIDE).exists() => {
+            Err(_) if layout.root().join(BACKUP).exists() => {
                 match restore(&layout) {
                     Ok(()) => {
                         ctx.info(format_args!(
@@ -482,7 +482,7 @@ impl Session {
                     Err(e) => {
                         ctx.warn(format_args!(
                             "the earlier data set is kept in {}: {e}",
-                            layout.root().join(ASIDE).display()
+                            layout.root().join(BACKUP).display()
                         ));
                     }
                 }
@@ -500,7 +500,7 @@ impl Session {
 }
 
 fn end_complete(layout: &Layout) -> Result<()> {
-    if layout.root().join(ASIDE).exists() {
+    if layout.root().join(BACKUP).exists() {
         discard(layout)?;
     }
     clear(layout)

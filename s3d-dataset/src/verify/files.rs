@@ -1,7 +1,7 @@
 //! The files of a data set against the list of them: which there are, their sizes and checksums.
 
+use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
-use super::told::Told;
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::work::for_each_in_order;
@@ -26,26 +26,29 @@ pub(crate) struct Files {
 
 impl Files {
     /// Reads the list, and holds it against the manifest.
-    pub(crate) fn read(layout: &Layout, told: &Told, report: &Report) -> Self {
+    pub(crate) fn read(layout: &Layout, manifest: &ReadManifest, report: &Report) -> Self {
         let path = layout.file_list();
-        if told.files.is_none() && !path.exists() {
+        if manifest.files.is_none() && !path.exists() {
             report.note("no files.csv: sizes and checksums of files were not compared");
             return Self { listed: None };
         }
         let records = report.read(Topic::Files, read_file_list(&path));
-        if let (Some(told), Some((bytes, sum))) =
-            (&told.files, report.read(Topic::Files, checksum_of_file(&path)))
+        if let (Some(manifest), Some((bytes, sum))) =
+            (&manifest.files, report.read(Topic::Files, checksum_of_file(&path)))
         {
             let checks = report.of(LIST, &path);
-            checks.check(sum == told.xxh3_128, || {
-                format!("{bytes} bytes with the checksum {sum}, and the manifest tells of {}", told.xxh3_128)
+            checks.check(sum == manifest.xxh3_128, || {
+                format!(
+                    "{bytes} bytes with the checksum {sum}, and the manifest tells of {}",
+                    manifest.xxh3_128
+                )
             });
             if let Some(records) = &records {
                 let (count, bytes) = (records.len() as u64, records.iter().map(|r| r.bytes).sum::<u64>());
-                checks.check((count, bytes) == (told.count, told.bytes), || {
+                checks.check((count, bytes) == (manifest.count, manifest.bytes), || {
                     format!(
                         "{count} files of {bytes} bytes, and the manifest tells of {} of {}",
-                        told.count, told.bytes
+                        manifest.count, manifest.bytes
                     )
                 });
             }
@@ -69,14 +72,14 @@ impl Files {
         &self,
         ctx: &Context,
         layout: &Layout,
-        told: &Told,
+        manifest: &ReadManifest,
         report: &Report,
     ) -> Result<()> {
-        let there = all_files(layout, &told.area_numbers, report);
+        let there = all_files(layout, &manifest.area_numbers, report);
         let Some(listed) = &self.listed else {
             for path in &there {
                 let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-                let is_image = is_in_images(layout, &told.area_numbers, path);
+                let is_image = is_in_images(layout, &manifest.area_numbers, path);
                 report.check(!is_image || ImageName::parse(name).is_some(), EXTRA, path, || {
                     "is no file of a data set".to_owned()
                 });

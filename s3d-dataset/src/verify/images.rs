@@ -2,12 +2,12 @@
 
 use super::files::Files;
 use super::labels::Labels;
+use super::manifest::ReadManifest;
 use super::mesh::LabelledMesh;
 use super::pixels::{Difference, Pixels};
 use super::pose::{self, CheckedPose};
 use super::rays::difference;
 use super::report::{Report, Topic};
-use super::told::Told;
 use super::views::Views;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{Conventions, DatasetImage, Domain, Frame, Layout, XyzType};
@@ -26,9 +26,9 @@ const COORDINATES: (Topic, &str) = (Topic::Images, "coordinates and depth");
 const SLACK: f64 = 0.005;
 
 /// What the images of an area are held against.
-pub(crate) struct Stage<'a> {
+pub(crate) struct Reference<'a> {
     pub(crate) layout: &'a Layout,
-    pub(crate) told: &'a Told,
+    pub(crate) manifest: &'a ReadManifest,
     pub(crate) labels: &'a Labels,
     pub(crate) mesh: &'a LabelledMesh,
     pub(crate) scene: &'a Scene<'a>,
@@ -39,32 +39,32 @@ pub(crate) struct Stage<'a> {
     pub(crate) report: &'a Report,
 }
 
-impl Stage<'_> {
+impl Reference<'_> {
     /// In which forms numbers are written.
     pub(crate) fn conventions(&self) -> Conventions {
-        self.told.conventions()
+        self.manifest.conventions()
     }
 }
 
 /// What every image of an area is checked with.
 pub(crate) struct ImageCheck<'a> {
     pub(crate) layout: &'a Layout,
-    pub(crate) told: &'a Told,
+    pub(crate) manifest: &'a ReadManifest,
     pub(crate) labels: Option<&'a Labels>,
     pub(crate) views: &'a Views,
     pub(crate) files: &'a Files,
     /// None if the meshes cannot be used.
-    pub(crate) stage: Option<&'a Stage<'a>>,
+    pub(crate) reference: Option<&'a Reference<'a>>,
     pub(crate) report: &'a Report,
     pub(crate) domains: &'a [Domain],
     /// What differs from the mesh, for a second look.
-    pub(crate) odd: &'a Mutex<Vec<Odd>>,
+    pub(crate) mismatches: &'a Mutex<Vec<Mismatch>>,
     /// The cameras of the images, as far as they could be read.
     pub(crate) cameras: &'a Mutex<Vec<(usize, Camera)>>,
 }
 
 /// A file that differs from the mesh.
-pub(crate) struct Odd {
+pub(crate) struct Mismatch {
     /// Its image, by place in the list.
     pub(crate) image: usize,
     pub(crate) domain: Domain,
@@ -73,17 +73,17 @@ pub(crate) struct Odd {
 }
 
 /// What a thread keeps from image to image.
-pub(crate) struct Memory<'s> {
+pub(crate) struct Scratch<'s> {
     pub(super) caster: Option<Caster<'s, 's>>,
     pub(super) hits: Hits,
     pub(super) images: ViewImages,
     pub(super) xyz: Raster<[f32; 3]>,
 }
 
-impl<'s> Memory<'s> {
-    pub(crate) fn new(stage: Option<&'s Stage<'s>>) -> Self {
+impl<'s> Scratch<'s> {
+    pub(crate) fn new(reference: Option<&'s Reference<'s>>) -> Self {
         Self {
-            caster: stage.map(|s| Caster::new(s.scene)),
+            caster: reference.map(|s| Caster::new(s.scene)),
             hits: Hits::default(),
             images: ViewImages::default(),
             xyz: Raster::filled(0, 0, [0.0; 3]),
@@ -93,11 +93,11 @@ impl<'s> Memory<'s> {
 
 impl ImageCheck<'_> {
     /// Checks all files of an image.
-    pub(crate) fn check(&self, index: usize, image: &DatasetImage, memory: &mut Memory<'_>) {
+    pub(crate) fn check(&self, index: usize, image: &DatasetImage, memory: &mut Scratch<'_>) {
         let report = self.report;
         let size = match image.frame {
-            Frame::View(_) => (self.told.options.size, self.told.options.size),
-            Frame::Panorama => (self.told.options.pano_width, self.told.options.pano_width / 2),
+            Frame::View(_) => (self.manifest.options.size, self.manifest.options.size),
+            Frame::Panorama => (self.manifest.options.pano_width, self.manifest.options.pano_width / 2),
         };
         for &domain in self.domains {
             let path = image.path(self.layout, domain);
@@ -170,7 +170,7 @@ struct ImageFiles<'a> {
 }
 
 impl ImageFiles<'_> {
-    fn domain(&mut self, domain: Domain, pixels: Pixels, path: &Path, memory: &mut Memory<'_>) {
+    fn domain(&mut self, domain: Domain, pixels: Pixels, path: &Path, memory: &mut Scratch<'_>) {
         self.against_mesh(domain, &pixels, memory);
         self.nothing(domain, &pixels, path);
         match (domain, pixels) {
@@ -251,13 +251,13 @@ impl ImageFiles<'_> {
     /// Coordinates are what depth and pose give, as far as both are rounded.
     fn coordinates(&self, points: &Raster<[f32; 3]>, path: &Path) {
         let (Some(pose), Some(depth)) = (self.pose, &self.depth) else { return };
-        let units = self.check.told.conventions().depth_units;
+        let units = self.check.manifest.conventions().depth_units;
         let (camera, rays) = (&pose.camera, pose.camera.rays());
         let origin = camera.pose.location;
-        let from_depth = self.check.told.xyz_from_depth.is_some();
+        let from_depth = self.check.manifest.xyz_from_depth.is_some();
         // What depth is rounded to, and what is too far for it.
         let (half_depth, far) = (0.5 / units.per_m(), 65_534.0 / units.per_m());
-        let is_half = self.check.told.conventions().xyz == XyzType::Half;
+        let is_half = self.check.manifest.conventions().xyz == XyzType::Half;
         let mut first = None;
         let mut count = 0u64;
         for y in 0..points.height() {
@@ -301,18 +301,20 @@ impl ImageFiles<'_> {
     }
 
     /// Holds a file against what the mesh shows.
-    fn against_mesh(&self, domain: Domain, pixels: &Pixels, memory: &mut Memory<'_>) {
-        let (Some(pose), Some(stage), true) = (self.pose, self.check.stage, self.cast) else { return };
-        if domain == Domain::Rgb && !stage.rgb_from_mesh {
+    fn against_mesh(&self, domain: Domain, pixels: &Pixels, memory: &mut Scratch<'_>) {
+        let (Some(pose), Some(reference), true) = (self.pose, self.check.reference, self.cast) else {
+            return;
+        };
+        if domain == Domain::Rgb && !reference.rgb_from_mesh {
             return;
         }
-        let difference = difference(stage, domain, pixels, pose, &self.depth, memory);
+        let difference = difference(reference, domain, pixels, pose, &self.depth, memory);
         self.check.report.checked(1);
         let Some(difference) = difference else { return };
         if !pose.is_consistent && (difference.count as f64) < SLACK * difference.of as f64 {
             return;
         }
-        let odd = Odd { image: self.index, domain, difference, camera: pose.camera };
-        self.check.odd.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(odd);
+        let mismatches = Mismatch { image: self.index, domain, difference, camera: pose.camera };
+        self.check.mismatches.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(mismatches);
     }
 }

@@ -1,8 +1,8 @@
 //! The tables of instances: boxes, voxels and numbers, each against the others.
 
 use super::labels::Labels;
+use super::manifest::ReadManifest;
 use super::report::{OfFile, Report, Topic};
-use super::told::Told;
 use s3d_io::dataset::{InstanceArrays, Layout, read_instance_arrays, read_instance_members, read_instances};
 use s3d_io::fs::read_json;
 use s3d_label::parse_name;
@@ -13,7 +13,7 @@ use std::path::Path;
 const INSTANCES: (Topic, &str) = (Topic::Instances, "tables of instances");
 
 /// Checks `instances.json`, `instances.npz` and `instance_numbers.json` of an area.
-pub(crate) fn check(layout: &Layout, area: u32, told: &Told, labels: &Labels, report: &Report) {
+pub(crate) fn check(layout: &Layout, area: u32, manifest: &ReadManifest, labels: &Labels, report: &Report) {
     let (json, npz) = (layout.instances_json(area), layout.instances_npz(area));
     let entries = report.read(Topic::Instances, read_instances(&json));
     let arrays = report.read(Topic::Instances, read_instance_arrays(&npz));
@@ -44,10 +44,10 @@ pub(crate) fn check(layout: &Layout, area: u32, told: &Told, labels: &Labels, re
                 )
             });
         }
-        if let Some(told) = told.area(area) {
+        if let Some(manifest) = manifest.area(area) {
             let points: u64 = entries.iter().map(|e| e.points).sum();
-            checks.check(points == told.annotated_points, || {
-                format!("{points} points, and the manifest tells of {}", told.annotated_points)
+            checks.check(points == manifest.annotated_points, || {
+                format!("{points} points, and the manifest tells of {}", manifest.annotated_points)
             });
         }
     }

@@ -1,8 +1,8 @@
 //! The exported meshes: one for colours, the same for labels, and the votes that made these.
 
 use super::labels::Labels;
+use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
-use super::told::Told;
 use s3d_geom::TriMesh;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::read_json;
@@ -29,7 +29,7 @@ pub(crate) struct LabelledMesh {
 pub(crate) fn read_and_check(
     layout: &Layout,
     area: u32,
-    told: &Told,
+    manifest: &ReadManifest,
     labels: &Labels,
     report: &Report,
 ) -> Option<LabelledMesh> {
@@ -45,9 +45,9 @@ pub(crate) fn read_and_check(
     let names = semantic_file.map(|file| (label_names(&file.mesh, labels, &semantic, report), file.mesh));
     let file = read(&colored)?;
     let faces = file.mesh.faces().len();
-    if let Some(told) = told.area(area) {
-        report.check(faces == told.faces, MESH, &colored, || {
-            format!("{faces} faces, and the manifest tells of {}", told.faces)
+    if let Some(manifest) = manifest.area(area) {
+        report.check(faces == manifest.faces, MESH, &colored, || {
+            format!("{faces} faces, and the manifest tells of {}", manifest.faces)
         });
     }
     let (face_labels, other) = names?;
@@ -131,18 +131,18 @@ fn check_votes(layout: &Layout, area: u32, face_labels: &[u32], labels: &Labels,
         }
     }
     let checks = report.of(VOTES, &path);
-    let is = |what: &str, told: u64, found: u64| {
-        checks.check(told == found, || format!("{told} faces {what}, and semantic.obj has {found}"));
+    let is = |what: &str, manifest: u64, found: u64| {
+        checks.check(manifest == found, || format!("{manifest} faces {what}, and semantic.obj has {found}"));
     };
     is("in all", votes.faces, face_labels.len() as u64);
     is("without votes", votes.faces_without_votes, others);
     is("with votes", votes.total.faces_voted, per_label.iter().sum::<u64>() - others);
     // Rooms of other areas may bear the same name: they have no face here.
-    let mut told: BTreeMap<String, u64> = BTreeMap::new();
-    votes.rooms.iter().for_each(|r| *told.entry(r.name.clone()).or_default() += r.faces_voted);
-    for room in rooms.keys().chain(told.keys()).collect::<std::collections::BTreeSet<_>>() {
+    let mut manifest: BTreeMap<String, u64> = BTreeMap::new();
+    votes.rooms.iter().for_each(|r| *manifest.entry(r.name.clone()).or_default() += r.faces_voted);
+    for room in rooms.keys().chain(manifest.keys()).collect::<std::collections::BTreeSet<_>>() {
         let of = |map: &BTreeMap<String, u64>| map.get(room).copied().unwrap_or(0);
-        is(&format!("of {room}"), of(&told), of(&rooms));
+        is(&format!("of {room}"), of(&manifest), of(&rooms));
     }
     for class in &votes.classes {
         is(

@@ -8,10 +8,12 @@
 //! than reading the files, so nothing is left to a sample. With `full` candidate views are scored again too, and the points
 //! are read in all their forms.
 
+mod diagnosis;
 mod files;
 mod images;
 mod instances;
 mod labels;
+mod manifest;
 mod mesh;
 mod pixels;
 mod points;
@@ -20,17 +22,16 @@ mod rays;
 mod report;
 mod scores;
 mod shade;
-mod suspects;
 mod tables;
-mod told;
 mod views;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::work::for_each_in_order;
 use files::Files;
-use images::{ImageCheck, Memory, Odd, Stage};
+use images::{ImageCheck, Mismatch, Reference, Scratch};
 use labels::Labels;
+use manifest::ReadManifest;
 use mesh::{LabelledMesh, NOT_IN_TABLE};
 pub use report::{FaultGroup, VerifyReport};
 use report::{Report, Topic};
@@ -41,11 +42,10 @@ use s3d_render::{MipMaps, Scene};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
-use told::Told;
 use views::Views;
 
 /// So many files of a domain that differ from the mesh get a second look at what they look like.
-const MOST_LOOKS: usize = 25;
+const MAX_DIAGNOSES: usize = 25;
 
 /// How a data set is checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,7 +59,7 @@ pub struct VerifyOptions {
 struct Common<'a> {
     ctx: &'a Context,
     layout: &'a Layout,
-    told: &'a Told,
+    manifest: &'a ReadManifest,
     labels: Option<&'a Labels>,
     views: &'a Views,
     files: &'a Files,
@@ -84,15 +84,15 @@ pub fn verify(root: impl Into<PathBuf>, options: &VerifyOptions, ctx: &Context) 
 
 fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
     let report = Report::new(layout);
-    let Some(told) = Told::read(layout, &report) else { return Ok(report) };
-    let labels = Labels::read(layout, &told, &report);
-    tables::conventions(layout, &told, &report);
-    let views = Views::read(layout, &told, &report);
-    let files = Files::read(layout, &told, &report);
+    let Some(manifest) = ReadManifest::read(layout, &report) else { return Ok(report) };
+    let labels = Labels::read(layout, &manifest, &report);
+    tables::conventions(layout, &manifest, &report);
+    let views = Views::read(layout, &manifest, &report);
+    let files = Files::read(layout, &manifest, &report);
     let common = Common {
         ctx,
         layout,
-        told: &told,
+        manifest: &manifest,
         labels: labels.as_ref(),
         views: &views,
         files: &files,
@@ -100,24 +100,24 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
         report: &report,
     };
     let mut all = Vec::new();
-    for &area in &told.area_numbers {
+    for &area in &manifest.area_numbers {
         let images = report.read(Topic::Images, dataset_images(layout, area)).unwrap_or_default();
         check_area(&common, area, &images)?;
         all.extend(images);
     }
-    views.check_images(layout, &told, &all, &report);
-    tables::splits(layout, &told, &all, &report);
-    tables::statistics(layout, &told, &report);
-    files.check_rest(ctx, layout, &told, &report)?;
+    views.check_images(layout, &manifest, &all, &report);
+    tables::splits(layout, &manifest, &all, &report);
+    tables::statistics(layout, &manifest, &report);
+    files.check_rest(ctx, layout, &manifest, &report)?;
     Ok(report)
 }
 
 fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result<()> {
-    let Common { layout, told, labels, report, .. } = *common;
-    tables::rooms(layout, area, told, report);
+    let Common { layout, manifest, labels, report, .. } = *common;
+    tables::rooms(layout, area, manifest, report);
     let mesh = labels.and_then(|labels| {
-        instances::check(layout, area, told, labels, report);
-        mesh::read_and_check(layout, area, told, labels, report)
+        instances::check(layout, area, manifest, labels, report);
+        mesh::read_and_check(layout, area, manifest, labels, report)
     });
     let (Some(labels), Some(mesh)) = (labels, &mesh) else {
         report.note(format!("area {area}: images were not held against the mesh, which cannot be used"));
@@ -127,8 +127,8 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     let textures = MipMaps::new(&mesh.file.mesh);
     let pretty = |label: &u32| if *label == NOT_IN_TABLE { [0; 3] } else { pretty_color(*label) };
     let pretty_per_face: Vec<[u8; 3]> = mesh.labels.iter().map(pretty).collect();
-    let source = told.area(area).map_or("texture", |a| a.rgb.as_str());
-    let domains = told.domains();
+    let source = manifest.area(area).map_or("texture", |a| a.rgb.as_str());
+    let domains = manifest.domains();
     if source != "texture" && domains.contains(&Domain::Rgb) {
         report.note(format!(
             "area {area}: the colours of its images come from pictures ({source}), which are not in the data set; they were \
@@ -138,9 +138,9 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     if !domains.is_empty() && !domains.contains(&Domain::Pose) {
         report.note(format!("area {area}: images were not held against the mesh: they have no poses"));
     }
-    let stage = Stage {
+    let reference = Reference {
         layout,
-        told,
+        manifest,
         labels,
         mesh,
         scene: &scene,
@@ -149,7 +149,7 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
         rgb_from_mesh: source == "texture",
         report,
     };
-    check_images(common, area, images, Some((&stage, mesh, labels)))
+    check_images(common, area, images, Some((&reference, mesh, labels)))
 }
 
 /// One piece of an area's work.
@@ -163,22 +163,22 @@ fn check_images(
     common: &Common<'_>,
     area: u32,
     images: &[DatasetImage],
-    stage: Option<(&Stage<'_>, &LabelledMesh, &Labels)>,
+    reference: Option<(&Reference<'_>, &LabelledMesh, &Labels)>,
 ) -> Result<()> {
     let ctx = common.ctx;
-    let Common { layout, told, labels, views, files, full, report, .. } = *common;
-    let (odd, cameras) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
-    let domains = told.domains();
+    let Common { layout, manifest, labels, views, files, full, report, .. } = *common;
+    let (mismatches, cameras) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
+    let domains = manifest.domains();
     let check = ImageCheck {
         layout,
-        told,
+        manifest,
         labels,
         views,
         files,
-        stage: stage.map(|(stage, ..)| stage),
+        reference: reference.map(|(reference, ..)| reference),
         report,
         domains: &domains,
-        odd: &odd,
+        mismatches: &mismatches,
         cameras: &cameras,
     };
     let progress = ctx.progress("verifying", "images", images.len() as u64);
@@ -186,12 +186,12 @@ fn check_images(
     for_each_in_order(
         ctx,
         &works,
-        || Memory::new(check.stage),
+        || Scratch::new(check.reference),
         |memory, work| {
             match *work {
                 Work::Points => {
-                    if let Some((_, mesh, labels)) = stage {
-                        points::check(layout, area, told, mesh, labels, full, report);
+                    if let Some((_, mesh, labels)) = reference {
+                        points::check(layout, area, manifest, mesh, labels, full, report);
                     }
                 }
                 Work::Image(index) => {
@@ -206,48 +206,54 @@ fn check_images(
     let unlocked = |e: PoisonError<_>| e.into_inner();
     let mut cameras = cameras.into_inner().unwrap_or_else(unlocked);
     cameras.sort_by_key(|(index, _)| *index);
-    let Some((stage, ..)) = stage else { return Ok(()) };
+    let Some((reference, ..)) = reference else { return Ok(()) };
     if full {
-        scores::check(ctx, stage, area, images, &cameras, views)?;
+        scores::check(ctx, reference, area, images, &cameras, views)?;
     }
-    look_again(ctx, stage, images, &cameras, odd.into_inner().unwrap_or_else(PoisonError::into_inner))
+    diagnose_mismatches(
+        ctx,
+        reference,
+        images,
+        &cameras,
+        mismatches.into_inner().unwrap_or_else(PoisonError::into_inner),
+    )
 }
 
 /// Tells of the files that differ from the mesh, and what they look like.
-fn look_again(
+fn diagnose_mismatches(
     ctx: &Context,
-    stage: &Stage<'_>,
+    reference: &Reference<'_>,
     images: &[DatasetImage],
     cameras: &[(usize, Camera)],
-    mut odd: Vec<Odd>,
+    mut mismatches: Vec<Mismatch>,
 ) -> Result<()> {
-    let report = stage.report;
-    odd.sort_by_key(|o| (o.domain, o.image));
+    let report = reference.report;
+    mismatches.sort_by_key(|o| (o.domain, o.image));
     let mut looks: BTreeMap<Domain, usize> = BTreeMap::new();
-    let chosen: Vec<bool> = odd
+    let chosen: Vec<bool> = mismatches
         .iter()
         .map(|o| {
             let n = looks.entry(o.domain).or_default();
             *n += 1;
-            *n <= MOST_LOOKS
+            *n <= MAX_DIAGNOSES
         })
         .collect();
-    let works: Vec<usize> = (0..odd.len()).collect();
+    let works: Vec<usize> = (0..mismatches.len()).collect();
     let guesses: Mutex<BTreeMap<usize, Vec<Option<String>>>> = Mutex::default();
-    let progress = ctx.progress("looking again", "files", odd.len() as u64);
+    let progress = ctx.progress("looking again", "files", mismatches.len() as u64);
     for_each_in_order(
         ctx,
         &works,
         || (),
         |(), &i| {
-            let (o, image) = (&odd[i], &images[odd[i].image]);
-            let guess = if chosen[i] { suspects::look(stage, images, cameras, o) } else { None };
+            let (o, image) = (&mismatches[i], &images[mismatches[i].image]);
+            let guess = if chosen[i] { diagnosis::diagnose(reference, images, cameras, o) } else { None };
             let mut sentence = o.difference.sentence("what the mesh shows there");
             if let Some(guess) = &guess {
                 sentence += &format!("; {guess}");
             }
             let kind = o.domain.folder();
-            report.fault(Topic::Rays, kind, &image.path(stage.layout, o.domain), sentence);
+            report.fault(Topic::Rays, kind, &image.path(reference.layout, o.domain), sentence);
             let mut all = guesses.lock().unwrap_or_else(PoisonError::into_inner);
             all.entry(o.image).or_default().push(guess);
             progress.add(1);
@@ -260,12 +266,12 @@ fn look_again(
         let files = image
             .domains
             .iter()
-            .filter(|d| **d != Domain::Pose && (stage.rgb_from_mesh || **d != Domain::Rgb));
+            .filter(|d| **d != Domain::Pose && (reference.rgb_from_mesh || **d != Domain::Rgb));
         if let Some(Some(first)) = guesses.first()
             && guesses.len() == files.count()
             && guesses.iter().all(|g| g.as_ref() == Some(first))
         {
-            let path = image.path(stage.layout, Domain::Pose);
+            let path = image.path(reference.layout, Domain::Pose);
             let message = format!(
                 "all images of it differ from the mesh in the same way: {first}; is it the pose that is wrong?"
             );

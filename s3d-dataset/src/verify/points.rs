@@ -1,9 +1,9 @@
 //! The sampled points: on their faces, with their faces' labels, and the same in every form.
 
 use super::labels::Labels;
+use super::manifest::ReadManifest;
 use super::mesh::LabelledMesh;
 use super::report::{Report, Topic};
-use super::told::Told;
 use s3d_geom::{PointCloud, TriMesh};
 use s3d_io::cloud::{LabelledPoint, LabelledPoints, MatArea, MatObject, PointReader};
 use s3d_io::dataset::Layout;
@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-6;
 pub(crate) fn check(
     layout: &Layout,
     area: u32,
-    told: &Told,
+    manifest: &ReadManifest,
     mesh: &LabelledMesh,
     labels: &Labels,
     full: bool,
@@ -33,9 +33,9 @@ pub(crate) fn check(
 ) {
     let path = layout.point_cloud(area);
     let Some(mut points) = report.read(Topic::Points, LabelledPoints::open(&path)) else { return };
-    if let Some(told) = told.area(area) {
-        report.check(points.count() == told.points, POINTS, &path, || {
-            format!("{} points, and the manifest tells of {}", points.count(), told.points)
+    if let Some(manifest) = manifest.area(area) {
+        report.check(points.count() == manifest.points, POINTS, &path, || {
+            format!("{} points, and the manifest tells of {}", points.count(), manifest.points)
         });
     }
     let mut forms = full.then(|| Forms::open(layout, area, labels, report));
@@ -125,7 +125,7 @@ struct Reader {
     path: PathBuf,
     points: PointReader,
     /// Whether it was told that it differs: once is enough.
-    told: bool,
+    manifest: bool,
 }
 
 impl<'a> Forms<'a> {
@@ -235,11 +235,11 @@ fn near(p: &LabelledPoint, q: glam::Vec3, color: [u8; 3]) -> bool {
 impl Reader {
     fn open(path: PathBuf, report: &Report) -> Option<Self> {
         let points = report.read(Topic::Points, PointReader::open(&path))?;
-        Some(Self { path, points, told: false })
+        Some(Self { path, points, manifest: false })
     }
 
     fn compare(&mut self, run: &[LabelledPoint], report: &Report) {
-        if self.told {
+        if self.manifest {
             return;
         }
         let mut cloud = PointCloud::default();
@@ -255,19 +255,19 @@ impl Reader {
                 }
                 Err(e) => {
                     report.unreadable(Topic::Points, &e);
-                    self.told = true;
+                    self.manifest = true;
                     return;
                 }
             }
         };
-        self.told = fault.is_some();
+        self.manifest = fault.is_some();
         let path: &Path = &self.path;
         report.check(fault.is_none(), FORMS, path, || fault.unwrap_or_default());
     }
 
     fn end(mut self, report: &Report) {
         let mut cloud = PointCloud::default();
-        let more = !self.told && self.points.read_chunk(1, &mut cloud).is_ok_and(|n| n > 0);
+        let more = !self.manifest && self.points.read_chunk(1, &mut cloud).is_ok_and(|n| n > 0);
         report.check(!more, FORMS, &self.path, || "has more points than pointcloud.ply".to_owned());
     }
 }

@@ -219,7 +219,7 @@ mod tests {
     const UUID: &str = "00112233445566778899aabbccddeeff";
 
     /// What is told of a pose file after `change`.
-    fn told(change: impl FnOnce(&mut PoseFile)) -> (String, bool) {
+    fn manifest(change: impl FnOnce(&mut PoseFile)) -> (String, bool) {
         let dir = tempfile::tempdir().unwrap();
         let layout = Layout::new(dir.path());
         let original = Pose::level(DVec3::new(1.0, -2.0, 1.5), 0.7);
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_good_file_gives_its_camera_to_the_bit() {
-        let (text, consistent) = told(|_| ());
+        let (text, consistent) = manifest(|_| ());
         assert!(consistent && text.ends_with(" 0 faults\n"), "{text}");
     }
 
@@ -285,7 +285,7 @@ mod tests {
             }),
         ];
         for (words, change) in cases {
-            let (text, consistent) = told(|f| change(f));
+            let (text, consistent) = manifest(|f| change(f));
             assert!(text.contains(words) && !consistent, "{words}: {text}");
         }
     }

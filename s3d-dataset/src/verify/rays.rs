@@ -1,6 +1,6 @@
 //! What the mesh shows: the pixels that a file should have.
 
-use super::images::{Memory, Stage};
+use super::images::{Reference, Scratch};
 use super::pixels::{Difference, Pixels};
 use super::pose::CheckedPose;
 use crate::xyz;
@@ -15,15 +15,15 @@ use s3d_render::{
 /// How a file differs from what the mesh shows: exactly, for the meshes of an export are those that it was rendered from, to
 /// the bit.
 pub(super) fn difference(
-    stage: &Stage<'_>,
+    reference: &Reference<'_>,
     domain: Domain,
     pixels: &Pixels,
     pose: &CheckedPose,
     depth_file: &Option<Raster<u16>>,
-    memory: &mut Memory<'_>,
+    memory: &mut Scratch<'_>,
 ) -> Option<Difference> {
-    let Memory { hits, images, xyz, .. } = memory;
-    let (camera, conventions) = (&pose.camera, stage.conventions());
+    let Scratch { hits, images, xyz, .. } = memory;
+    let (camera, conventions) = (&pose.camera, reference.conventions());
     let colors = |found: &Raster<[u8; 3]>, expected: &Raster<[u8; 3]>| {
         Difference::of(found, expected, |a, b| a == b, |c| format!("{c:?}"), |c| format!("{c:?}"))
     };
@@ -31,26 +31,26 @@ pub(super) fn difference(
         Pixels::Color(found) => match domain {
             Domain::Rgb => {
                 let filter = TextureFilter::default();
-                rgb_image_into(stage.scene, stage.textures, hits, camera, &filter, &mut images.rgb);
+                rgb_image_into(reference.scene, reference.textures, hits, camera, &filter, &mut images.rgb);
                 colors(found, &images.rgb)
             }
             Domain::Normal => {
-                let (normals, axes) = (stage.told.normals(), conventions.normal_axes);
+                let (normals, axes) = (reference.manifest.normals(), conventions.normal_axes);
                 let out = &mut images.faces.normal;
-                normal_image_into(stage.scene, hits, camera, normals, axes, out);
+                normal_image_into(reference.scene, hits, camera, normals, axes, out);
                 colors(found, out)
             }
             Domain::Semantic => {
-                index_image_into(hits, &stage.mesh.labels, &mut images.faces.index);
+                index_image_into(hits, &reference.mesh.labels, &mut images.faces.index);
                 let index = |c: [u8; 3]| u32::from_be_bytes([0, c[0], c[1], c[2]]);
                 let text = |c: [u8; 3]| match c {
                     MISSING_INDEX => "nothing".to_owned(),
-                    c => format!("{} ({})", index(c), stage.labels.name_of(index(c))),
+                    c => format!("{} ({})", index(c), reference.labels.name_of(index(c))),
                 };
                 Difference::of(found, &images.faces.index, |a, b| a == b, text, text)
             }
             _ => {
-                color_per_face_image_into(hits, stage.pretty_per_face, &mut images.faces.color);
+                color_per_face_image_into(hits, reference.pretty_per_face, &mut images.faces.color);
                 colors(found, &images.faces.color)
             }
         },
@@ -66,8 +66,8 @@ pub(super) fn difference(
             let same = |a: [f32; 3], b: [f32; 3]| a == b;
             let rounded = |p: [f16; 3]| p.map(f16::to_f32);
             let is_half = conventions.xyz != XyzType::Float;
-            if stage.told.xyz_from_depth.is_some() {
-                // Made by `s3d xyz`: from the pose as its angles give it.
+            if reference.manifest.xyz_from_depth.is_some() {
+                // Totals by `s3d xyz`: from the pose as its angles give it.
                 let camera = Camera { pose: pose.file.pose(), ..*camera };
                 let points = xyz::points(&camera, depth_file.as_ref()?, conventions.depth_units);
                 if is_half {

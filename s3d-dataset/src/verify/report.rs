@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Lines of one kind of fault; the rest is counted.
-const MOST_LINES: usize = 20;
+const MAX_LINES: usize = 20;
 
 /// What a fault is about; the report is grouped by it, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -100,7 +100,7 @@ impl Report {
         let kind = state.faults.entry((topic, kind)).or_default();
         kind.count += 1;
         kind.first.insert(line);
-        if kind.first.len() > MOST_LINES {
+        if kind.first.len() > MAX_LINES {
             kind.first.pop_last();
         }
     }

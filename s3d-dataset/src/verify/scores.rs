@@ -1,6 +1,6 @@
 //! Entropies of candidate views, scored again.
 
-use super::images::Stage;
+use super::images::Reference;
 use super::report::Topic;
 use super::views::Views;
 use crate::context::Context;
@@ -16,14 +16,14 @@ const ENTROPIES: (Topic, &str) = (Topic::Views, "entropies");
 /// Scores the candidates of each location whose panorama tells exactly where it is, and holds them against `views.json`.
 pub(crate) fn check(
     ctx: &Context,
-    stage: &Stage<'_>,
+    reference: &Reference<'_>,
     area: u32,
     images: &[DatasetImage],
     cameras: &[(usize, Camera)],
     views: &Views,
 ) -> Result<()> {
-    let Ok(table) = LabelTable::from_names(&stage.labels.names) else { return Ok(()) };
-    if stage.mesh.labels.iter().any(|l| *l as usize >= table.len()) {
+    let Ok(table) = LabelTable::from_names(&reference.labels.names) else { return Ok(()) };
+    if reference.mesh.labels.iter().any(|l| *l as usize >= table.len()) {
         return Ok(());
     }
     let located: Vec<ScanLocation> = cameras
@@ -33,19 +33,19 @@ pub(crate) fn check(
         .collect();
     // Every location of a data set has the same number of candidates.
     let Some(candidates) = views.candidates_of_a_location(area) else { return Ok(()) };
-    let options = &stage.told.options;
+    let options = &reference.manifest.options;
     let scoring = Scoring {
         area,
         views: candidates,
         size: options.size,
         stride: options.entropy_stride,
-        seed: stage.told.seed,
+        seed: reference.manifest.seed,
     };
-    let labels: Vec<LabelId> = stage.mesh.labels.iter().map(|l| LabelId(*l)).collect();
-    let path = stage.layout.views_json(area);
+    let labels: Vec<LabelId> = reference.mesh.labels.iter().map(|l| LabelId(*l)).collect();
+    let path = reference.layout.views_json(area);
     let locations: Vec<&ScanLocation> = located.iter().collect();
-    score_area(ctx, &locations, stage.scene, &labels, &table, scoring, |uuid, scores| {
-        let checks = stage.report.of(ENTROPIES, &path);
+    score_area(ctx, &locations, reference.scene, &labels, &table, scoring, |uuid, scores| {
+        let checks = reference.report.of(ENTROPIES, &path);
         for (record, score) in views.of_location(area, uuid).zip(scores) {
             checks.check(record.entropy == score, || {
                 format!(

@@ -1,6 +1,6 @@
 //! What single rays should write into the files of a domain: slower than images, for any ray.
 
-use super::images::Stage;
+use super::images::Reference;
 use glam::DVec3;
 use s3d_geom::Camera;
 use s3d_io::dataset::Domain;
@@ -8,19 +8,19 @@ use s3d_render::{Hit, MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, TextureFilte
 
 /// The values of a domain.
 pub(crate) struct Shade<'a> {
-    stage: &'a Stage<'a>,
+    reference: &'a Reference<'a>,
     domain: Domain,
 }
 
 impl<'a> Shade<'a> {
-    pub(crate) fn new(stage: &'a Stage<'a>, domain: Domain) -> Self {
-        Self { stage, domain }
+    pub(crate) fn new(reference: &'a Reference<'a>, domain: Domain) -> Self {
+        Self { reference, domain }
     }
 
     /// What the file has where the ray along `direction` ends at `hit`.
     pub(crate) fn value(&self, camera: &Camera, direction: DVec3, hit: Option<Hit>) -> [f64; 3] {
-        let stage = self.stage;
-        let conventions = stage.conventions();
+        let reference = self.reference;
+        let conventions = reference.conventions();
         let Some(hit) = hit else {
             return match self.domain {
                 Domain::Depth => [f64::from(MISSING_DEPTH), 0.0, 0.0],
@@ -34,20 +34,21 @@ impl<'a> Shade<'a> {
                 [(hit.t * conventions.depth_units.per_m() + 0.5).floor().min(65_535.0), 0.0, 0.0]
             }
             Domain::Normal => {
-                let n = stage.scene.mesh().normal(hit.face).as_dvec3();
+                let n = reference.scene.mesh().normal(hit.face).as_dvec3();
                 let n = if n.dot(direction) > 0.0 { -n } else { n };
                 let n: DVec3 = camera.normal_axes_from_world(conventions.normal_axes) * n;
                 (n * 127.5 + (128.0 + 1e-6)).to_array().map(f64::floor)
             }
             Domain::Semantic => {
-                let [_, r, g, b] = stage.mesh.labels[hit.face as usize].to_be_bytes();
+                let [_, r, g, b] = reference.mesh.labels[hit.face as usize].to_be_bytes();
                 [r, g, b].map(f64::from)
             }
-            Domain::SemanticPretty => stage.pretty_per_face[hit.face as usize].map(f64::from),
+            Domain::SemanticPretty => reference.pretty_per_face[hit.face as usize].map(f64::from),
             Domain::GlobalXyz => (camera.pose.location + direction * hit.t).to_array(),
             Domain::Rgb => {
                 let filter = TextureFilter::default();
-                rgb_of_ray(stage.scene, stage.textures, camera, direction, hit.face, &filter).map(f64::from)
+                rgb_of_ray(reference.scene, reference.textures, camera, direction, hit.face, &filter)
+                    .map(f64::from)
             }
             Domain::Pose => [0.0; 3],
         }

@@ -1,7 +1,7 @@
 //! The tables beside the images: rooms, folds, lists, statistics, conventions.
 
+use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
-use super::told::Told;
 use crate::tables::assets;
 use crate::tables::statistics::Statistics;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, read_conventions, read_splits};
@@ -20,10 +20,10 @@ const STATISTICS: (Topic, &str) = (Topic::Tables, "statistics");
 
 /// Holds `conventions.json` against the options, and what is the same in every data set of this version against that; profiles
 /// that are told of are there.
-pub(crate) fn conventions(layout: &Layout, told: &Told, report: &Report) {
+pub(crate) fn conventions(layout: &Layout, manifest: &ReadManifest, report: &Report) {
     let path = layout.conventions();
     if let Some(found) = report.read(Topic::Tables, read_conventions(&path)) {
-        report.check(found == told.conventions(), CONVENTIONS, &path, || {
+        report.check(found == manifest.conventions(), CONVENTIONS, &path, || {
             let text = |c: s3d_io::dataset::Conventions| {
                 format!(
                     "depth units {}, normal axes {}, coordinates {}",
@@ -32,19 +32,19 @@ pub(crate) fn conventions(layout: &Layout, told: &Told, report: &Report) {
                     c.xyz
                 )
             };
-            format!("{}; the manifest tells of {}", text(found), text(told.conventions()))
+            format!("{}; the manifest tells of {}", text(found), text(manifest.conventions()))
         });
     }
-    for name in told.profiles() {
+    for name in manifest.profiles() {
         let dir = layout.profile_dir(name);
         report.check(dir.is_dir(), CONVENTIONS, &dir, || {
             "missing: the manifest tells of this profile".to_owned()
         });
     }
-    if !told.is_of_this_version() {
+    if !manifest.is_of_this_version() {
         report.note(format!(
             "written by s3d {}: draws, selection and assets were not compared with those of this version",
-            told.version
+            manifest.version
         ));
         return;
     }
@@ -73,13 +73,13 @@ struct RoomRecord {
 }
 
 /// Checks `rooms.json` of an area, and the angles of its S3DIS tree.
-pub(crate) fn rooms(layout: &Layout, area: u32, told: &Told, report: &Report) {
+pub(crate) fn rooms(layout: &Layout, area: u32, manifest: &ReadManifest, report: &Report) {
     let path = layout.rooms_json(area);
     let Some(rooms) = report.read(Topic::Tables, read_json::<Vec<RoomRecord>>(&path)) else { return };
     let checks = report.of(ROOMS, &path);
-    if let Some(told) = told.area(area) {
-        checks.check(rooms.len() == told.rooms, || {
-            format!("{} rooms, and the manifest tells of {}", rooms.len(), told.rooms)
+    if let Some(manifest) = manifest.area(area) {
+        checks.check(rooms.len() == manifest.rooms, || {
+            format!("{} rooms, and the manifest tells of {}", rooms.len(), manifest.rooms)
         });
     }
     let mut names = BTreeSet::new();
@@ -124,8 +124,8 @@ pub(crate) fn rooms(layout: &Layout, area: u32, told: &Told, report: &Report) {
 }
 
 /// Checks `splits.json` and the lists of panoramas: what they name is there, and all that is there is named.
-pub(crate) fn splits(layout: &Layout, told: &Told, images: &[DatasetImage], report: &Report) {
-    let (areas, path) = (&told.area_numbers, layout.splits());
+pub(crate) fn splits(layout: &Layout, manifest: &ReadManifest, images: &[DatasetImage], report: &Report) {
+    let (areas, path) = (&manifest.area_numbers, layout.splits());
     let expected = folds(areas);
     if let Some(splits) = report.read(Topic::Tables, read_splits(&path)) {
         let same = splits.len() == expected.len()
@@ -172,8 +172,8 @@ pub(crate) fn splits(layout: &Layout, told: &Told, images: &[DatasetImage], repo
 }
 
 /// Holds the statistics against what is counted from the files.
-pub(crate) fn statistics(layout: &Layout, told: &Told, report: &Report) {
-    let counted = match Statistics::count(layout, &told.area_numbers) {
+pub(crate) fn statistics(layout: &Layout, manifest: &ReadManifest, report: &Report) {
+    let counted = match Statistics::count(layout, &manifest.area_numbers) {
         Ok(counted) => counted,
         Err(e) => {
             report.fault(

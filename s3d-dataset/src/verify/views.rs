@@ -1,7 +1,7 @@
 //! The list of views against its own draws and selection, and against the images that are there.
 
+use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
-use super::told::Told;
 use crate::export::views::{Candidate, select};
 use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, ViewRecord, read_views};
 use s3d_sample::{Pool, View, ViewDistribution, draw_view};
@@ -19,10 +19,10 @@ pub(crate) struct Views {
 
 impl Views {
     /// Reads and checks `views.json` of every area.
-    pub(crate) fn read(layout: &Layout, told: &Told, report: &Report) -> Self {
+    pub(crate) fn read(layout: &Layout, manifest: &ReadManifest, report: &Report) -> Self {
         let mut views = Self::default();
         let mut all_there = true;
-        for &area in &told.area_numbers {
+        for &area in &manifest.area_numbers {
             match report.read(Topic::Views, read_views(&layout.views_json(area))) {
                 Some(records) => {
                     let kept = records
@@ -35,12 +35,12 @@ impl Views {
             }
         }
         // Another version may draw otherwise.
-        if told.is_of_this_version() {
-            views.check_draws(layout, told, report);
+        if manifest.is_of_this_version() {
+            views.check_draws(layout, manifest, report);
         }
         // The selection is over the whole pool.
-        if told.is_of_this_version() && all_there {
-            views.check_selection(layout, told, report);
+        if manifest.is_of_this_version() && all_there {
+            views.check_selection(layout, manifest, report);
         }
         views
     }
@@ -66,7 +66,7 @@ impl Views {
         u32::try_from(self.of_location(area, &first.camera_uuid).count()).ok()
     }
 
-    fn check_draws(&self, layout: &Layout, told: &Told, report: &Report) {
+    fn check_draws(&self, layout: &Layout, manifest: &ReadManifest, report: &Report) {
         let distribution = ViewDistribution::default();
         for (area, records) in &self.by_area {
             let path = layout.views_json(*area);
@@ -74,12 +74,12 @@ impl Views {
             let mut seen = BTreeSet::new();
             for r in records {
                 let View { yaw_rad, pitch_rad, fov_rad } =
-                    draw_view(&distribution, told.seed, &r.camera_uuid, r.candidate);
+                    draw_view(&distribution, manifest.seed, &r.camera_uuid, r.candidate);
                 let same = (yaw_rad, pitch_rad, fov_rad) == (r.yaw_rad, r.pitch_rad, r.fov_rad);
                 checks.check(same, || {
                     format!(
                         "candidate {} of {} is not what seed {} draws",
-                        r.candidate, r.camera_uuid, told.seed
+                        r.candidate, r.camera_uuid, manifest.seed
                     )
                 });
                 checks.check(seen.insert((&r.camera_uuid, r.candidate)), || {
@@ -89,10 +89,10 @@ impl Views {
         }
     }
 
-    fn check_selection(&self, layout: &Layout, told: &Told, report: &Report) {
-        let Ok(pool) = told.options.pool.parse::<Pool>() else { return };
+    fn check_selection(&self, layout: &Layout, manifest: &ReadManifest, report: &Report) {
+        let Ok(pool) = manifest.options.pool.parse::<Pool>() else { return };
         let mut candidates = Vec::new();
-        for (&area, records) in told.area_numbers.iter().filter_map(|a| self.by_area.get_key_value(a)) {
+        for (&area, records) in manifest.area_numbers.iter().filter_map(|a| self.by_area.get_key_value(a)) {
             let mut location = 0;
             for (i, r) in records.iter().enumerate() {
                 location += usize::from(i > 0 && records[i - 1].camera_uuid != r.camera_uuid);
@@ -109,8 +109,8 @@ impl Views {
                 });
             }
         }
-        select(&mut candidates, pool, told.options.keep_all, told.seed);
-        let found = told.area_numbers.iter().filter_map(|a| self.by_area.get(a)).flatten();
+        select(&mut candidates, pool, manifest.options.keep_all, manifest.seed);
+        let found = manifest.area_numbers.iter().filter_map(|a| self.by_area.get(a)).flatten();
         for (c, r) in candidates.iter().zip(found) {
             report.check(c.frame_num == r.frame_num, DRAWS, &layout.views_json(c.area), || {
                 format!(
@@ -125,7 +125,7 @@ impl Views {
     pub(crate) fn check_images(
         &self,
         layout: &Layout,
-        told: &Told,
+        manifest: &ReadManifest,
         images: &[DatasetImage],
         report: &Report,
     ) {
@@ -145,7 +145,7 @@ impl Views {
                     .is_none_or(|known| known.is_empty() || known.contains(image.uuid.as_str())),
             };
             report.check(known, THERE, &path, || "views.json does not tell of this image".to_owned());
-            report.check(told.is_chosen(&image.uuid), THERE, &path, || {
+            report.check(manifest.is_chosen(&image.uuid), THERE, &path, || {
                 "the manifest's option only does not name this location".to_owned()
             });
             let first = there.insert((image.area, image.uuid.as_str(), image.frame));
@@ -155,7 +155,7 @@ impl Views {
             let count = if image.frame == Frame::Panorama { &mut panoramas } else { &mut views };
             *count.entry(image.area).or_default() += 1;
         }
-        if told.domains().is_empty() {
+        if manifest.domains().is_empty() {
             return;
         }
         let missing = |area: u32, uuid: &str, frame: Frame| {
@@ -166,17 +166,21 @@ impl Views {
             });
         };
         for (area, known) in &locations {
-            known.iter().filter(|u| told.is_chosen(u)).for_each(|uuid| missing(*area, uuid, Frame::Panorama));
+            known
+                .iter()
+                .filter(|u| manifest.is_chosen(u))
+                .for_each(|uuid| missing(*area, uuid, Frame::Panorama));
         }
-        for (area, uuid, number) in self.kept.keys().filter(|(_, uuid, _)| told.is_chosen(uuid)) {
+        for (area, uuid, number) in self.kept.keys().filter(|(_, uuid, _)| manifest.is_chosen(uuid)) {
             missing(*area, uuid, Frame::View(*number));
         }
-        for area in &told.areas {
+        for area in &manifest.areas {
             let path = layout.manifest();
             let checks = report.of((Topic::Manifest, "counts"), &path);
-            let is = |what: &str, told: u64, found: u64| {
-                checks
-                    .check(told == found, || format!("area {}: {told} {what}, there are {found}", area.area));
+            let is = |what: &str, manifest: u64, found: u64| {
+                checks.check(manifest == found, || {
+                    format!("area {}: {manifest} {what}, there are {found}", area.area)
+                });
             };
             is("panoramas", area.panoramas, panoramas.get(&area.area).copied().unwrap_or(0));
             is("views", area.views, views.get(&area.area).copied().unwrap_or(0));

@@ -1,9 +1,9 @@
-//! What a file looks like that is not what the mesh shows: the usual suspects, each tried on some of its pixels.
+//! What a file looks like that is not what the mesh shows: the usual diagnosis, each tried on some of its pixels.
 //!
 //! A suspect says what a pixel would show if the fault were that one. It is named if it explains nearly all pixels that
 //! differ, and nearly all others.
 
-use super::images::{Odd, Stage};
+use super::images::{Mismatch, Reference};
 use super::pixels::Pixels;
 use super::shade::Shade;
 use glam::{DMat3, DVec3};
@@ -61,7 +61,7 @@ struct Suspect {
 
 /// What a pixel sees, as far as changes need it.
 struct Seen<'a> {
-    stage: &'a Stage<'a>,
+    reference: &'a Reference<'a>,
     camera: Camera,
     direction: DVec3,
     hit: Option<Hit>,
@@ -73,27 +73,27 @@ fn as_is(_: &Seen<'_>, value: [f64; 3]) -> [f64; 3] {
 
 /// What the file `odd` of `image` looks like; `None` if no suspect explains it. `others` are the cameras of the area's
 /// images.
-pub(crate) fn look(
-    stage: &Stage<'_>,
+pub(crate) fn diagnose(
+    reference: &Reference<'_>,
     images: &[DatasetImage],
     others: &[(usize, Camera)],
-    odd: &Odd,
+    mismatches: &Mismatch,
 ) -> Option<String> {
-    let image = &images[odd.image];
-    let pixels = Pixels::read(odd.domain, &image.path(stage.layout, odd.domain)).ok()?;
-    let shade = Shade::new(stage, odd.domain);
-    let sample = sample(stage, &shade, odd, &pixels);
+    let image = &images[mismatches.image];
+    let pixels = Pixels::read(mismatches.domain, &image.path(reference.layout, mismatches.domain)).ok()?;
+    let shade = Shade::new(reference, mismatches.domain);
+    let sample = sample(reference, &shade, mismatches, &pixels);
     if sample.iter().filter(|p| p.differs).count() < FEWEST {
         return None;
     }
-    if odd.domain == Domain::Semantic
-        && let Some(words) = other_table(stage, &sample)
+    if mismatches.domain == Domain::Semantic
+        && let Some(words) = other_table(reference, &sample)
     {
         return Some(words);
     }
     let mut best: Option<(f64, String)> = None;
-    for suspect in suspects(image, images, others, odd) {
-        let share = explained(stage, &shade, odd, &sample, &suspect);
+    for suspect in diagnosis(image, images, others, mismatches) {
+        let share = explained(reference, &shade, mismatches, &sample, &suspect);
         if share >= EXPLAINED && best.as_ref().is_none_or(|(b, _)| share > b + 0.002) {
             best = Some((share, suspect.words));
         }
@@ -110,7 +110,12 @@ struct Probe {
 }
 
 /// Pixels spread over the image: some that differ, and some of all.
-fn sample(stage: &Stage<'_>, shade: &Shade<'_>, odd: &Odd, pixels: &Pixels) -> Vec<Probe> {
+fn sample(
+    reference: &Reference<'_>,
+    shade: &Shade<'_>,
+    mismatches: &Mismatch,
+    pixels: &Pixels,
+) -> Vec<Probe> {
     let (w, h) = pixels.size();
     let (mut probes, mut differing, mut all) = (Vec::new(), 0, 0);
     // Steps of the golden ratio and of its like in two dimensions reach everywhere, and never in a pattern.
@@ -120,8 +125,8 @@ fn sample(stage: &Stage<'_>, shade: &Shade<'_>, odd: &Odd, pixels: &Pixels) -> V
         let at =
             (spread(i, 0.754_877_666_246_693, w).min(w - 1), spread(i, 0.569_840_290_998_053, h).min(h - 1));
         let found = pixels.value(at.0, at.1);
-        let (_, expected) = predict(stage, shade, odd, Ray::Own, at);
-        let differs = !near(odd.domain, found, expected);
+        let (_, expected) = predict(reference, shade, mismatches, Ray::Own, at);
+        let differs = !near(mismatches.domain, found, expected);
         let room = if differs { &mut differing } else { &mut all };
         if *room < PIXELS {
             *room += 1;
@@ -135,30 +140,36 @@ fn sample(stage: &Stage<'_>, shade: &Shade<'_>, odd: &Odd, pixels: &Pixels) -> V
 }
 
 fn predict<'a>(
-    stage: &'a Stage<'a>,
+    reference: &'a Reference<'a>,
     shade: &Shade<'_>,
-    odd: &Odd,
+    mismatches: &Mismatch,
     ray: Ray,
     (x, y): (u32, u32),
 ) -> (Seen<'a>, [f64; 3]) {
-    let (camera, px, py) = ray.place(&odd.camera, x, y);
+    let (camera, px, py) = ray.place(&mismatches.camera, x, y);
     let direction = camera.direction(px, py);
-    let hit = cast_ray(stage.scene, camera.pose.location, direction);
+    let hit = cast_ray(reference.scene, camera.pose.location, direction);
     let value = shade.value(&camera, direction, hit);
-    (Seen { stage, camera, direction, hit }, value)
+    (Seen { reference, camera, direction, hit }, value)
 }
 
 /// The share of pixels that a suspect explains, the smaller of that of differing pixels and of the others.
-fn explained(stage: &Stage<'_>, shade: &Shade<'_>, odd: &Odd, sample: &[Probe], suspect: &Suspect) -> f64 {
+fn explained(
+    reference: &Reference<'_>,
+    shade: &Shade<'_>,
+    mismatches: &Mismatch,
+    sample: &[Probe],
+    suspect: &Suspect,
+) -> f64 {
     let (mut counts, mut right) = ([0usize; 2], [0usize; 2]);
-    // Pixels that differ first: most suspects fail there.
+    // Pixels that differ first: most diagnosis fail there.
     let (differing, others): (Vec<_>, Vec<_>) = sample.iter().partition(|p| p.differs);
     for (n, probe) in differing.into_iter().chain(others).enumerate() {
-        let (seen, value) = predict(stage, shade, odd, suspect.ray, probe.at);
+        let (seen, value) = predict(reference, shade, mismatches, suspect.ray, probe.at);
         let value = (suspect.change)(&seen, value);
         let which = usize::from(probe.differs);
         counts[which] += 1;
-        right[which] += usize::from(near(odd.domain, probe.found, value));
+        right[which] += usize::from(near(mismatches.domain, probe.found, value));
         if n == 40 && right[0] + right[1] < 20 {
             return 0.0;
         }
@@ -180,7 +191,7 @@ fn near(domain: Domain, found: [f64; 3], expected: [f64; 3]) -> bool {
 }
 
 /// Whether the indices are those of another label table: each stands for one label, but not for its own.
-fn other_table(stage: &Stage<'_>, sample: &[Probe]) -> Option<String> {
+fn other_table(reference: &Reference<'_>, sample: &[Probe]) -> Option<String> {
     let index = |c: [f64; 3]| c[0] as u32 * 65_536 + c[1] as u32 * 256 + c[2] as u32;
     let mut meanings: std::collections::BTreeMap<u32, std::collections::BTreeMap<u32, u32>> =
         Default::default();
@@ -204,19 +215,19 @@ fn other_table(stage: &Stage<'_>, sample: &[Probe]) -> Option<String> {
     (one_to_one && f64::from(best) >= 0.99 * f64::from(all)).then(|| {
         format!(
             "its indices are those of another label table: {found} stands for {} there, and for {} in semantic_labels.json",
-            stage.labels.name_of(label),
-            stage.labels.name_of(found)
+            reference.labels.name_of(label),
+            reference.labels.name_of(found)
         )
     })
 }
 
-fn suspects(
+fn diagnosis(
     image: &DatasetImage,
     images: &[DatasetImage],
     others: &[(usize, Camera)],
-    odd: &Odd,
+    mismatches: &Mismatch,
 ) -> Vec<Suspect> {
-    let camera = &odd.camera;
+    let camera = &mismatches.camera;
     let panorama = camera.projection == Projection::Equirectangular;
     let mut all = Vec::new();
     let mut of = |words: &str, ray: Ray| all.push(Suspect { words: words.to_owned(), ray, change: as_is });
@@ -253,8 +264,8 @@ fn suspects(
     // camera_rt_matrix is D·Eᵀ: what a transposed one of those means for E.
     of("it fits the pose with the rotation of camera_rt_matrix transposed", turned(d * r.transpose() * d));
     of("it fits the pose in the axes of OpenCV taken for Blender's", turned(r * d));
-    changes(odd.domain, panorama, &mut all);
-    all.extend(of_others(image, images, others, odd));
+    changes(mismatches.domain, panorama, &mut all);
+    all.extend(of_others(image, images, others, mismatches));
     all
 }
 
@@ -269,7 +280,7 @@ fn changes(domain: Domain, panorama: bool, all: &mut Vec<Suspect>) {
     match domain {
         Domain::Depth => {
             of("it is in the other unit of depth", |seen, [d, ..]| {
-                let units = match seen.stage.conventions().depth_units {
+                let units = match seen.reference.conventions().depth_units {
                     DepthUnits::Per512 => DepthUnits::Millimetres,
                     DepthUnits::Millimetres => DepthUnits::Per512,
                 };
@@ -315,7 +326,7 @@ fn changes(domain: Domain, panorama: bool, all: &mut Vec<Suspect>) {
 }
 
 fn world_normal(seen: &Seen<'_>) -> Option<[f64; 3]> {
-    let n = seen.stage.scene.mesh().normal(seen.hit?.face).as_dvec3();
+    let n = seen.reference.scene.mesh().normal(seen.hit?.face).as_dvec3();
     let n = if n.dot(seen.direction) > 0.0 { -n } else { n };
     Some((n * 127.5 + 128.0).to_array().map(f64::floor))
 }
@@ -325,11 +336,13 @@ fn of_others(
     image: &DatasetImage,
     images: &[DatasetImage],
     others: &[(usize, Camera)],
-    odd: &Odd,
+    mismatches: &Mismatch,
 ) -> Vec<Suspect> {
     let mut found: Vec<(bool, usize, Camera)> = others
         .iter()
-        .filter(|(i, camera)| *i != odd.image && camera.projection_kind() == odd.camera.projection_kind())
+        .filter(|(i, camera)| {
+            *i != mismatches.image && camera.projection_kind() == mismatches.camera.projection_kind()
+        })
         .map(|(i, camera)| (images[*i].uuid != image.uuid, *i, *camera))
         .collect();
     found.sort_by_key(|(elsewhere, i, _)| (*elsewhere, *i));

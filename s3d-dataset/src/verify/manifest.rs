@@ -9,27 +9,27 @@ use serde::Deserialize;
 
 /// The manifest.
 #[derive(Debug, Deserialize)]
-pub(crate) struct Told {
+pub(crate) struct ReadManifest {
     pub(crate) generator: String,
     pub(crate) version: String,
     pub(crate) status: String,
     pub(crate) seed: u64,
-    pub(crate) options: ToldOptions,
+    pub(crate) options: ManifestOptions,
     pub(crate) area_numbers: Vec<u32>,
     #[serde(default)]
-    pub(crate) areas: Vec<ToldArea>,
+    pub(crate) areas: Vec<ManifestArea>,
     pub(crate) labels: usize,
     #[serde(default)]
     pub(crate) labels_padded_to: usize,
     #[serde(default)]
-    pub(crate) files: Option<ToldFiles>,
+    pub(crate) files: Option<ManifestFiles>,
     #[serde(default)]
     pub(crate) xyz_from_depth: Option<serde_json::Value>,
 }
 
 /// What is told of the list of files.
 #[derive(Debug, Deserialize)]
-pub(crate) struct ToldFiles {
+pub(crate) struct ManifestFiles {
     pub(crate) count: u64,
     pub(crate) bytes: u64,
     pub(crate) xxh3_128: Checksum,
@@ -37,7 +37,7 @@ pub(crate) struct ToldFiles {
 
 /// The options that decide what is there.
 #[derive(Debug, Deserialize)]
-pub(crate) struct ToldOptions {
+pub(crate) struct ManifestOptions {
     pub(crate) size: u32,
     pub(crate) pano_width: u32,
     pub(crate) pool: String,
@@ -59,7 +59,7 @@ pub(crate) struct ToldOptions {
 
 /// What is told of an area.
 #[derive(Debug, Deserialize)]
-pub(crate) struct ToldArea {
+pub(crate) struct ManifestArea {
     pub(crate) area: u32,
     pub(crate) faces: usize,
     pub(crate) points: u64,
@@ -80,24 +80,24 @@ fn texture() -> String {
     "texture".to_owned()
 }
 
-impl Told {
+impl ReadManifest {
     /// Reads the manifest; `None`, and a fault, if it is none or that of an export that did not finish: nothing more can be
     /// said then.
     pub(crate) fn read(layout: &Layout, report: &Report) -> Option<Self> {
         let path = layout.manifest();
-        let told: Self = report.read(Topic::Manifest, read_json(&path))?;
-        let ours = told.generator == "s3d";
+        let manifest: Self = report.read(Topic::Manifest, read_json(&path))?;
+        let ours = manifest.generator == "s3d";
         report.check(ours, (Topic::Manifest, "origin"), &path, || {
-            format!("written by {:?}, not by s3d", told.generator)
+            format!("written by {:?}, not by s3d", manifest.generator)
         });
-        let complete = told.status == "complete";
+        let complete = manifest.status == "complete";
         report.check(complete, (Topic::Manifest, "status"), &path, || {
             format!(
                 "status {:?}: the export into this folder did not finish, and what is there is not checked; run it again",
-                told.status
+                manifest.status
             )
         });
-        (ours && complete).then_some(told)
+        (ours && complete).then_some(manifest)
     }
 
     /// Whether this program wrote it, so that what it always writes is known to the byte.
@@ -134,7 +134,7 @@ impl Told {
     }
 
     /// What is told of an area.
-    pub(crate) fn area(&self, number: u32) -> Option<&ToldArea> {
+    pub(crate) fn area(&self, number: u32) -> Option<&ManifestArea> {
         self.areas.iter().find(|a| a.area == number)
     }
 
