@@ -33,13 +33,13 @@ def content(name, path):
     with open(path, "rb") as file:
         data = file.read()
     if name == "manifest.json":
-        data = VERSION.sub(rb'\1"…"', data)
+        data = VERSION.sub(rb'\1"-"', data)
         # The list of files holds checksums only of files that are compared here by themselves.
         told = json.loads(data)
         told.pop("files", None)
         return json.dumps(told).encode()
     if name.endswith((".json", ".toml")):
-        return VERSION.sub(rb'\1"…"', data)
+        return VERSION.sub(rb'\1"-"', data)
     return data
 
 
