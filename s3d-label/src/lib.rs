@@ -50,41 +50,29 @@
 )]
 
 mod class;
-#[cfg(feature = "vote")]
-mod corners;
-#[cfg(feature = "vote")]
-mod face_labels;
 mod instance;
 mod label;
-#[cfg(feature = "vote")]
-mod labeler;
 mod numbering;
-#[cfg(feature = "vote")]
-mod report;
 mod room;
 #[cfg(feature = "serde")]
 mod serde_names;
 mod statistics;
 mod table;
 #[cfg(feature = "vote")]
-mod votes;
+mod voting;
 mod wall_direction;
 
 pub use class::{Class, UnknownClass};
-#[cfg(feature = "vote")]
-pub use face_labels::FaceLabels;
 pub use instance::InstanceSummary;
 pub use label::{Label, LabelError, NULL_NAME, parse_name};
-#[cfg(feature = "vote")]
-pub use labeler::{Labeler, VoteError, vote};
 pub use numbering::{NumberedInstance, NumberingError, number_area};
-#[cfg(feature = "vote")]
-pub use report::{VoteReport, VoteRow};
 pub use room::{Room, RoomError, RoomType, UnknownRoomType};
 pub use statistics::{ClassCounts, RoomCounts};
 pub use table::{LabelId, LabelTable, MAX_LABELS, TableError};
 #[cfg(feature = "vote")]
-pub use votes::{FaceVotes, PointTally, VoteOptions, Votes};
+pub use voting::{
+    FaceLabels, FaceVotes, Labeler, PointTally, VoteError, VoteOptions, VoteReport, VoteRow, Votes, vote,
+};
 pub use wall_direction::wall_directions_deg;
 
 /// The README's example, compiled.

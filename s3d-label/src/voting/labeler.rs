@@ -1,6 +1,6 @@
 //! From labelled points to labels of faces.
 
-use crate::corners::Corners;
+use super::corners::Corners;
 use crate::{FaceLabels, LabelId, MAX_LABELS, VoteOptions, Votes};
 use s3d_geom::glam::Vec3;
 use s3d_geom::{Nearest, NearestFaces, TriMesh};

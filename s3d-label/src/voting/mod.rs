@@ -1,0 +1,12 @@
+//! Votes of labelled points for the faces of a mesh.
+
+mod corners;
+mod face_labels;
+mod labeler;
+mod report;
+mod votes;
+
+pub use face_labels::FaceLabels;
+pub use labeler::{Labeler, VoteError, vote};
+pub use report::{VoteReport, VoteRow};
+pub use votes::{FaceVotes, PointTally, VoteOptions, Votes};
