@@ -3,15 +3,11 @@
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::inputs::AreaInput;
-use glam::Vec3;
-use s3d_geom::{
-    Aabb, Footprint, FootprintBuilder, FootprintOptions, Nearest, NearestFaces, PointCloud, TriMesh,
-    dominant_wall_direction_deg,
-};
+use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
 use s3d_io::Error as FileError;
-use s3d_io::cloud::{InstanceReader, PointPasses};
-use s3d_label::{Class, Label, LabelId, LabelTable, Room, VoteReport, Votes};
-use std::collections::BTreeMap;
+use s3d_io::cloud::{AnnotatedInstance as InstancePoints, InstanceReader, PointPasses};
+use s3d_label::{Label, LabelId, LabelTable, Labeler, Room, VoteReport, wall_directions_deg};
+use serde::{Deserialize, Serialize};
 
 /// Points that are in memory, three times: while some are looked up, those that follow are read.
 const BLOCK_POINTS: usize = 1 << 19;
@@ -23,15 +19,17 @@ const MANY_FAR: f64 = 0.05;
 const FEW_LABELLED: f64 = 0.5;
 
 /// An annotated area.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Annotated {
-    /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted.
+    /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted. As data it has a file of its own.
+    #[serde(skip)]
     pub(crate) face_labels: Vec<LabelId>,
     pub(crate) report: VoteReport,
     /// The rooms, in the order of their names.
     pub(crate) rooms: Vec<SurveyedRoom>,
     /// Annotated points.
     pub(crate) points: u64,
+    #[serde(skip)]
     pub(crate) skipped: SkippedLines,
 }
 
@@ -56,7 +54,7 @@ impl SkippedLines {
 }
 
 /// What is known of a room from its points and faces.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct SurveyedRoom {
     pub(crate) room: Room,
     pub(crate) points: u64,
@@ -87,18 +85,16 @@ pub(crate) fn annotate(
     mut each: impl FnMut(AnnotatedInstance<'_>) -> Result<()> + Send,
 ) -> Result<Annotated> {
     let mesh = nearest_faces.mesh();
-    let mut votes = Votes::new(mesh.faces().len());
+    let mut labeler = Labeler::new(nearest_faces);
     let mut rooms = Vec::new();
     // The last room's points: its outline is drawn beside what follows.
     let mut undrawn: Option<FootprintBuilder> = None;
     let mut total = 0u64;
     let mut skipped = SkippedLines::default();
     let lenient = area.lenient;
-    let mut corners: Option<Corners> = None;
     let files = area.rooms.iter().map(|r| r.instances.len()).sum::<usize>();
     let progress = ctx.progress("labelling", "instances", files as u64);
     let mut reader = InstanceReader::new(BLOCK_POINTS);
-    let mut nearest: Vec<Nearest> = Vec::new();
     let mut following = area.rooms.iter().flat_map(|r| &r.instances).skip(1);
     for room in &area.rooms {
         let mut builder = FootprintBuilder::new(FootprintOptions::default());
@@ -108,23 +104,10 @@ pub(crate) fn annotate(
             let then = following.next().map(|instance| &instance.points);
             ctx.check()?;
             let (mut bbox, mut is_handed_out) = (Aabb::EMPTY, false);
-            let vote_for_all = |block: &PointCloud, is_whole: bool| -> Result<()> {
+            let take = |block: &PointCloud, is_whole: bool| -> Result<()> {
                 ctx.check()?;
                 bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
-                let vote = || {
-                    if instance.points.are_vertices() {
-                        let corners = corners.get_or_insert_with(|| Corners::new(mesh));
-                        corners.vote(&block.positions, id, &mut votes, nearest_faces, &mut nearest);
-                        Ok(())
-                    } else if has_faces(block) {
-                        vote_for_faces(block, id, &mut votes)
-                            .map_err(|m| FileError::format(instance.points.path(), m))
-                    } else {
-                        nearest_faces.nearest_many(&block.positions, &mut nearest);
-                        nearest.iter().for_each(|n| votes.add(n.face, id, n.distance_m));
-                        Ok(())
-                    }
-                };
+                let vote = || vote(&mut labeler, &instance.points, block, id);
                 // Votes are counted by one thread; the others draw the floor's outline, and write.
                 let outline = || block.positions.iter().for_each(|p| builder.add(*p));
                 let hand_out = || {
@@ -140,10 +123,8 @@ pub(crate) fn annotate(
                 handed_out
             };
             let before = undrawn.take();
-            let (read, outline) = rayon::join(
-                || reader.read(&instance.points, then, vote_for_all),
-                || before.map(|b| b.finish()),
-            );
+            let (read, outline) =
+                rayon::join(|| reader.read(&instance.points, then, take), || before.map(|b| b.finish()));
             set_outline(&mut rooms, outline);
             let (mut passes, left_out) = read?;
             skipped.lines += left_out.count;
@@ -183,15 +164,15 @@ pub(crate) fn annotate(
         return Err(Error::Input(format!("{}: no room in it", area.path.display())));
     }
     let label = || {
-        let face_labels = votes.label_of_face();
-        let upright = || upright_faces(mesh, table, &face_labels);
-        let (upright, report) = rayon::join(upright, || VoteReport::new(&votes, table));
-        (face_labels, upright, report)
+        let labels = labeler.finish();
+        let directions = || wall_directions_deg(mesh, table, labels.label_of_face());
+        let (directions_deg, report) = rayon::join(directions, || labels.report(table));
+        (labels.into_label_of_face(), directions_deg, report)
     };
-    let ((face_labels, mut upright, report), outline) = rayon::join(label, || undrawn.map(|b| b.finish()));
+    let ((face_labels, directions_deg, report), outline) = rayon::join(label, || undrawn.map(|b| b.finish()));
     set_outline(&mut rooms, outline);
     for room in &mut rooms {
-        room.wall_direction_deg = upright.remove(&room.room).map_or(0, |faces| faces.direction_deg());
+        room.wall_direction_deg = directions_deg.get(&room.room).copied().unwrap_or(0);
     }
     let report = report.map_err(|e| Error::Input(e.to_string()))?;
     Ok(Annotated { face_labels, report, rooms, points: total, skipped })
@@ -204,20 +185,17 @@ fn set_outline(rooms: &mut [SurveyedRoom], outline: Option<Footprint>) {
     }
 }
 
-/// Whether it is known which face each point belongs to.
-fn has_faces(block: &PointCloud) -> bool {
-    block.faces.len() == block.len()
-}
-
-/// Lets each point vote for the face that it belongs to, or says which face there is not.
-fn vote_for_faces(block: &PointCloud, id: LabelId, votes: &mut Votes) -> Result<(), String> {
-    for face in &block.faces {
-        if *face as usize >= votes.face_count() {
-            return Err(format!("a point is of face {face}; the mesh has {}", votes.face_count()));
-        }
-        votes.add(*face, id, 0.0);
-    }
-    Ok(())
+/// Lets the points of a block of an instance vote: for the faces that they belong to, as far as the source of the annotations
+/// knows these, and else for the nearest.
+fn vote(labeler: &mut Labeler<'_>, instance: &InstancePoints, block: &PointCloud, id: LabelId) -> Result<()> {
+    let voted = if instance.are_vertices() {
+        labeler.add_vertices(&block.positions, id)
+    } else if block.faces.len() == block.len() {
+        labeler.add_points_on_faces(&block.faces, id)
+    } else {
+        labeler.add_points(&block.positions, id)
+    };
+    voted.map_err(|e| FileError::format(instance.path(), e.to_string()).into())
 }
 
 /// What looks wrong between mesh and annotations, as a sentence each.
@@ -259,93 +237,4 @@ pub(crate) fn hidden_instances(
         1 + hidden.count(),
         first.points.source()
     ))
-}
-
-/// The faces around each place where the mesh has a corner, for annotations that are its own vertices: such a point is
-/// equally near to all of them, and the nearest face by index alone would leave every other face without a vote.
-struct Corners {
-    /// The bits of a corner's place, and a face; sorted.
-    faces: Vec<([u32; 3], u32)>,
-}
-
-impl Corners {
-    fn new(mesh: &TriMesh) -> Self {
-        let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(3 * mesh.faces().len());
-        for (face, corners) in (0u32..).zip(mesh.faces()) {
-            faces.extend(corners.iter().map(|v| (Self::key(mesh.positions()[*v as usize]), face)));
-        }
-        faces.sort_unstable();
-        faces.dedup();
-        Self { faces }
-    }
-
-    /// The place to the bit, whatever the sign of a zero.
-    fn key(position: Vec3) -> [u32; 3] {
-        (position + 0.0).to_array().map(f32::to_bits)
-    }
-
-    /// The faces that have a corner there.
-    fn around(&self, position: Vec3) -> impl Iterator<Item = u32> {
-        let key = Self::key(position);
-        let start = self.faces.partition_point(|(k, _)| *k < key);
-        self.faces[start..].iter().take_while(move |(k, _)| *k == key).map(|(_, face)| *face)
-    }
-
-    /// Lets each point vote for all faces around it, or for the nearest if it is no corner of the mesh.
-    fn vote(
-        &self,
-        positions: &[Vec3],
-        id: LabelId,
-        votes: &mut Votes,
-        nearest_faces: &NearestFaces<'_>,
-        nearest: &mut Vec<Nearest>,
-    ) {
-        let mut others = Vec::new();
-        for position in positions {
-            let mut is_corner = false;
-            for face in self.around(*position) {
-                votes.add(face, id, 0.0);
-                is_corner = true;
-            }
-            if !is_corner {
-                others.push(*position);
-            }
-        }
-        nearest_faces.nearest_many(&others, nearest);
-        for n in nearest.iter() {
-            votes.add(n.face, id, n.distance_m);
-        }
-    }
-}
-
-/// The faces of a room that tell how its walls run: normals and areas.
-#[derive(Default)]
-struct UprightFaces {
-    walls: Vec<(Vec3, f64)>,
-    others: Vec<(Vec3, f64)>,
-}
-
-impl UprightFaces {
-    /// The dominant direction of the walls, or of all faces if no wall is annotated; 0 if none stands upright.
-    fn direction_deg(self) -> u32 {
-        let of = |faces: Vec<(Vec3, f64)>| dominant_wall_direction_deg(faces.into_iter());
-        of(self.walls).or_else(|| of(self.others)).map_or(0, |deg| deg.round() as u32 % 90)
-    }
-}
-
-/// The normals and areas of each room's faces.
-fn upright_faces(
-    mesh: &TriMesh,
-    table: &LabelTable,
-    face_labels: &[LabelId],
-) -> BTreeMap<Room, UprightFaces> {
-    let mut rooms: BTreeMap<Room, UprightFaces> = BTreeMap::new();
-    for (face, label) in (0u32..).zip(face_labels) {
-        if let Some(label) = table.get(*label) {
-            let room = rooms.entry(label.room).or_default();
-            let faces = if label.class == Class::Wall { &mut room.walls } else { &mut room.others };
-            faces.push((mesh.normal(face), mesh.area(face)));
-        }
-    }
-    rooms
 }

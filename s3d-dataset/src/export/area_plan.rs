@@ -5,24 +5,21 @@
 //! write the same area at the same time write the same bytes.
 
 use crate::error::Result;
-use crate::export::annotate::{Annotated, SkippedLines, SurveyedRoom};
+use crate::export::annotate::Annotated;
 use crate::export::inputs::RoomInput;
 use crate::store::checked::{read_checked, write_checked};
-use glam::{DMat3, DVec2, DVec3, Vec3};
-use s3d_geom::{Aabb, Footprint, Polygon, Pose};
+use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
 use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::NpyWriter;
 use s3d_io::dataset::is_valid_uuid;
 use s3d_io::fs::{Checksum, create_dir};
-use s3d_label::{Class, Label, LabelId, Room, VoteReport, VoteRow};
+use s3d_label::{Label, LabelId, Room};
 use serde::{Deserialize, Serialize};
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 /// All that an export needs to know of an area's annotations once it is labelled.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct AreaPlan {
     /// Its number, from 1.
     pub(crate) area: u32,
@@ -30,6 +27,7 @@ pub(crate) struct AreaPlan {
     /// The rooms, in the order of their names, each with the names of its instances.
     pub(crate) names: Vec<RoomNames>,
     /// The scan locations, listed or placed.
+    #[serde(with = "locations_as_data")]
     pub(crate) locations: Vec<ScanLocation>,
     /// The room of each location.
     pub(crate) location_rooms: Vec<Room>,
@@ -42,14 +40,14 @@ pub(crate) struct AreaPlan {
 }
 
 /// The annotated instances of a room, without their points.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RoomNames {
     pub(crate) room: Room,
     pub(crate) instances: Vec<InstanceName>,
 }
 
 /// What an instance is called.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct InstanceName {
     /// In the data set.
     pub(crate) label: Label,
@@ -84,7 +82,9 @@ impl AreaPlan {
         let mut array = NpyWriter::create(&labels_file(folder), "<u4", &[face_labels.len() as u64])?;
         array.put(&bytes)?;
         array.finish()?;
-        write_checked(&area_file(folder), &AreaFile::of(self, Checksum::of(&bytes)))
+        let faces = face_labels.len() as u64;
+        let file = AreaFile { faces, label_of_face_xxh3_128: Checksum::of(&bytes), plan: self };
+        write_checked(&area_file(folder), &file)
     }
 
     /// Reads what [`write`](Self::write) wrote.
@@ -93,12 +93,21 @@ impl AreaPlan {
     /// Files that are not there, damaged, or of an area with another number.
     pub(crate) fn read(folder: &Path, area: u32) -> Result<Self> {
         let path = area_file(folder);
-        let file: AreaFile = read_checked(&path)?;
-        if file.area != area {
-            return Err(FileError::format(&path, format!("is area {}, not area {area}", file.area)).into());
+        let AreaFile { faces, label_of_face_xxh3_128, mut plan } = read_checked::<AreaFile<Self>>(&path)?;
+        let refused = |message| Err(FileError::format(&path, message).into());
+        if plan.area != area {
+            return refused(format!("is area {}, not area {area}", plan.area));
         }
-        let face_labels = read_face_labels(&labels_file(folder), file.faces, file.face_labels_xxh3_128)?;
-        file.into_plan(&path, face_labels)
+        // They will stand in the names of files.
+        if let Some(location) = plan.locations.iter().find(|l| !is_valid_uuid(&l.uuid)) {
+            return refused(format!("{:?} is no uuid of a scan location", location.uuid));
+        }
+        let (locations, rooms) = (plan.locations.len(), plan.location_rooms.len());
+        if locations != rooms {
+            return refused(format!("has {locations} scan locations, and rooms of {rooms}"));
+        }
+        plan.annotated.face_labels = read_face_labels(&labels_file(folder), faces, label_of_face_xxh3_128)?;
+        Ok(plan)
     }
 }
 
@@ -128,264 +137,61 @@ fn read_face_labels(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec<L
 
 /// `area.jsonl`.
 #[derive(Serialize, Deserialize)]
-struct AreaFile {
-    area: u32,
+struct AreaFile<P> {
     faces: u64,
     /// Of the labels' bytes, without the array's header.
-    face_labels_xxh3_128: Checksum,
-    faces_left_out: usize,
-    mesh_box: Option<[f64; 6]>,
-    mesh_area_m2: f64,
-    points: u64,
-    rooms: Vec<RoomFile>,
-    votes: VotesFile,
-    locations: Vec<LocationFile>,
+    label_of_face_xxh3_128: Checksum,
+    plan: P,
 }
 
-#[derive(Serialize, Deserialize)]
-struct RoomFile {
-    room: String,
-    /// What points tell of it; a room may have names alone.
-    survey: Option<SurveyFile>,
-    /// Label, and number in the room.
-    instances: Vec<(String, u32)>,
-}
+/// Scan locations as data: a tuple each.
+mod locations_as_data {
+    use s3d_geom::Pose;
+    use s3d_io::camera::ScanLocation;
+    use serde::{Deserialize, Deserializer, Serializer};
 
-#[derive(Serialize, Deserialize)]
-struct SurveyFile {
-    points: u64,
-    bbox: Option<[f64; 6]>,
-    wall_direction_deg: u32,
-    floor_m2: f64,
-    polygons: Vec<(Vec<DVec2File>, Vec<Vec<DVec2File>>)>,
-}
-
-type DVec2File = [f64; 2];
-
-#[derive(Serialize, Deserialize)]
-struct VotesFile {
-    far_m: f64,
-    face_count: u64,
-    faces_without_vote: u64,
-    unlabeled_points: u64,
-    total: RowFile,
-    rooms: Vec<(u32, String, RowFile)>,
-    classes: Vec<(String, RowFile)>,
-}
-
-/// The columns of a [`VoteRow`].
-type RowFile = [u64; 7];
-
-#[derive(Serialize, Deserialize)]
-struct LocationFile {
-    uuid: String,
-    room: String,
-    location: [f64; 3],
-    world_from_camera_columns: [f64; 9],
-    line: u64,
-}
-
-impl AreaFile {
-    fn of(plan: &AreaPlan, face_labels_xxh3_128: Checksum) -> Self {
-        let survey = |room: Room| plan.annotated.rooms.iter().find(|r| r.room == room).map(survey_file);
-        let rooms = plan.names.iter().map(|names| RoomFile {
-            room: names.room.to_string(),
-            survey: survey(names.room),
-            instances: names.instances.iter().map(|i| (i.label.to_string(), i.number_in_room)).collect(),
-        });
-        let locations = plan.locations.iter().zip(&plan.location_rooms).map(|(l, room)| LocationFile {
-            uuid: l.uuid.clone(),
-            room: room.to_string(),
-            location: l.pose.location.to_array(),
-            world_from_camera_columns: l.pose.world_from_camera.to_cols_array(),
-            line: l.line,
-        });
-        Self {
-            area: plan.area,
-            faces: plan.annotated.face_labels.len() as u64,
-            face_labels_xxh3_128,
-            faces_left_out: plan.faces_left_out,
-            mesh_box: box_file(plan.mesh_box),
-            mesh_area_m2: plan.mesh_area_m2,
-            points: plan.annotated.points,
-            rooms: rooms.collect(),
-            votes: VotesFile::of(&plan.annotated.report),
-            locations: locations.collect(),
-        }
+    pub(super) fn serialize<S: Serializer>(
+        locations: &[ScanLocation],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(locations.iter().map(|l| (&l.uuid, l.pose, l.line)))
     }
 
-    fn into_plan(self, path: &Path, face_labels: Vec<LabelId>) -> Result<AreaPlan> {
-        let (mut names, mut rooms) = (Vec::new(), Vec::new());
-        for file in self.rooms {
-            let room: Room = parsed(path, &file.room)?;
-            let instances = file.instances.iter().map(|(label, number)| {
-                Ok(InstanceName { label: parsed(path, label)?, number_in_room: *number })
-            });
-            names.push(RoomNames { room, instances: instances.collect::<Result<_>>()? });
-            rooms.extend(file.survey.map(|survey| survey.into_room(room)));
-        }
-        let (mut locations, mut location_rooms) = (Vec::new(), Vec::new());
-        for file in self.locations {
-            // It will stand in the names of files.
-            if !is_valid_uuid(&file.uuid) {
-                return Err(FileError::format(
-                    path,
-                    format!("{:?} is no uuid of a scan location", file.uuid),
-                )
-                .into());
-            }
-            location_rooms.push(parsed(path, &file.room)?);
-            let pose = Pose {
-                location: DVec3::from_array(file.location),
-                world_from_camera: DMat3::from_cols_array(&file.world_from_camera_columns),
-            };
-            locations.push(ScanLocation { uuid: file.uuid, pose, line: file.line });
-        }
-        Ok(AreaPlan {
-            area: self.area,
-            annotated: Annotated {
-                face_labels,
-                report: self.votes.into_report(path)?,
-                rooms,
-                points: self.points,
-                skipped: SkippedLines::default(),
-            },
-            names,
-            locations,
-            location_rooms,
-            mesh_box: box_of(self.mesh_box),
-            mesh_area_m2: self.mesh_area_m2,
-            faces_left_out: self.faces_left_out,
-        })
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Vec<ScanLocation>, D::Error> {
+        let locations = Vec::<(String, Pose, u64)>::deserialize(deserializer)?;
+        Ok(locations.into_iter().map(|(uuid, pose, line)| ScanLocation { uuid, pose, line }).collect())
     }
-}
-
-fn survey_file(room: &SurveyedRoom) -> SurveyFile {
-    let ring = |points: &[DVec2]| -> Vec<DVec2File> { points.iter().map(DVec2::to_array).collect() };
-    let polygon = |p: &Polygon| (ring(&p.outer), p.holes.iter().map(|hole| ring(hole)).collect());
-    SurveyFile {
-        points: room.points,
-        bbox: box_file(room.bbox),
-        wall_direction_deg: room.wall_direction_deg,
-        floor_m2: room.footprint.area_m2,
-        polygons: room.footprint.polygons.iter().map(polygon).collect(),
-    }
-}
-
-impl SurveyFile {
-    fn into_room(self, room: Room) -> SurveyedRoom {
-        let ring =
-            |points: &[DVec2File]| -> Vec<DVec2> { points.iter().copied().map(DVec2::from_array).collect() };
-        let polygons = self.polygons.iter().map(|(outer, holes)| Polygon {
-            outer: ring(outer),
-            holes: holes.iter().map(|hole| ring(hole)).collect(),
-        });
-        SurveyedRoom {
-            room,
-            points: self.points,
-            footprint: Footprint { polygons: polygons.collect(), area_m2: self.floor_m2 },
-            bbox: box_of(self.bbox),
-            wall_direction_deg: self.wall_direction_deg,
-        }
-    }
-}
-
-impl VotesFile {
-    fn of(report: &VoteReport) -> Self {
-        Self {
-            far_m: f64::from(report.far_m),
-            face_count: report.face_count,
-            faces_without_vote: report.faces_without_vote,
-            unlabeled_points: report.unlabeled_points,
-            total: row_file(&report.total),
-            rooms: report.rooms.iter().map(|(a, room, row)| (*a, room.to_string(), row_file(row))).collect(),
-            classes: report.classes.iter().map(|(c, row)| (c.to_string(), row_file(row))).collect(),
-        }
-    }
-
-    fn into_report(self, path: &Path) -> Result<VoteReport> {
-        let mut rooms = Vec::new();
-        for (area, room, row) in self.rooms {
-            rooms.push((area, parsed(path, &room)?, vote_row(row)));
-        }
-        let mut classes = Class::ALL.map(|class| (class, VoteRow::default()));
-        for (class, row) in self.classes {
-            let class: Class = parsed(path, &class)?;
-            classes[class.index()].1 = vote_row(row);
-        }
-        Ok(VoteReport {
-            far_m: self.far_m as f32,
-            face_count: self.face_count,
-            faces_without_vote: self.faces_without_vote,
-            unlabeled_points: self.unlabeled_points,
-            total: vote_row(self.total),
-            rooms,
-            classes,
-        })
-    }
-}
-
-fn row_file(row: &VoteRow) -> RowFile {
-    [
-        row.points,
-        row.far_points,
-        row.faces,
-        row.face_votes,
-        row.contested,
-        row.contested_below_three_quarters,
-        row.contested_below_half,
-    ]
-}
-
-fn vote_row(file: RowFile) -> VoteRow {
-    let [
-        points,
-        far_points,
-        faces,
-        face_votes,
-        contested,
-        contested_below_three_quarters,
-        contested_below_half,
-    ] = file;
-    VoteRow {
-        points,
-        far_points,
-        faces,
-        face_votes,
-        contested,
-        contested_below_three_quarters,
-        contested_below_half,
-    }
-}
-
-/// A box's corners, as numbers that 64 bits hold exactly; an empty one has none.
-fn box_file(bbox: Aabb) -> Option<[f64; 6]> {
-    (!bbox.is_empty()).then(|| bbox.to_array().map(f64::from))
-}
-
-fn box_of(file: Option<[f64; 6]>) -> Aabb {
-    file.map_or(Aabb::EMPTY, |c| {
-        let [a, b, c, d, e, f] = c.map(|c| c as f32);
-        Aabb { min: Vec3::new(a, b, c), max: Vec3::new(d, e, f) }
-    })
-}
-
-fn parsed<T: FromStr<Err: Display>>(path: &Path, text: &str) -> Result<T> {
-    text.parse().map_err(|e: T::Err| FileError::format(path, e.to_string()).into())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::export::annotate::{SkippedLines, SurveyedRoom};
+    use glam::{DMat3, DVec2, DVec3, Vec3};
     use proptest::prelude::*;
     use proptest::strategy::ValueTree;
+    use s3d_geom::{Footprint, Polygon, Pose};
+    use s3d_label::{Class, VoteReport, VoteRow};
 
     fn room(name: &str) -> Room {
         name.parse().unwrap()
     }
 
     fn any_row() -> impl Strategy<Value = VoteRow> {
-        any::<[u64; 7]>().prop_map(vote_row)
+        any::<[u64; 7]>().prop_map(|columns| {
+            let [points, far_points, faces, face_votes, contested, three_quarters, half] = columns;
+            VoteRow {
+                points,
+                far_points,
+                faces,
+                face_votes,
+                contested,
+                contested_below_three_quarters: three_quarters,
+                contested_below_half: half,
+            }
+        })
     }
 
     fn any_number() -> impl Strategy<Value = f64> {
@@ -513,5 +319,56 @@ mod tests {
         plan.write(dir.path()).unwrap();
         let e = AreaPlan::read(dir.path(), 3).err().map(|e| e.to_string()).unwrap_or_default();
         assert!(e.contains("\"../../elsewhere\" is no uuid"), "{e}");
+    }
+
+    /// The paths of all values within `value`, itself included.
+    fn paths(value: &serde_json::Value, path: &str) -> Vec<String> {
+        let inner: Vec<String> = match value {
+            serde_json::Value::Array(list) => {
+                list.iter().enumerate().flat_map(|(i, v)| paths(v, &format!("{path}/{i}"))).collect()
+            }
+            serde_json::Value::Object(map) => {
+                map.iter().flat_map(|(key, v)| paths(v, &format!("{path}/{key}"))).collect()
+            }
+            _ => Vec::new(),
+        };
+        [vec![path.to_owned()], inner].concat()
+    }
+
+    #[test]
+    fn values_of_another_kind_are_refused_wherever_they_stand() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut runner = proptest::test_runner::TestRunner::deterministic();
+        any_plan().new_tree(&mut runner).unwrap().current().write(dir.path()).unwrap();
+        let text = std::fs::read_to_string(area_file(dir.path())).unwrap();
+        let whole: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+        let paths = paths(&whole, "");
+        assert!(paths.len() > 100, "{} values", paths.len());
+        for path in paths {
+            for odd in [serde_json::json!({}), serde_json::json!(true)] {
+                let mut file = whole.clone();
+                *file.pointer_mut(&path).unwrap() = odd;
+                write_checked(&area_file(dir.path()), &file).unwrap();
+                assert!(AreaPlan::read(dir.path(), 3).is_err(), "{path}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_location_without_a_room_and_a_word_that_is_no_room_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut runner = proptest::test_runner::TestRunner::deterministic();
+        let mut plan = any_plan().new_tree(&mut runner).unwrap().current();
+        plan.write(dir.path()).unwrap();
+        let text = std::fs::read_to_string(area_file(dir.path())).unwrap();
+        let mut file: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+        let refusal = || AreaPlan::read(dir.path(), 3).err().map(|e| e.to_string()).unwrap_or_default();
+        assert_eq!(refusal(), "");
+        file["plan"]["names"][0]["room"] = "kitchen_1".into();
+        write_checked(&area_file(dir.path()), &file).unwrap();
+        assert!(refusal().contains("kitchen_1") && refusal().contains("area.jsonl"), "{}", refusal());
+        plan.location_rooms.clear();
+        plan.write(dir.path()).unwrap();
+        assert!(refusal().contains("1 scan locations, and rooms of 0"), "{}", refusal());
     }
 }
