@@ -86,9 +86,7 @@ pub(crate) fn annotate(
 ) -> Result<Annotated> {
     let mesh = nearest_faces.mesh();
     let mut labeler = Labeler::new(nearest_faces);
-    let mut rooms = Vec::new();
-    // The last room's points: its outline is drawn beside what follows.
-    let mut undrawn: Option<FootprintBuilder> = None;
+    let mut rooms = Rooms::default();
     let mut total = 0u64;
     let mut skipped = SkippedLines::default();
     let lenient = area.lenient;
@@ -122,11 +120,7 @@ pub(crate) fn annotate(
                 voted?;
                 handed_out
             };
-            let before = undrawn.take();
-            let (read, outline) =
-                rayon::join(|| reader.read(&instance.points, then, take), || before.map(|b| b.finish()));
-            set_outline(&mut rooms, outline);
-            let (mut passes, left_out) = read?;
+            let (mut passes, left_out) = rooms.draw_beside(|| reader.read(&instance.points, then, take))?;
             skipped.lines += left_out.count;
             if let Some(first) = left_out.first {
                 skipped.first.get_or_insert(first.to_string());
@@ -149,28 +143,20 @@ pub(crate) fn annotate(
             }
         }
         total += points;
-        // Of a room before one without an instance.
-        set_outline(&mut rooms, undrawn.take().map(|b| b.finish()));
-        rooms.push(SurveyedRoom {
-            room: room.room,
-            points,
-            footprint: Footprint::default(),
-            bbox: room_bbox,
-            wall_direction_deg: 0,
-        });
-        undrawn = Some(builder);
+        let (footprint, wall_direction_deg) = Default::default();
+        let room = SurveyedRoom { room: room.room, points, footprint, bbox: room_bbox, wall_direction_deg };
+        rooms.push(room, builder);
     }
-    if rooms.is_empty() {
+    if rooms.surveyed.is_empty() {
         return Err(Error::Input(format!("{}: no room in it", area.path.display())));
     }
-    let label = || {
+    let (face_labels, directions_deg, report) = rooms.draw_beside(|| {
         let labels = labeler.finish();
         let directions = || wall_directions_deg(mesh, table, labels.label_of_face());
         let (directions_deg, report) = rayon::join(directions, || labels.report(table));
         (labels.into_label_of_face(), directions_deg, report)
-    };
-    let ((face_labels, directions_deg, report), outline) = rayon::join(label, || undrawn.map(|b| b.finish()));
-    set_outline(&mut rooms, outline);
+    });
+    let mut rooms = rooms.surveyed;
     for room in &mut rooms {
         room.wall_direction_deg = directions_deg.get(&room.room).copied().unwrap_or(0);
     }
@@ -178,10 +164,29 @@ pub(crate) fn annotate(
     Ok(Annotated { face_labels, report, rooms, points: total, skipped })
 }
 
-/// Gives the last room its outline, if that is drawn now.
-fn set_outline(rooms: &mut [SurveyedRoom], outline: Option<Footprint>) {
-    if let (Some(room), Some(outline)) = (rooms.last_mut(), outline) {
-        room.footprint = outline;
+/// The rooms so far. The outline of the last one is drawn beside what follows.
+#[derive(Default)]
+struct Rooms {
+    surveyed: Vec<SurveyedRoom>,
+    /// The points of the last room, until its outline is drawn.
+    undrawn: Option<FootprintBuilder>,
+}
+
+impl Rooms {
+    fn push(&mut self, room: SurveyedRoom, points: FootprintBuilder) {
+        self.draw_beside(|| ());
+        self.surveyed.push(room);
+        self.undrawn = Some(points);
+    }
+
+    /// Does some work, and draws the last room's outline on another thread if that is still to be done.
+    fn draw_beside<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> T {
+        let undrawn = self.undrawn.take();
+        let (done, outline) = rayon::join(work, || undrawn.map(|points| points.finish()));
+        if let (Some(room), Some(outline)) = (self.surveyed.last_mut(), outline) {
+            room.footprint = outline;
+        }
+        done
     }
 }
 
