@@ -206,7 +206,7 @@ fn what_a_plan_is_not_for_is_refused() {
     for (part, message) in [
         ("journal", "is not complete"),
         ("instances.json", "instances.json: "),
-        ("face_labels", "is damaged"),
+        ("label_of_face", "is damaged"),
     ] {
         let all = files(&plan);
         let (name, whole) =

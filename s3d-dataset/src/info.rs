@@ -138,7 +138,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     doubts.extend(mesh_doubts(mesh));
     doubts.extend(label_doubts(&annotated.report));
     doubts.extend(overlap_doubts(&annotated.rooms));
-    doubts.extend(hidden_instances(area, &annotated.face_labels, &inputs.table));
+    doubts.extend(hidden_instances(area, &annotated.label_of_face, &inputs.table));
     let total = &annotated.report.total;
     Ok(SceneInfo {
         area: area.number,

@@ -92,8 +92,8 @@ pub fn render(
         textures: &textures,
         pictures: None,
         normals: options.normals,
-        label_per_face: &[],
-        pretty_per_face: &[],
+        label_of_face: &[],
+        pretty_of_face: &[],
         compression: options.compression,
         conventions: Conventions::default(),
     };

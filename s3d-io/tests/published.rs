@@ -71,7 +71,7 @@ fn everything_is_found_and_comes_back() {
     assert_eq!(read.file.mesh.faces(), mesh().faces());
     let labels: Vec<String> = read.labels.iter().map(|l| l.to_string()).collect();
     assert_eq!(labels, NAMES[1..]);
-    assert_eq!(read.face_labels, [0, 0, 1, 1, NO_INDEX]);
+    assert_eq!(read.label_of_face, [0, 0, 1, 1, NO_INDEX]);
     let annotations = found.annotations(&read).unwrap();
     let mut cloud = PointCloud::default();
     annotations.rooms[0].instances[1].read(&mut cloud).unwrap();
@@ -96,7 +96,7 @@ fn an_area_can_be_moved() {
     for (is, was) in read.file.mesh.positions().iter().zip(mesh().positions()) {
         assert!(is.as_dvec3().abs_diff_eq(world_from_area.transform_point3(was.as_dvec3()), 1e-5));
     }
-    assert_eq!(read.face_labels, [0, 0, 1, 1, NO_INDEX]);
+    assert_eq!(read.label_of_face, [0, 0, 1, 1, NO_INDEX]);
     assert!(found.locations.iter().all(|l| l.location.pose.location != DVec3::ZERO));
 }
 
@@ -112,7 +112,7 @@ fn faces_in_another_order_are_matched() {
     let (floor, rest) = rest.split_once("usemtl").unwrap();
     fs::write(&path, format!("{head}usemtl{rest}usemtl floor_7_office_5_3\n{floor}")).unwrap();
     let read = PublishedArea::open(&folder).unwrap().read_mesh().unwrap();
-    assert_eq!(read.face_labels, [0, 0, 1, 1, NO_INDEX]);
+    assert_eq!(read.label_of_face, [0, 0, 1, 1, NO_INDEX]);
     assert_eq!(read.labels[0].to_string(), NAMES[1]);
     assert!(read.file.warnings.last().unwrap().contains("matched by their corners, 0 without"));
 }

@@ -23,7 +23,7 @@ const FEW_LABELLED: f64 = 0.5;
 pub(crate) struct Annotated {
     /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted. As data it has a file of its own.
     #[serde(skip)]
-    pub(crate) face_labels: Vec<LabelId>,
+    pub(crate) label_of_face: Vec<LabelId>,
     pub(crate) report: VoteReport,
     /// The rooms, in the order of their names.
     pub(crate) rooms: Vec<SurveyedRoom>,
@@ -150,7 +150,7 @@ pub(crate) fn annotate(
     if rooms.surveyed.is_empty() {
         return Err(Error::Input(format!("{}: no room in it", area.path.display())));
     }
-    let (face_labels, directions_deg, report) = rooms.draw_beside(|| {
+    let (label_of_face, directions_deg, report) = rooms.draw_beside(|| {
         let labels = labeler.finish();
         let directions = || wall_directions_deg(mesh, table, labels.label_of_face());
         let (directions_deg, report) = rayon::join(directions, || labels.report(table));
@@ -161,7 +161,7 @@ pub(crate) fn annotate(
         room.wall_direction_deg = directions_deg.get(&room.room).copied().unwrap_or(0);
     }
     let report = report.map_err(|e| Error::Input(e.to_string()))?;
-    Ok(Annotated { face_labels, report, rooms, points: total, skipped })
+    Ok(Annotated { label_of_face, report, rooms, points: total, skipped })
 }
 
 /// The rooms so far. The outline of the last one is drawn beside what follows.
@@ -229,11 +229,11 @@ pub(crate) fn label_doubts(report: &VoteReport) -> Vec<String> {
 /// image and no sampled point.
 pub(crate) fn hidden_instances(
     area: &AreaInput,
-    face_labels: &[LabelId],
+    label_of_face: &[LabelId],
     table: &LabelTable,
 ) -> Option<String> {
     let mut seen = vec![false; table.len()];
-    face_labels.iter().for_each(|label| seen[label.0 as usize] = true);
+    label_of_face.iter().for_each(|label| seen[label.0 as usize] = true);
     let instances = area.rooms.iter().flat_map(|r| &r.instances);
     let mut hidden = instances.filter(|i| table.id_of(&i.label).is_none_or(|id| !seen[id.0 as usize]));
     let first = hidden.next()?;

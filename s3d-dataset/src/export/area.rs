@@ -121,7 +121,7 @@ pub(crate) fn locate(
                 area: area.number,
                 scene,
                 nearest,
-                face_labels: &annotated.face_labels,
+                label_of_face: &annotated.label_of_face,
                 table,
                 rooms: &annotated.rooms,
             };
@@ -200,7 +200,7 @@ pub(crate) fn label_area(
     if let Some(w) = annotated.skipped.sentence() {
         ctx.warn(w);
     }
-    if let Some(w) = hidden_instances(area, &annotated.face_labels, table) {
+    if let Some(w) = hidden_instances(area, &annotated.label_of_face, table) {
         ctx.warn(w);
     }
     overlap_doubts(&annotated.rooms).iter().for_each(|w| ctx.warn(w));
@@ -324,7 +324,7 @@ pub(crate) fn score(plan: &AreaPlan, prepared: &PreparedMesh<'_>, common: Common
         stride: options.entropy_stride,
         seed: options.seed,
     };
-    let (labels, scene) = (&plan.annotated.face_labels, &prepared.scene);
+    let (labels, scene) = (&plan.annotated.label_of_face, &prepared.scene);
     score_area(ctx, &missing, scene, labels, table, scoring, |uuid, entropies| {
         journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))
     })?;
@@ -335,7 +335,7 @@ pub(crate) fn score(plan: &AreaPlan, prepared: &PreparedMesh<'_>, common: Common
 
 /// Refuses labels of another mesh.
 fn check_faces(plan: &AreaPlan, prepared: &PreparedMesh<'_>) -> Result<()> {
-    let (labels, faces) = (plan.annotated.face_labels.len(), prepared.file.mesh.faces().len());
+    let (labels, faces) = (plan.annotated.label_of_face.len(), prepared.file.mesh.faces().len());
     if labels == faces {
         return Ok(());
     }
@@ -346,7 +346,7 @@ fn check_faces(plan: &AreaPlan, prepared: &PreparedMesh<'_>) -> Result<()> {
 fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> AreaEntry {
     AreaEntry {
         area: area.number,
-        faces: plan.annotated.face_labels.len(),
+        faces: plan.annotated.label_of_face.len(),
         faces_left_out: plan.faces_left_out,
         points: 0,
         annotated_points: plan.annotated.points,
@@ -371,9 +371,9 @@ fn write_area_assets(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common:
     let (number, started) = (area.number, Instant::now());
     let meshes = account.stage(Stage::Meshes, Some(number));
     let mesh_dir = layout.mesh_dir(number);
-    let per_face: Vec<u32> = plan.annotated.face_labels.iter().map(|l| l.0).collect();
+    let label_of_face: Vec<u32> = plan.annotated.label_of_face.iter().map(|l| l.0).collect();
     write_colored_mesh(&mesh_dir, file, options.compression)?;
-    s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &per_face, &table.names())?;
+    s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &label_of_face, &table.names())?;
     meshes.end();
     ctx.check()?;
     let sampling = account.stage(Stage::Points, Some(number));
@@ -417,7 +417,7 @@ fn write_colored_mesh(dir: &Path, file: &MeshFile, compression: Compression) -> 
 
 fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
     let total = &annotated.report.total;
-    let faces = annotated.face_labels.len();
+    let faces = annotated.label_of_face.len();
     ctx.info(format_args!(
         "{} annotated points labelled {} of {faces} faces ({:.1} s)",
         annotated.points,
@@ -451,9 +451,9 @@ pub(crate) fn render_area(
     check_faces(plan, prepared)?;
     create_dir(&layout.mesh_dir(number))?;
     let textures = MipMaps::new(&file.mesh);
-    let label_per_face: Vec<u32> = annotated.face_labels.iter().map(|l| l.0).collect();
-    let pretty_per_face: Vec<[u8; 3]> =
-        label_per_face.iter().map(|l| s3d_io::image::pretty_color(*l)).collect();
+    let label_of_face: Vec<u32> = annotated.label_of_face.iter().map(|l| l.0).collect();
+    let pretty_of_face: Vec<[u8; 3]> =
+        label_of_face.iter().map(|l| s3d_io::image::pretty_color(*l)).collect();
     let chosen: Vec<bool> =
         locations.iter().map(|l| todo.contains(&Unit::Location(number, l.uuid.clone()))).collect();
     let finish_location = |written: WrittenLocation| {
@@ -471,8 +471,8 @@ pub(crate) fn render_area(
             textures: &textures,
             pictures: None,
             normals: options.normals,
-            label_per_face: &label_per_face,
-            pretty_per_face: &pretty_per_face,
+            label_of_face: &label_of_face,
+            pretty_of_face: &pretty_of_face,
             compression: options.compression,
             conventions: options.conventions(),
         },

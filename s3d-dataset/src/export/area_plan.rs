@@ -1,8 +1,8 @@
 //! A labelled area as files: what voting found, so that no other process opens the annotations or votes again.
 //!
-//! Two files in a folder: `area.jsonl`, small, and `face_labels.npy`, an array of `<u4` with a label index a face. The
-//! first holds the second's checksum and is written after it, so that an area which can be read is whole. Processes that
-//! write the same area at the same time write the same bytes.
+//! Two files in a folder: `area.jsonl`, small, and `label_of_face.npy`, an array of `<u4` with a label index a face.
+//! The first holds the second's checksum and is written after it, so that an area which can be read is whole. Processes
+//! that write the same area at the same time write the same bytes.
 
 use crate::error::Result;
 use crate::export::annotate::Annotated;
@@ -77,12 +77,12 @@ impl AreaPlan {
     /// Writes the area into `folder`.
     pub(crate) fn write(&self, folder: &Path) -> Result<()> {
         create_dir(folder)?;
-        let face_labels = &self.annotated.face_labels;
-        let bytes: Vec<u8> = face_labels.iter().flat_map(|l| l.0.to_le_bytes()).collect();
-        let mut array = NpyWriter::create(&labels_file(folder), "<u4", &[face_labels.len() as u64])?;
+        let label_of_face = &self.annotated.label_of_face;
+        let bytes: Vec<u8> = label_of_face.iter().flat_map(|l| l.0.to_le_bytes()).collect();
+        let mut array = NpyWriter::create(&labels_file(folder), "<u4", &[label_of_face.len() as u64])?;
         array.put(&bytes)?;
         array.finish()?;
-        let faces = face_labels.len() as u64;
+        let faces = label_of_face.len() as u64;
         let file = AreaFile { faces, label_of_face_xxh3_128: Checksum::of(&bytes), plan: self };
         write_checked(&area_file(folder), &file)
     }
@@ -106,7 +106,8 @@ impl AreaPlan {
         if locations != rooms {
             return refused(format!("has {locations} scan locations, and rooms of {rooms}"));
         }
-        plan.annotated.face_labels = read_face_labels(&labels_file(folder), faces, label_of_face_xxh3_128)?;
+        plan.annotated.label_of_face =
+            read_label_of_face(&labels_file(folder), faces, label_of_face_xxh3_128)?;
         Ok(plan)
     }
 }
@@ -116,11 +117,11 @@ fn area_file(folder: &Path) -> PathBuf {
 }
 
 fn labels_file(folder: &Path) -> PathBuf {
-    folder.join("face_labels.npy")
+    folder.join("label_of_face.npy")
 }
 
 /// The labels are what the file ends with, as `area.jsonl` says how many there are and what their checksum is.
-fn read_face_labels(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec<LabelId>> {
+fn read_label_of_face(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec<LabelId>> {
     let bytes = std::fs::read(path).map_err(|e| FileError::io(path, "read", e))?;
     let labels = usize::try_from(faces)
         .ok()
@@ -224,7 +225,7 @@ mod tests {
             AreaPlan {
                 area: 3,
                 annotated: Annotated {
-                    face_labels: labels.iter().copied().map(LabelId).collect(),
+                    label_of_face: labels.iter().copied().map(LabelId).collect(),
                     report: VoteReport {
                         far_m,
                         face_count: labels.len() as u64,
@@ -292,7 +293,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let mut runner = proptest::test_runner::TestRunner::deterministic();
         let mut plan = any_plan().new_tree(&mut runner).unwrap().current();
-        plan.annotated.face_labels = (0..100).map(LabelId).collect();
+        plan.annotated.label_of_face = (0..100).map(LabelId).collect();
         plan.write(dir.path()).unwrap();
         assert!(AreaPlan::is_in(dir.path()) && AreaPlan::read(dir.path(), 3).is_ok());
         let refusal =
@@ -304,10 +305,10 @@ mod tests {
         *other.last_mut().unwrap() ^= 1;
         for bytes in [&whole[..whole.len() - 4], &[], &other] {
             std::fs::write(&labels, bytes).unwrap();
-            assert!(refusal(3).contains("face_labels.npy: is damaged"), "{}", refusal(3));
+            assert!(refusal(3).contains("label_of_face.npy: is damaged"), "{}", refusal(3));
         }
         std::fs::remove_file(&labels).unwrap();
-        assert!(refusal(3).contains("face_labels.npy"), "{}", refusal(3));
+        assert!(refusal(3).contains("label_of_face.npy"), "{}", refusal(3));
     }
 
     #[test]

@@ -20,9 +20,9 @@ pub(crate) struct Channels<'a> {
     pub(crate) pictures: Option<PictureColors<'a>>,
     pub(crate) normals: Normals,
     /// The label index of each face; may be empty if no semantic image is asked for.
-    pub(crate) label_per_face: &'a [u32],
+    pub(crate) label_of_face: &'a [u32],
     /// The colour of each face in pretty images; may be empty likewise.
-    pub(crate) pretty_per_face: &'a [[u8; 3]],
+    pub(crate) pretty_of_face: &'a [[u8; 3]],
     /// How much time their files may take.
     pub(crate) compression: Compression,
     /// Units of depth, axes of normals, type of coordinates (of which none counts as half: it is not asked for then).
@@ -110,8 +110,8 @@ impl Channels<'_> {
                 mip_maps: self.textures,
                 filter: TextureFilter::default(),
                 normal_axes: self.conventions.normal_axes,
-                index_of_face: self.label_per_face,
-                color_of_face: self.pretty_per_face,
+                index_of_face: self.label_of_face,
+                color_of_face: self.pretty_of_face,
             };
             view_images_into(&shading, hits, camera, buffers.made, &mut buffers.images);
         }
@@ -162,9 +162,9 @@ impl Channels<'_> {
             Image::Normal if !made.faces => {
                 normal_image_into(self.scene, hits, camera, self.normals, normal_axes, &mut faces.normal);
             }
-            Image::Semantic if !made.faces => index_image_into(hits, self.label_per_face, &mut faces.index),
+            Image::Semantic if !made.faces => index_image_into(hits, self.label_of_face, &mut faces.index),
             Image::SemanticPretty if !made.faces => {
-                color_per_face_image_into(hits, self.pretty_per_face, &mut faces.color);
+                color_per_face_image_into(hits, self.pretty_of_face, &mut faces.color);
             }
             Image::GlobalXyz if xyz_type == XyzType::Float => xyz_image_into(hits, camera, xyz_float),
             Image::GlobalXyz if !made.xyz => xyz_image_half_into(hits, camera, xyz),

@@ -54,12 +54,12 @@ pub(crate) fn write_points(
         }
     }
     let key = |face: &u32| {
-        let label = annotated.face_labels[*face as usize];
+        let label = annotated.label_of_face[*face as usize];
         (place.get(&label).map_or((true, None), |(room, _)| (false, Some(*room))), label)
     };
     let mut faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
     faces.sort_by_cached_key(key);
-    let rooms: Vec<(Option<Room>, Vec<Run>)> = runs(&faces, &annotated.face_labels, &place);
+    let rooms: Vec<(Option<Room>, Vec<Run>)> = runs(&faces, &annotated.label_of_face, &place);
 
     let number = plan.area;
     let sampler = SurfaceSampler::over_faces(mesh, faces, density, seed);
@@ -120,11 +120,11 @@ struct Run {
 }
 
 /// The runs of ordered faces, by room; faces without a label have no room.
-fn runs(faces: &[u32], face_labels: &[LabelId], place: &Places) -> Vec<(Option<Room>, Vec<Run>)> {
+fn runs(faces: &[u32], label_of_face: &[LabelId], place: &Places) -> Vec<(Option<Room>, Vec<Run>)> {
     let mut rooms: Vec<(Option<Room>, Vec<Run>)> = Vec::new();
     let mut start = 0;
-    for run in faces.chunk_by(|a, b| face_labels[*a as usize] == face_labels[*b as usize]) {
-        let label = face_labels[run[0] as usize];
+    for run in faces.chunk_by(|a, b| label_of_face[*a as usize] == label_of_face[*b as usize]) {
+        let label = label_of_face[run[0] as usize];
         let (room, number_in_room) =
             place.get(&label).map_or((None, 0), |(room, number)| (Some(*room), *number));
         let run = Run { faces: start..start + run.len(), label, number_in_room };

@@ -91,7 +91,7 @@ pub(crate) fn score_area(
     ctx: &Context,
     locations: &[&ScanLocation],
     scene: &Scene<'_>,
-    face_labels: &[LabelId],
+    label_of_face: &[LabelId],
     table: &LabelTable,
     scoring: Scoring,
     each: impl Fn(&str, Vec<f64>) -> Result<()> + Sync,
@@ -104,7 +104,7 @@ pub(crate) fn score_area(
         return locations.iter().try_for_each(|location| each(&location.uuid, Vec::new()));
     }
     let left: Vec<AtomicU32> = locations.iter().map(|_| AtomicU32::new(scoring.views)).collect();
-    let classes: Vec<Option<Class>> = face_labels.iter().map(|l| table.class_of(*l)).collect();
+    let classes: Vec<Option<Class>> = label_of_face.iter().map(|l| table.class_of(*l)).collect();
     let progress = ctx.progress("scoring", "views", candidates.len() as u64);
     let scores: Vec<OnceLock<f64>> = candidates.iter().map(|_| OnceLock::new()).collect();
     let items: Vec<usize> = (0..candidates.len()).collect();

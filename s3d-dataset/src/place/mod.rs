@@ -43,7 +43,7 @@ pub(crate) struct Ground<'a> {
     pub(crate) area: u32,
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) nearest: &'a NearestFaces<'a>,
-    pub(crate) face_labels: &'a [LabelId],
+    pub(crate) label_of_face: &'a [LabelId],
     pub(crate) table: &'a LabelTable,
     pub(crate) rooms: &'a [SurveyedRoom],
 }
@@ -103,7 +103,7 @@ pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Resu
 /// The level faces labelled as floor, by room.
 fn floor_faces(ground: &Ground<'_>) -> BTreeMap<Room, Vec<u32>> {
     let mut floors: BTreeMap<Room, Vec<u32>> = BTreeMap::new();
-    for (face, label) in (0u32..).zip(ground.face_labels) {
+    for (face, label) in (0u32..).zip(ground.label_of_face) {
         if let Some(label) = ground.table.get(*label)
             && label.class == Class::Floor
             && ground.scene.mesh().normal(face).z.abs() > LEVEL
@@ -219,7 +219,7 @@ mod tests {
         let label = |class| Label { class, instance: 1, room: of, area: 1 };
         let used = [Class::Floor, Class::Ceiling, Class::Wall, Class::Table].map(label);
         let table = LabelTable::from_labels(used).unwrap();
-        let face_labels: Vec<LabelId> = classes
+        let label_of_face: Vec<LabelId> = classes
             .iter()
             .map(|&c| {
                 if c == Class::Floor && !has_floor { LabelId::NULL } else { table.id_of(&label(c)).unwrap() }
@@ -243,7 +243,7 @@ mod tests {
             area: 1,
             scene: &scene,
             nearest: &nearest,
-            face_labels: &face_labels,
+            label_of_face: &label_of_face,
             table: &table,
             rooms: &rooms,
         };

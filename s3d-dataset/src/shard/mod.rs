@@ -108,7 +108,7 @@ impl Job<'_> {
         let mut units = Vec::new();
         for plan in plans() {
             let points = (plan.mesh_area_m2 * options.points_per_m2) as u64;
-            let faces = plan.annotated.face_labels.len() as u64;
+            let faces = plan.annotated.label_of_face.len() as u64;
             units.push((Unit::Assets(plan.area), assets_cost(faces, points)));
             for location in plan.locations.iter().filter(|l| is_chosen(&self.request, &l.uuid)) {
                 let views = kept.get(&(plan.area, location.uuid.as_str())).copied().unwrap_or(0);

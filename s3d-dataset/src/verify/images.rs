@@ -33,7 +33,7 @@ pub(crate) struct Reference<'a> {
     pub(crate) mesh: &'a LabelledMesh,
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) textures: &'a MipMaps,
-    pub(crate) pretty_per_face: &'a [[u8; 3]],
+    pub(crate) pretty_of_face: &'a [[u8; 3]],
     /// Whether RGB comes from the mesh.
     pub(crate) rgb_from_mesh: bool,
     pub(crate) report: &'a Report,

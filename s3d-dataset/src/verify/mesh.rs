@@ -21,8 +21,8 @@ pub(crate) const NOT_IN_TABLE: u32 = 0xff_fffe;
 /// An area's mesh with the label of each face.
 pub(crate) struct LabelledMesh {
     pub(crate) file: MeshFile,
-    /// An index a face.
-    pub(crate) labels: Vec<u32>,
+    /// Its index in the label table, or [`NOT_IN_TABLE`].
+    pub(crate) label_of_face: Vec<u32>,
 }
 
 /// Reads and checks both meshes of an area.
@@ -50,7 +50,7 @@ pub(crate) fn read_and_check(
             format!("{faces} faces, and the manifest tells of {}", manifest.faces)
         });
     }
-    let (face_labels, other) = names?;
+    let (label_of_face, other) = names?;
     let same = report.check(faces == other.faces().len(), MESH, &semantic, || {
         format!("{} faces, and rgb.obj has {faces}", other.faces().len())
     });
@@ -67,8 +67,8 @@ pub(crate) fn read_and_check(
         )
     });
     drop(other);
-    check_votes(layout, area, &face_labels, labels, report);
-    Some(LabelledMesh { file, labels: face_labels })
+    check_votes(layout, area, &label_of_face, labels, report);
+    Some(LabelledMesh { file, label_of_face })
 }
 
 /// The index of each face's label.
@@ -109,11 +109,11 @@ struct VotesRecord {
 }
 
 /// Holds the labels of `semantic.obj` against the report on the votes: faces in all, by room and by class.
-fn check_votes(layout: &Layout, area: u32, face_labels: &[u32], labels: &Labels, report: &Report) {
+fn check_votes(layout: &Layout, area: u32, label_of_face: &[u32], labels: &Labels, report: &Report) {
     let path = layout.votes_json(area);
     let Some(votes) = report.read(Topic::Mesh, read_json::<VotesRecord>(&path)) else { return };
     let mut per_label = vec![0u64; labels.len()];
-    for &label in face_labels {
+    for &label in label_of_face {
         if let Some(count) = per_label.get_mut(label as usize) {
             *count += 1;
         }
@@ -134,7 +134,7 @@ fn check_votes(layout: &Layout, area: u32, face_labels: &[u32], labels: &Labels,
     let is = |what: &str, manifest: u64, found: u64| {
         checks.check(manifest == found, || format!("{manifest} faces {what}, and semantic.obj has {found}"));
     };
-    is("in all", votes.faces, face_labels.len() as u64);
+    is("in all", votes.faces, label_of_face.len() as u64);
     is("without votes", votes.faces_without_votes, others);
     is("with votes", votes.total.faces_voted, per_label.iter().sum::<u64>() - others);
     // Rooms of other areas may bear the same name: they have no face here.

@@ -126,7 +126,7 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     let scene = Scene::new(&mesh.file.mesh);
     let textures = MipMaps::new(&mesh.file.mesh);
     let pretty = |label: &u32| if *label == NOT_IN_TABLE { [0; 3] } else { pretty_color(*label) };
-    let pretty_per_face: Vec<[u8; 3]> = mesh.labels.iter().map(pretty).collect();
+    let pretty_of_face: Vec<[u8; 3]> = mesh.label_of_face.iter().map(pretty).collect();
     let source = manifest.area(area).map_or("texture", |a| a.rgb.as_str());
     let domains = manifest.domains();
     if source != "texture" && domains.contains(&Domain::Rgb) {
@@ -145,7 +145,7 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
         mesh,
         scene: &scene,
         textures: &textures,
-        pretty_per_face: &pretty_per_face,
+        pretty_of_face: &pretty_of_face,
         rgb_from_mesh: source == "texture",
         report,
     };

@@ -67,7 +67,7 @@ pub(crate) fn check(
 }
 
 fn fits(point: &LabelledPoint, mesh: &LabelledMesh, labels: &Labels) -> Result<(), String> {
-    let Some(&label) = mesh.labels.get(point.face as usize) else {
+    let Some(&label) = mesh.label_of_face.get(point.face as usize) else {
         return Err(format!("there is no face {}", point.face));
     };
     if label != point.label {

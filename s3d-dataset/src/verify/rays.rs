@@ -41,7 +41,7 @@ pub(super) fn difference(
                 colors(found, out)
             }
             Domain::Semantic => {
-                index_image_into(hits, &reference.mesh.labels, &mut images.faces.index);
+                index_image_into(hits, &reference.mesh.label_of_face, &mut images.faces.index);
                 let index = |c: [u8; 3]| u32::from_be_bytes([0, c[0], c[1], c[2]]);
                 let text = |c: [u8; 3]| match c {
                     MISSING_INDEX => "nothing".to_owned(),
@@ -50,7 +50,7 @@ pub(super) fn difference(
                 Difference::of(found, &images.faces.index, |a, b| a == b, text, text)
             }
             _ => {
-                color_per_face_image_into(hits, reference.pretty_per_face, &mut images.faces.color);
+                color_per_face_image_into(hits, reference.pretty_of_face, &mut images.faces.color);
                 colors(found, &images.faces.color)
             }
         },

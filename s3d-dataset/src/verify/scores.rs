@@ -23,7 +23,7 @@ pub(crate) fn check(
     views: &Views,
 ) -> Result<()> {
     let Ok(table) = LabelTable::from_names(&reference.labels.names) else { return Ok(()) };
-    if reference.mesh.labels.iter().any(|l| *l as usize >= table.len()) {
+    if reference.mesh.label_of_face.iter().any(|l| *l as usize >= table.len()) {
         return Ok(());
     }
     let located: Vec<ScanLocation> = cameras
@@ -41,7 +41,7 @@ pub(crate) fn check(
         stride: options.entropy_stride,
         seed: reference.manifest.seed,
     };
-    let labels: Vec<LabelId> = reference.mesh.labels.iter().map(|l| LabelId(*l)).collect();
+    let labels: Vec<LabelId> = reference.mesh.label_of_face.iter().map(|l| LabelId(*l)).collect();
     let path = reference.layout.views_json(area);
     let locations: Vec<&ScanLocation> = located.iter().collect();
     score_area(ctx, &locations, reference.scene, &labels, &table, scoring, |uuid, scores| {

@@ -40,10 +40,10 @@ impl<'a> Shade<'a> {
                 (n * 127.5 + (128.0 + 1e-6)).to_array().map(f64::floor)
             }
             Domain::Semantic => {
-                let [_, r, g, b] = reference.mesh.labels[hit.face as usize].to_be_bytes();
+                let [_, r, g, b] = reference.mesh.label_of_face[hit.face as usize].to_be_bytes();
                 [r, g, b].map(f64::from)
             }
-            Domain::SemanticPretty => reference.pretty_per_face[hit.face as usize].map(f64::from),
+            Domain::SemanticPretty => reference.pretty_of_face[hit.face as usize].map(f64::from),
             Domain::GlobalXyz => (camera.pose.location + direction * hit.t).to_array(),
             Domain::Rgb => {
                 let filter = TextureFilter::default();

@@ -20,7 +20,8 @@ const SPACING_M: f32 = 0.05;
 const MOST_ROWS: u32 = 256;
 
 impl Annotations {
-    /// The annotations that say of each face of `mesh` what `face_labels` does: its place in `labels`, or [`NO_INDEX`].
+    /// The annotations that say of each face of `mesh` what `label_of_face` does: its place in `labels`, or
+    /// [`NO_INDEX`].
     ///
     /// The points of an instance are the corners of its faces and places about 5 cm apart on them, black, and each says
     /// which face it is of ([`PointCloud::faces`]): no other face gets its vote. Instances are numbered in each room in the
@@ -30,17 +31,17 @@ impl Annotations {
     /// [`Error::Format`] for `path` if no face has a label.
     ///
     /// # Panics
-    /// If `face_labels` has not one entry a face, or one that is no index into `labels`.
+    /// If `label_of_face` has not one entry a face, or one that is no index into `labels`.
     pub fn from_face_labels(
         path: &Path,
         mesh: &TriMesh,
         labels: &[Label],
-        face_labels: &[u32],
+        label_of_face: &[u32],
     ) -> Result<Self> {
         let count = mesh.faces().len();
-        assert_eq!(face_labels.len(), count, "{count} faces need as many labels");
+        assert_eq!(label_of_face.len(), count, "{count} faces need as many labels");
         let mut faces: BTreeMap<(Room, Class, u32), Vec<Face>> = BTreeMap::new();
-        for (face, place) in (0u32..).zip(face_labels).filter(|(_, place)| **place != NO_INDEX) {
+        for (face, place) in (0u32..).zip(label_of_face).filter(|(_, place)| **place != NO_INDEX) {
             #[expect(
                 clippy::indexing_slicing,
                 reason = "the labels of faces are places in `labels`: see Panics"

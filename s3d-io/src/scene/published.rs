@@ -72,7 +72,7 @@ pub struct PublishedMesh {
     /// The different labels, in the order of their first faces.
     pub labels: Vec<Label>,
     /// One a face of the mesh: its place in `labels`, or [`NO_INDEX`] if it has none.
-    pub face_labels: Vec<u32>,
+    pub label_of_face: Vec<u32>,
 }
 
 impl PublishedArea {
@@ -162,7 +162,7 @@ impl PublishedArea {
         let n = file.mesh.faces().len() as u32;
         let are_paired = n as usize == semantic.faces().len()
             && (0..n).all(|f| near(file.mesh.triangle(f), semantic.triangle(f)));
-        let face_labels: Vec<u32> = if are_paired {
+        let label_of_face: Vec<u32> = if are_paired {
             (0..n).map(|f| place(other(f))).collect()
         } else {
             let mut by_corners: HashMap<[[u32; 3]; 3], Option<Label>> = HashMap::new();
@@ -186,7 +186,7 @@ impl PublishedArea {
         if labels.is_empty() {
             return Err(fault("no material of a face is a label, as in chair_3_office_5_1".into()));
         }
-        let mut mesh = PublishedMesh { file, labels, face_labels };
+        let mut mesh = PublishedMesh { file, labels, label_of_face };
         if self.world_from_area != DAffine3::IDENTITY {
             mesh.turn(&self.world_from_area)
                 .map_err(|source| Error::Mesh { path: self.mesh.clone(), source })?;
@@ -199,7 +199,7 @@ impl PublishedArea {
     /// # Errors
     /// As there.
     pub fn annotations(&self, mesh: &PublishedMesh) -> Result<Annotations> {
-        Annotations::from_face_labels(&self.semantic_mesh, &mesh.file.mesh, &mesh.labels, &mesh.face_labels)
+        Annotations::from_face_labels(&self.semantic_mesh, &mesh.file.mesh, &mesh.labels, &mesh.label_of_face)
     }
 }
 
@@ -213,9 +213,9 @@ impl PublishedMesh {
         for n in &mut parts.normals {
             *n = (normal_from * n.as_dvec3()).normalize_or_zero().as_vec3();
         }
-        parts.face_tags = std::mem::take(&mut self.face_labels);
+        parts.face_tags = std::mem::take(&mut self.label_of_face);
         self.file.mesh = TriMesh::new(parts)?;
-        self.face_labels = self.file.mesh.take_face_tags();
+        self.label_of_face = self.file.mesh.take_face_tags();
         Ok(())
     }
 }

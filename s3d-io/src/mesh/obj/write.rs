@@ -120,19 +120,24 @@ pub fn write_rgb_obj(dir: &Path, mesh: &TriMesh, textures: &[TextureOut<'_>]) ->
 }
 
 /// Writes `semantic.obj` and `semantic.mtl` into the folder `dir`, which must be there, and returns the size of both in
-/// bytes. A face's material bears the name of its label: `names[face_labels[face]]`. Each has the colour of
+/// bytes. A face's material bears the name of its label: `names[label_of_face[face]]`. Each has the colour of
 /// [`pretty_color`].
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
 ///
 /// # Panics
-/// If `face_labels` has not one entry a face, or one that is no index into `names`.
-pub fn write_semantic_obj(dir: &Path, mesh: &TriMesh, face_labels: &[u32], names: &[String]) -> Result<u64> {
+/// If `label_of_face` has not one entry a face, or one that is no index into `names`.
+pub fn write_semantic_obj(
+    dir: &Path,
+    mesh: &TriMesh,
+    label_of_face: &[u32],
+    names: &[String],
+) -> Result<u64> {
     let count = mesh.faces().len();
-    assert_eq!(face_labels.len(), count, "{count} faces need as many labels");
+    assert_eq!(label_of_face.len(), count, "{count} faces need as many labels");
     let mut used = vec![false; names.len()];
-    for &label in face_labels {
+    for &label in label_of_face {
         assert!((label as usize) < names.len(), "label {label} of {}", names.len());
         used[label as usize] = true;
     }
@@ -148,7 +153,7 @@ pub fn write_semantic_obj(dir: &Path, mesh: &TriMesh, face_labels: &[u32], names
         writeln!(w, "mtllib semantic.mtl")?;
         write_positions(w, mesh)?;
         let mut current = None;
-        for (corners, &label) in mesh.faces().iter().zip(face_labels) {
+        for (corners, &label) in mesh.faces().iter().zip(label_of_face) {
             if current != Some(label) {
                 current = Some(label);
                 writeln!(w, "usemtl {}", names[label as usize])?;
