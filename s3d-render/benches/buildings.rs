@@ -1,8 +1,10 @@
-//! What do faces cost that are not seen? A view of 1080² and a candidate view (every 4th pixel) from the first room of a
-//! building, as it grows from 1 to 64 rooms of 25,000 faces behind each other; and a view of 3 rooms as their faces grow
-//! from 30 thousand to 10 million. `Throughput` is in pixels: a flat curve is one in which hidden faces cost nothing.
+//! What do faces cost that are not seen? A view of 1080² and a candidate view (every 4th pixel) from the
+//! first room of a building, as it grows from 1 to 64 rooms of 25,000 faces behind each other; and a view of
+//! 3 rooms as their faces grow from 30 thousand to 10 million. `Throughput` is in pixels: a flat curve is one
+//! in which hidden faces cost nothing.
 //!
-//! `S3D_BENCH_FACES` limits the faces of the second (default 3 million: ten take a gigabyte and a minute to prepare).
+//! `S3D_BENCH_FACES` limits the faces of the second (default 3 million: ten take a gigabyte and a minute to
+//! prepare).
 #![allow(missing_docs)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};

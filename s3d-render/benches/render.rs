@@ -1,8 +1,9 @@
-//! How many rays and pixels a second does one core render: visibility, then each modality made from it? And what does
-//! the visibility pass buy over single rays?
+//! How many rays and pixels a second does one core render: visibility, then each modality made from it? And
+//! what does the visibility pass buy over single rays?
 //!
-//! A generated room of 250,000 faces, a scan-like mesh of 300,000 in several rooms, and the real scan beside the project if it is there; `S3D_BENCH_MESH` names
-//! another OBJ file (Y up), looked at from the middle of its box.
+//! A generated room of 250,000 faces, a scan-like mesh of 300,000 in several rooms, and the real scan beside
+//! the project if it is there; `S3D_BENCH_MESH` names another OBJ file (Y up), looked at from the middle of
+//! its box.
 
 mod common;
 

@@ -1,6 +1,7 @@
 //! How long do the images of a view take, once its hits are known: each modality alone, and all six?
 //!
-//! Nine views of 1080² and a panorama of 4096 × 2048 from one place in each of the scenes of [`common::shaded_scene`].
+//! Nine views of 1080² and a panorama of 4096 × 2048 from one place in each of the scenes of
+//! [`common::shaded_scene`].
 
 mod common;
 
@@ -29,7 +30,8 @@ fn shade(c: &mut Criterion) {
                     b.iter(|| shots.iter().for_each(|(camera, hits)| shade(camera, hits)));
                 });
             };
-            // Into images that are used again: the pages of new ones take the system longer than some take to be made.
+            // Into images that are used again: the pages of new ones take the system longer than some take to
+            // be made.
             let filter = TextureFilter::default();
             let (mut rgb, mut normal) = (Raster::filled(1, 1, [0; 3]), Raster::filled(1, 1, [0; 3]));
             let (mut semantic, mut colored) = (normal.clone(), normal.clone());

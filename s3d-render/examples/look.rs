@@ -4,7 +4,8 @@
 //! cargo run --release -p s3d-render --example look -- FOLDER [MESH.obj X Y Z [YAW_DEG]]
 //! ```
 //!
-//! The mesh is an OBJ file with Y up, looked at from (X, Y, Z) in the Z-up world; without one, a generated room.
+//! The mesh is an OBJ file with Y up, looked at from (X, Y, Z) in the Z-up world; without one, a generated
+//! room.
 
 #[path = "../benches/common/mod.rs"]
 mod common;

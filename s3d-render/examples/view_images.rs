@@ -1,12 +1,13 @@
-//! How long a view's six images take from its hits, again and again, for a comparison of two states of the project:
+//! How long a view's six images take from its hits, again and again, for a comparison of two states of the
+//! project:
 //!
 //! ```text
 //! cargo run --release -p s3d-render --example view_images -- scan-like|copyroom|office|fine-textures
 //! ```
 //!
-//! For every line that comes in it makes the images of nine views of 1080² and prints a line: the milliseconds of each. So
-//! `docs/performance/states.py` can let two programs take turns, a fraction of a second each, which a busy machine disturbs
-//! alike. The scenes are those of the bench `shade`.
+//! For every line that comes in it makes the images of nine views of 1080² and prints a line: the
+//! milliseconds of each. So `docs/performance/states.py` can let two programs take turns, a fraction of a
+//! second each, which a busy machine disturbs alike. The scenes are those of the bench `shade`.
 
 #[path = "../benches/common/mod.rs"]
 mod common;

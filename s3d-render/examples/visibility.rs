@@ -4,13 +4,14 @@
 //! cargo run --release -p s3d-render --example visibility -- MESH X Y Z [--up y|z] [--rounds N] [--threads N] [--dump DIR]
 //! ```
 //!
-//! MESH is an OBJ file (Y up unless said otherwise) or `scan-like:FACES`, a generated scan. From (X, Y, Z) in the Z-up
-//! world it casts 72 views of 1080² (24 yaws at the pitches 0°, −15° and 15°, 75° wide) and a panorama of 4096 × 2048,
-//! face and depth of every pixel written, and prints the rays per second of user time and of wall time: the median of
-//! the rounds. The location is rounded to `f32` first, so that ray casters of `f32` start at the very same point.
+//! MESH is an OBJ file (Y up unless said otherwise) or `scan-like:FACES`, a generated scan. From (X, Y, Z) in
+//! the Z-up world it casts 72 views of 1080² (24 yaws at the pitches 0°, −15° and 15°, 75° wide) and a
+//! panorama of 4096 × 2048, face and depth of every pixel written, and prints the rays per second of user
+//! time and of wall time: the median of the rounds. The location is rounded to `f32` first, so that ray
+//! casters of `f32` start at the very same point.
 //!
-//! With `--dump` it also writes what `docs/performance/embree_cast.cpp` needs to cast the same rays and compare, all
-//! little-endian:
+//! With `--dump` it also writes what `docs/performance/embree_cast.cpp` needs to cast the same rays and
+//! compare, all little-endian:
 //!
 //! | file | holds |
 //! |---|---|

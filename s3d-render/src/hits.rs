@@ -6,12 +6,27 @@ use s3d_geom::Raster;
 pub const NO_FACE: u32 = u32::MAX;
 
 /// What the pixels of an image see. All modalities of a view are made from it, so they agree pixel for pixel.
+///
+/// ```
+/// use s3d_geom::{Camera, Pose, TriMesh, glam::{dvec3, vec3}};
+/// use s3d_render::{NO_FACE, Scene, cast};
+///
+/// // A triangle 2 m ahead of a camera that looks along +Y.
+/// let corners = vec![vec3(-1.0, 2.0, 0.5), vec3(1.0, 2.0, 0.5), vec3(0.0, 2.0, 2.5)];
+/// let mesh = TriMesh::from_faces(corners, vec![[0, 1, 2]])?;
+/// let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 75f64.to_radians(), 540, 540);
+/// let hits = cast(&Scene::new(&mesh), &camera);
+/// assert_eq!((hits.face.at(270, 270), hits.depth.at(270, 270)), (0, 2.0));
+/// assert_eq!((hits.face.at(0, 0), hits.depth.at(0, 0)), (NO_FACE, f32::INFINITY));
+/// # Ok::<(), s3d_geom::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hits {
     /// The face that each pixel's ray hits first, [`NO_FACE`] where it hits nothing.
     pub face: Raster<u32>,
-    /// How far away it is in metres, as the multiple of the ray's direction that [`Camera::rays`](s3d_geom::Camera::rays) gives: z along the
-    /// optical axis in a perspective view, the distance in a panorama. Infinite where nothing is hit.
+    /// How far away it is in metres, as the multiple of the ray's direction that
+    /// [`Camera::rays`](s3d_geom::Camera::rays) gives: z along the optical axis in a perspective view, the
+    /// distance in a panorama. Infinite where nothing is hit.
     pub depth: Raster<f32>,
 }
 

@@ -1,39 +1,69 @@
 //! Watertight rendering of scans on the CPU: one hit a pixel serves every modality.
 //!
 //! - [`Scene`]: a mesh and the tree over its faces.
-//! - [`cast`]: scene + camera → [`Hits`], the face and the depth that each pixel sees. Exact: no pinhole, no leak, no
-//!   dependence on the order of faces or on the processor. [`cast_strided`] casts a part of the pixels, to score a view;
-//!   [`cast_ray`] a single ray.
-//! - [`depth_image`], [`normal_image`], [`xyz_image`], [`index_image`], [`color_per_face_image`]: hits → the images of
-//!   the data set (formats.md, "Images"). A semantic image is an index image: this crate stores faces and knows no
-//!   labels.
-//! - [`MipMaps`] and [`rgb_image`]: hits → colours, textures filtered over each pixel's footprint.
-//! - [`view_images_into`]: all of these in one walk over the hits, in less time and the same to the bit.
-//! - [`CubeMap`] and [`picture_image`]: hits → colours from the scanner's own pictures, be they a sky box, a panorama or
-//!   captures that overlap ([`stitch()`]).
+//! - [`Hits`]: the face and the depth that each pixel of a camera sees; [`cast`] makes them, [`Caster`] many
+//!   in a row.
+//! - [`MipMaps`]: the textures of a mesh, ready to be filtered.
+//! - [`ViewImages`]: colour, depth, normals, indices and points of a view; [`view_images_into`] makes them
+//!   from hits.
+//! - [`CubeMap`]: what pictures show all around a place, made from a sky box, a panorama or captures that
+//!   overlap ([`stitch()`]).
 //!
-//! Everything that makes one image runs on the calling thread: callers render many images at once.
+//! **Mesh and camera → hits.** Exact: no pinhole, no leak, no dependence on the order of faces or on the
+//! processor. [`cast_strided`] casts a part of the pixels, to score a view; [`cast_ray`] a single ray.
+//!
+//! **Hits → images** of the data set (formats.md, "Images"): [`rgb_image`], [`depth_image`],
+//! [`normal_image`], [`xyz_image`], [`index_image`], [`color_per_face_image`]; or all of them in one walk
+//! over the hits, in less time and the same to the bit: [`view_images_into`]. A semantic image is an index
+//! image: this crate stores faces and knows no labels. Functions that end in `_into` write to an image that
+//! is there.
+//!
+//! **Pictures → colours.** [`picture_image`] colours hits from a [`CubeMap`] instead of from textures.
+//!
+//! Everything that makes one image runs on the calling thread: callers render many images at once. The
+//! instructions of the processor are chosen when the program runs, and give the same bytes; the environment
+//! variable `S3D_SIMD` holds them down: see [`SimdLevel`].
+//!
+//! # Example
+//!
+//! A floor and a view of it, as colour, depth, normals, points and indices of faces.
 //!
 //! ```
-//! use s3d_geom::{Camera, Pose, TriMesh, glam::{dvec3, vec3}};
-//! use s3d_render::{Normals, Scene};
+//! use s3d_geom::{Camera, NormalAxes, Pose, TriMesh, glam::{dvec3, vec3}};
+//! use s3d_render::{
+//!     MISSING_DEPTH, MipMaps, Modalities, Scene, Shading, TextureFilter, ViewImages, cast, view_images_into,
+//! };
 //!
-//! // A triangle 2 m ahead of a camera that looks along +Y.
-//! let corners = vec![vec3(-1.0, 2.0, 0.5), vec3(1.0, 2.0, 0.5), vec3(0.0, 2.0, 2.5)];
+//! // A floor of one triangle, and a camera 1.5 m above it that looks along +Y.
+//! let corners = vec![vec3(-9.0, -9.0, 0.0), vec3(9.0, -9.0, 0.0), vec3(0.0, 9.0, 0.0)];
 //! let mesh = TriMesh::from_faces(corners, vec![[0, 1, 2]])?;
-//! let scene = Scene::new(&mesh);
-//! let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 75f64.to_radians(), 540, 540);
+//! let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 90f64.to_radians(), 64, 64);
 //!
-//! let hits = s3d_render::cast(&scene, &camera);
-//! assert_eq!((hits.face.at(270, 270), hits.depth.at(270, 270)), (0, 2.0));
-//! assert_eq!(s3d_render::depth_image(&hits).at(270, 270), 1024); // 512 units a metre
-//! let normals = s3d_render::normal_image(&scene, &hits, &camera, Normals::Flat);
-//! assert_eq!(normals.at(270, 270), [128, 128, 255]); // faces the camera
-//! assert_eq!(s3d_render::index_image(&hits, &[257]).at(270, 270), [0, 1, 1]);
+//! let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+//! let hits = cast(&scene, &camera);
+//! let shading = Shading {
+//!     scene: &scene,
+//!     mip_maps: &mip_maps,
+//!     filter: TextureFilter::default(),
+//!     normal_axes: NormalAxes::Paper,
+//!     index_of_face: &[257],
+//!     color_of_face: &[[9, 8, 7]],
+//! };
+//! let mut images = ViewImages::default();
+//! view_images_into(&shading, &hits, &camera, Modalities::ALL, &mut images);
+//!
+//! // The middle of the lowest row looks down by nearly 45°: 1.5 m below is 1.524 m along the axis.
+//! assert_eq!(images.depth.at(32, 63), 780); // 512 units a metre
+//! assert_eq!(images.rgb.at(32, 63), s3d_geom::DEFAULT_COLOR);
+//! assert_eq!(images.faces.index.at(32, 63), [0, 1, 1]); // 257
+//! assert_eq!(images.faces.color.at(32, 63), [9, 8, 7]);
+//! assert!(images.xyz.at(32, 63)[2].to_f32().abs() < 1e-3); // on the floor
+//! assert_eq!(images.depth.at(32, 0), MISSING_DEPTH); // the sky
 //! # Ok::<(), s3d_geom::MeshError>(())
 //! ```
 
-// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what TriMesh::new and Camera checked.
+// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what TriMesh::new and
+// Camera checked.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
@@ -65,6 +95,7 @@ pub use shade::mip_maps::{MipMaps, TextureFilter};
 pub use shade::pixel_color::{rgb_image_pixel_by_pixel, rgb_of_ray};
 pub use shade::points::{xyz_image, xyz_image_half, xyz_image_half_into, xyz_image_into};
 pub use shade::view::{FaceImages, Modalities, Shading, ViewImages, view_images_into};
+pub use simd::level::SimdLevel;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

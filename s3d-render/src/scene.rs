@@ -6,7 +6,21 @@ use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::bu
 use s3d_geom::TriMesh;
 use std::time::Duration;
 
-/// A mesh with a bounding volume hierarchy over its faces: built once, shared by any number of threads that render it.
+/// A mesh with a bounding volume hierarchy over its faces: built once, shared by any number of threads that
+/// render it.
+///
+/// ```
+/// use s3d_geom::{TriMesh, glam::{DVec3, dvec3, vec3}};
+/// use s3d_render::{Scene, cast_ray};
+///
+/// let corners = vec![vec3(-1.0, 2.0, 0.0), vec3(1.0, 2.0, 0.0), vec3(0.0, 2.0, 3.0)];
+/// let wall = TriMesh::from_faces(corners, vec![[0, 1, 2]])?;
+/// let scene = Scene::new(&wall);
+/// let hit = cast_ray(&scene, dvec3(0.0, 0.0, 1.0), DVec3::Y).expect("the wall is ahead");
+/// assert_eq!((hit.face, hit.t), (0, 2.0));
+/// assert!(cast_ray(&scene, dvec3(0.0, 0.0, 1.0), DVec3::X).is_none());
+/// # Ok::<(), s3d_geom::MeshError>(())
+/// ```
 pub struct Scene<'m> {
     mesh: &'m TriMesh,
     /// Boxes are exact unions of `f32` corners; every test against them allows for its own rounding.

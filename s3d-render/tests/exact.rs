@@ -1,5 +1,5 @@
-//! The visibility pass against single exact rays, pixel by pixel: random soups, slivers, duplicates, faces through the
-//! camera and behind it; and whole images of a scan-like mesh and of a real scan.
+//! The visibility pass against single exact rays, pixel by pixel: random soups, slivers, duplicates, faces
+//! through the camera and behind it; and whole images of a scan-like mesh and of a real scan.
 
 use proptest::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3, dvec3, vec3};
@@ -55,8 +55,8 @@ fn camera(pose: Pose, kind: u8) -> Camera {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(160))]
 
-    /// On a lattice faces share edges, overlap, lie in line with the camera and contain it; along the axes rays meet
-    /// corners and edges exactly.
+    /// On a lattice faces share edges, overlap, lie in line with the camera and contain it; along the axes
+    /// rays meet corners and edges exactly.
     #[test]
     fn lattices(
         points in prop::collection::vec(prop::array::uniform3(-3i8..=3), 3..40),
@@ -220,7 +220,8 @@ fn memory_that_was_used_changes_nothing() {
 
 #[test]
 fn an_image_may_be_as_thin_as_it_likes() {
-    // Two rows of faces, the nearer around row 65,535 of 70,000 and the farther below it, in groups of their own.
+    // Two rows of faces, the nearer around row 65,535 of 70,000 and the farther below it, in groups of their
+    // own.
     let (mut positions, mut faces) = (Vec::new(), Vec::new());
     for (y, top, bottom) in [(0.1, -3.0, -3.1), (0.2, -6.4, -6.8)] {
         for k in -50i32..50 {

@@ -9,8 +9,8 @@ use s3d_render::{
     Hits, MipMaps, Modalities, NO_FACE, Normals, Scene, Shading, TextureFilter, view_images_into,
 };
 
-/// A room of 4 × 4 × 3 m around (0, 0, 1.5); two faces a wall, whose index / 2 is: 0 floor, 1 ceiling, 2 wall at +Y,
-/// 3 at −Y, 4 at +X, 5 at −X. Wound to face inwards, textured with (0, 0) to (1, 1) a wall.
+/// A room of 4 × 4 × 3 m around (0, 0, 1.5); two faces a wall, whose index / 2 is: 0 floor, 1 ceiling, 2 wall
+/// at +Y, 3 at −Y, 4 at +X, 5 at −X. Wound to face inwards, textured with (0, 0) to (1, 1) a wall.
 fn room_parts() -> MeshParts {
     let corner = |x: f32, y: f32, z: f32| vec3(2.0 * x, 2.0 * y, 1.5 + 1.5 * z);
     let walls = [
@@ -245,7 +245,8 @@ fn normals_face_the_camera_from_either_side() {
 
 #[test]
 fn smooth_normals_are_interpolated_and_never_point_away() {
-    // The wall at +Y bulges: its corner normals lean outwards, the second time beyond what the camera can see.
+    // The wall at +Y bulges: its corner normals lean outwards, the second time beyond what the camera can
+    // see.
     for lean in [0.5, 2.0] {
         let mut parts = room_parts();
         parts.normals = vec![vec3(-lean, -1.0, 0.0).normalize(), vec3(lean, -1.0, 0.0).normalize()];
@@ -326,7 +327,8 @@ fn a_distant_checkerboard_is_grey() {
 
 #[test]
 fn a_floor_seen_at_an_angle_keeps_what_runs_along_it() {
-    // Stripes that run away from the camera, 4 pixels of the texture each: at a grazing angle plain mipmaps blur them.
+    // Stripes that run away from the camera, 4 pixels of the texture each: at a grazing angle plain mipmaps
+    // blur them.
     let pixel = |k: u32| if (k % 512 / 4).is_multiple_of(2) { [250; 3] } else { [10; 3] };
     let mesh = textured(Raster::from_vec(512, 512, (0..512 * 512).map(pixel).collect()), Wrap::Clamp);
     let pose = Pose::level(dvec3(0.0, -1.9, 0.25), 0.0);
@@ -380,8 +382,8 @@ fn an_index_beyond_24_bits_is_a_callers_mistake() {
     let _ = s3d_render::index_image(&hits, &[1 << 24; 12]);
 }
 
-/// The fast image against the one of single pixels: no channel may differ by more than 1, but in a few pixels where
-/// rounding decides how many samples are taken.
+/// The fast image against the one of single pixels: no channel may differ by more than 1, but in a few pixels
+/// where rounding decides how many samples are taken.
 fn close(mesh: &TriMesh, camera: &Camera, max_taps: u32) {
     let (scene, mip_maps) = (Scene::new(mesh), MipMaps::new(mesh));
     let hits = s3d_render::cast(&scene, camera);

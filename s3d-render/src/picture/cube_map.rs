@@ -1,13 +1,8 @@
-//! Cube maps: what is seen all around from one place.
+//! Cube maps: what is seen all around from one place. [`CubeMap`] says in which order and directions.
 //!
-//! Six faces of 90° each, in the order and with the names of the scanner's sky boxes (formats.md, "The scanner's own
-//! pictures"): 0 up, 1 right, 2 back, 3 left, 4 front, 5 down, relative to the location's original camera E(original).
-//! Faces 1 to 4 are what that camera sees when it turns on the spot, and 0 and 5 what it sees when it looks straight up or
-//! down from the front: the lower edge of *up* and the upper edge of *down* meet *front*. Every face is seen from
-//! inside, its first row at its top.
-//!
-//! A face is stored with a border of a 32nd of its width on every side, which shows what its neighbours show there. So a
-//! face can be filtered as any texture is, at every reduction down to a face of 32 pixels, and no seam shows.
+//! A face is stored with a border of a 32nd of its width on every side, which shows what its neighbours show
+//! there. So a face can be filtered as any texture is, at every reduction down to a face of 32 pixels, and no
+//! seam shows.
 
 use crate::picture::fill::fill_unseen;
 use crate::shade::filter::MipLevels;
@@ -22,7 +17,8 @@ const BORDERS: u32 = 32;
 /// The widest face.
 const MAX_SIZE: u32 = 8192;
 
-/// The axes of a face in the cube's frame, which is the original camera's in OpenCV's axes: x right, y down, z forward.
+/// The axes of a face in the cube's frame, which is the original camera's in OpenCV's axes: x right, y down,
+/// z forward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FaceAxes {
     /// For the face's right, its down and its forward: which axis of the frame, and its sign.
@@ -47,7 +43,8 @@ fn axis((axis, sign): (usize, i8)) -> DVec3 {
     v
 }
 
-/// The face that a direction in the cube's frame goes through; of two at the same angle, the one of the earlier axis.
+/// The face that a direction in the cube's frame goes through; of two at the same angle, the one of the
+/// earlier axis.
 #[inline]
 pub(crate) fn face_of(d: DVec3) -> usize {
     let a = d.abs();
@@ -62,7 +59,8 @@ pub(crate) fn face_of(d: DVec3) -> usize {
     }
 }
 
-/// The place on a face's plane, −1 to 1 to the right and downwards within the face, of a direction in the cube's frame.
+/// The place on a face's plane, −1 to 1 to the right and downwards within the face, of a direction in the
+/// cube's frame.
 #[inline]
 pub(crate) fn place_on(face: usize, d: DVec3) -> DVec2 {
     let along = |(axis, sign): (usize, i8)| d[axis] * f64::from(sign);
@@ -70,7 +68,31 @@ pub(crate) fn place_on(face: usize, d: DVec3) -> DVec2 {
     dvec2(along(right), along(down)) / along(forward)
 }
 
-/// The picture all around a place, in six faces; see the module for the order and the directions of the faces.
+/// The picture all around a place, in six faces of 90° each.
+///
+/// The faces have the order and the names of the scanner's sky boxes (formats.md, "The scanner's own
+/// pictures"): 0 up, 1 right, 2 back, 3 left, 4 front, 5 down, relative to the location's original camera
+/// E(original). Faces 1 to 4 are what that camera sees when it turns on the spot, and 0 and 5 what it sees
+/// when it looks straight up or down from the front: the lower edge of *up* and the upper edge of *down* meet
+/// *front*. Every face is seen from inside, its first row at its top.
+///
+/// ```
+/// use s3d_geom::{Pose, Raster, glam::DVec3};
+/// use s3d_render::{CubeMap, SkyBoxTurn, TextureFilter};
+///
+/// // Six pictures of one colour each.
+/// let pictures: Vec<Raster<[u8; 3]>> = (1..=6).map(|k| Raster::filled(64, 64, [40 * k; 3])).collect();
+/// let pose = Pose::level(DVec3::ZERO, 0.0); // looks along +Y
+/// let cube = CubeMap::from_sky_box(std::array::from_fn(|k| &pictures[k]), SkyBoxTurn::Front, &pose, None);
+/// assert_eq!((cube.size(), cube.coverage()), (64, 1.0));
+///
+/// let colour = |direction: DVec3| {
+///     let none = DVec3::splat(1e-9); // a footprint of no size
+///     cube.sample(direction, none, none, &TextureFilter::default()).0[0].round()
+/// };
+/// assert_eq!([DVec3::Z, DVec3::X, -DVec3::Y].map(colour), [40.0, 80.0, 120.0]); // up, right, back
+/// assert_eq!([-DVec3::X, DVec3::Y, -DVec3::Z].map(colour), [160.0, 200.0, 240.0]); // left, front, down
+/// ```
 #[derive(Clone, Debug)]
 pub struct CubeMap {
     pose: Pose,
@@ -87,15 +109,16 @@ pub struct CubeMap {
 pub(crate) type Texel = Option<[f32; 3]>;
 
 impl CubeMap {
-    /// The size of a face that [`CubeMap`]s can have and that is at least `wanted`: a multiple of 32 up to 8,192.
+    /// The size of a face that [`CubeMap`]s can have and that is at least `wanted`: a multiple of 32 up to
+    /// 8,192.
     pub fn fitting_size(wanted: f64) -> u32 {
         let parts = (wanted / f64::from(BORDERS)).clamp(1.0, f64::from(MAX_SIZE / BORDERS));
         libm::ceil(parts - 1e-9) as u32 * BORDERS
     }
 
-    /// A cube map around `pose` (E(original)) with faces of `size` pixels, each pixel from `texel`, which is given the
-    /// face, the column and row in the face with its border, and the direction in the cube's frame. On all threads of the
-    /// current pool.
+    /// A cube map around `pose` (E(original)) with faces of `size` pixels, each pixel from `texel`, which is
+    /// given the face, the column and row in the face with its border, and the direction in the cube's frame.
+    /// On all threads of the current pool.
     pub(crate) fn build(
         pose: Pose,
         size: u32,
@@ -137,7 +160,8 @@ impl CubeMap {
         Self { pose, size, border, faces, reductions, seen }
     }
 
-    /// Every pixel of a map with faces of `size`: its face, its column and row there, and its direction in the cube's frame.
+    /// Every pixel of a map with faces of `size`: its face, its column and row there, and its direction in
+    /// the cube's frame.
     pub(crate) fn directions(size: u32) -> impl Iterator<Item = (usize, u32, u32, DVec3)> {
         let width = size + 2 * (size / BORDERS);
         let at = move |face: usize, k: u32| (face, k % width, k / width);
@@ -190,8 +214,8 @@ impl CubeMap {
         std::array::from_fn(|face| MipLevels::new(&self.faces[face], &self.reductions[face]))
     }
 
-    /// What is added to the place on a face's plane, and what it is multiplied by then, to come to pixels of the stored
-    /// face.
+    /// What is added to the place on a face's plane, and what it is multiplied by then, to come to pixels of
+    /// the stored face.
     pub(crate) fn pixels_of_place(&self) -> (f64, f64) {
         let half = 0.5 * f64::from(self.size);
         ((f64::from(self.border) + half) / half, half)
@@ -221,9 +245,9 @@ impl CubeMap {
         ((upper * (256 - py) + lower * py) >> 16) as u8
     }
 
-    /// The colour in a direction of the world, 0 to 255 a channel, over the footprint whose sides are `x` and `y` (how the
-    /// direction changes to the next pixel), and how much of it a picture shows, 0 to 255. The plain form of
-    /// [`crate::picture_image`].
+    /// The colour in a direction of the world, 0 to 255 a channel, over the footprint whose sides are `x` and
+    /// `y` (how the direction changes to the next pixel), and how much of it a picture shows, 0 to 255. The
+    /// plain form of [`crate::picture_image`].
     pub fn sample(&self, direction: DVec3, x: DVec3, y: DVec3, filter: &TextureFilter) -> ([f32; 3], u8) {
         let turn = self.frame_from_world();
         let d = turn * direction;
@@ -249,7 +273,8 @@ impl CubeMap {
     }
 }
 
-/// The direction, in the cube's frame and with a depth of 1 on the face, of the centre of a pixel of a face with its border.
+/// The direction, in the cube's frame and with a depth of 1 on the face, of the centre of a pixel of a face
+/// with its border.
 fn direction_of(face: usize, size: u32, x: u32, y: u32) -> DVec3 {
     let half = 0.5 * f64::from(size);
     let at = |i: u32| (f64::from(i) + 0.5 - f64::from(size / BORDERS)) / half - 1.0;
@@ -297,13 +322,16 @@ pub(crate) mod tests {
     proptest! {
         /// Seams included: the second direction has two or three components that are nearly equal.
         #[test]
-        fn every_direction_has_its_colour(d in prop::array::uniform3(-1.0..1.0f64), tilt in -0.01..0.01f64, far in any::<bool>()) {
+        fn every_direction_has_its_colour(
+            d in prop::array::uniform3(-1.0..1.0f64), tilt in -0.01..0.01f64, far in any::<bool>(),
+        ) {
             static CUBE: std::sync::LazyLock<CubeMap> = std::sync::LazyLock::new(|| smooth(256));
             let cube = &*CUBE;
             let mut d = DVec3::from(d);
             prop_assume!(d.length() > 0.1);
             if far {
-                d = cube.frame_from_world().transpose() * dvec3(1.0f64.copysign(d.x), (1.0 + tilt).copysign(d.y), d.z);
+                let seam = dvec3(1.0f64.copysign(d.x), (1.0 + tilt).copysign(d.y), d.z);
+                d = cube.frame_from_world().transpose() * seam;
             }
             let tiny = DVec3::splat(1e-9);
             let (color, seen) = cube.sample(d, tiny, tiny, &TextureFilter::default());

@@ -5,17 +5,18 @@ use crate::shade::mip_maps::{MipMap, TextureFilter, halved};
 use glam::{DVec2, dvec2};
 use s3d_geom::{Pose, Raster, Texture, Wrap};
 
-/// Near its poles a pixel sees many columns of a photograph and few rows: as many samples as keep the rows apart.
+/// Near its poles a pixel sees many columns of a photograph and few rows: as many samples as keep the rows
+/// apart.
 const AT_POLES: TextureFilter = TextureFilter { max_taps: 256 };
 
-/// Which way the upper and the lower picture of a sky box are turned: with which side picture the lower edge of the one
-/// and the upper edge of the other meet.
+/// Which way the upper and the lower picture of a sky box are turned: with which side picture the lower edge
+/// of the one and the upper edge of the other meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum SkyBoxTurn {
     /// What agrees best along the edges, each for itself; *front* if nothing agrees better.
     ///
-    /// Viewers of Matterport's sky boxes (Matterport3DSimulator, PanoBasic) have them meet *right*; taken literally,
-    /// formats.md has them meet *front*. Pictures tell.
+    /// Viewers of Matterport's sky boxes (Matterport3DSimulator, PanoBasic) have them meet *right*; taken
+    /// literally, formats.md has them meet *front*. Pictures tell.
     #[default]
     Detect,
     /// With picture 4.
@@ -42,8 +43,8 @@ impl SkyBoxTurn {
 }
 
 impl CubeMap {
-    /// From the six pictures of a sky box, in the order of the faces and all of one size, with faces of `size` pixels, or
-    /// of the pictures' own. Pictures of a multiple of 32 pixels are taken as they are.
+    /// From the six pictures of a sky box, in the order of the faces and all of one size, with faces of
+    /// `size` pixels, or of the pictures' own. Pictures of a multiple of 32 pixels are taken as they are.
     ///
     /// # Panics
     /// If there are not six square pictures of one size of at least 1 pixel.
@@ -71,10 +72,11 @@ impl CubeMap {
         })
     }
 
-    /// From an equirectangular photograph, whose columns are longitudes growing to the right and whose rows are latitudes
-    /// from +90° at the top to −90°, upright in the world (+Z up). Its centre column looks along the forward axis of
-    /// `pose` projected to the horizon, turned by `yaw_rad` to the left: formats.md's panoramas have 0. With faces of
-    /// `size` pixels, or of as many as keep what the photograph shows.
+    /// From an equirectangular photograph, whose columns are longitudes growing to the right and whose rows
+    /// are latitudes from +90° at the top to −90°, upright in the world (+Z up). Its centre column looks
+    /// along the forward axis of `pose` projected to the horizon, turned by `yaw_rad` to the left:
+    /// formats.md's panoramas have 0. With faces of `size` pixels, or of as many as keep what the photograph
+    /// shows.
     ///
     /// # Panics
     /// If the photograph has no pixel.
@@ -93,7 +95,8 @@ impl CubeMap {
         let azimuth = pose.azimuth_rad() + yaw_rad;
         let angle = 2.0 / f64::from(size);
         Self::build(*pose, size, |_, _, _, d| {
-            // A pixel at the depth 1 and the distance r is seen under the angle 2/size · 1/r, across even 1/r².
+            // A pixel at the depth 1 and the distance r is seen under the angle 2/size · 1/r, across even
+            // 1/r².
             let distance = d.length();
             let v = world_from_frame * d;
             let flat = libm::hypot(v.x, v.y);
@@ -108,7 +111,8 @@ impl CubeMap {
     }
 }
 
-/// The quarter turns of the upper (0) or lower (5) picture with which its edges agree best with those of the sides.
+/// The quarter turns of the upper (0) or lower (5) picture with which its edges agree best with those of the
+/// sides.
 fn agreeing_turn(pictures: &[&Raster<[u8; 3]>; 6], face: usize) -> u32 {
     let n = pictures[0].width();
     let difference = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| u64::from(a[k].abs_diff(b[k]))).sum::<u64>();
@@ -117,7 +121,8 @@ fn agreeing_turn(pictures: &[&Raster<[u8; 3]>; 6], face: usize) -> u32 {
         (0..n)
             .map(|i| {
                 let last = n - 1;
-                // Along the edge with the front from left to right, then right, back and left, each as its own picture goes.
+                // Along the edge with the front from left to right, then right, back and left, each as its
+                // own picture goes.
                 let (edge, row) = if face == 0 {
                     ([cap.at(i, last), cap.at(last, last - i), cap.at(last - i, 0), cap.at(0, i)], 0)
                 } else {

@@ -2,8 +2,8 @@
 
 use s3d_geom::Raster;
 
-/// Gives every pixel of `image` whose `seen` is 0 a colour from those around it: the nearer, the more. Neighbours of holes
-/// can then be filtered without a rim. An image of which nothing is seen stays as it is.
+/// Gives every pixel of `image` whose `seen` is 0 a colour from those around it: the nearer, the more.
+/// Neighbours of holes can then be filtered without a rim. An image of which nothing is seen stays as it is.
 pub(crate) fn fill_unseen(image: &mut Raster<[u8; 3]>, seen: &Raster<u8>) {
     let colors = image.pixels().iter().zip(seen.pixels());
     let full: Vec<[f32; 4]> = colors
@@ -45,7 +45,8 @@ fn filled(mut image: Raster<[f32; 4]>) -> Raster<[f32; 4]> {
             if image.pixels()[at][3] > 0.0 {
                 continue;
             }
-            // Three quarters of the pixel that covers it, a quarter of the next one on its side, in either direction.
+            // Three quarters of the pixel that covers it, a quarter of the next one on its side, in either
+            // direction.
             let next =
                 |i: u32, n: u32| if i % 2 == 1 { (i / 2 + 1).min(n - 1) } else { (i / 2).saturating_sub(1) };
             let (x0, x1, y0, y1) = (x / 2, next(x, half_w), y / 2, next(y, half_h));
@@ -92,7 +93,8 @@ mod tests {
         fn what_is_seen_stays_and_what_is_not_is_between(w in 1u32..20, h in 1u32..20, seed in any::<u64>()) {
             let bit = |k: u32| seed.rotate_left(k * 7) & 3 == 0;
             let seen = Raster::from_vec(w, h, (0..w * h).map(|k| u8::from(bit(k))).collect());
-            let before = Raster::from_vec(w, h, (0..w * h).map(|k| [if bit(k) { 100 + (k % 50) as u8 } else { 0 }; 3]).collect());
+            let color = |k: u32| [if bit(k) { 100 + (k % 50) as u8 } else { 0 }; 3];
+            let before = Raster::from_vec(w, h, (0..w * h).map(color).collect());
             let mut after = before.clone();
             fill_unseen(&mut after, &seen);
             for ((a, b), s) in after.pixels().iter().zip(before.pixels()).zip(seen.pixels()) {

@@ -1,9 +1,9 @@
 //! The RGB image from pictures: colours of a cube map where the mesh is seen.
 //!
-//! As in [`crate::shade::color`] eight pixels go together, and their footprints are filtered by [`crate::shade::filter`]: a face of the
-//! cube is a texture whose coordinates are ratios of linear functions of the ray's direction. Those directions are unit
-//! vectors, or of unit depth, so that `f32` does without an anchor: a place in a face of 4,096 pixels is off by less than
-//! a 500th of a pixel.
+//! As in [`crate::shade::color`] eight pixels go together, and their footprints are filtered by
+//! [`crate::shade::filter`]: a face of the cube is a texture whose coordinates are ratios of linear functions
+//! of the ray's direction. Those directions are unit vectors, or of unit depth, so that `f32` does without an
+//! anchor: a place in a face of 4,096 pixels is off by less than a 500th of a pixel.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::picture::cube_map::{AXES, CubeMap, FaceAxes};
@@ -13,7 +13,8 @@ use crate::shade::channels::{assert_size, fit};
 use crate::shade::color::rgb_image_into;
 use crate::shade::filter::{Footprints, MipLevels};
 use crate::shade::mip_maps::{MipMaps, TextureFilter};
-use crate::simd::lanes::{self, LANES, LaneWork, Lanes, eight};
+use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
+use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
 use s3d_geom::{Camera, Raster, Rays};
 
@@ -26,8 +27,8 @@ pub enum Unseen<'a> {
     Nearby,
 }
 
-/// The colours of the pixels that see the mesh, from pictures; black where there is no mesh, and there alone: a dark pixel
-/// is at least (1, 1, 1). The camera stands where the cube map was made, or parallax shows.
+/// The colours of the pixels that see the mesh, from pictures; black where there is no mesh, and there alone:
+/// a dark pixel is at least (1, 1, 1). The camera stands where the cube map was made, or parallax shows.
 ///
 /// # Panics
 /// If the hits are not of the camera's size, or the mip_maps are another mesh's.
@@ -58,15 +59,15 @@ pub fn picture_image_into(
     assert_size(hits, camera);
     fit(out, &hits.face, [0; 3]);
     let Unseen::Mesh(scene, mip_maps) = unseen else {
-        lanes::run(PictureKernel { cube, hits, camera, filter, out, shown: None });
+        dispatch(PictureKernel { cube, hits, camera, filter, out, shown: None });
         return;
     };
     if !cube.has_holes() {
-        lanes::run(PictureKernel { cube, hits, camera, filter, out, shown: None });
+        dispatch(PictureKernel { cube, hits, camera, filter, out, shown: None });
         return;
     }
     let mut shown = Raster::filled(out.width(), out.height(), 255u8);
-    lanes::run(PictureKernel { cube, hits, camera, filter, out, shown: Some(&mut shown) });
+    dispatch(PictureKernel { cube, hits, camera, filter, out, shown: Some(&mut shown) });
     if shown.pixels().iter().all(|&s| s == 255) {
         return;
     }
@@ -98,11 +99,12 @@ struct PictureKernel<'a> {
     shown: Option<&'a mut Raster<u8>>,
 }
 
-impl LaneWork for PictureKernel<'_> {
+impl Kernel for PictureKernel<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self, lanes: impl Lanes) {
+    fn run<S: Simd>(self, simd: S) {
+        let lanes = simd.shade();
         let grid = CubeRays::new(self.cube, self.camera);
         if grid.is_panorama {
             self.image::<true>(lanes, &grid);
@@ -112,8 +114,8 @@ impl LaneWork for PictureKernel<'_> {
     }
 }
 
-/// The directions of an image's pixels in the cube's frame: what belongs to a column and what to a row, in a panorama
-/// multiplied, and added.
+/// The directions of an image's pixels in the cube's frame: what belongs to a column and what to a row, in a
+/// panorama multiplied, and added.
 struct CubeRays {
     /// By axis and column; two groups more.
     columns: [Vec<f32>; 3],
@@ -198,7 +200,7 @@ impl CubeRays {
 
 impl PictureKernel<'_> {
     #[inline(always)]
-    fn image<const PANORAMA: bool>(self, l: impl Lanes, grid: &CubeRays) {
+    fn image<const PANORAMA: bool>(self, l: impl ShadeLanes, grid: &CubeRays) {
         let Self { cube, hits, filter, out, mut shown, .. } = self;
         let width = hits.face.width() as usize;
         let levels = cube.levels();
@@ -232,7 +234,7 @@ impl PictureKernel<'_> {
 
 /// A direction of the cube's frame along a face's right, down and forward.
 #[inline(always)]
-fn on_face<L: Lanes>(l: L, face: usize, v: &[L::F; 3]) -> [L::F; 3] {
+fn on_face<L: ShadeLanes>(l: L, face: usize, v: &[L::F; 3]) -> [L::F; 3] {
     let FaceAxes { right, down, forward } = AXES[face];
     [right, down, forward].map(|(axis, sign)| if sign < 0 { l.sub(l.splat(0.0), v[axis]) } else { v[axis] })
 }
@@ -251,7 +253,7 @@ struct PicturePainter<'a, L> {
     wants_shown: bool,
 }
 
-impl<L: Lanes> PicturePainter<'_, L> {
+impl<L: ShadeLanes> PicturePainter<'_, L> {
     #[inline(always)]
     fn row<const PANORAMA: bool>(&mut self, grid: &CubeRays, j: usize, faces: &[u32]) {
         let l = self.lanes;
@@ -314,8 +316,8 @@ impl<L: Lanes> PicturePainter<'_, L> {
         }
     }
 
-    /// Those pixels of a group that are among `these`, which all look through one face. `directions` and their changes to
-    /// the next column and row are in the face's axes.
+    /// Those pixels of a group that are among `these`, which all look through one face. `directions` and
+    /// their changes to the next column and row are in the face's axes.
     #[inline(always)]
     fn face(&mut self, face: usize, i: usize, some: usize, these: u32, directions: &[[L::F; 3]; 3]) {
         let l = self.lanes;
@@ -358,7 +360,8 @@ impl<L: Lanes> PicturePainter<'_, L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::lanes::Plain;
+    use crate::simd::dispatch_on;
+    use crate::simd::level::all_levels;
     use glam::dvec3;
     use s3d_geom::{Pose, TriMesh};
     use s3d_synth::scenes::furnished_room;
@@ -458,31 +461,24 @@ mod tests {
     }
 
     #[test]
-    fn every_set_of_instructions_gives_the_same_bytes() {
+    fn every_level_of_instructions_gives_the_same_bytes() {
         let mesh = open_room();
         let scene = Scene::new(&mesh);
         let (cube, filter) = (noise(true), TextureFilter::default());
         for camera in cameras() {
             let hits = crate::cast(&scene, &camera);
-            let run = |plain: bool| {
+            let images = all_levels().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 let mut shown = Raster::filled(camera.width, camera.height, 0);
-                let work = PictureKernel {
-                    cube: &cube,
-                    hits: &hits,
-                    camera: &camera,
-                    filter: &filter,
-                    out: &mut out,
-                    shown: Some(&mut shown),
-                };
-                if plain {
-                    work.run(Plain)
-                } else {
-                    lanes::run(work)
-                }
+                let (cube, hits, filter) = (&cube, &hits, &filter);
+                let shown_out = Some(&mut shown);
+                let kernel =
+                    PictureKernel { cube, hits, camera: &camera, filter, out: &mut out, shown: shown_out };
+                dispatch_on(level, kernel);
                 (out, shown)
-            };
-            assert_eq!(run(true), run(false));
+            });
+            let images: Vec<_> = images.collect();
+            assert!(images.iter().all(|image| *image == images[0]));
         }
     }
 }

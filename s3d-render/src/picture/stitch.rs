@@ -1,13 +1,14 @@
 //! Cube maps from captures: pictures of real cameras that overlap, from about one place.
 //!
-//! A pixel of the cube takes the mean of the captures that see it, each with a weight that falls smoothly to 0 towards the
-//! border of its picture, so that no seam shows. Before that, each capture's exposure is brought to that of the others:
-//! one factor a channel, by least squares over what they see in common.
+//! A pixel of the cube takes the mean of the captures that see it, each with a weight that falls smoothly to
+//! 0 towards the border of its picture, so that no seam shows. Before that, each capture's exposure is
+//! brought to that of the others: one factor a channel, by least squares over what they see in common.
 //!
-//! **Parallax.** The cameras of a scanner turn about its axis and stand some centimetres from it, and from each other. With
-//! the mesh of the scene a pixel of the cube looks up the point that it sees, and takes it from those captures in which no
-//! other surface hides it. Without, or where there is no mesh, all stand at the centre: off by their distance from it over
-//! the distance of what is seen, 2 cm at 2 m being ten pixels of 1,000 a radian.
+//! **Parallax.** The cameras of a scanner turn about its axis and stand some centimetres from it, and from
+//! each other. With the mesh of the scene a pixel of the cube looks up the point that it sees, and takes it
+//! from those captures in which no other surface hides it. Without, or where there is no mesh, all stand at
+//! the centre: off by their distance from it over the distance of what is seen, 2 cm at 2 m being ten pixels
+//! of 1,000 a radian.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::picture::cube_map::{CubeMap, face_cameras};
@@ -60,8 +61,9 @@ impl Default for StitchOptions {
     }
 }
 
-/// The cube map around `pose` (E(original) of the location) of captures taken about there. With `scene` parallax is taken
-/// into account; see the module. What no capture sees is a hole. On all threads of the current pool.
+/// The cube map around `pose` (E(original) of the location) of captures taken about there. With `scene`
+/// parallax is taken into account; see the module. What no capture sees is a hole. On all threads of the
+/// current pool.
 ///
 /// # Panics
 /// If there is no capture, or a picture is not of its lens's size.
@@ -186,7 +188,8 @@ impl PreparedCapture {
         // 1 in the middle of the picture and 0 at its border, along either axis.
         let inner = |at: f64, size: f64| 1.0 - (2.0 * at / size - 1.0) * (2.0 * at / size - 1.0);
         let weight = inner(pixel.x, w) * inner(pixel.y, h);
-        // A pixel of the cube is 2/size wide at the depth 1; distortion hardly changes how much of the picture that is.
+        // A pixel of the cube is 2/size wide at the depth 1; distortion hardly changes how much of the
+        // picture that is.
         let step = ray.direction.length() * 2.0 / f64::from(ray.size) / ray.direction.length_squared();
         let along = self.lens.focal_px() * (step * length_2.sqrt() / v.z);
         let color = self.picture.sample(pixel, DVec2::X * along.x, DVec2::Y * along.y, &Default::default());
@@ -209,8 +212,9 @@ impl PreparedCapture {
     }
 }
 
-/// A factor a capture and channel that brings colours of what several see together: the least sum, over the pairs that
-/// overlap, of (gᵢ·meanᵢ − gⱼ·meanⱼ)² and of (1 − g)², each by its deviation and the number of pixels.
+/// A factor a capture and channel that brings colours of what several see together: the least sum, over the
+/// pairs that overlap, of (gᵢ·meanᵢ − gⱼ·meanⱼ)² and of (1 − g)², each by its deviation and the number of
+/// pixels.
 fn gains(views: &[PreparedCapture], size: u32, rays: &SceneDepths, world_from_frame: DMat3) -> Vec<[f32; 3]> {
     let n = views.len();
     // By pair: pixels and the sums of the colours of the first.
@@ -367,7 +371,11 @@ mod tests {
             // AᵀA + 1 is positive definite.
             let (a, x) = values.split_at(16);
             let matrix: Vec<f64> = (0..16)
-                .map(|k| (0..4).map(|r| a[4 * r + k / 4] * a[4 * r + k % 4]).sum::<f64>() + f64::from(u8::from(k / 4 == k % 4)))
+                .map(|k| (k / 4, k % 4))
+                .map(|(i, j)| {
+                    let product: f64 = (0..4).map(|r| a[4 * r + i] * a[4 * r + j]).sum();
+                    product + f64::from(u8::from(i == j))
+                })
                 .collect();
             let right = (0..4).map(|i| (0..4).map(|j| matrix[4 * i + j] * x[j]).sum()).collect();
             for (solved, x) in solve(matrix, right).iter().zip(x) {

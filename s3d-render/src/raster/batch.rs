@@ -1,18 +1,18 @@
 //! The faces of a cluster in a perspective view, set up eight at a time.
 //!
-//! One face after another is a chain of divisions, and of branches that nobody foresees: is it in the window, is it
-//! small, how wide is it? So all faces of a cluster are set up first, in arrays and without a branch, sorted by how they
-//! are drawn, and then drawn kind by kind.
+//! One face after another is a chain of divisions, and of branches that nobody foresees: is it in the window,
+//! is it small, how wide is it? So all faces of a cluster are set up first, in arrays and without a branch,
+//! sorted by how they are drawn, and then drawn kind by kind.
 
 #![expect(
     clippy::unwrap_used,
     reason = "slices are cut to the length of the array: there is nothing left of the check"
 )]
 
-use crate::raster::canvas::{Chunk, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TRUSTED};
+use crate::raster::chunk::{Chunk, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TRUSTED};
 use crate::raster::clusters::MAX_FACES;
 use crate::raster::pinhole::{PinholeBounds, PinholeCorners, PinholePlanes};
-use crate::simd::registers::LANES;
+use crate::simd::raster_lanes::LANES;
 
 /// An edge that is shorter, in pixels, has no direction to speak of: see the module `pinhole`.
 const SHORT: f64 = 1e-3;
@@ -167,7 +167,8 @@ impl FaceBatch {
                 (at[2] + across[2] * left + down[2] * top) as f32,
                 (at[3] + across[3] * left + down[3] * top) as f32,
             ];
-            // A second chunk begins sixteen columns on: its terms are bounded by those of one that is twice as wide.
+            // A second chunk begins sixteen columns on: its terms are bounded by those of one that is twice
+            // as wide.
             let small = right - left < LANES as f64;
             let bounds = if small { 15.0 } else { 31.0 };
             let spread = (across[3] as f32).abs() * bounds
@@ -221,7 +222,7 @@ impl FaceBatch {
         list.iter().map(|&i| usize::from(i) % MAX_FACES)
     }
 
-    /// 1/t as a function of the pixel, as [`DrawnFace`](crate::raster::canvas::DrawnFace) has it.
+    /// 1/t as a function of the pixel, as [`DrawnFace`](crate::simd::raster_lanes::DrawnFace) has it.
     #[inline(always)]
     pub(crate) fn inverse_t(&self, i: usize) -> [f64; 3] {
         [self.at[3][i], self.across[3][i], self.down[3][i]]
@@ -355,7 +356,8 @@ mod tests {
             batch.set_up(&places, &corners, WIDTH, HEIGHT);
 
             let kinds = [
-                DrawKind::Nothing, DrawKind::Narrow, DrawKind::Small, DrawKind::Careful, DrawKind::Wide, DrawKind::Large, DrawKind::InSpace,
+                DrawKind::Nothing, DrawKind::Narrow, DrawKind::Small, DrawKind::Careful, DrawKind::Wide,
+                DrawKind::Large, DrawKind::InSpace,
             ];
             let mut kind_of = vec![None; faces.len()];
             for kind in kinds {

@@ -2,35 +2,37 @@
 //!
 //! # The special case
 //!
-//! All rays of an image start at one point. Put it at zero: a face (a, b, c) is hit along the direction d exactly if d
-//! lies inside the three planes through the origin and an edge, N₁ = b × c, N₂ = c × a, N₃ = a × b (turned so that they
-//! look inwards), and 1/t = n · d / n · a, where n is the face's normal. So four dot products with d decide everything,
-//! and each is a simple function of the pixel: linear in a perspective view; in a row of a panorama, divided by the
-//! cosine of the latitude, x cos θ + y sin θ + z tan φ. Faces are drawn one after another, as a rasteriser does, the
-//! nearest first where that is known; what lies behind a tile of pixels that all see something nearer is not looked at.
+//! All rays of an image start at one point. Put it at zero: a face (a, b, c) is hit along the direction d
+//! exactly if d lies inside the three planes through the origin and an edge, N₁ = b × c, N₂ = c × a, N₃ = a ×
+//! b (turned so that they look inwards), and 1/t = n · d / n · a, where n is the face's normal. So four dot
+//! products with d decide everything, and each is a simple function of the pixel: linear in a perspective
+//! view; in a row of a panorama, divided by the cosine of the latitude, x cos θ + y sin θ + z tan φ. Faces
+//! are drawn one after another, as a rasteriser does, the nearest first where that is known; what lies behind
+//! a tile of pixels that all see something nearer is not looked at.
 //!
 //! # Why it is exact
 //!
-//! The four functions are set up in `f64`, moved to a pixel at the face (the *anchor* of a chunk of 16 × up to
-//! [`MAX_ROWS`] pixels), rounded to `f32` there, and evaluated with one multiplication and one addition a row. Take an
-//! edge function e(i, j) = c + a·i + b·j with |a| + |b| = 1, so that e is about a distance in pixels, and |i| ≤ 15,
-//! |j| ≤ 31. Near its zero |c| ≤ 46, so the roundings of a, b, c, two products and two sums are at most
-//! 2⁻²⁴·(46 + 46 + 46 + 92) < 1.4e-5; `f64` before it adds less than 1e-8 (lenses say why). [`EDGE_ERROR`] is twice
-//! that. A pixel where the smallest of the three exceeds its error is *certainly* in the face; where it is below minus
-//! the error, certainly not.
+//! The four functions are set up in `f64`, moved to a pixel at the face (the *anchor* of a chunk of 16 × up
+//! to [`MAX_ROWS`] pixels), rounded to `f32` there, and evaluated with one multiplication and one addition a
+//! row. Take an edge function e(i, j) = c + a·i + b·j with |a| + |b| = 1, so that e is about a distance in
+//! pixels, and |i| ≤ 15, |j| ≤ 31. Near its zero |c| ≤ 46, so the roundings of a, b, c, two products and two
+//! sums are at most 2⁻²⁴·(46 + 46 + 46 + 92) < 1.4e-5; `f64` before it adds less than 1e-8 (`pinhole` and
+//! `panorama` say why). [`EDGE_ERROR`] is twice that. A pixel where the smallest of the three exceeds its
+//! error is *certainly* in the face; where it is below minus the error, certainly not.
 //!
-//! 1/t is off by at most 2⁻²²·(|c| + |a|·15 + |b|·31), which is held against what it is worth: where that is more than
-//! [`TRUSTED`] of the value, the pixel is not certain. Values that differ by more than [`CLOSE_ULPS`] steps of the last place
-//! (2.5e-5 of themselves at least: two errors, and some) are in order.
+//! 1/t is off by at most 2⁻²²·(|c| + |a|·15 + |b|·31), which is held against what it is worth: where that is
+//! more than [`TRUSTED`] of the value, the pixel is not certain. Values that differ by more than
+//! [`CLOSE_ULPS`] steps of the last place (2.5e-5 of themselves at least: two errors, and some) are in order.
 //!
-//! Whatever is not certain — a pixel too near an edge, two faces almost equally far — goes to a list of *doubts*: this
-//! face may be what this pixel sees. In the end each pixel on the list is decided among its candidates by the exact
-//! [`Cone`](crate::ray::cone::Cone), as single rays are: the face that was certain of it, and all doubts that are not clearly behind. A face
-//! that is in neither place is certainly missed, or certainly behind a face that is certainly hit. So the face of every
-//! pixel is that of the exact ray, and no seam, sliver or duplicate is lost.
+//! Whatever is not certain — a pixel too near an edge, two faces almost equally far — goes to a list of
+//! *doubts*: this face may be what this pixel sees. In the end each pixel on the list is decided among its
+//! candidates by the exact [`Cone`](crate::ray::cone::Cone), as single rays are: the face that was certain of
+//! it, and all doubts that are not clearly behind. A face that is in neither place is certainly missed, or
+//! certainly behind a face that is certainly hit. So the face of every pixel is that of the exact ray, and no
+//! seam, sliver or duplicate is lost.
 //!
-//! Depth is computed at the end from the `f64` functions of the face that is seen, and rounded once: within one step of
-//! the last place of `f32` of what a single ray gives.
+//! Depth is computed at the end from the `f64` functions of the face that is seen, and rounded once: within
+//! one step of the last place of `f32` of what a single ray gives.
 
 #![expect(
     clippy::unwrap_used,
@@ -38,22 +40,8 @@
 )]
 
 use crate::hits::NO_FACE;
-use crate::simd::registers::{LANES, Registers, RowGroup};
-
-/// Rows of a chunk at most.
-pub(crate) const MAX_ROWS: usize = 32;
-
-/// Pixels whose edge function, about a distance in pixels, is nearer to zero are not certain.
-pub(crate) const EDGE_ERROR: f32 = 3e-5;
-
-/// A pixel trusts 1/t only if it is known to this part of itself.
-pub(crate) const TRUSTED: f32 = 1e-5;
-
-/// The rounding of 1/t in a chunk: this part of the sum of its terms' sizes.
-pub(crate) const INVERSE_T_ROUNDING: f32 = 3e-7;
-
-/// Values of 1/t that differ by no more steps of the last place are for exact arithmetic to order.
-pub(crate) const CLOSE_ULPS: i32 = 424;
+use crate::raster::chunk::{CLOSE_ULPS, Chunk, ChunkGrid, MAX_ROWS, draw};
+use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes, RowGroup};
 
 /// What is behind a tile must be so by this factor: ten times [`CLOSE_ULPS`].
 const BEHIND: f32 = 1.0 + 5e-4;
@@ -73,60 +61,6 @@ pub(crate) fn part_of_tile(tile_row: usize, top: usize, bottom: usize) -> (usize
 pub(crate) fn half_of_tile(tile_column: usize, left: usize, right: usize) -> (usize, bool) {
     let (first, middle) = (tile_column * TILE, tile_column * TILE + TILE / 2);
     if left >= middle { (middle, true) } else { (first, right < middle) }
-}
-
-/// A linear function of the pixel in a chunk.
-///
-/// Its value in column i and row j from the anchor is at + across·u(i) + bend·v(i) + down·r(j): see [`Chunk`].
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Linear {
-    pub(crate) at: f32,
-    pub(crate) across: f32,
-    /// 0 in perspective views.
-    pub(crate) bend: f32,
-    pub(crate) down: f32,
-}
-
-/// Part of a face, about to be drawn on 16 columns and some rows.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Chunk {
-    /// Column and row of the anchor.
-    pub(crate) column: usize,
-    pub(crate) row: usize,
-    pub(crate) edges: [Linear; 3],
-    /// No edge function is farther off than this.
-    pub(crate) edge_error: f32,
-    pub(crate) inverse_t: Linear,
-    /// No value of `inverse_t` is farther off than this. Only where the chunk is drawn with care.
-    pub(crate) inverse_t_error: f32,
-    /// From this value on, `inverse_t` is known to [`TRUSTED`]. Likewise.
-    pub(crate) trusted: f32,
-    /// The face, as it was entered by [`Canvas::enter`].
-    pub(crate) slot: u32,
-}
-
-/// The functions u, v and r of a chunk's columns and rows, and by what 1/t is multiplied in a row.
-#[derive(Clone, Copy)]
-pub(crate) struct ChunkGrid<'a> {
-    pub(crate) u: &'a [f32; LANES],
-    pub(crate) v: &'a [f32; LANES],
-    pub(crate) rows: &'a [f32; MAX_ROWS],
-    /// How many rows there are; at least one.
-    pub(crate) count: usize,
-    /// One a row; nothing in perspective views.
-    pub(crate) scale: &'a [f32],
-}
-
-/// A face that was drawn: half a line of the cache.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-pub(crate) struct DrawnFace {
-    /// 1/t as a function [a, b, c] of the pixel: with what a lens calls u and v of its column, level and rise of its row,
-    /// a + c·rise + b·u in a perspective view, and c·rise + level·(a·u + b·v) in a panorama.
-    pub(crate) inverse_t: [f64; 3],
-    pub(crate) face: u32,
-    /// Whether `inverse_t` is too poor for a depth: single rays give it then.
-    pub(crate) poor: bool,
 }
 
 /// A pixel that may see a face.
@@ -149,7 +83,8 @@ pub(crate) struct Cover {
 }
 
 impl Cover {
-    /// The part of a window of `width` × `height` pixels between the given columns and rows; `None` if there is none.
+    /// The part of a window of `width` × `height` pixels between the given columns and rows; `None` if there
+    /// is none.
     #[inline(always)]
     pub(crate) fn new(
         (left, right): (f32, f32),
@@ -193,7 +128,7 @@ pub(crate) struct Canvas {
     poor: Vec<u32>,
 }
 
-const NOTHING: DrawnFace = DrawnFace { inverse_t: [0.0; 3], face: NO_FACE, poor: false };
+const NOTHING: DrawnFace = DrawnFace::new([0.0; 3], NO_FACE, false);
 
 impl Canvas {
     /// Makes an empty window of a size.
@@ -299,7 +234,7 @@ impl Canvas {
 
     /// Draws a chunk; with `CARE` where 1/t is not trusted all over it; `PANORAMA` in panoramas.
     #[inline(always)]
-    pub(crate) fn draw<L: Registers, const PANORAMA: bool, const CARE: bool>(
+    pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
         &mut self,
         l: L,
         grid: &ChunkGrid<'_>,
@@ -308,7 +243,7 @@ impl Canvas {
         let at = chunk.row * self.pitch + chunk.column;
         let window = (&mut self.inverse_t[at..], &mut self.slots[at..], self.pitch);
         let mut doubts = [0; MAX_ROWS];
-        let any = l.draw::<PANORAMA, CARE>(window, grid, chunk, &mut doubts);
+        let any = draw::<L, PANORAMA, CARE>(l, window, grid, chunk, &mut doubts);
         if any {
             self.doubt(&doubts, grid, chunk, PANORAMA, CARE);
         }
@@ -351,8 +286,9 @@ impl Canvas {
         }
     }
 
-    /// Decides the doubtful pixels. `decide` is given a column, a row and what was drawn there and may be seen, and
-    /// says which of these it is (its place in the list), and whether its function is too poor to give a depth there.
+    /// Decides the doubtful pixels. `decide` is given a column, a row and what was drawn there and may be
+    /// seen, and says which of these it is (its place in the list), and whether its function is too poor to
+    /// give a depth there.
     #[inline(always)]
     pub(crate) fn settle(
         &mut self,
@@ -377,7 +313,7 @@ impl Canvas {
             candidates.extend(slots.iter().map(|&s| self.drawn[s as usize]));
             let decision = decide(pixel % self.pitch, pixel / self.pitch, &candidates);
             self.slots[pixel] = decision.map_or(0, |(which, _)| slots[which]);
-            if decision.is_some_and(|(which, poor)| poor || candidates[which].poor) {
+            if decision.is_some_and(|(which, poor)| poor || candidates[which].is_poor()) {
                 self.poor.push(pixel as u32);
             }
         }
@@ -385,13 +321,13 @@ impl Canvas {
         self.doubts = doubts;
     }
 
-    /// Writes faces and depths into `out`, whose first pixels are the window's and whose rows are `out_pitch` apart,
-    /// and empties the window.
+    /// Writes faces and depths into `out`, whose first pixels are the window's and whose rows are `out_pitch`
+    /// apart, and empties the window.
     ///
-    /// `u` and `v` of the columns come in groups, `line` gives level and rise of a row: see [`DrawnFace`]. `single` casts the
-    /// ray of a pixel (column, row) to a face whose function is too poor.
+    /// `u` and `v` of the columns come in groups, `line` gives level and rise of a row: see [`DrawnFace`].
+    /// `single` casts the ray of a pixel (column, row) to a face whose function is too poor.
     #[inline(always)]
-    pub(crate) fn finish<L: Registers, const PANORAMA: bool>(
+    pub(crate) fn finish<L: RasterLanes, const PANORAMA: bool>(
         &mut self,
         l: L,
         out: (&mut [u32], &mut [f32]),

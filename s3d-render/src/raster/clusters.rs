@@ -1,7 +1,7 @@
 //! The faces of a mesh in small groups that lie together, and a tree over the groups.
 //!
-//! The visibility pass prepares a group at a time: its corners are projected once however many of its faces meet in
-//! them, and its box says at once whether any of it can be seen.
+//! The visibility pass prepares a group at a time: its corners are projected once however many of its faces
+//! meet in them, and its box says at once whether any of it can be seen.
 
 use obvhs::bvh2::Bvh2;
 use s3d_geom::TriMesh;

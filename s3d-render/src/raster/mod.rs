@@ -1,9 +1,10 @@
-//! Which face each pixel sees: faces drawn from the rays' common origin, the nearest first, with the answer of exact
-//! single rays.
+//! Which face each pixel sees: faces drawn from the rays' common origin, the nearest first, with the answer
+//! of exact single rays.
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod batch;
 pub(crate) mod canvas;
+pub(crate) mod chunk;
 pub(crate) mod clusters;
 pub(crate) mod panorama;
 pub(crate) mod pinhole;

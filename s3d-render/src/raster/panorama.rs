@@ -1,14 +1,15 @@
 //! Panoramas, for the visibility pass.
 //!
-//! The direction in column i and row j is (cos θ cos φ, sin θ cos φ, sin φ), with the azimuth θ falling by the same step
-//! from column to column. Divided by cos φ > 0, a plane's value is x cos θ + y sin θ + z tan φ. From an anchor in column
-//! a the columns go by the angle kδ, and with h = x cos θₐ + y sin θₐ and h′ = x sin θₐ − y cos θₐ
+//! The direction in column i and row j is (cos θ cos φ, sin θ cos φ, sin φ), with the azimuth θ falling by
+//! the same step from column to column. Divided by cos φ > 0, a plane's value is x cos θ + y sin θ + z tan φ.
+//! From an anchor in column a the columns go by the angle kδ, and with h = x cos θₐ + y sin θₐ and h′ = x sin
+//! θₐ − y cos θₐ
 //!
 //! > x cos θ + y sin θ = h + h·(cos kδ − 1) + h′·sin kδ.
 //!
-//! So the functions u = cos kδ − 1 and v = sin kδ of a chunk's columns are the same for all, and those of its rows are
-//! differences of tangents. Near a plane's zero all terms are as small as the chunk, so the error of `f32` is as in a
-//! perspective view: a few parts in 10⁵ of a pixel.
+//! So the functions u = cos kδ − 1 and v = sin kδ of a chunk's columns are the same for all, and those of its
+//! rows are differences of tangents. Near a plane's zero all terms are as small as the chunk, so the error of
+//! `f32` is as in a perspective view: a few parts in 10⁵ of a pixel.
 
 #![expect(
     clippy::unwrap_used,
@@ -16,14 +17,13 @@
     reason = "slices are cut to the length of the array; a camera has rays of its own kind"
 )]
 
-use crate::raster::canvas::{
-    Canvas, Chunk, ChunkGrid, Cover, DrawnFace, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TILE, TRUSTED,
-    half_of_tile, part_of_tile,
-};
+use crate::raster::canvas::{Canvas, Cover, TILE, half_of_tile, part_of_tile};
+use crate::raster::chunk::{Chunk, ChunkGrid, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TRUSTED};
 use crate::raster::clusters::{Cluster, MAX_CORNERS, Node, PACKET};
 use crate::raster::window::{Pixels, ProjectionRaster, Window, groups};
 use crate::ray::cone::{Cone, Plane};
-use crate::simd::registers::{self, LANES, Registers, Work};
+use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
+use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
 use s3d_geom::{Rays, TriMesh};
 use std::f64::consts::{PI, TAU};
@@ -75,8 +75,8 @@ struct PanoramaCorners {
 }
 
 impl<'m> Panorama<'m> {
-    /// The sixteen columns of a chunk are taken to lie within half a radian: panoramas of fewer than 190 columns are for
-    /// single rays.
+    /// The sixteen columns of a chunk are taken to lie within half a radian: panoramas of fewer than 190
+    /// columns are for single rays.
     pub(crate) const WIDEST_STEP_RAD: f64 = 0.5 / (LANES - 1) as f64;
 
     /// The window of `window`, whose columns are no farther apart than that.
@@ -151,7 +151,7 @@ impl<'m> Panorama<'m> {
     }
 
     #[inline(always)]
-    fn draw_face<L: Registers>(&self, l: L, canvas: &mut Canvas, corners: [u8; 4], face: u32) {
+    fn draw_face<L: RasterLanes>(&self, l: L, canvas: &mut Canvas, corners: [u8; 4], face: u32) {
         let p = &self.projected;
         let c = [corners[0], corners[1], corners[2]].map(usize::from);
         let (turn, latitude) = (c.map(|k| p.turn[k]), c.map(|k| p.latitude[k]));
@@ -202,7 +202,7 @@ impl<'m> Panorama<'m> {
             return self.draw_in_space(canvas, face, (top, bottom));
         }
         let planes = PanoramaPlanes { edges: planes, inverse_t: normal / offset, edge_off: 1e-15 * off };
-        let slot = canvas.enter(DrawnFace { inverse_t: planes.inverse_t.to_array(), face, poor: false });
+        let slot = canvas.enter(DrawnFace::new(planes.inverse_t.to_array(), face, false));
         let bounds = PanoramaBounds { left, right, top, bottom };
         if small {
             let rows = bottom - top + 1;
@@ -219,11 +219,12 @@ impl<'m> Panorama<'m> {
             }
         } else {
             PanoramaTiles { raster: self, canvas, planes: &planes, bounds: &bounds, slot, poor: false }
-                .run(l);
+                .draw(l);
         }
     }
 
-    /// Draws a face that goes around a good part of the sky, or across the place opposite to the window's middle.
+    /// Draws a face that goes around a good part of the sky, or across the place opposite to the window's
+    /// middle.
     #[inline(never)]
     fn draw_wide(&self, canvas: &mut Canvas, face: u32) {
         let corners = self.mesh.triangle(face).map(|p| p.as_dvec3() - self.origin);
@@ -259,10 +260,10 @@ impl<'m> Panorama<'m> {
         // Near the plane of the face nothing but single rays can tell.
         let known = offset > 1e-7 * normal.length() * a.length();
         let inverse_t = if known { normal / offset } else { DVec3::ZERO };
-        let slot = canvas.enter(DrawnFace { inverse_t: inverse_t.to_array(), face, poor: !known });
+        let slot = canvas.enter(DrawnFace::new(inverse_t.to_array(), face, !known));
         let planes = PanoramaPlanes { edges, inverse_t, edge_off };
         let bounds = PanoramaBounds { left: 0, right: self.width - 1, top, bottom };
-        registers::run(PanoramaTiles {
+        dispatch(PanoramaTiles {
             raster: self,
             canvas,
             planes: &planes,
@@ -394,11 +395,18 @@ struct PanoramaTiles<'a, 'm> {
     poor: bool,
 }
 
-impl Work for PanoramaTiles<'_, '_> {
+impl Kernel for PanoramaTiles<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Registers>(self, l: L) {
+    fn run<S: Simd>(self, simd: S) {
+        self.draw(simd.raster());
+    }
+}
+
+impl PanoramaTiles<'_, '_> {
+    #[inline(always)]
+    fn draw<L: RasterLanes>(self, l: L) {
         let Self { raster, canvas, planes, bounds, slot, poor } = self;
         let mut tangents = [0.0; MAX_ROWS];
         for tile_row in bounds.top / TILE..=bounds.bottom / TILE {
@@ -435,6 +443,14 @@ impl Work for PanoramaTiles<'_, '_> {
 }
 
 impl ProjectionRaster for Panorama<'_> {
+    fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
     #[inline(always)]
     fn cover(&self, node: &Node) -> Option<Cover> {
         let o = self.origin.to_array();
@@ -484,7 +500,7 @@ impl ProjectionRaster for Panorama<'_> {
     }
 
     #[inline(always)]
-    fn draw<L: Registers>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>) {
+    fn draw<L: RasterLanes>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>) {
         self.project(cluster.corners);
         for (&corners, &face) in cluster.faces.iter().zip(cluster.ids) {
             self.draw_face(l, canvas, corners, face);
@@ -492,7 +508,7 @@ impl ProjectionRaster for Panorama<'_> {
     }
 
     #[inline(always)]
-    fn finish<L: Registers>(
+    fn finish<L: RasterLanes>(
         &self,
         l: L,
         canvas: &mut Canvas,

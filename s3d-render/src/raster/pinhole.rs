@@ -1,22 +1,22 @@
 //! Perspective views, for the visibility pass.
 //!
-//! A corner p (relative to the camera) is in column x = (ρ·p)/(φ·p) and row y = (δ·p)/(φ·p) of the window, pixel centres
-//! at whole numbers, at the depth z = φ·p. For a corner that is no farther out than [`GUARD`] pixels x and y are good to
-//! 2⁻⁵³·8·GUARD < 2e-11 pixels, since |p|/z is then bounded by the angle of the guard band; so an edge function made
-//! from two corners at least 1e-3 apart is good to 1e-8 over a chunk. Faces that bounds farther out, behind the camera,
-//! or have shorter edges, get their planes in space instead. The others are set up by [`FaceBatch`], a cluster at a time.
+//! A corner p (relative to the camera) is in column x = (ρ·p)/(φ·p) and row y = (δ·p)/(φ·p) of the window,
+//! pixel centres at whole numbers, at the depth z = φ·p. For a corner that is no farther out than [`GUARD`]
+//! pixels x and y are good to 2⁻⁵³·8·GUARD < 2e-11 pixels, since |p|/z is then bounded by the angle of the
+//! guard band; so an edge function made from two corners at least 1e-3 apart is good to 1e-8 over a chunk.
+//! Faces that bounds farther out, behind the camera, or have shorter edges, get their planes in space
+//! instead. The others are set up by [`FaceBatch`], a cluster at a time.
 
 #![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
 
 use crate::raster::batch::{DrawKind, FaceBatch};
-use crate::raster::canvas::{
-    Canvas, Chunk, ChunkGrid, Cover, DrawnFace, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TILE,
-    TRUSTED, half_of_tile, part_of_tile,
-};
+use crate::raster::canvas::{Canvas, Cover, TILE, half_of_tile, part_of_tile};
+use crate::raster::chunk::{Chunk, ChunkGrid, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TRUSTED};
 use crate::raster::clusters::{Cluster, MAX_CORNERS, Node, PACKET};
 use crate::raster::window::{Pixels, ProjectionRaster, Window, groups};
 use crate::ray::cone::Cone;
-use crate::simd::registers::{self, LANES, Registers, Work};
+use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
+use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
 use s3d_geom::{Rays, TriMesh};
 
@@ -186,10 +186,10 @@ impl<'m> Pinhole<'m> {
         }
         let planes = PinholePlanes { at, across, down };
         let inverse_t = [at[3], across[3], down[3]];
-        let slot = canvas.enter(DrawnFace { inverse_t, face, poor: !known });
+        let slot = canvas.enter(DrawnFace::new(inverse_t, face, !known));
         let edge_error = EDGE_ERROR + edge_error as f32;
         let (planes, bounds) = (&planes, &bounds);
-        registers::run(PinholeTiles { canvas, planes, bounds, edge_error, slot, poor: !known });
+        dispatch(PinholeTiles { canvas, planes, bounds, edge_error, slot, poor: !known });
     }
 
     /// The pixels that a face may cover; `None` if it is behind the camera or beside the window.
@@ -280,11 +280,18 @@ struct PinholeTiles<'a> {
     poor: bool,
 }
 
-impl Work for PinholeTiles<'_> {
+impl Kernel for PinholeTiles<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Registers>(self, l: L) {
+    fn run<S: Simd>(self, simd: S) {
+        self.draw(simd.raster());
+    }
+}
+
+impl PinholeTiles<'_> {
+    #[inline(always)]
+    fn draw<L: RasterLanes>(self, l: L) {
         let Self { canvas, planes, bounds, edge_error, slot, poor } = self;
         let nearest = (bounds.inverse_t.1 * (1.0 + 1e-6)) as f32;
         for tile_row in bounds.top / TILE..=bounds.bottom / TILE {
@@ -331,6 +338,14 @@ impl Work for PinholeTiles<'_> {
 }
 
 impl ProjectionRaster for Pinhole<'_> {
+    fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
     #[inline(always)]
     fn cover(&self, node: &Node) -> Option<Cover> {
         let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
@@ -384,17 +399,17 @@ impl ProjectionRaster for Pinhole<'_> {
     }
 
     #[inline(always)]
-    fn draw<L: Registers>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>) {
+    fn draw<L: RasterLanes>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>) {
         self.project(cluster.corners);
         self.batch.set_up(cluster.faces, &self.projected, self.width as f64, self.height as f64);
         let batch = &*self.batch;
         let enter = |canvas: &mut Canvas, i: usize| {
-            canvas.enter(DrawnFace { inverse_t: batch.inverse_t(i), face: cluster.ids[i], poor: false })
+            canvas.enter(DrawnFace::new(batch.inverse_t(i), cluster.ids[i], false))
         };
         for i in batch.faces(DrawKind::Large) {
             let slot = enter(canvas, i);
             let (planes, bounds) = (&batch.planes(i), &batch.bounds(i));
-            PinholeTiles { canvas, planes, bounds, edge_error: EDGE_ERROR, slot, poor: false }.run(l);
+            PinholeTiles { canvas, planes, bounds, edge_error: EDGE_ERROR, slot, poor: false }.draw(l);
         }
         for i in batch.faces(DrawKind::Narrow) {
             let (chunk, rows) = batch.chunk(i, enter(canvas, i));
@@ -424,7 +439,7 @@ impl ProjectionRaster for Pinhole<'_> {
     }
 
     #[inline(always)]
-    fn finish<L: Registers>(
+    fn finish<L: RasterLanes>(
         &self,
         l: L,
         canvas: &mut Canvas,

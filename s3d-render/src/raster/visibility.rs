@@ -3,15 +3,33 @@
 use crate::hits::{Hits, NO_FACE};
 use crate::raster::panorama::Panorama;
 use crate::raster::pinhole::Pinhole;
-use crate::raster::window::{self, Scratch, Window};
+use crate::raster::window::{Scratch, VisibilityKernel, Window};
 use crate::ray::caster::RayCaster;
 use crate::scene::Scene;
+use crate::simd::dispatch_on;
+use crate::simd::level::{Level, level};
 use s3d_geom::{Camera, Projection, Raster};
 use std::f64::consts::TAU;
 
-/// Casts image after image of a scene, and keeps its memory between them: what a thread that renders should hold.
+/// Casts image after image of a scene, and keeps its memory between them: what a thread that renders should
+/// hold.
 ///
 /// Nothing but time depends on what was cast before.
+///
+/// ```
+/// use s3d_geom::{Camera, Pose, TriMesh, glam::{dvec3, vec3}};
+/// use s3d_render::{Caster, Hits, Scene, coverage};
+///
+/// let corners = vec![vec3(-9.0, -9.0, 0.0), vec3(9.0, -9.0, 0.0), vec3(0.0, 9.0, 0.0)];
+/// let floor = TriMesh::from_faces(corners, vec![[0, 1, 2]])?;
+/// let scene = Scene::new(&floor);
+/// let (mut caster, mut hits) = (Caster::new(&scene), Hits::default());
+/// let panorama = Camera::equirectangular(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 256);
+/// caster.cast_into(&panorama, 4, &mut hits); // every fourth pixel of every fourth row, to score it
+/// assert_eq!((hits.face.width(), hits.face.height()), (64, 32));
+/// assert!((0.3..0.5).contains(&coverage(&hits)));
+/// # Ok::<(), s3d_geom::MeshError>(())
+/// ```
 pub struct Caster<'s, 'm> {
     scene: &'s Scene<'m>,
     scratch: Scratch,
@@ -34,8 +52,8 @@ impl<'s, 'm> Caster<'s, 'm> {
         self.scene
     }
 
-    /// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Spans on the
-    /// calling thread alone.
+    /// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit.
+    /// Runs on the calling thread alone.
     pub fn cast(&mut self, camera: &Camera) -> Hits {
         self.cast_strided(camera, 1)
     }
@@ -50,8 +68,8 @@ impl<'s, 'm> Caster<'s, 'm> {
         hits
     }
 
-    /// As [`Self::cast_strided`], into memory that is there: what `hits` held is lost. Images of one size after another
-    /// cost no new memory.
+    /// As [`Self::cast_strided`], into memory that is there: what `hits` held is lost. Images of one size
+    /// after another cost no new memory.
     ///
     /// # Panics
     /// If `stride` is 0.
@@ -86,31 +104,43 @@ impl<'s, 'm> Caster<'s, 'm> {
                 let window = Window { camera, stride, column, row, width, height };
                 let first = row * columns + column;
                 let out = (&mut hits.face.pixels_mut()[first..], &mut hits.depth.pixels_mut()[first..]);
-                let (scene, origin, scratch) = (self.scene, camera.pose.location, &mut self.scratch);
-                match camera.projection {
-                    Projection::Perspective { .. } => {
-                        let raster = Pinhole::new(scene.mesh(), &window);
-                        window::cast(scene, origin, raster, (width, height), scratch, out, columns);
-                    }
-                    Projection::Equirectangular => {
-                        let raster = Panorama::new(scene.mesh(), &window);
-                        window::cast(scene, origin, raster, (width, height), scratch, out, columns);
-                    }
-                }
+                cast_window(level(), self.scene, &window, &mut self.scratch, out, columns);
             }
         }
     }
 }
 
-/// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Spans on the
-/// calling thread alone. [`Caster`] keeps its memory for the next image.
+/// Casts a window with the instructions of a level: `out` begins at the window's first pixel, its rows are
+/// `pitch` apart.
+fn cast_window(
+    level: Level,
+    scene: &Scene<'_>,
+    window: &Window<'_>,
+    scratch: &mut Scratch,
+    out: (&mut [u32], &mut [f32]),
+    pitch: usize,
+) {
+    match window.camera.projection {
+        Projection::Perspective { .. } => {
+            let raster = Pinhole::new(scene.mesh(), window);
+            dispatch_on(level, VisibilityKernel { scene, raster, scratch, out, pitch });
+        }
+        Projection::Equirectangular => {
+            let raster = Panorama::new(scene.mesh(), window);
+            dispatch_on(level, VisibilityKernel { scene, raster, scratch, out, pitch });
+        }
+    }
+}
+
+/// Casts the ray through the centre of every pixel; see [`crate::cast_ray`] for what counts as a hit. Runs on
+/// the calling thread alone. [`Caster`] keeps its memory for the next image.
 pub fn cast(scene: &Scene<'_>, camera: &Camera) -> Hits {
     Caster::new(scene).cast(camera)
 }
 
-/// Casts the rays of every `stride`th pixel of every `stride`th row, from pixel (stride / 2, stride / 2) on: enough to
-/// score a view. Along an axis of n pixels there are (n − 1 − stride / 2) / stride + 1 of them (rounding down), none if
-/// stride / 2 ≥ n. A stride of 1 is [`cast`].
+/// Casts the rays of every `stride`th pixel of every `stride`th row, from pixel (stride / 2, stride / 2) on:
+/// enough to score a view. Along an axis of n pixels there are (n − 1 − stride / 2) / stride + 1 of them
+/// (rounding down), none if stride / 2 ≥ n. A stride of 1 is [`cast`].
 ///
 /// # Panics
 /// If `stride` is 0.
@@ -118,7 +148,8 @@ pub fn cast_strided(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits {
     Caster::new(scene).cast_strided(camera, stride)
 }
 
-/// As [`cast_strided`], one exact ray at a time: the reference that tests and benches hold the fast one against.
+/// As [`cast_strided`], one exact ray at a time: the reference that tests and benches hold the fast one
+/// against.
 ///
 /// # Panics
 /// If `stride` is 0.
@@ -147,4 +178,40 @@ fn samples(size: u32, stride: u32) -> u32 {
 fn strided(size: u32, stride: u32) -> Vec<u32> {
     assert!(stride > 0, "a stride of 0 pixels");
     (stride / 2..size).step_by(stride as usize).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::level::all_levels;
+    use glam::DVec3;
+    use s3d_geom::Pose;
+    use s3d_synth::scenes::scan_like;
+
+    #[test]
+    fn registers_of_any_width_give_the_same_bits() {
+        let mesh = scan_like(6000, 2);
+        let scene = Scene::new(&mesh);
+        let pose = Pose::level(DVec3::new(3.0, 2.5, 1.5), 0.3);
+        let views = [
+            Camera::perspective(pose.turned(0.0, -0.4), 1.4, 203, 131),
+            Camera::perspective(pose.turned(2.0, 0.2), 0.7, 203, 131),
+            Camera::equirectangular(pose, 400),
+        ];
+        for camera in &views {
+            let (width, height) = ((camera.width / 2) as usize, camera.height as usize - 5);
+            let window = Window { camera, stride: 1, column: 60, row: 3, width, height };
+            let images: Vec<_> = all_levels()
+                .into_iter()
+                .map(|level| {
+                    let (mut faces, mut depths) = (vec![7; width * height], vec![7.0; width * height]);
+                    let out = (&mut faces[..], &mut depths[..]);
+                    cast_window(level, &scene, &window, &mut Scratch::default(), out, width);
+                    (faces, depths)
+                })
+                .collect();
+            assert!(images.iter().all(|image| *image == images[0]));
+            assert!(images[0].0.iter().any(|&face| face != NO_FACE));
+        }
+    }
 }

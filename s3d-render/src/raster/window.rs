@@ -1,17 +1,19 @@
 //! The visibility pass over a window of an image, whatever the projection.
 
-use crate::raster::canvas::{Canvas, Cover, DrawnFace};
+use crate::raster::canvas::{Canvas, Cover};
 use crate::raster::clusters::{Cluster, Clusters, Content, Node};
 use crate::ray::caster::Nearest;
 use crate::ray::cone::Cone;
 use crate::scene::Scene;
-use crate::simd::registers::{self, LANES, Registers, Work};
+use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
+use crate::simd::{Kernel, Simd};
 use glam::DVec3;
 use s3d_geom::{Camera, Rays, TriMesh};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Samples of an image that are cast together: column `column` + i is pixel stride / 2 + stride · (`column` + i).
+/// Samples of an image that are cast together: its column i is the image's column of pixels
+/// stride / 2 + stride · (`column` + i), likewise its rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window<'a> {
     pub(crate) camera: &'a Camera,
@@ -52,12 +54,16 @@ pub(crate) fn groups(values: &[f64]) -> Vec<[f64; LANES]> {
 
 /// How a projection puts faces on a window.
 pub(crate) trait ProjectionRaster {
+    /// Where all rays start.
+    fn origin(&self) -> DVec3;
+    /// Width and height of the window.
+    fn size(&self) -> (usize, usize);
     /// The pixels that a box may cover; `None` if the window does not show it.
     fn cover(&self, node: &Node) -> Option<Cover>;
     /// Draws the faces of a group.
-    fn draw<L: Registers>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>);
+    fn draw<L: RasterLanes>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>);
     /// [`Canvas::finish`] with this raster's functions.
-    fn finish<L: Registers>(
+    fn finish<L: RasterLanes>(
         &self,
         l: L,
         canvas: &mut Canvas,
@@ -99,56 +105,31 @@ impl PartialEq for QueuedNode {
     }
 }
 
-/// The scratch of the visibility pass, for one window after another.
+/// The memory of the visibility pass, for one window after another.
 #[derive(Default)]
 pub(crate) struct Scratch {
     canvas: Canvas,
     queue: BinaryHeap<QueuedNode>,
 }
 
-/// Casts the rays of a window into `out`: faces and depths from its first pixel on, `pitch` from row to row.
-pub(crate) fn cast<T: ProjectionRaster>(
-    scene: &Scene<'_>,
-    origin: DVec3,
-    raster: T,
-    size: (usize, usize),
-    scratch: &mut Scratch,
-    out: (&mut [u32], &mut [f32]),
-    pitch: usize,
-) {
-    registers::run(VisibilityKernel { scene, origin, raster, size, scratch, out, pitch });
+/// Casts the rays of a window.
+pub(crate) struct VisibilityKernel<'a, 'm, T> {
+    pub(crate) scene: &'a Scene<'m>,
+    pub(crate) raster: T,
+    pub(crate) scratch: &'a mut Scratch,
+    /// Faces and depths from the window's first pixel on, `pitch` from row to row.
+    pub(crate) out: (&'a mut [u32], &'a mut [f32]),
+    pub(crate) pitch: usize,
 }
 
-/// As [`cast`], with registers that every processor has.
-#[cfg(test)]
-pub(crate) fn cast_portably<T: ProjectionRaster>(
-    scene: &Scene<'_>,
-    origin: DVec3,
-    raster: T,
-    size: (usize, usize),
-    scratch: &mut Scratch,
-    out: (&mut [u32], &mut [f32]),
-    pitch: usize,
-) {
-    VisibilityKernel { scene, origin, raster, size, scratch, out, pitch }.run(registers::Portable::<LANES>);
-}
-
-struct VisibilityKernel<'a, 'm, T> {
-    scene: &'a Scene<'m>,
-    origin: DVec3,
-    raster: T,
-    size: (usize, usize),
-    scratch: &'a mut Scratch,
-    out: (&'a mut [u32], &'a mut [f32]),
-    pitch: usize,
-}
-
-impl<T: ProjectionRaster> Work for VisibilityKernel<'_, '_, T> {
+impl<T: ProjectionRaster> Kernel for VisibilityKernel<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Registers>(self, l: L) {
-        let Self { scene, origin, mut raster, size, scratch, out, pitch } = self;
+    fn run<S: Simd>(self, simd: S) {
+        let l = simd.raster();
+        let Self { scene, mut raster, scratch, out, pitch } = self;
+        let (origin, size) = (raster.origin(), raster.size());
         let Scratch { canvas, queue } = scratch;
         canvas.begin(size.0, size.1);
         draw_all(l, scene.clusters(), &mut raster, canvas, queue);
@@ -169,7 +150,7 @@ impl<T: ProjectionRaster> Work for VisibilityKernel<'_, '_, T> {
 }
 
 #[inline(always)]
-fn draw_all<L: Registers, T: ProjectionRaster>(
+fn draw_all<L: RasterLanes, T: ProjectionRaster>(
     l: L,
     clusters: &Clusters,
     raster: &mut T,
@@ -212,64 +193,4 @@ fn nearest(mesh: &TriMesh, origin: DVec3, d: DVec3, candidates: &[DrawnFace]) ->
 #[inline(never)]
 fn distance(mesh: &TriMesh, origin: DVec3, d: DVec3, face: u32) -> f64 {
     Cone::new(mesh, face, origin).map_or(f64::INFINITY, |cone| cone.distance(d))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::raster::panorama::Panorama;
-    use crate::raster::pinhole::Pinhole;
-    use s3d_geom::Pose;
-    use s3d_synth::scenes::scan_like;
-
-    #[test]
-    fn registers_of_any_width_give_the_same_bits() {
-        let mesh = scan_like(6000, 2);
-        let scene = Scene::new(&mesh);
-        let pose = Pose::level(DVec3::new(3.0, 2.5, 1.5), 0.3);
-        let views = [
-            Camera::perspective(pose.turned(0.0, -0.4), 1.4, 203, 131),
-            Camera::perspective(pose.turned(2.0, 0.2), 0.7, 203, 131),
-            Camera::equirectangular(pose, 400),
-        ];
-        for camera in &views {
-            let (width, height) = ((camera.width / 2) as usize, camera.height as usize - 5);
-            let window = Window { camera, stride: 1, column: 60, row: 3, width, height };
-            let mut images = [(); 2].map(|()| (vec![7; width * height], vec![7.0; width * height]));
-            for (portable, (faces, depths)) in [true, false].into_iter().zip(&mut images) {
-                let (size, out, mut scratch) =
-                    ((width, height), (&mut faces[..], &mut depths[..]), Scratch::default());
-                let origin = camera.pose.location;
-                let pinhole = camera.projection != s3d_geom::Projection::Equirectangular;
-                match (pinhole, portable) {
-                    (true, true) => cast_portably(
-                        &scene,
-                        origin,
-                        Pinhole::new(&mesh, &window),
-                        size,
-                        &mut scratch,
-                        out,
-                        width,
-                    ),
-                    (true, false) => {
-                        cast(&scene, origin, Pinhole::new(&mesh, &window), size, &mut scratch, out, width)
-                    }
-                    (false, true) => cast_portably(
-                        &scene,
-                        origin,
-                        Panorama::new(&mesh, &window),
-                        size,
-                        &mut scratch,
-                        out,
-                        width,
-                    ),
-                    (false, false) => {
-                        cast(&scene, origin, Panorama::new(&mesh, &window), size, &mut scratch, out, width)
-                    }
-                }
-            }
-            assert!(images[0] == images[1]);
-            assert!(images[0].0.iter().any(|&face| face != crate::NO_FACE));
-        }
-    }
 }

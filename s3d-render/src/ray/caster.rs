@@ -5,9 +5,10 @@ use crate::scene::Scene;
 use glam::DVec3;
 use s3d_geom::TriMesh;
 
-/// Distances that agree to this relative difference are equal; the lowest face among them is the one that is hit. It
-/// covers the rounding of `f64` at edges that faces share. A wider one would hide faces of real scans, which hold
-/// overlapping ones that are less than a micrometre apart, behind others that are truly farther.
+/// Distances that agree to this relative difference are equal; the lowest face among them is the one that is
+/// hit. It covers the rounding of `f64` at edges that faces share. A wider one would hide faces of real
+/// scans, which hold overlapping ones that are less than a micrometre apart, behind others that are truly
+/// farther.
 pub(crate) const TIE: f64 = 1e-12;
 
 /// A box this much farther than the nearest hit is not looked into: more than a face's distance may be off.
@@ -26,11 +27,11 @@ pub struct Hit {
 ///
 /// - Watertight: what passes through an edge or a corner hits a face there; the rim belongs to a face.
 /// - A face whose plane contains the origin is not hit: it has no width from there. Nothing at t ≤ 0 is hit.
-/// - Of faces whose t agree to 1e-12 of the nearest, the lowest index is hit: coplanar duplicates do not depend on the
-///   order in which they are met.
+/// - Of faces whose t agree to 1e-12 of the nearest, the lowest index is hit: coplanar duplicates do not
+///   depend on the order in which they are met.
 ///
-/// `t` is good to 1e-7 of itself (or 1e-12 m); a face seen within 1e-8 rad of edge-on gives a place on it. A direction
-/// or origin that is not finite, or no direction, hits nothing.
+/// `t` is good to 1e-7 of itself (or 1e-12 m); a face seen within 1e-8 rad of edge-on gives a place on it. A
+/// direction or origin that is not finite, or no direction, hits nothing.
 pub fn cast_ray(scene: &Scene<'_>, origin: DVec3, direction: DVec3) -> Option<Hit> {
     RayCaster::new(scene, origin).cast(direction)
 }
@@ -210,7 +211,8 @@ mod tests {
         mesh(&corners, &faces)
     }
 
-    /// Directions that hit corners and the middles of edges exactly (where they are representable), and near them.
+    /// Directions that hit corners and the middles of edges exactly (where they are representable), and near
+    /// them.
     fn awkward(mesh: &TriMesh, origin: DVec3) -> Vec<DVec3> {
         let mut directions = Vec::new();
         for face in 0..mesh.faces().len() as u32 {
@@ -244,7 +246,8 @@ mod tests {
 
     #[test]
     fn nothing_leaks_through_a_wall_of_slivers() {
-        // A fan of 4,000 slivers from one corner over a wall, in front of another wall: the second is never seen.
+        // A fan of 4,000 slivers from one corner over a wall, in front of another wall: the second is never
+        // seen.
         let mut corners = vec![vec3(-1.0, 2.0, -1.0)];
         let rim: Vec<Vec3> = (0..=4000).map(|k| vec3(1.0, 2.0, -1.0 + k as f32 * 5e-4)).collect();
         corners.extend(&rim);
@@ -329,13 +332,14 @@ mod tests {
             far in prop::sample::select(vec![Vec3::ZERO, vec3(1000.0, -1000.0, 50.0)]),
         ) {
             let corners: Vec<Vec3> = corners.iter().map(|p| *p + far).collect();
-            let faces: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
-            let Ok(soup) = TriMesh::from_faces(corners, faces) else { return Ok(()) };
+            let faces = (0..corners.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]);
+            let Ok(soup) = TriMesh::from_faces(corners, faces.collect()) else { return Ok(()) };
             let origin = far.as_dvec3() + dvec3(0.1, 0.2, 0.3);
             for (hit, d) in check(&soup, origin, d.clone()).into_iter().zip(d) {
                 let all = (0..soup.faces().len() as u32).map(|f| textbook(&soup, f, origin, d));
                 let inside = |w: [f64; 3], by: f64| w.iter().all(|&w| w > by);
-                let nearest = all.filter(|(t, w)| *t > 0.0 && inside(*w, 1e-9)).map(|(t, _)| t).fold(f64::MAX, f64::min);
+                let hits = all.filter(|(t, w)| *t > 0.0 && inside(*w, 1e-9));
+                let nearest = hits.map(|(t, _)| t).fold(f64::MAX, f64::min);
                 match hit {
                     Some(hit) => {
                         let (t, w) = textbook(&soup, hit.face, origin, d);
@@ -354,7 +358,8 @@ mod tests {
             // Twelve corners shared by ten faces at random: many shared edges and corners, slivers, overlaps.
             let faces: Vec<[u32; 3]> = picks.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
             let Ok(soup) = TriMesh::from_faces(corners.clone(), faces) else { return Ok(()) };
-            for origin in [dvec3(0.1, -0.2, 3.0), corners[0].as_dvec3(), corners[1].lerp(corners[2], 0.5).as_dvec3()] {
+            let middle = corners[1].lerp(corners[2], 0.5);
+            for origin in [dvec3(0.1, -0.2, 3.0), corners[0].as_dvec3(), middle.as_dvec3()] {
                 check(&soup, origin, awkward(&soup, origin));
             }
         }

@@ -1,24 +1,25 @@
 //! A face as its origin sees it: the cone of directions that hit it, with exact signs.
 //!
-//! Put the origin of a ray at zero. Then the direction d hits the triangle (a, b, c), with det(a, b, c) > 0, exactly if
-//! it lies in the cone that a, b and c span: det(d, b, c) ≥ 0, det(d, c, a) ≥ 0 and det(d, a, b) ≥ 0. The corners
-//! relative to the origin are rounded once, in `f64`, the same for every face that has them; the signs of the
-//! determinants are exact (Shewchuk's adaptive predicates). So the test decides on true cones, and these leave no gap
-//! between faces that share an edge or a corner.
+//! Put the origin of a ray at zero. Then the direction d hits the triangle (a, b, c), with det(a, b, c) > 0,
+//! exactly if it lies in the cone that a, b and c span: det(d, b, c) ≥ 0, det(d, c, a) ≥ 0 and det(d, a, b) ≥
+//! 0. The corners relative to the origin are rounded once, in `f64`, the same for every face that has them;
+//! the signs of the determinants are exact (Shewchuk's adaptive predicates). So the test decides on true
+//! cones, and these leave no gap between faces that share an edge or a corner.
 
 use glam::DVec3;
 use robust::{Coord3D, orient3d};
 use s3d_geom::TriMesh;
 
-/// A face in front of an origin, wound so that det(a, b, c) > 0 for its corners a, b, c relative to the origin.
+/// A face in front of an origin, wound so that det(a, b, c) > 0 for its corners a, b, c relative to the
+/// origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cone {
     pub(crate) corners: [DVec3; 3],
     pub(crate) plane: Plane,
 }
 
-/// The points x with normal · x = offset, relative to the origin; offset > 0 up to rounding. `normal` is twice as long
-/// as the face's area.
+/// The points x with normal · x = offset, relative to the origin; offset > 0 up to rounding. `normal` is
+/// twice as long as the face's area.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plane {
     pub(crate) normal: DVec3,
@@ -26,12 +27,13 @@ pub(crate) struct Plane {
 }
 
 impl Cone {
-    /// `None` if the origin lies exactly in the plane of the face, which then has no width from there: what a ray
-    /// meets at its rim are its neighbours.
+    /// `None` if the origin lies exactly in the plane of the face, which then has no width from there: what a
+    /// ray meets at its rim are its neighbours.
     pub(crate) fn new(mesh: &TriMesh, face: u32, origin: DVec3) -> Option<Self> {
         let world = mesh.triangle(face).map(|p| p.as_dvec3());
         let [a, b, c] = world.map(|p| p - origin);
-        // Differences of `f32` positions are all but exact in `f64`: the normal of a sliver is as good as any.
+        // Differences of `f32` positions are all but exact in `f64`: the normal of a sliver is as good as
+        // any.
         let normal = (world[1] - world[0]).cross(world[2] - world[0]);
         let turn = side(a, b, c);
         if turn > 0.0 {
@@ -66,7 +68,8 @@ impl Cone {
 }
 
 impl Plane {
-    /// The multiple of `d` that lies in the plane, to 1e-8 of itself; `None` where the plane is seen too edge-on.
+    /// The multiple of `d` that lies in the plane, to 1e-8 of itself; `None` where the plane is seen too
+    /// edge-on.
     #[inline(always)]
     pub(crate) fn distance(&self, d: DVec3) -> Option<f64> {
         let slope = self.normal.dot(d);
@@ -110,7 +113,8 @@ mod tests {
     proptest! {
         #[test]
         fn signs_are_exact(a in point(), b in point(), c in point(), scale in -1e-3..1e-3f64) {
-            // Scaling each point by a factor that rounds keeps a zero only if it was exact: use powers of two.
+            // Scaling each point by a factor that rounds keeps a zero only if it was exact: use powers of
+            // two.
             let s = if scale > 0.0 { 1.0 / 1024.0 } else { 4096.0 };
             let p = |q: [i64; 3]| dvec3(q[0] as f64, q[1] as f64, q[2] as f64) * s;
             let expected = integer_side(a, b, c).signum() as f64;

@@ -1,27 +1,28 @@
 //! Attributes over a face, eight pixels at a time.
 //!
-//! An attribute (a texture coordinate, a channel of the colour) is a ratio a(d) = (α·d) / (ω·d) of linear functions of
-//! the ray's direction d (see [`crate::shade::patch`]). Taken in `f64` a pixel, that is most of an image's time; taken in `f32`,
-//! the numerator loses the digits that count. So it is anchored at a pixel of the face with the direction e, where the
-//! attribute is a₀ = a(e), once in `f64`:
+//! An attribute (a texture coordinate, a channel of the colour) is a ratio a(d) = (α·d) / (ω·d) of linear
+//! functions of the ray's direction d (see [`crate::shade::patch`]). Taken in `f64` a pixel, that is most of
+//! an image's time; taken in `f32`, the numerator loses the digits that count. So it is anchored at a pixel
+//! of the face with the direction e, where the attribute is a₀ = a(e), once in `f64`:
 //!
 //! ```text
 //! a(d) = a₀ + n(d) / w(d),   n(d) = (α − a₀ω)·(d − e) / ω·e,   w(d) = 1 + ω·(d − e) / ω·e
 //! ```
 //!
-//! Both n and what is added to 1 are linear in d − e and small near the anchor, so nothing cancels. Along a row d − e is
-//! made of two functions of the column's offset k from the anchor alone: in a perspective view of k itself; in a
-//! panorama, with the turn δ from column to column, of sin kδ and 1 − cos kδ.
+//! Both n and what is added to 1 are linear in d − e and small near the anchor, so nothing cancels. Along a
+//! row d − e is made of two functions of the column's offset k from the anchor alone: in a perspective view
+//! of k itself; in a panorama, with the turn δ from column to column, of sin kδ and 1 − cos kδ.
 //!
-//! Error: an anchor serves pixels that are at most [`REACH`] columns and rows away and whose w is within 1/[`DEEP`] to
-//! [`DEEP`]. n and w each go through fewer than 8 roundings of 2⁻²⁴ relative to the pixels between; with f what one pixel
-//! more adds to the attribute, here or at the anchor, the quotient is off by less than
-//! 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and below f / 8000 where w hardly varies, as it mostly does in 64
-//! pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel in a texture of 4096.
+//! Error: an anchor serves pixels that are at most [`REACH`] columns and rows away and whose w is within
+//! 1/[`DEEP`] to [`DEEP`]. n and w each go through fewer than 8 roundings of 2⁻²⁴ relative to the pixels
+//! between; with f what one pixel more adds to the attribute, here or at the anchor, the quotient is off by
+//! less than 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and below f / 8000 where w hardly varies, as
+//! it mostly does in 64 pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel in a
+//! texture of 4096.
 
 use crate::shade::patch::Patch;
 use crate::shade::texel_wrap::TexelWrap;
-use crate::simd::lanes::{LANES, Lanes, eight};
+use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
 use glam::DVec3;
 use s3d_geom::{Camera, Rays};
 
@@ -56,8 +57,9 @@ impl Attributes {
 }
 
 impl Attributes {
-    /// What [`AnchorBatch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face is along a ray, an
-    /// attribute changes by (m − (a − a₀) ω / ω·e) · step / w where m = (α − a₀ω) / ω·e; and z is greatest at a corner.
+    /// What [`AnchorBatch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face is
+    /// along a ray, an attribute changes by (m − (a − a₀) ω / ω·e) · step / w where m = (α − a₀ω) / ω·e; and
+    /// z is greatest at a corner.
     #[inline(always)]
     fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
         let scale = self.denominator.dot(e).recip();
@@ -131,8 +133,8 @@ impl RayGrid {
         !self.rows.is_empty()
     }
 
-    /// How directions change at column `i`: from column to column and from row to row in a perspective view; in a
-    /// panorama the first is the column's unit vector.
+    /// How directions change at column `i`: from column to column and from row to row in a perspective view;
+    /// in a panorama the first is the column's unit vector.
     fn steps(&self, i: usize) -> [DVec3; 2] {
         match &self.rays {
             Rays::Perspective { x_step, y_step, .. } => [*x_step, *y_step],
@@ -146,9 +148,9 @@ fn libm_sin(a: f64) -> f64 {
     glam::DVec2::from_angle(a).y
 }
 
-/// Linear functions of d − e, n of the three attributes and w: in a perspective view `along` · columns + `down` · rows.
-/// In a panorama, with c(k) the unit vector of the column's azimuth, `along` what c(0) turns towards, `down` along c(0),
-/// and `up` upwards.
+/// Linear functions of d − e, n of the three attributes and w: in a perspective view `along` · columns +
+/// `down` · rows. In a panorama, with c(k) the unit vector of the column's azimuth, `along` what c(0) turns
+/// towards, `down` along c(0), and `up` upwards.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slopes {
     along: [f32; 4],
@@ -172,11 +174,11 @@ impl Slopes {
         let mut slopes = Self::default();
         let scale = attributes.denominator.dot(e).recip();
         slopes.set::<PANORAMA>(3, attributes.denominator * scale, steps);
-        for (k, fold) in wraps.into_iter().enumerate() {
+        for (k, wrap) in wraps.into_iter().enumerate() {
             let (low, high) = attributes.bounds[k];
             let value = min(max(attributes.numerator[k].dot(e) * scale, low), high);
             let m = (attributes.numerator[k] - attributes.denominator * value) * scale;
-            let (sign, shift) = fold.sign_and_shift(value);
+            let (sign, shift) = wrap.sign_and_shift(value);
             slopes.set::<PANORAMA>(k, m * sign, steps);
             slopes.base[k] = (value * sign + shift) as f32;
             let (low, high) = ((low * sign + shift) as f32, (high * sign + shift) as f32);
@@ -213,8 +215,8 @@ impl Default for Anchor {
 }
 
 impl Anchor {
-    /// Anchors the attributes at a pixel, the values folded: an attribute with a period is brought between 0 and it,
-    /// mirrored if its fold is. `false` if the face is seen edge-on there, or numbers are too large.
+    /// Anchors the attributes at a pixel, the values wrapped: an attribute with a period is brought between 0
+    /// and it, mirrored if its fold is. `false` if the face is seen edge-on there, or numbers are too large.
     pub(crate) fn set<const PANORAMA: bool>(
         &mut self,
         attributes: &Attributes,
@@ -288,7 +290,8 @@ impl AnchorBatch {
         Self { corners: zeros, values: zeros, wraps: zeros, rays: zeros, at: [(0, 0); LANES] }
     }
 
-    /// Says what lane `k` is: the corners and the values there, as of [`Attributes::new`], and where it is anchored.
+    /// Says what lane `k` is: the corners and the values there, as of [`Attributes::new`], and where it is
+    /// anchored.
     #[inline(always)]
     pub(crate) fn put(
         &mut self,
@@ -303,21 +306,21 @@ impl AnchorBatch {
         let rays = [grid.rays.at(i as u32, j as u32), x, y];
         for n in 0..3 {
             let TexelWrap { divisor, period, half } = wraps[n];
-            let fold = [divisor, period, half];
+            let wrap = [divisor, period, half];
             let (corner, ray) = (corners[n].to_array(), rays[n].to_array());
             for m in 0..3 {
                 self.corners[n][m][k] = f64::from(corner[m]);
                 self.values[n][m][k] = values[n][m];
-                self.wraps[n][m][k] = fold[m];
+                self.wraps[n][m][k] = wrap[m];
                 self.rays[n][m][k] = ray[m];
             }
         }
         self.at[k] = (i, j);
     }
 
-    /// What [`Anchor::set`] makes of each lane; and of each a bound on how fast the first two attributes change: the sum
-    /// of the squares of what a column and a row add to them is nowhere on the face numerator it, and more than rounding
-    /// below. Infinite in a panorama.
+    /// What [`Anchor::set`] makes of each lane; and of each a bound on how fast the first two attributes
+    /// change: the sum of the squares of what a column and a row add to them is nowhere on the face numerator
+    /// it, and more than rounding below. Infinite in a panorama.
     #[inline(always)]
     pub(crate) fn anchors<const PANORAMA: bool>(&self, origin: DVec3) -> ([Anchor; LANES], [f32; LANES]) {
         let mut fastest = [f32::INFINITY; LANES];
@@ -331,13 +334,13 @@ impl AnchorBatch {
             let row = |v: &[[f64; LANES]; 3]| [v[0][k], v[1][k], v[2][k]];
             let world = [point(&self.corners[0]), point(&self.corners[1]), point(&self.corners[2])];
             let values = [row(&self.values[0]), row(&self.values[1]), row(&self.values[2])];
-            let fold = |n: usize| {
+            let wrap = |n: usize| {
                 let [divisor, period, half] = row(&self.wraps[n]);
                 TexelWrap { divisor, period, half }
             };
             let [e, x, y] = [point(&self.rays[0]), point(&self.rays[1]), point(&self.rays[2])];
             let attributes = Attributes::new(&Patch::of(world, origin), values);
-            let slopes = Slopes::new::<PANORAMA>(&attributes, [fold(0), fold(1), fold(2)], e, [x, y]);
+            let slopes = Slopes::new::<PANORAMA>(&attributes, [wrap(0), wrap(1), wrap(2)], e, [x, y]);
             for n in 0..4 {
                 (along[n][k], down[n][k], up[n][k]) = (slopes.along[n], slopes.down[n], slopes.up[n]);
             }
@@ -386,14 +389,15 @@ pub(crate) struct Interpolated<F, const N: usize> {
     pub(crate) x: [F; N],
     /// What a row more adds to each.
     pub(crate) y: [F; N],
-    /// Bit k: whether pixel k is so much nearer or farther than the anchor that its values are not exact enough.
+    /// Bit k: whether pixel k is so much nearer or farther than the anchor that its values are not exact
+    /// enough.
     pub(crate) doubtful: u32,
 }
 
 impl AnchoredRow<'_> {
     /// The first `N` attributes of the eight pixels from column `i` on.
     #[inline(always)]
-    pub(crate) fn at<const PANORAMA: bool, const N: usize, L: Lanes>(
+    pub(crate) fn at<const PANORAMA: bool, const N: usize, L: ShadeLanes>(
         &self,
         lanes: L,
         i: usize,
@@ -444,7 +448,7 @@ impl AnchoredRow<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::lanes::Plain;
+    use crate::simd::shade_lanes::Plain;
     use proptest::prelude::*;
     use s3d_geom::{Pose, TriMesh};
 
@@ -525,7 +529,8 @@ mod tests {
             let scale = attributes.denominator.dot(d).recip();
             for numerator in &attributes.numerator[..2] {
                 for step in steps {
-                    let change = numerator.dot(step) - numerator.dot(d) * scale * attributes.denominator.dot(step);
+                    let below = attributes.denominator.dot(step);
+                    let change = numerator.dot(step) - numerator.dot(d) * scale * below;
                     sum += (change * scale) * (change * scale);
                 }
             }
@@ -536,21 +541,23 @@ mod tests {
         fn faces_together_are_anchored_as_they_are_alone(
             corners in prop::array::uniform8(prop::array::uniform3(prop::array::uniform3(-5.0..5.0f32))),
             values in prop::array::uniform3(prop::array::uniform3(-9.0..9.0f64)),
-            period in 0.5..4.0f64, turn in prop::bool::ANY,
+            period in 0.5..4.0f64, panorama in prop::bool::ANY,
         ) {
             let pose = Pose::level(DVec3::new(0.3, -0.2, 0.1), 0.4);
-            let camera = if turn { Camera::equirectangular(pose, 64) } else { Camera::perspective(pose, 1.2, 64, 32) };
+            let perspective = Camera::perspective(pose, 1.2, 64, 32);
+            let camera = if panorama { Camera::equirectangular(pose, 64) } else { perspective };
             let (grid, mut batch) = (RayGrid::new(&camera), AnchorBatch::new());
             let wraps = [TexelWrap::NONE, TexelWrap::repeat(period), TexelWrap::mirror(period)];
             for (k, corners) in corners.iter().enumerate() {
                 batch.put(k, corners.map(glam::Vec3::from), values, wraps, &grid, (7 * k, 3 * k));
             }
-            let (together, _) = if turn { batch.anchors::<true>(pose.location) } else { batch.anchors::<false>(pose.location) };
+            let at = pose.location;
+            let (together, _) = if panorama { batch.anchors::<true>(at) } else { batch.anchors::<false>(at) };
             for (k, corners) in corners.iter().enumerate() {
                 let world = corners.map(|p| glam::Vec3::from(p).as_dvec3());
                 let attributes = Attributes::new(&Patch::of(world, pose.location), values);
                 let mut alone = Anchor::default();
-                if turn {
+                if panorama {
                     alone.set::<true>(&attributes, wraps, &grid, 7 * k, 3 * k);
                 } else {
                     alone.set::<false>(&attributes, wraps, &grid, 7 * k, 3 * k);
@@ -572,7 +579,7 @@ mod tests {
         }
 
         #[test]
-        fn folds_bring_a_value_into_the_first_period(value in -1e6..1e6f64, period in 1.0..5000.0f64) {
+        fn wraps_bring_a_value_into_the_first_period(value in -1e6..1e6f64, period in 1.0..5000.0f64) {
             let (sign, shift) = TexelWrap::repeat(period).sign_and_shift(value);
             prop_assert!(sign == 1.0 && (-1e-6..=period).contains(&(value + shift)));
             prop_assert!((shift / period - (shift / period).round()).abs() < 1e-9);

@@ -1,14 +1,15 @@
 //! From hits to the images of the data set. Source: formats.md, "Images".
 //!
-//! Every image has the size of the hits. Those that depend on the rays' directions take the camera that the hits were
-//! cast with, one ray a pixel.
+//! Every image has the size of the hits. Those that depend on the rays' directions take the camera that the
+//! hits were cast with, one ray a pixel.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::scene::Scene;
 use crate::shade::flat_painter::FlatPainter;
 use crate::shade::patch::{FaceCache, Patch};
 use crate::shade::spans::{Spans, band_rows};
-use crate::simd::lanes::{self, LANES, LaneWork, Lanes};
+use crate::simd::shade_lanes::{LANES, ShadeLanes};
+use crate::simd::{Kernel, Simd, dispatch};
 use glam::{DMat3, DVec3, Vec3};
 use s3d_geom::{Camera, NormalAxes, Raster, TriMesh};
 
@@ -40,7 +41,7 @@ pub fn depth_image(hits: &Hits) -> Raster<u16> {
 /// As [`depth_image`], into an image that is used again.
 pub fn depth_image_into(hits: &Hits, out: &mut Raster<u16>) {
     fit(out, &hits.depth, 0);
-    lanes::run(DepthKernel { depths: hits.depth.pixels(), out: out.pixels_mut() });
+    dispatch(DepthKernel { depths: hits.depth.pixels(), out: out.pixels_mut() });
 }
 
 /// As [`depth_image_into`], in millimetres: [`MISSING_DEPTH`] where nothing is seen and beyond 65.534 m.
@@ -57,18 +58,19 @@ struct DepthKernel<'a> {
     out: &'a mut [u16],
 }
 
-impl LaneWork for DepthKernel<'_> {
+impl Kernel for DepthKernel<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self, lanes: impl Lanes) {
+    fn run<S: Simd>(self, simd: S) {
+        let lanes = simd.shade();
         depths(lanes, self.depths, self.out);
     }
 }
 
 /// DepthKernel in 512ths of a metre.
 #[inline(always)]
-pub(crate) fn depths(lanes: impl Lanes, depths: &[f32], out: &mut [u16]) {
+pub(crate) fn depths(lanes: impl ShadeLanes, depths: &[f32], out: &mut [u16]) {
     let (eights, rest) = depths.as_chunks::<LANES>();
     let (out, last) = out.as_chunks_mut::<LANES>();
     for (depths, out) in eights.iter().zip(out) {
@@ -87,8 +89,9 @@ pub(crate) fn fit<T: Copy, U>(out: &mut Raster<T>, like: &Raster<U>, value: T) {
     }
 }
 
-/// Surface normals in the axes of [`Camera::normal_image_from_world`], the paper's, a channel = ⌊127.5 + 127.5 n + ½⌋; a normal never
-/// points away from the camera (its dot product with the ray is at most 0). [`MISSING_NORMAL`] where nothing is seen.
+/// Surface normals in the axes of [`Camera::normal_image_from_world`], the paper's, a channel = ⌊127.5 +
+/// 127.5 n + ½⌋; a normal never points away from the camera (its dot product with the ray is at most 0).
+/// [`MISSING_NORMAL`] where nothing is seen.
 ///
 /// # Panics
 /// If the hits are not of the camera's size.
@@ -98,7 +101,8 @@ pub fn normal_image(scene: &Scene<'_>, hits: &Hits, camera: &Camera, normals: No
     out
 }
 
-/// As [`normal_image`], with a choice of [axes](Camera::normal_axes_from_world) and into an image that is used again.
+/// As [`normal_image`], with a choice of [axes](Camera::normal_axes_from_world) and into an image that is
+/// used again.
 ///
 /// # Panics
 /// As [`normal_image`].
@@ -129,7 +133,8 @@ fn flat_normals(
     by_face(Some(scene), hits, MISSING_NORMAL, out, |faces| flat_normals_of(scene.mesh(), faces, view));
 }
 
-/// The colours of faces' normals, on the side that `origin` sees: all rays start there, and see the same side.
+/// The colours of faces' normals, on the side that `origin` sees: all rays start there, and see the same
+/// side.
 #[inline(always)]
 pub(crate) fn flat_normals_of(
     mesh: &TriMesh,
@@ -197,15 +202,15 @@ fn quantized(n: DVec3) -> [u8; 3] {
     shifted(n).to_array().map(|channel| channel as u8)
 }
 
-/// 127.5 + 127.5 n + ½ a channel, and a hair more: a wall along an axis has a 0 that rounding may put on either side of
-/// the tie, and 128 is meant.
+/// 127.5 + 127.5 n + ½ a channel, and a hair more: a wall along an axis has a 0 that rounding may put on
+/// either side of the tie, and 128 is meant.
 #[inline(always)]
 fn shifted(n: DVec3) -> DVec3 {
     n * 127.5 + (128.0 + 1e-9)
 }
 
-/// An index a face, as the colour R·65536 + G·256 + B = index; [`MISSING_INDEX`] where nothing is seen. With each face's
-/// index into the label table it is the semantic image.
+/// An index a face, as the colour R·65536 + G·256 + B = index; [`MISSING_INDEX`] where nothing is seen. With
+/// each face's index into the label table it is the semantic image.
 ///
 /// # Panics
 /// If there is not an index for each face that is seen, or one does not fit into 24 bits.
@@ -265,7 +270,7 @@ fn by_face(
 ) {
     fit(out, &hits.face, [0; 3]);
     let values = |faces: &[u32; LANES]| values(faces).map(|value| [value]);
-    lanes::run(ByFaceKernel {
+    dispatch(ByFaceKernel {
         mesh: scene.map(Scene::mesh),
         hits,
         flat: FlatPainter::new([missing], values),
@@ -281,11 +286,12 @@ struct ByFaceKernel<'a, V> {
     out: &'a mut Raster<[u8; 3]>,
 }
 
-impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> LaneWork for ByFaceKernel<'_, V> {
+impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> Kernel for ByFaceKernel<'_, V> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self, lanes: impl Lanes) {
+    fn run<S: Simd>(self, simd: S) {
+        let lanes = simd.shade();
         let Self { mesh, hits, mut flat, out } = self;
         let width = hits.face.width() as usize;
         let (mut spans, band) = (Spans::new(width), (band_rows(width) * width).max(1));

@@ -1,10 +1,11 @@
 //! The RGB image.
 //!
-//! Faces that a band of rows is the first to show are prepared eight at a time. Then each row is coloured in two passes. The
-//! first walks its spans of equal faces: [`crate::shade::anchor`] gives the texture coordinates of eight pixels at a time and their
-//! change from pixel to pixel, hence each pixel's footprint. The second walks the row regardless of spans and fetches the
-//! textures, again eight pixels at a time ([`crate::shade::filter`]). What a pixel gets depends on no other pixel but through
-//! the anchor, whose rounding it takes over.
+//! Faces that a band of rows is the first to show are prepared eight at a time. Then each row is coloured in
+//! two passes. The first walks its spans of equal faces: [`crate::shade::anchor`] gives the texture
+//! coordinates of eight pixels at a time and their change from pixel to pixel, hence each pixel's footprint.
+//! The second walks the row regardless of spans and fetches the textures, again eight pixels at a time
+//! ([`crate::shade::filter`]). What a pixel gets depends on no other pixel but through the anchor, whose
+//! rounding it takes over.
 
 use crate::hits::Hits;
 use crate::scene::Scene;
@@ -18,13 +19,15 @@ use crate::shade::pixel_color::PixelByPixel;
 use crate::shade::prefetch::Prefetch;
 use crate::shade::spans::{Spans, band_rows};
 use crate::shade::texel_wrap::TexelWrap;
-use crate::simd::lanes::{self, LANES, LaneWork, Lanes};
+use crate::simd::shade_lanes::{LANES, ShadeLanes};
+use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, Raster};
 use std::ops::Range;
 
-/// The colours that the pixels see: textures filtered over each pixel's footprint, corners' colours interpolated,
-/// materials flat. Black is for what is missing alone: a dark pixel that is seen is at least (1, 1, 1).
+/// The colours that the pixels see: textures filtered over each pixel's footprint, corners' colours
+/// interpolated, materials flat. Black is for what is missing alone: a dark pixel that is seen is at least
+/// (1, 1, 1).
 ///
 /// Near the seam of a texture atlas the footprint takes in what lies beside the seam, as with any mipmap.
 ///
@@ -64,7 +67,7 @@ pub fn rgb_image_into(
 ) {
     assert_size(hits, camera);
     fit(out, &hits.face, [0; 3]);
-    lanes::run(RgbKernel { scene, mip_maps, hits, camera, filter, out });
+    dispatch(RgbKernel { scene, mip_maps, hits, camera, filter, out });
 }
 
 struct RgbKernel<'a> {
@@ -76,11 +79,12 @@ struct RgbKernel<'a> {
     out: &'a mut Raster<[u8; 3]>,
 }
 
-impl LaneWork for RgbKernel<'_> {
+impl Kernel for RgbKernel<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self, lanes: impl Lanes) {
+    fn run<S: Simd>(self, simd: S) {
+        let lanes = simd.shade();
         let Self { scene, mip_maps, hits, camera, filter, out } = self;
         let grid = RayGrid::new(camera);
         let mut painter = RgbPainter::new(lanes, scene, mip_maps, camera, filter);
@@ -149,8 +153,8 @@ impl Prepared {
     }
 }
 
-/// A row between its two passes. Values are stored eight at a time, beyond the end of their span: the next span's go over
-/// them.
+/// A row between its two passes. Values are stored eight at a time, beyond the end of their span: the next
+/// span's go over them.
 struct RowBuffer {
     width: usize,
     footprints: Footprints,
@@ -183,11 +187,11 @@ pub(crate) struct RgbPainter<'a, L> {
     prepared: Vec<Prepared>,
     /// Of faces that need one anchor after another.
     large: FaceCache<Attributes>,
-    singly: PixelByPixel<'a>,
+    per_pixel: PixelByPixel<'a>,
     row: RowBuffer,
 }
 
-impl<'a, L: Lanes> RgbPainter<'a, L> {
+impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
     pub(crate) fn new(
         lanes: L,
         scene: &'a Scene<'a>,
@@ -204,7 +208,7 @@ impl<'a, L: Lanes> RgbPainter<'a, L> {
             batch: AnchorBatch::new(),
             prepared: vec![Prepared::missing()],
             large: FaceCache::new(),
-            singly: PixelByPixel::new(scene, mip_maps, camera, filter),
+            per_pixel: PixelByPixel::new(scene, mip_maps, camera, filter),
             row: RowBuffer::new(camera.width as usize),
         }
     }
@@ -318,7 +322,7 @@ impl<'a, L: Lanes> RgbPainter<'a, L> {
             if !self.anchor_again::<PANORAMA>(grid, face, number, start, j) {
                 self.row.tags[start..end].fill(DONE);
                 for (i, color) in (start..).zip(&mut out[start..end]) {
-                    *color = self.singly.color(face, i, j);
+                    *color = self.per_pixel.color(face, i, j);
                 }
                 return;
             }
@@ -351,7 +355,7 @@ impl<'a, L: Lanes> RgbPainter<'a, L> {
         while doubtful != 0 {
             let at = start + doubtful.trailing_zeros() as usize;
             row.tags[at] = DONE;
-            out[at] = self.singly.color(face, at, j);
+            out[at] = self.per_pixel.color(face, at, j);
             doubtful &= doubtful - 1;
         }
     }
@@ -388,7 +392,8 @@ impl<'a, L: Lanes> RgbPainter<'a, L> {
     }
 }
 
-/// Those of eight colours that are among `these`. Not inlined: that would take registers from the loop that rarely calls it.
+/// Those of eight colours that are among `these`. Not inlined: that would take registers from the loop that
+/// rarely calls it.
 #[cold]
 #[inline(never)]
 fn put_some(colors: &[u32; LANES], these: u32, to: &mut [[u8; 3]]) {
@@ -403,12 +408,13 @@ fn put_some(colors: &[u32; LANES], these: u32, to: &mut [[u8; 3]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::lanes::Plain;
+    use crate::simd::dispatch_on;
+    use crate::simd::level::all_levels;
     use s3d_geom::Pose;
     use s3d_synth::scenes::scan_like;
 
     #[test]
-    fn every_set_of_instructions_gives_the_same_bytes() {
+    fn every_level_of_instructions_gives_the_same_bytes() {
         let mesh = scan_like(6_000, 3);
         let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
         let pose = Pose::level(glam::dvec3(3.0, 2.5, 1.5), 0.3);
@@ -420,18 +426,16 @@ mod tests {
         ] {
             let hits = crate::cast(&scene, &camera);
             let filter = TextureFilter::default();
-            let fast = rgb_image_with(&scene, &mip_maps, &hits, &camera, &filter);
-            let mut plain = Raster::filled(camera.width, camera.height, [0; 3]);
-            let work = RgbKernel {
-                scene: &scene,
-                mip_maps: &mip_maps,
-                hits: &hits,
-                camera: &camera,
-                filter: &filter,
-                out: &mut plain,
-            };
-            work.run(Plain);
-            assert_eq!(fast, plain);
+            let images = all_levels().into_iter().map(|level| {
+                let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
+                let (scene, mip_maps, filter) = (&scene, &mip_maps, &filter);
+                let kernel =
+                    RgbKernel { scene, mip_maps, hits: &hits, camera: &camera, filter, out: &mut out };
+                dispatch_on(level, kernel);
+                out
+            });
+            let images: Vec<_> = images.collect();
+            assert!(images.iter().all(|image| *image == images[0]));
         }
     }
 }

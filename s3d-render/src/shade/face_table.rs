@@ -1,19 +1,20 @@
-//! Numbers for the faces that an image shows, row after row, so that what is prepared for a face is found again.
+//! Numbers for the faces that an image shows, row after row, so that what is prepared for a face is found
+//! again.
 //!
-//! A row's (or a block's) spans of pixels get their numbers first, and the faces that are new are listed: these can be
-//! prepared many at a time, which takes a fraction of what it takes one by one.
+//! A row's (or a block's) spans of pixels get their numbers first, and the faces that are new are listed:
+//! these can be prepared many at a time, which takes a fraction of what it takes one by one.
 
 use crate::hits::NO_FACE;
-use crate::simd::lanes::Lanes;
+use crate::simd::shade_lanes::ShadeLanes;
 use s3d_geom::TriMesh;
 
-/// Numbers faces 1, 2, 3… as they come, [`NO_FACE`] is 0, and forgets all but that now and then: its memory is bounded.
-/// The pixels of a face lie together, in one row after another.
+/// Numbers faces 1, 2, 3… as they come, [`NO_FACE`] is 0, and forgets all but that now and then: its memory
+/// is bounded. The pixels of a face lie together, in one row after another.
 pub(crate) struct FaceTable {
     /// By place, which a face's index gives: the face and its number.
     places: Vec<(u32, u32)>,
     count: usize,
-    most: usize,
+    max_count: usize,
 }
 
 /// A face that is new.
@@ -30,23 +31,23 @@ impl FaceTable {
 
     /// For blocks of no more than `longest` pixels.
     pub(crate) fn new(longest: usize) -> Self {
-        Self { places: vec![(NO_FACE, 0); Self::PLACES], count: 1, most: Self::PLACES + longest }
+        Self { places: vec![(NO_FACE, 0); Self::PLACES], count: 1, max_count: Self::PLACES + longest }
     }
 
-    /// Looks up the faces of a block's spans, which begin at `starts`: in `numbers` their numbers, in `new` those that had
-    /// none and get the next ones. Whether all earlier numbers are forgotten. What `mesh`, if any, has of new faces
-    /// themselves is fetched from memory.
+    /// Looks up the faces of a block's spans, which begin at `starts`: in `numbers` their numbers, in `new`
+    /// those that had none and get the next ones. Whether all earlier numbers are forgotten. What `mesh`, if
+    /// any, has of new faces themselves is fetched from memory.
     #[inline(always)]
     pub(crate) fn number(
         &mut self,
-        lanes: impl Lanes,
+        lanes: impl ShadeLanes,
         mesh: Option<&TriMesh>,
         faces: &[u32],
         starts: &[u32],
         numbers: &mut Vec<u32>,
         new: &mut Vec<NewFace>,
     ) -> bool {
-        let forget = self.count + starts.len() > self.most;
+        let forget = self.count + starts.len() > self.max_count;
         if forget {
             self.count = 1;
             self.places.fill((NO_FACE, 0));
@@ -77,10 +78,10 @@ impl FaceTable {
 }
 
 impl NewFace {
-    /// Fetches what of a mesh is read to prepare these faces, besides what [`FaceTable::number`] has fetched: all at once,
-    /// it comes many times as fast.
+    /// Fetches what of a mesh is read to prepare these faces, besides what [`FaceTable::number`] has fetched:
+    /// all at once, it comes many times as fast.
     #[inline(always)]
-    pub(crate) fn prefetch<const COLORS: bool>(new: &[Self], lanes: impl Lanes, mesh: &TriMesh) {
+    pub(crate) fn prefetch<const COLORS: bool>(new: &[Self], lanes: impl ShadeLanes, mesh: &TriMesh) {
         let p = mesh.parts();
         for &Self { face, .. } in new {
             for vertex in p.faces[face as usize] {
@@ -99,7 +100,7 @@ impl NewFace {
 
 /// Fetches what leads to a face's corners.
 #[inline(always)]
-fn prefetch_face(lanes: impl Lanes, mesh: &TriMesh, face: usize) {
+fn prefetch_face(lanes: impl ShadeLanes, mesh: &TriMesh, face: usize) {
     let p = mesh.parts();
     if let Some(corners) = p.faces.get(face) {
         lanes.prefetch(corners);
@@ -113,7 +114,7 @@ fn prefetch_face(lanes: impl Lanes, mesh: &TriMesh, face: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::lanes::Plain;
+    use crate::simd::shade_lanes::Plain;
     use proptest::prelude::*;
 
     proptest! {
@@ -123,7 +124,7 @@ mod tests {
             step in prop::sample::select(vec![1u32, 8192, 77]),
         ) {
             let mut table = FaceTable::new(60);
-            table.count = table.most - 150; // Forgets soon.
+            table.count = table.max_count - 150; // Forgets soon.
             let (mut things, mut numbers, mut new) = (vec![NO_FACE; table.count], Vec::new(), Vec::new());
             for block in blocks {
                 let faces: Vec<u32> =
@@ -136,7 +137,7 @@ mod tests {
                     assert_eq!(faces[new.at as usize], new.face);
                     new.face
                 }));
-                prop_assert!(things.len() <= table.most);
+                prop_assert!(things.len() <= table.max_count);
                 for (face, number) in faces.iter().zip(&numbers) {
                     prop_assert_eq!(things[*number as usize], *face);
                 }

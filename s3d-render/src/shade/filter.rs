@@ -1,18 +1,19 @@
 //! Textures fetched for eight pixels at a time.
 //!
-//! Gives what [`crate::shade::mip_maps::MipMap::sample`] gives, in integers: places between a texture's pixels are kept in
-//! 32768ths of a pixel, and so are the weights of all pixels that make a colour; their products are added without
-//! rounding. Before it is rounded to 8 bits a colour is off by less than 0.03 where one bilinear sample makes it. Where
-//! sixteen do, the weights of samples, rounded down, may darken it by 0.12. Samples of a footprint are steps of whole
-//! 32768ths apart, so that the last of eight is off by less than a 4000th of a pixel.
+//! Gives what [`crate::shade::mip_maps::MipMap::sample`] gives, in integers: places between a texture's
+//! pixels are kept in 32768ths of a pixel, and so are the weights of all pixels that make a colour; their
+//! products are added without rounding. Before it is rounded to 8 bits a colour is off by less than 0.03
+//! where one bilinear sample makes it. Where sixteen do, the weights of samples, rounded down, may darken it
+//! by 0.12. Samples of a footprint are steps of whole 32768ths apart, so that the last of eight is off by
+//! less than a 4000th of a pixel.
 
 use crate::shade::anchor::Interpolated;
 use crate::shade::texel_wrap::TexelWrap;
-use crate::simd::lanes::{LANES, Lanes, Texels, eight, put};
+use crate::simd::shade_lanes::{LANES, ShadeLanes, Texels, eight, put};
 use s3d_geom::{Raster, Texture, Wrap};
 
-/// Where the pixels of a row are in their textures, and the sides x and y of their footprints: what a column and what a
-/// row more add; in pixels of the full size. By column, and two more groups.
+/// Where the pixels of a row are in their textures, and the sides x and y of their footprints: what a column
+/// and what a row more add; in pixels of the full size. By column, and two more groups.
 #[derive(Debug, Default)]
 pub(crate) struct Footprints {
     at: [Vec<f32>; 2],
@@ -28,7 +29,13 @@ impl Footprints {
 
     /// The eight pixels from column `i` on; their sides only if they are not all `narrow`.
     #[inline(always)]
-    pub(crate) fn store<L: Lanes>(&mut self, l: L, i: usize, seen: &Interpolated<L::F, 2>, narrow: bool) {
+    pub(crate) fn store<L: ShadeLanes>(
+        &mut self,
+        l: L,
+        i: usize,
+        seen: &Interpolated<L::F, 2>,
+        narrow: bool,
+    ) {
         for n in 0..2 {
             put(l, &mut self.at[n], i, seen.values[n]);
         }
@@ -43,9 +50,9 @@ impl Footprints {
 
 /// How eight footprints are sampled.
 struct Taps<F> {
-    /// The size to sample: how often the full one is halved.
+    /// The level to sample: how often the full one is halved.
     level: F,
-    /// The weight of each sample there, and of each in the next size, in −32768ths.
+    /// The weight of each sample there, and of each in the next level, in −32768ths.
     weight: F,
     next_weight: F,
     /// How many samples.
@@ -55,7 +62,7 @@ struct Taps<F> {
     step_y: F,
 }
 
-/// A texture at one size.
+/// A texture at one level: halved so many times.
 #[derive(Clone, Copy)]
 struct MipLevel<'a> {
     image: &'a Raster<[u8; 3]>,
@@ -63,12 +70,12 @@ struct MipLevel<'a> {
     /// The last column and row, in 32768ths of a pixel.
     right: u32,
     bottom: u32,
-    /// Pixels of this size a pixel of the full one.
+    /// Pixels of this level a pixel of the full size.
     x: f32,
     y: f32,
 }
 
-/// What is read around eight places, one by one: see [`Lanes::place`] and [`Lanes::quads_from`].
+/// What is read around eight places, one by one: see [`ShadeLanes::place`] and [`ShadeLanes::quads_from`].
 #[derive(Default)]
 struct GatheredQuads {
     at: [i32; LANES],
@@ -79,7 +86,7 @@ struct GatheredQuads {
 }
 
 /// GatheredQuads in an image that go on in steps: 0 is the middle of the first pixel.
-struct TapWalk<L: Lanes> {
+struct TapWalk<L: ShadeLanes> {
     first: (L::F, L::F),
     step: (L::F, L::F),
     /// Where it has come to, and the step, in 32768ths.
@@ -87,7 +94,7 @@ struct TapWalk<L: Lanes> {
     fixed_step: (L::I, L::I),
 }
 
-impl<L: Lanes> TapWalk<L> {
+impl<L: ShadeLanes> TapWalk<L> {
     #[inline(always)]
     fn at(l: L, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
         let (place, fixed_step) = ((l.fixed(first.0), l.fixed(first.1)), (l.fixed(step.0), l.fixed(step.1)));
@@ -120,7 +127,7 @@ impl<'a> MipLevels<'a> {
         let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)) as f32;
         // Larger levels are not used.
         let last = |size: u32| (size.clamp(1, 1 << 15) - 1) << 15;
-        let size = |image: &'a Raster<[u8; 3]>| MipLevel {
+        let level = |image: &'a Raster<[u8; 3]>| MipLevel {
             image,
             texels: Texels::new(image.pixels().as_flattened(), image.width() as i32 * 3),
             right: last(image.width()),
@@ -128,7 +135,7 @@ impl<'a> MipLevels<'a> {
             x: ratio(image.width(), full.image.width()),
             y: ratio(image.height(), full.image.height()),
         };
-        Self { wrap: full.wrap, levels: std::iter::once(&full.image).chain(reductions).map(size).collect() }
+        Self { wrap: full.wrap, levels: std::iter::once(&full.image).chain(reductions).map(level).collect() }
     }
 
     /// Whether places in it fit the numbers here.
@@ -142,18 +149,18 @@ impl<'a> MipLevels<'a> {
     /// How coordinates in pixels of the full size repeat.
     pub(crate) fn wraps(&self) -> [TexelWrap; 3] {
         let image = self.levels[0].image;
-        let fold = |wrap, size: u32| match wrap {
+        let texel_wrap = |wrap, size: u32| match wrap {
             Wrap::Repeat => TexelWrap::repeat(f64::from(size)),
             Wrap::Mirror => TexelWrap::mirror(f64::from(size)),
             Wrap::Clamp => TexelWrap::NONE,
         };
-        [fold(self.wrap[0], image.width()), fold(self.wrap[1], image.height()), TexelWrap::NONE]
+        [texel_wrap(self.wrap[0], image.width()), texel_wrap(self.wrap[1], image.height()), TexelWrap::NONE]
     }
 
-    /// The colours of those of the eight pixels from `i` on that are among `these`, from at most `most` samples each. Of
-    /// these, those that are not among `maybe` have footprints that are not wide.
+    /// The colours of those of the eight pixels from `i` on that are among `these`, from at most `most`
+    /// samples each. Of these, those that are not among `maybe` have footprints that are not wide.
     #[inline(always)]
-    pub(crate) fn colors<L: Lanes>(
+    pub(crate) fn colors<L: ShadeLanes>(
         &self,
         l: L,
         footprints: &Footprints,
@@ -194,7 +201,7 @@ impl<'a> MipLevels<'a> {
                 let part = l.div(one, count);
                 let step = l.mul(stretch, part);
                 let (level, fraction) = l.log2(width);
-                // Beyond the last size there is the last.
+                // Beyond the last level there is the last.
                 let last = (self.levels.len() - 1) as f32;
                 let past = l.sub(level, l.splat(last));
                 let fraction = l.select_by_sign(past, fraction, zero);
@@ -216,14 +223,14 @@ impl<'a> MipLevels<'a> {
     }
 
     #[inline(always)]
-    fn magnified<L: Lanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
-        let (size, half, zero) = (&self.levels[0], l.splat(0.5), l.splat(0.0));
+    fn magnified<L: ShadeLanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
+        let (level, half, zero) = (&self.levels[0], l.splat(0.5), l.splat(0.0));
         let walk = TapWalk::at(l, (l.sub(x, half), l.sub(y, half)), (zero, zero));
-        l.pixels(self.add(l, l.zero_sum(), size, &walk, zero, l.full_weights(), these))
+        l.pixels(self.add(l, l.zero_sum(), level, &walk, zero, l.full_weights(), these))
     }
 
     #[inline(always)]
-    fn filtered<L: Lanes>(&self, l: L, x: L::F, y: L::F, taps: &Taps<L::F>, these: u32) -> L::ColorSum {
+    fn filtered<L: ShadeLanes>(&self, l: L, x: L::F, y: L::F, taps: &Taps<L::F>, these: u32) -> L::ColorSum {
         let Taps { level, weight, next_weight, count, step_x, step_y } = *taps;
         let (zero, half, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
         let middle = l.mul(half, l.sub(count, one));
@@ -239,7 +246,8 @@ impl<'a> MipLevels<'a> {
             && l.greater(l.splat(-1.0), next_weight) & these != 0
             && let Some([this, next]) = self.levels.get(at as usize..).and_then(<[_]>::first_chunk)
         {
-            // The same two levels for all, as mostly: both in one loop, of which nobody can foretell when it ends.
+            // The same two levels for all, as mostly: both in one loop, of which nobody can foretell when it
+            // ends.
             let (mut a, mut b) = (TapWalk::new(l, this, first, step), TapWalk::new(l, next, first, step));
             let (weights, next_weights) = (l.weights(weight), l.weights(next_weight));
             let (mut active, mut tap) = (these, zero);
@@ -253,7 +261,7 @@ impl<'a> MipLevels<'a> {
             }
             return sum;
         }
-        // MipLevel after size, each for the pixels that need it.
+        // Level after level, each for the pixels that need it.
         let mut left = these;
         let mut at = zero;
         for of in &self.levels {
@@ -277,10 +285,11 @@ impl<'a> MipLevels<'a> {
         sum
     }
 
-    /// `sum` and the weighted bilinear colours at those of the places that are among `these`, after `tap` steps of the walk.
+    /// `sum` and the weighted bilinear colours at those of the places that are among `these`, after `tap`
+    /// steps of the walk.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "all of them in registers")]
-    fn add<L: Lanes>(
+    fn add<L: ShadeLanes>(
         &self,
         l: L,
         sum: L::ColorSum,
@@ -309,8 +318,8 @@ impl<'a> MipLevels<'a> {
         l.add_weighted(sum, l.quads_from(&places.upper, &places.lower), corners)
     }
 
-    /// Reads what is at those of the places that are among `these`; of them, those among `inside` are not at the image's
-    /// edge.
+    /// Reads what is at those of the places that are among `these`; of them, those among `inside` are not at
+    /// the image's edge.
     #[cold]
     #[inline(never)]
     fn read_singly(

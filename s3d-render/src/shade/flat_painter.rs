@@ -1,7 +1,7 @@
 //! Images that have one value all over a face, painted span by span.
 
 use crate::shade::spans::Spans;
-use crate::simd::lanes::{COLOR_BLOCK, LANES, Lanes};
+use crate::simd::shade_lanes::{COLOR_BLOCK, LANES, ShadeLanes};
 use s3d_geom::TriMesh;
 
 /// `N` such images of a view, painted band by band.
@@ -22,11 +22,12 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> FlatPainter<
         self.colors.truncate(1);
     }
 
-    /// Paints a band: `out` is its part of each image. What `values` look at in `mesh`, if given, is fetched from memory.
+    /// Paints a band: `out` is its part of each image. What `values` look at in `mesh`, if given, is fetched
+    /// from memory.
     #[inline(always)]
     pub(crate) fn band(
         &mut self,
-        lanes: impl Lanes,
+        lanes: impl ShadeLanes,
         mesh: Option<&TriMesh>,
         spans: &Spans,
         mut out: [&mut [[u8; 3]]; N],
@@ -54,11 +55,11 @@ fn packed([r, g, b]: [u8; 3]) -> u32 {
     u32::from_le_bytes([r, g, b, 0])
 }
 
-/// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow: no more pixels than
-/// a block has.
+/// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow: no
+/// more pixels than a block has.
 #[inline(always)]
 fn fill<const N: usize>(
-    lanes: impl Lanes,
+    lanes: impl ShadeLanes,
     images: &mut [&mut [[u8; 3]]; N],
     start: usize,
     end: usize,

@@ -1,4 +1,4 @@
-//! Textures at every size that a pixel may need.
+//! Textures and their mip maps: every size that a pixel may need.
 
 use crate::shade::filter::MipLevels;
 use glam::{DVec2, Vec2};
@@ -8,8 +8,8 @@ use s3d_geom::{Raster, Texture, TriMesh, Wrap, sample_bilinear};
 /// How [`crate::rgb_image`] reads textures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TextureFilter {
-    /// The most samples along a pixel's footprint where a texture is seen at an angle; 1 blurs there, 8 is sharp up to
-    /// 83°. At least 1.
+    /// The most samples along a pixel's footprint where a texture is seen at an angle; 1 blurs there, 8 is
+    /// sharp up to 83°. At least 1.
     pub max_taps: u32,
 }
 
@@ -19,8 +19,36 @@ impl Default for TextureFilter {
     }
 }
 
-/// The textures of a mesh, each with its reductions to half, a quarter… down to one pixel: a third more memory. The
-/// full size stays in the mesh.
+/// The textures of a mesh, each with its reductions to half, a quarter… down to one pixel: a third more
+/// memory. The full size stays in the mesh.
+///
+/// ```
+/// use s3d_geom::glam::{DVec3, vec2, vec3};
+/// use s3d_geom::{Camera, Material, MeshParts, Pose, Raster, Texture, TriMesh, Wrap};
+/// use s3d_render::{MipMaps, Scene, cast, rgb_image};
+///
+/// // A wall 2 m ahead, with a chequered texture of 8 × 8.
+/// let chequers = (0..64).map(|k| [if (k + k / 8) % 2 == 0 { 50 } else { 150 }; 3]);
+/// let image = Raster::from_vec(8, 8, chequers.collect());
+/// let mesh = TriMesh::new(MeshParts {
+///     positions: vec![vec3(-9.0, 2.0, -9.0), vec3(9.0, 2.0, -9.0), vec3(0.0, 2.0, 18.0)],
+///     faces: vec![[0, 1, 2]],
+///     uvs: vec![vec2(0.0, 0.0), vec2(18.0, 0.0), vec2(9.0, 27.0)], // a metre wide each
+///     face_uvs: vec![[0, 1, 2]],
+///     materials: vec![Material { name: "wall".into(), color: [0; 3], texture: Some(0) }],
+///     face_materials: vec![0],
+///     textures: vec![Texture { name: "chequers".into(), image, wrap: [Wrap::Repeat; 2] }],
+///     ..MeshParts::default()
+/// })?;
+/// let mip_maps = MipMaps::new(&mesh);
+/// assert_eq!(mip_maps.bytes(), 3 * (4 * 4 + 2 * 2 + 1));
+///
+/// // Seen in few pixels the chequers are their mean.
+/// let (scene, camera) = (Scene::new(&mesh), Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 1.2, 5, 5));
+/// let rgb = rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
+/// assert_eq!(rgb.at(2, 2), [100; 3]);
+/// # Ok::<(), s3d_geom::MeshError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct MipMaps {
     /// By texture of the mesh; the first reduction is to half size.
@@ -54,8 +82,9 @@ impl MipMaps {
     }
 }
 
-/// The image at half the size, each pixel the mean of the area it covers; `None` if it is one pixel. An odd size is cut
-/// into equal parts too, so that coordinates keep their meaning: these parts take shares of pixels.
+/// The image at half the size, each pixel the mean of the area it covers; `None` if it is one pixel. An odd
+/// size is cut into equal parts too, so that coordinates keep their meaning: these parts take shares of
+/// pixels.
 pub(crate) fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
     let (w, h) = (image.width(), image.height());
     if w <= 1 && h <= 1 {
@@ -81,7 +110,8 @@ pub(crate) fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
     Some(Raster::from_vec(columns.len() as u32, rows.len() as u32, pixels.collect()))
 }
 
-/// The pixels along an axis whose mean is one pixel of half as many: up to three, with weights that add up to 1.
+/// The pixels along an axis whose mean is one pixel of half as many: up to three, with weights that add up to
+/// 1.
 struct Share {
     first: u32,
     weights: [f32; 3],
@@ -113,9 +143,10 @@ impl<'a> MipMap<'a> {
         Self { full, reductions }
     }
 
-    /// The colour at `uv`, 0 to 255 a channel, over the footprint of a pixel: the parallelogram whose sides are `x` and
-    /// `y`, in texture coordinates. Where the texture is magnified, the bilinear colour of the full size; else the mean
-    /// of samples along the footprint's long axis from the size at which its short axis is one pixel.
+    /// The colour at `uv`, 0 to 255 a channel, over the footprint of a pixel: the parallelogram whose sides
+    /// are `x` and `y`, in texture coordinates. Where the texture is magnified, the bilinear colour of the
+    /// full size; else the mean of samples along the footprint's long axis from the size at which its short
+    /// axis is one pixel.
     #[inline(always)]
     pub(crate) fn sample(&self, uv: DVec2, x: DVec2, y: DVec2, filter: &TextureFilter) -> [f32; 3] {
         let size = DVec2::new(f64::from(self.full.image.width()), f64::from(self.full.image.height()));
@@ -160,8 +191,8 @@ impl<'a> MipMap<'a> {
     }
 }
 
-/// How to sample the footprint with the sides `x` and `y`, in pixels: along which long axis, how wide each sample is
-/// (at least 1), and how many there are.
+/// How to sample the footprint with the sides `x` and `y`, in pixels: along which long axis, how wide each
+/// sample is (at least 1), and how many there are.
 #[inline(always)]
 fn taps(x: Vec2, y: Vec2, most: u32) -> (Vec2, f32, u32) {
     // The long axis is no longer than the root of this sum.
@@ -200,8 +231,8 @@ fn axes(x: Vec2, y: Vec2) -> (Vec2, f32) {
     (axis * long, x.perp_dot(y).abs() / long)
 }
 
-/// A weighted sum of colours. Two neighbours in a row are added at once, as they lie in memory: R G B R G B and two
-/// bytes that get no weight.
+/// A weighted sum of colours. Two neighbours in a row are added at once, as they lie in memory: R G B R G B
+/// and two bytes that get no weight.
 #[derive(Clone, Copy, Default)]
 struct ColorSum([f32; 8]);
 
@@ -283,8 +314,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn pyramids_keep_the_mean_and_a_third_of_the_memory(w in 1u32..70, h in 1u32..70, seed in any::<u32>()) {
-            let full = image(w, h, |x, y| (x * 7919 + y * 104_729).wrapping_mul(seed | 1).rotate_left(9) as u8);
+        fn mip_maps_keep_the_mean_and_take_a_third_more(
+            w in 1u32..70, h in 1u32..70, seed in any::<u32>(),
+        ) {
+            let noise = |x: u32, y: u32| (x * 7919 + y * 104_729).wrapping_mul(seed | 1).rotate_left(9) as u8;
+            let full = image(w, h, noise);
             let levels: Vec<_> = std::iter::successors(halved(&full), halved).collect();
             let bytes: usize = levels.iter().map(Raster::len).sum();
             // Along a strip of one pixel levels add up to as much again.
@@ -300,7 +334,8 @@ mod tests {
             u in -3.0..3.0f32, v in -3.0..3.0f32, w in 1u32..9, h in 1u32..9,
             wrap in prop::sample::select(vec![Wrap::Repeat, Wrap::Mirror, Wrap::Clamp]),
         ) {
-            let full = Texture { name: "t".into(), image: image(w, h, |x, y| (x * 31 + y * 77) as u8), wrap: [wrap; 2] };
+            let image = image(w, h, |x: u32, y: u32| (x * 31 + y * 77) as u8);
+            let full = Texture { name: "t".into(), image, wrap: [wrap; 2] };
             let mip_map = MipMap { full: &full, reductions: &[] };
             let uv = vec2(u, v);
             let tiny = DVec2::splat(1e-9);
@@ -312,7 +347,9 @@ mod tests {
         }
 
         #[test]
-        fn axes_are_those_of_the_ellipse(x in prop::array::uniform2(-9.0..9.0f32), y in prop::array::uniform2(-9.0..9.0f32)) {
+        fn axes_are_those_of_the_ellipse(
+            x in prop::array::uniform2(-9.0..9.0f32), y in prop::array::uniform2(-9.0..9.0f32),
+        ) {
             let (x, y) = (Vec2::from(x), Vec2::from(y));
             let (major, minor) = axes(x, y);
             // The farthest point x cos a + y sin a of the ellipse, by trying.

@@ -1,11 +1,13 @@
-//! A face as a function of the ray's direction: where on it a ray arrives, and how fast that changes from ray to ray.
+//! A face as a function of the ray's direction: where on it a ray arrives, and how fast that changes from ray
+//! to ray.
 
 use crate::hits::NO_FACE;
 use glam::{DVec2, DVec3, Vec2};
 use s3d_geom::TriMesh;
 
-/// A face seen from an origin. The ray along d meets it at the corners' mean with the weights w(k)·d / Σ w(k)·d: these
-/// are ratios of linear functions of d, so any attribute and its change from pixel to pixel come in closed form.
+/// A face seen from an origin. The ray along d meets it at the corners' mean with the weights w(k)·d / Σ
+/// w(k)·d: these are ratios of linear functions of d, so any attribute and its change from pixel to pixel
+/// come in closed form.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
     /// The normals of the planes through the origin and the edge opposite to each corner.
@@ -80,8 +82,8 @@ impl UvPatch {
         }
     }
 
-    /// The coordinates where the ray along `d` arrives, and what a step of the direction by `dx` and by `dy` adds, to
-    /// first order.
+    /// The coordinates where the ray along `d` arrives, and what a step of the direction by `dx` and by `dy`
+    /// adds, to first order.
     #[inline(always)]
     pub(crate) fn at(&self, d: DVec3, dx: DVec3, dy: DVec3) -> (DVec2, DVec2, DVec2) {
         let scale = self.denominator.dot(d).recip();
@@ -89,13 +91,14 @@ impl UvPatch {
         let step =
             |s: DVec3| (DVec2::new(self.u.dot(s), self.v.dot(s)) - uv * self.denominator.dot(s)) * scale;
         let (x, y) = (step(dx), step(dy));
-        // `max` and `min` take a coordinate that is not a number (a face seen exactly edge-on) into the box, too.
+        // `max` and `min` take a coordinate that is not a number (a face seen exactly edge-on) into the box,
+        // too.
         (uv.max(self.min).min(self.max), x, y)
     }
 }
 
-/// Things prepared once a face, as long as no other face takes their place: the pixels of a face lie together, in one
-/// row after another.
+/// Things prepared once a face, as long as no other face takes their place: the pixels of a face lie
+/// together, in one row after another.
 pub(crate) struct FaceCache<T> {
     /// By place, which a face's index gives: the face, and where its thing is.
     places: Vec<(u32, u32)>,

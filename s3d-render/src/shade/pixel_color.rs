@@ -1,5 +1,5 @@
-//! The RGB image, a pixel at a time in `f64`: what the fast way is held against, and what it asks where its `f32` would
-//! not do.
+//! The RGB image, a pixel at a time in `f64`: what the fast way is held against, and what it asks where its
+//! `f32` would not do.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::scene::Scene;
@@ -9,9 +9,9 @@ use crate::shade::patch::{FaceCache, Patch, UvPatch};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, Projection, Raster, Rays};
 
-/// As [`crate::rgb_image_with`], one pixel at a time: the reference that tests and benches hold the fast one against.
-/// Channels differ by 1 at most, where rounding decides; but for the few pixels whose footprint is so near to the next
-/// number of samples that rounding decides how many there are.
+/// As [`crate::rgb_image_with`], one pixel at a time: the reference that tests and benches hold the fast one
+/// against. Channels differ by 1 at most, where rounding decides; but for the few pixels whose footprint is
+/// so near to the next number of samples that rounding decides how many there are.
 ///
 /// # Panics
 /// As [`crate::rgb_image`].
@@ -34,9 +34,9 @@ pub fn rgb_image_pixel_by_pixel(
     Raster::from_vec(hits.face.width(), hits.face.height(), out)
 }
 
-/// The colour that the ray of `camera` along `direction` sees on `face`, which it hits: for places between pixels, or rays
-/// of no image. `direction` is as [`Camera::direction`] gives it. Channels are those of [`rgb_image_pixel_by_pixel`] at a
-/// pixel's centre.
+/// The colour that the ray of `camera` along `direction` sees on `face`, which it hits: for places between
+/// pixels, or rays of no image. `direction` is as [`Camera::direction`] gives it. Channels are those of
+/// [`rgb_image_pixel_by_pixel`] at a pixel's centre.
 ///
 /// # Panics
 /// If there is no face `face`, or `mip_maps` are another mesh's.
@@ -168,8 +168,8 @@ impl RayDifferentials {
         match self {
             Self::Same(x, y) => (*x, *y),
             Self::Turn { rad_per_pixel, rows } => {
-                // Azimuth falls to the right and latitude falls downwards. d = (cos lat · a, sin lat), |a| = 1; rows
-                // are never at a pole, so cos lat > 0.
+                // Azimuth falls to the right and latitude falls downwards. d = (cos lat · a, sin lat), |a| =
+                // 1; rows are never at a pole, so cos lat > 0.
                 let (cos, sin) = rows[j];
                 let x = DVec3::new(d.y, -d.x, 0.0) * *rad_per_pixel;
                 let up = sin / cos;

@@ -2,13 +2,14 @@
 
 use crate::hits::Hits;
 use crate::shade::channels::{assert_size, fit};
-use crate::simd::lanes::{self, EightRays, LANES, LaneWork, Lanes};
+use crate::simd::shade_lanes::{EightRays, LANES, ShadeLanes};
+use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
 use half::f16;
 use s3d_geom::{Camera, Projection, Raster, Rays};
 
-/// The points that are seen, in world metres; (0, 0, 0) where nothing is. A point seen exactly at the world's origin
-/// cannot be told from a missing one: that is the format's, not ours.
+/// The points that are seen, in world metres; (0, 0, 0) where nothing is. A point seen exactly at the world's
+/// origin cannot be told from a missing one: that is the format's, not ours.
 ///
 /// # Panics
 /// If the hits are not of the camera's size.
@@ -27,8 +28,8 @@ pub fn xyz_image_into(hits: &Hits, camera: &Camera, out: &mut Raster<[f32; 3]>) 
     points(hits, camera, out);
 }
 
-/// As [`xyz_image`], rounded to half floats as the data set has them: steps of 1.6 cm at 20 m from the world's origin, 6.3 cm at
-/// 100 m. A point within 3e-8 m of the origin looks like a missing one.
+/// As [`xyz_image`], rounded to half floats as the data set has them: steps of 1.6 cm at 20 m from the
+/// world's origin, 6.3 cm at 100 m. A point within 3e-8 m of the origin looks like a missing one.
 ///
 /// # Panics
 /// If the hits are not of the camera's size.
@@ -50,14 +51,18 @@ pub fn xyz_image_half_into(hits: &Hits, camera: &Camera, out: &mut Raster<[f16; 
 /// A number type that coordinates are written in.
 pub(crate) trait Coordinate: Copy {
     const ZERO: Self;
-    /// [`Lanes::points`] in this type.
-    fn points<const PANORAMA: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]);
+    /// [`ShadeLanes::points`] in this type.
+    fn points<const PANORAMA: bool>(lanes: impl ShadeLanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]);
 }
 
 impl Coordinate for f32 {
     const ZERO: Self = 0.0;
     #[inline(always)]
-    fn points<const PANORAMA: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]) {
+    fn points<const PANORAMA: bool>(
+        lanes: impl ShadeLanes,
+        rays: &EightRays<'_>,
+        to: &mut [Self; 3 * LANES],
+    ) {
         lanes.points::<PANORAMA>(rays, to);
     }
 }
@@ -65,7 +70,11 @@ impl Coordinate for f32 {
 impl Coordinate for f16 {
     const ZERO: Self = f16::ZERO;
     #[inline(always)]
-    fn points<const PANORAMA: bool>(lanes: impl Lanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]) {
+    fn points<const PANORAMA: bool>(
+        lanes: impl ShadeLanes,
+        rays: &EightRays<'_>,
+        to: &mut [Self; 3 * LANES],
+    ) {
         lanes.half_points::<PANORAMA>(rays, to);
     }
 }
@@ -73,8 +82,8 @@ impl Coordinate for f16 {
 fn points<T: Coordinate>(hits: &Hits, camera: &Camera, out: &mut Raster<[T; 3]>) {
     assert_size(hits, camera);
     match camera.projection {
-        Projection::Perspective { .. } => lanes::run(PointKernel::<T, false> { hits, camera, out }),
-        Projection::Equirectangular => lanes::run(PointKernel::<T, true> { hits, camera, out }),
+        Projection::Perspective { .. } => dispatch(PointKernel::<T, false> { hits, camera, out }),
+        Projection::Equirectangular => dispatch(PointKernel::<T, true> { hits, camera, out }),
     }
 }
 
@@ -84,18 +93,20 @@ struct PointKernel<'a, T, const PANORAMA: bool> {
     out: &'a mut Raster<[T; 3]>,
 }
 
-impl<T: Coordinate, const PANORAMA: bool> LaneWork for PointKernel<'_, T, PANORAMA> {
+impl<T: Coordinate, const PANORAMA: bool> Kernel for PointKernel<'_, T, PANORAMA> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self, lanes: impl Lanes) {
+    fn run<S: Simd>(self, simd: S) {
+        let lanes = simd.shade();
         let directions = RayTable::new(self.camera);
         directions.points::<PANORAMA, T>(lanes, 0, self.hits.depth.pixels(), self.out.pixels_mut());
     }
 }
 
-/// The directions of an image's pixels. Each is made of a vector a column and one a row: their sum in a perspective view,
-/// their product axis by axis in a panorama (`PANORAMA`). That is what [`Rays::at`] gives, to the last bit.
+/// The directions of an image's pixels. Each is made of a vector a column and one a row: their sum in a
+/// perspective view, their product axis by axis in a panorama (`PANORAMA`). That is what [`Rays::at`] gives,
+/// to the last bit.
 pub(crate) struct RayTable {
     /// In groups; the last filled up.
     columns: Vec<[f64; 3 * LANES]>,
@@ -127,7 +138,7 @@ impl RayTable {
     #[inline(always)]
     pub(crate) fn points<const PANORAMA: bool, T: Coordinate>(
         &self,
-        lanes: impl Lanes,
+        lanes: impl ShadeLanes,
         first_row: usize,
         depths: &[f32],
         out: &mut [[T; 3]],

@@ -1,10 +1,10 @@
 //! What is read and written soon, fetched from memory while there is something to calculate.
 
-use crate::simd::lanes::Lanes;
+use crate::simd::shade_lanes::ShadeLanes;
 use half::f16;
 
-/// By pixel of a band, what is next in turn after its colours: the images that are painted afterwards, and hits and images
-/// of the next band. By default nothing.
+/// By pixel of a band, what is next in turn after its colours: the images that are painted afterwards, and
+/// hits and images of the next band. By default nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Prefetch<'a> {
     pub(crate) faces: &'a [u32],
@@ -21,7 +21,7 @@ impl Prefetch<'_> {
 
     /// Fetches what belongs to the pixels from `at` on.
     #[inline(always)]
-    pub(crate) fn fetch(&self, lanes: impl Lanes, at: usize) {
+    pub(crate) fn fetch(&self, lanes: impl ShadeLanes, at: usize) {
         prefetch(lanes, self.faces, at);
         prefetch(lanes, self.distances, at);
         prefetch(lanes, self.depth, at);
@@ -34,7 +34,7 @@ impl Prefetch<'_> {
 }
 
 #[inline(always)]
-fn prefetch<T>(lanes: impl Lanes, of: &[T], at: usize) {
+fn prefetch<T>(lanes: impl ShadeLanes, of: &[T], at: usize) {
     if let Some(some) = of.get(at..at + Prefetch::PIXELS) {
         for thing in some.iter().step_by(64 / size_of::<T>()) {
             lanes.prefetch(thing);

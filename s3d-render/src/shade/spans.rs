@@ -1,17 +1,17 @@
 //! The spans of equal faces in a band of rows.
 //!
-//! Images are made from hits a band at a time: its hits, and what is made of them, stay in the cache from one modality to
-//! the next, and its spans are found once for all that have something to do with faces.
+//! Images are made from hits a band at a time: its hits, and what is made of them, stay in the cache from one
+//! modality to the next, and its spans are found once for all that have something to do with faces.
 
 use crate::shade::face_table::{FaceTable, NewFace};
-use crate::simd::lanes::{LANES, Lanes};
+use crate::simd::shade_lanes::{LANES, ShadeLanes};
 use s3d_geom::TriMesh;
 
 /// Pixels of a band, about.
 const BAND: usize = 1 << 13;
 
-/// NewFace faces that are fetched from memory while as many are prepared.
-const AHEAD: usize = 4 * LANES;
+/// New faces that are fetched from memory while as many are prepared.
+const PREFETCHED: usize = 4 * LANES;
 
 /// How many rows make a band of an image so wide.
 pub(crate) fn band_rows(width: usize) -> usize {
@@ -54,9 +54,10 @@ impl Spans {
         }
     }
 
-    /// Finds the spans of the next band. Whether faces have forgotten their numbers, which then begin with 1 again.
+    /// Finds the spans of the next band. Whether faces have forgotten their numbers, which then begin with 1
+    /// again.
     #[inline(always)]
-    pub(crate) fn find(&mut self, lanes: impl Lanes, mesh: Option<&TriMesh>, faces: &[u32]) -> bool {
+    pub(crate) fn find(&mut self, lanes: impl ShadeLanes, mesh: Option<&TriMesh>, faces: &[u32]) -> bool {
         self.starts.clear();
         for (row, faces) in faces.chunks(self.width.max(1)).enumerate() {
             add_starts(lanes, faces, row * self.width, &mut self.starts);
@@ -67,15 +68,15 @@ impl Spans {
         forgotten
     }
 
-    /// All spans in pieces, one after another, and one more that begins where the last one ends. None reaches from row to
-    /// row.
+    /// All spans in pieces, one after another, and one more that begins where the last one ends. None reaches
+    /// from row to row.
     #[inline(always)]
     pub(crate) fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
-    /// Cuts the spans. A loop for each piece of a span ends when nobody can foretell: here it is out of the way of those that
-    /// have much to do.
+    /// Cuts the spans. A loop for each piece of a span ends when nobody can foretell: here it is out of the
+    /// way of those that have much to do.
     #[inline(always)]
     fn cut(&mut self) {
         const PIECE: u32 = LANES as u32;
@@ -102,23 +103,23 @@ impl Spans {
         self.new.len().div_ceil(LANES)
     }
 
-    /// A group of new faces, filled up with its last face, and how many of it count. To be asked for one after another:
-    /// what `mesh`, if any, has of those to come is fetched
-    /// meanwhile, colours included if that is asked.
+    /// A group of new faces, filled up with its last face, and how many of it count. To be asked for one
+    /// after another: what `mesh`, if any, has of those to come is fetched meanwhile, colours included if
+    /// that is asked.
     #[inline(always)]
     pub(crate) fn new_group<const COLORS: bool>(
         &self,
-        lanes: impl Lanes,
+        lanes: impl ShadeLanes,
         mesh: Option<&TriMesh>,
         k: usize,
     ) -> ([NewFace; LANES], usize) {
         let first = k * LANES;
         let new = &self.new[..];
         if let Some(mesh) = mesh
-            && first.is_multiple_of(AHEAD)
+            && first.is_multiple_of(PREFETCHED)
         {
-            let from = if first == 0 { 0 } else { (first + AHEAD).min(new.len()) };
-            NewFace::prefetch::<COLORS>(&new[from..(first + 2 * AHEAD).min(new.len())], lanes, mesh);
+            let from = if first == 0 { 0 } else { (first + PREFETCHED).min(new.len()) };
+            NewFace::prefetch::<COLORS>(&new[from..(first + 2 * PREFETCHED).min(new.len())], lanes, mesh);
         }
         let count = (new.len() - first).min(LANES);
         (std::array::from_fn(|n| new[first + n.min(count - 1)]), count)
@@ -127,7 +128,7 @@ impl Spans {
 
 /// Adds to `starts` where each span of equal values of a row starts, `from` being the row's first pixel.
 #[inline(always)]
-fn add_starts(lanes: impl Lanes, values: &[u32], from: usize, starts: &mut Vec<u32>) {
+fn add_starts(lanes: impl ShadeLanes, values: &[u32], from: usize, starts: &mut Vec<u32>) {
     if values.is_empty() {
         return;
     }
@@ -156,13 +157,13 @@ fn add_starts(lanes: impl Lanes, values: &[u32], from: usize, starts: &mut Vec<u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::lanes::Plain;
+    use crate::simd::shade_lanes::Plain;
     use proptest::prelude::*;
     use s3d_synth::scenes::scan_like;
 
     proptest! {
         #[test]
-        fn runs_cover_a_band_row_by_row(
+        fn spans_cover_a_band_row_by_row(
             width in 1usize..90,
             bands in prop::collection::vec(prop::collection::vec((0u32..50, 1usize..40), 1..60), 1..4),
         ) {
@@ -170,7 +171,8 @@ mod tests {
             let mut spans = Spans::new(width);
             let mut things = vec![crate::NO_FACE];
             for band in bands {
-                let mut faces: Vec<u32> = band.iter().flat_map(|&(face, n)| std::iter::repeat_n(face, n)).collect();
+                let pixels = band.iter().flat_map(|&(face, n)| std::iter::repeat_n(face, n));
+                let mut faces: Vec<u32> = pixels.collect();
                 faces.resize(faces.len().next_multiple_of(width), 7);
                 if spans.find(Plain, Some(&mesh), &faces) {
                     things.truncate(1);

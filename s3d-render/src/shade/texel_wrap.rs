@@ -1,6 +1,7 @@
-//! Coordinates that repeat, as those of textures do.
+//! Wrap modes of textures, for coordinates in texels.
 
-/// How an attribute repeats: every `period`; beyond `half` of it, it is mirrored.
+/// How a coordinate repeats: every `period`; beyond `half` of it, it is mirrored. Of no period where a
+/// texture is clamped, since coordinates are brought to its edge when it is read.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TexelWrap {
     pub(crate) divisor: f64,

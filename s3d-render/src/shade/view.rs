@@ -1,7 +1,7 @@
 //! All images of a view from its hits, in one walk.
 //!
-//! Band by band, so that hits and what belongs to their faces are in the cache for one modality after another. The images
-//! are those of the functions that make one each.
+//! Band by band, so that hits and what belongs to their faces are in the cache for one modality after
+//! another. The images are those of the functions that make one each.
 
 use crate::hits::Hits;
 use crate::scene::Scene;
@@ -15,7 +15,8 @@ use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::shade::points::RayTable;
 use crate::shade::prefetch::Prefetch;
 use crate::shade::spans::{Spans, band_rows};
-use crate::simd::lanes::{self, LANES, LaneWork, Lanes};
+use crate::simd::shade_lanes::{LANES, ShadeLanes};
+use crate::simd::{Kernel, Simd, dispatch};
 use half::f16;
 use s3d_geom::{Camera, NormalAxes, Raster};
 use std::ops::Range;
@@ -99,12 +100,12 @@ impl Default for FaceImages {
     }
 }
 
-/// Makes those of a view's images that are wanted, in less time than one after another. The others in `out` stay what they
-/// were; memory that has the right size already is used again.
+/// Makes those of a view's images that are wanted, in less time than one after another. The others in `out`
+/// stay what they were; memory that has the right size already is used again.
 ///
 /// # Panics
-/// If the hits are not of the camera's size, or `shading` is not for the faces that are seen: see [`crate::rgb_image`],
-/// [`crate::index_image`] and [`crate::color_per_face_image`].
+/// If the hits are not of the camera's size, or `shading` is not for the faces that are seen: see
+/// [`crate::rgb_image`], [`crate::index_image`] and [`crate::color_per_face_image`].
 pub fn view_images_into(
     shading: &Shading<'_>,
     hits: &Hits,
@@ -129,7 +130,7 @@ pub fn view_images_into(
     if wanted.xyz {
         fit(xyz, &hits.face, [f16::ZERO; 3]);
     }
-    lanes::run(ViewKernel { shading, hits, camera, wanted, out });
+    dispatch(ViewKernel { shading, hits, camera, wanted, out });
 }
 
 struct ViewKernel<'a> {
@@ -140,11 +141,12 @@ struct ViewKernel<'a> {
     out: &'a mut ViewImages,
 }
 
-impl LaneWork for ViewKernel<'_> {
+impl Kernel for ViewKernel<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self, lanes: impl Lanes) {
+    fn run<S: Simd>(self, simd: S) {
+        let lanes = simd.shade();
         let grid = RayGrid::new(self.camera);
         if grid.is_panorama() {
             self.bands::<true>(lanes, &grid);
@@ -156,7 +158,7 @@ impl LaneWork for ViewKernel<'_> {
 
 impl ViewKernel<'_> {
     #[inline(always)]
-    fn bands<const PANORAMA: bool>(self, lanes: impl Lanes, grid: &RayGrid) {
+    fn bands<const PANORAMA: bool>(self, lanes: impl ShadeLanes, grid: &RayGrid) {
         let Self { shading, hits, camera, wanted, out } = self;
         let &Shading { scene, mip_maps, ref filter, normal_axes, index_of_face, color_of_face } = shading;
         let ViewImages { rgb, depth, faces: FaceImages { normal, index, color }, xyz } = out;

@@ -1,8 +1,125 @@
-//! Wide registers.
+//! Wide registers: one choice of instructions for all kernels.
+//!
+//! A kernel is written once, over [`Simd`], and compiled for every level of instructions; [`dispatch`] runs
+//! it with the level that [`level::level`] has chosen. A level gives it registers for sixteen pixels of the
+//! visibility pass ([`RasterLanes`]) or for eight pixels to be shaded ([`ShadeLanes`]). All give the same
+//! bits: every operation is on integers or rounds once, as IEEE 754 says it must; products and sums are never
+//! fused.
+//!
+//! Where time counts, no closure with instructions goes to `map` of an array: that is compiled for any
+//! processor, and would be called.
+
+pub(crate) mod level;
+pub(crate) mod raster_lanes;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod raster_x86;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod shade_avx2;
+pub(crate) mod shade_lanes;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod shade_width;
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) mod avx2;
+use level::{Avx2, Avx512};
+use level::{Level, Scalar};
+use raster_lanes::{Portable, RasterLanes};
+use shade_lanes::{Plain, ShadeLanes};
+
+/// A level of instructions, as the proof that the processor has them.
+pub(crate) trait Simd: Copy {
+    type Raster: RasterLanes;
+    type Shade: ShadeLanes;
+
+    /// Registers of the visibility pass.
+    fn raster(self) -> Self::Raster;
+    /// Registers of what makes images from hits.
+    fn shade(self) -> Self::Shade;
+}
+
+impl Simd for Scalar {
+    type Raster = Portable<{ raster_lanes::LANES }>;
+    type Shade = Plain;
+
+    #[inline(always)]
+    fn raster(self) -> Self::Raster {
+        Portable
+    }
+    #[inline(always)]
+    fn shade(self) -> Self::Shade {
+        Plain
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
-pub(crate) mod blend;
-pub(crate) mod lanes;
-pub(crate) mod registers;
+impl Simd for Avx2 {
+    type Raster = raster_x86::Wide256<2>;
+    type Shade = shade_avx2::Eight<Self>;
+
+    #[inline(always)]
+    fn raster(self) -> Self::Raster {
+        raster_x86::Wide256(self)
+    }
+    #[inline(always)]
+    fn shade(self) -> Self::Shade {
+        shade_avx2::Eight(self)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Simd for Avx512 {
+    type Raster = raster_x86::Wide512;
+    type Shade = shade_avx2::Eight<Self>;
+
+    #[inline(always)]
+    fn raster(self) -> Self::Raster {
+        raster_x86::Wide512(self)
+    }
+    #[inline(always)]
+    fn shade(self) -> Self::Shade {
+        shade_avx2::Eight(self)
+    }
+}
+
+/// Work that is compiled for every level. `run` and what it calls in its loops are `#[inline(always)]`.
+pub(crate) trait Kernel {
+    type Output;
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
+}
+
+/// Runs a kernel with the instructions in use.
+#[inline]
+pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    dispatch_on(level::level(), kernel)
+}
+
+/// Runs a kernel with the instructions of a level.
+#[allow(unsafe_code)]
+pub(crate) fn dispatch_on<K: Kernel>(level: Level, kernel: K) -> K::Output {
+    match level {
+        Level::Scalar(simd) => kernel.run(simd),
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2(simd) => {
+            // SAFETY: `simd` is the proof that the processor has the features that the function enables.
+            unsafe { with_avx2(kernel, simd) }
+        }
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512(simd) => {
+            // SAFETY: as above.
+            unsafe { with_avx512(kernel, simd) }
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt")]
+fn with_avx2<K: Kernel>(kernel: K, simd: Avx2) -> K::Output {
+    kernel.run(simd)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(
+    enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vnni"
+)]
+fn with_avx512<K: Kernel>(kernel: K, simd: Avx512) -> K::Output {
+    kernel.run(simd)
+}

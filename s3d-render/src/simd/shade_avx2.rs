@@ -1,95 +1,56 @@
-//! [`Lanes`] by AVX2, without fused multiplications: their rounding is not every processor's.
+//! [`ShadeLanes`] by AVX2, and by AVX-512 where registers of 64 bytes do better.
 //!
-//! All that is unsafe here is to use these instructions, which [`Blend::detect`] asks for, and to load from and store to
-//! references of the right size.
+//! Every block that is unsafe here uses instructions of which `self` holds the proof, or loads from and
+//! stores to references that are as large as what is loaded or stored.
 #![allow(unsafe_code)]
 
-use crate::simd::blend::Blend;
-use crate::simd::lanes::{COLOR_BLOCK, EightRays, LANES, Lanes, Texels};
+use crate::simd::shade_lanes::{COLOR_BLOCK, EightRays, LANES, ShadeLanes, Texels};
+use crate::simd::shade_width::Width;
 use half::f16;
 use std::arch::x86_64::*;
 
-/// The processor has AVX2, F16C and the bit instructions that come with them, of which `B` is proof; and what `B` blends
-/// texels with.
+/// The proof of AVX2, and how wide the registers are in which it blends texels.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Avx2<B>(pub(crate) B);
+pub(crate) struct Eight<W>(pub(crate) W);
 
-// SAFETY of all blocks below: an `Avx2` exists only where the processor has the instructions; pointers are to references
-// as large as what is loaded or stored, and nothing asks for more than bytes' alignment.
-impl<B: Blend> Lanes for Avx2<B> {
+/// Operations on registers, which touch no memory.
+macro_rules! registers {
+    ($(fn $name:ident($($arg:ident: $type:ty),*) -> $out:ty = $body:expr;)*) => {$(
+        #[inline(always)]
+        fn $name(self, $($arg: $type),*) -> $out {
+            // SAFETY: `self` holds the proof that the processor has AVX2.
+            unsafe { $body }
+        }
+    )*};
+}
+
+impl<W: Width> ShadeLanes for Eight<W> {
     type F = __m256;
     type I = __m256i;
     /// To the right, then downwards.
     type Parts = __m256i;
     type Weights = __m128i;
-    type Corners = B::Corners;
-    type Quads = B::Quads;
-    type ColorSum = B::ColorSum;
+    type Corners = W::Corners;
+    type Quads = W::Quads;
+    type ColorSum = W::ColorSum;
 
-    #[inline(always)]
-    fn splat(self, value: f32) -> __m256 {
-        unsafe { _mm256_set1_ps(value) }
-    }
-    #[inline(always)]
-    fn load(self, from: &[f32; LANES]) -> __m256 {
-        unsafe { _mm256_loadu_ps(from.as_ptr()) }
-    }
-    #[inline(always)]
-    fn store(self, values: __m256, to: &mut [f32; LANES]) {
-        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), values) }
-    }
-    #[inline(always)]
-    fn add(self, a: __m256, b: __m256) -> __m256 {
-        unsafe { _mm256_add_ps(a, b) }
-    }
-    #[inline(always)]
-    fn sub(self, a: __m256, b: __m256) -> __m256 {
-        unsafe { _mm256_sub_ps(a, b) }
-    }
-    #[inline(always)]
-    fn mul(self, a: __m256, b: __m256) -> __m256 {
-        unsafe { _mm256_mul_ps(a, b) }
-    }
-    #[inline(always)]
-    fn div(self, a: __m256, b: __m256) -> __m256 {
-        unsafe { _mm256_div_ps(a, b) }
-    }
-    #[inline(always)]
-    fn sqrt(self, a: __m256) -> __m256 {
-        unsafe { _mm256_sqrt_ps(a) }
-    }
-    #[inline(always)]
-    fn min(self, a: __m256, b: __m256) -> __m256 {
-        unsafe { _mm256_min_ps(a, b) }
-    }
-    #[inline(always)]
-    fn max(self, a: __m256, b: __m256) -> __m256 {
-        unsafe { _mm256_max_ps(a, b) }
-    }
-    #[inline(always)]
-    fn select_by_sign(self, of: __m256, negative: __m256, positive: __m256) -> __m256 {
-        unsafe { _mm256_blendv_ps(positive, negative, of) }
-    }
-    #[inline(always)]
-    fn select(self, these: u32, yes: __m256, no: __m256) -> __m256 {
-        unsafe { _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(lanes_of(these))) }
-    }
-    #[inline(always)]
-    fn truncate(self, values: __m256) -> __m256 {
-        unsafe { _mm256_cvtepi32_ps(_mm256_cvttps_epi32(values)) }
-    }
-    #[inline(always)]
-    fn greater(self, a: __m256, b: __m256) -> u32 {
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(a, b)) as u32 }
-    }
-    #[inline(always)]
-    fn store_int(self, values: __m256, to: &mut [i32; LANES]) {
-        unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_cvttps_epi32(values)) }
-    }
-
-    #[inline(always)]
-    fn log2(self, values: __m256) -> (__m256, __m256) {
-        unsafe {
+    registers! {
+        fn splat(value: f32) -> __m256 = _mm256_set1_ps(value);
+        fn add(a: __m256, b: __m256) -> __m256 = _mm256_add_ps(a, b);
+        fn sub(a: __m256, b: __m256) -> __m256 = _mm256_sub_ps(a, b);
+        fn mul(a: __m256, b: __m256) -> __m256 = _mm256_mul_ps(a, b);
+        fn div(a: __m256, b: __m256) -> __m256 = _mm256_div_ps(a, b);
+        fn sqrt(a: __m256) -> __m256 = _mm256_sqrt_ps(a);
+        fn min(a: __m256, b: __m256) -> __m256 = _mm256_min_ps(a, b);
+        fn max(a: __m256, b: __m256) -> __m256 = _mm256_max_ps(a, b);
+        fn select_by_sign(of: __m256, negative: __m256, positive: __m256) -> __m256 =
+            _mm256_blendv_ps(positive, negative, of);
+        fn select(these: u32, yes: __m256, no: __m256) -> __m256 =
+            _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(lanes_of(these)));
+        fn truncate(values: __m256) -> __m256 = _mm256_cvtepi32_ps(_mm256_cvttps_epi32(values));
+        fn greater(a: __m256, b: __m256) -> u32 =
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(a, b)) as u32;
+        fn log2(values: __m256) -> (__m256, __m256) = {
             let bits = _mm256_castps_si256(values);
             let whole = _mm256_sub_epi32(_mm256_srli_epi32::<23>(bits), _mm256_set1_epi32(127));
             let digits = _mm256_and_si256(bits, _mm256_set1_epi32(0x007F_FFFF));
@@ -98,32 +59,17 @@ impl<B: Blend> Lanes for Avx2<B> {
             let parabola = _mm256_mul_ps(_mm256_sub_ps(_mm256_set1_ps(2.0), third), mantissa);
             let fraction = _mm256_sub_ps(parabola, _mm256_set1_ps(5.0 / 3.0));
             (_mm256_cvtepi32_ps(whole), _mm256_max_ps(fraction, _mm256_setzero_ps()))
-        }
-    }
-    #[inline(always)]
-    fn fixed(self, values: __m256) -> __m256i {
-        unsafe { _mm256_cvttps_epi32(_mm256_mul_ps(values, _mm256_set1_ps(32768.0))) }
-    }
-    #[inline(always)]
-    fn add_fixed(self, a: __m256i, b: __m256i) -> __m256i {
-        unsafe { _mm256_add_epi32(a, b) }
-    }
-    #[inline(always)]
-    fn store_fixed(self, values: __m256i, to: &mut [i32; LANES]) {
-        unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), values) }
-    }
-    #[inline(always)]
-    fn within(self, values: __m256i, end: u32) -> u32 {
-        unsafe {
+        };
+        fn fixed(values: __m256) -> __m256i =
+            _mm256_cvttps_epi32(_mm256_mul_ps(values, _mm256_set1_ps(32768.0)));
+        fn add_fixed(a: __m256i, b: __m256i) -> __m256i = _mm256_add_epi32(a, b);
+        fn within(values: __m256i, end: u32) -> u32 = {
             // What is negative is large without a sign.
             let most = _mm256_max_epu32(values, _mm256_set1_epi32(end as i32));
             let beyond = _mm256_cmpeq_epi32(most, values);
             !(_mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32) & 0xFF
-        }
-    }
-    #[inline(always)]
-    fn place(self, x: __m256i, y: __m256i, stride: i32, these: u32) -> (__m256i, __m256i) {
-        unsafe {
+        };
+        fn place(x: __m256i, y: __m256i, stride: i32, these: u32) -> (__m256i, __m256i) = {
             let rest = _mm256_set1_epi32(0x7FFF);
             // x of pixels 0 to 3, y of 0 to 3, then of 4 to 7.
             let parts = _mm256_packus_epi32(_mm256_and_si256(x, rest), _mm256_and_si256(y, rest));
@@ -132,14 +78,47 @@ impl<B: Blend> Lanes for Avx2<B> {
             let rows = _mm256_mullo_epi32(_mm256_srai_epi32::<15>(y), _mm256_set1_epi32(stride));
             let at = _mm256_and_si256(_mm256_add_epi32(rows, columns), lanes_of(these));
             (at, _mm256_permute4x64_epi64::<0b11_01_10_00>(parts))
-        }
+        };
+        fn weights(weights: __m256) -> __m128i = {
+            let whole = _mm256_cvttps_epi32(weights);
+            _mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256::<1>(whole))
+        };
+        fn masked(these: u32, weights: __m128i) -> __m128i = {
+            let bits = _mm_setr_epi16(1, 2, 4, 8, 16, 32, 64, 128);
+            let all = _mm_and_si128(_mm_set1_epi16(these as i16), bits);
+            _mm_and_si128(weights, _mm_cmpeq_epi16(all, bits))
+        };
+        fn full_weights() -> __m128i = _mm_set1_epi16(i16::MIN);
+    }
+
+    #[inline(always)]
+    fn load(self, from: &[f32; LANES]) -> __m256 {
+        // SAFETY: `self` holds the proof of AVX2; the array has eight values.
+        unsafe { _mm256_loadu_ps(from.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store(self, values: __m256, to: &mut [f32; LANES]) {
+        // SAFETY: as in `load`, for arrays of eight values.
+        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), values) }
+    }
+    #[inline(always)]
+    fn store_int(self, values: __m256, to: &mut [i32; LANES]) {
+        // SAFETY: as in `load`, for arrays of eight values.
+        unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_cvttps_epi32(values)) }
+    }
+    #[inline(always)]
+    fn store_fixed(self, values: __m256i, to: &mut [i32; LANES]) {
+        // SAFETY: as in `load`, for arrays of eight values.
+        unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), values) }
     }
     #[inline(always)]
     fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> __m256i {
+        // SAFETY: as in `load`, for arrays of eight values.
         unsafe { _mm256_set_m128i(_mm_loadu_si128(y.as_ptr().cast()), _mm_loadu_si128(x.as_ptr().cast())) }
     }
     #[inline(always)]
     fn store_parts(self, parts: __m256i, x: &mut [i16; LANES], y: &mut [i16; LANES]) {
+        // SAFETY: as in `load`, for arrays of eight values.
         unsafe {
             _mm_storeu_si128(x.as_mut_ptr().cast(), _mm256_castsi256_si128(parts));
             _mm_storeu_si128(y.as_mut_ptr().cast(), _mm256_extracti128_si256::<1>(parts));
@@ -150,7 +129,8 @@ impl<B: Blend> Lanes for Avx2<B> {
         if self.within(at, image.end()) != 0xFF {
             return None;
         }
-        // SAFETY: 0 ≤ at < end.
+        // SAFETY: all places are below `end`, from where on `Texels` does not promise eight bytes and eight
+        // more a row later.
         Some(unsafe { self.0.quads(image.bytes().as_ptr(), at, image.stride() as usize) })
     }
     #[inline(always)]
@@ -158,26 +138,8 @@ impl<B: Blend> Lanes for Avx2<B> {
         self.0.quads_from(upper, lower)
     }
     #[inline(always)]
-    fn weights(self, weights: __m256) -> __m128i {
-        unsafe {
-            let whole = _mm256_cvttps_epi32(weights);
-            _mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256::<1>(whole))
-        }
-    }
-    #[inline(always)]
-    fn masked(self, these: u32, weights: __m128i) -> __m128i {
-        unsafe {
-            let bits = _mm_setr_epi16(1, 2, 4, 8, 16, 32, 64, 128);
-            let all = _mm_and_si128(_mm_set1_epi16(these as i16), bits);
-            _mm_and_si128(weights, _mm_cmpeq_epi16(all, bits))
-        }
-    }
-    #[inline(always)]
-    fn full_weights(self) -> __m128i {
-        unsafe { _mm_set1_epi16(i16::MIN) }
-    }
-    #[inline(always)]
     fn corners(self, parts: __m256i, weights: __m128i) -> Self::Corners {
+        // SAFETY: `self` holds the proof of AVX2.
         unsafe {
             let lower = _mm_mulhrs_epi16(weights, _mm256_extracti128_si256::<1>(parts));
             let rows = _mm256_set_m128i(lower, _mm_sub_epi16(weights, lower));
@@ -197,6 +159,7 @@ impl<B: Blend> Lanes for Avx2<B> {
     }
     #[inline(always)]
     fn pixels(self, sum: Self::ColorSum) -> [u32; LANES] {
+        // SAFETY: `self` holds the proof of AVX2; the array has eight values.
         unsafe {
             let colors = self.0.bytes(sum);
             let black = _mm256_cmpeq_epi32(colors, _mm256_setzero_si256());
@@ -208,6 +171,7 @@ impl<B: Blend> Lanes for Avx2<B> {
     }
     #[inline(always)]
     fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]) {
+        // SAFETY: `self` holds the proof of AVX2; 32 bytes are loaded of 32, and 16 + 8 stored of 24.
         unsafe {
             let packed = _mm256_loadu_si256(packed.as_ptr().cast());
             let three = _mm_setr_epi8(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1);
@@ -219,6 +183,7 @@ impl<B: Blend> Lanes for Avx2<B> {
     }
     #[inline(always)]
     fn store_repeated(self, packed: u32, to: &mut [u8; COLOR_BLOCK]) {
+        // SAFETY: `self` holds the proof of AVX2; 32 bytes are stored of 32.
         unsafe {
             let three = _mm256_setr_epi8(
                 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, //
@@ -228,13 +193,14 @@ impl<B: Blend> Lanes for Avx2<B> {
             _mm256_storeu_si256(to.as_mut_ptr().cast(), bytes);
         }
     }
-
     #[inline(always)]
     fn prefetch<T>(self, thing: &T) {
+        // SAFETY: `self` holds the proof of AVX2, which comes with SSE; what is fetched is not looked at.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(thing).cast()) }
     }
     #[inline(always)]
     fn equal(self, values: &[u32; LANES], value: u32) -> u32 {
+        // SAFETY: as in `load`, for arrays of eight values.
         unsafe {
             let values = _mm256_loadu_si256(values.as_ptr().cast());
             let same = _mm256_cmpeq_epi32(values, _mm256_set1_epi32(value as i32));
@@ -247,6 +213,7 @@ impl<B: Blend> Lanes for Avx2<B> {
     }
     #[inline(always)]
     fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]) {
+        // SAFETY: as in `load`, for arrays of eight values.
         unsafe {
             let twice = _mm256_mul_ps(_mm256_loadu_ps(depths.as_ptr()), _mm256_set1_ps(1024.0));
             // `max` gives its second value where the first is not a number.
@@ -259,6 +226,7 @@ impl<B: Blend> Lanes for Avx2<B> {
     }
     #[inline(always)]
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
+        // SAFETY: `self` holds the proof of AVX2; three times eight numbers are stored of 24.
         unsafe {
             let points = self.0.points::<PANORAMA>(rays);
             for (k, eight) in points.iter().enumerate() {
@@ -268,6 +236,7 @@ impl<B: Blend> Lanes for Avx2<B> {
     }
     #[inline(always)]
     fn half_points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
+        // SAFETY: `self` holds the proof of F16C; three times eight numbers are stored of 24.
         unsafe {
             let points = self.0.points::<PANORAMA>(rays);
             for (k, eight) in points.iter().enumerate() {
@@ -278,46 +247,6 @@ impl<B: Blend> Lanes for Avx2<B> {
     }
 }
 
-/// By a byte: the numbers of the bits that are set, ascending, and zeros.
-static BITS: [[u8; 8]; 256] = {
-    let mut table = [[0; 8]; 256];
-    let mut byte = 0;
-    while byte < 256 {
-        let (mut bit, mut count) = (0, 0);
-        while bit < 8 {
-            if byte >> bit & 1 == 1 {
-                table[byte][count] = bit as u8;
-                count += 1;
-            }
-            bit += 1;
-        }
-        byte += 1;
-    }
-    table
-};
-
-/// See [`Lanes::changes`].
-#[inline]
-#[target_feature(enable = "avx2,popcnt")]
-pub(crate) fn changes(values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
-    let mut count = 0;
-    for first in [0, LANES] {
-        // SAFETY: loads and stores of eight values, from `first` + 1 ≤ 9 on and from `count` ≤ 8 on.
-        unsafe {
-            let before = _mm256_loadu_si256(values.as_ptr().add(first).cast());
-            let after = _mm256_loadu_si256(values.as_ptr().add(first + 1).cast());
-            let same = _mm256_cmpeq_epi32(before, after);
-            let changes = !(_mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32) & 0xFF;
-            let places = _mm_loadl_epi64(BITS[changes as usize].as_ptr().cast());
-            let from = _mm256_set1_epi32((from + first as u32) as i32);
-            let places = _mm256_add_epi32(_mm256_cvtepu8_epi32(places), from);
-            _mm256_storeu_si256(to.as_mut_ptr().add(count).cast(), places);
-            count += changes.count_ones() as usize;
-        }
-    }
-    count
-}
-
 /// All bits of the lanes of `these`.
 #[inline]
 #[target_feature(enable = "avx2")]
@@ -326,51 +255,11 @@ fn lanes_of(these: u32) -> __m256i {
     _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(these as i32), bits), bits)
 }
 
-/// See [`Blend::points`].
-#[inline]
-#[target_feature(enable = "avx2")]
-pub(crate) fn points<const PANORAMA: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
-    let EightRays { column, row, depths, place } = *rays;
-    // SAFETY: loads from references, of no more than they hold.
-    let load = |from: &[f64], k: usize| unsafe { _mm256_loadu_pd(from[4 * k..4 * k + 4].as_ptr()) };
-    let all = unsafe { _mm256_loadu_ps(depths.as_ptr()) };
-    let seen = _mm256_cmp_ps::<_CMP_LT_OQ>(
-        _mm256_andnot_ps(_mm256_set1_ps(-0.0), all),
-        _mm256_set1_ps(f32::INFINITY),
-    );
-    let mut out = [_mm_setzero_ps(); 6];
-    for half in 0..2 {
-        let (four, seen) = if half == 0 {
-            (_mm256_castps256_ps128(all), _mm256_castps256_ps128(seen))
-        } else {
-            (_mm256_extractf128_ps::<1>(all), _mm256_extractf128_ps::<1>(seen))
-        };
-        let depths = _mm256_cvtps_pd(four);
-        let times = [
-            _mm256_permute4x64_pd::<0b01_00_00_00>(depths),
-            _mm256_permute4x64_pd::<0b10_10_01_01>(depths),
-            _mm256_permute4x64_pd::<0b11_11_11_10>(depths),
-        ];
-        let masks = [
-            _mm_permute_ps::<0b01_00_00_00>(seen),
-            _mm_permute_ps::<0b10_10_01_01>(seen),
-            _mm_permute_ps::<0b11_11_11_10>(seen),
-        ];
-        for k in 0..3 {
-            let (column, row) = (load(column, 3 * half + k), load(row, k));
-            let direction = if PANORAMA { _mm256_mul_pd(column, row) } else { _mm256_add_pd(column, row) };
-            let point = _mm256_add_pd(load(place, k), _mm256_mul_pd(direction, times[k]));
-            out[3 * half + k] = _mm_and_ps(_mm256_cvtpd_ps(point), masks[k]);
-        }
-    }
-    [_mm256_set_m128(out[1], out[0]), _mm256_set_m128(out[3], out[2]), _mm256_set_m128(out[5], out[4])]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::blend::{Full, Half};
-    use crate::simd::lanes::Plain;
+    use crate::simd::level::{Avx2, Avx512};
+    use crate::simd::shade_lanes::Plain;
     use proptest::prelude::*;
 
     fn eight() -> impl Strategy<Value = [f32; LANES]> {
@@ -388,7 +277,7 @@ mod tests {
     }
 
     /// Sums of colours with weights, and without.
-    fn same_colors<L: Lanes>(
+    fn same_colors<L: ShadeLanes>(
         lanes: L,
         upper: &[u64; LANES],
         lower: &[u64; LANES],
@@ -417,7 +306,7 @@ mod tests {
     }
 
     /// What is read of an image.
-    fn same_quads<L: Lanes>(
+    fn same_quads<L: ShadeLanes>(
         lanes: L,
         image: &Texels<'_>,
         (at, parts): (L::I, L::Parts),
@@ -435,7 +324,7 @@ mod tests {
     }
 
     /// Points that are seen, and those in half floats.
-    fn same_points(lanes: impl Lanes, rays: &EightRays<'_>) -> Result<(), TestCaseError> {
+    fn same_points(lanes: impl ShadeLanes, rays: &EightRays<'_>) -> Result<(), TestCaseError> {
         let (mut got, mut want) = ([0.0; 24], [0.0; 24]);
         lanes.points::<false>(rays, &mut got);
         Plain.points::<false>(rays, &mut want);
@@ -450,7 +339,7 @@ mod tests {
     proptest! {
         #[test]
         fn numbers_are_those_of_plain_rust(a in eight(), b in eight(), c in eight()) {
-            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
+            let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
             let (x, y, z) = (avx2.load(&a), avx2.load(&b), avx2.load(&c));
             let mut got = [0.0; LANES];
             macro_rules! same {
@@ -490,12 +379,10 @@ mod tests {
             x in prop::array::uniform8(0i16..), y in prop::array::uniform8(0i16..),
             weights in prop::array::uniform8(-32768.0..=0.0f32), these in 0u32..256,
         ) {
-            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
-            if let Some(half) = Half::detect() {
-                same_colors(Avx2(half), &upper, &lower, (&x, &y), &weights, these)?;
-            }
-            if let Some(full) = Full::detect() {
-                same_colors(Avx2(full), &upper, &lower, (&x, &y), &weights, these)?;
+            let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
+            same_colors(avx2, &upper, &lower, (&x, &y), &weights, these)?;
+            if let Some(full) = Avx512::detect().map(Eight) {
+                same_colors(full, &upper, &lower, (&x, &y), &weights, these)?;
             }
             let packed = upper.map(|v| v as u32);
             let (mut got, mut want) = ([0; 3 * LANES], [0; 3 * LANES]);
@@ -513,7 +400,7 @@ mod tests {
             x in prop::array::uniform8(-2.0..12.0f32), y in prop::array::uniform8(-2.0..9.0f32),
             these in 0u32..256, bytes in prop::collection::vec(any::<u8>(), 0..400),
         ) {
-            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
+            let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
             let image = Texels::new(&bytes, 36);
             let (a, b) = (avx2.fixed(avx2.load(&x)), avx2.fixed(avx2.load(&y)));
             let (at, parts) = avx2.place(a, b, 36, these);
@@ -523,14 +410,14 @@ mod tests {
             avx2.store_parts(parts, &mut got.1.0, &mut got.1.1);
             prop_assert_eq!(got, plain);
             same_quads(avx2, &image, (at, parts), plain)?;
-            if let Some(full) = Full::detect().map(Avx2) {
+            if let Some(full) = Avx512::detect().map(Eight) {
                 same_quads(full, &image, full.place(a, b, 36, these), plain)?;
             }
         }
 
         #[test]
         fn whole_numbers_are_those_of_plain_rust(a in eight(), b in eight(), end in 0u32..=1 << 31) {
-            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
+            let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
             let (x, y) = (avx2.fixed(avx2.load(&a)), avx2.fixed(avx2.load(&b)));
             let (plain_x, plain_y) = (Plain.fixed(a), Plain.fixed(b));
             let (mut got, sum) = ([0; LANES], Plain.add_fixed(plain_x, plain_y));
@@ -545,13 +432,13 @@ mod tests {
 
         #[test]
         fn changes_are_those_of_plain_rust(values in prop::collection::vec(0u32..3, 17)) {
-            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
+            let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
             let window = std::array::from_fn(|k| values[k]);
             let (mut got, mut want) = ([0; 16], [0; 16]);
             let same = Plain.changes(&window, 70_000, &mut want);
             let some = avx2.changes(&window, 70_000, &mut got);
             prop_assert_eq!(&got[..some], &want[..same]);
-            if let Some(full) = Full::detect().map(Avx2) {
+            if let Some(full) = Avx512::detect().map(Eight) {
                 let some = full.changes(&window, 70_000, &mut got);
                 prop_assert_eq!(&got[..some], &want[..same]);
             }
@@ -564,12 +451,12 @@ mod tests {
             column in prop::array::uniform24(-2.0..2.0f64), row in prop::array::uniform3(-2.0..2.0f64),
             place in prop::array::uniform3(-100.0..100.0f64), depths in eight(),
         ) {
-            let Some(avx2) = Half::detect().map(Avx2) else { return Ok(()) };
+            let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
             let four = |a: [f64; 3]| std::array::from_fn(|k| a[k % 3]);
             let (row, place): ([f64; 12], [f64; 12]) = (four(row), four(place));
             let rays = EightRays { column: &column, row: &row, depths: &depths, place: &place };
             same_points(avx2, &rays)?;
-            if let Some(full) = Full::detect().map(Avx2) {
+            if let Some(full) = Avx512::detect().map(Eight) {
                 same_points(full, &rays)?;
             }
         }

@@ -1,9 +1,7 @@
-//! Eight pixels at a time, with the same bits on every processor.
+//! Eight pixels at a time, for what makes images from hits.
 //!
-//! [`Lanes`] names the few operations on eight values that images need. [`Plain`] has them in ordinary Rust, which defines
-//! what they give; `Avx2` (in `avx2.rs`, and `blend.rs` for textures) gives the
-//! same faster. Every operation is on integers or rounds once, as
-//! IEEE 754 says it must, so that no result depends on which of the two ran.
+//! [`ShadeLanes`] names the few operations on eight values that images need. [`Plain`] has them in plain
+//! Rust, which defines what they give; `shade_avx2.rs` and `shade_width.rs` have them by wide registers.
 
 use half::f16;
 
@@ -14,7 +12,7 @@ pub(crate) const LANES: usize = 8;
 pub(crate) const COLOR_BLOCK: usize = 32;
 
 /// Operations on eight values.
-pub(crate) trait Lanes: Copy {
+pub(crate) trait ShadeLanes: Copy {
     /// Eight `f32`.
     type F: Copy;
     /// Eight whole numbers; of coordinates in an image, in 32768ths of a pixel.
@@ -62,11 +60,11 @@ pub(crate) trait Lanes: Copy {
     fn store_fixed(self, values: Self::I, to: &mut [i32; LANES]);
     /// Bit k: whether 0 ≤ v < `end` in lane k; `end` is at most 2^31.
     fn within(self, values: Self::I, end: u32) -> u32;
-    /// Of the places (x, y) of an image whose rows are `stride` bytes: where the upper left pixel begins, and how far
-    /// beyond it the places are. The beginning of the image in lanes that are not among `these`; anything for places that
-    /// are not in an image of less than 2^15 columns, rows and 2^31 bytes.
+    /// Of the places (x, y) of an image whose rows are `stride` bytes: where the upper left pixel begins, and
+    /// how far beyond it the places are. The beginning of the image in lanes that are not among `these`;
+    /// anything for places that are not in an image of less than 2^15 columns, rows and 2^31 bytes.
     fn place(self, x: Self::I, y: Self::I, stride: i32, these: u32) -> (Self::I, Self::Parts);
-    /// What [`Lanes::place`] gives, from the 32768ths.
+    /// What [`ShadeLanes::place`] gives, from the 32768ths.
     fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> Self::Parts;
     /// The 32768ths.
     fn store_parts(self, parts: Self::Parts, x: &mut [i16; LANES], y: &mut [i16; LANES]);
@@ -80,8 +78,8 @@ pub(crate) trait Lanes: Copy {
     fn masked(self, these: u32, weights: Self::Weights) -> Self::Weights;
     /// Weights of 1.
     fn full_weights(self) -> Self::Weights;
-    /// Weights shared out to the 2 × 2 pixels around places, downwards and then to the right, by [`part`]: each is off by
-    /// at most 1, and together they are what was shared out.
+    /// Weights shared out to the 2 × 2 pixels around places, downwards and then to the right, by [`part`]:
+    /// each is off by at most 1, and together they are what was shared out.
     fn corners(self, parts: Self::Parts, weights: Self::Weights) -> Self::Corners;
     /// No colour.
     fn zero_sum(self) -> Self::ColorSum;
@@ -98,14 +96,14 @@ pub(crate) trait Lanes: Copy {
     fn prefetch<T>(self, thing: &T);
     /// Bit k: whether `values[k]` is `value`.
     fn equal(self, values: &[u32; LANES], value: u32) -> u32;
-    /// Where a value differs from the one before it, ascending, as `from` and the number of values in between: how many
-    /// places that are. They are at the beginning of `to`; the rest there is anything.
+    /// Where a value differs from the one before it, ascending, as `from` and the number of values in
+    /// between: how many places that are. They are at the beginning of `to`; the rest there is anything.
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
     /// Depths in 512ths, rounded half up, at most 65,535.
     fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]);
     /// Points place + direction × depth, rounded to `f32`; `PANORAMA` says how a direction is made.
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]);
-    /// As [`Lanes::points`], rounded once more to half floats.
+    /// As [`ShadeLanes::points`], rounded once more to half floats.
     fn half_points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]);
 }
 
@@ -136,7 +134,8 @@ impl<'a> Texels<'a> {
         self.stride
     }
 
-    /// From every place before this one on there are eight bytes, and eight more a `stride` later. Less than 2^31.
+    /// From every place before this one on there are eight bytes, and eight more a `stride` later. Less than
+    /// 2^31.
     #[inline(always)]
     pub(crate) fn end(&self) -> u32 {
         self.end
@@ -162,28 +161,6 @@ pub(crate) fn part(a: i16, b: i16) -> i16 {
     ((i32::from(a) * i32::from(b) + 0x4000) >> 15) as i16
 }
 
-/// Work that is compiled once for every set of instructions. `run` and what it calls in its loops are
-/// `#[inline(always)]`.
-pub(crate) trait LaneWork {
-    type Output;
-    fn run(self, lanes: impl Lanes) -> Self::Output;
-}
-
-/// Does `work` with the widest registers of the processor.
-pub(crate) fn run<W: LaneWork>(work: W) -> W::Output {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use crate::simd::blend::{Blend, Full, Half};
-        if let Some(full) = Full::detect() {
-            return full.run(work);
-        }
-        if let Some(half) = Half::detect() {
-            return half.run(work);
-        }
-    }
-    work.run(Plain)
-}
-
 /// Ordinary Rust.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain;
@@ -195,7 +172,7 @@ fn each(f: impl FnMut(usize) -> f32) -> Eight {
     std::array::from_fn(f)
 }
 
-impl Lanes for Plain {
+impl ShadeLanes for Plain {
     type F = Eight;
     type I = [i32; LANES];
     type Parts = ([i16; LANES], [i16; LANES]);
@@ -429,7 +406,7 @@ impl Lanes for Plain {
 
 /// The eight values from the `at`th on; 0 if there are not as many.
 #[inline(always)]
-pub(crate) fn eight<L: Lanes>(lanes: L, of: &[f32], at: usize) -> L::F {
+pub(crate) fn eight<L: ShadeLanes>(lanes: L, of: &[f32], at: usize) -> L::F {
     match of[at..].first_chunk() {
         Some(values) => lanes.load(values),
         None => lanes.splat(0.0),
@@ -438,7 +415,7 @@ pub(crate) fn eight<L: Lanes>(lanes: L, of: &[f32], at: usize) -> L::F {
 
 /// Stores eight values from the `at`th on, if there are as many.
 #[inline(always)]
-pub(crate) fn put<L: Lanes>(lanes: L, to: &mut [f32], at: usize, values: L::F) {
+pub(crate) fn put<L: ShadeLanes>(lanes: L, to: &mut [f32], at: usize, values: L::F) {
     if let Some(to) = to[at..].first_chunk_mut() {
         lanes.store(values, to);
     }

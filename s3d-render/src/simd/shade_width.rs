@@ -1,18 +1,19 @@
-//! What [`Avx2`] does with textures, in registers of 32 and of 64 bytes.
+//! What [`Eight`](crate::simd::shade_avx2::Eight) does in registers of 32 and of 64 bytes.
 //!
-//! A place's 2 × 2 pixels are in 128 bits, the two neighbours of the upper row in the first half and those of the lower row in
-//! the second: one instruction multiplies neighbours by their weights and adds the two, for all channels.
+//! A place's 2 × 2 pixels are in 128 bits, the two neighbours of the upper row in the first half and those of
+//! the lower row in the second: one instruction multiplies neighbours by their weights and adds the two, for
+//! all channels.
 //!
-//! All that is unsafe here is, as in `avx2.rs`, to use these instructions, which [`Blend::detect`] asks for, and to load
-//! from places of an image that were compared with its end.
+//! Every block that is unsafe here uses instructions of which `self` is the proof, loads from or stores to
+//! references that are as large, or loads from places of an image that were compared with its end.
 #![allow(unsafe_code)]
 
-use crate::simd::avx2::{self, Avx2};
-use crate::simd::lanes::{EightRays, LANES, LaneWork};
+use crate::simd::level::{Avx2, Avx512};
+use crate::simd::shade_lanes::{EightRays, LANES};
 use std::arch::x86_64::*;
 
-/// The widest registers that hold texels. Its values are proof that the processor has what they take.
-pub(crate) trait Blend: Copy {
+/// The widest registers that hold texels, as the proof that the processor has them.
+pub(crate) trait Width: Copy {
     /// The weights of the 2 × 2 pixels of eight places.
     type Corners: Copy;
     /// The 2 × 2 pixels.
@@ -20,11 +21,8 @@ pub(crate) trait Blend: Copy {
     /// Weighted sums.
     type ColorSum: Copy;
 
-    fn detect() -> Option<Self>;
-    /// Does `work`, compiled for these instructions throughout.
-    fn run<W: LaneWork>(self, work: W) -> W::Output;
-    /// Of the weights of neighbours in a row: those of pixels 0 to 3 in the upper and then in the lower row, and those of
-    /// pixels 4 to 7.
+    /// Of the weights of neighbours in a row: those of pixels 0 to 3 in the upper and then in the lower row,
+    /// and those of pixels 4 to 7.
     fn corners(self, low: __m256i, high: __m256i) -> Self::Corners;
     /// # Safety
     /// At every place, and `stride` bytes after it, are eight bytes.
@@ -34,9 +32,9 @@ pub(crate) trait Blend: Copy {
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum;
     /// R, G, B and 0, rounded to bytes.
     fn bytes(self, sum: Self::ColorSum) -> __m256i;
-    /// See [`crate::simd::lanes::Lanes::changes`].
+    /// See [`crate::simd::shade_lanes::ShadeLanes::changes`].
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
-    /// What [`crate::simd::lanes::Lanes::points`] stores.
+    /// What [`crate::simd::shade_lanes::ShadeLanes::points`] stores.
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>) -> [__m256; 3];
 }
 
@@ -49,15 +47,17 @@ const NEIGHBORS: [[i8; 16]; 2] = [
 /// The 2 × 2 pixels of each place.
 ///
 /// # Safety
-/// At every place, and `stride` bytes after it, are eight bytes.
+/// The processor has AVX2. At every place, and `stride` bytes after it, are eight bytes.
 #[inline(always)]
 unsafe fn pairs(bytes: *const u8, at: __m256i, stride: usize) -> [__m128i; LANES] {
+    // SAFETY: the caller's word; eight values are stored in an array of eight.
     unsafe {
         let (mut each, below) = ([0u32; LANES], bytes.add(stride));
         _mm256_storeu_si256(each.as_mut_ptr().cast(), at);
         let mut pairs = [_mm_setzero_si128(); LANES];
         for k in 0..LANES {
-            // Volatile, since compilers would rather take `at` apart than load from where it was stored: twice the work.
+            // Volatile, since compilers would rather take `at` apart than load from where it was stored:
+            // twice the work.
             let at = std::ptr::read_volatile(&each[k]) as usize;
             let (upper, lower) = (bytes.add(at).cast::<f64>(), below.add(at).cast::<f64>());
             pairs[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_load_sd(upper), lower));
@@ -67,40 +67,22 @@ unsafe fn pairs(bytes: *const u8, at: __m256i, stride: usize) -> [__m128i; LANES
 }
 
 /// 32 bytes: pixels k and k + 4 a register.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Half(());
-
-// SAFETY of all blocks below: a `Half` exists only where the processor has AVX2, a `Full` only where it has AVX-512 too.
-impl Blend for Half {
+impl Width for Avx2 {
     /// Of the upper neighbours, as pixels in a register, and of the lower ones.
     type Corners = [__m256i; 2];
     type Quads = [__m256i; 4];
     type ColorSum = [__m256i; 4];
 
-    fn detect() -> Option<Self> {
-        (is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("f16c")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("popcnt"))
-        .then_some(Self(()))
-    }
-    fn run<W: LaneWork>(self, work: W) -> W::Output {
-        #[target_feature(enable = "avx2,f16c,bmi1,bmi2,popcnt")]
-        fn with_avx2<W: LaneWork>(work: W, lanes: Avx2<Half>) -> W::Output {
-            work.run(lanes)
-        }
-        // SAFETY: the processor has these instructions, or there were no `self`.
-        unsafe { with_avx2(work, Avx2(self)) }
-    }
     #[inline(always)]
     fn corners(self, low: __m256i, high: __m256i) -> Self::Corners {
+        // SAFETY: `self` is the proof of AVX2.
         unsafe {
             [_mm256_permute2x128_si256::<0x20>(low, high), _mm256_permute2x128_si256::<0x31>(low, high)]
         }
     }
     #[inline(always)]
     unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads {
+        // SAFETY: `self` is the proof of AVX2. What is around the places is the caller's word.
         unsafe {
             let pairs = pairs(bytes, at, stride);
             let mut quads = [_mm256_setzero_si256(); 4];
@@ -112,6 +94,7 @@ impl Blend for Half {
     }
     #[inline(always)]
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
+        // SAFETY: `self` is the proof of AVX2.
         unsafe {
             let mut quads = [_mm256_setzero_si256(); 4];
             for k in 0..4 {
@@ -123,10 +106,12 @@ impl Blend for Half {
     }
     #[inline(always)]
     fn none(self) -> Self::ColorSum {
+        // SAFETY: `self` is the proof of AVX2.
         unsafe { [_mm256_setzero_si256(); 4] }
     }
     #[inline(always)]
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
+        // SAFETY: `self` is the proof of AVX2. Sixteen bytes are loaded of sixteen.
         unsafe {
             let mut sum = sum;
             for (neighbors, corners) in NEIGHBORS.iter().zip(corners) {
@@ -147,6 +132,7 @@ impl Blend for Half {
     }
     #[inline(always)]
     fn bytes(self, sum: Self::ColorSum) -> __m256i {
+        // SAFETY: `self` is the proof of AVX2.
         unsafe {
             let half = _mm256_set1_epi32(0x4000);
             let mut whole = sum;
@@ -159,43 +145,26 @@ impl Blend for Half {
     }
     #[inline(always)]
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
-        unsafe { avx2::changes(values, from, to) }
+        // SAFETY: `self` is the proof of AVX2.
+        unsafe { changes_by_eights(values, from, to) }
     }
     #[inline(always)]
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
-        unsafe { avx2::points::<PANORAMA>(rays) }
+        // SAFETY: `self` is the proof of AVX2.
+        unsafe { points_by_fours::<PANORAMA>(rays) }
     }
 }
 
 /// 64 bytes: pixels 0 to 3 a register, and 4 to 7.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Full(());
-
-impl Blend for Full {
+impl Width for Avx512 {
     /// By register, of the upper neighbours and of the lower ones.
     type Corners = [[__m512i; 2]; 2];
     type Quads = [__m512i; 2];
     type ColorSum = [__m512i; 2];
 
-    fn detect() -> Option<Self> {
-        (Half::detect().is_some()
-            && is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512bw")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl")
-            && is_x86_feature_detected!("avx512vnni"))
-        .then_some(Self(()))
-    }
-    fn run<W: LaneWork>(self, work: W) -> W::Output {
-        #[target_feature(enable = "avx2,f16c,bmi1,bmi2,popcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vnni")]
-        fn with_avx512<W: LaneWork>(work: W, lanes: Avx2<Full>) -> W::Output {
-            work.run(lanes)
-        }
-        // SAFETY: the processor has these instructions, or there were no `self`.
-        unsafe { with_avx512(work, Avx2(self)) }
-    }
     #[inline(always)]
     fn corners(self, low: __m256i, high: __m256i) -> Self::Corners {
+        // SAFETY: `self` is the proof of AVX-512.
         unsafe {
             let upper = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
             let lower = _mm512_setr_epi32(4, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 7, 7, 7, 7);
@@ -208,6 +177,7 @@ impl Blend for Full {
     }
     #[inline(always)]
     unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads {
+        // SAFETY: `self` is the proof of AVX-512. What is around the places is the caller's word.
         unsafe {
             let [a, b, c, d, e, f, g, h] = pairs(bytes, at, stride);
             let (ab, cd) = (_mm256_set_m128i(b, a), _mm256_set_m128i(d, c));
@@ -220,6 +190,7 @@ impl Blend for Full {
     }
     #[inline(always)]
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
+        // SAFETY: `self` is the proof of AVX-512.
         unsafe {
             let mut quads = [_mm512_setzero_si512(); 2];
             for (quad, k) in quads.iter_mut().zip([0, 4]) {
@@ -232,10 +203,12 @@ impl Blend for Full {
     }
     #[inline(always)]
     fn none(self) -> Self::ColorSum {
+        // SAFETY: `self` is the proof of AVX-512.
         unsafe { [_mm512_setzero_si512(); 2] }
     }
     #[inline(always)]
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
+        // SAFETY: `self` is the proof of AVX-512. Sixteen bytes are loaded of sixteen.
         unsafe {
             let mut sum = sum;
             for k in 0..2 {
@@ -249,6 +222,7 @@ impl Blend for Full {
     }
     #[inline(always)]
     fn bytes(self, sum: Self::ColorSum) -> __m256i {
+        // SAFETY: `self` is the proof of AVX-512.
         unsafe {
             let half = _mm512_set1_epi32(0x4000);
             let mut whole = sum;
@@ -265,6 +239,8 @@ impl Blend for Full {
     }
     #[inline(always)]
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+        // SAFETY: `self` is the proof of AVX-512. Sixteen of seventeen values are loaded, and sixteen stored
+        // of sixteen.
         unsafe {
             let before = _mm512_loadu_si512(values.as_ptr().cast());
             let after = _mm512_loadu_si512(values.as_ptr().add(1).cast());
@@ -284,6 +260,7 @@ impl Blend for Full {
         /// Infinities and what is not a number.
         const MISSING: i32 = 0b1001_1001;
         let EightRays { column, row, depths, place } = *rays;
+        // SAFETY: `self` is the proof of AVX-512. Loads are from slices and arrays of eight.
         unsafe {
             let all = _mm512_cvtps_pd(_mm256_loadu_ps(depths.as_ptr()));
             let load = |from: &[f64], k: usize| _mm512_loadu_pd(from[k..k + 8].as_ptr());
@@ -300,4 +277,85 @@ impl Blend for Full {
             points
         }
     }
+}
+
+/// By a byte: the numbers of the bits that are set, ascending, and zeros.
+static BITS: [[u8; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let (mut bit, mut count) = (0, 0);
+        while bit < 8 {
+            if byte >> bit & 1 == 1 {
+                table[byte][count] = bit as u8;
+                count += 1;
+            }
+            bit += 1;
+        }
+        byte += 1;
+    }
+    table
+};
+
+/// See [`Width::changes`].
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+fn changes_by_eights(values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
+    let mut count = 0;
+    for first in [0, LANES] {
+        // SAFETY: loads and stores of eight values, from `first` + 1 ≤ 9 on and from `count` ≤ 8 on.
+        unsafe {
+            let before = _mm256_loadu_si256(values.as_ptr().add(first).cast());
+            let after = _mm256_loadu_si256(values.as_ptr().add(first + 1).cast());
+            let same = _mm256_cmpeq_epi32(before, after);
+            let changes = !(_mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32) & 0xFF;
+            let places = _mm_loadl_epi64(BITS[changes as usize].as_ptr().cast());
+            let from = _mm256_set1_epi32((from + first as u32) as i32);
+            let places = _mm256_add_epi32(_mm256_cvtepu8_epi32(places), from);
+            _mm256_storeu_si256(to.as_mut_ptr().add(count).cast(), places);
+            count += changes.count_ones() as usize;
+        }
+    }
+    count
+}
+
+/// See [`Width::points`].
+#[inline]
+#[target_feature(enable = "avx2")]
+fn points_by_fours<const PANORAMA: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
+    let EightRays { column, row, depths, place } = *rays;
+    // SAFETY: the slice has four values.
+    let load = |from: &[f64], k: usize| unsafe { _mm256_loadu_pd(from[4 * k..4 * k + 4].as_ptr()) };
+    // SAFETY: as above.
+    let all = unsafe { _mm256_loadu_ps(depths.as_ptr()) };
+    let seen = _mm256_cmp_ps::<_CMP_LT_OQ>(
+        _mm256_andnot_ps(_mm256_set1_ps(-0.0), all),
+        _mm256_set1_ps(f32::INFINITY),
+    );
+    let mut out = [_mm_setzero_ps(); 6];
+    for half in 0..2 {
+        let (four, seen) = if half == 0 {
+            (_mm256_castps256_ps128(all), _mm256_castps256_ps128(seen))
+        } else {
+            (_mm256_extractf128_ps::<1>(all), _mm256_extractf128_ps::<1>(seen))
+        };
+        let depths = _mm256_cvtps_pd(four);
+        let times = [
+            _mm256_permute4x64_pd::<0b01_00_00_00>(depths),
+            _mm256_permute4x64_pd::<0b10_10_01_01>(depths),
+            _mm256_permute4x64_pd::<0b11_11_11_10>(depths),
+        ];
+        let masks = [
+            _mm_permute_ps::<0b01_00_00_00>(seen),
+            _mm_permute_ps::<0b10_10_01_01>(seen),
+            _mm_permute_ps::<0b11_11_11_10>(seen),
+        ];
+        for k in 0..3 {
+            let (column, row) = (load(column, 3 * half + k), load(row, k));
+            let direction = if PANORAMA { _mm256_mul_pd(column, row) } else { _mm256_add_pd(column, row) };
+            let point = _mm256_add_pd(load(place, k), _mm256_mul_pd(direction, times[k]));
+            out[3 * half + k] = _mm_and_ps(_mm256_cvtpd_ps(point), masks[k]);
+        }
+    }
+    [_mm256_set_m128(out[1], out[0]), _mm256_set_m128(out[3], out[2]), _mm256_set_m128(out[5], out[4])]
 }

@@ -1,0 +1,195 @@
+//! Sixteen pixels at a time: the few operations that the visibility pass needs, on the widest registers there
+//! are.
+//!
+//! [`Portable`] has them in plain Rust, which defines what they give; `raster_x86.rs` has them by wide
+//! registers.
+#![expect(
+    clippy::expect_used,
+    reason = "slices are cut to the length of the array: there is nothing left of the check"
+)]
+
+/// Pixels in a register (or in as many registers as it takes).
+pub(crate) const LANES: usize = 16;
+
+/// A set of instructions, as the proof that the processor has it, and registers of [`RasterLanes::N`] pixels.
+pub(crate) trait RasterLanes: Copy {
+    /// Pixels at a time; at most [`LANES`].
+    const N: usize;
+    /// `N` times `f32`.
+    type F: Copy;
+    /// `N` times yes or no.
+    type M: Copy;
+    /// Registers of 8 pixels, for what is narrow.
+    type Half: RasterLanes;
+
+    fn half(self) -> Self::Half;
+    fn splat(self, x: f32) -> Self::F;
+    /// The first `N` of a slice. Panics if it is shorter; so do the others.
+    fn load(self, from: &[f32]) -> Self::F;
+    /// Overwrites the first `N`.
+    fn store(self, to: &mut [f32], x: Self::F);
+    fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a > b; no for what is not a number.
+    fn greater(self, a: Self::F, b: Self::F) -> Self::M;
+    /// The bits of `a`, as an integer, are above those of `b` plus `ulps`: for numbers from 0 on, `a` is
+    /// greater by more than so many times the last place.
+    fn greater_by_ulps(self, a: Self::F, b: Self::F, ulps: i32) -> Self::M;
+    fn and(self, a: Self::M, b: Self::M) -> Self::M;
+    /// One bit a lane, the first lane's the lowest.
+    fn bits(self, m: Self::M) -> u16;
+    /// Overwrites the lanes in `m`.
+    fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F);
+    /// Overwrites the lanes in `m`.
+    fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32);
+
+    /// Depths and faces of [`LANES`] pixels that see the faces drawn in their slots. Panics if there is no
+    /// such slot.
+    #[inline(always)]
+    fn resolve<const PANORAMA: bool>(
+        self,
+        slots: &[u32; LANES],
+        line: &RowGroup<'_>,
+        drawn: &[DrawnFace],
+        faces: &mut [u32; LANES],
+        depths: &mut [f32; LANES],
+    ) {
+        let mut values = [0.0; LANES];
+        for k in 0..LANES {
+            let DrawnFace { inverse_t, face, .. } = drawn[slots[k] as usize];
+            faces[k] = face;
+            let [at, across, bend] = along::<PANORAMA>(inverse_t, line);
+            values[k] = at + across * line.u[k];
+            if PANORAMA {
+                values[k] += bend * line.v[k];
+            }
+        }
+        for k in 0..LANES {
+            depths[k] = (1.0 / values[k]).abs() as f32;
+        }
+    }
+}
+
+/// A face that was drawn: half a line of the cache, and no padding, since its halves are read as numbers.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(crate) struct DrawnFace {
+    /// 1/t as a function [a, b, c] of the pixel: with u and v of its column, level and rise of its row
+    /// ([`RowGroup`]), a + c·rise + b·u in a perspective view, and c·rise + level·(a·u + b·v) in a panorama.
+    pub(crate) inverse_t: [f64; 3],
+    pub(crate) face: u32,
+    poor: u32,
+}
+
+impl DrawnFace {
+    /// `poor` says whether `inverse_t` is too poor for a depth: single rays give it then.
+    #[inline(always)]
+    pub(crate) const fn new(inverse_t: [f64; 3], face: u32, poor: bool) -> Self {
+        Self { inverse_t, face, poor: poor as u32 }
+    }
+
+    pub(crate) fn is_poor(&self) -> bool {
+        self.poor != 0
+    }
+}
+
+/// [`LANES`] pixels of a row, as the functions of [`DrawnFace`] take them.
+#[derive(Clone, Copy)]
+pub(crate) struct RowGroup<'a> {
+    pub(crate) u: &'a [f64; LANES],
+    pub(crate) v: &'a [f64; LANES],
+    /// See [`DrawnFace`].
+    pub(crate) level: f64,
+    pub(crate) rise: f64,
+}
+
+/// The function of a [`DrawnFace`] in a row: at + across·u + bend·v.
+#[inline(always)]
+pub(crate) fn along<const PANORAMA: bool>([a, b, c]: [f64; 3], line: &RowGroup<'_>) -> [f64; 3] {
+    if PANORAMA { [c * line.rise, a * line.level, b * line.level] } else { [a + c * line.rise, b, 0.0] }
+}
+
+/// Plain arrays of `N`, for any processor: the compiler uses the registers that every processor of the target
+/// has.
+#[derive(Clone, Copy)]
+pub(crate) struct Portable<const N: usize>;
+
+impl<const N: usize> RasterLanes for Portable<N> {
+    const N: usize = N;
+    type F = [f32; N];
+    type M = [u32; N];
+    type Half = Portable<8>;
+
+    #[inline(always)]
+    fn half(self) -> Self::Half {
+        Portable
+    }
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> Self::F {
+        [x; N]
+    }
+
+    #[inline(always)]
+    fn load(self, from: &[f32]) -> Self::F {
+        *from.first_chunk().expect(SHORT)
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f32], x: Self::F) {
+        *to.first_chunk_mut().expect(SHORT) = x;
+    }
+
+    #[inline(always)]
+    fn add(self, a: Self::F, b: Self::F) -> Self::F {
+        std::array::from_fn(|k| a[k] + b[k])
+    }
+
+    #[inline(always)]
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F {
+        std::array::from_fn(|k| a[k] * b[k])
+    }
+
+    #[inline(always)]
+    fn min(self, a: Self::F, b: Self::F) -> Self::F {
+        std::array::from_fn(|k| if a[k] < b[k] { a[k] } else { b[k] })
+    }
+
+    #[inline(always)]
+    fn greater(self, a: Self::F, b: Self::F) -> Self::M {
+        std::array::from_fn(|k| if a[k] > b[k] { u32::MAX } else { 0 })
+    }
+
+    #[inline(always)]
+    fn greater_by_ulps(self, a: Self::F, b: Self::F, ulps: i32) -> Self::M {
+        std::array::from_fn(|k| {
+            let above = a[k].to_bits() as i32 > (b[k].to_bits() as i32).wrapping_add(ulps);
+            if above { u32::MAX } else { 0 }
+        })
+    }
+
+    #[inline(always)]
+    fn and(self, a: Self::M, b: Self::M) -> Self::M {
+        std::array::from_fn(|k| a[k] & b[k])
+    }
+
+    #[inline(always)]
+    fn bits(self, m: Self::M) -> u16 {
+        (0..N).fold(0, |bits, k| bits | ((m[k] & 1) as u16) << k)
+    }
+
+    #[inline(always)]
+    fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
+        let to: &mut [f32; N] = to.first_chunk_mut().expect(SHORT);
+        *to = std::array::from_fn(|k| if m[k] != 0 { x[k] } else { to[k] });
+    }
+
+    #[inline(always)]
+    fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32) {
+        let to: &mut [u32; N] = to.first_chunk_mut().expect(SHORT);
+        *to = std::array::from_fn(|k| if m[k] != 0 { x } else { to[k] });
+    }
+}
+
+pub(crate) const SHORT: &str = "a slice as long as a register";
