@@ -360,6 +360,8 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::visibility::cast;
+    use crate::shade::color::rgb_image;
     use crate::simd::dispatch_on;
     use crate::simd::level::all_levels;
     use glam::dvec3;
@@ -417,7 +419,7 @@ mod tests {
         let cube = noise(false);
         let filter = TextureFilter::default();
         for camera in cameras() {
-            let hits = crate::cast(&scene, &camera);
+            let hits = cast(&scene, &camera);
             let image = picture_image(&cube, Unseen::Nearby, &hits, &camera, &filter);
             let (mut far, mut seen) = (0, 0);
             for (x, y) in (0..camera.width * camera.height).map(|k| (k % camera.width, k / camera.width)) {
@@ -445,10 +447,10 @@ mod tests {
         let mesh = furnished_room(3);
         let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
         let camera = Camera::equirectangular(pose(), 256);
-        let hits = crate::cast(&scene, &camera);
+        let hits = cast(&scene, &camera);
         let filter = TextureFilter::default();
         let cube = noise(true);
-        let mesh_image = crate::rgb_image(&scene, &mip_maps, &hits, &camera);
+        let mesh_image = rgb_image(&scene, &mip_maps, &hits, &camera);
         let nearby = picture_image(&cube, Unseen::Nearby, &hits, &camera, &filter);
         let image = picture_image(&cube, Unseen::Mesh(&scene, &mip_maps), &hits, &camera, &filter);
         let rows = |from: u32, to: u32| from as usize * 256..to as usize * 256;
@@ -466,7 +468,7 @@ mod tests {
         let scene = Scene::new(&mesh);
         let (cube, filter) = (noise(true), TextureFilter::default());
         for camera in cameras() {
-            let hits = crate::cast(&scene, &camera);
+            let hits = cast(&scene, &camera);
             let images = all_levels().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 let mut shown = Raster::filled(camera.width, camera.height, 0);

@@ -285,8 +285,10 @@ fn solve(mut matrix: Vec<f64>, mut right: Vec<f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::TextureFilter;
     use crate::picture::cube_map::tests::{close, color_of, pose};
+    use crate::picture::picture_color::{Unseen, picture_image};
+    use crate::shade::color::rgb_image;
+    use crate::shade::mip_maps::{MipMaps, TextureFilter};
     use glam::{DQuat, dvec3};
     use proptest::prelude::*;
 
@@ -388,7 +390,7 @@ mod tests {
     #[test]
     fn parallax_is_taken_out_with_the_mesh() {
         let mesh = s3d_synth::scenes::furnished_room(5);
-        let (scene, mip_maps) = (Scene::new(&mesh), crate::MipMaps::new(&mesh));
+        let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
         let center = Pose::from_scanner(dvec3(2.2, 2.1, 1.4), DQuat::from_rotation_z(0.4));
         let lens = Lens::new([320, 256], dvec2(215.0, 215.0), dvec2(160.0, 128.0), [0.0; 5]).unwrap();
         let shots: Vec<Capture> = (0..18usize)
@@ -399,17 +401,17 @@ mod tests {
                     center.location + 0.06 * turned.forward() + DVec3::Z * (0.05 - 0.05 * (k / 6) as f64);
                 let own = Pose { location, ..turned };
                 let camera = Camera::perspective(own, 2.0 * libm::atan(160.0 / 215.0), 320, 256);
-                let image = crate::rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
+                let image = rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
                 Capture { image, lens, pose: own }
             })
             .collect();
         let view = Camera::perspective(center.turned(0.5, -0.3), 1.2, 240, 240);
         let hits = cast(&scene, &view);
-        let direct = crate::rgb_image(&scene, &mip_maps, &hits, &view);
+        let direct = rgb_image(&scene, &mip_maps, &hits, &view);
         let error = |scene: Option<&Scene<'_>>| {
             let cube = stitch(shots.clone(), &center, scene, &StitchOptions::default());
             let filter = TextureFilter::default();
-            let image = crate::picture_image(&cube, crate::Unseen::Nearby, &hits, &view, &filter);
+            let image = picture_image(&cube, Unseen::Nearby, &hits, &view, &filter);
             let squares = image.pixels().as_flattened().iter().zip(direct.pixels().as_flattened());
             squares.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum::<f64>() / (3.0 * 240.0 * 240.0)
         };

@@ -424,7 +424,7 @@ mod tests {
             Camera::perspective(pose, 1.6, 33, 21),
             Camera::equirectangular(pose, 256),
         ] {
-            let hits = crate::cast(&scene, &camera);
+            let hits = crate::raster::visibility::cast(&scene, &camera);
             let filter = TextureFilter::default();
             let images = all_levels().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);

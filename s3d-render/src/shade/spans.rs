@@ -169,7 +169,7 @@ mod tests {
         ) {
             let mesh = scan_like(3_000, 1);
             let mut spans = Spans::new(width);
-            let mut things = vec![crate::NO_FACE];
+            let mut things = vec![crate::hits::NO_FACE];
             for band in bands {
                 let pixels = band.iter().flat_map(|&(face, n)| std::iter::repeat_n(face, n));
                 let mut faces: Vec<u32> = pixels.collect();
