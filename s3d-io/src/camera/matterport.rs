@@ -82,9 +82,17 @@ fn check_size(path: &Path, (w, h): (u32, u32), lens: &Lens) -> Result<()> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no such image or is damaged.
 pub fn read_picture(path: &Path) -> Result<Raster<[u8; 3]>> {
-    let texture = decode_texture(read_file(path)?).map_err(|fault| match fault {
-        TextureFault::TooLarge(message) => Error::unsupported(path, message),
-        TextureFault::Unreadable(message) => Error::format(path, message),
+    decode_picture(read_file(path)?, path)
+}
+
+/// As [`read_picture`], from the file's bytes; errors call it `name`.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn decode_picture(bytes: Vec<u8>, name: &Path) -> Result<Raster<[u8; 3]>> {
+    let texture = decode_texture(bytes).map_err(|fault| match fault {
+        TextureFault::TooLarge(message) => Error::unsupported(name, message),
+        TextureFault::Unreadable(message) => Error::format(name, message),
     })?;
     Ok(texture.image)
 }
@@ -227,8 +235,8 @@ fn remember(files: &mut BTreeMap<String, PathBuf>, path: PathBuf) {
 }
 
 /// The numbers of a text file, each with its line.
-fn numbers(path: &Path) -> Result<Vec<(u64, f64)>> {
-    let text = String::from_utf8(read_file(path)?).map_err(|_| Error::format(path, "is no text"))?;
+fn numbers(bytes: &[u8], path: &Path) -> Result<Vec<(u64, f64)>> {
+    let text = std::str::from_utf8(bytes).map_err(|_| Error::format(path, "is no text"))?;
     let mut numbers = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         for word in text.split_ascii_whitespace() {
@@ -247,7 +255,16 @@ fn numbers(path: &Path) -> Result<Vec<(u64, f64)>> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if they are not eleven numbers, or of no lens.
 pub fn read_intrinsics(path: &Path) -> Result<Lens> {
-    let numbers = numbers(path)?;
+    parse_intrinsics(&read_file(path)?, path)
+}
+
+/// As [`read_intrinsics`], from the file's bytes; errors call it `name`.
+///
+/// # Errors
+/// As [`read_intrinsics`].
+pub fn parse_intrinsics(bytes: &[u8], name: &Path) -> Result<Lens> {
+    let path = name;
+    let numbers = numbers(bytes, path)?;
     let Ok(lines_and_values) = <[(u64, f64); 11]>::try_from(numbers.as_slice()) else {
         let line = numbers.last().map_or(1, |n| n.0);
         let message =
@@ -276,7 +293,16 @@ pub fn read_intrinsics(path: &Path) -> Result<Lens> {
 /// [`Error::Io`]; [`Error::Format`], with the line where it can tell one, if there are not sixteen numbers, the last row is
 /// not 0 0 0 1, the 3×3 part is no rotation, or the place is farther than 10,000 km away.
 pub fn read_capture_pose(path: &Path) -> Result<Pose> {
-    let numbers = numbers(path)?;
+    parse_capture_pose(&read_file(path)?, path)
+}
+
+/// As [`read_capture_pose`], from the file's bytes; errors call it `name`.
+///
+/// # Errors
+/// As [`read_capture_pose`].
+pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
+    let path = name;
+    let numbers = numbers(bytes, path)?;
     let Ok(lines_and_values) = <[(u64, f64); 16]>::try_from(numbers.as_slice()) else {
         let line = numbers.last().map_or(1, |n| n.0);
         return Err(Error::line(path, line, format!("{} numbers; a 4×4 matrix has 16", numbers.len())));

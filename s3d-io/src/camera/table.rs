@@ -35,8 +35,26 @@ pub struct ScanLocation {
 /// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a uuid that is not 32 hexadecimal
 /// digits or is there twice, a number that is not finite, a quaternion of zeros; for the file, if it has no location.
 pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
-    let bytes = read_file(path)?;
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    parse_cameras(&read_file(path)?, path)
+}
+
+/// As [`read_cameras`], from the file's bytes; errors call it `name`.
+///
+/// ```
+/// use s3d_io::camera::parse_cameras;
+/// use std::path::Path;
+///
+/// let table = b"8eb9955b866b4b5f74abb1071416c628,1,2,1.5,0,0,0,1\n";
+/// let locations = parse_cameras(table, Path::new("cameras.csv"))?;
+/// assert_eq!(locations[0].pose.location.to_array(), [1.0, 2.0, 1.5]);
+/// # Ok::<(), s3d_io::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`read_cameras`].
+pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
+    let path = name;
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut locations = Vec::new();
     let mut lines: HashMap<String, u64> = HashMap::new();
     let mut order: [usize; 8] = std::array::from_fn(|i| i);

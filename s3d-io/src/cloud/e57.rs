@@ -6,25 +6,25 @@ use crate::cloud::table::columns::Columns;
 use crate::cloud::table::records::{Color, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};
+use crate::fs::source::Source;
 use e57::{E57Reader, PointCloud, RawValues, Record, RecordDataType, RecordName, RecordValue};
 use s3d_geom::glam::{DQuat, DVec3, dvec3};
-use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// An `.e57` file.
 pub(crate) struct E57Cloud<'a> {
-    path: PathBuf,
+    source: Source,
     options: &'a AnnotationOptions,
 }
 
 impl<'a> E57Cloud<'a> {
-    pub(crate) fn new(path: &Path, options: &'a AnnotationOptions) -> Self {
-        Self { path: path.to_owned(), options }
+    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
+        Self { source, options }
     }
 
     fn error(&self, error: &e57::Error) -> Error {
-        Error::format(&self.path, format!("cannot be read: {error}"))
+        Error::format(self.source.name(), format!("cannot be read: {error}"))
     }
 }
 
@@ -213,13 +213,12 @@ fn guarded<T>(path: &Path, f: impl FnOnce() -> T) -> Result<T> {
 
 impl Cloud for E57Cloud<'_> {
     fn path(&self) -> &Path {
-        &self.path
+        self.source.name()
     }
 
     fn read(&self, _: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-        let path = &self.path;
-        let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
-        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+        let path = self.source.name();
+        let (file, size) = self.source.open()?;
         let file = BufReader::with_capacity(1 << 18, file);
         let mut reader = guarded(path, || E57Reader::new(file))?.map_err(|e| self.error(&e))?;
         let scans = guarded(path, || reader.pointclouds())?;

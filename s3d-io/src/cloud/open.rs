@@ -8,8 +8,10 @@ use crate::cloud::s3dis::tree::{AnnotationTree, OnFault, TreeOptions};
 use crate::cloud::table::cloud::Cloud;
 use crate::cloud::table::read::read_flat;
 use crate::error::{Error, Result};
+use crate::fs::source::Source;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -58,11 +60,8 @@ impl Annotations {
         for path in paths {
             if path.is_dir() && !is_scannet(path) {
                 all.join(Self::from_tree(path, options)?)?;
-            } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) {
-                #[cfg(feature = "mat")]
-                all.join(Self::from_mat(path, options)?)?;
-                #[cfg(not(feature = "mat"))]
-                return Err(Error::not_built_in(path, "mat"));
+            } else if is_mat(path) {
+                all.join(Self::mat(Source::file(path), options)?)?;
             } else {
                 clouds.push(open_cloud(path, options)?);
             }
@@ -72,6 +71,47 @@ impl Annotations {
             all.join(read_flat(&clouds, options)?)?;
         }
         Ok(all)
+    }
+
+    /// As [`Annotations::open`], from a reader of one file's bytes, which is read as often as it takes: a `.mat`, or a table
+    /// of points (`.ply`, `.npy`, `.npz`, `.las`, `.laz`, `.e57`). The ending of `name` says which, and errors call the file
+    /// so.
+    ///
+    /// ```
+    /// use s3d_io::cloud::{AnnotationOptions, Annotations};
+    /// use std::{io::Cursor, path::Path};
+    ///
+    /// let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+    ///            property uchar class\nend_header\n1 2 3 7\n";
+    /// let classes = [("7".to_owned(), Some(s3d_label::Class::Chair))].into();
+    /// let options = AnnotationOptions { classes, ..Default::default() };
+    /// let area = Annotations::from_reader(Cursor::new(ply), Path::new("office_3.ply"), &options)?;
+    /// assert_eq!(area.rooms[0].instances[0].class, s3d_label::Class::Chair);
+    /// # Ok::<(), s3d_io::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Annotations::open`].
+    pub fn from_reader(
+        reader: impl Read + Seek + Send + 'static,
+        name: &Path,
+        options: &AnnotationOptions,
+    ) -> Result<Self> {
+        let source = Source::reader(name, reader);
+        if is_mat(name) {
+            return Self::mat(source, options);
+        }
+        read_flat(&[&*table(source, options)?], options)
+    }
+
+    #[cfg(feature = "mat")]
+    fn mat(source: Source, options: &AnnotationOptions) -> Result<Self> {
+        Self::from_mat(source, options)
+    }
+
+    #[cfg(not(feature = "mat"))]
+    fn mat(source: Source, _: &AnnotationOptions) -> Result<Self> {
+        Err(Error::not_built_in(source.name(), "mat"))
     }
 
     /// Adds the rooms of another source.
@@ -129,10 +169,6 @@ impl Annotations {
 }
 
 /// The reader of a cloud, by the file's name.
-#[cfg_attr(
-    not(any(feature = "ply", feature = "npy", feature = "las", feature = "e57")),
-    allow(unused_variables)
-)]
 fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn Cloud + 'a>> {
     let what = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
@@ -145,18 +181,29 @@ fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn
     if !what.is_file() {
         return Err(Error::format(path, "is no file"));
     }
+    table(Source::file(path), options)
+}
+
+/// The reader of a table of points in one file, by its name.
+#[cfg_attr(
+    not(any(feature = "ply", feature = "npy", feature = "las", feature = "e57")),
+    allow(unused_variables)
+)]
+fn table(source: Source, options: &AnnotationOptions) -> Result<Box<dyn Cloud + '_>> {
+    let path = source.name().to_owned();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
         #[cfg(feature = "ply")]
-        "ply" => Ok(Box::new(crate::cloud::ply::read::PlyCloud::new(path, options))),
+        "ply" => Ok(Box::new(crate::cloud::ply::read::PlyCloud::new(source, options))),
         #[cfg(feature = "npy")]
-        "npy" | "npz" => Ok(Box::new(crate::cloud::npy::read::NpyCloud::new(path, options))),
+        "npy" | "npz" => Ok(Box::new(crate::cloud::npy::read::NpyCloud::new(source, options))),
         #[cfg(feature = "las")]
-        "las" | "laz" => Ok(Box::new(crate::cloud::las::read::LasCloud::new(path, options))),
+        "las" | "laz" => Ok(Box::new(crate::cloud::las::read::LasCloud::new(source, options))),
         #[cfg(feature = "e57")]
-        "e57" => Ok(Box::new(crate::cloud::e57::E57Cloud::new(path, options))),
-        extension if let Some(feature) = feature_of(extension) => Err(Error::not_built_in(path, feature)),
+        "e57" => Ok(Box::new(crate::cloud::e57::E57Cloud::new(source, options))),
+        extension if let Some(feature) = feature_of(extension) => Err(Error::not_built_in(&path, feature)),
         _ => Err(Error::unsupported(
-            path,
+            &path,
             "is no kind of annotations that is read: an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, or \
              ScanNet's .aggregation.json",
         )),
@@ -172,6 +219,10 @@ fn feature_of(extension: &str) -> Option<&'static str> {
         "e57" => Some("e57"),
         _ => None,
     }
+}
+
+fn is_mat(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat"))
 }
 
 /// Whether a folder is a scan of ScanNet, and no S3DIS tree.

@@ -7,6 +7,7 @@ use crate::cloud::table::records::Color;
 use crate::cloud::table::rows::{Reading, Row, Tag, Value};
 use crate::error::{Error, Result};
 use crate::fs::json::read_json;
+use crate::fs::source::Source;
 use crate::mesh::ply::batch::PlyBatch;
 use crate::quote::quote;
 use s3d_geom::glam::DVec3;
@@ -256,7 +257,7 @@ impl Cloud for ScannetCloud {
                 self.aggregation.display()
             ));
         }
-        let (mut reader, element, _) = open_vertices(&self.mesh)?;
+        let (mut reader, element, _) = open_vertices(&Source::file(&self.mesh))?;
         if element.count != segments.len() as u64 {
             return Err(Error::format(
                 &self.segments,

@@ -135,8 +135,16 @@ pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Chec
 /// [`Error::Io`]; [`Error::Format`] with the line: another header, a line that is no path, size and checksum, a path that
 /// leads out of the folder, one that does not sort behind the one before, a last line without a line feed.
 pub fn read_file_list(path: &Path) -> Result<Vec<FileRecord>> {
+    parse_file_list(BufReader::new(open_file(path)?), path)
+}
+
+/// As [`read_file_list`], from a reader of the list; errors call it `name`.
+///
+/// # Errors
+/// As [`read_file_list`].
+pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileRecord>> {
+    let path = name;
     let failed = |e| Error::io(path, "read", e);
-    let mut lines = BufReader::new(open_file(path)?);
     let mut records: Vec<FileRecord> = Vec::new();
     let mut known: BTreeSet<String> = BTreeSet::new();
     let mut line = Vec::new();

@@ -21,7 +21,7 @@ mod splits;
 pub use conventions::{Conventions, DepthUnits, UnknownWord, XyzType, read_conventions};
 pub use domain::{Domain, UnknownDomain};
 #[cfg(feature = "dataset")]
-pub use file_list::{FileRecord, read_file_list, write_file_list};
+pub use file_list::{FileRecord, parse_file_list, read_file_list, write_file_list};
 #[cfg(feature = "dataset")]
 pub use images::{
     DatasetImage, ViewRecord, check_images_complete, dataset_images, read_png_size, read_views,
@@ -29,7 +29,7 @@ pub use images::{
 #[cfg(feature = "dataset")]
 pub use instances::{
     InstanceArrays, InstanceEntry, InstanceRecord, InstanceWriter, read_instance_arrays,
-    read_instance_members, read_instances,
+    read_instance_arrays_from, read_instance_members, read_instance_members_from, read_instances,
 };
 #[cfg(feature = "dataset")]
 pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};

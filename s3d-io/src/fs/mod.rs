@@ -7,6 +7,7 @@ pub(crate) mod checksum;
 #[cfg(feature = "json")]
 pub(crate) mod json;
 pub(crate) mod open;
+pub(crate) mod source;
 #[cfg(feature = "write")]
 mod sync;
 pub(crate) mod text;

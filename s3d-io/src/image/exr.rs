@@ -218,13 +218,21 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Work for Prepare<'_, T, F> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no OpenEXR file, damaged, or has no channels R G B.
 pub fn read_xyz(path: &Path) -> Result<Raster<[f32; 3]>> {
-    let bytes = read_file(path)?;
+    decode_xyz(&read_file(path)?, path)
+}
+
+/// As [`read_xyz`], from the file's bytes; errors call it `name`.
+///
+/// # Errors
+/// As [`read_xyz`].
+pub fn decode_xyz(bytes: &[u8], name: &Path) -> Result<Raster<[f32; 3]>> {
+    let path = name;
     let failed =
         |e: exr::error::Error| Error::format(path, format!("no readable OpenEXR file of R G B: {e}"));
     let too_large = |width: usize, height: usize| {
         Error::unsupported(path, format!("{width} × {height} pixels are more than {MAX_PIXELS}"))
     };
-    let meta = exr::meta::MetaData::read_from_buffered(bytes.as_slice(), false).map_err(failed)?;
+    let meta = exr::meta::MetaData::read_from_buffered(bytes, false).map_err(failed)?;
     for header in &meta.headers {
         let (width, height) = (header.layer_size.x(), header.layer_size.y());
         if width.checked_mul(height).is_none_or(|n| n > MAX_PIXELS) {

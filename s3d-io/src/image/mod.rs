@@ -11,9 +11,14 @@ pub(crate) mod pretty;
 pub(crate) mod texture;
 
 #[cfg(feature = "exr")]
-pub use self::exr::{encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half};
+pub use self::exr::{
+    decode_xyz, encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half,
+};
 #[cfg(feature = "png")]
-pub use self::png::{Content, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
+pub use self::png::{
+    Content, decode_gray16, decode_rgb8, encode_gray16, encode_rgb8, read_gray16, read_rgb8, write_gray16,
+    write_rgb8,
+};
 pub use compression::{Compression, UnknownCompression};
 pub use pretty::pretty_color;
 #[cfg(feature = "texture")]

@@ -24,4 +24,4 @@ pub use labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
 #[cfg(all(feature = "obj", feature = "png"))]
 pub use obj::{TextureOut, write_rgb_obj, write_semantic_obj};
 #[cfg(feature = "mesh")]
-pub use read::{read_mesh, read_mesh_with};
+pub use read::{read_mesh, read_mesh_from, read_mesh_with};

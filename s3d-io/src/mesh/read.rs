@@ -1,7 +1,9 @@
 //! Meshes of any format that is read.
 
 use crate::error::{Error, Result};
+use crate::fs::open::open_file;
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis};
+use std::io::Read;
 use std::path::Path;
 
 /// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf`, `.glb` or `.ply`, in any case.
@@ -21,16 +23,53 @@ pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
 /// # Errors
 /// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that is not
 /// whole.
-#[cfg_attr(not(feature = "ply"), allow(unused_variables))]
 pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
+    let open = || {
+        let file = open_file(path)?;
+        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+        Ok((file, size))
+    };
+    read(open, path, up, options)
+}
+
+/// As [`read_mesh_with`], from a reader of the file's bytes. The ending of `name` says how, errors call the file so, and
+/// the libraries, textures and buffers that it names are looked for in the folder of `name`.
+///
+/// ```
+/// use s3d_io::mesh::{UpAxis, read_mesh_from};
+/// use std::path::Path;
+///
+/// let obj = "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n";
+/// let file = read_mesh_from(obj.as_bytes(), Path::new("floor.obj"), UpAxis::Y, &Default::default())?;
+/// assert_eq!(file.mesh.triangle(0)[2].to_array(), [0.0, -1.0, 0.0]);
+/// # Ok::<(), s3d_io::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`read_mesh_with`].
+pub fn read_mesh_from(reader: impl Read, name: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
+    read(|| Ok((reader, 0)), name, up, options)
+}
+
+/// Reads the mesh that `open` gives the bytes of, and how many they are (0: not known).
+#[cfg_attr(not(feature = "ply"), allow(unused_variables))]
+fn read<R: Read>(
+    open: impl FnOnce() -> Result<(R, u64)>,
+    path: &Path,
+    up: UpAxis,
+    options: &MeshOptions,
+) -> Result<MeshFile> {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let file: Result<MeshFile> = match ending.as_str() {
         #[cfg(feature = "obj")]
-        "obj" => crate::mesh::obj::read::read(path, up),
+        "obj" => crate::mesh::obj::read::read_bytes(whole(open, path)?, path, up),
         #[cfg(feature = "gltf")]
-        "gltf" | "glb" => crate::mesh::gltf::read::read(path, up),
+        "gltf" | "glb" => crate::mesh::gltf::read::read_bytes(whole(open, path)?, path, up),
         #[cfg(feature = "ply")]
-        "ply" => crate::mesh::ply::read::read(path, up, options),
+        "ply" => {
+            let (file, bytes) = open()?;
+            crate::mesh::ply::read::read(file, bytes, path, up, options)
+        }
         "" => Err(Error::unsupported(path, "has no ending; meshes are read from .obj, .gltf, .glb and .ply")),
         _ if let Some(feature) = feature_of(&ending) => Err(Error::not_built_in(path, feature)),
         _ => {
@@ -39,6 +78,14 @@ pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<
         }
     };
     Ok(file?.tidy().0)
+}
+
+/// All bytes that `open` gives.
+fn whole<R: Read>(open: impl FnOnce() -> Result<(R, u64)>, path: &Path) -> Result<Vec<u8>> {
+    let (mut reader, size) = open()?;
+    let mut bytes = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
+    reader.read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+    Ok(bytes)
 }
 
 /// The feature that reads files with this ending.

@@ -12,7 +12,7 @@ mod parquet;
 mod webdataset;
 
 #[cfg(feature = "parquet")]
-pub use self::parquet::{ImageRow, SemanticRow, write_image_index};
+pub use self::parquet::{ImageRow, SemanticRow, write_image_index, write_image_index_to};
 #[cfg(feature = "coco")]
 pub use coco::{
     CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_category_id,

@@ -14,6 +14,7 @@ use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
 use s3d_label::Class;
 use std::fmt::Write as _;
+use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -160,6 +161,17 @@ fn schema(columns: &[(String, bool, Column)]) -> String {
 /// # Errors
 /// [`Error::Io`].
 pub fn write_image_index(path: &Path, rows: &[ImageRow]) -> Result<u64> {
+    let mut file = AtomicFile::create(path)?;
+    write_image_index_to(&mut file, path, rows)?;
+    file.commit()
+}
+
+/// As [`write_image_index`], to any writer; errors call it `name`.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_image_index_to(file: impl Write + Send, name: &Path, rows: &[ImageRow]) -> Result<()> {
+    let path = name;
     let failed = |e: ParquetError| match e {
         ParquetError::External(e) => match e.downcast::<std::io::Error>() {
             Ok(e) => Error::io(path, "write", *e),
@@ -175,9 +187,8 @@ pub fn write_image_index(path: &Path, rows: &[ImageRow]) -> Result<u64> {
         .set_key_value_metadata(Some(vec![KeyValue::new("description".to_owned(), about.to_owned())]))
         .build();
     let schema = parse_message_type(&schema(&columns(&[]))).map_err(failed)?;
-    let mut file = AtomicFile::create(path)?;
     let mut writer =
-        SerializedFileWriter::new(&mut file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
+        SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
     for rows in rows.chunks(GROUP) {
         let mut group = writer.next_row_group().map_err(failed)?;
         for (_, required, column) in columns(rows) {
@@ -189,7 +200,7 @@ pub fn write_image_index(path: &Path, rows: &[ImageRow]) -> Result<u64> {
         group.close().map_err(failed)?;
     }
     writer.close().map_err(failed)?;
-    file.commit()
+    Ok(())
 }
 
 /// Writes the values of a column that are there, and the levels that say which those are.

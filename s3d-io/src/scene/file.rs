@@ -119,7 +119,16 @@ struct MeshTable {
 /// one if a file or folder that it names is not there.
 pub fn read_scene(path: &Path) -> Result<SceneFile> {
     let text = String::from_utf8(read_file(path)?).map_err(|_| Error::format(path, "is no text in UTF-8"))?;
-    let document: Document = toml::from_str(&text).map_err(|e| {
+    parse_scene(&text, path)
+}
+
+/// As [`read_scene`], from the text of a scene file. Errors call it `path`, and the files that it names are looked for in
+/// the folder of `path`.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
+    let document: Document = toml::from_str(text).map_err(|e| {
         let message = e.message().replace('\n', "; ");
         match e.span() {
             // An error at the very start is about the file as a whole: a table that is missing.

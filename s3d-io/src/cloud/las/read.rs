@@ -9,12 +9,12 @@ use crate::cloud::table::columns::{CLASSES, INSTANCES};
 use crate::cloud::table::records::{Color, Field, Kind, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};
+use crate::fs::source::{Bytes, Source};
 use crate::guarded::guarded;
 use las::point::Format;
 use s3d_geom::glam::dvec3;
-use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// Points that are unpacked at a time, at most, and their bytes.
@@ -30,7 +30,7 @@ const WITHHELD: u8 = 0b100;
 
 /// A `.las` or `.laz` file.
 pub(crate) struct LasCloud<'a> {
-    path: PathBuf,
+    source: Source,
     options: &'a AnnotationOptions,
 }
 
@@ -73,15 +73,14 @@ impl Dimension {
 }
 
 impl<'a> LasCloud<'a> {
-    pub(crate) fn new(path: &Path, options: &'a AnnotationOptions) -> Self {
-        Self { path: path.to_owned(), options }
+    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
+        Self { source, options }
     }
 
     /// Looks at what the header claims before anything believes it.
     fn preflight(&self) -> Result<()> {
-        let path = &self.path;
-        let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
-        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+        let path = self.source.name();
+        let (file, size) = self.source.open()?;
         let mut source = BufReader::new(file);
         let mut head = Vec::new();
         source.by_ref().take(375).read_to_end(&mut head).map_err(|e| Error::io(path, "read", e))?;
@@ -117,7 +116,7 @@ impl<'a> LasCloud<'a> {
             }
         }
         if is_compressed {
-            let number = |source: &mut BufReader<File>, at: u64| -> std::io::Result<u64> {
+            let number = |source: &mut BufReader<Bytes>, at: u64| -> std::io::Result<u64> {
                 let mut bytes = [0; 8];
                 source.seek(SeekFrom::Start(at))?;
                 source.read_exact(&mut bytes)?;
@@ -208,7 +207,7 @@ impl<'a> LasCloud<'a> {
             None => {
                 let names: Vec<&str> = all.iter().map(|(n, _)| n.as_str()).collect();
                 Err(Error::format(
-                    &self.path,
+                    self.source.name(),
                     format!("has no dimension {name:?} ({key} in [annotations]); it has {}", names.join(" ")),
                 ))
             }
@@ -216,7 +215,7 @@ impl<'a> LasCloud<'a> {
     }
 
     fn error(&self, done: u64, error: &las::Error) -> Error {
-        let path = &self.path;
+        let path = self.source.name();
         let io = match error {
             las::Error::Io(e) => Some(e),
             _ => None,
@@ -247,14 +246,13 @@ fn color_at(format: &Format) -> Option<[usize; 3]> {
 
 impl Cloud for LasCloud<'_> {
     fn path(&self) -> &Path {
-        &self.path
+        self.source.name()
     }
 
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-        let path = &self.path;
+        let path = self.source.name();
         self.preflight()?;
-        let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
-        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+        let (file, size) = self.source.open()?;
         let (file, most) = BoundedClaims::new(BufReader::with_capacity(1 << 18, file));
         let damaged = || Error::format(path, "its compressed points are damaged");
         let reader = guarded(|| las::Reader::new(file)).ok_or_else(damaged)?;

@@ -6,6 +6,7 @@ use crate::cloud::annotations::{
 use crate::cloud::mat::read::{MatArea, MatObject, MatRoom};
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
+use crate::fs::source::Source;
 use crate::quote::quote;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
@@ -26,7 +27,8 @@ enum Named {
 
 impl Annotations {
     /// The objects of a `pointcloud.mat`. Those without points are left out, with a warning.
-    pub(crate) fn from_mat(path: &Path, options: &AnnotationOptions) -> Result<Self> {
+    pub(crate) fn from_mat(source: Source, options: &AnnotationOptions) -> Result<Self> {
+        let path = source.name();
         let columns = [&options.class_column, &options.instance_column, &options.room_column];
         if columns.iter().any(|c| c.is_some()) || options.room.is_some() || !options.columns.is_empty() {
             return Err(Error::format(
@@ -35,7 +37,7 @@ impl Annotations {
             ));
         }
         let mut all = Self { rooms: Vec::new(), warnings: Vec::new() };
-        for room in MatArea::open(path)?.rooms {
+        for room in MatArea::read(&source)?.rooms {
             if let Some(room) = all.mat_room(path, room, options)? {
                 match all.rooms.binary_search_by_key(&room.room, |r| r.room) {
                     Ok(_) => all.fault(path, options, format!("{} is there twice", room.room))?,

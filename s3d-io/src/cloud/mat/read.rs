@@ -7,9 +7,11 @@ use crate::cloud::mat::hdf5::file::{Dataset, Hdf5File, Kind};
 use crate::cloud::mat::hdf5::read::Object;
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
+use crate::fs::source::Source;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
 use std::collections::BTreeMap;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -76,7 +78,19 @@ impl MatArea {
     /// [`Error::Io`]; [`Error::Unsupported`] for forms of HDF5 that MATLAB does not write; [`Error::Format`] if it is no
     /// MAT-file of version 7.3, is cut off or damaged, or has not these structs: the sentence names the field.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = Arc::new(MatFile { path: path.to_owned(), hdf5: Hdf5File::open(path)? });
+        Self::read(&Source::file(path))
+    }
+
+    /// As [`MatArea::open`], from a reader of the file's bytes; errors call the file `name`.
+    ///
+    /// # Errors
+    /// As [`MatArea::open`].
+    pub fn new(reader: impl Read + Seek + Send + 'static, name: &Path) -> Result<Self> {
+        Self::read(&Source::reader(name, reader))
+    }
+
+    pub(crate) fn read(source: &Source) -> Result<Self> {
+        let file = Arc::new(MatFile { path: source.name().to_owned(), hdf5: Hdf5File::open(source)? });
         let area = file.area()?;
         let name = area.get("name").map(|name| file.text(*name, "Area.name")).transpose()?;
         let mut rooms = Vec::new();

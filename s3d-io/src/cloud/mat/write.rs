@@ -5,9 +5,11 @@
 
 use crate::cloud::mat::hdf5::write::{Attribute, Hdf5Writer, Kind};
 use crate::error::{Error, Result};
+use crate::fs::atomic::AtomicFile;
 use crate::image::pretty::pretty_color;
 use s3d_geom::glam::Vec3;
 use s3d_geom::{VoxelGrid, Voxels};
+use std::io::{Seek, Write};
 use std::path::Path;
 
 /// The fields of the structs, in the order in which MATLAB shows them.
@@ -71,8 +73,8 @@ fn user_block() -> [u8; 512] {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct MatWriter {
-    hdf5: Hdf5Writer,
+pub struct MatWriter<W = AtomicFile> {
+    hdf5: Hdf5Writer<W>,
     name: String,
     /// What is known by reference only: it gets a name in the group `#refs#`.
     referenced: Vec<u64>,
@@ -96,7 +98,25 @@ impl MatWriter {
     /// # Errors
     /// [`Error::Io`].
     pub fn create(path: &Path, name: &str) -> Result<Self> {
-        let mut hdf5 = Hdf5Writer::create(path, &user_block())?;
+        Self::new(AtomicFile::create(path)?, path, name)
+    }
+
+    /// Ends the area, gives the file its name, and returns its size in bytes.
+    ///
+    /// # Errors
+    /// As [`MatWriter::into_inner`]. Then there is no file.
+    pub fn finish(self) -> Result<u64> {
+        self.into_inner()?.commit()
+    }
+}
+
+impl<W: Write + Seek> MatWriter<W> {
+    /// Starts the area called `name` ("Area_1") in `file`, which is empty; errors call it `file_name`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn new(file: W, file_name: &Path, name: &str) -> Result<Self> {
+        let mut hdf5 = Hdf5Writer::new(file, file_name, &user_block())?;
         let room_fields = hdf5.words("MATLAB_fields", &ROOM_FIELDS)?;
         let object_fields = hdf5.words("MATLAB_fields", &OBJECT_FIELDS)?;
         Ok(Self {
@@ -151,24 +171,24 @@ impl MatWriter {
         assert_eq!(positions.len(), colors.len(), "{} points need as many colours", positions.len());
         if let Some(p) = positions.iter().find(|p| !p.is_finite()) {
             return Err(Error::format(
-                self.hdf5.path(),
+                self.hdf5.name(),
                 format!("a point of {name} at {p} cannot be written"),
             ));
         }
         if u32::try_from(self.positions.len() + positions.len()).is_err() {
             let message = format!("{name} has more points than can be numbered; fewer points a m² help");
-            return Err(Error::format(self.hdf5.path(), message));
+            return Err(Error::format(self.hdf5.name(), message));
         }
         self.positions.extend_from_slice(positions);
         self.colors.extend_from_slice(colors);
         Ok(())
     }
 
-    /// Gives the file its name, and returns its size in bytes.
+    /// What the area was written to, complete.
     ///
     /// # Errors
     /// As [`MatWriter::room`].
-    pub fn finish(mut self) -> Result<u64> {
+    pub fn into_inner(mut self) -> Result<W> {
         self.finish_room()?;
         let fields = self.hdf5.words("MATLAB_fields", &AREA_FIELDS)?;
         let name = self.name.clone();

@@ -8,11 +8,11 @@ use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::records::{Field, Table, fill, rows_of_block};
 use crate::cloud::table::rows::{Reading, Tag};
 use crate::error::{Error, Result};
+use crate::fs::source::{Bytes, Source};
 use s3d_label::Class;
 use std::cell::Cell;
-use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use zip::ZipArchive;
 
 /// The columns of a plain array, unless they are named.
@@ -20,31 +20,30 @@ const PLAIN: [&str; 8] = ["x", "y", "z", "r", "g", "b", "class", "instance"];
 
 /// An `.npy` or `.npz` file.
 pub(crate) struct NpyCloud<'a> {
-    path: PathBuf,
+    source: Source,
     options: &'a AnnotationOptions,
     /// Whether numbers of classes are the 13's: a plain array, of which nothing is said.
     s3dis_numbers: Cell<bool>,
 }
 
 impl<'a> NpyCloud<'a> {
-    pub(crate) fn new(path: &Path, options: &'a AnnotationOptions) -> Self {
-        Self { path: path.to_owned(), options, s3dis_numbers: Cell::new(false) }
+    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
+        Self { source, options, s3dis_numbers: Cell::new(false) }
     }
 
     fn is_npz(&self) -> bool {
-        self.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+        self.source.name().extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"))
     }
 
-    fn file(&self) -> Result<BufReader<File>> {
-        let file = File::open(&self.path).map_err(|e| Error::io(&self.path, "read", e))?;
-        Ok(BufReader::with_capacity(1 << 18, file))
+    fn file(&self) -> Result<BufReader<Bytes>> {
+        Ok(BufReader::with_capacity(1 << 18, self.source.open()?.0))
     }
 
     fn read_npy(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
         let mut source = self.file()?;
-        let header = NpyHeader::read(&self.path, &mut source)?;
+        let header = NpyHeader::read(self.source.name(), &mut source)?;
         let table = self.table(header.fields, header.stride, header.is_structured, reading)?;
-        table.read(&self.path, source, header.rows, colors, reading)
+        table.read(self.source.name(), source, header.rows, colors, reading)
     }
 
     /// The table of an array of its own.
@@ -59,7 +58,7 @@ impl<'a> NpyCloud<'a> {
             self.name_plain(&mut fields)?;
             if self.options.columns.is_empty() && self.options.classes.is_empty() {
                 self.s3dis_numbers.set(true);
-                let path = self.path.display();
+                let path = self.source.name().display();
                 reading.notes.push(format!(
                     "{path}: a plain array: its columns are taken for {}, and class numbers for S3DIS's, 0 ceiling to 12 \
                      clutter",
@@ -67,7 +66,7 @@ impl<'a> NpyCloud<'a> {
                 ));
             }
         }
-        Table::new(&self.path, fields, stride, self.options)
+        Table::new(self.source.name(), fields, stride, self.options)
     }
 
     fn name_plain(&self, fields: &mut [Field]) -> Result<()> {
@@ -82,7 +81,7 @@ impl<'a> NpyCloud<'a> {
                     m => format!("{m} are named"),
                 };
                 return Err(Error::format(
-                    &self.path,
+                    self.source.name(),
                     format!(
                         "has {n} columns, and {said}, as in columns = [\"x\", \"y\", \"z\", \"r\", \"g\", \"b\", \"class\", \
                          \"instance\"] in [annotations]"
@@ -98,8 +97,8 @@ impl<'a> NpyCloud<'a> {
 
     fn read_npz(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
         let zipped = |e: zip::result::ZipError| match e {
-            zip::result::ZipError::Io(e) => Error::io(&self.path, "read", e),
-            e => Error::format(&self.path, format!("is no NPZ that can be read: {e}")),
+            zip::result::ZipError::Io(e) => Error::io(self.source.name(), "read", e),
+            e => Error::format(self.source.name(), format!("is no NPZ that can be read: {e}")),
         };
         let names: Vec<String> = {
             let archive = ZipArchive::new(self.file()?).map_err(zipped)?;
@@ -113,7 +112,7 @@ impl<'a> NpyCloud<'a> {
         // An archive lends one member at a time: each array has one of its own. Few have more than a dozen.
         if names.is_empty() || names.len() > 64 {
             let message = format!("holds {} arrays: points are in 1 to 64 of them", names.len());
-            return Err(Error::format(&self.path, message));
+            return Err(Error::format(self.source.name(), message));
         }
         let mut archives = Vec::new();
         for _ in &names {
@@ -122,7 +121,7 @@ impl<'a> NpyCloud<'a> {
         let mut arrays = Vec::new();
         for (archive, name) in archives.iter_mut().zip(&names) {
             let mut member = archive.by_name(name).map_err(zipped)?;
-            let path = self.path.join(name);
+            let path = self.source.name().join(name);
             let stem = name.trim_end_matches(".npy").to_owned();
             match NpyHeader::read(&path, &mut member) {
                 Ok(header) => arrays.push((stem, header, member)),
@@ -134,7 +133,7 @@ impl<'a> NpyCloud<'a> {
         if let [(_, header, member)] = &mut arrays[..] {
             let fields = std::mem::take(&mut header.fields);
             let table = self.table(fields, header.stride, header.is_structured, reading)?;
-            return table.read(&self.path, member, header.rows, colors, reading);
+            return table.read(self.source.name(), member, header.rows, colors, reading);
         }
         // All arrays that are as long as most are columns of one table; what is shorter says something of the whole.
         let rows = arrays.iter().map(|(_, h, _)| h.rows).max().unwrap_or(0);
@@ -148,7 +147,7 @@ impl<'a> NpyCloud<'a> {
             }
             stride = header.stride.saturating_add(stride);
         }
-        let table = Table::new(&self.path, fields, stride, self.options)?;
+        let table = Table::new(self.source.name(), fields, stride, self.options)?;
         // Rows may be as long as 64 KiB: what is in memory is a few MiB all the same.
         let mut done = 0;
         let (mut block, mut column) = (Vec::new(), Vec::new());
@@ -158,7 +157,7 @@ impl<'a> NpyCloud<'a> {
             let mut at = 0usize;
             for (_, header, member) in &mut arrays {
                 column.resize(n.saturating_mul(header.stride), 0);
-                fill(&self.path, member, &mut column, done, rows, header.stride)?;
+                fill(self.source.name(), member, &mut column, done, rows, header.stride)?;
                 for (record, piece) in block.chunks_exact_mut(stride).zip(column.chunks_exact(header.stride))
                 {
                     let place = record.get_mut(at..).and_then(|r| r.get_mut(..piece.len()));
@@ -167,7 +166,7 @@ impl<'a> NpyCloud<'a> {
                 at = at.saturating_add(header.stride);
             }
             for (record, number) in block.chunks_exact(stride).zip(done.saturating_add(1)..) {
-                if !table.push(number, record, colors, &mut texts, &self.path, reading)? {
+                if !table.push(number, record, colors, &mut texts, self.source.name(), reading)? {
                     return Ok(false);
                 }
             }
@@ -179,7 +178,7 @@ impl<'a> NpyCloud<'a> {
 
 impl Cloud for NpyCloud<'_> {
     fn path(&self) -> &Path {
-        &self.path
+        self.source.name()
     }
 
     fn class_of(&self, tag: &Tag) -> Option<Class> {

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
-use std::path::Path;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 /// Writes one array of any size piece by piece, row-major (C order), whole or not at all.
 ///
@@ -17,15 +18,37 @@ use std::path::Path;
 /// # Ok::<(), s3d_io::Error>(())
 /// ```
 #[derive(Debug)]
-pub struct NpyWriter {
-    file: AtomicFile,
+pub struct NpyWriter<W = AtomicFile> {
+    file: W,
+    name: PathBuf,
     promised: u64,
     written: u64,
 }
 
 impl NpyWriter {
-    /// Starts an array of elements of a numpy type (`"<f4"`, `"<f8"`, `"<i8"`, `"<u4"`…: the digit is the element's bytes)
-    /// and this shape.
+    /// Starts the file `path`; see [`NpyWriter::new`].
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    ///
+    /// # Panics
+    /// As [`NpyWriter::new`].
+    pub fn create(path: &Path, kind: &str, shape: &[u64]) -> Result<Self> {
+        Self::new(AtomicFile::create(path)?, path, kind, shape)
+    }
+
+    /// Gives the file its name, and returns its size in bytes.
+    ///
+    /// # Errors
+    /// As [`NpyWriter::into_inner`]. Then there is no file.
+    pub fn finish(self) -> Result<u64> {
+        self.into_inner()?.commit()
+    }
+}
+
+impl<W: Write> NpyWriter<W> {
+    /// Starts, in `file`, an array of elements of a numpy type (`"<f4"`, `"<f8"`, `"<i8"`, `"<u4"`…: the digit is the element's bytes)
+    /// and this shape. Errors call the file `name`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -33,14 +56,13 @@ impl NpyWriter {
     /// # Panics
     /// If `kind` is no type with a size of one digit, or the array has more bytes than 64 bits can count.
     #[expect(clippy::expect_used, reason = "a caller's mistake: see Panics")]
-    pub fn create(path: &Path, kind: &str, shape: &[u64]) -> Result<Self> {
+    pub fn new(mut file: W, name: &Path, kind: &str, shape: &[u64]) -> Result<Self> {
         let size =
             kind.chars().last().and_then(|c| c.to_digit(10)).expect("a type ends with its size in bytes");
         let bytes = shape.iter().try_fold(u64::from(size), |n, side| n.checked_mul(*side));
         let promised = bytes.expect("an array that 64 bits can count");
-        let mut file = AtomicFile::create(path)?;
-        file.put(&npy_header(kind, shape))?;
-        Ok(Self { file, promised, written: 0 })
+        file.write_all(&npy_header(kind, shape)).map_err(|e| Error::io(name, "write", e))?;
+        Ok(Self { file, name: name.to_owned(), promised, written: 0 })
     }
 
     /// Appends elements: their bytes, lowest first.
@@ -49,19 +71,19 @@ impl NpyWriter {
     /// [`Error::Io`].
     pub fn put(&mut self, bytes: &[u8]) -> Result<()> {
         self.written += bytes.len() as u64;
-        self.file.put(bytes)
+        self.file.write_all(bytes).map_err(|e| Error::io(&self.name, "write", e))
     }
 
-    /// Gives the file its name, and returns its size in bytes.
+    /// What the array was written to, complete.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if not as many bytes came as the shape promises. Then there is no file.
-    pub fn finish(self) -> Result<u64> {
+    /// [`Error::Format`] if not as many bytes came as the shape promises.
+    pub fn into_inner(self) -> Result<W> {
         if self.written != self.promised {
             let message = format!("{} bytes of an array were promised, {} came", self.promised, self.written);
-            return Err(Error::format(self.file.path(), message));
+            return Err(Error::format(&self.name, message));
         }
-        self.file.commit()
+        Ok(self.file)
     }
 }
 

@@ -1,9 +1,10 @@
 //! Reads back the point clouds that [`PlyPointWriter`](crate::cloud::PlyPointWriter) writes.
 
 use crate::error::{Error, Result};
+use crate::fs::open::open_file;
 use s3d_geom::glam::Vec3;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Bytes of one point: three floats, three bytes, two integers.
@@ -27,9 +28,9 @@ pub struct LabelledPoint {
 
 /// The points of a file, piece by piece.
 #[derive(Debug)]
-pub struct LabelledPoints {
+pub struct LabelledPoints<R = File> {
     path: PathBuf,
-    file: BufReader<File>,
+    file: BufReader<R>,
     count: u64,
     left: u64,
 }
@@ -40,10 +41,20 @@ impl LabelledPoints {
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] if the file is another PLY file, none, or shorter or longer than its header says.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::new(open_file(path)?, path)
+    }
+}
+
+impl<R: Read + Seek> LabelledPoints<R> {
+    /// As [`LabelledPoints::open`], from a reader of the file's bytes; errors call it `name`.
+    ///
+    /// # Errors
+    /// As [`LabelledPoints::open`].
+    pub fn new(mut reader: R, name: &Path) -> Result<Self> {
+        let path = name;
         let io = |e| Error::io(path, "read", e);
-        let file = File::open(path).map_err(io)?;
-        let bytes = file.metadata().map_err(io)?.len();
-        let mut file = BufReader::with_capacity(1 << 18, file);
+        let bytes = reader.seek(SeekFrom::End(0)).and_then(|n| reader.rewind().map(|()| n)).map_err(io)?;
+        let mut file = BufReader::with_capacity(1 << 18, reader);
         let (mut count, mut properties, mut header) = (None, Vec::new(), 0u64);
         let mut line = Vec::new();
         let other = || Error::format(path, "is no PLY file of labelled points, as an export has it");

@@ -6,29 +6,31 @@ use crate::cloud::table::columns::Columns;
 use crate::cloud::table::records::{Color, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};
+use crate::fs::source::Source;
 use crate::mesh::ply::batch::PlyBatch;
 use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::header::PlyElement;
 use s3d_geom::glam::dvec3;
 use std::cell::Cell;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A `.ply` file.
 pub(crate) struct PlyCloud<'a> {
-    path: PathBuf,
+    source: Source,
     options: &'a AnnotationOptions,
     has_faces: Cell<bool>,
 }
 
 impl<'a> PlyCloud<'a> {
-    pub(crate) fn new(path: &Path, options: &'a AnnotationOptions) -> Self {
-        Self { path: path.to_owned(), options, has_faces: Cell::new(false) }
+    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
+        Self { source, options, has_faces: Cell::new(false) }
     }
 }
 
 /// Opens a PLY file at its vertices. The element, and whether the file is a mesh.
-pub(crate) fn open_vertices(path: &Path) -> Result<(PlyReader, PlyElement, bool)> {
-    let mut reader = PlyReader::open(path)?;
+pub(crate) fn open_vertices(source: &Source) -> Result<(PlyReader<'static>, PlyElement, bool)> {
+    let (file, size) = source.open()?;
+    let mut reader = PlyReader::new(file, size, source.name())?;
     let has_faces = reader.header().element("face").is_some_and(|(_, face)| face.count > 0);
     loop {
         match reader.next_element()? {
@@ -36,7 +38,7 @@ pub(crate) fn open_vertices(path: &Path) -> Result<(PlyReader, PlyElement, bool)
                 return Ok((reader, element, has_faces));
             }
             Some(_) => {}
-            None => return Err(Error::format(path, "has no element \"vertex\": no points")),
+            None => return Err(Error::format(source.name(), "has no element \"vertex\": no points")),
         }
     }
 }
@@ -60,7 +62,7 @@ pub(crate) fn color_of(
 
 impl Cloud for PlyCloud<'_> {
     fn path(&self) -> &Path {
-        &self.path
+        self.source.name()
     }
 
     fn are_vertices(&self) -> bool {
@@ -69,8 +71,8 @@ impl Cloud for PlyCloud<'_> {
 
     #[expect(clippy::indexing_slicing, reason = "a batch has as many rows of each column that is wanted")]
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-        let path = &self.path;
-        let (mut reader, element, has_faces) = open_vertices(path)?;
+        let path = self.source.name();
+        let (mut reader, element, has_faces) = open_vertices(&self.source)?;
         self.has_faces.set(has_faces);
         // A list is no column; an empty name is none's.
         let names: Vec<String> = element

@@ -4,8 +4,8 @@ use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
 use crate::fs::open::open_file;
 use s3d_geom::{NO_INDEX, PointCloud};
-use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
 
 /// Bytes of one point: three floats, three bytes, two integers.
 const POINT_BYTES: usize = 3 * 4 + 3 + 2 * 4;
@@ -19,8 +19,9 @@ const BATCH: usize = 4096;
 /// (uint, index into `semantic_labels.json`), `face` (uint, the face of the mesh that the point was drawn from;
 /// 4294967295 if unknown).
 #[derive(Debug)]
-pub struct PlyPointWriter {
-    file: AtomicFile,
+pub struct PlyPointWriter<W = AtomicFile> {
+    file: W,
+    name: PathBuf,
     promised: u64,
     written: u64,
     buffer: Vec<u8>,
@@ -32,7 +33,24 @@ impl PlyPointWriter {
     /// # Errors
     /// [`Error::Io`].
     pub fn create(path: &Path, count: u64) -> Result<Self> {
-        let mut file = AtomicFile::create(path)?;
+        Self::new(AtomicFile::create(path)?, path, count)
+    }
+
+    /// Gives the file its name, and returns its size in bytes.
+    ///
+    /// # Errors
+    /// As [`PlyPointWriter::into_inner`]. Then there is no file.
+    pub fn finish(self) -> Result<u64> {
+        self.into_inner()?.commit()
+    }
+}
+
+impl<W: Write> PlyPointWriter<W> {
+    /// Starts a file of `count` points in `file`; errors call it `name`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn new(mut file: W, name: &Path, count: u64) -> Result<Self> {
         let header = format!(
             "ply\n\
              format binary_little_endian 1.0\n\
@@ -50,8 +68,9 @@ impl PlyPointWriter {
              property uint face\n\
              end_header\n"
         );
-        file.put(header.as_bytes())?;
-        Ok(Self { file, promised: count, written: 0, buffer: Vec::with_capacity(BATCH * POINT_BYTES) })
+        file.write_all(header.as_bytes()).map_err(|e| Error::io(name, "write", e))?;
+        let name = name.to_owned();
+        Ok(Self { file, name, promised: count, written: 0, buffer: Vec::with_capacity(BATCH * POINT_BYTES) })
     }
 
     /// Appends the points of `cloud`, the label of each in `labels`.
@@ -87,22 +106,22 @@ impl PlyPointWriter {
                 self.buffer.extend_from_slice(&label.to_le_bytes());
                 self.buffer.extend_from_slice(&face.to_le_bytes());
             }
-            self.file.put(&self.buffer)?;
+            self.file.write_all(&self.buffer).map_err(|e| Error::io(&self.name, "write", e))?;
         }
         self.written += n as u64;
         Ok(())
     }
 
-    /// Gives the file its name, and returns its size in bytes.
+    /// What the points were written to, complete.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if not as many points came as were promised. Then there is no file.
-    pub fn finish(self) -> Result<u64> {
+    /// [`Error::Io`]; [`Error::Format`] if not as many points came as were promised.
+    pub fn into_inner(self) -> Result<W> {
         if self.written != self.promised {
             let message = format!("{} points were promised, {} came", self.promised, self.written);
-            return Err(Error::format(self.file.path(), message));
+            return Err(Error::format(&self.name, message));
         }
-        self.file.commit()
+        Ok(self.file)
     }
 }
 

@@ -45,9 +45,9 @@ const MARK: &[u8] = b"\xef\xbb\xbf";
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct PointReader {
+pub struct PointReader<R = File> {
     path: PathBuf,
-    file: File,
+    file: R,
     on_fault: OnFault,
     /// What was read and is not used up: `block[start..end]`.
     block: Vec<u8>,
@@ -73,10 +73,16 @@ impl PointReader {
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for a folder or a device.
     pub fn open_with(path: &Path, on_fault: OnFault) -> Result<Self> {
-        let file = open_file(path)?;
-        Ok(Self {
-            path: path.to_owned(),
-            file,
+        Ok(Self::new(open_file(path)?, path, on_fault))
+    }
+}
+
+impl<R: Read> PointReader<R> {
+    /// Reads the points of `reader`, with a choice of what to do at lines that are none; errors call it `name`.
+    pub fn new(reader: R, name: &Path, on_fault: OnFault) -> Self {
+        Self {
+            path: name.to_owned(),
+            file: reader,
             on_fault,
             block: vec![0; BLOCK],
             start: 0,
@@ -85,7 +91,7 @@ impl PointReader {
             line: 0,
             skipped: 0,
             first_skipped: None,
-        })
+        }
     }
 
     /// How many lines were left out so far; 0 unless opened with [`OnFault::Skip`].

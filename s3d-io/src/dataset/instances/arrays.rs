@@ -2,8 +2,8 @@
 
 use crate::cloud::npy::write::npy_header;
 use crate::error::{Error, Result};
-use std::fs::File;
-use std::io::{BufReader, Read};
+use crate::fs::open::open_file;
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 use zip::ZipArchive;
 
@@ -25,14 +25,13 @@ pub struct InstanceArrays {
 }
 
 /// The archive, opened.
-struct Archive<'a> {
+struct Archive<'a, R> {
     path: &'a Path,
-    zip: ZipArchive<BufReader<File>>,
+    zip: ZipArchive<BufReader<R>>,
 }
 
-impl<'a> Archive<'a> {
-    fn open(path: &'a Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
+impl<'a, R: Read + Seek> Archive<'a, R> {
+    fn new(file: R, path: &'a Path) -> Result<Self> {
         let zip = ZipArchive::new(BufReader::with_capacity(1 << 18, file))
             .map_err(|e| Error::format(path, format!("no readable archive: {e}")))?;
         Ok(Self { path, zip })
@@ -88,7 +87,16 @@ fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, shape: &[u64
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no such archive, damaged, or an array has another type or shape.
 pub fn read_instance_arrays(path: &Path) -> Result<InstanceArrays> {
-    let mut archive = Archive::open(path)?;
+    read_instance_arrays_from(open_file(path)?, path)
+}
+
+/// As [`read_instance_arrays`], from a reader of the archive; errors call it `name`.
+///
+/// # Errors
+/// As [`read_instance_arrays`].
+pub fn read_instance_arrays_from(reader: impl Read + Seek, name: &Path) -> Result<InstanceArrays> {
+    let path = name;
+    let mut archive = Archive::new(reader, path)?;
     let index = archive.whole("label_index", |_| "<u4".into(), |bytes| vec![bytes as u64 / 4])?;
     let n = index.len() / 4;
     let count = n as u64;
@@ -135,9 +143,23 @@ pub fn read_instance_arrays(path: &Path) -> Result<InstanceArrays> {
 pub fn read_instance_members(
     path: &Path,
     point_start: &[u64],
+    each: impl FnMut(usize, &[u32]),
+) -> Result<()> {
+    read_instance_members_from(open_file(path)?, path, point_start, each)
+}
+
+/// As [`read_instance_members`], from a reader of the archive; errors call it `name`.
+///
+/// # Errors
+/// As [`read_instance_members`].
+pub fn read_instance_members_from(
+    reader: impl Read + Seek,
+    name: &Path,
+    point_start: &[u64],
     mut each: impl FnMut(usize, &[u32]),
 ) -> Result<()> {
-    let mut archive = Archive::open(path)?;
+    let path = name;
+    let mut archive = Archive::new(reader, path)?;
     let name = "point_index";
     let total = point_start.last().copied().unwrap_or(0);
     if !point_start.is_sorted() || point_start.first() != Some(&0) {

@@ -4,5 +4,8 @@ mod arrays;
 mod members;
 mod write;
 
-pub use arrays::{InstanceArrays, read_instance_arrays, read_instance_members};
+pub use arrays::{
+    InstanceArrays, read_instance_arrays, read_instance_arrays_from, read_instance_members,
+    read_instance_members_from,
+};
 pub use write::{InstanceEntry, InstanceRecord, InstanceWriter, read_instances};

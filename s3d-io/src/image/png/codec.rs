@@ -8,7 +8,8 @@ use png::{BitDepth, ColorType};
 use s3d_deflate::png::{Filter, filtered};
 use s3d_deflate::{Candidates, Deflater, Search};
 use s3d_geom::Raster;
-use std::io::BufReader;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
 
 /// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
@@ -172,7 +173,20 @@ pub fn write_gray16(path: &Path, image: &Raster<u16>, compression: Compression) 
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no PNG file, damaged, or of another kind.
 pub fn read_rgb8(path: &Path) -> Result<Raster<[u8; 3]>> {
-    let (width, height, bytes) = decode(path, ColorType::Rgb, BitDepth::Eight)?;
+    let (file, size) = open(path)?;
+    rgb8(file, size, path)
+}
+
+/// As [`read_rgb8`], from the file's bytes; errors call it `name`.
+///
+/// # Errors
+/// As [`read_rgb8`].
+pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
+    rgb8(Cursor::new(bytes), bytes.len() as u64, name)
+}
+
+fn rgb8(file: impl BufRead + Seek, size: u64, path: &Path) -> Result<Raster<[u8; 3]>> {
+    let (width, height, bytes) = decode(file, size, path, ColorType::Rgb, BitDepth::Eight)?;
     Ok(Raster::from_vec(width, height, bytes.as_chunks().0.to_vec()))
 }
 
@@ -181,14 +195,49 @@ pub fn read_rgb8(path: &Path) -> Result<Raster<[u8; 3]>> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no PNG file, damaged, or of another kind.
 pub fn read_gray16(path: &Path) -> Result<Raster<u16>> {
-    let (width, height, bytes) = decode(path, ColorType::Grayscale, BitDepth::Sixteen)?;
+    let (file, size) = open(path)?;
+    gray16(file, size, path)
+}
+
+/// As [`read_gray16`], from the file's bytes; errors call it `name`.
+///
+/// ```
+/// use s3d_geom::Raster;
+/// use s3d_io::image::{Compression, decode_gray16, encode_gray16};
+///
+/// let depth = Raster::filled(4, 4, 1024u16);
+/// let bytes = encode_gray16(&depth, Compression::Balanced);
+/// assert_eq!(decode_gray16(&bytes, "depth.png".as_ref())?, depth);
+/// # Ok::<(), s3d_io::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`read_gray16`].
+pub fn decode_gray16(bytes: &[u8], name: &Path) -> Result<Raster<u16>> {
+    gray16(Cursor::new(bytes), bytes.len() as u64, name)
+}
+
+fn gray16(file: impl BufRead + Seek, size: u64, path: &Path) -> Result<Raster<u16>> {
+    let (width, height, bytes) = decode(file, size, path, ColorType::Grayscale, BitDepth::Sixteen)?;
     let values = bytes.as_chunks().0.iter().map(|&pair| u16::from_be_bytes(pair)).collect();
     Ok(Raster::from_vec(width, height, values))
 }
 
-fn decode(path: &Path, color: ColorType, depth: BitDepth) -> Result<(u32, u32, Vec<u8>)> {
+/// A file, and how many bytes it has.
+fn open(path: &Path) -> Result<(BufReader<File>, u64)> {
     let file = open_file(path)?;
     let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+    Ok((BufReader::new(file), size))
+}
+
+/// Width, height and samples of a file of `size` bytes.
+fn decode(
+    file: impl BufRead + Seek,
+    size: u64,
+    path: &Path,
+    color: ColorType,
+    depth: BitDepth,
+) -> Result<(u32, u32, Vec<u8>)> {
     let failed = |e| match e {
         png::DecodingError::IoError(e) if e.kind() != std::io::ErrorKind::UnexpectedEof => {
             Error::io(path, "read", e)
@@ -196,7 +245,7 @@ fn decode(path: &Path, color: ColorType, depth: BitDepth) -> Result<(u32, u32, V
         png::DecodingError::IoError(_) => Error::format(path, "the PNG file ends too early"),
         e => Error::format(path, format!("no readable PNG file: {e}")),
     };
-    let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(failed)?;
+    let mut reader = png::Decoder::new(file).read_info().map_err(failed)?;
     let info = reader.info();
     let (width, height) = (info.width, info.height);
     if (info.color_type, info.bit_depth) != (color, depth) {

@@ -65,9 +65,13 @@ struct Head {
 }
 
 impl GltfDocument {
-    /// Reads a `.gltf` or `.glb` file, told apart by its content, and its buffers.
+    #[cfg(test)]
     pub(crate) fn open(path: &Path) -> Result<Self> {
-        let mut bytes = read_file(path)?;
+        Self::read(read_file(path)?, path)
+    }
+
+    /// Reads a `.gltf` or `.glb` file, told apart by its content, and its buffers, which lie beside `path`.
+    pub(crate) fn read(mut bytes: Vec<u8>, path: &Path) -> Result<Self> {
         let (text, blob) =
             if bytes.starts_with(b"glTF") { split_glb(path, &bytes)? } else { (&bytes[..], None) };
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);

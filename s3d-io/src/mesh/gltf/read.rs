@@ -28,8 +28,8 @@ pub(crate) struct Instance {
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
-pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
-    let document = GltfDocument::open(path)?;
+pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
+    let document = GltfDocument::read(bytes, path)?;
     let instances = instances(&document)?;
     let mut used = vec![false; document.root.materials.len()];
     for instance in &instances {
@@ -112,6 +112,11 @@ fn parent_from_node(node: &Node) -> Option<DMat4> {
         }
     };
     matrix.is_finite().then_some(matrix)
+}
+
+#[cfg(test)]
+pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
+    read_bytes(crate::fs::open::read_file(path)?, path, up)
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 //! [`ObjNames`] and [`ObjLooks`] the libraries and images; here the parts become a mesh.
 
 use crate::error::{Error, Result};
-use crate::fs::open::read_file;
 use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
 use crate::mesh::obj::diagnose::{number_error, vertex_error};
 use crate::mesh::obj::looks::{ObjLooks, ObjNames};
@@ -21,8 +20,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
-pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
-    let bytes = read_file(path)?;
+pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
     // Decoding images takes as long as all else, and needs nothing of it but names.
     let (mut warnings, mut remarks) = (Vec::new(), Vec::new());
     let (geometry, looks) = rayon::join(
@@ -234,6 +232,11 @@ fn vertex_colors(plain: &PlainObj, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
         ));
     }
     colors
+}
+
+#[cfg(test)]
+pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
+    read_bytes(crate::fs::open::read_file(path)?, path, up)
 }
 
 #[cfg(test)]

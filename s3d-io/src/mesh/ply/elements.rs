@@ -1,7 +1,7 @@
 //! The rows of a PLY file, a batch at a time: memory does not grow with the file.
 //!
 //! ```text
-//! let mut reader = PlyReader::open(path)?;
+//! let mut reader = PlyReader::new(file, size, path)?;
 //! while let Some(element) = reader.next_element()? {         // in the order of the file
 //!     if element.name == "vertex" {
 //!         let x = element.find_scalar(&["x"]).ok_or(…)?;
@@ -23,7 +23,7 @@ use crate::mesh::ply::batch::PlyBatch;
 use crate::mesh::ply::header::{MAX_HEADER, PlyElement, PlyEncoding, PlyHeader, PlyProperty, PlyType};
 use crate::mesh::ply::source::{BUFFER, Fault, Outcome, Source, column_of, decode, number, parse_f64};
 use crate::quote::quote;
-use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The most rows of a batch.
@@ -34,11 +34,11 @@ const BATCH_VALUES: usize = 1 << 18;
 const MAX_LIST: usize = 1 << 26;
 
 /// Reads the elements of a PLY file one after the other.
-#[derive(Debug)]
-pub(crate) struct PlyReader {
+pub(crate) struct PlyReader<'r> {
     path: PathBuf,
     header: PlyHeader,
-    source: Source,
+    source: Source<'r>,
+    /// Of the whole file; 0 if that is not known.
     bytes: u64,
     /// The element whose rows come now, and how many are read of it; before the first one `None`.
     at: Option<(usize, u64)>,
@@ -49,20 +49,14 @@ pub(crate) struct PlyReader {
     row_end: u64,
 }
 
-impl PlyReader {
-    /// Opens a file and reads its header.
+impl<'r> PlyReader<'r> {
+    /// Reads the header of a file of so many bytes (0: not known), which errors call `path`.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] with the line.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn new(file: impl Read + 'r, bytes: u64, path: &Path) -> Result<Self> {
         let io = |e| Error::io(path, "read", e);
-        let what = std::fs::metadata(path).map_err(io)?;
-        if !what.is_file() {
-            // Reading a device or a pipe may never end.
-            let message = if what.is_dir() { "is a folder, not a file" } else { "is no file" };
-            return Err(Error::format(path, message));
-        }
-        let mut source = Source::new(File::open(path).map_err(io)?);
+        let mut source = Source::new(file);
         // A header is nearly always in the first bytes: more are read only where they are missing.
         let mut size = 4096usize;
         let header = loop {
@@ -78,7 +72,7 @@ impl PlyReader {
             path: path.to_owned(),
             header,
             source,
-            bytes: what.len(),
+            bytes,
             at: None,
             wanted: Vec::new(),
             line,
@@ -426,11 +420,8 @@ mod tests {
         out + "2 -3\r\n  4\t7 0\n\n0 8 1 0.1"
     }
 
-    fn open(bytes: &[u8]) -> Result<PlyReader> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.ply");
-        std::fs::write(&path, bytes).unwrap();
-        PlyReader::open(&path)
+    fn open(bytes: &[u8]) -> Result<PlyReader<'_>> {
+        PlyReader::new(bytes, bytes.len() as u64, Path::new("a.ply"))
     }
 
     /// Every row of every element as text, `wanted` properties of each.
@@ -524,7 +515,8 @@ mod tests {
             all(file("-NaN(ind) 255.0 0\ninf 2e1 0\n").as_bytes(), |_| true).unwrap()[0]
                 .starts_with("v 0: NaN")
         );
-        let mut reader = open(file("1 2 0\n1 2 0\n 3").as_bytes()).unwrap();
+        let text = file("1 2 0\n1 2 0\n 3");
+        let mut reader = open(text.as_bytes()).unwrap();
         while reader.next_element().unwrap().is_some() {}
         assert!(reader.has_more().unwrap());
 

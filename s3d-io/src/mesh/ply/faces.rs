@@ -34,7 +34,7 @@ impl PlyFaces {
     /// is not.
     pub(crate) fn read(
         path: &Path,
-        reader: &mut PlyReader,
+        reader: &mut PlyReader<'_>,
         element: &PlyElement,
         vertices: u64,
         mut labels: Option<&mut PlyLabels>,
@@ -101,7 +101,7 @@ impl PlyFaces {
     pub(crate) fn read_strips(
         &mut self,
         path: &Path,
-        reader: &mut PlyReader,
+        reader: &mut PlyReader<'_>,
         element: &PlyElement,
         vertices: u64,
     ) -> Result<()> {

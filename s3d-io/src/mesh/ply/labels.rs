@@ -76,7 +76,7 @@ impl PlyLabels {
     ///
     /// # Errors
     /// [`Error::Format`] for a number that is not whole in a column that was asked for.
-    pub(crate) fn add(&mut self, reader: &PlyReader, batch: &PlyBatch) -> Result<()> {
+    pub(crate) fn add(&mut self, reader: &PlyReader<'_>, batch: &PlyBatch) -> Result<()> {
         for column in [&mut self.class, &mut self.instance].into_iter().flatten() {
             for (row, &value) in batch.scalars(column.property).iter().enumerate() {
                 // CloudCompare writes NaN where there is none.

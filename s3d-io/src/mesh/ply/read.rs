@@ -15,14 +15,21 @@ use crate::mesh::ply::labels::PlyLabels;
 use crate::mesh::ply::vertices::PlyVertices;
 use crate::quote::{count, quote};
 use s3d_geom::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX, Texture, Wrap};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Reads a PLY file: vertices keep its order and number, faces its order.
+/// Reads a PLY file of so many bytes (0: not known), which errors call `path`: vertices keep its order and number, faces its order.
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh_with`].
-pub(crate) fn read(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
-    let mut reader = PlyReader::open(path)?;
+pub(crate) fn read(
+    file: impl Read,
+    bytes: u64,
+    path: &Path,
+    up: UpAxis,
+    options: &MeshOptions,
+) -> Result<MeshFile> {
+    let mut reader = PlyReader::new(file, bytes, path)?;
     let header = reader.header().clone();
     let vertex_count = header.element("vertex").map_or(0, |(_, e)| e.count);
     let rows_of = |name: &str| header.element(name).map_or(0, |(_, e)| e.count);
@@ -298,10 +305,8 @@ mod tests {
     fn axes_turn_positions_and_normals() {
         let elements = square("property float nx\nproperty float ny\nproperty float nz\n", "", 2);
         let rows = "0 0 0 0 2 0\n0 0 1 0 2 0\n1 0 0 0 2 0\n1 0 1 0 0 0\n3 0 1 2\n3 1 3 2\n";
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.ply");
-        std::fs::write(&path, format!("ply\nformat ascii 1.0\n{elements}end_header\n{rows}")).unwrap();
-        let file = read(&path, UpAxis::Y, &MeshOptions::default()).unwrap();
+        let bytes = format!("ply\nformat ascii 1.0\n{elements}end_header\n{rows}");
+        let file = read(bytes.as_bytes(), 0, Path::new("a.ply"), UpAxis::Y, &MeshOptions::default()).unwrap();
         assert_eq!(file.mesh.positions()[1], vec3(0.0, -1.0, 0.0));
         assert_eq!((file.mesh.normal(0), file.mesh.corner_normals(0)), (Vec3::Z, Some([Vec3::Z; 3])));
         // A normal without a length.

@@ -3,7 +3,6 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::mesh::ply::header::PlyType;
-use std::fs::File;
 use std::io::Read;
 
 /// The longest word of an ASCII file.
@@ -30,18 +29,17 @@ impl From<std::io::Error> for Fault {
 }
 
 /// A file and the bytes that were read ahead.
-#[derive(Debug)]
-pub(crate) struct Source {
-    file: File,
+pub(crate) struct Source<'r> {
+    file: Box<dyn Read + 'r>,
     buffer: Vec<u8>,
     /// Where what is not yet taken starts and ends in the buffer.
     pub(crate) start: usize,
     pub(crate) end: usize,
 }
 
-impl Source {
-    pub(crate) fn new(file: File) -> Self {
-        Self { file, buffer: vec![0; BUFFER], start: 0, end: 0 }
+impl<'r> Source<'r> {
+    pub(crate) fn new(file: impl Read + 'r) -> Self {
+        Self { file: Box::new(file), buffer: vec![0; BUFFER], start: 0, end: 0 }
     }
 
     pub(crate) fn bytes(&self) -> &[u8] {

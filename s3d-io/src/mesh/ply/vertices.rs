@@ -44,7 +44,7 @@ impl PlyVertices {
     /// As [`PlyReader::read_batch`]; [`Error::Format`] without coordinates.
     pub(crate) fn read(
         path: &Path,
-        reader: &mut PlyReader,
+        reader: &mut PlyReader<'_>,
         element: &PlyElement,
         up: UpAxis,
         mut labels: Option<&mut PlyLabels>,

@@ -4,10 +4,9 @@
 
 use super::{SIGNATURE, UNDEFINED};
 use crate::error::{Error, Result};
-use crate::fs::open::open_file;
-use std::fs::File;
+use crate::fs::source::{Bytes, Source};
 use std::io::{Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 /// What an element of an array is.
@@ -73,7 +72,7 @@ pub(crate) enum Filter {
 #[derive(Debug)]
 pub(crate) struct Hdf5File {
     path: PathBuf,
-    file: Mutex<File>,
+    file: Mutex<Bytes>,
     /// Bytes of the file.
     file_len: u64,
     /// Bytes before those that addresses count, fewer than the file has.
@@ -84,14 +83,12 @@ pub(crate) struct Hdf5File {
 
 impl Hdf5File {
     /// Opens a file.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
-        let io = |e| Error::io(path, "read", e);
-        let file = open_file(path)?;
-        let metadata = file.metadata().map_err(io)?;
+    pub(crate) fn open(source: &Source) -> Result<Self> {
+        let (file, file_len) = source.open()?;
         let mut this = Self {
-            path: path.to_owned(),
+            path: source.name().to_owned(),
             file: Mutex::new(file),
-            file_len: metadata.len(),
+            file_len,
             user_block: 0,
             root: UNDEFINED,
         };

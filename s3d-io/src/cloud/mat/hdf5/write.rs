@@ -4,9 +4,8 @@
 
 use super::{SIGNATURE, UNDEFINED};
 use crate::error::{Error, Result};
-use crate::fs::atomic::AtomicFile;
 use std::io::{Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Bytes of the superblock (version 0) with the root group's entry.
 const SUPERBLOCK: usize = 96;
@@ -113,25 +112,26 @@ impl Attribute {
 
 /// Writes a file. An address is that of an object's header, as the object is known to groups and references.
 #[derive(Debug)]
-pub(crate) struct Hdf5Writer {
-    file: AtomicFile,
+pub(crate) struct Hdf5Writer<W> {
+    file: W,
+    name: PathBuf,
     /// Bytes of the file behind the user block so far.
     at: u64,
     user_block: u64,
 }
 
-impl Hdf5Writer {
+impl<W: Write + Seek> Hdf5Writer<W> {
     /// Starts the file. `user_block` stands before all: 512 bytes, or twice as many, or twice again…
-    pub(crate) fn create(path: &Path, user_block: &[u8]) -> Result<Self> {
-        let mut file = AtomicFile::create(path)?;
-        file.put(user_block)?;
-        file.put(&[0; SUPERBLOCK])?;
-        Ok(Self { file, at: SUPERBLOCK as u64, user_block: user_block.len() as u64 })
+    pub(crate) fn new(mut file: W, name: &Path, user_block: &[u8]) -> Result<Self> {
+        let written = file.write_all(user_block).and_then(|()| file.write_all(&[0; SUPERBLOCK]));
+        written.map_err(|e| Error::io(name, "write", e))?;
+        let name = name.to_owned();
+        Ok(Self { file, name, at: SUPERBLOCK as u64, user_block: user_block.len() as u64 })
     }
 
     /// The file.
-    pub(crate) fn path(&self) -> &Path {
-        self.file.path()
+    pub(crate) fn name(&self) -> &Path {
+        &self.name
     }
 
     /// Writes an array of `dims`, the slowest first, whose elements are `elements`, each `N` bytes.
@@ -215,11 +215,11 @@ impl Hdf5Writer {
         self.header(&messages)
     }
 
-    /// Writes the root group, gives the file its name, and returns its size in bytes.
+    /// Writes the root group; what was written to is complete.
     ///
     /// # Panics
     /// As [`Hdf5Writer::group`].
-    pub(crate) fn finish(mut self, members: impl IntoIterator<Item = (String, u64)>) -> Result<u64> {
+    pub(crate) fn finish(mut self, members: impl IntoIterator<Item = (String, u64)>) -> Result<W> {
         let root = self.group(members, &[])?;
         let mut block = SIGNATURE.to_vec();
         block.extend([0, 0, 0, 0, 0, 8, 8, 0]);
@@ -230,16 +230,14 @@ impl Hdf5Writer {
         }
         block.extend(entry(0, root));
         debug_assert_eq!(block.len(), SUPERBLOCK);
-        let path = self.file.path().to_owned();
-        let failed = |e| Error::io(&path, "write", e);
-        self.file.seek(SeekFrom::Start(self.user_block)).map_err(failed)?;
-        self.file.put(&block)?;
-        self.file.flush().map_err(failed)?;
-        self.file.commit()
+        let placed =
+            self.file.seek(SeekFrom::Start(self.user_block)).and_then(|_| self.file.write_all(&block));
+        placed.and_then(|()| self.file.flush()).map_err(|e| Error::io(&self.name, "write", e))?;
+        Ok(self.file)
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
-        self.file.put(bytes)?;
+        self.file.write_all(bytes).map_err(|e| Error::io(&self.name, "write", e))?;
         self.at += bytes.len() as u64;
         Ok(())
     }
