@@ -1,4 +1,5 @@
-//! Hits to the bytes of an image file, one function for every modality.
+//! From hits to the bytes of image files, in two steps. `draw` makes the images: those that can be in one
+//! walk over the hits (`together`), the others one after another. `file` makes a file of each.
 
 use crate::export::pictures::PictureColors;
 use rayon::prelude::*;
@@ -143,32 +144,40 @@ impl Channels<'_> {
         }
     }
 
-    /// Draws an image that is not made yet.
+    /// Draws an image, unless it is made already.
     fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
         let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made } = buffers;
+        let is_made = match image {
+            Image::Rgb => made.rgb,
+            Image::Depth => made.depth,
+            Image::Normal | Image::Semantic | Image::SemanticPretty => made.faces,
+            Image::GlobalXyz => made.xyz,
+        };
+        if is_made {
+            return;
+        }
         match image {
-            Image::Rgb if !made.rgb => match &self.pictures {
+            Image::Rgb => match &self.pictures {
                 Some(pictures) => pictures.image_into(self, hits, camera, rgb),
                 None => {
                     let filter = TextureFilter::default();
                     rgb_image_into(self.scene, self.textures, hits, camera, &filter, rgb);
                 }
             },
-            Image::Depth if !made.depth => match depth_units {
+            Image::Depth => match depth_units {
                 DepthUnits::Per512 => depth_image_into(hits, depth),
                 DepthUnits::Millimetres => depth_image_mm_into(hits, depth),
             },
-            Image::Normal if !made.faces => {
+            Image::Normal => {
                 normal_image_into(self.scene, hits, camera, self.normals, normal_axes, &mut faces.normal);
             }
-            Image::Semantic if !made.faces => index_image_into(hits, self.label_of_face, &mut faces.index),
-            Image::SemanticPretty if !made.faces => {
+            Image::Semantic => index_image_into(hits, self.label_of_face, &mut faces.index),
+            Image::SemanticPretty => {
                 color_per_face_image_into(hits, self.pretty_of_face, &mut faces.color);
             }
             Image::GlobalXyz if xyz_type == XyzType::Float => xyz_image_into(hits, camera, xyz_float),
-            Image::GlobalXyz if !made.xyz => xyz_image_half_into(hits, camera, xyz),
-            _ => {}
+            Image::GlobalXyz => xyz_image_half_into(hits, camera, xyz),
         }
     }
 

@@ -22,10 +22,12 @@ impl Pixels {
     /// For poses, which have no pixels.
     pub(crate) fn read(domain: Domain, path: &Path) -> Result<Self> {
         Ok(match domain {
+            Domain::Rgb | Domain::Normal | Domain::Semantic | Domain::SemanticPretty => {
+                Self::Color(read_rgb8(path)?)
+            }
             Domain::Depth => Self::Depth(read_gray16(path)?),
             Domain::GlobalXyz => Self::Xyz(read_xyz(path)?),
             Domain::Pose => unreachable!("a pose has no pixels"),
-            _ => Self::Color(read_rgb8(path)?),
         })
     }
 
@@ -52,7 +54,9 @@ impl Pixels {
         let color = match domain {
             Domain::Normal => MISSING_NORMAL,
             Domain::Semantic => MISSING_INDEX,
-            _ => [0; 3],
+            Domain::Rgb | Domain::SemanticPretty => [0; 3],
+            // These have no colours.
+            Domain::Depth | Domain::GlobalXyz | Domain::Pose => [0; 3],
         };
         match self {
             Self::Color(r) => r.pixels().iter().map(|p| *p == color).collect(),

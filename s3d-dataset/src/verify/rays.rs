@@ -49,10 +49,11 @@ pub(super) fn difference(
                 };
                 Difference::of(found, &images.faces.index, |a, b| a == b, text, text)
             }
-            _ => {
+            Domain::SemanticPretty => {
                 color_per_face_image_into(hits, reference.pretty_of_face, &mut images.faces.color);
                 colors(found, &images.faces.color)
             }
+            Domain::Depth | Domain::GlobalXyz | Domain::Pose => unreachable!("{domain} has no colours"),
         },
         Pixels::Depth(found) => {
             match conventions.depth_units {

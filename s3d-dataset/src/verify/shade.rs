@@ -26,7 +26,7 @@ impl<'a> Shade<'a> {
                 Domain::Depth => [f64::from(MISSING_DEPTH), 0.0, 0.0],
                 Domain::Normal => MISSING_NORMAL.map(f64::from),
                 Domain::Semantic => MISSING_INDEX.map(f64::from),
-                _ => [0.0; 3],
+                Domain::Rgb | Domain::SemanticPretty | Domain::GlobalXyz | Domain::Pose => [0.0; 3],
             };
         };
         match self.domain {

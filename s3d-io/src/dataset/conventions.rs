@@ -1,5 +1,6 @@
 //! `conventions.json`: what the numbers of a data set mean, for programs. Source: formats.md.
 
+use crate::dataset::domain::Domain;
 use crate::error::{Error, Result};
 use crate::fs::json::write_json;
 use s3d_geom::NormalAxes;
@@ -138,11 +139,7 @@ impl Conventions {
             "files": {
                 "pattern": "area_{area}/{kind}/{folder}/camera_{uuid}_{roomType}_{roomNum}_frame_{frame}_domain_{suffix}.{ext}",
                 "kinds": { "data": "perspective views, frame counts from 0", "pano": "panoramas, frame is \"equirectangular\"" },
-                "folder_suffix_ext": [
-                    ["rgb", "rgb", "png"], ["depth", "depth", "png"], ["normal", "normals", "png"],
-                    ["semantic", "semantic", "png"], ["semantic_pretty", "semantic_pretty", "png"],
-                    ["global_xyz", "global_xyz", "exr"], ["pose", "pose", "json"],
-                ],
+                "folder_suffix_ext": Domain::ALL.map(|d| [d.folder(), d.suffix(), d.extension()]),
             },
             "meshes": {
                 "up": "+Y",

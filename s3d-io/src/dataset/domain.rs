@@ -4,7 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// What an image shows; the data set calls it the domain.
+/// What a file shows: a modality, which the data set calls a domain. All are images but the pose.
+/// CONTRIBUTING.md has what a new one needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Domain {
     /// Colour.
@@ -25,16 +26,14 @@ pub enum Domain {
 
 /// A word that names no domain.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error(
-    "no modality is called {word:?}; there are rgb, depth, normal, semantic, semantic_pretty, global_xyz and pose"
-)]
+#[error("no modality is called {word:?}; there are {}", names())]
 pub struct UnknownDomain {
     /// The word.
     pub word: String,
 }
 
 impl Domain {
-    /// All of them, in the order of formats.md.
+    /// All of them, in the order of formats.md: that of options, of manifests, and of the columns of tables.
     pub const ALL: [Self; 7] = [
         Self::Rgb,
         Self::Depth,
@@ -66,9 +65,9 @@ impl Domain {
     /// The ending of its files, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
+            Self::Rgb | Self::Depth | Self::Normal | Self::Semantic | Self::SemanticPretty => "png",
             Self::GlobalXyz => "exr",
             Self::Pose => "json",
-            _ => "png",
         }
     }
 }
@@ -86,5 +85,26 @@ impl FromStr for Domain {
     fn from_str(word: &str) -> Result<Self, UnknownDomain> {
         let found = Self::ALL.into_iter().find(|d| d.folder() == word);
         found.ok_or_else(|| UnknownDomain { word: word.to_owned() })
+    }
+}
+
+/// All of them in a sentence.
+fn names() -> String {
+    let [others @ .., last] = Domain::ALL.map(Domain::folder);
+    format!("{} and {last}", others.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_the_names_of_folders() {
+        for domain in Domain::ALL {
+            assert_eq!(domain.to_string().parse(), Ok(domain));
+        }
+        let message = "normals".parse::<Domain>().unwrap_err().to_string();
+        let all = "there are rgb, depth, normal, semantic, semantic_pretty, global_xyz and pose";
+        assert_eq!(message, format!("no modality is called \"normals\"; {all}"));
     }
 }

@@ -37,7 +37,7 @@ pub struct ImageRow {
     /// The number of a view; `None` for a panorama.
     pub frame_num: Option<u32>,
     /// Its files below the root of the data set, in the order of [`Domain::ALL`].
-    pub files: [Option<String>; 7],
+    pub files: [Option<String>; Domain::ALL.len()],
     /// Width and height in pixels.
     pub size: Option<[u32; 2]>,
     /// The angle of view; π/2 for a panorama, as in its pose file.

@@ -38,7 +38,8 @@ pub struct Shading<'a> {
     pub color_of_face: &'a [[u8; 3]],
 }
 
-/// Which images of a view are made; by default none.
+/// Which images of a view [`view_images_into`] makes; by default none. They share most of their work. What is
+/// not here has functions of its own alone: smooth normals, depth in millimetres, coordinates in 32 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Modalities {
     /// [`ViewImages::rgb`].
