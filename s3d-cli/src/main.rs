@@ -2,6 +2,7 @@
 //! `s3d-dataset`, and what these tell into lines for a person or a program.
 
 mod args;
+mod cli;
 mod commands;
 mod console;
 mod failure;
@@ -10,8 +11,8 @@ mod panics;
 mod stop;
 mod values;
 
-use args::Cli;
 use clap::Parser;
+use cli::Cli;
 use failure::Outcome;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;

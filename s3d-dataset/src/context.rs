@@ -1,7 +1,7 @@
 //! What a long call is handed by its caller: a way to end it early, and somebody to tell what happens.
 
 use crate::error::{Error, Result};
-use crate::event::{Event, Level};
+use crate::event::{Event, Level, Task};
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -146,19 +146,6 @@ impl Context {
         self.tell(&Event::TaskStarted { task });
         Progress { context: self, task, done: AtomicU64::new(0) }
     }
-}
-
-/// A piece of long work whose end can be foreseen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Task {
-    /// Tells apart what is under way at the same time; never the same twice in a process.
-    pub id: u64,
-    /// What is done: "rendering".
-    pub what: &'static str,
-    /// To what: "images".
-    pub unit: &'static str,
-    /// How many units there are.
-    pub total: u64,
 }
 
 /// Tells how far a [`Task`] is, by any thread; dropped, the task has ended.

@@ -1,6 +1,5 @@
 //! What an observer is told while a call runs.
 
-use crate::context::Task;
 use crate::tables::summary::{Summary, UnitTally};
 use serde::Serialize;
 use std::fmt;
@@ -82,6 +81,19 @@ pub enum Event<'a> {
     },
     /// What an export has made.
     Summary(&'a Summary),
+}
+
+/// A piece of long work whose end can be foreseen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Task {
+    /// Tells apart what is under way at the same time; never the same twice in a process.
+    pub id: u64,
+    /// What is done: "rendering".
+    pub what: &'static str,
+    /// To what: "images".
+    pub unit: &'static str,
+    /// How many units there are.
+    pub total: u64,
 }
 
 /// How much a message matters.

@@ -2,13 +2,13 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::SceneSource;
-use crate::export::annotate::{Annotated, annotate, hidden_instances, label_doubts};
-use crate::export::inputs::{AreaInput, Inputs, mesh_doubts};
-use crate::export::locate;
+use crate::export::area::locate;
+use crate::export::input::memory::SceneSource;
+use crate::export::input::pictures::Pictures;
+use crate::export::input::{AreaInput, Inputs, mesh_doubts};
+use crate::export::labels::annotate::{Annotated, annotate, hidden_instances, label_doubts};
+use crate::export::labels::overlap::overlap_doubts;
 use crate::export::location::Outlook;
-use crate::export::overlap::overlap_doubts;
-use crate::export::pictures::Pictures;
 use s3d_geom::{Aabb, NearestFaces, TriMesh};
 use s3d_io::camera::ScanLocation;
 use s3d_label::{Class, Room};

@@ -54,21 +54,23 @@ mod tables;
 mod verify;
 mod xyz;
 
-pub use context::{Cancel, Context, Observer, Task};
+pub use context::{Cancel, Context, Observer};
 pub use error::{Error, Result};
-pub use event::{Event, Level, Stage, UnitKind};
-pub use export::{Export, MemoryScene, SceneSource, SharedScene};
+pub use event::{Event, Level, Stage, Task, UnitKind};
+pub use export::Export;
+pub use export::input::memory::{MemoryScene, SceneSource, SharedScene};
 pub use info::{InfoOptions, LocationInfo, MeshInfo, RoomInfo, SceneInfo, info};
 pub use options::{ExportOptions, PadLabels, canonical_uuid};
 pub use pack::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions, pack,
 };
-pub use profile::{Profile, ProfileOptions, profile};
+pub use profile::loader::Profile;
+pub use profile::{ProfileOptions, profile};
 pub use render::{RenderOptions, render};
 pub use sample::{SampleOptions, sample};
 pub use shard::assignment::Shard;
+pub use shard::make_plan::plan;
 pub use shard::merge::merge;
-pub use shard::plan::plan;
 pub use tables::statistics::{AreaStatistics, RoomTypeStatistics, Statistics, statistics};
 pub use tables::summary::{ImageTally, Summary, UnitTally, ViewTally};
 pub use verify::{FaultGroup, VerifyOptions, VerifyReport, verify};

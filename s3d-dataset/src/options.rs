@@ -1,7 +1,7 @@
 //! What an export is asked for, as plain data.
 
 use crate::error::{Error, Result};
-use crate::profile::Profile;
+use crate::profile::loader::Profile;
 use s3d_geom::NormalAxes;
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, PADDED_LABELS, XyzType};
 use s3d_io::image::Compression;

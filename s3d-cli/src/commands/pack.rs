@@ -113,7 +113,7 @@ pub(crate) fn run(args: PackArgs) -> Outcome<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::args::{Cli, Command};
+    use crate::cli::{Cli, Command};
     use clap::Parser;
 
     fn parse(args: &[&str]) -> Result<PackArgs, clap::Error> {

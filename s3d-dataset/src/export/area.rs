@@ -3,14 +3,14 @@
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::event::{Stage, UnitKind};
-use crate::export::annotate::{Annotated, annotate, hidden_instances, label_doubts};
-use crate::export::area_plan::{AreaPlan, RoomNames};
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
-use crate::export::inputs::{AreaInput, Cameras};
+use crate::export::input::pictures::Pictures;
+use crate::export::input::{AreaInput, Cameras};
+use crate::export::labels::annotate::{Annotated, annotate, hidden_instances, label_doubts};
+use crate::export::labels::area_plan::{AreaPlan, RoomNames};
+use crate::export::labels::overlap::overlap_doubts;
 use crate::export::location::{Outlook, room_of};
 use crate::export::modality::Channels;
-use crate::export::overlap::overlap_doubts;
-use crate::export::pictures::Pictures;
 use crate::export::points::write_points;
 use crate::export::views::{Candidate, Scoring, score_area};
 use crate::options::ExportOptions;
@@ -19,10 +19,10 @@ use crate::shard::plan::Plan;
 use crate::store::journal::{
     AssetsDone, Done, Journal, LabelsDone, LocationDone, ScoresDone, Unit, tally_of,
 };
+use crate::tables::account::Account;
 use crate::tables::listing;
 use crate::tables::manifest::{AreaEntry, XyzLoss};
 use crate::tables::records;
-use crate::tables::summary::Account;
 use rayon::prelude::*;
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::camera::ScanLocation;

@@ -2,8 +2,8 @@
 
 use crate::context::{Context, Progress};
 use crate::error::Result;
+use crate::export::input::pictures::Pictures;
 use crate::export::modality::{Channels, Image, ImageBuffers};
-use crate::export::pictures::Pictures;
 use crate::export::views::Candidate;
 use crate::export::work::for_each_in_order;
 use crate::tables::summary::{ImageTally, UnitTally};

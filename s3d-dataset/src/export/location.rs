@@ -1,6 +1,6 @@
 //! What a scan location sees, and in which room it stands.
 
-use crate::export::annotate::SurveyedRoom;
+use crate::export::labels::annotate::SurveyedRoom;
 use glam::DVec3;
 use s3d_geom::Camera;
 use s3d_io::camera::ScanLocation;

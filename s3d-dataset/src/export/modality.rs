@@ -1,7 +1,7 @@
 //! From hits to the bytes of image files, in two steps. `draw` makes the images: those that can be in one
 //! walk over the hits (`together`), the others one after another. `file` makes a file of each.
 
-use crate::export::pictures::PictureColors;
+use crate::export::input::pictures::PictureColors;
 use rayon::prelude::*;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, XyzType};

@@ -3,7 +3,7 @@
 
 use crate::context::{Context, Progress};
 use crate::error::{Error, Result};
-use crate::export::area_plan::AreaPlan;
+use crate::export::labels::area_plan::AreaPlan;
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::cloud::{MatWriter, PlyPointWriter, S3disAreaWriter};
 use s3d_io::dataset::Layout;

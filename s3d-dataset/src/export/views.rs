@@ -164,8 +164,30 @@ pub(crate) fn select_requested(
     }
     let pool = options.pool;
     select(&mut candidates, pool, options.keep_all, request.seed);
-    let tally = ViewTally::of(&candidates, pool, options.keep_all, &options.only);
+    let tally = tally(&candidates, pool, options.keep_all, &options.only);
     Ok((candidates, tally))
+}
+
+/// Counts candidates after their selection; those of an area, and of a location in it, follow each other. `only` are
+/// the locations whose images are asked for, all if it is empty.
+pub(crate) fn tally(candidates: &[Candidate], pool: Pool, keep_all: bool, only: &[String]) -> ViewTally {
+    let kept: Vec<&Candidate> = candidates.iter().filter(|c| c.frame_num.is_some()).collect();
+    let same_pool = |a: &Candidate, b: &Candidate| match pool {
+        Pool::Dataset => true,
+        Pool::Area => a.area == b.area,
+        Pool::Location => (a.area, a.location) == (b.area, b.location),
+    };
+    let discarded = |pool: &[Candidate]| Selection::default().discarded(pool.len()) as u64;
+    let pools = candidates.chunk_by(same_pool);
+    let dropped_lowest = if keep_all { 0 } else { pools.map(discarded).sum() };
+    let asked = |c: &&&Candidate| only.is_empty() || only.contains(&c.camera_uuid);
+    ViewTally {
+        candidates: candidates.len() as u64,
+        kept: kept.len() as u64,
+        dropped_lowest,
+        dropped_not_drawn: (candidates.len() - kept.len()) as u64 - dropped_lowest,
+        not_asked: (kept.len() - kept.iter().filter(asked).count()) as u64,
+    }
 }
 
 /// Selects views over the pool, or all of them, and numbers the kept ones of each location from 0.

@@ -1,7 +1,7 @@
 //! Scan locations for a scan that comes without: on the floor of every room, spread evenly, away from walls and things.
 
 use crate::error::{Error, Result};
-use crate::export::annotate::SurveyedRoom;
+use crate::export::labels::annotate::SurveyedRoom;
 use crate::export::location::{LOW_COVERAGE, Outlook};
 use glam::{DVec3, Vec3, dvec3};
 use s3d_geom::{Density, NearestFaces, PointCloud, Pose, SurfaceSampler, TriMesh};

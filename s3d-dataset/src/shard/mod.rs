@@ -2,21 +2,24 @@
 //! own, and does that.
 
 pub(crate) mod assignment;
+pub(crate) mod make_plan;
 pub(crate) mod merge;
 pub(crate) mod plan;
 
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::finish::is_chosen;
+use crate::export::input::memory::SceneSource;
+use crate::export::job::{Job, Labelled, Scope, Target};
 use crate::export::views::{Candidate, select_requested};
-use crate::export::{Job, Labelled, SceneSource, Scope, Target};
 use crate::options::ExportOptions;
 use crate::shard::assignment::{Assignment, Shard, assets_cost, location_cost};
 use crate::shard::plan::Plan;
 use crate::store::journal::{Done, Journal, Unit};
 use crate::store::output::{self, Begin};
+use crate::tables::account::Account;
 use crate::tables::label_list::LabelList;
-use crate::tables::summary::{Account, Summary, UnitTally, ViewTally};
+use crate::tables::summary::{Summary, UnitTally, ViewTally};
 use s3d_io::dataset::Layout;
 use s3d_io::fs::Checksum;
 use std::collections::{BTreeMap, BTreeSet};

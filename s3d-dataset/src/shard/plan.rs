@@ -7,23 +7,17 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::area_plan::AreaPlan;
+use crate::export::labels::area_plan::AreaPlan;
 use crate::export::transfer::bring;
-use crate::export::{Job, SceneSource};
-use crate::options::ExportOptions;
-use crate::shard::assignment::Shard;
-use crate::store::checked::{read_checked, write_checked};
-use crate::store::journal::{Done, Finished, Journal, Unit};
-use crate::store::output;
+use crate::store::checked::read_checked;
+use crate::store::journal::{Done, Finished, Unit};
 use crate::store::request::Request;
+use crate::store::{is_plan, plan_file};
 use crate::tables::label_list::LabelList;
-use crate::tables::summary::Account;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Domain, FileRecord, Layout};
-use s3d_io::fs::create_dir;
+use s3d_io::dataset::{FileRecord, Layout};
 use s3d_label::LabelTable;
 use serde::{Deserialize, Serialize};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Most units that a message names.
@@ -38,22 +32,13 @@ pub(crate) struct Plan {
 
 /// `plan.jsonl`.
 #[derive(Serialize, Deserialize)]
-struct PlanFile {
+pub(crate) struct PlanFile {
     /// What it is for; of the options those that labels and scores depend on.
-    request: Request,
-    labels: LabelList,
+    pub(crate) request: Request,
+    pub(crate) labels: LabelList,
 }
 
-/// Whether a folder holds a plan.
-pub(crate) fn is_in(folder: &Path) -> bool {
-    plan_file(folder).exists()
-}
-
-fn plan_file(folder: &Path) -> PathBuf {
-    folder.join("plan.jsonl")
-}
-
-fn read_plan_file(path: &Path) -> Result<PlanFile> {
+pub(crate) fn read_plan_file(path: &Path) -> Result<PlanFile> {
     // Without it, nobody knows what the rest of the folder is for.
     let again = "remove the folder, and call `s3d plan` again";
     read_checked(path).map_err(|e| match e {
@@ -64,7 +49,7 @@ fn read_plan_file(path: &Path) -> Result<PlanFile> {
     })
 }
 
-fn area_folder(folder: &Path, area: u32) -> PathBuf {
+pub(crate) fn area_folder(folder: &Path, area: u32) -> PathBuf {
     folder.join(format!("area_{area}"))
 }
 
@@ -75,7 +60,7 @@ impl Plan {
     /// If there is none, or it is damaged.
     pub(crate) fn open(ctx: &Context, folder: &Path) -> Result<Self> {
         let path = plan_file(folder);
-        if !is_in(folder) {
+        if !is_plan(folder) {
             return Err(FileError::format(folder, "holds no plan: make one with `s3d plan`").into());
         }
         let file = read_plan_file(&path)?;
@@ -153,103 +138,11 @@ impl Plan {
     }
 }
 
-fn refuse_other(folder: &Path, there: &Request, now: &Request) -> Result<()> {
+pub(crate) fn refuse_other(folder: &Path, there: &Request, now: &Request) -> Result<()> {
     let differences = there.differences(&now.of_plan());
     if differences.is_empty() {
         return Ok(());
     }
     let root = folder.display();
     Err(Error::Usage(format!("{root} is a plan of another call ({})", differences.join("; "))))
-}
-
-/// Makes a plan of scenes in a folder, or a shard's part of it; what is there already is not made again.
-///
-/// # Errors
-/// [`Error::Usage`] if the folder holds something else, or a plan of another call.
-pub fn plan<S: Clone + Into<SceneSource>>(
-    scenes: &[S],
-    folder: &Path,
-    options: &ExportOptions,
-    shard: Option<Shard>,
-    ctx: &Context,
-) -> Result<()> {
-    let shard = shard.unwrap_or(Shard::ALL);
-    let options = &ExportOptions {
-        views: options.views,
-        size: options.size,
-        seed: options.seed,
-        place_cameras: options.place_cameras,
-        entropy_stride: options.entropy_stride,
-        lenient: options.lenient,
-        modalities: vec![Domain::Pose],
-        // Of panoramas and points nothing is asked.
-        pano_width: 8,
-        points_per_m2: f64::MIN_POSITIVE,
-        ..ExportOptions::default()
-    };
-    let options = &options.canonical()?;
-    let account = Account::new(ctx);
-    let layout = Layout::new(folder);
-    refuse_foreign(folder)?;
-    let scenes: Vec<SceneSource> = scenes.iter().cloned().map(Into::into).collect();
-    let job = Job::open(&scenes, &layout, options, None, &account)?;
-    let path = plan_file(folder);
-    if path.exists() {
-        let there = read_plan_file(&path)?;
-        refuse_other(folder, &there.request, &job.request)?;
-    } else {
-        create_dir(folder)?;
-        let labels = LabelList::of(&job.inputs.table);
-        write_checked(&path, &PlanFile { request: job.request.of_plan(), labels })?;
-    }
-    let journal = Journal::begin(&layout, Finished::default())?;
-    let areas = &job.inputs.areas;
-    for (position, area) in areas.iter().enumerate() {
-        ctx.check()?;
-        let Some(part) = shard.within(position, areas.len()) else { continue };
-        let number = area.number;
-        // What others have done meanwhile counts too.
-        let there = Finished::read(ctx, &layout)?
-            .checked_where(ctx, &layout, |unit| *unit == Unit::Labels(number))?;
-        there.iter().for_each(|done| journal.know(done.clone()));
-        let position_of = |uuid: &str| -> Option<usize> {
-            let finished = journal.finished();
-            finished.labels(number)?.locations.iter().position(|other| other == uuid)
-        };
-        let is_ours = |unit: &Unit| match unit {
-            Unit::Scores(_, uuid) => position_of(uuid).is_some_and(|position| part.takes(position)),
-            Unit::Labels(_) => true,
-            Unit::Location(..) | Unit::Assets(_) => false,
-        };
-        job.plan_area(area, &layout, &journal, &account, &is_ours)?;
-    }
-    let done = match shard {
-        Shard::ALL => "complete".to_owned(),
-        shard => format!("shard {shard} is done"),
-    };
-    ctx.info(format_args!("{}: the plan's {done}", folder.display()));
-    Ok(())
-}
-
-/// Refuses a folder that holds something, and no plan.
-fn refuse_foreign(folder: &Path) -> Result<()> {
-    let entries = match fs::read_dir(folder) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        entries => entries.map_err(|e| FileError::io(folder, "use as the folder of a plan", e))?,
-    };
-    if plan_file(folder).exists() {
-        return Ok(());
-    }
-    for entry in entries {
-        let name = entry.map_err(|e| FileError::io(folder, "read", e))?.file_name();
-        // Another shard may be about to begin.
-        if !output::is_working_name(&name) && !plan_file(folder).exists() {
-            let root = folder.display();
-            return Err(Error::Usage(format!(
-                "{root} holds {}, and no plan: choose another folder",
-                name.display()
-            )));
-        }
-    }
-    Ok(())
 }

@@ -9,7 +9,7 @@ pub(crate) mod request;
 
 use crate::error::{Error, Result};
 use s3d_io::Error as FileError;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Refuses to replace a file unless that was asked for.
 pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<()> {
@@ -20,4 +20,14 @@ pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<()> {
         Ok(_) => Ok(()),
         Err(e) => Err(FileError::io(path, "look for", e).into()),
     }
+}
+
+/// Whether a folder holds a plan, whose journals must not be taken for those of an export.
+pub(crate) fn is_plan(folder: &Path) -> bool {
+    plan_file(folder).exists()
+}
+
+/// What a plan is for.
+pub(crate) fn plan_file(folder: &Path) -> PathBuf {
+    folder.join("plan.jsonl")
 }

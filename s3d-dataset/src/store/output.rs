@@ -16,16 +16,16 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result, passes};
-use crate::export::inputs::Inputs;
+use crate::export::input::Inputs;
 use crate::store::backup::{
     BACKUP, MOVING, TRASH, clear, discard, move_entries, recover, remove, rename, restore,
 };
 use crate::store::journal::{Done, Finished, Journal};
 use crate::store::lock::{Lock, Sharing};
 use crate::store::request::Request;
+use crate::tables::account::Account;
 use crate::tables::listing::remove_parts;
 use crate::tables::manifest::{Head, Manifest, if_there};
-use crate::tables::summary::Account;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Layout, read_file_list};
 use s3d_io::fs::{read_json, sync_data_set, sync_file, write_bytes, write_json};
@@ -47,7 +47,7 @@ pub(crate) fn check(ctx: &Context, layout: &Layout, overwrite: bool, allowed: &[
         ));
     }
     // Its journals would be taken for those of an export.
-    if crate::shard::plan::is_in(root) {
+    if crate::store::is_plan(root) {
         return Err(Error::Usage(format!("{} holds a plan: choose another folder", root.display())));
     }
     match fs::read_dir(root) {

@@ -1,20 +1,11 @@
 //! What decides the bytes of a data set: the version of s3d, the options, the input. Two exports of equal requests write
 //! the same files, so that one can go on where the other was killed.
 
-use crate::context::Context;
-use crate::error::Result;
-use crate::export::inputs::{AreaInput, Cameras};
-use crate::export::work::for_each_in_order;
 use crate::options::ExportOptions;
-use crate::tables::listing::walk;
-use s3d_io::Error as FileError;
-use s3d_io::dataset::FileRecord;
-use s3d_io::fs::{Checksum, ChecksumOfParts, checksum_of_file};
+use s3d_io::fs::Checksum;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 
 /// What is asked for. It names neither threads nor folders of the machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -109,7 +100,7 @@ impl Request {
     }
 
     /// What is known of a file or folder of an area's input, by its name.
-    fn input(&self, area: u32, name: &str) -> Option<&InputRecord> {
+    pub(crate) fn input(&self, area: u32, name: &str) -> Option<&InputRecord> {
         let area = self.areas.iter().find(|a| a.area == area)?;
         area.inputs.iter().find(|i| i.path.strip_suffix('/').unwrap_or(&i.path) == name)
     }
@@ -193,135 +184,11 @@ impl RequestedArea {
     }
 }
 
-/// What each area asks for. All files that they read are read once, on all threads. `companions` are the files that
-/// their meshes were read from besides. Of annotations and folders that are `known` from a plan, and have as many bytes as
-/// then, the checksum is taken from there.
-pub(crate) fn requested_areas(
-    ctx: &Context,
-    areas: &[AreaInput],
-    companions: &[Vec<PathBuf>],
-    known: Option<&Request>,
-) -> Result<Vec<RequestedArea>> {
-    let paths: Vec<Vec<PathBuf>> =
-        areas.iter().zip(companions).map(|(area, besides)| [&area.sources[..], besides].concat()).collect();
-    // The files of each path: itself, or what is in it; and what a plan knows of the path.
-    let mut files: Vec<Vec<Vec<PathBuf>>> = Vec::new();
-    let mut taken: BTreeMap<(u32, &Path), InputRecord> = BTreeMap::new();
-    for (area, of_area) in areas.iter().zip(&paths) {
-        let mut listed = Vec::new();
-        for path in of_area {
-            let files = if path.is_dir() { walk(path)? } else { vec![path.clone()] };
-            let record = known.and_then(|known| known.input(area.number, &name_of(&area.path, path)));
-            if (path.is_dir() || area.annotations.contains(path))
-                && let Some(record) = record
-                && total_bytes(&files)? == record.bytes
-            {
-                taken.insert((area.number, path), record.clone());
-                listed.push(Vec::new());
-            } else {
-                listed.push(files);
-            }
-        }
-        files.push(listed);
-    }
-    let mut all: Vec<&PathBuf> = files.iter().flatten().flatten().collect();
-    all.sort();
-    all.dedup();
-    let sums = checksums(ctx, &all)?;
-    let record = |area: &AreaInput, path: &Path, files: &[PathBuf]| -> Result<InputRecord> {
-        if let Some(record) = taken.get(&(area.number, path)) {
-            return Ok(record.clone());
-        }
-        let name = name_of(&area.path, path);
-        if !path.is_dir() {
-            let (bytes, xxh3_128) = sums.get(path).copied().unwrap_or((0, Checksum::of(b"")));
-            return Ok(InputRecord { path: name, bytes, xxh3_128 });
-        }
-        let mut lines = ChecksumOfParts::default();
-        let mut total = 0;
-        let mut listed: Vec<(String, u64, Checksum)> = Vec::new();
-        for file in files {
-            let (bytes, sum) = sums.get(file.as_path()).copied().unwrap_or((0, Checksum::of(b"")));
-            listed.push((below(path, file), bytes, sum));
-            total += bytes;
-        }
-        listed.sort();
-        for (path, bytes, xxh3_128) in listed {
-            lines.add(FileRecord { path, bytes, xxh3_128 }.to_line().as_bytes());
-            lines.add(b"\n");
-        }
-        let (_, xxh3_128) = lines.finish();
-        Ok(InputRecord { path: format!("{name}/"), bytes: total, xxh3_128 })
-    };
-    let mut requested = Vec::new();
-    for ((area, paths), files) in areas.iter().zip(&paths).zip(&files) {
-        let inputs = paths.iter().zip(files).map(|(path, files)| record(area, path, files));
-        requested.push(RequestedArea {
-            area: area.number,
-            place_cameras: match area.cameras {
-                Cameras::Placed(distance_m) => Some(distance_m),
-                Cameras::Listed(..) => None,
-            },
-            inputs: inputs.chain(area.records.iter().cloned().map(Ok)).collect::<Result<_>>()?,
-        });
-    }
-    Ok(requested)
-}
-
-/// How many bytes some files have, without reading them.
-fn total_bytes(files: &[PathBuf]) -> Result<u64> {
-    let mut total = 0;
-    for file in files {
-        total += std::fs::metadata(file).map_err(|e| FileError::io(file, "read", e))?.len();
-    }
-    Ok(total)
-}
-
-/// Size and checksum of each file.
-fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<BTreeMap<&'a Path, (u64, Checksum)>> {
-    let sums = Mutex::new(BTreeMap::new());
-    let progress = ctx.progress("reading", "input files", files.len() as u64);
-    for_each_in_order(
-        ctx,
-        files,
-        || (),
-        |(), path| {
-            // Devices and pipes are refused: reading one may never end.
-            let what = std::fs::metadata(path).map_err(|e| FileError::io(path, "read", e))?;
-            if !what.is_file() {
-                return Err(FileError::format(path, "is no file").into());
-            }
-            let sum = checksum_of_file(path)?;
-            sums.lock().unwrap_or_else(PoisonError::into_inner).insert(path.as_path(), sum);
-            progress.add(1);
-            Ok(())
-        },
-    )?;
-    Ok(sums.into_inner().unwrap_or_else(PoisonError::into_inner))
-}
-
-/// What an input is called: its path from the folder of what the user named, or else its last part.
-fn name_of(scene: &Path, path: &Path) -> String {
-    let folder = scene.parent().unwrap_or(Path::new(""));
-    match path.strip_prefix(folder) {
-        Ok(below) if below.is_relative() && below.components().next().is_some() => slashed(below),
-        _ => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
-    }
-}
-
-fn below(folder: &Path, file: &Path) -> String {
-    slashed(file.strip_prefix(folder).unwrap_or(file))
-}
-
-fn slashed(path: &Path) -> String {
-    path.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join("/")
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
     use crate::options::PadLabels;
-    use crate::profile::Profile;
+    use crate::profile::loader::Profile;
     use s3d_io::dataset::{Domain, XyzType};
     use s3d_render::Normals;
     use s3d_sample::Pool;
@@ -408,16 +275,5 @@ pub(crate) mod tests {
         let known = request();
         assert_eq!(known.input(3, "Area_1").map(|i| i.path.as_str()), Some("Area_1/"));
         assert!(known.input(1, "rgb.obj").is_some() && known.input(2, "rgb.obj").is_none());
-    }
-
-    #[test]
-    fn inputs_are_named_from_the_scenes_folder() {
-        let name = |scene: &str, path: &str| name_of(Path::new(scene), Path::new(path));
-        assert_eq!(name("scan/scene.toml", "scan/Area_1"), "Area_1");
-        assert_eq!(name("scan/scene.toml", "scan/../shared/a.obj"), "../shared/a.obj");
-        assert_eq!(name("scan/scene.toml", "/data/a.obj"), "a.obj");
-        assert_eq!(name("scene.toml", "a/b.obj"), "a/b.obj");
-        assert_eq!(name("scene.toml", "/data/b.obj"), "b.obj");
-        assert_eq!(name("sets/area_3", "sets/area_3/3d/rgb.obj"), "area_3/3d/rgb.obj");
     }
 }

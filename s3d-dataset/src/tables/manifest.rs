@@ -2,7 +2,7 @@
 
 use crate::error::{Result, passes_io};
 use crate::options::ExportOptions;
-use crate::profile::Profile;
+use crate::profile::loader::Profile;
 use crate::store::request::{InputRecord, Request, RequestedArea};
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;

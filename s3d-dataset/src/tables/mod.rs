@@ -1,3 +1,4 @@
+pub(crate) mod account;
 pub(crate) mod assets;
 pub(crate) mod label_list;
 pub(crate) mod listing;

@@ -3,8 +3,8 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::annotate::Annotated;
-use crate::export::area_plan::RoomNames;
+use crate::export::labels::annotate::Annotated;
+use crate::export::labels::area_plan::RoomNames;
 use crate::export::views::Candidate;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, Frame, ImageName, Layout, Split};

@@ -1,15 +1,10 @@
 //! What an export has made: files, bytes, images, missing pixels, views that were dropped, time per stage.
 
-use crate::context::Context;
-use crate::event::{Event, Stage, UnitKind};
-use crate::export::views::Candidate;
-use s3d_sample::{Pool, Selection};
+use crate::event::Stage;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::iter::Sum;
 use std::ops::AddAssign;
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 
 /// Images of one kind, and what of them was cast.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,30 +69,6 @@ pub struct ViewTally {
     pub dropped_not_drawn: u64,
     /// Kept, but of scan locations that `--only` leaves out: not written.
     pub not_asked: u64,
-}
-
-impl ViewTally {
-    /// Counts candidates after their selection; those of an area, and of a location in it, follow each other. `only` are
-    /// the locations whose images are asked for, all if it is empty.
-    pub(crate) fn of(candidates: &[Candidate], pool: Pool, keep_all: bool, only: &[String]) -> Self {
-        let kept: Vec<&Candidate> = candidates.iter().filter(|c| c.frame_num.is_some()).collect();
-        let same_pool = |a: &Candidate, b: &Candidate| match pool {
-            Pool::Dataset => true,
-            Pool::Area => a.area == b.area,
-            Pool::Location => (a.area, a.location) == (b.area, b.location),
-        };
-        let discarded = |pool: &[Candidate]| Selection::default().discarded(pool.len()) as u64;
-        let pools = candidates.chunk_by(same_pool);
-        let dropped_lowest = if keep_all { 0 } else { pools.map(discarded).sum() };
-        let asked = |c: &&&Candidate| only.is_empty() || only.contains(&c.camera_uuid);
-        Self {
-            candidates: candidates.len() as u64,
-            kept: kept.len() as u64,
-            dropped_lowest,
-            dropped_not_drawn: (candidates.len() - kept.len()) as u64 - dropped_lowest,
-            not_asked: (kept.len() - kept.iter().filter(asked).count()) as u64,
-        }
-    }
 }
 
 /// What an export has made, all areas together, earlier runs of the same export included.
@@ -196,112 +167,6 @@ fn size(bytes: u64) -> String {
         value /= 1000.0;
     }
     format!("{value:.1} TB")
-}
-
-/// The account of an export while it runs: stages are timed and units counted in it, by any thread, and whoever watches is
-/// told.
-pub(crate) struct Account<'c> {
-    pub(crate) ctx: &'c Context,
-    warnings_before: u64,
-    started: Instant,
-    state: Mutex<State>,
-}
-
-#[derive(Default)]
-struct State {
-    stage_seconds: BTreeMap<Stage, f64>,
-    tally: UnitTally,
-}
-
-impl<'c> Account<'c> {
-    /// Opens it: the export begins.
-    pub(crate) fn new(ctx: &'c Context) -> Self {
-        Self { ctx, warnings_before: ctx.warnings(), started: Instant::now(), state: Mutex::default() }
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Begins a stage, of one area or of all together.
-    pub(crate) fn stage(&self, stage: Stage, area: Option<u32>) -> StageTimer<'_> {
-        self.ctx.tell(&Event::StageStarted { stage, area });
-        StageTimer { account: self, stage, area, started: Instant::now() }
-    }
-
-    /// A unit of work is on the disk.
-    pub(crate) fn unit_finished(
-        &self,
-        unit: UnitKind,
-        area: u32,
-        location: Option<&str>,
-        tally: &UnitTally,
-        started: Instant,
-    ) {
-        self.state().tally += *tally;
-        let seconds = thousandths(started.elapsed().as_secs_f64());
-        self.ctx.tell(&Event::UnitFinished { unit, area, location, tally, seconds });
-    }
-
-    /// Units that an earlier run finished were checked and are taken as they are.
-    pub(crate) fn units_taken(&self, units: u64, tally: &UnitTally, started: Instant) {
-        self.state().tally += *tally;
-        let seconds = thousandths(started.elapsed().as_secs_f64());
-        self.ctx.tell(&Event::UnitsTaken { units, tally, seconds });
-    }
-
-    /// Takes the count of all files of the complete data set, those that belong to no unit too.
-    pub(crate) fn set_files(&self, files: u64, bytes: u64) {
-        let mut state = self.state();
-        state.tally = UnitTally { files, bytes, ..state.tally };
-    }
-
-    /// Closes it: the export is complete, and its summary is told.
-    pub(crate) fn summarize(
-        self,
-        output: &str,
-        areas: usize,
-        locations: usize,
-        candidate_views: ViewTally,
-    ) -> Summary {
-        let State { stage_seconds, tally } = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let summary = Summary {
-            output: output.to_owned(),
-            areas: areas as u64,
-            locations: locations as u64,
-            tally,
-            candidate_views,
-            warnings: self.ctx.warnings() - self.warnings_before,
-            stage_seconds: stage_seconds.into_iter().map(|(stage, s)| (stage, thousandths(s))).collect(),
-            seconds: thousandths(self.started.elapsed().as_secs_f64()),
-        };
-        self.ctx.tell(&Event::Summary(&summary));
-        summary
-    }
-}
-
-/// A stage under way. One that is dropped without [`StageTimer::end`] failed, and is not told of.
-#[must_use = "a stage is counted when it ends"]
-pub(crate) struct StageTimer<'a> {
-    account: &'a Account<'a>,
-    stage: Stage,
-    area: Option<u32>,
-    started: Instant,
-}
-
-impl StageTimer<'_> {
-    /// The stage is done.
-    pub(crate) fn end(self) {
-        let Self { account, stage, area, started } = self;
-        let seconds = started.elapsed().as_secs_f64();
-        *account.state().stage_seconds.entry(stage).or_default() += seconds;
-        account.ctx.tell(&Event::StageFinished { stage, area, seconds: thousandths(seconds) });
-    }
-}
-
-/// A number of seconds, rounded to what is worth telling.
-fn thousandths(seconds: f64) -> f64 {
-    (1000.0 * seconds).round() / 1000.0
 }
 
 #[cfg(test)]

@@ -8,20 +8,16 @@
 //! than reading the files, so nothing is left to a sample. With `full` candidate views are scored again too, and the points
 //! are read in all their forms.
 
-mod diagnosis;
 mod files;
 mod images;
 mod instances;
 mod labels;
 mod manifest;
 mod mesh;
-mod pixels;
 mod points;
 mod pose;
-mod rays;
 mod report;
 mod scores;
-mod shade;
 mod tables;
 mod views;
 
@@ -247,7 +243,8 @@ fn diagnose_mismatches(
         || (),
         |(), &i| {
             let (o, image) = (&mismatches[i], &images[mismatches[i].image]);
-            let guess = if chosen[i] { diagnosis::diagnose(reference, images, cameras, o) } else { None };
+            let guess =
+                if chosen[i] { images::diagnosis::diagnose(reference, images, cameras, o) } else { None };
             let mut sentence = o.difference.sentence("what the mesh shows there");
             if let Some(guess) = &guess {
                 sentence += &format!("; {guess}");

@@ -1,6 +1,6 @@
 //! What single rays should write into the files of a domain: slower than images, for any ray.
 
-use super::images::Reference;
+use crate::verify::images::Reference;
 use glam::DVec3;
 use s3d_geom::Camera;
 use s3d_io::dataset::Domain;

@@ -3,9 +3,9 @@
 //! A suspect says what a pixel would show if the fault were that one. It is named if it explains nearly all pixels that
 //! differ, and nearly all others.
 
-use super::images::{Mismatch, Reference};
-use super::pixels::Pixels;
-use super::shade::Shade;
+use crate::verify::images::pixels::Pixels;
+use crate::verify::images::shade::Shade;
+use crate::verify::images::{Mismatch, Reference};
 use glam::{DMat3, DVec3};
 use s3d_geom::{Camera, Pose, Projection};
 use s3d_io::dataset::{DatasetImage, DepthUnits, Domain, Frame};

@@ -1,8 +1,8 @@
 //! What the mesh shows: the pixels that a file should have.
 
-use super::images::{Reference, Scratch};
-use super::pixels::{Difference, Pixels};
-use super::pose::CheckedPose;
+use crate::verify::images::pixels::{Difference, Pixels};
+use crate::verify::images::{Reference, Scratch};
+use crate::verify::pose::CheckedPose;
 use crate::xyz;
 use half::f16;
 use s3d_geom::{Camera, Raster};

@@ -1,14 +1,19 @@
 //! One image after another: its files against each other, and against the mesh.
 
-use super::files::Files;
-use super::labels::Labels;
-use super::manifest::ReadManifest;
-use super::mesh::LabelledMesh;
-use super::pixels::{Difference, Pixels};
-use super::pose::{self, CheckedPose};
-use super::rays::difference;
-use super::report::{Report, Topic};
-use super::views::Views;
+pub(crate) mod diagnosis;
+mod pixels;
+pub(crate) mod rays;
+mod shade;
+
+use crate::verify::files::Files;
+use crate::verify::images::pixels::{Difference, Pixels};
+use crate::verify::images::rays::difference;
+use crate::verify::labels::Labels;
+use crate::verify::manifest::ReadManifest;
+use crate::verify::mesh::LabelledMesh;
+use crate::verify::pose::{self, CheckedPose};
+use crate::verify::report::{Report, Topic};
+use crate::verify::views::Views;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{Conventions, DatasetImage, Domain, Frame, Layout, XyzType};
 use s3d_render::{Caster, Hits, MISSING_INDEX, MipMaps, Scene, ViewImages};

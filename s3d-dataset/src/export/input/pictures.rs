@@ -3,7 +3,7 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::inputs::{AreaInput, Cameras};
+use crate::export::input::{AreaInput, Cameras};
 use crate::export::modality::Channels;
 use s3d_geom::{Camera, Raster};
 use s3d_io::Error as FileError;

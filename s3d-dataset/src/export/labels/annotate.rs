@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::inputs::AreaInput;
+use crate::export::input::AreaInput;
 use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance as InstancePoints, InstanceReader, PointPasses};

@@ -5,8 +5,8 @@
 //! that write the same area at the same time write the same bytes.
 
 use crate::error::Result;
-use crate::export::annotate::Annotated;
-use crate::export::inputs::RoomInput;
+use crate::export::input::RoomInput;
+use crate::export::labels::annotate::Annotated;
 use crate::store::checked::{read_checked, write_checked};
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
@@ -169,7 +169,7 @@ mod locations_as_data {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::annotate::{SkippedLines, SurveyedRoom};
+    use crate::export::labels::annotate::{SkippedLines, SurveyedRoom};
     use glam::{DMat3, DVec2, DVec3, Vec3};
     use proptest::prelude::*;
     use proptest::strategy::ValueTree;

@@ -1,8 +1,12 @@
 //! Everything that an export reads, found and checked before anything is written.
 
+pub(crate) mod memory;
+pub(crate) mod pictures;
+pub(crate) mod requested;
+
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::memory::{SceneSource, SharedScene};
+use crate::export::input::memory::{SceneSource, SharedScene};
 use crate::store::request::InputRecord;
 use crate::tables::manifest::half_step;
 use glam::DAffine3;

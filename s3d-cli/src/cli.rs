@@ -1,0 +1,197 @@
+//! The command line as a whole.
+
+use crate::commands::{demo, export, info, merge, pack, plan, profile, render, sample, stats, verify, xyz};
+use crate::console::LogFormat;
+use crate::failure::Outcome;
+use clap::{Parser, Subcommand};
+
+/// From an annotated scan to a registered 2D-3D-Semantic data set.
+#[derive(Debug, Parser)]
+#[command(
+    name = "s3d",
+    version,
+    max_term_width = 110,
+    after_help = "\
+Start with the built-in scene:\n  s3d demo\nthen a scan of your own:\n  s3d info scan/scene.toml\n  s3d export scan/scene.toml -o dataset\n\n\
+Exit codes: 0 done, 1 the input or the disk, 2 the call, 75 stopped by a signal or a full disk: call it again."
+)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Log details.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    pub(crate) verbose: bool,
+    /// Log warnings and errors only, and show no progress.
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
+    /// Write to standard error for a person, or one JSON object a line for a program: log lines, progress, a line for each
+    /// finished unit of work, and a summary (docs/log.md).
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value_t,
+        value_name = "text|json",
+        hide_possible_values = true
+    )]
+    pub(crate) log: LogFormat,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Write the built-in scene as input files and export it: a data set to look at.
+    #[command(
+        after_help = "Example:\n  s3d demo -o s3d-demo\nThe scene's own files are in OUT/scan; export them again, larger, with\n  s3d export s3d-demo/scan/scene.toml -o dataset"
+    )]
+    Demo(demo::DemoArgs),
+    /// Turn scans into a data set: images, poses, meshes, points, labels, tables.
+    #[command(
+        after_help = "Examples:\n  s3d export scan/scene.toml -o dataset\n  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\nAn export that was stopped or killed goes on where it was when it is called again with the same arguments."
+    )]
+    Export(export::ExportArgs),
+    /// Label scenes and score their views ahead of an export that many machines share.
+    #[command(
+        after_help = "Examples:\n  s3d plan scan/scene.toml -o plan\n  s3d export scan/scene.toml -o dataset --plan plan --shard 1/4\nThe options are those of the export that labels and scores depend on. docs/cluster has files for Slurm and others."
+    )]
+    Plan(plan::PlanArgs),
+    /// Make one data set of what the shards of an export have written.
+    #[command(
+        after_help = "Examples:\n  s3d merge dataset -o dataset\n  s3d merge shard_1 shard_2 shard_3 -o dataset\nIt is that of a single run, byte for byte. What is missing is told with the shard to run again."
+    )]
+    Merge(merge::MergeArgs),
+    /// Sample a mesh densely and uniformly into a coloured point cloud.
+    #[command(after_help = "Example:\n  s3d sample scan/rgb.obj -o cloud.ply --points-per-m2 10000")]
+    Sample(sample::SampleArgs),
+    /// Render one view of a mesh, in every modality that needs no annotation.
+    #[command(
+        after_help = "Examples:\n  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --yaw 30 --pitch -10 --fov 75 -o view\n  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --pano -o pano"
+    )]
+    Render(render::RenderArgs),
+    /// Tell what a scene holds, and what looks wrong in it.
+    #[command(after_help = "Example:\n  s3d info scan/scene.toml")]
+    Info(info::InfoArgs),
+    /// Package a data set for a trainer: WebDataset, COLMAP, nerfstudio, COCO panoptic, or a Parquet table of its images.
+    #[command(
+        after_help = "Examples:\n  s3d pack dataset --to webdataset --images views --shuffle 1\n  s3d pack dataset --to colmap -o colmap --areas 1 --copy-images\n  s3d pack dataset --to nerfstudio\n  s3d pack dataset --to coco --areas 1,2,3,4,6 -o coco_train\n  s3d pack dataset --to parquet -o images.parquet"
+    )]
+    Pack(pack::PackArgs),
+    /// Make the world coordinates of a data set's images again, from depth and pose.
+    #[command(
+        after_help = "Example:\n  s3d xyz dataset --type float --overwrite\nDepth is stored in steps of 2 mm (or 1 mm), so what comes out is off by half of that along the ray; a pixel\nbeyond the depth's range is missing. What `s3d export` writes comes from the hits themselves."
+    )]
+    Xyz(xyz::XyzArgs),
+    /// Write what a point cloud loader wants from an existing data set.
+    #[command(
+        after_help = "Example:\n  s3d profile dataset --to pointnet --to pointcept\nEach comes to dataset/profiles/NAME."
+    )]
+    Profile(profile::ProfileArgs),
+    /// Print the tables of statistics of a data set, counted from its files.
+    #[command(after_help = "Example:\n  s3d stats dataset")]
+    Stats(stats::StatsArgs),
+    /// Read a data set back and check it: against its manifest, against itself, and every image against the mesh.
+    #[command(
+        after_help = "Examples:\n  s3d verify dataset\n  s3d verify dataset --full\nEach fault is a line on standard output; the last line counts. Exit code 0 without faults, 1 with some."
+    )]
+    Verify(verify::VerifyArgs),
+}
+
+impl Command {
+    /// Whether a signal stops it between files. The others write one thing or nothing, and are ended by the system.
+    pub(crate) fn stops_between_files(&self) -> bool {
+        match self {
+            Self::Demo(_) | Self::Export(_) | Self::Sample(_) => true,
+            Self::Plan(_) | Self::Merge(_) | Self::Pack(_) | Self::Xyz(_) | Self::Profile(_) => true,
+            Self::Render(_) | Self::Info(_) | Self::Stats(_) | Self::Verify(_) => false,
+        }
+    }
+
+    pub(crate) fn run(self) -> Outcome<()> {
+        match self {
+            Self::Demo(args) => demo::run(args),
+            Self::Export(args) => export::run(args),
+            Self::Plan(args) => plan::run(args),
+            Self::Merge(args) => merge::run(args),
+            Self::Sample(args) => sample::run(args),
+            Self::Render(args) => render::run(args),
+            Self::Info(args) => info::run(args),
+            Self::Pack(args) => pack::run(args),
+            Self::Xyz(args) => xyz::run(args),
+            Self::Profile(args) => profile::run(args),
+            Self::Stats(args) => stats::run(&args),
+            Self::Verify(args) => verify::run(args),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+    use s3d_dataset::{ExportOptions, Profile};
+    use s3d_io::dataset::Domain;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    fn options(args: &[&str]) -> ExportOptions {
+        match Cli::parse_from(["s3d", "export", "s.toml"].iter().chain(args)).command {
+            Command::Export(args) => args.options.into(),
+            _ => panic!("another command"),
+        }
+    }
+
+    #[test]
+    fn defaults_are_the_papers() {
+        let o = options(&[]);
+        assert_eq!(o, ExportOptions::default());
+        assert_eq!((o.views, o.size, o.pano_width, o.seed, o.entropy_stride), (72, 1080, 4096, 0, 4));
+    }
+
+    #[test]
+    fn options_written_in_two_ways_are_the_same() {
+        let canonical = |args: &[&str]| options(args).canonical().unwrap();
+        let (x, y) = ("00112233445566778899aabbccddeeff", "508160ba5d80a2e365609578a09bab8b");
+        let a = canonical(&[
+            "--modalities",
+            "pose,rgb,pose",
+            "--only",
+            "508160BA-5d80-a2e3-6560-9578a09bab8b",
+            x,
+        ]);
+        assert_eq!(a, canonical(&["--modalities", "rgb,pose", "--only", &[x, y, x].join(",")]));
+        assert_eq!(a.modalities, [Domain::Rgb, Domain::Pose]);
+        let none = canonical(&["--xyz", "none", "--profile", "pointnet,mmdet3d", "--profile", "pointnet"]);
+        assert!(none.modalities.len() == 6 && !none.modalities.contains(&Domain::GlobalXyz));
+        assert_eq!(none.profiles, [Profile::Mmdet3d, Profile::PointNet]);
+        assert_eq!(options(&["--pad-labels", "off"]).pad_labels.to_string(), "off");
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for bad in [
+            &["s3d", "export"] as &[&str],
+            &["s3d", "export", "a.toml", "--pano-width", "4095"],
+            &["s3d", "export", "a.toml", "--modalities", "rgb,smell"],
+            &["s3d", "export", "a.toml", "--pool", "sea"],
+            &["s3d", "export", "a.toml", "--xyz", "double"],
+            &["s3d", "export", "a.toml", "--normal-axes", "left"],
+            &["s3d", "export", "a.toml", "--depth-units", "inch"],
+            &["s3d", "export", "a.toml", "--pad-labels", "0"],
+            &["s3d", "export", "a.toml", "--pad-labels", "65537"],
+            &["s3d", "export", "a.toml", "--profile", "sea"],
+            &["s3d", "xyz", "out", "--type", "none"],
+            &["s3d", "profile", "out"],
+            &["s3d", "export", "a.toml", "--compression", "9"],
+            &["s3d", "export", "--only", "00112233445566778899aabbccddeeff", "a.toml"],
+            &["s3d", "export", "a.toml", "--points-per-m2", "nan"],
+            &["s3d", "render", "a.obj", "--at", "1,2", "-o", "x"],
+            &["s3d", "render", "a.obj", "--at", "1,2,3", "--fov", "180", "-o", "x"],
+            &["s3d", "render", "a.obj", "--at", "1,2,3", "--fov", "60", "--pano", "-o", "x"],
+        ] {
+            assert!(Cli::try_parse_from(bad).is_err(), "{bad:?}");
+        }
+        assert!(Cli::try_parse_from(["s3d", "render", "a.obj", "--at", "-1,2,3", "-o", "x"]).is_ok());
+    }
+}

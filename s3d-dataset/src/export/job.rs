@@ -1,0 +1,350 @@
+//! The work of an export: units of labels, scores, images and assets, done where they are not done yet.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::event::Stage;
+use crate::export::area::{self, Common, PreparedMesh};
+use crate::export::finish::{Totals, finish, missing_units};
+use crate::export::input::memory::SceneSource;
+use crate::export::input::pictures::Pictures;
+use crate::export::input::requested::requested_areas;
+use crate::export::input::{AreaInput, Cameras, Inputs};
+use crate::export::labels::area_plan::AreaPlan;
+use crate::export::points::check_density;
+use crate::export::views::{Candidate, select_requested};
+use crate::options::ExportOptions;
+use crate::shard::plan::Plan;
+use crate::store::journal::{Journal, Unit};
+use crate::store::output::{self, Begin};
+use crate::store::request::Request;
+use crate::tables::account::Account;
+use crate::tables::assets;
+use crate::tables::manifest::Manifest;
+use crate::tables::summary::Summary;
+use s3d_geom::NearestFaces;
+use s3d_io::dataset::{Domain, Layout};
+use s3d_io::fs::SyncAhead;
+use s3d_io::mesh::MeshFile;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What an export writes to.
+pub(crate) struct Target<'a> {
+    pub(crate) layout: Layout,
+    /// Whether OUT may hold something already.
+    pub(crate) overwrite: bool,
+    /// Names in OUT that do not count as something.
+    pub(crate) allowed: Vec<&'a str>,
+}
+
+/// An export whose input is open and checked.
+pub(crate) struct Job<'a> {
+    pub(crate) inputs: Inputs,
+    /// What decides the bytes.
+    pub(crate) request: Request,
+    options: &'a ExportOptions,
+    /// The pictures of each area, if colours are taken from some.
+    pictures: Vec<Option<Pictures>>,
+    /// The mesh, if there is one area.
+    single: Option<Arc<MeshFile>>,
+    /// Where labels and scores come from, if they were made before.
+    pub(crate) plan: Option<&'a Plan>,
+}
+
+/// What is known after labelling: by area, unless all of it was done before.
+pub(crate) struct Labelled<'j> {
+    single: Option<PreparedMesh<'j>>,
+    pub(crate) areas: Vec<Option<AreaPlan>>,
+}
+
+/// Which areas are labelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// Those of which something is still to be done.
+    Unfinished,
+    All,
+}
+
+/// Turns scenes into a data set; with a plan, labels and scores are taken from there.
+pub(crate) fn export(
+    ctx: &Context,
+    scenes: &[SceneSource],
+    target: &Target<'_>,
+    options: &ExportOptions,
+    plan: Option<&Plan>,
+) -> Result<Option<Summary>> {
+    let account = Account::new(ctx);
+    let layout = &target.layout;
+    output::check(ctx, layout, target.overwrite, &target.allowed)?;
+    let job = Job::open(scenes, layout, options, plan, &account)?;
+    let manifest = job.manifest();
+    let session = match output::begin(layout, target.overwrite, &job.request, &manifest, &account)? {
+        Begin::NothingToDo => {
+            ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
+            return Ok(None);
+        }
+        Begin::Session(session) => session,
+    };
+    let made = job.run(layout, &session.journal, &account).and_then(|disk| {
+        let tables = account.stage(Stage::Tables, None);
+        let made = finish(ctx, layout, &job.request, manifest, &session.journal.finished(), Some(disk))?;
+        tables.end();
+        Ok(made)
+    });
+    let made = session.end(ctx, made)?;
+    Ok(Some(summarize(account, layout, &job.request, &made)))
+}
+
+/// Tells what a complete data set holds.
+pub(crate) fn summarize(account: Account<'_>, layout: &Layout, request: &Request, made: &Totals) -> Summary {
+    account.set_files(made.files, made.bytes);
+    account.summarize(&layout.root().display().to_string(), request.areas.len(), made.locations, made.views)
+}
+
+impl<'a> Job<'a> {
+    /// Opens the input of an export into `layout`, and refuses what cannot be exported. Nothing is written.
+    pub(crate) fn open(
+        scenes: &[SceneSource],
+        layout: &Layout,
+        options: &'a ExportOptions,
+        plan: Option<&'a Plan>,
+        account: &Account<'_>,
+    ) -> Result<Self> {
+        let ctx = account.ctx;
+        let loading = account.stage(Stage::Load, None);
+        ctx.debug(format_args!("{options:?}"));
+        let (place, lenient) = (options.place_cameras, options.lenient);
+        let inputs = match plan {
+            Some(plan) => Inputs::open_planned(scenes, place, lenient, plan.table()?)?,
+            None => Inputs::open(scenes, place, lenient)?,
+        };
+        check_only(&inputs, &options.only)?;
+        output::check_inputs(layout, &inputs)?;
+        check_label_count(inputs.table.len() - 1)?;
+        let mut pictures = Vec::new();
+        for area in &inputs.areas {
+            pictures.push(area_pictures(ctx, area, options)?);
+        }
+        // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a single area is
+        // kept from then on; several are read again where they are needed, so that they never share memory.
+        let mut single: Option<Arc<MeshFile>> = None;
+        let mut companions = Vec::new();
+        for area in &inputs.areas {
+            ctx.check()?;
+            let file = area.read_mesh()?;
+            area.tell_mesh(ctx, &file);
+            check_density(&file.mesh, options.points_per_m2)?;
+            companions.push(file.companions.clone());
+            single = (inputs.areas.len() == 1).then_some(file);
+        }
+        let known = plan.map(Plan::request);
+        let request = Request::new(options, requested_areas(ctx, &inputs.areas, &companions, known)?);
+        if let Some(plan) = plan {
+            plan.refuse_other(&request)?;
+            plan.require_complete()?;
+        }
+        loading.end();
+        ctx.check()?;
+        Ok(Self { inputs, request, options, pictures, single, plan })
+    }
+
+    /// The manifest that says that this export runs.
+    pub(crate) fn manifest(&self) -> Manifest {
+        Manifest::begin(&self.request, self.inputs.table.len())
+    }
+
+    /// Does all units that are not done yet. What it has written goes to the disk meanwhile, and on after it.
+    fn run(&self, layout: &Layout, journal: &Journal, account: &Account<'_>) -> Result<SyncAhead> {
+        let ctx = account.ctx;
+        let disk = SyncAhead::start(layout.root());
+        self.write_assets(layout)?;
+        let cache = layout.work_dir();
+        let common = self.common(layout, journal, account, &cache, &|_| true);
+        let labelled = self.label(common, Scope::Unfinished)?;
+        let (candidates, _) = select_requested(&self.request, &journal.finished())?;
+        let kept = candidates.iter().filter(|c| c.frame_num.is_some()).count();
+        ctx.info(format_args!("selected {kept} of {} candidate views", candidates.len()));
+        self.render(common, &labelled, &candidates)?;
+        disk.sync_now();
+        Ok(disk)
+    }
+
+    /// Writes what is known before any unit is done: the label table, `assets`, `conventions.json`.
+    pub(crate) fn write_assets(&self, layout: &Layout) -> Result<()> {
+        let options = self.options;
+        let names = self.inputs.table.names();
+        assets::write(layout, names, options.pad_labels.0, options.conventions())
+    }
+
+    pub(crate) fn common<'b>(
+        &'b self,
+        layout: &'b Layout,
+        journal: &'b Journal,
+        account: &'b Account<'b>,
+        cache: &'b Path,
+        is_ours: &'b (dyn Fn(&Unit) -> bool + Sync),
+    ) -> Common<'b> {
+        let (table, options) = (&self.inputs.table, self.options);
+        Common { table, layout, options, journal, account, cache, is_ours }
+    }
+
+    /// Labels areas, those of which something is still to be done or all, and scores those of their locations that are not
+    /// scored. The files of an area's labels are written if that unit is ours; if not, what it tells is known to the
+    /// journal, but not written in it.
+    pub(crate) fn label(&self, common: Common<'_>, scope: Scope) -> Result<Labelled<'_>> {
+        let missing = missing_units(&self.request, &common.journal.finished());
+        let is_needed = |area: u32| scope == Scope::All || missing.iter().any(|unit| unit.area() == area);
+        let mut labelled = Labelled { single: None, areas: Vec::new() };
+        for area in &self.inputs.areas {
+            let plan = match self.plan {
+                _ if !is_needed(area.number) => None,
+                Some(plan) => Some(area::take_from_plan(area, plan, &common)?),
+                None => Some(self.label_area(area, common, &mut labelled.single)?),
+            };
+            labelled.areas.push(plan);
+        }
+        let finished = common.journal.finished();
+        let labels = self.request.areas.iter().filter_map(|a| finished.labels(a.area));
+        only_known(labels.flat_map(|l| &l.locations).map(String::as_str), &self.options.only)?;
+        Ok(labelled)
+    }
+
+    /// Labels an area, or takes it as it was labelled before, and scores what is ours and not scored. Its mesh, ready for
+    /// rays, is kept in `single` if there is but one area.
+    fn label_area<'j>(
+        &'j self,
+        area: &AreaInput,
+        common: Common<'_>,
+        single: &mut Option<PreparedMesh<'j>>,
+    ) -> Result<AreaPlan> {
+        let before = area::labelled_before(area.number, &common);
+        if let Some(plan) = &before {
+            area::know_labels(area, plan, &common);
+        }
+        let before = match before {
+            Some(plan) if !area::is_unscored(&plan, &common) => return Ok(plan),
+            before => before,
+        };
+        let is_labelled = before.is_some();
+        let finish = |prepared: &PreparedMesh<'_>, nearest: Option<NearestFaces<'_>>| {
+            let plan = match (before, nearest) {
+                (Some(plan), _) => plan,
+                (None, Some(nearest)) => area::label_area(area, prepared, nearest, common)?,
+                (None, None) => area::label_area(area, prepared, prepared.nearest(), common)?,
+            };
+            area::score(&plan, prepared, common)?;
+            Ok(plan)
+        };
+        if let Some(file) = &self.single {
+            let (prepared, nearest) = PreparedMesh::prepare(file, !is_labelled);
+            let plan = finish(&prepared, nearest)?;
+            *single = Some(prepared);
+            return Ok(plan);
+        }
+        let loading = common.account.stage(Stage::Load, Some(area.number));
+        let file = area.read_mesh()?;
+        let (prepared, nearest) = PreparedMesh::prepare(&file, !is_labelled);
+        loading.end();
+        finish(&prepared, nearest)
+    }
+
+    /// The part of a plan that an area is: its labels and those scores that are ours.
+    pub(crate) fn plan_area(
+        &self,
+        area: &AreaInput,
+        layout: &Layout,
+        journal: &Journal,
+        account: &Account<'_>,
+        is_ours: &(dyn Fn(&Unit) -> bool + Sync),
+    ) -> Result<()> {
+        let common = self.common(layout, journal, account, layout.root(), is_ours);
+        self.label_area(area, common, &mut None).map(drop)
+    }
+
+    /// Renders the locations, and writes the meshes and points, that are ours and not done yet.
+    pub(crate) fn render(
+        &self,
+        common: Common<'_>,
+        labelled: &Labelled<'_>,
+        candidates: &[Candidate],
+    ) -> Result<()> {
+        let missing = missing_units(&self.request, &common.journal.finished());
+        let Labelled { single, areas } = labelled;
+        for ((area, plan), pictures) in self.inputs.areas.iter().zip(areas).zip(&self.pictures) {
+            let todo: BTreeSet<&Unit> =
+                missing.iter().filter(|unit| unit.area() == area.number && (common.is_ours)(unit)).collect();
+            let Some(plan) = plan.as_ref().filter(|_| !todo.is_empty()) else { continue };
+            let render = |prepared: &PreparedMesh<'_>| {
+                area::render_area(area, prepared, plan, pictures.as_ref(), common, candidates, &todo)
+            };
+            match (single, &self.single) {
+                (Some(prepared), _) => render(prepared)?,
+                (None, Some(file)) => render(&PreparedMesh::for_rays(file))?,
+                (None, None) => {
+                    let loading = common.account.stage(Stage::Load, Some(area.number));
+                    let file = area.read_mesh()?;
+                    let prepared = PreparedMesh::for_rays(&file);
+                    loading.end();
+                    render(&prepared)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The pictures that an area's RGB images are made from, if they are.
+fn area_pictures(ctx: &Context, area: &AreaInput, options: &ExportOptions) -> Result<Option<Pictures>> {
+    if !options.modalities.contains(&Domain::Rgb) {
+        return Ok(None);
+    }
+    let pictures = Pictures::open(area, |l| options.only.is_empty() || options.only.contains(&l.uuid))?;
+    if let Some(pictures) = &pictures {
+        pictures.warnings.iter().for_each(|w| ctx.warn(w));
+        ctx.info(format_args!("colours from {}", pictures.summary()));
+    }
+    Ok(pictures)
+}
+
+/// Refuses more labels than loaders of the data set can tell apart.
+fn check_label_count(labels: usize) -> Result<()> {
+    if labels <= s3d_io::dataset::MAX_LABELS_OF_LOADERS {
+        return Ok(());
+    }
+    Err(Error::Input(format!(
+        "{labels} labels are more than {}: loaders of the data set take a label's index from G and B of a pixel alone, and a \
+         pixel with an R for one without a label; export the areas in several data sets",
+        s3d_io::dataset::MAX_LABELS_OF_LOADERS
+    )))
+}
+
+/// Refuses a `--only` that names no location, as far as they are known before the areas are labelled.
+fn check_only(inputs: &Inputs, only: &[String]) -> Result<()> {
+    if inputs.areas.iter().any(|a| matches!(a.cameras, Cameras::Placed(_))) {
+        return Ok(());
+    }
+    only_known(inputs.areas.iter().flat_map(|a| a.cameras.listed()).map(|l| l.uuid.as_str()), only)
+}
+
+fn only_known<'a>(uuids: impl Iterator<Item = &'a str>, only: &[String]) -> Result<()> {
+    let known: BTreeSet<&str> = uuids.collect();
+    match only.iter().find(|uuid| !known.contains(uuid.as_str())) {
+        Some(uuid) => Err(Error::Usage(format!("--only {uuid}: no scan location has this uuid"))),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_labels_than_sixteen_bits_are_refused() {
+        assert!(check_label_count(65_535).is_ok());
+        let e = check_label_count(65_536).unwrap_err();
+        assert!(
+            matches!(e, Error::Input(_)) && e.to_string().starts_with("65536 labels are more than 65535")
+        );
+    }
+}

@@ -1,0 +1,112 @@
+//! Making a plan: areas are labelled, and the candidate views of their locations scored.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::input::memory::SceneSource;
+use crate::export::job::Job;
+use crate::options::ExportOptions;
+use crate::shard::assignment::Shard;
+use crate::shard::plan::{PlanFile, read_plan_file, refuse_other};
+use crate::store::checked::write_checked;
+use crate::store::journal::{Finished, Journal, Unit};
+use crate::store::output;
+use crate::store::plan_file;
+use crate::tables::account::Account;
+use crate::tables::label_list::LabelList;
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{Domain, Layout};
+use s3d_io::fs::create_dir;
+use std::fs;
+use std::path::Path;
+
+/// Makes a plan of scenes in a folder, or a shard's part of it; what is there already is not made again.
+///
+/// # Errors
+/// [`Error::Usage`] if the folder holds something else, or a plan of another call.
+pub fn plan<S: Clone + Into<SceneSource>>(
+    scenes: &[S],
+    folder: &Path,
+    options: &ExportOptions,
+    shard: Option<Shard>,
+    ctx: &Context,
+) -> Result<()> {
+    let shard = shard.unwrap_or(Shard::ALL);
+    let options = &ExportOptions {
+        views: options.views,
+        size: options.size,
+        seed: options.seed,
+        place_cameras: options.place_cameras,
+        entropy_stride: options.entropy_stride,
+        lenient: options.lenient,
+        modalities: vec![Domain::Pose],
+        // Of panoramas and points nothing is asked.
+        pano_width: 8,
+        points_per_m2: f64::MIN_POSITIVE,
+        ..ExportOptions::default()
+    };
+    let options = &options.canonical()?;
+    let account = Account::new(ctx);
+    let layout = Layout::new(folder);
+    refuse_foreign(folder)?;
+    let scenes: Vec<SceneSource> = scenes.iter().cloned().map(Into::into).collect();
+    let job = Job::open(&scenes, &layout, options, None, &account)?;
+    let path = plan_file(folder);
+    if path.exists() {
+        let there = read_plan_file(&path)?;
+        refuse_other(folder, &there.request, &job.request)?;
+    } else {
+        create_dir(folder)?;
+        let labels = LabelList::of(&job.inputs.table);
+        write_checked(&path, &PlanFile { request: job.request.of_plan(), labels })?;
+    }
+    let journal = Journal::begin(&layout, Finished::default())?;
+    let areas = &job.inputs.areas;
+    for (position, area) in areas.iter().enumerate() {
+        ctx.check()?;
+        let Some(part) = shard.within(position, areas.len()) else { continue };
+        let number = area.number;
+        // What others have done meanwhile counts too.
+        let there = Finished::read(ctx, &layout)?
+            .checked_where(ctx, &layout, |unit| *unit == Unit::Labels(number))?;
+        there.iter().for_each(|done| journal.know(done.clone()));
+        let position_of = |uuid: &str| -> Option<usize> {
+            let finished = journal.finished();
+            finished.labels(number)?.locations.iter().position(|other| other == uuid)
+        };
+        let is_ours = |unit: &Unit| match unit {
+            Unit::Scores(_, uuid) => position_of(uuid).is_some_and(|position| part.takes(position)),
+            Unit::Labels(_) => true,
+            Unit::Location(..) | Unit::Assets(_) => false,
+        };
+        job.plan_area(area, &layout, &journal, &account, &is_ours)?;
+    }
+    let done = match shard {
+        Shard::ALL => "complete".to_owned(),
+        shard => format!("shard {shard} is done"),
+    };
+    ctx.info(format_args!("{}: the plan's {done}", folder.display()));
+    Ok(())
+}
+
+/// Refuses a folder that holds something, and no plan.
+fn refuse_foreign(folder: &Path) -> Result<()> {
+    let entries = match fs::read_dir(folder) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(|e| FileError::io(folder, "use as the folder of a plan", e))?,
+    };
+    if plan_file(folder).exists() {
+        return Ok(());
+    }
+    for entry in entries {
+        let name = entry.map_err(|e| FileError::io(folder, "read", e))?.file_name();
+        // Another shard may be about to begin.
+        if !output::is_working_name(&name) && !plan_file(folder).exists() {
+            let root = folder.display();
+            return Err(Error::Usage(format!(
+                "{root} holds {}, and no plan: choose another folder",
+                name.display()
+            )));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,114 @@
+//! The account of an export while it runs: what it takes and makes, and who watches.
+
+use crate::context::Context;
+use crate::event::{Event, Stage, UnitKind};
+use crate::tables::summary::{Summary, UnitTally, ViewTally};
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// The account of an export while it runs: stages are timed and units counted in it, by any thread, and whoever watches is
+/// told.
+pub(crate) struct Account<'c> {
+    pub(crate) ctx: &'c Context,
+    warnings_before: u64,
+    started: Instant,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    stage_seconds: BTreeMap<Stage, f64>,
+    tally: UnitTally,
+}
+
+impl<'c> Account<'c> {
+    /// Opens it: the export begins.
+    pub(crate) fn new(ctx: &'c Context) -> Self {
+        Self { ctx, warnings_before: ctx.warnings(), started: Instant::now(), state: Mutex::default() }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins a stage, of one area or of all together.
+    pub(crate) fn stage(&self, stage: Stage, area: Option<u32>) -> StageTimer<'_> {
+        self.ctx.tell(&Event::StageStarted { stage, area });
+        StageTimer { account: self, stage, area, started: Instant::now() }
+    }
+
+    /// A unit of work is on the disk.
+    pub(crate) fn unit_finished(
+        &self,
+        unit: UnitKind,
+        area: u32,
+        location: Option<&str>,
+        tally: &UnitTally,
+        started: Instant,
+    ) {
+        self.state().tally += *tally;
+        let seconds = thousandths(started.elapsed().as_secs_f64());
+        self.ctx.tell(&Event::UnitFinished { unit, area, location, tally, seconds });
+    }
+
+    /// Units that an earlier run finished were checked and are taken as they are.
+    pub(crate) fn units_taken(&self, units: u64, tally: &UnitTally, started: Instant) {
+        self.state().tally += *tally;
+        let seconds = thousandths(started.elapsed().as_secs_f64());
+        self.ctx.tell(&Event::UnitsTaken { units, tally, seconds });
+    }
+
+    /// Takes the count of all files of the complete data set, those that belong to no unit too.
+    pub(crate) fn set_files(&self, files: u64, bytes: u64) {
+        let mut state = self.state();
+        state.tally = UnitTally { files, bytes, ..state.tally };
+    }
+
+    /// Closes it: the export is complete, and its summary is told.
+    pub(crate) fn summarize(
+        self,
+        output: &str,
+        areas: usize,
+        locations: usize,
+        candidate_views: ViewTally,
+    ) -> Summary {
+        let State { stage_seconds, tally } = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let summary = Summary {
+            output: output.to_owned(),
+            areas: areas as u64,
+            locations: locations as u64,
+            tally,
+            candidate_views,
+            warnings: self.ctx.warnings() - self.warnings_before,
+            stage_seconds: stage_seconds.into_iter().map(|(stage, s)| (stage, thousandths(s))).collect(),
+            seconds: thousandths(self.started.elapsed().as_secs_f64()),
+        };
+        self.ctx.tell(&Event::Summary(&summary));
+        summary
+    }
+}
+
+/// A stage under way. One that is dropped without [`StageTimer::end`] failed, and is not told of.
+#[must_use = "a stage is counted when it ends"]
+pub(crate) struct StageTimer<'a> {
+    account: &'a Account<'a>,
+    stage: Stage,
+    area: Option<u32>,
+    started: Instant,
+}
+
+impl StageTimer<'_> {
+    /// The stage is done.
+    pub(crate) fn end(self) {
+        let Self { account, stage, area, started } = self;
+        let seconds = started.elapsed().as_secs_f64();
+        *account.state().stage_seconds.entry(stage).or_default() += seconds;
+        account.ctx.tell(&Event::StageFinished { stage, area, seconds: thousandths(seconds) });
+    }
+}
+
+/// A number of seconds, rounded to what is worth telling.
+fn thousandths(seconds: f64) -> f64 {
+    (1000.0 * seconds).round() / 1000.0
+}
