@@ -1,16 +1,23 @@
-//! Writes the scan of a building that `s3d export` reads: that of the demo.
+//! Writes the scan of a building that `s3d export` reads: that of the demo, or a random one of so many rooms.
 //!
-//! `cargo run --release -p s3d-synth --example building -- FOLDER`
+//! `cargo run --release -p s3d-synth --example building -- FOLDER [ROOMS [SEED]]`
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
-use s3d_synth::{Building, ScanOptions};
+use s3d_synth::{Building, BuildingOptions, ScanOptions};
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::Path;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: building FOLDER")?);
-    let scene = Building::demo().build()?;
-    let file = scene.write_scan(&folder, &ScanOptions::default(), || true)?;
-    println!("{}: {} faces", file.display(), scene.mesh.faces().len());
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let folder = args.first().ok_or("usage: building FOLDER [ROOMS [SEED]]")?;
+    let seed = args.get(2).map_or(Ok(1), |seed| seed.parse())?;
+    let building = match args.get(1) {
+        Some(rooms) => Building::generate(&BuildingOptions::drawn(rooms.parse()?, seed))?,
+        None => Building::demo(),
+    };
+    let scene = building.build()?;
+    let file = scene.write_scan(Path::new(folder), &ScanOptions::default(), || true)?;
+    let (faces, things) = (scene.mesh.faces().len(), scene.instances.len());
+    println!("{}: {faces} faces, {things} things, {} locations", file.display(), scene.locations.len());
     Ok(())
 }

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 /// A number is out of its range, or none at all.
 #[derive(Clone, Debug, Error, PartialEq)]
-#[error("{what} is {value}, and must be from {min} to {max}")]
+#[error("{what} is {value}, and must be from {min} to {max}", value = short(*value))]
 pub struct RangeError {
     /// What the number is, in words: "office_1: the width".
     pub what: String,
@@ -20,6 +20,12 @@ pub struct RangeError {
     pub max: f64,
 }
 
+/// A number as it was written: most come as `f32`.
+fn short(value: f64) -> String {
+    let single = value as f32;
+    if f64::from(single) == value { single.to_string() } else { value.to_string() }
+}
+
 impl RangeError {
     /// Nothing if `value` is from `min` to `max`, or else the error, with `what` in its words.
     pub(crate) fn check(
@@ -28,7 +34,13 @@ impl RangeError {
         what: impl FnOnce() -> String,
     ) -> Result<(), Self> {
         let value = value.into();
-        if (min..=max).contains(&value) { Ok(()) } else { Err(Self { what: what(), value, min, max }) }
+        // What is written as 1.8 may come as an `f32` a little below that.
+        let single = |bound: f64| f64::from(bound as f32);
+        if (min.min(single(min))..=max.max(single(max))).contains(&value) {
+            Ok(())
+        } else {
+            Err(Self { what: what(), value, min, max })
+        }
     }
 }
 

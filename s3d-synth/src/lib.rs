@@ -1,18 +1,29 @@
 //! Procedural furnished buildings.
 //!
 //! A [`Building`] is plain data: rooms with openings and finishes, things that stand in them, scan locations.
-//! [`Building::build`] makes an [`AnnotatedScene`] of it: a mesh with light and shade in its textures, whose every face
-//! belongs to an instance of one of the 13 classes.
+//! [`Building::demo`] is that of `s3d demo`, [`Building::generate`] makes one by rule from [`BuildingOptions`], and what is in
+//! [`building`] and [`look`] is what they are put together from. [`Building::build`] makes an [`AnnotatedScene`]: a mesh with
+//! light and shade in its textures, whose every face belongs to an instance of one of the 13 classes.
+//! [`AnnotatedScene::scan`] draws the points of a scan, and `AnnotatedScene::write_scan` (feature `files`, on by default)
+//! writes what `s3d export` reads. Meshes for benches and tests are in [`scenes`].
 //!
 //! ```
-//! use s3d_synth::Building;
+//! use s3d_label::Class;
+//! use s3d_synth::{Building, BuildingOptions};
 //!
-//! let scene = Building { texture_scale: 0.1, ..Building::demo() }.build()?;
-//! assert!(scene.mesh.faces().len() > 20_000 && scene.instances.len() > 100);
+//! // Two storeys of four random rooms, with coarse textures.
+//! let options = BuildingOptions { storeys: 2, texture_scale: 0.1, ..BuildingOptions::drawn(8, 42) };
+//! let building = Building::generate(&options)?;
+//! assert_eq!(building.rooms.len(), 10, "with a hallway a storey");
+//!
+//! let scene = building.build()?;
+//! assert_eq!(scene.instance_of_face.len(), scene.mesh.faces().len());
+//! assert!(scene.instances.iter().filter(|i| i.class == Class::Floor).count() == 10);
 //! # Ok::<(), s3d_synth::BuildingError>(())
 //! ```
 
-// Nothing panics, whatever a building says. Loops index by what was made here.
+// What a building says is checked: nothing panics but the generators of scenes, whose "Panics" tell when. Loops index by
+// what was made here.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
@@ -23,6 +34,7 @@ mod construct;
 mod error;
 #[cfg(feature = "files")]
 mod files;
+mod generate;
 pub mod look;
 mod scan;
 mod scene;
@@ -34,5 +46,11 @@ pub use error::ScanError;
 pub use error::{BuildingError, RangeError};
 #[cfg(feature = "files")]
 pub use files::is_demo_scan;
+pub use generate::{BuildingOptions, RoomOptions, Style};
 pub use scan::{Scan, ScanOptions};
 pub use scene::{AnnotatedScene, Instance};
+
+/// The example of the README, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

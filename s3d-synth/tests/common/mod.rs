@@ -125,13 +125,13 @@ impl Seen {
             let key = [n.x * 500.0, n.y * 500.0, n.z * 500.0, n.dot(t[0]) * 1000.0];
             planes.entry(key.map(|x| (x + 0.25).round() as i64)).or_default().push((f, flat));
         }
-        // Apart by a line along an edge of one of them, but for a tenth of a millimetre.
+        // Apart by a line along an edge of one of them, but for what corners move onto the builder's lattice.
         let apart = |a: &[DVec2; 3], b: &[DVec2; 3]| {
             (0..3).any(|i| {
                 let edge = (a[(i + 1) % 3] - a[i]).normalize();
                 let side = |p: DVec2| edge.perp_dot(p - a[i]);
                 let inner = side(a[(i + 2) % 3]).signum();
-                b.iter().all(|&p| side(p) * inner < 1e-4)
+                b.iter().all(|&p| side(p) * inner < 2e-4)
             })
         };
         let mut overlaps = BTreeMap::new();
@@ -141,10 +141,18 @@ impl Seen {
             for (i, (f, a)) in list.iter().enumerate() {
                 let right = a.iter().map(|p| p.x).fold(f64::MIN, f64::max);
                 for (g, b) in list[i + 1..].iter().take_while(|(_, b)| left(b) < right) {
-                    if !apart(a, b) && !apart(b, a) {
+                    // Far from the origin a plane's place in the key is rough.
+                    let n = self.scene.mesh.normal(*f).as_dvec3();
+                    let first = self.triangles[*f as usize][0];
+                    let level = self.triangles[*g as usize].iter().all(|p| n.dot(p - first).abs() < 2e-3);
+                    // Parts of one thing may touch: what is between them nobody sees.
+                    let opposite = n.dot(self.scene.mesh.normal(*g).as_dvec3()) < 0.0;
+                    let of = &self.scene.instance_of_face;
+                    let touches = opposite && of[*f as usize] == of[*g as usize];
+                    if level && !touches && !apart(a, b) && !apart(b, a) {
                         let pair =
                             [self.instance_of(*f), self.instance_of(*g)].map(|i| (i.class, i.number, i.room));
-                        overlaps.entry(pair).or_insert(self.scene.mesh.triangle(*f)[0]);
+                        overlaps.entry(pair).or_insert([*f, *g].map(|face| self.scene.mesh.triangle(face)));
                     }
                 }
             }

@@ -1,0 +1,83 @@
+//! Buildings by rule: from a list of rooms and a seed to what stands where.
+//!
+//! A storey is a hallway with rooms on both sides, each with a door to it and windows in its outer wall. `arrange` places
+//! rooms, `furnish` fills one with what its type has, `space` knows where there is room for it. Other floor plans are other
+//! ways to arrange; furnishing knows nothing of them.
+
+mod arrange;
+mod furnish;
+mod options;
+mod space;
+mod style;
+
+pub use options::{BuildingOptions, RoomOptions};
+pub use style::Style;
+
+use crate::BuildingError;
+use crate::building::Building;
+use furnish::furnish;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use s3d_geom::glam::Vec3;
+
+impl Building {
+    /// Makes a building of the rooms wanted: the same for the same options. Every room and hallway has a scan location.
+    ///
+    /// What is drawn in a room follows from the seed and the room's place in the list alone.
+    ///
+    /// ```
+    /// use s3d_label::RoomType;
+    /// use s3d_synth::{Building, BuildingOptions, RoomOptions};
+    ///
+    /// let rooms = vec![
+    ///     RoomOptions { size_m: [5.0, 4.2], ..RoomOptions::new(RoomType::Office) },
+    ///     RoomOptions { heights_m: [2.4, 3.4], ..RoomOptions::new(RoomType::Lounge) },
+    ///     RoomOptions::new(RoomType::Storage),
+    /// ];
+    /// let options = BuildingOptions { rooms, seed: 7, texture_scale: 0.1, ..BuildingOptions::default() };
+    /// let scene = Building::generate(&options)?.build()?;
+    /// let names: std::collections::BTreeSet<String> =
+    ///     scene.instances.iter().map(|instance| instance.room.to_string()).collect();
+    /// assert!(names.iter().eq(["hallway_1", "lounge_1", "office_1", "storage_1"]));
+    /// assert_eq!(scene.locations.len(), 4);
+    /// # Ok::<(), s3d_synth::BuildingError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`BuildingError`]: no room, a room of a type that cannot be furnished, a number out of its range, more windows than
+    /// the outer wall takes, a style without a choice.
+    pub fn generate(options: &BuildingOptions) -> Result<Self, BuildingError> {
+        options.check()?;
+        let mut building = Self {
+            title: options.title.clone(),
+            origin: Vec3::ZERO,
+            rooms: Vec::new(),
+            locations: Vec::new(),
+            texture_scale: options.texture_scale,
+        };
+        for (index, site) in (0..).zip(arrange::arrange(options)?) {
+            let mut rng = rng(options.seed, index);
+            let (room, locations) = furnish(site, &options.style, &mut rng);
+            building.rooms.push(room);
+            building.locations.extend(locations);
+        }
+        Ok(building)
+    }
+}
+
+/// The source of all randomness of one unit of work.
+fn rng(seed: u64, unit: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(unit);
+    rng
+}
+
+/// From `from` to `to`, which may be the same.
+fn between(rng: &mut ChaCha8Rng, from: f32, to: f32) -> f32 {
+    from + (to - from) * rng.random::<f32>()
+}
+
+/// One of them; there is one.
+fn pick<T: Copy>(rng: &mut ChaCha8Rng, choices: &[T]) -> T {
+    choices[rng.random_range(0..choices.len())]
+}

@@ -1,0 +1,149 @@
+//! What one may wish of a building.
+
+use super::furnish::can_furnish;
+use super::{Style, between, pick, rng};
+use crate::{BuildingError, RangeError};
+use s3d_label::RoomType;
+
+/// What [`Building::generate`](crate::Building::generate) makes a building of. Its `Default` has six rooms.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildingOptions {
+    /// What it is called: a line of text.
+    pub title: String,
+    /// The rooms, without hallways: 1 to 1,000. They are numbered by type in their order.
+    pub rooms: Vec<RoomOptions>,
+    /// The rooms are dealt to so many storeys in their order, one above the other, without stairs: from 1 to as many as
+    /// there are rooms.
+    pub storeys: u32,
+    /// How wide hallways are: 1.2 to 10 m.
+    pub hallway_width_m: f32,
+    /// How high they are: 2.4 to 10 m.
+    pub hallway_height_m: f32,
+    /// How thick walls are: 0.1 to 1 m.
+    pub wall_m: f32,
+    /// What rooms and furniture are made of.
+    pub style: Style,
+    /// How fine the images of floors, walls and ceilings are: at 1 a floor has 100 texels a metre.
+    pub texture_scale: f32,
+    /// From which all random choices come.
+    pub seed: u64,
+}
+
+/// A room that a building should have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoomOptions {
+    /// Its type: any but hallways (which join the rooms), auditoriums and WCs.
+    pub room_type: RoomType,
+    /// How long it is along the hallway (at least 1.8) and away from it (at least 2.2): up to 40 m.
+    pub size_m: [f32; 2],
+    /// Height of its ceiling at the smallest and at the largest y: 2.4 to 10 m.
+    pub heights_m: [f32; 2],
+    /// How many windows its outer wall has: one for each 1.1 m and 0.8 m more, at most.
+    pub windows: u32,
+    /// How much stands in it: from 0, nothing, to 1, as much as its type has.
+    pub furnishing: f32,
+    /// How many scan locations it has: 1 to 100, or as many as find room.
+    pub locations: u32,
+}
+
+/// The types that can be generated, common ones more than once; and between which sizes they lie.
+const DRAWN: [(RoomType, [[f32; 2]; 2]); 11] = [
+    (RoomType::Office, [[3.0, 5.6], [3.6, 5.2]]),
+    (RoomType::Office, [[3.0, 5.6], [3.6, 5.2]]),
+    (RoomType::Office, [[3.0, 5.6], [3.6, 5.2]]),
+    (RoomType::Office, [[3.0, 5.6], [3.6, 5.2]]),
+    (RoomType::ConferenceRoom, [[5.0, 8.5], [4.2, 6.0]]),
+    (RoomType::Lounge, [[5.0, 8.0], [4.4, 6.0]]),
+    (RoomType::Openspace, [[7.0, 12.0], [5.0, 8.0]]),
+    (RoomType::Pantry, [[3.2, 4.6], [3.2, 4.6]]),
+    (RoomType::CopyRoom, [[2.4, 3.6], [2.6, 4.0]]),
+    (RoomType::Storage, [[2.2, 4.0], [2.6, 4.4]]),
+    (RoomType::Lobby, [[5.0, 8.0], [4.4, 6.5]]),
+];
+
+impl RoomOptions {
+    /// A furnished room of a common size for its type, with windows and one scan location.
+    pub fn new(room_type: RoomType) -> Self {
+        let [[x0, x1], [y0, y1]] =
+            DRAWN.iter().find(|(t, _)| *t == room_type).map_or([[4.0; 2]; 2], |(_, sizes)| *sizes);
+        Self::sized(room_type, [0.5 * (x0 + x1), 0.5 * (y0 + y1)])
+    }
+
+    fn sized(room_type: RoomType, size_m: [f32; 2]) -> Self {
+        let windows = (size_m[0] / 2.2) as u32;
+        Self { room_type, size_m, heights_m: [2.8; 2], windows, furnishing: 1.0, locations: 1 }
+    }
+}
+
+impl Default for BuildingOptions {
+    fn default() -> Self {
+        Self::drawn(6, 1)
+    }
+}
+
+impl BuildingOptions {
+    /// One storey with `rooms` rooms of random types and sizes, about half of them offices. Same `seed`, same options.
+    pub fn drawn(rooms: u32, seed: u64) -> Self {
+        let mut rng = rng(seed, u64::MAX);
+        let room = |_| {
+            let (room_type, [[x0, x1], [y0, y1]]) = pick(&mut rng, &DRAWN);
+            let mut room =
+                RoomOptions::sized(room_type, [between(&mut rng, x0, x1), between(&mut rng, y0, y1)]);
+            room.heights_m = [between(&mut rng, 2.5, 3.1); 2];
+            if pick(&mut rng, &[true, false, false, false]) {
+                room.heights_m[1] = between(&mut rng, 2.4, 3.4);
+            }
+            room
+        };
+        Self {
+            title: format!("A building of {rooms} rooms, seed {seed}"),
+            rooms: (0..rooms).map(room).collect(),
+            storeys: 1,
+            hallway_width_m: 1.8,
+            hallway_height_m: 2.6,
+            wall_m: 0.15,
+            style: Style::default(),
+            texture_scale: 1.0,
+            seed,
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), BuildingError> {
+        if self.rooms.is_empty() {
+            return Err(BuildingError::NoRoom);
+        }
+        let words = |what: &str| what.to_owned();
+        let count = self.rooms.len() as f64;
+        RangeError::check(count, [1.0, 1000.0], || words("the number of rooms"))?;
+        RangeError::check(self.storeys, [1.0, count], || words("the number of storeys"))?;
+        RangeError::check(self.hallway_width_m, [1.2, 10.0], || words("the width of hallways"))?;
+        RangeError::check(self.hallway_height_m, HEIGHTS, || words("the height of hallways"))?;
+        RangeError::check(self.wall_m, [0.1, 1.0], || words("the thickness of walls"))?;
+        self.rooms.iter().enumerate().try_for_each(|(index, room)| room.check(index))?;
+        self.style.check()
+    }
+}
+
+/// Heights of ceilings: furniture, lamps and beams find room below.
+const HEIGHTS: [f64; 2] = [2.4, 10.0];
+
+impl RoomOptions {
+    fn check(&self, index: usize) -> Result<(), BuildingError> {
+        if !can_furnish(self.room_type) {
+            return Err(BuildingError::RoomType { room_type: self.room_type });
+        }
+        let room = |what: &str| format!("room {index}, {}: {what}", self.room_type.name());
+        let [length, depth] = self.size_m;
+        // So that the door has its place, and beyond its leaf a scanner has.
+        RangeError::check(length, [1.8, 40.0], || room("the length along the hallway"))?;
+        RangeError::check(depth, [2.2, 40.0], || room("the length away from the hallway"))?;
+        for height in self.heights_m {
+            RangeError::check(height, HEIGHTS, || room("the height of the ceiling"))?;
+        }
+        let most = f64::from(((length - 0.8) / 1.1).floor().max(0.0));
+        RangeError::check(self.windows, [0.0, most], || room("the number of windows"))?;
+        RangeError::check(self.furnishing, [0.0, 1.0], || room("how much stands in it"))?;
+        RangeError::check(self.locations, [1.0, 100.0], || room("the number of locations"))?;
+        Ok(())
+    }
+}
