@@ -1,8 +1,8 @@
 //! Blocks: what was found becomes bits, in whichever of the three forms of RFC 1951 is shortest.
 
-use crate::bits::{BitWriter, Bits};
+use crate::bit_writer::{BitWriter, Bits};
+use crate::fixed_distance::{LANES, Repeated};
 use crate::huffman::{canonical_codes, code_lengths};
-use crate::nearby::{LANES, Repeated};
 use crate::tokens::{Tokens, count_bytes};
 use std::array::from_fn;
 use std::ops::Range;

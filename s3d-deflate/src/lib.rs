@@ -4,7 +4,7 @@
 //! in chains, and the processor guesses wrong at each. Here, as they do,
 //!
 //! - a repetition is looked for at fixed distances, the smallest and those around a line back, where nearly all are if an
-//!   image is smooth ([`nearby`]); or, in other images, at the last places that have the same hash ([`finder`]). All are
+//!   image is smooth ([`fixed_distance`]); or, in other images, at the last places that have the same hash ([`hash_matcher`]). All are
 //!   compared at once, without a branch;
 //! - it is taken if it costs fewer bits than what it stands for, by the code of the block before ([`block::Prices`]), so
 //!   that noise is written as literals;
@@ -19,22 +19,22 @@
     reason = "a writer, on the way of every byte of an image: places are those that its own search found"
 )]
 
-mod bits;
+mod bit_writer;
 mod block;
-mod finder;
+mod fixed_distance;
+mod hash_matcher;
 mod huffman;
-mod nearby;
+mod parse;
 pub mod png;
-mod search;
 mod tokens;
 
-pub use search::{Candidates, Search, Work, wide};
+pub use parse::{Candidates, Search, Work, wide};
 
-use bits::BitWriter;
+use bit_writer::BitWriter;
 use block::Prices;
-use finder::Finder;
-use nearby::Nearby;
-use search::Parser;
+use fixed_distance::Nearby;
+use hash_matcher::Finder;
+use parse::Parser;
 use tokens::Tokens;
 
 /// Compresses one stream after the other. What one of them taught about costs serves the next, so a stream's bytes
@@ -55,7 +55,7 @@ impl Deflater {
     pub fn new(search: Search) -> Self {
         let finder = Finder::new(search.hash_bytes, search.nice);
         let nearby = Nearby::new(search.line);
-        let tokens = Tokens::new(nearby::lanes(search.line));
+        let tokens = Tokens::new(fixed_distance::lanes(search.line));
         Self { search, finder, nearby, prices: None, tokens }
     }
 
@@ -193,7 +193,7 @@ mod tests {
             Deflater::new(search).zlib(&data, 40_000, &mut chosen);
             let mut plain = vec![0x78, 0x01];
             let mut bits = BitWriter::new(&mut plain);
-            let mut tokens = Tokens::new(nearby::lanes(search.line));
+            let mut tokens = Tokens::new(fixed_distance::lanes(search.line));
             Parser {
                 finder: &mut Finder::new(search.hash_bytes, search.nice),
                 nearby: &mut Nearby::new(search.line),
@@ -202,7 +202,7 @@ mod tests {
                 search,
                 boundary: 40_000,
             }
-            .run_as::<nearby::Anywhere>(&data, &mut bits);
+            .run_as::<fixed_distance::Anywhere>(&data, &mut bits);
             bits.finish();
             assert_eq!(plain, chosen[..chosen.len() - 4], "{search:?}");
         }

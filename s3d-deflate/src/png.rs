@@ -2,7 +2,7 @@
 
 #![expect(clippy::indexing_slicing, reason = "a writer: lines are of the length that was asked for")]
 
-use crate::search::{Work, wide};
+use crate::parse::{Work, wide};
 
 /// What a byte is expected to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

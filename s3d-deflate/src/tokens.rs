@@ -3,10 +3,10 @@
 //! All of them are counted and written in the same way, without a question of which kind is next: a processor would
 //! guess the answer wrong. Only many bytes as they are stay where they lie, and are counted and written from there.
 
-use crate::bits::{BitWriter, Bits};
+use crate::bit_writer::{BitWriter, Bits};
 use crate::block::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST, distance_symbol};
-use crate::finder::WINDOW;
-use crate::nearby::LANES;
+use crate::fixed_distance::LANES;
+use crate::hash_matcher::WINDOW;
 
 /// Symbols in a block; only steps over several bytes make it a few more.
 pub(crate) const BLOCK: usize = 16_000;
@@ -17,7 +17,7 @@ const ROOM: usize = 4 * (BLOCK + 4 * LONGEST);
 const LENGTH: usize = 256;
 /// then one for each symbol of distances, without its extra bits;
 const DISTANCE: usize = LENGTH + LONGEST - 2;
-/// one for each of the distances of [`Nearby`](crate::nearby::Nearby), with them;
+/// one for each of the distances of [`Nearby`](crate::fixed_distance::Nearby), with them;
 const LANE: usize = DISTANCE + DISTANCES;
 /// and those for bits alone: the empty one, the two of one bit, the four of two, up to those of [`MOST_BITS`].
 const BITS: usize = LANE + 2 * LANES;
@@ -242,7 +242,7 @@ pub(crate) fn count_bytes(data: &[u8], counts: &mut [u32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nearby::lanes;
+    use crate::fixed_distance::lanes;
     use proptest::prelude::*;
 
     /// A table in which each token has bits of its own, as a reader takes them apart.

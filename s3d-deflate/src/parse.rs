@@ -1,9 +1,9 @@
 //! Data to tokens: which bytes are written as they are, and which as repetitions.
 
-use crate::bits::BitWriter;
+use crate::bit_writer::BitWriter;
 use crate::block::{LONGEST, Prices, write_block};
-use crate::finder::{Finder, WINDOW};
-use crate::nearby::{Anywhere, Compare, Nearby};
+use crate::fixed_distance::{Anywhere, Compare, Nearby};
+use crate::hash_matcher::{Finder, WINDOW};
 use crate::tokens::{BLOCK, Tokens};
 
 /// How hard and where repetitions are looked for.
@@ -38,7 +38,7 @@ pub enum Candidates {
     Steps,
     /// The sixteen last of its hash and those around a line back.
     Many,
-    /// Those at the 64 distances of [`Nearby`](crate::nearby::Nearby), at every byte: for smooth surfaces. Of all else, only
+    /// Those at the 64 distances of [`Nearby`](crate::fixed_distance::Nearby), at every byte: for smooth surfaces. Of all else, only
     /// the line matters to it.
     Nearby,
     /// The same, but only long repetitions, and not at every byte: where bytes as they are cost little.

@@ -6,7 +6,7 @@
 //! and a repetition lasts as long as the words of the places that follow have a bit in common.
 
 use crate::block::LONGEST;
-use crate::finder::WINDOW;
+use crate::hash_matcher::WINDOW;
 use std::array::from_fn;
 use std::hint::select_unpredictable;
 
