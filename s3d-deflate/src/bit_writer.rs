@@ -56,7 +56,8 @@ impl<'a> BitWriter<'a> {
         }
     }
 
-    /// Adds the lowest `count` bits; the others are 0. At most [`MOST`] bits may be added between two flushes.
+    /// Adds the lowest `count` bits; the others are 0. At most [`MOST`] bits may be added between two
+    /// flushes.
     #[inline(always)]
     pub(crate) fn add(&mut self, bits: u64, count: u32) {
         self.bits |= bits << self.count;
@@ -78,15 +79,16 @@ impl<'a> BitWriter<'a> {
         self.count &= 7;
     }
 
-    /// Adds the bits that `table` has for each of `indices`, modulo its length; if `FIT`, any four are [`MOST`] at most. There
-    /// is room for them.
+    /// Adds the bits that `table` has for each of `indices`, modulo its length; if `FIT`, any four are
+    /// [`MOST`] at most. There is room for them.
     #[inline(always)]
-    pub(crate) fn all<I: Copy + Into<usize>, const N: usize, const FIT: bool>(
+    pub(crate) fn add_all<I: Copy + Into<usize>, const N: usize, const FIT: bool>(
         &mut self,
         indices: &[[I; 4]],
         table: &[Bits; N],
     ) {
-        // What is written may be anywhere, as far as the compiler knows: all that is needed is kept outside of memory.
+        // What is written may be anywhere, as far as the compiler knows: all that is needed is kept outside
+        // of memory.
         let out = self.out.as_mut_slice();
         let (mut end, mut bits, mut count) = (self.end, self.bits, u64::from(self.count));
         for four in indices {
@@ -170,7 +172,7 @@ mod tests {
         let mut out = BitWriter::new(&mut bytes);
         out.reserve(4000 * 28);
         out.add(1, 3);
-        out.all::<_, _, false>(&indices, &table);
+        out.add_all::<_, _, false>(&indices, &table);
         out.finish();
         let mut plain = BitWriter::new(&mut expected);
         plain.reserve(4000 * 28);

