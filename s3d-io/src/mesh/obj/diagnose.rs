@@ -1,47 +1,77 @@
-//! Where in an OBJ file a number is bad: a plain scan of its lines, for when it is known only that one is.
+//! Where in an OBJ file a fault is: a strict scan of its statements, for when it is known only that there is
+//! one. tobj tells no line, and accepts indices that are not there.
 
 use crate::error::Error;
-use crate::mesh::obj::lines::{logical_lines, parse_f32, without_comment, words};
+use crate::mesh::obj::lines::{Line, logical_lines, next_word};
+use crate::mesh::obj::statement::{Why, corner, normal, out_of_range, uv, vertex};
 use crate::quote::quote;
 use s3d_geom::glam::Vec3;
 use std::path::Path;
 
-/// The error for the first number that cannot be read.
-pub(crate) fn number_error(path: &Path, bytes: &[u8]) -> Error {
-    for (number, line) in logical_lines(bytes) {
-        let mut words = words(without_comment(&line));
-        let most = match words.next() {
-            Some(b"v") => 7,
-            Some(b"vt") => 2,
-            Some(b"vn") => 3,
-            _ => continue,
-        };
-        let is_vertex = most == 7;
-        let numbers: Vec<&[u8]> = words.take(most).collect();
-        let bad = |word: &&&[u8]| !std::str::from_utf8(word).is_ok_and(|w| w.parse::<f32>().is_ok());
-        if let Some(word) = numbers.iter().find(bad) {
-            return Error::line(path, number, format!("{} is no number: {}", quote(word), quote(&line)));
-        }
-        if let [_, _, _, weight] = numbers[..]
-            && is_vertex
-            && parse_f32(weight) == Some(0.0)
-        {
-            return Error::line(path, number, format!("the vertex has the weight 0: {}", quote(&line)));
+/// The error for the first fault of a file that tobj refuses, `said` what it says.
+pub(crate) fn fault(path: &Path, bytes: &[u8], said: &str) -> Error {
+    // Faces may come before their vertices.
+    let mut counts = [0; 3];
+    for line in logical_lines(bytes) {
+        count(&line, &mut counts);
+    }
+    let mut so_far = [0; 3];
+    for line in logical_lines(bytes) {
+        count(&line, &mut so_far);
+        if let Err(why) = check(&line, so_far, counts) {
+            return Error::line(path, line.number, format!("{why}: {}", quote(&line.text)));
         }
     }
-    Error::format(path, "has a number that cannot be read")
+    Error::format(path, format!("cannot be read: {said}"))
+}
+
+fn count(line: &Line<'_>, counts: &mut [u64; 3]) {
+    let column = [&b"v"[..], b"vt", b"vn"].iter().position(|keyword| *keyword == line.keyword().0);
+    if let Some(count) = column.and_then(|column| counts.get_mut(column)) {
+        *count += 1;
+    }
+}
+
+/// Checks a statement before which, and after the last of which, columns have so many values.
+fn check(line: &Line<'_>, so_far: [u64; 3], counts: [u64; 3]) -> Result<(), Why> {
+    let (keyword, mut rest) = line.keyword();
+    match keyword {
+        b"v" => vertex(rest).map(|_| ()),
+        b"vt" => uv(rest).map(|_| ()),
+        b"vn" => normal(rest).map(|_| ()),
+        b"f" => {
+            while let Some(word) = next_word(&mut rest) {
+                let indices = corner(word, so_far)?;
+                for (column, (index, count)) in indices.into_iter().zip(counts).enumerate() {
+                    if index > count {
+                        return Err(out_of_range(column, index as i64, count));
+                    }
+                }
+            }
+            Ok(())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The error for the vertex `vertex`, from 0, whose position is not finite.
 pub(crate) fn vertex_error(path: &Path, bytes: &[u8], vertex: u32, position: Vec3) -> Error {
-    let mut vertices = logical_lines(bytes).filter(|(_, line)| words(line).next() == Some(b"v"));
-    match vertices.nth(vertex as usize) {
-        Some((number, line)) => {
-            let message = format!("a face uses a vertex that is not finite: {}", quote(&line));
-            Error::line(path, number, message)
+    match logical_lines(bytes).filter(|line| line.keyword().0 == b"v").nth(vertex as usize) {
+        Some(line) => {
+            let message = format!("a face uses a vertex that is not finite: {}", quote(&line.text));
+            Error::line(path, line.number, message)
         }
         None => Error::format(path, format!("vertex {} is not finite: {position}", u64::from(vertex) + 1)),
     }
+}
+
+/// The line of the face `face`, from 0, of those with three corners or more.
+pub(crate) fn face_line(bytes: &[u8], face: usize) -> Option<u64> {
+    let mut faces = logical_lines(bytes).filter(|line| {
+        let (keyword, mut rest) = line.keyword();
+        keyword == b"f" && std::iter::from_fn(|| next_word(&mut rest)).nth(2).is_some()
+    });
+    faces.nth(face).map(|line| line.number)
 }
 
 #[cfg(test)]
@@ -49,14 +79,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_bad_number_is_found() {
+    fn the_first_fault_is_found() {
+        let said = |text: &[u8]| fault(Path::new("a.obj"), text, "why").to_string();
         let text = b"v 0 0 0\nvt 0.5 # x\n# v 0 0 x\nvn 0 0 1\nv 1 3.1+e2 0\nv x 0 0\n";
-        let message = number_error(Path::new("a.obj"), text).to_string();
-        assert_eq!(message, "a.obj, line 5: `3.1+e2` is no number: `v 1 3.1+e2 0`");
-        let message = number_error(Path::new("a.obj"), b"v 0 0 0 0\n").to_string();
-        assert!(message.contains("line 1: the vertex has the weight 0"), "{message}");
-        let message = number_error(Path::new("a.obj"), b"v 0 0 0\n").to_string();
-        assert_eq!(message, "a.obj: has a number that cannot be read");
+        assert_eq!(said(text), "a.obj, line 5: `3.1+e2` is no number: `v 1 3.1+e2 0`");
+        assert!(said(b"v 0 0 0 0\n").contains("line 1: the vertex has the weight 0"));
+        assert_eq!(said(b"v 0 0 0\n"), "a.obj: cannot be read: why");
     }
 
     #[test]
@@ -65,5 +93,10 @@ mod tests {
         let message = vertex_error(Path::new("a.obj"), text, 1, Vec3::NAN).to_string();
         assert!(message.starts_with("a.obj, line 3") && message.contains("`v nan 0 0`"), "{message}");
         assert!(vertex_error(Path::new("a.obj"), text, 7, Vec3::NAN).to_string().contains("vertex 8"));
+    }
+
+    #[test]
+    fn a_face_is_found_by_its_number() {
+        assert_eq!(face_line(b"f 1 2 3\nf 1 2\nl 1 2 3\nf 1 2 # 3\nf 1 2 3", 1), Some(5));
     }
 }

@@ -1,44 +1,77 @@
 //! The lines of OBJ and MTL files.
 
-pub(crate) use crate::fs::text::{number, words};
+use crate::error::Result;
+use crate::fs::open::read_file;
+pub(crate) use crate::fs::text::words;
 use memchr::memchr;
 use std::borrow::Cow;
+use std::ops::Range;
+use std::path::Path;
 
-/// The statements of a file with the line, from 1, on which each starts: without surrounding space, a line that ends in
-/// a backslash joined with the next, a mark of UTF-8 at the start skipped. Lines end in LF, CR LF or, in a file without
-/// any LF, CR. Empty lines and comments stay.
-pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = (u64, Cow<'_, [u8]>)> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let end = if memchr(b'\n', bytes).is_some() { b'\n' } else { b'\r' };
-    let mut lines = (1..).zip(split(bytes, end).map(<[u8]>::trim_ascii));
+/// A statement of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Line<'a> {
+    /// The number, from 1, of the line on which it starts.
+    pub(crate) number: u64,
+    /// The bytes of its lines, their ends included.
+    pub(crate) place: Range<usize>,
+    /// What it says, without surrounding space; borrowed if it is on one line.
+    pub(crate) text: Cow<'a, [u8]>,
+}
+
+impl Line<'_> {
+    /// The word with which it starts, and what follows.
+    #[inline]
+    pub(crate) fn keyword(&self) -> (&[u8], &[u8]) {
+        let end = self.text.iter().position(u8::is_ascii_whitespace).unwrap_or(self.text.len());
+        self.text.split_at_checked(end).unwrap_or_default()
+    }
+}
+
+/// The statements of a file whose lines end in LF or CR LF: a line that ends in a backslash is joined with
+/// the next, a mark of UTF-8 at the start skipped. Empty lines and comments stay.
+pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
+    let mut start = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    let physical = std::iter::from_fn(move || {
+        // Behind the last line end is a line too, if only an empty one.
+        let rest = bytes.get(start..)?;
+        let length = memchr(b'\n', rest).unwrap_or(rest.len());
+        let line = rest.get(..length).unwrap_or_default();
+        let place = start..bytes.len().min(start + length + 1);
+        start += length + 1;
+        Some((place, line.trim_ascii()))
+    });
+    let mut lines = (1..).zip(physical);
     std::iter::from_fn(move || {
-        let (number, line) = lines.next()?;
+        let (number, (mut place, line)) = lines.next()?;
         let Some(continued) = line.strip_suffix(b"\\").filter(|line| !line.starts_with(b"#")) else {
-            return Some((number, Cow::Borrowed(line)));
+            return Some(Line { number, place, text: Cow::Borrowed(line) });
         };
         let mut joined = continued.to_vec();
-        for (_, next) in lines.by_ref() {
+        for (_, (next_place, next)) in lines.by_ref() {
+            place.end = next_place.end;
             joined.push(b' ');
             joined.extend_from_slice(next.strip_suffix(b"\\").unwrap_or(next));
             if !next.ends_with(b"\\") {
                 break;
             }
         }
-        Some((number, Cow::Owned(joined.trim_ascii().to_vec())))
+        Some(Line { number, place, text: Cow::Owned(joined.trim_ascii().to_vec()) })
     })
 }
 
-/// What is between the `end`s.
-fn split(bytes: &[u8], end: u8) -> impl Iterator<Item = &[u8]> {
-    let mut rest = Some(bytes);
-    std::iter::from_fn(move || {
-        let bytes = rest?;
-        let Some((line, after)) = memchr(end, bytes).and_then(|at| bytes.split_at_checked(at)) else {
-            return rest.take();
-        };
-        rest = after.get(1..);
-        Some(line)
-    })
+/// The content of a text file; if its lines end in CR alone, they end in LF now.
+pub(crate) fn read_text(path: &Path) -> Result<Vec<u8>> {
+    let mut bytes = read_file(path)?;
+    end_lines_in_lf(&mut bytes);
+    Ok(bytes)
+}
+
+/// Lines that end in CR alone end in LF then.
+pub(crate) fn end_lines_in_lf(bytes: &mut [u8]) {
+    if memchr(b'\n', bytes).is_none() {
+        bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+    }
 }
 
 /// What is behind the word that starts a line.
@@ -81,7 +114,9 @@ mod tests {
     use super::*;
 
     fn all(bytes: &[u8]) -> Vec<(u64, String)> {
-        logical_lines(bytes).map(|(n, l)| (n, text(&l))).collect()
+        let mut bytes = bytes.to_vec();
+        end_lines_in_lf(&mut bytes);
+        logical_lines(&bytes).map(|line| (line.number, text(&line.text))).collect()
     }
 
     #[test]

@@ -1,46 +1,15 @@
 //! How the faces of an OBJ file look: its libraries and the images that they name.
 
 use crate::error::Result;
-use crate::fs::open::read_file;
 use crate::image::find::{find_image, resolve};
 use crate::image::texture::{TextureFile, read_textures};
-use crate::mesh::obj::lines::{after, logical_lines, text};
+use crate::mesh::obj::lines::read_text;
 use crate::mesh::obj::mtl::{MtlMaterial, parse_mtl};
+use crate::mesh::obj::normal::ObjNames;
 use crate::quote::{count, quote};
 use s3d_geom::{DEFAULT_COLOR, Material, Raster, Texture, Wrap};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-
-/// The names in an OBJ file, found ahead of everything else in it: with them its images can be decoded while it is read.
-#[derive(Default)]
-pub(crate) struct ObjNames {
-    /// Those that `usemtl` gives, in the order of their first use.
-    pub(crate) materials: Vec<String>,
-    /// The lines and names of `mtllib`.
-    libraries: Vec<(u64, String)>,
-}
-
-impl ObjNames {
-    /// Finds them in the content of a file.
-    pub(crate) fn find(bytes: &[u8]) -> Self {
-        let mut names = Self::default();
-        let mut known = HashSet::new();
-        for (number, line) in logical_lines(bytes) {
-            // Most lines are of vertices and faces.
-            if !matches!(line.first(), Some(b'u' | b'm')) {
-                continue;
-            }
-            let keyword = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-            let name = text(after(&line, keyword).trim_ascii());
-            match keyword {
-                b"usemtl" if known.insert(name.clone()) => names.materials.push(name),
-                b"mtllib" => names.libraries.push((number, name)),
-                _ => {}
-            }
-        }
-        names
-    }
-}
 
 /// Materials and textures of the faces.
 #[derive(Default)]
@@ -61,7 +30,8 @@ struct Found {
 }
 
 impl ObjLooks {
-    /// Reads the libraries that the file at `path` has `names` of, and the images of the materials that it uses.
+    /// Reads the libraries that the file at `path` has `names` of, and the images of the materials that it
+    /// uses.
     ///
     /// # Errors
     /// For images that are too large.
@@ -187,7 +157,7 @@ fn load_libraries(
             names.split_whitespace().map(|name| resolve(folder, name)).collect()
         };
         for library in files {
-            match read_file(&library) {
+            match read_text(&library) {
                 Ok(bytes) => {
                     if !read.contains(&library) {
                         read.push(library.clone());

@@ -4,8 +4,9 @@ mod diagnose;
 mod lines;
 mod looks;
 mod mtl;
-mod plain;
+mod normal;
 pub(crate) mod read;
+mod statement;
 #[cfg(feature = "png")]
 mod write;
 

@@ -1,14 +1,17 @@
-//! Material libraries of OBJ files: the three statements that say how a face looks, `newmtl`, `Kd` and `map_Kd`.
+//! Material libraries of OBJ files: the three statements that say how a face looks, `newmtl`, `Kd` and
+//! `map_Kd`.
 //!
-//! tobj reads these files too, but panics on a `Kd` of fewer than three numbers, gives up a whole library for one
-//! malformed line of no interest, and takes the options of `map_Kd` for a part of the file's name.
+//! tobj reads these files too, but panics on a `Kd` of fewer than three numbers, gives up a whole library for
+//! one malformed line of no interest, tells no lines, and takes the options of `map_Kd` for a part of the
+//! file's name (`tobj_gives_a_library_up`). Every line would have to be written anew for it, and read again
+//! behind it.
 
-use crate::mesh::obj::lines::{after, logical_lines, parse_f32, text, without_comment, words};
+use crate::mesh::obj::lines::{Line, after, logical_lines, parse_f32, text, without_comment, words};
 use crate::quote::quote;
 use s3d_geom::{DEFAULT_COLOR, Wrap};
 
-/// Starts a comment that tells our own reader how the next texture goes on beyond its edges, where MTL files cannot say it,
-/// or do not for the sake of other readers.
+/// Starts a comment that tells our own reader how the next texture goes on beyond its edges, where MTL files
+/// cannot say it, or do not for the sake of other readers.
 pub(crate) const WRAP_COMMENT: &str = "# s3d wrap";
 
 /// The word for a wrap in such a comment.
@@ -44,7 +47,7 @@ pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
     let mut warnings = Vec::new();
     // What a comment of ours says of the texture to come.
     let mut wrap = None;
-    for (number, line) in logical_lines(bytes) {
+    for Line { number, text: line, .. } in logical_lines(bytes) {
         let line = &*line;
         let Some(keyword) = words(line).next() else { continue };
         let rest = after(line, keyword).trim_ascii();
@@ -88,7 +91,8 @@ fn parse_wrap(rest: &[u8]) -> Option<[Wrap; 2]> {
     Some([wrap(words.next()?)?, wrap(words.next()?)?])
 }
 
-/// Up to three numbers from 0 to 1; one stands for all three. `None` if it is something else, such as `Kd spectral …`.
+/// Up to three numbers from 0 to 1; one stands for all three. `None` if it is something else, such as `Kd
+/// spectral …`.
 fn parse_color(rest: &[u8]) -> Option<[u8; 3]> {
     let values: Option<Vec<f32>> = words(without_comment(rest)).take(3).map(parse_f32).collect();
     let to_byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
@@ -99,8 +103,8 @@ fn parse_color(rest: &[u8]) -> Option<[u8; 3]> {
     }
 }
 
-/// Takes the options from the front of a `map_Kd` line; the rest is the file's name, spaces included. Beside it the
-/// first option that moves or scales the image, which is not applied.
+/// Takes the options from the front of a `map_Kd` line; the rest is the file's name, spaces included. Beside
+/// it the first option that moves or scales the image, which is not applied.
 fn parse_map(mut rest: &[u8], line: u64) -> (Option<MtlMap>, Option<&[u8]>) {
     let mut wrap = Wrap::Repeat;
     let mut ignored = None;
@@ -178,6 +182,16 @@ mod tests {
         assert!(warnings.is_empty());
         let wraps: Vec<_> = m.iter().map(|m| m.map.as_ref().unwrap().wrap).collect();
         assert_eq!(wraps, [[Wrap::Mirror, Wrap::Clamp], [Wrap::Repeat; 2]]);
+    }
+
+    #[test]
+    fn tobj_gives_a_library_up() {
+        let library = |text: &str| tobj::load_mtl_buf(&mut text.as_bytes());
+        assert!(library("newmtl a\nKd 1 0 0\nillum x\n").is_err());
+        assert!(library("newmtl\nKd 1 0 0\n").is_err());
+        assert!(std::panic::catch_unwind(|| library("newmtl a\nKd 1\n")).is_err());
+        let (materials, _) = library("newmtl a\nmap_Kd -clamp on a.png\n").unwrap();
+        assert_eq!(materials[0].diffuse_texture.as_deref(), Some("-clamp on a.png"));
     }
 
     #[test]

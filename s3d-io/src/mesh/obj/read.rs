@@ -1,13 +1,14 @@
 //! Wavefront OBJ with its material libraries.
 //!
-//! [`PlainObj`] understands the dialects and reads the numbers, [`crate::mesh::obj::diagnose`] finds the line of a bad one,
-//! [`ObjNames`] and [`ObjLooks`] the libraries and images; here the parts become a mesh.
+//! tobj reads it. [`NormalObj`] hands it what it reads right, [`crate::mesh::obj::diagnose`] finds the line
+//! of a fault, [`ObjLooks`] the libraries and images; here the parts become a mesh.
 
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
-use crate::mesh::obj::diagnose::{number_error, vertex_error};
-use crate::mesh::obj::looks::{ObjLooks, ObjNames};
-use crate::mesh::obj::plain::PlainObj;
+use crate::mesh::obj::diagnose::{face_line, fault, vertex_error};
+use crate::mesh::obj::lines::end_lines_in_lf;
+use crate::mesh::obj::looks::ObjLooks;
+use crate::mesh::obj::normal::NormalObj;
 use crate::quote::count;
 use s3d_geom::glam::{Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
@@ -20,36 +21,50 @@ use std::path::Path;
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
-pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
+pub(crate) fn read_bytes(mut bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
+    end_lines_in_lf(&mut bytes);
+    refuse_other_files(path, &bytes)?;
+    let obj = NormalObj::new(&bytes).ok_or_else(|| fault(path, &bytes, "it is damaged"))?;
+    if obj.faces == 0 {
+        return Err(Error::format(path, no_faces(&obj)));
+    }
+    if obj.counts.iter().any(|&n| n >= u64::from(NO_INDEX)) {
+        return Err(Error::unsupported(
+            path,
+            "has more vertices than 32 bits count; cut the scan into parts",
+        ));
+    }
     // Decoding images takes as long as all else, and needs nothing of it but names.
     let (mut warnings, mut remarks) = (Vec::new(), Vec::new());
     let (geometry, looks) = rayon::join(
-        || Geometry::read(path, &bytes),
-        || ObjLooks::load(path, &ObjNames::find(&bytes), &mut remarks),
+        || Columns::read(&obj).map_err(|e| fault(path, &bytes, &e.to_string())),
+        || ObjLooks::load(path, &obj.names, &mut remarks),
     );
-    let (Geometry { plain, columns, faces }, looks) = (geometry?, looks?);
+    let (columns, looks) = (geometry?, looks?);
+    let faces = Triangles::new(&obj, &columns)
+        .map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
     let polygons_triangulated = faces.polygons;
+    let refused = faces.refused.map(|(face, why, n)| (face_line(&bytes, face).unwrap_or(0), why, n));
     if faces.triangles.is_empty() {
-        let reason =
-            faces.refused.map_or_else(String::new, |(line, why, _)| format!(", as on line {line}: {why}"));
+        let reason = refused.map_or_else(String::new, |(line, why, _)| format!(", as on line {line}: {why}"));
         return Err(Error::format(path, format!("has no face that can be used{reason}")));
     }
-    if let Some((line, why, n)) = &faces.refused {
-        warnings.push(format!("{} left out: the first, on line {line}, {why}", count(*n, "polygon")));
+    if let Some((line, why, n)) = refused {
+        warnings.push(format!("{} left out: the first, on line {line}, {why}", count(n, "polygon")));
     }
-    if let Some(first) = plain.elements.short_faces.first() {
-        let n = count(plain.elements.short_faces.len(), "face");
+    if let Some(first) = obj.short_faces.first() {
+        let n = count(obj.short_faces.len(), "face");
         warnings.push(format!("{n} with fewer than three corners left out, the first on line {first}"));
     }
-    let colors = vertex_colors(&plain, &mut warnings);
+    let colors = vertex_colors(&columns.colors, &mut warnings);
     warnings.append(&mut remarks);
     let parts = MeshParts {
-        positions: plain.values.positions.iter().map(|&p| up.world_from_file(p)).collect(),
+        positions: columns.positions.into_iter().map(|p| up.world_from_file(p)).collect(),
         faces: faces.triangles,
         colors,
         uvs: columns.uvs,
         face_uvs: faces.uvs,
-        normals: columns.normals.into_iter().map(|n| up.world_from_file(n)).collect(),
+        normals: columns.normals.into_iter().map(|n| up.world_from_file(n / n.length())).collect(),
         face_normals: faces.normals,
         materials: looks.materials,
         face_materials: faces.materials,
@@ -64,82 +79,78 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<Mesh
     Ok(MeshFile { texture_files, warnings, companions, polygons_triangulated, ..MeshFile::new(path, mesh) })
 }
 
-/// What an OBJ file holds itself.
-struct Geometry {
-    plain: PlainObj,
-    columns: Columns,
-    faces: Triangles,
+fn refuse_other_files(path: &Path, bytes: &[u8]) -> Result<()> {
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        return Err(Error::unsupported(
+            path,
+            "is UTF-16 text; save it as UTF-8, or convert it with `iconv -t UTF-8`",
+        ));
+    }
+    if bytes.iter().take(4096).any(|b| *b == 0) {
+        return Err(Error::format(path, "is binary; a Wavefront OBJ file is text"));
+    }
+    Ok(())
 }
 
-impl Geometry {
-    fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
-        let plain = PlainObj::parse(path, bytes)?;
-        if plain.elements.faces.is_empty() {
-            return Err(Error::format(path, no_faces(&plain)));
-        }
-        if plain.values.has_bad_number {
-            return Err(number_error(path, bytes));
-        }
-        let columns = Columns::new(&plain);
-        let faces = Triangles::new(&plain, &columns)
-            .map_err(|(vertex, position)| vertex_error(path, bytes, vertex, position))?;
-        Ok(Self { plain, columns, faces })
+fn no_faces(obj: &NormalObj<'_>) -> String {
+    let mut message = format!("has no face, only {}", count(obj.counts[0] as usize, "vertex"));
+    if obj.points_and_lines > 0 {
+        message += &format!(" and {}", count(obj.points_and_lines, "point and line element"));
     }
-}
-
-fn no_faces(plain: &PlainObj) -> String {
-    let mut message = format!("has no face, only {}", count(plain.values.positions.len(), "vertex"));
-    if plain.elements.points_and_lines > 0 {
-        message += &format!(" and {}", count(plain.elements.points_and_lines, "point and line element"));
-    }
-    if let Some(line) = plain.elements.short_faces.first() {
+    if let Some(line) = obj.short_faces.first() {
         message += &format!("; faces need three corners, the first that has fewer is on line {line}");
     }
     message + "; a mesh is needed"
 }
 
-/// Texture coordinates and normals that corners use, the first of the file and then in the order of their first use, and
-/// the corners' indices into them, both empty if the file has none.
+/// What tobj reads of a file, in the file's axes.
 struct Columns {
+    positions: Vec<Vec3>,
+    /// As written, and not finite for vertices without; empty if none has one.
+    colors: Vec<[f32; 3]>,
+    /// The first of the file and those that corners use, in the order of their first use.
     uvs: Vec<Vec2>,
-    face_uvs: Vec<u32>,
-    /// Unit normals; not finite where the file's has no length.
+    /// Likewise, of any length.
     normals: Vec<Vec3>,
-    face_normals: Vec<u32>,
+    /// The indices of all faces' corners into positions, texture coordinates and normals, the last two empty
+    /// if the file has none.
+    corners: [Vec<u32>; 3],
+    /// How many corners the faces have; empty if all have three.
+    arities: Vec<u32>,
 }
 
 impl Columns {
-    fn new(plain: &PlainObj) -> Self {
-        let ((uvs, face_uvs), (normals, face_normals)) = rayon::join(
-            || used(&plain.values.uvs, &plain.elements.corners[1]),
-            || used(&plain.values.normals, &plain.elements.corners[2]),
-        );
-        let normals = normals.into_iter().map(|n| n / n.length()).collect();
-        Self { uvs, face_uvs, normals, face_normals }
+    fn read(obj: &NormalObj<'_>) -> std::result::Result<Self, tobj::LoadError> {
+        let no_library = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+        let (models, _) = tobj::load_obj_buf(&mut obj.reader(), &tobj::LoadOptions::default(), no_library)?;
+        let mesh = models.into_iter().next().ok_or(tobj::LoadError::GenericFailure)?.mesh;
+        // The faces in front hold each vertex once.
+        let (vertices, faces) = (obj.counts[0] as usize, obj.vertex_faces());
+        let behind = |mut column: Vec<u32>, n: usize| {
+            column.drain(..column.len().min(n));
+            column
+        };
+        let corners = [mesh.indices, mesh.texcoord_indices, mesh.normal_indices];
+        let columns = Self {
+            positions: triples(&mesh.positions).map(Vec3::from_array).collect(),
+            colors: triples(&mesh.vertex_color).collect(),
+            uvs: mesh.texcoords.as_chunks().0.iter().map(|uv| Vec2::from_array(*uv)).collect(),
+            normals: triples(&mesh.normals).map(Vec3::from_array).collect(),
+            corners: corners.map(|column| behind(column, vertices)),
+            arities: behind(mesh.face_arities, faces),
+        };
+        let expected = if obj.colored > 0 { vertices } else { 0 };
+        // tobj passes over colours that are no numbers, and reads some that are too large for one.
+        if columns.colors.len() != expected {
+            return Err(tobj::LoadError::ColorParseError);
+        }
+        let finite = columns.colors.iter().filter(|color| color.iter().all(|c| c.is_finite())).count();
+        if finite as u64 != obj.colored { Err(tobj::LoadError::ColorParseError) } else { Ok(columns) }
     }
 }
 
-/// The first entry of a column and those that `corners` name, in the order of their first use, and `corners` with indices
-/// into them.
-fn used<T: Copy>(column: &[T], corners: &[u32]) -> (Vec<T>, Vec<u32>) {
-    let Some(&first) = column.first() else { return Default::default() };
-    let mut out = vec![first];
-    let mut new_index = vec![NO_INDEX; column.len()];
-    if let Some(new) = new_index.first_mut() {
-        *new = 0;
-    }
-    let corners = corners.iter().map(|&corner| {
-        // Indices are in range, or NO_INDEX.
-        let old = corner as usize;
-        let Some((new, value)) = new_index.get_mut(old).zip(column.get(old)) else { return NO_INDEX };
-        if *new == NO_INDEX {
-            *new = out.len() as u32;
-            out.push(*value);
-        }
-        *new
-    });
-    let corners = corners.collect();
-    (out, corners)
+fn triples(flat: &[f32]) -> impl Iterator<Item = [f32; 3]> {
+    flat.as_chunks().0.iter().copied()
 }
 
 /// The faces of a file, polygons cut into triangles.
@@ -151,29 +162,33 @@ struct Triangles {
     materials: Vec<u32>,
     /// Polygons that were cut.
     polygons: usize,
-    /// Polygons that cannot be cut: line and reason of the first, and their number.
-    refused: Option<(u64, String, usize)>,
+    /// Polygons that cannot be cut: number, from 0, and reason of the first, and how many.
+    refused: Option<(usize, String, usize)>,
 }
 
 impl Triangles {
     /// A vertex of a polygon that is not finite is the error.
     #[expect(
         clippy::indexing_slicing,
-        reason = "PlainObj checked indices and counts of corners; cuts index their polygon"
+        reason = "tobj checked indices and counted corners; cuts index their polygon; a face is of the first kind or a later one"
     )]
-    fn new(plain: &PlainObj, columns: &Columns) -> std::result::Result<Self, (u32, Vec3)> {
+    fn new(obj: &NormalObj<'_>, columns: &Columns) -> std::result::Result<Self, (u32, Vec3)> {
         let mut out = Self::default();
-        let mut start = 0;
-        let (vertices, uvs, normals) = (&plain.elements.corners[0], &columns.face_uvs, &columns.face_normals);
-        for face in &plain.elements.faces {
-            let n = face.corners as usize;
+        let [vertices, uvs, normals] = &columns.corners;
+        let (mut start, mut kind) = (0, 0);
+        for face in 0..obj.faces {
+            if obj.kinds.get(kind + 1).is_some_and(|(first, _)| *first == face) {
+                kind += 1;
+            }
+            let of_face = obj.kinds[kind].1;
+            let n = columns.arities.get(face).map_or(3, |n| *n as usize);
             let corners = start..start + n;
             start += n;
             let polygon = &vertices[corners.clone()];
             let cut = if n == 3 {
                 Cow::Borrowed(&[[0, 1, 2]][..])
             } else {
-                let points: Vec<Vec3> = polygon.iter().map(|&v| plain.values.positions[v as usize]).collect();
+                let points: Vec<Vec3> = polygon.iter().map(|&v| columns.positions[v as usize]).collect();
                 if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
                     return Err((polygon[bad], points[bad]));
                 }
@@ -183,19 +198,19 @@ impl Triangles {
                         Cow::Owned(cut)
                     }
                     Err(e) => {
-                        out.refused.get_or_insert_with(|| (face.line, e.to_string(), 0)).2 += 1;
+                        out.refused.get_or_insert_with(|| (face, e.to_string(), 0)).2 += 1;
                         continue;
                     }
                 }
             };
-            let uvs = (face.has_uv && !uvs.is_empty()).then(|| &uvs[corners.clone()]);
-            let normals = (face.has_normal && !normals.is_empty()).then(|| &normals[corners]);
+            let uvs = of_face.has_uv.then(|| &uvs[corners.clone()]);
+            let normals = of_face.has_normal.then(|| &normals[corners]);
             for triangle in cut.iter() {
                 let pick = |column: &[u32]| triangle.map(|c| column[c as usize]);
                 out.triangles.push(pick(polygon));
                 out.uvs.push(uvs.map_or([NO_INDEX; 3], pick));
                 out.normals.push(normals.map_or([NO_INDEX; 3], pick));
-                out.materials.push(face.material);
+                out.materials.push(of_face.material);
             }
         }
         for column in [&mut out.uvs, &mut out.normals] {
@@ -203,33 +218,30 @@ impl Triangles {
                 column.clear();
             }
         }
-        if !plain.elements.has_materials {
+        if obj.names.materials.is_empty() {
             out.materials.clear();
         }
         Ok(out)
     }
 }
 
-/// One colour a vertex if any has one. Files write them from 0 to 1, some from 0 to 255: the largest tells, with room for
-/// what is a little too bright.
-fn vertex_colors(plain: &PlainObj, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
-    if plain.values.colors.is_empty() {
-        return Vec::new();
-    }
-    let largest = plain.values.colors.iter().flat_map(|(_, c)| c).fold(0.0f32, |a, &b| a.max(b));
+/// One colour a vertex if any has one. Files write them from 0 to 1, some from 0 to 255: the largest tells,
+/// with room for what is a little too bright.
+fn vertex_colors(written: &[[f32; 3]], warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
+    // The largest is a number unless there is none.
+    let largest = written.iter().flatten().fold(0.0f32, |a, &b| a.max(b));
     let scale = if largest > 2.0 { 1.0 } else { 255.0 };
-    let mut colors = vec![DEFAULT_COLOR; plain.values.positions.len()];
-    for (vertex, color) in &plain.values.colors {
-        if let Some(slot) = colors.get_mut(*vertex as usize) {
-            *slot = color.map(|c| (c * scale).round().clamp(0.0, 255.0) as u8);
+    let mut without = 0;
+    let colors = written.iter().map(|color| {
+        if color.iter().all(|c| c.is_finite()) {
+            return color.map(|c| (c * scale).round().clamp(0.0, 255.0) as u8);
         }
-    }
-    let without = plain.values.positions.len() - plain.values.colors.len();
+        without += 1;
+        DEFAULT_COLOR
+    });
+    let colors = colors.collect();
     if without > 0 {
-        warnings.push(format!(
-            "{without} of {} vertices have no colour and are made gray",
-            plain.values.positions.len()
-        ));
+        warnings.push(format!("{without} of {} vertices have no colour and are made gray", written.len()));
     }
     colors
 }
@@ -380,10 +392,10 @@ mod tests {
 
     #[test]
     fn columns_keep_what_is_used_in_the_order_of_its_use() {
-        let corners = [3, NO_INDEX, 1, 3, 1];
-        assert_eq!(used(&['a', 'b', 'c', 'd'], &corners), (vec!['a', 'd', 'b'], vec![1, NO_INDEX, 2, 1, 2]));
-        assert_eq!(used(&['a', 'b'], &[NO_INDEX, 0]), (vec!['a'], vec![NO_INDEX, 0]));
-        assert_eq!(used::<char>(&[], &[NO_INDEX]), (vec![], vec![]));
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 1 0\nvt 2 0\nvt 3 0\nvt 4 0\nf 1/4 2/2 3/4\nf 1 2/3 3/3\nf 1/2 2/4 3/2\n";
+        let mesh = read_obj(obj).unwrap().mesh;
+        assert_eq!(mesh.parts().uvs.iter().map(|uv| uv.x).collect::<Vec<_>>(), [1.0, 4.0, 2.0, 3.0]);
+        assert_eq!(mesh.parts().face_uvs, [[1, 2, 1], [NO_INDEX; 3], [2, 1, 2]]);
     }
 
     #[test]
@@ -409,42 +421,9 @@ mod tests {
             "\nvt 0 0\n", "0", "1", "2", "3", "-1", "-2", "1/1", "-1/-1/-1", "2//1", "1/", "//", "1.5", "nan", "inf", "1e99",
             "-9223372036854775808", "9223372036854775807", "4294967296", "x", "\u{e4}", "0.5", "\r",
         ]), 0..60)) {
-            let _ = read_obj(&words.join(" "));
-        }
-
-        #[test]
-        fn corners_are_what_tobj_reads(
-            numbers in proptest::collection::vec((-1000.0..1000.0f32, 0usize..9, any::<bool>()), 30..90),
-            picks in proptest::collection::vec(any::<[[proptest::sample::Index; 3]; 3]>(), 1..20),
-        ) {
-            let word = |i: usize| {
-                let (value, decimals, e) = numbers[i];
-                if e { format!("{value:.decimals$e}") } else { format!("{value:.decimals$}") }
-            };
-            let n = numbers.len() / 3;
-            let mut obj = String::new();
-            for i in 0..n {
-                let [x, y, z] = std::array::from_fn(|k| word(3 * i + k));
-                obj += &format!("v {x} {y} {z}\nvt {z} {x}\nvn {y} {x} 1\n");
-            }
-            for face in &picks {
-                let corner = |c: usize| face[c].map(|i| (i.index(n) + 1).to_string()).join("/");
-                obj += &format!("f {} {} {}\n", corner(0), corner(1), corner(2));
-            }
-            let options = tobj::LoadOptions::default();
-            let (models, _) = tobj::load_obj_buf(&mut obj.as_bytes(), &options, |_| Err(tobj::LoadError::GenericFailure)).unwrap();
-            let theirs = &models[0].mesh;
-            let plain = PlainObj::parse(Path::new("a.obj"), obj.as_bytes()).unwrap();
-            let columns = Columns::new(&plain);
-            for corner in 0..3 * picks.len() {
-                let [v, t, n] = [&theirs.indices, &theirs.texcoord_indices, &theirs.normal_indices].map(|i| i[corner] as usize);
-                let position = plain.values.positions[plain.elements.corners[0][corner] as usize];
-                prop_assert_eq!(&position.to_array()[..], &theirs.positions[3 * v..3 * v + 3]);
-                let uv = columns.uvs[columns.face_uvs[corner] as usize];
-                prop_assert_eq!(&uv.to_array()[..], &theirs.texcoords[2 * t..2 * t + 2]);
-                let normal = columns.normals[columns.face_normals[corner] as usize];
-                let expected = Vec3::from_slice(&theirs.normals[3 * n..3 * n + 3]);
-                prop_assert_eq!(normal, expected / expected.length());
+            // Whatever tobj refuses has a line.
+            if let Err(e) = read_obj(&words.join(" ")) {
+                prop_assert!(!e.to_string().contains("cannot be read"), "{e}");
             }
         }
 

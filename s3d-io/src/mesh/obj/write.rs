@@ -1,8 +1,9 @@
 //! The meshes of the data set, `rgb.obj` and `semantic.obj`, with their materials.
 //!
-//! Both files are **Y-up**, as published: (x, y, z) in them is (x, z, −y) of the Z-up world. Both hold the faces in the
-//! mesh's own order, one line each, since consumers pair the two files face by face; `usemtl` stands where the material
-//! changes. Numbers are written so that they are read back bit by bit. Source: formats.md, "World and meshes".
+//! Both files are **Y-up**, as published: (x, y, z) in them is (x, z, −y) of the Z-up world. Both hold the
+//! faces in the mesh's own order, one line each, since consumers pair the two files face by face; `usemtl`
+//! stands where the material changes. Numbers are written so that they are read back bit by bit. Source:
+//! formats.md, "World and meshes".
 
 #![expect(clippy::indexing_slicing, reason = "a writer: the indices are those that TriMesh::new checked")]
 
@@ -30,13 +31,14 @@ pub struct TextureOut<'a> {
     pub bytes: &'a [u8],
 }
 
-/// Writes `rgb.obj`, `rgb.mtl` and the folder `rgb_textures` into the folder `dir`, which must be there, and returns the
-/// size of all files in bytes.
+/// Writes `rgb.obj`, `rgb.mtl` and the folder `rgb_textures` into the folder `dir`, which must be there, and
+/// returns the size of all files in bytes.
 ///
-/// `textures` holds the image files of [`TriMesh::textures`], one each; if it is empty, PNG files are made from the
-/// textures' pixels. Positions, texture coordinates, normals and vertex colours are those of the mesh; what is not finite
-/// (unused, so) is written as 0. Faces without a material get one called `default`. OBJ cannot say that a texture is
-/// mirrored beyond its edge: it is repeated then, but for [`read_mesh`](crate::mesh::read_mesh), which is told in a comment.
+/// `textures` holds the image files of [`TriMesh::textures`], one each; if it is empty, PNG files are made
+/// from the textures' pixels. Positions, texture coordinates, normals and vertex colours are those of the
+/// mesh; what is not finite (unused, so) is written as 0. Faces without a material get one called `default`.
+/// OBJ cannot say that a texture is mirrored beyond its edge: it is repeated then, but for
+/// [`read_mesh`](crate::mesh::read_mesh), which is told in a comment.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
@@ -119,9 +121,9 @@ pub fn write_rgb_obj(dir: &Path, mesh: &TriMesh, textures: &[TextureOut<'_>]) ->
     Ok(bytes)
 }
 
-/// Writes `semantic.obj` and `semantic.mtl` into the folder `dir`, which must be there, and returns the size of both in
-/// bytes. A face's material bears the name of its label: `names[label_of_face[face]]`. Each has the colour of
-/// [`pretty_color`].
+/// Writes `semantic.obj` and `semantic.mtl` into the folder `dir`, which must be there, and returns the size
+/// of both in bytes. A face's material bears the name of its label: `names[label_of_face[face]]`. Each has the
+/// colour of [`pretty_color`].
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
@@ -241,8 +243,8 @@ fn unit(channel: u8) -> f32 {
     f32::from(channel) / 255.0
 }
 
-/// Which textures need the word that they do not repeat: few readers know it, so it is left out where no face reaches
-/// beyond the edge.
+/// Which textures need the word that they do not repeat: few readers know it, so it is left out where no face
+/// reaches beyond the edge.
 fn clamped_textures(mesh: &TriMesh) -> Vec<bool> {
     let parts = mesh.parts();
     let mut clamped = vec![false; parts.textures.len()];
@@ -262,8 +264,9 @@ fn clamped_textures(mesh: &TriMesh) -> Vec<bool> {
 /// The most characters of a cleaned name: file systems take 255 bytes, and a temporary file's name is longer.
 const MAX_NAME: usize = 128;
 
-/// A file name of ASCII letters, digits, `-`, `.` and `_`, not hidden, and without "rgb", which loaders replace in paths.
-/// One that Windows keeps for a device (`con.png`) gets a `_` in front; a long one is cut before its ending.
+/// A file name of ASCII letters, digits, `-`, `.` and `_`, not hidden, and without "rgb", which loaders
+/// replace in paths. One that Windows keeps for a device (`con.png`) gets a `_` in front; a long one is cut
+/// before its ending.
 fn clean_file_name(name: &str) -> String {
     let safe = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_') { c } else { '_' };
     let mut clean: String = name.chars().map(safe).collect();
@@ -349,8 +352,8 @@ mod tests {
         assert_eq!(unique, ["Wall.png", "wall_2.PNG", "WALL_3.png", "wall_2_2.png"]);
     }
 
-    /// What another reader finds in an OBJ file: per face its corners' positions, coordinates, normals, colours, in the
-    /// world's axes again, and its material's name.
+    /// What another reader finds in an OBJ file: per face its corners' positions, coordinates, normals,
+    /// colours, in the world's axes again, and its material's name.
     #[derive(Debug, PartialEq)]
     struct Face {
         positions: [Vec3; 3],
@@ -433,7 +436,8 @@ mod tests {
             // Bit by bit, so that a corner at −0 counts too.
             let bits = |t: [Vec3; 3]| t.map(|v| v.to_array().map(f32::to_bits));
             assert_eq!(bits(face.positions), bits(mesh.triangle(f as u32)), "face {f}");
-            // tobj takes the first entry of the file where a face names none, so only what is there is compared here.
+            // tobj takes the first entry of the file where a face names none, so only what is there is
+            // compared here.
             if let Some(normals) = mesh.corner_normals(f as u32) {
                 assert_eq!(face.normals.map(bits), Some(bits(normals)), "face {f}");
             }

@@ -1,0 +1,429 @@
+//! OBJ text as tobj 4 reads it right.
+//!
+//! What is plain goes to tobj as it stands in the file; these are left out or written anew, each with its
+//! test:
+//! * `o`, `g` and `usemtl` start new models, which have their own vertices: here a mesh keeps the file's
+//!   (`vertices_and_faces_keep_the_files_order`, `polygons_are_cut_with_their_attributes`);
+//! * `l` with three points becomes a triangle, `f` with fewer than three corners stays
+//!   (`what_is_left_out_is_told`);
+//! * a corner without a texture coordinate or normal gets the one before (`dialects_become_plain`), and so
+//!   does one whose index is 0 or too far from the end, or overflows (`every_fault_has_its_line`);
+//! * lines that go on on the next, comments behind numbers, a `vt` of one number, a colour with alpha, lines
+//!   that end in CR alone and a mark of UTF-8 are refused (`dialects_become_plain`,
+//!   `obj_files_of_every_dialect`);
+//! * bytes that are no UTF-8, in comments and names too, are refused (`names_need_not_be_utf_8`);
+//! * colours of some vertices go to the first (`vertex_colours_of_both_scales_and_of_some_vertices`).
+
+use crate::mesh::obj::lines::{logical_lines, next_word, text};
+use crate::mesh::obj::statement;
+use s3d_geom::NO_INDEX;
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::io::{BufRead, Read};
+use std::ops::Range;
+
+/// What faces are beyond their corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FaceKind {
+    /// Into [`ObjNames::materials`], or [`NO_INDEX`].
+    pub(crate) material: u32,
+    /// Whether every corner has a texture coordinate.
+    pub(crate) has_uv: bool,
+    /// Whether every corner has a normal.
+    pub(crate) has_normal: bool,
+}
+
+/// The names in an OBJ file.
+#[derive(Debug, Default)]
+pub(crate) struct ObjNames {
+    /// Those that `usemtl` gives, in the order of their first use.
+    pub(crate) materials: Vec<String>,
+    /// The lines and names of `mtllib`.
+    pub(crate) libraries: Vec<(u64, String)>,
+}
+
+/// An OBJ file for tobj, and what tobj does not tell of it.
+#[derive(Debug, Default)]
+pub(crate) struct NormalObj<'a> {
+    bytes: &'a [u8],
+    /// What tobj is to read, in order: of the file, or of `rewritten`.
+    pieces: Vec<Piece>,
+    rewritten: Vec<u8>,
+    /// How many values the columns `v`, `vt` and `vn` have.
+    pub(crate) counts: [u64; 3],
+    /// Whether corners have indices into them.
+    used: [bool; 3],
+    /// How many vertices have a colour. If only some have, it is not finite for the others.
+    pub(crate) colored: u64,
+    /// Faces with three corners or more.
+    pub(crate) faces: usize,
+    /// What faces are, from the one of this number on.
+    pub(crate) kinds: Vec<(usize, FaceKind)>,
+    pub(crate) names: ObjNames,
+    /// Lines of `f` elements with fewer than three corners.
+    pub(crate) short_faces: Vec<u64>,
+    /// Number of `p` and `l` elements.
+    pub(crate) points_and_lines: usize,
+}
+
+#[derive(Debug)]
+enum Piece {
+    File(Range<usize>),
+    Rewritten(Range<usize>),
+}
+
+/// A line that tobj is to read: as it stands, or anew.
+type Line = Option<String>;
+
+impl<'a> NormalObj<'a> {
+    /// `None` if a statement has a fault. Others are found by tobj.
+    pub(crate) fn new(bytes: &'a [u8]) -> Option<Self> {
+        let obj = Self::scan(bytes, false)?;
+        // tobj passes over indices into a column that is empty.
+        if obj.used.iter().zip(obj.counts).any(|(used, count)| *used && count == 0) {
+            return None;
+        }
+        let every_or_none = obj.colored == 0 || obj.colored == obj.counts[0];
+        if every_or_none { Some(obj) } else { Self::scan(bytes, true) }
+    }
+
+    /// Vertices without a colour get one that is not finite if `fill_colors`.
+    fn scan(bytes: &'a [u8], fill_colors: bool) -> Option<Self> {
+        let mut obj = Self { bytes, ..Self::default() };
+        let mut materials: HashMap<String, u32> = HashMap::new();
+        let mut material = NO_INDEX;
+        for line in logical_lines(bytes) {
+            let (keyword, rest) = line.keyword();
+            let read = match keyword {
+                b"v" => obj.vertex(rest, fill_colors)?,
+                b"vt" => obj.uv(rest)?,
+                b"vn" => obj.normal(rest)?,
+                b"f" => match obj.face(rest, material)? {
+                    Some(read) => read,
+                    None => {
+                        obj.short_faces.push(line.number);
+                        continue;
+                    }
+                },
+                b"usemtl" => {
+                    let next = materials.len() as u32;
+                    let name = text(rest.trim_ascii());
+                    material = *materials.entry(name).or_insert_with_key(|name| {
+                        obj.names.materials.push(name.clone());
+                        next
+                    });
+                    continue;
+                }
+                b"mtllib" => {
+                    obj.names.libraries.push((line.number, text(rest.trim_ascii())));
+                    continue;
+                }
+                b"p" | b"l" => {
+                    obj.points_and_lines += 1;
+                    continue;
+                }
+                // Objects, groups, smoothing and curves say nothing about faces; comments and unknown words
+                // neither.
+                _ => continue,
+            };
+            match (read, line.text) {
+                (None, Cow::Borrowed(_)) => obj.keep(line.place),
+                (None, Cow::Owned(joined)) => obj.rewrite(&joined),
+                (Some(anew), _) => obj.rewrite(anew.as_bytes()),
+            }
+        }
+        Some(obj)
+    }
+
+    fn keep(&mut self, place: Range<usize>) {
+        match self.pieces.last_mut() {
+            Some(Piece::File(last)) if last.end == place.start => last.end = place.end,
+            _ => self.pieces.push(Piece::File(place)),
+        }
+    }
+
+    fn rewrite(&mut self, line: &[u8]) {
+        let start = self.rewritten.len();
+        self.rewritten.extend_from_slice(line);
+        self.rewritten.push(b'\n');
+        let end = self.rewritten.len();
+        match self.pieces.last_mut() {
+            Some(Piece::Rewritten(last)) => last.end = end,
+            _ => self.pieces.push(Piece::Rewritten(start..end)),
+        }
+    }
+
+    fn vertex(&mut self, rest: &[u8], fill_colors: bool) -> Option<Line> {
+        self.counts[0] += 1;
+        let plain = plain_numbers(rest);
+        if plain == Some(6) || !fill_colors && matches!(plain, Some(3 | 4)) {
+            self.colored += u64::from(plain == Some(6));
+            return Some(None);
+        }
+        let (p, color) = statement::vertex(rest).ok()?;
+        self.colored += u64::from(color.is_some());
+        let color = match color.or_else(|| fill_colors.then_some([f32::NAN; 3])) {
+            Some([r, g, b]) => format!(" {r} {g} {b}"),
+            None => String::new(),
+        };
+        Some(Some(format!("v {} {} {}{color}", p.x, p.y, p.z)))
+    }
+
+    fn uv(&mut self, rest: &[u8]) -> Option<Line> {
+        self.counts[1] += 1;
+        if plain_numbers(rest).is_some_and(|n| n >= 2) {
+            return Some(None);
+        }
+        let [u, v] = statement::uv(rest).ok()?;
+        Some(Some(format!("vt {u} {v}")))
+    }
+
+    fn normal(&mut self, rest: &[u8]) -> Option<Line> {
+        self.counts[2] += 1;
+        if plain_numbers(rest).is_some_and(|n| n >= 3) {
+            return Some(None);
+        }
+        let [x, y, z] = statement::normal(rest).ok()?;
+        Some(Some(format!("vn {x} {y} {z}")))
+    }
+
+    /// `Some(None)` for a face of fewer than three corners.
+    fn face(&mut self, rest: &[u8], material: u32) -> Option<Option<Line>> {
+        let (corners, line) = match Corners::plain(rest) {
+            Some(corners) => (corners, None),
+            None => self.any_face(rest)?,
+        };
+        if corners.n < 3 {
+            return Some(None);
+        }
+        for (used, has) in self.used.iter_mut().zip(corners.any_has) {
+            *used |= has;
+        }
+        let [_, has_uv, has_normal] = corners.all_have;
+        let kind = FaceKind { material, has_uv, has_normal };
+        if self.kinds.last().is_none_or(|(_, last)| *last != kind) {
+            self.kinds.push((self.faces, kind));
+        }
+        self.faces += 1;
+        Some(Some(line))
+    }
+
+    /// A face of corners that are written in any way, and plainly.
+    fn any_face(&self, mut rest: &[u8]) -> Option<(Corners, Line)> {
+        let mut line = String::from("f");
+        while let Some(word) = next_word(&mut rest) {
+            let [v, vt, vn] = statement::corner(word, self.counts).ok()?;
+            let part = |index: u64| if index == 0 { String::new() } else { index.to_string() };
+            line += &format!(" {v}/{}/{}", part(vt), part(vn));
+        }
+        let corners = line.strip_prefix('f').and_then(|rest| Corners::plain(rest.as_bytes()))?;
+        Some((corners, Some(line)))
+    }
+
+    /// What tobj is to read. In front of it are faces that hold all vertices in their order, as tobj numbers
+    /// them by their first use, with the first of the other columns: [`Self::vertex_faces`] many.
+    pub(crate) fn reader(&self) -> impl BufRead {
+        // Corners without an index get the one before.
+        let mut vertex_faces = String::from("f 1/1/1");
+        for vertex in 2..=self.counts[0] {
+            vertex_faces += if vertex % 4 == 1 { "\nf " } else { " " };
+            vertex_faces += &vertex.to_string();
+        }
+        vertex_faces.push('\n');
+        std::io::Cursor::new(vertex_faces).chain(Pieces { obj: self, next: 0, rest: &[] })
+    }
+
+    /// How many faces come before the file's in what tobj reads.
+    pub(crate) fn vertex_faces(&self) -> usize {
+        self.counts[0].div_ceil(4).max(1) as usize
+    }
+}
+
+/// The pieces of an OBJ file as one text.
+struct Pieces<'a> {
+    obj: &'a NormalObj<'a>,
+    next: usize,
+    rest: &'a [u8],
+}
+
+impl BufRead for Pieces<'_> {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        while self.rest.is_empty()
+            && let Some(piece) = self.obj.pieces.get(self.next)
+        {
+            self.next += 1;
+            let piece = match piece {
+                Piece::File(place) => self.obj.bytes.get(place.clone()),
+                Piece::Rewritten(place) => self.obj.rewritten.get(place.clone()),
+            };
+            self.rest = piece.unwrap_or_default();
+        }
+        Ok(self.rest)
+    }
+
+    fn consume(&mut self, n: usize) {
+        self.rest = self.rest.get(n..).unwrap_or_default();
+    }
+}
+
+impl Read for Pieces<'_> {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        let n = self.fill_buf()?.read(into)?;
+        self.consume(n);
+        Ok(n)
+    }
+}
+
+/// The corners of a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Corners {
+    n: usize,
+    /// Whether each, and whether any has a vertex, a texture coordinate, a normal.
+    all_have: [bool; 3],
+    any_has: [bool; 3],
+}
+
+impl Corners {
+    /// Those of an `f` line without its keyword, if each has a vertex, and tobj reads them right: digits and
+    /// slashes, no index 0 or larger than tobj can multiply.
+    fn plain(rest: &[u8]) -> Option<Self> {
+        let mut corners = Self { n: 0, all_have: [true; 3], any_has: [false; 3] };
+        // Of the corner so far: which indices it has, which one comes, and how many digits that has.
+        let (mut has, mut part, mut digits) = ([false; 3], 0, 0);
+        for &byte in rest.iter().chain(b" ") {
+            match byte {
+                b'0' if digits == 0 => return None,
+                b'0'..=b'9' if digits < 18 => {
+                    digits += 1;
+                    *has.get_mut(part)? = true;
+                }
+                b'/' => (part, digits) = (part + 1, 0),
+                b' ' | b'\t' if digits > 0 || part > 0 => {
+                    if !has[0] || part > 2 {
+                        return None;
+                    }
+                    corners.n += 1;
+                    for ((all, any), has) in corners.all_have.iter_mut().zip(&mut corners.any_has).zip(has) {
+                        *all &= has;
+                        *any |= has;
+                    }
+                    (has, part, digits) = ([false; 3], 0, 0);
+                }
+                b' ' | b'\t' => {}
+                _ => return None,
+            }
+        }
+        Some(corners)
+    }
+}
+
+/// How many words the rest of a line has, if they are made of what decimal numbers are.
+fn plain_numbers(rest: &[u8]) -> Option<usize> {
+    let (mut words, mut in_word) = (0, false);
+    for &byte in rest {
+        match byte {
+            b'0'..=b'9' | b'.' | b'-' | b'+' | b'e' | b'E' => {
+                words += usize::from(!in_word);
+                in_word = true;
+            }
+            b' ' | b'\t' => in_word = false,
+            _ => return None,
+        }
+    }
+    Some(words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What tobj is to read of a file, without the faces in front, and what it is not told.
+    fn normal(text: &str) -> Option<(String, NormalObj<'_>)> {
+        let obj = NormalObj::new(text.as_bytes())?;
+        let mut all = String::new();
+        obj.reader().read_to_string(&mut all).unwrap();
+        let rest = all.split_inclusive('\n').skip(obj.vertex_faces()).collect();
+        Some((rest, obj))
+    }
+
+    const THREE: &str = "v 0 0 0\nv 1 0 0 # x\nv\t0 1 0\n";
+
+    #[test]
+    fn plain_text_stays() {
+        let text = "v 0 0 0\nv 1 0 0 2\nv\t0 1e-3 -.5\r\nvt 0 1\nvt 0 1 0\nvn 0 +1 0\nf 1/1/1 2/2/1 3/1/1\nf 1 2 3 2\nf 1// 2//1 3";
+        let (rest, obj) = normal(text).unwrap();
+        assert_eq!(rest, text);
+        assert_eq!((obj.pieces.len(), obj.faces), (1, 3));
+        assert_eq!((obj.counts, obj.colored), ([3, 2, 1], 0));
+    }
+
+    #[test]
+    fn dialects_become_plain() {
+        let text = format!(
+            "\u{feff}{THREE}vt 0.5\nvn 0 0 1 x\nusemtl a b \nf 1/1/1 2/1/1 \\\n 3/1/1 # c\nusemtl c\nf -3//-1 -2//-1 -1//-1\n\
+             usemtl a b\nl 1 2 3\np 1\nf 1 2\nf\ng x\nf 1/1 2 +3"
+        );
+        let (rest, obj) = normal(&text).unwrap();
+        let expected = "v 0 0 0\nv 1 0 0\nv\t0 1 0\nvt 0.5 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1//1 2//1 3//1\nf 1/1/ 2// 3//\n";
+        assert_eq!(rest, expected);
+        let kind = |material, has_uv, has_normal| FaceKind { material, has_uv, has_normal };
+        assert_eq!(
+            obj.kinds,
+            [(0, kind(0, true, true)), (1, kind(1, false, true)), (2, kind(0, false, false))]
+        );
+        assert_eq!(obj.names.materials, ["a b", "c"]);
+        assert_eq!((obj.faces, obj.short_faces, obj.points_and_lines), (3, vec![14, 15], 2));
+    }
+
+    #[test]
+    fn every_vertex_has_a_colour_or_none() {
+        let (rest, obj) = normal("v 0 0 0 1 0 .5\nv 1 0 0 1 1 1 1\n").unwrap();
+        assert_eq!((&*rest, obj.colored), ("v 0 0 0 1 0 .5\nv 1 0 0 1 1 1\n", 2));
+        let (rest, obj) = normal("v 0 0 0 1 0 .5\nv 1 0 1e-1\nv 1 2 3 2\n").unwrap();
+        assert_eq!(rest, "v 0 0 0 1 0 .5\nv 1 0 0.1 NaN NaN NaN\nv 0.5 1 1.5 NaN NaN NaN\n");
+        assert_eq!(obj.colored, 1);
+    }
+
+    #[test]
+    fn corners_are_plain_as_nearly_all_files_write_them() {
+        for (face, n, all_have, any_has) in [
+            (" 1 2  3", 3, [true, false, false], [true, false, false]),
+            ("1/2 10/20\t100/200 3/4", 4, [true, true, false], [true, true, false]),
+            ("1//3 2/2/2 3/", 3, [true, false, false], [true; 3]),
+            ("123456789012345678", 1, [true, false, false], [true, false, false]),
+        ] {
+            assert_eq!(Corners::plain(face.as_bytes()), Some(Corners { n, all_have, any_has }), "{face}");
+        }
+        for face in
+            ["/1", "0", "1/0", "-1", "+1", "01", "1/2/3/4", "1/2/3/", "1234567890123456789", "1#", "1\r2"]
+        {
+            assert_eq!(Corners::plain(face.as_bytes()), None, "{face}");
+        }
+    }
+
+    #[test]
+    fn names_need_not_be_utf_8() {
+        let bytes = b"# W\xe4nde\nv 0 0 0 # \xe4\nusemtl W\xe4nde\nf 1 1 1\n";
+        let obj = NormalObj::new(bytes).unwrap();
+        let mut all = String::new();
+        obj.reader().read_to_string(&mut all).unwrap();
+        assert_eq!((&*all, &*obj.names.materials[0]), ("f 1/1/1\nv 0 0 0\nf 1 1 1\n", "W\u{e4}nde"));
+        let theirs = tobj::load_obj_buf(&mut &bytes[..], &tobj::LoadOptions::default(), |_| unreachable!());
+        assert_eq!(theirs.unwrap_err(), tobj::LoadError::ReadError);
+    }
+
+    #[test]
+    fn faults_are_not_passed_on() {
+        for text in [
+            "f 1/1 2 3",
+            "vt 0 0\nf 1/0 2/1 3/1",
+            "vt 0 0\nf 1/-2 2/1 3/1",
+            "vn 0 0 1\nf 1//6148914691236517206 2//1 3//1",
+            "f 1/1/1/1 2 3",
+            "v 1 2 3 1 2 x",
+            "vt 0 1\u{a0}0",
+        ] {
+            assert!(normal(&format!("{THREE}{text}")).is_none(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! One statement of an OBJ file, read strictly: what [`crate::mesh::obj::normal`] rewrites and
+//! [`crate::mesh::obj::diagnose`] looks for.
+
+use crate::fs::text::number;
+use crate::mesh::obj::lines::{next_word, parse_f32};
+use crate::quote::quote;
+use s3d_geom::glam::Vec3;
+
+/// What is wrong with a statement.
+pub(crate) type Why = String;
+
+/// The columns that a corner of a face points into.
+const COLUMNS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+/// A position, divided by its weight, and its colour as written, of a `v` line without its keyword.
+pub(crate) fn vertex(mut rest: &[u8]) -> Result<(Vec3, Option<[f32; 3]>), Why> {
+    let words: Vec<&[u8]> = std::iter::from_fn(|| next_word(&mut rest)).take(8).collect();
+    // A seventh is the colour's alpha.
+    let (position, weight, color) = match words[..] {
+        [x, y, z] => ([x, y, z], None, None),
+        [x, y, z, w] => ([x, y, z], Some(w), None),
+        [x, y, z, r, g, b] | [x, y, z, r, g, b, _] => ([x, y, z], None, Some([r, g, b])),
+        _ => {
+            let n = words.len();
+            return Err(format!(
+                "a vertex has three coordinates, and a colour has three numbers; here are {n}"
+            ));
+        }
+    };
+    let mut position = Vec3::from_array(numbers(position)?);
+    if let Some(weight) = weight {
+        let [weight] = numbers([weight])?;
+        if weight == 0.0 {
+            return Err("the vertex has the weight 0".into());
+        }
+        position /= weight;
+    }
+    let finite =
+        |word| parse_f32(word).ok_or_else(|| format!("the colour {} is no finite number", quote(word)));
+    let color = match color {
+        Some([r, g, b]) => Some([finite(r)?, finite(g)?, finite(b)?]),
+        None => None,
+    };
+    Ok((position, color))
+}
+
+/// A `vt` line without its keyword. A texture of one dimension has no second coordinate.
+pub(crate) fn uv(mut rest: &[u8]) -> Result<[f32; 2], Why> {
+    let u = next_word(&mut rest).ok_or("a texture coordinate without a number")?;
+    numbers([u, next_word(&mut rest).unwrap_or(b"0")])
+}
+
+/// A `vn` line without its keyword.
+pub(crate) fn normal(mut rest: &[u8]) -> Result<[f32; 3], Why> {
+    let mut words = [&b""[..]; 3];
+    for word in &mut words {
+        *word = next_word(&mut rest).ok_or("a normal needs three numbers")?;
+    }
+    numbers(words)
+}
+
+fn numbers<const N: usize>(words: [&[u8]; N]) -> Result<[f32; N], Why> {
+    let mut numbers = [0.0; N];
+    for (value, word) in numbers.iter_mut().zip(words) {
+        *value = number(word).ok_or_else(|| format!("{} is no number", quote(word)))?;
+    }
+    Ok(numbers)
+}
+
+/// The indices of a corner of a face into columns that have so many values so far: from 1, and 0 for none.
+pub(crate) fn corner(corner: &[u8], counts: [u64; 3]) -> Result<[u64; 3], Why> {
+    let mut indices = [0; 3];
+    let mut parts = corner.split(|&b| b == b'/');
+    for (column, (index, count)) in indices.iter_mut().zip(counts).enumerate() {
+        let part = parts.next().unwrap_or_default();
+        if part.is_empty() {
+            continue;
+        }
+        let written = std::str::from_utf8(part).ok().and_then(|part| part.parse::<i64>().ok());
+        let written = written.ok_or_else(|| format!("the index {} is no whole number", quote(part)))?;
+        // More values than 63 bits count are in no file.
+        let absolute = if written < 0 { count as i64 + written + 1 } else { written };
+        if absolute < 1 {
+            return Err(out_of_range(column, written, count));
+        }
+        *index = absolute as u64;
+    }
+    if parts.next().is_some() {
+        return Err(format!("the corner {} has more than three indices", quote(corner)));
+    }
+    if indices[0] == 0 {
+        return Err(format!("the corner {} has no vertex", quote(corner)));
+    }
+    Ok(indices)
+}
+
+/// An index of a column of `count` values that is not there.
+pub(crate) fn out_of_range(column: usize, index: i64, count: u64) -> Why {
+    let what = COLUMNS.get(column).copied().unwrap_or_default();
+    match index {
+        0 => format!("{what} 0: indices count from 1"),
+        _ => format!("{what} {index} is not there, {count} are"),
+    }
+}
