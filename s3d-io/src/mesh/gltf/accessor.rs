@@ -1,196 +1,178 @@
-//! The numbers of glTF accessors, every range checked before it is read.
+//! The numbers of glTF accessors.
+//!
+//! The gltf crate's utilities read them, but panic on indices that are not there, counts of 0, types that are
+//! unknown and sums that overflow (`claims_beyond_the_data_are_refused`), give memory to any count without
+//! data (`sparse_changes_apply_with_and_without_data`) and pass over sparse indices that do not grow
+//! (`sparse_indices_grow`): here every range is checked before they read it.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::error::Result;
 use crate::mesh::gltf::document::GltfDocument;
+use gltf::accessor::{DataType, Item, Iter};
 use gltf::json::Index;
-use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::accessor::Accessor;
 use gltf::json::buffer::View;
 use gltf::json::validation::Checked;
 
-/// The most elements of an accessor that has no data: one made of zeros and sparse changes can claim any number. Those
-/// that are lawful are of morph targets, which are not read.
+/// The most elements of an accessor that has no data: one made of zeros and sparse changes can claim any
+/// number. Those that are lawful are of morph targets, which are not read.
 const MAX_WITHOUT_DATA: u64 = 1 << 20;
 
-/// The elements of an accessor, each of `width` numbers. `f64` holds every component type exactly.
-struct Numbers {
-    width: usize,
-    component: ComponentType,
-    values: Vec<f64>,
-}
-
 impl GltfDocument {
-    /// The elements of an accessor of `N` numbers each; integers are scaled to 0…1 or −1…1 where the accessor says so.
-    /// `who` is for messages: "mesh 0, primitive 1, POSITION".
+    /// The elements of an accessor of `N` numbers each; integers are scaled to 0…1 or −1…1 where the accessor
+    /// says so. `who` is for messages: "mesh 0, primitive 1, POSITION".
     pub(crate) fn read_vectors<const N: usize>(
         &self,
         index: Index<Accessor>,
         who: &str,
-    ) -> Result<Vec<[f32; N]>> {
-        let numbers = self.numbers(index, who)?;
-        if numbers.width != N {
-            return Err(self
-                .fail(format!("{who}: accessor {index} has {} numbers an element, not {N}", numbers.width)));
+    ) -> Result<Vec<[f32; N]>>
+    where
+        [i8; N]: Item,
+        [u8; N]: Item,
+        [i16; N]: Item,
+        [u16; N]: Item,
+        [u32; N]: Item,
+        [f32; N]: Item,
+    {
+        let (accessor, width) = self.checked(index, who)?;
+        if width != N {
+            return Err(self.fail(format!("{who}: accessor {index} has {width} numbers an element, not {N}")));
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "vectors are rounded to f32, which they mostly came as"
-        )]
-        Ok(numbers.values.as_chunks::<N>().0.iter().map(|e| e.map(|v| v as f32)).collect())
+        if accessor.count() == 0 {
+            return Ok(Vec::new());
+        }
+        let zeros = || vec![[0.0; N]; accessor.count()];
+        macro_rules! vectors {
+            ($type:ty, $largest:expr) => {{
+                let largest: Option<f64> = $largest;
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "vectors are rounded to f32, which they mostly came as"
+                )]
+                let number = |v: $type| match largest {
+                    // glTF 2.0, section 3.11.
+                    Some(largest) if accessor.normalized() => (f64::from(v) / largest).max(-1.0) as f32,
+                    _ => f64::from(v) as f32,
+                };
+                self.iter::<[$type; N]>(&accessor)
+                    .map_or_else(zeros, |all| all.map(|e| e.map(number)).collect())
+            }};
+        }
+        Ok(match accessor.data_type() {
+            DataType::I8 => vectors!(i8, Some(127.0)),
+            DataType::U8 => vectors!(u8, Some(255.0)),
+            DataType::I16 => vectors!(i16, Some(32_767.0)),
+            DataType::U16 => vectors!(u16, Some(65_535.0)),
+            DataType::U32 => vectors!(u32, None),
+            DataType::F32 => vectors!(f32, None),
+        })
     }
 
     /// Colours: elements of three numbers, or of four, the last of which is left out.
     pub(crate) fn read_colors(&self, index: Index<Accessor>, who: &str) -> Result<Vec<[f32; 3]>> {
-        let numbers = self.numbers(index, who)?;
-        #[expect(clippy::cast_possible_truncation, reason = "colours are rounded to f32")]
-        let color = |[r, g, b]: [f64; 3]| [r as f32, g as f32, b as f32];
-        match numbers.width {
-            3 => Ok(numbers.values.as_chunks().0.iter().map(|rgb| color(*rgb)).collect()),
-            4 => Ok(numbers.values.as_chunks().0.iter().map(|&[r, g, b, _]| color([r, g, b])).collect()),
+        match self.checked(index, who)?.1 {
+            3 => self.read_vectors(index, who),
+            4 => Ok(self.read_vectors(index, who)?.into_iter().map(|[r, g, b, _]| [r, g, b]).collect()),
             width => Err(self.fail(format!("{who}: accessor {index} has {width} numbers a colour"))),
         }
     }
 
     /// Indices of vertices.
     pub(crate) fn read_indices(&self, index: Index<Accessor>, who: &str) -> Result<Vec<u32>> {
-        let numbers = self.numbers(index, who)?;
-        let whole = matches!(numbers.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
-        if numbers.width != 1 || !whole {
-            return Err(self.fail(format!("{who}: accessor {index} does not hold single unsigned integers")));
+        let (accessor, width) = self.checked(index, who)?;
+        if accessor.count() == 0 {
+            return Ok(Vec::new());
         }
-        #[expect(clippy::cast_possible_truncation, reason = "each was an integer of at most 32 bits")]
-        Ok(numbers.values.into_iter().map(|v| v as u32).collect())
+        let zeros = || vec![0; accessor.count()];
+        match accessor.data_type() {
+            DataType::U8 if width == 1 => {
+                Ok(self.iter(&accessor).map_or_else(zeros, |all| all.map(u8::into).collect()))
+            }
+            DataType::U16 if width == 1 => {
+                Ok(self.iter(&accessor).map_or_else(zeros, |all| all.map(u16::into).collect()))
+            }
+            DataType::U32 if width == 1 => Ok(self.iter(&accessor).map_or_else(zeros, Iterator::collect)),
+            _ => Err(self.fail(format!("{who}: accessor {index} does not hold single unsigned integers"))),
+        }
     }
 
-    fn numbers(&self, index: Index<Accessor>, who: &str) -> Result<Numbers> {
-        let accessor = self.get(index, who, "accessor")?;
+    /// The elements of a checked accessor that is not empty; `None` if it has no data, and they are zeros.
+    fn iter<'a, T: Item>(&'a self, accessor: &gltf::Accessor<'a>) -> Option<Iter<'a, T>> {
+        Iter::new(accessor.clone(), |buffer| self.buffer(buffer.index()))
+    }
+
+    /// An accessor that can be read, and how many numbers its elements have.
+    fn checked(&self, index: Index<Accessor>, who: &str) -> Result<(gltf::Accessor<'_>, usize)> {
+        let json = self.get(index, who, "accessor")?;
         let name = format!("{who}: accessor {index}");
-        let (Checked::Valid(component), Checked::Valid(kind)) = (accessor.component_type, accessor.type_)
-        else {
+        let (Checked::Valid(component), Checked::Valid(kind)) = (json.component_type, json.type_) else {
             return Err(self.fail(format!("{name} has an unknown type")));
         };
-        let (component, width) = (component.0, width_of(kind));
-        let mut values = match accessor.buffer_view {
+        let (count, width) = (json.count.0, kind.multiplicity());
+        let size = width.saturating_mul(component.0.size());
+        match json.buffer_view {
             Some(view) => {
-                let offset = accessor.byte_offset.map_or(0, |o| o.0);
-                self.elements(view, offset, accessor.count.0, width, component, true, &name)?
+                self.range(view, json.byte_offset.map_or(0, |o| o.0), count, size, &name)?;
             }
-            None => {
-                let count = Some(accessor.count.0).filter(|n| *n <= MAX_WITHOUT_DATA);
-                let numbers = count
-                    .and_then(|n| usize::try_from(n).ok())
-                    .and_then(|n| n.checked_mul(width))
-                    .ok_or_else(|| {
-                        self.fail(format!("{name} claims {} elements without data", accessor.count.0))
-                    })?;
-                vec![0.0; numbers]
+            None if count > MAX_WITHOUT_DATA => {
+                return Err(self.fail(format!("{name} claims {count} elements without data")));
             }
-        };
-        if let Some(sparse) = &accessor.sparse {
-            let Checked::Valid(index_type) = sparse.indices.component_type else {
+            None => {}
+        }
+        // Of no elements nothing is read; no sparse part is empty (see `GltfDocument::open`).
+        if let Some(sparse) = &json.sparse {
+            let Checked::Valid(place) = sparse.indices.component_type else {
                 return Err(self.fail(format!("{name}: its sparse indices have an unknown type")));
             };
-            let (at, n) = (&sparse.indices, sparse.count.0);
-            let places = self.elements(at.buffer_view, at.byte_offset.0, n, 1, index_type.0, false, &name)?;
-            let at = &sparse.values;
-            let changes =
-                self.elements(at.buffer_view, at.byte_offset.0, n, width, component, false, &name)?;
-            for (&place, change) in places.iter().zip(changes.chunks_exact(width)) {
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    reason = "a whole number; what is too large is not there"
-                )]
-                let start = (place as usize).saturating_mul(width);
-                match values.get_mut(start..).and_then(|v| v.get_mut(..width)) {
-                    Some(element) => element.copy_from_slice(change),
-                    None => {
-                        let count = accessor.count.0;
-                        return Err(self.fail(format!("{name}: sparse index {place} of {count} elements")));
-                    }
+            let (changes, at, size_of_place) = (sparse.count.0, &sparse.indices, place.0.size());
+            let (bytes, stride) =
+                self.range(at.buffer_view, at.byte_offset.0, changes, size_of_place, &name)?;
+            let mut least = 0;
+            for place in bytes.chunks(stride).take(usize::try_from(changes).unwrap_or(usize::MAX)) {
+                let place = place.iter().take(size_of_place).rev().fold(0u64, |n, b| n << 8 | u64::from(*b));
+                if place >= count {
+                    return Err(self.fail(format!("{name}: sparse index {place} of {count} elements")));
                 }
+                if place < least {
+                    return Err(self.fail(format!("{name}: its sparse indices do not grow at {place}")));
+                }
+                least = place.saturating_add(1);
             }
+            let at = &sparse.values;
+            self.range(at.buffer_view, at.byte_offset.0, changes, size, &name)?;
         }
-        if accessor.normalized {
-            values.iter_mut().for_each(|v| *v = normalized(*v, component));
-        }
-        Ok(Numbers { width, component, values })
+        let missing = || self.fail(format!("{name} is not there"));
+        Ok((self.json.accessors().nth(index.value()).ok_or_else(missing)?, width))
     }
 
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "an accessor and its two sparse parts differ in all of them"
-    )]
-    fn elements(
+    /// The bytes of a buffer view from `offset` on, which hold `count` elements of `size` bytes, and how far
+    /// these are apart.
+    fn range(
         &self,
         view: Index<View>,
         offset: u64,
         count: u64,
-        width: usize,
-        component: ComponentType,
-        strided: bool,
+        size: usize,
         name: &str,
-    ) -> Result<Vec<f64>> {
+    ) -> Result<(&[u8], usize)> {
         let bytes = self.view(view, name)?;
-        let size = width.saturating_mul(component.size());
-        let stride = match self.get(view, name, "buffer view")?.byte_stride {
-            Some(stride) if strided && stride.0 > 0 => stride.0 as u64,
-            _ => size as u64,
-        };
-        let Some(before_last) = count.checked_sub(1) else { return Ok(Vec::new()) };
+        let stride = self.get(view, name, "buffer view")?.byte_stride.map_or(0, |stride| stride.0);
+        let stride = if stride == 0 { size } else { stride };
+        let Some(before_last) = count.checked_sub(1) else { return Ok((&[], stride)) };
         let inside = || {
-            let end = before_last.checked_mul(stride)?.checked_add(offset)?.checked_add(size as u64)?;
-            let is_inside = end <= bytes.len() as u64 && stride >= size as u64;
-            let [offset, stride, count] = [offset, stride, count].map(|n| usize::try_from(n).ok());
-            Some((bytes.get(offset?..)?, stride?, count?)).filter(|_| is_inside)
+            let end =
+                before_last.checked_mul(stride as u64)?.checked_add(offset)?.checked_add(size as u64)?;
+            let bytes = bytes.get(usize::try_from(offset).ok()?..)?;
+            (end <= offset.checked_add(bytes.len() as u64)? && stride >= size).then_some(bytes)
         };
-        let Some((bytes, stride, count)) = inside() else {
+        let bytes = inside().ok_or_else(|| {
             let length = bytes.len();
-            return Err(self.fail(format!(
+            self.fail(format!(
                 "{name} takes {count} elements of {size} bytes, each {stride} after the last, from byte {offset}, but its buffer view has {length}"
-            )));
-        };
-        let elements = bytes.chunks(stride).take(count).filter_map(|element| element.get(..size));
-        let mut values = Vec::with_capacity(count.saturating_mul(width));
-        macro_rules! numbers {
-            ($type:ty) => {
-                for element in elements {
-                    let numbers = element.as_chunks().0.iter();
-                    values.extend(numbers.map(|b| f64::from(<$type>::from_le_bytes(*b))));
-                }
-            };
-        }
-        match component {
-            ComponentType::I8 => numbers!(i8),
-            ComponentType::U8 => numbers!(u8),
-            ComponentType::I16 => numbers!(i16),
-            ComponentType::U16 => numbers!(u16),
-            ComponentType::U32 => numbers!(u32),
-            ComponentType::F32 => numbers!(f32),
-        }
-        Ok(values)
-    }
-}
-
-fn width_of(kind: Type) -> usize {
-    match kind {
-        Type::Scalar => 1,
-        Type::Vec2 => 2,
-        Type::Vec3 => 3,
-        Type::Vec4 | Type::Mat2 => 4,
-        Type::Mat3 => 9,
-        Type::Mat4 => 16,
-    }
-}
-
-/// glTF 2.0, section 3.11.
-fn normalized(v: f64, component: ComponentType) -> f64 {
-    match component {
-        ComponentType::I8 => (v / 127.0).max(-1.0),
-        ComponentType::U8 => v / 255.0,
-        ComponentType::I16 => (v / 32_767.0).max(-1.0),
-        ComponentType::U16 => v / 65_535.0,
-        ComponentType::U32 | ComponentType::F32 => v,
+            ))
+        })?;
+        Ok((bytes, stride))
     }
 }
 
@@ -200,13 +182,18 @@ mod tests {
     use base64::Engine;
     use base64::engine::general_purpose::STANDARD;
 
-    /// A document of one buffer of the bytes 0, 1, 2 … 63 and one view over it, `view` added to the view's JSON.
+    /// A document of one buffer of the bytes 0, 1, 2 … 63 and one view over it, `view` added to the view's
+    /// JSON.
     fn document(view: &str, accessor: &str) -> (tempfile::TempDir, GltfDocument) {
         let data = STANDARD.encode((0..64).collect::<Vec<u8>>());
         let json = format!(
             r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 64, "uri": "data:;base64,{data}"}}],
             "bufferViews": [{{"buffer": 0, "byteLength": 64{view}}}], "accessors": [{accessor}]}}"#
         );
+        open(&json)
+    }
+
+    fn open(json: &str) -> (tempfile::TempDir, GltfDocument) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.gltf");
         std::fs::write(&path, json).unwrap();
@@ -239,7 +226,13 @@ mod tests {
         assert_eq!(vectors("", a).unwrap(), [[0.0, 1.0 / 255.0]]);
         let a = r#"{"bufferView": 0, "componentType": 5122, "type": "VEC2", "count": 1}"#;
         assert_eq!(vectors("", a).unwrap(), [[256.0, 770.0]]);
-        assert_eq!(normalized(-128.0, ComponentType::I8), -1.0);
+        let bytes = STANDARD.encode([0x80, 0x7f]);
+        let json = format!(
+            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 2, "uri": "data:;base64,{bytes}"}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 2}}], "accessors": [{{"bufferView": 0, "componentType": 5120,
+            "normalized": true, "type": "VEC2", "count": 1}}]}}"#
+        );
+        assert_eq!(open(&json).1.read_vectors(Index::new(0), "who").unwrap(), [[-1.0, 1.0]]);
     }
 
     #[test]
@@ -258,6 +251,27 @@ mod tests {
     }
 
     #[test]
+    fn sparse_indices_grow() {
+        // The bytes 0, 1, 2…: indices of 16 bits are 256, 770….
+        let sparse = r#"{"componentType": 5121, "type": "VEC2", "count": 771, "sparse": {"count": 2, "indices": {"bufferView": 0,
+            "componentType": 5123}, "values": {"bufferView": 0}}}"#;
+        let changed = vectors("", sparse).unwrap();
+        assert_eq!((changed[256], changed[770], changed.len()), ([0.0, 1.0], [2.0, 3.0], 771));
+        let backwards = STANDARD.encode([1u8, 0]);
+        let json = format!(
+            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 2, "uri": "data:;base64,{backwards}"}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 2}}], "accessors": [{{"componentType": 5121, "type": "SCALAR",
+            "count": 3, "sparse": {{"count": 2, "indices": {{"bufferView": 0, "componentType": 5121}}, "values": {{"bufferView": 0}}}}}},
+            {{"componentType": 5121, "type": "SCALAR", "count": 3, "sparse": {{"count": 0, "indices": {{"bufferView": 0,
+            "componentType": 5121}}, "values": {{"bufferView": 0}}}}}}]}}"#
+        );
+        let (_dir, document) = open(&json);
+        let message = document.read_indices(Index::new(0), "who").unwrap_err().to_string();
+        assert!(message.contains("do not grow at 0"), "{message}");
+        assert_eq!(document.read_indices(Index::new(1), "who").unwrap(), [0; 3]);
+    }
+
+    #[test]
     fn claims_beyond_the_data_are_refused() {
         for claim in ["18446744073709551615", "33", "9223372036854775808"] {
             let a =
@@ -273,5 +287,9 @@ mod tests {
         let a = r#"{"bufferView": 0, "componentType": 5126, "type": "SCALAR", "count": 1}"#;
         let (_dir, document) = document("", a);
         assert!(document.read_indices(Index::new(0), "who").unwrap_err().to_string().contains("unsigned"));
+        let a = r#"{"bufferView": 0, "componentType": 5121, "type": "VEC2", "count": 0}"#;
+        assert!(vectors("", a).unwrap().is_empty());
+        let a = r#"{"bufferView": 7, "componentType": 5121, "type": "VEC2", "count": 1}"#;
+        assert!(vectors("", a).unwrap_err().contains("buffer view 7, which is not there"));
     }
 }

@@ -62,7 +62,7 @@ impl<'a> Builder<'a> {
             for p in &mesh.primitives {
                 let positions = p.attributes.get(&Checked::Valid(Semantic::Positions));
                 for accessor in p.indices.iter().chain(positions) {
-                    let count = document.root.get(*accessor).map_or(0, |a| a.count.0);
+                    let count = document.root().get(*accessor).map_or(0, |a| a.count.0);
                     elements = elements.saturating_add(count);
                 }
             }

@@ -1,4 +1,7 @@
 //! The parts of a glTF file: its JSON, its buffers and the bytes that its images are made of.
+//!
+//! gltf's own import finds buffers and data URIs too, but brings a second base64 and decodes every image,
+//! wanted or not; what is left of it is [`GltfDocument::resource`].
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -14,8 +17,8 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Extensions that change nothing that is read, beside all whose names start with `KHR_materials_`: those change
-/// reflections and transparency.
+/// Extensions that change nothing that is read, beside all whose names start with `KHR_materials_`: those
+/// change reflections and transparency.
 const HARMLESS: [&str; 5] = [
     "KHR_texture_transform",
     "KHR_mesh_quantization",
@@ -50,8 +53,8 @@ const WAYS_OUT: [(&str, &str); 6] = [
 #[derive(Debug)]
 pub(crate) struct GltfDocument {
     path: PathBuf,
-    /// The JSON. Its indices are not checked; [`GltfDocument::get`] does.
-    pub(crate) root: json::Root,
+    /// The JSON. Its indices are not checked.
+    pub(crate) json: gltf::Document,
     buffers: Vec<Vec<u8>>,
 }
 
@@ -84,8 +87,13 @@ impl GltfDocument {
         let head: Head = serde_json::from_slice(text).map_err(json_error)?;
         check_version(path, &head.asset)?;
         check_extensions(path, &head.required)?;
-        let root = json::Root::from_slice(text).map_err(json_error)?;
-        let mut document = Self { path: path.to_owned(), root, buffers: Vec::new() };
+        let mut root = json::Root::from_slice(text).map_err(json_error)?;
+        for accessor in &mut root.accessors {
+            // No changes are the same as no sparse part, which the gltf crate can read.
+            accessor.sparse.take_if(|sparse| sparse.count.0 == 0);
+        }
+        let json = gltf::Document::from_json_without_validation(root);
+        let mut document = Self { path: path.to_owned(), json, buffers: Vec::new() };
         // The chunk stays where it was read to: it is most of the file.
         let blob = blob.map(|blob| {
             bytes.truncate(blob.end);
@@ -94,6 +102,16 @@ impl GltfDocument {
         });
         document.buffers = document.load_buffers(blob)?;
         Ok(document)
+    }
+
+    /// The JSON. Its indices are not checked; [`GltfDocument::get`] does.
+    pub(crate) fn root(&self) -> &json::Root {
+        self.json.as_json()
+    }
+
+    /// The bytes of a buffer.
+    pub(crate) fn buffer(&self, index: usize) -> Option<&[u8]> {
+        self.buffers.get(index).map(Vec::as_slice)
     }
 
     /// An error about this file.
@@ -106,7 +124,7 @@ impl GltfDocument {
     where
         json::Root: json::root::Get<T>,
     {
-        self.root
+        self.root()
             .get(index)
             .ok_or_else(|| self.fail(format!("{who} points to {what} {index}, which is not there")))
     }
@@ -115,7 +133,7 @@ impl GltfDocument {
     pub(crate) fn view(&self, index: json::Index<json::buffer::View>, who: &str) -> Result<&[u8]> {
         let view = self.get(index, who, "buffer view")?;
         self.get(view.buffer, &format!("buffer view {index}"), "buffer")?;
-        let buffer = self.buffers.get(view.buffer.value()).map_or(&[][..], Vec::as_slice);
+        let buffer = self.buffer(view.buffer.value()).unwrap_or_default();
         let start = view.byte_offset.map_or(0, |o| o.0);
         let range = usize::try_from(start).ok().zip(start.checked_add(view.byte_length.0));
         range.and_then(|(start, end)| buffer.get(start..usize::try_from(end).ok()?)).ok_or_else(|| {
@@ -133,7 +151,7 @@ impl GltfDocument {
     /// # Errors
     /// A sentence that follows the image's name: images that are missing do not stop the reading of a mesh.
     pub(crate) fn image(&self, image: usize) -> (String, std::result::Result<Vec<u8>, String>) {
-        let Some(json) = self.root.images.get(image) else {
+        let Some(json) = self.root().images.get(image) else {
             return (format!("image {image}"), Err("is not there".into()));
         };
         let uri = json.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
@@ -154,7 +172,7 @@ impl GltfDocument {
 
     fn load_buffers(&self, mut blob: Option<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
         let mut buffers = Vec::new();
-        for (i, json) in self.root.buffers.iter().enumerate() {
+        for (i, json) in self.root().buffers.iter().enumerate() {
             let bytes = match (&json.uri, blob.take_if(|_| i == 0 && json.uri.is_none())) {
                 (Some(uri), _) => self.resource(uri).map_err(|why| {
                     let name = if uri.starts_with("data:") { "the data URI" } else { uri };
@@ -164,7 +182,7 @@ impl GltfDocument {
                 (None, _) => {
                     // What an extension compresses may have a buffer that is not there.
                     let meshopt =
-                        self.root.extensions_used.iter().find(|e| e.ends_with("_meshopt_compression"));
+                        self.root().extensions_used.iter().find(|e| e.ends_with("_meshopt_compression"));
                     let why = meshopt.map_or_else(String::new, |e| {
                         format!(": its data are in the extension {e}, which is not read; {}", way_out(e))
                     });
@@ -196,8 +214,8 @@ impl GltfDocument {
 
     /// The files beside this one that its buffers and images are in, those that are there.
     pub(crate) fn companions(&self) -> Vec<PathBuf> {
-        let buffers = self.root.buffers.iter().filter_map(|b| b.uri.as_deref());
-        let images = self.root.images.iter().filter_map(|i| i.uri.as_deref());
+        let buffers = self.root().buffers.iter().filter_map(|b| b.uri.as_deref());
+        let images = self.root().images.iter().filter_map(|i| i.uri.as_deref());
         let files = buffers.chain(images).filter(|uri| !uri.starts_with("data:") && !uri.contains("://"));
         files.map(|uri| self.beside(uri)).filter(|path| path.is_file()).collect()
     }

@@ -68,7 +68,7 @@ impl GltfLooks {
     ) -> crate::error::Result<Self> {
         let mut looks = Self::default();
         let mut keys = Vec::new();
-        for ((i, material), used) in document.root.materials.iter().enumerate().zip(used) {
+        for ((i, material), used) in document.root().materials.iter().enumerate().zip(used) {
             let (factor, info) = base_color(material);
             let name = material.name.clone().unwrap_or_else(|| format!("material_{i}"));
             looks.materials.push(Material {
@@ -165,7 +165,7 @@ fn texture_key(
     index: Index<json::Texture>,
     factor: [f32; 3],
 ) -> Result<TextureKey, String> {
-    let texture = document.root.get(index).ok_or_else(|| format!("texture {index} is not there"))?;
+    let texture = document.root().get(index).ok_or_else(|| format!("texture {index} is not there"))?;
     if texture.source.value() == u32::MAX as usize {
         let only = texture.extensions.iter().flat_map(|e| e.others.keys()).next();
         let only = only.map_or_else(String::new, |name| {
@@ -174,7 +174,7 @@ fn texture_key(
         return Err(format!("texture {index} has no PNG or JPEG image{only}"));
     }
     let sampler = match texture.sampler {
-        Some(s) => Some(document.root.get(s).ok_or_else(|| format!("sampler {s} is not there"))?),
+        Some(s) => Some(document.root().get(s).ok_or_else(|| format!("sampler {s} is not there"))?),
         None => None,
     };
     let wrap = sampler.map_or([0; 2], |s| [s.wrap_s, s.wrap_t].map(wrap_number));

@@ -31,7 +31,7 @@ pub(crate) struct Instance {
 pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
     let document = GltfDocument::read(bytes, path)?;
     let instances = instances(&document)?;
-    let mut used = vec![false; document.root.materials.len()];
+    let mut used = vec![false; document.root().materials.len()];
     for instance in &instances {
         for (p, primitive) in document.get(instance.mesh, "a node", "mesh")?.primitives.iter().enumerate() {
             if let Some(material) = primitive.material {
@@ -60,7 +60,7 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<Mesh
 
 /// All meshes of the scene with their places, in the order of its nodes, parents first.
 fn instances(document: &GltfDocument) -> Result<Vec<Instance>> {
-    let root = &document.root;
+    let root = document.root();
     let first = (!root.scenes.is_empty()).then(|| Index::new(0));
     let roots: Vec<Index<Node>> = match root.scene.or(first) {
         Some(scene) => document.get(scene, "the file", "scene")?.nodes.clone(),
