@@ -1,15 +1,23 @@
 //! The header of an NPY file: what numpy says of an array, written as a Python dictionary. Source: numpy's
 //! "NPY format", versions 1.0 to 3.0.
+//!
+//! npyz reads it; here it becomes the fields of a table. npyz takes the length of a header at its word,
+//! overflows the stack or runs for minutes on brackets in brackets, and refuses Python 2's `7L`: see [`tame`]
+//! and `headers_that_npyz_would_choke_on_are_refused`.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::table::records::{Field, Kind};
 use crate::error::{Error, Result};
+use crate::guarded::guarded;
+use npyz::{DType, Endianness, Order, TypeChar, TypeStr};
 use std::io::Read;
 use std::path::Path;
 
 /// The longest header that is read: numpy's own are aligned to 64 bytes and rarely longer than a few hundred.
-const LONGEST_HEADER: usize = 1 << 20;
+const LONGEST_HEADER: usize = 1 << 17;
+/// How deep lists may be in lists: numpy's are four deep, and two more for each structure in a field.
+const DEEPEST_LIST: u32 = 8;
 /// The most columns of a table.
 const MOST_COLUMNS: usize = 4096;
 
@@ -44,19 +52,14 @@ impl NpyHeader {
         if &start[..6] != b"\x93NUMPY" {
             return Err(Error::format(path, "is no NPY array: it does not begin with \\x93NUMPY"));
         }
-        let length = match start[6] {
-            1 => {
-                let mut bytes = [0; 2];
-                source.read_exact(&mut bytes).map_err(short)?;
-                usize::from(u16::from_le_bytes(bytes))
-            }
-            2 | 3 => {
-                let mut bytes = [0; 4];
-                source.read_exact(&mut bytes).map_err(short)?;
-                u32::from_le_bytes(bytes) as usize
-            }
+        let mut length = [0; 4];
+        let digits = match start[6] {
+            1 => 2,
+            2 | 3 => 4,
             other => return Err(Error::format(path, format!("is of NPY version {other}; 1 to 3 are read"))),
         };
+        source.read_exact(length.get_mut(..digits).unwrap_or_default()).map_err(short)?;
+        let length = u32::from_le_bytes(length) as usize;
         if length > LONGEST_HEADER {
             return Err(Error::format(path, format!("claims a header of {length} bytes")));
         }
@@ -70,69 +73,110 @@ impl NpyHeader {
     }
 
     fn parse(text: &str) -> std::result::Result<Self, Refused> {
-        let mut parser = Parser { rest: text.trim(), levels_left: 16 };
-        let Literal::Dict(entries) = parser.literal()? else { return Err(bad("no dictionary")) };
-        let get = |key: &str| {
-            let found = entries.iter().find(|(k, _)| *k == Literal::Text(key.to_owned())).map(|(_, v)| v);
-            found.ok_or_else(|| bad(&format!("no {key:?}")))
-        };
-        let Literal::List(shape) = get("shape")? else { return Err(bad("its shape is no tuple")) };
-        let shape = numbers(shape)?;
-        let (rows, columns) = match shape[..] {
+        let text = tame(text)?;
+        let mut bytes = b"\x93NUMPY\x03\x00".to_vec();
+        // It is longer than it was by at most twice: see `String::from_utf8_lossy`.
+        bytes.extend(u32::try_from(text.len()).unwrap_or(u32::MAX).to_le_bytes());
+        bytes.extend(text);
+        // npyz multiplies the numbers of the shape.
+        let header = guarded(|| npyz::NpyHeader::from_reader(&bytes[..]))
+            .ok_or_else(|| bad("its shape is too large"))?
+            // The parser draws an arrow below its place, on lines of their own.
+            .map_err(|e| bad(e.to_string().split(" -->").next().unwrap_or_default()))?;
+        let rows = header.shape().iter().try_fold(1u64, |rows, side| rows.checked_mul(*side));
+        rows.ok_or_else(|| bad("its shape is too large"))?;
+        let (rows, columns) = match *header.shape() {
             [] => (1, None),
             [n] => (n, None),
             [n, k] => (n, Some(k)),
-            _ => {
+            ref shape => {
                 let why = format!("is an array of {} dimensions: save one of rows and columns", shape.len());
                 return Err(Refused::Unsupported(why));
             }
         };
-        if *get("fortran_order")? == Literal::Bool(true) && columns.is_some_and(|k| k > 1) && rows > 1 {
+        if header.order() == Order::Fortran && columns.is_some_and(|k| k > 1) && rows > 1 {
             let why = "is stored column by column: save numpy.ascontiguousarray(array)".to_owned();
             return Err(Refused::Unsupported(why));
         }
-        let mut fields = Vec::new();
-        let descr = get("descr")?;
-        let (mut at, is_structured) = (0, matches!(descr, Literal::List(_)));
-        match descr {
-            Literal::List(list) => {
-                if columns.is_some_and(|k| k != 1) {
-                    return Err(Refused::Unsupported("is a structured array of two dimensions".to_owned()));
-                }
-                for item in list {
-                    let Literal::List(item) = item else { return Err(bad("a field is no tuple")) };
-                    let (name, kind, shape) = match &item[..] {
-                        [Literal::Text(name), kind] => (name, kind, &[][..]),
-                        [Literal::Text(name), kind, Literal::List(shape)] => (name, kind, &shape[..]),
-                        [Literal::List(_), ..] => {
-                            return Err(Refused::Unsupported("has fields with titles".into()));
-                        }
-                        _ => return Err(bad("a field is no name and type")),
-                    };
-                    let Literal::Text(kind) = kind else {
-                        return Err(Refused::Unsupported(format!("has a structure in the field {name:?}")));
-                    };
-                    let n = numbers(shape)?.iter().try_fold(1u64, |n, k| n.checked_mul(*k));
-                    let n = n.filter(|n| *n <= MOST_COLUMNS as u64).ok_or_else(|| bad("a huge field"))?;
-                    let names: Vec<String> = if shape.is_empty() {
-                        vec![name.clone()]
-                    } else {
-                        (0..n).map(|i| format!("{name}[{i}]")).collect()
+        if header.uses_pickled_array() {
+            let why = "holds pickled Python objects: save an array of numbers or texts";
+            return Err(Refused::Unsupported(why.to_owned()));
+        }
+        let (mut fields, mut at) = (Vec::new(), 0);
+        let kind = header.dtype();
+        let is_structured = matches!(kind, DType::Record(_));
+        match kind {
+            DType::Record(_) if columns.is_some_and(|k| k != 1) => {
+                return Err(Refused::Unsupported("is a structured array of two dimensions".to_owned()));
+            }
+            DType::Record(record) => {
+                for npyz::Field { name, dtype } in record {
+                    let (n, kind) = elements(&name, &dtype)?;
+                    let names: Vec<String> = match n {
+                        None => vec![name],
+                        Some(n) => (0..n).map(|i| format!("{name}[{i}]")).collect(),
                     };
                     push_fields(&mut fields, &mut at, names, kind)?;
                 }
             }
-            Literal::Text(kind) => {
+            kind => {
                 let names = match columns {
                     None => vec![String::new()],
                     Some(k) if k <= MOST_COLUMNS as u64 => (0..k).map(|i| format!("[{i}]")).collect(),
                     Some(k) => return Err(bad(&format!("{k} columns"))),
                 };
-                push_fields(&mut fields, &mut at, names, kind)?;
+                push_fields(&mut fields, &mut at, names, elements("", &kind)?.1)?;
             }
-            _ => return Err(bad("its descr is no type")),
         }
         Ok(Self { rows, stride: at, fields, is_structured })
+    }
+}
+
+/// A header's text without the `L` of Python 2's numbers, if npyz reads it in little time and stack.
+fn tame(text: &str) -> std::result::Result<Vec<u8>, Refused> {
+    let mut bytes = text.as_bytes().to_vec();
+    let (mut quote, mut depth, mut dictionaries, mut before) = (None, 0u32, 0u32, 0u8);
+    let mut escaped = false;
+    for byte in &mut bytes {
+        match (*byte, quote) {
+            (_, Some(_)) if escaped => escaped = false,
+            (b'\\', Some(_)) => escaped = true,
+            (end, Some(start)) if end == start => quote = None,
+            (_, Some(_)) => {}
+            (start @ (b'\'' | b'"'), None) => quote = Some(start),
+            (b'L', None) if before.is_ascii_digit() => *byte = b' ',
+            (open @ (b'(' | b'[' | b'{'), None) => {
+                depth = depth.saturating_add(1);
+                dictionaries = dictionaries.saturating_add(u32::from(open == b'{'));
+            }
+            (b')' | b']' | b'}', None) => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        if depth > DEEPEST_LIST || dictionaries > 1 {
+            return Err(bad("its lists are too deep"));
+        }
+        before = *byte;
+    }
+    Ok(bytes)
+}
+
+/// The type of a field's elements, and their number if there are several.
+fn elements<'a>(name: &str, mut kind: &'a DType) -> std::result::Result<(Option<u64>, &'a TypeStr), Refused> {
+    let mut n = None;
+    loop {
+        match kind {
+            DType::Plain(kind) => return Ok((n, kind)),
+            DType::Array(side, inner) => {
+                n = n.unwrap_or(1u64).checked_mul(*side).filter(|n| *n <= MOST_COLUMNS as u64);
+                if n.is_none() {
+                    return Err(bad("a huge field"));
+                }
+                kind = &**inner;
+            }
+            DType::Record(_) => {
+                return Err(Refused::Unsupported(format!("has a structure in the field {name:?}")));
+            }
+        }
     }
 }
 
@@ -141,41 +185,27 @@ fn push_fields(
     fields: &mut Vec<Field>,
     at: &mut usize,
     names: Vec<String>,
-    kind: &str,
+    kind: &TypeStr,
 ) -> std::result::Result<(), Refused> {
-    let (order, code) = kind.split_at_checked(1).ok_or_else(|| bad("an empty type"))?;
-    let (letter, size) = code.split_at_checked(1).ok_or_else(|| bad(&format!("the type {kind:?}")))?;
-    let big_endian = match order {
-        "<" | "|" | "=" => false,
-        ">" => true,
-        _ => return Err(bad(&format!("the type {kind:?}"))),
-    };
-    if letter == "O" {
-        let why = "holds pickled Python objects: save an array of numbers or texts";
-        return Err(Refused::Unsupported(why.to_owned()));
-    }
-    // A time has its unit behind its size.
-    let digits: String = size.chars().take_while(char::is_ascii_digit).collect();
-    let size: usize = match digits.parse() {
-        Ok(size) if size <= 1 << 16 => size,
-        _ => return Err(bad(&format!("the type {kind:?}"))),
-    };
-    let (kind, bytes) = match (letter, size) {
-        ("i", 1) => (Some(Kind::I8), 1),
-        ("u" | "b", 1) => (Some(Kind::U8), 1),
-        ("i", 2) => (Some(Kind::I16), 2),
-        ("u", 2) => (Some(Kind::U16), 2),
-        ("f", 2) => (Some(Kind::F16), 2),
-        ("i", 4) => (Some(Kind::I32), 4),
-        ("u", 4) => (Some(Kind::U32), 4),
-        ("f", 4) => (Some(Kind::F32), 4),
-        ("i", 8) => (Some(Kind::I64), 8),
-        ("u", 8) => (Some(Kind::U64), 8),
-        ("f", 8) => (Some(Kind::F64), 8),
-        ("S", n) => (Some(Kind::Bytes(n)), n),
-        ("U", n) => (Some(Kind::Utf32(n)), n.saturating_mul(4)),
-        ("V" | "m" | "M" | "c" | "f", n) => (None, n),
-        _ => return Err(bad(&format!("the type {kind:?}"))),
+    let big_endian = kind.endianness() == Endianness::Big;
+    let size = usize::try_from(kind.size_field()).unwrap_or(usize::MAX);
+    let bytes =
+        kind.num_bytes().filter(|_| size <= 1 << 16).ok_or_else(|| bad(&format!("the type {kind}")))?;
+    let kind = match (kind.type_char(), size) {
+        (TypeChar::Int, 1) => Some(Kind::I8),
+        (TypeChar::Uint | TypeChar::Bool, 1) => Some(Kind::U8),
+        (TypeChar::Int, 2) => Some(Kind::I16),
+        (TypeChar::Uint, 2) => Some(Kind::U16),
+        (TypeChar::Float, 2) => Some(Kind::F16),
+        (TypeChar::Int, 4) => Some(Kind::I32),
+        (TypeChar::Uint, 4) => Some(Kind::U32),
+        (TypeChar::Float, 4) => Some(Kind::F32),
+        (TypeChar::Int, 8) => Some(Kind::I64),
+        (TypeChar::Uint, 8) => Some(Kind::U64),
+        (TypeChar::Float, 8) => Some(Kind::F64),
+        (TypeChar::ByteStr, n) => Some(Kind::Bytes(n)),
+        (TypeChar::UnicodeStr, n) => Some(Kind::Utf32(n)),
+        _ => None,
     };
     for name in names {
         if let Some(kind) = kind {
@@ -189,14 +219,6 @@ fn push_fields(
     Ok(())
 }
 
-fn numbers(list: &[Literal]) -> std::result::Result<Vec<u64>, Refused> {
-    let number = |l: &Literal| match l {
-        Literal::Number(n) => Ok(*n),
-        _ => Err(bad("a shape that is no number")),
-    };
-    list.iter().map(number).collect()
-}
-
 /// Why a header is not read.
 #[derive(Debug)]
 enum Refused {
@@ -206,87 +228,6 @@ enum Refused {
 
 fn bad(why: &str) -> Refused {
     Refused::Bad(why.to_owned())
-}
-
-/// As much of Python's literals as numpy writes.
-#[derive(Debug, PartialEq)]
-enum Literal {
-    Text(String),
-    Number(u64),
-    Bool(bool),
-    /// A tuple or a list.
-    List(Vec<Literal>),
-    Dict(Vec<(Literal, Literal)>),
-}
-
-struct Parser<'a> {
-    rest: &'a str,
-    /// How much deeper lists may be in lists.
-    levels_left: u32,
-}
-
-impl Parser<'_> {
-    fn eat(&mut self, token: &str) -> bool {
-        self.rest = self.rest.trim_start();
-        let found = self.rest.strip_prefix(token);
-        self.rest = found.unwrap_or(self.rest);
-        found.is_some()
-    }
-
-    fn literal(&mut self) -> std::result::Result<Literal, Refused> {
-        self.levels_left = self.levels_left.checked_sub(1).ok_or_else(|| bad("too deep"))?;
-        let literal = self.inner();
-        self.levels_left = self.levels_left.saturating_add(1);
-        literal
-    }
-
-    fn inner(&mut self) -> std::result::Result<Literal, Refused> {
-        for (open, close) in [("(", ")"), ("[", "]")] {
-            if self.eat(open) {
-                let mut list = Vec::new();
-                while !self.eat(close) {
-                    list.push(self.literal()?);
-                    if !self.eat(",") && !self.rest.starts_with(close) {
-                        return Err(bad("no comma in a list"));
-                    }
-                }
-                return Ok(Literal::List(list));
-            }
-        }
-        if self.eat("{") {
-            let mut entries = Vec::new();
-            while !self.eat("}") {
-                let key = self.literal()?;
-                if !self.eat(":") {
-                    return Err(bad("no colon in a dictionary"));
-                }
-                entries.push((key, self.literal()?));
-                if !self.eat(",") && !self.rest.starts_with('}') {
-                    return Err(bad("no comma in a dictionary"));
-                }
-            }
-            return Ok(Literal::Dict(entries));
-        }
-        for (word, value) in [("True", true), ("False", false)] {
-            if self.eat(word) {
-                return Ok(Literal::Bool(value));
-            }
-        }
-        for quote in ['\'', '"'] {
-            if let Some(rest) = self.rest.strip_prefix(quote) {
-                let (text, rest) = rest.split_once(quote).ok_or_else(|| bad("a text without end"))?;
-                self.rest = rest;
-                return Ok(Literal::Text(text.to_owned()));
-            }
-        }
-        let digits = self.rest.bytes().take_while(u8::is_ascii_digit).count();
-        let none = || bad("neither number nor text");
-        let (written, rest) = self.rest.split_at_checked(digits).ok_or_else(none)?;
-        let number = written.parse().map_err(|_| none())?;
-        // Old versions wrote 3L.
-        self.rest = rest.trim_start_matches('L');
-        Ok(Literal::Number(number))
-    }
 }
 
 #[cfg(test)]
@@ -330,13 +271,17 @@ mod tests {
             ("{'descr': '|O', 'fortran_order': False, 'shape': (5,)}", "pickled"),
             ("{'descr': '<f4', 'fortran_order': True, 'shape': (5, 7)}", "ascontiguousarray"),
             ("{'descr': '<f4', 'fortran_order': False, 'shape': (5, 7, 2)}", "3 dimensions"),
-            ("{'descr': '<f4', 'fortran_order': False}", "no \"shape\""),
-            ("{'descr': '<q4', 'fortran_order': False, 'shape': (5,)}", "<q4"),
+            ("{'descr': '<f4', 'fortran_order': False}", "missing key 'shape'"),
+            ("{'descr': '<q4', 'fortran_order': False, 'shape': (5,)}", "type string"),
+            (
+                "{'descr': [('a', [('b', '<f4')])], 'fortran_order': False, 'shape': (5,)}",
+                "a structure in the field",
+            ),
+            ("{'descr': [('a', '<f4', (5000,))], 'fortran_order': False, 'shape': (5,)}", "a huge field"),
             ("{'descr': '<f4', 'fortran_order': False, 'shape': (5, 99999999999)}", "columns"),
             ("{'descr': '<S99999999', 'fortran_order': False, 'shape': (5,)}", "<S99999999"),
-            ("[1, 2]", "no dictionary"),
-            ("{'descr'", "colon"),
-            ("{'a': ((((((((((((((((((((1))))))))))))))))))))}", "deep"),
+            ("[1, 2]", "dict"),
+            ("{'descr'", "could not parse"),
         ] {
             let message = format!("{:?}", header(text).unwrap_err());
             assert!(
@@ -344,6 +289,24 @@ mod tests {
                 "{text}: {message}"
             );
         }
+    }
+
+    #[test]
+    fn headers_that_npyz_would_choke_on_are_refused() {
+        for (text, words) in [
+            (format!("{{'a': {}", "(".repeat(100_000)), "deep"),
+            (format!("{{'a': {}", "{".repeat(40)), "deep"),
+            ("{'descr': '<f4', 'fortran_order': False, 'shape': (9223372036854775807, 3)}".into(), "large"),
+        ] {
+            let message = format!("{:?}", header(&text).unwrap_err());
+            assert!(message.contains(words), "{message}");
+        }
+        let name = "(".repeat(40);
+        let text = format!("{{'descr': [('{name}', '<f4')], 'fortran_order': False, 'shape': (3,)}}");
+        assert_eq!(header(&text).unwrap().fields[0].name, name);
+        let claims = b"\x93NUMPY\x02\x00\xff\xff\xff\xff";
+        let e = NpyHeader::read(Path::new("a.npy"), &mut &claims[..]).unwrap_err().to_string();
+        assert!(e.contains("claims a header of 4294967295 bytes"), "{e}");
     }
 
     proptest! {

@@ -135,7 +135,8 @@ impl<'a> NpyCloud<'a> {
             let table = self.table(fields, header.stride, header.is_structured, reading)?;
             return table.read(self.source.name(), member, header.rows, colors, reading);
         }
-        // All arrays that are as long as most are columns of one table; what is shorter says something of the whole.
+        // All arrays that are as long as most are columns of one table; what is shorter says something of the
+        // whole.
         let rows = arrays.iter().map(|(_, h, _)| h.rows).max().unwrap_or(0);
         arrays.retain(|(_, h, _)| h.rows == rows && h.stride > 0);
         let (mut fields, mut stride) = (Vec::new(), 0);

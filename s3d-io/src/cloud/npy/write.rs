@@ -47,8 +47,8 @@ impl NpyWriter {
 }
 
 impl<W: Write> NpyWriter<W> {
-    /// Starts, in `file`, an array of elements of a numpy type (`"<f4"`, `"<f8"`, `"<i8"`, `"<u4"`…: the digit is the element's bytes)
-    /// and this shape. Errors call the file `name`.
+    /// Starts, in `file`, an array of elements of a numpy type (`"<f4"`, `"<f8"`, `"<i8"`, `"<u4"`…: the digit
+    /// is the element's bytes) and this shape. Errors call the file `name`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -87,8 +87,9 @@ impl<W: Write> NpyWriter<W> {
     }
 }
 
-/// What stands before the numbers of an `.npy` file (version 1.0 of numpy's format): magic, length, and a Python literal
-/// padded with spaces so that the numbers begin at a multiple of 64 bytes. A library for it brings 20 crates along.
+/// What stands before the numbers of an `.npy` file (version 1.0 of numpy's format): magic, length, and a
+/// Python literal padded with spaces so that the numbers begin at a multiple of 64 bytes. npyz writes a space
+/// more in it (`npyz_writes_other_bytes`), and with its types of elements at run time this would be longer.
 pub(crate) fn npy_header(kind: &str, shape: &[u64]) -> Vec<u8> {
     const FIXED: usize = 10;
     let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
@@ -121,6 +122,20 @@ mod tests {
         NpyWriter::create(&path, "<i8", &[0]).unwrap().finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();
         assert!(npyz::NpyFile::new(&bytes[..]).unwrap().into_vec::<i64>().unwrap().is_empty());
+    }
+
+    #[test]
+    fn npyz_writes_other_bytes() {
+        use npyz::WriterBuilder;
+        let mut bytes = Vec::new();
+        let writer = npyz::WriteOptions::new().default_dtype().shape(&[2, 3]).writer(&mut bytes);
+        let mut writer = writer.begin_nd().unwrap();
+        writer.extend([0.0f64; 6]).unwrap();
+        writer.finish().unwrap();
+        let ours = npy_header("<f8", &[2, 3]);
+        assert_eq!(bytes.len(), ours.len() + 48);
+        assert_ne!(bytes[..ours.len()], ours);
+        assert_eq!(npyz::NpyHeader::from_reader(&ours[..]).unwrap().shape(), [2, 3]);
     }
 
     #[test]
