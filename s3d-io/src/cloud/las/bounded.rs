@@ -1,4 +1,7 @@
 //! Files for decoders that are not ours and allocate what a damaged file claims.
+//!
+//! laz allocates every layer of a chunk before it reads one: up to 4 GiB each for a file of a few hundred
+//! bytes (`tests/findings.rs` feeds those again that were found).
 
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 use std::sync::Arc;

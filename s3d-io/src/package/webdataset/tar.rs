@@ -1,4 +1,8 @@
 //! Tape archives (POSIX ustar), as far as training data needs them: plain files, one after another.
+//!
+//! The tar crate would save a dozen lines of these: the sizes of entries, by which shards are planned, and
+//! extended headers would stay ours, as it writes long names GNU's way, and the bytes of shards would change
+//! (`the_tar_crate_writes_other_bytes`). It reads them in the tests.
 
 #![expect(clippy::indexing_slicing, reason = "a writer: the fields of a header of 512 bytes")]
 
@@ -15,11 +19,12 @@ const END: u64 = 2 * BLOCK;
 /// Sizes from here on do not fit the header's eleven octal digits.
 const MAX_OCTAL: u64 = 1 << 33;
 
-/// Writes a tar archive of plain files, whole or not at all. It depends on nothing but what is appended: owner 0, mode
-/// 644, time 0.
+/// Writes a tar archive of plain files, whole or not at all. It depends on nothing but what is appended:
+/// owner 0, mode 644, time 0.
 ///
-/// Names of up to 100 bytes, or 256 with a `/` at a good place, stand in the header; longer ones, and sizes from 8 GiB on,
-/// in an extended header before it (POSIX pax), which tar programs and Python's `tarfile` read.
+/// Names of up to 100 bytes, or 256 with a `/` at a good place, stand in the header; longer ones, and sizes
+/// from 8 GiB on, in an extended header before it (POSIX pax), which tar programs and Python's `tarfile`
+/// read.
 #[derive(Debug)]
 pub struct TarWriter {
     file: AtomicFile,
@@ -104,8 +109,8 @@ fn pax_records(name: &str, size: u64) -> String {
     records
 }
 
-/// A name as the header's two fields take it: up to 155 bytes of folders, and up to 100 after a `/`. `None` if it does not
-/// fit.
+/// A name as the header's two fields take it: up to 155 bytes of folders, and up to 100 after a `/`. `None`
+/// if it does not fit.
 fn split_name(name: &str) -> Option<(&str, &str)> {
     if name.len() <= 100 {
         return Some(("", name));
@@ -143,41 +148,50 @@ fn header(name: &str, size: u64, kind: u8) -> [u8; BLOCK as usize] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Read;
 
-    /// A reader written from POSIX's description: names and contents.
+    /// Names and contents, as the tar crate reads them.
     fn read(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
-        let (mut at, mut files, mut long) = (0, Vec::new(), None);
-        loop {
-            let block = &bytes[at..at + 512];
-            if block.iter().all(|b| *b == 0) {
-                assert_eq!(bytes.len(), at + 1024);
-                assert!(bytes[at..].iter().all(|b| *b == 0));
-                return files;
-            }
-            let text = |range: std::ops::Range<usize>| {
-                String::from_utf8(block[range].split(|b| *b == 0).next().unwrap().to_vec()).unwrap()
-            };
-            let octal = |range| u64::from_str_radix(text(range).trim(), 8).unwrap();
-            let mut plain = block.to_vec();
-            plain[148..156].fill(b' ');
-            assert_eq!(octal(148..156), plain.iter().map(|b| u64::from(*b)).sum::<u64>());
-            assert_eq!((&block[257..265], octal(136..148)), (&b"ustar\x0000"[..], 0));
-            let size = octal(124..136) as usize;
-            let data = bytes[at + 512..at + 512 + size].to_vec();
-            at += 512 + size.next_multiple_of(512);
-            if block[156] == b'x' {
-                let record = String::from_utf8(data).unwrap();
-                let (length, rest) = record.split_once(' ').unwrap();
-                assert_eq!(length.parse(), Ok(record.len()));
-                long = Some(rest.strip_prefix("path=").unwrap().strip_suffix('\n').unwrap().to_owned());
-            } else {
-                assert_eq!(block[156], b'0');
-                let folders = text(345..500);
-                let name =
-                    if folders.is_empty() { text(0..100) } else { format!("{folders}/{}", text(0..100)) };
-                files.push((long.take().unwrap_or(name), data));
-            }
-        }
+        let mut archive = tar::Archive::new(bytes);
+        let files = archive.entries().unwrap().map(|entry| {
+            let mut entry = entry.unwrap();
+            let header = entry.header();
+            assert_eq!(
+                (header.mtime().unwrap(), header.mode().unwrap(), header.uid().unwrap()),
+                (0, 0o644, 0)
+            );
+            let name = String::from_utf8(entry.path_bytes().into_owned()).unwrap();
+            let mut data = Vec::new();
+            entry.read_to_end(&mut data).unwrap();
+            (name, data)
+        });
+        files.collect()
+    }
+
+    #[test]
+    fn the_tar_crate_writes_other_bytes() {
+        let theirs = |name: &str| {
+            let mut header = tar::Header::new_ustar();
+            header.set_path(name)?;
+            header.set_mode(0o644);
+            header.set_uid(0);
+            header.set_gid(0);
+            header.set_size(5);
+            header.set_mtime(0);
+            header.set_entry_type(tar::EntryType::Regular);
+            header.set_device_major(0)?;
+            header.set_device_minor(0)?;
+            header.set_cksum();
+            std::io::Result::Ok(*header.as_bytes())
+        };
+        let (ours, other) = (header("a", 5, b'0'), theirs("a").unwrap());
+        let differ: Vec<usize> = (0..512).filter(|&at| ours[at] != other[at]).collect();
+        assert!(differ.iter().all(|at| (148..156).contains(at)) && !differ.is_empty(), "{differ:?}");
+        let deep = format!("a/{}/{}", "b".repeat(60), "c".repeat(90));
+        assert_eq!(&header(&format!("a/b/{}", "c".repeat(97)), 5, b'0')[345..348], b"a\0\0");
+        assert_eq!(&theirs(&format!("a/b/{}", "c".repeat(97))).unwrap()[345..349], b"a/b\0");
+        assert_eq!(header(&deep, 5, b'0')[345..500], theirs(&deep).unwrap()[345..500]);
+        assert!(theirs(&"x".repeat(101)).is_err());
     }
 
     #[test]
