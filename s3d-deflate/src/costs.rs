@@ -1,6 +1,6 @@
 //! What literals and matches cost in bits, which decides what is taken.
 
-use crate::block::{CodeLengths, DISTANCES, LENGTH_SYMBOLS, LONGEST_CODE};
+use crate::alphabet::{CodeLengths, DISTANCES, LENGTH_SYMBOLS, LONGEST_CODE};
 use crate::fixed_distance::{FIXED, FixedMatch};
 use crate::huffman::code_lengths;
 use crate::tokens::{Tokens, count_bytes};

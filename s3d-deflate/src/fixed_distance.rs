@@ -8,7 +8,7 @@
 //! or larger sizes (bench `compressors`).
 
 use crate::WINDOW;
-use crate::block::LONGEST_MATCH;
+use crate::alphabet::LONGEST_MATCH;
 use crate::simd::{Compare, WIDTH};
 use std::array::from_fn;
 use std::hint::select_unpredictable;

@@ -2,7 +2,7 @@
 //! labels in 2.4 against zlib-rs's 3.8, at equal size (bench `compressors`).
 
 use crate::WINDOW;
-use crate::block::LONGEST_MATCH;
+use crate::alphabet::LONGEST_MATCH;
 use crate::costs::Costs;
 use std::array::from_fn;
 

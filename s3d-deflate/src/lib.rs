@@ -46,6 +46,7 @@
     reason = "an encoder, on the way of every byte of an image: places are those that its own search found"
 )]
 
+mod alphabet;
 mod bit_writer;
 mod block;
 mod costs;

@@ -1,8 +1,9 @@
 //! Data to tokens: which bytes become literals, and which matches.
 
 use crate::WINDOW;
+use crate::alphabet::LONGEST_MATCH;
 use crate::bit_writer::BitWriter;
-use crate::block::{LONGEST_MATCH, write_block};
+use crate::block::write_block;
 use crate::costs::Costs;
 use crate::fixed_distance::FixedDistanceMatcher;
 use crate::hash_matcher::HashMatcher;

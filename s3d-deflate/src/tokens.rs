@@ -4,8 +4,8 @@
 //! mispredicted. Only long runs of literals stay where they lie, and are counted and written from there.
 
 use crate::WINDOW;
+use crate::alphabet::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST_MATCH, distance_symbol};
 use crate::bit_writer::{BitWriter, Bits};
-use crate::block::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST_MATCH, distance_symbol};
 use crate::fixed_distance::FIXED;
 
 /// Symbols in a block; only steps over several bytes make it a few more.
