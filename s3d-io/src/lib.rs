@@ -1,8 +1,8 @@
 //! Readers and writers of scans and of the 2D-3D-S data set.
 //!
-//! Files on one side, the vocabulary of `s3d-geom` (meshes, clouds, cameras, rasters) on the other; nothing is computed
-//! here. Every file is written **whole or not at all** ([`fs::AtomicFile`]), the same input gives the same bytes, and
-//! every [`Error`] names the file.
+//! Files on one side, the vocabulary of `s3d-geom` (meshes, clouds, cameras, rasters) on the other; nothing
+//! is computed here. Every file is written **whole or not at all** ([`fs::AtomicFile`]), the same input gives
+//! the same bytes, and every [`Error`] names the file.
 //!
 //! | module | the files |
 //! |---|---|
@@ -17,9 +17,9 @@
 //!
 //! What a file holds is decided by formats.md; the docs here name its section.
 //!
-//! Each format is a cargo feature, and all are on by default. A file whose format was left out is refused with the name
-//! of the feature that reads it. With `default-features = false, features = ["obj"]` the crate reads textured OBJ meshes
-//! and builds from 43 packages instead of 110.
+//! Each format is a cargo feature, and all are on by default. A file whose format was left out is refused
+//! with the name of the feature that reads it. With `default-features = false, features = ["obj"]` the crate
+//! reads textured OBJ meshes and builds from 43 packages instead of 110.
 //!
 //! | features | what they bring |
 //! |---|---|

@@ -378,7 +378,7 @@ pub fn read_matterport_locations(dir: &Path) -> Result<Vec<ScanLocation>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::png::codec::write_rgb8;
+    use crate::image::png::write_rgb8;
     use glam::dvec3;
 
     const UUID: &str = "0c5a7d1e93b84f62a1d7e0f4b2683c95";
@@ -400,7 +400,7 @@ mod tests {
             write_rgb8(
                 &path,
                 &Raster::filled(w, h, [9, 8, 7]),
-                crate::image::png::codec::Content::Photo,
+                crate::image::png::Content::Photo,
                 crate::image::compression::Compression::Fast,
             )
             .unwrap();

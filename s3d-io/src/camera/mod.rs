@@ -1,4 +1,35 @@
-//! Lists of cameras, and the pictures that they took.
+//! Lists of cameras as scan locations, and the scanner's own pictures.
+//!
+//! A [`ScanLocation`] is where the scanner stood and how it was turned. [`read_scan_locations`] reads them
+//! from any list:
+//!
+//! | path | what it is |
+//! |---|---|
+//! | `.csv` | a table `uuid,x,y,z,qx,qy,qz,qw`: [`read_cameras`], [`parse_cameras`] |
+//! | `images.txt`, `images.bin` | a COLMAP model |
+//! | `transforms.json` | frames of nerfstudio, Polycam, Record3D, instant-ngp |
+//! | a folder of `*.json` | pose files of a published area |
+//! | a folder of Matterport captures | [`read_matterport_locations`] |
+//!
+//! Pictures of a model become locations where they were taken. A location lies at most 10,000 km from the
+//! origin, and a uuid stands in a list once.
+//!
+//! [`PictureFolder`] finds the pictures of each location, whatever form they have: raw captures
+//! ([`CaptureFile`], with lens and pose), sky boxes, panoramas. [`read_picture`] reads one, PNG or JPEG.
+//! Source: formats.md,
+//! "Scan locations" and "The scanner's pictures".
+//!
+//! ```
+//! use s3d_geom::glam::DAffine3;
+//! use s3d_io::camera::read_scan_locations;
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let path = folder.path().join("cameras.csv");
+//! std::fs::write(&path, "8eb9955b866b4b5f74abb1071416c628,1,2,1.5,0,0,0,1\n").unwrap();
+//! let locations = read_scan_locations(&path, &DAffine3::IDENTITY)?;
+//! assert_eq!(locations[0].pose.location.to_array(), [1.0, 2.0, 1.5]);
+//! # Ok::<(), s3d_io::Error>(())
+//! ```
 
 mod colmap;
 mod located;

@@ -1,4 +1,43 @@
-//! Annotated points of any source, and writers of point clouds.
+//! Annotated points of any format, and writers of points.
+//!
+//! [`Annotations::open`] finds the rooms of an area and their instances in files and folders of any of these
+//! formats, and [`AnnotatedInstance::read`] gives the points of one: world metres, Z-up, with a colour each.
+//! [`InstanceReader`] reads them block by block, so that instances of any size need little memory.
+//! [`AnnotationOptions`] name columns, classes and rooms where a file does not; [`Annotations::from_reader`]
+//! takes any reader.
+//!
+//! | format | its labels |
+//! |---|---|
+//! | S3DIS tree | rooms, classes and instances are folders and text files: [`AnnotationTree`], [`PointReader`] |
+//! | `pointcloud.mat` | MATLAB v7.3, as published: [`MatArea`] |
+//! | PLY, NPY, NPZ, LAS, LAZ, E57 | columns or attributes of points |
+//! | ScanNet | objects as lists of segments of a mesh |
+//! | a mesh | labels of its faces or vertices: [`Annotations::of_mesh`], [`Annotations::from_face_labels`] |
+//! | memory | [`AnnotatedPoints`] |
+//!
+//! A table of points may name 10,000 classes and rooms and a million instances at most. Coordinates become
+//! `f32`: for georeferenced clouds, [`AnnotationOptions::offset_m`] is subtracted before.
+//!
+//! Writers take points piece by piece, to a path (whole or not at all) or to any `Write`: [`PlyPointWriter`],
+//! read back by [`LabelledPoints`], [`S3disAreaWriter`], [`MatWriter`], and [`NpyWriter`] for arrays. Source:
+//! formats.md, "Annotations".
+//!
+//! ```
+//! use s3d_geom::PointCloud;
+//! use s3d_io::cloud::Annotations;
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! let room = folder.path().join("office_1/Annotations");
+//! std::fs::create_dir_all(&room).unwrap();
+//! std::fs::write(room.join("chair_1.txt"), "1 2 0.5 200 100 50\n1 2 0.6 200 100 50\n").unwrap();
+//!
+//! let area = Annotations::open(&[folder.path().to_owned()], &Default::default())?;
+//! let chair = &area.rooms[0].instances[0];
+//! let mut points = PointCloud::default();
+//! chair.read(&mut points)?;
+//! assert_eq!((area.rooms[0].room.to_string(), points.len()), ("office_1".to_owned(), 2));
+//! # Ok::<(), s3d_io::Error>(())
+//! ```
 
 pub(crate) mod annotations;
 #[cfg(feature = "e57")]

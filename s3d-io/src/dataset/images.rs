@@ -168,7 +168,7 @@ mod tests {
     use super::*;
     use crate::fs::atomic::{create_dir, write_bytes};
     use crate::image::compression::Compression;
-    use crate::image::png::codec::write_gray16;
+    use crate::image::png::write_gray16;
     use s3d_geom::Raster;
 
     fn put(layout: &Layout, uuid: &str, room: &str, frame: Frame, domains: &[Domain]) {

@@ -1,4 +1,29 @@
-//! The parts of a data set: names, poses, labels, instances, splits, lists.
+//! What a data set is made of besides images, meshes and points: names, poses, labels, instances, splits,
+//! lists.
+//!
+//! - Names: [`Layout`] knows where every file lies; [`ImageName`] takes the name of an image apart, into scan
+//!   location, room, [`Frame`] and [`Domain`]. They need no cargo feature.
+//! - [`dataset_images`] lists the images that are there, with the domains of each ([`DatasetImage`]).
+//! - [`PoseFile`]: the camera of an image, as `*.json`.
+//! - [`read_labels`], [`write_labels`]: `semantic_labels.json`. Loaders of the field hold at most
+//!   [`MAX_LABELS_OF_LOADERS`].
+//! - [`InstanceWriter`]: boxes and voxels of instances, as `instances.json` and `instances.npz`;
+//!   [`read_instances`], [`read_instance_arrays`].
+//! - [`Split`]: folds of areas; [`write_image_list`]: lists of images.
+//! - [`FileRecord`]: `files.csv`, sizes and checksums of all files.
+//! - [`Conventions`]: what the numbers mean, `conventions.json`.
+//!
+//! Source: formats.md, "What is written".
+//!
+//! ```
+//! use s3d_io::dataset::{Domain, Frame, ImageName, Layout};
+//!
+//! let layout = Layout::new("out");
+//! let path = layout.image_path(3, "5c2959c3", "office_5", Frame::View(41), Domain::Depth);
+//! let name = path.file_name().unwrap().to_str().unwrap();
+//! assert_eq!(name, "camera_5c2959c3_office_5_frame_41_domain_depth.png");
+//! assert_eq!(ImageName::parse(name).unwrap().domain, Domain::Depth);
+//! ```
 
 #[cfg(feature = "dataset")]
 mod conventions;

@@ -1,4 +1,19 @@
-//! Files: opened, written whole or not at all, checked, and on the disk.
+//! Files: written whole or not at all, brought to the disk, checked by their checksums; JSON.
+//!
+//! [`AtomicFile`] takes its name only when it is complete; [`write_bytes`] and [`write_whole`] write one in a
+//! call. [`sync_data_set`] brings a whole data set to the disk and [`SyncAhead`] does so while it is written.
+//! A [`Checksum`] is XXH3 of 128 bits. [`read_json`] and [`write_json`] name the file, and the line, in their
+//! errors. Readers of this crate refuse devices and pipes.
+//!
+//! ```
+//! use s3d_io::fs::{Checksum, checksum_of_file, write_bytes};
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let path = folder.path().join("list.txt");
+//! write_bytes(&path, b"a wall\n")?;
+//! assert_eq!(checksum_of_file(&path)?, (7, Checksum::of(b"a wall\n")));
+//! # Ok::<(), s3d_io::Error>(())
+//! ```
 
 #[cfg(feature = "write")]
 pub(crate) mod atomic;

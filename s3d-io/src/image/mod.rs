@@ -1,4 +1,27 @@
-//! Images: PNG, OpenEXR, textures.
+//! The images of a data set: 8-bit colour and 16-bit gray PNG, OpenEXR of world coordinates.
+//!
+//! `encode_…` makes a file's bytes, `decode_…` takes them, `write_…` and `read_…` do so with a path. Readers
+//! take no other kind of image than the one they are named after, as channels may be numbers, which must not
+//! be converted. An image has at most 2³⁰ pixels.
+//!
+//! | kind | samples | of a data set |
+//! |---|---|---|
+//! | [`encode_rgb8`] | 3 × 8 bits | `rgb`, `normal`, `semantic`, `semantic_pretty` |
+//! | [`encode_gray16`] | 16 bits | `depth` |
+//! | [`encode_xyz_half`], [`encode_xyz_float`] | 3 × 16 or 32 bits, floats | `global_xyz` |
+//!
+//! [`Compression`] chooses between time and size, and [`Content`] tells what kind of picture it is. The bytes
+//! depend on nothing else, and are the same on every machine. Source: formats.md, "What is written".
+//!
+//! ```
+//! use s3d_geom::Raster;
+//! use s3d_io::image::{Compression, Content, decode_rgb8, encode_rgb8};
+//!
+//! let image = Raster::filled(64, 32, [200, 100, 50]);
+//! let bytes = encode_rgb8(&image, Content::Photo, Compression::Balanced);
+//! assert_eq!(decode_rgb8(&bytes, "photo.png".as_ref())?, image);
+//! # Ok::<(), s3d_io::Error>(())
+//! ```
 
 pub(crate) mod compression;
 #[cfg(feature = "exr")]

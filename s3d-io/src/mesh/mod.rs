@@ -1,4 +1,34 @@
 //! Meshes with their textures and labels: OBJ, glTF and PLY.
+//!
+//! [`read_mesh`] reads one file and [`read_meshes`] joins several; the name's ending tells the format. What
+//! comes out is a [`MeshFile`]: the mesh in world metres, Z-up, the encoded textures as they were found,
+//! [`MeshLabels`] if the file labels its faces or vertices, and warnings of what was mended.
+//! [`read_mesh_from`] takes any reader.
+//!
+//! | ending | what is read |
+//! |---|---|
+//! | `.obj` | Wavefront OBJ in the dialects of scanners and modellers, `Kd` and `map_Kd` of its libraries |
+//! | `.gltf`, `.glb` | glTF 2.0: triangles of the default scene, base colours and their textures |
+//! | `.ply` | ASCII and binary, either byte order: polygons, strips, colours, texture coordinates, labels |
+//!
+//! Vertices and faces keep the file's order, polygons are cut into triangles, and faces that repeat an
+//! earlier one are left out. Textures are PNG or JPEG of at most 2²⁹ pixels each; vertices and faces are
+//! counted by 32 bits. What is compressed (Draco, meshopt, KTX2) is refused, with a way out.
+//!
+//! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set. Source: formats.md, "Meshes".
+//!
+//! ```
+//! use s3d_io::mesh::{UpAxis, read_mesh};
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let path = folder.path().join("table.obj");
+//! std::fs::write(&path, "v 0 1 0\nv 2 1 0\nv 2 1 -1\nv 0 1 -1\nf 1 2 3 4\n").unwrap();
+//! let file = read_mesh(&path, UpAxis::Y)?;
+//! assert_eq!((file.mesh.faces().len(), file.polygons_triangulated), (2, 1));
+//! // Y was up in the file, Z is in the world.
+//! assert_eq!(file.mesh.positions()[2].to_array(), [2.0, 1.0, 1.0]);
+//! # Ok::<(), s3d_io::Error>(())
+//! ```
 
 #[cfg(feature = "mesh")]
 pub(crate) mod file;

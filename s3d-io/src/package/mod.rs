@@ -1,4 +1,25 @@
-//! Packages for loaders and other programs.
+//! Packages of a data set for other programs.
+//!
+//! | package | what is written |
+//! |---|---|
+//! | WebDataset | tar archives of samples: [`TarWriter`], [`plan_shards`], [`write_shard_index`] |
+//! | COLMAP | cameras, images and points as a model: [`write_colmap_text`], [`write_colmap_binary`] |
+//! | nerfstudio | `transforms.json`: [`write_nerfstudio`] |
+//! | COCO | panoptic annotations: [`coco_panoptic`], [`write_coco`] |
+//! | Parquet | a table of all images: [`write_image_index`] |
+//!
+//! The same input gives the same bytes. The images come from
+//! [`dataset_images`](crate::dataset::dataset_images); nothing here reads them.
+//!
+//! ```
+//! use s3d_io::package::TarWriter;
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! let mut shard = TarWriter::create(&folder.path().join("shard-000000.tar"))?;
+//! shard.append("area_1/a.rgb.png", b"an image")?;
+//! assert_eq!(shard.finish()?, TarWriter::EMPTY_BYTES + TarWriter::entry_bytes("area_1/a.rgb.png", 8));
+//! # Ok::<(), s3d_io::Error>(())
+//! ```
 
 #[cfg(feature = "coco")]
 mod coco;

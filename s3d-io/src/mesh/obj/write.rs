@@ -10,7 +10,7 @@
 use crate::error::Result;
 use crate::fs::atomic::{create_dir, write_bytes, write_whole};
 use crate::image::compression::Compression;
-use crate::image::png::codec::{Content, encode_rgb8};
+use crate::image::png::{Content, encode_rgb8};
 use crate::image::pretty::pretty_color;
 use crate::mesh::obj::mtl::{WRAP_COMMENT, wrap_name};
 use s3d_geom::glam::{Vec2, Vec3};
@@ -470,8 +470,7 @@ mod tests {
         assert_eq!(materials[1].diffuse_texture.as_deref(), Some("rgb_textures/Scan.png"));
         assert_eq!(materials[0].diffuse_texture.as_deref(), Some("rgb_textures/scan_2.png"));
         for (i, file) in ["Scan.png", "scan_2.png"].iter().enumerate() {
-            let image =
-                crate::image::png::codec::read_rgb8(&dir.path().join(TEXTURE_FOLDER).join(file)).unwrap();
+            let image = crate::image::png::read_rgb8(&dir.path().join(TEXTURE_FOLDER).join(file)).unwrap();
             assert_eq!(image, mesh.textures()[i].image);
         }
         let files =
