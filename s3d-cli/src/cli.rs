@@ -24,8 +24,8 @@ pub(crate) struct Cli {
     /// Log warnings and errors only, and show no progress.
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
-    /// Write to standard error for a person, or one JSON object a line for a program: log lines, progress, a line for each
-    /// finished unit of work, and a summary (docs/log.md).
+    /// Write to standard error for a person, or one JSON object a line for a program: log lines, progress, a
+    /// line for each finished unit of work, and a summary (docs/log.md).
     #[arg(
         long,
         global = true,
@@ -70,7 +70,8 @@ pub(crate) enum Command {
     /// Tell what a scene holds, and what looks wrong in it.
     #[command(after_help = "Example:\n  s3d info scan/scene.toml")]
     Info(info::InfoArgs),
-    /// Package a data set for a trainer: WebDataset, COLMAP, nerfstudio, COCO panoptic, or a Parquet table of its images.
+    /// Package a data set for a trainer: WebDataset, COLMAP, nerfstudio, COCO panoptic, or a Parquet table of
+    /// its images.
     #[command(
         after_help = "Examples:\n  s3d pack dataset --to webdataset --images views --shuffle 1\n  s3d pack dataset --to colmap -o colmap --areas 1 --copy-images\n  s3d pack dataset --to nerfstudio\n  s3d pack dataset --to coco --areas 1,2,3,4,6 -o coco_train\n  s3d pack dataset --to parquet -o images.parquet"
     )]
@@ -88,7 +89,8 @@ pub(crate) enum Command {
     /// Print the tables of statistics of a data set, counted from its files.
     #[command(after_help = "Example:\n  s3d stats dataset")]
     Stats(stats::StatsArgs),
-    /// Read a data set back and check it: against its manifest, against itself, and every image against the mesh.
+    /// Read a data set back and check it: against its manifest, against itself, and every image against the
+    /// mesh.
     #[command(
         after_help = "Examples:\n  s3d verify dataset\n  s3d verify dataset --full\nEach fault is a line on standard output; the last line counts. Exit code 0 without faults, 1 with some."
     )]
@@ -96,7 +98,8 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    /// Whether a signal stops it between files. The others write one thing or nothing, and are ended by the system.
+    /// Whether a signal stops it between files. The others write one thing or nothing, and are ended by the
+    /// system.
     pub(crate) fn stops_between_files(&self) -> bool {
         match self {
             Self::Demo(_) | Self::Export(_) | Self::Sample(_) => true,

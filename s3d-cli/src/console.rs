@@ -1,5 +1,5 @@
-//! What is written to standard error while a command runs: log lines, and progress with rate and time left; for a person,
-//! or as a JSON object a line.
+//! What is written to standard error while a command runs: log lines, and progress with rate and time left;
+//! for a person, or as a JSON object a line.
 
 use clap::ValueEnum;
 use indicatif::{
@@ -46,8 +46,8 @@ struct Console {
     started: Instant,
 }
 
-/// Starts logging to standard error: `-v` details, `-q` warnings only. Progress bars are drawn if that is a terminal and
-/// the log is for a person.
+/// Starts logging to standard error: `-v` details, `-q` warnings only. Progress bars are drawn if that is a
+/// terminal and the log is for a person.
 pub(crate) fn start(verbose: bool, quiet: bool, format: LogFormat) {
     let level = match (verbose, quiet) {
         (true, _) => LevelFilter::DEBUG,
@@ -127,8 +127,8 @@ pub(crate) fn finished(exit_code: u8) {
     write_json(&Line::Finished { exit_code }, true);
 }
 
-/// Tells of what happens during a call: as lines of JSON with `--log json`; else what a person wants to know of it is a log
-/// line or a bar.
+/// Tells of what happens during a call: as lines of JSON with `--log json`; else what a person wants to know
+/// of it is a log line or a bar.
 pub(crate) fn observe(event: &Event<'_>) {
     match event {
         Event::Message { level: Level::Warning, text } => warn!("{text}"),
@@ -170,7 +170,8 @@ fn tasks() -> MutexGuard<'static, BTreeMap<u64, Progress>> {
     TASKS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A line on standard error with `--log json`; one of work under way only if the caller did not ask for quiet.
+/// A line on standard error with `--log json`; one of work under way only if the caller did not ask for
+/// quiet.
 fn write_json(line: &impl Serialize, essential: bool) {
     if is_json() && (essential || !CONSOLE.get().is_some_and(|c| c.quiet)) {
         let _ = LineAboveBars.write(json_line(line).as_bytes());

@@ -3,8 +3,8 @@
 use std::env;
 use std::ffi::OsString;
 
-/// "go on with: s3d export scan/scene.toml -o 'data set'": the command line as it was called, quoted for a shell. Every
-/// failure that may pass ends with it.
+/// "go on with: s3d export scan/scene.toml -o 'data set'": the command line as it was called, quoted for a
+/// shell. Every failure that may pass ends with it.
 pub(crate) fn resume_hint() -> String {
     format!("go on with: {}", command_line(env::args_os()))
 }

@@ -1,5 +1,5 @@
-//! `s3d`: from an annotated scan to a registered 2D-3D-Semantic data set. This crate translates words into calls of
-//! `s3d-dataset`, and what these tell into lines for a person or a program.
+//! `s3d`: from an annotated scan to a registered 2D-3D-Semantic data set. This crate translates words into
+//! calls of `s3d-dataset`, and what these tell into lines for a person or a program.
 
 mod args;
 mod cli;

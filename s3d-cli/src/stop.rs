@@ -1,8 +1,11 @@
-//! Ending early in good order: SIGINT and SIGTERM stop the work at the next file, and the call can be made again.
+//! Ending early in good order: SIGINT and SIGTERM stop the work at the next file, and the call can be made
+//! again.
 //!
-//! The first signal [cancels](Cancel) the call, whose work looks at that between files, chunks of points and instances. Where none looks at it within [`GRACE`] — inside one call of a library, such as the parsing of a large
-//! mesh — the process ends all the same, by [`watch`]: what is on the disk is whole at every moment, so that this loses no
-//! more than the piece of work at hand. A second signal kills at once, with the status of a process that the signal killed.
+//! The first signal [cancels](Cancel) the call, whose work looks at that between files, chunks of points and
+//! instances. Where none looks at it within [`GRACE`] — inside one call of a library, such as the parsing of
+//! a large mesh — the process ends all the same, by [`watch`]: what is on the disk is whole at every moment,
+//! so that this loses no more than the piece of work at hand. A second signal kills at once, with the status
+//! of a process that the signal killed.
 
 use crate::console;
 use crate::failure::{Failure, TRY_AGAIN};
@@ -26,12 +29,12 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 static REQUESTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 /// The signal that asked first or last.
 static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
-/// Whether somebody has claimed to end the process. Locked while something is said of the end, so that the last word is
-/// the last.
+/// Whether somebody has claimed to end the process. Locked while something is said of the end, so that the
+/// last word is the last.
 static ENDING: Mutex<bool> = Mutex::new(false);
 
-/// From now on SIGINT (Ctrl-C) and SIGTERM ask for an end instead of making it. For commands whose calls can be
-/// cancelled; others are better ended by the system.
+/// From now on SIGINT (Ctrl-C) and SIGTERM ask for an end instead of making it. For commands whose calls can
+/// be cancelled; others are better ended by the system.
 pub(crate) fn install() {
     for signal in [SIGINT, SIGTERM] {
         // The order matters: the first signal finds the flag unset, and sets it after that.

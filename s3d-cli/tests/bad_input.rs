@@ -1,5 +1,5 @@
-//! Input that is broken, hostile or absurd: every export of it ends soon, with exit code 1 and a message that names the
-//! file; nothing that a file says makes the program write outside of OUT.
+//! Input that is broken, hostile or absurd: every export of it ends soon, with exit code 1 and a message that
+//! names the file; nothing that a file says makes the program write outside of OUT.
 
 mod common;
 
@@ -53,7 +53,8 @@ fn a_texture_bomb_is_refused_with_its_size_and_the_limit() {
 
 #[test]
 fn one_bad_line_among_many_is_named() {
-    // Both the line and the ones before it are read as a stream. (With a hundred million lines: see docs/formats.md, "Limits".)
+    // Both the line and the ones before it are read as a stream. (With a hundred million lines: see
+    // docs/formats.md, "Limits".)
     let scan = Scan::new();
     let path = "Area_1/office_1/Annotations/floor_1.txt";
     let mut points = "1.234 2.345 0.001 120 130 140\n".repeat(1_500_000);

@@ -1,5 +1,5 @@
-//! Names in the input that are paths, or names of devices, or the same but for case: nothing that a file says makes the
-//! program write outside of OUT.
+//! Names in the input that are paths, or names of devices, or the same but for case: nothing that a file says
+//! makes the program write outside of OUT.
 
 mod common;
 

@@ -1,4 +1,5 @@
-//! Wrong calls and bad input: one clear message that names the file and the place, the right exit code, nothing lost.
+//! Wrong calls and bad input: one clear message that names the file and the place, the right exit code,
+//! nothing lost.
 
 mod common;
 
@@ -285,7 +286,8 @@ fn the_demo_does_not_write_over_a_scan() {
     assert!(files(scan.dir.path()) == before);
 }
 
-/// Whatever the moment at which an export that replaces another was killed: the next one finds one of the two whole.
+/// Whatever the moment at which an export that replaces another was killed: the next one finds one of the two
+/// whole.
 #[test]
 fn a_killed_replacement_is_mended() {
     let scan = Scan::new();
@@ -420,7 +422,8 @@ fn instances_that_no_image_shows_are_told() {
     scan.warns(&["1 annotated instances win no face", "table_2.txt"]);
 }
 
-/// A device that is always full stands in for a disk: what cannot be written is an error with its name, not a panic.
+/// A device that is always full stands in for a disk: what cannot be written is an error with its name, not a
+/// panic.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_is_told() {

@@ -1,5 +1,5 @@
-//! An export that is killed at any moment, on a disk that loses or mangles what was written lately, goes on with the same
-//! arguments and ends with the same bytes as one that nobody disturbed.
+//! An export that is killed at any moment, on a disk that loses or mangles what was written lately, goes on
+//! with the same arguments and ends with the same bytes as one that nobody disturbed.
 #![cfg(unix)]
 
 mod common;
@@ -64,8 +64,8 @@ struct Scene {
 
 impl Scene {
     fn new() -> Self {
-        // A disk in memory, where there is one: what is tested is what a killed process leaves there, and a busy disk would
-        // be most of the wait.
+        // A disk in memory, where there is one: what is tested is what a killed process leaves there, and a
+        // busy disk would be most of the wait.
         let memory = Path::new("/dev/shm");
         let dir = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap();
         let scenes = [1, 2].map(|area| write_scan(&dir.path().join(format!("scan_{area}")), area));
@@ -130,8 +130,8 @@ fn assert_whole(out: &Path, whole: &Files, when: &str) {
     assert!(!out.join(".s3d").exists(), "{when}: the working folder is still there");
 }
 
-/// Whatever the moment of a kill: a file under its final name is the one that it should be, as long as the disk keeps
-/// what it was given.
+/// Whatever the moment of a kill: a file under its final name is the one that it should be, as long as the
+/// disk keeps what it was given.
 fn assert_no_half_files(out: &Path, whole: &Files) {
     if !out.exists() {
         return;
@@ -241,7 +241,8 @@ fn after_a_power_loss_what_was_lost_is_made_again() {
             if fs::read_to_string(out.join("manifest.json")).is_ok_and(|text| text.contains("\"complete\"")) {
                 continue;
             }
-            // Every file may be hit but the request, which is brought to the disk before any other is written.
+            // Every file may be hit but the request, which is brought to the disk before any other is
+            // written.
             let request = Path::new(".s3d/request.json");
             let all: Vec<PathBuf> = files(&out).into_keys().filter(|path| path != request).collect();
             for _ in 0..all.len().div_ceil(3) {

@@ -12,7 +12,8 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Runs `s3d` and returns the largest memory that was seen of it, in bytes; `None` where the system does not tell.
+/// Runs `s3d` and returns the largest memory that was seen of it, in bytes; `None` where the system does not
+/// tell.
 fn peak_of(args: &[&str]) -> Option<u64> {
     let mut child = Command::new(env!("CARGO_BIN_EXE_s3d"))
         .args(args)

@@ -1,5 +1,5 @@
-//! `s3d pack`, run as a process on a small data set: packages are whole, the same for any number of threads, and never
-//! touch the data set; what is wrong is told with the file's name.
+//! `s3d pack`, run as a process on a small data set: packages are whole, the same for any number of threads,
+//! and never touch the data set; what is wrong is told with the file's name.
 
 mod common;
 

@@ -1,5 +1,6 @@
-//! RGB from the scanner's pictures, there and back: pictures that our own renderer took in the built-in scene — a sky box,
-//! a panorama, 18 captures through a lens that distorts — must give the images that the mesh itself gives.
+//! RGB from the scanner's pictures, there and back: pictures that our own renderer took in the built-in scene
+//! — a sky box, a panorama, 18 captures through a lens that distorts — must give the images that the mesh
+//! itself gives.
 
 mod common;
 
@@ -35,8 +36,8 @@ impl<'m> Studio<'m> {
         rgb_image(&self.scene, &self.mip_maps, &cast(&self.scene, camera), camera)
     }
 
-    /// What each face of a sky box shows, by the words of formats.md; up and down are held as one looks up and down from
-    /// `heading`.
+    /// What each face of a sky box shows, by the words of formats.md; up and down are held as one looks up
+    /// and down from `heading`.
     fn sky_box(&self, pose: &Pose, heading: f64, size: u32) -> Vec<Raster<[u8; 3]>> {
         let turns = [
             (heading, FRAC_PI_2),
@@ -96,7 +97,8 @@ fn lenses() -> [(Lens, String); 3] {
     })
 }
 
-/// The captures of a scanner at `pose`: three cameras on an arm, each a little beside the centre, at six stops.
+/// The captures of a scanner at `pose`: three cameras on an arm, each a little beside the centre, at six
+/// stops.
 fn write_captures(studio: &Studio<'_>, uuid: &str, pose: &Pose, dir: &Path) {
     fs::create_dir_all(dir).unwrap();
     for (camera, (lens, line)) in lenses().iter().enumerate() {
@@ -119,8 +121,9 @@ fn write_captures(studio: &Studio<'_>, uuid: &str, pose: &Pose, dir: &Path) {
     }
 }
 
-/// Whether a pixel or one beside it is at an edge of the depth, a step or a crease. Along a plane the reciprocal of the
-/// depth is linear, so its second difference tells, from 3 steps of the depth's quantisation and a five hundredth on.
+/// Whether a pixel or one beside it is at an edge of the depth, a step or a crease. Along a plane the
+/// reciprocal of the depth is linear, so its second difference tells, from 3 steps of the depth's
+/// quantisation and a five hundredth on.
 fn is_near_edge(depth: &Raster<u16>, x: u32, y: u32) -> bool {
     let bends = |x: u32, y: u32| {
         let at = |x: u32, y: u32| 1.0 / f64::from(depth.at(x, y));
@@ -131,8 +134,8 @@ fn is_near_edge(depth: &Raster<u16>, x: u32, y: u32) -> bool {
     (y - 1..=y + 1).any(|y| (x - 1..=x + 1).any(|x| bends(x, y)))
 }
 
-/// The lowest peak signal-to-noise ratio, in dB, of a kind of images against those of the same name in another data set,
-/// over all pixels that are not near an edge of the depth, and how many images there were.
+/// The lowest peak signal-to-noise ratio, in dB, of a kind of images against those of the same name in
+/// another data set, over all pixels that are not near an edge of the depth, and how many images there were.
 fn worst_psnr(ours: &Path, reference: &Path, kind: &str) -> (f64, usize) {
     let folder = |out: &Path, what: &str| out.join("area_1").join(kind).join(what);
     let (mut worst, mut count) = (f64::INFINITY, 0);

@@ -1,4 +1,5 @@
-//! Exports are read back and held against their own mesh, poses and tables: the built-in scene, and the real scan.
+//! Exports are read back and held against their own mesh, poses and tables: the built-in scene, and the real
+//! scan.
 
 mod common;
 
@@ -238,7 +239,8 @@ fn one_view_of_a_mesh_needs_no_annotation() {
     common::s3d_fails(&["sample", text(&mesh), "-o", text(&cloud)], 2, &["--overwrite"]);
 }
 
-/// `files.csv` lists every file of the data set but itself and the manifest, as it is, and the manifest tells of the list.
+/// `files.csv` lists every file of the data set but itself and the manifest, as it is, and the manifest tells
+/// of the list.
 fn assert_list_is_true(out: &Path) {
     let layout = Layout::new(out);
     let listed = read_file_list(&layout.file_list()).unwrap();

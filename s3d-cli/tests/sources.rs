@@ -1,4 +1,5 @@
-//! Scans in other forms than one OBJ and an S3DIS tree: published areas, labels that came with the mesh, several files.
+//! Scans in other forms than one OBJ and an S3DIS tree: published areas, labels that came with the mesh,
+//! several files.
 
 mod common;
 

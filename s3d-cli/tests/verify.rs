@@ -79,7 +79,8 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Brings the list of files, and what the manifest tells of it, up to date: the tool that made a fault knew of both.
+/// Brings the list of files, and what the manifest tells of it, up to date: the tool that made a fault knew
+/// of both.
 fn list_files(out: &Path) {
     let layout = Layout::new(out);
     let ours =
@@ -246,7 +247,8 @@ fn missing_extra_and_swapped_files_are_found() {
     }
 }
 
-/// The pixels of a view as the rays through their corners would have them, as a tool that forgets half a pixel does.
+/// The pixels of a view as the rays through their corners would have them, as a tool that forgets half a
+/// pixel does.
 fn shifted_depth(out: &Path, image: &DatasetImage) -> Raster<u16> {
     let layout = Layout::new(out);
     let mesh = read_mesh(&layout.rgb_obj(1), UpAxis::Y).unwrap().mesh;

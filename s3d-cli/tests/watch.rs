@@ -1,4 +1,5 @@
-//! What a program that watches sees: events and exit codes, what a signal does at every stage, what the summary counts.
+//! What a program that watches sees: events and exit codes, what a signal does at every stage, what the
+//! summary counts.
 #![cfg(unix)]
 
 mod common;
@@ -86,7 +87,8 @@ impl Run {
         assert!(kill.success(), "{}", self.seen);
     }
 
-    /// Waits for the end: how long that took, the exit status, and the whole log. Nothing is on standard output.
+    /// Waits for the end: how long that took, the exit status, and the whole log. Nothing is on standard
+    /// output.
     fn end(mut self) -> (Duration, ExitStatus, String) {
         let started = Instant::now();
         self.log.read_to_string(&mut self.seen).unwrap();
@@ -124,8 +126,8 @@ fn assert_same(a: &Path, b: &Path) {
     }
 }
 
-/// A stopped run: exit code 75, soon, every line of the log an event and the last of them the end, and a command that
-/// makes what the undisturbed run makes.
+/// A stopped run: exit code 75, soon, every line of the log an event and the last of them the end, and a
+/// command that makes what the undisturbed run makes.
 fn assert_stopped(run: Run, signal: &str, within: Duration) -> String {
     run.signal(signal);
     let (took, status, log) = run.end();
@@ -171,8 +173,8 @@ fn a_signal_stops_each_stage_soon_and_the_command_told_goes_on() {
     }
 }
 
-/// Starts an export that reads its mesh for minutes, in one call: faces whose many corners have no order take long to be
-/// cut into triangles.
+/// Starts an export that reads its mesh for minutes, in one call: faces whose many corners have no order take
+/// long to be cut into triangles.
 fn start_endless(dir: &Path) -> Run {
     let (scene, out) = (write_scan(dir, 1), dir.join("out"));
     let mut obj = fs::OpenOptions::new().append(true).open(dir.join("room.obj")).unwrap();
@@ -281,8 +283,8 @@ fn write_open_scan(dir: &Path, area: u32) -> PathBuf {
     scene
 }
 
-/// Files, images and missing pixels of the images of a kind, read back from the disk; one that is missing in the depth
-/// image has no face in this scene.
+/// Files, images and missing pixels of the images of a kind, read back from the disk; one that is missing in
+/// the depth image has no face in this scene.
 fn read_images(layout: &Layout, areas: &[u32], frame: Frame) -> (u64, u64, u64) {
     let (mut images, mut pixels, mut missing) = (0, 0, 0);
     for area in areas {

@@ -18,8 +18,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 pub struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
-    /// Asks for an end. Calls that were handed this switch end at the next file, chunk of points or instance with
-    /// [`Error::Cancelled`].
+    /// Asks for an end. Calls that were handed this switch end at the next file, chunk of points or instance
+    /// with [`Error::Cancelled`].
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -42,8 +42,8 @@ impl From<Arc<AtomicBool>> for Cancel {
     }
 }
 
-/// Who is told what happens during a call: see [`Event`]. It is called from all threads that work, and should return
-/// soon. Closures are observers.
+/// Who is told what happens during a call: see [`Event`]. It is called from all threads that work, and should
+/// return soon. Closures are observers.
 pub trait Observer: Send + Sync {
     /// Something happened.
     fn observe(&self, event: &Event<'_>);
@@ -55,7 +55,8 @@ impl<F: Fn(&Event<'_>) + Send + Sync> Observer for F {
     }
 }
 
-/// What calls of this crate are handed besides their options. The default watches nothing and never ends early.
+/// What calls of this crate are handed besides their options. The default watches nothing and never ends
+/// early.
 ///
 /// ```
 /// use s3d_dataset::{Context, Event};

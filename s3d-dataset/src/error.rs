@@ -11,8 +11,8 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, ThisError)]
 #[non_exhaustive]
 pub enum Error {
-    /// What is asked for cannot be: options that exclude each other, a folder that holds something else. Options are named
-    /// as on the command line of `s3d`.
+    /// What is asked for cannot be: options that exclude each other, a folder that holds something else.
+    /// Options are named as on the command line of `s3d`.
     #[error("{0}")]
     Usage(String),
     /// A file is wrong or the disk refuses.
@@ -21,7 +21,8 @@ pub enum Error {
     /// The input does not fit together.
     #[error("{0}")]
     Input(String),
-    /// Nothing is wrong with the call or the input, and what was done so far is kept: the same call may go on later.
+    /// Nothing is wrong with the call or the input, and what was done so far is kept: the same call may go on
+    /// later.
     #[error("{0}")]
     Temporary(String),
     /// The call was [cancelled](crate::Cancel). What was done so far is kept: the same call goes on.
@@ -43,14 +44,16 @@ impl From<s3d_io::Error> for Error {
     }
 }
 
-/// Whether an error, or one that it comes from, may pass: the same call may succeed later, or on another machine.
+/// Whether an error, or one that it comes from, may pass: the same call may succeed later, or on another
+/// machine.
 ///
-/// These are what is used up now and is given back by others (space, quota, memory, open files, threads, locks), what a
-/// network or a file system on one does (timeouts, stale handles, lost connections), and EIO: the system says it for a
-/// broken disk as for a network file system that was away (NFS mounted "soft", Lustre after an eviction). It cannot be told
-/// apart; a scheduler, which bounds its tries, loses a few of them in the first case and a night's work in the second if it
-/// is not tried. Everything else — missing files, permissions, read-only file systems, files too large for theirs — stays as
-/// it is until somebody does something.
+/// These are what is used up now and is given back by others (space, quota, memory, open files, threads,
+/// locks), what a network or a file system on one does (timeouts, stale handles, lost connections), and EIO:
+/// the system says it for a broken disk as for a network file system that was away (NFS mounted "soft",
+/// Lustre after an eviction). It cannot be told apart; a scheduler, which bounds its tries, loses a few of
+/// them in the first case and a night's work in the second if it is not tried. Everything else — missing
+/// files, permissions, read-only file systems, files too large for theirs — stays as it is until somebody
+/// does something.
 pub(crate) fn passes(error: &(dyn StdError + 'static)) -> bool {
     let mut next = Some(error);
     while let Some(error) = next {
@@ -139,7 +142,8 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn the_systems_own_numbers() {
-        // EIO, EAGAIN, ENOMEM, EBUSY, ENFILE, EMFILE, ENOSPC, ENOLCK, ENOTCONN, ESHUTDOWN, ETIMEDOUT, ESTALE, EDQUOT.
+        // EIO, EAGAIN, ENOMEM, EBUSY, ENFILE, EMFILE, ENOSPC, ENOLCK, ENOTCONN, ESHUTDOWN, ETIMEDOUT, ESTALE,
+        // EDQUOT.
         for code in [5, 11, 12, 16, 23, 24, 28, 37, 107, 108, 110, 116, 122] {
             assert!(is_temporary(io::Error::from_raw_os_error(code)), "{code}");
         }

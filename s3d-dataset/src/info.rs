@@ -19,7 +19,8 @@ use std::fmt;
 /// How a scene is looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InfoOptions {
-    /// Show the scan locations that an export would put on the floor, no two of a room nearer than this, metres.
+    /// Show the scan locations that an export would put on the floor, no two of a room nearer than this,
+    /// metres.
     pub place_cameras: Option<f64>,
     /// The seed by which they would be placed.
     pub seed: u64,
@@ -45,7 +46,8 @@ pub struct SceneInfo {
     pub contested_faces: u64,
     /// Points farther than 5 cm from every face.
     pub far_points: u64,
-    /// The pictures that colours come from, in a sentence; `None` if they are the mesh's own, or cannot be used.
+    /// The pictures that colours come from, in a sentence; `None` if they are the mesh's own, or cannot be
+    /// used.
     pub pictures: Option<String>,
     /// Its scan locations.
     pub locations: Vec<LocationInfo>,
@@ -101,11 +103,12 @@ pub struct LocationInfo {
     pub nearest_m: f32,
 }
 
-/// Looks at a scene file, or the folder of a published area. All of the scene is read, and labelled as an export would.
+/// Looks at a scene file, or the folder of a published area. All of the scene is read, and labelled as an
+/// export would.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be exported;
-/// [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be
+/// exported; [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context) -> Result<SceneInfo> {
     let inputs = Inputs::open(&[scene.into()], options.place_cameras, options.lenient)?;
     let area = &inputs.areas[0];

@@ -1,16 +1,18 @@
 //! 2D-3D-Semantic data sets as a whole.
 //!
-//! - [`Export`] turns scenes, from files or [in memory](MemoryScene), into a data set under the published names, with
-//!   [`ExportOptions`]. An export that was stopped, cancelled or killed goes on when the same call is made again, and ends
-//!   with the same bytes. [`plan`], [`Shard`] and [`merge`] share one among many machines.
-//! - [`verify`] reads a data set back, every pixel of it, and returns a [`VerifyReport`]; [`statistics`] counts it; [`info`]
-//!   tells what a scene holds before it is exported.
-//! - [`pack`] makes packages for trainers of it, [`profile`] what loaders of point clouds want; [`xyz`] makes its world
-//!   coordinates again. [`render`] and [`sample`] need a mesh alone.
+//! - [`Export`] turns scenes, from files or [in memory](MemoryScene), into a data set under the published
+//!   names, with [`ExportOptions`]. An export that was stopped, cancelled or killed goes on when the same
+//!   call is made again, and ends with the same bytes. [`plan`], [`Shard`] and [`merge`] share one among many
+//!   machines.
+//! - [`verify`] reads a data set back, every pixel of it, and returns a [`VerifyReport`]; [`statistics`]
+//!   counts it; [`info`] tells what a scene holds before it is exported.
+//! - [`pack`] makes packages for trainers of it, [`profile`] what loaders of point clouds want; [`xyz`] makes
+//!   its world coordinates again. [`render`] and [`sample`] need a mesh alone.
 //!
-//! Every call is handed a [`Context`]: a [`Cancel`] that ends it early, from any thread, and an [`Observer`] that is told
-//! [what happens](Event). Nothing here prints, reads the command line, handles signals or exits; several calls may run in one
-//! process at the same time. Work is done on the current rayon pool. World frame everywhere: metres, Z-up, right-handed.
+//! Every call is handed a [`Context`]: a [`Cancel`] that ends it early, from any thread, and an [`Observer`]
+//! that is told [what happens](Event). Nothing here prints, reads the command line, handles signals or exits;
+//! several calls may run in one process at the same time. Work is done on the current rayon pool. World frame
+//! everywhere: metres, Z-up, right-handed.
 //!
 //! ```
 //! use s3d_dataset::{Context, Export, ExportOptions, VerifyOptions};

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// What decides the bytes of a data set besides its input. The defaults are the paper's. The manifest stores them, with the
-/// seed and the distance of placed locations elsewhere in it.
+/// What decides the bytes of a data set besides its input. The defaults are the paper's. The manifest stores
+/// them, with the seed and the distance of placed locations elsewhere in it.
 ///
 /// ```
 /// use s3d_dataset::ExportOptions;
@@ -29,7 +29,8 @@ pub struct ExportOptions {
     /// Everything random comes from it: the same input and seed give the same bytes.
     #[serde(skip_serializing_if = "is_zero")]
     pub seed: u64,
-    /// Put scan locations on the floor of every room, no two of a room nearer than this, metres, instead of reading some.
+    /// Put scan locations on the floor of every room, no two of a room nearer than this, metres, instead of
+    /// reading some.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub place_cameras: Option<f64>,
     /// Candidate views a scan location, 100,000 at most; the paper's are 3 × 24.
@@ -52,7 +53,8 @@ pub struct ExportOptions {
     pub modalities: Vec<Domain>,
     /// Write every candidate view, whatever its entropy.
     pub keep_all: bool,
-    /// Write the images of these scan locations only, by uuid; of all if empty. The selection stays that of all locations.
+    /// Write the images of these scan locations only, by uuid; of all if empty. The selection stays that of
+    /// all locations.
     pub only: Vec<String>,
     /// The faces' normals, or those interpolated from the mesh's own where it has some.
     #[serde(with = "normals")]
@@ -113,8 +115,9 @@ impl ExportOptions {
         Conventions { depth_units: self.depth_units, normal_axes: self.normal_axes, xyz: self.xyz }
     }
 
-    /// The same options in their one form, however they were written: modalities once each and in their own order, without
-    /// world coordinates where none are stored; uuids in lower case without hyphens, sorted; profiles likewise.
+    /// The same options in their one form, however they were written: modalities once each and in their own
+    /// order, without world coordinates where none are stored; uuids in lower case without hyphens, sorted;
+    /// profiles likewise.
     ///
     /// # Errors
     /// [`Error::Usage`] if a number is out of its range or a uuid is none.
@@ -166,8 +169,8 @@ pub fn canonical_uuid(text: &str) -> Result<String> {
     Err(Error::Usage(format!("{text:?} is no uuid of 32 hexadecimal digits")))
 }
 
-/// How many entries the label table is filled up to with null labels; 0 for none. Loaders of the published data look
-/// missing pixels up at index 3341.
+/// How many entries the label table is filled up to with null labels; 0 for none. Loaders of the published
+/// data look missing pixels up at index 3341.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PadLabels(pub usize);
 

@@ -51,12 +51,13 @@ impl Default for RenderOptions {
     }
 }
 
-/// Renders what a camera sees of a mesh's file, in every modality that needs no annotation: `rgb.png`, `depth.png`,
-/// `normals.png`, `global_xyz.exr`, `faces.png` (indices of faces as R·65536 + G·256 + B; 255, 255, 255 where nothing is
-/// seen) and `camera.json` in the folder `output`.
+/// Renders what a camera sees of a mesh's file, in every modality that needs no annotation: `rgb.png`,
+/// `depth.png`, `normals.png`, `global_xyz.exr`, `faces.png` (indices of faces as R·65536 + G·256 + B; 255,
+/// 255, 255 where nothing is seen) and `camera.json` in the folder `output`.
 ///
 /// # Errors
-/// [`Error::Usage`] if one of them is there and not to be replaced; [`Error::File`].
+/// [`Error::Usage`](crate::Error::Usage) if one of them is there and not to be replaced;
+/// [`Error::File`](crate::Error::File).
 pub fn render(
     mesh: &Path,
     camera: &Camera,

@@ -32,12 +32,12 @@ impl Default for SampleOptions {
     }
 }
 
-/// Samples a mesh's file densely and uniformly into the PLY file `output`: world metres, Z-up, with colours. Returns the
-/// number of points.
+/// Samples a mesh's file densely and uniformly into the PLY file `output`: world metres, Z-up, with colours.
+/// Returns the number of points.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if the file is there and not to be replaced, or the points are too many;
-/// [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Error::Usage`](crate::Error::Usage) if the file is there and not to be replaced, or the points are too
+/// many; [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
     refuse_existing(output, options.overwrite)?;
     let file = s3d_io::mesh::read_mesh(mesh, options.up)?;

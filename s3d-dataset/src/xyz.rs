@@ -36,12 +36,12 @@ impl Default for XyzOptions {
     }
 }
 
-/// Makes the world coordinates of a data set's images again, from depth and pose: off by half of a step of depth along the
-/// ray. Returns the number of images.
+/// Makes the world coordinates of a data set's images again, from depth and pose: off by half of a step of
+/// depth along the ray. Returns the number of images.
 ///
 /// # Errors
-/// [`Error::Usage`] if coordinates are there and not to be replaced; [`Error::File`] if there is no data set, or no image
-/// with both depth and pose; [`Error::Cancelled`]; [`Error::Temporary`].
+/// [`Error::Usage`] if coordinates are there and not to be replaced; [`Error::File`] if there is no data set,
+/// or no image with both depth and pose; [`Error::Cancelled`]; [`Error::Temporary`].
 pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Result<usize> {
     if options.xyz == XyzType::None {
         return Err(Error::Usage("world coordinates are made as half or float".to_owned()));

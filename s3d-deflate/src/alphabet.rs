@@ -1,4 +1,5 @@
-//! The alphabets of RFC 1951 (3.2.5): symbols of literals, lengths and distances, how often they occur, and their codes.
+//! The alphabets of RFC 1951 (3.2.5): symbols of literals, lengths and distances, how often they occur, and
+//! their codes.
 
 use crate::bit_writer::Bits;
 use crate::huffman::canonical_codes;

@@ -1,5 +1,5 @@
-//! How many points a second go into a footprint, in the order of a scan and shuffled, and how long does it take to draw
-//! the outline of a 400 m² hall?
+//! How many points a second go into a footprint, in the order of a scan and shuffled, and how long does it
+//! take to draw the outline of a 400 m² hall?
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand::{Rng, SeedableRng};

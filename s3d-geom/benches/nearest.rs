@@ -1,6 +1,6 @@
-//! How many annotated points a second find the face to vote for, 5 mm off a mesh, as the mesh grows, when points come in
-//! the order of a scan and when they come shuffled, on tidy ground and on a scan? The aim is three million a second and
-//! core.
+//! How many annotated points a second find the face to vote for, 5 mm off a mesh, as the mesh grows, when
+//! points come in the order of a scan and when they come shuffled, on tidy ground and on a scan? The aim is
+//! three million a second and core.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::vec3;

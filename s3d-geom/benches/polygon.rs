@@ -1,5 +1,5 @@
-//! How many faces a second of 4, 6, 20 and 500 corners are cut into triangles? Meshes of modelling programs have tens of
-//! thousands of them, most of them quads.
+//! How many faces a second of 4, 6, 20 and 500 corners are cut into triangles? Meshes of modelling programs
+//! have tens of thousands of them, most of them quads.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{Vec3, vec3};

@@ -1,5 +1,5 @@
-//! How many coloured points a second come from a textured mesh of 32 thousand faces, and from a scan of 300 thousand with
-//! three textures, on one thread and on all? The aim is 15 million a second and core.
+//! How many coloured points a second come from a textured mesh of 32 thousand faces, and from a scan of 300
+//! thousand with three textures, on one thread and on all? The aim is 15 million a second and core.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{Vec3, vec2, vec3};

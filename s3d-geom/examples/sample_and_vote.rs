@@ -1,5 +1,5 @@
-//! From a mesh to annotations: samples a table in a room into a cloud, lets the points vote for their nearest faces with
-//! some noise on them, and sorts the table's points into voxels.
+//! From a mesh to annotations: samples a table in a room into a cloud, lets the points vote for their nearest
+//! faces with some noise on them, and sorts the table's points into voxels.
 //!
 //! `cargo run --release --example sample_and_vote -- [points per m²]`
 

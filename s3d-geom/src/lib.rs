@@ -1,9 +1,10 @@
 //! Vocabulary and plain geometry of indoor scans.
 //!
-//! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Lens`], [`Pose`], [`Raster`] —
-//! and the geometry that needs nothing else: a surface's points ([`SurfaceSampler`]), a point's nearest face
-//! ([`NearestFaces`]), polygons and their triangles ([`Polygon`], [`triangulate_face`]), a room's floor
-//! ([`FootprintBuilder`]) and the voxels of an instance ([`Voxels`]). World frame everywhere: metres, Z-up, right-handed.
+//! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Lens`],
+//! [`Pose`], [`Raster`] — and the geometry that needs nothing else: a surface's points ([`SurfaceSampler`]),
+//! a point's nearest face ([`NearestFaces`]), polygons and their triangles ([`Polygon`],
+//! [`triangulate_face`]), a room's floor ([`FootprintBuilder`]) and the voxels of an instance ([`Voxels`]).
+//! World frame everywhere: metres, Z-up, right-handed.
 //!
 //! ```
 //! use s3d_geom::{Camera, Pose, glam::dvec3};
@@ -14,15 +15,16 @@
 //! assert!((pixel.x - 540.0).abs() < 1e-9 && (depth - 4.0).abs() < 1e-9);
 //! ```
 //!
-//! With the cargo feature `serde`, the vocabulary is data: boxes, poses, cameras, lenses, outlines, polygons, voxels,
-//! point clouds. What is read is checked as it is by constructors (a pose's matrix and a polygon's corners are taken as
-//! they are), and a number that JSON can hold comes back to the bit where the reader rounds correctly (serde_json's
-//! `float_roundtrip`). Meshes, textures and images have their own files.
+//! With the cargo feature `serde`, the vocabulary is data: boxes, poses, cameras, lenses, outlines, polygons,
+//! voxels, point clouds. What is read is checked as it is by constructors (a pose's matrix and a polygon's
+//! corners are taken as they are), and a number that JSON can hold comes back to the bit where the reader
+//! rounds correctly (serde_json's `float_roundtrip`). Meshes, textures and images have their own files.
 //!
-//! The features `nearest` ([`NearestFaces`]) and `sampling` ([`SurfaceSampler`]) are on by default; without them, the
-//! crate builds from half as many packages.
+//! The features `nearest` ([`NearestFaces`]) and `sampling` ([`SurfaceSampler`]) are on by default; without
+//! them, the crate builds from half as many packages.
 
-// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what a constructor checked.
+// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what a constructor
+// checked.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)

@@ -1,8 +1,8 @@
 //! Plain patches and bodies, as [`MeshParts`] that can be changed and merged.
 //!
-//! Patches ([`quad`], [`grid`]) have texture coordinates from (0, 0) to (1, 1); those of bodies ([`cuboid`], [`cylinder`])
-//! count metres, so that a texture repeats once a metre. Corners at the same place are the same vertex wherever a body is
-//! closed. Nothing has a material.
+//! Patches ([`quad`], [`grid`]) have texture coordinates from (0, 0) to (1, 1); those of bodies ([`cuboid`],
+//! [`cylinder`]) count metres, so that a texture repeats once a metre. Corners at the same place are the same
+//! vertex wherever a body is closed. Nothing has a material.
 //!
 //! ```
 //! use s3d_geom::glam::{Vec3, vec3};
@@ -20,7 +20,8 @@
 use crate::MeshParts;
 use glam::{Vec2, Vec3, vec2, vec3};
 
-/// Two triangles over four `corners`, given counter-clockwise seen from the front, from the texture's bottom left.
+/// Two triangles over four `corners`, given counter-clockwise seen from the front, from the texture's bottom
+/// left.
 pub fn quad(corners: [Vec3; 4]) -> MeshParts {
     MeshParts {
         positions: corners.to_vec(),
@@ -31,8 +32,8 @@ pub fn quad(corners: [Vec3; 4]) -> MeshParts {
     }
 }
 
-/// The parallelogram from `origin` along `u` and `v`, in `cells[0]` × `cells[1]` quads of two triangles; its front is
-/// on the side of `u × v`. Row by row along `u`.
+/// The parallelogram from `origin` along `u` and `v`, in `cells[0]` × `cells[1]` quads of two triangles; its
+/// front is on the side of `u × v`. Row by row along `u`.
 ///
 /// # Panics
 /// If there is no cell.
@@ -58,8 +59,8 @@ pub fn grid(origin: Vec3, u: Vec3, v: Vec3, cells: [u32; 2]) -> MeshParts {
     parts
 }
 
-/// The closed box between two corners, its front outside. Eight vertices; side by side in the order z, x, y, the side
-/// at `min` before the one at `max`.
+/// The closed box between two corners, its front outside. Eight vertices; side by side in the order z, x, y,
+/// the side at `min` before the one at `max`.
 ///
 /// # Panics
 /// If `max` is not above `min` on each axis.
@@ -91,8 +92,8 @@ pub fn cuboid(min: Vec3, max: Vec3) -> MeshParts {
     parts
 }
 
-/// A closed upright cylinder, its front outside: `base` is the centre of its bottom, `sides` the number of its quads
-/// around.
+/// A closed upright cylinder, its front outside: `base` is the centre of its bottom, `sides` the number of
+/// its quads around.
 ///
 /// # Panics
 /// If a length is not positive or there are fewer than three sides.
@@ -107,7 +108,8 @@ pub fn cylinder(base: Vec3, radius_m: f32, height_m: f32, sides: u32) -> MeshPar
         uvs: vec![Vec2::splat(radius_m)],
         ..MeshParts::default()
     };
-    // Per column: a vertex below, one above; coordinates of the lid's corner, then of the wall's lower and upper one.
+    // Per column: a vertex below, one above; coordinates of the lid's corner, then of the wall's lower and
+    // upper one.
     for i in 0..=sides {
         let spoke = Vec2::from_angle(i as f32 * step_rad) * radius_m;
         if i < sides {

@@ -31,10 +31,10 @@ const CHUNK: usize = 4096;
 
 /// Points spread evenly over the surface of a mesh, to be drawn piece by piece.
 ///
-/// Point i of N lies at (i + uᵢ)/N of the cumulative area of the faces, uᵢ random in [0, 1), and anywhere in its
-/// triangle with equal probability. So the points come face by face in the order of the faces, every stretch of surface
-/// has its share of points to within two, and any range of them can be drawn alone. The random numbers of a point depend
-/// on the seed and its index only.
+/// Point i of N lies at (i + uᵢ)/N of the cumulative area of the faces, uᵢ random in [0, 1), and anywhere in
+/// its triangle with equal probability. So the points come face by face in the order of the faces, every
+/// stretch of surface has its share of points to within two, and any range of them can be drawn alone. The
+/// random numbers of a point depend on the seed and its index only.
 ///
 /// ```
 /// use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh, glam::Vec3};
@@ -65,8 +65,8 @@ impl<'m> SurfaceSampler<'m> {
         Self::over_faces(mesh, (0..mesh.faces().len() as u32).collect(), density, seed)
     }
 
-    /// Samples the given faces alone; points come in that order of faces. No face, no point. A face that is named twice
-    /// is sampled twice.
+    /// Samples the given faces alone; points come in that order of faces. No face, no point. A face that is
+    /// named twice is sampled twice.
     ///
     /// # Panics
     /// If a density is negative or not finite, or if there is no such face.
@@ -110,8 +110,8 @@ impl<'m> SurfaceSampler<'m> {
         &self.faces
     }
 
-    /// How many points lie on the faces before `position` in [`SurfaceSampler::faces`]: those that come first. The
-    /// points of the faces `a..b` of that list are `points_before(a)..points_before(b)`.
+    /// How many points lie on the faces before `position` in [`SurfaceSampler::faces`]: those that come
+    /// first. The points of the faces `a..b` of that list are `points_before(a)..points_before(b)`.
     ///
     /// # Panics
     /// If `position` is beyond the end of the list; the end itself is fine.
@@ -135,8 +135,9 @@ impl<'m> SurfaceSampler<'m> {
         before
     }
 
-    /// Draws the points `range` into `out`, whose content they replace: positions, colours and faces. Works on all
-    /// threads of the current rayon pool; the points are the same for any number of them and however a range is split.
+    /// Draws the points `range` into `out`, whose content they replace: positions, colours and faces. Works
+    /// on all threads of the current rayon pool; the points are the same for any number of them and however a
+    /// range is split.
     ///
     /// # Panics
     /// If the range goes beyond [`SurfaceSampler::len`], or is longer than memory can be.
@@ -202,8 +203,8 @@ fn unit(rng: &mut ChaCha8Rng) -> f64 {
     f64::from(rng.next_u32()) * (1.0 / 4_294_967_296.0)
 }
 
-/// Where point `i` lies along the cumulative area, counted in points: in [i, i + 1], ascending with i. `rng` stands at
-/// the point's first word.
+/// Where point `i` lies along the cumulative area, counted in points: in [i, i + 1], ascending with i. `rng`
+/// stands at the point's first word.
 #[inline(always)]
 fn place(rng: &mut ChaCha8Rng, i: u64) -> f64 {
     i as f64 + unit(rng)

@@ -7,9 +7,9 @@ use glam::Vec3;
 
 /// A box split in [`VoxelGrid::SIDE`]³ equal voxels.
 ///
-/// Voxel (ix, iy, iz), counted along the axes from the box's `min`, has the index `(ix * 6 + iy) * 6 + iz`. A point
-/// between two voxels belongs to the upper one, a point on the upper face of the box to the last voxel; along an axis
-/// without extent there is one layer, index 0.
+/// Voxel (ix, iy, iz), counted along the axes from the box's `min`, has the index `(ix * 6 + iy) * 6 + iz`. A
+/// point between two voxels belongs to the upper one, a point on the upper face of the box to the last voxel;
+/// along an axis without extent there is one layer, index 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -30,19 +30,22 @@ impl VoxelGrid {
     /// Voxels in all.
     pub const CELLS: usize = Self::SIDE * Self::SIDE * Self::SIDE;
 
-    /// Index of the voxel that holds `point`. A point outside of the box belongs to the nearest voxel of the surface.
+    /// Index of the voxel that holds `point`. A point outside of the box belongs to the nearest voxel of the
+    /// surface.
     pub fn cell_of(&self, point: Vec3) -> usize {
         cell_between(&self.planes(), point)
     }
 
-    /// The voxel of each of `points`, as [`VoxelGrid::cell_of`] gives it, into `out`, whose content they replace.
+    /// The voxel of each of `points`, as [`VoxelGrid::cell_of`] gives it, into `out`, whose content they
+    /// replace.
     pub fn cells_of(&self, points: &[Vec3], out: &mut Vec<u8>) {
         let planes = self.planes();
         out.clear();
         out.extend(points.iter().map(|&p| cell_between(&planes, p) as u8));
     }
 
-    /// The box of voxel `cell`. It contains, in `f32`, every point of the box that [`VoxelGrid::cell_of`] puts there.
+    /// The box of voxel `cell`. It contains, in `f32`, every point of the box that [`VoxelGrid::cell_of`]
+    /// puts there.
     ///
     /// # Panics
     /// If `cell` is not below [`VoxelGrid::CELLS`].
@@ -57,7 +60,8 @@ impl VoxelGrid {
         }
     }
 
-    /// One set of planes decides for points and for voxel boxes, so that the two cannot disagree by a rounding.
+    /// One set of planes decides for points and for voxel boxes, so that the two cannot disagree by a
+    /// rounding.
     fn planes(&self) -> Planes {
         let (min, max) = (self.bbox.min.to_array(), self.bbox.max.to_array());
         std::array::from_fn(|axis| {

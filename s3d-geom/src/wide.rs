@@ -1,14 +1,14 @@
 //! Wider registers where the processor has them.
 
-/// Work whose loops the compiler may vectorise. `run` and what it calls in its loops are `#[inline(always)]`, so that
-/// they are compiled once for any processor of the target and once for one with AVX2.
+/// Work whose loops the compiler may vectorise. `run` and what it calls in its loops are `#[inline(always)]`,
+/// so that they are compiled once for any processor of the target and once for one with AVX2.
 pub(crate) trait Work {
     type Output;
     fn run(self) -> Self::Output;
 }
 
-/// Runs `work`, compiled for AVX2 if the processor has it. The answer is the same, as no rounding depends on the width:
-/// products and sums are not fused.
+/// Runs `work`, compiled for AVX2 if the processor has it. The answer is the same, as no rounding depends on
+/// the width: products and sums are not fused.
 pub(crate) fn run<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {

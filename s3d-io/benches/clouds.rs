@@ -1,7 +1,8 @@
-//! How fast are flat clouds read and grouped by instance, in points a second: the whole of `Annotations::open`, for each kind of
-//! file; and how much slower through a temporary file?
+//! How fast are flat clouds read and grouped by instance, in points a second: the whole of
+//! `Annotations::open`, for each kind of file; and how much slower through a temporary file?
 //!
-//! The points are made here, with a fixed seed: 200 instances of 8 classes in no order. Files are warm in the system's cache.
+//! The points are made here, with a fixed seed: 200 instances of 8 classes in no order. Files are warm in the
+//! system's cache.
 #![allow(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};

@@ -1,13 +1,13 @@
-//! What does it cost to write a view of 1080² pixels, each of its images, on one core — and S3DIS text, OBJ meshes,
-//! PLY points, instances and poses?
+//! What does it cost to write a view of 1080² pixels, each of its images, on one core — and S3DIS text, OBJ
+//! meshes, PLY points, instances and poses?
 //!
-//! The images are those of a furnished room made here from a fixed seed: uneven walls as a scan has them, seen at an angle,
-//! a texture with noise, a few dozen instances. `Throughput` is in bytes before compression; the size after it is
-//! printed once. `view` is all six images of a view, one after the other. `docs/performance/encode_peers.py` has other
-//! encoders' figures for images of a data set.
+//! The images are those of a furnished room made here from a fixed seed: uneven walls as a scan has them,
+//! seen at an angle, a texture with noise, a few dozen instances. `Throughput` is in bytes before
+//! compression; the size after it is printed once. `view` is all six images of a view, one after the other.
+//! `docs/performance/encode_peers.py` has other encoders' figures for images of a data set.
 //!
-//! Goal: a view in 50 ms, balanced; no PNG image more than 1.1 times as large as libpng's level 6 makes it (RGB 1.15), no
-//! OpenEXR image larger than OpenEXR makes it.
+//! Goal: a view in 50 ms, balanced; no PNG image more than 1.1 times as large as libpng's level 6 makes it
+//! (RGB 1.15), no OpenEXR image larger than OpenEXR makes it.
 #![allow(clippy::print_stderr, missing_docs)]
 
 mod room;

@@ -1,5 +1,5 @@
-//! How many points a second go into `pointcloud.mat`, and come out of it? 40 objects of 50,000 points, as an export writes
-//! them (with boxes and voxels).
+//! How many points a second go into `pointcloud.mat`, and come out of it? 40 objects of 50,000 points, as an
+//! export writes them (with boxes and voxels).
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::PointCloud;

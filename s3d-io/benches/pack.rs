@@ -1,8 +1,8 @@
-//! How fast are packages written: bytes a second into shards and out of clouds, images a second into COLMAP's,
-//! nerfstudio's, COCO's and Parquet's files?
+//! How fast are packages written: bytes a second into shards and out of clouds, images a second into
+//! COLMAP's, nerfstudio's, COCO's and Parquet's files?
 //!
-//! Everything is made here with fixed seeds, so that figures compare between machines; files go to a temporary folder and
-//! stay in the system's cache.
+//! Everything is made here with fixed seeds, so that figures compare between machines; files go to a
+//! temporary folder and stay in the system's cache.
 #![allow(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};

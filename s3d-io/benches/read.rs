@@ -1,8 +1,9 @@
-//! How fast are scans read, in bytes of their files a second (PLY meshes in faces a second too): OBJ with its texture,
-//! glTF, PLY in all encodings, with and without labels, points of the S3DIS tree?
+//! How fast are scans read, in bytes of their files a second (PLY meshes in faces a second too): OBJ with its
+//! texture, glTF, PLY in all encodings, with and without labels, points of the S3DIS tree?
 //!
-//! The inputs are made here, with fixed seeds, so that figures compare between machines; `S3D_BENCH_MESH=rgb.obj` adds a
-//! real mesh. Files lie in a temporary folder and are warm in the system's cache.
+//! The inputs are made here, with fixed seeds, so that figures compare between machines;
+//! `S3D_BENCH_MESH=rgb.obj` adds a real mesh. Files lie in a temporary folder and are warm in the system's
+//! cache.
 #![allow(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -98,7 +99,8 @@ fn write_glb(dir: &Path, n: usize) -> PathBuf {
     path
 }
 
-/// The same floor as a `.ply` with colours; `encoding` as the header names it, `labels` a class and an object a face.
+/// The same floor as a `.ply` with colours; `encoding` as the header names it, `labels` a class and an object
+/// a face.
 fn write_ply(dir: &Path, n: usize, encoding: &str, labels: bool) -> PathBuf {
     let mut random = Numbers(7);
     let columns = if labels { "property int category_id\nproperty int object_id\n" } else { "" };

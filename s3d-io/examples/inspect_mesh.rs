@@ -1,6 +1,7 @@
 //! What is in a mesh file, as the data set's tools see it: size, area, textures, and what had to be mended.
 //!
-//! `cargo run --release -p s3d-io --example inspect_mesh -- scan/rgb.obj [y|z]`, the axis that points up: y unless said.
+//! `cargo run --release -p s3d-io --example inspect_mesh -- scan/rgb.obj [y|z]`, the axis that points up: y
+//! unless said.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for the terminal")]
 
 use s3d_io::mesh::{UpAxis, read_mesh};

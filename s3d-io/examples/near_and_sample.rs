@@ -1,8 +1,9 @@
-//! How many points a second and core find their nearest face, and how many are sampled with their colour, on a mesh of
-//! yours? Can write mesh, points and answers as plain columns, for another library to be timed on the same.
+//! How many points a second and core find their nearest face, and how many are sampled with their colour, on
+//! a mesh of yours? Can write mesh, points and answers as plain columns, for another library to be timed on
+//! the same.
 //!
-//! `cargo run --release -p s3d-io --example near_and_sample -- MESH [y|z] [POINTS] [FOLDER]`; MESH is a file, or
-//! `scan_like:300000` for a generated one. docs/performance/near_sample_peers.py compares with others.
+//! `cargo run --release -p s3d-io --example near_and_sample -- MESH [y|z] [POINTS] [FOLDER]`; MESH is a file,
+//! or `scan_like:300000` for a generated one. docs/performance/near_sample_peers.py compares with others.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for the terminal")]
 
 use s3d_geom::glam::Vec3;
@@ -100,7 +101,8 @@ fn hash(i: usize) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Little-endian columns: vertices, faces, texture coordinates of corners, the first texture, points, answers.
+/// Little-endian columns: vertices, faces, texture coordinates of corners, the first texture, points,
+/// answers.
 fn write(
     folder: &Path,
     mesh: &TriMesh,

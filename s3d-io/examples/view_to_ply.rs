@@ -1,5 +1,5 @@
-//! Turns a view of a data set back into coloured, labelled points: to look at it in any viewer, or to see that two views
-//! of a location lie over one another.
+//! Turns a view of a data set back into coloured, labelled points: to look at it in any viewer, or to see
+//! that two views of a location lie over one another.
 //!
 //! ```text
 //! cargo run --release -p s3d-io --example view_to_ply -- out/area_1/data/rgb/camera_…_domain_rgb.png view.ply

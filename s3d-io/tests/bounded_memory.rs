@@ -76,8 +76,8 @@ fn a_cloud_of_one_instance_is_boxed_and_voxelised_in_little_memory() {
         eprintln!("not measured: the system tells no peak memory");
         return;
     };
-    // Blocks, and indices that wait by voxel: about 20 MB. The positions alone are 36 MB, with colours, voxels and the
-    // copies that grouping takes 100.
+    // Blocks, and indices that wait by voxel: about 20 MB. The positions alone are 36 MB, with colours,
+    // voxels and the copies that grouping takes 100.
     let more = (after - before) >> 20;
     assert!(more < 32, "{more} MiB for {POINTS} points in blocks of {BLOCK}");
 }

@@ -1,4 +1,5 @@
-//! Files of annotated points that numpy, laspy, plyfile, pye57 and ScanNet's layout gave: see fixtures/clouds/README.md.
+//! Files of annotated points that numpy, laspy, plyfile, pye57 and ScanNet's layout gave: see
+//! fixtures/clouds/README.md.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{DVec3, Vec3, vec3};

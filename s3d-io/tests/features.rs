@@ -1,5 +1,5 @@
-//! A build with OBJ alone: textured meshes are read, and other formats name the feature that reads them. `.ci/features`
-//! runs it so; where all is built in, nothing is left to test.
+//! A build with OBJ alone: textured meshes are read, and other formats name the feature that reads them.
+//! `.ci/features` runs it so; where all is built in, nothing is left to test.
 #![cfg(all(feature = "obj", not(any(feature = "gltf", feature = "ply"))))]
 
 use s3d_io::{mesh::UpAxis, mesh::read_mesh};

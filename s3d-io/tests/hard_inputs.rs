@@ -132,8 +132,8 @@ fn cut_files_load_or_are_refused() {
                 found.starts_with("faces") || found == "refused",
                 "{name} cut at {length}: {found} {texts:?}"
             );
-            // JSON, chunks and headers say how long they are; OBJ does not. The last words of an ASCII file may lose
-            // digits and stay numbers, but a file is never cut there.
+            // JSON, chunks and headers say how long they are; OBJ does not. The last words of an ASCII file
+            // may lose digits and stay numbers, but a file is never cut there.
             assert!(name.ends_with(".obj") || found == "refused", "{name} cut at {length}: {found}");
         }
     }

@@ -1,4 +1,5 @@
-//! Headers that claim more than their files can hold, each in an otherwise sound file: an error that says so, at once.
+//! Headers that claim more than their files can hold, each in an otherwise sound file: an error that says so,
+//! at once.
 
 use s3d_geom::Raster;
 use s3d_io::Result;

@@ -1,5 +1,6 @@
-//! What real glTF, OBJ and PLY files hold, a smallest file for each: the same two triangles of a square, told in all ways that
-//! the formats have, must come out as the same mesh; what is not read is refused by name, with a way out.
+//! What real glTF, OBJ and PLY files hold, a smallest file for each: the same two triangles of a square, told
+//! in all ways that the formats have, must come out as the same mesh; what is not read is refused by name,
+//! with a way out.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -169,8 +170,8 @@ fn nested_and_mirroring_nodes_and_instances() {
     let mut f = Gltf::default();
     let p = f.corners();
     let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
-    // The square as it is; twice mirrored in x is as it is too; once mirrored it is beside, and still faces +Z; a half turn
-    // about Z by a matrix below a move. A second mesh of two primitives below the first.
+    // The square as it is; twice mirrored in x is as it is too; once mirrored it is beside, and still faces
+    // +Z; a half turn about Z by a matrix below a move. A second mesh of two primitives below the first.
     let file = f
         .read(&format!(
             r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}},

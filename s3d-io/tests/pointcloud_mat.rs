@@ -1,5 +1,5 @@
-//! `pointcloud.mat`: files that h5py made in the published layout (see `fixtures/pointcloud_mat`), our own read back, and
-//! files that are damaged.
+//! `pointcloud.mat`: files that h5py made in the published layout (see `fixtures/pointcloud_mat`), our own
+//! read back, and files that are damaged.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{Vec3, vec3};
@@ -188,7 +188,8 @@ fn a_field_that_is_missing_is_named() {
     assert!(message.contains("Disjoint_Space(1).object(1): has no field points"), "{message}");
 }
 
-/// Bytes changed here and there, and files cut off: an answer or an error, in bounded memory, and never a panic.
+/// Bytes changed here and there, and files cut off: an answer or an error, in bounded memory, and never a
+/// panic.
 #[test]
 fn damaged_files_never_panic() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! What takes a reader or a writer gives what is read or written by path, and its errors name what it is told to.
+//! What takes a reader or a writer gives what is read or written by path, and its errors name what it is told
+//! to.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::vec3;

@@ -1,4 +1,5 @@
-//! How long it takes to build, write and read the label table of a data set, up to ten times the published size.
+//! How long it takes to build, write and read the label table of a data set, up to ten times the published
+//! size.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_label::{Class, Label, LabelTable, Room, RoomType, number_area};

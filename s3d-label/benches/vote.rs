@@ -1,5 +1,5 @@
-//! How many points a second can vote, when they come instance by instance as in an annotated tree, and when they come
-//! in any order; and what it costs to read the winners.
+//! How many points a second can vote, when they come instance by instance as in an annotated tree, and when
+//! they come in any order; and what it costs to read the winners.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_label::{LabelId, Votes};

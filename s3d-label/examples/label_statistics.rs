@@ -1,4 +1,5 @@
-//! Prints what a data set holds — instances of each class and rooms of each type, by area — from its label table.
+//! Prints what a data set holds — instances of each class and rooms of each type, by area — from its label
+//! table.
 //!
 //! `cargo run --example label_statistics -- path/to/semantic_labels.json`
 #![allow(clippy::print_stdout)] // It is a program.

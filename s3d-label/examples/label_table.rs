@@ -7,8 +7,8 @@ use s3d_label::{Class, LabelTable, Room, number_area};
 use std::error::Error;
 use std::path::Path;
 
-/// The instances of one room: `Annotations/chair_3.txt` is the third chair. Files of unknown classes are reported and
-/// left out.
+/// The instances of one room: `Annotations/chair_3.txt` is the third chair. Files of unknown classes are
+/// reported and left out.
 fn instances(folder: &Path) -> std::io::Result<Vec<(Class, u32)>> {
     let mut found = Vec::new();
     for file in std::fs::read_dir(folder)? {

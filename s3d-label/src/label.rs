@@ -13,8 +13,9 @@ pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 /// One instance of a class in an area, written `class_instanceNum_roomType_roomNum_areaNum`, as in
 /// `board_3_hallway_4_6`. Source: formats.md, "Labels".
 ///
-/// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, the underscore included, so that
-/// `beam_10_…` stands before `beam_1_…`; then by room, which only matters between two labels of the same instance.
+/// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, the underscore included, so
+/// that `beam_10_…` stands before `beam_1_…`; then by room, which only matters between two labels of the same
+/// instance.
 ///
 /// ```
 /// use s3d_label::{Class, Label, LabelError};
@@ -117,11 +118,13 @@ pub fn parse_name(name: &str) -> Result<Option<Label>, LabelError> {
 }
 
 impl Label {
-    /// How the published order compares two instances; equal if they are the same instance, whatever their rooms.
+    /// How the published order compares two instances; equal if they are the same instance, whatever their
+    /// rooms.
     pub(crate) fn cmp_key(&self, other: &Self) -> Ordering {
         let instance = |label: &Self| Digits::new(label.instance, Some(b'_'));
         let area = |label: &Self| Digits::new(label.area, None);
-        // No class name is the start of another, so that their order decides before the underscore is reached.
+        // No class name is the start of another, so that their order decides before the underscore is
+        // reached.
         (self.class.name().cmp(other.class.name()))
             .then_with(|| instance(self).as_bytes().cmp(instance(other).as_bytes()))
             .then_with(|| area(self).as_bytes().cmp(area(other).as_bytes()))

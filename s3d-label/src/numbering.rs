@@ -1,4 +1,5 @@
-//! From the numbers of an annotated tree, which run per room, to the instance numbers of labels, which run per area.
+//! From the numbers of an annotated tree, which run per room, to the instance numbers of labels, which run
+//! per area.
 
 use crate::{Class, Label, Room};
 use thiserror::Error;
@@ -37,11 +38,11 @@ pub enum NumberingError {
 
 /// Gives each instance of an area, known by its room, class and number in that room, its label.
 ///
-/// Instance numbers run per class over the area, from 1 without gaps: through the rooms in their order (by type, then
-/// by number; see [`RoomType`](crate::RoomType)), and in a room by the number there. Areas 1 to 4 of the published
-/// table are numbered just so; in area 5, which was joined from 5a and 5b, and in area 6 a few rooms stand elsewhere.
-/// The result is in that order too — room, class, number in the room — whatever the order of the input. Source: formats.md, "Labels" and "S3DIS
-/// tree".
+/// Instance numbers run per class over the area, from 1 without gaps: through the rooms in their order (by
+/// type, then by number; see [`RoomType`](crate::RoomType)), and in a room by the number there. Areas 1 to 4
+/// of the published table are numbered just so; in area 5, which was joined from 5a and 5b, and in area 6 a
+/// few rooms stand elsewhere. The result is in that order too — room, class, number in the room — whatever
+/// the order of the input. Source: formats.md, "Labels" and "S3DIS tree".
 ///
 /// # Errors
 /// [`NumberingError::Duplicate`] if an instance is there twice.

@@ -7,8 +7,9 @@ use thiserror::Error;
 
 /// A type of room.
 ///
-/// [`RoomType::ALL`] and [`RoomType::index`] follow the list of formats.md, "Labels". `Ord` follows the names in the
-/// alphabet, whatever their case, so that `WC` is last: the order in which the published instance numbers run.
+/// [`RoomType::ALL`] and [`RoomType::index`] follow the list of formats.md, "Labels". `Ord` follows the names
+/// in the alphabet, whatever their case, so that `WC` is last: the order in which the published instance
+/// numbers run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum RoomType {
@@ -185,7 +186,8 @@ impl FromStr for Room {
     }
 }
 
-/// The number that `digits` spell in the only way that names allow: from 1, decimal, no sign, no leading zero.
+/// The number that `digits` spell in the only way that names allow: from 1, decimal, no sign, no leading
+/// zero.
 pub(crate) fn number_from_digits(digits: &str) -> Option<u32> {
     let plain = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
     if plain { digits.parse().ok() } else { None }

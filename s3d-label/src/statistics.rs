@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// How many instances of each class each area holds.
 ///
-/// The paper's table of object classes; it counts every cell one higher than the published labels do (formats.md,
-/// "Labels").
+/// The paper's table of object classes; it counts every cell one higher than the published labels do
+/// (formats.md, "Labels").
 ///
 /// ```
 /// use s3d_label::{Class, ClassCounts, LabelTable};

@@ -37,8 +37,8 @@ impl fmt::Display for LabelId {
     }
 }
 
-/// The labels of a data set in the published order: index 0 is the null label, the rest is sorted as [`Label`]'s `Ord`
-/// sorts. Source: formats.md, "Labels".
+/// The labels of a data set in the published order: index 0 is the null label, the rest is sorted as
+/// [`Label`]'s `Ord` sorts. Source: formats.md, "Labels".
 ///
 /// ```
 /// use s3d_label::{Class, LabelId, LabelTable, NULL_NAME};
@@ -137,11 +137,12 @@ impl LabelTable {
         Self { labels }.checked_count()
     }
 
-    /// Reads a table from its names, index by index, as `semantic_labels.json` holds them. Null labels behind the last
-    /// label are padding and dropped.
+    /// Reads a table from its names, index by index, as `semantic_labels.json` holds them. Null labels behind
+    /// the last label are padding and dropped.
     ///
     /// # Errors
-    /// [`TableError`] says at which index the order, a name or a duplicate is wrong; the first such index counts.
+    /// [`TableError`] says at which index the order, a name or a duplicate is wrong; the first such index
+    /// counts.
     pub fn from_names(names: &[String]) -> Result<Self, TableError> {
         if names.first().is_none_or(|name| name != NULL_NAME) {
             return Err(TableError::NoNull { found: names.first().cloned().unwrap_or_default() });

@@ -1,5 +1,5 @@
-//! What it costs to score and to select the views of a location, an area, and the published data set (1,413 locations
-//! with 72 candidates each).
+//! What it costs to score and to select the views of a location, an area, and the published data set (1,413
+//! locations with 72 candidates each).
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_sample::{Pool, PoolItem, Selection, entropy, select, select_pooled};

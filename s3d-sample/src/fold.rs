@@ -17,9 +17,9 @@ const PUBLISHED: [(u32, &[u32], &[u32]); 3] =
 
 /// The published folds, cut down to the areas that are there.
 ///
-/// Areas that are not in `present_areas` are dropped from both sides, and a fold that has a side left empty is dropped
-/// with its number; areas that the published folds do not know belong to no fold. Order and repetitions in
-/// `present_areas` do not matter.
+/// Areas that are not in `present_areas` are dropped from both sides, and a fold that has a side left empty
+/// is dropped with its number; areas that the published folds do not know belong to no fold. Order and
+/// repetitions in `present_areas` do not matter.
 ///
 /// ```
 /// let folds = s3d_sample::folds(&[1, 5]);

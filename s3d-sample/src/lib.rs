@@ -1,12 +1,15 @@
-//! The choice of camera views for a registered data set of an indoor scan, as 2D-3D-S (Armeni et al. 2017) made it.
+//! The choice of camera views for a registered data set of an indoor scan, as 2D-3D-S (Armeni et al. 2017)
+//! made it.
 //!
-//! At every scan location, candidate [`View`]s are drawn ([`draw_view`]); a renderer counts the classes that each sees;
-//! the [`entropy`] of the counts is its score; and [`select_pooled`] keeps the better ones of a [`Pool`]. [`folds`]
-//! splits areas for cross-validation. This crate sees numbers only: it knows no renderer and no labels.
+//! At every scan location, candidate [`View`]s are drawn ([`draw_view`]); a renderer counts the classes that
+//! each sees; the [`entropy`] of the counts is its score; and [`select_pooled`] keeps the better ones of a
+//! [`Pool`]. [`folds`] splits areas for cross-validation. This crate sees numbers only: it knows no renderer
+//! and no labels.
 //!
 //! Where there are no scan locations, [`poisson_disk`] spreads some.
 //!
-//! Everything random follows from one seed and from the name of what it is drawn for, never from threads or order.
+//! Everything random follows from one seed and from the name of what it is drawn for, never from threads or
+//! order.
 //!
 //! ```
 //! use s3d_sample::{Pool, PoolItem, Selection, ViewDistribution, draw_view, entropy, select_pooled};
@@ -27,7 +30,8 @@
 //! assert_eq!(stays.iter().filter(|&&stays| stays).count(), 52);
 //! ```
 
-// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what they ordered themselves.
+// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what they ordered
+// themselves.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)

@@ -4,11 +4,12 @@ use crate::stream::stream;
 use rand::Rng;
 use std::collections::HashMap;
 
-/// Chooses among `points` (metres) some of which no two are nearer than `distance_m`, so that every other point is nearer
-/// than that to a chosen one. Returns their indices, in the order in which they were chosen.
+/// Chooses among `points` (metres) some of which no two are nearer than `distance_m`, so that every other
+/// point is nearer than that to a chosen one. Returns their indices, in the order in which they were chosen.
 ///
-/// The points are offered in a random order that `seed` and `name` decide alone. Dense points give the pattern of dart
-/// throwing (Cook 1986) on what they cover. Takes time and memory in proportion to their number.
+/// The points are offered in a random order that `seed` and `name` decide alone. Dense points give the
+/// pattern of dart throwing (Cook 1986) on what they cover. Takes time and memory in proportion to their
+/// number.
 ///
 /// # Panics
 /// If `distance_m` is not above 0, or a point is not finite.

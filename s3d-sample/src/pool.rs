@@ -79,10 +79,10 @@ impl PoolItem<'_> {
 
 /// Selects views pool by pool: whether each of `items` stays.
 ///
-/// In a pool, views are in the order of (area, location, view), locations as UTF-8 bytes, and [`select`] decides by
-/// that order; its seed is drawn from a stream of the pool's own, keyed by `seed`, the area (0 for the data set) and the
-/// location (empty but for [`Pool::Location`]). So whether a view stays depends on the members of its pool and on
-/// `seed`, and neither on other pools nor on the order of `items`.
+/// In a pool, views are in the order of (area, location, view), locations as UTF-8 bytes, and [`select`]
+/// decides by that order; its seed is drawn from a stream of the pool's own, keyed by `seed`, the area (0 for
+/// the data set) and the location (empty but for [`Pool::Location`]). So whether a view stays depends on the
+/// members of its pool and on `seed`, and neither on other pools nor on the order of `items`.
 ///
 /// # Panics
 /// If a view is there twice, and as [`select`] does.

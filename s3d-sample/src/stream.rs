@@ -1,16 +1,16 @@
 //! Streams of random numbers, each for one unit of work.
 //!
-//! A number is never drawn from a generator that several units share: each unit's generator follows from the seed and
-//! the unit's name alone, so that neither threads nor order nor what else is drawn can change it.
+//! A number is never drawn from a generator that several units share: each unit's generator follows from the
+//! seed and the unit's name alone, so that neither threads nor order nor what else is drawn can change it.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// The random numbers of the unit of work that `purpose`, `seed`, `name` and `number` name.
 ///
-/// A ChaCha generator of 8 rounds, counter and nonce 0, with the 32-byte key: `seed` (8 bytes), `number` (4 bytes),
-/// `purpose` (4 bytes), the FNV-1a hash of `name`'s UTF-8 (16 bytes); integers little-endian. This layout is part of
-/// what a seed means: to change it changes every data set.
+/// A ChaCha generator of 8 rounds, counter and nonce 0, with the 32-byte key: `seed` (8 bytes), `number` (4
+/// bytes), `purpose` (4 bytes), the FNV-1a hash of `name`'s UTF-8 (16 bytes); integers little-endian. This
+/// layout is part of what a seed means: to change it changes every data set.
 pub(crate) fn stream(purpose: [u8; 4], seed: u64, name: &str, number: u32) -> ChaCha8Rng {
     let mut key = [0; 32];
     key[..8].copy_from_slice(&seed.to_le_bytes());
@@ -42,8 +42,8 @@ fn fraction(bits: u64) -> f64 {
     bits as f64 / (1u64 << 53) as f64
 }
 
-/// Normal with mean 0 and deviation 1, by Box and Muller: two uniform numbers a call, of which the first gives the
-/// radius; the second normal number that they could give is not used.
+/// Normal with mean 0 and deviation 1, by Box and Muller: two uniform numbers a call, of which the first
+/// gives the radius; the second normal number that they could give is not used.
 pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * libm::log(uniform_above_zero(rng))).sqrt();
     radius * libm::cos(2.0 * std::f64::consts::PI * uniform(rng))

@@ -8,7 +8,8 @@ use thiserror::Error;
 /// How many candidate views a scan location has: 3 × 24. Source: formats.md, "Sampling of views".
 pub const CANDIDATES_PER_LOCATION: u32 = 72;
 
-/// From what views are drawn. The yaw is always uniform, the roll always 0. Source: formats.md, "Sampling of views".
+/// From what views are drawn. The yaw is always uniform, the roll always 0. Source: formats.md, "Sampling of
+/// views".
 ///
 /// ```
 /// use s3d_sample::ViewDistribution;
@@ -24,7 +25,8 @@ pub struct ViewDistribution {
     pub pitch_sigma_deg: f64,
     /// The widest horizontal angle of view, the mode of the half-normal distribution; below 180 degrees.
     pub fov_max_deg: f64,
-    /// The deviation of the normal distribution whose amount is taken from the widest angle; 0 to 360 degrees.
+    /// The deviation of the normal distribution whose amount is taken from the widest angle; 0 to 360
+    /// degrees.
     pub fov_sigma_deg: f64,
     /// The narrowest angle: anything below is drawn again. Above 0.
     pub fov_min_deg: f64,
@@ -78,8 +80,8 @@ impl ViewDistribution {
     }
 }
 
-/// A view from a scan location, relative to its original camera: `E(final) = E(original) · Ry(yaw) · Rx(pitch)`, no
-/// roll. Source: formats.md, "Cameras".
+/// A view from a scan location, relative to its original camera: `E(final) = E(original) · Ry(yaw) ·
+/// Rx(pitch)`, no roll. Source: formats.md, "Cameras".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Turn about the vertical, in [−π, π).
@@ -92,11 +94,11 @@ pub struct View {
 
 /// Draws view `number` of the scan location whose camera has the uuid `location`.
 ///
-/// The view depends on nothing but the arguments: each has a stream of random numbers of its own (ChaCha8; its key is
-/// `seed` in 8 bytes, `number` in 4, `view` in ASCII, and the 128-bit FNV-1a hash of `location`, little-endian). From
-/// it come in turn the yaw, uniform in [−180°, 180°); the pitch, normal by Box and Muller, drawn again (2 in 10⁹) if the
-/// camera would tip over, at 90° or more up or down; and the angle of view, `fov_max − |normal|`, drawn again below
-/// `fov_min`.
+/// The view depends on nothing but the arguments: each has a stream of random numbers of its own (ChaCha8;
+/// its key is `seed` in 8 bytes, `number` in 4, `view` in ASCII, and the 128-bit FNV-1a hash of `location`,
+/// little-endian). From it come in turn the yaw, uniform in [−180°, 180°); the pitch, normal by Box and
+/// Muller, drawn again (2 in 10⁹) if the camera would tip over, at 90° or more up or down; and the angle of
+/// view, `fov_max − |normal|`, drawn again below `fov_min`.
 ///
 /// # Panics
 /// If [`ViewDistribution::check`] fails.
@@ -139,7 +141,8 @@ fn half_normal_within(rng: &mut ChaCha8Rng, sigma: f64, range: f64) -> f64 {
     }
     loop {
         let x = if range < sigma {
-            // The same distribution without the many draws that a short range would reject, endless for an empty one.
+            // The same distribution without the many draws that a short range would reject, endless for an
+            // empty one.
             let x = range * uniform(rng);
             let density = libm::exp(-0.5 * (x / sigma) * (x / sigma));
             if uniform_above_zero(rng) <= density { x } else { f64::INFINITY }
@@ -160,8 +163,8 @@ mod tests {
 
     const DRAWS: u32 = 40_000;
 
-    /// The largest distance between the distribution of `values` and its exact `cdf`, in units of 1/√n. Kolmogorov's
-    /// distribution exceeds 1.9495 with probability 0.001.
+    /// The largest distance between the distribution of `values` and its exact `cdf`, in units of 1/√n.
+    /// Kolmogorov's distribution exceeds 1.9495 with probability 0.001.
     fn kolmogorov(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
         values.sort_by(f64::total_cmp);
         let n = values.len() as f64;
@@ -221,8 +224,8 @@ mod tests {
         assert!(kolmogorov(fov, |x| fov_cdf(&untruncated, x)) > CRITICAL);
     }
 
-    /// Whether two columns are independent: χ² over 8 × 8 cells of equal probability. 49 degrees of freedom: above
-    /// 85.35 with probability 0.001.
+    /// Whether two columns are independent: χ² over 8 × 8 cells of equal probability. 49 degrees of freedom:
+    /// above 85.35 with probability 0.001.
     fn chi_square(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
         let mut cells = [0u32; 64];
         let mut n = 0.0;
@@ -269,9 +272,9 @@ mod tests {
 
     #[test]
     fn draws_are_the_same_for_ever() {
-        // Yaw, pitch and angle of view in millionths of a degree, computed by a second program from the description at
-        // draw_view. Other values mean that every seed means another data set: if that is wanted, say so in the
-        // changelog.
+        // Yaw, pitch and angle of view in millionths of a degree, computed by a second program from the
+        // description at draw_view. Other values mean that every seed means another data set: if that is
+        // wanted, say so in the changelog.
         let dist = ViewDistribution::default();
         let micro =
             |v: View| [v.yaw_rad, v.pitch_rad, v.fov_rad].map(|rad| (rad.to_degrees() * 1e6).round() as i64);

@@ -19,9 +19,10 @@ pub fn is_demo_scan(folder: &Path) -> bool {
 }
 
 impl AnnotatedScene {
-    /// Writes a scan of the scene into `folder`, which is made if it is not there: the textured mesh (`rgb.obj`), the
-    /// annotated points of [`AnnotatedScene::scan`] (an S3DIS tree, `Area_1`), the scan locations (`cameras.csv`), and
-    /// `scene.toml`, which ties them together. Returns the path of `scene.toml`, which is written last.
+    /// Writes a scan of the scene into `folder`, which is made if it is not there: the textured mesh
+    /// (`rgb.obj`), the annotated points of [`AnnotatedScene::scan`] (an S3DIS tree, `Area_1`), the scan
+    /// locations (`cameras.csv`), and `scene.toml`, which ties them together. Returns the path of
+    /// `scene.toml`, which is written last.
     ///
     /// `go_on` is asked before each room of points. Where it says no, what was written so far stays.
     ///

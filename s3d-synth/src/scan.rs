@@ -5,7 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
 
-/// How a scene is scanned. Its `Default` is that of the demo: 3,000 points a square metre, about what S3DIS has.
+/// How a scene is scanned. Its `Default` is that of the demo: 3,000 points a square metre, about what S3DIS
+/// has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanOptions {
     /// Points a square metre of every instance: at most 1e6.
@@ -24,8 +25,8 @@ impl Default for ScanOptions {
     }
 }
 
-/// The points of a scene's instances: yields the index of an instance and its points, in the order of the rooms' names
-/// and in a room in that of the instances. See [`AnnotatedScene::scan`].
+/// The points of a scene's instances: yields the index of an instance and its points, in the order of the
+/// rooms' names and in a room in that of the instances. See [`AnnotatedScene::scan`].
 #[derive(Clone, Debug)]
 pub struct Scan<'a> {
     scene: &'a AnnotatedScene,
@@ -37,8 +38,8 @@ pub struct Scan<'a> {
 }
 
 impl AnnotatedScene {
-    /// Scans every instance: uniformly drawn points with colours, each with the face that it lies on, off its surface by a
-    /// uniform noise. An instance gets one point at least. World metres.
+    /// Scans every instance: uniformly drawn points with colours, each with the face that it lies on, off its
+    /// surface by a uniform noise. An instance gets one point at least. World metres.
     ///
     /// ```
     /// use s3d_synth::{Building, ScanOptions};

@@ -23,7 +23,8 @@ use s3d_label::{Class, Room};
 /// ```
 #[derive(Clone, Debug)]
 pub struct AnnotatedScene {
-    /// Its surface with textures: world metres, Z-up. Room by room; fronts are on the side from which they are seen.
+    /// Its surface with textures: world metres, Z-up. Room by room; fronts are on the side from which they
+    /// are seen.
     pub mesh: TriMesh,
     /// Index into `instances` by face of the mesh.
     pub instance_of_face: Vec<u32>,
@@ -49,12 +50,14 @@ pub struct Instance {
 impl Building {
     /// Builds the scene: the same at every call, on every platform.
     ///
-    /// A room's faces come in this order: what fills its openings, its lamps, its items, floor, ceiling, walls. The images
-    /// of floors, walls and ceilings hold the light of windows and lamps, and shade where something stands.
+    /// A room's faces come in this order: what fills its openings, its lamps, its items, floor, ceiling,
+    /// walls. The images of floors, walls and ceilings hold the light of windows and lamps, and shade where
+    /// something stands.
     ///
     /// # Errors
-    /// [`BuildingError`] if something is impossible: a room without a size, an opening outside its wall, rooms or openings
-    /// that overlap, a thing that is too small to be built or leaves its room, a location outside of all rooms, …
+    /// [`BuildingError`] if something is impossible: a room without a size, an opening outside its wall,
+    /// rooms or openings that overlap, a thing that is too small to be built or leaves its room, a location
+    /// outside of all rooms, …
     pub fn build(&self) -> Result<AnnotatedScene, BuildingError> {
         self.check()?;
         let mut builder = Builder::new(self.texture_scale);

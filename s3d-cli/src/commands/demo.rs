@@ -53,8 +53,8 @@ pub(crate) struct SizeArgs {
     /// Density of the point cloud.
     #[arg(long, value_name = "N", default_value_t = 2500.0, value_parser = positive)]
     pub(crate) points_per_m2: f64,
-    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make them) or small
-    /// (slowest). The pixels are the same.
+    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make
+    /// them) or small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
 }
@@ -107,8 +107,8 @@ fn write_scan(folder: &Path, cancel: &Cancel) -> Result<PathBuf> {
     })
 }
 
-/// Gives the scene its place. One that is there already, of a demo that was stopped, may stay if it is the same to the
-/// byte: somebody may have changed it since.
+/// Gives the scene its place. One that is there already, of a demo that was stopped, may stay if it is the
+/// same to the byte: somebody may have changed it since.
 fn put(part: &Path, scan: &Path, overwrite: bool, cancel: &Cancel) -> Result<()> {
     if scan.exists() {
         if same(part, scan).map_err(|e| FileError::io(scan, "read", e))? {

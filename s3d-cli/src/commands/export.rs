@@ -21,12 +21,12 @@ pub(crate) struct ExportArgs {
     /// The data set's folder [default: SCENE_2d3ds beside the first scene]
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
-    /// Write into an OUT that holds something: an earlier data set there, or an unfinished one of another call, is
-    /// replaced, other files stay.
+    /// Write into an OUT that holds something: an earlier data set there, or an unfinished one of another
+    /// call, is replaced, other files stay.
     #[arg(long)]
     pub(crate) overwrite: bool,
-    /// Do one of N parts of the work, such as 2/4. The parts may be done anywhere, in any order, into one OUT or one each;
-    /// `s3d merge` makes the data set of them.
+    /// Do one of N parts of the work, such as 2/4. The parts may be done anywhere, in any order, into one OUT
+    /// or one each; `s3d merge` makes the data set of them.
     #[arg(long, value_name = "i/N", value_parser = parsed::<Shard>)]
     pub(crate) shard: Option<Shard>,
     /// Take labels and scores from the folder that `s3d plan` made, instead of making them.
@@ -52,8 +52,8 @@ pub(crate) struct OptionArgs {
     /// Everything random comes from it: the same input and seed give the same bytes.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Put scan locations on the floor of every room instead of reading some: no two of a room nearer than this, 1.5 m high,
-    /// clear of walls and things.
+    /// Put scan locations on the floor of every room instead of reading some: no two of a room nearer than
+    /// this, 1.5 m high, clear of walls and things.
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub(crate) place_cameras: Option<f64>,
     /// Among which candidates views are selected: of the whole data set, of an area, or of a location.
@@ -62,12 +62,13 @@ pub(crate) struct OptionArgs {
     /// Density of the point cloud.
     #[arg(long, value_name = "N", default_value_t = 10_000.0, value_parser = positive)]
     pub(crate) points_per_m2: f64,
-    /// Count the classes of a candidate view on every Nth pixel of both axes; 1 counts all, exactly. With 4 the entropies
-    /// of two scenes were off by 0.003 nats at most, 0.0006 on average, and the same views were kept.
+    /// Count the classes of a candidate view on every Nth pixel of both axes; 1 counts all, exactly. With 4
+    /// the entropies of two scenes were off by 0.003 nats at most, 0.0006 on average, and the same views were
+    /// kept.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = value_parser!(u32).range(1..=64))]
     pub(crate) entropy_stride: u32,
-    /// Which images to write, such as rgb,depth,pose [default: all of rgb, depth, normal, semantic, semantic_pretty,
-    /// global_xyz, pose]
+    /// Which images to write, such as rgb,depth,pose [default: all of rgb, depth, normal, semantic,
+    /// semantic_pretty, global_xyz, pose]
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = Domain::ALL,
         hide_default_value = true, value_parser = parsed::<Domain>)]
     pub(crate) modalities: Vec<Domain>,
@@ -80,12 +81,12 @@ pub(crate) struct OptionArgs {
     /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
     #[arg(long)]
     pub(crate) smooth_normals: bool,
-    /// Skip and count what is not as it should be in the annotations — odd names, lines that are no points, unknown
-    /// classes — instead of stopping at it.
+    /// Skip and count what is not as it should be in the annotations — odd names, lines that are no points,
+    /// unknown classes — instead of stopping at it.
     #[arg(long)]
     pub(crate) lenient: bool,
-    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make them) or small
-    /// (slowest). The pixels are the same.
+    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make
+    /// them) or small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
     #[command(flatten)]
@@ -95,19 +96,20 @@ pub(crate) struct OptionArgs {
 /// In which of several forms an export is written. The defaults are the published ones.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct FormatArgs {
-    /// World coordinates as half floats (1.6 cm steps at 20 m from the origin), as 32-bit floats, or not at all, whatever
-    /// --modalities says: `s3d xyz` makes them later from depth and pose.
+    /// World coordinates as half floats (1.6 cm steps at 20 m from the origin), as 32-bit floats, or not at
+    /// all, whatever --modalities says: `s3d xyz` makes them later from depth and pose.
     #[arg(long, default_value_t, value_parser = parsed::<XyzType>, value_name = "half|float|none")]
     pub(crate) xyz: XyzType,
-    /// Axes of normals in views: the paper's (B towards the camera) or OpenCV's (B forward, as omnidata has them).
-    /// Panoramas have X, −Z, Y of the world in either.
+    /// Axes of normals in views: the paper's (B towards the camera) or OpenCV's (B forward, as omnidata has
+    /// them). Panoramas have X, −Z, Y of the world in either.
     #[arg(long, default_value = "paper", value_parser = normal_axes, value_name = "paper|opencv")]
     pub(crate) normal_axes: NormalAxes,
-    /// Depth in 512ths of a metre (up to 128 m), or in millimetres (up to 65.534 m; loaders of the published data divide
-    /// by 512).
+    /// Depth in 512ths of a metre (up to 128 m), or in millimetres (up to 65.534 m; loaders of the published
+    /// data divide by 512).
     #[arg(long, default_value_t, value_parser = parsed::<DepthUnits>, value_name = "512|mm")]
     pub(crate) depth_units: DepthUnits,
-    /// Fill semantic_labels.json with null labels up to N entries: loaders look missing pixels up at index 3341.
+    /// Fill semantic_labels.json with null labels up to N entries: loaders look missing pixels up at index
+    /// 3341.
     #[arg(long, default_value_t, value_parser = parsed::<PadLabels>, value_name = "N|off")]
     pub(crate) pad_labels: PadLabels,
     /// Write what a point cloud loader wants to OUT/profiles/NAME besides; may be repeated.

@@ -50,8 +50,8 @@ pub(crate) struct SpecificArgs {
     /// webdataset: samples of a shard, at most [default: 10000]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_count: Option<u32>,
-    /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar and
-    /// area_N_panoramas-000000.tar for each
+    /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar
+    /// and area_N_panoramas-000000.tar for each
     #[arg(long, value_name = "PREFIX", value_parser = parsed::<ShardPrefix>)]
     pub(crate) prefix: Option<ShardPrefix>,
     /// webdataset: samples in a random order that this number decides, instead of by scan location
@@ -63,18 +63,21 @@ pub(crate) struct SpecificArgs {
     /// colmap: cameras.bin, images.bin and points3D.bin instead of text
     #[arg(long)]
     pub(crate) binary: bool,
-    /// colmap, nerfstudio: copy the RGB images into DEST, which can be moved then, instead of pointing to those in OUT
+    /// colmap, nerfstudio: copy the RGB images into DEST, which can be moved then, instead of pointing to
+    /// those in OUT
     #[arg(long)]
     pub(crate) copy_images: bool,
-    /// nerfstudio: depth written anew in millimetres with 0 for missing, as it is read by default; OUT's own files, for
-    /// which ns-train's --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels seem to be 128 m away; or
-    /// none [default: millimetres]
+    /// nerfstudio: depth written anew in millimetres with 0 for missing, as it is read by default; OUT's own
+    /// files, for which ns-train's --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels
+    /// seem to be 128 m away; or none [default: millimetres]
     #[arg(long, value_name = "millimetres|original|none", value_parser = parsed::<DepthFiles>)]
     pub(crate) depth: Option<DepthFiles>,
-    /// coco: classes of which all instances in an image are one segment, or none [default: ceiling,floor,wall]
+    /// coco: classes of which all instances in an image are one segment, or none [default:
+    /// ceiling,floor,wall]
     #[arg(long, value_name = "LIST|none", value_parser = parsed::<ClassList>)]
     pub(crate) stuff: Option<ClassList>,
-    /// coco, nerfstudio: how much time the images' files may take: fast, balanced or small [default: balanced]
+    /// coco, nerfstudio: how much time the images' files may take: fast, balanced or small [default:
+    /// balanced]
     #[arg(long, value_name = "fast|balanced|small", value_parser = parsed::<Compression>)]
     pub(crate) compression: Option<Compression>,
 }

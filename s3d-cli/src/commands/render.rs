@@ -37,8 +37,8 @@ pub(crate) struct RenderArgs {
     /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
     #[arg(long)]
     pub(crate) smooth_normals: bool,
-    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make them) or small
-    /// (slowest). The pixels are the same.
+    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make
+    /// them) or small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
     /// The folder for the images.

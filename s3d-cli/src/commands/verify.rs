@@ -12,8 +12,8 @@ pub(crate) struct VerifyArgs {
     /// The data set's folder.
     #[arg(value_name = "OUT")]
     pub(crate) output: PathBuf,
-    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point cloud. Every
-    /// pixel of every image is compared in either case.
+    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point
+    /// cloud. Every pixel of every image is compared in either case.
     #[arg(long)]
     pub(crate) full: bool,
     #[command(flatten)]

@@ -22,7 +22,8 @@ pub(crate) fn s3d_ok(args: &[&str]) -> String {
     log
 }
 
-/// Runs `s3d`, which must fail with this exit code and a message that holds each of these parts, without a panic.
+/// Runs `s3d`, which must fail with this exit code and a message that holds each of these parts, without a
+/// panic.
 pub(crate) fn s3d_fails(args: &[&str], code: i32, parts: &[&str]) {
     let out = s3d(args);
     let log = String::from_utf8_lossy(&out.stderr);
@@ -40,14 +41,15 @@ pub(crate) fn text(path: &Path) -> &str {
 pub(crate) const UUID_A: &str = "00112233445566778899aabbccddeeff";
 pub(crate) const UUID_B: &str = "ffeeddccbbaa99887766554433221100";
 
-/// A closed room of 4 × 3 × 2.5 m with a table in it, its annotation and two scan locations, all in `dir`. Returns the
-/// scene file.
+/// A closed room of 4 × 3 × 2.5 m with a table in it, its annotation and two scan locations, all in `dir`.
+/// Returns the scene file.
 pub(crate) fn write_scan(dir: &Path, area: u32) -> PathBuf {
     fs::create_dir_all(dir).unwrap();
     let mut obj = String::from("mtllib room.mtl\n");
     let mut corners = 0;
     let mut annotations: BTreeMap<&str, String> = BTreeMap::new();
-    // A quad o, o + u, o + u + v, o + v in world coordinates, counter-clockwise from the inside; the file is Y-up.
+    // A quad o, o + u, o + u + v, o + v in world coordinates, counter-clockwise from the inside; the file is
+    // Y-up.
     let mut quad = |name: &'static str, o: [f64; 3], u: [f64; 3], v: [f64; 3]| {
         let at = |s: f64, t: f64| -> [f64; 3] { std::array::from_fn(|k| o[k] + s * u[k] + t * v[k]) };
         let _ = writeln!(obj, "usemtl {}", name.split('_').next().unwrap());

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The longest that refusing something may take. It is a fraction of a second on a machine that does nothing else.
+/// The longest that refusing something may take. It is a fraction of a second on a machine that does nothing
+/// else.
 pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 pub(crate) const SMALL: [&str; 8] =
     ["--size", "32", "--pano-width", "64", "--views", "3", "--points-per-m2", "50"];
@@ -57,7 +58,8 @@ impl Scan {
         self.replace("scene.toml", "path = \"cameras.csv\"", &format!("path = \"{name}\""));
     }
 
-    /// An export fails with exit code 1, says so, and leaves everything beside OUT as it was, and no OUT that looks complete.
+    /// An export fails with exit code 1, says so, and leaves everything beside OUT as it was, and no OUT that
+    /// looks complete.
     pub(crate) fn refused(&self, parts: &[&str]) {
         let before = listing(self.dir.path());
         let out = self.out();

@@ -58,8 +58,8 @@ impl Common<'_> {
     }
 }
 
-/// With more faces than this, what is only needed while two hierarchies are built, 200 bytes a face each, should not be in
-/// memory twice.
+/// With more faces than this, what is only needed while two hierarchies are built, 200 bytes a face each,
+/// should not be in memory twice.
 const LARGE_MESH: usize = 2_000_000;
 
 /// A mesh that is ready for rays.
@@ -69,7 +69,8 @@ pub(crate) struct PreparedMesh<'m> {
 }
 
 impl<'m> PreparedMesh<'m> {
-    /// Prepares the mesh, and its nearest faces (at the same time, unless it is large), which are needed for its labels only.
+    /// Prepares the mesh, and its nearest faces (at the same time, unless it is large), which are needed for
+    /// its labels only.
     pub(crate) fn new(file: &'m MeshFile) -> (Self, NearestFaces<'m>) {
         let (scene, nearest) = match file.mesh.faces().len() {
             0..=LARGE_MESH => rayon::join(|| Scene::new(&file.mesh), || NearestFaces::new(&file.mesh)),
@@ -144,7 +145,8 @@ fn label_files(layout: &Layout, area: u32) -> [PathBuf; 5] {
     ]
 }
 
-/// An area that was labelled before, if it can be taken as it is: not where the files of its labels are still to be written.
+/// An area that was labelled before, if it can be taken as it is: not where the files of its labels are still
+/// to be written.
 pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<AreaPlan> {
     let ctx = common.account.ctx;
     let unit = Unit::Labels(area);
@@ -162,7 +164,8 @@ pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<AreaPlan
     }
 }
 
-/// Labels an area, keeps what is known then, and writes the files of its labels, if that is ours and was not done before.
+/// Labels an area, keeps what is known then, and writes the files of its labels, if that is ours and was not
+/// done before.
 pub(crate) fn label_area(
     area: &AreaInput,
     prepared: &PreparedMesh<'_>,
@@ -433,7 +436,8 @@ fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
     label_doubts(&annotated.report).iter().for_each(|w| ctx.warn(w));
 }
 
-/// Renders those locations of an area that are to be done, and beside them writes its meshes and points if they are.
+/// Renders those locations of an area that are to be done, and beside them writes its meshes and points if
+/// they are.
 pub(crate) fn render_area(
     area: &AreaInput,
     prepared: &PreparedMesh<'_>,

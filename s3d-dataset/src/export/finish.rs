@@ -1,5 +1,5 @@
-//! The end of an export: what is made of all areas together, once every unit is done. It needs nothing but the files on
-//! the disk, the request and what the journals tell.
+//! The end of an export: what is made of all areas together, once every unit is done. It needs nothing but
+//! the files on the disk, the request and what the journals tell.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -29,8 +29,8 @@ pub(crate) struct Totals {
     pub(crate) views: ViewTally,
 }
 
-/// The units that are still to be done of a request, as far as they are known: those of an area's locations only once its
-/// labels are done.
+/// The units that are still to be done of a request, as far as they are known: those of an area's locations
+/// only once its labels are done.
 pub(crate) fn missing_units(request: &Request, finished: &Finished) -> Vec<Unit> {
     let mut missing = Vec::new();
     for area in request.numbers() {
@@ -56,9 +56,10 @@ pub(crate) fn is_chosen(request: &Request, uuid: &str) -> bool {
     only.is_empty() || only.iter().any(|o| o == uuid)
 }
 
-/// Writes the tables, the list of files and, when all of it is on the disk, the manifest that says that the data set is
-/// complete. Beside the units' files there must be `assets` and `conventions.json`. `manifest` is the one that was written
-/// when the export began; `disk` what brings the units' files to the disk, if something does.
+/// Writes the tables, the list of files and, when all of it is on the disk, the manifest that says that the
+/// data set is complete. Beside the units' files there must be `assets` and `conventions.json`. `manifest` is
+/// the one that was written when the export began; `disk` what brings the units' files to the disk, if
+/// something does.
 ///
 /// # Errors
 /// [`Error::Input`] if a unit is missing.
@@ -122,8 +123,8 @@ pub(crate) fn finish(
     Ok(Totals { files: count + 2, bytes: listed + own.iter().sum::<u64>(), locations, views })
 }
 
-/// Writes the profiles that are asked for, anew: some of their files are second names of files of the tree, which must not
-/// be written to.
+/// Writes the profiles that are asked for, anew: some of their files are second names of files of the tree,
+/// which must not be written to.
 fn write_profiles(ctx: &Context, layout: &Layout, request: &Request, areas: &[u32]) -> Result<()> {
     let wanted = &request.options.profiles;
     for profile in wanted {

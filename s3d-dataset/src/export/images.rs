@@ -73,8 +73,8 @@ enum Work<'a> {
     Shot(&'a Shot),
 }
 
-/// Renders and writes the panoramas of the chosen locations and their kept views. `assets` is done once, by one of the
-/// threads, meanwhile; none if it is done already.
+/// Renders and writes the panoramas of the chosen locations and their kept views. `assets` is done once, by
+/// one of the threads, meanwhile; none if it is done already.
 pub(crate) fn write_images(
     ctx: &Context,
     job: &ImageJob<'_>,

@@ -126,8 +126,9 @@ impl<'a> Job<'a> {
         for area in &inputs.areas {
             pictures.push(area_pictures(ctx, area, options)?);
         }
-        // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a single area is
-        // kept from then on; several are read again where they are needed, so that they never share memory.
+        // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a
+        // single area is kept from then on; several are read again where they are needed, so that they never
+        // share memory.
         let mut single: Option<Arc<MeshFile>> = None;
         let mut companions = Vec::new();
         for area in &inputs.areas {
@@ -189,9 +190,9 @@ impl<'a> Job<'a> {
         Common { table, layout, options, journal, account, cache, is_ours }
     }
 
-    /// Labels areas, those of which something is still to be done or all, and scores those of their locations that are not
-    /// scored. The files of an area's labels are written if that unit is ours; if not, what it tells is known to the
-    /// journal, but not written in it.
+    /// Labels areas, those of which something is still to be done or all, and scores those of their locations
+    /// that are not scored. The files of an area's labels are written if that unit is ours; if not, what it
+    /// tells is known to the journal, but not written in it.
     pub(crate) fn label(&self, common: Common<'_>, scope: Scope) -> Result<Labelled<'_>> {
         let missing = missing_units(&self.request, &common.journal.finished());
         let is_needed = |area: u32| scope == Scope::All || missing.iter().any(|unit| unit.area() == area);
@@ -210,8 +211,8 @@ impl<'a> Job<'a> {
         Ok(labelled)
     }
 
-    /// Labels an area, or takes it as it was labelled before, and scores what is ours and not scored. Its mesh, ready for
-    /// rays, is kept in `single` if there is but one area.
+    /// Labels an area, or takes it as it was labelled before, and scores what is ours and not scored. Its
+    /// mesh, ready for rays, is kept in `single` if there is but one area.
     fn label_area<'j>(
         &'j self,
         area: &AreaInput,

@@ -91,9 +91,9 @@ impl Outlook {
     }
 }
 
-/// The room in which a point stands: the one whose floor outline holds it, or else the nearest outline; the first by
-/// name where several do. A room with too few points for an outline has its points' box instead. A building of one
-/// storey an area is assumed, as in the data set.
+/// The room in which a point stands: the one whose floor outline holds it, or else the nearest outline; the
+/// first by name where several do. A room with too few points for an outline has its points' box instead. A
+/// building of one storey an area is assumed, as in the data set.
 ///
 /// # Panics
 /// If there is no room.

@@ -1,7 +1,8 @@
-//! The export: load → label → sample → score → select → render → tables. The one place that composes the stages.
+//! The export: load → label → sample → score → select → render → tables. The one place that composes the
+//! stages.
 //!
-//! An export is begun or gone on with in a folder (`store/output.rs`), its units of work are done ([`job`]) and written down
-//! in the journal, and then finished ([`finish`]).
+//! An export is begun or gone on with in a folder (`store/output.rs`), its units of work are done ([`job`])
+//! and written down in the journal, and then finished ([`finish`]).
 
 pub(crate) mod area;
 pub(crate) mod finish;
@@ -41,8 +42,8 @@ pub struct Export {
 }
 
 impl Export {
-    /// Of these scenes, one an area: paths of scene files (`scene.toml`) or of folders of published areas (`area_3`), or
-    /// [values in memory](crate::MemoryScene).
+    /// Of these scenes, one an area: paths of scene files (`scene.toml`) or of folders of published areas
+    /// (`area_3`), or [values in memory](crate::MemoryScene).
     pub fn new<S: Into<SceneSource>>(scenes: impl IntoIterator<Item = S>) -> Self {
         Self {
             scenes: scenes.into_iter().map(Into::into).collect(),
@@ -70,8 +71,8 @@ impl Export {
         self
     }
 
-    /// Only one of several parts of the work. The parts may be done anywhere, in any order, into one folder or one each;
-    /// [`merge`](crate::merge()) makes the data set of them.
+    /// Only one of several parts of the work. The parts may be done anywhere, in any order, into one folder
+    /// or one each; [`merge`](crate::merge()) makes the data set of them.
     pub fn shard(self, shard: Option<Shard>) -> Self {
         Self { shard, ..self }
     }
@@ -84,7 +85,7 @@ impl Export {
     /// Looks whether the folder `output` may be exported into, and changes nothing.
     ///
     /// # Errors
-    /// [`Error::Usage`] if it holds something else, and is not to be replaced.
+    /// [`Usage`](crate::Error::Usage) if it holds something else, and is not to be replaced.
     pub fn check_output(&self, output: &Path, ctx: &Context) -> Result<()> {
         output::check(ctx, &Layout::new(output), self.overwrite, &self.allowed_names())
     }
@@ -93,15 +94,17 @@ impl Export {
         self.allowed.iter().map(String::as_str).collect()
     }
 
-    /// Makes the data set in the folder `output`, on the threads of the current rayon pool, or goes on with it where an
-    /// equal call was stopped. What is there when this returns [`Error::Cancelled`] or [`Error::Temporary`] is kept for the
-    /// same call; any other failure leaves what was there before.
+    /// Makes the data set in the folder `output`, on the threads of the current rayon pool, or goes on with
+    /// it where an equal call was stopped. What is there when this returns
+    /// [`Cancelled`](crate::Error::Cancelled) or [`Temporary`](crate::Error::Temporary) is kept for the same
+    /// call; any other failure leaves what was there before.
     ///
     /// Returns what was made; `None` if it was all there already.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the options are out of range or the folder holds something else; [`Error::Input`] or
-    /// [`Error::File`] if the input is wrong; [`Error::Cancelled`]; [`Error::Temporary`].
+    /// [`Usage`](crate::Error::Usage) if the options are out of range or the folder holds something else;
+    /// [`Input`](crate::Error::Input) or [`File`](crate::Error::File) if the input is wrong;
+    /// [`Cancelled`](crate::Error::Cancelled); [`Temporary`](crate::Error::Temporary).
     pub fn run(&self, output: impl Into<PathBuf>, ctx: &Context) -> Result<Option<Summary>> {
         let options = self.options.canonical()?;
         let plan = self.plan.as_deref().map(|folder| Plan::open(ctx, folder)).transpose()?;

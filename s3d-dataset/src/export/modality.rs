@@ -26,7 +26,8 @@ pub(crate) struct Channels<'a> {
     pub(crate) pretty_of_face: &'a [[u8; 3]],
     /// How much time their files may take.
     pub(crate) compression: Compression,
-    /// Units of depth, axes of normals, type of coordinates (of which none counts as half: it is not asked for then).
+    /// Units of depth, axes of normals, type of coordinates (of which none counts as half: it is not asked
+    /// for then).
     pub(crate) conventions: Conventions,
 }
 
@@ -89,9 +90,9 @@ impl Default for ImageBuffers {
 }
 
 impl Channels<'_> {
-    /// What `each` makes of the files of some images of a view, from the view's hits, in the order of `images`. Threads of the
-    /// current rayon pool that have nothing else to do take part. Nothing but time depends on what `prints` were used for
-    /// before.
+    /// What `each` makes of the files of some images of a view, from the view's hits, in the order of
+    /// `images`. Threads of the current rayon pool that have nothing else to do take part. Nothing but time
+    /// depends on what `prints` were used for before.
     ///
     /// # Errors
     /// That of `each`, which is given every file.

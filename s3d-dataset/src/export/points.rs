@@ -14,7 +14,8 @@ use std::ops::Range;
 /// Points drawn at a time: what is in memory of a cloud of any size.
 const CHUNK: u64 = 1 << 18;
 
-/// More points than this in one cloud are taken for a slip: 150 times the largest area of the published data set.
+/// More points than this in one cloud are taken for a slip: 150 times the largest area of the published data
+/// set.
 const MAX_POINTS: f64 = 1e11;
 
 /// Refuses a density that would draw points without end.
@@ -32,8 +33,8 @@ pub(crate) fn check_density(mesh: &TriMesh, points_per_m2: f64) -> Result<()> {
 /// Room of every label of an area, and the instance's number there.
 type Places = BTreeMap<LabelId, (Room, u32)>;
 
-/// Samples the labelled mesh and writes the points, grouped by room and instance: those of faces without a label come
-/// last, and into the PLY file only. Returns how many there are.
+/// Samples the labelled mesh and writes the points, grouped by room and instance: those of faces without a
+/// label come last, and into the PLY file only. Returns how many there are.
 pub(crate) fn write_points(
     ctx: &Context,
     layout: &Layout,
@@ -75,7 +76,8 @@ pub(crate) fn write_points(
         annotated.rooms.iter().map(|r| (r.room, r.wall_direction_deg)).collect();
     let mut in_tree = BTreeSet::new();
     for (room, runs) in rooms {
-        // A room that no point was drawn in stands nowhere in the tree: loaders stop at one without annotations.
+        // A room that no point was drawn in stands nowhere in the tree: loaders stop at one without
+        // annotations.
         let has_points =
             runs.iter().any(|r| sampler.points_before(r.faces.start) < sampler.points_before(r.faces.end));
         let room = room.filter(|_| has_points);

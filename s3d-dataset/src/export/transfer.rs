@@ -8,9 +8,9 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-/// Gives a file of the folder `from` the same name in `to`: as a second name of the same bytes where the file systems can do
-/// that, and else as a copy. Then it is read there; what is wrong with it is returned: nothing, if it is the file that was
-/// recorded.
+/// Gives a file of the folder `from` the same name in `to`: as a second name of the same bytes where the file
+/// systems can do that, and else as a copy. Then it is read there; what is wrong with it is returned:
+/// nothing, if it is the file that was recorded.
 pub(crate) fn bring(record: &FileRecord, from: &Path, to: &Path) -> Result<Option<String>> {
     let (source, target) = (record.path_in(from), record.path_in(to));
     // Refuses a path that leads out of the folder.
@@ -18,9 +18,10 @@ pub(crate) fn bring(record: &FileRecord, from: &Path, to: &Path) -> Result<Optio
     if let Some(folder) = target.parent() {
         create_dir(folder)?;
     }
-    // Of a link to a file a second name would be a link too, to a file that somebody else may remove. Whatever else keeps it
-    // from being linked, a name that is taken among that, a copy says it better: it takes its place only when it is whole,
-    // so that nothing is lost should the two be one file, as through two paths to one folder.
+    // Of a link to a file a second name would be a link too, to a file that somebody else may remove.
+    // Whatever else keeps it from being linked, a name that is taken among that, a copy says it better: it
+    // takes its place only when it is whole, so that nothing is lost should the two be one file, as through
+    // two paths to one folder.
     let is_link = fs::symlink_metadata(&source).is_ok_and(|found| found.is_symlink());
     if is_link || fs::hard_link(&source, &target).is_err() {
         let mut reader = match File::open(&source) {

@@ -85,8 +85,9 @@ fn draw(
     (0..views).map(candidate).collect()
 }
 
-/// Draws the candidates of those locations of an area that are asked for, and scores each by the entropy of what it sees.
-/// What is done goes to `each`, a location at a time, by whichever thread: its uuid, and the entropies of its candidates.
+/// Draws the candidates of those locations of an area that are asked for, and scores each by the entropy of
+/// what it sees. What is done goes to `each`, a location at a time, by whichever thread: its uuid, and the
+/// entropies of its candidates.
 pub(crate) fn score_area(
     ctx: &Context,
     locations: &[&ScanLocation],
@@ -134,8 +135,8 @@ pub(crate) fn score_area(
     })
 }
 
-/// All candidates of a request whose areas are labelled and whose locations are scored, with the selection made, and what
-/// became of them.
+/// All candidates of a request whose areas are labelled and whose locations are scored, with the selection
+/// made, and what became of them.
 ///
 /// # Errors
 /// [`Error::Input`] if something of that is missing.
@@ -168,8 +169,8 @@ pub(crate) fn select_requested(
     Ok((candidates, tally))
 }
 
-/// Counts candidates after their selection; those of an area, and of a location in it, follow each other. `only` are
-/// the locations whose images are asked for, all if it is empty.
+/// Counts candidates after their selection; those of an area, and of a location in it, follow each other.
+/// `only` are the locations whose images are asked for, all if it is empty.
 pub(crate) fn tally(candidates: &[Candidate], pool: Pool, keep_all: bool, only: &[String]) -> ViewTally {
     let kept: Vec<&Candidate> = candidates.iter().filter(|c| c.frame_num.is_some()).collect();
     let same_pool = |a: &Candidate, b: &Candidate| match pool {

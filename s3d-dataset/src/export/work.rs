@@ -5,10 +5,11 @@ use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Does `work` on every item, on every thread of the current pool. Items are handed out one at a time and in order, so
-/// that a slow one delays nobody else; at most one an item a thread is under way. After a failure, or a signal that asks for
-/// an end, no further item is begun, and the failure of the first item (by order) that failed is returned. Each thread works with a state of its
-/// own, which `state` makes: memory to be used again, nothing that a result depends on.
+/// Does `work` on every item, on every thread of the current pool. Items are handed out one at a time and in
+/// order, so that a slow one delays nobody else; at most one an item a thread is under way. After a failure,
+/// or a signal that asks for an end, no further item is begun, and the failure of the first item (by order)
+/// that failed is returned. Each thread works with a state of its own, which `state` makes: memory to be used
+/// again, nothing that a result depends on.
 pub(crate) fn for_each_in_order<T: Sync, S>(
     ctx: &Context,
     items: &[T],

@@ -35,7 +35,8 @@ impl About {
     }
 }
 
-/// A folder that is made beside its place and moved there when it is complete. Dropped before, it leaves nothing behind.
+/// A folder that is made beside its place and moved there when it is complete. Dropped before, it leaves
+/// nothing behind.
 pub(crate) struct Destination {
     place: PathBuf,
     begun: TempDir,
@@ -45,8 +46,8 @@ impl Destination {
     /// Begins the package that will be the folder `place`.
     ///
     /// # Errors
-    /// [`Error::Usage`] if it lies in the data set `root` or holds it, or if there is something in it that is not to be,
-    /// or may not be, replaced.
+    /// [`Error::Usage`] if it lies in the data set `root` or holds it, or if there is something in it that is
+    /// not to be, or may not be, replaced.
     pub(crate) fn begin(place: &Path, root: &Path, overwrite: bool) -> Result<Self> {
         check_apart(place, root)?;
         check_free(place, overwrite)?;
@@ -161,8 +162,8 @@ pub(crate) fn resolved(path: &Path) -> std::io::Result<PathBuf> {
     }
 }
 
-/// The path by which `target` is found from the folder `from`, with `/`; absolute where there is none (another drive).
-/// Both are absolute and without links.
+/// The path by which `target` is found from the folder `from`, with `/`; absolute where there is none
+/// (another drive). Both are absolute and without links.
 pub(crate) fn relative_path(from: &Path, target: &Path) -> String {
     let (mut a, mut b) = (from.components().peekable(), target.components().peekable());
     let mut common = 0;

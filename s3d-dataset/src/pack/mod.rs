@@ -32,8 +32,9 @@ const POINTS: u32 = 100_000;
 /// Makes a package of the data set in the folder `dataset`, in which nothing is altered. Returns where it is.
 ///
 /// # Errors
-/// [`Error::Usage`] if options exclude each other or something is in the way; [`Error::Input`] if the data set lacks what the
-/// package needs; [`Error::File`]; [`Error::Cancelled`]; [`Error::Temporary`]. No half of a package is left behind.
+/// [`Error::Usage`] if options exclude each other or something is in the way; [`Error::Input`] if the data
+/// set lacks what the package needs; [`Error::File`]; [`Error::Cancelled`]; [`Error::Temporary`]. No half of
+/// a package is left behind.
 pub fn pack(dataset: &Path, kind: PackageKind, options: &PackOptions, ctx: &Context) -> Result<PathBuf> {
     let started = Instant::now();
     options.specific.check(kind)?;

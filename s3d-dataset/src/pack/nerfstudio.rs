@@ -1,4 +1,5 @@
-//! `s3d pack --to nerfstudio`: `transforms.json` for each area, another for its panoramas, and a cloud to begin from.
+//! `s3d pack --to nerfstudio`: `transforms.json` for each area, another for its panoramas, and a cloud to
+//! begin from.
 
 use super::destination::{Destination, relative_path, resolved};
 use super::options::{DepthFiles, SpecificOptions};

@@ -32,8 +32,8 @@ pub struct SpecificOptions {
     pub max_size: Option<u32>,
     /// webdataset: samples of a shard, at most [default: 10000]
     pub max_count: Option<u32>,
-    /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar and
-    /// area_N_panoramas-000000.tar for each
+    /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar
+    /// and area_N_panoramas-000000.tar for each
     pub prefix: Option<ShardPrefix>,
     /// webdataset: samples in a random order that this number decides, instead of by scan location
     pub shuffle: Option<u64>,
@@ -41,15 +41,18 @@ pub struct SpecificOptions {
     pub points: Option<u32>,
     /// colmap: cameras.bin, images.bin and points3D.bin instead of text
     pub binary: bool,
-    /// colmap, nerfstudio: copy the RGB images into DEST, which can be moved then, instead of pointing to those in OUT
+    /// colmap, nerfstudio: copy the RGB images into DEST, which can be moved then, instead of pointing to
+    /// those in OUT
     pub copy_images: bool,
-    /// nerfstudio: depth written anew in millimetres with 0 for missing, as it is read by default; OUT's own files, for
-    /// which ns-train's --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels seem to be 128 m away; or
-    /// none [default: millimetres]
+    /// nerfstudio: depth written anew in millimetres with 0 for missing, as it is read by default; OUT's own
+    /// files, for which ns-train's --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels
+    /// seem to be 128 m away; or none [default: millimetres]
     pub depth: Option<DepthFiles>,
-    /// coco: classes of which all instances in an image are one segment, or none [default: ceiling,floor,wall]
+    /// coco: classes of which all instances in an image are one segment, or none [default:
+    /// ceiling,floor,wall]
     pub stuff: Option<ClassList>,
-    /// coco, nerfstudio: how much time the images' files may take: fast, balanced or small [default: balanced]
+    /// coco, nerfstudio: how much time the images' files may take: fast, balanced or small [default:
+    /// balanced]
     pub compression: Option<Compression>,
 }
 

@@ -135,8 +135,8 @@ fn depth_row(depth: &Raster<u16>, units_per_m: f64) -> (f64, Option<[f64; 3]>) {
     (count as f64 / depth.len() as f64, depth_m)
 }
 
-/// What the pixels of a semantic image show. `counts` has an entry a label, all 0, and is left so. The error is a label that
-/// is not in the table.
+/// What the pixels of a semantic image show. `counts` has an entry a label, all 0, and is left so. The error
+/// is a label that is not in the table.
 fn semantic_row(
     semantic: &Raster<[u8; 3]>,
     table: &LabelTable,

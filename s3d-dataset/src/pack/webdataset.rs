@@ -93,7 +93,8 @@ pub(super) fn pack(
     Ok(notes)
 }
 
-/// The series of shards: of each area its views and its panoramas, or one of all images under the user's name.
+/// The series of shards: of each area its views and its panoramas, or one of all images under the user's
+/// name.
 fn series<'a>(source: &'a Source, options: &SpecificOptions) -> Vec<(String, Vec<&'a DatasetImage>)> {
     if let Some(prefix) = options.prefix.as_ref().map(ShardPrefix::as_str) {
         return vec![(prefix.to_owned(), source.images.iter().collect())];

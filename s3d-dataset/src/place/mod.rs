@@ -1,4 +1,5 @@
-//! Scan locations for a scan that comes without: on the floor of every room, spread evenly, away from walls and things.
+//! Scan locations for a scan that comes without: on the floor of every room, spread evenly, away from walls
+//! and things.
 
 use crate::error::{Error, Result};
 use crate::export::labels::annotate::SurveyedRoom;
@@ -11,7 +12,8 @@ use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk;
 use std::collections::BTreeMap;
 
-/// A tripod's height above the floor, metres. The paper leaves it to the scanner; a tripod of Matterport's stands so.
+/// A tripod's height above the floor, metres. The paper leaves it to the scanner; a tripod of Matterport's
+/// stands so.
 const HEIGHT_M: f64 = 1.5;
 
 /// How far a location keeps from every surface, metres: the first that some place of its room allows.
@@ -54,18 +56,21 @@ pub(crate) type Located = Vec<(ScanLocation, Room)>;
 /// Placed locations, and a sentence on each room that has none.
 pub(crate) type Placed = (Located, Vec<String>);
 
-/// Puts scan locations into the rooms of an area, 1.5 m above their floors, on a Poisson-disk pattern: no two of a room are
-/// nearer than the distance asked for, and every place that is free is nearer than that to one. The way up from the floor
-/// is free, and so are 0.5 m around, or less in rooms that are narrower; and half of all directions or more end at the front of a surface, if that is so anywhere in the room. All look along +Y. Returns the locations with
-/// their rooms, in the order of rooms, and a sentence on each room that has none.
+/// Puts scan locations into the rooms of an area, 1.5 m above their floors, on a Poisson-disk pattern: no two
+/// of a room are nearer than the distance asked for, and every place that is free is nearer than that to one.
+/// The way up from the floor is free, and so are 0.5 m around, or less in rooms that are narrower; and half
+/// of all directions or more end at the front of a surface, if that is so anywhere in the room. All look
+/// along +Y. Returns the locations with their rooms, in the order of rooms, and a sentence on each room that
+/// has none.
 ///
-/// A room's floor is the faces labelled so; a room without any has the floor outline of its points instead, at the
-/// height of the lowest.
+/// A room's floor is the faces labelled so; a room without any has the floor outline of its points instead,
+/// at the height of the lowest.
 pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Result<Placed> {
     let (mut placed, mut warnings) = (Vec::new(), Vec::new());
     let mut floors = floor_faces(ground);
     let floor_m2: f64 = ground.rooms.iter().map(|r| r.footprint.area_m2).sum();
-    // A hundred or so places for each location that may be put, and as many as make 10 cm steps in small rooms.
+    // A hundred or so places for each location that may be put, and as many as make 10 cm steps in small
+    // rooms.
     let per_m2 = (100.0 / (placement.distance_m * placement.distance_m))
         .clamp(100.0, 10_000.0)
         .min(MOST_PLACES / floor_m2.max(1.0));
@@ -158,8 +163,9 @@ fn free_places(scene: &Scene<'_>, nearest: &NearestFaces<'_>, feet: &[DVec3]) ->
     Vec::new()
 }
 
-/// Spreads locations over free places so that each sees the front of a surface in half of all directions or more: the floor of a room
-/// may go on through a door, to where the scan ends. If no place does, as in a scan without walls, that is no condition.
+/// Spreads locations over free places so that each sees the front of a surface in half of all directions or
+/// more: the floor of a room may go on through a door, to where the scan ends. If no place does, as in a scan
+/// without walls, that is no condition.
 fn choose(scene: &Scene<'_>, free: Vec<[f64; 3]>, placement: Placement, name: &str) -> Vec<[f64; 3]> {
     let spread = |places: &[[f64; 3]]| -> Vec<[f64; 3]> {
         let chosen = poisson_disk(places, placement.distance_m, placement.seed, name);

@@ -1,17 +1,18 @@
 //! PointNet and mmdetection3d: a room's points in numpy arrays.
 //!
 //! **PointNet** (`sem_seg/indoor3d_util.py`, and the many that took it over) makes of each room of the tree
-//! `stanford_indoor3d/Area_1_office_3.npy`: float64, N × 7, a row `x y z r g b label`, the room moved so that its least
-//! coordinates are 0. The label is the class: ceiling 0, floor 1, wall 2, beam 3, column 4, window 5, door 6, table 7,
-//! chair 8, sofa 9, bookcase 10, board 11, clutter 12. Lists in `meta/` name the rooms: `anno_paths.txt` and
-//! `all_data_label.txt` take the place of those that come with the loader, which name the 272 published rooms.
+//! `stanford_indoor3d/Area_1_office_3.npy`: float64, N × 7, a row `x y z r g b label`, the room moved so that
+//! its least coordinates are 0. The label is the class: ceiling 0, floor 1, wall 2, beam 3, column 4, window
+//! 5, door 6, table 7, chair 8, sofa 9, bookcase 10, board 11, clutter 12. Lists in `meta/` name the rooms:
+//! `anno_paths.txt` and `all_data_label.txt` take the place of those that come with the loader, which name
+//! the 272 published rooms.
 //!
-//! **mmdetection3d** (`data/s3dis/indoor3d_util.py`) makes of it, in `s3dis_data/`, `Area_1_office_3_point.npy` (float32,
-//! N × 6, moved likewise), `…_sem_label.npy` (int64, N, the same classes) and `…_ins_label.npy` (int64, N, instances from
-//! 1, 0 for none). Its `create_data.py s3dis` then lists the rooms by the folders of
-//! `Stanford3dDataset_v1.2_Aligned_Version/Area_{1..6}`, all six of which must be there: they are made, with an empty
-//! folder a room; the points are in the arrays. The loader numbers instances in the order in which the system lists files;
-//! here it is that of their names.
+//! **mmdetection3d** (`data/s3dis/indoor3d_util.py`) makes of it, in `s3dis_data/`,
+//! `Area_1_office_3_point.npy` (float32, N × 6, moved likewise), `…_sem_label.npy` (int64, N, the same
+//! classes) and `…_ins_label.npy` (int64, N, instances from 1, 0 for none). Its `create_data.py s3dis` then
+//! lists the rooms by the folders of `Stanford3dDataset_v1.2_Aligned_Version/Area_{1..6}`, all six of which
+//! must be there: they are made, with an empty folder a room; the points are in the arrays. The loader
+//! numbers instances in the order in which the system lists files; here it is that of their names.
 //!
 //! Colours are the tree's, 0 to 255.
 

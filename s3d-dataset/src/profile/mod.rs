@@ -1,7 +1,7 @@
 //! What single loaders of point clouds want, made from the S3DIS tree of a data set, in `profiles/NAME`.
 //!
-//! Each file below says at its top what its loader reads, and where it would stop. A profile reads the tree's text files
-//! piece by piece; what is in memory does not grow with a room.
+//! Each file below says at its top what its loader reads, and where it would stop. A profile reads the tree's
+//! text files piece by piece; what is in memory does not grow with a room.
 
 mod arrays;
 pub(crate) mod loader;
@@ -37,8 +37,8 @@ pub struct ProfileOptions {
 /// Writes what these loaders want into the data set in the folder `root`, to `profiles/NAME`.
 ///
 /// # Errors
-/// [`Error::Usage`] if one is there and not to be replaced; [`Error::File`]; [`Error::Cancelled`]; [`Error::Temporary`]. No
-/// half of a profile is left behind.
+/// [`Error::Usage`] if one is there and not to be replaced; [`Error::File`]; [`Error::Cancelled`];
+/// [`Error::Temporary`]. No half of a profile is left behind.
 pub fn profile(
     root: impl Into<PathBuf>,
     wanted: &[Profile],

@@ -1,12 +1,13 @@
 //! Open3D-ML: a room's points and boxes in a pickle.
 //!
-//! Its `S3DIS` data set (`ml3d/datasets/s3dis.py`) reads `original_pkl/*.pkl` if there is that folder. Otherwise it makes
-//! it from a list of the 272 published rooms that comes with it, and stops at the first that is not there: so another
-//! data set can only come as pickles. `Area_1_office_3.pkl` is a list of two: the points, float64, N × 7, a row
-//! `x y z r g b label` in world metres (not moved; classes as PointNet's), and the boxes, a list of
-//! `[class, x, y, z, w, h, l, yaw]` an instance: the middle; the extents along the two principal axes of its points seen
-//! from above (w, l) and upwards (h); and the angle of the first of these axes, in radians.
-//! Here the first axis is the longer spread; the loader takes whichever its linear algebra gives first.
+//! Its `S3DIS` data set (`ml3d/datasets/s3dis.py`) reads `original_pkl/*.pkl` if there is that folder.
+//! Otherwise it makes it from a list of the 272 published rooms that comes with it, and stops at the first
+//! that is not there: so another data set can only come as pickles. `Area_1_office_3.pkl` is a list of two:
+//! the points, float64, N × 7, a row `x y z r g b label` in world metres (not moved; classes as PointNet's),
+//! and the boxes, a list of `[class, x, y, z, w, h, l, yaw]` an instance: the middle; the extents along the
+//! two principal axes of its points seen from above (w, l) and upwards (h); and the angle of the first of
+//! these axes, in radians. Here the first axis is the longer spread; the loader takes whichever its linear
+//! algebra gives first.
 //!
 //! `dataset_path` is the profile's folder; `test_area_idx` picks the area to test on.
 

@@ -1,8 +1,9 @@
 //! As much of Python's pickle format as a list of texts, numbers and one kind of array needs.
 //!
-//! Protocol 4 (Python 3.4 and later), whose opcodes are described in Python's `pickletools`. An array is written as
-//! `numpy.reshape(numpy.frombuffer(bytes, "<f8"), (rows, columns))`: public functions, the same in numpy 1 and 2, where
-//! numpy's own pickles name internal ones. It is read-only when read, as is any array that views bytes.
+//! Protocol 4 (Python 3.4 and later), whose opcodes are described in Python's `pickletools`. An array is
+//! written as `numpy.reshape(numpy.frombuffer(bytes, "<f8"), (rows, columns))`: public functions, the same in
+//! numpy 1 and 2, where numpy's own pickles name internal ones. It is read-only when read, as is any array
+//! that views bytes.
 
 use crate::error::Result as DatasetResult;
 use s3d_io::Result;
@@ -53,7 +54,8 @@ impl Pickle {
         self.file.put(&[0])
     }
 
-    /// Begins an array of `f64`, whose numbers follow through [`put`](Self::put), lowest byte first and row by row.
+    /// Begins an array of `f64`, whose numbers follow through [`put`](Self::put), lowest byte first and row
+    /// by row.
     pub(super) fn begin_array(&mut self, rows: u64, columns: u64) -> Result<()> {
         self.array = (rows, columns);
         self.missing = 8 * rows * columns;
@@ -89,8 +91,8 @@ impl Pickle {
 mod tests {
     use super::*;
 
-    /// Byte by byte what Python's `pickletools.dis` shows as the opcodes named above; that numpy reads it is tested in
-    /// Python, with the other loaders.
+    /// Byte by byte what Python's `pickletools.dis` shows as the opcodes named above; that numpy reads it is
+    /// tested in Python, with the other loaders.
     #[test]
     fn opcodes() {
         let dir = tempfile::tempdir().unwrap();

@@ -4,15 +4,16 @@
 //! `Area_k/Area_k_alignmentAngle.txt` with `numpy.loadtxt`, and of every room that it names all
 //! `Area_k/ROOM/Annotations/*.txt`, with `numpy.loadtxt` too. So it stops
 //! - where one of the six areas has no angle file: areas that are not in the data set get one without rooms;
-//! - at an angle file with one room, since its two words are no table: the room is named twice, and processed twice with
-//!   the same result;
+//! - at an angle file with one room, since its two words are no table: the room is named twice, and processed
+//!   twice with the same result;
 //! - at a room of the angle file without points: it is not named;
 //! - at an instance of one point, whose numbers are no table: the point stands twice.
 //!
 //! All but these are second names of the files in `s3dis/` (copies where the file system has none).
 //!
-//! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `area_k/3d/rgb.obj`, and for area 5
-//! `area_5a` and `area_5b`, moving 5b: area 5 of a data set is in one frame already and comes as `area_5a` alone.
+//! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `area_k/3d/rgb.obj`, and for
+//! area 5 `area_5a` and `area_5b`, moving 5b: area 5 of a data set is in one frame already and comes as
+//! `area_5a` alone.
 
 use super::room::{TreeRoom, count_and_min};
 use super::{AREAS_OF_LOADERS, link, write_lines};

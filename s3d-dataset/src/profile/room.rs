@@ -16,8 +16,8 @@ pub(super) struct TreeRoom {
     pub(super) area: u32,
     /// Such as `office_3`.
     pub(super) name: String,
-    /// Its instances, in the order of their file names as strings: `chair_10` before `chair_2`, as `sorted(glob(…))`
-    /// gives them.
+    /// Its instances, in the order of their file names as strings: `chair_10` before `chair_2`, as
+    /// `sorted(glob(…))` gives them.
     pub(super) instances: Vec<TreeInstance>,
 }
 
@@ -72,8 +72,9 @@ pub(super) fn for_each_piece(
     Ok(())
 }
 
-/// The number that stands in the file, as the nearest `f64`. Files hold millimetres, and a coordinate in them is the
-/// nearest `f32`, so that the whole millimetre next to it is what stood there, or nothing lies between the two.
+/// The number that stands in the file, as the nearest `f64`. Files hold millimetres, and a coordinate in them
+/// is the nearest `f32`, so that the whole millimetre next to it is what stood there, or nothing lies between
+/// the two.
 pub(super) fn as_written(coordinate: f32) -> f64 {
     (f64::from(coordinate) * 1000.0).round() / 1000.0
 }

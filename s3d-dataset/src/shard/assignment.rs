@@ -34,8 +34,8 @@ impl Shard {
         position % self.of as usize == self.number as usize - 1
     }
 
-    /// Its part in an area of so many, if it has one: the shards are spread over the areas, so that each opens as few as can
-    /// be, and areas over the shards where there are more of them.
+    /// Its part in an area of so many, if it has one: the shards are spread over the areas, so that each
+    /// opens as few as can be, and areas over the shards where there are more of them.
     pub(crate) fn within(self, position: usize, areas: usize) -> Option<Self> {
         let (index, of) = (self.number as usize - 1, self.of as usize);
         if of <= areas {
@@ -69,11 +69,12 @@ impl fmt::Display for Shard {
     }
 }
 
-/// Deals units with these costs among `shards`: the dearest first, each to the shard with the least so far, the first
-/// by number where several have as little. Returns the number of each unit's shard, from 1.
+/// Deals units with these costs among `shards`: the dearest first, each to the shard with the least so far,
+/// the first by number where several have as little. Returns the number of each unit's shard, from 1.
 ///
-/// No shard gets more than 4/3 of what the best assignment would give to its fullest (Graham, "Bounds on multiprocessing
-/// timing anomalies", 1969, whose bound is 4/3 − 1/3N). The result depends on nothing but the arguments.
+/// No shard gets more than 4/3 of what the best assignment would give to its fullest (Graham, "Bounds on
+/// multiprocessing timing anomalies", 1969, whose bound is 4/3 − 1/3N). The result depends on nothing but the
+/// arguments.
 ///
 /// # Panics
 /// If there is no shard.
@@ -96,8 +97,9 @@ pub(crate) fn assign_by_cost(costs: &[u64], shards: u32) -> Vec<u32> {
     assigned
 }
 
-/// How long units take, in nanoseconds of one core: measured on the built-in scene on a machine of 2026, and rounded. Their
-/// ratios matter alone. A pixel is cast, shaded in every modality, compressed and written, in views as in panoramas.
+/// How long units take, in nanoseconds of one core: measured on the built-in scene on a machine of 2026, and
+/// rounded. Their ratios matter alone. A pixel is cast, shaded in every modality, compressed and written, in
+/// views as in panoramas.
 const NS_PER_PIXEL: u64 = 55;
 /// A face is written to two OBJ files.
 const NS_PER_FACE: u64 = 1_000;
@@ -117,8 +119,8 @@ pub(crate) fn assets_cost(faces: u64, points: u64) -> u64 {
     NS_PER_FACE.saturating_mul(faces).saturating_add(NS_PER_POINT.saturating_mul(points))
 }
 
-/// Who does which units, among a number of shards: kept in the folder in which they work, so that a merge can tell which of
-/// them is to be run again, and a shard that is run again knows at once what is its own.
+/// Who does which units, among a number of shards: kept in the folder in which they work, so that a merge can
+/// tell which of them is to be run again, and a shard that is run again knows at once what is its own.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Assignment {
     shards: u32,
@@ -240,8 +242,8 @@ mod tests {
         ) {
             let assigned = assign_by_cost(&costs, shards);
             let fullest = *loads(&costs, &assigned, shards).iter().max().unwrap();
-            // What even the best assignment cannot go below: the mean, and the dearest unit; the bound of any list
-            // scheduling follows from them.
+            // What even the best assignment cannot go below: the mean, and the dearest unit; the bound of any
+            // list scheduling follows from them.
             let (sum, dearest) = (costs.iter().sum::<u64>(), *costs.iter().max().unwrap());
             let n = u64::from(shards);
             prop_assert!(n * fullest <= sum + (n - 1) * dearest);

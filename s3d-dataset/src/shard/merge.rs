@@ -1,5 +1,5 @@
-//! Shards of an export to one data set: the files of all units linked or copied into one folder, each checked, and the
-//! tables written.
+//! Shards of an export to one data set: the files of all units linked or copied into one folder, each
+//! checked, and the tables written.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -42,8 +42,9 @@ struct Part {
 /// Makes one data set of the folders of shards, in any order; OUT may be one of them.
 ///
 /// # Errors
-/// [`Error::Usage`] if they are of different calls, or OUT holds another data set; [`Error::Input`] with the shards
-/// that are to be run again if something is missing or damaged; [`Error::Temporary`] if a shard is still at work.
+/// [`Error::Usage`] if they are of different calls, or OUT holds another data set; [`Error::Input`] with the
+/// shards that are to be run again if something is missing or damaged; [`Error::Temporary`] if a shard is
+/// still at work.
 pub fn merge(
     folders: &[PathBuf],
     output: impl Into<PathBuf>,
@@ -59,7 +60,8 @@ pub fn merge(
         return Ok(None);
     }
     let stage = account.stage(Stage::Load, None);
-    // OUT's own lock is taken again when the merge begins in it; until then nobody may be at work there either.
+    // OUT's own lock is taken again when the merge begins in it; until then nobody may be at work there
+    // either.
     let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
         folders.iter().partition(|folder| is_same(folder, layout.root()));
     let _locks = apart.into_iter().map(|folder| lock(ctx, folder)).collect::<Result<Vec<_>>>()?;
@@ -130,8 +132,8 @@ fn is_done(folders: &[PathBuf], layout: &Layout) -> Result<bool> {
     Ok(true)
 }
 
-/// The label table, from the first that has it whole: a shard that was killed early has none, nor has an export that was
-/// begun without shards.
+/// The label table, from the first that has it whole: a shard that was killed early has none, nor has an
+/// export that was begun without shards.
 fn label_list(parts: &[Part]) -> Result<LabelList> {
     let found = parts.iter().find_map(|part| LabelList::read(&LabelList::path(&part.layout)).ok());
     found.ok_or_else(|| {
@@ -164,7 +166,8 @@ fn is_same(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Holds a shard's folder, so that nobody is at work in it; one that cannot be written to holds still by itself.
+/// Holds a shard's folder, so that nobody is at work in it; one that cannot be written to holds still by
+/// itself.
 fn lock(ctx: &Context, folder: &Path) -> Result<Option<Lock>> {
     let layout = Layout::new(folder);
     if !layout.lock().exists() {
@@ -281,7 +284,8 @@ fn gather(
         |(), unit| {
             let mut fault = None;
             for part in parts {
-                // OUT's own were looked at when the merge began, and this one is not among those that are whole.
+                // OUT's own were looked at when the merge began, and this one is not among those that are
+                // whole.
                 let Some(done) =
                     part.finished.get(unit).filter(|_| !is_same(part.layout.root(), layout.root()))
                 else {
@@ -316,7 +320,8 @@ fn gather(
     }
 }
 
-/// Brings the files of a unit into OUT; tells what is wrong with the first that is not the one that was written.
+/// Brings the files of a unit into OUT; tells what is wrong with the first that is not the one that was
+/// written.
 fn bring_unit(ctx: &Context, layout: &Layout, part: &Part, done: &Done) -> Result<Option<String>> {
     for record in done.files() {
         ctx.check()?;

@@ -1,5 +1,5 @@
-//! A shard: one of several processes, on any machines, that share the work of an export. Each finds by itself what is its
-//! own, and does that.
+//! A shard: one of several processes, on any machines, that share the work of an export. Each finds by itself
+//! what is its own, and does that.
 
 pub(crate) mod assignment;
 pub(crate) mod make_plan;
@@ -25,7 +25,8 @@ use s3d_io::fs::Checksum;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-/// Does a shard's part of an export into OUT, which other shards may share. It is no data set until it is merged.
+/// Does a shard's part of an export into OUT, which other shards may share. It is no data set until it is
+/// merged.
 pub(crate) fn export_shard(
     ctx: &Context,
     scenes: &[SceneSource],
@@ -58,8 +59,8 @@ pub(crate) fn export_shard(
 }
 
 impl Job<'_> {
-    /// Does the units of a shard that are not done yet, and tells what became of the candidate views of the whole; nothing
-    /// if all of the shard's units are done.
+    /// Does the units of a shard that are not done yet, and tells what became of the candidate views of the
+    /// whole; nothing if all of the shard's units are done.
     fn run_shard(
         &self,
         layout: &Layout,
@@ -82,7 +83,8 @@ impl Job<'_> {
         let positions: BTreeMap<u32, usize> = self.request.numbers().into_iter().zip(0..).collect();
         let labels_are_ours =
             |unit: &Unit| positions.get(&unit.area()).is_some_and(|position| shard.takes(*position));
-        // With a plan every shard writes down its share of the scores, for the merge; else every one has made them all.
+        // With a plan every shard writes down its share of the scores, for the merge; else every one has made
+        // them all.
         let is_ours = |unit: &Unit| match unit {
             Unit::Labels(_) => labels_are_ours(unit),
             Unit::Scores(_, uuid) => self.plan.is_none() || keeper(uuid, shard.of) == shard.number,

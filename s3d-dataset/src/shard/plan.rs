@@ -1,9 +1,9 @@
 //! A plan: labels and scores, made before an export and shared by its shards.
 //!
-//! PLAN holds `plan.jsonl` (what it is for, and the label table), `area_N` (the area as [`AreaPlan`] has it, and in
-//! `area_N/3d` the files of its labels as the data set has them), and journals of labels and scores in `.s3d/journal`, a file
-//! for each process that worked at it. Processes need not know of one another: each labels the areas that it scores in, if
-//! nobody has, and scores its share of their locations.
+//! PLAN holds `plan.jsonl` (what it is for, and the label table), `area_N` (the area as [`AreaPlan`] has it,
+//! and in `area_N/3d` the files of its labels as the data set has them), and journals of labels and scores in
+//! `.s3d/journal`, a file for each process that worked at it. Processes need not know of one another: each
+//! labels the areas that it scores in, if nobody has, and scores its share of their locations.
 
 use crate::context::Context;
 use crate::error::{Error, Result};

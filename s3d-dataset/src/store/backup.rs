@@ -1,5 +1,5 @@
-//! Moves in OUT: an earlier data set set aside and brought back, and what a killed export left brought to a state that has
-//! one meaning. The states are those of [`output`](super::output).
+//! Moves in OUT: an earlier data set set aside and brought back, and what a killed export left brought to a
+//! state that has one meaning. The states are those of [`output`](super::output).
 
 use crate::error::{Error, Result};
 use crate::store::output::{begun_by_other_version, read_request};
@@ -90,8 +90,8 @@ pub(super) fn restore(layout: &Layout) -> Result<()> {
     take_back(&aside, layout, head)
 }
 
-/// Moves the data set of a folder in OUT back into OUT, and removes the folder; what is in it is never removed unless its
-/// manifest tells that it is all in its place.
+/// Moves the data set of a folder in OUT back into OUT, and removes the folder; what is in it is never
+/// removed unless its manifest tells that it is all in its place.
 fn take_back(from: &Layout, layout: &Layout, head: Option<Head>) -> Result<()> {
     let Some(head) = head else {
         return match fs::remove_dir(from.root()) {

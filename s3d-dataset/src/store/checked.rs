@@ -1,4 +1,5 @@
-//! Small JSON files that say of themselves whether they are whole: the value on one line, its checksum on the next.
+//! Small JSON files that say of themselves whether they are whole: the value on one line, its checksum on the
+//! next.
 
 use crate::error::Result;
 use s3d_io::Error as FileError;
@@ -14,7 +15,8 @@ struct Seal {
     xxh3_128: Checksum,
 }
 
-/// Writes `value` as a line of JSON and its checksum as another, whole or not at all. Numbers come back exactly.
+/// Writes `value` as a line of JSON and its checksum as another, whole or not at all. Numbers come back
+/// exactly.
 pub(crate) fn write_checked<T: Serialize>(path: &Path, value: &T) -> Result<()> {
     let json = |e: serde_json::Error| FileError::format(path, e.to_string());
     let mut lines = serde_json::to_vec(value).map_err(json)?;

@@ -1,9 +1,9 @@
-//! Which work of an export is done, and what it wrote: written down as it is finished, so that a later run takes it as it
-//! is.
+//! Which work of an export is done, and what it wrote: written down as it is finished, so that a later run
+//! takes it as it is.
 //!
-//! Every process appends to a file of its own in `.s3d/journal`, a line for each finished unit: JSON, with the line's own
-//! checksum. Nothing is synced: a line, or a file that it tells of, that a power loss takes away or fills with zeros has
-//! another checksum, and the unit is done again.
+//! Every process appends to a file of its own in `.s3d/journal`, a line for each finished unit: JSON, with
+//! the line's own checksum. Nothing is synced: a line, or a file that it tells of, that a power loss takes
+//! away or fills with zeros has another checksum, and the unit is done again.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -231,7 +231,8 @@ impl Finished {
         areas.iter().filter_map(|area| self.labels(*area)).map(|labels| labels.locations.len()).sum()
     }
 
-    /// What is written in the journals of an export, lines that are torn left out. Nothing of it is checked yet.
+    /// What is written in the journals of an export, lines that are torn left out. Nothing of it is checked
+    /// yet.
     pub(crate) fn read(ctx: &Context, layout: &Layout) -> Result<Self> {
         let mut finished = Self::default();
         let mut torn = 0;
@@ -250,8 +251,8 @@ impl Finished {
         Ok(finished)
     }
 
-    /// Reads the files of all units, and leaves out each unit of which one is missing or not the one that was written:
-    /// it is to be done again.
+    /// Reads the files of all units, and leaves out each unit of which one is missing or not the one that was
+    /// written: it is to be done again.
     pub(crate) fn checked(self, ctx: &Context, layout: &Layout) -> Result<Self> {
         self.checked_where(ctx, layout, |_| true)
     }
@@ -320,8 +321,8 @@ impl Journal {
         self.finished().insert(done);
     }
 
-    /// Reads the files of the finished units of which `which` holds, and takes those for not done of which one is not as it
-    /// was written.
+    /// Reads the files of the finished units of which `which` holds, and takes those for not done of which
+    /// one is not as it was written.
     pub(crate) fn check(&self, ctx: &Context, layout: &Layout, which: impl Fn(&Unit) -> bool) -> Result<()> {
         let finished = self.finished().clone();
         let checked = finished.checked_where(ctx, layout, which)?;

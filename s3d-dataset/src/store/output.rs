@@ -1,10 +1,10 @@
-//! The folder of a data set: what is in it, whether it may be written to, what becomes of an earlier data set in it, and
-//! how an export that was killed goes on.
+//! The folder of a data set: what is in it, whether it may be written to, what becomes of an earlier data set
+//! in it, and how an export that was killed goes on.
 //!
-//! While an export is unfinished, `.s3d/request.json` says what was asked for, `.s3d/journal` what is done of it, and the
-//! manifest says "running". An earlier data set that is replaced lies aside in `.s3d-previous` until the new one is
-//! complete. Every step from one state to the next is one rename or one file, so that whoever comes after a kill finds one
-//! of these:
+//! While an export is unfinished, `.s3d/request.json` says what was asked for, `.s3d/journal` what is done of
+//! it, and the manifest says "running". An earlier data set that is replaced lies aside in `.s3d-previous`
+//! until the new one is complete. Every step from one state to the next is one rename or one file, so that
+//! whoever comes after a kill finds one of these:
 //!
 //! | `request.json` | manifest | `.s3d-previous` | |
 //! |---|---|---|---|
@@ -36,8 +36,8 @@ use std::time::{Duration, Instant};
 /// How many differences are named in a message.
 const MAX_NAMED: usize = 8;
 
-/// Refuses an OUT that holds something of somebody else, unless it may be overwritten or is one of the `allowed` names;
-/// looks only, changes nothing.
+/// Refuses an OUT that holds something of somebody else, unless it may be overwritten or is one of the
+/// `allowed` names; looks only, changes nothing.
 pub(crate) fn check(ctx: &Context, layout: &Layout, overwrite: bool, allowed: &[&str]) -> Result<()> {
     let root = layout.root();
     if layout.root_misleads_loaders() {
@@ -84,8 +84,8 @@ pub(crate) fn is_working_name(name: &std::ffi::OsStr) -> bool {
     name == ".s3d" || name.starts_with(".s3d-")
 }
 
-/// Refuses an OUT in which the data set, or an earlier one that it replaces, would lie on its own input, or in its
-/// annotations.
+/// Refuses an OUT in which the data set, or an earlier one that it replaces, would lie on its own input, or
+/// in its annotations.
 pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Result<()> {
     let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
     // Those of a data set that is there go, too, if it has other areas.
@@ -161,7 +161,8 @@ pub(crate) fn read_request(layout: &Layout) -> Result<Option<Request>> {
     if_there(read_json(&layout.request()))
 }
 
-/// The version of s3d that began an unfinished export whose request this one cannot read, for it has other options.
+/// The version of s3d that began an unfinished export whose request this one cannot read, for it has other
+/// options.
 pub(crate) fn begun_by_other_version(layout: &Layout) -> Result<Option<String>> {
     #[derive(Deserialize)]
     struct Of {
@@ -191,8 +192,9 @@ pub(crate) struct Session {
 /// Begins an export into OUT, or goes on with it. `manifest` is written if it begins.
 ///
 /// # Errors
-/// [`Error::Usage`] if OUT holds a data set or an unfinished export of another request, and `overwrite` is not set, or
-/// something that is in the way and not ours; [`Error::Temporary`] if another process exports into it.
+/// [`Error::Usage`] if OUT holds a data set or an unfinished export of another request, and `overwrite` is
+/// not set, or something that is in the way and not ours; [`Error::Temporary`] if another process exports
+/// into it.
 pub(crate) fn begin(
     layout: &Layout,
     overwrite: bool,
@@ -201,7 +203,8 @@ pub(crate) fn begin(
     account: &Account<'_>,
 ) -> Result<Begin> {
     let ctx = account.ctx;
-    // What is refused is refused before anything changes, and what is complete may lie where nothing can be changed.
+    // What is refused is refused before anything changes, and what is complete may lie where nothing can be
+    // changed.
     let leftovers = [BACKUP, MOVING, TRASH].map(|name| layout.root().join(name));
     if !leftovers.iter().any(|path| path.exists()) {
         let found = find(layout, request)?;
@@ -240,8 +243,8 @@ pub(crate) fn begin(
 const BEGIN_EVERY: Duration = Duration::from_millis(100);
 const BEGIN_WITHIN: Duration = Duration::from_secs(60);
 
-/// Begins a shard's work in OUT, or goes on with it; other shards of the same request may be at work there. Nothing of what
-/// is done is checked yet.
+/// Begins a shard's work in OUT, or goes on with it; other shards of the same request may be at work there.
+/// Nothing of what is done is checked yet.
 ///
 /// # Errors
 /// As [`begin`]; [`Error::Temporary`] if somebody merges or exports into it alone.
@@ -360,8 +363,8 @@ fn begin_locked(
     recover(layout)?;
     let found = find(layout, request)?;
     refuse(layout, &found, overwrite)?;
-    // Whatever the state, what a killed process was writing is of no use. The folders of areas are looked at, or
-    // removed, below.
+    // Whatever the state, what a killed process was writing is of no use. The folders of areas are looked at,
+    // or removed, below.
     remove_parts(layout.root(), false)?;
     remove_parts(&layout.work_dir(), true)?;
     for folder in layout.shared_dirs() {
@@ -445,7 +448,8 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
     )))
 }
 
-/// Refuses what is in the way of the data set that is asked for, unless it is of one of these areas, which is ours.
+/// Refuses what is in the way of the data set that is asked for, unless it is of one of these areas, which is
+/// ours.
 fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Result<()> {
     let ours = if areas.is_empty() { Vec::new() } else { layout.entries(areas) };
     for path in layout.entries(&request.numbers()) {
@@ -460,9 +464,10 @@ fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Resul
 }
 
 impl Session {
-    /// Ends the export as `outcome` says. Complete, the data set takes the place of an earlier one. After a failure that
-    /// trying again may mend, everything stays as it is, to go on with; after any other an earlier data set comes back, or,
-    /// where there is none, what is done stays, but does not stand in the way of another call.
+    /// Ends the export as `outcome` says. Complete, the data set takes the place of an earlier one. After a
+    /// failure that trying again may mend, everything stays as it is, to go on with; after any other an
+    /// earlier data set comes back, or, where there is none, what is done stays, but does not stand in the
+    /// way of another call.
     ///
     /// A shard's work ends by dropping it: what is done stays, whatever became of the rest.
     pub(crate) fn end<T>(self, ctx: &Context, outcome: Result<T>) -> Result<T> {
@@ -489,7 +494,8 @@ impl Session {
                 Ok(())
             }
             Err(_) => {
-                // On a full disk it may not be possible, and is no reason to say anything else than what failed.
+                // On a full disk it may not be possible, and is no reason to say anything else than what
+                // failed.
                 let _ = write_bytes(&layout.failed(), b"");
                 Ok(())
             }

@@ -1,5 +1,5 @@
-//! What decides the bytes of a data set: the version of s3d, the options, the input. Two exports of equal requests write
-//! the same files, so that one can go on where the other was killed.
+//! What decides the bytes of a data set: the version of s3d, the options, the input. Two exports of equal
+//! requests write the same files, so that one can go on where the other was killed.
 
 use crate::options::ExportOptions;
 use s3d_io::fs::Checksum;
@@ -32,13 +32,13 @@ pub(crate) struct RequestedArea {
 /// A file or folder of the input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct InputRecord {
-    /// From the folder of the scene file; of what is named by a whole path its last part alone. That of a folder ends with
-    /// `/`.
+    /// From the folder of the scene file; of what is named by a whole path its last part alone. That of a
+    /// folder ends with `/`.
     pub(crate) path: String,
     /// Its size; of a folder that of all files in it.
     pub(crate) bytes: u64,
-    /// The checksum of its content; of a folder that of a list of its files, a line `path,bytes,xxh3_128` each, paths from
-    /// the folder and sorted.
+    /// The checksum of its content; of a folder that of a list of its files, a line `path,bytes,xxh3_128`
+    /// each, paths from the folder and sorted.
     pub(crate) xxh3_128: Checksum,
 }
 
@@ -119,8 +119,8 @@ impl Request {
         Self { options, ..self.clone() }
     }
 
-    /// What is asked for `now` that was not asked for here, and the other way round, a sentence each; none if the two
-    /// make the same bytes.
+    /// What is asked for `now` that was not asked for here, and the other way round, a sentence each; none if
+    /// the two make the same bytes.
     pub(crate) fn differences(&self, now: &Self) -> Vec<String> {
         let mut differences = Vec::new();
         if self.version != now.version {
@@ -176,7 +176,8 @@ impl RequestedArea {
         }
         let more = after.keys().filter(|path| !there.contains_key(*path));
         differences.extend(more.map(|path| format!("{path}: input now, not there")));
-        // The same files in another order are another input: meshes are joined in the order of the scene file.
+        // The same files in another order are another input: meshes are joined in the order of the scene
+        // file.
         if differences.is_empty() && self.inputs != now.inputs {
             differences.push(format!("area {}: its input in another order", self.area));
         }

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The account of an export while it runs: stages are timed and units counted in it, by any thread, and whoever watches is
-/// told.
+/// The account of an export while it runs: stages are timed and units counted in it, by any thread, and
+/// whoever watches is told.
 pub(crate) struct Account<'c> {
     pub(crate) ctx: &'c Context,
     warnings_before: u64,

@@ -10,8 +10,8 @@ const UTILS_PY: &str = include_str!("../../assets/utils.py");
 const POSE_SCHEMA: &str = include_str!("../../assets/pose.schema.json");
 const MANIFEST_SCHEMA: &str = include_str!("../../assets/manifest.schema.json");
 
-/// Writes the names of a label table, padded to as many as `pad_labels` if there are fewer, `conventions.json`,
-/// `assets/utils.py` and `assets/schema`.
+/// Writes the names of a label table, padded to as many as `pad_labels` if there are fewer,
+/// `conventions.json`, `assets/utils.py` and `assets/schema`.
 pub(crate) fn write(
     layout: &Layout,
     mut names: Vec<String>,

@@ -11,13 +11,15 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Whether a file is one that some process is writing, or was when it was killed: see [`s3d_io::fs::AtomicFile`].
+/// Whether a file is one that some process is writing, or was when it was killed: see
+/// [`s3d_io::fs::AtomicFile`].
 pub(crate) fn is_part(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.starts_with(".s3d-") && name.ends_with(".part")
 }
 
-/// All files in a folder and those below it, sorted; none if there is no such folder. What is being written is no file yet.
+/// All files in a folder and those below it, sorted; none if there is no such folder. What is being written
+/// is no file yet.
 pub(crate) fn walk(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -82,8 +84,8 @@ pub(crate) fn records(ctx: &Context, layout: &Layout, paths: &[PathBuf]) -> Resu
     Ok(records)
 }
 
-/// What is wrong with files that were recorded, a sentence each, with the index of the file. They are read, on all
-/// threads.
+/// What is wrong with files that were recorded, a sentence each, with the index of the file. They are read,
+/// on all threads.
 pub(crate) fn faults(ctx: &Context, layout: &Layout, files: &[&FileRecord]) -> Result<Vec<(usize, String)>> {
     let faults = Mutex::new(Vec::new());
     let progress = ctx.progress("checking", "files", files.len() as u64);
@@ -117,8 +119,8 @@ pub(crate) fn write(layout: &Layout, records: &[FileRecord]) -> Result<FileList>
     })
 }
 
-/// Brings `files.csv` and the manifest of a complete data set up to date, after the files of `changed` were written
-/// and all others for which `is_gone` holds were removed. A data set that never had a list gets none.
+/// Brings `files.csv` and the manifest of a complete data set up to date, after the files of `changed` were
+/// written and all others for which `is_gone` holds were removed. A data set that never had a list gets none.
 pub(crate) fn update(
     layout: &Layout,
     manifest: &mut Manifest,

@@ -16,8 +16,8 @@ const GENERATOR: &str = "s3d";
 const RUNNING: &str = "running";
 const COMPLETE: &str = "complete";
 
-/// The manifest. It names neither threads nor times nor folders of the machine: the same input and options give the
-/// same bytes.
+/// The manifest. It names neither threads nor times nor folders of the machine: the same input and options
+/// give the same bytes.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Manifest {
     generator: String,
@@ -59,8 +59,8 @@ pub(crate) struct FileList {
 struct XyzFromDepth {
     #[serde(rename = "type")]
     kind: String,
-    /// The distance between neighbouring depths, metres: a point is off by at most half of it along its ray, or along the
-    /// optical axis in a view.
+    /// The distance between neighbouring depths, metres: a point is off by at most half of it along its ray,
+    /// or along the optical axis in a view.
     depth_step_m: f64,
     /// Points beyond this depth are missing, metres.
     largest_depth_m: f64,
@@ -96,8 +96,8 @@ pub(crate) struct XyzLoss {
     kind: String,
     /// The farthest that a coordinate of the mesh is from 0, metres.
     largest_coordinate_m: f32,
-    /// The distance between neighbouring numbers of the type there, metres; the error is at most half of it. Nothing if
-    /// there are no coordinates.
+    /// The distance between neighbouring numbers of the type there, metres; the error is at most half of it.
+    /// Nothing if there are no coordinates.
     largest_step_m: Option<f64>,
 }
 
@@ -224,8 +224,8 @@ impl Manifest {
 /// What a file holds; nothing if it is not there, or is none of ours.
 ///
 /// # Errors
-/// Those of the disk or the network at this moment, and of permissions: what cannot be read now may be there all the same,
-/// and must not be taken for gone.
+/// Those of the disk or the network at this moment, and of permissions: what cannot be read now may be there
+/// all the same, and must not be taken for gone.
 pub(crate) fn if_there<T>(read: s3d_io::Result<T>) -> Result<Option<T>> {
     match read {
         Ok(value) => Ok(Some(value)),
@@ -248,7 +248,8 @@ pub(crate) struct Head {
 }
 
 impl Head {
-    /// The manifest at `path`, if there is one and it is ours, of a complete data set or of one that was begun.
+    /// The manifest at `path`, if there is one and it is ours, of a complete data set or of one that was
+    /// begun.
     ///
     /// # Errors
     /// It cannot be read now: as [`if_there`].

@@ -1,5 +1,5 @@
-//! The tables beside the images: rooms, votes, instance numbers, views, splits. Each is a JSON file that says what its
-//! keys mean by their names.
+//! The tables beside the images: rooms, votes, instance numbers, views, splits. Each is a JSON file that says
+//! what its keys mean by their names.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -25,8 +25,8 @@ pub(crate) struct RoomRecord {
     pub(crate) floor_m2: f64,
     /// The dominant horizontal direction of the walls, whole degrees in [0, 90).
     pub(crate) wall_direction_deg: u32,
-    /// The floor outline: polygons, each a ring around it (counter-clockwise) and rings around its holes (clockwise), of
-    /// world x and y in metres.
+    /// The floor outline: polygons, each a ring around it (counter-clockwise) and rings around its holes
+    /// (clockwise), of world x and y in metres.
     pub(crate) outline: Vec<OutlineRecord>,
 }
 
@@ -125,8 +125,8 @@ pub(crate) fn write_votes(layout: &Layout, area: u32, report: &VoteReport) -> Re
     Ok(())
 }
 
-/// Writes `area_N/3d/instance_numbers.json`: which label each instance of the annotation tree, whose numbers run per
-/// room, has in the area.
+/// Writes `area_N/3d/instance_numbers.json`: which label each instance of the annotation tree, whose numbers
+/// run per room, has in the area.
 pub(crate) fn write_instance_numbers(layout: &Layout, area: u32, rooms: &[RoomNames]) -> Result<()> {
     #[derive(Serialize)]
     struct Mapping {
@@ -149,7 +149,8 @@ pub(crate) fn write_instance_numbers(layout: &Layout, area: u32, rooms: &[RoomNa
     Ok(())
 }
 
-/// Writes `area_N/views.json`: every candidate view with its draw, its entropy and, if it was kept, its frame number.
+/// Writes `area_N/views.json`: every candidate view with its draw, its entropy and, if it was kept, its frame
+/// number.
 pub(crate) fn write_views(layout: &Layout, area: u32, candidates: &[Candidate]) -> Result<()> {
     let of_area: Vec<&Candidate> = candidates.iter().filter(|c| c.area == area).collect();
     write_json(&layout.views_json(area), &of_area)?;
@@ -166,8 +167,8 @@ pub(crate) fn write_splits(layout: &Layout, folds: &[Fold]) -> Result<()> {
     Ok(())
 }
 
-/// Writes the lists of panoramas that depth loaders read: of all areas, and of both sides of each fold. A data set
-/// without panoramas, or without their colour or depth, has none.
+/// Writes the lists of panoramas that depth loaders read: of all areas, and of both sides of each fold. A
+/// data set without panoramas, or without their colour or depth, has none.
 pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: &[Fold]) -> Result<()> {
     let mut pairs = Vec::new();
     for area in areas {
@@ -202,7 +203,8 @@ pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: 
     Ok(())
 }
 
-/// The names of an area's panoramas that are there in a domain, with the domain left at colour so that they compare.
+/// The names of an area's panoramas that are there in a domain, with the domain left at colour so that they
+/// compare.
 fn panoramas(layout: &Layout, area: u32, domain: Domain) -> Result<BTreeSet<ImageName>> {
     let dir = layout.image_dir(area, Frame::Panorama, domain);
     let entries = match fs::read_dir(&dir) {

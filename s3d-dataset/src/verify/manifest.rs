@@ -81,8 +81,8 @@ fn texture() -> String {
 }
 
 impl ReadManifest {
-    /// Reads the manifest; `None`, and a fault, if it is none or that of an export that did not finish: nothing more can be
-    /// said then.
+    /// Reads the manifest; `None`, and a fault, if it is none or that of an export that did not finish:
+    /// nothing more can be said then.
     pub(crate) fn read(layout: &Layout, report: &Report) -> Option<Self> {
         let path = layout.manifest();
         let manifest: Self = report.read(Topic::Manifest, read_json(&path))?;

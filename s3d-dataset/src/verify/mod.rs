@@ -1,12 +1,13 @@
-//! Reading a data set back: is it what its manifest says, does it contradict itself, and do its images show its mesh?
+//! Reading a data set back: is it what its manifest says, does it contradict itself, and do its images show
+//! its mesh?
 //!
-//! Nothing here stops at a fault. What is found goes to a [`Report`]; only what keeps everything else from being checked,
-//! such as a manifest that cannot be read, ends it early.
+//! Nothing here stops at a fault. What is found goes to a [`Report`]; only what keeps everything else from
+//! being checked, such as a manifest that cannot be read, ends it early.
 //!
-//! Images are rendered again from the exported mesh. Its files hold every coordinate to the bit and every face in order,
-//! and pose files the rotation: so every pixel of every image must be equal to the bit, colours included. That costs less
-//! than reading the files, so nothing is left to a sample. With `full` candidate views are scored again too, and the points
-//! are read in all their forms.
+//! Images are rendered again from the exported mesh. Its files hold every coordinate to the bit and every
+//! face in order, and pose files the rotation: so every pixel of every image must be equal to the bit,
+//! colours included. That costs less than reading the files, so nothing is left to a sample. With `full`
+//! candidate views are scored again too, and the points are read in all their forms.
 
 mod files;
 mod images;
@@ -46,8 +47,8 @@ const MAX_DIAGNOSES: usize = 25;
 /// How a data set is checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VerifyOptions {
-    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point cloud. Every
-    /// pixel of every image is compared in either case.
+    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point
+    /// cloud. Every pixel of every image is compared in either case.
     pub full: bool,
 }
 

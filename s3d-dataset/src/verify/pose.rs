@@ -8,16 +8,17 @@ use s3d_io::fs::read_json;
 use serde_json::Value;
 use std::path::Path;
 
-/// How far rotations may be apart: Euler angles lose the last bits of a rotation, and half of them where two axes nearly
-/// coincide.
+/// How far rotations may be apart: Euler angles lose the last bits of a rotation, and half of them where two
+/// axes nearly coincide.
 const ROTATION: f64 = 1e-7;
 
 const FAULT: (Topic, &str) = (Topic::Poses, "contradictions in a pose file");
 
-/// Reads an image's pose and holds it against itself and the image's name. `size` is that of the image's files.
+/// Reads an image's pose and holds it against itself and the image's name. `size` is that of the image's
+/// files.
 ///
-/// The result's pose is exact to the bit, that of `camera_rt_matrix`, unless the file contradicts itself: then
-/// `is_consistent` is false, and the pose is that of its angles.
+/// The result's pose is exact to the bit, that of `camera_rt_matrix`, unless the file contradicts itself:
+/// then `is_consistent` is false, and the pose is that of its angles.
 pub(crate) fn read_and_check(
     layout: &Layout,
     image: &DatasetImage,

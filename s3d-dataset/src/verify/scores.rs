@@ -13,7 +13,8 @@ use s3d_label::{LabelId, LabelTable};
 
 const ENTROPIES: (Topic, &str) = (Topic::Views, "entropies");
 
-/// Scores the candidates of each location whose panorama tells exactly where it is, and holds them against `views.json`.
+/// Scores the candidates of each location whose panorama tells exactly where it is, and holds them against
+/// `views.json`.
 pub(crate) fn check(
     ctx: &Context,
     reference: &Reference<'_>,

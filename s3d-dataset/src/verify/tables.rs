@@ -18,8 +18,8 @@ const ROOMS: (Topic, &str) = (Topic::Tables, "rooms");
 const SPLITS: (Topic, &str) = (Topic::Tables, "folds and lists");
 const STATISTICS: (Topic, &str) = (Topic::Tables, "statistics");
 
-/// Holds `conventions.json` against the options, and what is the same in every data set of this version against that; profiles
-/// that are told of are there.
+/// Holds `conventions.json` against the options, and what is the same in every data set of this version
+/// against that; profiles that are told of are there.
 pub(crate) fn conventions(layout: &Layout, manifest: &ReadManifest, report: &Report) {
     let path = layout.conventions();
     if let Some(found) = report.read(Topic::Tables, read_conventions(&path)) {

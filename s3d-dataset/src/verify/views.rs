@@ -121,7 +121,8 @@ impl Views {
         }
     }
 
-    /// Holds the images that are there against the list: each view that was kept, a panorama a location, and nothing else.
+    /// Holds the images that are there against the list: each view that was kept, a panorama a location, and
+    /// nothing else.
     pub(crate) fn check_images(
         &self,
         layout: &Layout,

@@ -11,8 +11,9 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 /// x' = x·q + 2p₁xy + p₂(r² + 2x²),   y' = y·q + p₁(r² + 2y²) + 2p₂xy
 /// ```
 ///
-/// and comes to the pixel (fx·x' + cx, fy·y' + cy). The picture's top left corner is (0, 0) and the centre of pixel (i, j)
-/// is at (i + ½, j + ½), as everywhere. Source: OpenCV's `projectPoints`; formats.md, "The scanner's own pictures".
+/// and comes to the pixel (fx·x' + cx, fy·y' + cy). The picture's top left corner is (0, 0) and the centre of
+/// pixel (i, j) is at (i + ½, j + ½), as everywhere. Source: OpenCV's `projectPoints`; formats.md, "The
+/// scanner's own pictures".
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -45,8 +46,9 @@ pub struct Lens {
 const FARTHEST_R2: f64 = 100.0;
 
 impl Lens {
-    /// A lens with the focal lengths and the principal point in pixels, and OpenCV's k₁ k₂ p₁ p₂ k₃. `None` if a number is
-    /// not finite, a size is 0, a focal length is not above 0, or no direction comes to the middle of the picture.
+    /// A lens with the focal lengths and the principal point in pixels, and OpenCV's k₁ k₂ p₁ p₂ k₃. `None`
+    /// if a number is not finite, a size is 0, a focal length is not above 0, or no direction comes to the
+    /// middle of the picture.
     pub fn new(size: [u32; 2], focal_px: DVec2, center_px: DVec2, distortion: [f64; 5]) -> Option<Self> {
         let finite =
             focal_px.is_finite() && center_px.is_finite() && distortion.iter().all(|k| k.is_finite());
@@ -82,8 +84,8 @@ impl Lens {
         self.focal_px
     }
 
-    /// Where a direction in OpenCV's axes, of any length, comes to in the picture's plane. `None` behind the camera, and so
-    /// far out that the polynomial folds back.
+    /// Where a direction in OpenCV's axes, of any length, comes to in the picture's plane. `None` behind the
+    /// camera, and so far out that the polynomial folds back.
     #[inline]
     pub fn project(&self, direction: DVec3) -> Option<DVec2> {
         if direction.z <= 0.0 {
@@ -102,8 +104,8 @@ impl Lens {
         dvec2(x * q + 2.0 * p1 * xy + p2 * (r2 + 2.0 * xx), y * q + p1 * (r2 + 2.0 * yy) + 2.0 * p2 * xy)
     }
 
-    /// The direction, with z = 1, that comes to a place of the picture's plane: Newton's method, exact to 1e-12. `None` if
-    /// there is none.
+    /// The direction, with z = 1, that comes to a place of the picture's plane: Newton's method, exact to
+    /// 1e-12. `None` if there is none.
     pub fn direction(&self, pixel: DVec2) -> Option<DVec3> {
         let goal = (pixel - self.center_px) / self.focal_px;
         let mut at = goal;

@@ -1,7 +1,7 @@
 //! Cameras: from pixels to rays and back.
 //!
-//! Pixel coordinates: x to the right, y down, the centre of pixel (i, j) at (i + ½, j + ½). Source: formats.md,
-//! "Cameras".
+//! Pixel coordinates: x to the right, y down, the centre of pixel (i, j) at (i + ½, j + ½). Source:
+//! formats.md, "Cameras".
 
 mod lens;
 mod pose;
@@ -21,9 +21,9 @@ pub enum Projection {
         /// The full horizontal angle of view, in (0, π).
         fov_rad: f64,
     },
-    /// A panorama: columns are longitudes, growing to the right, rows are latitudes, from +90° at the top to −90°. Its
-    /// centre column looks along the pose's forward axis projected to the horizon; up is the world's +Z whatever the
-    /// pose's tilt.
+    /// A panorama: columns are longitudes, growing to the right, rows are latitudes, from +90° at the top to
+    /// −90°. Its centre column looks along the pose's forward axis projected to the horizon; up is the
+    /// world's +Z whatever the pose's tilt.
     Equirectangular,
 }
 
@@ -34,8 +34,9 @@ pub enum NormalAxes {
     /// As in the paper: right, down and towards the camera, so that what faces the camera is (0, 0, 1).
     #[default]
     Paper,
-    /// OpenCV's: right, down and forward, so that what faces the camera is (0, 0, −1). A panorama's X, −Z, Y of the world
-    /// are such axes already, those of a level camera that looks along +Y, and are the same under both.
+    /// OpenCV's: right, down and forward, so that what faces the camera is (0, 0, −1). A panorama's X, −Z, Y
+    /// of the world are such axes already, those of a level camera that looks along +Y, and are the same
+    /// under both.
     OpenCv,
 }
 
@@ -105,7 +106,8 @@ impl Camera {
         Self { pose, projection: Projection::Equirectangular, width, height: width / 2 }
     }
 
-    /// The horizontal angle of view that the pose file states: a panorama's is π/2, as in the published files.
+    /// The horizontal angle of view that the pose file states: a panorama's is π/2, as in the published
+    /// files.
     pub fn fov_rad(&self) -> f64 {
         match self.projection {
             Projection::Perspective { fov_rad } => fov_rad,
@@ -157,8 +159,8 @@ impl Camera {
         }
     }
 
-    /// The direction through the point (x, y) of the image, in the world. Perspective: its component along the optical
-    /// axis is 1, so that a multiple of it is a z-depth. Panorama: a unit vector.
+    /// The direction through the point (x, y) of the image, in the world. Perspective: its component along
+    /// the optical axis is 1, so that a multiple of it is a z-depth. Panorama: a unit vector.
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
         match self.projection {
             Projection::Perspective { .. } => {
@@ -175,8 +177,9 @@ impl Camera {
         }
     }
 
-    /// Where `point` (world) appears in the image, and its depth: z along the optical axis in a perspective view, the
-    /// distance in a panorama. `None` for what lies behind a perspective camera, or in the camera's centre.
+    /// Where `point` (world) appears in the image, and its depth: z along the optical axis in a perspective
+    /// view, the distance in a panorama. `None` for what lies behind a perspective camera, or in the camera's
+    /// centre.
     pub fn project(&self, point: DVec3) -> Option<(DVec2, f64)> {
         let (w, h) = (f64::from(self.width), f64::from(self.height));
         let d = point - self.pose.location;
@@ -196,8 +199,9 @@ impl Camera {
         }
     }
 
-    /// World → the axes in which normals of this camera's images are written (formats.md, "Images"): the channels
-    /// R G B are right, down and towards the camera in a perspective view, and X, −Z, Y of the world in a panorama.
+    /// World → the axes in which normals of this camera's images are written (formats.md, "Images"): the
+    /// channels R G B are right, down and towards the camera in a perspective view, and X, −Z, Y of the world
+    /// in a panorama.
     pub fn normal_image_from_world(&self) -> DMat3 {
         self.normal_axes_from_world(NormalAxes::Paper)
     }
@@ -342,7 +346,8 @@ mod tests {
         assert_eq!(panorama.normal_axes_from_world(NormalAxes::OpenCv), panorama.normal_image_from_world());
     }
 
-    /// A genuine pose of the published data set (Area 3): K, original rotation and final rotation agree with the rest.
+    /// A genuine pose of the published data set (Area 3): K, original rotation and final rotation agree with
+    /// the rest.
     #[test]
     fn a_genuine_pose_is_reproduced() {
         let original = dvec3(1.57489812374115, 0.0024619516916573048, 0.7112205624580383);

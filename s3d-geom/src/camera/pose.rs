@@ -13,8 +13,8 @@ pub fn rotation_from_euler(angles_rad: DVec3) -> DMat3 {
         * DMat3::from_rotation_x(angles_rad.x)
 }
 
-/// Three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in [−π/2, π/2]. Where the
-/// two outer axes coincide (y = ±π/2) z is 0.
+/// Three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in [−π/2, π/2].
+/// Where the two outer axes coincide (y = ±π/2) z is 0.
 pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
     let m = |row: usize, col: usize| rotation.col(col)[row];
     let cos_y = libm::hypot(m(0, 0), m(1, 0));
@@ -51,14 +51,15 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°), so that the identity
-    /// looks along +Y with +Z up.
+    /// The pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°), so that the
+    /// identity looks along +Y with +Z up.
     pub fn from_scanner(location: DVec3, world_from_scanner: DQuat) -> Self {
         let turn = DMat3::from_quat(world_from_scanner.normalize());
         Self { location, world_from_camera: turn * DMat3::from_rotation_x(FRAC_PI_2) }
     }
 
-    /// A level camera (+Z up) that looks along the heading `yaw_rad`, 0 along +Y, growing to the left (towards −X).
+    /// A level camera (+Z up) that looks along the heading `yaw_rad`, 0 along +Y, growing to the left
+    /// (towards −X).
     pub fn level(location: DVec3, yaw_rad: f64) -> Self {
         Self::from_scanner(location, DQuat::from_rotation_z(yaw_rad))
     }
@@ -71,7 +72,8 @@ impl Pose {
         Self { location: self.location, world_from_camera: self.world_from_camera * turn }
     }
 
-    /// Yaw and pitch, in radians, that [`Pose::turned`] takes from this pose to `view`, as far as one without roll can.
+    /// Yaw and pitch, in radians, that [`Pose::turned`] takes from this pose to `view`, as far as one without
+    /// roll can.
     pub fn yaw_pitch_to(&self, view: &Pose) -> (f64, f64) {
         let turn = self.world_from_camera.transpose() * view.world_from_camera;
         // Ry(yaw)·Rx(pitch) has the columns (cos y, 0, −sin y), … and the middle row (0, cos p, −sin p).
@@ -104,15 +106,16 @@ impl Pose {
         DMat3::from_cols(self.right(), -self.up(), self.forward()).transpose()
     }
 
-    /// `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C], world → camera, 3 × 4.
+    /// `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C], world → camera, 3 ×
+    /// 4.
     pub fn rt_matrix(&self) -> [[f64; 4]; 3] {
         let r = self.opencv_from_world();
         let t = -(r * self.location);
         std::array::from_fn(|i| [r.x_axis[i], r.y_axis[i], r.z_axis[i], t[i]])
     }
 
-    /// The heading of the viewing direction in the horizontal plane: radians from +X towards +Y. A camera that looks
-    /// straight up or down has the heading of its image's lower or upper edge.
+    /// The heading of the viewing direction in the horizontal plane: radians from +X towards +Y. A camera
+    /// that looks straight up or down has the heading of its image's lower or upper edge.
     pub fn azimuth_rad(&self) -> f64 {
         let f = self.forward();
         if libm::hypot(f.x, f.y) > 1e-9 {

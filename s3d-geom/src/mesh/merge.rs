@@ -3,9 +3,10 @@
 use crate::{DEFAULT_COLOR, Material, MeshParts, MeshReport, NO_INDEX, TriMesh};
 
 impl MeshParts {
-    /// Adds the vertices, faces, materials and textures of `other` after its own. Every face keeps its attributes; a
-    /// column that only one of the two has is filled up with [`NO_INDEX`], and a missing vertex colour with the colour
-    /// of the vertex's material (of its last face, if they differ) or [`DEFAULT_COLOR`].
+    /// Adds the vertices, faces, materials and textures of `other` after its own. Every face keeps its
+    /// attributes; a column that only one of the two has is filled up with [`NO_INDEX`], and a missing vertex
+    /// colour with the colour of the vertex's material (of its last face, if they differ) or
+    /// [`DEFAULT_COLOR`].
     pub fn append(&mut self, mut other: MeshParts) {
         if self.colors.is_empty() != other.colors.is_empty() {
             self.fill_colors();

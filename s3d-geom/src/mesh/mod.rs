@@ -53,8 +53,8 @@ pub struct MeshParts {
     pub face_materials: Vec<u32>,
     /// The textures.
     pub textures: Vec<Texture>,
-    /// A number of the caller's for each face, such as its place in a file, by which columns of the caller's own can follow
-    /// when faces are dropped; none, or one a face.
+    /// A number of the caller's for each face, such as its place in a file, by which columns of the caller's
+    /// own can follow when faces are dropped; none, or one a face.
     pub face_tags: Vec<u32>,
 }
 
@@ -121,7 +121,8 @@ pub enum FaceColor<'a> {
     Flat([u8; 3]),
 }
 
-/// A textured triangle mesh: at least one face, every face with an area, every index in range, every number finite.
+/// A textured triangle mesh: at least one face, every face with an area, every index in range, every number
+/// finite.
 ///
 /// World frame: metres, Z-up, right-handed.
 ///
@@ -153,8 +154,8 @@ impl TriMesh {
     /// Checks the columns, and drops the faces of zero area (exactly zero in `f64`: slivers stay).
     ///
     /// # Errors
-    /// [`MeshError`] for an index out of range, a used vertex that is not finite, a column of the wrong length, or no
-    /// face left.
+    /// [`MeshError`] for an index out of range, a used vertex that is not finite, a column of the wrong
+    /// length, or no face left.
     pub fn new(mut parts: MeshParts) -> Result<Self, MeshError> {
         let n = parts.faces.len();
         let length = |what, count: usize, expected| {
@@ -319,8 +320,8 @@ impl TriMesh {
         self.parts.face_materials.get(face as usize).copied().filter(|&m| m != NO_INDEX)
     }
 
-    /// Where face `face` takes its colour from: its texture if it has one and coordinates to look it up, else its
-    /// corners' colours, else its material's, else [`DEFAULT_COLOR`].
+    /// Where face `face` takes its colour from: its texture if it has one and coordinates to look it up, else
+    /// its corners' colours, else its material's, else [`DEFAULT_COLOR`].
     pub fn color_of(&self, face: u32) -> FaceColor<'_> {
         let p = &self.parts;
         let material = self.material_of(face).map(|m| &p.materials[m as usize]);

@@ -5,9 +5,9 @@ use crate::{MeshParts, TriMesh};
 use rayon::prelude::*;
 
 impl TriMesh {
-    /// The mesh without the faces that repeat an earlier one — the same three corners in space, in any order — and how
-    /// many there were. Scans and two-sided models hold such faces. A repeated face is never the first that a ray or a
-    /// point meets, and it would be sampled twice as densely as the rest.
+    /// The mesh without the faces that repeat an earlier one — the same three corners in space, in any order
+    /// — and how many there were. Scans and two-sided models hold such faces. A repeated face is never the
+    /// first that a ray or a point meets, and it would be sampled twice as densely as the rest.
     #[must_use]
     pub fn without_repeated_faces(self) -> (Self, usize) {
         let count = self.faces().len();
@@ -37,7 +37,8 @@ impl TriMesh {
     }
 }
 
-/// The corners of a face as bits, sorted: equal for faces with the same corners. Zeros of either sign are one.
+/// The corners of a face as bits, sorted: equal for faces with the same corners. Zeros of either sign are
+/// one.
 fn corners(mesh: &TriMesh, face: u32) -> [[u32; 3]; 3] {
     let mut corners = mesh.triangle(face).map(|p| p.to_array().map(|c| (c + 0.0).to_bits()));
     corners.sort_unstable();

@@ -59,8 +59,8 @@ fn remainder(i: i64, n: i64) -> i64 {
 
 /// An 8-bit colour image laid over faces by texture coordinates.
 ///
-/// Coordinates are OBJ's: (0, 0) is the **bottom** left corner of the image, (1, 1) the top right. Colours are
-/// interpolated as they are encoded (sRGB), as the viewers of the field do.
+/// Coordinates are OBJ's: (0, 0) is the **bottom** left corner of the image, (1, 1) the top right. Colours
+/// are interpolated as they are encoded (sRGB), as the viewers of the field do.
 ///
 /// ```
 /// use s3d_geom::{Raster, Texture, Wrap, glam::vec2};
@@ -81,23 +81,24 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// The colour at `uv`, bilinear between the four nearest pixels, 0 to 255 a channel. A coordinate that is not
-    /// finite gives the corner pixel's colour.
+    /// The colour at `uv`, bilinear between the four nearest pixels, 0 to 255 a channel. A coordinate that is
+    /// not finite gives the corner pixel's colour.
     #[inline(always)]
     pub fn sample(&self, uv: Vec2) -> [f32; 3] {
         sample_bilinear(&self.image, self.wrap, uv)
     }
 }
 
-/// The colour of `image` at `uv`, bilinear between the four nearest pixels, 0 to 255 a channel; conventions as in
-/// [`Texture`]. An image without pixels is black.
+/// The colour of `image` at `uv`, bilinear between the four nearest pixels, 0 to 255 a channel; conventions
+/// as in [`Texture`]. An image without pixels is black.
 #[inline(always)]
 pub fn sample_bilinear(image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: Vec2) -> [f32; 3] {
     let (w, h) = (image.width(), image.height());
     if w == 0 || h == 0 {
         return [0.0; 3];
     }
-    // f64 keeps the fraction of a pixel when a coordinate repeats many times; `as i64` saturates and takes NaN to 0.
+    // f64 keeps the fraction of a pixel when a coordinate repeats many times; `as i64` saturates and takes
+    // NaN to 0.
     let x = f64::from(uv.x) * f64::from(w) - 0.5;
     let y = (1.0 - f64::from(uv.y)) * f64::from(h) - 0.5;
     let (x, y) = (if x.is_finite() { x } else { 0.0 }, if y.is_finite() { y } else { 0.0 });
@@ -138,7 +139,8 @@ mod tests {
 
     #[test]
     fn wrap_modes_differ_beyond_the_edge() {
-        // Half a pixel left of the left edge: repeat blends with the right column, the others see the edge twice.
+        // Half a pixel left of the left edge: repeat blends with the right column, the others see the edge
+        // twice.
         let at = vec2(0.0, 0.75);
         assert_eq!(two_by_two(Wrap::Repeat).sample(at)[0], 50.0);
         assert_eq!(two_by_two(Wrap::Mirror).sample(at)[0], 0.0);

@@ -10,8 +10,9 @@ pub(crate) const MOST_POINTS: usize = 1 << 20;
 /// Cells to a side of a cube around the points, less one.
 const LAST_CELL: f32 = 16_383.0;
 
-/// The indices of points in an order in which neighbours are near each other: by the cells of a cube around them, along
-/// Z-order. Points that are not finite come anywhere. Works on all threads of the current rayon pool.
+/// The indices of points in an order in which neighbours are near each other: by the cells of a cube around
+/// them, along Z-order. Points that are not finite come anywhere. Works on all threads of the current rayon
+/// pool.
 ///
 /// # Panics
 /// If there are more than [`MOST_POINTS`].

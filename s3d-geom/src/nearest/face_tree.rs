@@ -52,8 +52,8 @@ pub(crate) struct Search<'t> {
     near: [f32; 3],
     exact: DVec3,
     best: Best,
-    /// What is farther than this (squared) is not the nearest: the distance to something and more than the rounding of the
-    /// bounds, which is below 1e-6 of them, or 1e-44 where numbers get that small.
+    /// What is farther than this (squared) is not the nearest: the distance to something and more than the
+    /// rounding of the bounds, which is below 1e-6 of them, or 1e-44 where numbers get that small.
     prune_beyond: f32,
     /// Boxes to look into, with their squared distance.
     open: Vec<(f32, u32)>,
@@ -89,8 +89,8 @@ impl FaceTree {
         tree
     }
 
-    /// Where a search for points of `around` may start that finds nothing farther than the root of `reach_squared`: leaves,
-    /// or nodes above them if these get many.
+    /// Where a search for points of `around` may start that finds nothing farther than the root of
+    /// `reach_squared`: leaves, or nodes above them if these get many.
     #[inline(always)]
     pub(crate) fn starts_near(&self, around: Aabb, reach_squared: f32, starts: &mut Starts) {
         let (low, high) = (around.min.to_array(), around.max.to_array());
@@ -142,15 +142,17 @@ impl<'t> Search<'t> {
         Self { tree, near: [0.0; 3], exact: DVec3::ZERO, best, prune_beyond: f32::INFINITY, open, candidates }
     }
 
-    /// Finds the triangle nearest to `point`, the smallest face among equally near ones. The search begins in the leaf
-    /// `guess`, which costs or saves time and changes nothing else: what is pruned is farther than the best, not as far.
+    /// Finds the triangle nearest to `point`, the smallest face among equally near ones. The search begins in
+    /// the leaf `guess`, which costs or saves time and changes nothing else: what is pruned is farther than
+    /// the best, not as far.
     #[inline(always)]
     pub(crate) fn nearest(&mut self, point: Vec3, guess: u32) -> Best {
         self.nearest_below(&self.tree.nodes[..1], point, guess);
         self.best
     }
 
-    /// The same for a point of the box and starts of [`FaceTree::starts_near`], if it is no farther than what they reach.
+    /// The same for a point of the box and starts of [`FaceTree::starts_near`], if it is no farther than what
+    /// they reach.
     #[inline(always)]
     pub(crate) fn nearest_from(
         &mut self,
@@ -296,8 +298,8 @@ impl Node8 {
     }
 }
 
-/// The nodes below `node`, or it alone if it is to be a leaf: its children, of which the largest are opened as long as there
-/// are no more than eight.
+/// The nodes below `node`, or it alone if it is to be a leaf: its children, of which the largest are opened
+/// as long as there are no more than eight.
 fn eight_below(bvh: &Bvh2, sizes: &[usize], node: usize) -> Vec<usize> {
     let mut below = vec![node];
     while below.len() < 8 {

@@ -1,10 +1,11 @@
 //! The face of a mesh that is nearest to a point.
 //!
-//! Source: formats.md, "Labels": an annotated point votes for its nearest face, and a point equally near to several
-//! faces for the smallest face index.
+//! Source: formats.md, "Labels": an annotated point votes for its nearest face, and a point equally near to
+//! several faces for the smallest face index.
 //!
-//! All arithmetic that decides is `f64`, on corners in the order of their coordinates. So faces that share an edge or a
-//! corner get bit by bit the same distance there, whatever their winding and the indices of their vertices.
+//! All arithmetic that decides is `f64`, on corners in the order of their coordinates. So faces that share an
+//! edge or a corner get bit by bit the same distance there, whatever their winding and the indices of their
+//! vertices.
 
 mod curve;
 mod face_tree;
@@ -42,7 +43,8 @@ impl Nearest {
     }
 }
 
-/// Finds the nearest face by looking at all of them: the reference for [`NearestFaces`], which gives the same.
+/// Finds the nearest face by looking at all of them: the reference for [`NearestFaces`], which gives the
+/// same.
 pub fn nearest_brute_force(mesh: &TriMesh, point: Vec3) -> Nearest {
     if !point.is_finite() {
         return Nearest::none(point);
@@ -58,8 +60,8 @@ pub fn nearest_brute_force(mesh: &TriMesh, point: Vec3) -> Nearest {
     Nearest::on(&SortedTriangle::new(mesh.triangle(nearest)), nearest, point)
 }
 
-/// A bounding volume hierarchy over the faces of a mesh, to find the nearest of them to any number of points, from any
-/// number of threads.
+/// A bounding volume hierarchy over the faces of a mesh, to find the nearest of them to any number of points,
+/// from any number of threads.
 ///
 /// ```
 /// use s3d_geom::{NearestFaces, TriMesh, glam::{Vec3, vec3}};
@@ -92,9 +94,10 @@ impl<'m> NearestFaces<'m> {
         nearest[0]
     }
 
-    /// The nearest faces of many points, in their order, into `out`, whose content they replace. Works on all threads of
-    /// the current rayon pool. The points may come in any order: they are looked up in one in which neighbours follow each
-    /// other, up to a million at a time, and the nearer these are, the faster. Beside `out` this takes 28 MB at most.
+    /// The nearest faces of many points, in their order, into `out`, whose content they replace. Works on all
+    /// threads of the current rayon pool. The points may come in any order: they are looked up in one in
+    /// which neighbours follow each other, up to a million at a time, and the nearer these are, the faster.
+    /// Beside `out` this takes 28 MB at most.
     pub fn nearest_many(&self, points: &[Vec3], out: &mut Vec<Nearest>) {
         out.resize(points.len(), Nearest::none(Vec3::ZERO));
         let mut order = Vec::new();

@@ -2,14 +2,14 @@
 
 use glam::{DVec3, Vec3, Vec3A};
 
-/// Triangles thinner than this, relative to their longest edge, have no normal to speak of: they are measured by their
-/// edges, which is off by less than the rounding of `f32` coordinates.
+/// Triangles thinner than this, relative to their longest edge, have no normal to speak of: they are measured
+/// by their edges, which is off by less than the rounding of `f32` coordinates.
 const THINNEST: f64 = 1e-8;
 
 /// A triangle with its corners in ascending order of (x, y, z).
 ///
-/// The same positions give the same arithmetic, whatever a face's winding and first corner; and an edge runs in the same
-/// direction in all its triangles.
+/// The same positions give the same arithmetic, whatever a face's winding and first corner; and an edge runs
+/// in the same direction in all its triangles.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SortedTriangle([Vec3A; 3]);
 
@@ -41,7 +41,8 @@ impl SortedTriangle {
         (longest, (b - a).cross(c - a).length_squared())
     }
 
-    /// The squared distance to `point` and the nearest point. The distance is never below that to the bounding box.
+    /// The squared distance to `point` and the nearest point. The distance is never below that to the
+    /// bounding box.
     pub(crate) fn closest(&self, point: DVec3) -> (f64, DVec3) {
         let [a, b, c] = self.0.map(|p| p.as_dvec3());
         let (ab, ac, bc) = (b - a, c - a, c - b);
@@ -50,8 +51,9 @@ impl SortedTriangle {
         let longest = ab.length_squared().max(ac.length_squared()).max(bc.length_squared());
         let thin = normal_squared <= THINNEST * THINNEST * longest * longest;
 
-        // Barycentric coordinates of the foot on the plane, times the normal's square; the signs tell on which side of
-        // each edge it is. (C. Ericson, "Real-Time Collision Detection", 5.1.5, has the derivation.)
+        // Barycentric coordinates of the foot on the plane, times the normal's square; the signs tell on
+        // which side of each edge it is. (C. Ericson, "Real-Time Collision Detection", 5.1.5, has the
+        // derivation.)
         let (ap, bp, cp) = (point - a, point - b, point - c);
         let (ab_a, ac_a) = (ab.dot(ap), ac.dot(ap));
         let (ab_b, ac_b) = (ab.dot(bp), ac.dot(bp));
@@ -197,7 +199,8 @@ mod tests {
             [a, b, c, d] in [corner(), corner(), corner(), corner()],
             t in 0.0..1.0f64,
         ) {
-            // Nearest to the edge, or an end of it, from both: opposite to the inner bisector of the two triangles.
+            // Nearest to the edge, or an end of it, from both: opposite to the inner bisector of the two
+            // triangles.
             let [ad, bd, cd, dd] = [a, b, c, d].map(|p| p.as_dvec3());
             let away = |p: DVec3| (p - ad).reject_from(bd - ad).normalize();
             prop_assume!(away(cd).is_finite() && away(dd).is_finite());

@@ -1,18 +1,19 @@
 //! Eight triangles at once: a lower bound of their distances, so that few need the exact one.
 //!
-//! **The bound.** Seen from the point, let the corners of a triangle T be a, b and c. For every direction q, all of T
-//! lies at least min(q·a, q·b, q·c)/|q| along it, so T is no nearer than that; for q the nearest point of T, it is the
-//! distance itself. A good q is found with plain `f32` arithmetic, region by region; wherever rounding takes it, the
-//! bound holds, and only the arithmetic of the bound has to be accounted for:
-//! - Corners seen from the point are rounded by 2⁻²⁴ of their length, three-term dot products by 3·2⁻²⁴ |q||v|. With
-//!   R ≥ |v| for all corners v, that is below 3e-7 R of the distance; 1e-6 R is taken off.
-//! - The reference is not the distance but [`SortedTriangle::closest`], in `f64`. Where it takes the foot on the plane, it
-//!   may have taken a foot outside of a thin triangle for one inside: its weights, the areas of three small triangles
-//!   times the triangle's own, are off by at most 32·2⁻⁵³ L²R², L being the longest edge, and n², their sum, is all the
-//!   smaller for it. Barycentric coordinates that are off by η move the foot by up to 4 η L, so the reference may be
-//!   below the distance by 128·2⁻⁵³ L³R²/n². That is taken off, too: `thinness` is 2⁻⁴⁵ L³/n².
-//! - Other roundings of the reference are below 1e-7 R (see [`SortedTriangle`]: thinner triangles than 1e-8 are measured
-//!   by their edges).
+//! **The bound.** Seen from the point, let the corners of a triangle T be a, b and c. For every direction q,
+//! all of T lies at least min(q·a, q·b, q·c)/|q| along it, so T is no nearer than that; for q the nearest
+//! point of T, it is the distance itself. A good q is found with plain `f32` arithmetic, region by region;
+//! wherever rounding takes it, the bound holds, and only the arithmetic of the bound has to be accounted for:
+//! - Corners seen from the point are rounded by 2⁻²⁴ of their length, three-term dot products by 3·2⁻²⁴
+//!   |q||v|. With R ≥ |v| for all corners v, that is below 3e-7 R of the distance; 1e-6 R is taken off.
+//! - The reference is not the distance but [`SortedTriangle::closest`], in `f64`. Where it takes the foot on
+//!   the plane, it may have taken a foot outside of a thin triangle for one inside: its weights, the areas of
+//!   three small triangles times the triangle's own, are off by at most 32·2⁻⁵³ L²R², L being the longest
+//!   edge, and n², their sum, is all the smaller for it. Barycentric coordinates that are off by η move the
+//!   foot by up to 4 η L, so the reference may be below the distance by 128·2⁻⁵³ L³R²/n². That is taken off,
+//!   too: `thinness` is 2⁻⁴⁵ L³/n².
+//! - Other roundings of the reference are below 1e-7 R (see [`SortedTriangle`]: thinner triangles than 1e-8
+//!   are measured by their edges).
 //!
 //! Where numbers get so large or small that they overflow or lose digits, the bound is 0.
 

@@ -1,8 +1,8 @@
 //! The floor outline of a room, from its points.
 //!
-//! An alpha shape (Edelsbrunner, Kirkpatrick and Seidel, "On the shape of a set of points in the plane", 1983): the
-//! triangles of a Delaunay triangulation whose circumscribed circle is small, so that the outline follows corners and
-//! pillars and still spans the gaps under furniture.
+//! An alpha shape (Edelsbrunner, Kirkpatrick and Seidel, "On the shape of a set of points in the plane",
+//! 1983): the triangles of a Delaunay triangulation whose circumscribed circle is small, so that the outline
+//! follows corners and pillars and still spans the gaps under furniture.
 
 use super::polygon::Polygon;
 use super::polygon::{edges, signed_area};
@@ -18,9 +18,9 @@ use std::hash::{BuildHasherDefault, Hasher};
 pub struct FootprintOptions {
     /// Points are thinned to a few in each cell of a square grid this wide, in metres.
     pub cell_m: f64,
-    /// Triangles whose circumscribed circle has at most this radius, in metres, belong to the floor: gaps up to twice as
-    /// wide are closed, and a corner that juts into the room is cut off where the circle touches its sides (half the
-    /// radius's square at a right angle).
+    /// Triangles whose circumscribed circle has at most this radius, in metres, belong to the floor: gaps up
+    /// to twice as wide are closed, and a corner that juts into the room is cut off where the circle touches
+    /// its sides (half the radius's square at a right angle).
     pub alpha_m: f64,
 }
 
@@ -83,8 +83,8 @@ impl Cell {
     }
 }
 
-/// Hashes a grid cell: a multiplication a coordinate. Clouds of hundreds of millions of points look cells up, and nobody
-/// gains from cells that collide.
+/// Hashes a grid cell: a multiplication a coordinate. Clouds of hundreds of millions of points look cells up,
+/// and nobody gains from cells that collide.
 #[derive(Clone, Copy, Debug, Default)]
 struct CellHasher(u64);
 
@@ -158,8 +158,8 @@ impl FootprintBuilder {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Footprint {
-    /// Its connected parts in world x and y, metres. Outer rings run counter-clockwise, holes clockwise; each starts with
-    /// its smallest corner by (x, y), by which rings and parts are sorted as well.
+    /// Its connected parts in world x and y, metres. Outer rings run counter-clockwise, holes clockwise; each
+    /// starts with its smallest corner by (x, y), by which rings and parts are sorted as well.
     pub polygons: Vec<Polygon>,
     /// The area in m².
     pub area_m2: f64,
@@ -253,7 +253,8 @@ fn alpha_shape(points: &[Vec2], alpha: f64) -> Footprint {
     Footprint { polygons, area_m2 }
 }
 
-/// Cuts a closed walk that passes a place more than once there, and starts each ring with its smallest corner.
+/// Cuts a closed walk that passes a place more than once there, and starts each ring with its smallest
+/// corner.
 fn simple_rings(walk: Vec<DVec2>) -> Vec<Vec<DVec2>> {
     let mut rings = Vec::new();
     let mut open: Vec<DVec2> = Vec::with_capacity(walk.len());

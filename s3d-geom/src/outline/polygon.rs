@@ -8,12 +8,12 @@ use thiserror::Error;
 /// Coordinates beyond this are refused: products of them would overflow.
 const LARGEST_COORDINATE: f64 = 1e60;
 
-/// A face of more corners is refused: where they lie without order, the time that cutting takes grows faster than their
-/// number. It is half a second then.
+/// A face of more corners is refused: where they lie without order, the time that cutting takes grows faster
+/// than their number. It is half a second then.
 const MOST_CORNERS: usize = 1 << 14;
 
-/// Why an outline cannot be cut into triangles. Corners count from 0; in a [`Polygon`], those of the holes follow those
-/// of the outer ring.
+/// Why an outline cannot be cut into triangles. Corners count from 0; in a [`Polygon`], those of the holes
+/// follow those of the outer ring.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum PolygonError {
@@ -46,13 +46,14 @@ pub enum PolygonError {
         /// The corner at its other end.
         to: usize,
     },
-    /// No edges cross, but the outline turns over where it touches itself, or a hole is not where a hole may be.
+    /// No edges cross, but the outline turns over where it touches itself, or a hole is not where a hole may
+    /// be.
     #[error("parts of the outline overlap, or a hole is not inside")]
     Overlap,
 }
 
-/// A polygon with holes, in a plane. A hole lies within the outer ring and outside of the other holes; rings may touch
-/// in corners. The closing edge, from the last corner to the first, goes without saying.
+/// A polygon with holes, in a plane. A hole lies within the outer ring and outside of the other holes; rings
+/// may touch in corners. The closing edge, from the last corner to the first, goes without saying.
 ///
 /// ```
 /// use s3d_geom::{Polygon, PolygonError, glam::{DVec2, dvec2}};
@@ -87,7 +88,8 @@ impl Polygon {
             if side == 0.0 && (point - a).dot(point - b) <= 0.0 {
                 return true;
             }
-            // A ray to the right crosses edges that start below or at its height and end above it, or the other way.
+            // A ray to the right crosses edges that start below or at its height and end above it, or the
+            // other way.
             if (a.y > point.y) != (b.y > point.y) && (side > 0.0) == (b.y > a.y) {
                 inside = !inside;
             }
@@ -109,13 +111,13 @@ impl Polygon {
         self.rings().flat_map(edges).map(squared).fold(f64::INFINITY, f64::min).sqrt()
     }
 
-    /// Cuts the polygon into counter-clockwise triangles whose corners are its own: indices into the outer ring, followed
-    /// by the holes in their order. A constrained Delaunay triangulation. Corners at the same place are one: triangles
-    /// name the first.
+    /// Cuts the polygon into counter-clockwise triangles whose corners are its own: indices into the outer
+    /// ring, followed by the holes in their order. A constrained Delaunay triangulation. Corners at the same
+    /// place are one: triangles name the first.
     ///
     /// # Errors
-    /// [`PolygonError`] for a ring of fewer than three corners, a corner that is no number, no area, or rings that cross
-    /// themselves, each other, or are not nested as they should be.
+    /// [`PolygonError`] for a ring of fewer than three corners, a corner that is no number, no area, or rings
+    /// that cross themselves, each other, or are not nested as they should be.
     pub fn triangulate(&self) -> Result<Vec<[u32; 3]>, PolygonError> {
         let points: Vec<DVec2> = self.rings().flatten().copied().collect();
         let mut rings = Vec::with_capacity(1 + self.holes.len());
@@ -132,14 +134,16 @@ impl Polygon {
     }
 }
 
-/// Cuts a face of any number of corners into triangles of the same corners and winding, as indices into `corners`.
+/// Cuts a face of any number of corners into triangles of the same corners and winding, as indices into
+/// `corners`.
 ///
-/// The face is looked at along its mean normal (Newell's), so that it may be concave and somewhat bent. Corners on a
-/// straight line and repeated corners are fine, and so is an outline that runs to a hole and back over the same edge.
+/// The face is looked at along its mean normal (Newell's), so that it may be concave and somewhat bent.
+/// Corners on a straight line and repeated corners are fine, and so is an outline that runs to a hole and
+/// back over the same edge.
 ///
 /// # Errors
-/// [`PolygonError`] for fewer than three corners or more than 16,384, a corner that is no number, no area, or an outline
-/// that crosses itself as seen along the normal.
+/// [`PolygonError`] for fewer than three corners or more than 16,384, a corner that is no number, no area, or
+/// an outline that crosses itself as seen along the normal.
 pub fn triangulate_face(corners: &[Vec3]) -> Result<Vec<[u32; 3]>, PolygonError> {
     if corners.len() < 3 {
         return Err(PolygonError::TooFewCorners { corners: corners.len() });
@@ -210,7 +214,8 @@ fn triangulate_rings(
         vertices.push(vertex);
     }
 
-    // An edge that rings take an even number of times (there and back, to a hole) does not part inside from outside.
+    // An edge that rings take an even number of times (there and back, to a hole) does not part inside from
+    // outside.
     let mut borders: Vec<[usize; 2]> = Vec::with_capacity(points.len());
     for ring in rings {
         for (from, to) in edges(&vertices[ring.clone()]).filter(|(from, to)| from != to) {

@@ -5,13 +5,13 @@ use glam::Vec3;
 /// Faces whose unit normal has a smaller |z| are walls.
 const STEEPEST: f32 = 0.3;
 
-/// The dominant horizontal direction of the walls among faces given by unit normal and area: degrees in [0, 90) from +X
-/// towards +Y, by which a room is turned about Z to have its walls parallel to the axes. `None` without a near-vertical
-/// face.
+/// The dominant horizontal direction of the walls among faces given by unit normal and area: degrees in [0,
+/// 90) from +X towards +Y, by which a room is turned about Z to have its walls parallel to the axes. `None`
+/// without a near-vertical face.
 ///
-/// Walls that meet at a right angle count as one direction. The peak of a histogram keeps clutter out; around the peak
-/// the mean by area refines it. Faces whose normal is not finite or whose area is not positive are left out. Source:
-/// formats.md, "S3DIS tree" (the alignment angle).
+/// Walls that meet at a right angle count as one direction. The peak of a histogram keeps clutter out; around
+/// the peak the mean by area refines it. Faces whose normal is not finite or whose area is not positive are
+/// left out. Source: formats.md, "S3DIS tree" (the alignment angle).
 ///
 /// ```
 /// use s3d_geom::{dominant_wall_direction_deg, glam::Vec3};

@@ -1,8 +1,10 @@
-//! The pictures of a COLMAP model: `images.txt` or `images.bin`. Source: COLMAP's documentation, "Output Format".
+//! The pictures of a COLMAP model: `images.txt` or `images.bin`. Source: COLMAP's documentation, "Output
+//! Format".
 //!
 //! Lines of ten words, or the same in binary: no library is needed for them.
 //!
-//! A picture's pose is world → camera in OpenCV's axes (x right, y down, z forward): a quaternion w x y z and a translation.
+//! A picture's pose is world → camera in OpenCV's axes (x right, y down, z forward): a quaternion w x y z and
+//! a translation.
 
 use crate::camera::located::{LocatedPicture, pose_from_opencv};
 use crate::error::{Error, Result};
@@ -66,8 +68,8 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
     Ok(pictures)
 }
 
-/// Little-endian: a count; for each picture its id (4 bytes), seven numbers (8 each), its camera (4), a name that ends at
-/// a zero, a count of points (8) and 24 bytes each.
+/// Little-endian: a count; for each picture its id (4 bytes), seven numbers (8 each), its camera (4), a name
+/// that ends at a zero, a count of points (8) and 24 bytes each.
 fn read_binary(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
     let mut rest = bytes;
     let mut pictures = Vec::new();

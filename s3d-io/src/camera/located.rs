@@ -21,9 +21,10 @@ pub(crate) struct LocatedPicture {
     pub(crate) line: u64,
 }
 
-/// The scan locations of a list of pictures. A location is where a picture was taken, its camera level and with the
-/// picture's heading, since views are drawn around the horizon. Its uuid is the first run of 32 hexadecimal digits in the
-/// picture's name, or else follows from the name; pictures of one uuid are one location, which has the first one's heading.
+/// The scan locations of a list of pictures. A location is where a picture was taken, its camera level and
+/// with the picture's heading, since views are drawn around the horizon. Its uuid is the first run of 32
+/// hexadecimal digits in the picture's name, or else follows from the name; pictures of one uuid are one
+/// location, which has the first one's heading.
 pub(crate) fn locations_of(path: &Path, pictures: Vec<LocatedPicture>) -> Result<Vec<ScanLocation>> {
     let mut locations: Vec<ScanLocation> = Vec::new();
     let mut index: HashMap<String, usize> = HashMap::new();
@@ -61,14 +62,16 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<LocatedPicture>) -> Result
     Ok(locations)
 }
 
-/// The first run of exactly 32 hexadecimal digits, in lower case; hyphens of a uuid's usual form do not count.
+/// The first run of exactly 32 hexadecimal digits, in lower case; hyphens of a uuid's usual form do not
+/// count.
 fn uuid_in(name: &str) -> Option<String> {
     name.split(|c: char| !c.is_ascii_hexdigit() && c != '-')
         .map(|run| run.replace('-', "").to_ascii_lowercase())
         .find(|run| run.len() == 32)
 }
 
-/// A uuid of 32 hexadecimal digits that follows from a name alone (XXH3, 128 bits): the same on every machine.
+/// A uuid of 32 hexadecimal digits that follows from a name alone (XXH3, 128 bits): the same on every
+/// machine.
 pub fn uuid_from_name(name: &str) -> String {
     format!("{:032x}", xxhash_rust::xxh3::xxh3_128(name.as_bytes()))
 }

@@ -15,16 +15,19 @@ const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a
 /// Reads the scan locations of `path`, a file or a folder:
 ///
 /// - `.csv`, or any ending that is not named here: the table that [`read_cameras`] reads;
-/// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a COLMAP model;
+/// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a
+///   COLMAP model;
 /// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and its kin;
 /// - a folder of pose files of images, as published: where the scanner stood and how it was turned;
 /// - a folder with the raw captures of a Matterport: see [`read_matterport_locations`].
 ///
-/// The pictures of a COLMAP model and of a `transforms.json` give scan locations where they were taken: level, with the picture's heading, one for each
-/// uuid in their names. `world_from_file` takes the file's frame to the world (metres, Z-up): turns, shifts and scales.
+/// The pictures of a COLMAP model and of a `transforms.json` give scan locations where they were taken:
+/// level, with the picture's heading, one for each uuid in their names. `world_from_file` takes the file's
+/// frame to the world (metres, Z-up): turns, shifts and scales.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these in it.
+/// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these
+/// in it.
 pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocation>> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let turned = |mut pictures: Vec<located::LocatedPicture>| {

@@ -1,7 +1,7 @@
 //! The scanner's own pictures: raw Matterport captures, sky boxes and equirectangular photographs.
 //!
-//! Source: formats.md, "The scanner's own pictures". A folder's files are looked up in it and in the folders in it, as
-//! Matterport3D has colours, poses and intrinsics apart (`matterport_color_images/`…).
+//! Source: formats.md, "The scanner's own pictures". A folder's files are looked up in it and in the folders
+//! in it, as Matterport3D has colours, poses and intrinsics apart (`matterport_color_images/`…).
 
 use crate::camera::table::ScanLocation;
 use crate::error::{Error, Result};
@@ -15,8 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// How far a matrix may be from a rotation, and its last row from 0 0 0 1: what eight digits leave, and scanners that
-/// round to four.
+/// How far a matrix may be from a rotation, and its last row from 0 0 0 1: what eight digits leave, and
+/// scanners that round to four.
 const ROTATION_ERROR: f64 = 2e-3;
 
 /// Farther from the origin nothing was scanned, in metres.
@@ -153,8 +153,8 @@ impl PictureFolder {
         uuids.collect::<BTreeSet<_>>().into_iter().collect()
     }
 
-    /// The six pictures of a location's sky box, in their order: 0 up, 1 right, 2 back, 3 left, 4 front, 5 down. `Err`
-    /// names what is missing.
+    /// The six pictures of a location's sky box, in their order: 0 up, 1 right, 2 back, 3 left, 4 front, 5
+    /// down. `Err` names what is missing.
     pub fn sky_box(&self, uuid: &str) -> std::result::Result<[PathBuf; 6], String> {
         let stem = |k: usize| format!("{uuid}_skybox{k}_sami");
         let found: [Option<PathBuf>; 6] = std::array::from_fn(|k| self.picture(&stem(k)));
@@ -180,9 +180,9 @@ impl PictureFolder {
     /// A location's captures, by camera and stop, with their poses and lenses; none if it has none.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`], with the line, for a pose that is no 4×4 matrix of a rotation and a translation and
-    /// for intrinsics that are not eleven numbers of a lens; for a picture without pose or intrinsics, for a pose without a
-    /// picture, and for a picture that is not of its lens's size.
+    /// [`Error::Io`]; [`Error::Format`], with the line, for a pose that is no 4×4 matrix of a rotation and a
+    /// translation and for intrinsics that are not eleven numbers of a lens; for a picture without pose or
+    /// intrinsics, for a pose without a picture, and for a picture that is not of its lens's size.
     pub fn captures(&self, uuid: &str) -> Result<Vec<CaptureFile>> {
         let mut captures = Vec::new();
         for camera in 0..3 {
@@ -249,8 +249,8 @@ fn numbers(bytes: &[u8], path: &Path) -> Result<Vec<(u64, f64)>> {
     Ok(numbers)
 }
 
-/// Reads the intrinsics of a camera: `width height fx fy cx cy k1 k2 p1 p2 k3`, OpenCV's model, origin at the picture's top
-/// left corner.
+/// Reads the intrinsics of a camera: `width height fx fy cx cy k1 k2 p1 p2 k3`, OpenCV's model, origin at the
+/// picture's top left corner.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if they are not eleven numbers, or of no lens.
@@ -286,12 +286,12 @@ pub fn parse_intrinsics(bytes: &[u8], name: &Path) -> Result<Lens> {
     })
 }
 
-/// Reads the pose of a capture: a 4×4 matrix, row by row, from the camera (x right, y down, z forward) to the world
-/// (metres, Z-up).
+/// Reads the pose of a capture: a 4×4 matrix, row by row, from the camera (x right, y down, z forward) to the
+/// world (metres, Z-up).
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`], with the line where it can tell one, if there are not sixteen numbers, the last row is
-/// not 0 0 0 1, the 3×3 part is no rotation, or the place is farther than 10,000 km away.
+/// [`Error::Io`]; [`Error::Format`], with the line where it can tell one, if there are not sixteen numbers,
+/// the last row is not 0 0 0 1, the 3×3 part is no rotation, or the place is farther than 10,000 km away.
 pub fn read_capture_pose(path: &Path) -> Result<Pose> {
     parse_capture_pose(&read_file(path)?, path)
 }
@@ -341,12 +341,13 @@ pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
     Ok(Pose { location, world_from_camera: DMat3::from_cols(right, -down, -forward) })
 }
 
-/// The scan locations of a folder of raw captures, by uuid: of each the mean place of its level camera (camera 1), and as
-/// E(original) that camera's pose at stop 0, tilt included. [`ScanLocation::line`] counts them from 1.
+/// The scan locations of a folder of raw captures, by uuid: of each the mean place of its level camera
+/// (camera 1), and as E(original) that camera's pose at stop 0, tilt included. [`ScanLocation::line`] counts
+/// them from 1.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] for the folder if there is no location in it, for a pose as [`read_capture_pose`] says,
-/// and for a location whose `_pose_1_0.txt` is not there.
+/// [`Error::Io`]; [`Error::Format`] for the folder if there is no location in it, for a pose as
+/// [`read_capture_pose`] says, and for a location whose `_pose_1_0.txt` is not there.
 pub fn read_matterport_locations(dir: &Path) -> Result<Vec<ScanLocation>> {
     let folder = PictureFolder::open(dir)?;
     let uuids = folder.uuids();

@@ -1,5 +1,5 @@
-//! The pictures of a `transforms.json`, as nerfstudio, Polycam, Record3D and instant-ngp write it. Source: nerfstudio's
-//! documentation, "Data conventions".
+//! The pictures of a `transforms.json`, as nerfstudio, Polycam, Record3D and instant-ngp write it. Source:
+//! nerfstudio's documentation, "Data conventions".
 //!
 //! A frame's `transform_matrix` is camera → world, 4 × 4, in OpenGL's axes: x right, y up, z backwards.
 

@@ -30,8 +30,9 @@ struct PoseOf {
     room: Option<String>,
 }
 
-/// The scan locations of the pose files in `folders`, by uuid, each with the file that tells of it: one of each location's
-/// files is read, that in the first folder. `world_from_file` turns, shifts and scales. Folders that are not there do not count.
+/// The scan locations of the pose files in `folders`, by uuid, each with the file that tells of it: one of
+/// each location's files is read, that in the first folder. `world_from_file` turns, shifts and scales.
+/// Folders that are not there do not count.
 pub(crate) fn read(
     folders: &[PathBuf],
     world_from_file: &DAffine3,

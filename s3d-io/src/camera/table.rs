@@ -25,15 +25,17 @@ pub struct ScanLocation {
     pub line: u64,
 }
 
-/// Reads a table of scan locations: CSV with the columns `uuid,x,y,z,qx,qy,qz,qw`, metres in the Z-up world and the
-/// scanner's rotation, of any length but zero, as a quaternion.
+/// Reads a table of scan locations: CSV with the columns `uuid,x,y,z,qx,qy,qz,qw`, metres in the Z-up world
+/// and the scanner's rotation, of any length but zero, as a quaternion.
 ///
-/// A first line of those eight names gives their order; without one it is that order. A uuid may be in upper case and
-/// hyphenated. Lines that start with `#` and empty lines do not count. Source: formats.md, "Cameras".
+/// A first line of those eight names gives their order; without one it is that order. A uuid may be in upper
+/// case and hyphenated. Lines that start with `#` and empty lines do not count. Source: formats.md,
+/// "Cameras".
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a uuid that is not 32 hexadecimal
-/// digits or is there twice, a number that is not finite, a quaternion of zeros; for the file, if it has no location.
+/// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a uuid that is not 32
+/// hexadecimal digits or is there twice, a number that is not finite, a quaternion of zeros; for the file, if
+/// it has no location.
 pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
     parse_cameras(&read_file(path)?, path)
 }

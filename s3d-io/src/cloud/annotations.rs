@@ -17,8 +17,8 @@ pub struct AnnotationOptions {
     pub on_fault: OnFault,
     /// Whether a class that is unknown, and not in [`AnnotationOptions::classes`], is taken for clutter.
     pub unknown_as_clutter: bool,
-    /// Which class a name or number in the files means; `None`: points of it are left out, as if they were not annotated.
-    /// Names are compared to the letter, numbers as decimals: `"2"`.
+    /// Which class a name or number in the files means; `None`: points of it are left out, as if they were
+    /// not annotated. Names are compared to the letter, numbers as decimals: `"2"`.
     pub classes: BTreeMap<String, Option<Class>>,
     /// The room of points whose file names none. With a column of room *numbers*, the type of these rooms.
     pub room: Option<Room>,
@@ -28,10 +28,11 @@ pub struct AnnotationOptions {
     pub instance_column: Option<String>,
     /// The name of the column of rooms; `None`: there is none.
     pub room_column: Option<String>,
-    /// The names of the columns of a file that has none (a plain NPY array), from the first; empty: `x y z r g b class`
-    /// and, if there is one more, `instance`.
+    /// The names of the columns of a file that has none (a plain NPY array), from the first; empty: `x y z r
+    /// g b class` and, if there is one more, `instance`.
     pub columns: Vec<String>,
-    /// What is subtracted from coordinates in `f64` before they are rounded to `f32`: metres. For georeferenced clouds.
+    /// What is subtracted from coordinates in `f64` before they are rounded to `f32`: metres. For
+    /// georeferenced clouds.
     pub offset_m: DVec3,
     /// A cloud with more points than this waits in a temporary file to be read by instance, and not in memory
     /// (15 bytes a point).
@@ -98,8 +99,8 @@ pub struct Skipped {
 
 /// Where the points of one instance are.
 pub(crate) trait InstancePoints: Debug + Send + Sync {
-    /// Appends the instance's points to `out`: positions, a colour for each (black if the file has none), and faces if they
-    /// are known.
+    /// Appends the instance's points to `out`: positions, a colour for each (black if the file has none), and
+    /// faces if they are known.
     fn read(&self, out: &mut PointCloud) -> Result<Skipped>;
 
     /// The file that holds them.
@@ -116,7 +117,8 @@ pub(crate) trait InstancePoints: Debug + Send + Sync {
     /// The same points, to be read block by block.
     fn open(&self) -> Result<Box<dyn PointBlocks + '_>>;
 
-    /// The folder for a copy of the points, if reading them a second time would take longer than reading that.
+    /// The folder for a copy of the points, if reading them a second time would take longer than reading
+    /// that.
     fn copy_to(&self) -> Option<PathBuf> {
         None
     }
@@ -124,8 +126,8 @@ pub(crate) trait InstancePoints: Debug + Send + Sync {
 
 /// The points of an instance as their source reads them.
 pub(crate) trait PointBlocks: Send {
-    /// Appends the next points to `out`: about as many as asked for, or fewer if there are no more. `false`: these were the
-    /// last.
+    /// Appends the next points to `out`: about as many as asked for, or fewer if there are no more. `false`:
+    /// these were the last.
     fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool>;
 
     /// What was left out so far.
@@ -137,13 +139,13 @@ impl AnnotatedInstance {
         Self { class, number, points }
     }
 
-    /// Appends the instance's points to `out`: world metres, Z-up, a colour for each (black if the file has none).
-    /// [`PointCloud::faces`] comes to have an entry a point if it is known already which face each point belongs to.
-    /// Points of a file, and the order of points, are the same each time.
+    /// Appends the instance's points to `out`: world metres, Z-up, a colour for each (black if the file has
+    /// none). [`PointCloud::faces`] comes to have an entry a point if it is known already which face each
+    /// point belongs to. Points of a file, and the order of points, are the same each time.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] with the line for a point that is none, unless it is to be skipped. `out` may
-    /// then hold the points before it.
+    /// [`Error::Io`]; [`Error::Format`] with the line for a point that is none, unless it is to be skipped.
+    /// `out` may then hold the points before it.
     ///
     /// # Panics
     /// If `out` has points without colours, or with faces where these points have none.
@@ -159,8 +161,8 @@ impl AnnotatedInstance {
         self.points.copy_to()
     }
 
-    /// Whether its points are the vertices of a mesh. Where that is the scene's own, a vertex is equally near to all faces
-    /// around it, and should vote for each of them.
+    /// Whether its points are the vertices of a mesh. Where that is the scene's own, a vertex is equally near
+    /// to all faces around it, and should vote for each of them.
     pub fn are_vertices(&self) -> bool {
         self.points.are_vertices()
     }

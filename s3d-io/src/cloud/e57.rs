@@ -206,7 +206,8 @@ fn range_of(kind: &RecordDataType) -> Option<(f64, f64)> {
     }
 }
 
-/// What `f` gives, or a sentence if it panicked: the decoder is not ours, and a damaged file must not end the program.
+/// What `f` gives, or a sentence if it panicked: the decoder is not ours, and a damaged file must not end the
+/// program.
 fn guarded<T>(path: &Path, f: impl FnOnce() -> T) -> Result<T> {
     crate::guarded::guarded(f).ok_or_else(|| Error::format(path, "its points are damaged"))
 }

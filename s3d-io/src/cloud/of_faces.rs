@@ -23,9 +23,10 @@ impl Annotations {
     /// The annotations that say of each face of `mesh` what `label_of_face` does: its place in `labels`, or
     /// [`NO_INDEX`].
     ///
-    /// The points of an instance are the corners of its faces and places about 5 cm apart on them, black, and each says
-    /// which face it is of ([`PointCloud::faces`]): no other face gets its vote. Instances are numbered in each room in the
-    /// order of their numbers in the area. `path` is the file that messages name.
+    /// The points of an instance are the corners of its faces and places about 5 cm apart on them, black, and
+    /// each says which face it is of ([`PointCloud::faces`]): no other face gets its vote. Instances are
+    /// numbered in each room in the order of their numbers in the area. `path` is the file that messages
+    /// name.
     ///
     /// # Errors
     /// [`Error::Format`] for `path` if no face has a label.
@@ -95,7 +96,8 @@ impl InstancePoints for FacePoints {
     }
 }
 
-/// The points of an instance's faces, block by block; all points of a face are in one, which may be longer by them.
+/// The points of an instance's faces, block by block; all points of a face are in one, which may be longer by
+/// them.
 struct FaceBlocks<'a> {
     /// The faces that are left.
     faces: &'a [Face],

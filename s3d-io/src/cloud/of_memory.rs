@@ -22,8 +22,8 @@ pub struct AnnotatedPoints {
     pub class: Class,
     /// Its number among the room's instances of its class, from 1.
     pub number: u32,
-    /// Its points, world metres, Z-up. Colours are black if there are none; with [`PointCloud::faces`] each point votes for
-    /// the face that it says, else for the nearest.
+    /// Its points, world metres, Z-up. Colours are black if there are none; with [`PointCloud::faces`] each
+    /// point votes for the face that it says, else for the nearest.
     pub points: PointCloud,
 }
 
@@ -43,8 +43,8 @@ impl Annotations {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Format`] if there is no instance, one without points, one twice, one with the number 0, or one with
-    /// coordinates that are not finite or with other numbers of colours or faces than of points.
+    /// [`Error::Format`] if there is no instance, one without points, one twice, one with the number 0, or
+    /// one with coordinates that are not finite or with other numbers of colours or faces than of points.
     pub fn from_points(instances: impl IntoIterator<Item = AnnotatedPoints>) -> Result<Self> {
         let mut rooms: BTreeMap<Room, BTreeMap<(Class, u32), PointCloud>> = BTreeMap::new();
         for AnnotatedPoints { room, class, number, mut points } in instances {

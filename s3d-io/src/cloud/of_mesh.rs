@@ -16,13 +16,14 @@ impl Annotations {
     /// The annotations that came with a mesh: see [`MeshLabels`].
     ///
     /// Numbers of faces or vertices mean what [`AnnotationOptions::classes`] says; the room is
-    /// [`AnnotationOptions::room`], or else that which the mesh's file is named after (`office_3.ply`). Faces of one room, class and object number are one
-    /// instance; those without a number are one a class and room. Without such numbers the names of materials are labels
-    /// (`chair_3_office_5_1`), if those of half the faces are. Points are those of [`Annotations::from_face_labels`].
+    /// [`AnnotationOptions::room`], or else that which the mesh's file is named after (`office_3.ply`). Faces
+    /// of one room, class and object number are one instance; those without a number are one a class and
+    /// room. Without such numbers the names of materials are labels (`chair_3_office_5_1`), if those of half
+    /// the faces are. Points are those of [`Annotations::from_face_labels`].
     ///
     /// # Errors
-    /// [`Error::Format`] if the mesh has no labels, if there are none of classes, and for classes and rooms without a
-    /// meaning, unless they are to be skipped.
+    /// [`Error::Format`] if the mesh has no labels, if there are none of classes, and for classes and rooms
+    /// without a meaning, unless they are to be skipped.
     ///
     /// # Panics
     /// If the mesh has no [`MeshFile::sources`].

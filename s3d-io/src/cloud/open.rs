@@ -29,27 +29,29 @@ impl Annotations {
     /// | `.las`, `.laz` | `classification`, and `point_source_id` as instance; extra dimensions by name |
     /// | `.e57` | several scans with their poses; attributes of extensions for classes and instances |
     ///
-    /// The points of a tree are read when they are asked for, an instance at a time. All other files hold *clouds*: rows of
-    /// points, each of which says what it belongs to. All clouds of an area are read as one, and grouped:
+    /// The points of a tree are read when they are asked for, an instance at a time. All other files hold
+    /// *clouds*: rows of points, each of which says what it belongs to. All clouds of an area are read as
+    /// one, and grouped:
     ///
-    /// - **class**: [`AnnotationOptions::classes`] tells what a number or a name means; names of the 13 classes mean
-    ///   themselves, and the usual words of ScanNet's annotators the nearest of the 13. The numbers of a plain NPY array are
-    ///   S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes are named. A class without a meaning stops with a
-    ///   list of them.
-    /// - **instance**: points of one room and class with one number are one. Two classes of the file that mean the same are
-    ///   kept apart, since many files number per class. Points without a number, or with a negative one, are one instance a
-    ///   class and room. Instances are numbered per class and room from 1 in the order of their numbers in the file.
-    /// - **room**: what the column says (a name, or the number of a room of [`AnnotationOptions::room`]'s type), or else
-    ///   [`AnnotationOptions::room`], or else the room that a file is named after: `office_3.ply`, `Area_1_office_3.npy`, or
-    ///   an E57 scan.
+    /// - **class**: [`AnnotationOptions::classes`] tells what a number or a name means; names of the 13
+    ///   classes mean themselves, and the usual words of ScanNet's annotators the nearest of the 13. The
+    ///   numbers of a plain NPY array are S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes are
+    ///   named. A class without a meaning stops with a list of them.
+    /// - **instance**: points of one room and class with one number are one. Two classes of the file that
+    ///   mean the same are kept apart, since many files number per class. Points without a number, or with a
+    ///   negative one, are one instance a class and room. Instances are numbered per class and room from 1 in
+    ///   the order of their numbers in the file.
+    /// - **room**: what the column says (a name, or the number of a room of [`AnnotationOptions::room`]'s
+    ///   type), or else [`AnnotationOptions::room`], or else the room that a file is named after:
+    ///   `office_3.ply`, `Area_1_office_3.npy`, or an E57 scan.
     ///
-    /// Colours of 16 bits or as floats become 8 bits: 16-bit numbers count as 8-bit ones if no number in the file is above
-    /// 255, floats from 0 to 1 if none is above 1.
+    /// Colours of 16 bits or as floats become 8 bits: 16-bit numbers count as 8-bit ones if no number in the
+    /// file is above 255, floats from 0 to 1 if none is above 1.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] for a path of another kind, for what the kind's reader finds wrong, for a room that
-    /// two sources tell of, and if no room is found. With [`OnFault::Skip`] single names, lines and classes are left out
-    /// instead and [`Annotations::warnings`] tells of them.
+    /// [`Error::Io`]; [`Error::Format`] for a path of another kind, for what the kind's reader finds wrong,
+    /// for a room that two sources tell of, and if no room is found. With [`OnFault::Skip`] single names,
+    /// lines and classes are left out instead and [`Annotations::warnings`] tells of them.
     ///
     /// # Panics
     /// If `paths` is empty.
@@ -73,9 +75,9 @@ impl Annotations {
         Ok(all)
     }
 
-    /// As [`Annotations::open`], from a reader of one file's bytes, which is read as often as it takes: a `.mat`, or a table
-    /// of points (`.ply`, `.npy`, `.npz`, `.las`, `.laz`, `.e57`). The ending of `name` says which, and errors call the file
-    /// so.
+    /// As [`Annotations::open`], from a reader of one file's bytes, which is read as often as it takes: a
+    /// `.mat`, or a table of points (`.ply`, `.npy`, `.npz`, `.las`, `.laz`, `.e57`). The ending of `name`
+    /// says which, and errors call the file so.
     ///
     /// ```
     /// use s3d_io::cloud::{AnnotationOptions, Annotations};

@@ -1,4 +1,5 @@
-//! The points of an instance, gone through several times in blocks, so that an instance of any size needs little memory.
+//! The points of an instance, gone through several times in blocks, so that an instance of any size needs
+//! little memory.
 
 use crate::cloud::annotations::{AnnotatedInstance, PointBlocks, Skipped};
 use crate::error::{Error, Result};
@@ -42,7 +43,8 @@ impl PointPasses for &[Vec3] {
     }
 }
 
-/// Reads the points of instances in blocks, one instance after another. It holds three blocks, whose memory it keeps.
+/// Reads the points of instances in blocks, one instance after another. It holds three blocks, whose memory
+/// it keeps.
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -109,11 +111,11 @@ impl<'a> InstanceReader<'a> {
         Self { block_points, now, next, ahead: None, first }
     }
 
-    /// Hands all points of an instance to `each`, block after block, with what [`AnnotatedInstance::read`] gives of each,
-    /// and whether the block is all of them; not even one block if it has no point. The next block is read meanwhile, on
-    /// another thread of the current rayon pool; during the last that is the first block of `then`, the instance that is
-    /// going to be read after this one.
-    /// Returns the points, to be gone through again, and what was left out.
+    /// Hands all points of an instance to `each`, block after block, with what [`AnnotatedInstance::read`]
+    /// gives of each, and whether the block is all of them; not even one block if it has no point. The next
+    /// block is read meanwhile, on another thread of the current rayon pool; during the last that is the
+    /// first block of `then`, the instance that is going to be read after this one. Returns the points, to be
+    /// gone through again, and what was left out.
     ///
     /// # Errors
     /// What `each` returns, which ends the reading; as [`AnnotatedInstance::read`].

@@ -1,5 +1,5 @@
-//! ScanNet's annotations: a mesh, a segment for each of its vertices (`*.segs.json`), and objects as lists of segments
-//! (`*.aggregation.json`). Source: ScanNet's README, "Data Organization".
+//! ScanNet's annotations: a mesh, a segment for each of its vertices (`*.segs.json`), and objects as lists of
+//! segments (`*.aggregation.json`). Source: ScanNet's README, "Data Organization".
 
 use crate::cloud::ply::read::{color_of, open_vertices};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
@@ -162,8 +162,8 @@ impl ScannetCloud {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let aggregation = if path.is_dir() {
             let mut found = aggregations(path).unwrap_or_default();
-            // `X_vh_clean.aggregation.json` is of the finer mesh, if there are both: the coarser one is what ScanNet's own
-            // labels are on.
+            // `X_vh_clean.aggregation.json` is of the finer mesh, if there are both: the coarser one is what
+            // ScanNet's own labels are on.
             if found.len() > 1 {
                 found.retain(|p| !name_of(p).ends_with("_vh_clean.aggregation.json"));
             }

@@ -120,7 +120,8 @@ pub struct Conventions {
 }
 
 impl Conventions {
-    /// Writes `conventions.json`, these choices and all that is the same in every data set, and returns its size in bytes.
+    /// Writes `conventions.json`, these choices and all that is the same in every data set, and returns its
+    /// size in bytes.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -205,11 +206,12 @@ impl Conventions {
     }
 }
 
-/// Which conventions the data set has whose `conventions.json` is at `path`; the published ones if there is no such file,
-/// as there is none in the published data.
+/// Which conventions the data set has whose `conventions.json` is at `path`; the published ones if there is
+/// no such file, as there is none in the published data.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if the file is something else or names a convention that is not known here.
+/// [`Error::Io`]; [`Error::Format`] if the file is something else or names a convention that is not known
+/// here.
 pub fn read_conventions(path: &Path) -> Result<Conventions> {
     #[derive(Deserialize)]
     struct File {

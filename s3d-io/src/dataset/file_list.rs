@@ -27,10 +27,12 @@ pub struct FileRecord {
 }
 
 impl FileRecord {
-    /// The record of the file `path` with this content, in a data set in `root`; the file itself is not looked at.
+    /// The record of the file `path` with this content, in a data set in `root`; the file itself is not
+    /// looked at.
     ///
     /// # Errors
-    /// [`Error::Format`] if the path does not lie below `root`, or is not in UTF-8, as no path of a data set is.
+    /// [`Error::Format`] if the path does not lie below `root`, or is not in UTF-8, as no path of a data set
+    /// is.
     pub fn of_bytes(root: &Path, path: &Path, content: &[u8]) -> Result<Self> {
         Ok(Self { path: relative(root, path)?, bytes: content.len() as u64, xxh3_128: Checksum::of(content) })
     }
@@ -50,8 +52,8 @@ impl FileRecord {
         root.join(&self.path)
     }
 
-    /// Reads the file in the data set in `root`, and tells what is wrong with it: nothing, if it is the one that was
-    /// recorded.
+    /// Reads the file in the data set in `root`, and tells what is wrong with it: nothing, if it is the one
+    /// that was recorded.
     pub fn fault(&self, root: &Path) -> Option<String> {
         let path = self.path_in(root);
         // A wrong size is told without reading.
@@ -132,8 +134,9 @@ pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Chec
 /// Reads a list as [`write_file_list`] writes it, and nothing else.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the line: another header, a line that is no path, size and checksum, a path that
-/// leads out of the folder, one that does not sort behind the one before, a last line without a line feed.
+/// [`Error::Io`]; [`Error::Format`] with the line: another header, a line that is no path, size and checksum,
+/// a path that leads out of the folder, one that does not sort behind the one before, a last line without a
+/// line feed.
 pub fn read_file_list(path: &Path) -> Result<Vec<FileRecord>> {
     parse_file_list(BufReader::new(open_file(path)?), path)
 }

@@ -58,8 +58,9 @@ impl DatasetImage {
     }
 }
 
-/// The images of an area, found by the names of their files: by scan location and room (as text), views by number and
-/// the panorama last. Files with other names are passed over. An area without images gives an empty list.
+/// The images of an area, found by the names of their files: by scan location and room (as text), views by
+/// number and the panorama last. Files with other names are passed over. An area without images gives an
+/// empty list.
 ///
 /// # Errors
 /// [`Error::Io`] if a folder cannot be read.
@@ -85,7 +86,8 @@ pub fn dataset_images(layout: &Layout, area: u32) -> Result<Vec<DatasetImage>> {
     Ok(found.into_iter().map(image).collect())
 }
 
-/// Checks that every image has a file in each domain in which another of its area and kind (view or panorama) has one.
+/// Checks that every image has a file in each domain in which another of its area and kind (view or panorama)
+/// has one.
 ///
 /// # Errors
 /// [`Error::Format`] that names the first file that is missing.

@@ -5,19 +5,21 @@ use crate::fs::json::{read_json, write_json};
 use s3d_label::NULL_NAME;
 use std::path::Path;
 
-/// How many entries a table must have for loaders that look a pixel up as `table[G * 256 + B]` before they find that R is
-/// not 0: the colour of missing pixels, (13, 13, 13), is such an index too.
+/// How many entries a table must have for loaders that look a pixel up as `table[G * 256 + B]` before they
+/// find that R is not 0: the colour of missing pixels, (13, 13, 13), is such an index too.
 pub const PADDED_LABELS: usize = 13 * 256 + 13 + 1;
 
 /// The most labels of instances in a table for such loaders: they see 16 bits of an index.
 pub const MAX_LABELS_OF_LOADERS: usize = 65_535;
 
-/// Appends null labels until there are `entries` names. Whoever reads a table takes null labels at its end for padding.
+/// Appends null labels until there are `entries` names. Whoever reads a table takes null labels at its end
+/// for padding.
 pub fn pad_labels(names: &mut Vec<String>, entries: usize) {
     names.resize(names.len().max(entries), NULL_NAME.to_owned());
 }
 
-/// Writes the names of labels, the null label first, and returns the file's size in bytes. Source: formats.md, "Labels".
+/// Writes the names of labels, the null label first, and returns the file's size in bytes. Source:
+/// formats.md, "Labels".
 ///
 /// # Errors
 /// [`crate::Error::Io`].

@@ -1,8 +1,9 @@
 //! Every path and every name of the data set. Source: formats.md, "Names and folders".
 //!
-//! Loaders of the field find a file's fellows by replacing `rgb` in its **whole path** by another domain's name, and its
-//! room and scan location by splitting its name at `_`. So below the root `rgb` stands in a path only where a domain
-//! stands (besides `3d/rgb.obj` and its fellows, which are named as published), and no part holds an underscore.
+//! Loaders of the field find a file's fellows by replacing `rgb` in its **whole path** by another domain's
+//! name, and its room and scan location by splitting its name at `_`. So below the root `rgb` stands in a
+//! path only where a domain stands (besides `3d/rgb.obj` and its fellows, which are named as published), and
+//! no part holds an underscore.
 
 use crate::dataset::domain::Domain;
 #[cfg(feature = "json")]
@@ -10,7 +11,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Which image of a scan location: `frame_…` in a file's name, `frame_num` in a pose file (a number, or the word).
+/// Which image of a scan location: `frame_…` in a file's name, `frame_num` in a pose file (a number, or the
+/// word).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Frame {
     /// A perspective view, counted from 0.
@@ -172,14 +174,14 @@ impl Layout {
         &self.root
     }
 
-    /// Whether "rgb" stands in the root itself, so that loaders that replace it in whole paths find nothing: worth a
-    /// warning.
+    /// Whether "rgb" stands in the root itself, so that loaders that replace it in whole paths find nothing:
+    /// worth a warning.
     pub fn root_misleads_loaders(&self) -> bool {
         self.root.to_string_lossy().contains("rgb")
     }
 
-    /// What a data set of these areas has in its folder: the folders of the areas and of their S3DIS trees, and its
-    /// tables; the manifest last. Anything else there is somebody else's.
+    /// What a data set of these areas has in its folder: the folders of the areas and of their S3DIS trees,
+    /// and its tables; the manifest last. Anything else there is somebody else's.
     pub fn entries(&self, areas: &[u32]) -> Vec<PathBuf> {
         let mut entries: Vec<PathBuf> =
             areas.iter().flat_map(|a| [self.area_dir(*a), self.s3dis_area_dir(*a)]).collect();
@@ -359,8 +361,8 @@ impl Layout {
         self.root.join("files.csv")
     }
 
-    /// `.s3d`: what an export keeps while it is unfinished. No [entry](Self::entries) of a data set: it is gone when the
-    /// data set is complete.
+    /// `.s3d`: what an export keeps while it is unfinished. No [entry](Self::entries) of a data set: it is
+    /// gone when the data set is complete.
     pub fn work_dir(&self) -> PathBuf {
         self.root.join(".s3d")
     }
@@ -455,7 +457,8 @@ mod tests {
         assert!(!is_valid_room("office") && !is_valid_room("open_space_1") && is_valid_room("WC_1"));
     }
 
-    /// A loader swaps `rgb` for another domain in the whole path, or for the empty word to find the modality's root.
+    /// A loader swaps `rgb` for another domain in the whole path, or for the empty word to find the
+    /// modality's root.
     #[test]
     fn rgb_stands_in_a_path_only_for_the_domain() {
         let layout = Layout::new("root");

@@ -11,7 +11,8 @@ use std::path::Path;
 
 /// The contents of a pose file. The fields bear the file's names and are written in this order.
 ///
-/// Rotations are Blender's XYZ Euler angles in radians, E = Rz·Ry·Rx; lengths are metres, in the world's frame (Z-up).
+/// Rotations are Blender's XYZ Euler angles in radians, E = Rz·Ry·Rx; lengths are metres, in the world's
+/// frame (Z-up).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "RawPoseFile")]
 pub struct PoseFile {
@@ -35,14 +36,15 @@ pub struct PoseFile {
     pub camera_uuid: String,
     /// The same.
     pub point_uuid: String,
-    /// Number of the view; the word "equirectangular" for a panorama. (formats.md leaves the panorama open; the word is
-    /// what stands in the file's name.)
+    /// Number of the view; the word "equirectangular" for a panorama. (formats.md leaves the panorama open;
+    /// the word is what stands in the file's name.)
     pub frame_num: Frame,
     /// Type, number and area of the room: "office_5_3".
     pub room: String,
 }
 
-/// What files may hold: the published ones have no `camera_rotation_final`, and a matrix may have its fourth row.
+/// What files may hold: the published ones have no `camera_rotation_final`, and a matrix may have its fourth
+/// row.
 #[derive(Deserialize)]
 struct RawPoseFile {
     camera_k_matrix: [[f64; 3]; 3],
@@ -88,8 +90,8 @@ impl TryFrom<RawPoseFile> for PoseFile {
 }
 
 impl PoseFile {
-    /// The pose file of an image of `camera` from the scan location `uuid`, where the scanner stood as `original`, in
-    /// the room `room` (type, number and area: "office_5_3").
+    /// The pose file of an image of `camera` from the scan location `uuid`, where the scanner stood as
+    /// `original`, in the room `room` (type, number and area: "office_5_3").
     pub fn new(camera: &Camera, original: &Pose, uuid: &str, room: &str, frame_num: Frame) -> Self {
         let last = camera.pose.world_from_camera;
         let between = last * original.world_from_camera.transpose();
@@ -149,8 +151,8 @@ impl PoseFile {
 /// Reads a pose file, ours or a published one.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io); [`Error::Format`](crate::Error::Format) if it is no JSON, a key is missing or holds
-/// something else.
+/// [`Error::Io`](crate::Error::Io); [`Error::Format`](crate::Error::Format) if it is no JSON, a key is
+/// missing or holds something else.
 pub fn read_pose(path: &Path) -> Result<PoseFile> {
     read_json(path)
 }

@@ -22,8 +22,8 @@ struct Splits {
     folds: Vec<Split>,
 }
 
-/// Writes the folds, `{"folds": [{"fold": 1, "train_areas": [1, …], "test_areas": [5]}, …]}`, and returns the file's size
-/// in bytes.
+/// Writes the folds, `{"folds": [{"fold": 1, "train_areas": [1, …], "test_areas": [5]}, …]}`, and returns the
+/// file's size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
@@ -40,8 +40,9 @@ pub fn read_splits(path: &Path) -> Result<Vec<Split>> {
     Ok(folds)
 }
 
-/// Writes a list of images, a line each, as depth loaders such as UniFuse's read it: the colour image and the depth image,
-/// paths relative to the data set's folder with `/`, between them one space. Returns the file's size in bytes.
+/// Writes a list of images, a line each, as depth loaders such as UniFuse's read it: the colour image and the
+/// depth image, paths relative to the data set's folder with `/`, between them one space. Returns the file's
+/// size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).

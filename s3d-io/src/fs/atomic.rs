@@ -12,9 +12,9 @@ const BUFFER: usize = 1 << 18;
 /// A file that takes its name only when it is complete.
 ///
 /// It is written under a temporary name (a dot and random letters) in the folder of the final one, and
-/// [`AtomicFile::commit`] renames it, over an older file if there is one. Dropped without that, it leaves nothing behind.
-/// Nobody who lists the folder meets half a file under the final name, even when the process is killed; a crash of the
-/// whole machine is not guarded against (nothing is synced to the disk).
+/// [`AtomicFile::commit`] renames it, over an older file if there is one. Dropped without that, it leaves
+/// nothing behind. Nobody who lists the folder meets half a file under the final name, even when the process
+/// is killed; a crash of the whole machine is not guarded against (nothing is synced to the disk).
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
@@ -91,7 +91,8 @@ impl Seek for AtomicFile {
     }
 }
 
-/// Temporary files are made for their owner alone; these become ordinary files, which the umask decides about.
+/// Temporary files are made for their owner alone; these become ordinary files, which the umask decides
+/// about.
 #[cfg(unix)]
 fn usual_permissions() -> Option<Permissions> {
     use std::os::unix::fs::PermissionsExt;

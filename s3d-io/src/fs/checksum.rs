@@ -1,7 +1,7 @@
 //! Checksums of files: XXH3 of 128 bits, written as `xxhsum -H2` prints it.
 //!
-//! They tell a file that changed by accident — half of it written, a flipped bit, zeros after a power loss — from the one
-//! that was written. They are no proof against somebody who changes files on purpose.
+//! They tell a file that changed by accident — half of it written, a flipped bit, zeros after a power loss —
+//! from the one that was written. They are no proof against somebody who changes files on purpose.
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -16,7 +16,8 @@ use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 /// Bytes that are read at a time.
 const BUFFER: usize = 1 << 18;
 
-/// XXH3 of 128 bits, with seed 0, of a file's content. As text it is 32 lower-case hexadecimal digits, the highest first.
+/// XXH3 of 128 bits, with seed 0, of a file's content. As text it is 32 lower-case hexadecimal digits, the
+/// highest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Checksum(pub u128);
 

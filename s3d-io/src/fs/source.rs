@@ -42,7 +42,8 @@ impl Source {
         &self.name
     }
 
-    /// The bytes from the first, and how many they are. Each time it is another reader, with a place of its own.
+    /// The bytes from the first, and how many they are. Each time it is another reader, with a place of its
+    /// own.
     pub(crate) fn open(&self) -> Result<(Bytes, u64)> {
         let io = |e| Error::io(&self.name, "read", e);
         match &self.reader {

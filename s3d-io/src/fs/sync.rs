@@ -11,12 +11,13 @@ use std::time::Duration;
 /// How long [`SyncAhead`] rests.
 const REST: Duration = Duration::from_secs(1);
 
-/// Returns when all that was written below the folder `root` is on the disk, so that a power loss later takes nothing of
-/// it away. `files` are the files that count.
+/// Returns when all that was written below the folder `root` is on the disk, so that a power loss later takes
+/// nothing of it away. `files` are the files that count.
 ///
-/// Files are renamed to their names without being synced one by one, which would make an export of hundreds of thousands
-/// of small files wait for the disk at each. On Linux one call (`syncfs`) brings the whole file system's data out at the
-/// end; elsewhere, and where the file system does not know that call, every file is synced in turn, and then the folders.
+/// Files are renamed to their names without being synced one by one, which would make an export of hundreds
+/// of thousands of small files wait for the disk at each. On Linux one call (`syncfs`) brings the whole file
+/// system's data out at the end; elsewhere, and where the file system does not know that call, every file is
+/// synced in turn, and then the folders.
 ///
 /// # Errors
 /// [`Error::Io`]: the disk did not take the data after all.
@@ -27,8 +28,8 @@ pub fn sync_data_set(root: &Path, files: &[PathBuf]) -> Result<()> {
     sync_one_by_one(root, files)
 }
 
-/// Brings what is written below a folder to the disk while more is written, so that little is left for [`sync_data_set`] to
-/// wait for. Where the system has no call for that it does nothing.
+/// Brings what is written below a folder to the disk while more is written, so that little is left for
+/// [`sync_data_set`] to wait for. Where the system has no call for that it does nothing.
 #[derive(Debug)]
 pub struct SyncAhead {
     root: PathBuf,
@@ -64,7 +65,8 @@ impl SyncAhead {
     /// Ends, when what is under way is done.
     ///
     /// # Errors
-    /// [`Error::Io`]: the disk did not take something. The system tells that once, so that no sync after this would.
+    /// [`Error::Io`]: the disk did not take something. The system tells that once, so that no sync after this
+    /// would.
     pub fn end(self) -> Result<()> {
         let Self { root, open, thread } = self;
         drop(open);
@@ -102,7 +104,8 @@ fn sync_content(path: &Path) -> Result<()> {
     synced.map_err(|e| Error::io(path, "bring to the disk", e))
 }
 
-/// Not every system lets folders be opened (Windows does not); where it does not, names are as safe as it makes them.
+/// Not every system lets folders be opened (Windows does not); where it does not, names are as safe as it
+/// makes them.
 fn sync_folder(path: &Path) {
     if let Ok(folder) = File::open(path) {
         let _ = folder.sync_all();

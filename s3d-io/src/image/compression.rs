@@ -6,7 +6,8 @@ use std::str::FromStr;
 /// How much time the compression of images may take. What is read back is the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Compression {
-    /// As [`Balanced`](Self::Balanced), but less time for colours and labels, which get up to a quarter larger.
+    /// As [`Balanced`](Self::Balanced), but less time for colours and labels, which get up to a quarter
+    /// larger.
     Fast,
     /// About as small as libpng's level 6 and OpenEXR's ZIP, in about a tenth of their time.
     #[default]

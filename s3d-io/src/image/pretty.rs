@@ -2,13 +2,14 @@
 
 #![expect(clippy::indexing_slicing, reason = "places are taken modulo the length")]
 
-/// The colour of label `label_index` in `semantic_pretty` images and in `semantic.mtl`: never black, mid grey for the null
-/// label (index 0), and all different for any of the first 20,000 labels.
+/// The colour of label `label_index` in `semantic_pretty` images and in `semantic.mtl`: never black, mid grey
+/// for the null label (index 0), and all different for any of the first 20,000 labels.
 ///
-/// Hues follow one another by the golden angle, so that neighbours in the list differ most; value and saturation
-/// alternate in steps. Integers only: the same colours everywhere.
+/// Hues follow one another by the golden angle, so that neighbours in the list differ most; value and
+/// saturation alternate in steps. Integers only: the same colours everywhere.
 pub fn pretty_color(label_index: u32) -> [u8; 3] {
-    // Eleven and thirteen steps have no common divisor: 143 pairs, each of which sees a golden spiral of hues again.
+    // Eleven and thirteen steps have no common divisor: 143 pairs, each of which sees a golden spiral of hues
+    // again.
     const VALUES: [u32; 11] = [255, 195, 225, 165, 245, 185, 215, 155, 235, 175, 205];
     const SATURATIONS: [u32; 13] = [220, 160, 250, 190, 130, 230, 170, 200, 140, 240, 180, 150, 210];
     /// 2³² divided by the golden ratio: the golden angle, if the full circle is 2³².

@@ -13,12 +13,13 @@ use std::path::PathBuf;
 
 /// The longest side of a texture in pixels.
 const MAX_SIDE: u32 = 65_535;
-/// The most pixels of a texture: 32,768 × 16,384, twice what graphics cards take, and 1.6 GB once it is decoded. A file
-/// of half a megabyte can claim seven times as many.
+/// The most pixels of a texture: 32,768 × 16,384, twice what graphics cards take, and 1.6 GB once it is
+/// decoded. A file of half a megabyte can claim seven times as many.
 const MAX_PIXELS: u64 = 1 << 29;
 /// The most pixels of all textures of a file together, 26 GB of them: 2,048 textures of 2,048 × 2,048.
 const MAX_PIXELS_TOGETHER: u64 = 1 << 33;
-/// No PNG or JPEG holds more pixels than this in a byte: deflate shrinks at most 1,032 times, a pixel of a bit or more.
+/// No PNG or JPEG holds more pixels than this in a byte: deflate shrinks at most 1,032 times, a pixel of a
+/// bit or more.
 const MAX_PIXELS_PER_BYTE: u64 = 8 * 1_032;
 
 /// The encoded image of a texture as it was found, so that an export can copy it unchanged.
@@ -53,7 +54,8 @@ impl std::fmt::Display for TextureFault {
     }
 }
 
-/// Decodes a PNG or JPEG of any kind — gray, palette, with alpha, 16 bits — to 8-bit R G B. Alpha is left out.
+/// Decodes a PNG or JPEG of any kind — gray, palette, with alpha, 16 bits — to 8-bit R G B. Alpha is left
+/// out.
 pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTexture, TextureFault> {
     let (format, extension, size) = size_of_texture(&bytes)?;
     // The decoders are not ours: some panic at what is damaged.
@@ -128,14 +130,14 @@ fn name_of(format: ImageFormat) -> &'static str {
     format.extensions_str().first().copied().unwrap_or("different")
 }
 
-/// Reads and decodes image files, in parallel, each as [`decode_texture`] does. Beside each its fault, if it has one that
-/// a mesh can be drawn with.
+/// Reads and decodes image files, in parallel, each as [`decode_texture`] does. Beside each its fault, if it
+/// has one that a mesh can be drawn with.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for an image that is too large, and if they are together.
 pub(crate) fn read_textures(paths: &[PathBuf]) -> Result<Vec<std::result::Result<LoadedTexture, String>>> {
-    // One at a time: sizes differ, and a thread that is done takes the next. The files' bytes stay, so they are all read
-    // before the first image is decoded.
+    // One at a time: sizes differ, and a thread that is done takes the next. The files' bytes stay, so they
+    // are all read before the first image is decoded.
     let read = |path: &PathBuf| match read_file(path) {
         Ok(bytes) => Ok((size_of_texture(&bytes), bytes)),
         Err(Error::Io { source, .. }) => Err(format!("cannot be read: {source}")),

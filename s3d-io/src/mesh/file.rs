@@ -41,8 +41,8 @@ pub struct MeshFile {
     pub labels: Option<MeshLabels>,
     /// The files that the mesh comes from, and where in it each begins.
     pub sources: Vec<MeshSource>,
-    /// The other files that were read for it: libraries of materials, textures, buffers. Those that it names and that are
-    /// not there are not among them.
+    /// The other files that were read for it: libraries of materials, textures, buffers. Those that it names
+    /// and that are not there are not among them.
     pub companions: Vec<PathBuf>,
     /// How many faces of the file had more than three corners.
     pub polygons_triangulated: usize,
@@ -74,7 +74,8 @@ impl MeshFile {
         }
     }
 
-    /// The faces that come from `sources[source]`. Numbers of objects may mean different objects in different files.
+    /// The faces that come from `sources[source]`. Numbers of objects may mean different objects in different
+    /// files.
     ///
     /// # Panics
     /// If there is no such source.
@@ -84,7 +85,8 @@ impl MeshFile {
         self.sources[source].first_face..end
     }
 
-    /// Leaves out the faces that repeat an earlier one; labels follow the tags of the mesh, which are returned.
+    /// Leaves out the faces that repeat an earlier one; labels follow the tags of the mesh, which are
+    /// returned.
     pub(crate) fn tidy(mut self) -> (Self, Vec<u32>) {
         let (mut mesh, repeated) = self.mesh.without_repeated_faces();
         let tags = mesh.take_face_tags();
@@ -115,11 +117,11 @@ pub struct MeshSource {
 /// How a mesh is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MeshOptions {
-    /// The property of a PLY file's faces or vertices that tells what they are; by default one of the names that
-    /// scanners and data sets use, such as `label`, `class` and `category_id`, if it is there.
+    /// The property of a PLY file's faces or vertices that tells what they are; by default one of the names
+    /// that scanners and data sets use, such as `label`, `class` and `category_id`, if it is there.
     pub class_column: Option<String>,
-    /// The property that tells which object they belong to; by default one such as `object_id` and `instance`, if it is
-    /// there.
+    /// The property that tells which object they belong to; by default one such as `object_id` and
+    /// `instance`, if it is there.
     pub instance_column: Option<String>,
 }
 

@@ -7,16 +7,16 @@ use crate::mesh::read::read_mesh_with;
 use s3d_geom::{NO_INDEX, TriMesh};
 use std::path::{Path, PathBuf};
 
-/// Reads the meshes of `paths` and joins them in this order: vertices, faces, materials and textures of the first file,
-/// then those of the second… Each texture stays one of its own, whatever its name. Warnings name their file, if there
-/// are several.
+/// Reads the meshes of `paths` and joins them in this order: vertices, faces, materials and textures of the
+/// first file, then those of the second… Each texture stays one of its own, whatever its name. Warnings name
+/// their file, if there are several.
 ///
-/// A column that only some files have is filled up as [`s3d_geom::MeshParts::append`] tells; vertex labels become labels of faces
-/// if other files label faces, and what a file does not label has [`NO_LABEL`].
+/// A column that only some files have is filled up as [`s3d_geom::MeshParts::append`] tells; vertex labels
+/// become labels of faces if other files label faces, and what a file does not label has [`NO_LABEL`].
 ///
 /// # Errors
-/// As [`read_mesh_with`] for each file; [`Error::Format`] if `paths` is empty or the meshes have too many vertices
-/// together.
+/// As [`read_mesh_with`] for each file; [`Error::Format`] if `paths` is empty or the meshes have too many
+/// vertices together.
 pub fn read_meshes(paths: &[PathBuf], up: UpAxis) -> Result<MeshFile> {
     read_meshes_with(paths, up, &MeshOptions::default())
 }
@@ -83,8 +83,8 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
 
 type Labelled<'a> = (Option<MeshLabels>, &'a TriMesh);
 
-/// The labels of two meshes, one behind the other: of vertices where both have them for vertices, else of faces. Files
-/// have numbers, never names.
+/// The labels of two meshes, one behind the other: of vertices where both have them for vertices, else of
+/// faces. Files have numbers, never names.
 fn joined_labels(a: Labelled<'_>, b: Labelled<'_>) -> MeshLabels {
     let of_faces =
         |labels: &Option<MeshLabels>| labels.as_ref().is_some_and(|l| l.element() == LabelElement::Face);

@@ -49,9 +49,9 @@ pub enum MeshLabels {
 }
 
 impl MeshLabels {
-    /// Labels of faces from the names of their materials (`usemtl chair_3_office_5_1`), and a warning for names that are
-    /// none; `None` if fewer than half of the faces have such a name, or none of them. The null label
-    /// `<UNK>_0_<UNK>_0_0` is a name too. Source: formats.md, "World and meshes".
+    /// Labels of faces from the names of their materials (`usemtl chair_3_office_5_1`), and a warning for
+    /// names that are none; `None` if fewer than half of the faces have such a name, or none of them. The
+    /// null label `<UNK>_0_<UNK>_0_0` is a name too. Source: formats.md, "World and meshes".
     ///
     /// ```
     /// use s3d_geom::{Material, MeshParts, TriMesh, glam::Vec3};
@@ -128,8 +128,8 @@ impl MeshLabels {
         }
     }
 
-    /// The same as labels of faces: a face has the number that two or three of its corners have, and that of its first
-    /// corner if all differ. [`NO_LABEL`] counts as a number.
+    /// The same as labels of faces: a face has the number that two or three of its corners have, and that of
+    /// its first corner if all differ. [`NO_LABEL`] counts as a number.
     ///
     /// # Panics
     /// If the labels are not those of `mesh`.
@@ -159,8 +159,8 @@ impl MeshLabels {
         }
     }
 
-    /// Makes columns of faces of those of other faces, such as the polygons of a file: `tags` tells for each face its
-    /// place among them, or [`NO_INDEX`] for a face without a label.
+    /// Makes columns of faces of those of other faces, such as the polygons of a file: `tags` tells for each
+    /// face its place among them, or [`NO_INDEX`] for a face without a label.
     pub(crate) fn pick_faces(&mut self, tags: &[u32]) {
         match self {
             Self::Numbers { element: LabelElement::Face, class, instance } => {
@@ -178,9 +178,9 @@ fn picked<T: Copy>(values: &[T], tags: &[u32], missing: T) -> Vec<T> {
     tags.iter().map(|&tag| values.get(tag as usize).copied().unwrap_or(missing)).collect()
 }
 
-/// Names of properties that hold classes, in the order in which they are looked for; case is no matter. Matterport3D
-/// (`category_id`), ScanNet and SceneNN (`label`), 3RScan (`globalId`, `NYU40`), CloudCompare (`scalar_…`) and what people
-/// write by hand.
+/// Names of properties that hold classes, in the order in which they are looked for; case is no matter.
+/// Matterport3D (`category_id`), ScanNet and SceneNN (`label`), 3RScan (`globalId`, `NYU40`), CloudCompare
+/// (`scalar_…`) and what people write by hand.
 pub(crate) const CLASS_NAMES: [&str; 22] = [
     "label",
     "class",
@@ -206,8 +206,8 @@ pub(crate) const CLASS_NAMES: [&str; 22] = [
     "scalar_semantic",
 ];
 
-/// Names of properties that hold objects. Replica and Habitat (`object_id` of faces), 3RScan and MultiScan (`objectId`).
-/// Matterport3D's `segment_id` and `material_id` are none: an object has many segments.
+/// Names of properties that hold objects. Replica and Habitat (`object_id` of faces), 3RScan and MultiScan
+/// (`objectId`). Matterport3D's `segment_id` and `material_id` are none: an object has many segments.
 pub(crate) const INSTANCE_NAMES: [&str; 14] = [
     "instance",
     "instance_id",

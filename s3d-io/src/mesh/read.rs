@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf`, `.glb` or `.ply`, in any case.
 ///
-/// A texture that is missing or cannot be decoded, a face without area, of fewer than three corners or with the corners
-/// of an earlier one and the like do not stop it: they become [`MeshFile::warnings`].
+/// A texture that is missing or cannot be decoded, a face without area, of fewer than three corners or with
+/// the corners of an earlier one and the like do not stop it: they become [`MeshFile::warnings`].
 ///
 /// # Errors
 /// [`Error::Unsupported`] for any other ending and for features of a format that are not read, [`Error::Io`],
@@ -21,8 +21,8 @@ pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
 /// As [`read_mesh`], with the names of the columns of labels. Only PLY files have such columns.
 ///
 /// # Errors
-/// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that is not
-/// whole.
+/// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that
+/// is not whole.
 pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let open = || {
         let file = open_file(path)?;
@@ -32,8 +32,8 @@ pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<
     read(open, path, up, options)
 }
 
-/// As [`read_mesh_with`], from a reader of the file's bytes. The ending of `name` says how, errors call the file so, and
-/// the libraries, textures and buffers that it names are looked for in the folder of `name`.
+/// As [`read_mesh_with`], from a reader of the file's bytes. The ending of `name` says how, errors call the
+/// file so, and the libraries, textures and buffers that it names are looked for in the folder of `name`.
 ///
 /// ```
 /// use s3d_io::mesh::{UpAxis, read_mesh_from};

@@ -66,8 +66,8 @@ pub fn coco_categories(stuff: &[Class]) -> Vec<CocoCategory> {
 /// A segment of an image. The fields bear the file's names.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CocoSegment {
-    /// Its number in the image: the index of its label, which is the same in all images of the data set; of a class that is
-    /// stuff 16,711,680 and its category.
+    /// Its number in the image: the index of its label, which is the same in all images of the data set; of a
+    /// class that is stuff 16,711,680 and its category.
     pub id: u32,
     /// See [`coco_category_id`].
     pub category_id: u32,
@@ -93,8 +93,9 @@ pub struct UnknownLabelIndex {
     pub labels: usize,
 }
 
-/// The panoptic image of a semantic image, a segment's number as R + 256·G + 65536·B (which is not the order of our
-/// semantic images) and 0 where nothing was seen or what was seen has no label; and its segments, by number.
+/// The panoptic image of a semantic image, a segment's number as R + 256·G + 65536·B (which is not the order
+/// of our semantic images) and 0 where nothing was seen or what was seen has no label; and its segments, by
+/// number.
 ///
 /// # Errors
 /// [`UnknownLabelIndex`].
@@ -175,7 +176,8 @@ impl Extent {
 pub struct CocoImage {
     /// Number of the image, in the data set.
     pub id: u32,
-    /// The image below the folder of images, and the panoptic image below its own: COCO gives both the same name.
+    /// The image below the folder of images, and the panoptic image below its own: COCO gives both the same
+    /// name.
     pub file_name: String,
     /// Width in pixels.
     pub width: u32,
@@ -185,7 +187,8 @@ pub struct CocoImage {
     pub segments: Vec<CocoSegment>,
 }
 
-/// Writes a panoptic annotation file (`info`, `images`, `annotations`, `categories`) and returns its size in bytes.
+/// Writes a panoptic annotation file (`info`, `images`, `annotations`, `categories`) and returns its size in
+/// bytes.
 ///
 /// # Errors
 /// [`crate::Error::Io`].

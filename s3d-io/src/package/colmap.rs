@@ -1,7 +1,7 @@
 //! COLMAP models: cameras, images and points, for reconstruction and Gaussian splatting.
 //!
-//! COLMAP's conventions are ours: metres, world → camera in axes x right, y down, z forward, and the centre of the first
-//! pixel at (½, ½).
+//! COLMAP's conventions are ours: metres, world → camera in axes x right, y down, z forward, and the centre
+//! of the first pixel at (½, ½).
 
 #![expect(clippy::indexing_slicing, reason = "a writer: its tables are its own")]
 
@@ -44,8 +44,9 @@ impl ColmapImage {
     }
 }
 
-/// Writes a model as text, `cameras.txt`, `images.txt` and `points3D.txt`, into the folder `dir`, which is made if it is
-/// not there. Images and cameras have the numbers 1, 2, … of `images`; points those of `points`, no tracks and error 0.
+/// Writes a model as text, `cameras.txt`, `images.txt` and `points3D.txt`, into the folder `dir`, which is
+/// made if it is not there. Images and cameras have the numbers 1, 2, … of `images`; points those of
+/// `points`, no tracks and error 0.
 ///
 /// # Errors
 /// [`crate::Error::Io`].

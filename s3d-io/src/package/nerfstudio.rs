@@ -1,7 +1,7 @@
 //! `transforms.json`: what nerfstudio, and others after instant-ngp, read cameras from.
 //!
-//! Its cameras have OpenGL's axes, which are Blender's and our poses': x right, y up, looking along −z. Distances are
-//! metres, Z-up; the transform that was applied to the world is the identity.
+//! Its cameras have OpenGL's axes, which are Blender's and our poses': x right, y up, looking along −z.
+//! Distances are metres, Z-up; the transform that was applied to the world is the identity.
 
 use crate::dataset::pose::PoseFile;
 use crate::error::Result;
@@ -19,14 +19,14 @@ pub enum NerfstudioCamera {
     Equirectangular,
 }
 
-/// An image of `transforms.json`. The fields bear the file's names; lengths of the camera are pixels, the centre of the
-/// first pixel at (½, ½).
+/// An image of `transforms.json`. The fields bear the file's names; lengths of the camera are pixels, the
+/// centre of the first pixel at (½, ½).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NerfstudioFrame {
     /// The image, relative to the folder of the file.
     pub file_path: String,
-    /// Its depth, a 16-bit PNG file in units that `--depth-unit-scale-factor` turns into metres; along the optical axis, in
-    /// panoramas the distance.
+    /// Its depth, a 16-bit PNG file in units that `--depth-unit-scale-factor` turns into metres; along the
+    /// optical axis, in panoramas the distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth_file_path: Option<String>,
     /// Focal length along x; a panorama's height.
@@ -53,8 +53,8 @@ impl NerfstudioFrame {
         Self { file_path, depth_file_path: None, fl_x, fl_y, cx, cy, w, h, transform_matrix }
     }
 
-    /// A panorama, from its pose file. Panoramas of the data set are level whatever the scanner's tilt: the camera's turn is
-    /// its heading alone.
+    /// A panorama, from its pose file. Panoramas of the data set are level whatever the scanner's tilt: the
+    /// camera's turn is its heading alone.
     ///
     /// # Panics
     /// If the image is not twice as wide as high.
@@ -85,8 +85,8 @@ fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
     [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Writes a `transforms.json` and returns its size in bytes. `ply_file_path` names a cloud in world coordinates, relative
-/// to the file's folder, from which Gaussian splatting begins.
+/// Writes a `transforms.json` and returns its size in bytes. `ply_file_path` names a cloud in world
+/// coordinates, relative to the file's folder, from which Gaussian splatting begins.
 ///
 /// # Errors
 /// [`crate::Error::Io`]; [`crate::Error::Format`] if a number is not finite.

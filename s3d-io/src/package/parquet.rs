@@ -150,13 +150,15 @@ fn schema(columns: &[(String, bool, Column)]) -> String {
     text
 }
 
-/// Writes the table of images, a row an image in the order given, and returns the file's size in bytes. Columns:
+/// Writes the table of images, a row an image in the order given, and returns the file's size in bytes.
+/// Columns:
 ///
-/// `area`, `camera_uuid`, `room`, `room_type`, `room_number`, `kind` ("view" or "panorama"), `frame_num` (null for
-/// panoramas); the path of each modality below the data set's folder, named as its folder (`rgb`, `depth`, `normal`, …); `width`,
-/// `height`, `fov_rad`, `yaw_rad`, `pitch_rad`, `x`, `y`, `z`; `k` (9 numbers) and `rt` (12), row by row;
-/// `selection_entropy`, `entropy`, `coverage`, `share_ceiling` … `share_clutter`, `share_unlabelled` (with the 13 they make
-/// the coverage), `instances`; `depth_min_m`, `depth_mean_m`, `depth_max_m`. See [`ImageRow`].
+/// `area`, `camera_uuid`, `room`, `room_type`, `room_number`, `kind` ("view" or "panorama"), `frame_num`
+/// (null for panoramas); the path of each modality below the data set's folder, named as its folder (`rgb`,
+/// `depth`, `normal`, …); `width`, `height`, `fov_rad`, `yaw_rad`, `pitch_rad`, `x`, `y`, `z`; `k` (9
+/// numbers) and `rt` (12), row by row; `selection_entropy`, `entropy`, `coverage`, `share_ceiling` …
+/// `share_clutter`, `share_unlabelled` (with the 13 they make the coverage), `instances`; `depth_min_m`,
+/// `depth_mean_m`, `depth_max_m`. See [`ImageRow`].
 ///
 /// # Errors
 /// [`Error::Io`].

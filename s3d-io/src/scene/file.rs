@@ -12,24 +12,27 @@ use serde::Deserialize;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
-/// The parts of a scan of one area. Paths are resolved: relative ones start at the folder of the file that names them.
+/// The parts of a scan of one area. Paths are resolved: relative ones start at the folder of the file that
+/// names them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
     /// The `scene.toml` itself.
     pub path: PathBuf,
     /// The number of the area, from 1.
     pub area: u32,
-    /// The folder of a published area that mesh, labels and scan locations come from; then `mesh` and `annotations` are
-    /// empty. See [`PublishedArea`](crate::scene::PublishedArea).
+    /// The folder of a published area that mesh, labels and scan locations come from; then `mesh` and
+    /// `annotations` are empty. See [`PublishedArea`](crate::scene::PublishedArea).
     pub published: Option<PathBuf>,
     /// Takes that area's frame to the world's: turns, shifts and scales. For one of 5a and 5b.
     pub world_from_published: DAffine3,
     /// The textured mesh, in one file or several that are joined in this order. At least one.
     pub mesh: Vec<PathBuf>,
-    /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published OBJ files.
+    /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published
+    /// OBJ files.
     pub up: UpAxis,
-    /// The annotated points: files and folders, see [`Annotations::open`](crate::cloud::Annotations::open). None: the
-    /// labels that came with the mesh, see [`Annotations::of_mesh`](crate::cloud::Annotations::of_mesh).
+    /// The annotated points: files and folders, see [`Annotations::open`](crate::cloud::Annotations::open).
+    /// None: the labels that came with the mesh, see
+    /// [`Annotations::of_mesh`](crate::cloud::Annotations::of_mesh).
     pub annotations: Vec<PathBuf>,
     /// How they are read. Faults stop.
     pub annotation_options: AnnotationOptions,
@@ -81,11 +84,12 @@ struct MeshTable {
 /// path = "raw"        # the pictures' folder; named after the source if it is left out
 /// ```
 ///
-/// Without `[cameras]` there is nowhere to stand, unless the caller places scan locations. The list's frame is the world
-/// (Z-up) unless the table says `up = "y"`, or gives a `transform` (four rows of four numbers, world from file, applied
-/// after `up`).
+/// Without `[cameras]` there is nowhere to stand, unless the caller places scan locations. The list's frame
+/// is the world (Z-up) unless the table says `up = "y"`, or gives a `transform` (four rows of four numbers,
+/// world from file, applied after `up`).
 ///
-/// Annotations of other kinds, and how they are read (see [`AnnotationOptions`]); every key but the path may be left out:
+/// Annotations of other kinds, and how they are read (see [`AnnotationOptions`]); every key but the path may
+/// be left out:
 ///
 /// ```toml
 /// [annotations]
@@ -102,8 +106,8 @@ struct MeshTable {
 /// "7" = ""                            # unlabelled
 /// ```
 ///
-/// A published area, or an export, brings mesh, labels and scan locations of its own, instead of `[mesh]`, `[annotations]`
-/// and `[cameras]`, of which the last may still be given:
+/// A published area, or an export, brings mesh, labels and scan locations of its own, instead of `[mesh]`,
+/// `[annotations]` and `[cameras]`, of which the last may still be given:
 ///
 /// ```toml
 /// area = 5
@@ -115,15 +119,15 @@ struct MeshTable {
 /// Further keys of `[rgb]` are those of [`crate::scene::PictureOptions`].
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value; without
-/// one if a file or folder that it names is not there.
+/// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value;
+/// without one if a file or folder that it names is not there.
 pub fn read_scene(path: &Path) -> Result<SceneFile> {
     let text = String::from_utf8(read_file(path)?).map_err(|_| Error::format(path, "is no text in UTF-8"))?;
     parse_scene(&text, path)
 }
 
-/// As [`read_scene`], from the text of a scene file. Errors call it `path`, and the files that it names are looked for in
-/// the folder of `path`.
+/// As [`read_scene`], from the text of a scene file. Errors call it `path`, and the files that it names are
+/// looked for in the folder of `path`.
 ///
 /// # Errors
 /// As [`read_scene`].

@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 pub struct PublishedOptions {
     /// The area's number; `None`: the folder's name says it (`area_3`, `area_5a`).
     pub area: Option<u32>,
-    /// Takes the area's frame to the world: turns, shifts and scales. For one of 5a and 5b, to bring it to the other's
-    /// frame, which is in no file of the published data set.
+    /// Takes the area's frame to the world: turns, shifts and scales. For one of 5a and 5b, to bring it to
+    /// the other's frame, which is in no file of the published data set.
     pub world_from_area: DAffine3,
 }
 
@@ -79,7 +79,8 @@ impl PublishedArea {
     /// Finds what is in the folder `path`, and reads its scan locations.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] that names what is missing, or the pose file that is not as it should be.
+    /// [`Error::Io`]; [`Error::Format`] that names what is missing, or the pose file that is not as it should
+    /// be.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_with(path, &PublishedOptions::default())
     }
@@ -135,12 +136,12 @@ impl PublishedArea {
 
     /// Reads both meshes: the textured one, and the labels of its faces from the other.
     ///
-    /// The two have the same faces, in the same order as a rule. If not, a face gets the label of the one with the same
-    /// corners, whichever comes first.
+    /// The two have the same faces, in the same order as a rule. If not, a face gets the label of the one
+    /// with the same corners, whichever comes first.
     ///
     /// # Errors
-    /// As [`read_mesh`]; [`Error::Format`] for `3d/semantic.obj` if fewer than half of the faces are in it, or none of its
-    /// materials is a label.
+    /// As [`read_mesh`]; [`Error::Format`] for `3d/semantic.obj` if fewer than half of the faces are in it,
+    /// or none of its materials is a label.
     pub fn read_mesh(&self) -> Result<PublishedMesh> {
         let mut file = read_mesh(&self.mesh, self.up)?;
         let semantic = read_mesh(&self.semantic_mesh, self.up)?.mesh;

@@ -1,8 +1,9 @@
-//! Any bytes, fed to every reader of this crate: what the fuzz targets run (`../fuzz`), and the test of what they found.
+//! Any bytes, fed to every reader of this crate: what the fuzz targets run (`../fuzz`), and the test of what
+//! they found.
 //!
-//! Each entry of [`FEEDS`] writes the bytes to a file, or a few, in a folder of its own, and reads that as an export would.
-//! Whether it can be read does not matter; it must end, without a panic, in memory that the file's size warrants, and an
-//! error must name a file.
+//! Each entry of [`FEEDS`] writes the bytes to a file, or a few, in a folder of its own, and reads that as an
+//! export would. Whether it can be read does not matter; it must end, without a panic, in memory that the
+//! file's size warrants, and an error must name a file.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DAffine3;
@@ -90,7 +91,8 @@ fn numbered() -> AnnotationOptions {
     }
 }
 
-/// Annotations as they are read by default, then with all that can be forgiven and too many points for memory.
+/// Annotations as they are read by default, then with all that can be forgiven and too many points for
+/// memory.
 fn annotations(dir: &Path, path: &Path) {
     let skip = AnnotationOptions { on_fault: OnFault::Skip, points_in_memory: 16, ..numbered() };
     for options in [numbered(), skip] {

@@ -3,7 +3,8 @@
 use s3d_geom::TriMesh;
 use s3d_geom::glam::Vec3;
 
-/// Which faces have a corner at a place, by bisection of a sorted list: 16 bytes for each corner of each face.
+/// Which faces have a corner at a place, by bisection of a sorted list: 16 bytes for each corner of each
+/// face.
 #[derive(Clone, Debug)]
 pub(crate) struct Corners {
     /// The bits of a corner's place, and a face; sorted, each pair once.

@@ -32,8 +32,8 @@ impl FaceLabels {
         Self { label_of_face: votes.label_of_face(), votes }
     }
 
-    /// The label of each face of the mesh: the most frequent among its votes, the smallest of equally frequent ones, and
-    /// [`LabelId::NULL`] without a vote.
+    /// The label of each face of the mesh: the most frequent among its votes, the smallest of equally
+    /// frequent ones, and [`LabelId::NULL`] without a vote.
     pub fn label_of_face(&self) -> &[LabelId] {
         &self.label_of_face
     }
@@ -53,8 +53,8 @@ impl FaceLabels {
         self.label_of_face.is_empty()
     }
 
-    /// How the vote for a face went: winner, runner-up, distances. `None` if nobody voted for the face, and if there is
-    /// no such face.
+    /// How the vote for a face went: winner, runner-up, distances. `None` if nobody voted for the face, and
+    /// if there is no such face.
     pub fn votes_of(&self, face: u32) -> Option<FaceVotes> {
         ((face as usize) < self.len()).then(|| self.votes.of_face(face)).flatten()
     }

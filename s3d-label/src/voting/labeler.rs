@@ -49,14 +49,15 @@ pub enum VoteError {
 
 /// Labels the faces of a mesh by votes of labelled points, which come block by block.
 ///
-/// Each point votes for its nearest face, and a face takes the label with the most votes. A block is of any size, the
-/// points of an instance may be spread over any number of blocks, and blocks may come in any order: the result is the
-/// same, for any number of threads too. Nothing is kept of a point but its vote, so a scan of any size needs little memory
-/// (see [`Votes`]; 20 bytes for each point of a block, 20 MB at most). Nearest faces are looked up on all threads of the
-/// current rayon pool; votes are counted on the thread that hands in the block.
+/// Each point votes for its nearest face, and a face takes the label with the most votes. A block is of any
+/// size, the points of an instance may be spread over any number of blocks, and blocks may come in any order:
+/// the result is the same, for any number of threads too. Nothing is kept of a point but its vote, so a scan
+/// of any size needs little memory (see [`Votes`]; 20 bytes for each point of a block, 20 MB at most).
+/// Nearest faces are looked up on all threads of the current rayon pool; votes are counted on the thread that
+/// hands in the block.
 ///
-/// A block that is refused has not voted. Points with the label [`LabelId::NULL`] do not vote; they are only counted.
-/// Source: formats.md, "Labels": voting.
+/// A block that is refused has not voted. Points with the label [`LabelId::NULL`] do not vote; they are only
+/// counted. Source: formats.md, "Labels": voting.
 ///
 /// ```
 /// use s3d_geom::{NearestFaces, TriMesh, glam::{Vec3, vec3}};
@@ -104,7 +105,8 @@ impl<'m> Labeler<'m> {
         Self { nearest_faces, votes, corners: None, nearest: Vec::new(), others: Vec::new() }
     }
 
-    /// Points (world metres) with the same label, such as those of an instance: each votes for its nearest face.
+    /// Points (world metres) with the same label, such as those of an instance: each votes for its nearest
+    /// face.
     ///
     /// # Errors
     /// [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
@@ -141,9 +143,10 @@ impl<'m> Labeler<'m> {
         Ok(())
     }
 
-    /// Annotations that are vertices of the mesh itself (world metres), with the same label: each votes for every face
-    /// that has a corner at exactly that place. All of them are equally near, and the smallest index alone would leave
-    /// the others without a vote. A point where no face has a corner votes for its nearest face.
+    /// Annotations that are vertices of the mesh itself (world metres), with the same label: each votes for
+    /// every face that has a corner at exactly that place. All of them are equally near, and the smallest
+    /// index alone would leave the others without a vote. A point where no face has a corner votes for its
+    /// nearest face.
     ///
     /// # Errors
     /// [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
@@ -169,8 +172,8 @@ impl<'m> Labeler<'m> {
         Ok(())
     }
 
-    /// Points with the same label that are known to lie on faces, as the mesh's own labels do: each votes for its face, at
-    /// a distance of 0.
+    /// Points with the same label that are known to lie on faces, as the mesh's own labels do: each votes for
+    /// its face, at a distance of 0.
     ///
     /// # Errors
     /// [`VoteError::NoSuchFace`] and [`VoteError::NoSuchLabel`].
@@ -246,7 +249,8 @@ mod tests {
     use s3d_geom::nearest_brute_force;
     use std::collections::BTreeMap;
 
-    /// Triangles on a coarse lattice, so that they share corners and edges, and points are equally near to several.
+    /// Triangles on a coarse lattice, so that they share corners and edges, and points are equally near to
+    /// several.
     fn any_mesh() -> impl Strategy<Value = TriMesh> {
         let corner = || (0..4i8, 0..4i8, 0..3i8);
         prop::collection::vec([corner(), corner(), corner()], 1..25).prop_filter_map("no area", |triangles| {

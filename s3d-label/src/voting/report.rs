@@ -17,7 +17,8 @@ pub struct VoteRow {
     pub faces: u64,
     /// The votes that these faces got, for whatever label.
     pub face_votes: u64,
-    /// Faces with votes for more than one label: the winner's share is below 1. Those of the next two columns too.
+    /// Faces with votes for more than one label: the winner's share is below 1. Those of the next two columns
+    /// too.
     pub contested: u64,
     /// Faces whose winner's share is below ¾.
     pub contested_below_three_quarters: u64,

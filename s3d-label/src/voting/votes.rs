@@ -45,7 +45,8 @@ pub struct FaceVotes {
     pub label: LabelId,
     /// Its votes, at least 1.
     pub votes: u64,
-    /// The second most frequent label, the smallest of equally frequent ones; [`LabelId::NULL`] if all votes agree.
+    /// The second most frequent label, the smallest of equally frequent ones; [`LabelId::NULL`] if all votes
+    /// agree.
     pub runner_up: LabelId,
     /// Its votes, at most [`votes`](Self::votes); 0 if all votes agree.
     pub runner_up_votes: u64,
@@ -53,8 +54,8 @@ pub struct FaceVotes {
     pub total: u64,
     /// How far the farthest voter is from the face, metres. Infinite if a distance was no number.
     pub farthest_m: f32,
-    /// The mean distance of the voters from the face, metres. Distances are summed in whole nanometres, so that the sum
-    /// is the same for any order; infinite if the sum is above 1.8·10¹⁰ m.
+    /// The mean distance of the voters from the face, metres. Distances are summed in whole nanometres, so
+    /// that the sum is the same for any order; infinite if the sum is above 1.8·10¹⁰ m.
     pub mean_m: f32,
 }
 
@@ -72,10 +73,11 @@ impl FaceVotes {
 
 /// Counts, for each face of a mesh, the labels of the points to which it is the nearest.
 ///
-/// Points stream through [`Votes::add`], one at a time and in any order; nothing of them is kept but counts. Several
-/// counts over the same faces [`merge`](Votes::merge) into one. Every result is the same for any order of points and
-/// merges. Memory: 16 bytes a face, and 16 bytes for each pair of a face and a label that occurs. Source: formats.md,
-/// "Labels": voting. A [`Labeler`](crate::Labeler) finds the faces of points and counts them here.
+/// Points stream through [`Votes::add`], one at a time and in any order; nothing of them is kept but counts.
+/// Several counts over the same faces [`merge`](Votes::merge) into one. Every result is the same for any
+/// order of points and merges. Memory: 16 bytes a face, and 16 bytes for each pair of a face and a label that
+/// occurs. Source: formats.md, "Labels": voting. A [`Labeler`](crate::Labeler) finds the faces of points and
+/// counts them here.
 ///
 /// ```
 /// use s3d_label::{LabelId, Votes};
@@ -143,8 +145,9 @@ impl Votes {
         }
     }
 
-    /// A point with `label` votes for `face`, which is `distance_m` metres away, at least 0 (a distance that is not a
-    /// number counts as infinite). A point without a label ([`LabelId::NULL`]) does not vote: it is only counted, in [`Votes::unlabeled_points`].
+    /// A point with `label` votes for `face`, which is `distance_m` metres away, at least 0 (a distance that
+    /// is not a number counts as infinite). A point without a label ([`LabelId::NULL`]) does not vote: it is
+    /// only counted, in [`Votes::unlabeled_points`].
     ///
     /// # Panics
     /// If there is no face `face`, or above 2³² − 1 pairs of a face and a label.
@@ -206,7 +209,8 @@ impl Votes {
             if entry.label == label {
                 self.entries[at as usize].votes += votes;
                 if before != END {
-                    // To the front: points come instance by instance, so that the next one probably has this label.
+                    // To the front: points come instance by instance, so that the next one probably has this
+                    // label.
                     self.entries[before as usize].next = entry.next;
                     self.entries[at as usize].next = head;
                     self.faces[face as usize].head = at;

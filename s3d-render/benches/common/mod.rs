@@ -1,4 +1,5 @@
-//! Meshes that the benches, examples and tests share: those of s3d-synth, and a plain reader of textured OBJ files.
+//! Meshes that the benches, examples and tests share: those of s3d-synth, and a plain reader of textured OBJ
+//! files.
 #![allow(dead_code, unreachable_pub)]
 
 use s3d_geom::glam::{DVec3, dvec3, vec2, vec3};
@@ -6,7 +7,8 @@ use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, Tri
 use s3d_synth::scenes::{CLASSROOM_LOCATION, classroom, scan_like};
 use std::path::{Path, PathBuf};
 
-/// Reads the v, vt and f lines of an OBJ file with Y up, and the picture `map_Kd` of the material file beside it.
+/// Reads the v, vt and f lines of an OBJ file with Y up, and the picture `map_Kd` of the material file beside
+/// it.
 pub fn read_obj(path: &Path) -> TriMesh {
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let mut parts = MeshParts::default();
@@ -53,10 +55,10 @@ pub fn real_scan() -> Option<(PathBuf, DVec3)> {
     path.exists().then_some((path, dvec3(13.1, 9.65, 1.4)))
 }
 
-/// The scenes that images are made of to see how long that takes, and where one stands in them: `scan-like`, generated;
-/// `copyroom`, the real scan beside the project; `office`, the OBJ file with Z up that `S3D_BENCH_OFFICE` names; and
-/// `fine-textures`, with about three of their pixels for one of the image's: the filter has work to do. `None` if it is not
-/// there.
+/// The scenes that images are made of to see how long that takes, and where one stands in them: `scan-like`,
+/// generated; `copyroom`, the real scan beside the project; `office`, the OBJ file with Z up that
+/// `S3D_BENCH_OFFICE` names; and `fine-textures`, with about three of their pixels for one of the image's:
+/// the filter has work to do. `None` if it is not there.
 pub fn shaded_scene(name: &str) -> Option<(TriMesh, DVec3)> {
     match name {
         "scan-like" => Some((scan_like(300_000, 1), dvec3(3.0, 2.5, 1.5))),

@@ -1,4 +1,5 @@
-//! What is impossible in a building, found before it is built. What things leave their room is found while they are built.
+//! What is impossible in a building, found before it is built. What things leave their room is found while
+//! they are built.
 
 use super::{Beam, Building, Filling, Item, Opening, RoomPlan, Thing};
 use crate::construct::shell::KNEE_M;

@@ -1,5 +1,5 @@
-//! The building of `s3d demo`: a hallway with an office and a conference room to its south and a lounge under a slanted
-//! roof to its north.
+//! The building of `s3d demo`: a hallway with an office and a conference room to its south and a lounge under
+//! a slanted roof to its north.
 
 use super::{Beam, Building, Filling, Item, Opening, RoomPlan, ScanLocation, Thing, Wall};
 use crate::look::*;
@@ -14,9 +14,9 @@ const WALL_M: f32 = 0.15;
 const DOOR_M: f32 = 2.1;
 
 impl Building {
-    /// The building of `s3d demo`: three rooms and a hallway of about 120 m². It holds what a scan holds: textures with
-    /// light and shade in them, windows as opaque surfaces, doors that stand open, a slanted ceiling, all 13 classes, and a
-    /// place that was not captured (a tile of the conference room's ceiling).
+    /// The building of `s3d demo`: three rooms and a hallway of about 120 m². It holds what a scan holds:
+    /// textures with light and shade in them, windows as opaque surfaces, doors that stand open, a slanted
+    /// ceiling, all 13 classes, and a place that was not captured (a tile of the conference room's ceiling).
     pub fn demo() -> Self {
         let location = |(uuid, position, yaw_deg): (&str, [f64; 3], f64)| ScanLocation {
             uuid: uuid.to_owned(),

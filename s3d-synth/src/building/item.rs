@@ -14,7 +14,8 @@ pub enum Item {
         thing: Thing,
         /// The middle of its foot: x and y of the building, z from the room's floor.
         position: Vec3,
-        /// By how much it is turned, degrees, counter-clockwise seen from above. Without a turn its back is to the north.
+        /// By how much it is turned, degrees, counter-clockwise seen from above. Without a turn its back is
+        /// to the north.
         yaw_deg: f32,
     },
     /// It hangs on a wall or stands with its back to it.
@@ -45,8 +46,8 @@ pub struct Beam {
     pub look: Look,
 }
 
-/// Things, with the measures that may differ: metres. Where nothing else is said they stand with the middle of their foot
-/// at the origin of their frame and look along −y: their back goes to a wall.
+/// Things, with the measures that may differ: metres. Where nothing else is said they stand with the middle
+/// of their foot at the origin of their frame and look along −y: their back goes to a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Thing {

@@ -1,8 +1,9 @@
-//! Buildings as plain data: rooms with their openings and finishes, what stands in them, and where a scanner stood.
+//! Buildings as plain data: rooms with their openings and finishes, what stands in them, and where a scanner
+//! stood.
 //!
 //! A [`Building`] says what is where and nothing of triangles; [`Building::build`] makes an
-//! [`AnnotatedScene`](crate::AnnotatedScene) of it. Its coordinates are the building's own: metres, x to the east, y to
-//! the north, z up. The walls of rooms are parallel to the axes.
+//! [`AnnotatedScene`](crate::AnnotatedScene) of it. Its coordinates are the building's own: metres, x to the
+//! east, y to the north, z up. The walls of rooms are parallel to the axes.
 
 mod check;
 mod demo;
@@ -54,12 +55,13 @@ pub struct RoomPlan {
     pub high: Vec2,
     /// Height of the floor in the building. Every other height is counted from there.
     pub floor_m: f32,
-    /// Height of the ceiling at the smallest and at the largest y. Where they differ the ceiling is slanted; openings then
-    /// end at 2.1 m at the highest.
+    /// Height of the ceiling at the smallest and at the largest y. Where they differ the ceiling is slanted;
+    /// openings then end at 2.1 m at the highest.
     pub heights_m: [f32; 2],
     /// What is cut out of the walls.
     pub openings: Vec<Opening>,
-    /// A rectangle of the ceiling that is not there, as if it had not been captured: its smallest and largest corner.
+    /// A rectangle of the ceiling that is not there, as if it had not been captured: its smallest and largest
+    /// corner.
     pub ceiling_hole: Option<[Vec2; 2]>,
     /// Lamps under the ceiling: x and y of the middle, and the lengths along x and y.
     pub lamps: Vec<[f32; 4]>,
@@ -71,8 +73,8 @@ pub struct RoomPlan {
     pub floor: FloorFinish,
     /// What covers the ceiling.
     pub ceiling: CeilingFinish,
-    /// Furniture, structure and all else. Instances of a class are numbered in this order, after those of openings and
-    /// lamps.
+    /// Furniture, structure and all else. Instances of a class are numbered in this order, after those of
+    /// openings and lamps.
     pub items: Vec<Item>,
 }
 
@@ -158,7 +160,8 @@ impl Wall {
         -self.right().perp().extend(0.0)
     }
 
-    /// By how much a frame is turned so that it looks at the wall: degrees, counter-clockwise seen from above.
+    /// By how much a frame is turned so that it looks at the wall: degrees, counter-clockwise seen from
+    /// above.
     pub fn yaw_deg(self) -> f32 {
         match self {
             Self::South => 180.0,

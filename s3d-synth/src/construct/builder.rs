@@ -1,4 +1,5 @@
-//! Puts surfaces together: places them, cuts them into cells, notes whose they are and bakes a light into their looks.
+//! Puts surfaces together: places them, cuts them into cells, notes whose they are and bakes a light into
+//! their looks.
 
 use super::light::Light;
 use crate::BuildingError;
@@ -100,7 +101,8 @@ impl Builder {
         self.instances.push(Instance { class, number: number as u32, room: self.room });
     }
 
-    /// Runs `build` in a frame with its origin at `origin`, turned by `yaw_deg` counter-clockwise seen from above.
+    /// Runs `build` in a frame with its origin at `origin`, turned by `yaw_deg` counter-clockwise seen from
+    /// above.
     pub(crate) fn place(&mut self, origin: Vec3, yaw_deg: f32, build: impl FnOnce(&mut Self)) {
         let outer = self.frame;
         self.frame = outer.then(origin, yaw_deg);
@@ -116,8 +118,8 @@ impl Builder {
         self.hexahedron(std::array::from_fn(corner), look, omit);
     }
 
-    /// A body of six sides: the corners of its bottom counter-clockwise seen from above, from the front left one, then
-    /// those of its top.
+    /// A body of six sides: the corners of its bottom counter-clockwise seen from above, from the front left
+    /// one, then those of its top.
     pub(crate) fn hexahedron(&mut self, corners: [Vec3; 8], look: Look, omit: &[Side]) {
         let sides = [
             (Side::Front, [0, 1, 5, 4]),
@@ -135,7 +137,8 @@ impl Builder {
         self.light.block(Aabb::from_points(corners.map(|p| self.frame.apply(p))));
     }
 
-    /// A four-sided surface, its corners counter-clockwise seen from the front, from the texture's bottom left.
+    /// A four-sided surface, its corners counter-clockwise seen from the front, from the texture's bottom
+    /// left.
     pub(crate) fn panel(&mut self, corners: [Vec3; 4], look: Look) {
         self.shifted_panel(corners, look, 0.0);
     }
@@ -182,8 +185,8 @@ impl Builder {
         }
     }
 
-    /// An upright cone stump of `sides` sides from radius `radii[0]` at `foot` to `radii[1]` at `foot` + `height`, with
-    /// lids unless `omit` has its top or bottom.
+    /// An upright cone stump of `sides` sides from radius `radii[0]` at `foot` to `radii[1]` at `foot` +
+    /// `height`, with lids unless `omit` has its top or bottom.
     pub(crate) fn stump(
         &mut self,
         foot: [f32; 3],
@@ -270,7 +273,8 @@ impl Builder {
         self.push(parts, material);
     }
 
-    /// `name`, or if something else has it a name that begins so. Names are written into files: words without spaces.
+    /// `name`, or if something else has it a name that begins so. Names are written into files: words without
+    /// spaces.
     fn unique(&mut self, name: String) -> String {
         let name = name.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
         let mut unique = name.clone();

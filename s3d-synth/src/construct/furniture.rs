@@ -1,5 +1,5 @@
-//! Tables, seats and shelves. Each stands with the middle of its foot at the origin of the frame and looks along −y: its
-//! back goes to a wall.
+//! Tables, seats and shelves. Each stands with the middle of its foot at the origin of the frame and looks
+//! along −y: its back goes to a wall.
 
 use super::builder::{Builder, Side};
 use crate::look::*;

@@ -1,5 +1,5 @@
-//! The light that the scene's textures carry, as a scan's do: bright near windows and lamps, dark in corners and under
-//! furniture. A rule of thumb, no simulation: it only has to look right.
+//! The light that the scene's textures carry, as a scan's do: bright near windows and lamps, dark in corners
+//! and under furniture. A rule of thumb, no simulation: it only has to look right.
 
 use s3d_geom::{Aabb, glam::Vec3};
 
@@ -34,7 +34,8 @@ impl Light {
         self.blockers.push(body);
     }
 
-    /// The brightness, about 1 where it is bright, of a surface at `p` with the unit normal `n`, with nothing in between.
+    /// The brightness, about 1 where it is bright, of a surface at `p` with the unit normal `n`, with nothing
+    /// in between.
     pub(crate) fn open(&self, p: Vec3, n: Vec3) -> f32 {
         // The floor throws light back to the ceiling, but not to the undersides of tables.
         let height = (p.z / self.height_m.max(0.1)).min(1.0);

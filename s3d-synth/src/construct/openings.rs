@@ -18,8 +18,8 @@ fn reveal(b: &mut Builder, width: f32, [z0, z1]: [f32; 2], depth: f32, look: Loo
     b.panel([g, h, f, e], look);
 }
 
-/// A window `heights` above the floor: its pane behind the wall, its board before it. The frame is the wall's, from the
-/// opening's left edge.
+/// A window `heights` above the floor: its pane behind the wall, its board before it. The frame is the
+/// wall's, from the opening's left edge.
 pub(crate) fn window(b: &mut Builder, width: f32, heights: [f32; 2]) {
     const DEPTH: f32 = 0.16;
     const BAR: f32 = 0.05;

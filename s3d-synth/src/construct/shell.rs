@@ -71,8 +71,8 @@ impl RoomPlan {
         Light::new(windows.chain(lamps).collect(), self.top())
     }
 
-    /// Runs `build` in a frame on `wall`: x to the right for who looks at it, y into the wall, the origin at its foot,
-    /// at `along` (x or y of the building).
+    /// Runs `build` in a frame on `wall`: x to the right for who looks at it, y into the wall, the origin at
+    /// its foot, at `along` (x or y of the building).
     fn at_wall(&self, b: &mut Builder, wall: Wall, along: f32, build: impl FnOnce(&mut Builder)) {
         b.place(self.on_wall(wall, along).extend(0.0), wall.yaw_deg(), build);
     }
@@ -270,8 +270,8 @@ fn bake(
     Raster::from_vec(w, h, pixels.collect())
 }
 
-/// The quads between the lines `us` and `vs` whose middle `keep` wants: `place` gives a corner and its coordinate in the
-/// texture. Fronts are on the side of u × v.
+/// The quads between the lines `us` and `vs` whose middle `keep` wants: `place` gives a corner and its
+/// coordinate in the texture. Fronts are on the side of u × v.
 fn lattice(
     us: &[f32],
     vs: &[f32],

@@ -1,5 +1,5 @@
-//! What stands and hangs about: boards, pictures, screens, plants, boxes. Frames as in `furniture`; what hangs has its
-//! origin on the wall, at its foot.
+//! What stands and hangs about: boards, pictures, screens, plants, boxes. Frames as in `furniture`; what
+//! hangs has its origin on the wall, at its foot.
 
 use super::builder::{Builder, Side};
 use super::furniture::*;
@@ -243,7 +243,8 @@ fn rug(b: &mut Builder) {
     b.panel(corners.map(|[x, y]| vec3(x, y, 0.012)), Look::Fitted(Pattern::Rug));
 }
 
-/// A beam under a ceiling from `from` to `to`, which are on the ceiling: `half` its width to either side, `depth` down.
+/// A beam under a ceiling from `from` to `to`, which are on the ceiling: `half` its width to either side,
+/// `depth` down.
 pub(super) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32, look: Look) {
     b.begin(Class::Beam);
     // The ends touch walls, and the top the ceiling.

@@ -55,7 +55,8 @@ fn arrange_storey(
     sites: &mut Vec<Site>,
 ) {
     let wall_m = options.wall_m;
-    // Each room goes to the side that is shorter so far. Nothing lies below zero: patterns of floors start there.
+    // Each room goes to the side that is shorter so far. Nothing lies below zero: patterns of floors start
+    // there.
     let mut ends = [0f32; 2];
     let places: Vec<(usize, f32)> = rooms
         .iter()

@@ -1,8 +1,8 @@
 //! Buildings by rule: from a list of rooms and a seed to what stands where.
 //!
-//! A storey is a hallway with rooms on both sides, each with a door to it and windows in its outer wall. `arrange` places
-//! rooms, `furnish` fills one with what its type has, `space` knows where there is room for it. Other floor plans are other
-//! ways to arrange; furnishing knows nothing of them.
+//! A storey is a hallway with rooms on both sides, each with a door to it and windows in its outer wall.
+//! `arrange` places rooms, `furnish` fills one with what its type has, `space` knows where there is room for
+//! it. Other floor plans are other ways to arrange; furnishing knows nothing of them.
 
 mod arrange;
 mod furnish;
@@ -21,7 +21,8 @@ use rand_chacha::ChaCha8Rng;
 use s3d_geom::glam::Vec3;
 
 impl Building {
-    /// Makes a building of the rooms wanted: the same for the same options. Every room and hallway has a scan location.
+    /// Makes a building of the rooms wanted: the same for the same options. Every room and hallway has a scan
+    /// location.
     ///
     /// What is drawn in a room follows from the seed and the room's place in the list alone.
     ///
@@ -44,8 +45,8 @@ impl Building {
     /// ```
     ///
     /// # Errors
-    /// [`BuildingError`]: no room, a room of a type that cannot be furnished, a number out of its range, more windows than
-    /// the outer wall takes, a style without a choice.
+    /// [`BuildingError`]: no room, a room of a type that cannot be furnished, a number out of its range, more
+    /// windows than the outer wall takes, a style without a choice.
     pub fn generate(options: &BuildingOptions) -> Result<Self, BuildingError> {
         options.check()?;
         let mut building = Self {

@@ -12,8 +12,8 @@ pub struct BuildingOptions {
     pub title: String,
     /// The rooms, without hallways: 1 to 1,000. They are numbered by type in their order.
     pub rooms: Vec<RoomOptions>,
-    /// The rooms are dealt to so many storeys in their order, one above the other, without stairs: from 1 to as many as
-    /// there are rooms.
+    /// The rooms are dealt to so many storeys in their order, one above the other, without stairs: from 1 to
+    /// as many as there are rooms.
     pub storeys: u32,
     /// How wide hallways are: 1.2 to 10 m.
     pub hallway_width_m: f32,
@@ -82,7 +82,8 @@ impl Default for BuildingOptions {
 }
 
 impl BuildingOptions {
-    /// One storey with `rooms` rooms of random types and sizes, about half of them offices. Same `seed`, same options.
+    /// One storey with `rooms` rooms of random types and sizes, about half of them offices. Same `seed`, same
+    /// options.
     pub fn drawn(rooms: u32, seed: u64) -> Self {
         let mut rng = rng(seed, u64::MAX);
         let room = |_| {

@@ -30,7 +30,8 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// A thing at a place in the frame (x to the right, y to the back, z from the floor), turned in the frame.
+    /// A thing at a place in the frame (x to the right, y to the back, z from the floor), turned in the
+    /// frame.
     pub(super) fn put(&self, [x, y, z]: [f32; 3], yaw_deg: f32, thing: Thing) -> Item {
         // The turns of frames are right angles.
         let right = match self.yaw_deg.rem_euclid(360.0) {
@@ -62,7 +63,8 @@ impl Space {
         space
     }
 
-    /// Takes what is before doorways without a leaf in this room: a scanner may stand there, furniture may not.
+    /// Takes what is before doorways without a leaf in this room: a scanner may stand there, furniture may
+    /// not.
     pub(super) fn keep_ways_free(&mut self, room: &RoomPlan) {
         for opening in &room.openings {
             if matches!(opening.filling, Filling::ShutDoor | Filling::Nothing) {
@@ -115,8 +117,8 @@ impl Space {
         true
     }
 
-    /// A place for a group with its back to any wall: `size` along the wall and away from it. Tall ones do not stand before
-    /// windows or what hangs.
+    /// A place for a group with its back to any wall: `size` along the wall and away from it. Tall ones do
+    /// not stand before windows or what hangs.
     pub(super) fn find_at_wall(&mut self, rng: &mut ChaCha8Rng, size: [f32; 2], tall: bool) -> Option<Frame> {
         (0..TRIES).find_map(|_| {
             let (wall, along) = self.draw_on_wall(rng, size[0])?;
@@ -128,7 +130,8 @@ impl Space {
         })
     }
 
-    /// A place to hang something `width` wide, up to 20 cm deep where `depth` says so: the wall, and where along it.
+    /// A place to hang something `width` wide, up to 20 cm deep where `depth` says so: the wall, and where
+    /// along it.
     pub(super) fn find_on_wall(
         &mut self,
         rng: &mut ChaCha8Rng,

@@ -3,7 +3,8 @@
 use crate::BuildingError;
 use crate::look::*;
 
-/// What is chosen from for each room and thing. Its `Default` is what the demo is made of; no list may be empty.
+/// What is chosen from for each room and thing. Its `Default` is what the demo is made of; no list may be
+/// empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
     /// Colours of walls: red, green and blue, 0 to 255.

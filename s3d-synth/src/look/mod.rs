@@ -1,4 +1,5 @@
-//! How surfaces look: what covers walls, floors and ceilings, what furniture is made of, and the images on it.
+//! How surfaces look: what covers walls, floors and ceilings, what furniture is made of, and the images on
+//! it.
 //!
 //! All images are computed, so that a scene needs no files, and are the same on every platform.
 

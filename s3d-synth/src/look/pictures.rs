@@ -1,5 +1,5 @@
-//! What hangs on the walls and glows on the screens. Each picture reads only one way round, so that a mirrored or upside
-//! down texture shows at once.
+//! What hangs on the walls and glows on the screens. Each picture reads only one way round, so that a
+//! mirrored or upside down texture shows at once.
 
 use super::noise::{fractal, hash, mix, smooth, tint};
 use super::textures::{image, to_bytes};

@@ -9,8 +9,8 @@ use s3d_geom::glam::{vec2, vec3};
 use s3d_geom::primitives::{cuboid, cylinder};
 use s3d_geom::{Material, MeshParts, TriMesh};
 
-/// A closed, textured room with furniture in its corners, from the origin to between (4.5, 4, 2.6) and (6, 5.5, 3)
-/// metres; its middle is free from floor to ceiling. Same `seed`, same room.
+/// A closed, textured room with furniture in its corners, from the origin to between (4.5, 4, 2.6) and (6,
+/// 5.5, 3) metres; its middle is free from floor to ceiling. Same `seed`, same room.
 pub fn furnished_room(seed: u64) -> TriMesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let size = vec3(rng.random_range(4.5..6.0), rng.random_range(4.0..5.5), rng.random_range(2.6..3.0));

@@ -23,10 +23,10 @@ const SWEEPS: u64 = 256;
 /// How far points lie off their surface, metres.
 const NOISE_M: f32 = 0.005;
 
-/// A scan of any size as files: to see what an export of it takes. A building of rooms with simple furniture, its
-/// annotated points, textures and scan locations; of several rooms the first is a hall with half of all surfaces, whose
-/// floor holds about a tenth of the points. Everything is streamed, so that a cloud larger than the memory can be made, and
-/// the same numbers give the same bytes.
+/// A scan of any size as files: to see what an export of it takes. A building of rooms with simple furniture,
+/// its annotated points, textures and scan locations; of several rooms the first is a hall with half of all
+/// surfaces, whose floor holds about a tenth of the points. Everything is streamed, so that a cloud larger
+/// than the memory can be made, and the same numbers give the same bytes.
 ///
 /// ```
 /// use s3d_synth::scenes::LargeScan;
@@ -98,8 +98,8 @@ impl Default for LargeScan {
 }
 
 impl LargeScan {
-    /// Writes `building.obj` with its materials and textures, the points, `cameras.csv`, and `scene.toml`, which ties them
-    /// together, into `folder`, which is made if it is not there.
+    /// Writes `building.obj` with its materials and textures, the points, `cameras.csv`, and `scene.toml`,
+    /// which ties them together, into `folder`, which is made if it is not there.
     ///
     /// # Errors
     /// [`ScanError::Range`] for a number that is out of its range, [`ScanError::File`].
@@ -239,7 +239,8 @@ impl Rooms {
         self.things.push(Thing { class, number, surfaces: first..self.surfaces.len() });
     }
 
-    /// The rows and columns of squares that a surface is cut into so that all have `faces` triangles together.
+    /// The rows and columns of squares that a surface is cut into so that all have `faces` triangles
+    /// together.
     fn squares(&self, surface: &Surface, faces: u64) -> [u64; 2] {
         let edge = (2.0 * self.area / faces as f64).sqrt();
         [surface.u, surface.v].map(|side| ((f64::from(side.length()) / edge).round() as u64).max(1))

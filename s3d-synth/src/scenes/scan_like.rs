@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 use s3d_geom::glam::{Vec3, vec3};
 use s3d_geom::{MeshParts, TriMesh};
 
-/// A mesh of exactly `faces` or `faces` − 1 triangles that looks like a scan: [`scan_like_rooms`], with 3 rooms and one
-/// more for every 25,000 faces, 24 at most.
+/// A mesh of exactly `faces` or `faces` − 1 triangles that looks like a scan: [`scan_like_rooms`], with 3
+/// rooms and one more for every 25,000 faces, 24 at most.
 ///
 /// # Panics
 /// If `faces` is below 2,000.
@@ -16,10 +16,10 @@ pub fn scan_like(faces: usize, seed: u64) -> TriMesh {
     scan_like_rooms((3 + faces / 25_000).min(24) as u32, faces, seed)
 }
 
-/// A mesh of exactly `faces` or `faces` − 1 triangles that looks like a scan: rooms behind each other along +Y, joined
-/// by doorways, with furniture in them; jittered vertices, 4 % of faces split, half of them into slivers, and small
-/// holes. From (0, 0, 0) on, 6 m wide; a point 1.5 m above (3, 2.5) stands free in the first room. Same `seed`, same
-/// mesh.
+/// A mesh of exactly `faces` or `faces` − 1 triangles that looks like a scan: rooms behind each other along
+/// +Y, joined by doorways, with furniture in them; jittered vertices, 4 % of faces split, half of them into
+/// slivers, and small holes. From (0, 0, 0) on, 6 m wide; a point 1.5 m above (3, 2.5) stands free in the
+/// first room. Same `seed`, same mesh.
 ///
 /// # Panics
 /// If there is no room, or fewer than 600 faces a room or 2,000 in all.
@@ -43,7 +43,8 @@ pub fn scan_like_rooms(rooms: u32, faces: usize, seed: u64) -> TriMesh {
     for p in &mut parts.positions {
         *p += vec3(jitter(&mut rng, amplitude), jitter(&mut rng, amplitude), jitter(&mut rng, amplitude));
     }
-    // Neighbours in the list are neighbours on the surface, so a run of faces is a strip that the scanner missed.
+    // Neighbours in the list are neighbours on the surface, so a run of faces is a strip that the scanner
+    // missed.
     let mut missed = vec![false; parts.faces.len()];
     for _ in 0..faces / 2000 {
         let start = rng.random_range(0..parts.faces.len() - 8);
@@ -57,7 +58,8 @@ pub fn scan_like_rooms(rooms: u32, faces: usize, seed: u64) -> TriMesh {
     parts.face_materials.retain(|_| at.next() != Some(&true));
     while parts.faces.len() + 2 <= faces {
         let face = rng.random_range(0..parts.faces.len());
-        // Weights of the new vertex; one of nearly nothing makes a sliver along the edge opposite to that corner.
+        // Weights of the new vertex; one of nearly nothing makes a sliver along the edge opposite to that
+        // corner.
         let mut weights = [1.0, rng.random_range(0.5..2.0), rng.random_range(0.5..2.0)];
         if rng.random_bool(0.5) {
             weights[rng.random_range(0..3)] = rng.random_range(1e-4..1e-2);
@@ -115,7 +117,8 @@ fn jitter(rng: &mut ChaCha8Rng, amplitude: f32) -> f32 {
     rng.random_range(-amplitude..amplitude)
 }
 
-/// Replaces `face` by three around the mean of its corners by `weights`; the last two go to the end of the list.
+/// Replaces `face` by three around the mean of its corners by `weights`; the last two go to the end of the
+/// list.
 fn split(parts: &mut MeshParts, face: usize, weights: [f32; 3]) {
     let sum: f32 = weights.iter().sum();
     let [wa, wb, wc] = weights.map(|w| w / sum);

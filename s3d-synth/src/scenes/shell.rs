@@ -5,9 +5,10 @@ use rand_chacha::ChaCha8Rng;
 use s3d_geom::glam::{Vec3, vec2};
 use s3d_geom::{Material, MeshParts, NO_INDEX, Raster, Texture, Wrap};
 
-/// The surface of the box between two corners, its front inside, in `cells` quads along x, y and z. Vertices are
-/// shared, also along the edges. Only the cells that `keep` wants by side (floor, ceiling, smallest x, largest x,
-/// smallest y, largest y) and middle. Texture coordinates in metres, v upwards on walls; materials floor, wall, ceiling.
+/// The surface of the box between two corners, its front inside, in `cells` quads along x, y and z. Vertices
+/// are shared, also along the edges. Only the cells that `keep` wants by side (floor, ceiling, smallest x,
+/// largest x, smallest y, largest y) and middle. Texture coordinates in metres, v upwards on walls; materials
+/// floor, wall, ceiling.
 pub(super) fn shell(min: Vec3, max: Vec3, cells: [u32; 3], keep: impl Fn(usize, Vec3) -> bool) -> MeshParts {
     assert!(
         min.cmplt(max).all() && cells.iter().all(|&n| n > 0),

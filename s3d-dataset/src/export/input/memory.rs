@@ -28,8 +28,8 @@ pub struct MemoryScene {
     pub locations: Vec<ScanLocation>,
 }
 
-/// One area of an export: a scene file (`scene.toml`) or the folder of a published area (`area_3`), by its path, or values
-/// in memory.
+/// One area of an export: a scene file (`scene.toml`) or the folder of a published area (`area_3`), by its
+/// path, or values in memory.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum SceneSource {

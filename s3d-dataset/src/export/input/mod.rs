@@ -106,15 +106,16 @@ pub(crate) struct Inputs {
 }
 
 impl Inputs {
-    /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan locations,
-    /// instead of which locations are placed if `place_m` says how far apart.
+    /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan
+    /// locations, instead of which locations are placed if `place_m` says how far apart.
     pub(crate) fn open(scenes: &[SceneSource], place_m: Option<f64>, lenient: bool) -> Result<Self> {
         let mut areas = Self::open_areas(scenes, place_m, lenient, Opened::All)?;
         let table = label_table(&mut areas)?;
         Ok(Self { areas, table })
     }
 
-    /// The same without the annotations, for which a plan stands that has this table: rooms are not known then.
+    /// The same without the annotations, for which a plan stands that has this table: rooms are not known
+    /// then.
     pub(crate) fn open_planned(
         scenes: &[SceneSource],
         place_m: Option<f64>,
@@ -437,8 +438,8 @@ fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
     files
 }
 
-/// The table of all labels. That of a published data set is kept whole if it has them all, so that an index means the same
-/// in its images and in ours; else it is made of the labels at hand.
+/// The table of all labels. That of a published data set is kept whole if it has them all, so that an index
+/// means the same in its images and in ours; else it is made of the labels at hand.
 fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
     let labels: Vec<Label> =
         areas.iter().flat_map(|a| &a.rooms).flat_map(|r| &r.instances).map(|i| i.label).collect();
@@ -465,8 +466,8 @@ fn number(area: u32, annotations: Annotations) -> Result<Vec<RoomInput>, Numberi
     Ok(named(annotations, &labels))
 }
 
-/// Gives every instance the label that it was published with: those of a class and room were numbered there in the order
-/// of their labels.
+/// Gives every instance the label that it was published with: those of a class and room were numbered there
+/// in the order of their labels.
 fn published_numbers(labels: &[Label], annotations: Annotations) -> Vec<RoomInput> {
     let mut sorted: Vec<Label> = labels.to_vec();
     sorted.sort_by_key(|l| (l.room, l.class, l.instance));

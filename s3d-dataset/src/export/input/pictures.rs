@@ -1,5 +1,5 @@
-//! The scanner's pictures as the source of colours: found and checked before anything is written, and made into one cube
-//! map at a time.
+//! The scanner's pictures as the source of colours: found and checked before anything is written, and made
+//! into one cube map at a time.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -38,8 +38,8 @@ enum Found {
 }
 
 impl Pictures {
-    /// Finds the pictures of an area's locations, if it has a source of pictures, and looks at their sizes. Locations that
-    /// `is_asked` is false for need none.
+    /// Finds the pictures of an area's locations, if it has a source of pictures, and looks at their sizes.
+    /// Locations that `is_asked` is false for need none.
     ///
     /// # Errors
     /// For what is missing, all of it; for the first picture that is not what it should be.

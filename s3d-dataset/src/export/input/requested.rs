@@ -13,9 +13,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// What each area asks for. All files that they read are read once, on all threads. `companions` are the files that
-/// their meshes were read from besides. Of annotations and folders that are `known` from a plan, and have as many bytes as
-/// then, the checksum is taken from there.
+/// What each area asks for. All files that they read are read once, on all threads. `companions` are the
+/// files that their meshes were read from besides. Of annotations and folders that are `known` from a plan,
+/// and have as many bytes as then, the checksum is taken from there.
 pub(crate) fn requested_areas(
     ctx: &Context,
     areas: &[AreaInput],

@@ -21,7 +21,8 @@ const FEW_LABELLED: f64 = 0.5;
 /// An annotated area.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Annotated {
-    /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted. As data it has a file of its own.
+    /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted. As data it has a file of
+    /// its own.
     #[serde(skip)]
     pub(crate) label_of_face: Vec<LabelId>,
     pub(crate) report: VoteReport,
@@ -75,8 +76,9 @@ pub(crate) struct AnnotatedInstance<'a> {
     pub(crate) points: &'a mut dyn PointPasses,
 }
 
-/// Reads an area's annotated points, one instance at a time and block by block, and lets each vote for its nearest face.
-/// `each` gets every instance with its box and points, in the order of rooms and of numbers in the room.
+/// Reads an area's annotated points, one instance at a time and block by block, and lets each vote for its
+/// nearest face. `each` gets every instance with its box and points, in the order of rooms and of numbers in
+/// the room.
 pub(crate) fn annotate(
     ctx: &Context,
     area: &AreaInput,
@@ -190,8 +192,8 @@ impl Rooms {
     }
 }
 
-/// Lets the points of a block of an instance vote: for the faces that they belong to, as far as the source of the annotations
-/// knows these, and else for the nearest.
+/// Lets the points of a block of an instance vote: for the faces that they belong to, as far as the source of
+/// the annotations knows these, and else for the nearest.
 fn vote(labeler: &mut Labeler<'_>, instance: &InstancePoints, block: &PointCloud, id: LabelId) -> Result<()> {
     let voted = if instance.are_vertices() {
         labeler.add_vertices(&block.positions, id)
@@ -225,8 +227,8 @@ pub(crate) fn label_doubts(report: &VoteReport) -> Vec<String> {
     doubts
 }
 
-/// A sentence on the instances that no face is labelled with, if there are some: they are in the label table, but in no
-/// image and no sampled point.
+/// A sentence on the instances that no face is labelled with, if there are some: they are in the label table,
+/// but in no image and no sampled point.
 pub(crate) fn hidden_instances(
     area: &AreaInput,
     label_of_face: &[LabelId],

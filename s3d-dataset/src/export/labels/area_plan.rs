@@ -1,8 +1,9 @@
-//! A labelled area as files: what voting found, so that no other process opens the annotations or votes again.
+//! A labelled area as files: what voting found, so that no other process opens the annotations or votes
+//! again.
 //!
-//! Two files in a folder: `area.jsonl`, small, and `label_of_face.npy`, an array of `<u4` with a label index a face.
-//! The first holds the second's checksum and is written after it, so that an area which can be read is whole. Processes
-//! that write the same area at the same time write the same bytes.
+//! Two files in a folder: `area.jsonl`, small, and `label_of_face.npy`, an array of `<u4` with a label index
+//! a face. The first holds the second's checksum and is written after it, so that an area which can be read
+//! is whole. Processes that write the same area at the same time write the same bytes.
 
 use crate::error::Result;
 use crate::export::input::RoomInput;
@@ -120,7 +121,8 @@ fn labels_file(folder: &Path) -> PathBuf {
     folder.join("label_of_face.npy")
 }
 
-/// The labels are what the file ends with, as `area.jsonl` says how many there are and what their checksum is.
+/// The labels are what the file ends with, as `area.jsonl` says how many there are and what their checksum
+/// is.
 fn read_label_of_face(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec<LabelId>> {
     let bytes = std::fs::read(path).map_err(|e| FileError::io(path, "read", e))?;
     let labels = usize::try_from(faces)

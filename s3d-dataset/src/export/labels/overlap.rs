@@ -1,9 +1,11 @@
-//! Rooms that lie in one another, which is nearly always a mistake: an instance in another room's folder, a room twice.
+//! Rooms that lie in one another, which is nearly always a mistake: an instance in another room's folder, a
+//! room twice.
 
 use crate::export::labels::annotate::SurveyedRoom;
 use s3d_geom::Aabb;
 
-/// A share of the smaller room's floor, and of the lower one's height, above which it is told. Neighbours share a wall.
+/// A share of the smaller room's floor, and of the lower one's height, above which it is told. Neighbours
+/// share a wall.
 const MUCH: f64 = 0.2;
 /// Places along an axis at which two rooms are compared.
 const STEPS: u32 = 32;

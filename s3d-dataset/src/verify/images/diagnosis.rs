@@ -1,7 +1,8 @@
-//! What a file looks like that is not what the mesh shows: the usual diagnosis, each tried on some of its pixels.
+//! What a file looks like that is not what the mesh shows: the usual diagnosis, each tried on some of its
+//! pixels.
 //!
-//! A suspect says what a pixel would show if the fault were that one. It is named if it explains nearly all pixels that
-//! differ, and nearly all others.
+//! A suspect says what a pixel would show if the fault were that one. It is named if it explains nearly all
+//! pixels that differ, and nearly all others.
 
 use crate::verify::images::pixels::Pixels;
 use crate::verify::images::shade::Shade;
@@ -71,8 +72,8 @@ fn as_is(_: &Seen<'_>, value: [f64; 3]) -> [f64; 3] {
     value
 }
 
-/// What the file `odd` of `image` looks like; `None` if no suspect explains it. `others` are the cameras of the area's
-/// images.
+/// What the file `odd` of `image` looks like; `None` if no suspect explains it. `others` are the cameras of
+/// the area's images.
 pub(crate) fn diagnose(
     reference: &Reference<'_>,
     images: &[DatasetImage],

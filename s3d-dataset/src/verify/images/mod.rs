@@ -27,7 +27,8 @@ const PRETTY: (Topic, &str) = (Topic::Images, "colours of labels");
 const NOTHING: (Topic, &str) = (Topic::Images, "pixels that see nothing");
 const COORDINATES: (Topic, &str) = (Topic::Images, "coordinates and depth");
 
-/// An image whose pose contradicts itself may differ from the mesh in a share of pixels: its camera is not exact.
+/// An image whose pose contradicts itself may differ from the mesh in a share of pixels: its camera is not
+/// exact.
 const SLACK: f64 = 0.005;
 
 /// What the images of an area are held against.
@@ -190,8 +191,9 @@ impl ImageFiles<'_> {
         }
     }
 
-    /// Modalities agree on where nothing is seen. Depth also is missing where it is too large, and coordinates that are
-    /// made from depth are missing with it: those two are compared in [`Self::coordinates`].
+    /// Modalities agree on where nothing is seen. Depth also is missing where it is too large, and
+    /// coordinates that are made from depth are missing with it: those two are compared in
+    /// [`Self::coordinates`].
     fn nothing(&mut self, domain: Domain, pixels: &Pixels, path: &Path) {
         if domain == Domain::GlobalXyz {
             return;

@@ -12,8 +12,8 @@ use s3d_render::{
     index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into, xyz_image_into,
 };
 
-/// How a file differs from what the mesh shows: exactly, for the meshes of an export are those that it was rendered from, to
-/// the bit.
+/// How a file differs from what the mesh shows: exactly, for the meshes of an export are those that it was
+/// rendered from, to the bit.
 pub(super) fn difference(
     reference: &Reference<'_>,
     domain: Domain,

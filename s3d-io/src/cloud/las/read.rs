@@ -20,8 +20,8 @@ use std::sync::atomic::Ordering::Relaxed;
 /// Points that are unpacked at a time, at most, and their bytes.
 const BATCH: u64 = 65_536;
 const BATCH_BYTES: u64 = 1 << 23;
-/// The most points that a byte of a compressed file stands for: a hundred times what the flattest scans come to. Layers
-/// that say nothing take no bytes, so any number could be claimed.
+/// The most points that a byte of a compressed file stands for: a hundred times what the flattest scans come
+/// to. Layers that say nothing take no bytes, so any number could be claimed.
 const MAX_POINTS_PER_BYTE: u64 = 1024;
 /// Numbers of points and bytes in a chunk of compressed points that are believed whatever the file's size.
 const PLAUSIBLE: u32 = 1 << 24;
@@ -153,8 +153,8 @@ impl<'a> LasCloud<'a> {
                 let name = extra[4..36].split(|b| *b == 0).next().unwrap_or_default();
                 let name = String::from_utf8_lossy(name).into_owned();
                 let double = |at: usize| number_at(extra, at).map_or(f64::NAN, f64::from_le_bytes);
-                // 11 to 20 are pairs of the first ten, 21 to 30 triples, no longer used; 0 is a number of bytes that only
-                // its writer knows.
+                // 11 to 20 are pairs of the first ten, 21 to 30 triples, no longer used; 0 is a number of
+                // bytes that only its writer knows.
                 let (data_type, options) = (extra[2], extra[3]);
                 let kind = match data_type % 10 {
                     1 => Kind::U8,
@@ -260,8 +260,8 @@ impl Cloud for LasCloud<'_> {
         let header = reader.header().clone();
         let format = *header.point_format();
         if format.is_extended {
-            // Compressed points of these formats are layers, each with its size before it. Others are streams, of which
-            // four bytes may be any number.
+            // Compressed points of these formats are layers, each with its size before it. Others are
+            // streams, of which four bytes may be any number.
             most.store(u32::try_from(size).unwrap_or(u32::MAX).max(PLAUSIBLE), Relaxed);
         }
         let all = self.dimensions(&header);

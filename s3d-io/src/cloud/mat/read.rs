@@ -1,4 +1,5 @@
-//! Reading `pointcloud.mat`, as MATLAB saved the published ones and as [`MatWriter`](crate::cloud::MatWriter) writes it.
+//! Reading `pointcloud.mat`, as MATLAB saved the published ones and as [`MatWriter`](crate::cloud::MatWriter)
+//! writes it.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -22,11 +23,11 @@ const LONGEST_NAME: u64 = 4096;
 
 /// What a `pointcloud.mat` holds: names, and where the points are.
 ///
-/// The file is a MAT-file of version 7.3 with a variable `Area` (or of any other name, if there is one alone with a field
-/// `Disjoint_Space`), in which [`MatWriter`](crate::cloud::MatWriter) tells what is. Of an area only `Disjoint_Space` is needed,
-/// of a room `name` and `object`, of an object `name` and `points`; other fields may be there. Struct arrays may be cells
-/// of structs; names may be in cells; numbers may be of any class. `points` and `RGB_color` may be of 3 × N instead of
-/// N × 3.
+/// The file is a MAT-file of version 7.3 with a variable `Area` (or of any other name, if there is one alone
+/// with a field `Disjoint_Space`), in which [`MatWriter`](crate::cloud::MatWriter) tells what is. Of an area
+/// only `Disjoint_Space` is needed, of a room `name` and `object`, of an object `name` and `points`; other
+/// fields may be there. Struct arrays may be cells of structs; names may be in cells; numbers may be of any
+/// class. `points` and `RGB_color` may be of 3 × N instead of N × 3.
 #[derive(Clone, Debug)]
 pub struct MatArea {
     /// The area's name: "Area_1". `None` if the file has none.
@@ -75,8 +76,9 @@ impl MatArea {
     /// Reads the names in a file, and where its points are.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Unsupported`] for forms of HDF5 that MATLAB does not write; [`Error::Format`] if it is no
-    /// MAT-file of version 7.3, is cut off or damaged, or has not these structs: the sentence names the field.
+    /// [`Error::Io`]; [`Error::Unsupported`] for forms of HDF5 that MATLAB does not write; [`Error::Format`]
+    /// if it is no MAT-file of version 7.3, is cut off or damaged, or has not these structs: the sentence
+    /// names the field.
     pub fn open(path: &Path) -> Result<Self> {
         Self::read(&Source::file(path))
     }
@@ -103,12 +105,12 @@ impl MatArea {
 }
 
 impl MatObject {
-    /// Appends the points to `out`: as many as [`MatObject::len`], in world metres, with a colour each (black if the file
-    /// has none).
+    /// Appends the points to `out`: as many as [`MatObject::len`], in world metres, with a colour each (black
+    /// if the file has none).
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if the arrays are damaged, or for a coordinate that is not finite or a colour
-    /// beyond 0 to 255: the sentence says which point. `out` may then hold the points before it.
+    /// [`Error::Io`]; [`Error::Format`] if the arrays are damaged, or for a coordinate that is not finite or
+    /// a colour beyond 0 to 255: the sentence says which point. `out` may then hold the points before it.
     ///
     /// # Panics
     /// If `out` has points without colours or with faces.
@@ -117,8 +119,8 @@ impl MatObject {
         Ok(())
     }
 
-    /// As [`MatObject::read`], less `offset_m`, which is subtracted before positions become `f32`, and with a choice of
-    /// what to do at a point that is none.
+    /// As [`MatObject::read`], less `offset_m`, which is subtracted before positions become `f32`, and with a
+    /// choice of what to do at a point that is none.
     pub(crate) fn read_with(
         &self,
         offset_m: DVec3,

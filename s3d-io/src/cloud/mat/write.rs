@@ -1,5 +1,5 @@
-//! Writing `pointcloud.mat`: an area's points by room and object. Source: formats.md, "S3DIS tree", and the README of the
-//! published data set.
+//! Writing `pointcloud.mat`: an area's points by room and object. Source: formats.md, "S3DIS tree", and the
+//! README of the published data set.
 
 #![expect(clippy::indexing_slicing, reason = "a writer: places in the file are those that it gave")]
 
@@ -18,8 +18,8 @@ const ROOM_FIELDS: [&str; 4] = ["name", "AlignmentAngle", "color", "object"];
 const OBJECT_FIELDS: [&str; 8] =
     ["name", "points", "RGB_color", "global_name", "Bbox", "Voxels", "Voxel_Occupancy", "Points_per_Voxel"];
 
-/// What stands before all in a MAT-file: text, which ends at byte 116, version and byte order. MATLAB writes the time
-/// too; here it is the same in every file.
+/// What stands before all in a MAT-file: text, which ends at byte 116, version and byte order. MATLAB writes
+/// the time too; here it is the same in every file.
 fn user_block() -> [u8; 512] {
     let mut block = [0; 512];
     block[..116].fill(b' ');
@@ -31,8 +31,8 @@ fn user_block() -> [u8; 512] {
 
 /// Writes `pointcloud.mat` of an area, a MAT-file of version 7.3 (HDF5) as MATLAB, h5py and others read it.
 ///
-/// It holds one variable, `Area`, of nested structs. The sizes are MATLAB's; in HDF5, and so in h5py, the axes are
-/// reversed: `points` is 3 × N there.
+/// It holds one variable, `Area`, of nested structs. The sizes are MATLAB's; in HDF5, and so in h5py, the
+/// axes are reversed: `points` is 3 × N there.
 ///
 /// | field | class, size | |
 /// |---|---|---|
@@ -51,11 +51,12 @@ fn user_block() -> [u8; 512] {
 /// | `….object.Voxel_Occupancy` | uint8, 216 × 1 | 1 where a voxel holds a point |
 /// | `….object.Points_per_Voxel` | cell, 216 × 1 | for each voxel the rows of `points` in it: uint32, n × 1, from 1 |
 ///
-/// Box and voxels are those of the points beside them. A room without objects and an object without points are left out.
-/// As in MATLAB's own files a struct of one element has its fields themselves, one of more has references to them.
+/// Box and voxels are those of the points beside them. A room without objects and an object without points
+/// are left out. As in MATLAB's own files a struct of one element has its fields themselves, one of more has
+/// references to them.
 ///
-/// The points of one object are in memory, and 60 bytes an array that was written. The file is there whole or not at
-/// all, and the same input gives the same bytes.
+/// The points of one object are in memory, and 60 bytes an array that was written. The file is there whole or
+/// not at all, and the same input gives the same bytes.
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -161,7 +162,8 @@ impl<W: Write + Seek> MatWriter<W> {
     /// Appends points to the object.
     ///
     /// # Errors
-    /// [`Error::Format`] for a coordinate that is not finite, and for more than 4,294,967,295 points of an object.
+    /// [`Error::Format`] for a coordinate that is not finite, and for more than 4,294,967,295 points of an
+    /// object.
     ///
     /// # Panics
     /// If no object was started, or there are not as many colours as positions.

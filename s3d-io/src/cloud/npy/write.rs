@@ -47,8 +47,8 @@ impl NpyWriter {
 }
 
 impl<W: Write> NpyWriter<W> {
-    /// Starts, in `file`, an array of elements of a numpy type (`"<f4"`, `"<f8"`, `"<i8"`, `"<u4"`…: the digit
-    /// is the element's bytes) and this shape. Errors call the file `name`.
+    /// Starts, in `file`, an array of elements of a numpy type (`"<f4"`, `"<f8"`, `"<i8"`, `"<u4"`…: the
+    /// digit is the element's bytes) and this shape. Errors call the file `name`.
     ///
     /// # Errors
     /// [`Error::Io`].

@@ -39,7 +39,8 @@ impl LabelledPoints {
     /// Reads the header of `path`.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if the file is another PLY file, none, or shorter or longer than its header says.
+    /// [`Error::Io`]; [`Error::Format`] if the file is another PLY file, none, or shorter or longer than its
+    /// header says.
     pub fn open(path: &Path) -> Result<Self> {
         Self::new(open_file(path)?, path)
     }
@@ -90,7 +91,8 @@ impl<R: Read + Seek> LabelledPoints<R> {
         self.count
     }
 
-    /// Puts the next points, `most` at most, into `out`; what it held is lost. Returns whether there were any.
+    /// Puts the next points, `most` at most, into `out`; what it held is lost. Returns whether there were
+    /// any.
     ///
     /// # Errors
     /// [`Error::Io`].

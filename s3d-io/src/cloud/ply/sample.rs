@@ -23,15 +23,15 @@ struct Header {
     color: Option<[usize; 3]>,
 }
 
-/// Reads up to `most` points of a binary little-endian PLY cloud such as `area_N/3d/pointcloud.ply`: all of them, or
-/// evenly spaced ones in the file's order. As the file is ordered by face, they cover the surface evenly. Their colours
-/// are black if the file has none; what else the file tells of them is left out.
+/// Reads up to `most` points of a binary little-endian PLY cloud such as `area_N/3d/pointcloud.ply`: all of
+/// them, or evenly spaced ones in the file's order. As the file is ordered by face, they cover the surface
+/// evenly. Their colours are black if the file has none; what else the file tells of them is left out.
 ///
 /// Never more is in memory than the points that are returned.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is another kind of PLY file, if it is shorter than its header says, or if a
-/// coordinate is not finite.
+/// [`Error::Io`]; [`Error::Format`] if it is another kind of PLY file, if it is shorter than its header says,
+/// or if a coordinate is not finite.
 pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
     let io = |e| Error::io(path, "read", e);
     let file = open_file(path)?;
@@ -73,7 +73,8 @@ pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
     Ok(cloud)
 }
 
-/// The number of the element in the middle of the `k`th of `parts` parts of `count`, which are as many or more.
+/// The number of the element in the middle of the `k`th of `parts` parts of `count`, which are as many or
+/// more.
 fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
     // u128, as counts may be anything.
     let [k, parts, count] = [k, parts, count].map(u128::from);
@@ -82,8 +83,8 @@ fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
     middle.and_then(|i| u64::try_from(i).ok()).unwrap_or(0)
 }
 
-/// Writes a cloud as a binary little-endian PLY file of positions (float) and colours (uchar, black if it has none), as
-/// viewers and Gaussian splatting read it, whole or not at all, and returns its size in bytes.
+/// Writes a cloud as a binary little-endian PLY file of positions (float) and colours (uchar, black if it has
+/// none), as viewers and Gaussian splatting read it, whole or not at all, and returns its size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`].

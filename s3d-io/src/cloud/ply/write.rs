@@ -15,9 +15,9 @@ const BATCH: usize = 4096;
 
 /// Writes a point cloud of any size piece by piece as a binary little-endian PLY file, whole or not at all.
 ///
-/// Columns: `x y z` (float, world metres, Z-up), `red green blue` (uchar; black if the cloud has no colours), `label`
-/// (uint, index into `semantic_labels.json`), `face` (uint, the face of the mesh that the point was drawn from;
-/// 4294967295 if unknown).
+/// Columns: `x y z` (float, world metres, Z-up), `red green blue` (uchar; black if the cloud has no colours),
+/// `label` (uint, index into `semantic_labels.json`), `face` (uint, the face of the mesh that the point was
+/// drawn from; 4294967295 if unknown).
 #[derive(Debug)]
 pub struct PlyPointWriter<W = AtomicFile> {
     file: W,

@@ -27,8 +27,8 @@ const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Reads points of a file piece by piece, so that one of any size needs little memory.
 ///
-/// A line is `x y z r g b` between any ASCII white space: metres in the Z-up world, as the nearest `f32`, and a colour of
-/// whole numbers, 0 to 255, which may be written `41.000000`. Empty lines do not count.
+/// A line is `x y z r g b` between any ASCII white space: metres in the Z-up world, as the nearest `f32`, and
+/// a colour of whole numbers, 0 to 255, which may be written `41.000000`. Empty lines do not count.
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -78,7 +78,8 @@ impl PointReader {
 }
 
 impl<R: Read> PointReader<R> {
-    /// Reads the points of `reader`, with a choice of what to do at lines that are none; errors call it `name`.
+    /// Reads the points of `reader`, with a choice of what to do at lines that are none; errors call it
+    /// `name`.
     pub fn new(reader: R, name: &Path, on_fault: OnFault) -> Self {
         Self {
             path: name.to_owned(),
@@ -109,11 +110,12 @@ impl<R: Read> PointReader<R> {
         Skipped { count: self.skipped, first: self.first_skipped }
     }
 
-    /// Appends the next points, at most `max_points`, to `out`, and gives their number: 0 at the end of the file.
+    /// Appends the next points, at most `max_points`, to `out`, and gives their number: 0 at the end of the
+    /// file.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] with the number and the text of a line that is no point, or has a coordinate
-    /// that is not finite or a colour beyond 0 to 255. `out` holds the points before it.
+    /// [`Error::Io`]; [`Error::Format`] with the number and the text of a line that is no point, or has a
+    /// coordinate that is not finite or a colour beyond 0 to 255. `out` holds the points before it.
     ///
     /// # Panics
     /// If `max_points` is 0, or `out` has points without colours or with faces.
@@ -159,8 +161,8 @@ impl<R: Read> PointReader<R> {
         Ok(n)
     }
 
-    /// Appends the points of all whole lines at hand, on all threads, and gives their number. Nothing if something is wrong
-    /// with one, or if they may be more than `max_points`.
+    /// Appends the points of all whole lines at hand, on all threads, and gives their number. Nothing if
+    /// something is wrong with one, or if they may be more than `max_points`.
     fn read_pieces(&mut self, max_points: usize, out: &mut PointCloud) -> usize {
         let unread = self.block.get(self.start..self.end).unwrap_or_default();
         let Some((lines, _)) = memrchr(b'\n', unread).and_then(|last| unread.split_at_checked(last + 1))

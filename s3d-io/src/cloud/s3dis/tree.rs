@@ -1,5 +1,5 @@
-//! The S3DIS tree: an area's folder of rooms, their folders of annotated instances. Names only; the points are read by
-//! [`PointReader`](crate::cloud::PointReader). Source: formats.md, "S3DIS tree".
+//! The S3DIS tree: an area's folder of rooms, their folders of annotated instances. Names only; the points
+//! are read by [`PointReader`](crate::cloud::PointReader). Source: formats.md, "S3DIS tree".
 
 use crate::error::{Error, Result};
 use crate::quote::quote;
@@ -23,11 +23,12 @@ pub enum OnFault {
 pub struct TreeOptions {
     /// At a folder that names no room, a room without annotations, or a file that names no instance.
     pub on_fault: OnFault,
-    /// Whether an unknown class (`stairs_1.txt` in the published area) is taken for clutter, as its loaders do: its
-    /// instances get the numbers after those of the room's clutter.
+    /// Whether an unknown class (`stairs_1.txt` in the published area) is taken for clutter, as its loaders
+    /// do: its instances get the numbers after those of the room's clutter.
     pub unknown_as_clutter: bool,
-    /// Which class a word of a file's name means, even if it is one of the 13; `None`: such files are left out without a
-    /// warning. Instances of another class than the word's get the numbers after those of the room's own, as with clutter.
+    /// Which class a word of a file's name means, even if it is one of the 13; `None`: such files are left
+    /// out without a warning. Instances of another class than the word's get the numbers after those of the
+    /// room's own, as with clutter.
     pub classes: BTreeMap<String, Option<Class>>,
 }
 
@@ -69,8 +70,8 @@ impl AnnotationTree {
     /// [`AnnotationTree::warnings`].
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] for the path of a folder that names no room, a room without annotations, a file
-    /// that names no instance or one that is there twice, an area without rooms.
+    /// [`Error::Io`]; [`Error::Format`] for the path of a folder that names no room, a room without
+    /// annotations, a file that names no instance or one that is there twice, an area without rooms.
     pub fn open(dir: &Path) -> Result<Self> {
         Self::open_with(dir, &TreeOptions::default())
     }

@@ -13,9 +13,9 @@ const BATCH_BYTES: usize = 1 << 16;
 /// Writes the tree of one area, room by room: `office_1/office_1.txt`, `office_1/Annotations/chair_1.txt`…,
 /// `Area_1_alignmentAngle.txt`.
 ///
-/// A line is `x y z r g b`: metres with three decimals, colours 0 to 255. A room's file holds its points in the order in
-/// which they came, which is that of its annotation files one after another. Nothing is kept in memory. Each file is
-/// there whole or not at all.
+/// A line is `x y z r g b`: metres with three decimals, colours 0 to 255. A room's file holds its points in
+/// the order in which they came, which is that of its annotation files one after another. Nothing is kept in
+/// memory. Each file is there whole or not at all.
 #[derive(Debug)]
 pub struct S3disAreaWriter {
     dir: PathBuf,
@@ -48,8 +48,8 @@ impl S3disAreaWriter {
         })
     }
 
-    /// Writes the angle of each room, in the order given: whole degrees, 0 to 359. The file is named after the area's
-    /// folder.
+    /// Writes the angle of each room, in the order given: whole degrees, 0 to 359. The file is named after
+    /// the area's folder.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -253,7 +253,8 @@ mod tests {
     proptest! {
         #[test]
         fn fast_digits_are_those_of_the_formatter(metres in prop_oneof![-1e3..1e3f32, -1e6..1e6f32, -1e-2..1e-2f32]) {
-            // `{:.3}` rounds the exact value, and a half that comes up exactly to even; ours goes away from zero.
+            // `{:.3}` rounds the exact value, and a half that comes up exactly to even; ours goes away from
+            // zero.
             let plain = format!("{metres:.3}");
             let half = f64::from(metres) * 1000.0;
             if (half - half.trunc()).abs() != 0.5 {

@@ -34,7 +34,8 @@ pub(crate) trait Cloud {
         false
     }
 
-    /// Reads all rows. `false`: colours go beyond the narrow range, and the rows must be read again with the wide one.
+    /// Reads all rows. `false`: colours go beyond the narrow range, and the rows must be read again with the
+    /// wide one.
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool>;
 }
 

@@ -64,8 +64,8 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Finds the columns: those that the options name, to the letter, and else those that are called as usual, in capitals or
-    /// not. An element of an array is a column `name[i]`.
+    /// Finds the columns: those that the options name, to the letter, and else those that are called as
+    /// usual, in capitals or not. An element of an array is a column `name[i]`.
     ///
     /// # Errors
     /// [`Error::Format`] with the columns that there are if one is missing, or named and not there.

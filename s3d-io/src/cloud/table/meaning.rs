@@ -49,8 +49,9 @@ pub(crate) struct Meaning {
     pub(crate) instance_of: Vec<Option<usize>>,
 }
 
-/// What makes an instance: equal keys are one, and their order is that of the numbers. The tag is `None` for points without
-/// an instance number, which are one instance a class and room, whatever their class is called.
+/// What makes an instance: equal keys are one, and their order is that of the numbers. The tag is `None` for
+/// points without an instance number, which are one instance a class and room, whatever their class is
+/// called.
 type Key = (Room, Class, i64, Option<Tag>);
 
 impl Meaning {

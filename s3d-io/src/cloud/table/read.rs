@@ -1,9 +1,10 @@
-//! Flat clouds: every instance of an area in one table of points, or in a few. Rows are grouped by room, class and
-//! instance, whatever the format.
+//! Flat clouds: every instance of an area in one table of points, or in a few. Rows are grouped by room,
+//! class and instance, whatever the format.
 //!
-//! The files are read once and their points counted by what they say of themselves. Then it is known what the tags mean
-//! and how many instances there are. As long as the points fit, they were kept on the way and are put in order; else the
-//! files are read a second time, and every point goes to its place in a temporary file.
+//! The files are read once and their points counted by what they say of themselves. Then it is known what the
+//! tags mean and how many instances there are. As long as the points fit, they were kept on the way and are
+//! put in order; else the files are read a second time, and every point goes to its place in a temporary
+//! file.
 
 use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
@@ -39,7 +40,8 @@ struct Gathered {
 /// Reads flat clouds as one.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] for what a reader finds wrong, and for classes and rooms without a meaning.
+/// [`Error::Io`]; [`Error::Format`] for what a reader finds wrong, and for classes and rooms without a
+/// meaning.
 pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> Result<Annotations> {
     let mut colors = vec![ColorRange::Narrow; clouds.len()];
     // Each turn settles the colours of one file at least.

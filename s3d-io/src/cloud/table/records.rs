@@ -185,8 +185,8 @@ pub(crate) struct Table {
 
 impl Table {
     /// # Errors
-    /// [`Error::Format`] if columns are missing, a coordinate or colour is a text, records are too long, or a field reaches
-    /// beyond them.
+    /// [`Error::Format`] if columns are missing, a coordinate or colour is a text, records are too long, or a
+    /// field reaches beyond them.
     pub(crate) fn new(
         path: &Path,
         fields: Vec<Field>,
@@ -278,8 +278,8 @@ impl Table {
     }
 }
 
-/// How many records of `stride` bytes are read at once after `done` of `count`: as many as fit a block, but one at least;
-/// `None` at the end.
+/// How many records of `stride` bytes are read at once after `done` of `count`: as many as fit a block, but
+/// one at least; `None` at the end.
 pub(crate) fn rows_of_block(count: u64, done: u64, stride: usize) -> Option<usize> {
     let most = BLOCK.checked_div(stride)?.max(1);
     match count.checked_sub(done)? {

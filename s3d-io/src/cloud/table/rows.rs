@@ -1,4 +1,5 @@
-//! The rows of a flat cloud, as every format's reader hands them on: one point each, with what it says of itself.
+//! The rows of a flat cloud, as every format's reader hands them on: one point each, with what it says of
+//! itself.
 
 use crate::cloud::annotations::{AnnotationOptions, Skipped};
 use crate::cloud::s3dis::tree::OnFault;
@@ -195,7 +196,8 @@ impl<'a> Reading<'a> {
     /// Takes the record `number` (from 1).
     ///
     /// # Errors
-    /// Those of the sink; [`Error::Format`] with the record's number if it is no point, unless faults are skipped.
+    /// Those of the sink; [`Error::Format`] with the record's number if it is no point, unless faults are
+    /// skipped.
     pub(crate) fn push(&mut self, number: u64, row: &Row<'_>) -> Result<()> {
         self.push_at(row, |path, why| Error::format(path, format!("record {number}: {why}")))
     }

@@ -20,7 +20,8 @@ pub struct InstanceArrays {
     pub voxel_occupancy: Vec<u8>,
     /// 216 an instance.
     pub points_per_voxel: Vec<u32>,
-    /// One more than instances: the points of instance i are `point_index[point_start[i]..point_start[i + 1]]`.
+    /// One more than instances: the points of instance i are `point_index[point_start[i]..point_start[i +
+    /// 1]]`.
     pub point_start: Vec<u64>,
 }
 
@@ -37,7 +38,8 @@ impl<'a, R: Read + Seek> Archive<'a, R> {
         Ok(Self { path, zip })
     }
 
-    /// The header of an array, and its values to be read. The archive's own checksum is looked at where these end.
+    /// The header of an array, and its values to be read. The archive's own checksum is looked at where these
+    /// end.
     fn array(&mut self, name: &str) -> Result<(Vec<u8>, impl Read + '_)> {
         let path = self.path;
         let mut entry = self
@@ -81,8 +83,8 @@ fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, shape: &[u64
     Err(Error::format(path, format!("the array {name:?} is not of type {kind} and shape {shape:?}")))
 }
 
-/// Reads the arrays that [`InstanceWriter`](crate::dataset::InstanceWriter) wrote, but for the members of voxels, which
-/// [`read_instance_members`] reads: a few kilobytes an instance.
+/// Reads the arrays that [`InstanceWriter`](crate::dataset::InstanceWriter) wrote, but for the members of
+/// voxels, which [`read_instance_members`] reads: a few kilobytes an instance.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no such archive, damaged, or an array has another type or shape.
@@ -135,11 +137,12 @@ pub fn read_instance_arrays_from(reader: impl Read + Seek, name: &Path) -> Resul
     })
 }
 
-/// Hands the points of each instance, voxel after voxel, to `each`, one instance at a time. `point_start` is that of the
-/// archive's arrays.
+/// Hands the points of each instance, voxel after voxel, to `each`, one instance at a time. `point_start` is
+/// that of the archive's arrays.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is no such archive, damaged, or has not as many points as `point_start` tells.
+/// [`Error::Io`]; [`Error::Format`] if it is no such archive, damaged, or has not as many points as
+/// `point_start` tells.
 pub fn read_instance_members(
     path: &Path,
     point_start: &[u64],

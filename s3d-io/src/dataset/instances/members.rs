@@ -37,7 +37,8 @@ impl<'a> VoxelMembers<'a> {
         Ok(Self { file, voxels, next: 0, end })
     }
 
-    /// Takes the voxels of the next points. Points that were not counted are an error: their file has changed.
+    /// Takes the voxels of the next points. Points that were not counted are an error: their file has
+    /// changed.
     pub(crate) fn add(&mut self, cells: &[u8]) -> io::Result<()> {
         for cell in cells {
             let voxel = self.voxels.get_mut(usize::from(*cell)).ok_or_else(changed)?;

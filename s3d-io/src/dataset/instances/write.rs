@@ -1,8 +1,8 @@
 //! Boxes and voxels of an area's instances: `instances.json` to read, `instances.npz` for numpy.
 //!
-//! They hold what the published `pointcloud.mat` does beside the points: per instance its tightest box, split in 6 × 6 × 6
-//! equal voxels, each with its occupancy and its points. Voxel (ix, iy, iz), counted from the box's smallest corner, has
-//! the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "Labels".
+//! They hold what the published `pointcloud.mat` does beside the points: per instance its tightest box, split
+//! in 6 × 6 × 6 equal voxels, each with its occupancy and its points. Voxel (ix, iy, iz), counted from the
+//! box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "Labels".
 
 use crate::cloud::npy::write::npy_header;
 use crate::cloud::passes::PointPasses;
@@ -71,7 +71,8 @@ pub struct InstanceEntry {
 /// | `point_start` | u64, n + 1 | the points of instance i are `point_index[point_start[i]:point_start[i+1]]` |
 /// | `point_index` | u32, N | points of an instance (from 0, in the order of its file in the S3DIS tree), voxel after voxel |
 ///
-/// Memory: about 1.3 kilobytes an instance, whatever its points. Point indices wait in a nameless temporary file.
+/// Memory: about 1.3 kilobytes an instance, whatever its points. Point indices wait in a nameless temporary
+/// file.
 #[derive(Debug)]
 pub struct InstanceWriter {
     json: PathBuf,
@@ -96,8 +97,9 @@ impl InstanceWriter {
         })
     }
 
-    /// Appends an instance, whose points are in the order of its file in the S3DIS tree. Those that are not in memory are
-    /// gone through twice, once to count them by voxel and once to write their indices, which takes 14 MB.
+    /// Appends an instance, whose points are in the order of its file in the S3DIS tree. Those that are not
+    /// in memory are gone through twice, once to count them by voxel and once to write their indices, which
+    /// takes 14 MB.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for more points than `u32` can number; those of the points' own file.
@@ -494,7 +496,8 @@ mod tests {
             archive.start("point_index", size).unwrap();
             archive.zip.write_all(b"abc").unwrap();
             let bytes = archive.zip.finish().unwrap().into_inner();
-            // The local header: version 4.5 is needed, the sizes are elsewhere, namely in an extra field of the kind 1.
+            // The local header: version 4.5 is needed, the sizes are elsewhere, namely in an extra field of
+            // the kind 1.
             assert_eq!(bytes[..4], *b"PK\x03\x04");
             let extra = 30 + "point_index.npy".len();
             let sizes = if is_large { [0xff; 8] } else { [3, 0, 0, 0, 3, 0, 0, 0] };

@@ -13,7 +13,8 @@ use s3d_geom::glam::{DMat3, Vec2, Vec3};
 use s3d_geom::{MeshParts, NO_INDEX};
 use std::collections::HashMap;
 
-/// The most vertices and corners of faces that are placed, 30 GB of them. A file can place a mesh any number of times.
+/// The most vertices and corners of faces that are placed, 30 GB of them. A file can place a mesh any number
+/// of times.
 const MAX_ELEMENTS: u64 = 1 << 30;
 
 /// Collects the columns of a mesh.
@@ -147,7 +148,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// An accessor may lawfully have no data, and is zero then; of positions it means that an extension has them.
+    /// An accessor may lawfully have no data, and is zero then; of positions it means that an extension has
+    /// them.
     fn refuse_missing_data(&self, p: &Primitive, positions: Index<Accessor>, who: &str) -> Result<()> {
         let accessor = self.document.get(positions, who, "accessor")?;
         if accessor.buffer_view.is_some() || accessor.sparse.is_some() {
@@ -211,8 +213,8 @@ impl<'a> Builder<'a> {
         Ok(start)
     }
 
-    /// Where the texture coordinates of the primitive start, if its material has a texture and the primitive has
-    /// coordinates for it.
+    /// Where the texture coordinates of the primitive start, if its material has a texture and the primitive
+    /// has coordinates for it.
     fn uv_start(&mut self, p: &Primitive, vertices: usize, who: &str) -> Result<Option<u32>> {
         let Some(material) = p.material.map(|m| m.value()).filter(|_| is_textured(p, self.looks)) else {
             return Ok(None);
@@ -251,7 +253,8 @@ impl<'a> Builder<'a> {
         }
         let normals: Vec<[f32; 3]> = self.document.read_vectors(accessor, &format!("{who}, NORMAL"))?;
         let start = self.next_start(self.parts.normals.len(), normals.len())?;
-        // Normals turn with the inverse transpose; the cofactors are that up to a factor and exist for flat scales too.
+        // Normals turn with the inverse transpose; the cofactors are that up to a factor and exist for flat
+        // scales too.
         let m = DMat3::from_mat4(instance.world_from_node);
         let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
         let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * m.determinant().signum();

@@ -36,8 +36,8 @@ pub(crate) struct UvMapping {
 impl UvMapping {
     const PLAIN: Self = Self { set: 0, offset: Vec2::ZERO, rotation_rad: 0.0, scale: Vec2::ONE };
 
-    /// The coordinate in a [`Texture`], whose v points up, of one of the file, whose v points down. Source: the
-    /// extension KHR_texture_transform: scaled, turned, moved.
+    /// The coordinate in a [`Texture`], whose v points up, of one of the file, whose v points down. Source:
+    /// the extension KHR_texture_transform: scaled, turned, moved.
     pub(crate) fn apply(&self, uv: Vec2) -> Vec2 {
         let (sin, cos) = libm::sincosf(self.rotation_rad);
         let s = uv * self.scale;
@@ -138,8 +138,8 @@ impl GltfLooks {
     }
 }
 
-/// Base colour, linear, and texture of a material: of its specular-glossiness variant if it has one, which readers
-/// that know the extension prefer.
+/// Base colour, linear, and texture of a material: of its specular-glossiness variant if it has one, which
+/// readers that know the extension prefer.
 fn base_color(material: &json::Material) -> ([f32; 3], Option<&texture::Info>) {
     let metallic = &material.pbr_metallic_roughness;
     let variant = material.extensions.as_ref().and_then(|e| e.pbr_specular_glossiness.as_ref());

@@ -1,8 +1,8 @@
 //! glTF 2.0, `.gltf` and `.glb`.
 //!
-//! The `gltf` crate gives the JSON its types. Its import and its check are not used: the one decodes every image, wanted
-//! or not, and panics on ranges that are wrong, the other panics on a wrong index and refuses what does no harm, such
-//! as a missing bounding box. Here each index is checked before it is followed.
+//! The `gltf` crate gives the JSON its types. Its import and its check are not used: the one decodes every
+//! image, wanted or not, and panics on ranges that are wrong, the other panics on a wrong index and refuses
+//! what does no harm, such as a missing bounding box. Here each index is checked before it is followed.
 
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
@@ -24,7 +24,8 @@ pub(crate) struct Instance {
     pub(crate) skinned: bool,
 }
 
-/// Reads the default scene of a glTF file; without one its first, and without any all nodes that are no one's child.
+/// Reads the default scene of a glTF file; without one its first, and without any all nodes that are no one's
+/// child.
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].

@@ -122,8 +122,8 @@ pub fn write_rgb_obj(dir: &Path, mesh: &TriMesh, textures: &[TextureOut<'_>]) ->
 }
 
 /// Writes `semantic.obj` and `semantic.mtl` into the folder `dir`, which must be there, and returns the size
-/// of both in bytes. A face's material bears the name of its label: `names[label_of_face[face]]`. Each has the
-/// colour of [`pretty_color`].
+/// of both in bytes. A face's material bears the name of its label: `names[label_of_face[face]]`. Each has
+/// the colour of [`pretty_color`].
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).

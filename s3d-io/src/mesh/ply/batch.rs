@@ -30,12 +30,14 @@ impl PlyBatch {
         self.first_row
     }
 
-    /// The numbers of a property, one a row; of a list property, all of all rows; none of one that is not wanted.
+    /// The numbers of a property, one a row; of a list property, all of all rows; none of one that is not
+    /// wanted.
     pub(crate) fn scalars(&self, property: usize) -> &[f64] {
         self.columns.get(property).map_or(&[], |column| &column.values)
     }
 
-    /// The list of row `row`, counted from the first of the batch; empty for a property that is none or not wanted.
+    /// The list of row `row`, counted from the first of the batch; empty for a property that is none or not
+    /// wanted.
     pub(crate) fn list(&self, property: usize, row: usize) -> &[f64] {
         let list = |Column { values, ends }: &'_ Column| {
             let start = row.checked_sub(1).map_or(Some(0), |before| ends.get(before).copied())?;

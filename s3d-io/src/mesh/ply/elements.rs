@@ -14,7 +14,8 @@
 //! }
 //! ```
 //!
-//! Numbers come as `f64`, which holds every type of PLY exactly; [`crate::mesh::ply::batch::integer`] makes whole ones of them.
+//! Numbers come as `f64`, which holds every type of PLY exactly; [`crate::mesh::ply::batch::integer`] makes
+//! whole ones of them.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -91,7 +92,8 @@ impl<'r> PlyReader<'r> {
         usize::try_from(self.bytes.checked_div(row).unwrap_or(0).min(element.count)).unwrap_or(0)
     }
 
-    /// Goes to the next element, whose rows follow, over what is left of the last one. Nothing is wanted of it yet.
+    /// Goes to the next element, whose rows follow, over what is left of the last one. Nothing is wanted of
+    /// it yet.
     ///
     /// # Errors
     /// As [`PlyReader::read_batch`], for the rows that are passed over.
@@ -108,7 +110,8 @@ impl<'r> PlyReader<'r> {
         Ok(Some(element))
     }
 
-    /// Says which properties of the element the next batches hold, by their places; the others are passed over.
+    /// Says which properties of the element the next batches hold, by their places; the others are passed
+    /// over.
     ///
     /// # Panics
     /// If there is no element, or no such property.
@@ -123,12 +126,12 @@ impl<'r> PlyReader<'r> {
         }
     }
 
-    /// Reads the next rows of the element into `batch`, whose memory is used again; `false` if there are no more, or before
-    /// the first [`PlyReader::next_element`].
+    /// Reads the next rows of the element into `batch`, whose memory is used again; `false` if there are no
+    /// more, or before the first [`PlyReader::next_element`].
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] with the line or the row: the file ends too soon, a word is no number or does not
-    /// fit its property's type, a line holds more than a row, a list has a negative length.
+    /// [`Error::Io`]; [`Error::Format`] with the line or the row: the file ends too soon, a word is no number
+    /// or does not fit its property's type, a line holds more than a row, a list has a negative length.
     pub(crate) fn read_batch(&mut self, batch: &mut PlyBatch) -> Result<bool> {
         let Some((element, done)) = self.at else { return Ok(false) };
         let Some(current) = self.header.elements.get_mut(element) else { return Ok(false) };

@@ -27,11 +27,12 @@ pub(crate) struct PlyFaces {
 const CORNERS: [&str; 4] = ["vertex_indices", "vertex_index", "vertex_indexes", "vertices"];
 
 impl PlyFaces {
-    /// Reads the element that comes now; its labels too, if they belong to faces. `vertices` is the number of vertices.
+    /// Reads the element that comes now; its labels too, if they belong to faces. `vertices` is the number of
+    /// vertices.
     ///
     /// # Errors
-    /// As [`PlyReader::read_batch`]; [`Error::Format`] for a list of corners that is not there or names a vertex that
-    /// is not.
+    /// As [`PlyReader::read_batch`]; [`Error::Format`] for a list of corners that is not there or names a
+    /// vertex that is not.
     pub(crate) fn read(
         path: &Path,
         reader: &mut PlyReader<'_>,
@@ -93,8 +94,8 @@ impl PlyFaces {
         Ok(out)
     }
 
-    /// Adds the triangles of the element `tristrips`: lists of vertices, of which each three neighbours are a triangle; −1
-    /// starts a new strip.
+    /// Adds the triangles of the element `tristrips`: lists of vertices, of which each three neighbours are a
+    /// triangle; −1 starts a new strip.
     ///
     /// # Errors
     /// As [`PlyFaces::read`].
@@ -183,7 +184,8 @@ impl PlyFaces {
         out
     }
 
-    /// The coordinates of corners, and the indices into them of the triangles' corners; `None` if there are none.
+    /// The coordinates of corners, and the indices into them of the triangles' corners; `None` if there are
+    /// none.
     pub(crate) fn take_uvs(&mut self, triangles: &PlyTriangles) -> Option<(Vec<Vec2>, Vec<[u32; 3]>)> {
         if self.uvs.is_empty() {
             return None;

@@ -1,7 +1,8 @@
 //! The header of a PLY file: its encoding, and which elements of which properties follow.
 //!
-//! PLY has no standard beyond Greg Turk's description of 1994. What is read here is what files hold: both families of type
-//! names (`uchar` and `uint8`), lines that end in LF, CR LF or CR, comments anywhere, any elements in any order.
+//! PLY has no standard beyond Greg Turk's description of 1994. What is read here is what files hold: both
+//! families of type names (`uchar` and `uint8`), lines that end in LF, CR LF or CR, comments anywhere, any
+//! elements in any order.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -9,7 +10,8 @@ use crate::error::{Error, Result};
 use crate::quote::quote;
 use std::path::Path;
 
-/// The most bytes of a header. Files with hundreds of properties and a story in their comments stay far below.
+/// The most bytes of a header. Files with hundreds of properties and a story in their comments stay far
+/// below.
 pub(crate) const MAX_HEADER: usize = 1 << 20;
 
 /// How the numbers of a file are written.
@@ -124,8 +126,8 @@ pub(crate) struct PlyElement {
 }
 
 impl PlyElement {
-    /// The place among the properties of the first of `names` that is one, upper and lower case being the same. A name
-    /// earlier in `names` goes before one later.
+    /// The place among the properties of the first of `names` that is one, upper and lower case being the
+    /// same. A name earlier in `names` goes before one later.
     pub(crate) fn find(&self, names: &[&str]) -> Option<usize> {
         names.iter().find_map(|name| self.properties.iter().position(|p| p.name.eq_ignore_ascii_case(name)))
     }

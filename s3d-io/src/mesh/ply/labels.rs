@@ -29,7 +29,8 @@ pub(crate) struct PlyLabels {
 }
 
 impl PlyLabels {
-    /// Finds the columns that `options` names, or known names where it names none: of faces or else of vertices.
+    /// Finds the columns that `options` names, or known names where it names none: of faces or else of
+    /// vertices.
     ///
     /// # Errors
     /// [`Error::Format`] if what `options` names is not there.

@@ -1,7 +1,8 @@
 //! Meshes in PLY files.
 //!
-//! [`PlyReader`] reads the numbers; [`PlyVertices`] and [`PlyFaces`] know what they are called, and here they become a
-//! mesh. Texture images are named by comments, as MeshLab writes them: `comment TextureFile wall.png`.
+//! [`PlyReader`] reads the numbers; [`PlyVertices`] and [`PlyFaces`] know what they are called, and here they
+//! become a mesh. Texture images are named by comments, as MeshLab writes them: `comment TextureFile
+//! wall.png`.
 
 use crate::error::{Error, Result};
 use crate::image::find::find_image;
@@ -18,7 +19,8 @@ use s3d_geom::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX, Texture, Wrap};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Reads a PLY file of so many bytes (0: not known), which errors call `path`: vertices keep its order and number, faces its order.
+/// Reads a PLY file of so many bytes (0: not known), which errors call `path`: vertices keep its order and
+/// number, faces its order.
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh_with`].
@@ -356,7 +358,8 @@ mod tests {
             assert!(file.companions.len() == 1 && file.companions[0].ends_with("two words.png"));
             assert!(file.warnings.is_empty());
         }
-        // As MeshLab writes them: two images, one list a face; the coordinates of a polygon go with its corners.
+        // As MeshLab writes them: two images, one list a face; the coordinates of a polygon go with its
+        // corners.
         let list = "property list uchar float texcoord\nproperty int texnumber\n";
         let comments = "comment TextureFile two words.png\ncomment TextureFile b.png\n";
         let rows = format!(
@@ -412,7 +415,8 @@ mod tests {
 
     #[test]
     fn labels_of_faces_stay_with_their_faces() {
-        // A quad, a face without area, one with two corners, one that repeats the first half of the quad, a triangle.
+        // A quad, a face without area, one with two corners, one that repeats the first half of the quad, a
+        // triangle.
         let elements = format!(
             "element vertex 5\n{XYZ}element face 5\nproperty int material_id\nproperty short category_id\n{FACE}property uint object_id\n"
         );

@@ -207,8 +207,8 @@ pub(crate) fn parse_f64(word: &[u8]) -> Option<f64> {
     text.parse().ok().or_else(|| written.to_ascii_lowercase().starts_with(b"nan(").then_some(f64::NAN))
 }
 
-/// A plain decimal fraction whose digits `f64` holds exactly, as nearly all are: the quotient of two exact numbers is
-/// rounded once.
+/// A plain decimal fraction whose digits `f64` holds exactly, as nearly all are: the quotient of two exact
+/// numbers is rounded once.
 #[inline]
 fn plain_f64(written: &[u8]) -> Option<f64> {
     if written.len() > 19 {

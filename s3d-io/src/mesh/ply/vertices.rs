@@ -113,8 +113,8 @@ impl Colors {
         }
     }
 
-    /// Numbers of floating point run from 0 to 1, in some files from 0 to 255: the largest tells, with room for what is a
-    /// little too bright. Those of 16 bits run to 65,535 if one is larger than 255.
+    /// Numbers of floating point run from 0 to 1, in some files from 0 to 255: the largest tells, with room
+    /// for what is a little too bright. Those of 16 bits run to 65,535 if one is larger than 255.
     fn finish(self) -> Vec<[u8; 3]> {
         if self.kind == PlyType::U8 {
             return self.bytes;

@@ -1,8 +1,9 @@
 //! WebDataset: training samples in tar archives, the shards.
 //!
-//! A sample is the files of one image, one after another in its shard, all named by the same key. WebDataset takes as key
-//! what stands before the first dot of the file's name, folders included, and as field what stands after it: the image
-//! `area_1/camera_…_office_3_frame_7` has the fields `rgb.png`, `depth.png`, …, `pose.json`.
+//! A sample is the files of one image, one after another in its shard, all named by the same key. WebDataset
+//! takes as key what stands before the first dot of the file's name, folders included, and as field what
+//! stands after it: the image `area_1/camera_…_office_3_frame_7` has the fields `rgb.png`, `depth.png`, …,
+//! `pose.json`.
 
 use crate::dataset::domain::Domain;
 use crate::dataset::images::DatasetImage;
@@ -13,14 +14,14 @@ use serde::Serialize;
 use std::ops::Range;
 use std::path::Path;
 
-/// The key of an image's sample: `area_{N}/camera_{uuid}_{room}_frame_{frame}`. It has no dot, and no other image of the
-/// data set has the same.
+/// The key of an image's sample: `area_{N}/camera_{uuid}_{room}_frame_{frame}`. It has no dot, and no other
+/// image of the data set has the same.
 pub fn sample_key(image: &DatasetImage) -> String {
     format!("area_{}/{}", image.area, image.stem())
 }
 
-/// The name of a sample's file in the archive: the key and, after its first dot, the field: `rgb.png`, `normals.png`,
-/// `global_xyz.exr`, `pose.json`.
+/// The name of a sample's file in the archive: the key and, after its first dot, the field: `rgb.png`,
+/// `normals.png`, `global_xyz.exr`, `pose.json`.
 pub fn sample_member(key: &str, domain: Domain) -> String {
     format!("{key}.{}.{}", domain.suffix(), domain.extension())
 }
@@ -41,8 +42,8 @@ impl Default for ShardLimits {
     }
 }
 
-/// Which samples go to which shard, in order: as many to each as the limits allow. `sizes` are what the samples take in
-/// an archive, the sum of [`TarWriter::entry_bytes`].
+/// Which samples go to which shard, in order: as many to each as the limits allow. `sizes` are what the
+/// samples take in an archive, the sum of [`TarWriter::entry_bytes`].
 ///
 /// # Panics
 /// If a shard may hold no sample.
@@ -75,8 +76,8 @@ pub struct ShardEntry {
     pub filesize: u64,
 }
 
-/// Writes a list of shards in the form of the `wids` index (`wids-shard-index-v1`), which says how many samples there are
-/// before a shard is opened, and returns the file's size in bytes.
+/// Writes a list of shards in the form of the `wids` index (`wids-shard-index-v1`), which says how many
+/// samples there are before a shard is opened, and returns the file's size in bytes.
 ///
 /// # Errors
 /// [`crate::Error::Io`].

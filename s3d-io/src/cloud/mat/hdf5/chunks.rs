@@ -76,7 +76,8 @@ pub(super) fn read(
 /// The chunks under a B-tree.
 fn list(file: &Hdf5File, tree: u64, axes: usize) -> Result<Vec<Chunk>> {
     let damaged = || file.fault("the list of an array's chunks is damaged");
-    // A key: bytes and filters, an offset along each axis and in the element. A node has one more than children.
+    // A key: bytes and filters, an offset along each axis and in the element. A node has one more than
+    // children.
     let key_bytes = axes.checked_add(2).and_then(|n| n.checked_mul(8)).ok_or_else(damaged)?;
     let entry_bytes = key_bytes.checked_add(8).ok_or_else(damaged)?;
     let mut chunks = Vec::new();
@@ -146,8 +147,8 @@ fn unfilter(
     (data.len() == size).then_some(data)
 }
 
-/// Copies a chunk to its place; what lies beyond the array is filling. `None` if the chunk or the array is smaller than its
-/// extents say.
+/// Copies a chunk to its place; what lies beyond the array is filling. `None` if the chunk or the array is
+/// smaller than its extents say.
 fn place(
     data: &mut [u8],
     dims: &[u64],

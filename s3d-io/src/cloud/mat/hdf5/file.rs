@@ -120,7 +120,8 @@ impl Hdf5File {
     /// The address of the root group.
     fn superblock(&self) -> Result<u64> {
         let [version] = self.array(8)?;
-        // Version 1 has four bytes more than version 0 before the addresses: of the end, and with the root's entry.
+        // Version 1 has four bytes more than version 0 before the addresses: of the end, and with the root's
+        // entry.
         let (sizes, root, end) = match version {
             0 => (13, 64, 40),
             1 => (13, 68, 44),

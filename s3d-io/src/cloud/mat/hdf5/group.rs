@@ -10,7 +10,8 @@ use crate::error::Result;
 /// Levels of a B-tree: with two children a node that is more than any file has.
 const MAX_LEVELS: u8 = 40;
 
-/// The members of a group, in the order of their names where it is in the old form; `None` if the object is no group.
+/// The members of a group, in the order of their names where it is in the old form; `None` if the object is
+/// no group.
 pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(String, u64)>>> {
     if header.is_dense {
         return Err(file.unsupported("a group with its members in a heap (HDF5 1.8's newer form)"));

@@ -112,7 +112,8 @@ impl Header {
     /// Takes a message; `None` if it is damaged.
     fn take(&mut self, kind: u64, body: &[u8], is_shared: bool) -> Option<()> {
         if is_shared {
-            // The message is elsewhere. Of an attribute that is no loss; a datatype that has a name of its own…
+            // The message is elsewhere. Of an attribute that is no loss; a datatype that has a name of its
+            // own…
             if kind == 0x03 {
                 self.layout = Some(Layout::Unsupported("an array's type is stored as an object of its own"));
                 self.kind = Some(Kind::Other { size: 1 });

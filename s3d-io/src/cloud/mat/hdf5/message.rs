@@ -123,7 +123,8 @@ pub(super) fn link_info_is_dense(body: &[u8]) -> Option<bool> {
     Some(m.number(8)? != UNDEFINED)
 }
 
-/// An attribute, if its value is one text or one integer. Others are left out, and so are damaged ones: none is needed.
+/// An attribute, if its value is one text or one integer. Others are left out, and so are damaged ones: none
+/// is needed.
 pub(super) fn attribute(body: &[u8]) -> Option<(String, AttributeValue)> {
     let mut m = Cursor::new(body);
     let (version, flags) = (m.byte()?, m.byte()?);

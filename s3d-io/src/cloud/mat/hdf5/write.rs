@@ -1,4 +1,5 @@
-//! Writing HDF5 from front to back: each object once, its data before its header, groups when their members are there.
+//! Writing HDF5 from front to back: each object once, its data before its header, groups when their members
+//! are there.
 
 #![expect(clippy::indexing_slicing, reason = "a writer: places in the file are those that it gave")]
 
@@ -9,8 +10,8 @@ use std::path::{Path, PathBuf};
 
 /// Bytes of the superblock (version 0) with the root group's entry.
 const SUPERBLOCK: usize = 96;
-/// Half of the names in a symbol table's node, and of the children of a B-tree's: the library's own defaults, which the
-/// superblock tells.
+/// Half of the names in a symbol table's node, and of the children of a B-tree's: the library's own defaults,
+/// which the superblock tells.
 const LEAF_K: u16 = 4;
 const INTERNAL_K: u16 = 16;
 /// Bytes that are collected before the file is called.
@@ -301,7 +302,8 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         Ok((tree, heap))
     }
 
-    /// Writes a B-tree over nodes, each known by the place of its last name in the heap; the address of its root.
+    /// Writes a B-tree over nodes, each known by the place of its last name in the heap; the address of its
+    /// root.
     fn tree(&mut self, mut nodes: Vec<(u64, u64)>) -> Result<u64> {
         let (fan, mut level) = (2 * usize::from(INTERNAL_K), 0u8);
         let size = 24 + 8 * (2 * fan + 1);
