@@ -2,7 +2,6 @@
 
 use crate::error::Result;
 use crate::fs::open::read_file;
-pub(crate) use crate::fs::text::words;
 use memchr::memchr;
 use std::borrow::Cow;
 use std::ops::Range;
