@@ -14,16 +14,16 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 
-# Packages that need libraries of the system fail to load with an OSError where these are missing, which
+# Packages that need libraries of the system fail to load with an OSError or an ImportError where these are missing, which
 # pytest.importorskip does not take for a missing package.
 for name in ["open3d", "pye57"]:
     try:
         importlib.import_module(name)
-    except OSError as e:
+    except ModuleNotFoundError:
+        pass
+    except (OSError, ImportError) as e:
         print(f"{name} cannot be loaded: {e}", file=sys.stderr)
         sys.modules[name] = None
-    except ImportError:
-        pass
 
 
 @pytest.fixture(scope="session")

@@ -311,7 +311,8 @@ def test_open3d_ml_itself_reads_them(variant):
     )
     folder = variant / "profiles/open3d-ml"
     done = subprocess.run([sys.executable, "-c", probe, str(folder)], capture_output=True, text=True)
-    if done.returncode != 0 and "ModuleNotFoundError" in done.stderr:
+    last = done.stderr.splitlines()[-1:]
+    if done.returncode != 0 and last and last[0].startswith(("ModuleNotFoundError", "ImportError", "OSError")):
         pytest.skip("open3d's ml3d is not there: " + done.stderr.splitlines()[-1])
     assert done.returncode == 0, done.stderr
     found, points, boxes = map(int, done.stdout.split()[-3:])

@@ -40,7 +40,7 @@ impl Building {
     /// let names: std::collections::BTreeSet<String> =
     ///     scene.instances.iter().map(|instance| instance.room.to_string()).collect();
     /// assert!(names.iter().eq(["hallway_1", "lounge_1", "office_1", "storage_1"]));
-    /// assert_eq!(scene.locations.len(), 4);
+    /// assert!(scene.locations.len() >= 4, "a room and a hallway have one or more");
     /// # Ok::<(), s3d_synth::BuildingError>(())
     /// ```
     ///
