@@ -4,7 +4,6 @@ mod common;
 
 use common::{Seen, directions};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use s3d_label::{Class, RoomType};
 use s3d_synth::building::Filling;
 use s3d_synth::look::{Look, RED};
@@ -113,15 +112,30 @@ fn check(options: &BuildingOptions) {
     assert_eq!(stood_in.len(), building.rooms.len(), "a location in every room");
 }
 
+/// Once drawn by the property below: a bookcase of two shelves went through the sill of the window behind it.
+#[test]
+fn bookcases_keep_away_from_window_sills() {
+    let storage = RoomOptions {
+        size_m: [4.593977, 6.332293],
+        windows: 1,
+        furnishing: 0.6225713,
+        locations: 2,
+        heights_m: [2.4; 2],
+        ..RoomOptions::new(RoomType::Storage)
+    };
+    check(&BuildingOptions {
+        rooms: vec![storage],
+        hallway_width_m: 1.2,
+        hallway_height_m: 2.4,
+        wall_m: 0.1,
+        texture_scale: 0.05,
+        seed: 6484140468959298736,
+        ..BuildingOptions::default()
+    });
+}
+
 proptest! {
-    // The same cases at every run. Of some sixty others one had two things whose faces lie on each other, a fault of
-    // `generate/furnish.rs` that is still to be mended: a storage of 4.59 × 6.33 m, seed 6484140468959298736.
-    #![proptest_config(ProptestConfig {
-        cases: 16,
-        rng_seed: RngSeed::Fixed(1),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(ProptestConfig { cases: 16, ..ProptestConfig::default() })]
 
     #[test]
     fn any_building_is_closed_labelled_and_seen_from_every_room(options in options()) {

@@ -40,7 +40,8 @@ impl Building {
     /// let names: std::collections::BTreeSet<String> =
     ///     scene.instances.iter().map(|instance| instance.room.to_string()).collect();
     /// assert!(names.iter().eq(["hallway_1", "lounge_1", "office_1", "storage_1"]));
-    /// assert!(scene.locations.len() >= 4, "a room and a hallway have one or more");
+    /// // One in each room, and one for every 8 m of the hallway.
+    /// assert_eq!(scene.locations.len(), 3 + 2);
     /// # Ok::<(), s3d_synth::BuildingError>(())
     /// ```
     ///
