@@ -78,6 +78,9 @@ pub use tables::summary::{ImageTally, Summary, UnitTally, ViewTally};
 pub use verify::{FaultGroup, VerifyOptions, VerifyReport, verify};
 pub use xyz::{XyzOptions, xyz};
 
+/// The crates whose types [`MemoryScene`] is made of.
+pub use {s3d_geom, s3d_io, s3d_label};
+
 /// The README's example, compiled and run.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

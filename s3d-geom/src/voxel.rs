@@ -1,6 +1,7 @@
 //! The box of an instance, split in 6 × 6 × 6 voxels.
 //!
-//! Source: formats.md, "Labels" (the data set's `Bbox`, `Voxels`, `Voxel_Occupancy`, `Points_per_Voxel`).
+//! Source: formats.md, "What is written" (the data set's `Bbox`, `Voxels`, `Voxel_Occupancy`,
+//! `Points_per_Voxel`).
 
 use crate::Aabb;
 use glam::Vec3;

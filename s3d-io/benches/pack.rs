@@ -11,9 +11,8 @@ use s3d_geom::{Camera, PointCloud, Pose, Raster};
 use s3d_io::cloud::{NpyWriter, read_point_sample, write_colored_points};
 use s3d_io::dataset::{Domain, Frame, PoseFile};
 use s3d_io::package::{
-    CocoImage, ColmapImage, ImageRow, NerfstudioCamera, NerfstudioFrame, SemanticRow, TarWriter,
-    coco_categories, coco_panoptic, write_coco, write_colmap_binary, write_colmap_text, write_image_index,
-    write_nerfstudio,
+    CocoImage, ColmapImage, ColmapModel, ImageRow, NerfstudioCamera, NerfstudioFrame, SemanticRow, TarWriter,
+    coco_categories, coco_panoptic, write_coco, write_image_index, write_nerfstudio,
 };
 use s3d_label::{Class, Label, LabelTable};
 use std::hint::black_box;
@@ -98,12 +97,9 @@ fn cameras(c: &mut Criterion) {
     let points = cloud(100_000);
     let mut group = c.benchmark_group("pack");
     group.throughput(Throughput::Elements(IMAGES));
-    group.bench_function("colmap, text", |b| {
-        b.iter(|| write_colmap_text(dir.path(), &images, &points).unwrap())
-    });
-    group.bench_function("colmap, binary", |b| {
-        b.iter(|| write_colmap_binary(dir.path(), &images, &points).unwrap());
-    });
+    let model = ColmapModel::new(&images, &points);
+    group.bench_function("colmap, text", |b| b.iter(|| model.write_text(dir.path()).unwrap()));
+    group.bench_function("colmap, binary", |b| b.iter(|| model.write_binary(dir.path()).unwrap()));
     let path = dir.path().join("transforms.json");
     group.bench_function("nerfstudio", |b| {
         b.iter(|| {

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// A class of object. The order is that of formats.md, "Labels"; [`Class::index`] counts along it.
+/// A class of object. The order is that of formats.md, "What is written"; [`Class::index`] counts along it.
 ///
 /// ```
 /// use s3d_label::Class;

@@ -11,7 +11,7 @@ use thiserror::Error;
 pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 
 /// One instance of a class in an area, written `class_instanceNum_roomType_roomNum_areaNum`, as in
-/// `board_3_hallway_4_6`. Source: formats.md, "Labels".
+/// `board_3_hallway_4_6`. Source: formats.md, "What is written".
 ///
 /// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, the underscore included, so
 /// that `beam_10_…` stands before `beam_1_…`; then by room, which only matters between two labels of the same

@@ -42,7 +42,7 @@ pub enum NumberingError {
 /// type, then by number; see [`RoomType`](crate::RoomType)), and in a room by the number there. Areas 1 to 4
 /// of the published table are numbered just so; in area 5, which was joined from 5a and 5b, and in area 6 a
 /// few rooms stand elsewhere. The result is in that order too — room, class, number in the room — whatever
-/// the order of the input. Source: formats.md, "Labels" and "S3DIS tree".
+/// the order of the input. Source: formats.md, "What is written" and "S3DIS tree".
 ///
 /// # Errors
 /// [`NumberingError::Duplicate`] if an instance is there twice.

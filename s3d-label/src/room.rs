@@ -7,9 +7,9 @@ use thiserror::Error;
 
 /// A type of room.
 ///
-/// [`RoomType::ALL`] and [`RoomType::index`] follow the list of formats.md, "Labels". `Ord` follows the names
-/// in the alphabet, whatever their case, so that `WC` is last: the order in which the published instance
-/// numbers run.
+/// [`RoomType::ALL`] and [`RoomType::index`] follow the list of formats.md, "What is written". `Ord` follows
+/// the names in the alphabet, whatever their case, so that `WC` is last: the order in which the published
+/// instance numbers run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum RoomType {

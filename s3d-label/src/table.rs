@@ -8,7 +8,7 @@ use thiserror::Error;
 /// The most entries a label table can have, the null label included.
 ///
 /// A semantic image writes an index as a colour, and the colour (13, 13, 13) means that the ray hit nothing
-/// (formats.md, "Images"): every index stays below 13·65536 + 13·256 + 13.
+/// (formats.md, "What is written"): every index stays below 13·65536 + 13·256 + 13.
 pub const MAX_LABELS: usize = 13 * 65_536 + 13 * 256 + 13;
 
 /// An index into a label table: what a semantic image stores, and what a point votes for.
@@ -38,7 +38,7 @@ impl fmt::Display for LabelId {
 }
 
 /// The labels of a data set in the published order: index 0 is the null label, the rest is sorted as
-/// [`Label`]'s `Ord` sorts. Source: formats.md, "Labels".
+/// [`Label`]'s `Ord` sorts. Source: formats.md, "What is written".
 ///
 /// ```
 /// use s3d_label::{Class, LabelId, LabelTable, NULL_NAME};

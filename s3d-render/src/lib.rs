@@ -12,7 +12,7 @@
 //! **Mesh and camera → hits.** Exact: no pinhole, no leak, no dependence on the order of faces or on the
 //! processor. [`cast_strided`] casts a part of the pixels, to score a view; [`cast_ray`] a single ray.
 //!
-//! **Hits → images** of the data set (formats.md, "Images"): [`rgb_image`], [`depth_image`],
+//! **Hits → images** of the data set (formats.md, "What is written"): [`rgb_image`], [`depth_image`],
 //! [`normal_image`], [`xyz_image`], [`index_image`], [`color_per_face_image`]; or all of them in one walk
 //! over the hits, in less time and the same to the bit: [`view_images_into`]. A semantic image is an index
 //! image: this crate stores faces and knows no labels. Functions that end in `_into` write to an image that

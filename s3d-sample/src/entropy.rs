@@ -2,7 +2,7 @@
 
 /// The Shannon entropy of a histogram of the 13 semantic classes, in nats: 0 if one class has all pixels, ln
 /// 13 if all have the same number. Pixels without a class are not in the histogram; without any pixel the
-/// entropy is 0. Source: formats.md, "Sampling of views".
+/// entropy is 0. Source: formats.md, "Views".
 ///
 /// ```
 /// // As many pixels of wall as of floor.

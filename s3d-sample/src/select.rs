@@ -3,7 +3,7 @@
 use crate::stream::{stream, uniform_above_zero};
 use thiserror::Error;
 
-/// What shares of a pool to keep. Source: formats.md, "Sampling of views".
+/// What shares of a pool to keep. Source: formats.md, "Views".
 ///
 /// ```
 /// use s3d_sample::Selection;

@@ -5,11 +5,10 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
 use thiserror::Error;
 
-/// How many candidate views a scan location has: 3 × 24. Source: formats.md, "Sampling of views".
+/// How many candidate views a scan location has: 3 × 24. Source: formats.md, "Views".
 pub const CANDIDATES_PER_LOCATION: u32 = 72;
 
-/// From what views are drawn. The yaw is always uniform, the roll always 0. Source: formats.md, "Sampling of
-/// views".
+/// From what views are drawn. The yaw is always uniform, the roll always 0. Source: formats.md, "Views".
 ///
 /// ```
 /// use s3d_sample::ViewDistribution;
@@ -81,7 +80,7 @@ impl ViewDistribution {
 }
 
 /// A view from a scan location, relative to its original camera: `E(final) = E(original) · Ry(yaw) ·
-/// Rx(pitch)`, no roll. Source: formats.md, "Cameras".
+/// Rx(pitch)`, no roll. Source: formats.md, "Views".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Turn about the vertical, in [−π, π).

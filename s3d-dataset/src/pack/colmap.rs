@@ -8,7 +8,7 @@ use crate::context::Context;
 use crate::error::Result;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::create_dir;
-use s3d_io::package::{ColmapImage, write_colmap_binary, write_colmap_text};
+use s3d_io::package::{ColmapImage, ColmapModel};
 
 pub(super) fn pack(
     ctx: &Context,
@@ -47,12 +47,8 @@ pub(super) fn pack(
             },
         )?;
         let points = area_points(source, area, options.points)?;
-        let model = folder.join("sparse").join("0");
-        if options.binary {
-            write_colmap_binary(&model, &models, &points)?;
-        } else {
-            write_colmap_text(&model, &models, &points)?;
-        }
+        let (model, dir) = (ColmapModel::new(&models, &points), folder.join("sparse").join("0"));
+        if options.binary { model.write_binary(&dir) } else { model.write_text(&dir) }?;
         let images = if options.copy_images {
             format!("area_{area}/images")
         } else {

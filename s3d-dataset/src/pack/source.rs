@@ -106,7 +106,7 @@ impl Source {
 }
 
 /// Units a metre of depth images, as the manifest has them: 512, as published, where it tells of none.
-/// Source: formats.md, "Images".
+/// Source: formats.md, "What is written".
 fn depth_units_per_m(layout: &Layout) -> Result<f64> {
     #[derive(Deserialize)]
     struct Manifest {

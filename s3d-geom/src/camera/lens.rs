@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 ///
 /// and comes to the pixel (fx·x' + cx, fy·y' + cy). The picture's top left corner is (0, 0) and the centre of
 /// pixel (i, j) is at (i + ½, j + ½), as everywhere. Source: OpenCV's `projectPoints`; formats.md, "The
-/// scanner's own pictures".
+/// scanner's pictures".
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

@@ -1,7 +1,7 @@
 //! Cameras: from pixels to rays and back.
 //!
 //! Pixel coordinates: x to the right, y down, the centre of pixel (i, j) at (i + ½, j + ½). Source:
-//! formats.md, "Cameras".
+//! formats.md, "What is written".
 
 mod lens;
 mod pose;
@@ -27,7 +27,7 @@ pub enum Projection {
     Equirectangular,
 }
 
-/// The axes in which normals are written. Source: formats.md, "Images".
+/// The axes in which normals are written. Source: formats.md, "What is written".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum NormalAxes {
@@ -199,9 +199,9 @@ impl Camera {
         }
     }
 
-    /// World → the axes in which normals of this camera's images are written (formats.md, "Images"): the
-    /// channels R G B are right, down and towards the camera in a perspective view, and X, −Z, Y of the world
-    /// in a panorama.
+    /// World → the axes in which normals of this camera's images are written (formats.md, "What is written"):
+    /// the channels R G B are right, down and towards the camera in a perspective view, and X, −Z, Y of the
+    /// world in a panorama.
     pub fn normal_image_from_world(&self) -> DMat3 {
         self.normal_axes_from_world(NormalAxes::Paper)
     }

@@ -1,7 +1,7 @@
 //! Where a camera stands and how it is turned, in the convention of the published data set.
 //!
 //! Camera axes here are Blender's: x right, y up, looking along −z. Angles are Blender's XYZ Euler angles,
-//! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "Cameras" (settled on genuine pose files).
+//! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "What is written" (settled on genuine pose files).
 
 use glam::{DMat3, DQuat, DVec3, dvec3};
 use std::f64::consts::FRAC_PI_2;

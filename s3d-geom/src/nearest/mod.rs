@@ -1,7 +1,7 @@
 //! The face of a mesh that is nearest to a point.
 //!
-//! Source: formats.md, "Labels": an annotated point votes for its nearest face, and a point equally near to
-//! several faces for the smallest face index.
+//! Source: formats.md, "What is written": an annotated point votes for its nearest face, and a point equally
+//! near to several faces for the smallest face index.
 //!
 //! All arithmetic that decides is `f64`, on corners in the order of their coordinates. So faces that share an
 //! edge or a corner get bit by bit the same distance there, whatever their winding and the indices of their

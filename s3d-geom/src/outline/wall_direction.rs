@@ -11,7 +11,7 @@ const STEEPEST: f32 = 0.3;
 ///
 /// Walls that meet at a right angle count as one direction. The peak of a histogram keeps clutter out; around
 /// the peak the mean by area refines it. Faces whose normal is not finite or whose area is not positive are
-/// left out. Source: formats.md, "S3DIS tree" (the alignment angle).
+/// left out. Source: formats.md, "What is written" (the alignment angle).
 ///
 /// ```
 /// use s3d_geom::{dominant_wall_direction_deg, glam::Vec3};

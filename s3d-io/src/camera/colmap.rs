@@ -1,7 +1,7 @@
 //! The pictures of a COLMAP model: `images.txt` or `images.bin`. Source: COLMAP's documentation, "Output
 //! Format".
 //!
-//! Lines of ten words, or the same in binary: no library is needed for them.
+//! Own code: lines of ten words, or the same in binary, are eighty lines to read.
 //!
 //! A picture's pose is world → camera in OpenCV's axes (x right, y down, z forward): a quaternion w x y z and
 //! a translation.

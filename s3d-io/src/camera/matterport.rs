@@ -1,6 +1,6 @@
 //! The scanner's own pictures: raw Matterport captures, sky boxes and equirectangular photographs.
 //!
-//! Source: formats.md, "The scanner's own pictures". A folder's files are looked up in it and in the folders
+//! Source: formats.md, "The scanner's pictures". A folder's files are looked up in it and in the folders
 //! in it, as Matterport3D has colours, poses and intrinsics apart (`matterport_color_images/`…).
 
 use crate::camera::table::ScanLocation;

@@ -19,7 +19,7 @@ const COLUMNS: [&str; 8] = ["uuid", "x", "y", "z", "qx", "qy", "qz", "qw"];
 pub struct ScanLocation {
     /// Its name: 32 lower-case hexadecimal digits.
     pub uuid: String,
-    /// Where it is, world metres, and how its camera is turned: E(original) of formats.md, "Cameras".
+    /// Where it is, world metres, and how its camera is turned: E(original) of formats.md, "What is written".
     pub pose: Pose,
     /// Its line in the table, from 1; 0 if it comes from a file without lines.
     pub line: u64,
@@ -30,7 +30,7 @@ pub struct ScanLocation {
 ///
 /// A first line of those eight names gives their order; without one it is that order. A uuid may be in upper
 /// case and hyphenated. Lines that start with `#` and empty lines do not count. Source: formats.md,
-/// "Cameras".
+/// "Scan locations".
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a uuid that is not 32

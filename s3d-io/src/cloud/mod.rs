@@ -75,5 +75,5 @@ pub use ply::{
 };
 pub use s3dis::{
     AnnotationTree, InstanceFile, OnFault, PointReader, RoomFiles, S3disAreaWriter, S3disInstanceWriter,
-    S3disRoomWriter, TreeOptions, read_points,
+    S3disRoomWriter, TreeOptions, read_points, write_s3dis_points,
 };

@@ -1,4 +1,4 @@
-//! What an image of the data set shows. Source: formats.md, "Names and folders".
+//! What an image of the data set shows. Source: formats.md, "What is written".
 
 use std::fmt;
 use std::str::FromStr;

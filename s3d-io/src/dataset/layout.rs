@@ -1,4 +1,4 @@
-//! Every path and every name of the data set. Source: formats.md, "Names and folders".
+//! Every path and every name of the data set. Source: formats.md, "What is written".
 //!
 //! Loaders of the field find a file's fellows by replacing `rgb` in its **whole path** by another domain's
 //! name, and its room and scan location by splitting its name at `_`. So below the root `rgb` stands in a

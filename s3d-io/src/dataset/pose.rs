@@ -1,4 +1,4 @@
-//! Pose files: where the camera of an image is. Source: formats.md, "Cameras".
+//! Pose files: where the camera of an image is. Source: formats.md, "What is written".
 
 use crate::dataset::layout::Frame;
 use crate::error::Result;

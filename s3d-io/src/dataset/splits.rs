@@ -1,4 +1,4 @@
-//! `splits.json`: which areas to train on and which to test on. Source: formats.md, "Folds".
+//! `splits.json`: which areas to train on and which to test on. Source: formats.md, "What is written".
 
 use crate::error::Result;
 use crate::fs::atomic::write_whole;

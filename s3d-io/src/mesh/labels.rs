@@ -51,7 +51,7 @@ pub enum MeshLabels {
 impl MeshLabels {
     /// Labels of faces from the names of their materials (`usemtl chair_3_office_5_1`), and a warning for
     /// names that are none; `None` if fewer than half of the faces have such a name, or none of them. The
-    /// null label `<UNK>_0_<UNK>_0_0` is a name too. Source: formats.md, "World and meshes".
+    /// null label `<UNK>_0_<UNK>_0_0` is a name too. Source: formats.md, "What is written".
     ///
     /// ```
     /// use s3d_geom::{Material, MeshParts, TriMesh, glam::Vec3};

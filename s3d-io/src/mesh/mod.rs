@@ -15,7 +15,8 @@
 //! earlier one are left out. Textures are PNG or JPEG of at most 2²⁹ pixels each; vertices and faces are
 //! counted by 32 bits. What is compressed (Draco, meshopt, KTX2) is refused, with a way out.
 //!
-//! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set. Source: formats.md, "Meshes".
+//! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set into a folder, [`RgbObj`] and
+//! [`SemanticObj`] into any writer. Source: formats.md, "Meshes".
 //!
 //! ```
 //! use s3d_io::mesh::{UpAxis, read_mesh};
@@ -52,6 +53,6 @@ pub use join::{read_meshes, read_meshes_with};
 #[cfg(feature = "mesh")]
 pub use labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
 #[cfg(all(feature = "obj", feature = "png"))]
-pub use obj::{TextureOut, write_rgb_obj, write_semantic_obj};
+pub use obj::{RgbObj, SemanticObj, TextureOut, write_rgb_obj, write_semantic_obj};
 #[cfg(feature = "mesh")]
 pub use read::{read_mesh, read_mesh_from, read_mesh_with};

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
 
-/// What is no pixel of a surface in a semantic image. Source: formats.md, "Images".
+/// What is no pixel of a surface in a semantic image. Source: formats.md, "What is written".
 const MISSING: [u8; 3] = [13; 3];
 
 /// Segments that stand for all of a class in an image have numbers from here on, above those of all labels.

@@ -6,7 +6,7 @@
 #![expect(clippy::indexing_slicing, reason = "a writer: its tables are its own")]
 
 use crate::error::Result;
-use crate::fs::atomic::{AtomicFile, create_dir};
+use crate::fs::atomic::{create_dir, write_whole};
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{DMat3, DQuat, DVec3};
 use std::io::{self, Write};
@@ -44,60 +44,115 @@ impl ColmapImage {
     }
 }
 
-/// Writes a model as text, `cameras.txt`, `images.txt` and `points3D.txt`, into the folder `dir`, which is
-/// made if it is not there. Images and cameras have the numbers 1, 2, … of `images`; points those of
-/// `points`, no tracks and error 0.
+/// A model: a file of cameras, one of images, one of points, each as text or binary. Images and cameras have
+/// the numbers 1, 2, … of their order; points likewise, with no tracks and error 0.
 ///
-/// # Errors
-/// [`crate::Error::Io`].
+/// ```
+/// use s3d_geom::PointCloud;
+/// use s3d_geom::glam::vec3;
+/// use s3d_io::package::ColmapModel;
 ///
-/// # Panics
-/// If `points` has colours, but not one a point; if a name holds whitespace.
-pub fn write_colmap_text(dir: &Path, images: &[ColmapImage], points: &PointCloud) -> Result<()> {
-    check(images, points);
-    create_dir(dir)?;
-    write(&dir.join("cameras.txt"), |out| {
+/// let points = PointCloud { positions: vec![vec3(1.5, 0.0, -2.0)], ..PointCloud::default() };
+/// let mut text = Vec::new();
+/// ColmapModel::new(&[], &points).points_text(&mut text)?;
+/// assert!(text.ends_with(b"1 1.5 0 -2 0 0 0 0\n"));
+/// # std::io::Result::Ok(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct ColmapModel<'a> {
+    images: &'a [ColmapImage],
+    points: &'a PointCloud,
+}
+
+impl<'a> ColmapModel<'a> {
+    /// A model of these images and points.
+    ///
+    /// # Panics
+    /// If `points` has colours, but not one a point; if a name holds whitespace.
+    pub fn new(images: &'a [ColmapImage], points: &'a PointCloud) -> Self {
+        let (count, colors) = (points.len(), points.colors.len());
+        assert!(colors == 0 || colors == count, "{colors} colours for {count} points");
+        for image in images {
+            let bad = image.name.is_empty() || image.name.contains(|c: char| c.is_whitespace() || c == '\0');
+            assert!(!bad, "{:?} cannot stand in a COLMAP model", image.name);
+        }
+        Self { images, points }
+    }
+
+    /// Writes `cameras.txt`, `images.txt` and `points3D.txt` into the folder `dir`, which is made if it is
+    /// not there.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn write_text(&self, dir: &Path) -> Result<()> {
+        create_dir(dir)?;
+        write_whole(&dir.join("cameras.txt"), |out| self.cameras_text(out))?;
+        write_whole(&dir.join("images.txt"), |out| self.images_text(out))?;
+        write_whole(&dir.join("points3D.txt"), |out| self.points_text(out))?;
+        Ok(())
+    }
+
+    /// Writes the same in COLMAP's binary form: `cameras.bin`, `images.bin`, `points3D.bin`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn write_binary(&self, dir: &Path) -> Result<()> {
+        create_dir(dir)?;
+        write_whole(&dir.join("cameras.bin"), |out| self.cameras_binary(out))?;
+        write_whole(&dir.join("images.bin"), |out| self.images_binary(out))?;
+        write_whole(&dir.join("points3D.bin"), |out| self.points_binary(out))?;
+        Ok(())
+    }
+
+    /// Writes the content of `cameras.txt`.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn cameras_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "# CAMERA_ID MODEL WIDTH HEIGHT fx fy cx cy")?;
-        for (i, image) in images.iter().enumerate() {
+        for (i, image) in self.images.iter().enumerate() {
             let [fx, fy, cx, cy] = image.intrinsics();
             writeln!(out, "{} PINHOLE {} {} {fx} {fy} {cx} {cy}", i + 1, image.width, image.height)?;
         }
         Ok(())
-    })?;
-    write(&dir.join("images.txt"), |out| {
+    }
+
+    /// Writes the content of `images.txt`.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn images_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and an empty line: no 2D points")?;
-        for (i, image) in images.iter().enumerate() {
+        for (i, image) in self.images.iter().enumerate() {
             let ([qw, qx, qy, qz], [tx, ty, tz]) = image.pose();
             let id = i + 1;
             writeln!(out, "{id} {qw} {qx} {qy} {qz} {tx} {ty} {tz} {id} {}\n", image.name)?;
         }
         Ok(())
-    })?;
-    write(&dir.join("points3D.txt"), |out| {
+    }
+
+    /// Writes the content of `points3D.txt`.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn points_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "# POINT3D_ID X Y Z R G B ERROR")?;
-        for (i, p) in points.positions.iter().enumerate() {
-            let [r, g, b] = color(points, i);
+        for (i, p) in self.points.positions.iter().enumerate() {
+            let [r, g, b] = color(self.points, i);
             writeln!(out, "{} {} {} {} {r} {g} {b} 0", i + 1, p.x + 0.0, p.y + 0.0, p.z + 0.0)?;
         }
         Ok(())
-    })
-}
+    }
 
-/// Writes the same model in COLMAP's binary form: `cameras.bin`, `images.bin`, `points3D.bin`.
-///
-/// # Errors
-/// [`crate::Error::Io`].
-///
-/// # Panics
-/// As [`write_colmap_text`].
-pub fn write_colmap_binary(dir: &Path, images: &[ColmapImage], points: &PointCloud) -> Result<()> {
-    /// COLMAP's number of the model PINHOLE.
-    const PINHOLE: i32 = 1;
-    check(images, points);
-    create_dir(dir)?;
-    write(&dir.join("cameras.bin"), |out| {
-        out.write_all(&(images.len() as u64).to_le_bytes())?;
-        for (i, image) in images.iter().enumerate() {
+    /// Writes the content of `cameras.bin`.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn cameras_binary(&self, out: &mut dyn Write) -> io::Result<()> {
+        /// COLMAP's number of the model PINHOLE.
+        const PINHOLE: i32 = 1;
+        out.write_all(&(self.images.len() as u64).to_le_bytes())?;
+        for (i, image) in self.images.iter().enumerate() {
             out.write_all(&(i as u32 + 1).to_le_bytes())?;
             out.write_all(&PINHOLE.to_le_bytes())?;
             out.write_all(&u64::from(image.width).to_le_bytes())?;
@@ -105,10 +160,15 @@ pub fn write_colmap_binary(dir: &Path, images: &[ColmapImage], points: &PointClo
             put_f64(out, &image.intrinsics())?;
         }
         Ok(())
-    })?;
-    write(&dir.join("images.bin"), |out| {
-        out.write_all(&(images.len() as u64).to_le_bytes())?;
-        for (i, image) in images.iter().enumerate() {
+    }
+
+    /// Writes the content of `images.bin`.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn images_binary(&self, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&(self.images.len() as u64).to_le_bytes())?;
+        for (i, image) in self.images.iter().enumerate() {
             let (rotation, translation) = image.pose();
             let id = (i as u32 + 1).to_le_bytes();
             out.write_all(&id)?;
@@ -120,30 +180,22 @@ pub fn write_colmap_binary(dir: &Path, images: &[ColmapImage], points: &PointClo
             out.write_all(&[0; 1 + 8])?;
         }
         Ok(())
-    })?;
-    write(&dir.join("points3D.bin"), |out| {
-        out.write_all(&(points.len() as u64).to_le_bytes())?;
-        for (i, p) in points.positions.iter().enumerate() {
+    }
+
+    /// Writes the content of `points3D.bin`.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn points_binary(&self, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&(self.points.len() as u64).to_le_bytes())?;
+        for (i, p) in self.points.positions.iter().enumerate() {
             out.write_all(&(i as u64 + 1).to_le_bytes())?;
             put_f64(out, &p.as_dvec3().to_array())?;
-            out.write_all(&color(points, i))?;
+            out.write_all(&color(self.points, i))?;
             // Error 0, and a track of length 0.
             out.write_all(&[0; 8 + 8])?;
         }
         Ok(())
-    })
-}
-
-fn check(images: &[ColmapImage], points: &PointCloud) {
-    assert!(
-        points.colors.is_empty() || points.colors.len() == points.len(),
-        "{} colours for {} points",
-        points.colors.len(),
-        points.len()
-    );
-    for image in images {
-        let bad = image.name.is_empty() || image.name.contains(|c: char| c.is_whitespace() || c == '\0');
-        assert!(!bad, "{:?} cannot stand in a COLMAP model", image.name);
     }
 }
 
@@ -153,13 +205,6 @@ fn color(points: &PointCloud, i: usize) -> [u8; 3] {
 
 fn put_f64(out: &mut dyn Write, values: &[f64]) -> io::Result<()> {
     values.iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))
-}
-
-fn write(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
-    let mut file = AtomicFile::create(path)?;
-    content(&mut file).map_err(|e| crate::error::Error::io(path, "write", e))?;
-    file.commit()?;
-    Ok(())
 }
 
 #[cfg(test)]
@@ -224,8 +269,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let images: Vec<ColmapImage> =
             cameras().iter().enumerate().map(|(i, c)| image(c, &format!("camera_{i}.png"))).collect();
-        write_colmap_text(dir.path(), &images, &points()).unwrap();
-        write_colmap_binary(dir.path(), &images, &points()).unwrap();
+        let points = points();
+        let model = ColmapModel::new(&images, &points);
+        model.write_text(dir.path()).unwrap();
+        model.write_binary(dir.path()).unwrap();
         let lines = |name: &str| -> Vec<Vec<String>> {
             let text = std::fs::read_to_string(dir.path().join(name)).unwrap();
             let lines = text.lines().filter(|l| !l.starts_with('#'));
@@ -277,7 +324,6 @@ mod tests {
     #[test]
     #[should_panic(expected = "cannot stand in a COLMAP model")]
     fn a_name_with_a_space_is_a_mistake() {
-        let dir = tempfile::tempdir().unwrap();
-        let _ = write_colmap_text(dir.path(), &[image(&cameras()[0], "a b.png")], &points());
+        ColmapModel::new(&[image(&cameras()[0], "a b.png")], &points());
     }
 }

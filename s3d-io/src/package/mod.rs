@@ -3,7 +3,7 @@
 //! | package | what is written |
 //! |---|---|
 //! | WebDataset | tar archives of samples: [`TarWriter`], [`plan_shards`], [`write_shard_index`] |
-//! | COLMAP | cameras, images and points as a model: [`write_colmap_text`], [`write_colmap_binary`] |
+//! | COLMAP | cameras, images and points as a model: [`ColmapModel`] |
 //! | nerfstudio | `transforms.json`: [`write_nerfstudio`] |
 //! | COCO | panoptic annotations: [`coco_panoptic`], [`write_coco`] |
 //! | Parquet | a table of all images: [`write_image_index`] |
@@ -40,7 +40,7 @@ pub use coco::{
     coco_panoptic, write_coco,
 };
 #[cfg(feature = "colmap")]
-pub use colmap::{ColmapImage, write_colmap_binary, write_colmap_text};
+pub use colmap::{ColmapImage, ColmapModel};
 #[cfg(feature = "nerfstudio")]
 pub use nerfstudio::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 #[cfg(feature = "webdataset")]

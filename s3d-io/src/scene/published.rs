@@ -39,7 +39,7 @@ impl Default for PublishedOptions {
 /// | `3d/pointcloud.mat` | annotated points, if it is there |
 /// | `assets/semantic_labels.json` | beside the area's folder or in it, if it is there |
 ///
-/// Source: formats.md, "Names and folders", "World and meshes".
+/// Source: formats.md, "What is written", "World and meshes".
 #[derive(Clone, Debug, PartialEq)]
 pub struct PublishedArea {
     /// The folder.

@@ -17,7 +17,7 @@ pub struct PictureSource {
     pub options: PictureOptions,
 }
 
-/// What the scanner's pictures are. Source: formats.md, "The scanner's own pictures".
+/// What the scanner's pictures are. Source: formats.md, "The scanner's pictures".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PictureKind {

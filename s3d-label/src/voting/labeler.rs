@@ -57,7 +57,7 @@ pub enum VoteError {
 /// hands in the block.
 ///
 /// A block that is refused has not voted. Points with the label [`LabelId::NULL`] do not vote; they are only
-/// counted. Source: formats.md, "Labels": voting.
+/// counted. Source: formats.md, "What is written": voting.
 ///
 /// ```
 /// use s3d_geom::{NearestFaces, TriMesh, glam::{Vec3, vec3}};

@@ -76,8 +76,8 @@ impl FaceVotes {
 /// Points stream through [`Votes::add`], one at a time and in any order; nothing of them is kept but counts.
 /// Several counts over the same faces [`merge`](Votes::merge) into one. Every result is the same for any
 /// order of points and merges. Memory: 16 bytes a face, and 16 bytes for each pair of a face and a label that
-/// occurs. Source: formats.md, "Labels": voting. A [`Labeler`](crate::Labeler) finds the faces of points and
-/// counts them here.
+/// occurs. Source: formats.md, "What is written": voting. A [`Labeler`](crate::Labeler) finds the faces of
+/// points and counts them here.
 ///
 /// ```
 /// use s3d_label::{LabelId, Votes};

@@ -70,7 +70,7 @@ pub(crate) fn place_on(face: usize, d: DVec3) -> DVec2 {
 
 /// The picture all around a place, in six faces of 90° each.
 ///
-/// The faces have the order and the names of the scanner's sky boxes (formats.md, "The scanner's own
+/// The faces have the order and the names of the scanner's sky boxes (formats.md, "The scanner's
 /// pictures"): 0 up, 1 right, 2 back, 3 left, 4 front, 5 down, relative to the location's original camera
 /// E(original). Faces 1 to 4 are what that camera sees when it turns on the spot, and 0 and 5 what it sees
 /// when it looks straight up or down from the front: the lower edge of *up* and the upper edge of *down* meet

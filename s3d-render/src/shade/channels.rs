@@ -1,4 +1,4 @@
-//! From hits to the images of the data set. Source: formats.md, "Images".
+//! From hits to the images of the data set. Source: formats.md, "What is written".
 //!
 //! Every image has the size of the hits. Those that depend on the rays' directions take the camera that the
 //! hits were cast with, one ray a pixel.

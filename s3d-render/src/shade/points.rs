@@ -1,4 +1,4 @@
-//! From hits to the points that are seen. Source: formats.md, "Images".
+//! From hits to the points that are seen. Source: formats.md, "What is written".
 
 use crate::hits::Hits;
 use crate::shade::channels::{assert_size, fit};

@@ -1,5 +1,5 @@
-//! Writing `pointcloud.mat`: an area's points by room and object. Source: formats.md, "S3DIS tree", and the
-//! README of the published data set.
+//! Writing `pointcloud.mat`: an area's points by room and object. Source: formats.md, "What is written", and
+//! the README of the published data set.
 
 #![expect(clippy::indexing_slicing, reason = "a writer: places in the file are those that it gave")]
 

@@ -1,4 +1,6 @@
 //! Writing `.npy` files, numpy's arrays, piece by piece.
+//!
+//! Own code, a dozen lines: npyz writes other bytes than numpy (`npyz_writes_other_bytes`).
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;

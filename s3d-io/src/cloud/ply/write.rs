@@ -1,4 +1,7 @@
 //! Labelled point clouds as binary PLY files.
+//!
+//! Own code: ply-rs holds all points before it writes the first; here the millions of an area go through in
+//! pieces (`points_come_back_from_several_pieces`).
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;

@@ -6,4 +6,4 @@ mod write;
 
 pub use points::{PointReader, read_points};
 pub use tree::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
-pub use write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter};
+pub use write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter, write_s3dis_points};

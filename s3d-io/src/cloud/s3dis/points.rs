@@ -1,4 +1,7 @@
 //! The points of the S3DIS tree: `x y z r g b` a line.
+//!
+//! Own code: the csv crate splits at one separator, where these files have runs of any blanks
+//! (`forms_of_a_line`), and holds a line of any length (`an_endless_line_is_refused_without_holding_it`).
 
 use crate::cloud::annotations::{PointBlocks, Skipped};
 use crate::cloud::s3dis::tree::OnFault;

@@ -1,5 +1,5 @@
 //! The S3DIS tree: an area's folder of rooms, their folders of annotated instances. Names only; the points
-//! are read by [`PointReader`](crate::cloud::PointReader). Source: formats.md, "S3DIS tree".
+//! are read by [`PointReader`](crate::cloud::PointReader). Source: formats.md, "What is written".
 
 use crate::error::{Error, Result};
 use crate::quote::quote;

@@ -1,10 +1,11 @@
-//! Writing the S3DIS tree: text files of annotated points. Source: formats.md, "S3DIS tree".
+//! Writing the S3DIS tree: text files of annotated points. Source: formats.md, "What is written".
 
-#![expect(clippy::indexing_slicing, reason = "a writer: its tables are its own")]
+#![expect(clippy::indexing_slicing, reason = "a writer: its table is its own")]
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::{AtomicFile, create_dir, write_whole};
 use s3d_geom::glam::Vec3;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Text that is collected before it is handed on.
@@ -39,13 +40,7 @@ impl S3disAreaWriter {
         let dir = self.dir.join(room);
         create_dir(&dir.join("Annotations"))?;
         let file = AtomicFile::create(dir.join(format!("{room}.txt")))?;
-        Ok(S3disRoomWriter {
-            dir,
-            file,
-            text: Vec::with_capacity(2 * BATCH_BYTES),
-            points: 0,
-            unfinished: false,
-        })
+        Ok(S3disRoomWriter { dir, file, points: 0, unfinished: false })
     }
 
     /// Writes the angle of each room, in the order given: whole degrees, 0 to 359. The file is named after
@@ -68,7 +63,6 @@ impl S3disAreaWriter {
 pub struct S3disRoomWriter {
     dir: PathBuf,
     file: AtomicFile,
-    text: Vec<u8>,
     points: u64,
     /// An instance was begun and not finished: its points stand in the room's file only.
     unfinished: bool,
@@ -113,31 +107,35 @@ impl S3disRoomWriter {
         &mut self,
         positions: &[Vec3],
         colors: &[[u8; 3]],
-        mut instance: Option<&mut AtomicFile>,
+        instance: Option<&mut AtomicFile>,
     ) -> Result<()> {
-        assert_eq!(positions.len(), colors.len(), "{} points need as many colours", positions.len());
-        let mut start = 0;
-        while start < positions.len() {
-            self.text.clear();
-            let mut end = start;
-            while end < positions.len() && self.text.len() < BATCH_BYTES {
-                if !positions[end].is_finite() {
-                    let path = instance.as_deref().unwrap_or(&self.file).path();
-                    return Err(Error::format(
-                        path,
-                        format!("a point at {} cannot be written", positions[end]),
-                    ));
-                }
-                push_point(&mut self.text, positions[end], colors[end]);
-                end += 1;
-            }
-            self.file.put(&self.text)?;
-            if let Some(file) = &mut instance {
-                file.put(&self.text)?;
-            }
-            start = end;
-        }
+        let path = instance.as_deref().unwrap_or(&self.file).path().to_owned();
+        let mut files = RoomAndInstance { room: &mut self.file, instance };
+        write_s3dis_points(&mut files, positions, colors).map_err(|e| match e.kind() {
+            io::ErrorKind::InvalidInput => Error::format(&path, e.to_string()),
+            _ => Error::io(&path, "write", e),
+        })?;
         self.points += positions.len() as u64;
+        Ok(())
+    }
+}
+
+/// Writes the same into a room's file and that of one of its instances, if the points are of one.
+struct RoomAndInstance<'a> {
+    room: &'a mut AtomicFile,
+    instance: Option<&'a mut AtomicFile>,
+}
+
+impl Write for RoomAndInstance<'_> {
+    fn write(&mut self, text: &[u8]) -> io::Result<usize> {
+        self.room.write_all(text)?;
+        if let Some(file) = &mut self.instance {
+            file.write_all(text)?;
+        }
+        Ok(text.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
 }
@@ -173,6 +171,40 @@ impl S3disInstanceWriter<'_> {
         self.room.unfinished = false;
         Ok(self.points)
     }
+}
+
+/// Writes points as the files of the tree hold them, a line `x y z r g b` each: metres with three decimals,
+/// colours 0 to 255.
+///
+/// # Errors
+/// Those of `w`; [`InvalidInput`](io::ErrorKind::InvalidInput) for a coordinate that is not finite.
+///
+/// # Panics
+/// If there are not as many colours as positions.
+///
+/// ```
+/// use s3d_geom::glam::vec3;
+///
+/// let mut text = Vec::new();
+/// s3d_io::cloud::write_s3dis_points(&mut text, &[vec3(-24.048, 3.9971, 0.0)], &[[7, 8, 9]])?;
+/// assert_eq!(text, b"-24.048 3.997 0.000 7 8 9\n");
+/// # std::io::Result::Ok(())
+/// ```
+pub fn write_s3dis_points(w: &mut dyn Write, positions: &[Vec3], colors: &[[u8; 3]]) -> io::Result<()> {
+    assert_eq!(positions.len(), colors.len(), "{} points need as many colours", positions.len());
+    let mut text = Vec::new();
+    for (&position, &color) in positions.iter().zip(colors) {
+        if !position.is_finite() {
+            let message = format!("a point at {position} cannot be written");
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+        }
+        push_point(&mut text, position, color);
+        if text.len() >= BATCH_BYTES {
+            w.write_all(&text)?;
+            text.clear();
+        }
+    }
+    w.write_all(&text)
 }
 
 /// Appends the line of a point, `x y z r g b`, as `{:.3}` and `{}` would write it, many times as fast.

@@ -2,13 +2,13 @@
 //!
 //! They hold what the published `pointcloud.mat` does beside the points: per instance its tightest box, split
 //! in 6 × 6 × 6 equal voxels, each with its occupancy and its points. Voxel (ix, iy, iz), counted from the
-//! box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "Labels".
+//! box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "What is written".
 
 use crate::cloud::npy::write::npy_header;
 use crate::cloud::passes::PointPasses;
 use crate::dataset::instances::members::VoxelMembers;
 use crate::error::{Error, Result};
-use crate::fs::atomic::{AtomicFile, write_whole};
+use crate::fs::atomic::AtomicFile;
 use crate::fs::json::read_json;
 use s3d_geom::{Aabb, VoxelGrid, Voxels};
 use serde::{Deserialize, Serialize};
@@ -74,9 +74,11 @@ pub struct InstanceEntry {
 /// Memory: about 1.3 kilobytes an instance, whatever its points. Point indices wait in a nameless temporary
 /// file.
 #[derive(Debug)]
-pub struct InstanceWriter {
-    json: PathBuf,
-    npz: AtomicFile,
+pub struct InstanceWriter<J = AtomicFile, N = AtomicFile> {
+    json: J,
+    npz: N,
+    /// Of `npz`, for messages.
+    name: PathBuf,
     entries: Vec<InstanceEntry>,
     point_index: BufWriter<File>,
 }
@@ -89,12 +91,25 @@ impl InstanceWriter {
     pub fn create(json: &Path, npz: &Path) -> Result<Self> {
         let folder = npz.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let spool = tempfile::tempfile_in(folder).map_err(|e| Error::io(npz, "write", e))?;
-        Ok(Self {
-            json: json.to_owned(),
-            npz: AtomicFile::create(npz)?,
-            entries: Vec::new(),
-            point_index: BufWriter::with_capacity(1 << 18, spool),
-        })
+        Ok(Self::new(AtomicFile::create(json)?, AtomicFile::create(npz)?, npz, spool))
+    }
+
+    /// Gives both files their names, and returns their size in bytes.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn finish(self) -> Result<u64> {
+        let (json, npz) = self.into_inner()?;
+        Ok(npz.commit()? + json.commit()?)
+    }
+}
+
+impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
+    /// Starts the two files in writers of the caller's. `name` stands for `npz` in messages; indices of
+    /// points wait in `spool`, an empty file that is open for reading and writing.
+    pub fn new(json: J, npz: N, name: &Path, spool: File) -> Self {
+        let point_index = BufWriter::with_capacity(1 << 18, spool);
+        Self { json, npz, name: name.to_owned(), entries: Vec::new(), point_index }
     }
 
     /// Appends an instance, whose points are in the order of its file in the S3DIS tree. Those that are not
@@ -115,7 +130,7 @@ impl InstanceWriter {
                 points.len(),
                 u32::MAX
             );
-            return Err(Error::format(self.npz.path(), message));
+            return Err(Error::format(&self.name, message));
         }
         let grid = VoxelGrid { bbox: instance.bbox };
         let points_per_voxel = match points.in_memory().and_then(Voxels::from_points) {
@@ -141,13 +156,13 @@ impl InstanceWriter {
 
     /// Appends indices of points.
     fn put(&mut self, members: &[u32]) -> Result<()> {
-        let failed = |e| Error::io(self.npz.path(), "write", e);
+        let failed = |e| Error::io(&self.name, "write", e);
         members.iter().try_for_each(|m| self.point_index.write_all(&m.to_le_bytes())).map_err(failed)
     }
 
     /// Appends the indices of points that are not in memory, and returns how many are in each voxel.
     fn put_in_passes(&mut self, grid: VoxelGrid, points: &mut dyn PointPasses) -> Result<Vec<u32>> {
-        let failed = |e| Error::io(self.npz.path(), "write", e);
+        let failed = |e| Error::io(&self.name, "write", e);
         let mut counts = vec![0u32; CELLS];
         let mut cells = Vec::new();
         points.pass(&mut |block| {
@@ -169,32 +184,29 @@ impl InstanceWriter {
         Ok(counts)
     }
 
-    /// Gives both files their names, and returns their size in bytes.
+    /// Writes both files to their ends, and hands them back: `instances.json`, `instances.npz`.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn finish(self) -> Result<u64> {
-        let Self { json, npz, entries, point_index } = self;
-        let path = npz.path().to_owned();
-        let io = |e| Error::io(&path, "write", e);
+    pub fn into_inner(self) -> Result<(J, N)> {
+        let Self { mut json, npz, name, entries, point_index } = self;
+        let io = |e| Error::io(&name, "write", e);
         let mut spool = point_index.into_inner().map_err(|e| io(e.into_error()))?;
         spool.seek(SeekFrom::Start(0)).map_err(io)?;
         let npz = write_arrays(npz, &entries, spool).map_err(io)?;
-        let bytes = npz.commit()?;
-        Ok(bytes + write_json(&json, &entries)?)
+        write_entries(&mut json, &entries).map_err(io)?;
+        Ok((json, npz))
     }
 }
 
 /// One instance a line.
-fn write_json(path: &Path, entries: &[InstanceEntry]) -> Result<u64> {
-    write_whole(path, |w| {
-        w.write_all(b"{\"instances\":[")?;
-        for (i, entry) in entries.iter().enumerate() {
-            w.write_all(if i == 0 { b"\n" } else { b",\n" })?;
-            serde_json::to_writer(&mut *w, entry)?;
-        }
-        w.write_all(b"\n]}\n")
-    })
+fn write_entries(w: &mut impl Write, entries: &[InstanceEntry]) -> io::Result<()> {
+    w.write_all(b"{\"instances\":[")?;
+    for (i, entry) in entries.iter().enumerate() {
+        w.write_all(if i == 0 { b"\n" } else { b",\n" })?;
+        serde_json::to_writer(&mut *w, entry)?;
+    }
+    w.write_all(b"\n]}\n")
 }
 
 /// Reads `instances.json`.
@@ -215,7 +227,7 @@ pub fn read_instances(path: &Path) -> Result<Vec<InstanceEntry>> {
     Ok(instances)
 }
 
-fn write_arrays(file: AtomicFile, entries: &[InstanceEntry], spool: File) -> io::Result<AtomicFile> {
+fn write_arrays<N: Write + Seek>(file: N, entries: &[InstanceEntry], spool: File) -> io::Result<N> {
     let mut archive = Archive { zip: ZipWriter::new(file) };
     let n = entries.len() as u64;
 
@@ -375,6 +387,20 @@ mod tests {
         let counts = &chair.points_per_voxel;
         assert_eq!((counts[0], counts[7], counts[215], counts.iter().sum::<u32>()), (2, 1, 2, 5));
         assert!(counts.iter().zip(&chair.voxel_occupancy).all(|(&n, &o)| o == u8::from(n > 0)));
+    }
+
+    #[test]
+    fn other_writers_get_the_same_bytes() {
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path());
+        let archive = io::Cursor::new(Vec::new());
+        let spool = tempfile::tempfile().unwrap();
+        let mut writer = InstanceWriter::new(Vec::new(), archive, Path::new("instances.npz"), spool);
+        writer.push(&record("chair_3_office_5_1"), &mut OnDisk(&chair_points())).unwrap();
+        writer.push(&record("wall_1_WC_2_1"), &mut &[WALL.min][..]).unwrap();
+        let (json, npz) = writer.into_inner().unwrap();
+        assert!(json == std::fs::read(dir.path().join("instances.json")).unwrap());
+        assert!(npz.into_inner() == std::fs::read(dir.path().join("instances.npz")).unwrap());
     }
 
     /// The archive through the reader of npyz, which knows numpy's types.

@@ -4,6 +4,8 @@ mod diagnose;
 mod lines;
 mod looks;
 mod mtl;
+#[cfg(feature = "png")]
+mod names;
 mod normal;
 pub(crate) mod read;
 mod statement;
@@ -11,4 +13,4 @@ mod statement;
 mod write;
 
 #[cfg(feature = "png")]
-pub use write::{TextureOut, write_rgb_obj, write_semantic_obj};
+pub use write::{RgbObj, SemanticObj, TextureOut, write_rgb_obj, write_semantic_obj};
