@@ -5,18 +5,20 @@
 
 use s3d_dataset::{Context, Export, ExportOptions, MemoryScene};
 use s3d_geom::glam::{Vec3, dvec3, vec3};
-use s3d_geom::{Pose, TriMesh};
+use s3d_geom::{MeshParts, Pose, TriMesh};
 use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::Annotations;
 use s3d_label::{Class, Label};
 use std::path::Path;
 
-/// The corners of a room of 4 × 3 × 2.5 m, and its six walls seen from inside, each of two triangles.
+/// The coloured corners of a room of 4 × 3 × 2.5 m, and its six walls seen from inside, each of two triangles.
 fn room() -> Result<TriMesh, s3d_geom::MeshError> {
     let corner = |i: u32| vec3((i & 1) as f32 * 4.0, (i >> 1 & 1) as f32 * 3.0, (i >> 2) as f32 * 2.5);
     let quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
     let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    TriMesh::from_faces((0..8).map(corner).collect::<Vec<Vec3>>(), faces)
+    let positions: Vec<Vec3> = (0..8).map(corner).collect();
+    let colors = (0..8).map(|i| [30 * i, 200, 100]).collect();
+    TriMesh::new(MeshParts { positions, faces, colors, ..MeshParts::default() })
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

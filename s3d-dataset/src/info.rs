@@ -2,13 +2,16 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::area::locate;
+use crate::export::area::{locate, look_around};
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
-use crate::export::input::{AreaInput, Inputs, mesh_doubts};
-use crate::export::labels::annotate::{Annotated, annotate, hidden_instances, label_doubts};
+use crate::export::input::{AreaInput, Inputs};
+use crate::export::labels::annotate::{Annotated, annotate, hidden_instances};
 use crate::export::labels::overlap::overlap_doubts;
-use crate::export::location::Outlook;
+use crate::options::ExportOptions;
+use crate::useful::{
+    Estimate, Finding, label_findings, mesh_findings, outlook_findings, size_findings, stops_any,
+};
 use s3d_geom::{Aabb, NearestFaces, TriMesh};
 use s3d_io::camera::ScanLocation;
 use s3d_label::{Class, Room};
@@ -51,6 +54,8 @@ pub struct SceneInfo {
     pub pictures: Option<String>,
     /// Its scan locations.
     pub locations: Vec<LocationInfo>,
+    /// About how large an export with the default options becomes.
+    pub estimate: Estimate,
     /// What looks wrong, a sentence each.
     pub doubts: Vec<String>,
 }
@@ -129,17 +134,34 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
             None
         }
     };
-    let located = locate(ctx, area, &scene, &nearest, &annotated, &inputs.table, options.seed)?;
-    let mut locations = Vec::with_capacity(located.len());
-    for (location, room) in located {
-        let outlook = Outlook::of(&scene, &location);
+    let defaults = ExportOptions::default();
+    let mut findings = mesh_findings(mesh, area.pictures.is_none());
+    findings.extend(size_findings(mesh, defaults.points_per_m2)?);
+    findings.extend(label_findings(mesh, &annotated, &inputs.table));
+    let too_many = area.count_findings(&annotated.rooms);
+    let located = match stops_any(&too_many) {
+        // They would take hours to place.
+        true => Vec::new(),
+        false => locate(ctx, area, &scene, &nearest, &annotated, &inputs.table, options.seed)?,
+    };
+    findings.extend(too_many);
+    let (at, room_of): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();
+    let outlooks = look_around(ctx, &scene, &at)?;
+    let estimate = match at.len() {
+        0 => area.estimate(mesh, &defaults),
+        count => Estimate::new(mesh.total_area(), count as f64, &defaults),
+    };
+    let mut locations = Vec::with_capacity(at.len());
+    if !at.is_empty() {
+        findings.extend(outlook_findings(&outlooks));
+    }
+    doubts.extend(findings.iter().map(Finding::sentence));
+    for ((location, room), outlook) in at.into_iter().zip(room_of).zip(outlooks) {
         doubts.extend(outlook.warnings(&location));
         let (coverage, nearest_m) = (outlook.coverage, outlook.nearest_m);
         locations.push(LocationInfo { location, room, coverage, nearest_m });
     }
     doubts.extend(annotated.skipped.sentence());
-    doubts.extend(mesh_doubts(mesh));
-    doubts.extend(label_doubts(&annotated.report));
     doubts.extend(overlap_doubts(&annotated.rooms));
     doubts.extend(hidden_instances(area, &annotated.label_of_face, &inputs.table));
     let total = &annotated.report.total;
@@ -153,6 +175,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
         far_points: total.far_points,
         pictures,
         locations,
+        estimate,
         doubts,
     })
 }
@@ -211,6 +234,7 @@ impl fmt::Display for SceneInfo {
                 100.0 * coverage
             )?;
         }
+        writeln!(f, "\nan export with the default options: {}", self.estimate)?;
         let verdict = if self.doubts.is_empty() { "nothing looks wrong" } else { "what looks wrong:" };
         writeln!(f, "\n{verdict}")?;
         self.doubts.iter().try_for_each(|doubt| writeln!(f, "  {doubt}"))

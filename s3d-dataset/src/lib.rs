@@ -53,6 +53,7 @@ mod sample;
 mod shard;
 mod store;
 mod tables;
+mod useful;
 mod verify;
 mod xyz;
 
@@ -75,6 +76,7 @@ pub use shard::make_plan::plan;
 pub use shard::merge::merge;
 pub use tables::statistics::{AreaStatistics, RoomTypeStatistics, Statistics, statistics};
 pub use tables::summary::{ImageTally, Summary, UnitTally, ViewTally};
+pub use useful::{Condition, Estimate};
 pub use verify::{FaultGroup, VerifyOptions, VerifyReport, verify};
 pub use xyz::{XyzOptions, xyz};
 

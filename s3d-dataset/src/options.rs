@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::profile::loader::Profile;
+use crate::useful::Condition;
 use s3d_geom::NormalAxes;
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, PADDED_LABELS, XyzType};
 use s3d_io::image::Compression;
@@ -77,6 +78,10 @@ pub struct ExportOptions {
     /// What is written besides for loaders of point clouds.
     #[serde(with = "by_names")]
     pub profiles: Vec<Profile>,
+    /// Conditions of usefulness that the data set need not meet. They decide none of its bytes, and are not
+    /// stored.
+    #[serde(skip)]
+    pub allow: Vec<Condition>,
 }
 
 impl Default for ExportOptions {
@@ -101,6 +106,7 @@ impl Default for ExportOptions {
             depth_units: DepthUnits::default(),
             pad_labels: PadLabels::default(),
             profiles: Vec::new(),
+            allow: Vec::new(),
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::points::check_density;
 use crate::store::refuse_existing;
+use crate::useful::{PLY_POINT_BYTES, check_points, judge, space_findings};
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use s3d_io::cloud::PlyPointWriter;
 use s3d_io::mesh::UpAxis;
@@ -42,9 +42,12 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     refuse_existing(output, options.overwrite)?;
     let file = s3d_io::mesh::read_mesh(mesh, options.up)?;
     ctx.warn_each(&file.warnings);
-    if let Density::PerM2(points_per_m2) = options.density {
-        check_density(&file.mesh, points_per_m2)?;
-    }
+    let points = match options.density {
+        Density::PerM2(points_per_m2) => file.mesh.total_area() * points_per_m2,
+        Density::Total(points) => points as f64,
+    };
+    check_points(points)?;
+    judge(ctx, &space_findings(points * PLY_POINT_BYTES, output), &[])?;
     let started = Instant::now();
     let sampler = SurfaceSampler::new(&file.mesh, options.density, options.seed);
     let mut ply = PlyPointWriter::create(output, sampler.len())?;

@@ -1,31 +1,20 @@
 //! What a program does that depends on this crate alone: exports, cancels, goes on, verifies and packs.
 
+mod common;
+
+use common::{memory_scene, options};
 use s3d_dataset::{
-    Cancel, Context, Error, Event, Export, ExportOptions, InfoOptions, Level, MemoryScene, PackOptions,
-    PackageKind, Profile, ProfileOptions, Stage, UnitKind, VerifyOptions, XyzOptions,
+    Cancel, Context, Error, Event, Export, ExportOptions, InfoOptions, Level, PackOptions, PackageKind,
+    Profile, ProfileOptions, Stage, UnitKind, VerifyOptions, XyzOptions,
 };
-use s3d_geom::glam::{Vec3, dvec3, vec3};
-use s3d_geom::{PointCloud, Pose, TriMesh};
-use s3d_io::camera::ScanLocation;
-use s3d_io::cloud::{AnnotatedPoints, Annotations};
-use s3d_label::Class;
+use s3d_geom::glam::dvec3;
+use s3d_geom::{Pose, TriMesh};
 use s3d_synth::{Building, ScanOptions};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, Mutex};
-
-fn options(seed: u64) -> ExportOptions {
-    ExportOptions {
-        seed,
-        views: 4,
-        size: 96,
-        pano_width: 192,
-        points_per_m2: 40.0,
-        ..ExportOptions::default()
-    }
-}
 
 /// The built-in scene as files in `folder`.
 fn scan(folder: &Path) -> PathBuf {
@@ -121,31 +110,6 @@ fn two_exports_at_the_same_time_do_not_meet() {
     run("d", 2);
     assert_same(&dir.path().join("a"), &dir.path().join("c"));
     assert_same(&dir.path().join("b"), &dir.path().join("d"));
-}
-
-/// A room of 4 × 3 × 2.5 m, its points by wall, and one location in it.
-fn memory_scene() -> MemoryScene {
-    let corner = |i: u32| vec3((i & 1) as f32 * 4.0, (i >> 1 & 1) as f32 * 3.0, (i >> 2) as f32 * 2.5);
-    let quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
-    let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let mesh = TriMesh::from_faces((0..8).map(corner).collect::<Vec<Vec3>>(), faces).unwrap();
-    let classes = [Class::Floor, Class::Ceiling, Class::Wall, Class::Wall, Class::Wall, Class::Wall];
-    let instances = classes.iter().enumerate().map(|(i, &class)| {
-        let [a, b, _, d] = quads[i].map(corner);
-        let at = |u: u32, v: u32| a + (b - a) * (u as f32 / 20.0) + (d - a) * (v as f32 / 20.0);
-        let positions = (0..=20).flat_map(|u| (0..=20).map(move |v| at(u, v))).collect();
-        let points = PointCloud { positions, ..PointCloud::default() };
-        let number = if class == Class::Wall { i as u32 - 1 } else { 1 };
-        AnnotatedPoints { room: "office_1".parse().unwrap(), class, number, points }
-    });
-    let annotations = Annotations::from_points(instances).unwrap();
-    let pose = Pose::level(dvec3(2.0, 1.5, 1.4), 0.3);
-    MemoryScene {
-        area: 2,
-        mesh,
-        annotations,
-        locations: vec![ScanLocation { uuid: "a".repeat(32), pose, line: 0 }],
-    }
 }
 
 #[test]

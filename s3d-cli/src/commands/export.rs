@@ -1,7 +1,7 @@
 //! `s3d export`: scenes to a data set.
 
 use super::on_threads;
-use crate::args::Threads;
+use crate::args::{Allow, Threads};
 use crate::failure::Outcome;
 use crate::values::{even_width, normal_axes, parsed, positive, uuid};
 use clap::{Args, value_parser};
@@ -90,6 +90,8 @@ pub(crate) struct OptionArgs {
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
     #[command(flatten)]
+    pub(crate) allow: Allow,
+    #[command(flatten)]
     pub(crate) format: FormatArgs,
 }
 
@@ -141,6 +143,7 @@ impl From<OptionArgs> for ExportOptions {
             depth_units,
             pad_labels,
             profiles,
+            allow: args.allow.allow,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! `s3d plan`: labels and scores, for the shards of an export.
 
 use super::on_threads;
-use crate::args::Threads;
+use crate::args::{Allow, Threads};
 use crate::failure::Outcome;
 use crate::values::{parsed, positive};
 use clap::{Args, value_parser};
@@ -38,6 +38,8 @@ pub(crate) struct PlanArgs {
     #[arg(long)]
     lenient: bool,
     #[command(flatten)]
+    allow: Allow,
+    #[command(flatten)]
     pub(crate) threads: Threads,
 }
 
@@ -49,6 +51,7 @@ pub(crate) fn run(args: PlanArgs) -> Outcome<()> {
         place_cameras: args.place_cameras,
         entropy_stride: args.entropy_stride,
         lenient: args.lenient,
+        allow: args.allow.allow,
         ..ExportOptions::default()
     };
     on_threads(args.threads, |context| {

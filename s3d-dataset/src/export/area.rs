@@ -6,7 +6,7 @@ use crate::event::{Stage, UnitKind};
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
 use crate::export::input::pictures::Pictures;
 use crate::export::input::{AreaInput, Cameras};
-use crate::export::labels::annotate::{Annotated, annotate, hidden_instances, label_doubts};
+use crate::export::labels::annotate::{Annotated, annotate, hidden_instances};
 use crate::export::labels::area_plan::{AreaPlan, RoomNames};
 use crate::export::labels::overlap::overlap_doubts;
 use crate::export::location::{Outlook, room_of};
@@ -23,6 +23,7 @@ use crate::tables::account::Account;
 use crate::tables::listing;
 use crate::tables::manifest::{AreaEntry, XyzLoss};
 use crate::tables::records;
+use crate::useful::{judge, label_findings, outlook_findings};
 use rayon::prelude::*;
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::camera::ScanLocation;
@@ -207,9 +208,17 @@ pub(crate) fn label_area(
         ctx.warn(w);
     }
     overlap_doubts(&annotated.rooms).iter().for_each(|w| ctx.warn(w));
+    let mut findings = label_findings(&file.mesh, &annotated, table);
+    findings.extend(area.count_findings(&annotated.rooms));
+    judge(ctx, &findings, &options.allow)?;
     let located = locate(ctx, area, scene, &nearest, &annotated, table, options.seed)?;
     drop(nearest);
     let (locations, location_rooms): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();
+    let outlooks = look_around(ctx, scene, &locations)?;
+    judge(ctx, &outlook_findings(&outlooks), &options.allow)?;
+    for (outlook, location) in outlooks.iter().zip(&locations) {
+        ctx.warn_each(&outlook.warnings(location));
+    }
     let plan = AreaPlan {
         area: number,
         annotated,
@@ -233,21 +242,23 @@ pub(crate) fn label_area(
         account.unit_finished(UnitKind::Labels, number, None, &tally, started);
         Ok(())
     };
-    let (doubts, written) = rayon::join(|| location_doubts(ctx, scene, &plan.locations), write);
-    doubts?.iter().for_each(|w| ctx.warn(w));
-    written?;
+    write()?;
     know_labels(area, &plan, &common);
     labelling.end();
     Ok(plan)
 }
 
-/// What looks wrong about scan locations, as a sentence each.
-fn location_doubts(ctx: &Context, scene: &Scene<'_>, locations: &[ScanLocation]) -> Result<Vec<String>> {
-    let doubts = locations.par_iter().map(|location| -> Result<Vec<String>> {
+/// What each scan location sees.
+pub(crate) fn look_around(
+    ctx: &Context,
+    scene: &Scene<'_>,
+    locations: &[ScanLocation],
+) -> Result<Vec<Outlook>> {
+    let outlooks = locations.par_iter().map(|location| {
         ctx.check()?;
-        Ok(Outlook::of(scene, location).warnings(location))
+        Ok(Outlook::of(scene, location))
     });
-    Ok(doubts.collect::<Result<Vec<_>>>()?.concat())
+    outlooks.collect()
 }
 
 /// Tells the journal of an area's labels, if it does not know of them: their files are another's work.
@@ -433,7 +444,6 @@ fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
             row.points, row.faces, row.contested
         ));
     }
-    label_doubts(&annotated.report).iter().for_each(|w| ctx.warn(w));
 }
 
 /// Renders those locations of an area that are to be done, and beside them writes its meshes and points if

@@ -10,7 +10,6 @@ use crate::export::input::pictures::Pictures;
 use crate::export::input::requested::requested_areas;
 use crate::export::input::{AreaInput, Cameras, Inputs};
 use crate::export::labels::area_plan::AreaPlan;
-use crate::export::points::check_density;
 use crate::export::views::{Candidate, select_requested};
 use crate::options::ExportOptions;
 use crate::shard::plan::Plan;
@@ -21,6 +20,7 @@ use crate::tables::account::Account;
 use crate::tables::assets;
 use crate::tables::manifest::Manifest;
 use crate::tables::summary::Summary;
+use crate::useful::{Estimate, judge, mesh_findings, size_findings, space_findings};
 use s3d_geom::NearestFaces;
 use s3d_io::dataset::{Domain, Layout};
 use s3d_io::fs::SyncAhead;
@@ -48,6 +48,8 @@ pub(crate) struct Job<'a> {
     pictures: Vec<Option<Pictures>>,
     /// The mesh, if there is one area.
     single: Option<Arc<MeshFile>>,
+    /// How large the data set becomes.
+    estimate: Estimate,
     /// Where labels and scores come from, if they were made before.
     pub(crate) plan: Option<&'a Plan>,
 }
@@ -79,6 +81,9 @@ pub(crate) fn export(
     output::check(ctx, layout, target.overwrite, &target.allowed)?;
     let job = Job::open(scenes, layout, options, plan, &account)?;
     let manifest = job.manifest();
+    if !output::is_begun(layout)? {
+        judge(ctx, &space_findings(job.estimate.bytes, layout.root()), &options.allow)?;
+    }
     let session = match output::begin(layout, target.overwrite, &job.request, &manifest, &account)? {
         Begin::NothingToDo => {
             ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
@@ -131,11 +136,16 @@ impl<'a> Job<'a> {
         // share memory.
         let mut single: Option<Arc<MeshFile>> = None;
         let mut companions = Vec::new();
+        let makes_rgb = options.modalities.contains(&Domain::Rgb);
+        let mut estimate = Estimate::default();
         for area in &inputs.areas {
             ctx.check()?;
             let file = area.read_mesh()?;
             area.tell_mesh(ctx, &file);
-            check_density(&file.mesh, options.points_per_m2)?;
+            let mut findings = mesh_findings(&file.mesh, area.pictures.is_none() && makes_rgb);
+            findings.extend(size_findings(&file.mesh, options.points_per_m2)?);
+            judge(ctx, &findings, &options.allow)?;
+            estimate = estimate.add(area.estimate(&file.mesh, options));
             companions.push(file.companions.clone());
             single = (inputs.areas.len() == 1).then_some(file);
         }
@@ -147,7 +157,8 @@ impl<'a> Job<'a> {
         }
         loading.end();
         ctx.check()?;
-        Ok(Self { inputs, request, options, pictures, single, plan })
+        ctx.debug(format_args!("the data set will have {estimate}"));
+        Ok(Self { estimate, inputs, request, options, pictures, single, plan })
     }
 
     /// The manifest that says that this export runs.

@@ -2,7 +2,7 @@
 //! `pointcloud.mat`.
 
 use crate::context::{Context, Progress};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::export::labels::area_plan::AreaPlan;
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::cloud::{MatWriter, PlyPointWriter, S3disAreaWriter};
@@ -13,22 +13,6 @@ use std::ops::Range;
 
 /// Points drawn at a time: what is in memory of a cloud of any size.
 const CHUNK: u64 = 1 << 18;
-
-/// More points than this in one cloud are taken for a slip: 150 times the largest area of the published data
-/// set.
-const MAX_POINTS: f64 = 1e11;
-
-/// Refuses a density that would draw points without end.
-pub(crate) fn check_density(mesh: &TriMesh, points_per_m2: f64) -> Result<()> {
-    let (area, points) = (mesh.total_area(), mesh.total_area() * points_per_m2);
-    if points <= MAX_POINTS {
-        return Ok(());
-    }
-    Err(Error::Input(format!(
-        "{points_per_m2} points a m² on {area:.1} m² are {points:.1e} points, more than {MAX_POINTS:.0e}: is the mesh in \
-         metres? or lower --points-per-m2"
-    )))
-}
 
 /// Room of every label of an area, and the instance's number there.
 type Places = BTreeMap<LabelId, (Room, u32)>;

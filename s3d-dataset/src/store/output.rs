@@ -111,6 +111,11 @@ pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Result<()> {
     Ok(())
 }
 
+/// Whether an export into OUT has begun, or is complete.
+pub(crate) fn is_begun(layout: &Layout) -> Result<bool> {
+    Ok(Head::read(&layout.manifest())?.is_some() || read_request(layout)?.is_some())
+}
+
 /// What is in OUT.
 #[derive(Debug)]
 enum Found {

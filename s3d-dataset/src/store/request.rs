@@ -90,7 +90,7 @@ impl Request {
     /// What is asked for by these options of areas with this input.
     pub(crate) fn new(options: &ExportOptions, areas: Vec<RequestedArea>) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
-        let stored = ExportOptions { seed: 0, place_cameras: None, ..options.clone() };
+        let stored = ExportOptions { seed: 0, place_cameras: None, allow: Vec::new(), ..options.clone() };
         Self { version, seed: options.seed, options: stored, areas }
     }
 

@@ -7,8 +7,10 @@ pub(crate) mod requested;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::input::memory::{SceneSource, SharedScene};
+use crate::export::labels::annotate::SurveyedRoom;
+use crate::options::ExportOptions;
 use crate::store::request::InputRecord;
-use crate::tables::manifest::half_step;
+use crate::useful::{Estimate, Finding, count_findings};
 use glam::DAffine3;
 use s3d_geom::TriMesh;
 use s3d_io::Error as FileError;
@@ -20,9 +22,6 @@ use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// The largest number that a half float can hold.
-const LARGEST_HALF_M: f32 = 65_504.0;
 
 /// One area: its files, annotations and scan locations.
 pub(crate) struct AreaInput {
@@ -337,6 +336,28 @@ impl AreaInput {
         self.source.read()
     }
 
+    /// About how much an export of it writes. Placed locations, which are not known yet, count as one on 4 m² of
+    /// floor, and floors as a fifth of the mesh.
+    pub(crate) fn estimate(&self, mesh: &TriMesh, options: &ExportOptions) -> Estimate {
+        let area_m2 = mesh.total_area();
+        let locations = match &self.cameras {
+            Cameras::Listed(locations, _) => locations.len() as f64,
+            Cameras::Placed(distance_m) => area_m2 / 5.0 / distance_m.max(2.0).powi(2),
+        };
+        Estimate::new(area_m2, locations, options)
+    }
+
+    /// What looks wrong about the number of its scan locations. Places nearer to each other than a distance
+    /// fill a floor with about one on 0.7 times its square.
+    pub(crate) fn count_findings(&self, rooms: &[SurveyedRoom]) -> Vec<Finding> {
+        let floor_m2: f64 = rooms.iter().map(|r| r.footprint.area_m2).sum();
+        let count = match &self.cameras {
+            Cameras::Listed(locations, _) => locations.len() as f64,
+            Cameras::Placed(distance_m) => floor_m2 / (0.7 * distance_m.powi(2)),
+        };
+        count_findings(count, rooms)
+    }
+
     /// The data set's list of labels that the area's folder came with.
     fn published_labels(&self) -> Option<&PathBuf> {
         match &self.source {
@@ -348,7 +369,6 @@ impl AreaInput {
     /// Logs what the area's mesh is, and what was odd in mesh and annotations.
     pub(crate) fn tell_mesh(&self, ctx: &Context, file: &MeshFile) {
         self.warnings.iter().chain(&file.warnings).for_each(|w| ctx.warn(w));
-        mesh_doubts(&file.mesh).iter().for_each(|w| ctx.warn(w));
         ctx.info(format_args!(
             "{}: {} faces, {} vertices, {} textures, {:.1} m²",
             self.source.describe(),
@@ -358,32 +378,6 @@ impl AreaInput {
             file.mesh.total_area()
         ));
     }
-}
-
-/// What looks wrong about the place and size of a mesh, as a sentence each.
-pub(crate) fn mesh_doubts(mesh: &TriMesh) -> Vec<String> {
-    let mut doubts = Vec::new();
-    let bbox = mesh.aabb();
-    let (length, farthest) = (bbox.size().max_element(), bbox.min.abs().max(bbox.max.abs()).max_element());
-    if length > 1000.0 {
-        doubts.push(format!("the mesh is {length:.0} m long: is it in metres?"));
-    }
-    if length < 0.5 {
-        doubts.push(format!("the mesh is only {:.1} cm long: is it in metres?", 100.0 * length));
-    }
-    if farthest > LARGEST_HALF_M {
-        doubts.push(format!(
-            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates end at 65504; move mesh, \
-             points and cameras nearer to it"
-        ));
-    } else if farthest > 1000.0 {
-        doubts.push(format!(
-            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates step by {} m there; move \
-             mesh, points and cameras nearer to it",
-            half_step(farthest)
-        ));
-    }
-    doubts
 }
 
 impl MeshSource {

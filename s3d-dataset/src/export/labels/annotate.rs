@@ -12,12 +12,6 @@ use serde::{Deserialize, Serialize};
 /// Points that are in memory, three times: while some are looked up, those that follow are read.
 const BLOCK_POINTS: usize = 1 << 19;
 
-/// A share of points far from every face above which it is told.
-const MANY_FAR: f64 = 0.05;
-
-/// A share of labelled faces below which it is told.
-const FEW_LABELLED: f64 = 0.5;
-
 /// An annotated area.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Annotated {
@@ -203,28 +197,6 @@ fn vote(labeler: &mut Labeler<'_>, instance: &InstancePoints, block: &PointCloud
         labeler.add_points(&block.positions, id)
     };
     voted.map_err(|e| FileError::format(instance.path(), e.to_string()).into())
-}
-
-/// What looks wrong between mesh and annotations, as a sentence each.
-pub(crate) fn label_doubts(report: &VoteReport) -> Vec<String> {
-    let mut doubts = Vec::new();
-    let far = report.total.far_points as f64 / report.total.points.max(1) as f64;
-    if far > MANY_FAR {
-        doubts.push(format!(
-            "{:.0} % of the annotated points are farther than 5 cm from every face: do mesh and annotations share a \
-             frame? see `up` in the scene file",
-            100.0 * far
-        ));
-    }
-    let labelled = report.total.faces as f64 / report.face_count.max(1) as f64;
-    if labelled < FEW_LABELLED {
-        doubts.push(format!(
-            "only {:.0} % of the faces get a label: the others are written as {}",
-            100.0 * labelled,
-            s3d_label::NULL_NAME
-        ));
-    }
-    doubts
 }
 
 /// A sentence on the instances that no face is labelled with, if there are some: they are in the label table,

@@ -1,0 +1,206 @@
+//! How large a data set becomes, before its first byte is written.
+
+use super::{Condition, Finding};
+use crate::error::{Error, Result};
+use crate::options::ExportOptions;
+use s3d_geom::TriMesh;
+use s3d_io::dataset::{Domain, XyzType};
+use std::fmt;
+use std::path::Path;
+
+/// More points than this in one cloud are taken for a slip: seven times the largest area of the published data
+/// set has 470 million.
+const MANY_POINTS: f64 = 3e9;
+
+/// More cannot be meant, and are refused whatever is allowed.
+const MOST_POINTS: f64 = 1e11;
+
+/// Bytes of a point in `pointcloud.ply`; all of it.
+pub(crate) const PLY_POINT_BYTES: f64 = 23.0;
+
+/// Bytes of a point in all files of points: PLY, the S3DIS tree, `pointcloud.mat`.
+const POINT_BYTES: f64 = 100.0;
+
+/// Bytes of a pixel on average of a synthetic office, a made building and a real scan, default compression.
+fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
+    match domain {
+        Domain::Rgb => 0.65,
+        Domain::Depth => 0.14,
+        Domain::Normal => 0.11,
+        Domain::Semantic => 0.02,
+        Domain::SemanticPretty => 0.025,
+        Domain::GlobalXyz if xyz == XyzType::Float => 1.2,
+        Domain::GlobalXyz => 0.5,
+        Domain::Pose => 0.001,
+    }
+}
+
+/// Nanoseconds that one core of a server of 2022 takes for a pixel of all images of a view: scored, cast, shaded
+/// and compressed.
+const PIXEL_NS: f64 = 50.0;
+
+/// The same for a sampled point: drawn and written in three formats.
+const POINT_NS: f64 = 400.0;
+
+/// The share of candidate views that are kept.
+const KEPT: f64 = 0.725;
+
+/// About how large an export becomes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Estimate {
+    /// Sampled points.
+    pub points: f64,
+    /// Kept views and panoramas, of every modality.
+    pub images: f64,
+    /// Files.
+    pub files: f64,
+    /// Bytes.
+    pub bytes: f64,
+    /// Seconds of one core.
+    pub core_seconds: f64,
+}
+
+impl Estimate {
+    /// Of an export of so many scan locations in meshes of so many square metres.
+    pub(crate) fn new(area_m2: f64, locations: f64, options: &ExportOptions) -> Self {
+        let share = if options.keep_all { 1.0 } else { KEPT };
+        let written = match options.only.len() {
+            0 => locations,
+            only => locations.min(only as f64),
+        };
+        let (views, panoramas) = (written * f64::from(options.views) * share, written);
+        let view_pixels = f64::from(options.size).powi(2);
+        let panorama_pixels = f64::from(options.pano_width).powi(2) / 2.0;
+        let pixels = views * view_pixels + panoramas * panorama_pixels;
+        let points = area_m2 * options.points_per_m2;
+        let bytes_per_pixel: f64 = options.modalities.iter().map(|d| pixel_bytes(*d, options.xyz)).sum();
+        let images = (views + panoramas) * options.modalities.len() as f64;
+        Self {
+            points,
+            images,
+            files: images + 60.0,
+            bytes: pixels * bytes_per_pixel + points * POINT_BYTES,
+            core_seconds: 1e-9 * (pixels * PIXEL_NS + points * POINT_NS),
+        }
+    }
+
+    pub(crate) fn add(self, other: Self) -> Self {
+        Self {
+            points: self.points + other.points,
+            images: self.images + other.images,
+            files: self.files + other.files,
+            bytes: self.bytes + other.bytes,
+            core_seconds: self.core_seconds + other.core_seconds,
+        }
+    }
+}
+
+impl fmt::Display for Estimate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let minutes = self.core_seconds / 60.0;
+        let time =
+            if minutes < 1.0 { "less than a minute".to_owned() } else { format!("{minutes:.0} minutes") };
+        write!(f, "about {:.0} files, {}, {time} of one core", self.files, Bytes(self.bytes))
+    }
+}
+
+/// Bytes as people say them: powers of 1000.
+struct Bytes(f64);
+
+impl fmt::Display for Bytes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let bytes = self.0;
+        match bytes {
+            0.0..1e9 => write!(f, "{:.0} MB", bytes / 1e6),
+            1e9..1e12 => write!(f, "{:.1} GB", bytes / 1e9),
+            _ => write!(f, "{:.0} TB", bytes / 1e12),
+        }
+    }
+}
+
+/// Refuses a number of points that cannot be meant.
+pub(crate) fn check_points(points: f64) -> Result<()> {
+    if points <= MOST_POINTS {
+        return Ok(());
+    }
+    Err(Error::Input(format!("{points:.1e} points are more than {MOST_POINTS:.0e}: is the mesh in metres?")))
+}
+
+/// What looks wrong about the number of points sampled of a mesh.
+///
+/// # Errors
+/// [`check_points`].
+pub(crate) fn size_findings(mesh: &TriMesh, points_per_m2: f64) -> Result<Vec<Finding>> {
+    let (area_m2, points) = (mesh.total_area(), mesh.total_area() * points_per_m2);
+    let text = format!(
+        "{points_per_m2} points a m² on {area_m2:.1} m² are {points:.1e} points: is the mesh in metres? or lower \
+         --points-per-m2"
+    );
+    if points > MOST_POINTS {
+        return Err(Error::Input(text));
+    }
+    Ok((points > MANY_POINTS).then(|| Finding::new(Condition::Size, true, text)).into_iter().collect())
+}
+
+/// Whether about so many bytes fit on the disk of `folder`, which need not be there yet. Images are
+/// compressed by what they show: half of what is expected must fit.
+pub(crate) fn space_findings(bytes: f64, folder: &Path) -> Vec<Finding> {
+    // The system knows better than a guess where it does not say.
+    let Some(free) = folder
+        .ancestors()
+        .find_map(|f| fs4::available_space(if f.as_os_str().is_empty() { Path::new(".") } else { f }).ok())
+    else {
+        return Vec::new();
+    };
+    let free = free as f64;
+    if bytes <= free {
+        return Vec::new();
+    }
+    let text = format!(
+        "about {} are to be written, and {} are free at {}: make room, choose another folder, or write less",
+        Bytes(bytes),
+        Bytes(free),
+        folder.display()
+    );
+    vec![Finding::new(Condition::Size, bytes > 2.0 * free, text)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_estimate_is_near_what_was_written() {
+        // A synthetic office, a made building, a real scan: their exports' files, bytes of images and points,
+        // and seconds of one core.
+        let demo = ExportOptions {
+            size: 540,
+            pano_width: 2048,
+            views: 24,
+            points_per_m2: 2500.0,
+            ..ExportOptions::default()
+        };
+        for (area_m2, locations, options, files, bytes, seconds) in [
+            (257.1, 1.0, ExportOptions::default(), 433.0, 4.3e8, 5.4),
+            (778.0, 6.0, demo, 870.0, 2.6e8, 6.0),
+            (48.0, 3.0, ExportOptions::default(), 1191.0, 2.1e8, 26.0),
+        ] {
+            let estimate = Estimate::new(area_m2, locations, &options);
+            for (guess, real) in
+                [(estimate.files, files), (estimate.bytes, bytes), (estimate.core_seconds, seconds)]
+            {
+                assert!((0.4..2.5).contains(&(guess / real)), "{area_m2} m²: {guess} for {real}: {estimate}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_fit_stops() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(space_findings(1e3, &dir.path().join("not/there/yet")).is_empty());
+        assert!(space_findings(1e18, &dir.path().join("not/there/yet"))[0].stops);
+        let free = fs4::available_space(dir.path()).unwrap() as f64;
+        assert!(!space_findings(1.5 * free, dir.path())[0].stops);
+    }
+}

@@ -1,0 +1,311 @@
+//! Whether a data set would be of use: what looks wrong in a scene, and what stops an export of it.
+//!
+//! Each [`Finding`] belongs to a [`Condition`]. Beyond a limit it stops an export, unless the caller allows the
+//! condition; nearer it is a warning. `info` and `export` find the same.
+
+mod estimate;
+
+pub use estimate::Estimate;
+pub(crate) use estimate::{PLY_POINT_BYTES, check_points, size_findings, space_findings};
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::labels::annotate::{Annotated, SurveyedRoom};
+use crate::export::location::{LOW_COVERAGE, Outlook};
+use crate::tables::manifest::half_step;
+use s3d_geom::TriMesh;
+use s3d_label::{Class, LabelId, LabelTable, VoteReport};
+use std::fmt;
+use std::str::FromStr;
+
+/// What a data set must be to be of use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Condition {
+    /// The mesh has colours where RGB images are made from it.
+    Colour,
+    /// Scan locations see the mesh in most directions.
+    Coverage,
+    /// Mesh and annotations lie on each other.
+    Frame,
+    /// Scan locations see the front of faces.
+    InsideOut,
+    /// Faces get labels.
+    Labels,
+    /// There are not many more scan locations than the floor needs.
+    Locations,
+    /// Mesh and rooms are as large as buildings are.
+    Scale,
+    /// The data set fits on the disk.
+    Size,
+    /// Floors and ceilings are level.
+    Up,
+}
+
+impl Condition {
+    /// All of them, by name.
+    pub const ALL: [Self; 9] = [
+        Self::Colour,
+        Self::Coverage,
+        Self::Frame,
+        Self::InsideOut,
+        Self::Labels,
+        Self::Locations,
+        Self::Scale,
+        Self::Size,
+        Self::Up,
+    ];
+
+    /// Its name, as `--allow` takes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Colour => "colour",
+            Self::Coverage => "coverage",
+            Self::Frame => "frame",
+            Self::InsideOut => "inside-out",
+            Self::Labels => "labels",
+            Self::Locations => "locations",
+            Self::Scale => "scale",
+            Self::Size => "size",
+            Self::Up => "up",
+        }
+    }
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Condition {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let names = Self::ALL.map(Self::name).join(", ");
+        Self::ALL.into_iter().find(|c| c.name() == name).ok_or_else(|| format!("must be one of {names}"))
+    }
+}
+
+/// Something that looks wrong.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Finding {
+    condition: Condition,
+    /// Whether the data set would be of no use.
+    stops: bool,
+    /// A sentence on it.
+    text: String,
+}
+
+impl Finding {
+    fn new(condition: Condition, stops: bool, text: String) -> Self {
+        Self { condition, stops, text }
+    }
+
+    /// What `info` says of it.
+    pub(crate) fn sentence(&self) -> String {
+        let Self { condition, stops, text } = self;
+        if *stops {
+            format!("{text}; an export stops here without --allow {condition}")
+        } else {
+            text.clone()
+        }
+    }
+}
+
+/// Warns of what was found, unless some of it stops the export and is not allowed.
+///
+/// # Errors
+/// [`Error::Input`] with all that stops it.
+pub(crate) fn judge(ctx: &Context, findings: &[Finding], allowed: &[Condition]) -> Result<()> {
+    let stops = |f: &&Finding| f.stops && !allowed.contains(&f.condition);
+    let stopping: Vec<&Finding> = findings.iter().filter(stops).collect();
+    findings.iter().filter(|f| !stops(f)).for_each(|f| ctx.warn(&f.text));
+    if stopping.is_empty() {
+        return Ok(());
+    }
+    let mut conditions: Vec<Condition> = stopping.iter().map(|f| f.condition).collect();
+    conditions.sort_unstable();
+    conditions.dedup();
+    let texts: Vec<&str> = stopping.iter().map(|f| f.text.as_str()).collect();
+    let options: Vec<String> = conditions.iter().map(|c| format!("--allow {c}")).collect();
+    Err(Error::Input(format!(
+        "the data set would be of no use: {} (to export it all the same: {})",
+        texts.join("; "),
+        options.join(" ")
+    )))
+}
+
+/// Whether something would stop an export that allows nothing.
+pub(crate) fn stops_any(findings: &[Finding]) -> bool {
+    findings.iter().any(|f| f.stops)
+}
+
+/// A share as a whole percentage.
+fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+/// What looks wrong about the place, size and colours of a mesh. `makes_rgb` says whether images are coloured
+/// by it.
+pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
+    /// The largest number that a half float can hold.
+    const LARGEST_HALF_M: f32 = 65_504.0;
+    let mut findings = Vec::new();
+    let bbox = mesh.aabb();
+    let (length, farthest) = (bbox.size().max_element(), bbox.min.abs().max(bbox.max.abs()).max_element());
+    if length > 1000.0 {
+        let text = format!("the mesh is {length:.0} m long: is it in metres?");
+        findings.push(Finding::new(Condition::Scale, length > 3000.0, text));
+    }
+    if length < 0.5 {
+        let text = format!("the mesh is only {:.1} cm long: is it in metres?", 100.0 * length);
+        findings.push(Finding::new(Condition::Scale, length < 0.1, text));
+    }
+    let moving = "move mesh, points and cameras nearer to it";
+    if farthest > LARGEST_HALF_M {
+        let text = format!(
+            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates end at 65504; {moving}"
+        );
+        findings.push(Finding::new(Condition::Scale, false, text));
+    } else if farthest > 1000.0 {
+        let text = format!(
+            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates step by {} m there; {moving}",
+            half_step(farthest)
+        );
+        findings.push(Finding::new(Condition::Scale, false, text));
+    }
+    if makes_rgb && !has_colors(mesh) {
+        let text = "the mesh has no texture and no colours, so that its RGB images would be flat: leave rgb out of \
+                    --modalities, or name the scanner's pictures";
+        findings.push(Finding::new(Condition::Colour, true, text.to_owned()));
+    }
+    findings
+}
+
+/// Whether a mesh has more colours than one.
+fn has_colors(mesh: &TriMesh) -> bool {
+    if !mesh.textures().is_empty() || !mesh.parts().colors.is_empty() {
+        return true;
+    }
+    let mut colors = (0..mesh.faces().len() as u32)
+        .map(|f| mesh.material_of(f).map(|m| mesh.materials()[m as usize].color));
+    let first = colors.next();
+    colors.any(|color| Some(color) != first)
+}
+
+/// What looks wrong between mesh and annotations.
+pub(crate) fn label_findings(mesh: &TriMesh, annotated: &Annotated, table: &LabelTable) -> Vec<Finding> {
+    let mut findings = vote_findings(&annotated.report);
+    findings.extend(level_finding(mesh, &annotated.label_of_face, table));
+    findings.extend(room_findings(&annotated.rooms));
+    findings
+}
+
+fn vote_findings(report: &VoteReport) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let far = report.total.far_points as f64 / report.total.points.max(1) as f64;
+    if far > 0.05 {
+        let text = format!(
+            "{} of the annotated points are farther than 5 cm from every face: do mesh and annotations share a frame? \
+             see `up` in the scene file",
+            percent(far)
+        );
+        findings.push(Finding::new(Condition::Frame, far > 0.5, text));
+    }
+    let labelled = report.total.faces as f64 / report.face_count.max(1) as f64;
+    if labelled < 0.5 {
+        let text = format!(
+            "only {} of the faces get a label: the others are written as {}",
+            percent(labelled),
+            s3d_label::NULL_NAME
+        );
+        findings.push(Finding::new(Condition::Labels, labelled < 0.05, text));
+    }
+    findings
+}
+
+/// Floors and ceilings are level if the axis that points up is the right one.
+fn level_finding(mesh: &TriMesh, label_of_face: &[LabelId], table: &LabelTable) -> Option<Finding> {
+    /// The cosine of 30°.
+    const LEVEL: f32 = 0.866;
+    let (mut level_m2, mut all_m2) = (0.0, 0.0);
+    for (face, label) in (0u32..).zip(label_of_face) {
+        let class = table.get(*label).map(|label| label.class);
+        if matches!(class, Some(Class::Floor | Class::Ceiling)) {
+            let area_m2 = mesh.area(face);
+            all_m2 += area_m2;
+            if mesh.normal(face).z.abs() > LEVEL {
+                level_m2 += area_m2;
+            }
+        }
+    }
+    let share = level_m2 / all_m2;
+    // Without floors and ceilings it is no number, and no less than anything.
+    (share < 0.5).then(|| {
+        let text = format!(
+            "only {} of the floors and ceilings are level: does another axis point up? see `up` in the scene file",
+            percent(share)
+        );
+        Finding::new(Condition::Up, share < 0.25, text)
+    })
+}
+
+fn room_findings(rooms: &[SurveyedRoom]) -> Vec<Finding> {
+    let median = |of: &dyn Fn(&SurveyedRoom) -> f64| {
+        let mut values: Vec<f64> = rooms.iter().filter(|r| r.points > 0).map(of).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    let mut findings = Vec::new();
+    if let Some(height_m) = median(&|room| f64::from(room.bbox.size().z))
+        && height_m > 5.0
+    {
+        let text = format!("rooms are {height_m:.1} m high: are points and mesh in metres, not in feet?");
+        findings.push(Finding::new(Condition::Scale, height_m > 8.0, text));
+    }
+    if let Some(floor_m2) = median(&|room| room.footprint.area_m2)
+        && floor_m2 > 2000.0
+    {
+        let text = format!("rooms have {floor_m2:.0} m² of floor: are points and mesh in metres?");
+        findings.push(Finding::new(Condition::Scale, floor_m2 > 10_000.0, text));
+    }
+    findings
+}
+
+/// What looks wrong about the number of scan locations; `count` may be how many would be placed.
+pub(crate) fn count_findings(count: f64, rooms: &[SurveyedRoom]) -> Vec<Finding> {
+    let floor_m2: f64 = rooms.iter().map(|r| r.footprint.area_m2).sum();
+    let per_m2 = count / floor_m2.max(1.0);
+    if count <= 100.0 || per_m2 <= 1.0 {
+        return Vec::new();
+    }
+    let text = format!(
+        "{count:.0} scan locations on {floor_m2:.0} m² of floor are many: the published data set has one on 4 m²"
+    );
+    vec![Finding::new(Condition::Locations, count > 1000.0 && per_m2 > 4.0, text)]
+}
+
+/// What looks wrong about what all scan locations see together.
+pub(crate) fn outlook_findings(outlooks: &[Outlook]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let count = outlooks.len().max(1) as f64;
+    let coverage = outlooks.iter().map(|o| o.coverage).sum::<f64>() / count;
+    let back_sides = outlooks.iter().map(|o| o.coverage * o.back_sides).sum::<f64>() / count / coverage;
+    if coverage < LOW_COVERAGE {
+        let text = format!(
+            "scan locations see the mesh in {} of all directions: are they in its frame, and inside?",
+            percent(coverage)
+        );
+        findings.push(Finding::new(Condition::Coverage, true, text));
+    }
+    if back_sides > 0.5 {
+        let text = format!(
+            "{} of what scan locations see are back sides: the faces are wound the other way, or the locations stand in \
+             walls",
+            percent(back_sides)
+        );
+        findings.push(Finding::new(Condition::InsideOut, back_sides > 0.75, text));
+    }
+    findings
+}

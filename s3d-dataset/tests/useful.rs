@@ -1,0 +1,160 @@
+//! Data sets that would be of no use are not made, unless the caller insists; `info` says the same.
+
+mod common;
+
+use common::{memory_scene, options, scene_of};
+use s3d_dataset::{Condition, Context, Error, Event, Export, ExportOptions, InfoOptions, Level, MemoryScene};
+use s3d_geom::glam::{Vec3, dvec3, vec3};
+use s3d_geom::{Pose, TriMesh};
+use std::sync::{Arc, Mutex};
+
+/// Refused by this condition, with these words; `info` names it too, and with the condition allowed there is a
+/// data set, and a warning in the same words.
+#[track_caller]
+fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Condition, words: &str) {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let export = |allow: &[Condition], context: &Context| {
+        let options = ExportOptions { allow: allow.to_vec(), ..options.clone() };
+        Export::new([scene()]).options(options).run(&out, context)
+    };
+    let error = export(&[], &Context::default()).unwrap_err();
+    assert!(matches!(&error, Error::Input(m) if m.contains(words)), "{error}");
+    assert!(error.to_string().contains(&format!("--allow {condition}")), "{error}");
+    let manifest = || std::fs::read_to_string(out.join("manifest.json")).unwrap_or_default();
+    assert!(!manifest().contains("complete"), "nothing passes for a data set");
+    let others: Vec<Condition> = Condition::ALL.into_iter().filter(|c| *c != condition).collect();
+    assert!(export(&others, &Context::default()).is_err());
+
+    let info_options = InfoOptions { place_cameras: options.place_cameras, ..InfoOptions::default() };
+    let info = s3d_dataset::info(scene(), &info_options, &Context::default()).unwrap();
+    let named = info.doubts.iter().any(|d| d.contains(words) && d.contains(&format!("--allow {condition}")));
+    assert!(named || condition == Condition::Size, "{info}");
+
+    let warnings = Arc::new(Mutex::new(Vec::new()));
+    let seen = Arc::clone(&warnings);
+    let context = Context::default().observed_by(move |event: &Event<'_>| {
+        if let Event::Message { level: Level::Warning, text } = event {
+            seen.lock().unwrap().push((*text).to_owned());
+        }
+    });
+    // What the limits of an image's size and of the disk say is another thing than what these scenes are.
+    if condition == Condition::Size || condition == Condition::Locations {
+        return;
+    }
+    assert!(export(&[condition], &context).unwrap().is_some(), "an export that is insisted on");
+    assert!(warnings.lock().unwrap().iter().any(|w| w.contains(words)), "{:?}", warnings.lock().unwrap());
+    assert!(manifest().contains("complete") && !manifest().contains("allow"));
+}
+
+#[test]
+fn a_good_scene_is_of_use() {
+    let info = s3d_dataset::info(memory_scene(), &InfoOptions::default(), &Context::default()).unwrap();
+    assert_eq!(info.doubts, Vec::<String>::new());
+    assert!(
+        info.estimate.files > 300.0 && info.to_string().contains("an export with the default options: about")
+    );
+}
+
+#[test]
+fn points_beside_the_mesh() {
+    stops(
+        || scene_of(|p| p, |p| p + 1.0),
+        &options(0),
+        Condition::Frame,
+        "farther than 5 cm from every face",
+    );
+}
+
+#[test]
+fn another_axis_that_points_up() {
+    // Mesh and points lie on their side, and a location in the middle of both.
+    let turned = |p: Vec3| vec3(p.x, -p.z, p.y);
+    let scene = move || {
+        let mut scene = scene_of(turned, turned);
+        scene.locations[0].pose = Pose::level(dvec3(2.0, -1.25, 1.5), 0.0);
+        scene
+    };
+    stops(scene, &options(0), Condition::Up, "floors and ceilings are level");
+}
+
+#[test]
+fn feet_for_metres() {
+    let scene = || {
+        let mut scene = scene_of(|p| 4.0 * p, |p| 4.0 * p);
+        scene.locations[0].pose = Pose::level(dvec3(8.0, 6.0, 5.0), 0.0);
+        scene
+    };
+    stops(scene, &options(0), Condition::Scale, "rooms are 10.0 m high");
+}
+
+#[test]
+fn a_mesh_of_millimetres() {
+    let scene = || {
+        let mut scene = scene_of(|p| 0.02 * p, |p| 0.02 * p);
+        scene.locations[0].pose = Pose::level(dvec3(0.04, 0.03, 0.025), 0.0);
+        scene
+    };
+    let dense = ExportOptions { points_per_m2: 1e5, ..options(0) };
+    stops(scene, &dense, Condition::Scale, "only 8.0 cm long");
+}
+
+#[test]
+fn a_location_outside() {
+    let scene = || {
+        let mut scene = memory_scene();
+        scene.locations[0].pose = Pose::level(dvec3(12.0, 1.5, 1.4), 0.0);
+        scene
+    };
+    let both = ExportOptions { allow: vec![Condition::InsideOut], ..options(0) };
+    let dir = tempfile::tempdir().unwrap();
+    let error =
+        Export::new([scene()]).options(both).run(dir.path().join("out"), &Context::default()).unwrap_err();
+    assert!(
+        error.to_string().contains("scan locations see the mesh in")
+            && error.to_string().contains("--allow coverage")
+    );
+}
+
+#[test]
+fn faces_wound_the_other_way() {
+    let scene = || {
+        let mut scene = memory_scene();
+        let mut parts = scene.mesh.into_parts();
+        parts.faces.iter_mut().for_each(|f| f.swap(1, 2));
+        scene.mesh = TriMesh::new(parts).unwrap();
+        scene
+    };
+    stops(scene, &options(0), Condition::InsideOut, "are back sides");
+}
+
+#[test]
+fn a_mesh_without_colours() {
+    let scene = || {
+        let mut scene = memory_scene();
+        let mut parts = scene.mesh.into_parts();
+        parts.colors.clear();
+        scene.mesh = TriMesh::new(parts).unwrap();
+        scene
+    };
+    stops(scene, &options(0), Condition::Colour, "no texture and no colours");
+    // Without RGB images it is none the worse.
+    let modalities = options(0).modalities.into_iter().filter(|d| d.to_string() != "rgb").collect();
+    let dir = tempfile::tempdir().unwrap();
+    let export = Export::new([scene()]).options(ExportOptions { modalities, ..options(0) });
+    assert!(export.run(dir.path().join("out"), &Context::default()).unwrap().is_some());
+}
+
+#[test]
+fn a_location_on_every_millimetre() {
+    let close = ExportOptions { place_cameras: Some(0.001), ..options(0) };
+    stops(memory_scene, &close, Condition::Locations, "scan locations on 12 m² of floor");
+}
+
+#[test]
+fn more_than_the_disk_holds() {
+    let dense = ExportOptions { points_per_m2: 1e8, ..options(0) };
+    stops(memory_scene, &dense, Condition::Size, "points: is the mesh in metres?");
+    let large = ExportOptions { views: 100_000, size: 16_384, ..options(0) };
+    stops(memory_scene, &large, Condition::Size, "are free at");
+}
