@@ -1,5 +1,6 @@
 //! The table of scan locations.
 
+use crate::camera::located::uuid_from_name;
 use crate::error::{Error, Result};
 use crate::fs::open::read_file;
 use csv::{ByteRecord, ReaderBuilder, Trim};
@@ -29,12 +30,13 @@ pub struct ScanLocation {
 /// and the scanner's rotation, of any length but zero, as a quaternion.
 ///
 /// A first line of those eight names gives their order; without one it is that order. A uuid may be in upper
-/// case and hyphenated. Lines that start with `#` and empty lines do not count. Source: formats.md,
+/// case and hyphenated; where no location has one, their names ("scan_0") are turned into uuids by
+/// [`uuid_from_name`]. Lines that start with `#` and empty lines do not count. Source: formats.md,
 /// "Scan locations".
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a uuid that is not 32
-/// hexadecimal digits or is there twice, a number that is not finite, a quaternion of zeros; for the file, if
+/// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a name that is no uuid
+/// beside others that are, one that is there twice, a number that is not finite, a quaternion of zeros; for the file, if
 /// it has no location.
 pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
     parse_cameras(&read_file(path)?, path)
@@ -61,6 +63,7 @@ pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
     let mut lines: HashMap<String, u64> = HashMap::new();
     let mut order: [usize; 8] = std::array::from_fn(|i| i);
     let mut is_first = true;
+    let (mut names, mut first_name) = (0, None);
     // Line by line: csv counts the comments and empty lines before a record to the record.
     for (line, text) in (1..).zip(bytes.split(|&b| b == b'\n')) {
         let text = text.trim_ascii();
@@ -78,11 +81,15 @@ pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
             continue;
         }
         let location = location(&record, order, line).map_err(|message| Error::line(path, line, message))?;
+        if !is_uuid(&location.uuid) {
+            names += 1;
+            first_name.get_or_insert_with(|| (line, location.uuid.clone()));
+        }
         if let Some(first) = lines.insert(location.uuid.clone(), line) {
             return Err(Error::line(
                 path,
                 line,
-                format!("uuid {} is on line {first} already", location.uuid),
+                format!("location {} is on line {first} already", location.uuid),
             ));
         }
         locations.push(location);
@@ -90,7 +97,18 @@ pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
     if locations.is_empty() {
         return Err(Error::format(path, format!("has no scan location; a line is {}", COLUMNS.join(","))));
     }
+    if let Some((line, name)) = first_name {
+        if names < locations.len() {
+            let message = format!("{name:?} is no uuid of 32 hexadecimal digits, as others here are");
+            return Err(Error::line(path, line, message));
+        }
+        locations.iter_mut().for_each(|l| l.uuid = uuid_from_name(&l.uuid));
+    }
     Ok(locations)
+}
+
+fn is_uuid(text: &str) -> bool {
+    text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
 }
 
 /// The fields of a line, without white space around them.
@@ -120,10 +138,12 @@ fn header(record: &ByteRecord) -> std::result::Result<[usize; 8], String> {
 fn location(record: &ByteRecord, order: [usize; 8], line: u64) -> std::result::Result<ScanLocation, String> {
     let fields = order.map(|at| String::from_utf8_lossy(record.get(at).unwrap_or_default()).into_owned());
     let [written, fields @ ..] = fields;
-    let uuid: String = written.chars().filter(|&c| c != '-').map(|c| c.to_ascii_lowercase()).collect();
-    if uuid.len() != 32 || !uuid.bytes().all(|b| b.is_ascii_hexdigit()) {
-        return Err(format!("{written:?} is no uuid of 32 hexadecimal digits"));
+    if written.is_empty() {
+        return Err("the location has no name".to_owned());
     }
+    let uuid: String = written.chars().filter(|&c| c != '-').map(|c| c.to_ascii_lowercase()).collect();
+    // Or another name, until it is known what the other lines have.
+    let uuid = if is_uuid(&uuid) { uuid } else { written };
     let mut numbers = [0.0; 7];
     for ((number, text), column) in numbers.iter_mut().zip(&fields).zip(&COLUMNS[1..]) {
         *number = text
@@ -167,6 +187,17 @@ mod tests {
         assert!(plain[1].pose.forward().abs_diff_eq(-DVec3::Y, 1e-12));
         let header = read(&format!("\u{feff}X,y,z,uuid,qw,qx,qy,qz\n1,2,3,{A},1,0,0,0\n")).unwrap();
         assert_eq!(header[0].pose, plain[0].pose);
+    }
+
+    #[test]
+    fn names_that_are_no_uuids_become_some() {
+        let named = read("scan_0,1,2,3,0,0,0,1\nroom 2/left,4,5,6,0,0,0,1\n").unwrap();
+        assert_eq!(named[0].uuid, uuid_from_name("scan_0"));
+        assert!(named.iter().all(|l| is_uuid(&l.uuid)) && named[0].uuid != named[1].uuid);
+        let twice = read("scan_0,1,2,3,0,0,0,1\nscan_0,4,5,6,0,0,0,1\n").unwrap_err().to_string();
+        assert!(twice.contains("location scan_0 is on line 1 already"), "{twice}");
+        let nameless = read("scan_0,1,2,3,0,0,0,1\n,4,5,6,0,0,0,1\n").unwrap_err().to_string();
+        assert!(nameless.contains("line 2: the location has no name"), "{nameless}");
     }
 
     #[test]
