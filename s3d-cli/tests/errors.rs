@@ -149,10 +149,15 @@ fn bad_camera_tables_are_named_with_their_line() {
 fn cameras_outside_or_inside_something_are_told_with_their_coverage() {
     let scan = Scan::new();
     fs::write(scan.file("cameras.csv"), format!("{UUID_A},50,50,1.5,0,0,0,1\n")).unwrap();
-    scan.warns(&[UUID_A, "coverage", "%"]);
+    let useless = ["in 0 % of all directions", "--allow coverage"];
+    s3d_fails(&scan.args(&scan.out()), 1, &useless);
+    let log = scan.exported();
+    assert!(log.contains(UUID_A) && log.contains("(coverage 0 %)"), "{log}");
     let scan = Scan::new();
     fs::write(scan.file("cameras.csv"), format!("{UUID_A},2,-1,1.5,0,0,0,1\n")).unwrap();
-    scan.warns(&[UUID_A, "back sides"]);
+    s3d_fails(&scan.args(&scan.out()), 1, &["are back sides", "--allow inside-out"]);
+    let log = scan.exported();
+    assert!(log.contains(UUID_A) && log.contains("back sides in"), "{log}");
     let scan = Scan::new();
     fs::write(scan.file("cameras.csv"), format!("{UUID_A},0.01,1,1.5,0,0,0,1\n")).unwrap();
     scan.warns(&[UUID_A, "10 mm"]);
@@ -162,8 +167,8 @@ fn cameras_outside_or_inside_something_are_told_with_their_coverage() {
 fn points_in_another_frame_are_told() {
     let scan = Scan::new();
     scan.replace("scene.toml", "up = \"y\"", "up = \"z\"");
-    let log = s3d_ok(&scan.args(&scan.out()));
-    assert!(log.contains("share a frame"), "{log}");
+    s3d_fails(&scan.args(&scan.out()), 1, &["share a frame", "--allow frame"]);
+    assert!(scan.exported().contains("share a frame"));
     let info = s3d(&["info", text(&scan.scene)]);
     assert!(String::from_utf8_lossy(&info.stdout).contains("share a frame"));
 }

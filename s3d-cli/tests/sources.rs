@@ -141,7 +141,7 @@ fn labels_of_the_mesh_give_what_the_tree_gives() {
         );
         fs::write(&toml, &table).unwrap();
         let out = dir.path().join(format!("out_{parts}"));
-        export(&toml, &out, &SIX);
+        export(&toml, &out, &[&SIX[..], &["--allow", "colour"]].concat());
         let labels = |out: &Path| fs::read(out.join("assets/semantic_labels.json")).unwrap();
         assert!(labels(&expected) == labels(&out));
         for domain in ["semantic", "depth", "normal", "global_xyz"] {
@@ -173,7 +173,7 @@ fn columns_of_a_cloud_are_not_looked_for_in_the_mesh() {
                  classes = { 5 = \"floor\" }\n[cameras]\npath = \"cameras.csv\"\n";
     fs::write(&toml, table).unwrap();
     let out = dir.path().join("out");
-    export(&toml, &out, &["--views", "0"]);
+    export(&toml, &out, &["--views", "0", "--allow", "colour,labels"]);
     assert!(
         fs::read_to_string(out.join("area_3/3d/semantic.obj")).unwrap().contains("usemtl floor_1_office_1_3")
     );
@@ -225,7 +225,7 @@ fn vertices_of_a_scannet_scan_vote_for_all_faces_around_them() {
                  path = \"scene0000_00\"\nroom = \"office_1\"\n[cameras]\npath = \"cameras.csv\"\n";
     fs::write(&toml, table).unwrap();
     let out = dir.path().join("out");
-    export(&toml, &out, &["--views", "0"]);
+    export(&toml, &out, &["--views", "0", "--allow", "colour"]);
     let semantic = fs::read_to_string(out.join("area_3/3d/semantic.obj")).unwrap();
     let (mut material, mut of_faces) = (String::new(), Vec::new());
     for line in semantic.lines() {

@@ -460,7 +460,7 @@ fn wrong_calls_and_bad_input_have_their_own_codes() {
 #[cfg(target_os = "linux")]
 #[test]
 #[allow(clippy::print_stderr, reason = "a test that is skipped says so")]
-fn a_full_disk_is_told_and_the_same_call_goes_on() {
+fn a_full_disk_is_told_and_the_same_call_goes_on_if_it_was_insisted_on() {
     let dir = tempfile::tempdir().unwrap();
     let scene = write_scan(dir.path(), 1);
     let (mount, copy, undisturbed) =
@@ -468,7 +468,9 @@ fn a_full_disk_is_told_and_the_same_call_goes_on() {
     fs::create_dir(&mount).unwrap();
     let script = r#"
         mount -t tmpfs -o size="$1" none "$2" || exit 99
-        "$3" --log json export "$4" -o "$2/out" $5 2> "$6.log"
+        "$3" export "$4" -o "$2/out" $5 2> "$6.log"
+        [ "$?" = 1 ] && [ ! -e "$2/out" ] && grep -q "allow size" "$6.log" || exit 97
+        "$3" --log json export "$4" -o "$2/out" --allow size $5 2> "$6.log"
         echo "$?" > "$6.code"
         mount -o remount,size=256m "$2" || exit 99
         "$3" --log json export "$4" -o "$2/out" $5 2>> "$6.log" || exit 98

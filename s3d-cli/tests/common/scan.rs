@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 pub(crate) const SMALL: [&str; 8] =
     ["--size", "32", "--pano-width", "64", "--views", "3", "--points-per-m2", "50"];
+pub(crate) const ALL_CONDITIONS: &str = "colour,coverage,frame,inside-out,labels,locations,scale,size,up";
 
 /// A small scan in a folder of its own, to be spoilt.
 pub(crate) struct Scan {
@@ -78,10 +79,10 @@ impl Scan {
         assert!(!out.exists() || manifest.contains("\"running\""), "OUT looks complete: {manifest}");
     }
 
-    /// An export succeeds; its log.
+    /// An export succeeds, of whatever use its data set is; its log.
     pub(crate) fn exported(&self) -> String {
         let out = self.out();
-        let mut args = vec!["export", text(&self.scene), "-o", text(&out)];
+        let mut args = vec!["export", text(&self.scene), "-o", text(&out), "--allow", ALL_CONDITIONS];
         args.extend(SMALL);
         s3d_ok(&args)
     }
