@@ -5,7 +5,7 @@
 
 use crate::camera::table::ScanLocation;
 use crate::error::{Error, Result};
-use crate::fs::open::read_file;
+use crate::fs::open::{open_file, read_file};
 use crate::guarded::guarded;
 use crate::image::texture::{TextureFault, decode_texture};
 use glam::{DMat3, DVec2, DVec3};
@@ -13,6 +13,7 @@ use image::ImageReader;
 use s3d_geom::{Lens, Pose, Raster};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// How far a matrix may be from a rotation, and its last row from 0 0 0 1: what eight digits leave, and
@@ -102,12 +103,8 @@ pub fn decode_picture(bytes: Vec<u8>, name: &Path) -> Result<Raster<[u8; 3]>> {
 /// # Errors
 /// As [`read_picture`].
 pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
-    let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
-    if !what.is_file() {
-        return Err(Error::format(path, "is no file"));
-    }
-    let open = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
-    let reader = open.map_err(|e| Error::io(path, "read", e))?;
+    let file = BufReader::new(open_file(path)?);
+    let reader = ImageReader::new(file).with_guessed_format().map_err(|e| Error::io(path, "read", e))?;
     let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
     let size = guarded(|| reader.into_dimensions()).ok_or_else(|| failed("its header is damaged"))?;
     size.map_err(|e| failed(&e.to_string()))

@@ -180,9 +180,6 @@ fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn
         #[cfg(not(feature = "scannet"))]
         return Err(Error::not_built_in(path, "scannet"));
     }
-    if !what.is_file() {
-        return Err(Error::format(path, "is no file"));
-    }
     table(Source::file(path), options)
 }
 

@@ -4,9 +4,9 @@
 //! from the one that was written. They are no proof against somebody who changes files on purpose.
 
 use crate::error::{Error, Result};
+use crate::fs::open::open_file;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
-use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::str::FromStr;
@@ -71,10 +71,10 @@ impl ChecksumOfParts {
 /// Size in bytes and checksum of a file, of which little is in memory at a time.
 ///
 /// # Errors
-/// [`Error::Io`].
+/// [`Error::Io`]; [`Error::Format`] for what is no regular file.
 pub fn checksum_of_file(path: &Path) -> Result<(u64, Checksum)> {
     let failed = |e| Error::io(path, "read", e);
-    let mut file = File::open(path).map_err(failed)?;
+    let mut file = open_file(path)?;
     let mut buffer = vec![0; BUFFER];
     let mut parts = ChecksumOfParts::default();
     loop {

@@ -3,7 +3,8 @@
 //! [`AtomicFile`] takes its name only when it is complete; [`write_bytes`] and [`write_whole`] write one in a
 //! call. [`sync_data_set`] brings a whole data set to the disk and [`SyncAhead`] does so while it is written.
 //! A [`Checksum`] is XXH3 of 128 bits. [`read_json`] and [`write_json`] name the file, and the line, in their
-//! errors. Readers of this crate refuse devices and pipes.
+//! errors. [`open_file`] and [`read_file`] are what all readers of this crate open files with: they refuse
+//! pipes and devices, which may never end.
 //!
 //! ```
 //! use s3d_io::fs::{Checksum, checksum_of_file, write_bytes};
@@ -35,5 +36,6 @@ pub use checksum::{BadChecksum, Checksum, ChecksumOfParts, checksum_of_file};
 pub use json::read_json;
 #[cfg(all(feature = "json", feature = "write"))]
 pub use json::write_json;
+pub use open::{open_file, read_file};
 #[cfg(feature = "write")]
 pub use sync::{SyncAhead, sync_data_set, sync_file};

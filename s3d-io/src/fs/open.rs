@@ -1,27 +1,54 @@
-//! Files to read. Devices and pipes are refused before they are opened: even that may never end.
+//! Files to read: the one place that opens them. Pipes and devices are refused before they are opened, since
+//! even that may never end.
 
 use crate::error::{Error, Result};
 use std::fs;
 use std::path::Path;
 
-/// The content of a regular file.
-pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
-    refuse_what_is_no_file(path)?;
+/// The content of a regular file, or of what a link leads to.
+///
+/// # Errors
+/// [`Error::Io`] if it is not there or may not be read; [`Error::Format`] for a folder, a pipe, a socket or a
+/// device: opening one may wait for ever, and reading one may never end.
+pub fn read_file(path: &Path) -> Result<Vec<u8>> {
+    must_be_regular(path)?;
     fs::read(path).map_err(|e| Error::io(path, "read", e))
 }
 
-/// Opens a regular file.
-pub(crate) fn open_file(path: &Path) -> Result<fs::File> {
-    refuse_what_is_no_file(path)?;
+/// Opens a regular file to read it.
+///
+/// ```
+/// use s3d_io::fs::open_file;
+/// use std::path::Path;
+///
+/// let message = open_file(Path::new(".")).unwrap_err().to_string();
+/// assert_eq!(message, ".: is a folder, not a file");
+/// ```
+///
+/// # Errors
+/// As [`read_file`].
+pub fn open_file(path: &Path) -> Result<fs::File> {
+    must_be_regular(path)?;
     fs::File::open(path).map_err(|e| Error::io(path, "read", e))
 }
 
-fn refuse_what_is_no_file(path: &Path) -> Result<()> {
+/// Stops at what is there and is no regular file, before anything opens it.
+///
+/// # Errors
+/// As [`read_file`].
+pub(crate) fn must_be_regular(path: &Path) -> Result<()> {
     let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
     if what.is_file() {
         return Ok(());
     }
-    Err(Error::format(path, if what.is_dir() { "is a folder, not a file" } else { "is no file" }))
+    Err(Error::format(
+        path,
+        if what.is_dir() {
+            "is a folder, not a file"
+        } else {
+            "is a pipe or a device, and only files are read: put its content into a file"
+        },
+    ))
 }
 
 #[cfg(test)]
@@ -35,7 +62,27 @@ mod tests {
             assert!(error.to_string().contains("is a folder, not a file"), "{error}");
         }
         let device = if cfg!(unix) { "/dev/null" } else { "nul" };
-        assert!(read_file(Path::new(device)).unwrap_err().to_string().contains("is no file"));
+        assert!(read_file(Path::new(device)).unwrap_err().to_string().contains("is a pipe or a device"));
         assert!(matches!(open_file(&dir.path().join("gone")), Err(Error::Io { .. })));
+    }
+    /// Each of these would wait for somebody to write into the pipe.
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_refused_at_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let pipe = dir.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let readers: [fn(&Path) -> Result<()>; 2] =
+            [|path| read_file(path).map(drop), |path| open_file(path).map(drop)];
+        for read in readers {
+            let message = read(&pipe).unwrap_err().to_string();
+            assert!(message.contains("pipe: is a pipe or a device, and only files are read"), "{message}");
+        }
+        #[cfg(feature = "dataset")]
+        assert!(crate::fs::checksum_of_file(&pipe).is_err());
+        #[cfg(feature = "write")]
+        assert!(crate::fs::sync_file(&pipe).is_err());
+        #[cfg(feature = "camera")]
+        assert!(crate::camera::read_picture_size(&pipe).is_err());
     }
 }

@@ -1,6 +1,7 @@
 //! What is written is on the disk.
 
 use crate::error::{Error, Result};
+use crate::fs::open::must_be_regular;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -98,6 +99,10 @@ fn sync_one_by_one(root: &Path, files: &[PathBuf]) -> Result<()> {
 }
 
 fn sync_content(path: &Path) -> Result<()> {
+    must_be_regular(path).map_err(|e| match e {
+        Error::Io { source, .. } => Error::io(path, "bring to the disk", source),
+        no_file => no_file,
+    })?;
     // Windows syncs through handles that may write alone.
     let opened = if cfg!(windows) { File::options().write(true).open(path) } else { File::open(path) };
     let synced = opened.and_then(|file| file.sync_all());

@@ -106,11 +106,6 @@ fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<BTreeMap<&'a Pa
         files,
         || (),
         |(), path| {
-            // Devices and pipes are refused: reading one may never end.
-            let what = std::fs::metadata(path).map_err(|e| FileError::io(path, "read", e))?;
-            if !what.is_file() {
-                return Err(FileError::format(path, "is no file").into());
-            }
             let sum = checksum_of_file(path)?;
             sums.lock().unwrap_or_else(PoisonError::into_inner).insert(path.as_path(), sum);
             progress.add(1);
