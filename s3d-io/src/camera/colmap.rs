@@ -8,6 +8,7 @@
 
 use crate::camera::located::{LocatedPicture, pose_from_opencv};
 use crate::error::{Error, Result};
+use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use crate::quote::quote;
 use s3d_geom::Pose;
@@ -28,22 +29,23 @@ pub(crate) fn read(path: &Path) -> Result<Vec<LocatedPicture>> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin")) {
         read_binary(path, &bytes)
     } else {
-        read_text(path, &bytes)
+        read_text(path, &text_of(&bytes, path)?)
     }
 }
 
 /// Two lines a picture: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, and its points, which may be none.
+/// Some programs leave the empty lines out: what follows a picture are its points only if it looks like them.
 fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
-    const FORM: &str =
-        "a picture is IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, with a line of points after it";
+    const FORM: &str = "a picture is IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and the line after it may hold its points, \
+                        X Y POINT3D_ID each";
     let mut pictures = Vec::new();
-    let mut is_points = false;
+    let mut may_be_points = false;
     for (line, text) in (1u64..).zip(bytes.split(|&b| b == b'\n')) {
         let text = text.trim_ascii();
-        if std::mem::take(&mut is_points) {
+        if text.starts_with(b"#") {
             continue;
         }
-        if text.is_empty() || text.starts_with(b"#") {
+        if std::mem::take(&mut may_be_points) && are_points(text) || text.is_empty() {
             continue;
         }
         let text = std::str::from_utf8(text).map_err(|_| Error::line(path, line, "is no text in UTF-8"))?;
@@ -63,9 +65,24 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
         }
         let pose = pose(numbers).map_err(|m| Error::line(path, line, m))?;
         pictures.push(LocatedPicture { name: rest.to_owned(), pose, line });
-        is_points = true;
+        may_be_points = true;
     }
     Ok(pictures)
+}
+
+/// Whether a line consists of numbers, three a point, or is empty. A picture has ten words, of which the name
+/// is seldom a number.
+fn are_points(line: &[u8]) -> bool {
+    let is_number = |b: &u8| matches!(b, b'0'..=b'9' | b'.' | b'-' | b'+' | b'e' | b'E');
+    let (mut words, mut in_word) = (0u64, false);
+    for byte in line {
+        if !is_number(byte) && !byte.is_ascii_whitespace() {
+            return false;
+        }
+        words += u64::from(is_number(byte) && !in_word);
+        in_word = is_number(byte);
+    }
+    words % 3 == 0
 }
 
 /// Little-endian: a count; for each picture its id (4 bytes), seven numbers (8 each), its camera (4), a name
@@ -176,6 +193,26 @@ mod tests {
                 assert_eq!(picture.name, format!("scan {i}.jpg"));
             }
         }
+    }
+
+    #[test]
+    fn pictures_without_lines_of_points_are_all_read() {
+        let names = |text: &str| -> Vec<String> {
+            let read = read_text(Path::new("images.txt"), text.as_bytes()).unwrap();
+            read.into_iter().map(|picture| picture.name).collect()
+        };
+        let picture = |name: &str| format!("1 1 0 0 0 0 0 0 1 {name}\n");
+        let [a, b, c] = ["a.jpg", "7", "c d.png"].map(|name| picture(name));
+        assert_eq!(names(&format!("# no points\n{a}{b}{c}")), ["a.jpg", "7", "c d.png"]);
+        // With and without, and with what people write between.
+        assert_eq!(names(&format!("{a}\n{b}1 2 -1 3.5 4e1 7\n{c}")), ["a.jpg", "7", "c d.png"]);
+        assert_eq!(
+            names(&format!("{a}# a comment\n0 0 -1\n{c}{a}\n\n\n{b}")),
+            ["a.jpg", "c d.png", "a.jpg", "7"]
+        );
+        // Half a point is no picture either.
+        let message = read_text(Path::new("i"), format!("{a}1.5 2.5 -1 3\n").as_bytes()).err().unwrap();
+        assert!(message.to_string().contains("line 2: `1.5 2.5 -1 3`: a picture is"), "{message}");
     }
 
     #[test]

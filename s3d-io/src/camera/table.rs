@@ -2,6 +2,7 @@
 
 use crate::camera::located::uuid_from_name;
 use crate::error::{Error, Result};
+use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use csv::{ByteRecord, ReaderBuilder, Trim};
 use s3d_geom::Pose;
@@ -58,7 +59,7 @@ pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
 /// As [`read_cameras`].
 pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
     let path = name;
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = text_of(bytes, path)?;
     let mut locations = Vec::new();
     let mut lines: HashMap<String, u64> = HashMap::new();
     let mut order: [usize; 8] = std::array::from_fn(|i| i);

@@ -1,6 +1,7 @@
 //! JSON files: pretty-printed, keys in the order of the struct, a line feed at the end.
 
 use crate::error::{Error, Result};
+use crate::fs::encoding::utf8;
 use crate::fs::open::read_file;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -22,7 +23,7 @@ pub fn write_json<T: serde::Serialize + ?Sized>(path: &Path, value: &T) -> Resul
 /// [`Error::Io`]; [`Error::Format`] with the line if the file is no JSON or no `T`.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let bytes = read_file(path)?;
-    serde_json::from_slice(&bytes).map_err(|e| Error::line(path, e.line() as u64, e.to_string()))
+    serde_json::from_slice(&utf8(&bytes)).map_err(|e| Error::line(path, e.line() as u64, e.to_string()))
 }
 
 #[cfg(test)]
@@ -36,6 +37,11 @@ mod tests {
         let numbers = vec![0.1, 1e-300, -7.000000000000001];
         write_json(&path, &numbers).unwrap();
         assert_eq!(read_json::<Vec<f64>>(&path).unwrap(), numbers);
+        for bytes in crate::fs::encoding::tests::encoded("[0.1, 1e-300, -7.000000000000001]") {
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(read_json::<Vec<f64>>(&path).unwrap(), numbers);
+        }
+        write_json(&path, &numbers).unwrap();
         let wrong = read_json::<Vec<String>>(&path).unwrap_err().to_string();
         assert!(wrong.contains("numbers.json, line 2"), "{wrong}");
     }

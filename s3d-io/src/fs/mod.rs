@@ -20,6 +20,7 @@
 pub(crate) mod atomic;
 #[cfg(feature = "dataset")]
 pub(crate) mod checksum;
+pub(crate) mod encoding;
 #[cfg(feature = "json")]
 pub(crate) mod json;
 pub(crate) mod open;

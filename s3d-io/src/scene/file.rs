@@ -2,6 +2,7 @@
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::error::{Error, Result};
+use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use crate::mesh::file::UpAxis;
 use crate::scene::annotations::AnnotationTable;
@@ -122,8 +123,31 @@ struct MeshTable {
 /// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value;
 /// without one if a file or folder that it names is not there.
 pub fn read_scene(path: &Path) -> Result<SceneFile> {
-    let text = String::from_utf8(read_file(path)?).map_err(|_| Error::format(path, "is no text in UTF-8"))?;
-    parse_scene(&text, path)
+    if let Some(what) = other_kind(path) {
+        return Err(Error::unsupported(path, format!("is {what}; {SCENE}")));
+    }
+    let bytes = read_file(path)?;
+    let no_text = |_| Error::format(path, format!("is no text in UTF-8; {SCENE}"));
+    parse_scene(std::str::from_utf8(&text_of(&bytes, path)?).map_err(no_text)?, path)
+}
+
+/// What a scene is, for who gives something else.
+const SCENE: &str = "a scene is a text file, scene.toml, that names the parts of a scan: `area = 1`, `[mesh]` with `path = \
+                     \"scan.obj\"`, `[annotations]` with a path, `[cameras]` with a path or `place = 2.0`, each on a line";
+
+/// What a file is that users give in place of a scene, by its ending.
+fn other_kind(path: &Path) -> Option<&'static str> {
+    Some(match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
+        "obj" | "gltf" | "glb" | "stl" | "fbx" | "dae" | "off" | "usd" | "usdz" => "a mesh, not a scene",
+        "ply" => "a mesh or a cloud, not a scene",
+        "las" | "laz" | "e57" | "npy" | "npz" | "mat" | "pcd" | "pts" | "xyz" => {
+            "a cloud of points, not a scene"
+        }
+        "mtl" | "png" | "jpg" | "jpeg" => "a part of a mesh, not a scene",
+        "csv" => "a table, not a scene",
+        "json" => "JSON, not a scene",
+        _ => return None,
+    })
 }
 
 /// As [`read_scene`], from the text of a scene file. Errors call it `path`, and the files that it names are
@@ -414,6 +438,37 @@ mod tests {
         ] {
             let message = read(&GOOD.replacen(from, to, 1)).unwrap_err().to_string();
             assert!(message.contains(words), "{to}: {message}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_another_kind_is_called_what_it_is() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, words) in [
+            ("m.obj", "m.obj: is a mesh, not a scene"),
+            ("M.GLB", "M.GLB: is a mesh, not a scene"),
+            ("scan.ply", "is a mesh or a cloud, not a scene"),
+            ("scan.laz", "is a cloud of points, not a scene"),
+            ("cameras.csv", "is a table, not a scene"),
+            ("scene", "is no text: it holds zero bytes"),
+        ] {
+            let path = dir.path().join(name);
+            fs::write(&path, b"# Blender\no Cube\n\0").unwrap();
+            let message = read_scene(&path).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+            assert_eq!(message.contains("scene.toml, that names"), name != "scene", "{message}");
+        }
+    }
+
+    #[test]
+    fn a_scene_may_be_in_any_unicode() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("a.obj"), "").unwrap();
+        let path = dir.path().join("scene.toml");
+        let text = "area = 4\n[mesh]\npath = \"a.obj\"\n[annotations]\nmesh = true\n";
+        for bytes in crate::fs::encoding::tests::encoded(text) {
+            fs::write(&path, bytes).unwrap();
+            assert_eq!(read_scene(&path).unwrap().area, 4);
         }
     }
 

@@ -6,6 +6,7 @@
 use crate::cloud::annotations::{PointBlocks, Skipped};
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
+use crate::fs::encoding::Utf8Reader;
 use crate::fs::open::open_file;
 use crate::fs::text::{number, words};
 use crate::quote::quote;
@@ -25,8 +26,6 @@ const LONGEST_LINE: usize = 1 << 16;
 const SHORTEST_LINE: usize = 12;
 /// Bytes that one thread reads at a time.
 const PIECE: usize = 1 << 16;
-/// What files of UTF-8 may begin with.
-const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Reads points of a file piece by piece, so that one of any size needs little memory.
 ///
@@ -50,7 +49,7 @@ const MARK: &[u8] = b"\xef\xbb\xbf";
 #[derive(Debug)]
 pub struct PointReader<R = File> {
     path: PathBuf,
-    file: R,
+    file: Utf8Reader<R>,
     on_fault: OnFault,
     /// What was read and is not used up: `block[start..end]`.
     block: Vec<u8>,
@@ -86,7 +85,7 @@ impl<R: Read> PointReader<R> {
     pub fn new(reader: R, name: &Path, on_fault: OnFault) -> Self {
         Self {
             path: name.to_owned(),
-            file: reader,
+            file: Utf8Reader::new(reader),
             on_fault,
             block: vec![0; BLOCK],
             start: 0,
@@ -140,8 +139,6 @@ impl<R: Read> PointReader<R> {
                 None => (unread, unread.len()),
             };
             self.line += 1;
-            // A mark of UTF-8 is no part of the first number.
-            let line = if self.line == 1 { line.strip_prefix(MARK).unwrap_or(line) } else { line };
             match parse_point(line) {
                 Ok(Some((position, color))) => {
                     out.positions.push(position);
@@ -172,8 +169,7 @@ impl<R: Read> PointReader<R> {
         else {
             return 0;
         };
-        let has_mark = self.line == 0 && lines.starts_with(MARK);
-        if has_mark || lines.len() / SHORTEST_LINE >= max_points {
+        if lines.len() / SHORTEST_LINE >= max_points {
             return 0;
         }
         let pieces: Vec<&[u8]> = pieces(lines).collect();
@@ -319,6 +315,9 @@ mod tests {
         assert_eq!(cloud.positions, [vec3(1.0, 2.0, 3.0), vec3(-1.5, 2.0, 0.25), vec3(7.0, 8.0, 9.0)]);
         assert_eq!(cloud.colors, [[4, 5, 6], [41, 0, 255], [10, 11, 12]]);
         assert!(read(b"").unwrap().is_empty());
+        for bytes in crate::fs::encoding::tests::encoded(&"1 2 3 4 5 6\n".repeat(100_000)) {
+            assert_eq!(read(&bytes).unwrap().len(), 100_000);
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The lines of OBJ and MTL files.
 
 use crate::error::Result;
+use crate::fs::encoding::into_utf8;
 use crate::fs::open::read_file;
 use memchr::memchr;
 use std::borrow::Cow;
@@ -59,9 +60,9 @@ pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
-/// The content of a text file; if its lines end in CR alone, they end in LF now.
+/// The content of a text file, in UTF-8 if its mark says what it is; if its lines end in CR alone, they end in LF now.
 pub(crate) fn read_text(path: &Path) -> Result<Vec<u8>> {
-    let mut bytes = read_file(path)?;
+    let mut bytes = into_utf8(read_file(path)?);
     end_lines_in_lf(&mut bytes);
     Ok(bytes)
 }

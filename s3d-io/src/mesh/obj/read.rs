@@ -4,6 +4,7 @@
 //! of a fault, [`ObjLooks`] the libraries and images; here the parts become a mesh.
 
 use crate::error::{Error, Result};
+use crate::fs::encoding::into_utf8;
 use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
 use crate::mesh::obj::diagnose::{face_line, fault, vertex_error};
 use crate::mesh::obj::lines::end_lines_in_lf;
@@ -21,7 +22,8 @@ use std::path::Path;
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
-pub(crate) fn read_bytes(mut bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
+pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
+    let mut bytes = into_utf8(bytes);
     end_lines_in_lf(&mut bytes);
     refuse_other_files(path, &bytes)?;
     let obj = NormalObj::new(&bytes).ok_or_else(|| fault(path, &bytes, "it is damaged"))?;
@@ -80,12 +82,6 @@ pub(crate) fn read_bytes(mut bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<
 }
 
 fn refuse_other_files(path: &Path, bytes: &[u8]) -> Result<()> {
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err(Error::unsupported(
-            path,
-            "is UTF-16 text; save it as UTF-8, or convert it with `iconv -t UTF-8`",
-        ));
-    }
     if bytes.iter().take(4096).any(|b| *b == 0) {
         return Err(Error::format(path, "is binary; a Wavefront OBJ file is text"));
     }

@@ -20,6 +20,7 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::error::{Error, Result};
+use crate::fs::encoding::Utf8Reader;
 use crate::mesh::ply::batch::PlyBatch;
 use crate::mesh::ply::header::{MAX_HEADER, PlyElement, PlyEncoding, PlyHeader, PlyProperty, PlyType};
 use crate::mesh::ply::source::{BUFFER, Fault, Outcome, Source, column_of, decode, number, parse_f64};
@@ -57,7 +58,7 @@ impl<'r> PlyReader<'r> {
     /// [`Error::Io`]; [`Error::Format`] with the line.
     pub(crate) fn new(file: impl Read + 'r, bytes: u64, path: &Path) -> Result<Self> {
         let io = |e| Error::io(path, "read", e);
-        let mut source = Source::new(file);
+        let mut source = Source::new(Utf8Reader::new(file));
         // A header is nearly always in the first bytes: more are read only where they are missing.
         let mut size = 4096usize;
         let header = loop {
