@@ -286,3 +286,27 @@ fn what_is_no_annotation_says_what_is_read() {
         assert!(message.contains(name), "{message}");
     }
 }
+
+/// laspy reads such files too: what the records say is not needed for the points, or is in those that are
+/// there.
+#[test]
+fn headers_that_miscount_their_records_do_not_hide_the_points() {
+    for name in ["1_2_format_3.las", "1_2_format_2.laz", "1_4_format_7.las", "1_4_format_7.laz"] {
+        let good = std::fs::read(fixture(name)).unwrap();
+        let records = u32::from_le_bytes(*good[100..].first_chunk().unwrap());
+        let extended = [&u64::MAX.to_le_bytes()[..], &3u32.to_le_bytes()].concat();
+        let far = [&good.len().to_le_bytes()[..], &1u32.to_le_bytes()].concat();
+        let more = [records + 1, records + 500, u32::MAX].map(|n| (100, n.to_le_bytes().to_vec()));
+        let is_1_4 = good[25] == 4;
+        let beyond = [(235, extended), (235, far)].into_iter().filter(|_| is_1_4);
+        for (at, bytes) in more.into_iter().chain(beyond) {
+            let mut bad = good.clone();
+            bad[at..at + bytes.len()].copy_from_slice(&bytes);
+            let read = Annotations::from_reader(std::io::Cursor::new(bad), Path::new(name), &options());
+            let found = read.unwrap_or_else(|e| panic!("{e}: {at} {bytes:?}"));
+            assert_eq!(contents(&found, "office_1"), expected(DVec3::ZERO), "{name}");
+            let there = if at == 100 { format!("and {records} are there") } else { "where none are".into() };
+            assert!(found.warnings.len() == 1 && found.warnings[0].contains(&there), "{:?}", found.warnings);
+        }
+    }
+}

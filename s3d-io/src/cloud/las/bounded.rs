@@ -1,4 +1,5 @@
-//! Files for decoders that are not ours and allocate what a damaged file claims.
+//! Files for decoders that are not ours: they allocate what a damaged file claims, and stop at a header that
+//! miscounts what nobody needs.
 //!
 //! laz allocates every layer of a chunk before it reads one: up to 4 GiB each for a file of a few hundred
 //! bytes (`tests/findings.rs` feeds those again that were found).
@@ -45,10 +46,69 @@ impl<R: Seek> Seek for BoundedClaims<R> {
     }
 }
 
+/// A file with other numbers at a few places.
+#[derive(Debug)]
+pub(crate) struct Mended<R> {
+    file: R,
+    at: u64,
+    /// Where, and what stands there instead.
+    mends: Vec<(u64, [u8; 4])>,
+}
+
+impl<R> Mended<R> {
+    /// The file from its first byte, with these numbers at these places.
+    pub(crate) fn new(file: R, mends: &[(u64, u32)]) -> Self {
+        Self { file, at: 0, mends: mends.iter().map(|(at, n)| (*at, n.to_le_bytes())).collect() }
+    }
+}
+
+impl<R: Read> Read for Mended<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
+        let n = self.file.read(buffer)?;
+        let read = buffer.get_mut(..n).unwrap_or_default();
+        for (place, bytes) in &self.mends {
+            for (place, byte) in (*place..).zip(bytes) {
+                let here = place.checked_sub(self.at).and_then(|i| read.get_mut(usize::try_from(i).ok()?));
+                here.into_iter().for_each(|here| *here = *byte);
+            }
+        }
+        self.at = self.at.saturating_add(n as u64);
+        Ok(n)
+    }
+}
+
+impl<R: Seek> Seek for Mended<R> {
+    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
+        self.at = self.file.seek(to)?;
+        Ok(self.at)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::io::Cursor;
+
+    #[test]
+    fn numbers_are_replaced_however_they_are_read() {
+        let bytes: Vec<u8> = (0..20).collect();
+        let expected = [&bytes[..3], &[9, 8, 7, 6], &bytes[7..12], &[5, 0, 0, 0], &bytes[16..]].concat();
+        for at_once in 1..20 {
+            let mut file = Mended::new(Cursor::new(&bytes), &[(3, 0x0607_0809), (12, 5)]);
+            for start in [0, 5] {
+                let (mut all, mut piece) = (Vec::new(), vec![0; at_once]);
+                file.seek(SeekFrom::Start(start)).unwrap();
+                loop {
+                    let n = file.read(&mut piece).unwrap();
+                    all.extend_from_slice(&piece[..n]);
+                    if n == 0 {
+                        break;
+                    }
+                }
+                assert_eq!(all, expected[start as usize..], "{at_once}");
+            }
+        }
+    }
 
     #[test]
     fn claims_beyond_the_bound_are_errors() {

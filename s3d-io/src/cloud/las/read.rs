@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::annotations::AnnotationOptions;
-use crate::cloud::las::bounded::BoundedClaims;
+use crate::cloud::las::bounded::{BoundedClaims, Mended};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::{CLASSES, INSTANCES};
 use crate::cloud::table::records::{Color, Field, Kind, color};
@@ -14,6 +14,7 @@ use crate::guarded::guarded;
 use las::point::Format;
 use s3d_geom::glam::dvec3;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -27,6 +28,13 @@ const MAX_POINTS_PER_BYTE: u64 = 1024;
 const PLAUSIBLE: u32 = 1 << 24;
 /// The bit of a point that was deleted: "withheld".
 const WITHHELD: u8 = 0b100;
+
+/// Where the header counts its records, and where its extended ones.
+const VLRS_AT: u64 = 100;
+const EVLRS_AT: u64 = 243;
+
+/// Numbers of the header that are wrong, and what is right: a place and a number each.
+type Mends = Vec<(u64, u32)>;
 
 /// A `.las` or `.laz` file.
 pub(crate) struct LasCloud<'a> {
@@ -77,8 +85,9 @@ impl<'a> LasCloud<'a> {
         Self { source, options }
     }
 
-    /// Looks at what the header claims before anything believes it.
-    fn preflight(&self) -> Result<()> {
+    /// Looks at what the header claims before anything believes it. Records that are not there are told in
+    /// `notes`: they hold coordinate systems and names of dimensions, and the points can be read without.
+    fn preflight(&self, notes: &mut Vec<String>) -> Result<Mends> {
         let path = self.source.name();
         let (file, size) = self.source.open()?;
         let mut source = BufReader::new(file);
@@ -101,6 +110,17 @@ impl<'a> LasCloud<'a> {
         if offset > size || is_bomb || end.is_none_or(|end| !is_compressed && end > size) {
             return cut(&format!("{points} points of {length} bytes in a file of {size} bytes"));
         }
+        let mut mends = Mends::new();
+        let claimed = number_at(header, 100).map_or(0, u32::from_le_bytes);
+        let start = u64::from(number_at(header, 94).map_or(0, u16::from_le_bytes));
+        let there = records(&mut source, start..offset, claimed).map_err(|e| Error::io(path, "read", e))?;
+        if there < claimed {
+            notes.push(format!(
+                "{}: its header counts {claimed} records before the points, and {there} are there; those are read",
+                path.display()
+            ));
+            mends.push((VLRS_AT, there));
+        }
         // The 1.4 header's extended records, whose lengths are numbers of 64 bits.
         if let Some(header) = header_1_4
             && number_at(header, 243).map_or(0, u32::from_le_bytes) > 0
@@ -109,10 +129,15 @@ impl<'a> LasCloud<'a> {
             let mut record = [0; 60];
             let read = source.seek(SeekFrom::Start(start)).and_then(|_| source.read_exact(&mut record));
             let length = number_at(&record, 20).map_or(0, u64::from_le_bytes);
-            if read.is_err()
-                || start.checked_add(60).and_then(|n| n.checked_add(length)).is_none_or(|n| n > size)
-            {
-                return cut("extended records beyond its end");
+            let is_inside =
+                start.checked_add(60).and_then(|n| n.checked_add(length)).is_some_and(|n| n <= size);
+            let is_behind = is_compressed || end.is_some_and(|end| end <= start);
+            if start > 0 && (read.is_err() || !is_inside || !is_behind) {
+                notes.push(format!(
+                    "{}: its header tells of extended records at byte {start}, where none are; it is read without them",
+                    path.display()
+                ));
+                mends.push((EVLRS_AT, 0));
             }
         }
         if is_compressed {
@@ -133,7 +158,7 @@ impl<'a> LasCloud<'a> {
                 _ => return cut("a table of chunks that is not there"),
             }
         }
-        Ok(())
+        Ok(mends)
     }
 
     /// The dimensions that can hold classes, instances or rooms, by their usual names.
@@ -229,6 +254,25 @@ impl<'a> LasCloud<'a> {
     }
 }
 
+/// How many records lie whole in a range of bytes, one after the other, `claimed` at most.
+fn records(source: &mut BufReader<Bytes>, place: Range<u64>, claimed: u32) -> std::io::Result<u32> {
+    let mut at = place.start;
+    let mut head = [0; 54];
+    for n in 0..claimed {
+        if at.saturating_add(54) > place.end {
+            return Ok(n);
+        }
+        source.seek(SeekFrom::Start(at))?;
+        source.read_exact(&mut head)?;
+        let length = number_at(&head, 20).map_or(0, u16::from_le_bytes);
+        at = at.saturating_add(54).saturating_add(u64::from(length));
+        if at > place.end {
+            return Ok(n);
+        }
+    }
+    Ok(claimed)
+}
+
 /// The bytes of a number `at` bytes into a record.
 fn number_at<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
     bytes.get(at..)?.first_chunk().copied()
@@ -251,8 +295,9 @@ impl Cloud for LasCloud<'_> {
 
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
         let path = self.source.name();
-        self.preflight()?;
+        let mends = self.preflight(&mut reading.notes)?;
         let (file, size) = self.source.open()?;
+        let file = Mended::new(file, &mends);
         let (file, most) = BoundedClaims::new(BufReader::with_capacity(1 << 18, file));
         let damaged = || Error::format(path, "its compressed points are damaged");
         let reader = guarded(|| las::Reader::new(file)).ok_or_else(damaged)?;

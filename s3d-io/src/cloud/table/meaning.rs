@@ -71,11 +71,15 @@ impl Meaning {
         let mut unknown_classes = Unknown::default();
         let mut unknown_rooms = Unknown::default();
         let mut keys: Vec<Option<Key>> = Vec::new();
+        let mut any_known = false;
         for group in groups {
             let room = room_of(options, rooms.get(group.room));
             let tag = classes.get(group.class).expect("groups have classes");
             let class = match class_of(clouds[group.file], options, tag) {
-                Some(known) => known,
+                Some(known) => {
+                    any_known |= known.is_some();
+                    known
+                }
                 None => {
                     unknown_classes.add(tag.key(), group);
                     options.unknown_as_clutter.then_some(Class::Clutter)
@@ -89,8 +93,9 @@ impl Meaning {
             let tag = (group.instance != NO_INSTANCE).then(|| tag.clone());
             keys.push(room.zip(class).map(|(room, class)| (room, class, group.instance, tag)));
         }
-        unknown_classes.tell_classes(clouds, options, warnings)?;
-        unknown_rooms.tell_rooms(clouds, options, warnings)?;
+        unknown_classes.tell_classes(clouds, options, any_known, warnings)?;
+        let any_left = keys.iter().any(Option::is_some);
+        unknown_rooms.tell_rooms(clouds, options, any_left, warnings)?;
         Self::number(clouds, groups, &keys)
     }
 
@@ -178,22 +183,29 @@ impl Unknown {
         &self,
         clouds: &[&dyn Cloud],
         options: &AnnotationOptions,
+        any_known: bool,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
         let Some((path, list, points)) = self.list(clouds) else { return Ok(()) };
         if options.unknown_as_clutter {
             warnings.push(format!("{}: classes taken for clutter: {list}", path.display()));
-        } else if options.on_fault == OnFault::Skip {
+        } else if options.on_fault == OnFault::Skip && any_known {
             let message = format!("{points} points left out, whose class is none: {list}");
             warnings.push(format!("{}: {message}", path.display()));
         } else {
             let first = self.0.keys().next().map_or("", String::as_str);
+            // Without them nothing would be left, so that there is nothing to be lenient about.
+            let column = if any_known {
+                ""
+            } else {
+                ". No point has another: if the classes are in another column, name it, as in class = \"label\""
+            };
             return Err(Error::format(
                 path,
                 format!(
                     "classes that are none of the 13: {list}. Say what they are in [annotations.classes], as in \
                      {first:?} = \"chair\", or \"\" for points without a label; or take all of them for clutter with \
-                     unknown_as_clutter = true"
+                     unknown_as_clutter = true{column}"
                 ),
             ));
         }
@@ -204,6 +216,7 @@ impl Unknown {
         &self,
         clouds: &[&dyn Cloud],
         options: &AnnotationOptions,
+        any_left: bool,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
         let Some((path, list, points)) = self.list(clouds) else { return Ok(()) };
@@ -220,7 +233,7 @@ impl Unknown {
                  they are, as in room = \"office_1\""
             ),
         };
-        if options.on_fault == OnFault::Skip && !self.0.contains_key("") {
+        if options.on_fault == OnFault::Skip && any_left && !self.0.contains_key("") {
             warnings.push(format!("{}: {points} points left out; {message}", path.display()));
             return Ok(());
         }

@@ -56,6 +56,13 @@ pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> R
             None => break (gathered, classes, rooms, warnings),
         }
     };
+    if gathered.points == 0 {
+        // What is wrong with the first record says why there is none.
+        let path = clouds.first().map_or(Path::new(""), |cloud| cloud.path());
+        let of = format!("{}: ", path.display());
+        let why = warnings.first().map_or_else(String::new, |why| format!(": {}", why.replace(&of, "")));
+        return Err(Error::format(path, format!("holds no point that can be used{why}")));
+    }
     let meaning = Meaning::new(clouds, options, &gathered.groups, &classes, &rooms, &mut warnings)?;
     let counts: Vec<u64> = meaning.instances.iter().map(|i| i.points).collect();
     let store = if gathered.group_of.len() as u64 == gathered.points {
@@ -484,6 +491,40 @@ mod tests {
             "{:?}",
             found.warnings
         );
+    }
+
+    #[test]
+    fn nothing_is_left_out_until_nothing_is_left() {
+        let lenient = AnnotationOptions { on_fault: OnFault::Skip, ..options() };
+        let message = |rows: &[TestRow], options: &AnnotationOptions| {
+            read(&[TestCloud::new("a.las", rows)], options).unwrap_err().to_string()
+        };
+        // A column of intensities, say: no number in it is a class.
+        let said = message(&[(77, 1, 0), (78, 1, 0), (78, 1, 0)], &lenient);
+        assert!(said.contains("\"77\" (1 points), \"78\" (2 points)"), "{said}");
+        assert!(said.contains("class = \"label\""), "{said}");
+        let some = read(&[TestCloud::new("a.las", &[(77, 1, 0), (1, 1, 0)])], &lenient).unwrap();
+        assert!(some.warnings[0].contains("1 points left out, whose class is none"), "{:?}", some.warnings);
+        // Numbers of rooms, and nothing says of which type.
+        let said = message(&[(1, 1, 4)], &AnnotationOptions { room: None, ..lenient.clone() });
+        assert!(said.contains("rooms that are none: \"4\""), "{said}");
+        // Not one record is a point.
+        struct Halves;
+        impl Cloud for Halves {
+            fn path(&self) -> &Path {
+                Path::new("a.las")
+            }
+            fn read(&self, _: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
+                let (position, color) = (DVec3::ZERO, [0; 3]);
+                let (class, instance, room) = (Value::Float(0.5), Value::None, Value::None);
+                reading.push(1, &Row { position, color, class, instance, room })?;
+                Ok(true)
+            }
+        }
+        let said = read_flat(&[&Halves], &lenient).unwrap_err().to_string();
+        let expected = "a.las: holds no point that can be used: 1 records left out; record 1: class: 0.5 is no whole number";
+        assert_eq!(said, expected);
+        assert!(message(&[], &lenient).contains("a.las: holds no point that can be used"));
     }
 
     #[test]
