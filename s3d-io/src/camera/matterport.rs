@@ -3,17 +3,15 @@
 //! Source: formats.md, "The scanner's pictures". A folder's files are looked up in it and in the folders
 //! in it, as Matterport3D has colours, poses and intrinsics apart (`matterport_color_images/`…).
 
+use crate::camera::picture::{check_picture, read_picture};
 use crate::camera::table::ScanLocation;
 use crate::error::{Error, Result};
-use crate::fs::open::{open_file, read_file};
-use crate::guarded::guarded;
-use crate::image::texture::{TextureFault, decode_texture};
+use crate::fs::encoding::text_of;
+use crate::fs::open::read_file;
 use glam::{DMat3, DVec2, DVec3};
-use image::ImageReader;
 use s3d_geom::{Lens, Pose, Raster};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// How far a matrix may be from a rotation, and its last row from 0 0 0 1: what eight digits leave, and
@@ -76,38 +74,6 @@ fn check_size(path: &Path, (w, h): (u32, u32), lens: &Lens) -> Result<()> {
             lens.height()
         ),
     ))
-}
-
-/// Reads a PNG or JPEG file of any kind as 8-bit R G B.
-///
-/// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is no such image or is damaged.
-pub fn read_picture(path: &Path) -> Result<Raster<[u8; 3]>> {
-    decode_picture(read_file(path)?, path)
-}
-
-/// As [`read_picture`], from the file's bytes; errors call it `name`.
-///
-/// # Errors
-/// As [`read_picture`].
-pub fn decode_picture(bytes: Vec<u8>, name: &Path) -> Result<Raster<[u8; 3]>> {
-    let texture = decode_texture(bytes).map_err(|fault| match fault {
-        TextureFault::TooLarge(message) => Error::unsupported(name, message),
-        TextureFault::Unreadable(message) => Error::format(name, message),
-    })?;
-    Ok(texture.image)
-}
-
-/// Width and height of a PNG or JPEG file, from its first bytes.
-///
-/// # Errors
-/// As [`read_picture`].
-pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
-    let file = BufReader::new(open_file(path)?);
-    let reader = ImageReader::new(file).with_guessed_format().map_err(|e| Error::io(path, "read", e))?;
-    let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
-    let size = guarded(|| reader.into_dimensions()).ok_or_else(|| failed("its header is damaged"))?;
-    size.map_err(|e| failed(&e.to_string()))
 }
 
 impl PictureFolder {
@@ -208,7 +174,7 @@ impl PictureFolder {
                         *lens.insert(read_intrinsics(path)?)
                     }
                 };
-                check_size(&color, read_picture_size(&color)?, &lens)?;
+                check_size(&color, check_picture(&color)?, &lens)?;
                 captures.push(CaptureFile { camera, yaw, color, lens, pose: read_capture_pose(pose)? });
             }
         }
@@ -233,7 +199,8 @@ fn remember(files: &mut BTreeMap<String, PathBuf>, path: PathBuf) {
 
 /// The numbers of a text file, each with its line.
 fn numbers(bytes: &[u8], path: &Path) -> Result<Vec<(u64, f64)>> {
-    let text = std::str::from_utf8(bytes).map_err(|_| Error::format(path, "is no text"))?;
+    let bytes = text_of(bytes, path)?;
+    let text = std::str::from_utf8(&bytes).map_err(|_| Error::format(path, "is no text"))?;
     let mut numbers = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         for word in text.split_ascii_whitespace() {
@@ -443,7 +410,7 @@ mod tests {
             let message = read_capture_pose(&folder.text("p.txt", text)).unwrap_err().to_string();
             assert!(message.contains(words) && message.contains("p.txt"), "{text}: {message}");
         }
-        fs::write(folder.0.path().join("p.txt"), [0xff, 0xfe]).unwrap();
+        fs::write(folder.0.path().join("p.txt"), [0xff, 0xff]).unwrap();
         assert!(
             read_capture_pose(&folder.0.path().join("p.txt")).unwrap_err().to_string().contains("no text")
         );
@@ -542,7 +509,7 @@ mod tests {
         assert!(folder.open().panorama(UUID).unwrap().ends_with(published));
         folder.picture(&format!("{UUID}.png"), 8, 4);
         assert!(folder.open().panorama(UUID).unwrap().ends_with(format!("{UUID}.png")));
-        assert_eq!(read_picture_size(&folder.open().panorama(UUID).unwrap()).unwrap(), (8, 4));
+        assert_eq!(check_picture(&folder.open().panorama(UUID).unwrap()).unwrap(), (8, 4));
         for k in [0, 1, 3, 4] {
             folder.picture(&format!("{UUID}_skybox{k}_sami.png"), 4, 4);
         }

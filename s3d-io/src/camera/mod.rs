@@ -36,14 +36,16 @@ mod located;
 mod locations;
 mod matterport;
 mod nerfstudio;
+mod picture;
 pub(crate) mod poses;
 mod table;
 
 pub use located::uuid_from_name;
 pub use locations::read_scan_locations;
 pub use matterport::{
-    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, decode_picture, parse_capture_pose, parse_intrinsics,
-    read_capture_pose, read_intrinsics, read_matterport_locations, read_picture, read_picture_size,
+    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, parse_capture_pose, parse_intrinsics, read_capture_pose,
+    read_intrinsics, read_matterport_locations,
 };
+pub use picture::{check_picture, decode_picture, read_picture, read_picture_size};
 pub use poses::PublishedLocation;
 pub use table::{ScanLocation, parse_cameras, read_cameras};

@@ -27,6 +27,8 @@ pub(crate) mod compression;
 #[cfg(feature = "exr")]
 mod exr;
 pub(crate) mod find;
+#[cfg(feature = "texture")]
+mod jpeg;
 #[cfg(feature = "png")]
 pub(crate) mod png;
 pub(crate) mod pretty;

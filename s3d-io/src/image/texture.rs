@@ -5,6 +5,7 @@
 use crate::error::{Error, Result};
 use crate::fs::open::read_file;
 use crate::guarded::guarded;
+use crate::image::jpeg::{missing, without_fill};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 use s3d_geom::Raster;
@@ -59,9 +60,14 @@ impl std::fmt::Display for TextureFault {
 pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTexture, TextureFault> {
     let (format, extension, size) = size_of_texture(&bytes)?;
     // The decoders are not ours: some panic at what is damaged.
-    let image = guarded(|| decode(&bytes, format, size))
+    let is_jpeg = format == ImageFormat::Jpeg;
+    let encoded = if is_jpeg { without_fill(&bytes) } else { &bytes };
+    let image = guarded(|| decode(encoded, format, size))
         .unwrap_or_else(|| Err("its content is damaged".into()))
         .map_err(|e| TextureFault::Unreadable(format!("cannot be decoded: {e}")))?;
+    if let Some(what) = Some(encoded).filter(|_| is_jpeg).and_then(|jpeg| missing(jpeg, &image)) {
+        return Err(TextureFault::Unreadable(what));
+    }
     Ok(LoadedTexture { image, file: TextureFile { extension, bytes } })
 }
 

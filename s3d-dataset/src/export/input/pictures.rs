@@ -8,7 +8,7 @@ use crate::export::modality::Channels;
 use s3d_geom::{Camera, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::camera::{
-    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, ScanLocation, read_picture, read_picture_size,
+    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, ScanLocation, check_picture, read_picture,
 };
 use s3d_io::scene::{PictureKind, PictureSource, SkyBoxCaps, UnseenColor};
 use s3d_render::{
@@ -183,18 +183,18 @@ fn find(folder: &PictureFolder, kind: PictureKind, uuid: &str) -> s3d_io::Result
 }
 
 impl Found {
-    /// Looks at the sizes, without reading whole pictures.
+    /// Looks at sizes and ends, without reading whole pictures.
     fn check(&self) -> Result<()> {
         match self {
             Self::SkyBox(paths) => {
                 let mut sizes = [(0, 0); 6];
                 for (size, path) in sizes.iter_mut().zip(paths) {
-                    *size = read_picture_size(path)?;
+                    *size = check_picture(path)?;
                 }
                 check_sky_box(&paths[0], sizes)
             }
             Self::Panorama(path) => {
-                let (w, h) = read_picture_size(path)?;
+                let (w, h) = check_picture(path)?;
                 if w.abs_diff(h.saturating_mul(2)) > 1 {
                     let message = format!(
                         "has {w} × {h} pixels: an equirectangular photograph is twice as wide as high"
