@@ -6,7 +6,11 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::error::{Error, Result};
+use crate::fs::encoding::into_utf8;
 use crate::fs::open::read_file;
+use crate::mesh::gltf::extensions::{check_required, way_out};
+use crate::mesh::gltf::tolerant::needed;
+use crate::quote::quote;
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -16,38 +20,6 @@ use std::borrow::Cow;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-
-/// Extensions that change nothing that is read, beside all whose names start with `KHR_materials_`: those
-/// change reflections and transparency.
-const HARMLESS: [&str; 5] = [
-    "KHR_texture_transform",
-    "KHR_mesh_quantization",
-    "KHR_lights_punctual",
-    "KHR_xmp_json_ld",
-    "KHR_animation_pointer",
-];
-
-/// What to do about extensions that are not read.
-const WAYS_OUT: [(&str, &str); 6] = [
-    (
-        "KHR_draco_mesh_compression",
-        "export without Draco compression, or run `gltf-transform copy in.glb out.glb`",
-    ),
-    (
-        "EXT_meshopt_compression",
-        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
-    ),
-    (
-        "KHR_meshopt_compression",
-        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
-    ),
-    (
-        "KHR_texture_basisu",
-        "export PNG or JPEG textures instead of KTX2, or run `gltf-transform ktxdecompress in.glb out.glb`",
-    ),
-    ("EXT_texture_webp", "export PNG or JPEG textures, or run `gltf-transform png in.glb out.glb`"),
-    ("EXT_mesh_gpu_instancing", "export instances as nodes of their own"),
-];
 
 /// A glTF file with its buffers in memory.
 #[derive(Debug)]
@@ -74,10 +46,10 @@ impl GltfDocument {
     }
 
     /// Reads a `.gltf` or `.glb` file, told apart by its content, and its buffers, which lie beside `path`.
-    pub(crate) fn read(mut bytes: Vec<u8>, path: &Path) -> Result<Self> {
+    pub(crate) fn read(bytes: Vec<u8>, path: &Path) -> Result<Self> {
+        let mut bytes = into_utf8(bytes);
         let (text, blob) =
             if bytes.starts_with(b"glTF") { split_glb(path, &bytes)? } else { (&bytes[..], None) };
-        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
         let is_text = blob.is_none() && !bytes.starts_with(b"glTF");
         let json_error = |e: serde_json::Error| match is_text {
             true if e.line() > 0 => Error::line(path, e.line() as u64, format!("is no valid glTF 2.0: {e}")),
@@ -86,8 +58,8 @@ impl GltfDocument {
         };
         let head: Head = serde_json::from_slice(text).map_err(json_error)?;
         check_version(path, &head.asset)?;
-        check_extensions(path, &head.required)?;
-        let mut root = json::Root::from_slice(text).map_err(json_error)?;
+        check_required(path, &head.required)?;
+        let mut root = root_of(text).map_err(json_error)?;
         for accessor in &mut root.accessors {
             // No changes are the same as no sparse part, which the gltf crate can read.
             accessor.sparse.take_if(|sparse| sparse.count.0 == 0);
@@ -102,6 +74,11 @@ impl GltfDocument {
         });
         document.buffers = document.load_buffers(blob)?;
         Ok(document)
+    }
+
+    /// The file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// The JSON. Its indices are not checked; [`GltfDocument::get`] does.
@@ -173,7 +150,8 @@ impl GltfDocument {
     fn load_buffers(&self, mut blob: Option<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
         let mut buffers = Vec::new();
         for (i, json) in self.root().buffers.iter().enumerate() {
-            let bytes = match (&json.uri, blob.take_if(|_| i == 0 && json.uri.is_none())) {
+            let may_be_blob = i == 0 && json.uri.is_none() && !is_fallback(json);
+            let bytes = match (&json.uri, blob.take_if(|_| may_be_blob)) {
                 (Some(uri), _) => self.resource(uri).map_err(|why| {
                     let name = if uri.starts_with("data:") { "the data URI" } else { uri };
                     self.fail(format!("buffer {i}: {name} {why}"))
@@ -245,6 +223,23 @@ impl GltfDocument {
     }
 }
 
+/// Whether a buffer only stands for what an extension has compressed.
+fn is_fallback(buffer: &json::Buffer) -> bool {
+    let extensions = buffer.extensions.iter().flat_map(|e| &e.others);
+    extensions.into_iter().any(|(_, extension)| extension.get("fallback") == Some(&true.into()))
+}
+
+/// The JSON, or what is needed of it if the crate's types do not fit all of it.
+fn root_of(text: &[u8]) -> std::result::Result<json::Root, serde_json::Error> {
+    json::Root::from_slice(text).or_else(|first| {
+        let document = serde_json::from_slice(text)?;
+        serde_json::from_value(needed(document)).map_err(|second| {
+            // The same fault, and its place with it.
+            if first.to_string().starts_with(&second.to_string()) { first } else { second }
+        })
+    })
+}
+
 /// The JSON of a `.glb` file, and where its binary chunk is.
 fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Range<usize>>)> {
     let cut = || {
@@ -262,13 +257,10 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Range
     }
     let mut chunks = [const { None }; 2];
     let (_, mut rest) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
-    // Chunks beyond the second belong to extensions.
+    // Chunks beyond the second belong to extensions; what is behind the last chunk may be anything.
     for (chunk, kind) in chunks.iter_mut().zip([*b"JSON", *b"BIN\0"]) {
-        if rest.is_empty() {
-            break;
-        }
-        let (length, after) = rest.split_first_chunk().ok_or_else(cut)?;
-        let (found, after) = after.split_first_chunk().ok_or_else(cut)?;
+        let Some((length, after)) = rest.split_first_chunk() else { break };
+        let Some((found, after)) = after.split_first_chunk() else { break };
         if *found != kind {
             break;
         }
@@ -280,19 +272,39 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Range
     }
     let [json, blob] = chunks;
     let json = json.and_then(|json| bytes.get(json));
+    // Some writers fill the chunk with zeros.
+    let json = json.map(|json| {
+        let zeros = json.iter().rev().take_while(|b| **b == 0).count();
+        json.get(..json.len().saturating_sub(zeros)).unwrap_or(json)
+    });
     Ok((json.ok_or_else(|| Error::format(path, "is a .glb without a JSON chunk"))?, blob))
 }
 
 fn check_version(path: &Path, asset: &serde_json::Value) -> Result<()> {
-    let version = |key: &str| asset.get(key).and_then(serde_json::Value::as_str);
-    match version("version") {
-        Some(v) if v.starts_with("2.") => {}
+    // A text by the format; a number is understood too.
+    let version = |key: &str| match asset.get(key)? {
+        serde_json::Value::String(text) => Some(text.trim().to_owned()),
+        serde_json::Value::Number(number) => Some(number.to_string()),
+        _ => None,
+    };
+    match version("version").as_deref() {
+        None | Some("") => {
+            return Err(Error::format(
+                path,
+                "does not say that it is glTF 2.0: asset.version is missing or empty. If it is, put \"asset\": \
+                 {\"version\": \"2.0\"} into its JSON",
+            ));
+        }
+        Some(v) if v == "2" || v.starts_with("2.") => {}
         Some(v) if v.starts_with("1.") || v.starts_with("0.") => return Err(old_version(path, v)),
-        Some(v) => return Err(Error::unsupported(path, format!("is glTF {v}; 2.0 is read"))),
-        None => return Err(Error::format(path, "is no glTF: asset.version is missing")),
+        Some(v) => {
+            let v = quote(v.as_bytes());
+            return Err(Error::unsupported(path, format!("is glTF of the version {v}; 2.0 is read")));
+        }
     }
-    match version("minVersion") {
-        Some(v) if v != "2.0" => {
+    match version("minVersion").as_deref() {
+        Some(v) if v != "2.0" && v != "2" => {
+            let v = quote(v.as_bytes());
             Err(Error::unsupported(path, format!("needs a reader of glTF {v}; 2.0 is read")))
         }
         _ => Ok(()),
@@ -302,18 +314,6 @@ fn check_version(path: &Path, asset: &serde_json::Value) -> Result<()> {
 fn old_version(path: &Path, version: &str) -> Error {
     let way_out = "convert it, for example by importing it into Blender and exporting glTF 2.0";
     Error::unsupported(path, format!("is glTF {version}, which differs from 2.0 and is not read; {way_out}"))
-}
-
-fn check_extensions(path: &Path, required: &[String]) -> Result<()> {
-    let known = |e: &str| HARMLESS.contains(&e) || e.starts_with("KHR_materials_");
-    let Some(extension) = required.iter().find(|e| !known(e)) else { return Ok(()) };
-    let way_out = way_out(extension);
-    Err(Error::unsupported(path, format!("requires the extension {extension}, which is not read; {way_out}")))
-}
-
-/// What to do about an extension that is not read.
-pub(crate) fn way_out(extension: &str) -> &'static str {
-    WAYS_OUT.iter().find(|(name, _)| *name == extension).map_or("export without it", |(_, way)| *way)
 }
 
 /// `text` with `%20` and the like replaced. What is not an escape stays.
@@ -401,7 +401,7 @@ mod tests {
         assert!(required("XYZ_thing").contains("XYZ_thing, which is not read"));
         assert!(error(r#"{"asset": {"version": "1.0"}, "meshes": {}}"#).contains("is glTF 1.0"));
         assert!(
-            error(r#"{"asset": {"version": "2.1", "minVersion": "2.1"}}"#).contains("reader of glTF 2.1")
+            error(r#"{"asset": {"version": "2.1", "minVersion": "2.1"}}"#).contains("reader of glTF `2.1`")
         );
         assert!(error("{}").contains("asset.version is missing"));
         assert!(error("{\n\"asset\": ]").contains("line 2"));

@@ -3,5 +3,8 @@
 mod accessor;
 mod builder;
 mod document;
+mod extensions;
 mod material;
 pub(crate) mod read;
+mod scene;
+mod tolerant;

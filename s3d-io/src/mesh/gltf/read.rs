@@ -9,29 +9,19 @@ use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
 use crate::mesh::gltf::builder::Builder;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::material::GltfLooks;
-use gltf::json::{Index, Mesh, Node};
+use crate::mesh::gltf::scene::instances;
 use s3d_geom::MeshParts;
-use s3d_geom::glam::{DMat4, DQuat, DVec3, DVec4};
 use std::path::Path;
 
-/// A mesh at its place in the scene.
-#[derive(Debug)]
-pub(crate) struct Instance {
-    pub(crate) mesh: Index<Mesh>,
-    /// Node → the file's world, in the file's axes.
-    pub(crate) world_from_node: DMat4,
-    /// Whether joints would move it.
-    pub(crate) skinned: bool,
-}
-
-/// Reads the default scene of a glTF file; without one its first, and without any all nodes that are no one's
-/// child.
+/// Reads the default scene of a glTF file; without one the first that has nodes, and without any all nodes
+/// that are no one's child.
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
 pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
     let document = GltfDocument::read(bytes, path)?;
-    let instances = instances(&document)?;
+    let mut warnings = Vec::new();
+    let instances = instances(&document, &mut warnings)?;
     let mut used = vec![false; document.root().materials.len()];
     for instance in &instances {
         for (p, primitive) in document.get(instance.mesh, "a node", "mesh")?.primitives.iter().enumerate() {
@@ -41,7 +31,6 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<Mesh
             }
         }
     }
-    let mut warnings = Vec::new();
     let looks = GltfLooks::load(&document, &used, &mut warnings)?;
     let mut builder = Builder::new(&document, &looks, up, &instances)?;
     for instance in &instances {
@@ -50,69 +39,14 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<Mesh
     let parts = builder.finish(&mut warnings);
     if parts.faces.is_empty() {
         let what = if instances.is_empty() { "mesh" } else { "triangle" };
-        return Err(document.fail(format!("has no {what} in its scene")));
+        let why = if warnings.is_empty() { String::new() } else { format!(": {}", warnings.join("; ")) };
+        return Err(document.fail(format!("has no {what} in its scene{why}")));
     }
     let parts = MeshParts { materials: looks.materials, textures: looks.textures, ..parts };
     let mesh =
         checked_mesh(parts, &mut warnings).map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
     let companions = document.companions();
     Ok(MeshFile { texture_files: looks.files, warnings, companions, ..MeshFile::new(path, mesh) })
-}
-
-/// All meshes of the scene with their places, in the order of its nodes, parents first.
-fn instances(document: &GltfDocument) -> Result<Vec<Instance>> {
-    let root = document.root();
-    let first = (!root.scenes.is_empty()).then(|| Index::new(0));
-    let roots: Vec<Index<Node>> = match root.scene.or(first) {
-        Some(scene) => document.get(scene, "the file", "scene")?.nodes.clone(),
-        None => {
-            let mut is_child = vec![false; root.nodes.len()];
-            for child in root.nodes.iter().flat_map(|n| n.children.iter().flatten()) {
-                if let Some(flag) = is_child.get_mut(child.value()) {
-                    *flag = true;
-                }
-            }
-            (0..).zip(is_child).filter(|(_, is_child)| !is_child).map(|(n, _)| Index::new(n)).collect()
-        }
-    };
-    let mut instances = Vec::new();
-    // A tree holds each node once; one that comes twice would make a circle, or instances without end.
-    let mut visited = vec![false; root.nodes.len()];
-    let mut stack: Vec<(Index<Node>, DMat4)> =
-        roots.into_iter().rev().map(|n| (n, DMat4::IDENTITY)).collect();
-    while let Some((index, world_from_parent)) = stack.pop() {
-        let node = document.get(index, "the scene", "node")?;
-        if visited.get_mut(index.value()).is_none_or(|visited| std::mem::replace(visited, true)) {
-            return Err(document.fail(format!("node {index} is in the scene twice; nodes must form a tree")));
-        }
-        let world_from_node = world_from_parent
-            * parent_from_node(node).ok_or_else(|| {
-                document.fail(format!("node {index} has a transform that is not finite or turns by no angle"))
-            })?;
-        if let Some(mesh) = node.mesh {
-            instances.push(Instance { mesh, world_from_node, skinned: node.skin.is_some() });
-        }
-        stack.extend(node.children.iter().flatten().rev().map(|&child| (child, world_from_node)));
-    }
-    Ok(instances)
-}
-
-fn parent_from_node(node: &Node) -> Option<DMat4> {
-    let vector =
-        |v: Option<[f32; 3]>, default: DVec3| v.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
-    let matrix = match node.matrix {
-        Some(matrix) => DMat4::from_cols_array(&matrix.map(f64::from)),
-        None => {
-            let rotation = node.rotation.unwrap_or_default().0;
-            DMat4::from_scale_rotation_translation(
-                vector(node.scale, DVec3::ONE),
-                // Files round their unit quaternions to f32.
-                DQuat::from_vec4(DVec4::from_array(rotation.map(f64::from)).try_normalize()?),
-                vector(node.translation, DVec3::ZERO),
-            )
-        }
-    };
-    matrix.is_finite().then_some(matrix)
 }
 
 #[cfg(test)]
@@ -406,7 +340,7 @@ mod tests {
             (r#""nodes": [{"children": [7]}]"#, "the scene points to node 7"),
             (r#""nodes": [{"mesh": 7}]"#, "a node points to mesh 7"),
             (r#""nodes": [{"rotation": [0, 0, 0, 0]}]"#, "node 0 has a transform"),
-            (r#""nodes": [{"scale": [1e39, 1, 1]}]"#, "number out of range"),
+            (r#""nodes": [{"scale": [1e39, 1, 1]}]"#, "node 0 has a transform"),
         ] {
             let message = f.error(rest);
             assert!(message.contains(words), "{words}: {message}");

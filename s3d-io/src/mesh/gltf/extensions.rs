@@ -1,0 +1,128 @@
+//! Extensions of glTF: which are read, which change nothing that is, and which a file is refused for.
+//!
+//! A file may be read without an extension that it does not require. That is no use where the extension has
+//! the geometry: such an object is refused by the extension's name, whatever the file requires of readers.
+
+use crate::error::{Error, Result};
+use crate::mesh::gltf::document::GltfDocument;
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// Extensions that are read or change nothing that is, beside the families of [`is_harmless`].
+const HARMLESS: [&str; 24] = [
+    // Read.
+    "EXT_mesh_gpu_instancing",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_transform",
+    "MSFT_lod",
+    // What is not drawn, or not now: animation, physics, light, sound, the mouse.
+    "AGI_articulations",
+    "AGI_stk_metadata",
+    "EXT_lights_ies",
+    "EXT_lights_image_based",
+    "KHR_animation_pointer",
+    "KHR_implicit_shapes",
+    "KHR_interactivity",
+    "KHR_lights_punctual",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    // What describes the geometry that is there.
+    "CESIUM_primitive_outline",
+    "EXT_instance_features",
+    "EXT_mesh_features",
+    "EXT_mesh_manifold",
+    "EXT_mesh_primitive_edge_visibility",
+    "EXT_structural_metadata",
+    "FB_geometry_metadata",
+    "FB_ngon_encoding",
+    "GODOT_single_root",
+];
+
+/// Families that change reflections and transparency, describe the file, or are of physics and avatars.
+const HARMLESS_FAMILIES: [&str; 6] =
+    ["KHR_materials_", "KHR_xmp", "KHR_audio_", "KHR_physics_", "OMI_physics_", "VRM"];
+
+/// Extensions that hold the geometry beside a form without them, which is read where it is there.
+const COMPRESSIONS: [&str; 3] =
+    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+/// Extensions that add, replace or move geometry, so that an object with one is not what it seems without.
+const GEOMETRY: [&str; 6] = [
+    "CESIUM_RTC",
+    "EXT_mesh_primitive_restart",
+    "EXT_primitive_voxels",
+    "MPEG_accessor_timed",
+    "MPEG_mesh_linking",
+    "NEEDLE_progressive",
+];
+
+/// What to do about extensions that are not read.
+const WAYS_OUT: [(&str, &str); 9] = [
+    (
+        "KHR_draco_mesh_compression",
+        "export without Draco compression, or run `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "EXT_meshopt_compression",
+        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "KHR_meshopt_compression",
+        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
+    ),
+    (
+        "KHR_texture_basisu",
+        "export PNG or JPEG textures instead of KTX2, or run `gltf-transform ktxdecompress in.glb out.glb`",
+    ),
+    ("EXT_texture_webp", "export PNG or JPEG textures, or run `gltf-transform png in.glb out.glb`"),
+    ("EXT_texture_avif", "export PNG or JPEG textures, or run `gltf-transform png in.glb out.glb`"),
+    ("CESIUM_RTC", "add its centre to the translation of the outermost nodes"),
+    ("EXT_mesh_primitive_restart", "export lists of triangles, not strips"),
+    ("NEEDLE_progressive", "export the full mesh: the file holds a coarse one"),
+];
+
+/// Whether what is read stays as it is without the extension.
+fn is_harmless(extension: &str) -> bool {
+    HARMLESS.contains(&extension) || HARMLESS_FAMILIES.iter().any(|family| extension.starts_with(family))
+}
+
+/// Stops at an extension without which, as the file says, it cannot be read.
+pub(crate) fn check_required(path: &Path, required: &[String]) -> Result<()> {
+    let Some(extension) = required.iter().find(|e| !is_harmless(e)) else { return Ok(()) };
+    let way_out = way_out(extension);
+    Err(Error::unsupported(path, format!("requires the extension {extension}, which is not read; {way_out}")))
+}
+
+/// What to do about an extension that is not read.
+pub(crate) fn way_out(extension: &str) -> &'static str {
+    WAYS_OUT.iter().find(|(name, _)| *name == extension).map_or("export without it", |(_, way)| *way)
+}
+
+impl GltfDocument {
+    /// Stops at an object whose geometry is another with its extensions. `who` is for the message: "node 3".
+    /// Extensions that nothing is known of are added to `unknown`.
+    pub(crate) fn check_extensions(
+        &self,
+        extensions: Option<&Map<String, Value>>,
+        who: &str,
+        unknown: &mut Vec<String>,
+    ) -> Result<()> {
+        for extension in extensions.into_iter().flat_map(Map::keys) {
+            if GEOMETRY.contains(&extension.as_str()) {
+                let way_out = way_out(extension);
+                return Err(Error::unsupported(
+                    self.path(),
+                    format!(
+                        "{who} has the extension {extension}, which changes its geometry and is not read; {way_out}"
+                    ),
+                ));
+            }
+            let is_known = is_harmless(extension) || COMPRESSIONS.contains(&extension.as_str());
+            if !is_known && !unknown.contains(extension) {
+                unknown.push(extension.clone());
+            }
+        }
+        Ok(())
+    }
+}
