@@ -202,7 +202,7 @@ mod tests {
             read.into_iter().map(|picture| picture.name).collect()
         };
         let picture = |name: &str| format!("1 1 0 0 0 0 0 0 1 {name}\n");
-        let [a, b, c] = ["a.jpg", "7", "c d.png"].map(|name| picture(name));
+        let [a, b, c] = ["a.jpg", "7", "c d.png"].map(picture);
         assert_eq!(names(&format!("# no points\n{a}{b}{c}")), ["a.jpg", "7", "c d.png"]);
         // With and without, and with what people write between.
         assert_eq!(names(&format!("{a}\n{b}1 2 -1 3.5 4e1 7\n{c}")), ["a.jpg", "7", "c d.png"]);
