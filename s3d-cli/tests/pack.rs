@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{files, s3d_fails, s3d_ok, text, write_scan};
+use common::{files, list_files, s3d_fails, s3d_ok, text, write_scan};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -271,18 +271,22 @@ fn a_damaged_data_set_is_told_by_the_file() {
     }
     fs::copy(dataset().join(&of_depth), out.join(&of_depth)).unwrap();
 
+    // What follows is what a tool may make that knows of files.csv.
     fs::write(out.join(&of_semantic), "no image").unwrap();
+    list_files(&out);
     fails("coco", &[&of_semantic, "PNG"]);
     fails("parquet", &[&of_semantic, "PNG"]);
     // A label that is in no table.
     let labels = out.join("assets/semantic_labels.json");
     fs::copy(dataset().join(&of_semantic), out.join(&of_semantic)).unwrap();
     fs::write(&labels, "[\"<UNK>_0_<UNK>_0_0\"]").unwrap();
+    list_files(&out);
     fails("coco", &["_domain_semantic.png", "has label", "semantic_labels.json"]);
     fails("parquet", &["_domain_semantic.png", "has label", "semantic_labels.json"]);
     fs::copy(dataset().join("assets/semantic_labels.json"), &labels).unwrap();
 
     fs::write(out.join(&of_pose), "{\n}").unwrap();
+    list_files(&out);
     for kind in ["colmap", "nerfstudio", "parquet"] {
         fails(kind, &[&of_pose, "missing field"]);
     }
@@ -290,6 +294,7 @@ fn a_damaged_data_set_is_told_by_the_file() {
     let cloud = out.join("area_2/3d/pointcloud.ply");
     let bytes = fs::read(&cloud).unwrap();
     fs::write(&cloud, &bytes[..bytes.len() - 1]).unwrap();
+    list_files(&out);
     fails("colmap", &["area_2/3d/pointcloud.ply", "ends too early"]);
     fs::remove_file(&cloud).unwrap();
     fails("nerfstudio", &["area_2/3d/pointcloud.ply", "cannot read"]);
@@ -299,20 +304,25 @@ fn a_damaged_data_set_is_told_by_the_file() {
 fn units_of_depth_are_those_of_the_manifest() {
     let dir = tempfile::tempdir().unwrap();
     let out = damaged(dir.path(), |_| {});
-    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
     let place = dir.path().join("package");
-    let write = |units: &str| {
-        let mut json: serde_json::Value = serde_json::from_str(&manifest).unwrap();
-        json["options"]["depth_units"] = units.into();
-        fs::write(out.join("manifest.json"), json.to_string()).unwrap();
+    let write = |units: &str, per_m: f64| {
+        for (name, place, value) in [
+            ("manifest.json", "/options/depth_units", units.into()),
+            ("conventions.json", "/depth/units_per_m", per_m.into()),
+        ] {
+            let mut json = json(&fs::read(out.join(name)).unwrap());
+            *json.pointer_mut(place).unwrap() = value;
+            fs::write(out.join(name), json.to_string()).unwrap();
+        }
+        list_files(&out);
     };
     let args =
         ["pack", text(&out), "--to", "nerfstudio", "--depth", "original", "--overwrite", "-o", text(&place)];
-    write("512");
+    write("512", 512.0);
     assert!(s3d_ok(&args).contains("--depth-unit-scale-factor 0.001953125;"));
-    write("mm");
+    write("mm", 1000.0);
     assert!(s3d_ok(&args).contains("--depth-unit-scale-factor 0.001;"));
-    write("ell");
+    write("ell", 1000.0);
     s3d_fails(&args, 1, &["manifest.json", "\"ell\""]);
 }
 

@@ -2,12 +2,11 @@
 
 mod common;
 
-use common::{UUID_A, s3d, s3d_ok, text, write_scan};
+use common::{UUID_A, list_files, s3d, s3d_ok, text, write_scan};
 use glam::DMat3;
 use s3d_geom::{Camera, Pose, Raster};
 use s3d_io::dataset::{
-    DatasetImage, Domain, FileRecord, Frame, Layout, PoseFile, dataset_images, read_labels, read_pose,
-    write_file_list, write_labels,
+    DatasetImage, Domain, Frame, Layout, PoseFile, dataset_images, read_labels, read_pose, write_labels,
 };
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::{Compression, Content, encode_rgb8, read_gray16, read_rgb8, write_gray16, write_rgb8};
@@ -77,24 +76,6 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
     }
     found.sort();
     found
-}
-
-/// Brings the list of files, and what the manifest tells of it, up to date: the tool that made a fault knew
-/// of both.
-fn list_files(out: &Path) {
-    let layout = Layout::new(out);
-    let ours =
-        |p: &PathBuf| !p.starts_with(out.join("scan")) && *p != layout.manifest() && *p != layout.file_list();
-    let records: Vec<FileRecord> =
-        walk(out).iter().filter(|p| ours(p)).map(|p| FileRecord::of_file(out, p).unwrap()).collect();
-    let (_, sum) = write_file_list(&layout.file_list(), &records).unwrap();
-    let bytes: u64 = records.iter().map(|r| r.bytes).sum();
-    let mut manifest: serde_json::Value =
-        serde_json::from_slice(&fs::read(layout.manifest()).unwrap()).unwrap();
-    manifest["files"] = serde_json::json!({
-        "list": "files.csv", "count": records.len(), "bytes": bytes, "xxh3_128": sum.to_string()
-    });
-    write_bytes(&layout.manifest(), manifest.to_string().as_bytes()).unwrap();
 }
 
 /// The first file below `folder` whose name ends so.
@@ -241,7 +222,7 @@ fn missing_extra_and_swapped_files_are_found() {
     tells(&report, "area_1/data/rgb/Thumbs.db", &["files.csv does not name it"]);
     tells(&report, "area_1/3d/rgb_textures/more.png", &["files.csv does not name it"]);
     for (file, other) in [(&a, panoramas(&out)[1].stem()), (&b, panoramas(&out)[0].stem())] {
-        tells(&report, file, &["and files.csv tells of"]);
+        tells(&report, file, &["is damaged"]);
         tells(&report, file, &["colours of the labels in the semantic image"]);
         tells(&report, file, &["are not what the mesh shows", &other, "swapped"]);
     }
@@ -364,7 +345,7 @@ fn what_tools_get_wrong_is_called_by_its_name() {
         is(turned, Domain::Pose, &["all images of it differ", "rotation transposed"]);
         is(swapped, Domain::Normal, &["red and blue are swapped"]);
         is(swapped, Domain::Pose, &["camera_k_matrix is transposed"]);
-        assert!(report.contains("note: no files.csv") != listed, "{report}");
+        assert!(report.contains("  manifest.json: tells of no files.csv") != listed, "{report}");
     }
 }
 

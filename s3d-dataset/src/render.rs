@@ -4,6 +4,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::store::refuse_existing;
+use crate::store::staging::Staging;
 use s3d_geom::{Camera, Projection};
 use s3d_io::dataset::Conventions;
 use s3d_io::fs::{create_dir, write_bytes, write_json};
@@ -72,7 +73,13 @@ pub fn render(
         (Image::GlobalXyz, "global_xyz.exr"),
     ];
     let names = images.iter().map(|(_, name)| *name).chain(["faces.png", "camera.json"]);
-    names.into_iter().try_for_each(|name| refuse_existing(&output.join(name), options.overwrite))?;
+    let refuse =
+        |overwrite| names.clone().try_for_each(|name| refuse_existing(&output.join(name), overwrite));
+    // For what is made of several files, all of them or none.
+    let whole = Path::new("render");
+    if !Staging::is_left(output, whole) {
+        refuse(options.overwrite)?;
+    }
 
     let file = s3d_io::mesh::read_mesh(mesh, options.up)?;
     file.warnings.iter().for_each(|w| ctx.warn(w));
@@ -99,13 +106,16 @@ pub fn render(
         conventions: Conventions::default(),
     };
     create_dir(output)?;
+    let staging = Staging::begin(ctx, output, whole)?;
+    refuse(options.overwrite || staging.was_placing())?;
+    let folder = staging.path();
     let kinds = images.map(|(image, _)| image);
     channels.encode(&kinds, &hits, camera, &mut ImageBuffers::default(), |image, file| {
         let name = images.iter().find(|(other, _)| *other == image).map_or("image", |(_, name)| name);
-        write_bytes(&output.join(name), &file).map(drop)
+        write_bytes(&folder.join(name), &file).map(drop)
     })?;
     if file.mesh.faces().len() < FACES_IN_COLORS {
-        write_bytes(&output.join("faces.png"), &face_image(&hits, options.compression))?;
+        write_bytes(&folder.join("faces.png"), &face_image(&hits, options.compression))?;
     } else {
         ctx.warn(format_args!(
             "no faces.png: {} faces are more than 24 bits can tell apart",
@@ -122,7 +132,8 @@ pub fn render(
         camera_rt_matrix: camera.pose.rt_matrix(),
         field_of_view_rads: camera.fov_rad(),
     };
-    write_json(&output.join("camera.json"), &view)?;
+    write_json(&folder.join("camera.json"), &view)?;
+    staging.place_files(output)?;
     ctx.info(format_args!(
         "{}: {} × {} pixels, {:.1} % of them see the mesh ({:.2} s to cast)",
         output.display(),

@@ -2,7 +2,8 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::store::refuse_existing;
+use crate::store::staging::Staging;
+use crate::store::{parent_of, refuse_existing};
 use crate::useful::{PLY_POINT_BYTES, check_points, judge, space_findings};
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use s3d_io::cloud::PlyPointWriter;
@@ -39,7 +40,10 @@ impl Default for SampleOptions {
 /// [`Error::Usage`](crate::Error::Usage) if the file is there and not to be replaced, or the points are too
 /// many; [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
-    refuse_existing(output, options.overwrite)?;
+    let (parent, name) = (parent_of(output), Path::new(output.file_name().unwrap_or_default()));
+    if !Staging::is_left(&parent, name) {
+        refuse_existing(output, options.overwrite)?;
+    }
     let file = s3d_io::mesh::read_mesh(mesh, options.up)?;
     ctx.warn_each(&file.warnings);
     let points = match options.density {
@@ -47,10 +51,13 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
         Density::Total(points) => points as f64,
     };
     check_points(points)?;
+    // What a killed process left takes no space after this.
+    let staging = Staging::begin(ctx, &parent, name)?;
+    refuse_existing(output, options.overwrite || staging.was_placing())?;
     judge(ctx, &space_findings(points * PLY_POINT_BYTES, output), &[])?;
     let started = Instant::now();
     let sampler = SurfaceSampler::new(&file.mesh, options.density, options.seed);
-    let mut ply = PlyPointWriter::create(output, sampler.len())?;
+    let mut ply = PlyPointWriter::create(&staging.path().join(name), sampler.len())?;
     let progress = ctx.progress("sampling", "points", sampler.len());
     let mut cloud = PointCloud::default();
     let mut at = 0;
@@ -63,6 +70,7 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
         at = end;
     }
     ply.finish()?;
+    staging.place_files(&parent)?;
     drop(progress);
     ctx.info(format_args!(
         "{}: {} points on {:.1} m² in {:.1} s",

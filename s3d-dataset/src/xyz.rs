@@ -3,20 +3,19 @@
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::work::for_each_in_order;
+use crate::store::change::Change;
 use crate::store::lock::Lock;
+use crate::tables::dataset::{Dataset, Listed};
 use crate::tables::listing;
-use crate::tables::manifest::{Head, Manifest};
+use crate::tables::manifest::Manifest;
 use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{
-    Conventions, DepthUnits, Domain, FileRecord, Frame, ImageName, Layout, XyzType, read_conventions,
-    read_pose,
-};
+use s3d_io::dataset::{DepthUnits, Domain, FileRecord, Frame, Layout, XyzType, read_pose};
 use s3d_io::fs::{create_dir, write_bytes};
-use s3d_io::image::{Compression, encode_xyz_float, encode_xyz_half, read_gray16};
-use std::fs;
-use std::path::PathBuf;
+use s3d_io::image::{Compression, decode_gray16, encode_xyz_float, encode_xyz_half};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// How world coordinates are made again.
@@ -41,15 +40,29 @@ impl Default for XyzOptions {
 ///
 /// # Errors
 /// [`Error::Usage`] if coordinates are there and not to be replaced; [`Error::File`] if there is no data set,
-/// or no image with both depth and pose; [`Error::Cancelled`]; [`Error::Temporary`].
+/// or no image with both depth and pose, or one of these is damaged; [`Error::Cancelled`];
+/// [`Error::Temporary`]. The data set stays as it was then; so it does when the process is killed, or the same
+/// call completes what it had begun.
 pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Result<usize> {
     if options.xyz == XyzType::None {
         return Err(Error::Usage("world coordinates are made as half or float".to_owned()));
     }
     let layout = &Layout::new(root.into());
-    Head::require(layout)?;
+    Manifest::require(layout)?;
+    let call = format!("s3d xyz --type {} --compression {}", options.xyz, options.compression);
     // Nobody may replace the data set meanwhile.
-    Lock::during(ctx, layout, || make(ctx, layout, options))
+    Lock::during(ctx, layout, |completed| {
+        let data = Dataset::open(layout)?;
+        let works = works(&data);
+        if completed.as_ref() == Some(&call) {
+            ctx.info(format_args!(
+                "{}: what a killed process had begun is complete",
+                layout.root().display()
+            ));
+            return Ok(works.len());
+        }
+        make(ctx, &data, &works, options, &call)
+    })
 }
 
 /// The files of one image.
@@ -60,92 +73,83 @@ struct Work {
     frame: Frame,
 }
 
-fn make(ctx: &Context, layout: &Layout, args: &XyzOptions) -> Result<usize> {
-    let head = Head::require(layout)?;
-    let mut manifest = Manifest::read(layout)?;
-    let conventions = read_conventions(&layout.conventions())?;
-    let mut work = Vec::new();
-    for area in &head.area_numbers {
-        for kind in [Frame::Panorama, Frame::View(0)] {
-            work.extend(images(layout, *area, kind)?);
+/// The images that have depth and pose, by area.
+fn works(data: &Dataset) -> Vec<Work> {
+    let mut works = Vec::new();
+    for area in &data.manifest.area_numbers {
+        for image in data.files.images(&data.layout, *area) {
+            if image.has(Domain::Pose) && image.has(Domain::Depth) {
+                let path = |domain| image.path(&data.layout, domain);
+                let [pose, depth, xyz] = [Domain::Pose, Domain::Depth, Domain::GlobalXyz].map(path);
+                works.push(Work { pose, depth, xyz, frame: image.frame });
+            }
         }
     }
-    if work.is_empty() {
+    works
+}
+
+fn make(ctx: &Context, data: &Dataset, works: &[Work], args: &XyzOptions, call: &str) -> Result<usize> {
+    let layout = &data.layout;
+    if works.is_empty() {
         return Err(FileError::format(layout.root(), "no image with both depth and pose: export them").into());
     }
-    if let Some(there) = work.iter().find(|w| w.xyz.exists() && !args.overwrite) {
+    if let Some(there) = works.iter().find(|w| w.xyz.exists() && !args.overwrite) {
         return Err(Error::Usage(format!(
             "{} is there already, and what export writes is more exact: replace it with --overwrite",
             there.xyz.display()
         )));
     }
-    for area in &head.area_numbers {
+    let needed: BTreeSet<&Path> = works.iter().flat_map(|w| [&*w.pose, &*w.depth]).collect();
+    data.files.require(ctx, |path| needed.contains(path))?;
+    let change = Change::begin(layout)?;
+    let staged = change.staged();
+    for area in &data.manifest.area_numbers {
         for kind in [Frame::Panorama, Frame::View(0)] {
-            create_dir(&layout.image_dir(*area, kind, Domain::GlobalXyz))?;
+            create_dir(&staged.image_dir(*area, kind, Domain::GlobalXyz))?;
         }
     }
-    let progress = ctx.progress("coordinates", "images", work.len() as u64);
-    let changed = Mutex::new(Vec::with_capacity(work.len() + 1));
-    let made = for_each_in_order(
+    let conventions = data.manifest.conventions();
+    let progress = ctx.progress("coordinates", "images", works.len() as u64);
+    let changed = Mutex::new(Vec::with_capacity(works.len() + 1));
+    for_each_in_order(
         ctx,
-        &work,
+        works,
         || (),
         |(), work| {
-            let file = make_one(work, conventions.depth_units, args.xyz, args.compression)?;
-            write_bytes(&work.xyz, &file)?;
+            let file = make_one(&data.files, work, conventions.depth_units, args.xyz, args.compression)?;
             let record = FileRecord::of_bytes(layout.root(), &work.xyz, &file)?;
+            write_bytes(&record.path_in(staged.root()), &file)?;
             changed.lock().unwrap_or_else(PoisonError::into_inner).push(record);
             progress.add(1);
             Ok(())
         },
-    );
+    )?;
     drop(progress);
     let mut changed = changed.into_inner().unwrap_or_else(PoisonError::into_inner);
-    if let Err(e) = made {
-        // Files that are in no list would stand in the way of the same call.
-        if !args.overwrite {
-            changed.iter().for_each(|record| drop(fs::remove_file(record.path_in(layout.root()))));
-        }
-        return Err(e);
-    }
-    Conventions { xyz: args.xyz, ..conventions }.write(&layout.conventions())?;
-    changed.push(FileRecord::of_file(layout.root(), &layout.conventions())?);
+    let mut manifest = Manifest::read(layout)?;
     manifest.xyz_from_depth(args.xyz, conventions.depth_units);
-    listing::update(layout, &mut manifest, changed, |_| false)?;
+    manifest.conventions().write(&staged.conventions())?;
+    changed.push(FileRecord::of_file(staged.root(), &staged.conventions())?);
+    listing::write_changed(data, &mut manifest, changed, |_| false, staged)?;
+    change.commit(call, &[])?;
     ctx.info(format_args!(
         "{}: world coordinates of {} images from depth and pose",
         layout.root().display(),
-        work.len()
+        works.len()
     ));
-    Ok(work.len())
-}
-
-/// The images of an area that have depth and pose, by name.
-fn images(layout: &Layout, area: u32, kind: Frame) -> Result<Vec<Work>> {
-    let dir = layout.image_dir(area, kind, Domain::Depth);
-    let entries = match fs::read_dir(&dir) {
-        Ok(entries) => entries,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(e) => return Err(FileError::io(&dir, "read", e).into()),
-    };
-    let mut names = Vec::new();
-    for entry in entries {
-        let entry = entry.map_err(|e| FileError::io(&dir, "read", e))?;
-        names.extend(entry.file_name().to_str().and_then(ImageName::parse));
-    }
-    names.sort();
-    let works = names.into_iter().map(|name| {
-        let path = |domain| layout.image_path(area, &name.uuid, &name.room, name.frame, domain);
-        let [pose, depth, xyz] = [Domain::Pose, Domain::Depth, Domain::GlobalXyz].map(path);
-        Work { pose, depth, xyz, frame: name.frame }
-    });
-    Ok(works.filter(|w| w.pose.exists()).collect())
+    Ok(works.len())
 }
 
 /// The file of an image's world coordinates.
-fn make_one(work: &Work, units: DepthUnits, kind: XyzType, compression: Compression) -> Result<Vec<u8>> {
-    let pose = read_pose(&work.pose)?;
-    let depth = read_gray16(&work.depth)?;
+fn make_one(
+    files: &Listed,
+    work: &Work,
+    units: DepthUnits,
+    kind: XyzType,
+    compression: Compression,
+) -> Result<Vec<u8>> {
+    let pose = read_pose(files.checked(&work.pose)?)?;
+    let depth = decode_gray16(&files.read_bytes(&work.depth)?, &work.depth)?;
     let camera = if work.frame == Frame::Panorama {
         if depth.width() != 2 * depth.height() {
             let size =

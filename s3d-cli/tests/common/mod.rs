@@ -3,6 +3,8 @@
 
 pub(crate) mod scan;
 
+use s3d_io::dataset::{FileRecord, Layout, write_file_list};
+use s3d_io::fs::write_bytes;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
@@ -125,6 +127,27 @@ pub(crate) fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         }
     }
     all
+}
+
+/// Brings the list of files, and what the manifest tells of it, up to date: the tool that made a fault knew
+/// of both.
+pub(crate) fn list_files(out: &Path) {
+    let layout = Layout::new(out);
+    let ours = |path: &PathBuf| {
+        let at = out.join(path);
+        !path.starts_with("scan") && at != layout.manifest() && at != layout.file_list()
+    };
+    let paths = files(out).into_keys().filter(ours);
+    let records: Vec<FileRecord> =
+        paths.map(|path| FileRecord::of_file(out, &out.join(path)).unwrap()).collect();
+    let (_, sum) = write_file_list(&layout.file_list(), &records).unwrap();
+    let bytes: u64 = records.iter().map(|r| r.bytes).sum();
+    let mut manifest: serde_json::Value =
+        serde_json::from_slice(&fs::read(layout.manifest()).unwrap()).unwrap();
+    manifest["files"] = serde_json::json!({
+        "list": "files.csv", "count": records.len(), "bytes": bytes, "xxh3_128": sum.to_string()
+    });
+    write_bytes(&layout.manifest(), manifest.to_string().as_bytes()).unwrap();
 }
 
 /// The real scan beside the checkout, if it is there.

@@ -7,13 +7,14 @@ use crate::export::views::select_requested;
 use crate::profile::{self};
 use crate::store::journal::{Finished, Unit};
 use crate::store::request::Request;
+use crate::tables::dataset::Listed;
 use crate::tables::listing;
 use crate::tables::manifest::{AreaEntry, Manifest};
 use crate::tables::records;
 use crate::tables::statistics::Statistics;
 use crate::tables::summary::{UnitTally, ViewTally};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Frame, Layout};
+use s3d_io::dataset::{FileRecord, Frame, Layout};
 use s3d_io::fs::{SyncAhead, create_dir, sync_data_set, sync_file};
 use s3d_sample::folds;
 use std::fs;
@@ -105,8 +106,8 @@ pub(crate) fn finish(
     let folds = folds(&areas);
     records::write_splits(layout, &folds)?;
     records::write_lists(ctx, layout, &areas, &folds)?;
-    write_profiles(ctx, layout, request, &areas)?;
-    Statistics::count(layout, &areas)?.write(layout)?;
+    write_profiles(ctx, layout, request, &areas, &files)?;
+    Statistics::count(layout, &areas, |_, _| Ok(()))?.write(layout)?;
 
     ctx.check()?;
     let tables = listing::records(ctx, layout, &table_files(layout, &areas)?)?;
@@ -124,8 +125,14 @@ pub(crate) fn finish(
 }
 
 /// Writes the profiles that are asked for, anew: some of their files are second names of files of the tree,
-/// which must not be written to.
-fn write_profiles(ctx: &Context, layout: &Layout, request: &Request, areas: &[u32]) -> Result<()> {
+/// which must not be written to. `files` are those of the tree, and others.
+fn write_profiles(
+    ctx: &Context,
+    layout: &Layout,
+    request: &Request,
+    areas: &[u32],
+    files: &[FileRecord],
+) -> Result<()> {
     let wanted = &request.options.profiles;
     for profile in wanted {
         let dir = layout.profile_dir(profile.name());
@@ -136,7 +143,11 @@ fn write_profiles(ctx: &Context, layout: &Layout, request: &Request, areas: &[u3
             _ => {}
         }
     }
-    profile::write(ctx, layout, areas, wanted)
+    if wanted.is_empty() {
+        return Ok(());
+    }
+    let files = Listed::of(layout.root(), files.iter().cloned());
+    profile::write(ctx, layout, &files, layout, areas, wanted)
 }
 
 /// The files of a data set that no unit wrote.

@@ -3,8 +3,8 @@
 use crate::error::Result;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::FileRecord;
-use s3d_io::fs::{AtomicFile, create_dir};
-use std::fs::{self, File};
+use s3d_io::fs::{AtomicFile, create_dir, open_file};
+use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
@@ -24,9 +24,12 @@ pub(crate) fn bring(record: &FileRecord, from: &Path, to: &Path) -> Result<Optio
     // two paths to one folder.
     let is_link = fs::symlink_metadata(&source).is_ok_and(|found| found.is_symlink());
     if is_link || fs::hard_link(&source, &target).is_err() {
-        let mut reader = match File::open(&source) {
-            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Some(format!("{}: {e}", record.path))),
-            reader => reader.map_err(|e| FileError::io(&source, "read", e))?,
+        let mut reader = match record.check_size(from).and_then(|()| open_file(&source)) {
+            Err(FileError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => {
+                return Ok(Some(format!("{}: {source}", record.path)));
+            }
+            Err(e @ FileError::Format { .. }) => return Ok(Some(e.to_string())),
+            reader => reader?,
         };
         let mut file = AtomicFile::create(&target)?;
         io::copy(&mut reader, &mut file).map_err(|e| FileError::io(&target, "copy to", e))?;
@@ -51,7 +54,7 @@ mod tests {
         assert_eq!(bring(&record, &from, &to).unwrap(), None);
         assert_eq!(fs::read(to.join("a/b")).unwrap(), b"content");
         fs::write(from.join("a/b"), b"contenu").unwrap();
-        assert_eq!(bring(&record, &from, &to).unwrap().unwrap(), "a/b: other content");
+        assert!(bring(&record, &from, &to).unwrap().unwrap().contains("a/b: is damaged: other content"));
         fs::remove_file(from.join("a/b")).unwrap();
         assert!(bring(&record, &from, &to).unwrap().unwrap().starts_with("a/b: "));
         // Between file systems it is copied.

@@ -9,7 +9,7 @@ use crate::error::Result;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
 use s3d_io::fs::{create_dir, write_bytes};
-use s3d_io::image::{Content, encode_rgb8, read_rgb8};
+use s3d_io::image::{Content, encode_rgb8};
 use s3d_io::package::{CocoImage, coco_categories, coco_panoptic, write_coco};
 use std::path::Path;
 
@@ -41,7 +41,7 @@ pub(super) fn pack(
         || (),
         |(), (id, image)| {
             let path = image.path(&source.layout, Domain::Semantic);
-            let semantic = read_rgb8(&path)?;
+            let semantic = source.rgb8(image, Domain::Semantic)?;
             let (panoptic, segments) = coco_panoptic(&semantic, &table, &stuff).map_err(|e| {
                 FileError::format(&path, format!("{e} in {}", source.layout.labels_json().display()))
             })?;

@@ -3,7 +3,7 @@
 use super::destination::Destination;
 use super::options::SpecificOptions;
 use super::source::Source;
-use super::{area_points, copy, map_in_order};
+use super::{area_points, map_in_order};
 use crate::context::Context;
 use crate::error::Result;
 use s3d_io::dataset::Domain;
@@ -37,10 +37,9 @@ pub(super) fn pack(
             || (),
             |(), image| {
                 let (pose, (width, height)) = (source.pose(image)?, source.size(image)?);
-                let rgb = image.path(&source.layout, Domain::Rgb);
                 let name = format!("{}_domain_rgb.png", image.stem());
                 if options.copy_images {
-                    copy(&rgb, &copies.join(&name))?;
+                    source.copy(image, Domain::Rgb, &copies.join(&name))?;
                 }
                 progress.add(1);
                 Ok(ColmapImage { name, width, height, k: pose.camera_k_matrix, rt: pose.camera_rt_matrix })

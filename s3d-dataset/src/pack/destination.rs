@@ -1,6 +1,9 @@
 //! Where a package goes: whole, or not at all.
 
+use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::store::parent_of;
+use crate::store::staging::Staging;
 use s3d_io::Error as FileError;
 use s3d_io::fs::{create_dir, read_json, write_json};
 use serde::{Deserialize, Serialize};
@@ -8,7 +11,6 @@ use std::ffi::OsString;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
-use tempfile::TempDir;
 
 /// The file in a package's folder that says what it is.
 const ABOUT: &str = "pack.json";
@@ -39,7 +41,7 @@ impl About {
 /// nothing behind.
 pub(crate) struct Destination {
     place: PathBuf,
-    begun: TempDir,
+    staging: Staging,
 }
 
 impl Destination {
@@ -47,27 +49,23 @@ impl Destination {
     ///
     /// # Errors
     /// [`Error::Usage`] if it lies in the data set `root` or holds it, or if there is something in it that is
-    /// not to be, or may not be, replaced.
-    pub(crate) fn begin(place: &Path, root: &Path, overwrite: bool) -> Result<Self> {
+    /// not to be, or may not be, replaced; as [`Staging::begin`].
+    pub(crate) fn begin(ctx: &Context, place: &Path, root: &Path, overwrite: bool) -> Result<Self> {
         check_apart(place, root)?;
-        check_free(place, overwrite)?;
-        let parent = parent_of(place);
-        create_dir(&parent)?;
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".s3d-pack-").suffix(".part");
-        // Temporary folders are made for their owner alone; this one becomes an ordinary one.
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(0o777));
+        let (parent, name) = (parent_of(place), Path::new(place.file_name().unwrap_or_default()));
+        // What a killed process left may be about to come back.
+        if !Staging::is_left(&parent, name) {
+            check_free(place, overwrite)?;
         }
-        let begun = builder.tempdir_in(&parent).map_err(|e| FileError::io(place, "create the folder", e))?;
-        Ok(Self { place: place.to_owned(), begun })
+        create_dir(&parent)?;
+        let staging = Staging::begin(ctx, &parent, name)?;
+        check_free(place, overwrite || staging.was_placing())?;
+        Ok(Self { place: place.to_owned(), staging })
     }
 
     /// The folder to write to.
     pub(crate) fn path(&self) -> &Path {
-        self.begun.path()
+        self.staging.path()
     }
 
     /// The folder that it will be.
@@ -77,29 +75,8 @@ impl Destination {
 
     /// Moves the package to its place, instead of an earlier one.
     pub(crate) fn finish(self, about: &About) -> Result<()> {
-        write_json(&self.begun.path().join(ABOUT), about)?;
-        let place = &self.place;
-        let failed = |e| FileError::io(place, "move the finished package to this name", e);
-        // An earlier package goes aside by one rename; an empty folder goes.
-        let aside = if is_package(place) {
-            let aside = self.begun.path().with_extension("old");
-            fs::rename(place, &aside).map_err(failed)?;
-            Some(aside)
-        } else {
-            match fs::remove_dir(place) {
-                Err(e) if e.kind() != ErrorKind::NotFound => return Err(failed(e).into()),
-                _ => None,
-            }
-        };
-        if let Err(e) = fs::rename(self.begun.path(), place) {
-            if let Some(aside) = aside {
-                fs::rename(aside, place).map_err(failed)?;
-            }
-            return Err(failed(e).into());
-        }
-        // It is not there any more under its first name.
-        let _ = self.begun.keep();
-        aside.map_or(Ok(()), |a| fs::remove_dir_all(&a).map_err(|e| FileError::io(&a, "remove", e).into()))
+        write_json(&self.path().join(ABOUT), about)?;
+        self.staging.place_folder(&self.place, is_package(&self.place))
     }
 }
 
@@ -138,14 +115,6 @@ fn check_free(place: &Path, overwrite: bool) -> Result<()> {
 
 fn is_package(folder: &Path) -> bool {
     read_json::<About>(&folder.join(ABOUT)).is_ok_and(|about| about.generator == GENERATOR)
-}
-
-/// The folder that a path lies in.
-pub(crate) fn parent_of(path: &Path) -> PathBuf {
-    match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-        _ => PathBuf::from("."),
-    }
 }
 
 /// An absolute path without links, also if its end is not there yet.
@@ -203,13 +172,13 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (root, place) = (dir.path().join("data"), dir.path().join("new/package"));
         fs::create_dir(&root).unwrap();
-        let begun = Destination::begin(&place, &root, false).unwrap();
+        let begun = Destination::begin(&Context::default(), &place, &root, false).unwrap();
         fs::write(begun.path().join("half"), "").unwrap();
         drop(begun);
         assert!(names(&dir.path().join("new")).is_empty());
 
         let write = |text: &str, overwrite| {
-            let begun = Destination::begin(&place, &root, overwrite)?;
+            let begun = Destination::begin(&Context::default(), &place, &root, overwrite)?;
             fs::write(begun.path().join("file"), text).unwrap();
             begun.finish(&about())
         };
@@ -230,7 +199,9 @@ mod tests {
         let (root, place) = (dir.path().join("data"), dir.path().join("thesis"));
         fs::create_dir_all(&place).unwrap();
         fs::write(place.join("chapter_1.tex"), "").unwrap();
-        let fails = |place: &Path| Destination::begin(place, &root, true).err().unwrap().to_string();
+        let fails = |place: &Path| {
+            Destination::begin(&Context::default(), place, &root, true).err().unwrap().to_string()
+        };
         assert!(fails(&place).contains("holds chapter_1.tex, and was not written by s3d pack"));
         assert!(fails(&place.join("chapter_1.tex")).contains("cannot use as the package's folder"));
         fs::create_dir(&root).unwrap();

@@ -12,8 +12,9 @@ mod webdataset;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::work::for_each_in_order;
-use crate::store::refuse_existing;
-use destination::{About, Destination, check_apart, parent_of, resolved};
+use crate::store::staging::Staging;
+use crate::store::{parent_of, refuse_existing};
+use destination::{About, Destination, check_apart, resolved};
 pub use options::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions,
 };
@@ -21,7 +22,6 @@ use s3d_geom::PointCloud;
 use s3d_io::Error as FileError;
 use s3d_io::fs::create_dir;
 use source::Source;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -39,18 +39,24 @@ pub fn pack(dataset: &Path, kind: PackageKind, options: &PackOptions, ctx: &Cont
     let started = Instant::now();
     options.specific.check(kind)?;
     let which = which_images(ctx, kind, options.images)?;
-    let source = Source::open(dataset, &options.areas, which)?;
+    let source = Source::open(ctx, dataset, &options.areas, which)?;
     let place = match &options.output {
         Some(place) => place.clone(),
         None => default_place(dataset, kind)?,
     };
     if kind == PackageKind::Parquet {
         check_apart(&place, dataset)?;
-        refuse_existing(&place, options.overwrite)?;
-        create_dir(&parent_of(&place))?;
-        parquet::pack(ctx, &source, &place)?;
+        let (parent, name) = (parent_of(&place), Path::new(place.file_name().unwrap_or_default()));
+        if !Staging::is_left(&parent, name) {
+            refuse_existing(&place, options.overwrite)?;
+        }
+        create_dir(&parent)?;
+        let staging = Staging::begin(ctx, &parent, name)?;
+        refuse_existing(&place, options.overwrite || staging.was_placing())?;
+        parquet::pack(ctx, &source, &staging.path().join(name))?;
+        staging.place_files(&parent)?;
     } else {
-        let destination = Destination::begin(&place, dataset, options.overwrite)?;
+        let destination = Destination::begin(ctx, &place, dataset, options.overwrite)?;
         let notes = match kind {
             PackageKind::Webdataset => webdataset::pack(ctx, &source, &destination, &options.specific)?,
             PackageKind::Colmap => colmap::pack(ctx, &source, &destination, &options.specific)?,
@@ -124,14 +130,8 @@ fn map_in_order<T: Sync, S, R: Send + Sync>(
 fn area_points(source: &Source, area: u32, max: Option<u32>) -> Result<PointCloud> {
     match max.unwrap_or(POINTS) {
         0 => Ok(PointCloud::default()),
-        max => Ok(s3d_io::cloud::read_point_sample(&source.layout.point_cloud(area), max as usize)?),
+        max => source.points(area, max as usize),
     }
-}
-
-/// Copies a file of the data set.
-fn copy(from: &Path, to: &Path) -> Result<()> {
-    let bytes = fs::read(from).map_err(|e| FileError::io(from, "read", e))?;
-    Ok(s3d_io::fs::write_bytes(to, &bytes).map(drop)?)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use super::destination::{Destination, relative_path, resolved};
 use super::options::{DepthFiles, SpecificOptions};
 use super::source::{DEPTH_MISSING, Source};
-use super::{area_points, copy, map_in_order};
+use super::{area_points, map_in_order};
 use crate::context::Context;
 use crate::error::Result;
 use s3d_geom::Raster;
@@ -12,7 +12,7 @@ use s3d_io::Error as FileError;
 use s3d_io::cloud::write_colored_points;
 use s3d_io::dataset::{DatasetImage, Domain, Frame};
 use s3d_io::fs::{create_dir, write_bytes};
-use s3d_io::image::{encode_gray16, read_gray16};
+use s3d_io::image::encode_gray16;
 use s3d_io::package::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 use std::path::{Path, PathBuf};
 
@@ -139,7 +139,7 @@ impl<'a> Job<'a> {
             DepthFiles::None => None,
             DepthFiles::Original => Some(self.file(image, Domain::Depth, "depths")?),
             DepthFiles::Millimetres => {
-                let depth = read_gray16(&image.path(&self.source.layout, Domain::Depth))?;
+                let depth = self.source.depth(image)?;
                 let file = encode_gray16(
                     &millimetres(&depth, self.source.depth_units_per_m),
                     self.options.compression.unwrap_or_default(),
@@ -158,7 +158,7 @@ impl<'a> Job<'a> {
             return Ok(relative_path(&self.place, &self.root.join(image.relative_path(domain))));
         }
         let name = format!("{copies}/{}_{domain}.png", image.stem());
-        copy(&image.path(&self.source.layout, domain), &self.folder.join(&name))?;
+        self.source.copy(image, domain, &self.folder.join(&name))?;
         Ok(name)
     }
 }

@@ -6,8 +6,7 @@ use crate::context::Context;
 use crate::error::Result;
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{DatasetImage, Domain, Frame, ViewRecord, read_views};
-use s3d_io::image::{read_gray16, read_rgb8};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, ViewRecord};
 use s3d_io::package::{ImageRow, SemanticRow, write_image_index};
 use s3d_label::{LabelId, LabelTable, Room, RoomError};
 use s3d_sample::entropy;
@@ -23,8 +22,7 @@ type Views = BTreeMap<(String, u32), ViewRecord>;
 pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
     let mut views: BTreeMap<u32, Views> = BTreeMap::new();
     for &area in &source.areas {
-        let path = source.layout.views_json(area);
-        let kept = read_views(&path)?.into_iter().filter_map(|v| {
+        let kept = source.views(area)?.into_iter().filter_map(|v| {
             let number = v.frame_num?;
             Some(((v.camera_uuid.clone(), number), v))
         });
@@ -92,14 +90,14 @@ fn row(
         row.selection_entropy = Some(view.entropy);
     }
     if image.has(Domain::Depth) {
-        let (coverage, depth_m) = depth_row(&read_gray16(&path(Domain::Depth))?, source.depth_units_per_m);
+        let (coverage, depth_m) = depth_row(&source.depth(image)?, source.depth_units_per_m);
         (row.coverage, row.depth_m) = (Some(coverage), depth_m);
     } else if image.has(Domain::Rgb) && !image.has(Domain::Semantic) {
-        row.coverage = Some(share(&read_rgb8(&path(Domain::Rgb))?, |p| *p != [0; 3]));
+        row.coverage = Some(share(&source.rgb8(image, Domain::Rgb)?, |p| *p != [0; 3]));
     }
     if image.has(Domain::Semantic) {
         // Depth misses what is beyond 128 m; labels do not.
-        let semantic = read_rgb8(&path(Domain::Semantic))?;
+        let semantic = source.rgb8(image, Domain::Semantic)?;
         row.coverage = Some(share(&semantic, |p| *p != MISSING));
         let known = semantic_row(&semantic, table, counts).map_err(|index| {
             let labels = source.layout.labels_json();

@@ -1,24 +1,28 @@
 //! The data set that is packed: its images, and what is known of them.
 
 use super::options::PackedImages;
+use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::tables::manifest::Head;
+use crate::tables::dataset::{Dataset, Listed};
+use s3d_geom::{PointCloud, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    DatasetImage, Domain, Frame, Layout, PoseFile, check_images_complete, dataset_images, read_labels,
-    read_pose,
+    DatasetImage, Domain, Frame, Layout, PoseFile, ViewRecord, check_images_complete, read_labels, read_pose,
+    read_views,
 };
-use s3d_io::fs::read_json;
+use s3d_io::fs::write_bytes;
+use s3d_io::image::{decode_gray16, decode_rgb8};
 use s3d_label::LabelTable;
-use serde::Deserialize;
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 /// The depth of a pixel that shows nothing, or something farther than can be said.
 pub(crate) const DEPTH_MISSING: u16 = u16::MAX;
 
-/// A data set, or some of it.
+/// A data set, or some of it. All that is read of it is held against its list of files.
 pub(crate) struct Source {
     pub(crate) layout: Layout,
+    files: Listed,
     /// The areas that are packed, and all of their images that are.
     pub(crate) areas: Vec<u32>,
     pub(crate) images: Vec<DatasetImage>,
@@ -28,11 +32,11 @@ pub(crate) struct Source {
 
 impl Source {
     /// Opens the complete data set in `root`.
-    pub(crate) fn open(root: &Path, areas: &[u32], which: PackedImages) -> Result<Self> {
-        let layout = Layout::new(root);
-        let head = Head::require(&layout)?;
-        if let Some(area) = areas.iter().find(|a| !head.area_numbers.contains(a)) {
-            let there: Vec<String> = head.area_numbers.iter().map(u32::to_string).collect();
+    pub(crate) fn open(ctx: &Context, root: &Path, areas: &[u32], which: PackedImages) -> Result<Self> {
+        let Dataset { layout, manifest, files } = Dataset::open(&Layout::new(root))?;
+        let there = &manifest.area_numbers;
+        if let Some(area) = areas.iter().find(|a| !there.contains(a)) {
+            let there: Vec<String> = there.iter().map(u32::to_string).collect();
             return Err(Error::Usage(format!(
                 "--areas {area}: the data set in {} has no such area; there are {}",
                 root.display(),
@@ -40,13 +44,10 @@ impl Source {
             )));
         }
         let chosen = |a: &u32| areas.is_empty() || areas.contains(a);
-        let mut areas: Vec<u32> = head.area_numbers.iter().copied().filter(chosen).collect();
+        let mut areas: Vec<u32> = there.iter().copied().filter(chosen).collect();
         areas.sort_unstable();
-        areas.dedup();
-        let mut images = Vec::new();
-        for area in &areas {
-            images.extend(dataset_images(&layout, *area)?);
-        }
+        let mut images: Vec<DatasetImage> =
+            areas.iter().flat_map(|area| files.images(&layout, *area)).collect();
         images.retain(|image| match which {
             PackedImages::Views => image.frame != Frame::Panorama,
             PackedImages::Panoramas => image.frame == Frame::Panorama,
@@ -57,8 +58,13 @@ impl Source {
             let what = if which == PackedImages::All { "images".to_owned() } else { which.to_string() };
             return Err(Error::Input(format!("{}: the data set has no {what} to pack", root.display())));
         }
-        let depth_units_per_m = depth_units_per_m(&layout)?;
-        Ok(Self { layout, areas, images, depth_units_per_m })
+        let of_image = |image: &DatasetImage| -> Vec<PathBuf> {
+            image.domains.iter().map(|domain| image.path(&layout, *domain)).collect()
+        };
+        let needed: BTreeSet<PathBuf> = images.iter().flat_map(of_image).collect();
+        files.require(ctx, |path| needed.contains(path))?;
+        let depth_units_per_m = manifest.conventions().depth_units.per_m();
+        Ok(Self { layout, files, areas, images, depth_units_per_m })
     }
 
     /// The images of an area.
@@ -85,7 +91,7 @@ impl Source {
 
     /// The pose of an image.
     pub(crate) fn pose(&self, image: &DatasetImage) -> Result<PoseFile> {
-        Ok(read_pose(&image.path(&self.layout, Domain::Pose))?)
+        Ok(read_pose(self.files.checked(&image.path(&self.layout, Domain::Pose))?)?)
     }
 
     /// Its size in pixels.
@@ -97,33 +103,46 @@ impl Source {
         Ok(size.expect("packages that ask for a size require an image"))
     }
 
+    /// The content of a file of an image.
+    pub(crate) fn bytes(&self, image: &DatasetImage, domain: Domain) -> Result<Vec<u8>> {
+        Ok(self.files.read_bytes(&image.path(&self.layout, domain))?)
+    }
+
+    /// How many bytes that is.
+    pub(crate) fn byte_count(&self, image: &DatasetImage, domain: Domain) -> Result<u64> {
+        Ok(self.files.bytes(&image.path(&self.layout, domain))?)
+    }
+
+    /// Copies a file of an image.
+    pub(crate) fn copy(&self, image: &DatasetImage, domain: Domain, to: &Path) -> Result<()> {
+        Ok(write_bytes(to, &self.bytes(image, domain)?).map(drop)?)
+    }
+
+    /// The pixels of a file of an image, 8-bit R G B.
+    pub(crate) fn rgb8(&self, image: &DatasetImage, domain: Domain) -> Result<Raster<[u8; 3]>> {
+        Ok(decode_rgb8(&self.bytes(image, domain)?, &image.path(&self.layout, domain))?)
+    }
+
+    /// The depth of an image.
+    pub(crate) fn depth(&self, image: &DatasetImage) -> Result<Raster<u16>> {
+        Ok(decode_gray16(&self.bytes(image, Domain::Depth)?, &image.path(&self.layout, Domain::Depth))?)
+    }
+
+    /// The candidate views of an area.
+    pub(crate) fn views(&self, area: u32) -> Result<Vec<ViewRecord>> {
+        Ok(read_views(self.files.checked(&self.layout.views_json(area))?)?)
+    }
+
+    /// Points of an area's cloud, at most so many.
+    pub(crate) fn points(&self, area: u32, most: usize) -> Result<PointCloud> {
+        // Of a large cloud little is read.
+        Ok(s3d_io::cloud::read_point_sample(self.files.sized(&self.layout.point_cloud(area))?, most)?)
+    }
+
     /// The labels of the data set.
     pub(crate) fn labels(&self) -> Result<LabelTable> {
         let path = self.layout.labels_json();
-        LabelTable::from_names(&read_labels(&path)?)
+        LabelTable::from_names(&read_labels(self.files.checked(&path)?)?)
             .map_err(|e| FileError::format(&path, e.to_string()).into())
-    }
-}
-
-/// Units a metre of depth images, as the manifest has them: 512, as published, where it tells of none.
-/// Source: formats.md, "What is written".
-fn depth_units_per_m(layout: &Layout) -> Result<f64> {
-    #[derive(Deserialize)]
-    struct Manifest {
-        options: Options,
-    }
-    #[derive(Deserialize)]
-    struct Options {
-        depth_units: Option<String>,
-    }
-    let path = layout.manifest();
-    let manifest: Manifest = read_json(&path)?;
-    match manifest.options.depth_units.as_deref() {
-        None | Some("512") => Ok(512.0),
-        Some("mm") => Ok(1000.0),
-        Some(other) => {
-            Err(FileError::format(&path, format!("options.depth_units is \"{other}\", neither 512 nor mm"))
-                .into())
-        }
     }
 }

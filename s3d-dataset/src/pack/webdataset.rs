@@ -8,12 +8,10 @@ use crate::context::Context;
 use crate::error::Result;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame};
 use s3d_io::package::{
     ShardEntry, ShardLimits, TarWriter, plan_shards, sample_key, sample_member, write_shard_index,
 };
-use std::fs;
 
 /// A shard to write: its file, and the samples that go into it.
 struct Shard<'a> {
@@ -68,9 +66,7 @@ pub(super) fn pack(
             for image in &shard.images {
                 let key = sample_key(image);
                 for domain in present(image, &domains) {
-                    let path = image.path(&source.layout, domain);
-                    let bytes = fs::read(&path).map_err(|e| FileError::io(&path, "read", e))?;
-                    tar.append(&sample_member(&key, domain), &bytes)?;
+                    tar.append(&sample_member(&key, domain), &source.bytes(image, domain)?)?;
                 }
                 progress.add(1);
             }
@@ -128,8 +124,7 @@ fn sample_bytes(source: &Source, image: &DatasetImage, domains: &[Domain]) -> Re
     let key = sample_key(image);
     let mut bytes = 0;
     for domain in present(image, domains) {
-        let path = image.path(&source.layout, domain);
-        let size = fs::metadata(&path).map_err(|e| FileError::io(&path, "read", e))?.len();
+        let size = source.byte_count(image, domain)?;
         bytes += TarWriter::entry_bytes(&sample_member(&key, domain), size);
     }
     Ok(bytes)

@@ -17,19 +17,18 @@
 //! Colours are the tree's, 0 to 255.
 
 use super::room::{TreeRoom, as_written, count_and_min, for_each_piece};
-use super::{AREAS_OF_LOADERS, for_each_room, write_lines};
-use crate::context::Context;
+use super::{AREAS_OF_LOADERS, Source, for_each_room, write_lines};
 use crate::error::Result;
 use s3d_io::cloud::NpyWriter;
 use s3d_io::fs::create_dir;
 use std::path::Path;
 
 /// The points of a room's instances, and the least coordinates of all.
-fn survey(ctx: &Context, room: &TreeRoom) -> Result<(Vec<u64>, [f64; 3])> {
+fn survey(source: &Source<'_>, room: &TreeRoom) -> Result<(Vec<u64>, [f64; 3])> {
     let mut counts = Vec::new();
     let mut min = [f64::INFINITY; 3];
     for instance in &room.instances {
-        let (count, corner) = count_and_min(ctx, &instance.path)?;
+        let (count, corner) = count_and_min(source, &instance.path)?;
         counts.push(count);
         min = std::array::from_fn(|k| min[k].min(corner[k]));
     }
@@ -37,20 +36,20 @@ fn survey(ctx: &Context, room: &TreeRoom) -> Result<(Vec<u64>, [f64; 3])> {
 }
 
 /// Writes the arrays and lists of PointNet.
-pub(super) fn write_pointnet(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
+pub(super) fn write_pointnet(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
     let (arrays, meta) = (dir.join("stanford_indoor3d"), dir.join("meta"));
     create_dir(&arrays)?;
     create_dir(&meta)?;
     write_lines(&meta.join("anno_paths.txt"), rooms.iter().map(TreeRoom::annotations))?;
     write_lines(&meta.join("all_data_label.txt"), rooms.iter().map(|r| format!("{}.npy", r.stem())))?;
-    for_each_room(ctx, rooms, |room| {
-        let (counts, min) = survey(ctx, room)?;
+    for_each_room(source.ctx, rooms, |room| {
+        let (counts, min) = survey(source, room)?;
         let path = arrays.join(format!("{}.npy", room.stem()));
         let mut array = NpyWriter::create(&path, "<f8", &[counts.iter().sum(), 7])?;
         let mut bytes = Vec::new();
         for instance in &room.instances {
             let class = instance.class.index() as f64;
-            for_each_piece(ctx, &instance.path, |piece| {
+            for_each_piece(source, &instance.path, |piece| {
                 bytes.clear();
                 for (p, color) in piece.positions.iter().zip(&piece.colors) {
                     let place = std::array::from_fn::<f64, 3, _>(|k| as_written(p[k]) - min[k]);
@@ -66,7 +65,7 @@ pub(super) fn write_pointnet(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> R
 }
 
 /// Writes the arrays, lists and folders of mmdetection3d.
-pub(super) fn write_mmdet3d(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
+pub(super) fn write_mmdet3d(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
     let (arrays, meta) = (dir.join("s3dis_data"), dir.join("meta_data"));
     let tree = dir.join("Stanford3dDataset_v1.2_Aligned_Version");
     create_dir(&arrays)?;
@@ -78,8 +77,8 @@ pub(super) fn write_mmdet3d(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Re
         create_dir(&tree.join(format!("Area_{}", room.area)).join(&room.name))?;
     }
     write_lines(&meta.join("anno_paths.txt"), rooms.iter().map(TreeRoom::annotations))?;
-    for_each_room(ctx, rooms, |room| {
-        let (counts, min) = survey(ctx, room)?;
+    for_each_room(source.ctx, rooms, |room| {
+        let (counts, min) = survey(source, room)?;
         let total = counts.iter().sum();
         let path = |kind: &str| arrays.join(format!("{}_{kind}.npy", room.stem()));
         let mut points = NpyWriter::create(&path("point"), "<f4", &[total, 6])?;
@@ -88,7 +87,7 @@ pub(super) fn write_mmdet3d(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Re
         let mut bytes = Vec::new();
         for (number, instance) in (1i64..).zip(&room.instances) {
             let class = instance.class.index() as i64;
-            for_each_piece(ctx, &instance.path, |piece| {
+            for_each_piece(source, &instance.path, |piece| {
                 bytes.clear();
                 for (p, color) in piece.positions.iter().zip(&piece.colors) {
                     let place = std::array::from_fn::<f32, 3, _>(|k| (as_written(p[k]) - min[k]) as f32);

@@ -13,9 +13,11 @@ mod room;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::work::for_each_in_order;
+use crate::store::change::Change;
 use crate::store::lock::Lock;
+use crate::tables::dataset::{Dataset, Listed};
 use crate::tables::listing;
-use crate::tables::manifest::{Head, Manifest};
+use crate::tables::manifest::Manifest;
 pub(crate) use loader::Profile;
 use room::{TreeRoom, rooms_of};
 use s3d_io::Error as FileError;
@@ -38,7 +40,8 @@ pub struct ProfileOptions {
 ///
 /// # Errors
 /// [`Error::Usage`] if one is there and not to be replaced; [`Error::File`]; [`Error::Cancelled`];
-/// [`Error::Temporary`]. No half of a profile is left behind.
+/// [`Error::Temporary`]. The data set stays as it was then; so it does when the process is killed, or the
+/// same call completes what it had begun.
 pub fn profile(
     root: impl Into<PathBuf>,
     wanted: &[Profile],
@@ -46,71 +49,99 @@ pub fn profile(
     ctx: &Context,
 ) -> Result<()> {
     let layout = &Layout::new(root.into());
-    Head::require(layout)?;
-    // Nobody may replace the data set meanwhile.
-    Lock::during(ctx, layout, || add(ctx, layout, wanted, options.overwrite))
-}
-
-fn add(ctx: &Context, layout: &Layout, wanted: &[Profile], overwrite: bool) -> Result<()> {
-    let head = Head::require(layout)?;
-    let mut manifest = Manifest::read(layout)?;
     let mut wanted = wanted.to_vec();
     wanted.sort();
     wanted.dedup();
-    for profile in &wanted {
-        let dir = layout.profile_dir(profile.name());
-        if dir.exists() && !overwrite {
-            return Err(Error::Usage(format!(
-                "{} is there already: replace it with --overwrite",
-                dir.display()
-            )));
+    let names: Vec<&str> = wanted.iter().map(|profile| profile.name()).collect();
+    let call = format!("s3d profile --to {}", names.join(","));
+    Manifest::require(layout)?;
+    // Nobody may replace the data set meanwhile.
+    Lock::during(ctx, layout, |completed| {
+        if completed.as_ref() == Some(&call) {
+            ctx.info(format_args!(
+                "{}: what a killed process had begun is complete",
+                layout.root().display()
+            ));
+            return Ok(());
         }
-    }
-    for profile in &wanted {
-        let dir = layout.profile_dir(profile.name());
-        if dir.exists() {
-            fs::remove_dir_all(&dir).map_err(|e| FileError::io(&dir, "remove", e))?;
-        }
-    }
-    if let Err(e) = write(ctx, layout, &head.area_numbers, &wanted) {
-        // Halves of profiles would stand in the way of the same call.
-        for profile in &wanted {
-            let _ = fs::remove_dir_all(layout.profile_dir(profile.name()));
-        }
-        return Err(e);
-    }
-    manifest.add_profiles(&wanted);
-    let mut files = Vec::new();
-    for profile in &wanted {
-        files.extend(listing::walk(&layout.profile_dir(profile.name()))?);
-    }
-    let changed = listing::records(ctx, layout, &files)?;
-    let is_gone =
-        |path: &str| wanted.iter().any(|profile| path.starts_with(&format!("profiles/{}/", profile.name())));
-    listing::update(layout, &mut manifest, changed, is_gone)
+        add(ctx, &Dataset::open(layout)?, &wanted, options.overwrite, &call)
+    })
 }
 
-/// Writes the profiles of a data set of these areas, whose S3DIS tree is written.
-pub(crate) fn write(ctx: &Context, layout: &Layout, areas: &[u32], profiles: &[Profile]) -> Result<()> {
+fn add(ctx: &Context, data: &Dataset, wanted: &[Profile], overwrite: bool, call: &str) -> Result<()> {
+    let layout = &data.layout;
+    let dirs: Vec<PathBuf> = wanted.iter().map(|profile| layout.profile_dir(profile.name())).collect();
+    if let Some(dir) = dirs.iter().find(|dir| dir.exists() && !overwrite) {
+        return Err(Error::Usage(format!("{} is there already: replace it with --overwrite", dir.display())));
+    }
+    let areas = &data.manifest.area_numbers;
+    let trees: Vec<PathBuf> = areas.iter().map(|area| layout.s3dis_area_dir(*area)).collect();
+    data.files.require(ctx, |path| trees.iter().any(|tree| path.starts_with(tree)))?;
+    let change = Change::begin(layout)?;
+    let staged = change.staged();
+    write(ctx, layout, &data.files, staged, areas, wanted)?;
+    let mut files = Vec::new();
+    for profile in wanted {
+        files.extend(listing::walk(&staged.profile_dir(profile.name()))?);
+    }
+    let changed = listing::records(ctx, staged, &files)?;
+    let mut manifest = Manifest::read(layout)?;
+    manifest.add_profiles(wanted);
+    let is_gone =
+        |path: &str| wanted.iter().any(|profile| path.starts_with(&format!("profiles/{}/", profile.name())));
+    listing::write_changed(data, &mut manifest, changed, is_gone, staged)?;
+    change.commit(call, &dirs)
+}
+
+/// Writes the profiles of a data set of these areas, whose S3DIS tree is written, to where they have their
+/// places in `staged`.
+pub(crate) fn write(
+    ctx: &Context,
+    layout: &Layout,
+    files: &Listed,
+    staged: &Layout,
+    areas: &[u32],
+    profiles: &[Profile],
+) -> Result<()> {
     if profiles.is_empty() {
         return Ok(());
     }
+    let source = Source { ctx, layout, files };
     let mut rooms = Vec::new();
     for area in areas {
         rooms.extend(rooms_of(layout, *area)?);
     }
     for profile in profiles {
-        let dir = layout.profile_dir(profile.name());
+        let dir = staged.profile_dir(profile.name());
         create_dir(&dir)?;
         match profile {
-            Profile::PointNet => arrays::write_pointnet(ctx, &dir, &rooms)?,
-            Profile::Mmdet3d => arrays::write_mmdet3d(ctx, &dir, &rooms)?,
-            Profile::Open3dMl => open3d_ml::write(ctx, &dir, &rooms)?,
-            Profile::Pointcept => pointcept::write(ctx, &dir, layout, areas, &rooms)?,
+            Profile::PointNet => arrays::write_pointnet(&source, &dir, &rooms)?,
+            Profile::Mmdet3d => arrays::write_mmdet3d(&source, &dir, &rooms)?,
+            Profile::Open3dMl => open3d_ml::write(&source, &dir, &rooms)?,
+            Profile::Pointcept => pointcept::write(&source, &dir, areas, &rooms)?,
         }
-        ctx.info(format_args!("{}: {} rooms for {profile}", dir.display(), rooms.len()));
+        let place = layout.profile_dir(profile.name());
+        ctx.info(format_args!("{}: {} rooms for {profile}", place.display(), rooms.len()));
     }
     Ok(())
+}
+
+/// What profiles are made from.
+struct Source<'a> {
+    ctx: &'a Context,
+    layout: &'a Layout,
+    files: &'a Listed,
+}
+
+impl Source<'_> {
+    /// Gives a file of the data set a second name, or copies it where the file system knows no such thing.
+    fn link(&self, from: &Path, to: &Path) -> Result<()> {
+        let from = self.files.checked(from)?;
+        match fs::hard_link(from, to) {
+            Ok(()) => Ok(()),
+            Err(_) => fs::copy(from, to).map(drop).map_err(|e| FileError::io(to, "copy to", e).into()),
+        }
+    }
 }
 
 /// Does `work` on every room, on all threads.
@@ -136,14 +167,6 @@ fn for_each_room(
 fn write_lines(path: &Path, lines: impl IntoIterator<Item = String>) -> Result<()> {
     write_whole(path, |w| lines.into_iter().try_for_each(|line| writeln!(w, "{line}")))?;
     Ok(())
-}
-
-/// Gives a file a second name, or copies it where the file system knows no such thing.
-fn link(from: &Path, to: &Path) -> Result<()> {
-    match std::fs::hard_link(from, to) {
-        Ok(()) => Ok(()),
-        Err(_) => std::fs::copy(from, to).map(drop).map_err(|e| FileError::io(to, "copy to", e).into()),
-    }
 }
 
 #[cfg(test)]

@@ -11,28 +11,27 @@
 //!
 //! `dataset_path` is the profile's folder; `test_area_idx` picks the area to test on.
 
-use super::for_each_room;
 use super::pickle::Pickle;
 use super::room::{TreeInstance, TreeRoom, as_written, for_each_piece};
-use crate::context::Context;
+use super::{Source, for_each_room};
 use crate::error::Result;
 use glam::{DMat2, DVec2, DVec3, dvec2, dvec3};
 use s3d_io::fs::create_dir;
 use std::path::Path;
 
 /// Writes the pickles.
-pub(super) fn write(ctx: &Context, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
+pub(super) fn write(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
     let dir = dir.join("original_pkl");
     create_dir(&dir)?;
-    for_each_room(ctx, rooms, |room| {
-        let boxes = room.instances.iter().map(|i| OrientedBox::of(ctx, i)).collect::<Result<Vec<_>>>()?;
+    for_each_room(source.ctx, rooms, |room| {
+        let boxes = room.instances.iter().map(|i| OrientedBox::of(source, i)).collect::<Result<Vec<_>>>()?;
         let mut pickle = Pickle::create(&dir.join(format!("{}.pkl", room.stem())))?;
         pickle.list(|pickle| {
             pickle.begin_array(boxes.iter().map(|b| b.points).sum(), 7)?;
             let mut bytes = Vec::new();
             for instance in &room.instances {
                 let class = instance.class.index() as f64;
-                for_each_piece(ctx, &instance.path, |piece| {
+                for_each_piece(source, &instance.path, |piece| {
                     bytes.clear();
                     for (p, color) in piece.positions.iter().zip(&piece.colors) {
                         let row = p
@@ -72,12 +71,12 @@ struct OrientedBox {
 }
 
 impl OrientedBox {
-    fn of(ctx: &Context, instance: &TreeInstance) -> Result<Self> {
+    fn of(source: &Source<'_>, instance: &TreeInstance) -> Result<Self> {
         // Sums of what lies around the first point, so that little is lost.
         let (mut points, mut origin) = (0u64, DVec2::ZERO);
         let (mut sum, mut xx, mut xy, mut yy) = (DVec2::ZERO, 0.0, 0.0, 0.0);
         let place = |p: &glam::Vec3| dvec3(as_written(p.x), as_written(p.y), as_written(p.z));
-        for_each_piece(ctx, &instance.path, |piece| {
+        for_each_piece(source, &instance.path, |piece| {
             for p in &piece.positions {
                 let p = place(p).truncate();
                 if points == 0 {
@@ -97,7 +96,7 @@ impl OrientedBox {
         let (sin, cos) = libm::sincos(yaw_rad);
         let axes = DMat2::from_cols(dvec2(cos, sin), dvec2(-sin, cos));
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for_each_piece(ctx, &instance.path, |piece| {
+        for_each_piece(source, &instance.path, |piece| {
             for p in &piece.positions {
                 let p = place(p);
                 let turned = (axes.transpose() * p.truncate()).extend(p.z);
@@ -120,6 +119,9 @@ impl OrientedBox {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::context::Context;
+    use crate::tables::dataset::Listed;
+    use s3d_io::dataset::{FileRecord, Layout};
     use s3d_label::Class;
 
     #[test]
@@ -135,17 +137,20 @@ mod tests {
                 text += &format!("{x:.3} {y:.3} 0.7 0 0 0\n{x:.3} {y:.3} 0.75 0 0 0\n");
             }
         }
-        std::fs::write(&path, text).unwrap();
-        let b =
-            OrientedBox::of(&Context::default(), &TreeInstance { class: Class::Table, path: path.clone() })
-                .unwrap();
+        let of = |text: String| {
+            std::fs::write(&path, text).unwrap();
+            let files = Listed::of(dir.path(), [FileRecord::of_file(dir.path(), &path).unwrap()]);
+            let (ctx, layout) = (&Context::default(), &Layout::new(dir.path()));
+            let table = TreeInstance { class: Class::Table, path: path.clone() };
+            OrientedBox::of(&Source { ctx, layout, files: &files }, &table).unwrap()
+        };
+        let b = of(text);
         assert_eq!(b.points, 2 * 101 * 41);
         let expected = [4.0, -3.0, 0.725, 2.0, 0.05, 0.8, 0.5];
         for (got, expected) in b.numbers().into_iter().zip(expected) {
             assert!((got - expected).abs() < 0.002, "{:?}", b.numbers());
         }
-        std::fs::write(&path, "1 2 3 4 5 6\n").unwrap();
-        let b = OrientedBox::of(&Context::default(), &TreeInstance { class: Class::Table, path }).unwrap();
+        let b = of("1 2 3 4 5 6\n".to_owned());
         assert_eq!(b.numbers(), [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
     }
 }

@@ -16,24 +16,16 @@
 //! `area_5a` alone.
 
 use super::room::{TreeRoom, count_and_min};
-use super::{AREAS_OF_LOADERS, link, write_lines};
-use crate::context::Context;
+use super::{AREAS_OF_LOADERS, Source, write_lines};
 use crate::error::Result;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::Layout;
 use s3d_io::fs::{create_dir, write_bytes};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 /// Writes the tree.
-pub(super) fn write(
-    ctx: &Context,
-    dir: &Path,
-    layout: &Layout,
-    areas: &[u32],
-    rooms: &[TreeRoom],
-) -> Result<()> {
+pub(super) fn write(source: &Source<'_>, dir: &Path, areas: &[u32], rooms: &[TreeRoom]) -> Result<()> {
+    let ctx = source.ctx;
     for area in areas.iter().filter(|a| !AREAS_OF_LOADERS.contains(*a)) {
         ctx.warn(format_args!("area {area}: Pointcept's preprocessing reads areas 1 to 6 only"));
     }
@@ -42,12 +34,12 @@ pub(super) fn write(
         create_dir(&tree)?;
         let mut named = Vec::new();
         if areas.contains(&area) {
-            let angles = read_angles(layout, area)?;
+            let angles = read_angles(source, area)?;
             for room in rooms.iter().filter(|r| r.area == area) {
-                write_room(ctx, &tree.join(&room.name), layout, room)?;
+                write_room(source, &tree.join(&room.name), room)?;
                 named.push(format!("{} {}", room.name, angles.get(&room.name).map_or("0", String::as_str)));
             }
-            link_mesh(layout, area, &dir.join("raw"))?;
+            link_mesh(source, area, &dir.join("raw"))?;
         }
         if let [only] = &named[..] {
             ctx.warn(format_args!(
@@ -67,49 +59,47 @@ pub(super) fn write(
 }
 
 /// The angle of each room, as it is written.
-fn read_angles(layout: &Layout, area: u32) -> Result<BTreeMap<String, String>> {
-    let path = layout.s3dis_area_dir(area).join(format!("Area_{area}_alignmentAngle.txt"));
-    let text = fs::read_to_string(&path).map_err(|e| FileError::io(&path, "read", e))?;
+fn read_angles(source: &Source<'_>, area: u32) -> Result<BTreeMap<String, String>> {
+    let path = source.layout.s3dis_area_dir(area).join(format!("Area_{area}_alignmentAngle.txt"));
+    let text = String::from_utf8(source.files.read_bytes(&path)?)
+        .map_err(|_| FileError::format(&path, "is no text in UTF-8"))?;
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     Ok(lines.filter_map(|l| l.split_once(' ')).map(|(room, deg)| (room.into(), deg.into())).collect())
 }
 
-fn write_room(ctx: &Context, dir: &Path, layout: &Layout, room: &TreeRoom) -> Result<()> {
+fn write_room(source: &Source<'_>, dir: &Path, room: &TreeRoom) -> Result<()> {
     create_dir(&dir.join("Annotations"))?;
     let name = format!("{}.txt", room.name);
-    link(&layout.s3dis_area_dir(room.area).join(&room.name).join(&name), &dir.join(&name))?;
+    source.link(&source.layout.s3dis_area_dir(room.area).join(&room.name).join(&name), &dir.join(&name))?;
     for instance in &room.instances {
         let to = dir.join("Annotations").join(instance.path.file_name().unwrap_or_default());
         // A line is at most some hundred bytes.
-        let size = fs::metadata(&instance.path).map_err(|e| FileError::io(&instance.path, "read", e))?.len();
-        if size < 1024 && count_and_min(ctx, &instance.path)?.0 == 1 {
-            let line = fs::read(&instance.path).map_err(|e| FileError::io(&instance.path, "read", e))?;
+        let size = source.files.bytes(&instance.path)?;
+        if size < 1024 && count_and_min(source, &instance.path)?.0 == 1 {
+            let line = source.files.read_bytes(&instance.path)?;
             write_bytes(&to, &line.repeat(2))?;
         } else {
-            link(&instance.path, &to)?;
+            source.link(&instance.path, &to)?;
         }
     }
     Ok(())
 }
 
 /// The mesh of an area with its materials and textures, where the preprocessing looks for it.
-fn link_mesh(layout: &Layout, area: u32, raw: &Path) -> Result<()> {
-    let from = layout.mesh_dir(area);
+fn link_mesh(source: &Source<'_>, area: u32, raw: &Path) -> Result<()> {
+    let from = source.layout.mesh_dir(area);
     let name = if area == 5 { "area_5a".to_owned() } else { format!("area_{area}") };
     let to = raw.join(name).join("3d");
     create_dir(&to)?;
-    for name in ["rgb.obj", "rgb.mtl"] {
-        if from.join(name).exists() {
-            link(&from.join(name), &to.join(name))?;
-        }
-    }
     let textures = from.join("rgb_textures");
-    if textures.is_dir() {
-        create_dir(&to.join("rgb_textures"))?;
-        for entry in fs::read_dir(&textures).map_err(|e| FileError::io(&textures, "read", e))? {
-            let entry = entry.map_err(|e| FileError::io(&textures, "read", e))?;
-            link(&entry.path(), &to.join("rgb_textures").join(entry.file_name()))?;
+    for path in source.files.below(&from) {
+        let Ok(below) = path.strip_prefix(&from) else { continue };
+        if path.starts_with(&textures) {
+            create_dir(&to.join("rgb_textures"))?;
+        } else if below != Path::new("rgb.obj") && below != Path::new("rgb.mtl") {
+            continue;
         }
+        source.link(&path, &to.join(below))?;
     }
     Ok(())
 }

@@ -1,9 +1,9 @@
 //! The rooms of an S3DIS tree, and their points as numpy would read them.
 
-use crate::context::Context;
+use super::Source;
 use crate::error::Result;
 use s3d_geom::PointCloud;
-use s3d_io::cloud::{AnnotationTree, PointReader};
+use s3d_io::cloud::{AnnotationTree, OnFault, PointReader};
 use s3d_io::dataset::Layout;
 use s3d_label::Class;
 use std::path::{Path, PathBuf};
@@ -58,14 +58,14 @@ pub(super) fn rooms_of(layout: &Layout, area: u32) -> Result<Vec<TreeRoom>> {
 
 /// Hands out the points of a file, some at a time.
 pub(super) fn for_each_piece(
-    ctx: &Context,
+    source: &Source<'_>,
     path: &Path,
     mut each: impl FnMut(&PointCloud) -> Result<()>,
 ) -> Result<()> {
-    let mut reader = PointReader::open(path)?;
+    let mut reader = PointReader::new(source.files.open(path)?, path, OnFault::Stop);
     let mut piece = PointCloud::default();
     while reader.read_chunk(CHUNK, &mut piece)? > 0 {
-        ctx.check()?;
+        source.ctx.check()?;
         each(&piece)?;
         piece.clear();
     }
@@ -80,9 +80,9 @@ pub(super) fn as_written(coordinate: f32) -> f64 {
 }
 
 /// The number of points of an instance, and their least coordinates.
-pub(super) fn count_and_min(ctx: &Context, path: &Path) -> Result<(u64, [f64; 3])> {
+pub(super) fn count_and_min(source: &Source<'_>, path: &Path) -> Result<(u64, [f64; 3])> {
     let (mut count, mut min) = (0, [f64::INFINITY; 3]);
-    for_each_piece(ctx, path, |piece| {
+    for_each_piece(source, path, |piece| {
         count += piece.len() as u64;
         for p in &piece.positions {
             for (min, c) in min.iter_mut().zip(p.to_array()) {

@@ -2,6 +2,7 @@
 //! state that has one meaning. The states are those of [`output`](super::output).
 
 use crate::error::{Error, Result};
+use crate::store::change;
 use crate::store::output::{begun_by_other_version, read_request};
 use crate::tables::manifest::Head;
 use s3d_io::Error as FileError;
@@ -19,6 +20,7 @@ pub(super) const TRASH: &str = ".s3d-trash";
 /// Brings a folder in which an export was killed to a state that has only one meaning.
 pub(super) fn recover(layout: &Layout) -> Result<()> {
     let inside = |name: &str| layout.root().join(name);
+    change::settle(layout)?;
     remove(&inside(TRASH))?;
     let moving = Layout::new(inside(MOVING));
     if moving.root().exists() {

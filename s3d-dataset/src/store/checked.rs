@@ -3,7 +3,7 @@
 
 use crate::error::Result;
 use s3d_io::Error as FileError;
-use s3d_io::fs::{Checksum, write_bytes};
+use s3d_io::fs::{Checksum, read_file, write_bytes};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -33,7 +33,7 @@ pub(crate) fn write_checked<T: Serialize>(path: &Path, value: &T) -> Result<()> 
 /// # Errors
 /// A file that is not there, was cut off, or was changed by as much as a bit.
 pub(crate) fn read_checked<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = std::fs::read(path).map_err(|e| FileError::io(path, "read", e))?;
+    let bytes = read_file(path)?;
     let damaged =
         || FileError::format(path, "is damaged: its checksum differs; remove it, and it is made again");
     let end = bytes.iter().position(|b| *b == b'\n').ok_or_else(damaged)? + 1;

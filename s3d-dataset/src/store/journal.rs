@@ -12,11 +12,11 @@ use crate::tables::manifest::AreaEntry;
 use crate::tables::summary::UnitTally;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{FileRecord, Layout};
-use s3d_io::fs::{Checksum, create_dir};
+use s3d_io::fs::{Checksum, create_dir, read_file};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::Write;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -237,7 +237,7 @@ impl Finished {
         let mut finished = Self::default();
         let mut torn = 0;
         for path in crate::tables::listing::walk(&layout.journal_dir())? {
-            let content = fs::read(&path).map_err(|e| FileError::io(&path, "read", e))?;
+            let content = read_file(&path)?;
             for line in content.split(|b| *b == b'\n').filter(|line| !line.is_empty()) {
                 match Done::from_line(line) {
                     Some(done) => finished.insert(done),
@@ -340,6 +340,7 @@ impl Journal {
 mod tests {
     use super::*;
     use s3d_io::fs::write_bytes;
+    use std::fs;
 
     fn scores(location: &str) -> Done {
         let entropies = vec![0.1, 1.7e-300, 2.564_949_357_461_536_7];

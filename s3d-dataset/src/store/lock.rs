@@ -2,6 +2,7 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::store::change;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;
@@ -65,13 +66,18 @@ impl Lock {
         }
     }
 
-    /// The lock of a complete data set that a command changes, for the time of `work`.
+    /// The lock of a complete data set that a command changes, for the time of `work`. That is told which
+    /// call's change, begun by a process that was killed, was completed before.
     ///
     /// # Errors
     /// As [`Lock::take`], and those of `work`.
-    pub(crate) fn during<T>(ctx: &Context, layout: &Layout, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    pub(crate) fn during<T>(
+        ctx: &Context,
+        layout: &Layout,
+        work: impl FnOnce(Option<String>) -> Result<T>,
+    ) -> Result<T> {
         let lock = Self::take(ctx, layout, Sharing::Alone)?;
-        let done = work();
+        let done = change::settle(layout).and_then(work);
         lock.abandon();
         done
     }

@@ -1,11 +1,13 @@
 //! The folder of a data set: what state it is in, what is done of an export, and who may write to it.
 
 pub(crate) mod backup;
+pub(crate) mod change;
 pub(crate) mod checked;
 pub(crate) mod journal;
 pub(crate) mod lock;
 pub(crate) mod output;
 pub(crate) mod request;
+pub(crate) mod staging;
 
 use crate::error::{Error, Result};
 use s3d_io::Error as FileError;
@@ -30,4 +32,12 @@ pub(crate) fn is_plan(folder: &Path) -> bool {
 /// What a plan is for.
 pub(crate) fn plan_file(folder: &Path) -> PathBuf {
     folder.join("plan.jsonl")
+}
+
+/// The folder that a path lies in.
+pub(crate) fn parent_of(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    }
 }

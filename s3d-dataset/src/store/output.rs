@@ -134,7 +134,7 @@ fn find(layout: &Layout, request: &Request) -> Result<Found> {
     if head.as_ref().is_some_and(Head::is_complete) {
         let differences = match Manifest::read(layout) {
             Ok(manifest) => manifest.differences(request),
-            Err(e) if e.is_temporary() => return Err(e),
+            Err(e) if passes(&e) => return Err(e.into()),
             // Of another version.
             Err(e) => vec![e.to_string()],
         };
@@ -431,9 +431,7 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
         let files: Vec<_> = records.iter().collect();
         crate::tables::listing::faults(ctx, layout, &files)?.into_iter().map(|(_, fault)| fault).collect()
     } else {
-        let wrong = |r: &&s3d_io::dataset::FileRecord| {
-            fs::metadata(r.path_in(layout.root())).map_or(true, |found| found.len() != r.bytes)
-        };
+        let wrong = |r: &&s3d_io::dataset::FileRecord| r.check_size(layout.root()).is_err();
         records.iter().filter(wrong).map(|r| r.path.clone()).collect::<Vec<String>>()
     };
     let Some(first) = faults.first() else { return Ok(true) };

@@ -3,9 +3,11 @@
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::work::for_each_in_order;
+use crate::tables::dataset::Dataset;
 use crate::tables::manifest::{FileList, Manifest};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{FileRecord, Layout, read_file_list, write_file_list};
+use s3d_io::dataset::{FileRecord, Layout, write_file_list};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -119,23 +121,19 @@ pub(crate) fn write(layout: &Layout, records: &[FileRecord]) -> Result<FileList>
     })
 }
 
-/// Brings `files.csv` and the manifest of a complete data set up to date, after the files of `changed` were
-/// written and all others for which `is_gone` holds were removed. A data set that never had a list gets none.
-pub(crate) fn update(
-    layout: &Layout,
+/// Writes `files.csv` and the manifest of a complete data set as they are after a change: the files of
+/// `changed` are new, and all others for which `is_gone` holds are not there any more.
+pub(crate) fn write_changed(
+    data: &Dataset,
     manifest: &mut Manifest,
     changed: Vec<FileRecord>,
     is_gone: impl Fn(&str) -> bool,
+    staged: &Layout,
 ) -> Result<()> {
-    if manifest.files.is_some() {
-        let mut all: std::collections::BTreeMap<String, FileRecord> = read_file_list(&layout.file_list())?
-            .into_iter()
-            .filter(|record| !is_gone(&record.path))
-            .map(|record| (record.path.clone(), record))
-            .collect();
-        all.extend(changed.into_iter().map(|record| (record.path.clone(), record)));
-        let all: Vec<FileRecord> = all.into_values().collect();
-        manifest.files = Some(write(layout, &all)?);
-    }
-    manifest.write(layout)
+    let kept = data.files.records().filter(|record| !is_gone(&record.path)).cloned();
+    let all: BTreeMap<String, FileRecord> =
+        kept.chain(changed).map(|record| (record.path.clone(), record)).collect();
+    let all: Vec<FileRecord> = all.into_values().collect();
+    manifest.files = Some(write(staged, &all)?);
+    manifest.write(staged)
 }

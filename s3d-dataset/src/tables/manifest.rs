@@ -1,14 +1,17 @@
 //! `manifest.json`: what made a data set, from what, with which options, and what was lost on the way.
 
 use crate::error::{Result, passes_io};
-use crate::options::ExportOptions;
+use crate::options::{ExportOptions, by_name};
 use crate::profile::loader::Profile;
+use crate::store::change;
 use crate::store::request::{InputRecord, Request, RequestedArea};
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{DepthUnits, Layout, XyzType};
+use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType};
 use s3d_io::fs::{Checksum, read_json, write_json};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -16,21 +19,30 @@ const GENERATOR: &str = "s3d";
 const RUNNING: &str = "running";
 const COMPLETE: &str = "complete";
 
+/// The name of the list of files.
+const LIST: &str = "files.csv";
+
+/// What RGB images are made from: the mesh, or pictures of a kind.
+const RGB_SOURCES: [&str; 4] = ["texture", "skybox", "captures", "panorama"];
+
+/// A larger file is no manifest: a line for each file of the input is most of one.
+const LARGEST: u64 = 1 << 28;
+
 /// The manifest. It names neither threads nor times nor folders of the machine: the same input and options
-/// give the same bytes.
+/// give the same bytes. Whoever reads a data set reads it by [`Manifest::read`].
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Manifest {
     generator: String,
-    version: String,
+    pub(crate) version: String,
     /// `"running"` from the first file on, `"complete"` after the last.
     status: String,
-    seed: u64,
-    options: ExportOptions,
+    pub(crate) seed: u64,
+    pub(crate) options: ExportOptions,
     /// The areas that are in the folder, or will be.
-    area_numbers: Vec<u32>,
-    areas: Vec<AreaEntry>,
+    pub(crate) area_numbers: Vec<u32>,
+    pub(crate) areas: Vec<AreaEntry>,
     /// Entries of the label table, the null label and no padding included.
-    labels: usize,
+    pub(crate) labels: usize,
     /// Entries of `semantic_labels.json`: null labels fill it up.
     labels_padded_to: usize,
     /// The list of all other files; not while the export runs.
@@ -55,15 +67,21 @@ pub(crate) struct FileList {
 }
 
 /// What made world coordinates from depth, and what that loses.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct XyzFromDepth {
-    #[serde(rename = "type")]
-    kind: String,
+    #[serde(rename = "type", with = "by_name")]
+    kind: XyzType,
     /// The distance between neighbouring depths, metres: a point is off by at most half of it along its ray,
     /// or along the optical axis in a view.
     depth_step_m: f64,
     /// Points beyond this depth are missing, metres.
     largest_depth_m: f64,
+}
+
+impl XyzFromDepth {
+    fn of(kind: XyzType, units: DepthUnits) -> Self {
+        Self { kind, depth_step_m: 1.0 / units.per_m(), largest_depth_m: 65_534.0 / units.per_m() }
+    }
 }
 
 /// What the manifest tells of an area.
@@ -92,8 +110,8 @@ pub(crate) struct AreaEntry {
 /// What storing world coordinates loses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct XyzLoss {
-    #[serde(rename = "type")]
-    kind: String,
+    #[serde(rename = "type", with = "by_name")]
+    kind: XyzType,
     /// The farthest that a coordinate of the mesh is from 0, metres.
     largest_coordinate_m: f32,
     /// The distance between neighbouring numbers of the type there, metres; the error is at most half of it.
@@ -105,13 +123,13 @@ impl XyzLoss {
     /// The loss in a mesh with this box.
     pub(crate) fn of(bbox: Aabb, kind: XyzType) -> Self {
         let largest = bbox.to_array().iter().fold(0.0f32, |m, c| m.max(c.abs()));
-        let mut loss = Self { kind: String::new(), largest_coordinate_m: largest, largest_step_m: None };
+        let mut loss = Self { kind, largest_coordinate_m: largest, largest_step_m: None };
         loss.store_as(kind);
         loss
     }
 
     fn store_as(&mut self, kind: XyzType) {
-        self.kind = kind.name().to_owned();
+        self.kind = kind;
         self.largest_step_m = match kind {
             XyzType::Half => Some(half_step(self.largest_coordinate_m)),
             XyzType::Float => Some(float_step(self.largest_coordinate_m)),
@@ -182,20 +200,118 @@ impl Manifest {
         differences
     }
 
-    /// The manifest of a complete data set, to be changed.
-    pub(crate) fn read(layout: &Layout) -> Result<Self> {
-        Head::require(layout)?;
-        Ok(read_json(&layout.manifest())?)
+    /// Refuses a folder in which there is no complete data set of ours, however damaged.
+    pub(crate) fn require(layout: &Layout) -> Result<(), FileError> {
+        let path = layout.manifest();
+        let head: Head = read_manifest(&path)?;
+        let fault = |message: String| Err(FileError::format(&path, message));
+        if head.generator != GENERATOR {
+            return fault(format!("written by {:?}, not by s3d", head.generator));
+        }
+        if !head.is_complete() {
+            return fault(format!(
+                "status {:?}: the export into this folder did not finish, call it again, with the same arguments, and it \
+                 goes on",
+                head.status
+            ));
+        }
+        Ok(())
+    }
+
+    /// The manifest of a complete data set.
+    ///
+    /// # Errors
+    /// One of the file for all that is wrong with it: it is not there or none of ours, the export did not
+    /// finish, a field is missing or is not what it should be, the data set is half changed.
+    pub(crate) fn read(layout: &Layout) -> Result<Self, FileError> {
+        Self::require(layout)?;
+        let path = layout.manifest();
+        let fault = |message: String| Err(FileError::format(&path, message));
+        if let Some(what) = change::pending(layout)? {
+            return fault(format!(
+                "the data set is half changed: make the call {what:?} again, and it goes on"
+            ));
+        }
+        let manifest: Self = read_manifest(&path)?;
+        match manifest.contradiction() {
+            Some(message) => fault(message),
+            None => Ok(manifest),
+        }
+    }
+
+    /// What cannot be, of all that is read.
+    fn contradiction(&self) -> Option<String> {
+        let numbers: BTreeSet<u32> = self.area_numbers.iter().copied().collect();
+        if numbers.is_empty() || numbers.contains(&0) || numbers.len() != self.area_numbers.len() {
+            return Some(format!("area_numbers {:?} are no numbers of areas", self.area_numbers));
+        }
+        if !self.areas.iter().map(|area| area.area).eq(self.area_numbers.iter().copied()) {
+            let told: Vec<u32> = self.areas.iter().map(|area| area.area).collect();
+            return Some(format!("area_numbers {:?}, and areas tells of {told:?}", self.area_numbers));
+        }
+        let padded = self.labels.max(self.options.pad_labels.0);
+        if self.labels == 0 || self.labels_padded_to != padded {
+            let told = self.labels_padded_to;
+            return Some(format!("{} labels, padded to {told}: its options make it {padded}", self.labels));
+        }
+        if let Some(files) = self.files.as_ref().filter(|files| files.list != LIST) {
+            return Some(format!("tells of a list {:?}; it is called {LIST}", files.list));
+        }
+        let units = self.options.depth_units;
+        if let Some(made) = &self.xyz_from_depth
+            && (made.kind == XyzType::None || *made != XyzFromDepth::of(made.kind, units))
+        {
+            return Some(format!("xyz_from_depth does not fit depth units {units}"));
+        }
+        if let Some(area) = self.areas.iter().find(|area| !RGB_SOURCES.contains(&area.rgb.as_str())) {
+            return Some(format!("area {}: colours come from {:?}, which is not known", area.area, area.rgb));
+        }
+        self.options.canonical().err().map(|e| format!("in its options: {e}"))
+    }
+
+    /// Whether this program wrote it, so that what it always writes is known to the byte.
+    pub(crate) fn is_of_this_version(&self) -> bool {
+        self.version == env!("CARGO_PKG_VERSION")
+    }
+
+    /// In which forms numbers are written. `conventions.json` tells the same to other programs.
+    pub(crate) fn conventions(&self) -> Conventions {
+        let made = self.xyz_from_depth.as_ref().map(|made| made.kind);
+        let told = self.options.conventions();
+        Conventions { xyz: made.unwrap_or(told.xyz), ..told }
+    }
+
+    /// What `conventions.json` says against the manifest, if it does.
+    pub(crate) fn contradiction_of(&self, found: Conventions) -> Option<String> {
+        let told = self.conventions();
+        (found != told).then(|| format!("{found}; the manifest tells of {told}"))
+    }
+
+    /// The domains that every image has, in their order.
+    pub(crate) fn domains(&self) -> Vec<Domain> {
+        let made_later = |d: &Domain| *d == Domain::GlobalXyz && self.is_xyz_from_depth();
+        Domain::ALL.into_iter().filter(|d| self.options.modalities.contains(d) || made_later(d)).collect()
+    }
+
+    /// Whether its world coordinates were made by `s3d xyz`.
+    pub(crate) fn is_xyz_from_depth(&self) -> bool {
+        self.xyz_from_depth.is_some()
+    }
+
+    /// What is told of an area.
+    pub(crate) fn area(&self, number: u32) -> Option<&AreaEntry> {
+        self.areas.iter().find(|a| a.area == number)
+    }
+
+    /// Whether a location's images were asked for.
+    pub(crate) fn is_chosen(&self, uuid: &str) -> bool {
+        self.options.only.is_empty() || self.options.only.iter().any(|o| o == uuid)
     }
 
     /// Tells that the world coordinates were made from depth.
     pub(crate) fn xyz_from_depth(&mut self, kind: XyzType, units: DepthUnits) {
         self.areas.iter_mut().for_each(|area| area.xyz.store_as(kind));
-        self.xyz_from_depth = Some(XyzFromDepth {
-            kind: kind.name().to_owned(),
-            depth_step_m: 1.0 / units.per_m(),
-            largest_depth_m: 65_534.0 / units.per_m(),
-        });
+        self.xyz_from_depth = Some(XyzFromDepth::of(kind, units));
     }
 
     /// Tells that there are profiles besides those that there were.
@@ -238,7 +354,22 @@ pub(crate) fn if_there<T>(read: s3d_io::Result<T>) -> Result<Option<T>> {
     }
 }
 
-/// What a manifest tells of the data set beside it.
+/// Reads a manifest, or as much of one as is asked for.
+fn read_manifest<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
+    let size = match std::fs::metadata(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => {
+            return Err(FileError::format(path, "not there: give the folder of a data set"));
+        }
+        found => found.map_err(|e| FileError::io(path, "read", e))?.len(),
+    };
+    if size > LARGEST {
+        return Err(FileError::format(path, format!("{size} bytes: no manifest is as large")));
+    }
+    read_json(path)
+}
+
+/// What a manifest of any version tells of the data set beside it: enough to go on with it, to replace it, or
+/// to bring it back.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Head {
     generator: String,
@@ -254,21 +385,8 @@ impl Head {
     /// # Errors
     /// It cannot be read now: as [`if_there`].
     pub(crate) fn read(path: &Path) -> Result<Option<Self>> {
-        let head: Option<Self> = if_there(read_json(path))?;
+        let head: Option<Self> = if_there(read_manifest(path))?;
         Ok(head.filter(|head| head.generator == GENERATOR))
-    }
-
-    /// The manifest of a folder that must hold a complete data set of ours.
-    pub(crate) fn require(layout: &Layout) -> Result<Self> {
-        let path = layout.manifest();
-        let head = Self::read(&path)?.ok_or_else(|| {
-            FileError::format(&path, "not there, or not written by s3d: give the folder of a data set")
-        })?;
-        if head.is_complete() {
-            return Ok(head);
-        }
-        Err(FileError::format(&path, "the export into this folder did not finish: call it again, with the same arguments, and it goes on")
-            .into())
     }
 
     /// Whether the export ended.

@@ -1,5 +1,6 @@
 pub(crate) mod account;
 pub(crate) mod assets;
+pub(crate) mod dataset;
 pub(crate) mod label_list;
 pub(crate) mod listing;
 pub(crate) mod manifest;

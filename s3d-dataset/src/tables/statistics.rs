@@ -1,18 +1,22 @@
 //! The paper's tables of statistics, counted from the files of a data set.
 
+use crate::context::Context;
 use crate::error::Result;
-use crate::tables::manifest::Head;
+use crate::tables::dataset::Dataset;
 use crate::tables::records::RoomRecord;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Domain, Frame, Layout, read_labels};
-use s3d_io::fs::{read_json, write_bytes, write_json};
+use s3d_io::dataset::{Domain, Frame, ImageName, Layout, read_labels};
+use s3d_io::fs::{open_file, read_json, write_bytes, write_json};
 use s3d_label::{Class, ClassCounts, LabelTable, Room, RoomError, RoomType};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::{self, File};
-use std::io::{BufRead, BufReader};
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
+
+/// So much of a line is read at once.
+const LONGEST_PART: u64 = 1 << 16;
 
 /// The tables, an entry an area.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -59,20 +63,34 @@ pub struct RoomTypeStatistics {
 /// # Errors
 /// [`Error::File`](crate::Error::File) if there is no complete data set, or a file cannot be read.
 pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
-    let layout = Layout::new(root.into());
-    let head = Head::require(&layout)?;
-    Statistics::count(&layout, &head.area_numbers)
+    let layout = &Layout::new(root.into());
+    let data = Dataset::open(layout)?;
+    let areas = &data.manifest.area_numbers;
+    let folders: Vec<PathBuf> = areas.iter().map(|area| layout.area_dir(*area)).collect();
+    // Images are counted, and not read.
+    data.files.require(&Context::default(), |path| folders.iter().any(|area| path.starts_with(area)))?;
+    Statistics::count(layout, areas, |path, whole| {
+        if whole { data.files.checked(path) } else { data.files.sized(path) }.map(drop)
+    })
 }
 
 impl Statistics {
-    /// Counts what lies in the folders of a data set of these areas.
-    pub(crate) fn count(layout: &Layout, areas: &[u32]) -> Result<Self> {
+    /// Counts what lies in the folders of a data set of these areas. Before a file is read, as a `whole` or
+    /// not, `check` may refuse it.
+    pub(crate) fn count(
+        layout: &Layout,
+        areas: &[u32],
+        check: impl Fn(&Path, bool) -> Result<(), FileError>,
+    ) -> Result<Self> {
         let path = layout.labels_json();
+        check(&path, true)?;
         let table = LabelTable::from_names(&read_labels(&path)?)
             .map_err(|e| FileError::format(&path, e.to_string()))?;
         let classes = ClassCounts::from_table(&table);
-        let areas =
-            areas.iter().map(|n| AreaStatistics::count(layout, *n, &classes)).collect::<Result<_>>()?;
+        let areas = areas
+            .iter()
+            .map(|n| AreaStatistics::count(layout, *n, &classes, &check))
+            .collect::<Result<_>>()?;
         Ok(Self { areas })
     }
 
@@ -147,7 +165,15 @@ fn rows<'a, F: Fn(&AreaStatistics) -> f64>(rows: &'a [(&'static str, F)]) -> Vec
 }
 
 impl AreaStatistics {
-    fn count(layout: &Layout, area: u32, classes: &ClassCounts) -> Result<Self> {
+    fn count(
+        layout: &Layout,
+        area: u32,
+        classes: &ClassCounts,
+        check: impl Fn(&Path, bool) -> Result<(), FileError>,
+    ) -> Result<Self> {
+        check(&layout.rooms_json(area), true)?;
+        check(&layout.point_cloud(area), false)?;
+        check(&layout.semantic_obj(area), true)?;
         let mut rooms_per_type: BTreeMap<_, RoomTypeStatistics> =
             RoomType::ALL.map(|t| (t.name(), RoomTypeStatistics::default())).into();
         let rooms: Vec<RoomRecord> = read_json(&layout.rooms_json(area))?;
@@ -175,16 +201,17 @@ impl AreaStatistics {
 
 /// The number of faces in an OBJ file.
 fn count_faces(path: &Path) -> Result<u64> {
-    let file = File::open(path).map_err(|e| FileError::io(path, "read", e))?;
-    let mut reader = BufReader::new(file);
-    let mut line = Vec::new();
-    let mut faces = 0;
+    let mut reader = BufReader::new(open_file(path)?);
+    let (mut part, mut begins, mut faces) = (Vec::new(), true, 0);
     loop {
-        line.clear();
-        if reader.read_until(b'\n', &mut line).map_err(|e| FileError::io(path, "read", e))? == 0 {
+        part.clear();
+        // A line is read in parts, however long it is.
+        let read = reader.by_ref().take(LONGEST_PART).read_until(b'\n', &mut part);
+        if read.map_err(|e| FileError::io(path, "read", e))? == 0 {
             return Ok(faces);
         }
-        faces += u64::from(line.starts_with(b"f "));
+        faces += u64::from(begins && part.starts_with(b"f "));
+        begins = part.ends_with(b"\n");
     }
 }
 
@@ -194,7 +221,11 @@ fn count_images(layout: &Layout, area: u32, frame: Frame) -> Result<u64> {
     for domain in Domain::ALL {
         let dir = layout.image_dir(area, frame, domain);
         match fs::read_dir(&dir) {
-            Ok(entries) => most = most.max(entries.count() as u64),
+            Ok(entries) => {
+                let names = entries.flatten().map(|entry| entry.file_name());
+                let images = names.filter(|name| name.to_str().and_then(ImageName::parse).is_some());
+                most = most.max(images.count() as u64);
+            }
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
             Err(e) => return Err(FileError::io(&dir, "read", e).into()),
         }

@@ -1,10 +1,11 @@
 //! The files of a data set against the list of them: which there are, their sizes and checksums.
 
-use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::work::for_each_in_order;
+use crate::tables::dataset::Listed;
+use crate::tables::manifest::Manifest;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FileRecord, Frame, ImageName, Layout, read_file_list};
 use s3d_io::fs::checksum_of_file;
@@ -26,32 +27,28 @@ pub(crate) struct Files {
 
 impl Files {
     /// Reads the list, and holds it against the manifest.
-    pub(crate) fn read(layout: &Layout, manifest: &ReadManifest, report: &Report) -> Self {
+    pub(crate) fn read(layout: &Layout, manifest: &Manifest, report: &Report) -> Self {
         let path = layout.file_list();
-        if manifest.files.is_none() && !path.exists() {
-            report.note("no files.csv: sizes and checksums of files were not compared");
+        let Some(told) = &manifest.files else {
+            let _ = report.ok(Topic::Files, Listed::read(layout, manifest));
             return Self { listed: None };
-        }
-        let records = report.read(Topic::Files, read_file_list(&path));
-        if let (Some(manifest), Some((bytes, sum))) =
-            (&manifest.files, report.read(Topic::Files, checksum_of_file(&path)))
+        };
+        let records = report.read(Topic::Files, &path, read_file_list);
+        report.expect(records.clone(), told.bytes);
+        if let (Some(records), Some((bytes, sum))) =
+            (&records, report.read(Topic::Files, &path, checksum_of_file))
         {
             let checks = report.of(LIST, &path);
-            checks.check(sum == manifest.xxh3_128, || {
+            checks.check(sum == told.xxh3_128, || {
+                format!("{bytes} bytes with the checksum {sum}, and the manifest tells of {}", told.xxh3_128)
+            });
+            let (count, bytes) = (records.len() as u64, records.iter().map(|r| r.bytes).sum::<u64>());
+            checks.check((count, bytes) == (told.count, told.bytes), || {
                 format!(
-                    "{bytes} bytes with the checksum {sum}, and the manifest tells of {}",
-                    manifest.xxh3_128
+                    "{count} files of {bytes} bytes, and the manifest tells of {} of {}",
+                    told.count, told.bytes
                 )
             });
-            if let Some(records) = &records {
-                let (count, bytes) = (records.len() as u64, records.iter().map(|r| r.bytes).sum::<u64>());
-                checks.check((count, bytes) == (manifest.count, manifest.bytes), || {
-                    format!(
-                        "{count} files of {bytes} bytes, and the manifest tells of {} of {}",
-                        manifest.count, manifest.bytes
-                    )
-                });
-            }
         }
         let listed = |r: FileRecord| (r.path.clone(), (r, AtomicBool::new(false)));
         Self { listed: records.map(|records| records.into_iter().map(listed).collect()) }
@@ -63,7 +60,7 @@ impl Files {
         let entry = self.listed.as_ref().and_then(|l| l.get(&report.relative(path)));
         if let Some((record, looked_at)) = entry {
             looked_at.store(true, Ordering::Relaxed);
-            check_record(record, path, report);
+            check_record(record, report);
         }
     }
 
@@ -72,7 +69,7 @@ impl Files {
         &self,
         ctx: &Context,
         layout: &Layout,
-        manifest: &ReadManifest,
+        manifest: &Manifest,
         report: &Report,
     ) -> Result<()> {
         let there = all_files(layout, &manifest.area_numbers, report);
@@ -101,9 +98,8 @@ impl Files {
             &left,
             || (),
             |(), record| {
-                let path = record.path_in(layout.root());
                 report.looked_at(1);
-                check_record(record, &path, report);
+                check_record(record, report);
                 progress.add(1);
                 Ok(())
             },
@@ -111,19 +107,10 @@ impl Files {
     }
 }
 
-fn check_record(record: &FileRecord, path: &Path, report: &Report) {
-    let size = fs::metadata(path).map(|m| m.len()).map_err(|e| FileError::io(path, "read", e));
-    let Some(size) = report.read(Topic::Files, size) else { return };
-    let same = report.check(size == record.bytes, BYTES, path, || {
-        format!("{size} bytes, and files.csv tells of {}", record.bytes)
-    });
-    if same && let Some((_, sum)) = report.read(Topic::Files, checksum_of_file(path)) {
-        report.check(sum == record.xxh3_128, BYTES, path, || {
-            format!(
-                "other content than was written: checksum {sum}, and files.csv tells of {}",
-                record.xxh3_128
-            )
-        });
+fn check_record(record: &FileRecord, report: &Report) {
+    report.checked(2);
+    if let Err(e) = record.check(report.root()) {
+        report.wrong(BYTES, &e);
     }
 }
 

@@ -1,8 +1,8 @@
 //! The tables of instances: boxes, voxels and numbers, each against the others.
 
 use super::labels::Labels;
-use super::manifest::ReadManifest;
 use super::report::{OfFile, Report, Topic};
+use crate::tables::manifest::Manifest;
 use s3d_io::dataset::{InstanceArrays, Layout, read_instance_arrays, read_instance_members, read_instances};
 use s3d_io::fs::read_json;
 use s3d_label::parse_name;
@@ -13,10 +13,10 @@ use std::path::Path;
 const INSTANCES: (Topic, &str) = (Topic::Instances, "tables of instances");
 
 /// Checks `instances.json`, `instances.npz` and `instance_numbers.json` of an area.
-pub(crate) fn check(layout: &Layout, area: u32, manifest: &ReadManifest, labels: &Labels, report: &Report) {
+pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &Labels, report: &Report) {
     let (json, npz) = (layout.instances_json(area), layout.instances_npz(area));
-    let entries = report.read(Topic::Instances, read_instances(&json));
-    let arrays = report.read(Topic::Instances, read_instance_arrays(&npz));
+    let entries = report.read(Topic::Instances, &json, read_instances);
+    let arrays = report.read(Topic::Instances, &npz, read_instance_arrays);
     if let Some(entries) = &entries {
         let checks = report.of(INSTANCES, &json);
         let mut seen = BTreeSet::new();
@@ -83,7 +83,7 @@ fn label(name: &str, index: u32, labels: &Labels, checks: &OfFile<'_>) {
 fn members(arrays: &InstanceArrays, path: &Path, report: &Report) {
     let checks = report.of(INSTANCES, path);
     let mut seen = Vec::new();
-    let read = read_instance_members(path, &arrays.point_start, |i, members| {
+    let each = |i: usize, members: &[u32]| {
         seen.clear();
         seen.resize(members.len(), false);
         let once =
@@ -100,8 +100,8 @@ fn members(arrays: &InstanceArrays, path: &Path, report: &Report) {
                 members.len()
             )
         });
-    });
-    report.read(Topic::Instances, read);
+    };
+    report.read(Topic::Instances, path, |path| read_instance_members(path, &arrays.point_start, each));
 }
 
 #[derive(Deserialize)]
@@ -114,7 +114,7 @@ struct Number {
 
 fn numbers(layout: &Layout, area: u32, labels: &Labels, report: &Report) {
     let path = layout.instance_numbers_json(area);
-    let Some(numbers) = report.read(Topic::Instances, read_json::<Vec<Number>>(&path)) else { return };
+    let Some(numbers) = report.read(Topic::Instances, &path, read_json::<Vec<Number>>) else { return };
     let checks = report.of(INSTANCES, &path);
     let (mut names, mut places) = (BTreeSet::new(), BTreeSet::new());
     for n in &numbers {

@@ -1,7 +1,7 @@
 //! The label table, and the labels that the meshes give their faces.
 
-use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
+use crate::tables::manifest::Manifest;
 use s3d_io::dataset::{Layout, read_labels};
 use s3d_io::image::pretty_color;
 use s3d_label::{LabelTable, NULL_NAME};
@@ -20,18 +20,16 @@ pub(crate) struct Labels {
 
 impl Labels {
     /// Reads and checks `semantic_labels.json`.
-    pub(crate) fn read(layout: &Layout, manifest: &ReadManifest, report: &Report) -> Option<Self> {
+    pub(crate) fn read(layout: &Layout, manifest: &Manifest, report: &Report) -> Option<Self> {
         let path = layout.labels_json();
-        let mut names = report.read(Topic::Labels, read_labels(&path))?;
+        let mut names = report.read(Topic::Labels, &path, read_labels)?;
         let checks = report.of(ORDER, &path);
         if let Err(e) = LabelTable::from_names(&names) {
             checks.check(false, || format!("out of order, or no table: {e}"));
         }
-        if manifest.labels_padded_to > 0 {
-            checks.check(names.len() == manifest.labels_padded_to, || {
-                format!("{} entries, and the manifest tells of {}", names.len(), manifest.labels_padded_to)
-            });
-        }
+        checks.check(names.len() == manifest.labels_padded_to(), || {
+            format!("{} entries, and the manifest tells of {}", names.len(), manifest.labels_padded_to())
+        });
         let count = names.iter().rposition(|name| name != NULL_NAME).map_or(1, |last| last + 1);
         names.truncate(count);
         checks.check(count == manifest.labels, || {

@@ -1,8 +1,8 @@
 //! The exported meshes: one for colours, the same for labels, and the votes that made these.
 
 use super::labels::Labels;
-use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
+use crate::tables::manifest::{Manifest, XyzLoss};
 use s3d_geom::TriMesh;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::read_json;
@@ -29,13 +29,20 @@ pub(crate) struct LabelledMesh {
 pub(crate) fn read_and_check(
     layout: &Layout,
     area: u32,
-    manifest: &ReadManifest,
+    manifest: &Manifest,
     labels: &Labels,
     report: &Report,
 ) -> Option<LabelledMesh> {
     let (colored, semantic) = (layout.rgb_obj(area), layout.semantic_obj(area));
     let read = |path: &Path| {
-        let file = report.read(Topic::Mesh, read_mesh(path, UpAxis::Y))?;
+        // The mesh names them, and they are read with it.
+        let with_it = path.with_extension("mtl");
+        let textures = layout.mesh_dir(area).join("rgb_textures");
+        let fits = |other: &Path| *other == *with_it || other.starts_with(&textures);
+        let file = report.read(Topic::Mesh, path, |path| {
+            report.check_sizes(fits)?;
+            read_mesh(path, UpAxis::Y)
+        })?;
         for warning in &file.warnings {
             report.fault(Topic::Mesh, "what is wrong in a mesh", path, warning);
         }
@@ -45,10 +52,23 @@ pub(crate) fn read_and_check(
     let names = semantic_file.map(|file| (label_names(&file.mesh, labels, &semantic, report), file.mesh));
     let file = read(&colored)?;
     let faces = file.mesh.faces().len();
+    let kind = manifest.conventions().xyz;
     if let Some(manifest) = manifest.area(area) {
         report.check(faces == manifest.faces, MESH, &colored, || {
             format!("{faces} faces, and the manifest tells of {}", manifest.faces)
         });
+        let loss = XyzLoss::of(file.mesh.aabb(), kind);
+        report.check(
+            manifest.xyz == loss,
+            (Topic::Manifest, "loss of coordinates"),
+            &layout.manifest(),
+            || {
+                format!(
+                    "area {area}: the loss of coordinates is {:?}, and that of its mesh {loss:?}",
+                    manifest.xyz
+                )
+            },
+        );
     }
     let (label_of_face, other) = names?;
     let same = report.check(faces == other.faces().len(), MESH, &semantic, || {
@@ -111,7 +131,7 @@ struct VotesRecord {
 /// Holds the labels of `semantic.obj` against the report on the votes: faces in all, by room and by class.
 fn check_votes(layout: &Layout, area: u32, label_of_face: &[u32], labels: &Labels, report: &Report) {
     let path = layout.votes_json(area);
-    let Some(votes) = report.read(Topic::Mesh, read_json::<VotesRecord>(&path)) else { return };
+    let Some(votes) = report.read(Topic::Mesh, &path, read_json::<VotesRecord>) else { return };
     let mut per_label = vec![0u64; labels.len()];
     for &label in label_of_face {
         if let Some(count) = per_label.get_mut(label as usize) {

@@ -13,7 +13,6 @@ mod files;
 mod images;
 mod instances;
 mod labels;
-mod manifest;
 mod mesh;
 mod points;
 mod pose;
@@ -25,10 +24,10 @@ mod views;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::work::for_each_in_order;
+use crate::tables::manifest::Manifest;
 use files::Files;
 use images::{ImageCheck, Mismatch, Reference, Scratch};
 use labels::Labels;
-use manifest::ReadManifest;
 use mesh::{LabelledMesh, NOT_IN_TABLE};
 pub use report::{FaultGroup, VerifyReport};
 use report::{Report, Topic};
@@ -56,7 +55,7 @@ pub struct VerifyOptions {
 struct Common<'a> {
     ctx: &'a Context,
     layout: &'a Layout,
-    manifest: &'a ReadManifest,
+    manifest: &'a Manifest,
     labels: Option<&'a Labels>,
     views: &'a Views,
     files: &'a Files,
@@ -81,11 +80,11 @@ pub fn verify(root: impl Into<PathBuf>, options: &VerifyOptions, ctx: &Context) 
 
 fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
     let report = Report::new(layout);
-    let Some(manifest) = ReadManifest::read(layout, &report) else { return Ok(report) };
+    let Some(manifest) = report.ok(Topic::Manifest, Manifest::read(layout)) else { return Ok(report) };
+    let files = Files::read(layout, &manifest, &report);
     let labels = Labels::read(layout, &manifest, &report);
     tables::conventions(layout, &manifest, &report);
     let views = Views::read(layout, &manifest, &report);
-    let files = Files::read(layout, &manifest, &report);
     let common = Common {
         ctx,
         layout,
@@ -98,7 +97,7 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
     };
     let mut all = Vec::new();
     for &area in &manifest.area_numbers {
-        let images = report.read(Topic::Images, dataset_images(layout, area)).unwrap_or_default();
+        let images = report.ok(Topic::Images, dataset_images(layout, area)).unwrap_or_default();
         check_area(&common, area, &images)?;
         all.extend(images);
     }

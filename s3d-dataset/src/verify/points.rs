@@ -1,9 +1,9 @@
 //! The sampled points: on their faces, with their faces' labels, and the same in every form.
 
 use super::labels::Labels;
-use super::manifest::ReadManifest;
 use super::mesh::LabelledMesh;
 use super::report::{Report, Topic};
+use crate::tables::manifest::Manifest;
 use s3d_geom::{PointCloud, TriMesh};
 use s3d_io::cloud::{LabelledPoint, LabelledPoints, MatArea, MatObject, PointReader};
 use s3d_io::dataset::Layout;
@@ -25,14 +25,14 @@ const ROUNDING: f64 = 1e-6;
 pub(crate) fn check(
     layout: &Layout,
     area: u32,
-    manifest: &ReadManifest,
+    manifest: &Manifest,
     mesh: &LabelledMesh,
     labels: &Labels,
     full: bool,
     report: &Report,
 ) {
     let path = layout.point_cloud(area);
-    let Some(mut points) = report.read(Topic::Points, LabelledPoints::open(&path)) else { return };
+    let Some(mut points) = report.read(Topic::Points, &path, LabelledPoints::open) else { return };
     if let Some(manifest) = manifest.area(area) {
         report.check(points.count() == manifest.points, POINTS, &path, || {
             format!("{} points, and the manifest tells of {}", points.count(), manifest.points)
@@ -41,7 +41,7 @@ pub(crate) fn check(
     let mut forms = full.then(|| Forms::open(layout, area, labels, report));
     let (mut chunk, mut faults, mut first, mut at) = (Vec::new(), 0u64, None, 0u64);
     loop {
-        match report.read(Topic::Points, points.read(CHUNK, &mut chunk)) {
+        match report.ok(Topic::Points, points.read(CHUNK, &mut chunk)) {
             Some(true) => {}
             Some(false) => break,
             None => return,
@@ -131,10 +131,10 @@ struct Reader {
 impl<'a> Forms<'a> {
     fn open(layout: &'a Layout, area: u32, labels: &'a Labels, report: &'a Report) -> Self {
         let numbers: Vec<Number> =
-            report.read(Topic::Points, read_json(&layout.instance_numbers_json(area))).unwrap_or_default();
+            report.read(Topic::Points, &layout.instance_numbers_json(area), read_json).unwrap_or_default();
         let file = |n: &Number| format!("{}_{}.txt", n.class, n.number_in_room);
         let places = numbers.iter().map(|n| (n.label.clone(), (n.room.clone(), file(n)))).collect();
-        let mat = report.read(Topic::Points, MatArea::open(&layout.point_cloud_mat(area)));
+        let mat = report.read(Topic::Points, &layout.point_cloud_mat(area), MatArea::open);
         let objects = mat.into_iter().flat_map(|m| m.rooms).flat_map(|r| r.objects);
         let objects = objects.map(|o| (o.global_name.clone().unwrap_or_else(|| o.name.clone()), o)).collect();
         Self {
@@ -194,7 +194,7 @@ impl<'a> Forms<'a> {
         self.met.extend(self.instance.as_ref().map(|r| r.path.clone()));
         self.met.extend(self.room.as_ref().map(|(_, r)| r.path.clone()));
         if let Some(object) = self.objects.get(name) {
-            let _ = self.report.read(Topic::Points, object.read(&mut self.object));
+            let _ = self.report.ok(Topic::Points, object.read(&mut self.object));
         }
     }
 
@@ -234,7 +234,7 @@ fn near(p: &LabelledPoint, q: glam::Vec3, color: [u8; 3]) -> bool {
 
 impl Reader {
     fn open(path: PathBuf, report: &Report) -> Option<Self> {
-        let points = report.read(Topic::Points, PointReader::open(&path))?;
+        let points = report.read(Topic::Points, &path, PointReader::open)?;
         Some(Self { path, points, manifest: false })
     }
 

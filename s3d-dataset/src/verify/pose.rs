@@ -26,7 +26,7 @@ pub(crate) fn read_and_check(
     report: &Report,
 ) -> Option<CheckedPose> {
     let path = image.path(layout, Domain::Pose);
-    let raw: Value = report.read(Topic::Poses, read_json(&path))?;
+    let raw: Value = report.read(Topic::Poses, &path, read_json)?;
     let file: PoseFile = match serde_json::from_value(raw.clone()) {
         Ok(file) => file,
         Err(e) => {

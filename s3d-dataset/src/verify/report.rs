@@ -1,17 +1,20 @@
 //! What was checked and what is wrong: faults by topic and kind, few lines of each.
 
 use crate::error::passes;
-use s3d_io::dataset::Layout;
+use s3d_io::dataset::{FileRecord, Layout};
 use s3d_io::{Error as FileError, Place};
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Lines of one kind of fault; the rest is counted.
 const MAX_LINES: usize = 20;
+
+/// Bytes that can be read whatever they are.
+const SMALL: u64 = 1 << 26;
 
 /// What a fault is about; the report is grouped by it, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -69,6 +72,14 @@ pub(crate) struct Report {
     state: Mutex<State>,
     checks: AtomicU64,
     files: AtomicU64,
+    sizes: OnceLock<Sizes>,
+}
+
+/// The sizes that files may have.
+#[derive(Debug)]
+struct Sizes {
+    listed: Option<BTreeMap<String, FileRecord>>,
+    most: u64,
 }
 
 impl Report {
@@ -79,11 +90,17 @@ impl Report {
             state: Mutex::default(),
             checks: AtomicU64::new(0),
             files: AtomicU64::new(0),
+            sizes: OnceLock::new(),
         }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The data set's folder.
+    pub(crate) fn root(&self) -> &Path {
+        &self.root
     }
 
     /// A file's path below the data set's folder, with `/`.
@@ -125,14 +142,61 @@ impl Report {
         OfFile { report: self, fault, path, all_hold: Cell::new(true) }
     }
 
+    /// From now on no file is read that is much larger than it is listed; where there is no list,
+    /// none that is larger than `most` bytes, those of all files.
+    pub(crate) fn expect(&self, listed: Option<Vec<FileRecord>>, most: u64) {
+        let listed = listed.map(|all| all.into_iter().map(|record| (record.path.clone(), record)).collect());
+        let _ = self.sizes.set(Sizes { listed, most });
+    }
+
+    /// Whether a file has a size with which it may be read. One that no list names is told of elsewhere.
+    pub(crate) fn check_size(&self, path: &Path) -> Result<(), FileError> {
+        let Some(sizes) = self.sizes.get() else { return Ok(()) };
+        if let Some(listed) = &sizes.listed
+            && let Some(record) = listed.get(&self.relative(path))
+        {
+            // Of what is damaged it may be told what it looks like.
+            let is_small = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() <= SMALL);
+            return if is_small { Ok(()) } else { record.check_size(&self.root) };
+        }
+        let size = std::fs::metadata(path).map_err(|e| FileError::io(path, "read", e))?.len();
+        if size > sizes.most {
+            return Err(FileError::format(path, format!("{size} bytes, more than the data set has")));
+        }
+        Ok(())
+    }
+
+    /// The same of all files that are listed and `chosen`.
+    pub(crate) fn check_sizes(&self, chosen: impl Fn(&Path) -> bool) -> Result<(), FileError> {
+        let listed = self.sizes.get().and_then(|sizes| sizes.listed.as_ref());
+        let records = listed.into_iter().flat_map(BTreeMap::values);
+        let paths = records.map(|record| record.path_in(&self.root));
+        paths.filter(|path| chosen(path)).try_for_each(|path| self.check_size(&path))
+    }
+
+    /// What `read` gives of a file; what cannot be read is a fault of the file.
+    pub(crate) fn read<T>(
+        &self,
+        topic: Topic,
+        path: &Path,
+        read: impl FnOnce(&Path) -> Result<T, FileError>,
+    ) -> Option<T> {
+        self.ok(topic, self.check_size(path).and_then(|()| read(path)))
+    }
+
     /// What could be read; what could not is a fault of its file.
-    pub(crate) fn read<T>(&self, topic: Topic, result: Result<T, FileError>) -> Option<T> {
+    pub(crate) fn ok<T>(&self, topic: Topic, result: Result<T, FileError>) -> Option<T> {
         self.checked(1);
         result.map_err(|e| self.unreadable(topic, &e)).ok()
     }
 
-    /// A file that cannot be read: a fault of it, or of the system if it may do better the next time.
+    /// A file that cannot be read: a fault of it.
     pub(crate) fn unreadable(&self, topic: Topic, error: &FileError) {
+        self.wrong((topic, "cannot be read"), error);
+    }
+
+    /// An error of a file: a fault of it, or of the system if it may do better the next time.
+    pub(crate) fn wrong(&self, (topic, kind): (Topic, &'static str), error: &FileError) {
         if passes(error) {
             self.state().again.get_or_insert_with(|| error.to_string());
             return;
@@ -147,7 +211,7 @@ impl Report {
             FileError::Mesh { source, .. } => source.to_string(),
             other => other.to_string(),
         };
-        self.fault(topic, "cannot be read", error.path(), message);
+        self.fault(topic, kind, error.path(), message);
     }
 
     /// Something that was left out, and why.

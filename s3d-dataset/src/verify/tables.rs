@@ -1,11 +1,12 @@
 //! The tables beside the images: rooms, folds, lists, statistics, conventions.
 
-use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
+use crate::profile::loader::Profile;
 use crate::tables::assets;
+use crate::tables::manifest::Manifest;
 use crate::tables::statistics::Statistics;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, read_conventions, read_splits};
-use s3d_io::fs::read_json;
+use s3d_io::fs::{read_file, read_json};
 use s3d_label::Room;
 use s3d_sample::folds;
 use serde::Deserialize;
@@ -20,26 +21,33 @@ const STATISTICS: (Topic, &str) = (Topic::Tables, "statistics");
 
 /// Holds `conventions.json` against the options, and what is the same in every data set of this version
 /// against that; profiles that are told of are there.
-pub(crate) fn conventions(layout: &Layout, manifest: &ReadManifest, report: &Report) {
+pub(crate) fn conventions(layout: &Layout, manifest: &Manifest, report: &Report) {
     let path = layout.conventions();
-    if let Some(found) = report.read(Topic::Tables, read_conventions(&path)) {
-        report.check(found == manifest.conventions(), CONVENTIONS, &path, || {
-            let text = |c: s3d_io::dataset::Conventions| {
-                format!(
-                    "depth units {}, normal axes {}, coordinates {}",
-                    c.depth_units,
-                    c.normal_axes.name(),
-                    c.xyz
-                )
-            };
-            format!("{}; the manifest tells of {}", text(found), text(manifest.conventions()))
-        });
+    if let Some(found) = report.read(Topic::Tables, &path, read_conventions) {
+        let contradiction = manifest.contradiction_of(found);
+        report.check(contradiction.is_none(), CONVENTIONS, &path, || contradiction.unwrap_or_default());
     }
-    for name in manifest.profiles() {
-        let dir = layout.profile_dir(name);
-        report.check(dir.is_dir(), CONVENTIONS, &dir, || {
-            "missing: the manifest tells of this profile".to_owned()
-        });
+    for profile in Profile::ALL {
+        let dir = layout.profile_dir(profile.name());
+        match (dir.is_dir(), manifest.options.profiles.contains(&profile)) {
+            (false, true) => {
+                report.fault(
+                    CONVENTIONS.0,
+                    CONVENTIONS.1,
+                    &dir,
+                    "missing: the manifest tells of this profile",
+                );
+            }
+            (true, false) => {
+                report.fault(
+                    CONVENTIONS.0,
+                    CONVENTIONS.1,
+                    &dir,
+                    "the manifest does not tell of this profile",
+                );
+            }
+            _ => report.checked(1),
+        }
     }
     if !manifest.is_of_this_version() {
         report.note(format!(
@@ -49,13 +57,16 @@ pub(crate) fn conventions(layout: &Layout, manifest: &ReadManifest, report: &Rep
         return;
     }
     for (path, text) in assets::texts(layout) {
-        let found = std::fs::read(&path).map_err(|e| s3d_io::Error::io(&path, "read", e));
-        if let Some(found) = report.read(Topic::Tables, found) {
+        if let Some(found) = report.read(Topic::Tables, &path, read_file) {
             report.check(found == text.as_bytes(), CONVENTIONS, &path, || {
                 "is not what s3d writes there".to_owned()
             });
         }
     }
+}
+
+fn read_text(path: &Path) -> s3d_io::Result<String> {
+    String::from_utf8(read_file(path)?).map_err(|_| s3d_io::Error::format(path, "is no text in UTF-8"))
 }
 
 #[derive(Deserialize)]
@@ -73,9 +84,9 @@ struct RoomRecord {
 }
 
 /// Checks `rooms.json` of an area, and the angles of its S3DIS tree.
-pub(crate) fn rooms(layout: &Layout, area: u32, manifest: &ReadManifest, report: &Report) {
+pub(crate) fn rooms(layout: &Layout, area: u32, manifest: &Manifest, report: &Report) {
     let path = layout.rooms_json(area);
-    let Some(rooms) = report.read(Topic::Tables, read_json::<Vec<RoomRecord>>(&path)) else { return };
+    let Some(rooms) = report.read(Topic::Tables, &path, read_json::<Vec<RoomRecord>>) else { return };
     let checks = report.of(ROOMS, &path);
     if let Some(manifest) = manifest.area(area) {
         checks.check(rooms.len() == manifest.rooms, || {
@@ -104,8 +115,7 @@ pub(crate) fn rooms(layout: &Layout, area: u32, manifest: &ReadManifest, report:
     }
     let tree = layout.s3dis_area_dir(area);
     let list = tree.join(format!("Area_{area}_alignmentAngle.txt"));
-    let text = std::fs::read_to_string(&list).map_err(|e| s3d_io::Error::io(&list, "read", e));
-    let Some(text) = report.read(Topic::Tables, text) else { return };
+    let Some(text) = report.read(Topic::Tables, &list, read_text) else { return };
     let checks = report.of(ROOMS, &list);
     let mut listed = BTreeSet::new();
     for line in text.lines().filter(|l| !l.starts_with('#')) {
@@ -124,10 +134,10 @@ pub(crate) fn rooms(layout: &Layout, area: u32, manifest: &ReadManifest, report:
 }
 
 /// Checks `splits.json` and the lists of panoramas: what they name is there, and all that is there is named.
-pub(crate) fn splits(layout: &Layout, manifest: &ReadManifest, images: &[DatasetImage], report: &Report) {
+pub(crate) fn splits(layout: &Layout, manifest: &Manifest, images: &[DatasetImage], report: &Report) {
     let (areas, path) = (&manifest.area_numbers, layout.splits());
     let expected = folds(areas);
-    if let Some(splits) = report.read(Topic::Tables, read_splits(&path)) {
+    if let Some(splits) = report.read(Topic::Tables, &path, read_splits) {
         let same = splits.len() == expected.len()
             && splits
                 .iter()
@@ -141,8 +151,7 @@ pub(crate) fn splits(layout: &Layout, manifest: &ReadManifest, images: &[Dataset
         return;
     }
     let list = |path: &Path, areas: &[u32]| {
-        let text = std::fs::read_to_string(path).map_err(|e| s3d_io::Error::io(path, "read", e));
-        let Some(text) = report.read(Topic::Tables, text) else { return };
+        let Some(text) = report.read(Topic::Tables, path, read_text) else { return };
         let checks = report.of(SPLITS, path);
         let pair =
             |i: &DatasetImage| format!("{} {}", i.relative_path(Domain::Rgb), i.relative_path(Domain::Depth));
@@ -172,8 +181,9 @@ pub(crate) fn splits(layout: &Layout, manifest: &ReadManifest, images: &[Dataset
 }
 
 /// Holds the statistics against what is counted from the files.
-pub(crate) fn statistics(layout: &Layout, manifest: &ReadManifest, report: &Report) {
-    let counted = match Statistics::count(layout, &manifest.area_numbers) {
+pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) {
+    let check = |path: &Path, _| report.check_size(path);
+    let counted = match Statistics::count(layout, &manifest.area_numbers, check) {
         Ok(counted) => counted,
         Err(e) => {
             report.fault(
@@ -187,7 +197,7 @@ pub(crate) fn statistics(layout: &Layout, manifest: &ReadManifest, report: &Repo
     };
     let path = layout.statistics_json();
     if let (Some(found), Ok(expected)) =
-        (report.read(Topic::Tables, read_json::<Value>(&path)), serde_json::to_value(&counted))
+        (report.read(Topic::Tables, &path, read_json::<Value>), serde_json::to_value(&counted))
     {
         let mut differences = Vec::new();
         differ(&found, &expected, "", &mut differences);
@@ -196,8 +206,7 @@ pub(crate) fn statistics(layout: &Layout, manifest: &ReadManifest, report: &Repo
         });
     }
     let path = layout.statistics_md();
-    let text = std::fs::read_to_string(&path).map_err(|e| s3d_io::Error::io(&path, "read", e));
-    if let Some(text) = report.read(Topic::Tables, text) {
+    if let Some(text) = report.read(Topic::Tables, &path, read_text) {
         let expected = counted.to_markdown();
         report.check(text == expected, STATISTICS, &path, || {
             let pair = text.lines().zip(expected.lines()).find(|(a, b)| a != b).unwrap_or_default();

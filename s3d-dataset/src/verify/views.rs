@@ -1,10 +1,10 @@
 //! The list of views against its own draws and selection, and against the images that are there.
 
-use super::manifest::ReadManifest;
 use super::report::{Report, Topic};
 use crate::export::views::{Candidate, select};
+use crate::tables::manifest::Manifest;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, ViewRecord, read_views};
-use s3d_sample::{Pool, View, ViewDistribution, draw_view};
+use s3d_sample::{View, ViewDistribution, draw_view};
 use std::collections::{BTreeMap, BTreeSet};
 
 const DRAWS: (Topic, &str) = (Topic::Views, "draws and selection");
@@ -19,12 +19,21 @@ pub(crate) struct Views {
 
 impl Views {
     /// Reads and checks `views.json` of every area.
-    pub(crate) fn read(layout: &Layout, manifest: &ReadManifest, report: &Report) -> Self {
+    pub(crate) fn read(layout: &Layout, manifest: &Manifest, report: &Report) -> Self {
         let mut views = Self::default();
         let mut all_there = true;
         for &area in &manifest.area_numbers {
-            match report.read(Topic::Views, read_views(&layout.views_json(area))) {
+            match report.read(Topic::Views, &layout.views_json(area), read_views) {
                 Some(records) => {
+                    let locations = manifest.area(area).map_or(0, |area| area.locations as u64);
+                    let expected = locations.saturating_mul(manifest.options.views.into());
+                    report.check(records.len() as u64 == expected, DRAWS, &layout.views_json(area), || {
+                        format!(
+                            "{} candidates; the manifest tells of {locations} locations and {} candidates each",
+                            records.len(),
+                            manifest.options.views
+                        )
+                    });
                     let kept = records
                         .iter()
                         .filter_map(|r| Some(((area, r.camera_uuid.clone(), r.frame_num?), r.clone())));
@@ -66,7 +75,7 @@ impl Views {
         u32::try_from(self.of_location(area, &first.camera_uuid).count()).ok()
     }
 
-    fn check_draws(&self, layout: &Layout, manifest: &ReadManifest, report: &Report) {
+    fn check_draws(&self, layout: &Layout, manifest: &Manifest, report: &Report) {
         let distribution = ViewDistribution::default();
         for (area, records) in &self.by_area {
             let path = layout.views_json(*area);
@@ -89,8 +98,7 @@ impl Views {
         }
     }
 
-    fn check_selection(&self, layout: &Layout, manifest: &ReadManifest, report: &Report) {
-        let Ok(pool) = manifest.options.pool.parse::<Pool>() else { return };
+    fn check_selection(&self, layout: &Layout, manifest: &Manifest, report: &Report) {
         let mut candidates = Vec::new();
         for (&area, records) in manifest.area_numbers.iter().filter_map(|a| self.by_area.get_key_value(a)) {
             let mut location = 0;
@@ -109,7 +117,7 @@ impl Views {
                 });
             }
         }
-        select(&mut candidates, pool, manifest.options.keep_all, manifest.seed);
+        select(&mut candidates, manifest.options.pool, manifest.options.keep_all, manifest.seed);
         let found = manifest.area_numbers.iter().filter_map(|a| self.by_area.get(a)).flatten();
         for (c, r) in candidates.iter().zip(found) {
             report.check(c.frame_num == r.frame_num, DRAWS, &layout.views_json(c.area), || {
@@ -126,7 +134,7 @@ impl Views {
     pub(crate) fn check_images(
         &self,
         layout: &Layout,
-        manifest: &ReadManifest,
+        manifest: &Manifest,
         images: &[DatasetImage],
         report: &Report,
     ) {

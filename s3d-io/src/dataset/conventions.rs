@@ -78,6 +78,15 @@ pub struct UnknownWord {
     pub valid: &'static str,
 }
 
+impl fmt::Display for Conventions {
+    /// In a line, as messages have it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { depth_units, normal_axes, xyz } = self;
+        let axes = normal_axes.name();
+        write!(f, "depth units {depth_units}, normal axes {axes}, coordinates {xyz}")
+    }
+}
+
 impl FromStr for DepthUnits {
     type Err = UnknownWord;
 
@@ -206,12 +215,12 @@ impl Conventions {
     }
 }
 
-/// Which conventions the data set has whose `conventions.json` is at `path`; the published ones if there is
-/// no such file, as there is none in the published data.
+/// Which conventions the data set has whose `conventions.json` is at `path`. The published data has no such
+/// file: its conventions are [`Conventions::default`].
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if the file is something else or names a convention that is not known
-/// here.
+/// [`Error::Io`], also if there is no such file; [`Error::Format`] if it is something else or names a
+/// convention that is not known here.
 pub fn read_conventions(path: &Path) -> Result<Conventions> {
     #[derive(Deserialize)]
     struct File {
@@ -231,9 +240,6 @@ pub fn read_conventions(path: &Path) -> Result<Conventions> {
     struct Xyz {
         #[serde(rename = "type")]
         kind: String,
-    }
-    if !path.try_exists().map_err(|e| Error::io(path, "look for", e))? {
-        return Ok(Conventions::default());
     }
     let file: File = crate::fs::json::read_json(path)?;
     let units = [DepthUnits::Per512, DepthUnits::Millimetres];
@@ -260,7 +266,7 @@ mod tests {
     fn choices_come_back() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("conventions.json");
-        assert_eq!(read_conventions(&path).unwrap(), Conventions::default(), "the published files have none");
+        assert!(matches!(read_conventions(&path), Err(Error::Io { .. })), "no file says nothing");
         for depth_units in [DepthUnits::Per512, DepthUnits::Millimetres] {
             for normal_axes in [NormalAxes::Paper, NormalAxes::OpenCv] {
                 for xyz in [XyzType::Half, XyzType::Float, XyzType::None] {

@@ -2,11 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_whole;
-use crate::fs::checksum::{Checksum, checksum_of_file};
-use crate::fs::open::open_file;
+use crate::fs::checksum::{Checksum, ChecksumOfParts, checksum_of_file};
+use crate::fs::open::{must_be_regular, open_file, read_file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::io::{BufRead, BufReader};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// The first line.
@@ -52,28 +53,103 @@ impl FileRecord {
         root.join(&self.path)
     }
 
-    /// Reads the file in the data set in `root`, and tells what is wrong with it: nothing, if it is the one
-    /// that was recorded.
-    pub fn fault(&self, root: &Path) -> Option<String> {
+    /// Whether the file in the data set in `root` is a regular one of the size that was recorded; it is not
+    /// read.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it is not there; [`Error::Format`] if it is another.
+    pub fn check_size(&self, root: &Path) -> Result<()> {
         let path = self.path_in(root);
-        // A wrong size is told without reading.
-        match std::fs::metadata(&path) {
-            Err(e) => return Some(format!("{}: {e}", self.path)),
-            Ok(found) if found.len() != self.bytes => {
-                return Some(format!("{}: {} bytes instead of {}", self.path, found.len(), self.bytes));
-            }
-            Ok(_) => {}
+        let found = regular_size(&path)?;
+        if found == self.bytes { Ok(()) } else { Err(self.other_size(&path, found)) }
+    }
+
+    /// Whether the file in the data set in `root` is the one that was recorded. It is read, unless its size
+    /// tells already.
+    ///
+    /// # Errors
+    /// As [`FileRecord::check_size`].
+    pub fn check(&self, root: &Path) -> Result<()> {
+        self.check_size(root)?;
+        let path = self.path_in(root);
+        let found = checksum_of_file(&path)?;
+        self.check_found(&path, found)
+    }
+
+    /// What is wrong with the file in the data set in `root`, by [`FileRecord::check`].
+    pub fn fault(&self, root: &Path) -> Option<String> {
+        self.check(root).err().map(|e| e.to_string())
+    }
+
+    /// The content of the file in the data set in `root`, if it is the one that was recorded.
+    ///
+    /// # Errors
+    /// As [`FileRecord::check`].
+    pub fn read(&self, root: &Path) -> Result<Vec<u8>> {
+        self.check_size(root)?;
+        let path = self.path_in(root);
+        let bytes = read_file(&path)?;
+        self.check_found(&path, (bytes.len() as u64, Checksum::of(&bytes)))?;
+        Ok(bytes)
+    }
+
+    /// Opens the file in the data set in `root` to be read piece by piece; see [`CheckedFile`].
+    ///
+    /// # Errors
+    /// As [`FileRecord::check_size`].
+    pub fn open(&self, root: &Path) -> Result<CheckedFile> {
+        self.check_size(root)?;
+        let file = open_file(&self.path_in(root))?;
+        Ok(CheckedFile { file, record: self.clone(), parts: ChecksumOfParts::default() })
+    }
+
+    fn check_found(&self, path: &Path, (bytes, sum): (u64, Checksum)) -> Result<()> {
+        if bytes != self.bytes {
+            return Err(self.other_size(path, bytes));
         }
-        match checksum_of_file(&path) {
-            Err(e) => Some(e.to_string()),
-            Ok((bytes, xxh3_128)) if (bytes, xxh3_128) == (self.bytes, self.xxh3_128) => None,
-            Ok(_) => Some(format!("{}: other content", self.path)),
-        }
+        if sum == self.xxh3_128 { Ok(()) } else { Err(Error::format(path, self.other_content(sum))) }
+    }
+
+    fn other_size(&self, path: &Path, found: u64) -> Error {
+        Error::format(path, format!("is damaged: {found} bytes, and {} were written", self.bytes))
+    }
+
+    fn other_content(&self, found: Checksum) -> String {
+        format!("is damaged: other content than was written (checksum {found}, not {})", self.xxh3_128)
     }
 
     /// Its line in the file, without the line feed.
     pub fn to_line(&self) -> String {
         format!("{},{},{}", self.path, self.bytes, self.xxh3_128)
+    }
+}
+
+/// The size of a regular file.
+fn regular_size(path: &Path) -> Result<u64> {
+    must_be_regular(path)?;
+    Ok(std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len())
+}
+
+/// A recorded file that is read piece by piece. The read that finds its end fails if the file was not the one
+/// that was recorded.
+#[derive(Debug)]
+pub struct CheckedFile {
+    file: File,
+    record: FileRecord,
+    parts: ChecksumOfParts,
+}
+
+impl Read for CheckedFile {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let n = self.file.read(out)?;
+        self.parts.add(out.get(..n).unwrap_or_default());
+        if n == 0 && !out.is_empty() {
+            let (bytes, sum) = self.parts.finish();
+            if (bytes, sum) != (self.record.bytes, self.record.xxh3_128) {
+                return Err(io::Error::new(io::ErrorKind::InvalidData, self.record.other_content(sum)));
+            }
+        }
+        Ok(n)
     }
 }
 
@@ -154,8 +230,7 @@ pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileR
     for number in 1u64.. {
         let fault = |message: String| Err(Error::line(path, number, message));
         line.clear();
-        let read =
-            std::io::Read::take(&mut lines, LONGEST_LINE).read_until(b'\n', &mut line).map_err(failed)?;
+        let read = Read::take(&mut lines, LONGEST_LINE).read_until(b'\n', &mut line).map_err(failed)?;
         if read == 0 {
             return if number == 1 { fault("is empty".to_owned()) } else { Ok(records) };
         }
@@ -249,13 +324,28 @@ mod tests {
         let record = FileRecord::of_file(root, &path).unwrap();
         assert_eq!(record, FileRecord::of_bytes(root, &path, b"content").unwrap());
         assert_eq!((record.path.as_str(), record.path_in(root)), ("a/b/c.txt", path.clone()));
-        assert_eq!(record.fault(root), None);
+        assert_eq!((record.fault(root), record.read(root).unwrap()), (None, b"content".to_vec()));
+        let pieces = || {
+            let mut all = Vec::new();
+            record.open(root)?.read_to_end(&mut all).map_err(|e| Error::io(&path, "read", e))?;
+            Ok(all)
+        };
+        assert_eq!(pieces().unwrap(), b"content");
+        let told = |words: &str| {
+            let all: [Result<()>; 3] = [record.check(root), record.read(root).map(drop), pieces().map(drop)];
+            all.into_iter().all(|told| {
+                let told = told.unwrap_err().to_string();
+                told.contains("a/b/c.txt: ") && told.contains(words)
+            })
+        };
         write_bytes(&path, b"contend").unwrap();
-        assert_eq!(record.fault(root).unwrap(), "a/b/c.txt: other content");
+        assert!(record.check_size(root).is_ok() && told("other content than was written"));
         write_bytes(&path, b"parcel").unwrap();
-        assert_eq!(record.fault(root).unwrap(), "a/b/c.txt: 6 bytes instead of 7");
+        assert!(record.check_size(root).is_err() && told("6 bytes, and 7 were written"));
         std::fs::remove_file(&path).unwrap();
-        assert!(record.fault(root).unwrap().starts_with("a/b/c.txt: "));
+        assert!(record.check_size(root).is_err() && told("cannot read"));
+        create_dir(&path).unwrap();
+        assert!(record.check_size(root).is_err() && told("is a folder"));
         for (root, path) in [("x", "y"), ("x", "x"), ("x", "x/../y"), ("x", "x/a,b")] {
             assert!(FileRecord::of_bytes(Path::new(root), Path::new(path), b"").is_err(), "{path}");
         }

@@ -46,7 +46,7 @@ mod splits;
 pub use conventions::{Conventions, DepthUnits, UnknownWord, XyzType, read_conventions};
 pub use domain::{Domain, UnknownDomain};
 #[cfg(feature = "dataset")]
-pub use file_list::{FileRecord, parse_file_list, read_file_list, write_file_list};
+pub use file_list::{CheckedFile, FileRecord, parse_file_list, read_file_list, write_file_list};
 #[cfg(feature = "dataset")]
 pub use images::{
     DatasetImage, ViewRecord, check_images_complete, dataset_images, read_png_size, read_views,

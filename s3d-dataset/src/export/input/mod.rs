@@ -10,6 +10,7 @@ use crate::export::input::memory::{SceneSource, SharedScene};
 use crate::export::labels::annotate::SurveyedRoom;
 use crate::options::ExportOptions;
 use crate::store::request::InputRecord;
+use crate::tables::dataset::check_area;
 use crate::useful::{Estimate, Finding, count_findings};
 use glam::DAffine3;
 use s3d_geom::TriMesh;
@@ -284,6 +285,7 @@ impl AreaInput {
             area: scene.as_ref().map(|s| s.area),
             world_from_area: scene.as_ref().map_or(DAffine3::IDENTITY, |s| s.world_from_published),
         };
+        check_area(folder)?;
         let mut area = PublishedArea::open_with(folder, &options)?;
         let mut warnings = std::mem::take(&mut area.warnings);
         let mut rooms = Vec::new();

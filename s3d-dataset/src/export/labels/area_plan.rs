@@ -124,7 +124,7 @@ fn labels_file(folder: &Path) -> PathBuf {
 /// The labels are what the file ends with, as `area.jsonl` says how many there are and what their checksum
 /// is.
 fn read_label_of_face(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec<LabelId>> {
-    let bytes = std::fs::read(path).map_err(|e| FileError::io(path, "read", e))?;
+    let bytes = s3d_io::fs::read_file(path)?;
     let labels = usize::try_from(faces)
         .ok()
         .and_then(|faces| faces.checked_mul(4))

@@ -5,11 +5,11 @@ mod pixels;
 pub(crate) mod rays;
 mod shade;
 
+use crate::tables::manifest::Manifest;
 use crate::verify::files::Files;
 use crate::verify::images::pixels::{Difference, Pixels};
 use crate::verify::images::rays::difference;
 use crate::verify::labels::Labels;
-use crate::verify::manifest::ReadManifest;
 use crate::verify::mesh::LabelledMesh;
 use crate::verify::pose::{self, CheckedPose};
 use crate::verify::report::{Report, Topic};
@@ -34,7 +34,7 @@ const SLACK: f64 = 0.005;
 /// What the images of an area are held against.
 pub(crate) struct Reference<'a> {
     pub(crate) layout: &'a Layout,
-    pub(crate) manifest: &'a ReadManifest,
+    pub(crate) manifest: &'a Manifest,
     pub(crate) labels: &'a Labels,
     pub(crate) mesh: &'a LabelledMesh,
     pub(crate) scene: &'a Scene<'a>,
@@ -55,7 +55,7 @@ impl Reference<'_> {
 /// What every image of an area is checked with.
 pub(crate) struct ImageCheck<'a> {
     pub(crate) layout: &'a Layout,
-    pub(crate) manifest: &'a ReadManifest,
+    pub(crate) manifest: &'a Manifest,
     pub(crate) labels: Option<&'a Labels>,
     pub(crate) views: &'a Views,
     pub(crate) files: &'a Files,
@@ -150,7 +150,9 @@ impl ImageCheck<'_> {
         };
         for &domain in self.domains.iter().filter(|d| **d != Domain::Pose && image.has(**d)) {
             let path = image.path(self.layout, domain);
-            let Some(pixels) = report.read(Topic::Images, Pixels::read(domain, &path)) else { continue };
+            let Some(pixels) = report.read(Topic::Images, &path, |path| Pixels::read(domain, path)) else {
+                continue;
+            };
             let fits = report.check(pixels.size() == size, SIZES, &path, || {
                 let (w, h) = pixels.size();
                 format!("{w} × {h} pixels, and the manifest tells of {} × {}", size.0, size.1)
@@ -261,7 +263,7 @@ impl ImageFiles<'_> {
         let units = self.check.manifest.conventions().depth_units;
         let (camera, rays) = (&pose.camera, pose.camera.rays());
         let origin = camera.pose.location;
-        let from_depth = self.check.manifest.xyz_from_depth.is_some();
+        let from_depth = self.check.manifest.is_xyz_from_depth();
         // What depth is rounded to, and what is too far for it.
         let (half_depth, far) = (0.5 / units.per_m(), 65_534.0 / units.per_m());
         let is_half = self.check.manifest.conventions().xyz == XyzType::Half;

@@ -35,7 +35,7 @@ pub(super) fn difference(
                 colors(found, &images.rgb)
             }
             Domain::Normal => {
-                let (normals, axes) = (reference.manifest.normals(), conventions.normal_axes);
+                let (normals, axes) = (reference.manifest.options.normals, conventions.normal_axes);
                 let out = &mut images.faces.normal;
                 normal_image_into(reference.scene, hits, camera, normals, axes, out);
                 colors(found, out)
@@ -67,7 +67,7 @@ pub(super) fn difference(
             let same = |a: [f32; 3], b: [f32; 3]| a == b;
             let rounded = |p: [f16; 3]| p.map(f16::to_f32);
             let is_half = conventions.xyz != XyzType::Float;
-            if reference.manifest.xyz_from_depth.is_some() {
+            if reference.manifest.is_xyz_from_depth() {
                 // Totals by `s3d xyz`: from the pose as its angles give it.
                 let camera = Camera { pose: pose.file.pose(), ..*camera };
                 let points = xyz::points(&camera, depth_file.as_ref()?, conventions.depth_units);

@@ -1,0 +1,258 @@
+//! A change of a complete data set: all of it, or nothing.
+//!
+//! What is new is written in `.s3d/change/new`, under the names that it will have, the list of files and the
+//! manifest too. Then `.s3d/change/ready` is written, and from there on the change is only completed: what is
+//! replaced goes, what is new takes its place, the manifest last. A process that is killed before leaves the
+//! data set as it was; one that is killed after leaves one that [`pending`] tells of, and the next that has
+//! the lock completes it.
+
+use crate::error::Result;
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Layout;
+use s3d_io::fs::{create_dir, read_json, sync_data_set, sync_file, write_json};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// What `ready` holds.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Ready {
+    /// The call that makes the change, in words: the same words are the same call.
+    call: String,
+    /// Folders that give way as a whole, from the data set's.
+    replaced: Vec<PathBuf>,
+}
+
+/// A change that is being written.
+pub(crate) struct Change {
+    layout: Layout,
+    staged: Layout,
+}
+
+fn folder(layout: &Layout) -> PathBuf {
+    layout.work_dir().join("change")
+}
+
+fn ready(layout: &Layout) -> PathBuf {
+    folder(layout).join("ready")
+}
+
+fn staged(layout: &Layout) -> Layout {
+    Layout::new(folder(layout).join("new"))
+}
+
+/// The call whose change is not completed, if there is one: the data set is half of the old and half of the
+/// new then.
+pub(crate) fn pending(layout: &Layout) -> Result<Option<String>, FileError> {
+    let path = ready(layout);
+    match fs::symlink_metadata(&path) {
+        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
+        Err(e) => Err(FileError::io(&path, "look for", e)),
+        Ok(_) => read_json::<Ready>(&path).map(|ready| Some(ready.call)),
+    }
+}
+
+/// Completes a change that is ready, and removes one that is not. Returns the call that made the first. The
+/// lock is the caller's.
+pub(crate) fn settle(layout: &Layout) -> Result<Option<String>> {
+    let call = pending(layout)?;
+    if call.is_some() {
+        complete(layout)?;
+    }
+    remove(&folder(layout))?;
+    Ok(call)
+}
+
+impl Change {
+    /// Begins a change of a complete data set, whose lock is the caller's.
+    pub(crate) fn begin(layout: &Layout) -> Result<Self> {
+        remove(&folder(layout))?;
+        let staged = staged(layout);
+        create_dir(staged.root())?;
+        Ok(Self { layout: layout.clone(), staged })
+    }
+
+    /// Where what is new is written.
+    pub(crate) fn staged(&self) -> &Layout {
+        &self.staged
+    }
+
+    /// Puts what was written in its place; of `replaced`, folders of the data set, nothing stays that is not
+    /// written anew. The list of files and the manifest must have been written.
+    pub(crate) fn commit(self, call: &str, replaced: &[PathBuf]) -> Result<()> {
+        let below = |path: &PathBuf| path.strip_prefix(self.layout.root()).map(Path::to_owned).ok();
+        let ready = Ready { call: call.to_owned(), replaced: replaced.iter().filter_map(below).collect() };
+        // A change that is called ready on a disk that lost some of it could not be completed.
+        sync_data_set(self.layout.root(), &entries(self.staged.root())?.1)?;
+        let path = folder(&self.layout).join("ready");
+        write_json(&path, &ready)?;
+        sync_file(&path)?;
+        complete(&self.layout)?;
+        Ok(())
+    }
+}
+
+impl Drop for Change {
+    /// What was not committed goes; that of a change which is ready stays.
+    fn drop(&mut self) {
+        if matches!(pending(&self.layout), Ok(None)) {
+            let _ = remove(&folder(&self.layout));
+        }
+    }
+}
+
+/// Moves what is there still of a change that is ready to its place. Every step can be made again.
+fn complete(layout: &Layout) -> Result<()> {
+    let (staged, root) = (staged(layout), layout.root());
+    let path = ready(layout);
+    let Ready { replaced, .. } = read_json(&path)?;
+    for folder in &replaced {
+        let (from, to) = (staged.root().join(folder), root.join(folder));
+        if from.exists() {
+            remove(&to)?;
+            to.parent().map_or(Ok(()), create_dir)?;
+            rename(&from, &to)?;
+        }
+    }
+    let (folders, files) = entries(staged.root())?;
+    let place = |from: &Path| from.strip_prefix(staged.root()).map(|below| root.join(below)).ok();
+    folders.iter().filter_map(|from| place(from)).try_for_each(|to| create_dir(&to))?;
+    // The manifest last, and before it the list of which it has the checksum.
+    let last = [staged.file_list(), staged.manifest()];
+    let first = files.iter().filter(|file| !last.contains(file));
+    for from in first.chain(last.iter().filter(|file| files.contains(file))) {
+        if let Some(to) = place(from) {
+            rename(from, &to)?;
+        }
+    }
+    // From here on it is done, though a folder of nothing may be left.
+    remove(&path)?;
+    remove(&folder(layout))
+}
+
+/// The folders and the files below a folder; none if it is not there.
+fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let (mut folders, mut files) = (Vec::new(), Vec::new());
+    let mut left = vec![folder.to_owned()];
+    while let Some(folder) = left.pop() {
+        let failed = |e| FileError::io(&folder, "read the folder", e);
+        let there = match fs::read_dir(&folder) {
+            Err(e) if e.kind() == ErrorKind::NotFound => continue,
+            there => there.map_err(failed)?,
+        };
+        for entry in there {
+            let path = entry.map_err(failed)?.path();
+            if path.is_dir() {
+                folders.push(path.clone());
+                left.push(path);
+            } else {
+                files.push(path);
+            }
+        }
+    }
+    folders.sort();
+    files.sort();
+    Ok((folders, files))
+}
+
+fn rename(from: &Path, to: &Path) -> Result<()> {
+    fs::rename(from, to).map_err(|e| FileError::io(to, "put what is new to", e).into())
+}
+
+fn remove(path: &Path) -> Result<()> {
+    let gone = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    match gone {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(FileError::io(path, "remove", e).into()),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_io::fs::write_bytes;
+
+    const CALL: &str = "s3d profile --to pointnet";
+
+    fn put(layout: &Layout, name: &str, text: &str) {
+        let path = layout.root().join(name);
+        create_dir(path.parent().unwrap()).unwrap();
+        write_bytes(&path, text.as_bytes()).unwrap();
+    }
+
+    fn state(layout: &Layout) -> Vec<(PathBuf, String)> {
+        let below = |path: PathBuf| {
+            let text = fs::read_to_string(&path).unwrap();
+            (path.strip_prefix(layout.root()).unwrap().to_owned(), text)
+        };
+        entries(layout.root()).unwrap().1.into_iter().map(below).collect()
+    }
+
+    /// A data set, and a change of it that replaces a folder and adds a file.
+    fn begun() -> (tempfile::TempDir, Layout, Change) {
+        let dir = tempfile::tempdir().unwrap();
+        let layout = Layout::new(dir.path());
+        for name in
+            ["profiles/pointnet/a", "profiles/pointnet/gone", "files.csv", "manifest.json", "mine.txt"]
+        {
+            put(&layout, name, "old");
+        }
+        let change = Change::begin(&layout).unwrap();
+        for name in ["profiles/pointnet/a", "area_1/data/b", "area_1/c", "files.csv", "manifest.json"] {
+            put(change.staged(), name, "new");
+        }
+        (dir, layout, change)
+    }
+
+    #[test]
+    fn a_change_is_made_as_a_whole_or_not_at_all() {
+        let (_dir, layout, change) = begun();
+        let before = { state(&layout).into_iter().filter(|(path, _)| !path.starts_with(".s3d")) };
+        let before: Vec<_> = before.collect();
+        drop(change);
+        assert_eq!((state(&layout), pending(&layout).unwrap()), (before.clone(), None));
+        // Killed before it was ready.
+        let (_dir, layout, change) = begun();
+        std::mem::forget(change);
+        assert_eq!((settle(&layout).unwrap(), state(&layout)), (None, before));
+    }
+
+    /// A kill may come between any two renames: the state after each of them ends in the same.
+    #[test]
+    fn a_change_that_is_ready_is_completed_from_every_state() {
+        let (_dir, layout, change) = begun();
+        change.commit(CALL, &[layout.profile_dir("pointnet")]).unwrap();
+        let whole = state(&layout);
+        let names: Vec<&str> = whole.iter().map(|(path, _)| path.to_str().unwrap()).collect();
+        let expected =
+            ["area_1/c", "area_1/data/b", "files.csv", "manifest.json", "mine.txt", "profiles/pointnet/a"];
+        assert_eq!(names, expected);
+        assert!(whole.iter().all(|(path, text)| (text == "old") == path.ends_with("mine.txt")));
+        type Step<'s> = &'s dyn Fn(&Path, &Path);
+        let steps: [Step<'_>; 5] = [
+            &|root, _| fs::remove_file(root.join("profiles/pointnet/gone")).unwrap(),
+            &|root, new| {
+                fs::remove_dir_all(root.join("profiles/pointnet")).unwrap();
+                fs::rename(new.join("profiles/pointnet"), root.join("profiles/pointnet")).unwrap();
+            },
+            &|root, new| {
+                fs::create_dir_all(root.join("area_1/data")).unwrap();
+                fs::rename(new.join("area_1/c"), root.join("area_1/c")).unwrap();
+            },
+            &|root, new| fs::rename(new.join("files.csv"), root.join("files.csv")).unwrap(),
+            &|root, new| fs::rename(new.join("area_1/data/b"), root.join("area_1/data/b")).unwrap(),
+        ];
+        for killed_after in 0..=steps.len() {
+            let (_dir, layout, change) = begun();
+            let ready = Ready { call: CALL.to_owned(), replaced: vec!["profiles/pointnet".into()] };
+            write_json(&super::ready(&layout), &ready).unwrap();
+            let new = change.staged().root().to_owned();
+            drop(change);
+            steps[..killed_after].iter().for_each(|step| step(layout.root(), &new));
+            assert_eq!(pending(&layout).unwrap().as_deref(), Some(CALL));
+            assert_eq!(settle(&layout).unwrap().as_deref(), Some(CALL), "{killed_after}");
+            assert_eq!((state(&layout), pending(&layout).unwrap()), (whole.clone(), None), "{killed_after}");
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Where something is written that is to appear whole: a folder beside its place, held by a lock.
+//!
+//! A process that is killed leaves the folder, and the next that makes the same thing takes it over: what was
+//! written goes, and an earlier thing that was just being replaced comes back. If it was killed after it had
+//! begun to put the new thing in its place, [`Staging::was_placing`] says so: what is there is its own, and
+//! may be replaced by the same call.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::store::lock::{Lock, Sharing};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Layout;
+use s3d_io::fs::{Checksum, create_dir, write_bytes};
+use std::fs;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// A folder to write to.
+pub(crate) struct Staging {
+    folder: PathBuf,
+    new: PathBuf,
+    lock: Option<Lock>,
+    was_placing: bool,
+}
+
+/// In that folder: what replaces something, while it is replaced; and a file while things are moved.
+fn old_in(folder: &Path) -> PathBuf {
+    folder.join("old")
+}
+
+fn placing_in(folder: &Path) -> PathBuf {
+    folder.join("placing")
+}
+
+/// The folder for what will be called `name` in the folder `parent`. Names may be as long as the system lets
+/// them be, and this one is not longer.
+fn folder_of(parent: &Path, name: &Path) -> PathBuf {
+    let sum = Checksum::of(name.as_os_str().as_encoded_bytes()).to_string();
+    parent.join(format!(".s3d-{}.part", sum.get(..8).unwrap_or_default()))
+}
+
+impl Staging {
+    /// Whether a process that was killed has left something of what will be called `name` in `parent`.
+    pub(crate) fn is_left(parent: &Path, name: &Path) -> bool {
+        folder_of(parent, name).exists()
+    }
+
+    /// Begins what will be called `name` in the folder `parent`, which must be there.
+    ///
+    /// # Errors
+    /// [`Error::Temporary`] if another process makes it; [`Error::File`] if no file can be made there, or a
+    /// device or pipe has the name.
+    pub(crate) fn begin(ctx: &Context, parent: &Path, name: &Path) -> Result<Self> {
+        let place = parent.join(name);
+        let refused = |e| Err(FileError::io(&place, "write", e).into());
+        if !parent.is_dir() {
+            return refused(io::Error::from(ErrorKind::NotFound));
+        }
+        if fs::metadata(&place).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+            return refused(io::Error::new(ErrorKind::InvalidInput, "it is a device or a pipe, no file"));
+        }
+        let folder = folder_of(parent, name);
+        let lock = Lock::take(ctx, &Layout::new(&folder), Sharing::Alone).map_err(|e| match e {
+            Error::Temporary(_) => {
+                Error::Temporary(format!("{}: another process is writing it", place.display()))
+            }
+            Error::File(FileError::Io { source, .. }) => FileError::io(&place, "write", source).into(),
+            other => other,
+        })?;
+        let staging = Self {
+            new: folder.join("new"),
+            was_placing: placing_in(&folder).exists(),
+            folder,
+            lock: Some(lock),
+        };
+        let old = old_in(&staging.folder);
+        if old.exists() && !place.exists() {
+            rename(&old, &place)?;
+        }
+        staging.clear()?;
+        create_dir(&staging.new)?;
+        Ok(staging)
+    }
+
+    /// Whether a process was killed while it put the same thing in its place.
+    pub(crate) fn was_placing(&self) -> bool {
+        self.was_placing
+    }
+
+    /// The folder to write to.
+    pub(crate) fn path(&self) -> &Path {
+        &self.new
+    }
+
+    /// Moves the whole folder to its place. What is there goes: all of it if it is to be `replaced`, else no
+    /// more than an empty folder.
+    pub(crate) fn place_folder(self, place: &Path, replaced: bool) -> Result<()> {
+        let failed = |e| FileError::io(place, "move what is finished to this name", e);
+        write_bytes(&placing_in(&self.folder), b"")?;
+        let old = old_in(&self.folder);
+        if replaced {
+            fs::rename(place, &old).map_err(failed)?;
+        } else {
+            match fs::remove_dir(place) {
+                Err(e) if e.kind() != ErrorKind::NotFound => return Err(failed(e).into()),
+                _ => {}
+            }
+        }
+        if let Err(e) = fs::rename(&self.new, place) {
+            if replaced {
+                fs::rename(old, place).map_err(failed)?;
+            }
+            return Err(failed(e).into());
+        }
+        self.clear()
+    }
+
+    /// Moves the files, each to the place of its name in a folder, over what is there.
+    pub(crate) fn place_files(self, folder: &Path) -> Result<()> {
+        let failed = |e| FileError::io(&self.new, "read the folder", e);
+        let mut paths = Vec::new();
+        for entry in fs::read_dir(&self.new).map_err(failed)? {
+            paths.push(entry.map_err(failed)?.path());
+        }
+        // `camera.json`, which says what the images beside it are, comes last.
+        paths.sort_by(|a, b| b.cmp(a));
+        write_bytes(&placing_in(&self.folder), b"")?;
+        for path in paths {
+            let place = folder.join(path.file_name().unwrap_or_default());
+            fs::rename(&path, &place)
+                .map_err(|e| FileError::io(&place, "rename the finished file to this name", e))?;
+        }
+        self.clear()
+    }
+
+    /// Removes all but the lock.
+    fn clear(&self) -> Result<()> {
+        for path in [self.new.clone(), old_in(&self.folder), placing_in(&self.folder)] {
+            let gone = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+            match gone {
+                Err(e) if e.kind() != ErrorKind::NotFound => {
+                    return Err(FileError::io(&path, "remove", e).into());
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Staging {
+    /// Leaves nothing behind, unless something that was replaced could not be put back.
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.new);
+        if !old_in(&self.folder).exists() {
+            let _ = fs::remove_file(placing_in(&self.folder));
+        }
+        if let Some(lock) = self.lock.take() {
+            lock.abandon();
+        }
+        let _ = fs::remove_dir(&self.folder);
+    }
+}
+
+fn rename(from: &Path, to: &Path) -> Result<()> {
+    fs::rename(from, to).map_err(|e| FileError::io(from, "move", e).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn begin(dir: &Path) -> Staging {
+        Staging::begin(&Context::default(), dir, Path::new("thing")).unwrap()
+    }
+
+    /// As a kill leaves it: nothing is tidied up, and the lock is free.
+    fn killed(mut staging: Staging) {
+        drop(staging.lock.take());
+        std::mem::forget(staging);
+    }
+
+    #[test]
+    fn what_a_killed_process_left_is_taken_over() {
+        let dir = tempfile::tempdir().unwrap();
+        let place = dir.path().join("thing");
+        let staging = begin(dir.path());
+        fs::write(staging.path().join("half"), "").unwrap();
+        let other = Staging::begin(&Context::default(), dir.path(), Path::new("thing"));
+        assert!(matches!(other, Err(Error::Temporary(_))));
+        killed(staging);
+        assert!(Staging::is_left(dir.path(), Path::new("thing")) && !place.exists());
+
+        let staging = begin(dir.path());
+        assert!(!staging.was_placing() && fs::read_dir(staging.path()).unwrap().next().is_none());
+        fs::write(staging.path().join("file"), "1").unwrap();
+        staging.place_folder(&place, false).unwrap();
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+
+        // Killed when the earlier one was aside.
+        let staging = begin(dir.path());
+        fs::write(placing_in(&staging.folder), "").unwrap();
+        fs::rename(&place, old_in(&staging.folder)).unwrap();
+        killed(staging);
+        let staging = begin(dir.path());
+        assert!(staging.was_placing());
+        assert_eq!(fs::read_to_string(place.join("file")).unwrap(), "1");
+        drop(staging);
+        assert!(!Staging::is_left(dir.path(), Path::new("thing")));
+    }
+
+    #[test]
+    fn files_take_the_places_of_others() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("a"), "old").unwrap();
+        let staging = begin(dir.path());
+        ["a", "b"].iter().for_each(|name| fs::write(staging.path().join(name), "new").unwrap());
+        staging.place_files(dir.path()).unwrap();
+        for name in ["a", "b"] {
+            assert_eq!(fs::read_to_string(dir.path().join(name)).unwrap(), "new");
+        }
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2);
+    }
+}
