@@ -4,6 +4,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod kills;
+mod structured;
 
 use common::{files, list_files, s3d_ok, text, write_scan};
 use s3d_io::fs::{create_dir, write_bytes};

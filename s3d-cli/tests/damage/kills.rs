@@ -1,0 +1,194 @@
+//! Every command that writes, killed at any moment: no file is there by halves, what is half made does not
+//! pass for whole, and the same call ends with the same files as one that nobody disturbed.
+//!
+//! `S3D_KILLS=100 cargo test -p s3d-cli --test damage killed` kills each of them so often.
+
+use super::structured::{Random, number_of};
+use super::{SMALL, common, folder};
+use common::{files, s3d_ok, text, write_scan};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// The commands, as they are called in a folder with `scan` (the input), `out` (an export) and `shard_1`,
+/// `shard_2` (its shards). Whoever adds a command that writes adds a line.
+const COMMANDS: [&str; 20] = [
+    "export scan/scene.toml -o new SMALL",
+    "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
+    "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
+    "plan scan/scene.toml -o new --views 3 --size 32",
+    "merge shard_1 shard_2 -o new",
+    "demo -o new --views 1 --size 32 --pano-width 64 --points-per-m2 5",
+    "xyz out --type float --overwrite",
+    "profile out --to pointcept,mmdet3d",
+    "profile out --to pointnet,open3d-ml --overwrite",
+    "pack out --to webdataset",
+    "pack out --to webdataset -o packed --overwrite",
+    "pack out --to colmap --copy-images",
+    "pack out --to nerfstudio --copy-images -o new/package",
+    "pack out --to coco",
+    "pack out --to parquet -o new.parquet",
+    "sample scan/room.obj -o new.ply --points 200000",
+    "sample scan/room.obj -o old.ply --points 200000 --overwrite",
+    "render scan/room.obj --at 2,1.2,1.5 --size 200 -o new",
+    "render scan/room.obj --at 2,1.2,1.5 --size 200 -o old --pano --overwrite",
+    "profile out --to mmdet3d",
+];
+
+type Files = BTreeMap<PathBuf, Vec<u8>>;
+
+/// What each command finds.
+struct Template {
+    dir: TempDir,
+    files: Files,
+}
+
+impl Template {
+    fn new() -> Self {
+        let dir = folder();
+        let at = |name: &str| dir.path().join("template").join(name);
+        let scene = write_scan(&at("scan"), 1);
+        let export = |name: &str, more: &[&str]| {
+            s3d_ok(&[&["export", text(&scene), "-o", text(&at(name))], &SMALL[..], more].concat());
+        };
+        export("out", &["--profile", "pointnet"]);
+        export("shard_1", &["--shard", "1/2"]);
+        export("shard_2", &["--shard", "2/2"]);
+        s3d_ok(&[
+            "pack",
+            text(&at("out")),
+            "--to",
+            "webdataset",
+            "-o",
+            text(&at("packed")),
+            "--max-count",
+            "2",
+        ]);
+        s3d_ok(&["sample", text(&at("scan/room.obj")), "-o", text(&at("old.ply")), "--points", "1000"]);
+        let view = ["--at", "2,1.2,1.5", "--size", "100", "-o", text(&at("old"))].map(str::to_owned);
+        let view: Vec<&str> = view.iter().map(String::as_str).collect();
+        s3d_ok(&[&["render", text(&at("scan/room.obj"))], &view[..]].concat());
+        let files = files(&at(""));
+        Self { dir, files }
+    }
+
+    /// A folder of a command's own.
+    fn begin(&self, name: &str) -> PathBuf {
+        let folder = self.dir.path().join(name);
+        for (path, bytes) in &self.files {
+            let to = folder.join(path);
+            fs::create_dir_all(to.parent().unwrap()).unwrap();
+            fs::write(to, bytes).unwrap();
+        }
+        folder
+    }
+}
+
+/// Runs a command in a folder, and kills it after a while if it is not done by then.
+fn run(folder: &Path, command: &str, delay: Option<Duration>) -> ExitStatus {
+    let words = command.split(' ').flat_map(|word| if word == "SMALL" { SMALL.to_vec() } else { vec![word] });
+    let mut child = Command::new(env!("CARGO_BIN_EXE_s3d"))
+        .args(words)
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let Some(delay) = delay else { return child.wait().unwrap() };
+    let until = Instant::now() + delay;
+    while Instant::now() < until {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        thread::sleep(Duration::from_micros(300));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap()
+}
+
+/// What a process keeps for itself while it is not done.
+fn is_working(path: &Path) -> bool {
+    path.components().any(|name| name.as_os_str().to_str().is_some_and(|name| name.starts_with(".s3d")))
+}
+
+/// Every process that makes a plan keeps a journal of its own in it.
+fn made(folder: &Path, command: &str) -> Files {
+    let mut all = files(folder);
+    all.retain(|path, _| !(command.starts_with("plan") && is_working(path)));
+    all
+}
+
+/// Whatever the moment of a kill: a file is the one that was there, or the one that will be.
+fn assert_nothing_by_halves(folder: &Path, before: &Files, whole: &Files, command: &str) {
+    for (path, bytes) in files(folder) {
+        // A manifest of an export under way says so.
+        let says_so =
+            path.ends_with("manifest.json") && String::from_utf8_lossy(&bytes).contains("\"running\"");
+        let known = [before, whole].iter().any(|files| files.get(&path) == Some(&bytes));
+        assert!(known || is_working(&path) || says_so, "{command}: {} is there by halves", path.display());
+    }
+    // A package is there as a whole, or not at all.
+    for place in whole.keys().filter(|path| path.ends_with("pack.json")) {
+        if fs::read(folder.join(place)).ok().as_ref() == whole.get(place) {
+            let inside = |path: &&PathBuf| path.starts_with(place.parent().unwrap());
+            assert!(whole.keys().filter(inside).all(|path| folder.join(path).exists()), "{command}");
+        }
+    }
+    // So is a data set, or `verify` tells of it.
+    for name in ["out", "new"] {
+        let out = folder.join(name);
+        if command.contains(&format!(" {name}")) && out.join("manifest.json").exists() {
+            let said = common::s3d(&["verify", text(&out)]);
+            let report = String::from_utf8_lossy(&said.stdout).into_owned();
+            let told = ["half changed", "did not finish"].iter().any(|words| report.contains(words));
+            assert!(said.status.success() || told, "{command}: {report}");
+        }
+    }
+}
+
+#[test]
+fn killed_commands_are_made_whole_by_the_same_call() {
+    let template = Template::new();
+    let wanted = number_of("S3D_KILLS", 3);
+    for (number, command) in COMMANDS.iter().enumerate() {
+        let undisturbed = template.begin(&format!("undisturbed_{number}"));
+        let started = Instant::now();
+        assert!(run(&undisturbed, command, None).success(), "{command}");
+        let took = started.elapsed();
+        let whole = made(&undisturbed, command);
+        assert!(whole != template.files, "{command} makes nothing");
+        fs::remove_dir_all(undisturbed).unwrap();
+
+        let mut random = Random(number as u64);
+        let (mut kills, mut cycles) = (0, 0);
+        while kills < wanted {
+            let folder = template.begin(&format!("killed_{number}_{cycles}"));
+            loop {
+                let share = 0.02 + 1.08 * random.below(1000) as f64 / 1000.0;
+                let status = run(&folder, command, Some(took.mul_f64(share)));
+                if status.success() {
+                    break;
+                }
+                // It was killed when all was done, and is told so.
+                if status.code() == Some(2) && made(&folder, command) == whole {
+                    break;
+                }
+                assert_eq!(status.code(), None, "{command}: the same call failed after {kills} kills");
+                assert_nothing_by_halves(&folder, &template.files, &whole, command);
+                kills += 1;
+            }
+            let found = made(&folder, command);
+            let names = |files: &Files| files.keys().cloned().collect::<Vec<_>>();
+            assert_eq!(names(&found), names(&whole), "{command} after {kills} kills");
+            for (path, bytes) in &whole {
+                assert!(found[path] == *bytes, "{command} after {kills} kills: {} differs", path.display());
+            }
+            fs::remove_dir_all(folder).unwrap();
+            cycles += 1;
+        }
+    }
+}
