@@ -217,7 +217,7 @@ pub(crate) fn label_area(
     let outlooks = look_around(ctx, scene, &locations)?;
     judge(ctx, &outlook_findings(&outlooks), &options.allow)?;
     for (outlook, location) in outlooks.iter().zip(&locations) {
-        ctx.warn_each(&outlook.warnings(location));
+        ctx.warn_each(outlook.warnings(location));
     }
     let plan = AreaPlan {
         area: number,
