@@ -132,8 +132,7 @@ impl<'a> Job<'a> {
             pictures.push(area_pictures(ctx, area, options)?);
         }
         // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a
-        // single area is kept from then on; several are read again where they are needed, so that they never
-        // share memory.
+        // single area stays in memory; several are read again where they are needed.
         let mut single: Option<Arc<MeshFile>> = None;
         let mut companions = Vec::new();
         let makes_rgb = options.modalities.contains(&Domain::Rgb);

@@ -1,6 +1,7 @@
 //! A bounding volume hierarchy over the faces of a mesh, eight boxes or triangles at a time.
 
-use super::triangle::SortedTriangle;
+use super::surroundings::Surroundings;
+use super::triangle::{SortedTriangle, to_box};
 use super::triangle8::Triangles8;
 use crate::wide::{at_most, least, max, min};
 use crate::{Aabb, NO_INDEX, TriMesh};
@@ -15,6 +16,7 @@ pub(crate) struct FaceTree {
     /// The root first.
     nodes: Vec<Node8>,
     leaves: Vec<Triangles8>,
+    pub(crate) surroundings: Surroundings,
 }
 
 /// Up to eight boxes and what is in them.
@@ -59,13 +61,19 @@ pub(crate) struct Search<'t> {
     open: Vec<(f32, u32)>,
     /// Triangles that may be the nearest: the least squared distance, leaf and lane.
     candidates: Vec<(f32, u32, u32)>,
+    /// As `open`, for a far point.
+    open_far: Vec<(f64, u32)>,
+    /// Triangles whose exact distance was taken.
+    #[cfg(test)]
+    pub(crate) measured: usize,
 }
 
 impl FaceTree {
     pub(crate) fn new(mesh: &TriMesh) -> Self {
         let bvh = build_bvh(mesh);
         let sizes = faces_below(&bvh);
-        let mut tree = Self { nodes: vec![Node8::new()], leaves: Vec::new() };
+        let surroundings = Surroundings::new(mesh.aabb());
+        let mut tree = Self { nodes: vec![Node8::new()], leaves: Vec::new(), surroundings };
         // A node of ours, and the one of theirs that it opens.
         let mut open = vec![(0, 0)];
         let mut leaves = Vec::new();
@@ -138,8 +146,18 @@ pub(crate) struct Starts {
 impl<'t> Search<'t> {
     pub(crate) fn new(tree: &'t FaceTree) -> Self {
         let best = Best { leaf: 0, face: NO_INDEX, distance_squared: f64::INFINITY, point: DVec3::ZERO };
-        let (open, candidates) = (Vec::with_capacity(64), Vec::with_capacity(64));
-        Self { tree, near: [0.0; 3], exact: DVec3::ZERO, best, prune_beyond: f32::INFINITY, open, candidates }
+        Self {
+            tree,
+            near: [0.0; 3],
+            exact: DVec3::ZERO,
+            best,
+            prune_beyond: f32::INFINITY,
+            open: Vec::with_capacity(64),
+            candidates: Vec::with_capacity(64),
+            open_far: Vec::new(),
+            #[cfg(test)]
+            measured: 0,
+        }
     }
 
     /// Finds the triangle nearest to `point`, the smallest face among equally near ones. The search begins in
@@ -163,6 +181,51 @@ impl<'t> Search<'t> {
     ) -> Option<Best> {
         self.nearest_below(&starts.nodes, point, guess);
         (self.prune_beyond <= reach_squared).then_some(self.best)
+    }
+
+    /// The same for a point far from the mesh, whose bounds are `f64`. They need no room for rounding: a
+    /// triangle's distance is never below that to a box around it ([`SortedTriangle::closest`]).
+    pub(crate) fn nearest_far(&mut self, point: DVec3, guess: u32) -> Best {
+        self.exact = point;
+        self.best.distance_squared = f64::INFINITY;
+        self.best.face = NO_INDEX;
+        self.open_far.clear();
+        self.open_far.extend([(0.0, 0), (0.0, LEAF + guess)]);
+        while let Some((bound, child)) = self.open_far.pop() {
+            if bound > self.best.distance_squared {
+                continue;
+            }
+            if child >= LEAF {
+                self.visit_far(child - LEAF);
+            } else {
+                self.enter_far(child as usize);
+            }
+        }
+        self.best
+    }
+
+    /// Opens the boxes of a node within reach, the nearest on top.
+    fn enter_far(&mut self, node: usize) {
+        let node = &self.tree.nodes[node];
+        let bottom = self.open_far.len();
+        for lane in 0..node.count as usize {
+            let [low, high] = [&node.low, &node.high].map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]));
+            let bound = to_box(self.exact, low.as_dvec3(), high.as_dvec3());
+            if bound <= self.best.distance_squared {
+                self.open_far.push((bound, node.children[lane]));
+            }
+        }
+        self.open_far[bottom..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+    }
+
+    fn visit_far(&mut self, leaf: u32) {
+        let triangles = &self.tree.leaves[leaf as usize];
+        for lane in (0..8).filter(|lane| triangles.lanes() >> lane & 1 == 1) {
+            let [a, b, c] = triangles.triangle(lane).corners().map(|p| p.as_dvec3());
+            if to_box(self.exact, a.min(b).min(c), a.max(b).max(c)) <= self.best.distance_squared {
+                self.measure(leaf, lane);
+            }
+        }
     }
 
     #[inline(always)]
@@ -237,6 +300,10 @@ impl<'t> Search<'t> {
     /// The exact distance of a triangle.
     #[inline(always)]
     fn measure(&mut self, leaf: u32, lane: usize) {
+        #[cfg(test)]
+        {
+            self.measured += 1;
+        }
         let triangles = &self.tree.leaves[leaf as usize];
         let (distance_squared, point) = triangles.triangle(lane).closest(self.exact);
         let face = triangles.face(lane);

@@ -6,9 +6,13 @@
 //! All arithmetic that decides is `f64`, on corners in the order of their coordinates. So faces that share an
 //! edge or a corner get bit by bit the same distance there, whatever their winding and the indices of their
 //! vertices.
+//!
+//! A lookup costs about the same wherever the point is. Where it is very far ([`surroundings`]), the nearest
+//! face is that of a nearer point in the same direction.
 
 mod curve;
 mod face_tree;
+mod surroundings;
 mod triangle;
 mod triangle8;
 
@@ -16,8 +20,9 @@ use crate::wide::{self, Work};
 use crate::{Aabb, NO_INDEX, TriMesh};
 use curve::{MOST_POINTS, along_a_curve};
 use face_tree::{FaceTree, Search, Starts};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use surroundings::Surroundings;
 use triangle::SortedTriangle;
 
 /// The face of a mesh nearest to a point, and the point of it.
@@ -37,9 +42,13 @@ impl Nearest {
         Self { face: NO_INDEX, distance_m: f32::INFINITY, point }
     }
 
-    fn on(triangle: &SortedTriangle, face: u32, point: Vec3) -> Self {
-        let (distance_squared, nearest) = triangle.closest(point.as_dvec3());
-        Self { face, distance_m: distance_squared.sqrt() as f32, point: nearest.as_vec3() }
+    /// What a search from `query` has found for `point`.
+    fn found(point: Vec3, query: DVec3, face: u32, distance_squared: f64, nearest: DVec3) -> Self {
+        let distance_m = match point.as_dvec3() {
+            exact if exact == query => distance_squared.sqrt(),
+            exact => exact.distance(nearest),
+        };
+        Self { face, distance_m: distance_m as f32, point: nearest.as_vec3() }
     }
 }
 
@@ -49,15 +58,15 @@ pub fn nearest_brute_force(mesh: &TriMesh, point: Vec3) -> Nearest {
     if !point.is_finite() {
         return Nearest::none(point);
     }
-    let query = point.as_dvec3();
-    let (mut best, mut nearest) = (f64::INFINITY, 0);
-    for face in 0..mesh.faces().len() as u32 {
-        let distance_squared = SortedTriangle::new(mesh.triangle(face)).closest(query).0;
-        if distance_squared < best {
-            (best, nearest) = (distance_squared, face);
+    let query = Surroundings::new(mesh.aabb()).looked_up_from(point);
+    let (mut best, mut nearest, mut face) = (f64::INFINITY, query, 0);
+    for candidate in 0..mesh.faces().len() as u32 {
+        let found = SortedTriangle::new(mesh.triangle(candidate)).closest(query);
+        if found.0 < best {
+            (best, nearest, face) = (found.0, found.1, candidate);
         }
     }
-    Nearest::on(&SortedTriangle::new(mesh.triangle(nearest)), nearest, point)
+    Nearest::found(point, query, face, best, nearest)
 }
 
 /// A bounding volume hierarchy over the faces of a mesh, to find the nearest of them to any number of points,
@@ -135,6 +144,19 @@ impl Work for Lookup<'_> {
         for (group, out) in self.order.chunks(GROUP).zip(self.out.chunks_mut(GROUP)) {
             let points = group.iter().map(|&at| self.points[at as usize]);
             let around = Aabb::from_points(points.clone().filter(|p| p.is_finite()));
+            let surroundings = &self.tree.surroundings;
+            if !surroundings.are_near(around) {
+                for (point, out) in points.zip(out) {
+                    *out = Nearest::none(point);
+                    if point.is_finite() {
+                        let query = surroundings.looked_up_from(point);
+                        let best = search.nearest_far(query, guess);
+                        guess = best.leaf;
+                        *out = Nearest::found(point, query, best.face, best.distance_squared, best.point);
+                    }
+                }
+                continue;
+            }
             // A guess, too: most points are as far from the mesh as those before.
             let reach_m = 1.25 * farthest_m + 0.1 * around.size().max_element();
             let reach_squared = reach_m * reach_m;
@@ -273,6 +295,61 @@ mod tests {
             let points: Vec<Vec3> = points.iter().map(|&p| p * scale).collect();
             prop_assume!(parts.positions.iter().chain(&points).all(|p| p.is_finite()));
             check(&TriMesh::new(parts).unwrap(), &points);
+        }
+    }
+
+    /// Points around `from`, up to `spread` off on each axis.
+    fn points_at(from: Vec3, spread: f32, n: u32) -> Vec<Vec3> {
+        let off = |i: u32, k: u32| ((i * k) % 101) as f32 / 50.0 - 1.0;
+        (0..n).map(|i| from + spread * vec3(off(i, 7), off(i, 31), off(i, 57))).collect()
+    }
+
+    #[test]
+    fn far_points_find_the_same_as_by_looking_at_all_faces() {
+        let bumpy = grid(20, 0.2, |x, y| 0.3 * libm::sinf(9.0 * x) * libm::cosf(7.0 * y));
+        let flat = grid(20, 0.2, |_, _| 0.0);
+        for mesh in [bumpy, flat] {
+            for from in [
+                vec3(0.0, 0.0, 150.0),
+                vec3(-2000.0, 1.0, 0.0),
+                vec3(500_000.0, 5_400_000.0, 300.0),
+                vec3(2.0, 2.0, 5e6),
+                vec3(1e9, -1e9, 1e7),
+                vec3(3e38, 0.0, 0.0),
+            ] {
+                check(&mesh, &points_at(from, 3.0, 40));
+                // Some near, some far.
+                check(&mesh, &points_at(from * 0.5, from.abs().max_element() * 0.5, 40));
+            }
+        }
+    }
+
+    #[test]
+    fn a_mesh_far_from_the_origin_finds_the_same() {
+        let mut parts = grid(20, 2.0, |x, y| x * y * 0.01).into_parts();
+        parts.positions.iter_mut().for_each(|p| *p += vec3(500_000.0, 5_400_000.0, 300.0));
+        let mesh = TriMesh::new(parts).unwrap();
+        check(&mesh, &points_at(Vec3::ZERO, 10.0, 40));
+        check(&mesh, &points_at(mesh.aabb().center(), 30.0, 40));
+    }
+
+    #[test]
+    fn a_lookup_costs_the_same_at_any_distance() {
+        let mesh = grid(120, 0.1, |x, y| 0.3 * libm::sinf(9.0 * x) * libm::cosf(7.0 * y));
+        let tree = FaceTree::new(&mesh);
+        let measured = |distance: f32| {
+            let mut search = Search::new(&tree);
+            let points = points_at(Vec3::ZERO, 6.0, 200);
+            for (i, p) in points.into_iter().enumerate() {
+                let to = [Vec3::X, Vec3::Y, Vec3::Z, vec3(0.1, 0.99, 0.0), Vec3::ONE][i % 5].normalize();
+                search.nearest_far(tree.surroundings.looked_up_from(p + to * distance), 0);
+            }
+            search.measured
+        };
+        let near = measured(300.0);
+        for distance in [1e4, 1e5, 5.4e6, 1e9, 1e20, 1e38] {
+            let far = measured(distance);
+            assert!(far < 2 * near + 200, "{far} triangles at {distance} m, {near} at 300 m");
         }
     }
 

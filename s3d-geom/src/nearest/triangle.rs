@@ -101,7 +101,7 @@ fn closest_on_edge(point: DVec3, from: DVec3, to: DVec3) -> (f64, DVec3) {
 }
 
 /// The squared distance from `point` to a box.
-fn to_box(point: DVec3, low: DVec3, high: DVec3) -> f64 {
+pub(crate) fn to_box(point: DVec3, low: DVec3, high: DVec3) -> f64 {
     (low - point).max(point - high).max(DVec3::ZERO).length_squared()
 }
 

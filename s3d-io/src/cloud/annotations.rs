@@ -2,8 +2,8 @@
 
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
-use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
+use s3d_geom::{Aabb, PointCloud};
 use s3d_label::{Class, Room};
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -34,6 +34,9 @@ pub struct AnnotationOptions {
     /// What is subtracted from coordinates in `f64` before they are rounded to `f32`: metres. For
     /// georeferenced clouds.
     pub offset_m: DVec3,
+    /// The box of the mesh that they belong to, world metres: points that all lie far from it
+    /// ([`FrameGap`](crate::cloud::FrameGap)) are refused, as soon as that is known. `None`: anywhere.
+    pub mesh_bounds: Option<Aabb>,
     /// A cloud with more points than this waits in a temporary file to be read by instance, and not in memory
     /// (15 bytes a point).
     pub points_in_memory: u64,
@@ -54,6 +57,7 @@ impl Default for AnnotationOptions {
             room_column: None,
             columns: Vec::new(),
             offset_m: DVec3::ZERO,
+            mesh_bounds: None,
             points_in_memory: 20_000_000,
             spool_dir: None,
         }

@@ -1,6 +1,7 @@
 //! Annotated points of E57 files: several scans, each with its pose. Source: ASTM E2807.
 
 use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::frame_gap::Bounds;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::Columns;
 use crate::cloud::table::records::{Color, color};
@@ -124,10 +125,9 @@ impl<'a> Scan<'a> {
             let [of_r, of_g, of_b] = stated;
             [(of_r, r), (of_g, g), (of_b, b)].map(|channel| limits(channel).unwrap_or((0.0, 255.0)))
         });
-        let pose = cloud.transform.clone().unwrap_or_default();
-        let (q, t) = (pose.rotation, pose.translation);
-        let rotation = DQuat::from_xyzw(q.x, q.y, q.z, q.w);
+        let (rotation, translation) = pose_of(cloud);
         if !rotation.is_finite() || rotation.length() < 0.5 {
+            let q = cloud.transform.clone().unwrap_or_default().rotation;
             return Err(Error::format(path, format!("has a scan whose pose has no rotation: {q:?}")));
         }
         let room = cloud.name.clone().filter(|name| name.parse::<s3d_label::Room>().is_ok());
@@ -143,7 +143,7 @@ impl<'a> Scan<'a> {
             colorless: find(&RecordName::IsColorInvalid),
             limits,
             rotation: rotation.normalize(),
-            translation: dvec3(t.x, t.y, t.z),
+            translation,
             room,
         })
     }
@@ -226,6 +226,9 @@ impl Cloud for E57Cloud<'_> {
         if scans.is_empty() {
             return Err(Error::format(path, "holds no scan"));
         }
+        if let Some(bounds) = bounds_of(&scans) {
+            reading.claims(bounds);
+        }
         let (mut number, mut invalid) = (0, 0u64);
         for cloud in &scans {
             let scan = Scan::new(path, self.options, cloud)?;
@@ -266,6 +269,25 @@ impl Cloud for E57Cloud<'_> {
         }
         Ok(true)
     }
+}
+
+/// The box of all scans at their places, if each says where its points are.
+fn bounds_of(scans: &[PointCloud]) -> Option<Bounds> {
+    scans.iter().filter(|scan| scan.records > 0).try_fold(Bounds::EMPTY, |all, scan| {
+        let b = scan.cartesian_bounds.as_ref()?;
+        let [x, y, z] = [[b.x_min?, b.x_max?], [b.y_min?, b.y_max?], [b.z_min?, b.z_max?]];
+        let (rotation, translation) = pose_of(scan);
+        let corners =
+            x.into_iter().flat_map(|x| y.map(|y| (x, y))).flat_map(|(x, y)| z.map(|z| dvec3(x, y, z)));
+        Some(all.union(Bounds::of(corners.map(|p| rotation.normalize() * p + translation))))
+    })
+}
+
+/// Turn, of any length, and place of a scan.
+fn pose_of(scan: &PointCloud) -> (DQuat, DVec3) {
+    let pose = scan.transform.clone().unwrap_or_default();
+    let (q, t) = (pose.rotation, pose.translation);
+    (DQuat::from_xyzw(q.x, q.y, q.z, q.w), dvec3(t.x, t.y, t.z))
 }
 
 /// The bits that a value takes.

@@ -42,6 +42,7 @@
 pub(crate) mod annotations;
 #[cfg(feature = "e57")]
 mod e57;
+pub(crate) mod frame_gap;
 #[cfg(feature = "las")]
 mod las;
 #[cfg(feature = "mat")]
@@ -62,6 +63,7 @@ mod scannet;
 mod table;
 
 pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, Skipped};
+pub use frame_gap::FrameGap;
 #[cfg(feature = "mat")]
 pub use mat::{MatArea, MatObject, MatRoom, MatWriter};
 #[cfg(feature = "npy")]

@@ -3,14 +3,15 @@
 use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
+use crate::cloud::frame_gap::{Bounds, FrameGap, refusal};
 use crate::cloud::s3dis::points::PointReader;
 use crate::cloud::s3dis::tree::{AnnotationTree, OnFault, TreeOptions};
 use crate::cloud::table::cloud::Cloud;
 use crate::cloud::table::read::read_flat;
 use crate::error::{Error, Result};
 use crate::fs::source::Source;
-use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
+use s3d_geom::{Aabb, PointCloud};
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -63,7 +64,12 @@ impl Annotations {
             if path.is_dir() && !is_scannet(path) {
                 all.join(Self::from_tree(path, options)?)?;
             } else if is_mat(path) {
-                all.join(Self::mat(Source::file(path), options)?)?;
+                let area = Self::mat(Source::file(path), options)?;
+                let gap = options.mesh_bounds.and_then(|mesh| area.frame_gap(options.offset_m, mesh));
+                if let Some(gap) = gap {
+                    return Err(refusal(path, &gap));
+                }
+                all.join(area)?;
             } else {
                 clouds.push(open_cloud(path, options)?);
             }
@@ -116,6 +122,23 @@ impl Annotations {
         Err(Error::not_built_in(source.name(), "mat"))
     }
 
+    /// The gap between the points and a mesh with these bounds, if the first points of the instances all lie
+    /// far from it. `offset_m` is what was subtracted from them.
+    pub fn frame_gap(&self, offset_m: DVec3, mesh: Aabb) -> Option<FrameGap> {
+        let instances: Vec<&AnnotatedInstance> = self.rooms.iter().flat_map(|r| &r.instances).collect();
+        let mut points = Bounds::EMPTY;
+        for instance in sampled(&instances) {
+            let mut cloud = PointCloud::default();
+            // What cannot be read is told of when all is read.
+            if let Ok(mut blocks) = instance.open() {
+                let _ = blocks.read_block(SAMPLED_POINTS, &mut cloud);
+            }
+            let [min, max] = bounds_of(&cloud, offset_m);
+            points = points.union(Bounds { min, max });
+        }
+        FrameGap::between([points.min, points.max], offset_m, mesh)
+    }
+
     /// Adds the rooms of another source.
     fn join(&mut self, other: Self) -> Result<()> {
         for room in other.rooms {
@@ -138,14 +161,13 @@ impl Annotations {
     /// The S3DIS tree of an area.
     fn from_tree(dir: &Path, options: &AnnotationOptions) -> Result<Self> {
         let columns = [&options.class_column, &options.instance_column, &options.room_column];
-        if columns.iter().any(|c| c.is_some()) || options.room.is_some() || options.offset_m != DVec3::ZERO {
+        if columns.iter().any(|c| c.is_some()) || options.room.is_some() {
             return Err(Error::format(
                 dir,
-                "is a folder: its rooms, classes and instances are named by its files; columns, a room and an offset are \
-                 for clouds",
+                "is a folder: its rooms, classes and instances are named by its files; columns and a room are for clouds",
             ));
         }
-        let on_fault = options.on_fault;
+        let (on_fault, offset_m) = (options.on_fault, options.offset_m);
         let spool_dir = options.spool_dir.clone().map(Arc::new);
         let tree = AnnotationTree::open_with(
             dir,
@@ -155,19 +177,65 @@ impl Annotations {
                 classes: options.classes.clone(),
             },
         )?;
+        if let Some(mesh) = options.mesh_bounds {
+            let files: Vec<&Path> =
+                tree.rooms.iter().flat_map(|r| &r.instances).map(|i| i.path.as_path()).collect();
+            refuse_far_tree(dir, &files, offset_m, mesh)?;
+        }
         let rooms = tree.rooms.into_iter().map(|room| AnnotatedRoom {
             room: room.room,
             instances: room
                 .instances
                 .into_iter()
                 .map(|i| {
-                    let points = TextPoints { path: i.path, on_fault, spool_dir: spool_dir.clone() };
+                    let points =
+                        TextPoints { path: i.path, on_fault, offset_m, spool_dir: spool_dir.clone() };
                     AnnotatedInstance::new(i.class, i.number, Arc::new(points))
                 })
                 .collect(),
         });
         Ok(Self { rooms: rooms.collect(), warnings: tree.warnings })
     }
+}
+
+/// Files of a tree, or instances, whose first points tell where all are.
+const SAMPLED: usize = 32;
+/// Points of each.
+const SAMPLED_POINTS: usize = 256;
+
+/// Some of many, from the first to the last.
+fn sampled<T>(all: &[T]) -> impl Iterator<Item = &T> {
+    all.iter().step_by(all.len().div_ceil(SAMPLED).max(1))
+}
+
+/// Refuses a tree if the first points of its files lie far from the mesh. Faults in them are told of when
+/// all are read.
+fn refuse_far_tree(dir: &Path, files: &[&Path], offset_m: DVec3, mesh: Aabb) -> Result<()> {
+    let sample = |offset_m: DVec3| {
+        let mut cloud = PointCloud::default();
+        for file in sampled(files) {
+            if let Ok(reader) = PointReader::open_with(file, OnFault::Skip) {
+                let _ = reader.with_offset(offset_m).read_chunk(SAMPLED_POINTS, &mut cloud);
+            }
+        }
+        bounds_of(&cloud, offset_m)
+    };
+    let rough = sample(offset_m);
+    if FrameGap::between(rough, offset_m, mesh).is_none() {
+        return Ok(());
+    }
+    // Near their own middle the points keep all digits.
+    let near = ((rough[0] + rough[1]) * 0.5).round();
+    match FrameGap::between(sample(near), offset_m, mesh) {
+        Some(gap) => Err(refusal(dir, &gap)),
+        None => Ok(()),
+    }
+}
+
+/// The smallest and the largest coordinates of points from which an offset was subtracted, as they were.
+fn bounds_of(cloud: &PointCloud, offset_m: DVec3) -> [DVec3; 2] {
+    let bounds = Bounds::of(cloud.positions.iter().map(|p| p.as_dvec3() + offset_m));
+    [bounds.min, bounds.max]
 }
 
 /// The reader of a cloud, by the file's name.
@@ -235,13 +303,14 @@ fn is_scannet(dir: &Path) -> bool {
 struct TextPoints {
     path: PathBuf,
     on_fault: OnFault,
+    offset_m: DVec3,
     /// See [`AnnotationOptions::spool_dir`].
     spool_dir: Option<Arc<PathBuf>>,
 }
 
 impl InstancePoints for TextPoints {
     fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
-        let mut reader = PointReader::open_with(&self.path, self.on_fault)?;
+        let mut reader = PointReader::open_with(&self.path, self.on_fault)?.with_offset(self.offset_m);
         while reader.read_chunk(usize::MAX, out)? > 0 {}
         Ok(reader.into_skipped())
     }
@@ -255,7 +324,7 @@ impl InstancePoints for TextPoints {
     }
 
     fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
-        Ok(Box::new(PointReader::open_with(&self.path, self.on_fault)?))
+        Ok(Box::new(PointReader::open_with(&self.path, self.on_fault)?.with_offset(self.offset_m)))
     }
 
     fn copy_to(&self) -> Option<PathBuf> {
@@ -266,6 +335,7 @@ impl InstancePoints for TextPoints {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use s3d_geom::glam::{Vec3, vec3};
     use s3d_label::Class;
     use std::collections::BTreeMap;
     use std::fs;
@@ -346,14 +416,31 @@ mod tests {
     }
 
     #[test]
+    fn a_tree_in_another_frame_is_refused_with_the_offset_that_fits() {
+        let line = |x: f64| format!("{} 5400002.75 301.5 4 5 6\n", 500_000.0 + x);
+        let a = tree(&[
+            ("WC_1/Annotations/wall_1.txt", &(line(0.0) + &line(4.0))),
+            ("WC_1/Annotations/wall_2.txt", "no point\n"),
+        ]);
+        let mesh = Aabb { min: Vec3::ZERO, max: vec3(4.0, 5.5, 3.0) };
+        let near = AnnotationOptions { mesh_bounds: Some(mesh), ..AnnotationOptions::default() };
+        let message = open(&[&a], &near).unwrap_err().to_string();
+        let offset = "write offset_m = [500000.0, 5400000.0, 300.0] under [annotations]";
+        assert!(message.contains(offset) && message.contains("5423096 m"), "{message}");
+        let moved = AnnotationOptions { offset_m: DVec3::new(500_000.0, 5_400_000.0, 300.0), ..near };
+        let found = open(&[&a], &moved).unwrap();
+        let mut cloud = PointCloud::default();
+        found.rooms[0].instances[0].read(&mut cloud).unwrap();
+        assert_eq!(cloud.positions, [vec3(0.0, 2.75, 1.5), vec3(4.0, 2.75, 1.5)]);
+        assert!(found.frame_gap(moved.offset_m, mesh).is_none());
+    }
+
+    #[test]
     fn options_of_clouds_are_refused_for_a_tree() {
         let a = tree(&[("WC_1/Annotations/wall_1.txt", "1 2 3 4 5 6\n")]);
         let with_class = AnnotationOptions { class_column: Some("label".into()), ..Default::default() };
-        let with_offset = AnnotationOptions { offset_m: DVec3::X, ..Default::default() };
-        for options in [with_class, with_offset] {
-            let message = open(&[&a], &options).unwrap_err().to_string();
-            assert!(message.contains("are for clouds"), "{message}");
-        }
+        let message = open(&[&a], &with_class).unwrap_err().to_string();
+        assert!(message.contains("are for clouds"), "{message}");
         let gone = Annotations::open(&[a.path().join("gone")], &AnnotationOptions::default());
         assert!(matches!(gone, Err(Error::Io { .. })));
     }

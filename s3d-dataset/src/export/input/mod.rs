@@ -1,12 +1,14 @@
 //! Everything that an export reads, found and checked before anything is written.
 
 pub(crate) mod memory;
+pub(crate) mod mesh;
 pub(crate) mod pictures;
 pub(crate) mod requested;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::input::memory::{SceneSource, SharedScene};
+use crate::export::input::mesh::{MeshFrame, MeshSource};
 use crate::export::labels::annotate::SurveyedRoom;
 use crate::options::ExportOptions;
 use crate::store::request::InputRecord;
@@ -16,8 +18,8 @@ use glam::DAffine3;
 use s3d_geom::TriMesh;
 use s3d_io::Error as FileError;
 use s3d_io::camera::ScanLocation;
-use s3d_io::cloud::{AnnotatedInstance, Annotations, OnFault};
-use s3d_io::mesh::{MeshFile, MeshOptions, UpAxis};
+use s3d_io::cloud::{AnnotatedInstance, AnnotationOptions, Annotations, OnFault};
+use s3d_io::mesh::{MeshFile, MeshOptions};
 use s3d_io::scene::{CameraSource, PictureSource, PublishedArea, PublishedOptions, SceneFile};
 use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
 use std::collections::BTreeMap;
@@ -31,6 +33,10 @@ pub(crate) struct AreaInput {
     /// What the user named: a scene file, or the folder of a published area.
     pub(crate) path: PathBuf,
     source: MeshSource,
+    /// Where its mesh is.
+    pub(crate) frame: MeshFrame,
+    /// Its mesh itself, if it is to stay in memory.
+    mesh_file: Option<Arc<MeshFile>>,
     /// The scanner's pictures, if colours are taken from them.
     pub(crate) pictures: Option<PictureSource>,
     /// The rooms, in the order of their names, each with its annotated instances.
@@ -55,17 +61,12 @@ pub(crate) struct AreaInput {
 
 /// What of an area is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Opened {
-    All,
-    /// All but its annotations, which a plan stands for: it has no rooms then.
-    NoAnnotations,
-}
-
-/// Where an area's mesh comes from.
-enum MeshSource {
-    Files { paths: Vec<PathBuf>, up: UpAxis, options: MeshOptions },
-    Published(Box<PublishedArea>),
-    Memory(Arc<MeshFile>),
+struct Opened {
+    /// Whether its annotations are; if not, a plan stands for them, and it has no rooms.
+    annotations: bool,
+    /// Whether its mesh stays in memory. Several are read again where they are needed, so that they never
+    /// share it.
+    keep_mesh: bool,
 }
 
 /// Where an area is looked at from.
@@ -109,7 +110,7 @@ impl Inputs {
     /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan
     /// locations, instead of which locations are placed if `place_m` says how far apart.
     pub(crate) fn open(scenes: &[SceneSource], place_m: Option<f64>, lenient: bool) -> Result<Self> {
-        let mut areas = Self::open_areas(scenes, place_m, lenient, Opened::All)?;
+        let mut areas = Self::open_areas(scenes, place_m, lenient, true)?;
         let table = label_table(&mut areas)?;
         Ok(Self { areas, table })
     }
@@ -122,7 +123,7 @@ impl Inputs {
         lenient: bool,
         table: LabelTable,
     ) -> Result<Self> {
-        let areas = Self::open_areas(scenes, place_m, lenient, Opened::NoAnnotations)?;
+        let areas = Self::open_areas(scenes, place_m, lenient, false)?;
         Ok(Self { areas, table })
     }
 
@@ -130,8 +131,9 @@ impl Inputs {
         scenes: &[SceneSource],
         place_m: Option<f64>,
         lenient: bool,
-        opened: Opened,
+        annotations: bool,
     ) -> Result<Vec<AreaInput>> {
+        let opened = Opened { annotations, keep_mesh: scenes.len() == 1 };
         let mut areas: Vec<AreaInput> = Vec::new();
         let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
@@ -203,18 +205,25 @@ impl AreaInput {
                 MeshOptions::default()
             },
         };
+        // The mesh comes first: what lies far from it need not be read.
+        let file = source.read()?;
+        let frame = MeshFrame::of(&file);
+        let file = Some(file).filter(|_| opened.keep_mesh || scene.annotations.is_empty());
         let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
-        if opened == Opened::All {
-            let mut annotations = if scene.annotations.is_empty() {
-                Annotations::of_mesh(source.read()?.as_ref(), options)?
-            } else {
-                Annotations::open(&scene.annotations, options)?
+        if opened.annotations {
+            let mut annotations = match &file {
+                Some(file) if scene.annotations.is_empty() => Annotations::of_mesh(file, options)?,
+                _ => {
+                    let options = AnnotationOptions { mesh_bounds: Some(frame.bounds), ..options.clone() };
+                    Annotations::open(&scene.annotations, &options)?
+                }
             };
             warnings = std::mem::take(&mut annotations.warnings);
             let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
             rooms = number(scene.area, annotations)
                 .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
         }
+        let mesh_file = file.filter(|_| opened.keep_mesh);
         let Some((cameras, cameras_path)) = listed_cameras(&scene, place_m)? else {
             return Err(FileError::format(
                 &scene.path,
@@ -222,9 +231,12 @@ impl AreaInput {
             )
             .into());
         };
+        frame.refuse_far_locations(&cameras_path, cameras.listed())?;
         Ok(Self {
             number: scene.area,
             source,
+            frame,
+            mesh_file,
             rooms,
             cameras,
             warnings,
@@ -244,7 +256,9 @@ impl AreaInput {
         scene.check()?;
         let name = scene.name();
         let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
-        if opened == Opened::All {
+        let frame = MeshFrame::of(&scene.mesh);
+        if opened.annotations {
+            frame.refuse_far_points(&name, &scene.annotations)?;
             let mut annotations = scene.annotations.clone();
             warnings = std::mem::take(&mut annotations.warnings);
             rooms = number(scene.area, annotations)
@@ -257,9 +271,12 @@ impl AreaInput {
             }
             None => Cameras::Listed(scene.locations.clone(), vec![None; scene.locations.len()]),
         };
+        frame.refuse_far_locations(&name, cameras.listed())?;
         Ok(Self {
             number: scene.area,
             source: MeshSource::Memory(Arc::clone(&scene.mesh)),
+            frame,
+            mesh_file: Some(Arc::clone(&scene.mesh)),
             pictures: None,
             rooms,
             cameras,
@@ -289,8 +306,8 @@ impl AreaInput {
         let mut area = PublishedArea::open_with(folder, &options)?;
         let mut warnings = std::mem::take(&mut area.warnings);
         let mut rooms = Vec::new();
-        if opened == Opened::All {
-            let mut mesh = area.read_mesh()?;
+        let mut mesh = area.read_mesh()?;
+        if opened.annotations {
             for label in &mut mesh.labels {
                 label.area = area.area;
             }
@@ -316,10 +333,15 @@ impl AreaInput {
             files.extend(files_of(scene));
             sources.extend(files_of(scene).into_iter().filter(|path| path != folder));
         }
+        let file = Arc::new(mesh.file);
+        let frame = MeshFrame::of(&file);
+        frame.refuse_far_locations(&cameras_path, cameras.listed())?;
         Ok(Self {
             number: area.area,
             path: scene.as_ref().map_or(folder, |s| &s.path).to_owned(),
             source: MeshSource::Published(Box::new(area)),
+            frame,
+            mesh_file: opened.keep_mesh.then_some(file),
             pictures: scene.and_then(|s| s.pictures),
             rooms,
             cameras,
@@ -333,9 +355,9 @@ impl AreaInput {
         })
     }
 
-    /// Reads the mesh.
+    /// The mesh, read again if it is not in memory.
     pub(crate) fn read_mesh(&self) -> Result<Arc<MeshFile>> {
-        self.source.read()
+        self.mesh_file.as_ref().map_or_else(|| self.source.read(), |file| Ok(Arc::clone(file)))
     }
 
     /// About how much an export of it writes. Placed locations, which are not known yet, count as one on 4 m² of
@@ -379,31 +401,6 @@ impl AreaInput {
             file.mesh.textures().len(),
             file.mesh.total_area()
         ));
-    }
-}
-
-impl MeshSource {
-    fn read(&self) -> Result<Arc<MeshFile>> {
-        let file = match self {
-            Self::Memory(file) => return Ok(Arc::clone(file)),
-            Self::Files { paths, up, options } => s3d_io::mesh::read_meshes_with(paths, *up, options)?,
-            Self::Published(area) => area.read_mesh()?.file,
-        };
-        Ok(Arc::new(file))
-    }
-
-    fn describe(&self) -> String {
-        match self {
-            Self::Published(area) => area.mesh.display().to_string(),
-            Self::Memory(file) => {
-                file.sources.first().map_or_else(String::new, |s| s.path.display().to_string())
-            }
-            Self::Files { paths, .. } => {
-                let more = paths.len() - 1;
-                let first = paths[0].display();
-                if more == 0 { first.to_string() } else { format!("{first} and {more} more") }
-            }
-        }
     }
 }
 

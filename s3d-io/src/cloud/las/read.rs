@@ -3,6 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::frame_gap::Bounds;
 use crate::cloud::las::bounded::{BoundedClaims, Mended};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::{CLASSES, INSTANCES};
@@ -321,6 +322,8 @@ impl Cloud for LasCloud<'_> {
         let channels = color_at(&format).map(|at| at.map(|at| field("colour", at, Kind::U16)));
         let [x, y, z] = [0, 4, 8].map(|at| field("coordinate", at, Kind::I32));
         let t = header.transforms();
+        let [min, max] = [header.bounds().min, header.bounds().max].map(|p| dvec3(p.x, p.y, p.z));
+        reading.claims(Bounds { min, max });
         let count = header.number_of_points();
         let mut data = las::PointDataBuilder::new().for_header(&header).build();
         let at_once = BATCH_BYTES.checked_div(u64::from(format.len())).unwrap_or(1).clamp(1, BATCH);

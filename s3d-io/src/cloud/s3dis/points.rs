@@ -13,7 +13,7 @@ use crate::quote::quote;
 use memchr::{memchr, memrchr};
 use rayon::prelude::*;
 use s3d_geom::PointCloud;
-use s3d_geom::glam::{Vec3, vec3};
+use s3d_geom::glam::{DVec3, Vec3, vec3};
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -51,6 +51,7 @@ pub struct PointReader<R = File> {
     path: PathBuf,
     file: Utf8Reader<R>,
     on_fault: OnFault,
+    offset_m: DVec3,
     /// What was read and is not used up: `block[start..end]`.
     block: Vec<u8>,
     start: usize,
@@ -87,6 +88,7 @@ impl<R: Read> PointReader<R> {
             path: name.to_owned(),
             file: Utf8Reader::new(reader),
             on_fault,
+            offset_m: DVec3::ZERO,
             block: vec![0; BLOCK],
             start: 0,
             end: 0,
@@ -95,6 +97,13 @@ impl<R: Read> PointReader<R> {
             skipped: 0,
             first_skipped: None,
         }
+    }
+
+    /// The same points, less `offset_m`, which is subtracted in `f64`, before coordinates are rounded.
+    #[must_use]
+    pub fn with_offset(mut self, offset_m: DVec3) -> Self {
+        self.offset_m = offset_m;
+        self
     }
 
     /// How many lines were left out so far; 0 unless opened with [`OnFault::Skip`].
@@ -139,7 +148,7 @@ impl<R: Read> PointReader<R> {
                 None => (unread, unread.len()),
             };
             self.line += 1;
-            match parse_point(line) {
+            match parse_point(line, self.offset_m) {
                 Ok(Some((position, color))) => {
                     out.positions.push(position);
                     out.colors.push(color);
@@ -173,7 +182,9 @@ impl<R: Read> PointReader<R> {
             return 0;
         }
         let pieces: Vec<&[u8]> = pieces(lines).collect();
-        let read: Option<Vec<(PointCloud, u64)>> = pieces.par_iter().map(|piece| points_of(piece)).collect();
+        let offset_m = self.offset_m;
+        let read = pieces.par_iter().map(|piece| points_of(piece, offset_m));
+        let read: Option<Vec<(PointCloud, u64)>> = read.collect();
         let Some(read) = read else { return 0 };
         self.start += lines.len();
         let before = out.len();
@@ -237,13 +248,13 @@ fn pieces(mut lines: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 /// The points of whole lines and the number of these, if nothing is wrong with any.
-fn points_of(mut lines: &[u8]) -> Option<(PointCloud, u64)> {
+fn points_of(mut lines: &[u8], offset_m: DVec3) -> Option<(PointCloud, u64)> {
     let mut points = PointCloud::default();
     let mut n = 0;
     while let Some((line, rest)) = memchr(b'\n', lines).and_then(|end| lines.split_at_checked(end)) {
         lines = rest.get(1..)?;
         n += 1;
-        if let Some((position, color)) = parse_point(line).ok()? {
+        if let Some((position, color)) = parse_point(line, offset_m).ok()? {
             points.positions.push(position);
             points.colors.push(color);
         }
@@ -251,8 +262,8 @@ fn points_of(mut lines: &[u8]) -> Option<(PointCloud, u64)> {
     Some((points, n))
 }
 
-/// The point of a line, or `None` if the line is empty.
-fn parse_point(line: &[u8]) -> std::result::Result<Option<(Vec3, [u8; 3])>, String> {
+/// The point of a line, less an offset, or `None` if the line is empty.
+fn parse_point(line: &[u8], offset_m: DVec3) -> std::result::Result<Option<(Vec3, [u8; 3])>, String> {
     let mut words = words(line);
     let mut fields: [&[u8]; 6] = [b""; 6];
     let mut n = 0;
@@ -268,8 +279,9 @@ fn parse_point(line: &[u8]) -> std::result::Result<Option<(Vec3, [u8; 3])>, Stri
         let than = if n > 6 { "more than " } else { "" };
         return Err(format!("not a point `x y z r g b`: {than}{} fields", n.min(6)));
     }
-    let coordinate = |word: &[u8]| -> std::result::Result<f32, String> {
-        match number(word) {
+    let coordinate = |word: &[u8], offset_m: f64| -> std::result::Result<f32, String> {
+        let value = if offset_m == 0.0 { number(word) } else { less(word, offset_m) };
+        match value {
             Some(v) if v.is_finite() => Ok(v),
             Some(_) => Err(format!("the coordinate {} is not finite", quote(word))),
             None => Err(format!("the coordinate {} is no number", quote(word))),
@@ -279,8 +291,14 @@ fn parse_point(line: &[u8]) -> std::result::Result<Option<(Vec3, [u8; 3])>, Stri
         parse_byte(word).ok_or_else(|| format!("the colour {} is none from 0 to 255", quote(word)))
     };
     let [x, y, z, r, g, b] = fields;
-    let position = vec3(coordinate(x)?, coordinate(y)?, coordinate(z)?);
+    let position = vec3(coordinate(x, offset_m.x)?, coordinate(y, offset_m.y)?, coordinate(z, offset_m.z)?);
     Ok(Some((position, [color(r)?, color(g)?, color(b)?])))
+}
+
+/// The number that a word spells, less an offset.
+fn less(word: &[u8], offset_m: f64) -> Option<f32> {
+    let value: f64 = std::str::from_utf8(word).ok()?.parse().ok()?;
+    Some((value - offset_m) as f32)
 }
 
 /// A whole number from 0 to 255, or the nearest to a float that lies between.
@@ -318,6 +336,18 @@ mod tests {
         for bytes in crate::fs::encoding::tests::encoded(&"1 2 3 4 5 6\n".repeat(100_000)) {
             assert_eq!(read(&bytes).unwrap().len(), 100_000);
         }
+    }
+
+    #[test]
+    fn an_offset_is_subtracted_before_coordinates_are_rounded() {
+        let text = b"500000.125 5400000.0625 300.5 1 2 3\n499999.875 -1 inf 1 2 3\n";
+        let offset = DVec3::new(500_000.0, 5_400_000.0, 300.0);
+        let reader = PointReader::new(&text[..], Path::new("a.txt"), OnFault::Skip).with_offset(offset);
+        let mut cloud = PointCloud::default();
+        let mut reader = reader;
+        while reader.read_chunk(usize::MAX, &mut cloud).unwrap() > 0 {}
+        assert_eq!(cloud.positions, [vec3(0.125, 0.0625, 0.5)]);
+        assert!(reader.first_skipped().unwrap().to_string().contains("`inf` is not finite"));
     }
 
     #[test]

@@ -111,7 +111,7 @@ fn gather(
         if !cloud.read(*colors, &mut reading)? {
             return Ok(Some(file));
         }
-        reading.flush()?;
+        reading.end()?;
         let (skipped, farthest_m) = (std::mem::take(&mut reading.skipped), reading.farthest_m);
         warnings.append(&mut reading.notes);
         if let Some(first) = skipped.first {

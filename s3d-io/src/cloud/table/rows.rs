@@ -2,6 +2,7 @@
 //! itself.
 
 use crate::cloud::annotations::{AnnotationOptions, Skipped};
+use crate::cloud::frame_gap::{Bounds, FrameWatch};
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
 use s3d_geom::glam::{DVec3, Vec3};
@@ -157,6 +158,7 @@ pub(crate) struct Reading<'a> {
     path: PathBuf,
     on_fault: OnFault,
     offset_m: DVec3,
+    watch: Option<FrameWatch>,
     /// The room of rows that name none.
     room: u32,
     pub(crate) classes: &'a mut Tags,
@@ -182,6 +184,7 @@ impl<'a> Reading<'a> {
             path: path.to_owned(),
             on_fault: options.on_fault,
             offset_m: options.offset_m,
+            watch: options.mesh_bounds.map(|mesh| FrameWatch::new(mesh, options.offset_m)),
             room,
             classes,
             rooms,
@@ -252,6 +255,9 @@ impl<'a> Reading<'a> {
             }
         };
         self.farthest_m = self.farthest_m.max(farthest);
+        if let Some(watch) = &mut self.watch {
+            watch.see(row.position);
+        }
         self.rows.positions.push(position.as_vec3());
         self.rows.colors.push(row.color);
         self.rows.classes.push(class);
@@ -260,9 +266,26 @@ impl<'a> Reading<'a> {
         Ok(())
     }
 
-    /// Hands on what is left; to be called at the end of the file.
+    /// Takes the box that the file's header gives its points.
+    #[cfg_attr(not(any(feature = "las", feature = "e57")), allow(dead_code))]
+    pub(crate) fn claims(&mut self, bounds: Bounds) {
+        if let Some(watch) = &mut self.watch {
+            watch.header(bounds);
+        }
+    }
+
+    /// Ends the file: hands on what is left, and refuses points that all lie far from the mesh.
+    pub(crate) fn end(&mut self) -> Result<()> {
+        self.flush()?;
+        self.watch.as_ref().map_or(Ok(()), |watch| watch.at_end(&self.path))
+    }
+
+    /// Hands on the rows so far.
     pub(crate) fn flush(&mut self) -> Result<()> {
         if self.rows.len() > 0 {
+            if let Some(watch) = &mut self.watch {
+                watch.after_block(&self.path)?;
+            }
             (self.sink)(&self.rows)?;
             self.rows.clear();
         }

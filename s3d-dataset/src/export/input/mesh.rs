@@ -1,0 +1,81 @@
+//! The mesh of an area: where it is read from, and where it is.
+
+use crate::error::{Error, Result};
+use glam::DVec3;
+use s3d_geom::Aabb;
+use s3d_io::camera::ScanLocation;
+use s3d_io::cloud::{Annotations, FrameGap};
+use s3d_io::mesh::{MeshFile, MeshOptions, UpAxis};
+use s3d_io::scene::PublishedArea;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Where an area's mesh comes from.
+pub(crate) enum MeshSource {
+    Files { paths: Vec<PathBuf>, up: UpAxis, options: MeshOptions },
+    Published(Box<PublishedArea>),
+    Memory(Arc<MeshFile>),
+}
+
+impl MeshSource {
+    pub(crate) fn read(&self) -> Result<Arc<MeshFile>> {
+        let file = match self {
+            Self::Memory(file) => return Ok(Arc::clone(file)),
+            Self::Files { paths, up, options } => s3d_io::mesh::read_meshes_with(paths, *up, options)?,
+            Self::Published(area) => area.read_mesh()?.file,
+        };
+        Ok(Arc::new(file))
+    }
+
+    pub(crate) fn describe(&self) -> String {
+        match self {
+            Self::Published(area) => area.mesh.display().to_string(),
+            Self::Memory(file) => {
+                file.sources.first().map_or_else(String::new, |s| s.path.display().to_string())
+            }
+            Self::Files { paths, .. } => {
+                let more = paths.len() - 1;
+                let first = paths[0].display();
+                if more == 0 { first.to_string() } else { format!("{first} and {more} more") }
+            }
+        }
+    }
+}
+
+/// Where a mesh is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MeshFrame {
+    /// Its box.
+    pub(crate) bounds: Aabb,
+}
+
+impl MeshFrame {
+    /// Of a mesh that was read.
+    pub(crate) fn of(file: &MeshFile) -> Self {
+        Self { bounds: file.mesh.aabb() }
+    }
+
+    /// Refuses annotated points, at hand as `name`, that all lie far from the mesh.
+    pub(crate) fn refuse_far_points(&self, name: &Path, annotations: &Annotations) -> Result<()> {
+        let Some(gap) = annotations.frame_gap(DVec3::ZERO, self.bounds) else { return Ok(()) };
+        let [x, y, z] = gap.offset_m.to_array();
+        Err(Error::Input(format!(
+            "{}: the annotated points lie {gap}, in metres, Z-up; subtract {x:?}, {y:?}, {z:?} from them",
+            name.display()
+        )))
+    }
+
+    /// Refuses scan locations that all lie far from the mesh.
+    pub(crate) fn refuse_far_locations(&self, list: &Path, locations: &[ScanLocation]) -> Result<()> {
+        let at = || locations.iter().map(|l| l.pose.location);
+        let (min, max) = at().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+        let Some(gap) = FrameGap::between([min, max], DVec3::ZERO, self.bounds) else { return Ok(()) };
+        let [x, y, z] = (-gap.offset_m + DVec3::ZERO).to_array();
+        Err(Error::Input(format!(
+            "{}: the scan locations lie {gap}, in metres, Z-up. Locations and mesh need one frame: if they are of one \
+             scan, write transform = [[1, 0, 0, {x:?}], [0, 1, 0, {y:?}], [0, 0, 1, {z:?}], [0, 0, 0, 1]] under \
+             [cameras] in the scene file",
+            list.display()
+        )))
+    }
+}
