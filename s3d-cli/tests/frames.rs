@@ -46,7 +46,8 @@ fn move_tree(scan: &Scan) {
 const CLASSES: [&str; 4] = ["floor", "ceiling", "wall", "table"];
 
 /// What a scene file says of a cloud whose classes are numbers.
-const CLASS_TABLE: &str = "room = \"office_1\"\n[annotations.classes]\n0 = \"floor\"\n1 = \"ceiling\"\n2 = \"wall\"\n3 = \"table\"\n";
+const CLASS_TABLE: &str = "room = \"office_1\"\n[annotations.classes]\n\
+                           0 = \"floor\"\n1 = \"ceiling\"\n2 = \"wall\"\n3 = \"table\"\n";
 
 /// The moved points as LAS 1.2, millimetres from the offset of the header.
 fn las(scan: &Scan) -> Vec<u8> {
@@ -159,11 +160,237 @@ fn a_part_of_the_points_elsewhere_is_no_other_frame() {
     let scan = Scan::new();
     let wall = fs::read_to_string(scan.annotation("wall_1.txt")).unwrap();
     scan.write("Area_1/office_1/Annotations/wall_1.txt", wall + "900 900 900 1 2 3\n");
-    let mut args = vec!["info", text(&scan.scene)];
-    s3d_ok(&args);
-    let out = scan.out();
-    args = vec!["export", text(&scan.scene), "-o", text(&out)];
+    let info = common::s3d(&["info", text(&scan.scene)]);
+    let told = String::from_utf8_lossy(&info.stdout);
+    assert!(info.status.success() && told.contains("1 points are farther than 5 cm"), "{told}");
+}
+
+/// Numbers that are exact in `f64` at home and in UTM.
+fn snapped(v: f64) -> f64 {
+    (v * 4096.0).round() / 4096.0
+}
+
+/// Takes mesh, points and locations to `at`, without a word in the scene file.
+fn move_all(scan: &Scan, at: [f64; 3]) {
+    let numbers = |line: &str| -> Vec<f64> { line.split(' ').map(|w| snapped(w.parse().unwrap())).collect() };
+    let mut obj = String::new();
+    for line in fs::read_to_string(scan.file("room.obj")).unwrap().lines() {
+        match line.strip_prefix("v ").map(numbers).as_deref() {
+            Some(&[x, y, z]) => writeln!(obj, "v {} {} {}", x + at[0], y + at[2], z - at[1]).unwrap(),
+            _ => writeln!(obj, "{line}").unwrap(),
+        }
+    }
+    scan.write("room.obj", obj);
+    for path in files(&scan.file("Area_1")).into_keys() {
+        let mut text_of_points = String::new();
+        for line in fs::read_to_string(scan.file("Area_1").join(&path)).unwrap().lines() {
+            let n = numbers(line);
+            let [x, y, z] = [n[0] + at[0], n[1] + at[1], n[2] + at[2]];
+            writeln!(text_of_points, "{x} {y} {z} {} {} {}", n[3], n[4], n[5]).unwrap();
+        }
+        scan.write(&format!("Area_1/{}", text(&path)), text_of_points);
+    }
+    let mut list = String::new();
+    for line in fs::read_to_string(scan.file("cameras.csv")).unwrap().lines() {
+        let mut words: Vec<String> = line.split(',').map(str::to_owned).collect();
+        for (word, at) in words[1..4].iter_mut().zip(at) {
+            *word = (snapped(word.parse().unwrap()) + at).to_string();
+        }
+        list += &(words.join(",") + "\n");
+    }
+    scan.write("cameras.csv", list);
+}
+
+const OFFSET_JSON: &str = "[500000.0,5400000.0,300.0]";
+
+/// A file of an export without what states the offset.
+fn without_offset(path: &Path, bytes: &[u8]) -> Vec<u8> {
+    let comment = b"comment offset_m 500000.0 5400000.0 300.0: add it for the scan's own coordinates\n";
+    let in_pose = format!(",\"world_offset_m\":{OFFSET_JSON}");
+    let stated: &[u8] = match path.extension().and_then(|e| e.to_str()) {
+        Some("ply") => comment,
+        Some("json") if path.iter().any(|part| part == "pose") => in_pose.as_bytes(),
+        _ => return bytes.to_vec(),
+    };
+    let at =
+        bytes.windows(stated.len()).position(|w| w == stated).unwrap_or_else(|| panic!("{}", path.display()));
+    [&bytes[..at], &bytes[at + stated.len()..]].concat()
+}
+
+fn json(out: &Path, name: &str) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(out.join(name)).unwrap()).unwrap()
+}
+
+/// Compares an export of the scan in UTM with one at home.
+fn assert_same(home: &Path, moved: &Path) {
+    let (home, out) = (files(home), files(moved));
+    assert!(home.keys().eq(out.keys()));
+    for (path, bytes) in &home {
+        let name = text(path);
+        // Checksums of input and output; both say so.
+        if !["manifest.json", "files.csv", "conventions.json"].contains(&name) {
+            assert!(*bytes == without_offset(path, &out[path]), "{name} differs");
+        }
+    }
+    let offset = serde_json::json!([5e5, 5.4e6, 300.0]);
+    assert_eq!(json(moved, "manifest.json")["areas"][0]["offset_m"], offset);
+    assert_eq!(json(moved, "conventions.json")["world"]["offset_m"]["1"], offset);
+}
+
+/// Scan and export at home.
+fn at_home() -> Scan {
+    let home = Scan::new();
+    move_all(&home, [0.0; 3]);
+    home.exported();
+    let told = |name: &str| fs::read_to_string(home.out().join(name)).unwrap();
+    assert!(!told("manifest.json").contains("offset_m") && !told("conventions.json").contains("offset_m"));
+    home
+}
+
+#[test]
+fn a_scan_in_utm_makes_the_same_data_set_by_itself_and_when_told() {
+    let home = at_home();
+    for said in [false, true] {
+        let scan = Scan::new();
+        move_all(&scan, UTM);
+        if said {
+            scan.replace("scene.toml", "[mesh]\n", &format!("[mesh]\n{UTM_LINE}\n"));
+        }
+        let log = scan.exported();
+        assert!(log.contains("offset_m = [500000.0, 5400000.0, 300.0] is subtracted"), "{log}");
+        assert_same(&home.out(), &scan.out());
+        assert!(scan.exported().contains("nothing to do"));
+        let info = common::s3d(&["info", text(&scan.scene)]);
+        let told = String::from_utf8_lossy(&info.stdout).into_owned();
+        assert!(told.contains("less offset_m = [500000.0, 5400000.0, 300.0]"), "{told}");
+        assert!(told.contains("to (4.00, 3.00, 2.50), Z-up"), "{told}");
+    }
+}
+
+#[test]
+fn clouds_of_a_scan_in_utm_line_up_and_an_offset_of_their_own_wins() {
+    let home = Scan::new();
+    let images = |scan: &Scan| {
+        let mut all = files(&scan.out().join("area_1/data/semantic"));
+        all.extend(files(&scan.out().join("area_1/pano/semantic")));
+        all
+    };
+    move_all(&home, [0.0; 3]);
+    let cloud = las(&home);
+    home.exported();
+    for own in [false, true] {
+        let scan = Scan::new();
+        move_all(&scan, UTM);
+        let mut bytes = cloud.clone();
+        if own {
+            // The cloud is elsewhere: its header's offset is another.
+            for (axis, at) in [7000.0, 8000.0, 9.0f64].into_iter().enumerate() {
+                bytes[155 + 8 * axis..163 + 8 * axis].copy_from_slice(&at.to_le_bytes());
+            }
+        }
+        scan.write("cloud.las", bytes);
+        scan.use_annotations("cloud.las");
+        let line = if own { "offset_m = [7000, 8000, 9]\n" } else { "" };
+        scan.replace("scene.toml", "cloud.las\"\n", &format!("cloud.las\"\n{line}{CLASS_TABLE}"));
+        scan.exported();
+        assert_eq!(images(&scan), images(&home));
+    }
+}
+
+#[test]
+fn points_that_are_near_already_say_so() {
+    let (home, scan) = (at_home(), Scan::new());
+    move_all(&scan, UTM);
+    for (path, bytes) in files(&home.file("Area_1")) {
+        scan.write(&format!("Area_1/{}", text(&path)), bytes);
+    }
+    let line = "offset_m = [0.0, 0.0, 0.0]";
+    refused(&scan, &[line, "the mesh between (0.00, 0.00, 0.00) and (4.00, 3.00, 2.50)"]);
+    scan.replace("scene.toml", "[annotations]\n", &format!("[annotations]\n{line}\n"));
+    scan.exported();
+    assert_same(&home.out(), &scan.out());
+}
+
+#[test]
+fn what_follows_an_export_keeps_the_offset() {
+    let home = at_home();
+    let scan = Scan::new();
+    move_all(&scan, UTM);
+    scan.exported();
+    let (out, dir) = (scan.out(), scan.dir.path());
+    s3d_ok(&["verify", text(&out)]);
+    // The same from shards.
+    let (plan, parts, merged) = (dir.join("plan"), dir.join("parts"), dir.join("merged"));
+    s3d_ok(&["plan", text(&scan.scene), "-o", text(&plan), "--size", "32", "--views", "3"]);
+    for shard in ["1/2", "2/2"] {
+        let mut args = scan.args(&parts);
+        args.extend(["--shard", shard, "--plan", text(&plan)]);
+        s3d_ok(&args);
+    }
+    s3d_ok(&["merge", text(&parts), "-o", text(&merged)]);
+    assert!(files(&merged) == files(&out));
+    // An export of the export is still in that frame.
+    let again = dir.join("again");
+    let mut args = vec!["export", text(&out), "-o", text(&again)];
+    let area = out.join("area_1");
+    args[1] = text(&area);
     args.extend(SMALL);
     s3d_ok(&args);
-    assert!(Path::new(&out).join("manifest.json").is_file());
+    assert_eq!(json(&again, "conventions.json")["world"], json(&out, "conventions.json")["world"]);
+    // Packages say so.
+    for kind in ["colmap", "nerfstudio", "webdataset"] {
+        let place = dir.join(kind);
+        s3d_ok(&["pack", text(&out), "--to", kind, "-o", text(&place)]);
+        let notes = json(&place, "pack.json").to_string();
+        assert!(notes.contains("its scan less offset_m = [500000.0, 5400000.0, 300.0]"), "{notes}");
+        if kind != "webdataset" {
+            // Paths of images are relative.
+            let plain = home.dir.path().join(kind);
+            s3d_ok(&["pack", text(&home.out()), "--to", kind, "-o", text(&plain)]);
+            let (mut here, mut there) = (files(&place), files(&plain));
+            [&mut here, &mut there].into_iter().for_each(|all| drop(all.remove(Path::new("pack.json"))));
+            assert!(here == there, "{kind}");
+        }
+    }
+    // Coordinates that are made again, in the same frame.
+    s3d_ok(&["xyz", text(&out), "--type", "float", "--overwrite"]);
+    assert_eq!(json(&out, "conventions.json")["world"]["offset_m"]["1"], serde_json::json!(UTM));
+    s3d_ok(&["verify", text(&out)]);
+    // A pose that is silent about it, or says another, is found.
+    let folder = out.join("area_1/pano/pose");
+    let pose = folder.join(files(&folder).into_keys().next().unwrap());
+    let content = fs::read_to_string(&pose).unwrap();
+    fs::write(&pose, content.replace("5400000.0", "5400001.0")).unwrap();
+    s3d_fails(&["verify", text(&out)], 1, &[]);
+    let found = common::s3d(&["verify", text(&out)]);
+    assert!(
+        String::from_utf8_lossy(&found.stdout)
+            .contains("world_offset_m is Some([500000.0, 5400001.0, 300.0])")
+    );
+}
+
+#[test]
+fn a_mesh_in_utm_is_sampled_and_rendered_near_the_origin() {
+    let (home, scan) = (Scan::new(), Scan::new());
+    move_all(&home, [0.0; 3]);
+    move_all(&scan, UTM);
+    let sampled = |scan: &Scan| {
+        let ply = scan.file("points.ply");
+        s3d_ok(&["sample", text(&scan.file("room.obj")), "-o", text(&ply), "--points", "500"]);
+        fs::read(ply).unwrap()
+    };
+    let (near, far) = (sampled(&home), sampled(&scan));
+    assert!(near == without_offset(Path::new("points.ply"), &far));
+    let rendered = |scan: &Scan, at: &str| {
+        let out = scan.file("view");
+        s3d_ok(&["render", text(&scan.file("room.obj")), "--at", at, "--size", "32", "-o", text(&out)]);
+        files(&out)
+    };
+    let near = rendered(&home, "2,1.5,1.5");
+    let mut far = rendered(&scan, "500002,5400001.5,301.5");
+    let camera: serde_json::Value =
+        serde_json::from_slice(&far.remove(Path::new("camera.json")).unwrap()).unwrap();
+    assert_eq!(camera["world_offset_m"], serde_json::json!(UTM));
+    assert_eq!(camera["camera_location"], serde_json::json!([2.0, 1.5, 1.5]));
+    assert!(far.iter().all(|(path, bytes)| near[path] == *bytes));
 }

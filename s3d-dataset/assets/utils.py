@@ -273,6 +273,12 @@ class Dataset:
         opencv = normals * [1, 1, -1] if towards else normals
         return opencv @ np.array(self.pose(image)["camera_rt_matrix"])[:, :3]
 
+    def scan_from_world(self, points, area):
+        """World coordinates (..., 3) of an area in the frame of its scan, float64: where that is far from its origin, as in
+        UTM, the world is the scan's frame less an offset."""
+        offset = self.conventions["world"].get("offset_m", {}).get(str(area), [0, 0, 0])
+        return np.asarray(points, np.float64) + offset
+
     def s3dis_rooms(self, area):
         """The folders of the rooms of an area in the S3DIS tree."""
         tree = self.root / "s3dis" / f"Area_{area}"

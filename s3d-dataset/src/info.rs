@@ -12,8 +12,9 @@ use crate::options::ExportOptions;
 use crate::useful::{
     Estimate, Finding, label_findings, mesh_findings, outlook_findings, size_findings, stops_any,
 };
-use s3d_geom::{Aabb, NearestFaces, TriMesh};
+use s3d_geom::{Aabb, NearestFaces};
 use s3d_io::camera::ScanLocation;
+use s3d_io::mesh::MeshFile;
 use s3d_label::{Class, Room};
 use s3d_render::Scene;
 use std::collections::BTreeMap;
@@ -76,6 +77,9 @@ pub struct MeshInfo {
     pub area_m2: f64,
     /// Its box, world metres, Z-up.
     pub bounds: Aabb,
+    /// What was subtracted from the coordinates of its files, and is from those of points and locations; 0 if
+    /// nothing is.
+    pub offset_m: [f64; 3],
 }
 
 /// A room.
@@ -167,7 +171,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let total = &annotated.report.total;
     Ok(SceneInfo {
         area: area.number,
-        mesh: MeshInfo::of(mesh),
+        mesh: MeshInfo::of(&file),
         rooms: rooms(area, &annotated),
         points: annotated.points,
         labelled_faces: total.faces,
@@ -196,7 +200,8 @@ fn rooms(area: &AreaInput, annotated: &Annotated) -> Vec<RoomInfo> {
 }
 
 impl MeshInfo {
-    fn of(mesh: &TriMesh) -> Self {
+    fn of(file: &MeshFile) -> Self {
+        let mesh = &file.mesh;
         let textures = mesh.textures().iter().map(|t| (t.name.clone(), t.image.width(), t.image.height()));
         Self {
             faces: mesh.faces().len(),
@@ -205,6 +210,7 @@ impl MeshInfo {
             textures: textures.collect(),
             area_m2: mesh.total_area(),
             bounds: mesh.aabb(),
+            offset_m: file.offset_m.to_array(),
         }
     }
 }
@@ -258,6 +264,9 @@ impl fmt::Display for MeshInfo {
             "  {:.2} × {:.2} × {:.2} m, from ({:.2}, {:.2}, {:.2}) to ({:.2}, {:.2}, {:.2}), Z-up",
             s.x, s.y, s.z, b.min.x, b.min.y, b.min.z, b.max.x, b.max.y, b.max.z
         )?;
+        if self.offset_m != [0.0; 3] {
+            writeln!(f, "  less offset_m = {:?}, as are points and scan locations", self.offset_m)?;
+        }
         self.textures.iter().try_for_each(|(name, width, height)| writeln!(f, "  {name} {width} × {height}"))
     }
 }

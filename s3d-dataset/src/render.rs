@@ -5,11 +5,12 @@ use crate::error::Result;
 use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::store::refuse_existing;
 use crate::store::staging::Staging;
+use glam::DVec3;
 use s3d_geom::{Camera, Projection};
 use s3d_io::dataset::Conventions;
 use s3d_io::fs::{create_dir, write_bytes, write_json};
 use s3d_io::image::{Compression, Content, encode_rgb8};
-use s3d_io::mesh::UpAxis;
+use s3d_io::mesh::{MeshOptions, MeshOrigin, UpAxis};
 use s3d_render::{Hits, MipMaps, NO_FACE, Normals, Scene, cast, coverage};
 use serde::Serialize;
 use std::path::Path;
@@ -31,6 +32,9 @@ struct View {
     /// World → camera, OpenCV axes, 3 × 4.
     camera_rt_matrix: [[f64; 4]; 3],
     field_of_view_rads: f64,
+    /// What was subtracted from the coordinates of the mesh's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    world_offset_m: Option<[f64; 3]>,
 }
 
 /// One view of a mesh.
@@ -81,7 +85,19 @@ pub fn render(
         refuse(options.overwrite)?;
     }
 
-    let file = s3d_io::mesh::read_mesh(mesh, options.up)?;
+    let near = MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() };
+    let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
+    // What is written is in the frame of the mesh as it was read.
+    let mut camera = *camera;
+    camera.pose.location -= file.offset_m;
+    let camera = &camera;
+    let world_offset_m = (file.offset_m != DVec3::ZERO).then(|| file.offset_m.to_array());
+    if let Some(offset_m) = world_offset_m {
+        ctx.info(format_args!(
+            "the mesh lies far from the origin: {offset_m:?} is subtracted from its coordinates and the camera's, \
+             which camera.json tells"
+        ));
+    }
     file.warnings.iter().for_each(|w| ctx.warn(w));
     let scene = Scene::new(&file.mesh);
     let textures = MipMaps::new(&file.mesh);
@@ -131,6 +147,7 @@ pub fn render(
         camera_k_matrix: (!is_panorama).then(|| camera.k_matrix()),
         camera_rt_matrix: camera.pose.rt_matrix(),
         field_of_view_rads: camera.fov_rad(),
+        world_offset_m,
     };
     write_json(&folder.join("camera.json"), &view)?;
     staging.place_files(output)?;

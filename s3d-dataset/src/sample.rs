@@ -5,9 +5,10 @@ use crate::error::Result;
 use crate::store::staging::Staging;
 use crate::store::{parent_of, refuse_existing};
 use crate::useful::{PLY_POINT_BYTES, check_points, judge, space_findings};
+use glam::DVec3;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use s3d_io::cloud::PlyPointWriter;
-use s3d_io::mesh::UpAxis;
+use s3d_io::mesh::{MeshOptions, MeshOrigin, UpAxis};
 use std::path::Path;
 use std::time::Instant;
 
@@ -34,7 +35,8 @@ impl Default for SampleOptions {
 }
 
 /// Samples a mesh's file densely and uniformly into the PLY file `output`: world metres, Z-up, with colours.
-/// Returns the number of points.
+/// From a mesh far from the origin an offset is subtracted ([`MeshOrigin::Near`]). Returns the number of
+/// points.
 ///
 /// # Errors
 /// [`Error::Usage`](crate::Error::Usage) if the file is there and not to be replaced, or the points are too
@@ -44,7 +46,8 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     if !Staging::is_left(&parent, name) {
         refuse_existing(output, options.overwrite)?;
     }
-    let file = s3d_io::mesh::read_mesh(mesh, options.up)?;
+    let near = MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() };
+    let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
     ctx.warn_each(&file.warnings);
     let points = match options.density {
         Density::PerM2(points_per_m2) => file.mesh.total_area() * points_per_m2,
@@ -55,9 +58,16 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     let staging = Staging::begin(ctx, &parent, name)?;
     refuse_existing(output, options.overwrite || staging.was_placing())?;
     judge(ctx, &space_findings(points * PLY_POINT_BYTES, output), &[])?;
+    if file.offset_m != DVec3::ZERO {
+        ctx.info(format_args!(
+            "the mesh lies far from the origin: {:?} is subtracted from its coordinates, which the cloud's header \
+             tells",
+            file.offset_m.to_array()
+        ));
+    }
     let started = Instant::now();
     let sampler = SurfaceSampler::new(&file.mesh, options.density, options.seed);
-    let mut ply = PlyPointWriter::create(&staging.path().join(name), sampler.len())?;
+    let mut ply = PlyPointWriter::create_moved(&staging.path().join(name), sampler.len(), file.offset_m)?;
     let progress = ctx.progress("sampling", "points", sampler.len());
     let mut cloud = PointCloud::default();
     let mut at = 0;

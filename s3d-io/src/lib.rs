@@ -74,6 +74,8 @@
     )
 )]
 
+#[cfg(any(feature = "cloud", feature = "mesh"))]
+mod bounds;
 #[cfg(feature = "camera")]
 pub mod camera;
 #[cfg(feature = "cloud")]

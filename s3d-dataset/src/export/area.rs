@@ -374,6 +374,7 @@ fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> Are
             Cameras::Placed(distance_m) => Some(distance_m),
             Cameras::Listed(..) => None,
         },
+        offset_m: area.frame.offset(),
         inputs: Vec::new(),
     }
 }
@@ -392,7 +393,7 @@ fn write_area_assets(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common:
     ctx.check()?;
     let sampling = account.stage(Stage::Points, Some(number));
     let density = Density::PerM2(options.points_per_m2);
-    let points = write_points(ctx, layout, &file.mesh, plan, table, density, options.seed)?;
+    let points = write_points(ctx, layout, &file.mesh, plan, table, (density, options.seed), file.offset_m)?;
     let mut paths = listing::walk(&mesh_dir)?;
     let labels = label_files(layout, number);
     paths.retain(|path| !labels.contains(path));
@@ -497,6 +498,7 @@ pub(crate) fn render_area(
         modalities: &options.modalities,
         size: options.size,
         pano_width: options.pano_width,
+        offset_m: area.frame.offset(),
         each: &finish_location,
     };
     let rendering = account.stage(Stage::Render, Some(number));

@@ -32,6 +32,8 @@ pub(crate) struct ImageJob<'a> {
     pub(crate) modalities: &'a [Domain],
     pub(crate) size: u32,
     pub(crate) pano_width: u32,
+    /// What was subtracted from the scan's coordinates, if something was.
+    pub(crate) offset_m: Option<[f64; 3]>,
     /// ReadManifest of every location whose images are all there, by whichever thread wrote the last.
     pub(crate) each: &'a (dyn Fn(WrittenLocation) -> Result<()> + Sync),
 }
@@ -206,7 +208,8 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
     }
     if job.modalities.contains(&Domain::Pose) {
         let room = format!("{room}_{}", job.area);
-        let pose = PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame);
+        let mut pose = PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame);
+        pose.world_offset_m = job.offset_m;
         written.files.push(write(Domain::Pose, &pose.to_json())?);
     }
     if !images.is_empty() {

@@ -185,7 +185,13 @@ impl<'a> Job<'a> {
     pub(crate) fn write_assets(&self, layout: &Layout) -> Result<()> {
         let options = self.options;
         let names = self.inputs.table.names();
-        assets::write(layout, names, options.pad_labels.0, options.conventions())
+        assets::write(
+            layout,
+            names,
+            options.pad_labels.0,
+            options.conventions(),
+            &self.request.world_offsets(),
+        )
     }
 
     pub(crate) fn common<'b>(

@@ -4,6 +4,7 @@
 use crate::context::{Context, Progress};
 use crate::error::Result;
 use crate::export::labels::area_plan::AreaPlan;
+use glam::DVec3;
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::cloud::{MatWriter, PlyPointWriter, S3disAreaWriter};
 use s3d_io::dataset::Layout;
@@ -18,15 +19,16 @@ const CHUNK: u64 = 1 << 18;
 type Places = BTreeMap<LabelId, (Room, u32)>;
 
 /// Samples the labelled mesh and writes the points, grouped by room and instance: those of faces without a
-/// label come last, and into the PLY file only. Returns how many there are.
+/// label come last, and into the PLY file only, whose header tells of `offset_m`, the mesh's. Returns how
+/// many there are.
 pub(crate) fn write_points(
     ctx: &Context,
     layout: &Layout,
     mesh: &TriMesh,
     plan: &AreaPlan,
     table: &LabelTable,
-    density: Density,
-    seed: u64,
+    (density, seed): (Density, u64),
+    offset_m: DVec3,
 ) -> Result<u64> {
     // Number in the room of every label of this area: the tree's files are named by it.
     let mut place = Places::new();
@@ -49,7 +51,7 @@ pub(crate) fn write_points(
     let number = plan.area;
     let sampler = SurfaceSampler::over_faces(mesh, faces, density, seed);
     let mut sink = Sink {
-        ply: PlyPointWriter::create(&layout.point_cloud(number), sampler.len())?,
+        ply: PlyPointWriter::create_moved(&layout.point_cloud(number), sampler.len(), offset_m)?,
         progress: ctx.progress("sampling", "points", sampler.len()),
         sampler: &sampler,
         cloud: PointCloud::default(),

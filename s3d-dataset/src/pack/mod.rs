@@ -55,14 +55,16 @@ pub fn pack(dataset: &Path, kind: PackageKind, options: &PackOptions, ctx: &Cont
         refuse_existing(&place, options.overwrite || staging.was_placing())?;
         parquet::pack(ctx, &source, &staging.path().join(name))?;
         staging.place_files(&parent)?;
+        source.frame_notes().iter().for_each(|note| ctx.info(note));
     } else {
         let destination = Destination::begin(ctx, &place, dataset, options.overwrite)?;
-        let notes = match kind {
+        let mut notes = match kind {
             PackageKind::Webdataset => webdataset::pack(ctx, &source, &destination, &options.specific)?,
             PackageKind::Colmap => colmap::pack(ctx, &source, &destination, &options.specific)?,
             PackageKind::Nerfstudio => nerfstudio::pack(ctx, &source, &destination, &options.specific)?,
             _ => coco::pack(ctx, &source, &destination, &options.specific)?,
         };
+        notes.extend(source.frame_notes());
         notes.iter().for_each(|note| ctx.info(note));
         let about = About::new(kind.to_string(), &source.areas, source.images.len(), notes);
         destination.finish(&about)?;

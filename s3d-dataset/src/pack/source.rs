@@ -7,8 +7,8 @@ use crate::tables::dataset::{Dataset, Listed};
 use s3d_geom::{PointCloud, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    DatasetImage, Domain, Frame, Layout, PoseFile, ViewRecord, check_images_complete, read_labels, read_pose,
-    read_views,
+    DatasetImage, Domain, Frame, Layout, PoseFile, ViewRecord, WorldOffsets, check_images_complete,
+    read_labels, read_pose, read_views,
 };
 use s3d_io::fs::write_bytes;
 use s3d_io::image::{decode_gray16, decode_rgb8};
@@ -28,6 +28,8 @@ pub(crate) struct Source {
     pub(crate) images: Vec<DatasetImage>,
     /// Units a metre of depth images.
     pub(crate) depth_units_per_m: f64,
+    /// What was subtracted from the coordinates of the areas' scans.
+    offsets: WorldOffsets,
 }
 
 impl Source {
@@ -64,7 +66,17 @@ impl Source {
         let needed: BTreeSet<PathBuf> = images.iter().flat_map(of_image).collect();
         files.require(ctx, |path| needed.contains(path))?;
         let depth_units_per_m = manifest.conventions().depth_units.per_m();
-        Ok(Self { layout, files, areas, images, depth_units_per_m })
+        let offsets = manifest.request().world_offsets();
+        Ok(Self { layout, files, areas, images, depth_units_per_m, offsets })
+    }
+
+    /// Which frame coordinates are in, a sentence for each area whose scan has another.
+    pub(crate) fn frame_notes(&self) -> Vec<String> {
+        let packed = self.offsets.iter().filter(|(area, _)| self.areas.contains(area));
+        let note = |(area, offset_m): (&u32, &[f64; 3])| {
+            format!("area {area}: coordinates are those of its scan less offset_m = {offset_m:?}")
+        };
+        packed.map(note).collect()
     }
 
     /// The images of an area.

@@ -100,7 +100,8 @@ pub fn merge(
         stage.end();
         let stage = account.stage(Stage::Tables, None);
         let options = &request.options;
-        assets::write(layout, labels.names().to_vec(), manifest.labels_padded_to(), options.conventions())?;
+        let (names, padded) = (labels.names().to_vec(), manifest.labels_padded_to());
+        assets::write(layout, names, padded, options.conventions(), &request.world_offsets())?;
         let made = finish(ctx, layout, request, manifest, &session.journal.finished(), None)?;
         stage.end();
         Ok(made)

@@ -2,6 +2,7 @@
 //! requests write the same files, so that one can go on where the other was killed.
 
 use crate::options::ExportOptions;
+use s3d_io::dataset::WorldOffsets;
 use s3d_io::fs::Checksum;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -25,6 +26,10 @@ pub(crate) struct RequestedArea {
     pub(crate) area: u32,
     /// How far apart scan locations are placed, metres; null if the scene has its own.
     pub(crate) place_cameras: Option<f64>,
+    /// What is subtracted from the scan's coordinates, metres; not there if nothing is. It follows from what
+    /// is read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) offset_m: Option<[f64; 3]>,
     /// What is read.
     pub(crate) inputs: Vec<InputRecord>,
 }
@@ -99,6 +104,11 @@ impl Request {
         self.areas.iter().map(|a| a.area).collect()
     }
 
+    /// What is subtracted from the coordinates of the areas' scans.
+    pub(crate) fn world_offsets(&self) -> WorldOffsets {
+        self.areas.iter().filter_map(|a| Some((a.area, a.offset_m?))).collect()
+    }
+
     /// What is known of a file or folder of an area's input, by its name.
     pub(crate) fn input(&self, area: u32, name: &str) -> Option<&InputRecord> {
         let area = self.areas.iter().find(|a| a.area == area)?;
@@ -159,6 +169,15 @@ impl RequestedArea {
                 words(now.place_cameras)
             ));
         }
+        if self.offset_m != now.offset_m {
+            let words = |offset: Option<[f64; 3]>| offset.map_or("none".to_owned(), |o| format!("{o:?}"));
+            differences.push(format!(
+                "offset_m of area {}: {} there, {} now",
+                self.area,
+                words(self.offset_m),
+                words(now.offset_m)
+            ));
+        }
         let by_path = |inputs: &[InputRecord]| -> BTreeMap<String, Vec<(u64, Checksum)>> {
             let mut map: BTreeMap<String, Vec<(u64, Checksum)>> = BTreeMap::new();
             for input in inputs {
@@ -212,6 +231,7 @@ pub(crate) mod tests {
         RequestedArea {
             area,
             place_cameras: None,
+            offset_m: None,
             inputs: vec![input("scene.toml"), input("rgb.obj"), input("Area_1/")],
         }
     }
@@ -251,6 +271,10 @@ pub(crate) mod tests {
         assert_eq!(
             changed(&|r| r.areas[0].place_cameras = Some(2.5)),
             ["placed scan locations of area 1: none there, 2.5 m apart now"]
+        );
+        assert_eq!(
+            changed(&|r| r.areas[0].offset_m = Some([5e5, 0.0, 1.5])),
+            ["offset_m of area 1: none there, [500000.0, 0.0, 1.5] now"]
         );
         assert_eq!(changed(&|r| drop(r.areas.remove(1))), ["area 3 there, not now"]);
         assert_eq!(changed(&|r| r.areas[1].area = 4), ["area 3 there, not now", "area 4 now, not there"]);

@@ -1,7 +1,7 @@
 //! What a data set tells of itself: conventions, schemas, and a Python module that reads it.
 
 use crate::error::Result;
-use s3d_io::dataset::{Conventions, Layout};
+use s3d_io::dataset::{Conventions, Layout, WorldOffsets};
 use s3d_io::fs::{create_dir, write_bytes};
 use std::path::PathBuf;
 
@@ -17,11 +17,12 @@ pub(crate) fn write(
     mut names: Vec<String>,
     pad_labels: usize,
     conventions: Conventions,
+    offsets: &WorldOffsets,
 ) -> Result<()> {
     create_dir(&layout.assets_dir())?;
     s3d_io::dataset::pad_labels(&mut names, pad_labels);
     s3d_io::dataset::write_labels(&layout.labels_json(), &names)?;
-    conventions.write(&layout.conventions())?;
+    conventions.write(&layout.conventions(), offsets)?;
     create_dir(&layout.schema_dir())?;
     for (path, text) in texts(layout) {
         write_bytes(&path, text.as_bytes())?;

@@ -102,6 +102,9 @@ pub(crate) struct AreaEntry {
     pub(crate) rgb: String,
     /// How far apart scan locations were placed, metres; null if the scene has its own.
     pub(crate) place_cameras: Option<f64>,
+    /// What was subtracted from the scan's coordinates, metres; not there if nothing was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) offset_m: Option<[f64; 3]>,
     /// What it was made from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) inputs: Vec<InputRecord>,
@@ -181,6 +184,7 @@ impl Manifest {
         let areas = self.areas.iter().map(|entry| RequestedArea {
             area: entry.area,
             place_cameras: entry.place_cameras,
+            offset_m: entry.offset_m,
             inputs: entry.inputs.clone(),
         });
         Request {

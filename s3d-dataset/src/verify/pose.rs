@@ -51,6 +51,14 @@ pub(crate) struct CheckedPose {
     pub(crate) is_consistent: bool,
 }
 
+/// Holds what the pose tells of the world's frame against what the manifest does.
+pub(crate) fn check_frame(pose: &CheckedPose, offset_m: Option<[f64; 3]>, path: &Path, report: &Report) {
+    let told = pose.file.world_offset_m;
+    report.check(told == offset_m, FAULT, path, || {
+        format!("world_offset_m is {told:?}, and the manifest tells of {offset_m:?}")
+    });
+}
+
 fn names(file: &PoseFile, image: &DatasetImage, checks: &OfFile<'_>) {
     for (key, value) in [("camera_uuid", &file.camera_uuid), ("point_uuid", &file.point_uuid)] {
         checks.check(*value == image.uuid, || {

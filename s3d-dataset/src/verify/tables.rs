@@ -5,7 +5,9 @@ use crate::profile::loader::Profile;
 use crate::tables::assets;
 use crate::tables::manifest::Manifest;
 use crate::tables::statistics::Statistics;
-use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, read_conventions, read_splits};
+use s3d_io::dataset::{
+    DatasetImage, Domain, Frame, Layout, read_conventions, read_splits, read_world_offsets,
+};
 use s3d_io::fs::{read_file, read_json};
 use s3d_label::Room;
 use s3d_sample::folds;
@@ -26,6 +28,12 @@ pub(crate) fn conventions(layout: &Layout, manifest: &Manifest, report: &Report)
     if let Some(found) = report.read(Topic::Tables, &path, read_conventions) {
         let contradiction = manifest.contradiction_of(found);
         report.check(contradiction.is_none(), CONVENTIONS, &path, || contradiction.unwrap_or_default());
+    }
+    if let Some(found) = report.read(Topic::Tables, &path, read_world_offsets) {
+        let told = manifest.request().world_offsets();
+        report.check(found == told, CONVENTIONS, &path, || {
+            format!("world.offset_m is {found:?}; the manifest tells of {told:?}")
+        });
     }
     for profile in Profile::ALL {
         let dir = layout.profile_dir(profile.name());

@@ -1,7 +1,7 @@
 //! Annotated points of E57 files: several scans, each with its pose. Source: ASTM E2807.
 
+use crate::bounds::Bounds;
 use crate::cloud::annotations::AnnotationOptions;
-use crate::cloud::frame_gap::Bounds;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::Columns;
 use crate::cloud::table::records::{Color, color};

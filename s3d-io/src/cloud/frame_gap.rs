@@ -1,5 +1,6 @@
 //! Points and a mesh whose frames differ: they lie so far apart that nothing of the one belongs to the other.
 
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use s3d_geom::Aabb;
 use s3d_geom::glam::DVec3;
@@ -13,57 +14,6 @@ const SAME_FRAME_M: f64 = 100.0;
 /// Farther apart than this, and than ten times the mesh's size, no two parts of one scan are: the first
 /// points tell, whatever follows.
 const OTHER_FRAME_M: f64 = 10_000.0;
-
-/// A box in `f64`, which holds the digits of any frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bounds {
-    pub(crate) min: DVec3,
-    pub(crate) max: DVec3,
-}
-
-impl Bounds {
-    pub(crate) const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
-
-    pub(crate) fn of(points: impl IntoIterator<Item = DVec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, Self::with)
-    }
-
-    #[inline]
-    pub(crate) fn with(self, p: DVec3) -> Self {
-        Self { min: self.min.min(p), max: self.max.max(p) }
-    }
-
-    pub(crate) fn union(self, other: Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
-    }
-
-    /// Whether it is a box of finite numbers.
-    pub(crate) fn is_some(&self) -> bool {
-        self.min.is_finite() && self.max.is_finite() && self.min.cmple(self.max).all()
-    }
-
-    fn size(&self) -> DVec3 {
-        self.max - self.min
-    }
-
-    fn center(&self) -> DVec3 {
-        (self.min + self.max) * 0.5
-    }
-
-    fn minus(self, offset: DVec3) -> Self {
-        Self { min: self.min - offset, max: self.max - offset }
-    }
-
-    fn distance_m(&self, other: &Self) -> f64 {
-        (self.min - other.max).max(other.min - self.max).max(DVec3::ZERO).length()
-    }
-}
-
-impl From<Aabb> for Bounds {
-    fn from(b: Aabb) -> Self {
-        Self { min: b.min.as_dvec3(), max: b.max.as_dvec3() }
-    }
-}
 
 /// How far points and a mesh are apart, and what would bring them together. Displayed, it is a sentence.
 ///
@@ -215,8 +165,8 @@ impl FrameWatch {
 pub(crate) fn refusal(path: &Path, gap: &FrameGap) -> Error {
     let offset = gap.offset_in_toml();
     let message = format!(
-        "its points lie {gap}, in metres, Z-up. Points and mesh need one frame: if they are of one scan, write {offset} under \
-         [annotations] in the scene file; it is subtracted from the points"
+        "its points lie {gap}, in metres, Z-up. Points and mesh need one frame: if they are of one scan, write \
+         {offset} under [annotations] in the scene file; it is subtracted from the points"
     );
     Error::format(path, message)
 }

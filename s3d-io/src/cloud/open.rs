@@ -1,9 +1,10 @@
 //! Annotations, from any files that are read.
 
+use crate::bounds::Bounds;
 use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
-use crate::cloud::frame_gap::{Bounds, FrameGap, refusal};
+use crate::cloud::frame_gap::{FrameGap, refusal};
 use crate::cloud::s3dis::points::PointReader;
 use crate::cloud::s3dis::tree::{AnnotationTree, OnFault, TreeOptions};
 use crate::cloud::table::cloud::Cloud;
@@ -164,7 +165,8 @@ impl Annotations {
         if columns.iter().any(|c| c.is_some()) || options.room.is_some() {
             return Err(Error::format(
                 dir,
-                "is a folder: its rooms, classes and instances are named by its files; columns and a room are for clouds",
+                "is a folder: its rooms, classes and instances are named by its files; columns and a room are for \
+                 clouds",
             ));
         }
         let (on_fault, offset_m) = (options.on_fault, options.offset_m);

@@ -7,6 +7,7 @@ use s3d_geom::NormalAxes;
 use s3d_label::NULL_NAME;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
@@ -117,6 +118,10 @@ impl fmt::Display for XyzType {
     }
 }
 
+/// What was subtracted from the coordinates of a scan to make those of the world, metres, by the number of
+/// the area; areas from which nothing was are not in it.
+pub type WorldOffsets = BTreeMap<u32, [f64; 3]>;
+
 /// Which of the conventions that a data set may choose it has; the default is the published one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conventions {
@@ -129,13 +134,20 @@ pub struct Conventions {
 }
 
 impl Conventions {
-    /// Writes `conventions.json`, these choices and all that is the same in every data set, and returns its
-    /// size in bytes.
+    /// Writes `conventions.json`, these choices, the frames of areas, and all that is the same in every data
+    /// set, and returns its size in bytes.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write(&self, path: &Path) -> Result<u64> {
-        write_json(path, &self.to_json())
+    pub fn write(&self, path: &Path, offsets: &WorldOffsets) -> Result<u64> {
+        let mut json = self.to_json();
+        if let Some(world) =
+            json.get_mut("world").and_then(Value::as_object_mut).filter(|_| !offsets.is_empty())
+        {
+            world.insert("offset_m".to_owned(), json!(offsets));
+            world.insert("frame_of_scan".to_owned(), json!("world + offset_m of the area, in f64"));
+        }
+        write_json(path, &json)
     }
 
     fn to_json(self) -> Value {
@@ -257,6 +269,29 @@ pub fn read_conventions(path: &Path) -> Result<Conventions> {
     Ok(Conventions { depth_units, normal_axes, xyz })
 }
 
+/// What was subtracted from the coordinates of each area's scan, as the `conventions.json` at `path` says;
+/// nothing if there is no such file.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if the file is something else.
+pub fn read_world_offsets(path: &Path) -> Result<WorldOffsets> {
+    #[derive(Deserialize)]
+    struct File {
+        #[serde(default)]
+        world: World,
+    }
+    #[derive(Default, Deserialize)]
+    struct World {
+        #[serde(default)]
+        offset_m: WorldOffsets,
+    }
+    if !path.try_exists().map_err(|e| Error::io(path, "look for", e))? {
+        return Ok(WorldOffsets::new());
+    }
+    let file: File = crate::fs::json::read_json(path)?;
+    Ok(file.world.offset_m)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -271,8 +306,15 @@ mod tests {
             for normal_axes in [NormalAxes::Paper, NormalAxes::OpenCv] {
                 for xyz in [XyzType::Half, XyzType::Float, XyzType::None] {
                     let conventions = Conventions { depth_units, normal_axes, xyz };
-                    conventions.write(&path).unwrap();
-                    assert_eq!(read_conventions(&path).unwrap(), conventions);
+                    for offsets in
+                        [WorldOffsets::new(), [(1, [5e5, 5.4e6, 300.0]), (12, [0.0, -100.0, 0.5])].into()]
+                    {
+                        conventions.write(&path, &offsets).unwrap();
+                        assert_eq!(read_conventions(&path).unwrap(), conventions);
+                        assert_eq!(read_world_offsets(&path).unwrap(), offsets);
+                        let text = std::fs::read_to_string(&path).unwrap();
+                        assert_eq!(text.contains("offset_m"), !offsets.is_empty());
+                    }
                     assert_eq!(xyz.to_string().parse(), Ok(xyz));
                 }
                 assert_eq!(NormalAxes::from_name(normal_axes.name()), Some(normal_axes));

@@ -43,7 +43,9 @@ pub(crate) mod pose;
 mod splits;
 
 #[cfg(feature = "dataset")]
-pub use conventions::{Conventions, DepthUnits, UnknownWord, XyzType, read_conventions};
+pub use conventions::{
+    Conventions, DepthUnits, UnknownWord, WorldOffsets, XyzType, read_conventions, read_world_offsets,
+};
 pub use domain::{Domain, UnknownDomain};
 #[cfg(feature = "dataset")]
 pub use file_list::{CheckedFile, FileRecord, parse_file_list, read_file_list, write_file_list};

@@ -41,6 +41,10 @@ pub struct PoseFile {
     pub frame_num: Frame,
     /// Type, number and area of the room: "office_5_3".
     pub room: String,
+    /// What was subtracted from the scan's coordinates to make those of the world, metres; not there if
+    /// nothing was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub world_offset_m: Option<[f64; 3]>,
 }
 
 /// What files may hold: the published ones have no `camera_rotation_final`, and a matrix may have its fourth
@@ -59,6 +63,7 @@ struct RawPoseFile {
     point_uuid: Option<String>,
     frame_num: Frame,
     room: String,
+    world_offset_m: Option<[f64; 3]>,
 }
 
 impl TryFrom<RawPoseFile> for PoseFile {
@@ -85,6 +90,7 @@ impl TryFrom<RawPoseFile> for PoseFile {
             camera_uuid: raw.camera_uuid,
             frame_num: raw.frame_num,
             room: raw.room,
+            world_offset_m: raw.world_offset_m,
         })
     }
 }
@@ -110,6 +116,7 @@ impl PoseFile {
             point_uuid: uuid.to_owned(),
             frame_num,
             room: room.to_owned(),
+            world_offset_m: None,
         }
     }
 
@@ -240,6 +247,9 @@ mod tests {
         ] {
             let file = PoseFile::new(&camera, &original, "a1b2", "WC_1_4", frame);
             let path = dir.path().join("pose.json");
+            let moved = PoseFile { world_offset_m: Some([5e5, -1.0, 0.5]), ..file.clone() };
+            moved.write(&path).unwrap();
+            assert_eq!(read_pose(&path).unwrap(), moved);
             file.write(&path).unwrap();
             assert_eq!(read_pose(&path).unwrap(), file);
             assert!((file.pose().world_from_camera - camera.pose.world_from_camera).col(0).length() < 1e-12);

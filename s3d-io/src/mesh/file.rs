@@ -2,8 +2,9 @@
 
 use crate::image::texture::TextureFile;
 use crate::mesh::labels::MeshLabels;
+use crate::mesh::origin::MeshOrigin;
 use crate::quote::count;
-use s3d_geom::glam::{Vec3, vec3};
+use s3d_geom::glam::{DVec3, Vec3, vec3};
 use s3d_geom::{MeshError, MeshParts, TriMesh};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -44,6 +45,9 @@ pub struct MeshFile {
     /// The other files that were read for it: libraries of materials, textures, buffers. Those that it names
     /// and that are not there are not among them.
     pub companions: Vec<PathBuf>,
+    /// What was subtracted from the positions of its files, in the world's axes: add it to a position to have
+    /// that of the scan. Source: [`MeshOptions::origin`].
+    pub offset_m: DVec3,
     /// How many faces of the file had more than three corners.
     pub polygons_triangulated: usize,
     /// How many faces were left out because an earlier one has the same corners.
@@ -69,6 +73,7 @@ impl MeshFile {
             labels,
             sources,
             companions,
+            offset_m: DVec3::ZERO,
             polygons_triangulated,
             repeated_faces,
         }
@@ -115,7 +120,7 @@ pub struct MeshSource {
 }
 
 /// How a mesh is read.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshOptions {
     /// The property of a PLY file's faces or vertices that tells what they are; by default one of the names
     /// that scanners and data sets use, such as `label`, `class` and `category_id`, if it is there.
@@ -123,6 +128,8 @@ pub struct MeshOptions {
     /// The property that tells which object they belong to; by default one such as `object_id` and
     /// `instance`, if it is there.
     pub instance_column: Option<String>,
+    /// Which place becomes the origin.
+    pub origin: MeshOrigin,
 }
 
 /// Makes the mesh, and tells in `warnings` what was mended.

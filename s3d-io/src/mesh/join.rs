@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, MeshOptions, MeshSource, UpAxis};
 use crate::mesh::labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
+use crate::mesh::origin::MeshOrigin;
 use crate::mesh::read::read_mesh_with;
 use s3d_geom::{NO_INDEX, TriMesh};
 use std::path::{Path, PathBuf};
@@ -12,7 +13,8 @@ use std::path::{Path, PathBuf};
 /// their file, if there are several.
 ///
 /// A column that only some files have is filled up as [`s3d_geom::MeshParts::append`] tells; vertex labels
-/// become labels of faces if other files label faces, and what a file does not label has [`NO_LABEL`].
+/// become labels of faces if other files label faces, and what a file does not label has [`NO_LABEL`]. The
+/// origin that is found for the first file is that of all.
 ///
 /// # Errors
 /// As [`read_mesh_with`] for each file; [`Error::Format`] if `paths` is empty or the meshes have too many
@@ -34,8 +36,9 @@ pub fn read_meshes_with(paths: &[PathBuf], up: UpAxis, options: &MeshOptions) ->
         return Ok(joined);
     }
     name_warnings(&mut joined.warnings, first);
+    let options = MeshOptions { origin: MeshOrigin::behind(joined.offset_m), ..options.clone() };
     for path in others {
-        let mut next = read_mesh_with(path, up, options)?;
+        let mut next = read_mesh_with(path, up, &options)?;
         name_warnings(&mut next.warnings, path);
         joined = join(joined, next)?;
     }
@@ -76,6 +79,7 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
         labels,
         sources,
         companions: [joined.companions, next.companions].concat(),
+        offset_m: joined.offset_m,
         polygons_triangulated: joined.polygons_triangulated + next.polygons_triangulated,
         repeated_faces: joined.repeated_faces + next.repeated_faces,
     })

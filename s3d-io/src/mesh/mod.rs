@@ -3,7 +3,8 @@
 //! [`read_mesh`] reads one file and [`read_meshes`] joins several; the name's ending tells the format. What
 //! comes out is a [`MeshFile`]: the mesh in world metres, Z-up, the encoded textures as they were found,
 //! [`MeshLabels`] if the file labels its faces or vertices, and warnings of what was mended.
-//! [`read_mesh_from`] takes any reader.
+//! [`read_mesh_from`] takes any reader. A mesh far from its origin, as in UTM, is brought near to it before
+//! positions become `f32` if [`MeshOptions::origin`] says so.
 //!
 //! | ending | what is read |
 //! |---|---|
@@ -41,6 +42,8 @@ pub(crate) mod join;
 pub(crate) mod labels;
 #[cfg(feature = "obj")]
 mod obj;
+#[cfg(feature = "mesh")]
+pub(crate) mod origin;
 #[cfg(feature = "ply")]
 pub(crate) mod ply;
 #[cfg(feature = "mesh")]
@@ -54,5 +57,7 @@ pub use join::{read_meshes, read_meshes_with};
 pub use labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
 #[cfg(all(feature = "obj", feature = "png"))]
 pub use obj::{RgbObj, SemanticObj, TextureOut, write_rgb_obj, write_semantic_obj};
+#[cfg(feature = "mesh")]
+pub use origin::MeshOrigin;
 #[cfg(feature = "mesh")]
 pub use read::{read_mesh, read_mesh_from, read_mesh_with};

@@ -20,8 +20,7 @@ pub(crate) struct AnnotationTable {
     rooms: Option<String>,
     #[serde(default)]
     columns: Vec<String>,
-    #[serde(default)]
-    offset_m: [f64; 3],
+    offset_m: Option<[f64; 3]>,
     #[serde(default)]
     unknown_as_clutter: bool,
     #[serde(default)]
@@ -39,6 +38,11 @@ impl AnnotationTable {
         }
     }
 
+    /// Whether they say what is subtracted from coordinates.
+    pub(crate) fn has_offset(&self) -> bool {
+        self.offset_m.is_some()
+    }
+
     /// How they are read.
     pub(crate) fn options(&self) -> std::result::Result<AnnotationOptions, String> {
         let room: Option<Room> = match &self.room {
@@ -53,8 +57,9 @@ impl AnnotationTable {
             };
             classes.insert(key.clone(), class);
         }
-        if !self.offset_m.iter().all(|v| v.is_finite()) {
-            return Err(format!("annotations.offset_m = {:?} is not finite", self.offset_m));
+        let offset_m = self.offset_m.unwrap_or_default();
+        if !offset_m.iter().all(|v| v.is_finite()) {
+            return Err(format!("annotations.offset_m = {offset_m:?} is not finite"));
         }
         Ok(AnnotationOptions {
             unknown_as_clutter: self.unknown_as_clutter,
@@ -64,7 +69,7 @@ impl AnnotationTable {
             instance_column: self.instance.clone(),
             room_column: self.rooms.clone(),
             columns: self.columns.clone(),
-            offset_m: DVec3::from_array(self.offset_m),
+            offset_m: DVec3::from_array(offset_m),
             ..AnnotationOptions::default()
         })
     }

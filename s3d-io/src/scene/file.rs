@@ -8,7 +8,7 @@ use crate::mesh::file::UpAxis;
 use crate::scene::annotations::AnnotationTable;
 use crate::scene::cameras::{CameraSource, CamerasTable, similarity};
 use crate::scene::rgb::{PictureSource, RgbEntry};
-use s3d_geom::glam::DAffine3;
+use s3d_geom::glam::{DAffine3, DVec3};
 use serde::Deserialize;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -31,12 +31,17 @@ pub struct SceneFile {
     /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published
     /// OBJ files.
     pub up: UpAxis,
+    /// What is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing, unless it
+    /// lies far from the origin ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
+    pub mesh_offset_m: Option<DVec3>,
     /// The annotated points: files and folders, see [`Annotations::open`](crate::cloud::Annotations::open).
     /// None: the labels that came with the mesh, see
     /// [`Annotations::of_mesh`](crate::cloud::Annotations::of_mesh).
     pub annotations: Vec<PathBuf>,
     /// How they are read. Faults stop.
     pub annotation_options: AnnotationOptions,
+    /// Whether the file says what is subtracted from them. If not, it is what is subtracted from the mesh.
+    pub annotations_have_offset: bool,
     /// Where the scan locations come from; `None` if the file does not say.
     pub cameras: Option<CameraSource>,
     /// The scanner's pictures, if RGB images are made from them and not from the mesh's texture.
@@ -67,6 +72,7 @@ struct MeshTable {
     path: Option<PathBuf>,
     paths: Option<Vec<PathBuf>>,
     up: Option<UpAxis>,
+    offset_m: Option<[f64; 3]>,
 }
 
 /// Reads a `scene.toml`:
@@ -76,6 +82,7 @@ struct MeshTable {
 /// [mesh]
 /// path = "rgb.obj"    # or paths = ["floor_1.ply", "floor_2.ply"]
 /// up   = "y"          # or "z"; "y" if it is left out
+/// offset_m = [500000.0, 5400000.0, 300.0]  # subtracted from positions; found by itself if it is left out
 /// [annotations]
 /// path = "Area_1"     # or mesh = true: the labels that came with the mesh
 /// [cameras]
@@ -100,7 +107,7 @@ struct MeshTable {
 /// room       = "office_1"             # the room of points that name none
 /// rooms      = "room"                 # the column of rooms
 /// columns    = ["x", "y", "z", "class"]         # of a plain NPY array
-/// offset_m   = [500000.0, 4000000.0, 0.0]       # subtracted from coordinates
+/// offset_m   = [500000.0, 4000000.0, 0.0]       # subtracted from coordinates; the mesh's if left out
 /// unknown_as_clutter = true           # classes without a meaning; else they stop
 /// [annotations.classes]
 /// "2" = "floor"
@@ -202,6 +209,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
     };
     let (mut mesh, mut annotations) = (Vec::new(), Vec::new());
     let (mut up, mut annotation_options) = (UpAxis::Y, AnnotationOptions::default());
+    let (mut mesh_offset_m, mut annotations_have_offset) = (None, false);
     if let Some((meshes, labels)) = files {
         mesh = match (&meshes.path, &meshes.paths) {
             (Some(written), None) => vec![found("mesh.path", written, "file", Path::is_file)?],
@@ -215,6 +223,11 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         annotations =
             written.iter().map(|written| found(key, written, "", Path::exists)).collect::<Result<_>>()?;
         annotation_options = labels.options().map_err(fault)?;
+        annotations_have_offset = labels.has_offset();
+        mesh_offset_m = meshes.offset_m.map(DVec3::from_array);
+        if let Some(offset_m) = mesh_offset_m.filter(|o| !o.is_finite()) {
+            return Err(fault(format!("mesh.offset_m = {:?} is not finite", offset_m.to_array())));
+        }
         up = meshes.up.unwrap_or(UpAxis::Y);
     }
     let cameras = match document.cameras.map(CamerasTable::source).transpose() {
@@ -236,8 +249,10 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         world_from_published,
         mesh,
         up,
+        mesh_offset_m,
         annotations,
         annotation_options,
+        annotations_have_offset,
         cameras,
         pictures,
     })
@@ -247,7 +262,6 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
 mod tests {
     use super::*;
     use crate::scene::rgb::{PictureKind, PictureOptions, UnseenColor};
-    use s3d_geom::glam::DVec3;
     use s3d_label::Class;
     use std::collections::BTreeMap;
     use std::fs;
@@ -280,6 +294,9 @@ mod tests {
         let scene = read(GOOD).unwrap();
         assert_eq!((scene.area, scene.up), (2, UpAxis::Z));
         assert_eq!(read(&GOOD.replace("up = \"z\"\n", "")).unwrap().up, UpAxis::Y);
+        assert_eq!((scene.mesh_offset_m, scene.annotations_have_offset), (None, false));
+        let moved = read(&GOOD.replace("up = \"z\"\n", "offset_m = [5e5, 0, 7]\n")).unwrap();
+        assert_eq!(moved.mesh_offset_m, Some(DVec3::new(5e5, 0.0, 7.0)));
     }
 
     #[test]
@@ -396,6 +413,7 @@ mod tests {
             ..AnnotationOptions::default()
         };
         assert_eq!(scene.annotation_options, expected);
+        assert!(scene.annotations_have_offset);
     }
 
     #[test]
@@ -498,6 +516,7 @@ mod tests {
                 "annotations.classes.\"2\": \"sky\" is no class",
             ),
             ("\"Area_2\"", "\"Area_2\"\noffset_m = [1, inf, 0]", "not finite"),
+            ("\"a.obj\"", "\"a.obj\"\noffset_m = [1, inf, 0]", "mesh.offset_m"),
             ("c.csv", "gone.csv", "cameras.path = \"gone.csv\""),
         ] {
             let message = read(&GOOD.replacen(from, to, 1)).unwrap_err().to_string();

@@ -3,10 +3,11 @@
 use crate::camera::poses;
 use crate::camera::poses::PublishedLocation;
 use crate::cloud::annotations::Annotations;
+use crate::dataset::read_world_offsets;
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, UpAxis};
 use crate::mesh::read::read_mesh;
-use s3d_geom::glam::{DAffine3, Vec3};
+use s3d_geom::glam::{DAffine3, DVec3, Vec3};
 use s3d_geom::{NO_INDEX, TriMesh};
 use s3d_label::{Label, parse_name};
 use std::collections::HashMap;
@@ -60,6 +61,10 @@ pub struct PublishedArea {
     pub locations: Vec<PublishedLocation>,
     /// Takes the files' frame to the world.
     pub world_from_area: DAffine3,
+    /// What was subtracted from the coordinates of the area's scan when it was exported, as the
+    /// `conventions.json` beside its folder says; 0 if there is none, or the area is moved by
+    /// `world_from_area`.
+    pub world_offset_m: DVec3,
     /// What was odd: a sentence each, for the user.
     pub warnings: Vec<String>,
 }
@@ -115,8 +120,20 @@ impl PublishedArea {
             labels: optional(path.join("..").join(labels)).or_else(|| optional(path.join(labels))),
             locations: Vec::new(),
             world_from_area: options.world_from_area,
+            world_offset_m: DVec3::ZERO,
             warnings: Vec::new(),
         };
+        if this.world_from_area == DAffine3::IDENTITY
+            && let Some(number) = area_of(path)
+        {
+            match read_world_offsets(&this.conventions()) {
+                Ok(offsets) => {
+                    this.world_offset_m =
+                        offsets.get(&number).copied().map_or(DVec3::ZERO, DVec3::from_array);
+                }
+                Err(e) => this.warnings.push(e.to_string()),
+            }
+        }
         let folders = ["data/pose", "pano/pose"].map(|folder| path.join(folder));
         let found = poses::read(&folders, &this.world_from_area)?;
         if found.is_empty() {
@@ -134,6 +151,11 @@ impl PublishedArea {
         Ok(this)
     }
 
+    /// The file beside the area's folder that tells of its frame; there may be none.
+    pub fn conventions(&self) -> PathBuf {
+        self.path.join("../conventions.json")
+    }
+
     /// Reads both meshes: the textured one, and the labels of its faces from the other.
     ///
     /// The two have the same faces, in the same order as a rule. If not, a face gets the label of the one
@@ -144,6 +166,7 @@ impl PublishedArea {
     /// or none of its materials is a label.
     pub fn read_mesh(&self) -> Result<PublishedMesh> {
         let mut file = read_mesh(&self.mesh, self.up)?;
+        file.offset_m = self.world_offset_m;
         let semantic = read_mesh(&self.semantic_mesh, self.up)?.mesh;
         let fault = |message: String| Error::format(&self.semantic_mesh, message);
 

@@ -111,8 +111,13 @@ fn annotations(dir: &Path, path: &Path) {
 fn obj(dir: &Path, data: &[u8]) {
     let path = file(dir, "mesh.obj", data);
     for up in [UpAxis::Y, UpAxis::Z] {
-        check_mesh(dir, read_mesh(&path, up));
+        check_mesh(dir, near(&path, up));
     }
+}
+
+/// Reads a mesh as scenes do: brought near the origin if it is far.
+fn near(path: &Path, up: UpAxis) -> Result<MeshFile> {
+    read_mesh_with(path, up, &MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() })
 }
 
 /// A library, and whatever images it names.
@@ -132,12 +137,12 @@ fn texture(dir: &Path, data: &[u8]) {
 /// Binary glTF and the JSON form by what the bytes begin with.
 fn gltf(dir: &Path, data: &[u8]) {
     let name = if data.starts_with(b"glTF") { "mesh.glb" } else { "mesh.gltf" };
-    check_mesh(dir, read_mesh(&file(dir, name, data), UpAxis::Y));
+    check_mesh(dir, near(&file(dir, name, data), UpAxis::Y));
 }
 
 fn ply_mesh(dir: &Path, data: &[u8]) {
     let path = file(dir, "mesh.ply", data);
-    check_mesh(dir, read_mesh(&path, UpAxis::Z));
+    check_mesh(dir, near(&path, UpAxis::Z));
     check(dir, read_ply_point_count(&path));
 }
 

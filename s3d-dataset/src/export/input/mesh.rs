@@ -1,5 +1,6 @@
 //! The mesh of an area: where it is read from, and where it is.
 
+use crate::context::Context;
 use crate::error::{Error, Result};
 use glam::DVec3;
 use s3d_geom::Aabb;
@@ -47,12 +48,29 @@ impl MeshSource {
 pub(crate) struct MeshFrame {
     /// Its box.
     pub(crate) bounds: Aabb,
+    /// What was subtracted from the scan's coordinates, in the world's axes.
+    pub(crate) offset_m: DVec3,
 }
 
 impl MeshFrame {
     /// Of a mesh that was read.
     pub(crate) fn of(file: &MeshFile) -> Self {
-        Self { bounds: file.mesh.aabb() }
+        Self { bounds: file.mesh.aabb(), offset_m: file.offset_m }
+    }
+
+    /// The offset, if there is one, as tables have it.
+    pub(crate) fn offset(&self) -> Option<[f64; 3]> {
+        (self.offset_m != DVec3::ZERO).then(|| self.offset_m.to_array())
+    }
+
+    /// Logs the offset, if there is one.
+    pub(crate) fn tell(&self, ctx: &Context) {
+        if let Some(offset) = self.offset() {
+            ctx.info(format_args!(
+                "offset_m = {offset:?} is subtracted from the coordinates of mesh, points and scan locations: the world \
+                 of the data set is the scan's frame less it ([mesh] offset_m in the scene file says another)"
+            ));
+        }
     }
 
     /// Refuses annotated points, at hand as `name`, that all lie far from the mesh.

@@ -14,12 +14,12 @@ use crate::options::ExportOptions;
 use crate::store::request::InputRecord;
 use crate::tables::dataset::check_area;
 use crate::useful::{Estimate, Finding, count_findings};
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use s3d_geom::TriMesh;
 use s3d_io::Error as FileError;
 use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::{AnnotatedInstance, AnnotationOptions, Annotations, OnFault};
-use s3d_io::mesh::{MeshFile, MeshOptions};
+use s3d_io::mesh::{MeshFile, MeshOptions, MeshOrigin};
 use s3d_io::scene::{CameraSource, PictureSource, PublishedArea, PublishedOptions, SceneFile};
 use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
 use std::collections::BTreeMap;
@@ -196,13 +196,10 @@ impl AreaInput {
             paths: scene.mesh.clone(),
             up: scene.up,
             // The columns that are named are those of the annotations.
-            options: if scene.annotations.is_empty() {
-                MeshOptions {
-                    class_column: options.class_column.clone(),
-                    instance_column: options.instance_column.clone(),
-                }
-            } else {
-                MeshOptions::default()
+            options: MeshOptions {
+                class_column: options.class_column.clone().filter(|_| scene.annotations.is_empty()),
+                instance_column: options.instance_column.clone().filter(|_| scene.annotations.is_empty()),
+                origin: scene.mesh_offset_m.map_or(MeshOrigin::Near, MeshOrigin::At),
             },
         };
         // The mesh comes first: what lies far from it need not be read.
@@ -214,7 +211,12 @@ impl AreaInput {
             let mut annotations = match &file {
                 Some(file) if scene.annotations.is_empty() => Annotations::of_mesh(file, options)?,
                 _ => {
-                    let options = AnnotationOptions { mesh_bounds: Some(frame.bounds), ..options.clone() };
+                    let given = Some(options.offset_m).filter(|_| scene.annotations_have_offset);
+                    let options = AnnotationOptions {
+                        offset_m: given.unwrap_or(frame.offset_m),
+                        mesh_bounds: Some(frame.bounds),
+                        ..options.clone()
+                    };
                     Annotations::open(&scene.annotations, &options)?
                 }
             };
@@ -224,7 +226,7 @@ impl AreaInput {
                 .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
         }
         let mesh_file = file.filter(|_| opened.keep_mesh);
-        let Some((cameras, cameras_path)) = listed_cameras(&scene, place_m)? else {
+        let Some((cameras, cameras_path)) = listed_cameras(&scene, place_m, frame.offset_m)? else {
             return Err(FileError::format(
                 &scene.path,
                 "has no scan locations: add [cameras] with a path, or place some with --place-cameras 2 (metres)",
@@ -316,7 +318,7 @@ impl AreaInput {
             rooms = published_numbers(&mesh.labels, annotations);
         }
         let listed = match &scene {
-            Some(scene) => listed_cameras(scene, place_m)?,
+            Some(scene) => listed_cameras(scene, place_m, DVec3::ZERO)?,
             None => place_m.map(|distance_m| (Cameras::Placed(distance_m), folder.to_owned())),
         };
         let (cameras, cameras_path) = listed.unwrap_or_else(|| {
@@ -327,6 +329,9 @@ impl AreaInput {
         let mut files = vec![folder.to_owned()];
         let mut sources = vec![area.mesh.clone(), area.semantic_mesh.clone()];
         sources.extend(area.labels.clone());
+        if area.world_offset_m != DVec3::ZERO {
+            sources.push(area.conventions());
+        }
         let poses = ["data/pose", "pano/pose"].map(|name| folder.join(name));
         sources.extend(poses.into_iter().filter(|path| path.is_dir()));
         if let Some(scene) = &scene {
@@ -392,6 +397,7 @@ impl AreaInput {
 
     /// Logs what the area's mesh is, and what was odd in mesh and annotations.
     pub(crate) fn tell_mesh(&self, ctx: &Context, file: &MeshFile) {
+        self.frame.tell(ctx);
         self.warnings.iter().chain(&file.warnings).for_each(|w| ctx.warn(w));
         ctx.info(format_args!(
             "{}: {} faces, {} vertices, {} textures, {:.1} m²",
@@ -404,14 +410,21 @@ impl AreaInput {
     }
 }
 
-/// The scan locations that a scene file names, or that are to be placed, and where they come from.
-fn listed_cameras(scene: &SceneFile, place_m: Option<f64>) -> Result<Option<(Cameras, PathBuf)>> {
+/// The scan locations that a scene file names, less the mesh's offset, or that are to be placed, and where
+/// they come from.
+fn listed_cameras(
+    scene: &SceneFile,
+    place_m: Option<f64>,
+    offset_m: DVec3,
+) -> Result<Option<(Cameras, PathBuf)>> {
     Ok(match (place_m, &scene.cameras) {
         (Some(distance_m), _) => Some((Cameras::Placed(distance_m), scene.path.clone())),
         (None, Some(CameraSource::Placed { distance_m })) => {
             Some((Cameras::Placed(*distance_m), scene.path.clone()))
         }
         (None, Some(CameraSource::Listed { path, world_from_file })) => {
+            let moved = DAffine3::from_translation(-offset_m) * *world_from_file;
+            let world_from_file = if offset_m == DVec3::ZERO { world_from_file } else { &moved };
             let locations = s3d_io::camera::read_scan_locations(path, world_from_file)?;
             let rooms = vec![None; locations.len()];
             Some((Cameras::Listed(locations, rooms), path.clone()))

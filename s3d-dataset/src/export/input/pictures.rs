@@ -5,6 +5,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::{AreaInput, Cameras};
 use crate::export::modality::Channels;
+use glam::DVec3;
 use s3d_geom::{Camera, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::camera::{
@@ -62,8 +63,9 @@ impl Pictures {
             let uuid = &location.uuid;
             let of_location = if is_asked(location) { Some(find(&folder, source.kind, uuid)?) } else { None };
             found.push(match of_location {
-                Some(Ok(pictures)) => {
+                Some(Ok(mut pictures)) => {
                     pictures.check()?;
+                    pictures.subtract(area.frame.offset_m);
                     if let Found::Captures(captures) = &pictures
                         && captures.len() < CAPTURES_A_LOCATION
                     {
@@ -183,6 +185,13 @@ fn find(folder: &PictureFolder, kind: PictureKind, uuid: &str) -> s3d_io::Result
 }
 
 impl Found {
+    /// Takes the poses of captures, which are in the frame of the mesh's file, to where the mesh is.
+    fn subtract(&mut self, offset_m: DVec3) {
+        if let Self::Captures(captures) = self {
+            captures.iter_mut().for_each(|capture| capture.pose.location -= offset_m);
+        }
+    }
+
     /// Looks at sizes and ends, without reading whole pictures.
     fn check(&self) -> Result<()> {
         match self {

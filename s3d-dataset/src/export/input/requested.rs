@@ -82,6 +82,7 @@ pub(crate) fn requested_areas(
                 Cameras::Placed(distance_m) => Some(distance_m),
                 Cameras::Listed(..) => None,
             },
+            offset_m: area.frame.offset(),
             inputs: inputs.chain(area.records.iter().cloned().map(Ok)).collect::<Result<_>>()?,
         });
     }

@@ -126,6 +126,8 @@ impl ImageCheck<'_> {
             image.has(Domain::Pose).then(|| pose::read_and_check(self.layout, image, size, report)).flatten();
         if let Some(pose) = &pose {
             let path = image.path(self.layout, Domain::Pose);
+            let offset_m = self.manifest.area(image.area).and_then(|area| area.offset_m);
+            pose::check_frame(pose, offset_m, &path, report);
             let draw = self.views.draw_of(image);
             if draw.is_some() || image.frame == Frame::Panorama {
                 pose::check_draw(pose, draw, &path, report);

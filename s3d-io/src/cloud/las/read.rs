@@ -2,8 +2,8 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
+use crate::bounds::Bounds;
 use crate::cloud::annotations::AnnotationOptions;
-use crate::cloud::frame_gap::Bounds;
 use crate::cloud::las::bounded::{BoundedClaims, Mended};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::{CLASSES, INSTANCES};

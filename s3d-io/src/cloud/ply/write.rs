@@ -6,6 +6,7 @@
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
 use crate::fs::open::open_file;
+use s3d_geom::glam::DVec3;
 use s3d_geom::{NO_INDEX, PointCloud};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -36,7 +37,16 @@ impl PlyPointWriter {
     /// # Errors
     /// [`Error::Io`].
     pub fn create(path: &Path, count: u64) -> Result<Self> {
-        Self::new(AtomicFile::create(path)?, path, count)
+        Self::create_moved(path, count, DVec3::ZERO)
+    }
+
+    /// As [`PlyPointWriter::create`], for points from which `offset_m` was subtracted: a comment of the
+    /// header says so, if it is not 0.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn create_moved(path: &Path, count: u64, offset_m: DVec3) -> Result<Self> {
+        Self::start(AtomicFile::create(path)?, path, count, offset_m)
     }
 
     /// Gives the file its name, and returns its size in bytes.
@@ -53,11 +63,22 @@ impl<W: Write> PlyPointWriter<W> {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn new(mut file: W, name: &Path, count: u64) -> Result<Self> {
+    pub fn new(file: W, name: &Path, count: u64) -> Result<Self> {
+        Self::start(file, name, count, DVec3::ZERO)
+    }
+
+    fn start(mut file: W, name: &Path, count: u64, offset_m: DVec3) -> Result<Self> {
+        let frame = match offset_m.to_array() {
+            [0.0, 0.0, 0.0] => String::new(),
+            [x, y, z] => {
+                format!("comment offset_m {x:?} {y:?} {z:?}: add it for the scan's own coordinates\n")
+            }
+        };
         let header = format!(
             "ply\n\
              format binary_little_endian 1.0\n\
              comment x y z: metres, Z up, right-handed\n\
+             {frame}\
              comment label: index into semantic_labels.json, 0 for the null label\n\
              comment face: index of the face of the mesh that the point lies on, {NO_INDEX} if unknown\n\
              element vertex {count}\n\

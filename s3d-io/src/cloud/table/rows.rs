@@ -1,8 +1,9 @@
 //! The rows of a flat cloud, as every format's reader hands them on: one point each, with what it says of
 //! itself.
 
+use crate::bounds::Bounds;
 use crate::cloud::annotations::{AnnotationOptions, Skipped};
-use crate::cloud::frame_gap::{Bounds, FrameWatch};
+use crate::cloud::frame_gap::FrameWatch;
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
 use s3d_geom::glam::{DVec3, Vec3};

@@ -10,7 +10,7 @@ use crate::quote::{count, quote};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
-use s3d_geom::glam::{DMat3, Vec2, Vec3};
+use s3d_geom::glam::{DMat3, DVec3, Vec2, Vec3};
 use s3d_geom::{MeshParts, NO_INDEX};
 use std::collections::HashMap;
 
@@ -23,6 +23,8 @@ pub(crate) struct Builder<'a> {
     document: &'a GltfDocument,
     looks: &'a GltfLooks,
     up: UpAxis,
+    /// What is subtracted from positions, in the world's axes.
+    offset_m: DVec3,
     /// Whether the mesh has colours of vertices.
     colored: bool,
     parts: MeshParts,
@@ -56,6 +58,7 @@ impl<'a> Builder<'a> {
         looks: &'a GltfLooks,
         up: UpAxis,
         instances: &[Instance],
+        offset_m: DVec3,
     ) -> Result<Self> {
         let mut colored = false;
         let mut elements = 0u64;
@@ -77,7 +80,18 @@ impl<'a> Builder<'a> {
             colored |= mesh.primitives.iter().any(|p| color_accessor(p).is_some() && !is_textured(p, looks));
         }
         let (parts, uv_starts, notes) = Default::default();
-        Ok(Self { document, looks, up, colored, parts, uv_starts, notes })
+        Ok(Self { document, looks, up, offset_m, colored, parts, uv_starts, notes })
+    }
+
+    /// The vertices so far, in the world's axes.
+    pub(crate) fn positions(&self) -> &[Vec3] {
+        &self.parts.positions
+    }
+
+    /// The corners of all faces so far.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = DVec3> {
+        let position = |&v: &u32| self.parts.positions.get(v as usize).map(|p| p.as_dvec3());
+        self.parts.faces.iter().flatten().filter_map(position)
     }
 
     /// Adds the triangles of an instance.
@@ -196,7 +210,7 @@ impl<'a> Builder<'a> {
         let matrix = instance.world_from_node;
         self.parts.positions.extend(vertices.iter().map(|&v| {
             let moved = matrix.transform_point3(Vec3::from_array(v).as_dvec3());
-            self.up.world_from_file(moved.as_vec3())
+            (self.up.exact_world_from_file(moved) - self.offset_m).as_vec3()
         }));
         let base = match material {
             Some(m) => self.looks.linear_colors.get(m).copied(),

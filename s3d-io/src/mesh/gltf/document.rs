@@ -15,6 +15,7 @@ use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json;
+use s3d_geom::glam::DVec3;
 use serde::Deserialize;
 use std::borrow::Cow;
 use std::fs;
@@ -28,6 +29,8 @@ pub(crate) struct GltfDocument {
     /// The JSON. Its indices are not checked.
     pub(crate) json: gltf::Document,
     buffers: Vec<Vec<u8>>,
+    /// The places of nodes as they are written, of scenes far from their origin.
+    places: Vec<ExactNode>,
 }
 
 /// What must be known before the JSON is read in full.
@@ -37,6 +40,29 @@ struct Head {
     asset: serde_json::Value,
     #[serde(default, rename = "extensionsRequired")]
     required: Vec<String>,
+}
+
+/// Where a node is, in `f64`.
+#[derive(Debug, Default, Deserialize)]
+struct ExactNode {
+    #[serde(default)]
+    translation: Option<[f64; 3]>,
+    #[serde(default)]
+    matrix: Option<[f64; 16]>,
+}
+
+/// The nodes of a file in which one is so far from its parent's origin that `f32` loses digits of its place.
+fn exact_nodes(root: &json::Root, text: &[u8]) -> Vec<ExactNode> {
+    #[derive(Deserialize)]
+    struct Nodes {
+        nodes: Vec<ExactNode>,
+    }
+    let is_far = |node: &json::Node| {
+        let place = node.translation.or(node.matrix.map(|m| [m[12], m[13], m[14]]));
+        place.is_some_and(|place| place.iter().any(|v| v.abs() > 1000.0))
+    };
+    let read = || serde_json::from_slice(text).map_or_else(|_| Vec::new(), |all: Nodes| all.nodes);
+    if root.nodes.iter().any(is_far) { read() } else { Vec::new() }
 }
 
 impl GltfDocument {
@@ -64,8 +90,9 @@ impl GltfDocument {
             // No changes are the same as no sparse part, which the gltf crate can read.
             accessor.sparse.take_if(|sparse| sparse.count.0 == 0);
         }
+        let places = exact_nodes(&root, text);
         let json = gltf::Document::from_json_without_validation(root);
-        let mut document = Self { path: path.to_owned(), json, buffers: Vec::new() };
+        let mut document = Self { path: path.to_owned(), json, buffers: Vec::new(), places };
         // The chunk stays where it was read to: it is most of the file.
         let blob = blob.map(|blob| {
             bytes.truncate(blob.end);
@@ -84,6 +111,14 @@ impl GltfDocument {
     /// The JSON. Its indices are not checked; [`GltfDocument::get`] does.
     pub(crate) fn root(&self) -> &json::Root {
         self.json.as_json()
+    }
+
+    /// Where a node is in its parent's frame, as it is written, if that is more exact than what
+    /// [`GltfDocument::root`] has.
+    pub(crate) fn exact_place(&self, node: usize) -> Option<DVec3> {
+        let node = self.places.get(node)?;
+        let of_matrix = node.matrix.map(|m| [m[12], m[13], m[14]]);
+        of_matrix.or(node.translation).map(DVec3::from_array)
     }
 
     /// The bytes of a buffer.

@@ -9,8 +9,10 @@ use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
 use crate::mesh::gltf::builder::Builder;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::material::GltfLooks;
-use crate::mesh::gltf::scene::instances;
+use crate::mesh::gltf::scene::{Instance, Precision, instances};
+use crate::mesh::origin::{MeshOrigin, largest};
 use s3d_geom::MeshParts;
+use s3d_geom::glam::DVec3;
 use std::path::Path;
 
 /// Reads the default scene of a glTF file; without one the first that has nodes, and without any all nodes
@@ -18,10 +20,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
-pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
+pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, origin: MeshOrigin) -> Result<MeshFile> {
     let document = GltfDocument::read(bytes, path)?;
     let mut warnings = Vec::new();
-    let instances = instances(&document, &mut warnings)?;
+    let instances = instances(&document, Precision::OfFile, &mut warnings)?;
     let mut used = vec![false; document.root().materials.len()];
     for instance in &instances {
         for (p, primitive) in document.get(instance.mesh, "a node", "mesh")?.primitives.iter().enumerate() {
@@ -32,9 +34,21 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<Mesh
         }
     }
     let looks = GltfLooks::load(&document, &used, &mut warnings)?;
-    let mut builder = Builder::new(&document, &looks, up, &instances)?;
-    for instance in &instances {
-        builder.add(instance)?;
+    let build = |instances: &[Instance], offset_m: DVec3| {
+        let mut builder = Builder::new(&document, &looks, up, instances, offset_m)?;
+        instances.iter().try_for_each(|instance| builder.add(instance))?;
+        Ok::<_, Error>(builder)
+    };
+    let mut builder = build(&instances, DVec3::ZERO)?;
+    let mut offset_m = DVec3::ZERO;
+    if origin.needs_exact(largest(builder.positions())) {
+        offset_m = origin.offset_m(builder.corners());
+        if offset_m != DVec3::ZERO {
+            // Not two meshes at once. What is to be told was told.
+            drop(builder);
+            let exact = self::instances(&document, Precision::Exact, &mut Vec::new())?;
+            builder = build(&exact, offset_m)?;
+        }
     }
     let parts = builder.finish(&mut warnings);
     if parts.faces.is_empty() {
@@ -46,12 +60,12 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<Mesh
     let mesh =
         checked_mesh(parts, &mut warnings).map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
     let companions = document.companions();
-    Ok(MeshFile { texture_files: looks.files, warnings, companions, ..MeshFile::new(path, mesh) })
+    Ok(MeshFile { texture_files: looks.files, warnings, companions, offset_m, ..MeshFile::new(path, mesh) })
 }
 
 #[cfg(test)]
 pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
-    read_bytes(crate::fs::open::read_file(path)?, path, up)
+    read_bytes(crate::fs::open::read_file(path)?, path, up, MeshOrigin::OfFile)
 }
 
 #[cfg(test)]

@@ -23,8 +23,21 @@ pub(crate) struct Instance {
     pub(crate) skinned: bool,
 }
 
+/// How places of nodes are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Precision {
+    /// As `f32`, which the gltf crate reads.
+    OfFile,
+    /// As `f64`, for scenes far from their origin.
+    Exact,
+}
+
 /// All meshes of the scene with their places, in the order of its nodes, parents first.
-pub(crate) fn instances(document: &GltfDocument, warnings: &mut Vec<String>) -> Result<Vec<Instance>> {
+pub(crate) fn instances(
+    document: &GltfDocument,
+    precision: Precision,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Instance>> {
     let root = document.root();
     let mut unknown = Vec::new();
     document.check_extensions(root.extensions.as_ref().map(|e| &e.others), "the file", &mut unknown)?;
@@ -51,8 +64,9 @@ pub(crate) fn instances(document: &GltfDocument, warnings: &mut Vec<String>) -> 
         }
         let others = node.extensions.as_ref().map(|e| &e.others);
         document.check_extensions(others, &format!("node {index}"), &mut unknown)?;
+        let place = document.exact_place(index.value()).filter(|_| precision == Precision::Exact);
         let world_from_node = world_from_parent
-            * parent_from_node(node).ok_or_else(|| {
+            * parent_from_node(node, place).ok_or_else(|| {
                 document.fail(format!("node {index} has a transform that is not finite or turns by no angle"))
             })?;
         if let Some(mesh) = node.mesh {
@@ -235,17 +249,22 @@ impl Instancing {
     }
 }
 
-fn parent_from_node(node: &Node) -> Option<DMat4> {
+/// `place` is its last column, where that is known better.
+fn parent_from_node(node: &Node, place: Option<DVec3>) -> Option<DMat4> {
     let vector =
         |v: Option<[f32; 3]>, default: DVec3| v.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
     match node.matrix {
         Some(matrix) => {
-            Some(DMat4::from_cols_array(&matrix.map(f64::from))).filter(|matrix| matrix.is_finite())
+            let mut matrix = DMat4::from_cols_array(&matrix.map(f64::from));
+            if let Some(place) = place {
+                matrix.w_axis = place.extend(matrix.w_axis.w);
+            }
+            Some(matrix).filter(|matrix| matrix.is_finite())
         }
         None => placed_by(
             vector(node.scale, DVec3::ONE),
             node.rotation.unwrap_or_default().0,
-            vector(node.translation, DVec3::ZERO),
+            place.unwrap_or_else(|| vector(node.translation, DVec3::ZERO)),
         ),
     }
 }

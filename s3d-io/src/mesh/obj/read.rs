@@ -7,11 +7,13 @@ use crate::error::{Error, Result};
 use crate::fs::encoding::into_utf8;
 use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
 use crate::mesh::obj::diagnose::{face_line, fault, vertex_error};
-use crate::mesh::obj::lines::end_lines_in_lf;
+use crate::mesh::obj::lines::{end_lines_in_lf, logical_lines};
 use crate::mesh::obj::looks::ObjLooks;
 use crate::mesh::obj::normal::NormalObj;
+use crate::mesh::obj::statement::exact_vertex;
+use crate::mesh::origin::{MeshOrigin, largest};
 use crate::quote::count;
-use s3d_geom::glam::{Vec2, Vec3};
+use s3d_geom::glam::{DVec3, Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
 use std::borrow::Cow;
 use std::path::Path;
@@ -22,7 +24,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
-pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<MeshFile> {
+pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, origin: MeshOrigin) -> Result<MeshFile> {
     let mut bytes = into_utf8(bytes);
     end_lines_in_lf(&mut bytes);
     refuse_other_files(path, &bytes)?;
@@ -42,7 +44,8 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<Mesh
         || Columns::read(&obj).map_err(|e| fault(path, &bytes, &e.to_string())),
         || ObjLooks::load(path, &obj.names, &mut remarks),
     );
-    let (columns, looks) = (geometry?, looks?);
+    let (mut columns, looks) = (geometry?, looks?);
+    let offset_m = columns.bring_near(&bytes, up, origin);
     let faces = Triangles::new(&obj, &columns)
         .map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
     let polygons_triangulated = faces.polygons;
@@ -78,7 +81,14 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis) -> Result<Mesh
         source => Error::Mesh { path: path.to_owned(), source },
     })?;
     let (texture_files, companions) = (looks.files, looks.companions);
-    Ok(MeshFile { texture_files, warnings, companions, polygons_triangulated, ..MeshFile::new(path, mesh) })
+    Ok(MeshFile {
+        texture_files,
+        warnings,
+        companions,
+        offset_m,
+        polygons_triangulated,
+        ..MeshFile::new(path, mesh)
+    })
 }
 
 fn refuse_other_files(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -142,6 +152,29 @@ impl Columns {
         }
         let finite = columns.colors.iter().filter(|color| color.iter().all(|c| c.is_finite())).count();
         if finite as u64 != obj.colored { Err(tobj::LoadError::ColorParseError) } else { Ok(columns) }
+    }
+}
+
+impl Columns {
+    /// Brings the vertices near the origin, if they are to be; their positions are read again for it, in
+    /// `f64`, which tobj does not give. Returns what was subtracted, in the world's axes.
+    fn bring_near(&mut self, bytes: &[u8], up: UpAxis, origin: MeshOrigin) -> DVec3 {
+        if !origin.needs_exact(largest(&self.positions)) {
+            return DVec3::ZERO;
+        }
+        let corners = self.corners[0].iter().filter_map(|&v| self.positions.get(v as usize));
+        let offset_m = origin.offset_m(corners.map(|p| up.exact_world_from_file(p.as_dvec3())));
+        if offset_m == DVec3::ZERO {
+            return offset_m;
+        }
+        let statements = logical_lines(bytes).filter(|line| line.keyword().0 == b"v");
+        for (position, line) in self.positions.iter_mut().zip(statements) {
+            let exact = exact_vertex(line.keyword().1).unwrap_or(position.as_dvec3());
+            // In the world's axes, in which a difference of 0 has no sign.
+            let near = up.exact_world_from_file(exact) - offset_m;
+            *position = up.exact_file_from_world(near).as_vec3();
+        }
+        offset_m
     }
 }
 
@@ -244,7 +277,7 @@ fn vertex_colors(written: &[[f32; 3]], warnings: &mut Vec<String>) -> Vec<[u8; 3
 
 #[cfg(test)]
 pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
-    read_bytes(crate::fs::open::read_file(path)?, path, up)
+    read_bytes(crate::fs::open::read_file(path)?, path, up, MeshOrigin::OfFile)
 }
 
 #[cfg(test)]

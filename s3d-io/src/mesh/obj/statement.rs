@@ -4,7 +4,7 @@
 use crate::fs::text::number;
 use crate::mesh::obj::lines::{next_word, parse_f32};
 use crate::quote::quote;
-use s3d_geom::glam::Vec3;
+use s3d_geom::glam::{DVec3, Vec3};
 
 /// What is wrong with a statement.
 pub(crate) type Why = String;
@@ -42,6 +42,18 @@ pub(crate) fn vertex(mut rest: &[u8]) -> Result<(Vec3, Option<[f32; 3]>), Why> {
         None => None,
     };
     Ok((position, color))
+}
+
+/// The position of [`vertex`] in `f64`; `None` if the statement has a fault.
+pub(crate) fn exact_vertex(mut rest: &[u8]) -> Option<DVec3> {
+    let words: Vec<&[u8]> = std::iter::from_fn(|| next_word(&mut rest)).take(8).collect();
+    let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f64>().ok();
+    let (&[x, y, z], more) = words.split_first_chunk()?;
+    let position = DVec3::new(number(x)?, number(y)?, number(z)?);
+    match more {
+        [weight] => Some(position / number(weight)?),
+        _ => Some(position),
+    }
 }
 
 /// A `vt` line without its keyword. A texture of one dimension has no second coordinate.

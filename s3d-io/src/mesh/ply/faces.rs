@@ -94,6 +94,11 @@ impl PlyFaces {
         Ok(out)
     }
 
+    /// The corners of all polygons.
+    pub(crate) fn corners(&self) -> &[u32] {
+        &self.corners
+    }
+
     /// Adds the triangles of the element `tristrips`: lists of vertices, of which each three neighbours are a
     /// triangle; −1 starts a new strip.
     ///

@@ -54,7 +54,7 @@ pub(crate) fn read(
         match known.filter(is_first) {
             Some(0) => {
                 let labels = labels.as_mut().filter(|l| belongs(l, LabelElement::Vertex));
-                vertices = PlyVertices::read(path, &mut reader, &element, up, labels)?;
+                vertices = PlyVertices::read(path, &mut reader, &element, (up, options.origin), labels)?;
             }
             Some(1) => {
                 let labels = labels.as_mut().filter(|l| belongs(l, LabelElement::Face));
@@ -71,6 +71,7 @@ pub(crate) fn read(
     if reader.has_more()? {
         warnings.push("the file goes on after its last element; the rest is not read".into());
     }
+    let offset_m = vertices.bring_near(options.origin, faces.corners());
     let triangles = faces.triangles(&vertices.positions);
     tell_triangles(path, &triangles, &mut warnings)?;
     if faces.odd_uvs > 0 {
@@ -106,6 +107,7 @@ pub(crate) fn read(
         checked_mesh(parts, &mut warnings).map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
     Ok(MeshFile {
         polygons_triangulated: cut,
+        offset_m,
         texture_files: looks.files,
         companions: looks.companions,
         warnings,
@@ -449,6 +451,7 @@ mod tests {
         let ask = |class: Option<&str>, instance: Option<&str>| MeshOptions {
             class_column: class.map(str::to_owned),
             instance_column: instance.map(str::to_owned),
+            ..MeshOptions::default()
         };
         let file = read_with(&elements, rows, &ask(Some("nyu"), None)).unwrap();
         assert_eq!(numbers(&file).1, [column("nyu", &[7, 7, 8, 9]), instance]);

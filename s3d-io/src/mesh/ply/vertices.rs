@@ -2,17 +2,20 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::file::UpAxis;
+use crate::mesh::origin::MeshOrigin;
 use crate::mesh::ply::batch::PlyBatch;
 use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::header::{PlyElement, PlyType};
 use crate::mesh::ply::labels::PlyLabels;
-use s3d_geom::glam::{Vec2, Vec3, vec2, vec3};
+use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};
 use std::path::Path;
 
 /// Columns of the element `vertex`, in the world's axes; those that the file lacks are empty.
 #[derive(Debug, Default)]
 pub(crate) struct PlyVertices {
     pub(crate) positions: Vec<Vec3>,
+    /// The same in `f64`, of a mesh that is to be brought nearer to the origin; else empty.
+    exact: Vec<DVec3>,
     /// Of length 1; NaN where the file's has no length.
     pub(crate) normals: Vec<Vec3>,
     pub(crate) colors: Vec<[u8; 3]>,
@@ -46,7 +49,7 @@ impl PlyVertices {
         path: &Path,
         reader: &mut PlyReader<'_>,
         element: &PlyElement,
-        up: UpAxis,
+        (up, origin): (UpAxis, MeshOrigin),
         mut labels: Option<&mut PlyLabels>,
     ) -> Result<Self> {
         let Some(xyz) = places(element, &POSITIONS) else {
@@ -63,9 +66,17 @@ impl PlyVertices {
         let mut colors = color.map(|places| Colors::new(element, places));
         let mut batch = PlyBatch::default();
         while reader.read_batch(&mut batch)? {
-            out.positions.extend(vectors(&batch, xyz).map(|v| up.world_from_file(v)));
+            // The first rows tell how far all are: of those that are used no one knows yet.
+            let is_far =
+                || origin.needs_exact(vectors(&batch, xyz).fold(0.0, |m, v| m.max(v.abs().max_element())));
+            if !out.exact.is_empty() || out.positions.is_empty() && is_far() {
+                out.exact.extend(vectors(&batch, xyz).map(|v| up.exact_world_from_file(v)));
+            }
+            out.positions.extend(vectors(&batch, xyz).map(|v| up.world_from_file(v.as_vec3())));
             if let Some(places) = normal {
-                out.normals.extend(vectors(&batch, places).map(|n| up.world_from_file(n / n.length())));
+                out.normals.extend(
+                    vectors(&batch, places).map(|n| n.as_vec3()).map(|n| up.world_from_file(n / n.length())),
+                );
             }
             if let Some([u, v]) = uv {
                 let pairs = batch.scalars(u).iter().zip(batch.scalars(v));
@@ -81,11 +92,25 @@ impl PlyVertices {
         out.colors = colors.map_or_else(Vec::new, Colors::finish);
         Ok(out)
     }
+
+    /// Brings the vertices near the origin, if they are to be; `corners` are those of faces. Returns what was
+    /// subtracted, in the world's axes.
+    pub(crate) fn bring_near(&mut self, origin: MeshOrigin, corners: &[u32]) -> DVec3 {
+        let exact = std::mem::take(&mut self.exact);
+        if exact.is_empty() {
+            return DVec3::ZERO;
+        }
+        let offset_m = origin.offset_m(corners.iter().filter_map(|&v| exact.get(v as usize).copied()));
+        if offset_m != DVec3::ZERO {
+            self.positions = exact.into_iter().map(|p| (p - offset_m).as_vec3()).collect();
+        }
+        offset_m
+    }
 }
 
-fn vectors(batch: &PlyBatch, [x, y, z]: [usize; 3]) -> impl Iterator<Item = Vec3> {
+fn vectors(batch: &PlyBatch, [x, y, z]: [usize; 3]) -> impl Iterator<Item = DVec3> {
     let (x, y, z) = (batch.scalars(x), batch.scalars(y), batch.scalars(z));
-    x.iter().zip(y).zip(z).map(|((&x, &y), &z)| vec3(x as f32, y as f32, z as f32))
+    x.iter().zip(y).zip(z).map(|((&x, &y), &z)| DVec3::new(x, y, z))
 }
 
 /// Colours while they are read: bytes as bytes, other types as they are until the largest is known.
