@@ -12,7 +12,7 @@ enum Keep {
     All,
     /// It, if it is a text.
     Text,
-    /// Members of an object, each with what is kept of it; nothing, if it is none.
+    /// Members of an object, each with what is kept of it.
     Members(&'static [(&'static str, Keep)]),
     /// As [`Keep::Members`], of each element of a list.
     Each(&'static [(&'static str, Keep)]),
@@ -135,10 +135,10 @@ impl Keep {
                     .filter_map(|(name, keep)| Some(((*name).to_owned(), keep.of(object.remove(*name)?)?)));
                 Some(Value::Object(kept.collect()))
             }
-            (Members(_), _) => None,
-            // An element that is none keeps its place.
+            // What is needed and of another kind is a fault, which the types tell.
+            (Members(_), value) => Some(value),
             (Each(members), Value::Array(list)) => {
-                let kept = list.into_iter().map(|e| Members(members).of(e).unwrap_or_else(|| json!({})));
+                let kept = list.into_iter().map(|e| Members(members).of(e).unwrap_or_default());
                 Some(Value::Array(kept.collect()))
             }
             (Each(_), value) => Some(value),
@@ -174,7 +174,7 @@ mod tests {
             "asset": {"version": "2.0", "extras": 7},
             "animations": [{"channels": [{"sampler": 0, "target": {"path": "pointer"}}]}],
             "cameras": "none", "extras": [1], "scene": 0.0, "scenes": [{"name": "empty", "extras": "x"}],
-            "nodes": [{"mesh": 1.0, "camera": "x", "name": 5, "translation": [-1.0, 0.5, 2.0], "children": null}, "no node"],
+            "nodes": [{"mesh": 1.0, "camera": "x", "name": 5, "translation": [-1.0, 0.5, 2.0], "children": null}, {}],
             "meshes": [{"primitives": [{"attributes": {"POSITION": 2.0}, "targets": [{"POSITION": "x"}], "extras": 1}]}],
         });
         let expected = json!({
