@@ -95,7 +95,6 @@ pub mod mesh;
     feature = "parquet"
 ))]
 pub mod package;
-mod quote;
 #[cfg(feature = "toml")]
 pub mod scene;
 

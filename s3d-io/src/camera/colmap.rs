@@ -10,7 +10,7 @@ use crate::camera::located::{LocatedPicture, pose_from_opencv};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
-use crate::quote::quote;
+use crate::fs::quote::quote;
 use s3d_geom::Pose;
 use s3d_geom::glam::{DMat3, DQuat, DVec3};
 use std::path::{Path, PathBuf};

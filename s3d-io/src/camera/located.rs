@@ -2,7 +2,7 @@
 
 use crate::camera::table::{FARTHEST_M, ScanLocation};
 use crate::error::{Error, Result};
-use crate::quote::quote;
+use crate::fs::quote::quote;
 use s3d_geom::Pose;
 use s3d_geom::glam::DVec3;
 use std::collections::HashMap;

@@ -24,6 +24,7 @@ pub(crate) mod encoding;
 #[cfg(feature = "json")]
 pub(crate) mod json;
 pub(crate) mod open;
+pub(crate) mod quote;
 pub(crate) mod source;
 #[cfg(feature = "write")]
 mod sync;

@@ -1,9 +1,9 @@
 //! A mesh as it was read, with its textures and labels.
 
+use crate::fs::quote::count;
 use crate::image::texture::TextureFile;
 use crate::mesh::labels::MeshLabels;
 use crate::mesh::origin::MeshOrigin;
-use crate::quote::count;
 use s3d_geom::glam::{DVec3, Vec3, vec3};
 use s3d_geom::{MeshError, MeshParts, TriMesh};
 use std::ops::Range;

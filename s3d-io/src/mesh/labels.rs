@@ -1,6 +1,6 @@
 //! Labels that came with a mesh: numbers of its faces or vertices, or the names of its materials.
 
-use crate::quote::{count, quote};
+use crate::fs::quote::{count, quote};
 use s3d_geom::{NO_INDEX, TriMesh};
 use s3d_label::{Label, parse_name};
 use std::collections::HashMap;

@@ -6,8 +6,8 @@ use crate::cloud::annotations::{
 use crate::cloud::mat::read::{MatArea, MatObject, MatRoom};
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
+use crate::fs::quote::quote;
 use crate::fs::source::Source;
-use crate::quote::quote;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
 use s3d_label::{Class, Room};

@@ -2,7 +2,7 @@
 //! are read by [`PointReader`](crate::cloud::PointReader). Source: formats.md, "What is written".
 
 use crate::error::{Error, Result};
-use crate::quote::quote;
+use crate::fs::quote::quote;
 use s3d_label::{Class, Room};
 use std::collections::BTreeMap;
 use std::fs;

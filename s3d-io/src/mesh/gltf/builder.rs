@@ -1,12 +1,12 @@
 //! The primitives of a glTF scene, put together to one mesh.
 
 use crate::error::{Error, Result};
+use crate::fs::quote::{count, quote};
 use crate::mesh::file::UpAxis;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::extensions::way_out;
 use crate::mesh::gltf::material::{GltfLooks, default_linear, srgb_from_linear};
 use crate::mesh::gltf::scene::Instance;
-use crate::quote::{count, quote};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};

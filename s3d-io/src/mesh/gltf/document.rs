@@ -8,9 +8,9 @@
 use crate::error::{Error, Result};
 use crate::fs::encoding::into_utf8;
 use crate::fs::open::read_file;
+use crate::fs::quote::quote;
 use crate::mesh::gltf::extensions::{check_required, way_out};
 use crate::mesh::gltf::tolerant::needed;
-use crate::quote::quote;
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};

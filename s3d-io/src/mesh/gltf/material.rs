@@ -1,9 +1,9 @@
 //! Materials and textures of glTF files: the base colour, which is all that a data set keeps of them.
 
+use crate::fs::quote::quote;
 use crate::image::texture::{LoadedTexture, TextureFault, TextureFile, Together, decode_texture};
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::extensions::way_out;
-use crate::quote::quote;
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index, texture};
 use rayon::prelude::*;

@@ -1,8 +1,8 @@
 //! Where the meshes of a glTF scene stand: its nodes, and the instances of EXT_mesh_gpu_instancing.
 
 use crate::error::Result;
+use crate::fs::quote::count;
 use crate::mesh::gltf::document::GltfDocument;
-use crate::quote::count;
 use gltf::accessor::Item;
 use gltf::json::accessor::Accessor;
 use gltf::json::{Index, Mesh, Node};

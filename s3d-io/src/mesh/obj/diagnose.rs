@@ -2,9 +2,9 @@
 //! one. tobj tells no line, and accepts indices that are not there.
 
 use crate::error::Error;
+use crate::fs::quote::quote;
 use crate::mesh::obj::lines::{Line, logical_lines, next_word};
 use crate::mesh::obj::statement::{Why, corner, normal, out_of_range, uv, vertex};
-use crate::quote::quote;
 use s3d_geom::glam::Vec3;
 use std::path::Path;
 

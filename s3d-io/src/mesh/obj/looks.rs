@@ -1,12 +1,12 @@
 //! How the faces of an OBJ file look: its libraries and the images that they name.
 
 use crate::error::Result;
+use crate::fs::quote::{count, quote};
 use crate::image::find::{find_image, resolve};
 use crate::image::texture::{TextureFile, read_textures};
 use crate::mesh::obj::lines::read_text;
 use crate::mesh::obj::mtl::{MtlMaterial, parse_mtl};
 use crate::mesh::obj::normal::ObjNames;
-use crate::quote::{count, quote};
 use s3d_geom::{DEFAULT_COLOR, Material, Raster, Texture, Wrap};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

@@ -6,9 +6,9 @@
 //! file's name (`tobj_gives_a_library_up`). Every line would have to be written anew for it, and read again
 //! behind it.
 
+use crate::fs::quote::quote;
 use crate::fs::text::words;
 use crate::mesh::obj::lines::{Line, after, logical_lines, parse_f32, text, without_comment};
-use crate::quote::quote;
 use s3d_geom::{DEFAULT_COLOR, Wrap};
 
 /// Starts a comment that tells our own reader how the next texture goes on beyond its edges, where MTL files

@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::fs::encoding::into_utf8;
+use crate::fs::quote::count;
 use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
 use crate::mesh::obj::diagnose::{face_line, fault, vertex_error};
 use crate::mesh::obj::lines::{end_lines_in_lf, logical_lines};
@@ -12,7 +13,6 @@ use crate::mesh::obj::looks::ObjLooks;
 use crate::mesh::obj::normal::NormalObj;
 use crate::mesh::obj::statement::exact_vertex;
 use crate::mesh::origin::{MeshOrigin, largest};
-use crate::quote::count;
 use s3d_geom::glam::{DVec3, Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
 use std::borrow::Cow;

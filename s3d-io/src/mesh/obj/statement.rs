@@ -1,9 +1,9 @@
 //! One statement of an OBJ file, read strictly: what [`crate::mesh::obj::normal`] rewrites and
 //! [`crate::mesh::obj::diagnose`] looks for.
 
+use crate::fs::quote::quote;
 use crate::fs::text::number;
 use crate::mesh::obj::lines::{next_word, parse_f32};
-use crate::quote::quote;
 use s3d_geom::glam::{DVec3, Vec3};
 
 /// What is wrong with a statement.

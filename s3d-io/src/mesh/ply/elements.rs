@@ -21,10 +21,10 @@
 
 use crate::error::{Error, Result};
 use crate::fs::encoding::Utf8Reader;
+use crate::fs::quote::quote;
 use crate::mesh::ply::batch::PlyBatch;
 use crate::mesh::ply::header::{MAX_HEADER, PlyElement, PlyEncoding, PlyHeader, PlyProperty, PlyType};
 use crate::mesh::ply::source::{BUFFER, Fault, Outcome, Source, column_of, decode, number, parse_f64};
-use crate::quote::quote;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 

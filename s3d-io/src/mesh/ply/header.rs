@@ -7,7 +7,7 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::error::{Error, Result};
-use crate::quote::quote;
+use crate::fs::quote::quote;
 use std::path::Path;
 
 /// The most bytes of a header. Files with hundreds of properties and a story in their comments stay far

@@ -5,6 +5,7 @@
 //! wall.png`.
 
 use crate::error::{Error, Result};
+use crate::fs::quote::{count, quote};
 use crate::image::find::find_image;
 use crate::image::texture::{TextureFile, read_textures};
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
@@ -14,7 +15,6 @@ use crate::mesh::ply::faces::{PlyFaces, PlyTriangles};
 use crate::mesh::ply::header::PlyHeader;
 use crate::mesh::ply::labels::PlyLabels;
 use crate::mesh::ply::vertices::PlyVertices;
-use crate::quote::{count, quote};
 use s3d_geom::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX, Texture, Wrap};
 use std::io::Read;
 use std::path::{Path, PathBuf};
