@@ -225,7 +225,7 @@ fn vertices_of_a_scannet_scan_vote_for_all_faces_around_them() {
                  path = \"scene0000_00\"\nroom = \"office_1\"\n[cameras]\npath = \"cameras.csv\"\n";
     fs::write(&toml, table).unwrap();
     let out = dir.path().join("out");
-    export(&toml, &out, &["--views", "0", "--allow", "colour,up"]);
+    export(&toml, &out, &["--views", "0", "--allow", "colour,coverage,inside-out,up"]);
     let semantic = fs::read_to_string(out.join("area_3/3d/semantic.obj")).unwrap();
     let (mut material, mut of_faces) = (String::new(), Vec::new());
     for line in semantic.lines() {
