@@ -5,7 +5,7 @@
 
 Each run draws options from SEED and its number, exports with 1 and with 2 threads, holds the two against each other byte
 for byte, and verifies one. CHECKER is a program of your own that takes the folder of a data set, and exits with 0 if it
-finds nothing: it is run where an export has the published forms and every modality. A line a run; exit code 1 if one failed.
+finds nothing: it is run where an export has views, the published forms and every modality. A line a run; exit code 1 if one failed.
 """
 
 import argparse
@@ -21,9 +21,10 @@ MODALITIES = ["rgb", "depth", "normal", "semantic", "semantic_pretty", "global_x
 
 
 def draw(rng):
-    """Options of an export, and whether it has the published forms."""
+    """Options of an export, and whether it has views, and the published forms."""
     options = ["--seed", rng.randrange(2**64), "--size", rng.randrange(8, 120), "--pano-width", 2 * rng.randrange(4, 120)]
-    options += ["--views", rng.randrange(0, 7), "--points-per-m2", rng.choice([0.5, 5, 60])]
+    views = rng.randrange(0, 7)
+    options += ["--views", views, "--points-per-m2", rng.choice([0.5, 5, 60])]
     options += ["--pool", rng.choice(["dataset", "area", "location"]), "--entropy-stride", rng.choice([1, 2, 4, 64])]
     options += ["--compression", rng.choice(["fast", "balanced", "small"])]
     for flag in ["--keep-all", "--smooth-normals", "--lenient"]:
@@ -37,7 +38,7 @@ def draw(rng):
         options += ["--xyz", rng.choice(["half", "float", "none"]), "--normal-axes", rng.choice(["paper", "opencv"])]
         options += ["--depth-units", rng.choice(["512", "mm"]), "--pad-labels", rng.choice(["off", 3342, 500])]
         options += ["--modalities", ",".join(rng.sample(MODALITIES, rng.randrange(1, 8)))]
-    return [str(option) for option in options], is_published
+    return [str(option) for option in options], is_published and views > 0
 
 
 def files(root):
