@@ -124,7 +124,9 @@ pub(crate) fn check_points(points: f64) -> Result<()> {
     if points <= MOST_POINTS {
         return Ok(());
     }
-    Err(Error::Input(format!("{points:.1e} points are more than {MOST_POINTS:.0e}: is the mesh in metres?")))
+    Err(Error::Input(format!(
+        "{points:.1e} points are more than {MOST_POINTS:.0e}: ask for fewer, or is the mesh not in metres?"
+    )))
 }
 
 /// What looks wrong about the number of points sampled of a mesh.
