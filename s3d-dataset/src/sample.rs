@@ -4,7 +4,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::store::staging::Staging;
 use crate::store::{parent_of, refuse_existing};
-use crate::useful::{PLY_POINT_BYTES, check_points, judge, space_findings};
+use crate::useful::{PLY_POINT_BYTES, check_points, check_space};
 use glam::DVec3;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use s3d_io::cloud::PlyPointWriter;
@@ -57,7 +57,7 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     // What a killed process left takes no space after this.
     let staging = Staging::begin(ctx, &parent, name)?;
     refuse_existing(output, options.overwrite || staging.was_placing())?;
-    judge(ctx, &space_findings(points * PLY_POINT_BYTES, output), &[])?;
+    check_space(points * PLY_POINT_BYTES, output)?;
     if file.offset_m != DVec3::ZERO {
         ctx.info(format_args!(
             "the mesh lies far from the origin: {:?} is subtracted from its coordinates, which the cloud's header \

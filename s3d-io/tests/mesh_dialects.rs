@@ -68,7 +68,8 @@ impl Gltf {
     fn accessor(&mut self, bytes: &[u8], kind: &str, component: u32, count: usize, more: &str) -> usize {
         let view = self.view(bytes);
         self.accessors.push(format!(
-            r#"{{"bufferView": {view}, "componentType": {component}, "type": "{kind}", "count": {count}{more}}}"#
+            r#"{{"bufferView": {view}, "componentType": {component}, "type": "{kind}",
+            "count": {count}{more}}}"#
         ));
         self.accessors.len() - 1
     }
@@ -137,7 +138,8 @@ fn sparse_and_quantized_positions() {
     let values = f.view(&values);
     f.accessors.push(format!(
         r#"{{"componentType": 5126, "type": "VEC3", "count": 4, "sparse": {{"count": 3,
-        "indices": {{"bufferView": {places}, "componentType": 5121}}, "values": {{"bufferView": {values}}}}}}}"#
+        "indices": {{"bufferView": {places}, "componentType": 5121}},
+        "values": {{"bufferView": {values}}}}}}}"#
     ));
     let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
     let file = f.mesh(&format!(r#"{{"attributes": {{"POSITION": 0}}, "indices": {i}}}"#));
@@ -157,7 +159,8 @@ fn sparse_and_quantized_positions() {
         let scale = if normalized { 1.0 } else { 1.0 / f64::from(whole) };
         let file = f
             .read(&format!(
-                r#""extensionsRequired": ["KHR_mesh_quantization"], "nodes": [{{"mesh": 0, "scale": [{scale}, {scale}, {scale}]}}],
+                r#""extensionsRequired": ["KHR_mesh_quantization"], "nodes": [{{"mesh": 0, "scale": [{scale},
+                {scale}, {scale}]}}],
                 "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}}]"#
             ))
             .unwrap();
@@ -175,10 +178,13 @@ fn nested_and_mirroring_nodes_and_instances() {
     let file = f
         .read(&format!(
             r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}},
-            {{"primitives": [{{"attributes": {{"POSITION": {p}}}}}, {{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}}],
-            "nodes": [{{"scale": [-1, 1, 1], "children": [1, 2]}}, {{"mesh": 0, "scale": [-1, 1, 1], "translation": [-10, 0, 0]}},
+            {{"primitives": [{{"attributes": {{"POSITION": {p}}}}}, {{"attributes": {{"POSITION": {p}}},
+            "indices": {i}}}]}}],
+            "nodes": [{{"scale": [-1, 1, 1], "children": [1, 2]}}, {{"mesh": 0, "scale": [-1, 1, 1],
+            "translation": [-10, 0, 0]}},
             {{"mesh": 0}}, {{"translation": [30, 0, 0], "children": [4]}},
-            {{"mesh": 0, "matrix": [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}}, {{"mesh": 1, "translation": [0, 0, 9]}}],
+            {{"mesh": 0, "matrix": [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}}, {{"mesh": 1,
+            "translation": [0, 0, 9]}}],
             "scenes": [{{"nodes": [0, 3, 5]}}], "scene": 0"#
         ))
         .unwrap();
@@ -231,7 +237,8 @@ fn buffers_beside_the_file_and_in_it() {
     let mut f = Gltf::default();
     let (p, i) = (f.corners(), f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, ""));
     let rest = format!(
-        r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}}], "nodes": [{{"mesh": 0}}]"#
+        r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}}],
+        "nodes": [{{"mesh": 0}}]"#
     );
     let beside: [(&str, &[u8]); 1] = [("öl & 100% wood.bin", &f.data)];
     for uri in ["%C3%B6l%20&%20100%25%20wood.bin", "öl & 100% wood.bin"] {
@@ -272,9 +279,11 @@ fn compression_is_refused_by_name_with_the_way_out() {
     }
     // Used, but not required: the vertices are nowhere else all the same.
     let message = refused(
-        r#"{"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_draco_mesh_compression"], "nodes": [{"mesh": 0}],
+        r#"{"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_draco_mesh_compression"],
+        "nodes": [{"mesh": 0}],
         "accessors": [{"componentType": 5126, "type": "VEC3", "count": 3}], "meshes": [{"primitives": [
-        {"attributes": {"POSITION": 0}, "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}}}]}]}"#
+        {"attributes": {"POSITION": 0}, "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0,
+        "attributes": {}}}}]}]}"#
             .into(),
     );
     assert!(
@@ -301,8 +310,10 @@ fn textures_of_extensions_are_replaced_with_a_warning() {
             .read(&format!(
                 r#""extensionsUsed": ["{extension}"], "images": [{{"uri": "a.ktx2"}}],
                 "textures": [{{"extensions": {{"{extension}": {{"source": 0}}}}}}],
-                "materials": [{{"name": "wall", "pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}, "baseColorFactor": [1, 0, 0, 1]}}}}],
-                "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "TEXCOORD_0": {uv}}}, "indices": {i}, "material": 0}}]}}],
+                "materials": [{{"name": "wall", "pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}},
+                "baseColorFactor": [1, 0, 0, 1]}}}}],
+                "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "TEXCOORD_0": {uv}}},
+                "indices": {i}, "material": 0}}]}}],
                 "nodes": [{{"mesh": 0}}]"#
             ))
             .unwrap();
@@ -334,9 +345,12 @@ fn texture_transforms_and_sets() {
         .read(&format!(
             r#""images": [{{"bufferView": {view}, "mimeType": "image/png"}}], "textures": [{{"source": 0}}],
             "extensionsUsed": ["KHR_texture_transform"], "extensionsRequired": ["KHR_texture_transform"],
-            "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0, "texCoord": 0, "extensions":
-            {{"KHR_texture_transform": {{"texCoord": 1, "offset": [0.25, 0.5], "scale": [0.5, 0.25]}}}}}}}}}}],
-            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "TEXCOORD_1": {uv}}}, "indices": {i}, "material": 0}}]}}],
+            "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0, "texCoord": 0,
+            "extensions":
+            {{"KHR_texture_transform": {{"texCoord": 1, "offset": [0.25, 0.5], "scale": [0.5,
+            0.25]}}}}}}}}}}],
+            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "TEXCOORD_1": {uv}}},
+            "indices": {i}, "material": 0}}]}}],
             "nodes": [{{"mesh": 0}}]"#
         ))
         .unwrap();
@@ -391,7 +405,8 @@ fn obj_files_of_every_dialect() {
 fn obj_materials_repeated_spaced_and_missing() {
     let vertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n";
     let obj = format!(
-        "mtllib my scan (1).mtl\n{vertices}usemtl dark oak\nf 1 2 3\nusemtl wall\nf 1 3 4\nusemtl dark oak\nf 1 2 5\nusemtl gone\nf 1 4 5\n"
+        "mtllib my scan (1).mtl\n{vertices}usemtl dark oak\nf 1 2 3\nusemtl wall\nf 1 3 4\n\
+         usemtl dark oak\nf 1 2 5\nusemtl gone\nf 1 4 5\n"
     );
     let library: (&str, &[u8]) = ("my scan (1).mtl", b"newmtl dark oak\nKd 1 0 0\nnewmtl wall\nKd 0 1 0\n");
     let file = read_file("a.obj", obj.as_bytes(), &[library]).unwrap();
@@ -414,7 +429,8 @@ fn obj_materials_repeated_spaced_and_missing() {
 fn a_published_semantic_obj_has_labels() {
     let vertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n";
     let obj = format!(
-        "mtllib semantic.mtl\n{vertices}usemtl chair_3_office_5_1\nf 1 2 3\nusemtl <UNK>_0_<UNK>_0_0\nf 1 3 4\n\
+        "mtllib semantic.mtl\n{vertices}usemtl chair_3_office_5_1\nf 1 2 3\n\
+         usemtl <UNK>_0_<UNK>_0_0\nf 1 3 4\n\
          usemtl wall_10_hallway_2_1\nf 1 1 2\nf 1 2 5\nusemtl chair_3_office_5_1\nf 1 4 5\n"
     );
     let file = read_file("semantic.obj", obj.as_bytes(), &[]).unwrap();

@@ -7,6 +7,7 @@
 //! the lock completes it.
 
 use crate::error::Result;
+use crate::store::backup::{remove, rename};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::{create_dir, read_json, sync_data_set, sync_file, write_json};
@@ -154,18 +155,6 @@ fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     folders.sort();
     files.sort();
     Ok((folders, files))
-}
-
-fn rename(from: &Path, to: &Path) -> Result<()> {
-    fs::rename(from, to).map_err(|e| FileError::io(to, "put what is new to", e).into())
-}
-
-fn remove(path: &Path) -> Result<()> {
-    let gone = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-    match gone {
-        Err(e) if e.kind() != ErrorKind::NotFound => Err(FileError::io(path, "remove", e).into()),
-        _ => Ok(()),
-    }
 }
 
 #[cfg(test)]

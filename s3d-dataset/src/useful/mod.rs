@@ -6,7 +6,7 @@
 mod estimate;
 
 pub use estimate::Estimate;
-pub(crate) use estimate::{PLY_POINT_BYTES, check_points, size_findings, space_findings};
+pub(crate) use estimate::{PLY_POINT_BYTES, check_points, check_space, size_findings, space_findings};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -162,7 +162,7 @@ pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
         let text = format!("the mesh is only {:.1} cm long: is it in metres?", 100.0 * length);
         findings.push(Finding::new(Condition::Scale, length < 0.1, text));
     }
-    let moving = "move mesh, points and cameras nearer to it";
+    let moving = "give [mesh] offset_m, or move mesh, points and cameras nearer to it";
     if farthest > LARGEST_HALF_M {
         let text = format!(
             "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates end at 65504; {moving}"

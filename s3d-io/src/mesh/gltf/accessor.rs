@@ -169,7 +169,8 @@ impl GltfDocument {
         let bytes = inside().ok_or_else(|| {
             let length = bytes.len();
             self.fail(format!(
-                "{name} takes {count} elements of {size} bytes, each {stride} after the last, from byte {offset}, but its buffer view has {length}"
+                "{name} takes {count} elements of {size} bytes, each {stride} after the last, \
+                 from byte {offset}, but its buffer view has {length}"
             ))
         })?;
         Ok((bytes, stride))
@@ -187,7 +188,8 @@ mod tests {
     fn document(view: &str, accessor: &str) -> (tempfile::TempDir, GltfDocument) {
         let data = STANDARD.encode((0..64).collect::<Vec<u8>>());
         let json = format!(
-            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 64, "uri": "data:;base64,{data}"}}],
+            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 64,
+            "uri": "data:;base64,{data}"}}],
             "bufferViews": [{{"buffer": 0, "byteLength": 64{view}}}], "accessors": [{accessor}]}}"#
         );
         open(&json)
@@ -228,8 +230,10 @@ mod tests {
         assert_eq!(vectors("", a).unwrap(), [[256.0, 770.0]]);
         let bytes = STANDARD.encode([0x80, 0x7f]);
         let json = format!(
-            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 2, "uri": "data:;base64,{bytes}"}}],
-            "bufferViews": [{{"buffer": 0, "byteLength": 2}}], "accessors": [{{"bufferView": 0, "componentType": 5120,
+            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 2,
+            "uri": "data:;base64,{bytes}"}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 2}}], "accessors": [{{"bufferView": 0,
+            "componentType": 5120,
             "normalized": true, "type": "VEC2", "count": 1}}]}}"#
         );
         assert_eq!(open(&json).1.read_vectors(Index::new(0), "who").unwrap(), [[-1.0, 1.0]]);
@@ -242,7 +246,8 @@ mod tests {
         let a = format!(r#"{{"componentType": 5121, "type": "VEC2", "count": 3, {sparse}}}"#);
         assert_eq!(vectors("", &a).unwrap(), [[10.0, 11.0], [12.0, 13.0], [0.0, 0.0]]);
         let a = format!(
-            r#"{{"bufferView": 0, "byteOffset": 20, "componentType": 5121, "type": "VEC2", "count": 1, {sparse}}}"#
+            r#"{{"bufferView": 0, "byteOffset": 20, "componentType": 5121, "type": "VEC2", "count": 1,
+            {sparse}}}"#
         );
         assert!(vectors("", &a).unwrap_err().contains("sparse index 1 of 1"));
         let a =
@@ -253,16 +258,21 @@ mod tests {
     #[test]
     fn sparse_indices_grow() {
         // The bytes 0, 1, 2…: indices of 16 bits are 256, 770….
-        let sparse = r#"{"componentType": 5121, "type": "VEC2", "count": 771, "sparse": {"count": 2, "indices": {"bufferView": 0,
+        let sparse = r#"{"componentType": 5121, "type": "VEC2", "count": 771, "sparse": {"count": 2,
+        "indices": {"bufferView": 0,
             "componentType": 5123}, "values": {"bufferView": 0}}}"#;
         let changed = vectors("", sparse).unwrap();
         assert_eq!((changed[256], changed[770], changed.len()), ([0.0, 1.0], [2.0, 3.0], 771));
         let backwards = STANDARD.encode([1u8, 0]);
         let json = format!(
-            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 2, "uri": "data:;base64,{backwards}"}}],
-            "bufferViews": [{{"buffer": 0, "byteLength": 2}}], "accessors": [{{"componentType": 5121, "type": "SCALAR",
-            "count": 3, "sparse": {{"count": 2, "indices": {{"bufferView": 0, "componentType": 5121}}, "values": {{"bufferView": 0}}}}}},
-            {{"componentType": 5121, "type": "SCALAR", "count": 3, "sparse": {{"count": 0, "indices": {{"bufferView": 0,
+            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 2,
+            "uri": "data:;base64,{backwards}"}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 2}}], "accessors": [{{"componentType": 5121,
+            "type": "SCALAR",
+            "count": 3, "sparse": {{"count": 2, "indices": {{"bufferView": 0, "componentType": 5121}},
+            "values": {{"bufferView": 0}}}}}},
+            {{"componentType": 5121, "type": "SCALAR", "count": 3, "sparse": {{"count": 0,
+            "indices": {{"bufferView": 0,
             "componentType": 5121}}, "values": {{"bufferView": 0}}}}}}]}}"#
         );
         let (_dir, document) = open(&json);
@@ -278,7 +288,8 @@ mod tests {
                 format!(r#"{{"bufferView": 0, "componentType": 5121, "type": "VEC2", "count": {claim}}}"#);
             assert!(vectors("", &a).unwrap_err().contains("who: accessor 0 takes"), "{claim}");
         }
-        let a = r#"{"bufferView": 0, "byteOffset": 18446744073709551615, "componentType": 5121, "type": "VEC2", "count": 1}"#;
+        let a = r#"{"bufferView": 0, "byteOffset": 18446744073709551615, "componentType": 5121,
+        "type": "VEC2", "count": 1}"#;
         assert!(vectors("", a).is_err());
         let a = r#"{"bufferView": 0, "componentType": 5121, "type": "VEC3", "count": 1}"#;
         assert!(vectors("", a).unwrap_err().contains("3 numbers an element, not 2"));

@@ -94,7 +94,8 @@ mod tests {
             self.views.push(format!(r#"{{"buffer": 0, "byteOffset": {offset}, "byteLength": {length}}}"#));
             let normalized = if kind == "VEC3" && component == 5121 { r#", "normalized": true"# } else { "" };
             self.accessors.push(format!(
-                r#"{{"bufferView": {view}, "componentType": {component}, "type": "{kind}", "count": {count}{normalized}}}"#
+                r#"{{"bufferView": {view}, "componentType": {component}, "type": "{kind}",
+                "count": {count}{normalized}}}"#
             ));
             self.accessors.len() - 1
         }
@@ -115,7 +116,8 @@ mod tests {
 
         fn json(&self, rest: &str) -> String {
             format!(
-                r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}, "uri": "data:;base64,{}"}}],
+                r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {},
+                "uri": "data:;base64,{}"}}],
                 "bufferViews": [{}], "accessors": [{}], {rest}}}"#,
                 self.data.len(),
                 STANDARD.encode(&self.data),
@@ -207,7 +209,8 @@ mod tests {
 
     const IMAGES: &str = r#""images": [{"uri": "two%20words.png"}, {"uri": "gone.jpg"}],
         "samplers": [{"wrapS": 33071, "wrapT": 33648}],
-        "textures": [{"source": 0, "sampler": 0}, {"source": 1}, {"extensions": {"KHR_texture_basisu": {"source": 0}}}]"#;
+        "textures": [{"source": 0, "sampler": 0}, {"source": 1},
+        {"extensions": {"KHR_texture_basisu": {"source": 0}}}]"#;
 
     #[test]
     fn textures_factors_and_fallbacks() {
@@ -215,7 +218,8 @@ mod tests {
         let (p, uv) = (f.triangle(), f.floats(&[[0.0, 0.0], [1.0, 0.0], [0.0, 0.75]]));
         let textured = |i: u32, more: &str| {
             format!(
-                r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": {i}{more}}}, "baseColorFactor": [1, 1, 1, 1]}}}}"#
+                r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": {i}{more}}},
+                "baseColorFactor": [1, 1, 1, 1]}}}}"#
             )
         };
         let materials = [
@@ -224,8 +228,14 @@ mod tests {
             textured(1, "").replace("[1, 1, 1, 1]", "[0.5, 0, 0, 1]"),
             textured(2, ""),
             textured(0, r#", "texCoord": 1"#),
-            textured(0, r#", "extensions": {"KHR_texture_transform": {"offset": [0.5, 0], "scale": [2, 1]}}"#),
-            r#"{"name": "old", "extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0, 1, 0, 1]}}}"#.into(),
+            textured(
+                0,
+                r#", "extensions": {"KHR_texture_transform": {"offset": [0.5, 0], "scale": [2,
+            1]}}"#,
+            ),
+            r#"{"name": "old", "extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0, 1,
+            0, 1]}}}"#
+                .into(),
         ];
         let primitive = |m: usize| {
             format!(r#"{{"attributes": {{"POSITION": {p}, "TEXCOORD_0": {uv}}}, "material": {m}}}"#)
@@ -233,7 +243,8 @@ mod tests {
         let primitives: Vec<String> = (0..materials.len()).map(primitive).collect();
         let file = f
             .read(&format!(
-                r#"{IMAGES}, "materials": [{}], "meshes": [{{"primitives": [{}]}}], "nodes": [{{"mesh": 0}}]"#,
+                r#"{IMAGES}, "materials": [{}], "meshes": [{{"primitives": [{}]}}],
+                "nodes": [{{"mesh": 0}}]"#,
                 materials.join(","),
                 primitives.join(",")
             ))
@@ -273,7 +284,8 @@ mod tests {
                 r#""materials": [{{"pbrMetallicRoughness": {{"baseColorFactor": [0.5, 1, 1, 1]}}}}],
                 "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "COLOR_0": {c}}}}},
                 {{"attributes": {{"POSITION": {p}, "COLOR_0": {c}}}, "material": 0}},
-                {{"attributes": {{"POSITION": {p}}}, "material": 0}}, {{"attributes": {{"POSITION": {p}}}}}]}}],
+                {{"attributes": {{"POSITION": {p}}}, "material": 0}},
+                {{"attributes": {{"POSITION": {p}}}}}]}}],
                 "nodes": [{{"mesh": 0}}]"#
             ))
             .unwrap();
@@ -298,7 +310,9 @@ mod tests {
         let (i, beyond) = (f.indices(&[0, 1, 2]), f.indices(&[0, 1, 3]));
         let mesh = |primitive: &str| {
             format!(
-                r#"{IMAGES}, "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}], "meshes": [{{"name": "box", "primitives": [{{{primitive}}}]}}], "nodes": [{{"mesh": 0}}]"#
+                r#"{IMAGES},
+                "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
+                "meshes": [{{"name": "box", "primitives": [{{{primitive}}}]}}], "nodes": [{{"mesh": 0}}]"#
             )
         };
         for (primitive, words) in [
@@ -366,7 +380,8 @@ mod tests {
         let mut f = Fixture::default();
         f.accessors.push(r#"{"componentType": 5126, "type": "VEC3", "count": 3}"#.into());
         let message = f.error(
-            r#""meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "extensions": {"KHR_draco_mesh_compression": {}}}]}],
+            r#""meshes": [{"primitives": [{"attributes": {"POSITION": 0},
+            "extensions": {"KHR_draco_mesh_compression": {}}}]}],
             "nodes": [{"mesh": 0}]"#,
         );
         assert!(message.contains("extension KHR_draco_mesh_compression"), "{message}");
@@ -378,9 +393,12 @@ mod tests {
         let mut f = Fixture::default();
         let (p, uv, i) = (f.triangle(), f.floats(&[[0.0; 2]; 3]), f.indices(&[0, 1, 2]));
         let rest = format!(
-            r#"{IMAGES}, "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0, "texCoord": 0}}}}}}],
-            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "TEXCOORD_0": {uv}, "NORMAL": {p}, "COLOR_0": {p}}},
-            "indices": {i}, "material": 0, "mode": 4}}]}}], "nodes": [{{"mesh": 0, "skin": 0}}], "scenes": [{{"nodes": [0]}}], "scene": 0"#
+            r#"{IMAGES}, "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0,
+            "texCoord": 0}}}}}}],
+            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "TEXCOORD_0": {uv}, "NORMAL": {p},
+            "COLOR_0": {p}}},
+            "indices": {i}, "material": 0, "mode": 4}}]}}], "nodes": [{{"mesh": 0, "skin": 0}}],
+            "scenes": [{{"nodes": [0]}}], "scene": 0"#
         );
         assert!(f.read(&rest).is_ok());
         let dir = tempfile::tempdir().unwrap();
