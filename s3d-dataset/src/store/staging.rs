@@ -7,10 +7,11 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::store::backup::{remove, rename};
 use crate::store::lock::{Lock, Sharing};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
-use s3d_io::fs::{Checksum, create_dir, write_bytes};
+use s3d_io::fs::{Checksum, create_dir};
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -96,7 +97,7 @@ impl Staging {
     /// more than an empty folder.
     pub(crate) fn place_folder(self, place: &Path, replaced: bool) -> Result<()> {
         let failed = |e| FileError::io(place, "move what is finished to this name", e);
-        write_bytes(&placing_in(&self.folder), b"")?;
+        self.begin_placing()?;
         let old = old_in(&self.folder);
         if replaced {
             fs::rename(place, &old).map_err(failed)?;
@@ -124,7 +125,7 @@ impl Staging {
         }
         // `camera.json`, which says what the images beside it are, comes last.
         paths.sort_by(|a, b| b.cmp(a));
-        write_bytes(&placing_in(&self.folder), b"")?;
+        self.begin_placing()?;
         for path in paths {
             let place = folder.join(path.file_name().unwrap_or_default());
             fs::rename(&path, &place)
@@ -133,18 +134,18 @@ impl Staging {
         self.clear()
     }
 
+    /// Says that the new thing is being put in its place. The file is empty, so that it is there or not; one
+    /// beside it that is yet to be renamed would stay after a kill.
+    fn begin_placing(&self) -> Result<()> {
+        let path = placing_in(&self.folder);
+        fs::File::create(&path).map_err(|e| FileError::io(&path, "write", e))?;
+        Ok(())
+    }
+
     /// Removes all but the lock.
     fn clear(&self) -> Result<()> {
-        for path in [self.new.clone(), old_in(&self.folder), placing_in(&self.folder)] {
-            let gone = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
-            match gone {
-                Err(e) if e.kind() != ErrorKind::NotFound => {
-                    return Err(FileError::io(&path, "remove", e).into());
-                }
-                _ => {}
-            }
-        }
-        Ok(())
+        let paths = [self.new.clone(), old_in(&self.folder), placing_in(&self.folder)];
+        paths.iter().try_for_each(|path| remove(path))
     }
 }
 
@@ -160,10 +161,6 @@ impl Drop for Staging {
         }
         let _ = fs::remove_dir(&self.folder);
     }
-}
-
-fn rename(from: &Path, to: &Path) -> Result<()> {
-    fs::rename(from, to).map_err(|e| FileError::io(from, "move", e).into())
 }
 
 #[cfg(test)]
