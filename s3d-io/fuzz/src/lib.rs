@@ -1,11 +1,15 @@
 //! What all fuzz targets share: a folder in memory, a limit to what may be allocated, and the feeds of the crate's tests.
+//! The manifest of a data set is read by s3d-dataset, and has its feed here.
 
 #[path = "../../tests/feed/mod.rs"]
 mod feed;
 
 use feed::{FEEDS, Feed};
+use s3d_dataset::{Context, VerifyOptions, statistics, verify};
+use s3d_io::fs::Checksum;
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -66,7 +70,8 @@ static TARGET: OnceLock<Target> = OnceLock::new();
 
 /// Chooses the reader and makes its folder.
 pub fn start(name: &str) {
-    let (_, feed) = FEEDS.into_iter().find(|(n, _)| *n == name).expect("a feed has this name");
+    let mut feeds = FEEDS.into_iter().chain([("manifest", manifest as Feed)]);
+    let (_, feed) = feeds.find(|(n, _)| *n == name).expect("a feed has this name");
     // No threads: a run is to depend on its input alone.
     rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -83,7 +88,7 @@ pub fn start(name: &str) {
     }));
     let root = std::env::var_os("S3D_FUZZ_DIR").map_or_else(|| "/dev/shm".into(), PathBuf::from);
     let dir = root.join(format!("s3d-fuzz-{name}-{}", std::process::id()));
-    std::fs::create_dir_all(&dir).expect("the folder can be made");
+    fs::create_dir_all(&dir).expect("the folder can be made");
     // A pixel of a compressed image may take an eighth of a bit; a byte of deflated numbers becomes a thousand.
     let per_byte = if matches!(name, "texture" | "gltf" | "png" | "exr") { 32 << 10 } else { 4 << 10 };
     let target = Target { feed, dir, base: 256 << 20, per_byte };
@@ -96,4 +101,19 @@ pub fn run(data: &[u8]) {
     LIMIT.store(LIVE.load(Relaxed) + target.base + target.per_byte * data.len(), Relaxed);
     (target.feed)(&target.dir, data);
     LIMIT.store(usize::MAX, Relaxed);
+}
+
+/// A manifest, and after a zero byte the list of files beside it. A checksum of zeros in the manifest stands for that of
+/// the list, so that readers come past it.
+fn manifest(dir: &Path, data: &[u8]) {
+    let end = data.iter().position(|b| *b == 0).unwrap_or(data.len());
+    let (manifest, list) = data.split_at(end);
+    let list = list.get(1..).unwrap_or_default();
+    let manifest = String::from_utf8_lossy(manifest).replace(&"0".repeat(32), &Checksum::of(list).to_string());
+    for (name, content) in [("manifest.json", manifest.as_bytes()), ("files.csv", list)] {
+        fs::write(dir.join(name), content).expect("the folder can be written");
+    }
+    let report = verify(dir, &VerifyOptions::default(), &Context::default()).expect("faults are no error");
+    assert!(report.fault_count() > 0, "a data set of two files is no whole one");
+    statistics(dir).expect_err("a data set of two files is no whole one");
 }

@@ -211,8 +211,8 @@ pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Chec
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line: another header, a line that is no path, size and checksum,
-/// a path that leads out of the folder, one that does not sort behind the one before, a last line without a
-/// line feed.
+/// a path that leads out of the folder, one that does not sort behind the one before, sizes whose sum does not
+/// fit in 64 bits, a last line without a line feed.
 pub fn read_file_list(path: &Path) -> Result<Vec<FileRecord>> {
     parse_file_list(BufReader::new(open_file(path)?), path)
 }
@@ -226,6 +226,7 @@ pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileR
     let failed = |e| Error::io(path, "read", e);
     let mut records: Vec<FileRecord> = Vec::new();
     let mut known: BTreeSet<String> = BTreeSet::new();
+    let mut total = 0u64;
     let mut line = Vec::new();
     for number in 1u64.. {
         let fault = |message: String| Err(Error::line(path, number, message));
@@ -260,6 +261,10 @@ pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileR
                 record.path
             ));
         }
+        let Some(sum) = total.checked_add(record.bytes) else {
+            return fault("with the files before it more bytes than 64 bits can count".to_owned());
+        };
+        total = sum;
         records.push(record);
     }
     Ok(records)
@@ -273,8 +278,7 @@ fn parse_line(text: &str) -> std::result::Result<FileRecord, String> {
         return Err(format!("has {} fields instead of path, bytes and checksum", text.split(',').count()));
     };
     check_path(path)?;
-    let plain = !bytes.is_empty() && bytes.bytes().all(|b| b.is_ascii_digit());
-    let size = if plain { bytes.parse().ok() } else { None };
+    let size: Option<u64> = bytes.parse().ok().filter(|size: &u64| size.to_string() == bytes);
     let size = size.ok_or_else(|| format!("{bytes:?} is no number of bytes"))?;
     let xxh3_128 = sum.parse().map_err(|e: crate::fs::checksum::BadChecksum| e.to_string())?;
     Ok(FileRecord { path: path.to_owned(), bytes: size, xxh3_128 })
@@ -365,9 +369,18 @@ mod tests {
             (format!("{HEADER}\n{good}\n{good}\n"), "line 3: \"a\" does not sort"),
             (format!("{HEADER}\n{}\n{good}\n", good.replace("a,", "A,")), "line 3: \"a\" differs"),
             (format!("{HEADER}\n{}\n", good.replace(",0,", ",-1,")), "line 2: \"-1\" is no number"),
+            (format!("{HEADER}\n{}\n", good.replace(",0,", ",00,")), "line 2: \"00\" is no number"),
             (
                 format!("{HEADER}\n{}\n", good.replace(",0,", ",99999999999999999999,")),
                 "is no number of bytes",
+            ),
+            (
+                format!(
+                    "{HEADER}\n{}\nb{}\n",
+                    good.replace(",0,", &format!(",{},", u64::MAX)),
+                    &good[1..].replace(",0,", ",1,")
+                ),
+                "line 3: with the files before it",
             ),
             (format!("{HEADER}\n{}\n", good.replace("9", "x")), "line 2: \"xxaa"),
             (format!("{HEADER}\n../{good}\n"), "line 2: \"../a\" is no path"),

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub(crate) type Feed = fn(&Path, &[u8]);
 
 /// Every reader, by the name of its fuzz target.
-pub(crate) const FEEDS: [(&str, Feed); 18] = [
+pub(crate) const FEEDS: [(&str, Feed); 19] = [
     ("obj", obj),
     ("mtl", mtl),
     ("texture", texture),
@@ -34,6 +34,7 @@ pub(crate) const FEEDS: [(&str, Feed); 18] = [
     ("captures", captures),
     ("json", json),
     ("scene", scene),
+    ("file_list", file_list),
     ("npy", npy),
     ("las", las),
     ("e57", e57),
@@ -292,4 +293,13 @@ fn png(dir: &Path, data: &[u8]) {
 
 fn exr(dir: &Path, data: &[u8]) {
     check(dir, read_xyz(&file(dir, "image.exr", data)));
+}
+
+/// What is read as a list of files is written again byte for byte.
+fn file_list(dir: &Path, data: &[u8]) {
+    if let Some(records) = check(dir, read_file_list(&file(dir, "files.csv", data))) {
+        let again = dir.join("again.csv");
+        write_file_list(&again, &records).expect("what was read can be written");
+        assert!(fs::read(again).is_ok_and(|written| written == data));
+    }
 }
