@@ -47,7 +47,7 @@ mod view;
 
 pub use entropy::entropy;
 pub use fold::{Fold, folds};
-pub use poisson_disk::poisson_disk;
+pub use poisson_disk::{poisson_disk, poisson_disk_where};
 pub use pool::{Pool, PoolItem, UnknownPool, select_pooled};
 pub use select::{Selection, SelectionError, select};
 pub use view::{CANDIDATES_PER_LOCATION, DistributionError, View, ViewDistribution, draw_view};

@@ -20,6 +20,29 @@ use std::collections::HashMap;
 /// assert!((3..=5).contains(&chosen.len()));
 /// ```
 pub fn poisson_disk(points: &[[f64; 3]], distance_m: f64, seed: u64, name: &str) -> Vec<usize> {
+    poisson_disk_where(points, distance_m, seed, name, |_, _| true)
+}
+
+/// As [`poisson_disk`], but two points count as near only if `is_near` says so too, which is asked for pairs of
+/// indices that are nearer than `distance_m`. So points on both sides of a wall need not keep apart.
+///
+/// # Panics
+/// If `distance_m` is not above 0, or a point is not finite.
+///
+/// ```
+/// // Two rooms on a line; the wall is at 1.
+/// let line: Vec<[f64; 3]> = (0..20).map(|i| [0.1 * f64::from(i), 0.0, 0.0]).collect();
+/// let is_same_room = |a: usize, b: usize| (a < 10) == (b < 10);
+/// let chosen = s3d_sample::poisson_disk_where(&line, 5.0, 7, "line", is_same_room);
+/// assert_eq!(chosen.len(), 2);
+/// ```
+pub fn poisson_disk_where(
+    points: &[[f64; 3]],
+    distance_m: f64,
+    seed: u64,
+    name: &str,
+    is_near: impl Fn(usize, usize) -> bool,
+) -> Vec<usize> {
     assert!(distance_m > 0.0, "a distance of {distance_m} m");
     assert!(points.iter().flatten().all(|c| c.is_finite()), "a point that is not finite");
     let mut order: Vec<usize> = (0..points.len()).collect();
@@ -35,16 +58,16 @@ pub fn poisson_disk(points: &[[f64; 3]], distance_m: f64, seed: u64, name: &str)
     for index in order {
         let point = &points[index];
         let at = cell(point);
-        let is_near = |other: &usize| {
+        let is_too_near = |other: &usize| {
             let d2: f64 = (0..3).map(|k| (points[*other][k] - point[k]).powi(2)).sum();
-            d2 < distance_m * distance_m
+            d2 < distance_m * distance_m && is_near(*other, index)
         };
         let near = (-1..=1).any(|x| {
             (-1..=1).any(|y| {
                 (-1..=1).any(|z| {
                     let neighbour =
                         [at[0].saturating_add(x), at[1].saturating_add(y), at[2].saturating_add(z)];
-                    cells.get(&neighbour).is_some_and(|c| c.iter().any(is_near))
+                    cells.get(&neighbour).is_some_and(|c| c.iter().any(is_too_near))
                 })
             })
         });

@@ -1,0 +1,437 @@
+//! Where a person with a tripod can stand and walk.
+//!
+//! A grid of vertical lines meets every surface that faces up: each meeting is a foot. A foot that has headroom
+//! and room around is walkable. Walkable feet of neighbouring lines are joined if a person can step from one to
+//! the other; what is joined is a component, such as all floors and stairs of a building. Components that end in
+//! a drop around, table tops for one, are left out.
+
+use super::FloorFound;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::place::{FOOT_M, HEIGHT_M, LEVEL};
+use glam::{DVec3, Vec3, dvec3};
+use rayon::prelude::*;
+use s3d_geom::{NearestFaces, TriMesh};
+use s3d_render::{Scene, cast_ray};
+use std::collections::BTreeMap;
+
+/// The distance of the grid's lines, metres; larger where there is very much floor.
+pub(super) const STEP_M: f64 = 0.1;
+
+/// The largest distance of lines: diagonal neighbours are then as far apart as two balls of [`BODY_M`] reach.
+pub(super) const MOST_STEP_M: f64 = 0.28;
+
+/// With more feet than this the grid is made coarser.
+const MANY_FEET: f64 = 400_000.0;
+
+/// With more feet than this on the coarsest grid nothing is placed: 300,000 m² of floors.
+const MOST_FEET: f64 = 4_000_000.0;
+
+/// Half the width of a person, metres: so much is free around at 1 m and at 1.5 m.
+const BODY_M: f32 = 0.2;
+
+/// Heights above a foot at which room around is looked for, metres: of knees, hips, and the location.
+const KNEE_M: f64 = 0.5;
+const HIP_M: f64 = 1.0;
+
+/// A location wants this much free around itself; with less a place counts for less.
+const CLEARANCE_M: f32 = 0.5;
+
+/// A place has at least this much free around.
+const LEAST_CLEARANCE_M: f32 = 0.1;
+
+/// Layers of one floor, such as a rug on it, are one foot if nearer than this, metres.
+const LAYER_M: f64 = 0.08;
+
+/// A person climbs this much, metres, and a slope of 35° besides.
+const RISER_M: f64 = 0.13;
+const SLOPE: f64 = 0.7;
+
+/// A tripod stands where the floor around is this level, metres a line.
+const UNEVEN_M: f64 = 0.05;
+
+/// Furniture ends in a drop of at most this, metres: a storey is higher.
+const DROP_M: f64 = 2.2;
+
+/// A component of which this share of the rim is such a drop is furniture …
+const DROP_SHARE: f64 = 0.25;
+
+/// … unless it has more floor than any table, m².
+const LARGEST_TABLE_M2: f64 = 20.0;
+
+/// Components of less floor are left out, m².
+const SMALLEST_M2: f64 = 0.25;
+
+/// Which side of a face counts as its front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Facing {
+    Fronts,
+    /// To tell whether a mesh is inside out.
+    Backs,
+}
+
+impl Facing {
+    /// The normal of a face on the side that counts.
+    pub(super) fn normal(self, mesh: &TriMesh, face: u32) -> Vec3 {
+        match self {
+            Self::Fronts => mesh.normal(face),
+            Self::Backs => -mesh.normal(face),
+        }
+    }
+}
+
+/// Where a location could be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) foot: DVec3,
+    /// Free space around, metres, at most [`CLEARANCE_M`].
+    clearance_m: f32,
+    /// How much walkable floor this place was taken from.
+    pub(super) stands_for_m2: f64,
+}
+
+impl Place {
+    pub(super) fn eye(&self) -> DVec3 {
+        // As it is written: coordinates of the mesh have no more digits.
+        (self.foot + HEIGHT_M * DVec3::Z).as_vec3().as_dvec3()
+    }
+
+    /// What a square metre that it sees counts: less with less clearance than a location wants.
+    pub(super) fn weight(&self) -> u64 {
+        (1000.0 * self.clearance_m) as u64
+    }
+}
+
+/// A meeting of a line of the grid and a surface that faces up.
+#[derive(Clone, Copy, Debug)]
+struct Foot {
+    column: u64,
+    z: f64,
+    has_headroom: bool,
+    /// Free at the hips and above.
+    walkable: bool,
+    clearance_m: f32,
+}
+
+/// All feet, by column and height.
+pub(super) struct Ground {
+    grid: Grid,
+    feet: Vec<Foot>,
+    /// Of each foot, the first foot of its component.
+    component: Vec<u32>,
+    /// Whether a tripod may stand there: walkable, level, and of a component that is kept.
+    is_place: Vec<bool>,
+    pub(super) floor: FloorFound,
+}
+
+impl Ground {
+    /// Looks for feet, and which of them are places.
+    pub(super) fn find(
+        ctx: &Context,
+        scene: &Scene<'_>,
+        nearest: &NearestFaces<'_>,
+        facing: Facing,
+    ) -> Result<Self> {
+        let mesh = scene.mesh();
+        let up: Vec<u32> = (0..mesh.faces().len() as u32)
+            .into_par_iter()
+            .filter(|&face| facing.normal(mesh, face).z > LEVEL)
+            .collect();
+        let m2: f64 = up.iter().map(|&f| mesh.area(f) * f64::from(mesh.normal(f).z.abs())).sum();
+        let grid = Grid::new(mesh, m2)?;
+        ctx.check()?;
+        let mut feet = grid.feet(mesh, &up);
+        drop(up);
+        ctx.check()?;
+        feet.par_iter_mut().try_for_each(|foot| {
+            ctx.check()?;
+            let at = grid.at(foot);
+            let way = (HEIGHT_M - FOOT_M) * DVec3::Z;
+            let hit = cast_ray(scene, at + FOOT_M * DVec3::Z, way);
+            foot.has_headroom = hit.is_none_or(|hit| hit.t > 1.0);
+            Ok::<(), Error>(())
+        })?;
+        room_around(&grid, nearest, &mut feet);
+        ctx.check()?;
+        let square = grid.step * grid.step;
+        let count = |has: &dyn Fn(&Foot) -> bool| feet.iter().filter(|f| has(f)).count() as f64 * square;
+        let floor =
+            FloorFound { up_facing_m2: m2, headroom_m2: count(&|f| f.has_headroom), ..FloorFound::default() };
+        let mut ground = Self { component: Vec::new(), is_place: vec![false; feet.len()], grid, feet, floor };
+        ground.join(scene);
+        ground.judge();
+        Ok(ground)
+    }
+
+    /// Joins walkable feet into components.
+    fn join(&mut self, scene: &Scene<'_>) {
+        let mut parents: Vec<u32> = (0..self.feet.len() as u32).collect();
+        for a in 0..self.feet.len() {
+            if !self.feet[a].walkable {
+                continue;
+            }
+            for (side, b) in self.neighbours(a, &HALF) {
+                if self.feet[b].walkable && self.is_step(a, b, side) && self.is_way(scene, a, b) {
+                    let (a, b) = (root(&mut parents, a as u32), root(&mut parents, b as u32));
+                    parents[a.max(b) as usize] = a.min(b);
+                }
+            }
+        }
+        for foot in 0..self.feet.len() as u32 {
+            let first = root(&mut parents, foot);
+            parents[foot as usize] = first;
+        }
+        self.component = parents;
+    }
+
+    /// Decides which components are floors, and which of their feet are places.
+    fn judge(&mut self) {
+        #[derive(Default)]
+        struct Tally {
+            feet: u64,
+            rim: u64,
+            drops: u64,
+        }
+        let mut tallies: BTreeMap<u32, Tally> = BTreeMap::new();
+        for a in (0..self.feet.len()).filter(|&a| self.feet[a].walkable) {
+            let tally = tallies.entry(self.component[a]).or_default();
+            tally.feet += 1;
+            let mut is_level = true;
+            for side in SIDES {
+                let (mut goes_on, mut has_surface, mut lower) = (false, false, false);
+                for b in self.beside(a, side) {
+                    if self.is_step(a, b, side) {
+                        has_surface = true;
+                        goes_on |= self.component[b] == self.component[a] && self.feet[b].walkable;
+                        is_level &= (self.feet[b].z - self.feet[a].z).abs() <= UNEVEN_M;
+                    } else {
+                        let below = self.feet[a].z - self.feet[b].z;
+                        lower |= below > 0.0 && below < DROP_M;
+                    }
+                }
+                let is_drop = !has_surface && lower;
+                tally.rim += u64::from(!goes_on);
+                tally.drops += u64::from(is_drop);
+                is_level &= !is_drop;
+            }
+            self.is_place[a] = is_level;
+        }
+        let square = self.grid.step * self.grid.step;
+        let is_floor = |tally: &Tally| {
+            let m2 = tally.feet as f64 * square;
+            let is_furniture = tally.drops as f64 > DROP_SHARE * tally.rim as f64 && m2 < LARGEST_TABLE_M2;
+            m2 >= SMALLEST_M2 && !is_furniture
+        };
+        let floors: Vec<u32> = tallies.iter().filter(|(_, t)| is_floor(t)).map(|(&first, _)| first).collect();
+        let mut walkable = 0;
+        for a in 0..self.feet.len() {
+            let is_kept = self.feet[a].walkable && floors.binary_search(&self.component[a]).is_ok();
+            self.feet[a].walkable = is_kept;
+            self.is_place[a] &= is_kept && self.feet[a].clearance_m >= LEAST_CLEARANCE_M;
+            walkable += u64::from(is_kept);
+        }
+        self.floor.walkable_m2 = walkable as f64 * square;
+        if !self.is_place.contains(&true) {
+            // Nowhere level, as in a rough scan: then the tripod stands askew.
+            self.is_place =
+                self.feet.iter().map(|f| f.walkable && f.clearance_m >= LEAST_CLEARANCE_M).collect();
+        }
+    }
+
+    /// The places with most room around, one for each square of `cell_m` or larger: `most` at the most, or one
+    /// a component. In the order of the grid.
+    pub(super) fn candidates(&self, cell_m: f64, most: usize) -> Vec<Place> {
+        let square = self.grid.step * self.grid.step;
+        let mut cell_m = cell_m.max(self.grid.step);
+        loop {
+            // Of each square the best place, if there is one, and how much floor it has.
+            let mut cells: BTreeMap<(u32, [i64; 3]), (Option<usize>, f64)> = BTreeMap::new();
+            for a in (0..self.feet.len()).filter(|&a| self.feet[a].walkable) {
+                let at = self.grid.at(&self.feet[a]) - self.grid.origin;
+                // A component goes over storeys.
+                let cell = [at.x / cell_m, at.y / cell_m, at.z / DROP_M].map(|c| c.floor() as i64);
+                let best = cells.entry((self.component[a], cell)).or_insert((None, 0.0));
+                best.1 += square;
+                if !self.is_place[a] {
+                    continue;
+                }
+                let off = |b: usize| {
+                    let at = self.grid.at(&self.feet[b]) - self.grid.origin;
+                    let off = |c: f64, i: i64| (c / cell_m - i as f64 - 0.5).powi(2);
+                    off(at.x, cell[0]) + off(at.y, cell[1])
+                };
+                let is_better = |old: usize| {
+                    let (this, old_m) = (self.feet[a].clearance_m, self.feet[old].clearance_m);
+                    this > old_m || this == old_m && off(a) < off(old)
+                };
+                if best.0.is_none_or(is_better) {
+                    best.0 = Some(a);
+                }
+            }
+            let mut found: Vec<(usize, f64)> =
+                cells.into_values().filter_map(|(a, m2)| Some((a?, m2))).collect();
+            // Squares that are larger than the building do not become fewer.
+            if found.len() <= most || cell_m > self.grid.extent_m() {
+                found.sort_by_key(|(a, _)| *a);
+                let place = |(a, stands_for_m2): (usize, f64)| Place {
+                    foot: self.grid.at(&self.feet[a]),
+                    clearance_m: self.feet[a].clearance_m,
+                    stands_for_m2,
+                };
+                return found.into_iter().map(place).collect();
+            }
+            cell_m *= (found.len() as f64 / most as f64).sqrt().max(1.1);
+        }
+    }
+
+    /// Whether a person can step from `a` to `b` on the line at `side`.
+    fn is_step(&self, a: usize, b: usize, side: Side) -> bool {
+        let along = self.grid.step * (f64::from(side.0 * side.0 + side.1 * side.1)).sqrt();
+        (self.feet[a].z - self.feet[b].z).abs() <= RISER_M + SLOPE * along
+    }
+
+    /// Whether the way is free. Balls of free space at both ends leave no gap for a surface if they overlap.
+    fn is_way(&self, scene: &Scene<'_>, a: usize, b: usize) -> bool {
+        let [from, to] = [a, b].map(|i| self.grid.at(&self.feet[i]) + HIP_M * DVec3::Z);
+        from.distance(to) <= 2.0 * f64::from(BODY_M)
+            || cast_ray(scene, from, to - from).is_none_or(|h| h.t > 1.0)
+    }
+
+    /// Feet on the lines at some sides of a foot.
+    fn neighbours<'a>(&'a self, a: usize, sides: &'a [Side]) -> impl Iterator<Item = (Side, usize)> + 'a {
+        sides.iter().flat_map(move |&side| self.beside(a, side).map(move |b| (side, b)))
+    }
+
+    /// Feet on the line at one side of a foot.
+    fn beside(&self, a: usize, side: Side) -> std::ops::Range<usize> {
+        let Some(column) = self.grid.beside(self.feet[a].column, side) else { return 0..0 };
+        let start = self.feet.partition_point(|f| f.column < column);
+        let len = self.feet.iter().skip(start).take_while(|f| f.column == column).count();
+        start..start + len
+    }
+}
+
+/// A direction in the grid.
+type Side = (i32, i32);
+
+const SIDES: [Side; 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
+
+/// Every pair of neighbours once.
+const HALF: [Side; 4] = [(1, 0), (1, 1), (0, 1), (-1, 1)];
+
+/// The first foot of a component, and a shorter way to it.
+fn root(parents: &mut [u32], mut foot: u32) -> u32 {
+    while parents[foot as usize] != foot {
+        let next = parents[foot as usize];
+        parents[foot as usize] = parents[next as usize];
+        foot = parents[foot as usize];
+    }
+    foot
+}
+
+/// Measures the free space around feet that have headroom.
+fn room_around(grid: &Grid, nearest: &NearestFaces<'_>, feet: &mut [Foot]) {
+    let mut found = Vec::new();
+    let mut measure = |feet: &mut [Foot], height: f64, least: f32| {
+        let asked: Vec<usize> = (0..feet.len()).filter(|&i| feet[i].walkable).collect();
+        let points: Vec<Vec3> =
+            asked.iter().map(|&i| (grid.at(&feet[i]) + height * DVec3::Z).as_vec3()).collect();
+        nearest.nearest_many(&points, &mut found);
+        for (&i, n) in asked.iter().zip(&found) {
+            feet[i].clearance_m = feet[i].clearance_m.min(n.distance_m);
+            feet[i].walkable = n.distance_m >= least;
+        }
+    };
+    feet.iter_mut().for_each(|f| f.walkable = f.has_headroom);
+    measure(feet, HEIGHT_M, BODY_M);
+    measure(feet, HIP_M, BODY_M);
+    measure(feet, KNEE_M, 0.0);
+}
+
+/// Vertical lines at equal distances. They miss the lines on which builders of models put their edges.
+#[derive(Clone, Copy)]
+struct Grid {
+    origin: DVec3,
+    step: f64,
+    columns: [u64; 2],
+}
+
+impl Grid {
+    /// A grid for so many square metres that face up.
+    fn new(mesh: &TriMesh, m2: f64) -> Result<Self> {
+        let step = (m2 / MANY_FEET).sqrt().clamp(STEP_M, MOST_STEP_M);
+        if m2 / (step * step) > MOST_FEET {
+            return Err(Error::Input(format!(
+                "{m2:.0} m² of the mesh face up, which is too much floor to place scan locations on: is `units` right? If it is, \
+                 list scan locations or split the scan"
+            )));
+        }
+        let aabb = mesh.aabb();
+        let (min, size) = (aabb.min.as_dvec3(), aabb.size().as_dvec3());
+        let columns = [size.x, size.y].map(|length| (length / step).ceil().min(1e9) as u64 + 1);
+        Ok(Self { origin: min - dvec3(0.618, 0.382, 0.0) * step, step, columns })
+    }
+
+    /// The longer side.
+    fn extent_m(&self) -> f64 {
+        self.columns[0].max(self.columns[1]) as f64 * self.step
+    }
+
+    fn at(&self, foot: &Foot) -> DVec3 {
+        let [i, j] = self.indices(foot.column);
+        dvec3(self.origin.x + i as f64 * self.step, self.origin.y + j as f64 * self.step, foot.z)
+    }
+
+    fn indices(&self, column: u64) -> [u64; 2] {
+        [column / (self.columns[1] + 1), column % (self.columns[1] + 1)]
+    }
+
+    fn column(&self, i: u64, j: u64) -> u64 {
+        i * (self.columns[1] + 1) + j
+    }
+
+    /// The column at one side of another.
+    fn beside(&self, column: u64, side: Side) -> Option<u64> {
+        let [i, j] = self.indices(column);
+        let i = i.checked_add_signed(side.0.into()).filter(|&i| i <= self.columns[0])?;
+        let j = j.checked_add_signed(side.1.into()).filter(|&j| j <= self.columns[1])?;
+        Some(self.column(i, j))
+    }
+
+    /// Where the lines meet some faces, none of them upright; layers of one floor are one foot, the highest.
+    fn feet(&self, mesh: &TriMesh, faces: &[u32]) -> Vec<Foot> {
+        let mut all: Vec<(u64, f64)> =
+            faces.par_iter().flat_map_iter(|&face| self.meetings(mesh.triangle(face))).collect();
+        all.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut feet: Vec<Foot> = Vec::new();
+        for (column, z) in all {
+            match feet.last_mut() {
+                Some(last) if last.column == column && z - last.z < LAYER_M => last.z = z,
+                _ => feet.push(Foot {
+                    column,
+                    z,
+                    has_headroom: false,
+                    walkable: false,
+                    clearance_m: CLEARANCE_M,
+                }),
+            }
+        }
+        feet
+    }
+
+    /// Where the lines meet a triangle.
+    fn meetings(&self, corners: [Vec3; 3]) -> impl Iterator<Item = (u64, f64)> {
+        let grid = *self;
+        let [a, b, c] = corners.map(|p| (p.as_dvec3() - grid.origin) / dvec3(grid.step, grid.step, 1.0));
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let range = move |k: usize| low[k].ceil().max(0.0) as u64..=high[k].floor().max(0.0) as u64;
+        let cross = |p: DVec3, q: DVec3, x: f64, y: f64| (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
+        let area = cross(a, b, c.x, c.y);
+        range(0).flat_map(move |i| range(1).map(move |j| (i, j))).filter_map(move |(i, j)| {
+            let (x, y) = (i as f64, j as f64);
+            let [wa, wb, wc] = [cross(b, c, x, y), cross(c, a, x, y), cross(a, b, x, y)].map(|w| w / area);
+            let is_in = wa >= 0.0 && wb >= 0.0 && wc >= 0.0;
+            is_in.then(|| (grid.column(i, j), grid.origin.z + wa * a.z + wb * b.z + wc * c.z))
+        })
+    }
+}

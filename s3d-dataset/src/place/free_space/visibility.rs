@@ -1,0 +1,157 @@
+//! What is seen from a place: the surface, and whether the place is inside.
+
+use super::standing::Facing;
+use crate::context::Context;
+use crate::error::Result;
+use glam::{DVec3, dvec3};
+use rayon::prelude::*;
+use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
+use s3d_render::{Scene, cast_ray};
+use std::f64::consts::PI;
+
+/// Samples of the surface a square metre, and how few and how many there are at least and at most.
+const SAMPLES_PER_M2: f64 = 12.0;
+const FEWEST_SAMPLES: u64 = 4000;
+const MOST_SAMPLES: u64 = 40_000;
+
+/// What is farther is not seen, metres: a texel of a scanner's picture is then a centimetre or so wide.
+const REACH_M: f64 = 10.0;
+
+/// What is seen at a smaller angle than this is not seen: the cosine of 78°.
+const GRAZING: f64 = 0.2;
+
+/// What is hit this much nearer than a sample, metres, hides it.
+const HIDES_M: f64 = 0.01;
+
+/// Directions that tell whether a place is inside.
+const DIRECTIONS: u32 = 256;
+
+/// Inside, rays end on front sides in this share of all directions …
+const FRONT_SHARE: f64 = 0.5;
+/// … on back sides in no more than this share of those in which they end, …
+const BACK_SHARE: f64 = 0.25;
+/// … in this share of directions a little above the horizon on front sides, and above it likewise, …
+const AROUND_SHARE: f64 = 0.5;
+const ABOVE_SHARE: f64 = 0.5;
+/// … or, under the open sky as where a ceiling was not captured, in this share around.
+const WALLED_SHARE: f64 = 0.75;
+
+/// Samples of the surface of a mesh, each of the same area.
+pub(super) struct Surface {
+    points: Vec<DVec3>,
+    normals: Vec<DVec3>,
+    pub(super) m2_per_sample: f64,
+}
+
+impl Surface {
+    pub(super) fn sample(mesh: &TriMesh, seed: u64) -> Self {
+        let m2 = mesh.total_area();
+        let total = ((m2 * SAMPLES_PER_M2) as u64).clamp(FEWEST_SAMPLES, MOST_SAMPLES);
+        let sampler = SurfaceSampler::new(mesh, Density::Total(total), seed);
+        let mut cloud = PointCloud::default();
+        sampler.sample(0..sampler.len(), &mut cloud);
+        Self {
+            points: cloud.positions.iter().map(|p| p.as_dvec3()).collect(),
+            normals: cloud.faces.iter().map(|&f| mesh.normal(f).as_dvec3()).collect(),
+            m2_per_sample: m2 / total as f64,
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// The samples that each of some places sees, in ascending order.
+    pub(super) fn seen_from(
+        &self,
+        ctx: &Context,
+        scene: &Scene<'_>,
+        eyes: &[DVec3],
+    ) -> Result<Vec<Vec<u32>>> {
+        let progress = ctx.progress("looking from", "places", eyes.len() as u64);
+        eyes.par_iter()
+            .map(|&eye| {
+                ctx.check()?;
+                let seen =
+                    (0..self.len()).filter(|&i| self.is_seen(scene, eye, i)).map(|i| i as u32).collect();
+                progress.add(1);
+                Ok(seen)
+            })
+            .collect()
+    }
+
+    fn is_seen(&self, scene: &Scene<'_>, eye: DVec3, sample: usize) -> bool {
+        let way = self.points[sample] - eye;
+        let m = way.length();
+        m <= REACH_M
+            && -self.normals[sample].dot(way) >= GRAZING * m
+            && cast_ray(scene, eye, way).is_none_or(|hit| hit.t * m >= m - HIDES_M)
+    }
+}
+
+/// What ends rays from a place: shares of directions.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Enclosure {
+    /// Front sides and back sides, of all directions.
+    front: f64,
+    back: f64,
+    /// Front sides, of directions up to 15° above the horizon, and of those above 30°.
+    around: f64,
+    above: f64,
+}
+
+impl Enclosure {
+    pub(super) fn of(scene: &Scene<'_>, eye: DVec3, facing: Facing) -> Self {
+        // How many directions, and in how many of them a front side is hit.
+        let (mut all, mut around, mut above) = ([0.0; 3], [0.0; 2], [0.0; 2]);
+        for direction in directions() {
+            let hit = cast_ray(scene, eye, direction);
+            let is_front = |face| facing.normal(scene.mesh(), face).as_dvec3().dot(direction) < 0.0;
+            let kind = hit.map_or(2, |hit| usize::from(!is_front(hit.face)));
+            all[kind] += 1.0;
+            if (0.0..0.26).contains(&direction.z) {
+                around[usize::from(kind != 0)] += 1.0;
+            }
+            if direction.z > 0.5 {
+                above[usize::from(kind != 0)] += 1.0;
+            }
+        }
+        let share = |[front, other]: [f64; 2]| front / (front + other);
+        let n = f64::from(DIRECTIONS);
+        Self { front: all[0] / n, back: all[1] / n, around: share(around), above: share(above) }
+    }
+
+    /// Whether a place is in a room or in a yard that is walled all around.
+    pub(super) fn is_inside(&self) -> bool {
+        self.front >= FRONT_SHARE
+            && self.back <= BACK_SHARE * (self.front + self.back)
+            && self.around >= AROUND_SHARE
+            && (self.above >= ABOVE_SHARE || self.around >= WALLED_SHARE)
+    }
+
+    pub(super) fn mean(all: &[Self]) -> Self {
+        let n = all.len().max(1) as f64;
+        let mean = |of: fn(&Self) -> f64| all.iter().map(of).sum::<f64>() / n;
+        Self {
+            front: mean(|e| e.front),
+            back: mean(|e| e.back),
+            around: mean(|e| e.around),
+            above: mean(|e| e.above),
+        }
+    }
+
+    /// In how many of a hundred directions there is a front side, a back side, nothing.
+    pub(super) fn percent(&self) -> [f64; 3] {
+        [self.front, self.back, 1.0 - self.front - self.back].map(|share| 100.0 * share)
+    }
+}
+
+/// Directions all around, evenly: a Fibonacci lattice.
+fn directions() -> impl Iterator<Item = DVec3> {
+    (0..DIRECTIONS).map(|i| {
+        let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(DIRECTIONS);
+        let (sin, cos) = libm::sincos(f64::from(i) * PI * (3.0 - 5f64.sqrt()));
+        let r = (1.0 - z * z).sqrt();
+        dvec3(r * cos, r * sin, z)
+    })
+}
