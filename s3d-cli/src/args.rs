@@ -1,9 +1,8 @@
 //! What several commands share.
 
-use crate::values::parsed;
-use clap::builder::PossibleValuesParser;
+use crate::values::{parsed, positive};
 use clap::{Args, value_parser};
-use s3d_dataset::Condition;
+use s3d_dataset::{Condition, SceneSource};
 use s3d_io::mesh::UpAxis;
 use std::path::PathBuf;
 
@@ -29,12 +28,37 @@ pub(crate) struct MeshArgs {
     #[arg(value_name = "MESH")]
     pub(crate) mesh: PathBuf,
     /// Which axis of the file points up.
-    #[arg(long, default_value = "y", value_parser = PossibleValuesParser::new(["y", "z"]))]
-    pub(crate) up: String,
+    #[arg(long, default_value = "y", value_parser = parsed::<UpAxis>, value_name = "y|z")]
+    pub(crate) up: UpAxis,
 }
 
-impl MeshArgs {
-    pub(crate) fn up(&self) -> UpAxis {
-        if self.up == "z" { UpAxis::Z } else { UpAxis::Y }
+/// The scenes of a data set.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Scenes {
+    /// Scene files, or folders of published areas (area_3), one an area; or the files of one mesh (OBJ,
+    /// glTF, GLB, PLY), which is an area without labels.
+    #[arg(required = true, value_name = "SCENE.toml")]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// Which axis of the files of a mesh points up [default: y in glTF, guessed in others]
+    #[arg(long, value_parser = parsed::<UpAxis>, value_name = "y|z")]
+    pub(crate) up: Option<UpAxis>,
+}
+
+impl Scenes {
+    pub(crate) fn sources(&self) -> Vec<SceneSource> {
+        SceneSource::list(self.scenes.iter().cloned(), self.up)
     }
+}
+
+/// How scan locations are placed, if they are.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct Placing {
+    /// Put scan locations on the floor of every room instead of reading some: no two of a room nearer than
+    /// this, 1.5 m high, clear of walls and things.
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub(crate) place_cameras: Option<f64>,
+    /// Put as few scan locations as see this share of the surface that can be seen, instead of reading some
+    /// [default where there are none to read: 0.95]
+    #[arg(long, value_name = "SHARE", value_parser = positive, conflicts_with = "place_cameras")]
+    pub(crate) see: Option<f64>,
 }

@@ -217,7 +217,11 @@ class Dataset:
         self.conventions = read_json(self.root / "conventions.json")
         self.manifest = read_json(self.root / "manifest.json")
         self.areas = self.manifest["area_numbers"]
-        self.label_names = read_json(self.root / "assets/semantic_labels.json")
+        self.is_labelled = self.manifest["labels"] > 0
+        # Without labels: nothing but the one that means that there is none.
+        self.label_names = ["<UNK>_0_<UNK>_0_0"]
+        if self.is_labelled:
+            self.label_names = read_json(self.root / "assets/semantic_labels.json")
         self.labels = [parse_label(name) for name in self.label_names]
         # One entry more: index -1, nothing seen, has no class either.
         kinds = [CLASSES.index(label.class_name) if label else -1 for label in self.labels]
@@ -347,13 +351,16 @@ def main():
             text = f", depth and coordinates at most {max(off) * 1000:.1f} mm apart" if off else ""
             print(f"area {area} {kind}: {len(images)} images, {len(picked)} read{text}")
         folder = data.root / f"area_{area}" / "3d"
-        vertices, faces, materials = read_obj(folder / "semantic.obj")
-        if len(faces) and faces.max() >= len(vertices) or not set(materials) <= set(data.label_names):
-            failures.append(f"area {area}: semantic.obj has faces without vertices, or materials that are no labels")
+        name = "semantic.obj" if data.is_labelled else "rgb.obj"
+        vertices, faces, materials = read_obj(folder / name)
+        if len(faces) and faces.max() >= len(vertices):
+            failures.append(f"area {area}: {name} has faces without vertices")
+        if data.is_labelled and not set(materials) <= set(data.label_names):
+            failures.append(f"area {area}: {name} has materials that are no labels")
         points = read_points(folder / "pointcloud.ply")
         if len(points) and points["label"].max() >= len(data.labels):
             failures.append(f"area {area}: pointcloud.ply has labels beyond the table")
-        instances = read_instances(folder / "instances.npz")
+        instances = read_instances(folder / "instances.npz") if data.is_labelled else []
         if any(i["counts"].sum() != len(i["points"]) for i in instances):
             failures.append(f"area {area}: instances.npz counts other points than it lists")
         rooms = data.s3dis_rooms(area)

@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let pose = Pose::level(dvec3(2.0, 1.5, 1.4), 0.0);
     let locations = vec![ScanLocation { uuid: "0".repeat(32), pose, line: 0 }];
 
-    let scene = MemoryScene { area: 1, mesh, annotations, locations };
+    let scene = MemoryScene { area: 1, mesh, annotations: Some(annotations), locations };
     let options = ExportOptions { views: 4, size: 128, pano_width: 256, ..ExportOptions::default() };
     let made = Export::new([scene]).options(options).run(&out, &Context::default())?;
     if let Some(made) = made {

@@ -2,12 +2,12 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::area::{locate, look_around};
+use crate::export::area::label_doubts;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::{AreaInput, Inputs};
-use crate::export::labels::annotate::{Annotated, annotate, hidden_instances};
-use crate::export::labels::overlap::overlap_doubts;
+use crate::export::labels::annotate::{Annotated, annotate, unannotated};
+use crate::export::location::{Located, locate, look_around, room_name};
 use crate::options::ExportOptions;
 use crate::useful::{
     Estimate, Finding, label_findings, mesh_findings, outlook_findings, size_findings, stops_any,
@@ -26,6 +26,8 @@ pub struct InfoOptions {
     /// Show the scan locations that an export would put on the floor, no two of a room nearer than this,
     /// metres.
     pub place_cameras: Option<f64>,
+    /// Show those that see this share of the surface.
+    pub see: Option<f64>,
     /// The seed by which they would be placed.
     pub seed: u64,
     /// Skip and count what is not as it should be in the annotations, as in an export that is lenient.
@@ -40,6 +42,10 @@ pub struct SceneInfo {
     pub area: u32,
     /// Its mesh.
     pub mesh: MeshInfo,
+    /// What was found out about it, a sentence each.
+    pub notes: Vec<String>,
+    /// Whether there are labels: if not, it has no rooms either.
+    pub is_labelled: bool,
     /// Its rooms, by name.
     pub rooms: Vec<RoomInfo>,
     /// Annotated points.
@@ -55,6 +61,8 @@ pub struct SceneInfo {
     pub pictures: Option<String>,
     /// Its scan locations.
     pub locations: Vec<LocationInfo>,
+    /// How much of the surface they see, in a sentence; `None` if they were not placed by what they see.
+    pub surface_seen: Option<String>,
     /// About how large an export with the default options becomes.
     pub estimate: Estimate,
     /// What looks wrong, a sentence each.
@@ -77,8 +85,8 @@ pub struct MeshInfo {
     pub area_m2: f64,
     /// Its box, world metres, Z-up.
     pub bounds: Aabb,
-    /// What was subtracted from the coordinates of its files, and is from those of points and locations; 0 if
-    /// nothing is.
+    /// What was subtracted from the coordinates of its files, and is from those of points and locations; 0
+    /// if nothing is.
     pub offset_m: [f64; 3],
 }
 
@@ -104,8 +112,8 @@ pub struct RoomInfo {
 pub struct LocationInfo {
     /// Where it is.
     pub location: ScanLocation,
-    /// Its room.
-    pub room: Room,
+    /// Its room, if there are rooms.
+    pub room: Option<Room>,
     /// The share of directions in which it sees the mesh, 0 to 1.
     pub coverage: f64,
     /// The distance to the nearest of what it sees, metres.
@@ -119,13 +127,18 @@ pub struct LocationInfo {
 /// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be
 /// exported; [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context) -> Result<SceneInfo> {
-    let inputs = Inputs::open(&[scene.into()], options.place_cameras, options.lenient)?;
+    let InfoOptions { place_cameras, see, seed, lenient } = *options;
+    let placing = ExportOptions { place_cameras, see, ..ExportOptions::default() }.canonical()?.placing();
+    let inputs = Inputs::open(&[scene.into()], placing, lenient)?;
     let area = &inputs.areas[0];
     let file = area.read_mesh()?;
     let mut doubts: Vec<String> = area.warnings.iter().chain(&file.warnings).cloned().collect();
     let mesh = &file.mesh;
     let nearest = NearestFaces::new(mesh);
-    let annotated = annotate(ctx, area, &nearest, &inputs.table, |_| Ok(()))?;
+    let annotated = match area.is_labelled {
+        true => annotate(ctx, area, &nearest, &inputs.table, |_| Ok(()))?,
+        false => unannotated(&nearest, &inputs.table)?,
+    };
     let scene = Scene::new(mesh);
     let pictures = match Pictures::open(area, |_| true) {
         Ok(pictures) => pictures.map(|pictures| {
@@ -138,18 +151,24 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
             None
         }
     };
-    let defaults = ExportOptions::default();
+    let defaults = match area.is_labelled {
+        true => ExportOptions::default(),
+        false => ExportOptions::default().without_labels()?,
+    };
     let mut findings = mesh_findings(mesh, area.pictures.is_none());
     findings.extend(size_findings(mesh, defaults.points_per_m2)?);
-    findings.extend(label_findings(mesh, &annotated, &inputs.table));
-    let too_many = area.count_findings(&annotated.rooms);
+    let mut too_many = Vec::new();
+    if area.is_labelled {
+        findings.extend(label_findings(mesh, &annotated, &inputs.table));
+        too_many = area.count_findings(&annotated.rooms);
+    }
     let located = match stops_any(&too_many) {
         // They would take hours to place.
-        true => Vec::new(),
-        false => locate(ctx, area, &scene, &nearest, &annotated, &inputs.table, options.seed)?,
+        true => Located::default(),
+        false => locate(ctx, area, &scene, &nearest, &annotated, &inputs.table, seed)?,
     };
     findings.extend(too_many);
-    let (at, room_of): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();
+    let Located { locations: at, rooms: room_of, surface_seen } = located;
     let outlooks = look_around(ctx, &scene, &at)?;
     let estimate = match at.len() {
         0 => area.estimate(mesh, &defaults),
@@ -165,13 +184,13 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
         let (coverage, nearest_m) = (outlook.coverage, outlook.nearest_m);
         locations.push(LocationInfo { location, room, coverage, nearest_m });
     }
-    doubts.extend(annotated.skipped.sentence());
-    doubts.extend(overlap_doubts(&annotated.rooms));
-    doubts.extend(hidden_instances(area, &annotated.label_of_face, &inputs.table));
+    doubts.extend(label_doubts(area, &annotated, &inputs.table));
     let total = &annotated.report.total;
     Ok(SceneInfo {
         area: area.number,
         mesh: MeshInfo::of(&file),
+        notes: area.notes.clone(),
+        is_labelled: area.is_labelled,
         rooms: rooms(area, &annotated),
         points: annotated.points,
         labelled_faces: total.faces,
@@ -179,6 +198,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
         far_points: total.far_points,
         pictures,
         locations,
+        surface_seen: surface_seen.map(|seen| seen.to_string()),
         estimate,
         doubts,
     })
@@ -218,19 +238,24 @@ impl MeshInfo {
 impl fmt::Display for SceneInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "area {}\n\n{}", self.area, self.mesh)?;
-        writeln!(f, "annotations: {} points, {} rooms", self.points, self.rooms.len())?;
-        self.rooms.iter().try_for_each(|room| writeln!(f, "{room}"))?;
-        writeln!(
-            f,
-            "  {} of {} faces get a label, {} of them contested; {} points are farther than 5 cm from every face",
-            self.labelled_faces, self.mesh.faces, self.contested_faces, self.far_points
-        )?;
+        self.notes.iter().try_for_each(|note| writeln!(f, "  {note}"))?;
+        if self.is_labelled {
+            writeln!(f, "annotations: {} points, {} rooms", self.points, self.rooms.len())?;
+            self.rooms.iter().try_for_each(|room| writeln!(f, "{room}"))?;
+            writeln!(
+                f,
+                "  {} of {} faces get a label, {} of them contested; {} points are farther than 5 cm from every face",
+                self.labelled_faces, self.mesh.faces, self.contested_faces, self.far_points
+            )?;
+        } else {
+            writeln!(f, "annotations: none, so that a data set of it has no labels")?;
+        }
         if let Some(pictures) = &self.pictures {
             writeln!(f, "\ncolours: {pictures}")?;
         }
         writeln!(f, "\nscan locations: {}", self.locations.len())?;
         for LocationInfo { location, room, coverage, nearest_m } in &self.locations {
-            let (uuid, at) = (&location.uuid, location.pose.location);
+            let (uuid, at, room) = (&location.uuid, location.pose.location, room_name(*room));
             writeln!(
                 f,
                 "  {uuid}  ({:.2}, {:.2}, {:.2})  {room}  sees the mesh in {:.0} %, the nearest of it at {nearest_m:.2} m",
@@ -239,6 +264,9 @@ impl fmt::Display for SceneInfo {
                 at.z,
                 100.0 * coverage
             )?;
+        }
+        if let Some(seen) = &self.surface_seen {
+            writeln!(f, "  {seen}")?;
         }
         writeln!(f, "\nan export with the default options: {}", self.estimate)?;
         let verdict = if self.doubts.is_empty() { "nothing looks wrong" } else { "what looks wrong:" };

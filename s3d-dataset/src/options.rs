@@ -1,6 +1,7 @@
 //! What an export is asked for, as plain data.
 
 use crate::error::{Error, Result};
+use crate::export::input::cameras::Placing;
 use crate::profile::loader::Profile;
 use crate::useful::Condition;
 use s3d_geom::NormalAxes;
@@ -31,9 +32,13 @@ pub struct ExportOptions {
     #[serde(skip_serializing_if = "is_zero")]
     pub seed: u64,
     /// Put scan locations on the floor of every room, no two of a room nearer than this, metres, instead of
-    /// reading some.
+    /// reading some. Without labels: no two nearer than this at all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub place_cameras: Option<f64>,
+    /// Put as few scan locations as see this share of the surface that can be seen from anywhere, above 0 to
+    /// 1, instead of reading some. Where there are none to be read, and nothing is said, it is 0.95.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub see: Option<f64>,
     /// Candidate views a scan location, 100,000 at most; the paper's are 3 × 24.
     pub views: u32,
     /// Width and height of a view in pixels, 8 to 16,384.
@@ -89,6 +94,7 @@ impl Default for ExportOptions {
         Self {
             seed: 0,
             place_cameras: None,
+            see: None,
             views: 72,
             size: 1080,
             pano_width: 4096,
@@ -116,6 +122,11 @@ fn is_zero(seed: &u64) -> bool {
 }
 
 impl ExportOptions {
+    /// How scan locations are to be placed, if they are.
+    pub(crate) fn placing(&self) -> Option<Placing> {
+        self.place_cameras.map(Placing::Apart).or(self.see.map(Placing::Seeing))
+    }
+
     /// What `conventions.json` tells of them.
     pub fn conventions(&self) -> Conventions {
         Conventions { depth_units: self.depth_units, normal_axes: self.normal_axes, xyz: self.xyz }
@@ -141,6 +152,29 @@ impl ExportOptions {
         Ok(options)
     }
 
+    /// Whether something is asked for that is made of labels.
+    pub(crate) fn need_labels(&self) -> bool {
+        self.modalities.iter().any(|d| d.is_semantic()) || !self.profiles.is_empty() || self.pad_labels.0 > 0
+    }
+
+    /// The same for scenes without labels: what is made of them is left out.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if nothing else is asked for, and for what only makes sense with labels.
+    pub(crate) fn without_labels(&self) -> Result<Self> {
+        if let Some(profile) = self.profiles.first() {
+            return Err(Error::Usage(format!("--profile {profile} needs labels, and the scene has none")));
+        }
+        let mut options = Self { pad_labels: PadLabels(0), lenient: false, ..self.clone() };
+        options.modalities.retain(|d| !d.is_semantic());
+        if options.modalities.is_empty() && !self.modalities.is_empty() {
+            return Err(Error::Usage(
+                "--modalities: only images of labels, and the scene has none".to_owned(),
+            ));
+        }
+        Ok(options)
+    }
+
     fn check_ranges(&self) -> Result<()> {
         let positive = |value: f64| value > 0.0 && value.is_finite();
         let fits = [
@@ -153,6 +187,8 @@ impl ExportOptions {
             ),
             ("points_per_m2", positive(self.points_per_m2), "above 0"),
             ("place_cameras", self.place_cameras.is_none_or(positive), "above 0"),
+            ("see", self.see.is_none_or(|share| positive(share) && share <= 1.0), "above 0, and at most 1"),
+            ("see", self.see.is_none() || self.place_cameras.is_none(), "left out beside place_cameras"),
             ("entropy_stride", (1..=64).contains(&self.entropy_stride), "from 1 to 64"),
             ("pad_labels", self.pad_labels.0 <= 65_536, "at most 65536"),
         ];

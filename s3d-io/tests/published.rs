@@ -119,17 +119,18 @@ fn faces_in_another_order_are_matched() {
 
 #[test]
 fn what_is_missing_is_named() {
-    for (missing, words) in [
-        ("3d/rgb.obj", "has no 3d/rgb.obj, the textured mesh"),
-        ("3d/semantic.obj", "has no 3d/semantic.obj, which labels"),
-    ] {
-        let dir = tempfile::tempdir().unwrap();
-        area(dir.path());
-        let folder = dir.path().join("area_3");
-        fs::remove_file(folder.join(missing)).unwrap();
-        let message = PublishedArea::open(&folder).unwrap_err().to_string();
-        assert!(message.contains(words), "{message}");
-    }
+    let dir = tempfile::tempdir().unwrap();
+    area(dir.path());
+    let folder = dir.path().join("area_3");
+    // Without labels it is an area like any other.
+    fs::remove_file(folder.join("3d/semantic.obj")).unwrap();
+    let found = PublishedArea::open(&folder).unwrap();
+    assert!(found.warnings.iter().any(|w| w.contains("has no 3d/semantic.obj, so that there are no labels")));
+    let mesh = found.read_mesh().unwrap();
+    assert!(mesh.labels.is_empty() && mesh.label_of_face.is_empty() && mesh.file.mesh.faces().len() == 5);
+    fs::remove_file(folder.join("3d/rgb.obj")).unwrap();
+    let message = PublishedArea::open(&folder).unwrap_err().to_string();
+    assert!(message.contains("has no 3d/rgb.obj, the textured mesh"), "{message}");
     let dir = tempfile::tempdir().unwrap();
     area(dir.path());
     let folder = dir.path().join("area_3");

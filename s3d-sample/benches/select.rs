@@ -28,7 +28,7 @@ fn bench(c: &mut Criterion) {
     group.sample_size(20);
     for locations in [1usize, 200, 1413] {
         let histograms = histograms(locations * 72);
-        let scores: Vec<f64> = histograms.iter().map(entropy).collect();
+        let scores: Vec<f64> = histograms.iter().map(|h| entropy(h)).collect();
         let uuids: Vec<String> =
             (0..locations as u64).map(|i| format!("{:032x}", i * 0x9e37_79b9_7f4a)).collect();
         let items: Vec<PoolItem<'_>> = (0..scores.len())
@@ -42,7 +42,7 @@ fn bench(c: &mut Criterion) {
         let options = Selection::default();
         group.throughput(Throughput::Elements(scores.len() as u64));
         group.bench_with_input(BenchmarkId::new("entropy", locations), &histograms, |b, histograms| {
-            b.iter(|| black_box(histograms).iter().map(entropy).sum::<f64>());
+            b.iter(|| black_box(histograms).iter().map(|h| entropy(h)).sum::<f64>());
         });
         group.bench_with_input(BenchmarkId::new("one_pool", locations), &scores, |b, scores| {
             b.iter(|| select(black_box(scores), &options, 42));

@@ -1,7 +1,7 @@
-//! The score of a view: how evenly it sees the classes.
+//! The score of a view: how evenly it sees what there is to be seen, the semantic classes in the paper.
 
-/// The Shannon entropy of a histogram of the 13 semantic classes, in nats: 0 if one class has all pixels, ln
-/// 13 if all have the same number. Pixels without a class are not in the histogram; without any pixel the
+/// The Shannon entropy of a histogram of classes, in nats: 0 if one class has all pixels, ln of the number of
+/// classes if all have the same number. Pixels without a class are not in the histogram; without any pixel the
 /// entropy is 0. Source: formats.md, "Views".
 ///
 /// ```
@@ -10,14 +10,14 @@
 /// (histogram[1], histogram[2]) = (500, 500);
 /// assert_eq!(s3d_sample::entropy(&histogram), 2f64.ln());
 /// ```
-pub fn entropy(histogram: &[u64; 13]) -> f64 {
+pub fn entropy(histogram: &[u64]) -> f64 {
     let total: u128 = histogram.iter().map(|&n| u128::from(n)).sum();
     let sum = histogram.iter().filter(|&&n| n > 0).fold(0.0, |sum, &n| {
         let share = n as f64 / total as f64;
         sum - share * libm::log(share)
     });
     // Rounding may lead past the ends; and −0 is no score.
-    sum.clamp(0.0, libm::log(13.0)) + 0.0
+    sum.clamp(0.0, libm::log(histogram.len().max(1) as f64)) + 0.0
 }
 
 #[cfg(test)]
@@ -32,6 +32,7 @@ mod tests {
         one[7] = u64::MAX;
         assert_eq!(entropy(&one).to_bits(), 0f64.to_bits());
         assert_eq!(entropy(&[u64::MAX; 13]), libm::log(13.0));
+        assert_eq!((entropy(&[]), entropy(&[5]), entropy(&[3, 3])), (0.0, 0.0, libm::log(2.0)));
         let mut some = [0; 13];
         (some[0], some[5], some[12]) = (1, 2, 1);
         assert!((entropy(&some) - 1.5 * 2f64.ln()).abs() < 1e-15);

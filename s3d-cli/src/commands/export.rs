@@ -1,7 +1,7 @@
 //! `s3d export`: scenes to a data set.
 
 use super::on_threads;
-use crate::args::{Allow, Threads};
+use crate::args::{Allow, Placing, Scenes, Threads};
 use crate::failure::Outcome;
 use crate::values::{even_width, normal_axes, parsed, positive, uuid};
 use clap::{Args, value_parser};
@@ -15,9 +15,8 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
-    /// Scene files, or folders of published areas (area_3), one an area.
-    #[arg(required = true, value_name = "SCENE.toml")]
-    pub(crate) scenes: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) scenes: Scenes,
     /// The data set's folder [default: SCENE_2d3ds beside the first scene]
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
@@ -52,10 +51,8 @@ pub(crate) struct OptionArgs {
     /// Everything random comes from it: the same input and seed give the same bytes.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Put scan locations on the floor of every room instead of reading some: no two of a room nearer than
-    /// this, 1.5 m high, clear of walls and things.
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    pub(crate) place_cameras: Option<f64>,
+    #[command(flatten)]
+    pub(crate) placing: Placing,
     /// Among which candidates views are selected: of the whole data set, of an area, or of a location.
     #[arg(long, default_value = "dataset", value_parser = parsed::<Pool>, value_name = "dataset|area|location")]
     pub(crate) pool: Pool,
@@ -125,7 +122,8 @@ impl From<OptionArgs> for ExportOptions {
         let FormatArgs { xyz, normal_axes, depth_units, pad_labels, profiles } = args.format;
         Self {
             seed: args.seed,
-            place_cameras: args.place_cameras,
+            place_cameras: args.placing.place_cameras,
+            see: args.placing.see,
             views: args.views,
             size: args.size,
             pano_width: args.pano_width,
@@ -149,8 +147,8 @@ impl From<OptionArgs> for ExportOptions {
 }
 
 pub(crate) fn run(args: ExportArgs) -> Outcome<()> {
-    let output = args.output.unwrap_or_else(|| default_output(&args.scenes[0]));
-    let export = Export::new(args.scenes)
+    let output = args.output.unwrap_or_else(|| default_output(&args.scenes.scenes[0]));
+    let export = Export::new(args.scenes.sources())
         .options(args.options.into())
         .overwrite(args.overwrite)
         .shard(args.shard)

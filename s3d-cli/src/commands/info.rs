@@ -1,21 +1,24 @@
 //! `s3d info`: what a scene holds, and what looks wrong in it.
 
 use super::{on_threads, print};
-use crate::args::Threads;
+use crate::args::{Placing, Threads};
 use crate::failure::Outcome;
-use crate::values::positive;
+use crate::values::parsed;
 use clap::Args;
-use s3d_dataset::InfoOptions;
+use s3d_dataset::{InfoOptions, SceneSource};
+use s3d_io::mesh::UpAxis;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// The scene file, or the folder of a published area.
+    /// The scene file, the folder of a published area, or a mesh.
     #[arg(value_name = "SCENE.toml")]
     pub(crate) scene: PathBuf,
-    /// Show the scan locations that export would put on the floor with this option.
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    pub(crate) place_cameras: Option<f64>,
+    /// Which axis of a mesh points up [default: y in glTF, guessed in others]
+    #[arg(long, value_parser = parsed::<UpAxis>, value_name = "y|z")]
+    pub(crate) up: Option<UpAxis>,
+    #[command(flatten)]
+    pub(crate) placing: Placing,
     /// The seed by which they would be placed.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
@@ -27,7 +30,9 @@ pub(crate) struct InfoArgs {
 }
 
 pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
-    let options = InfoOptions { place_cameras: args.place_cameras, seed: args.seed, lenient: args.lenient };
-    let info = on_threads(args.threads, |context| s3d_dataset::info(&args.scene, &options, context))?;
+    let Placing { place_cameras, see } = args.placing;
+    let options = InfoOptions { place_cameras, see, seed: args.seed, lenient: args.lenient };
+    let scene = SceneSource::list([args.scene], args.up).remove(0);
+    let info = on_threads(args.threads, |context| s3d_dataset::info(scene, &options, context))?;
     print(&info.to_string())
 }

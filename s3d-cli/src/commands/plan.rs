@@ -1,18 +1,17 @@
 //! `s3d plan`: labels and scores, for the shards of an export.
 
 use super::on_threads;
-use crate::args::{Allow, Threads};
+use crate::args::{Allow, Placing, Scenes, Threads};
 use crate::failure::Outcome;
-use crate::values::{parsed, positive};
+use crate::values::parsed;
 use clap::{Args, value_parser};
 use s3d_dataset::{ExportOptions, Shard};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct PlanArgs {
-    /// Scene files, or folders of published areas, one an area.
-    #[arg(required = true, value_name = "SCENE.toml")]
-    pub(crate) scenes: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) scenes: Scenes,
     /// The plan's folder; called again, what is missing in it is made.
     #[arg(short, long, value_name = "PLAN")]
     pub(crate) output: PathBuf,
@@ -28,9 +27,8 @@ pub(crate) struct PlanArgs {
     /// Everything random comes from it.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Put scan locations on the floor of every room, no two of a room nearer than this.
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    place_cameras: Option<f64>,
+    #[command(flatten)]
+    placing: Placing,
     /// Count the classes of a candidate view on every Nth pixel of both axes.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = value_parser!(u32).range(1..=64))]
     entropy_stride: u32,
@@ -48,13 +46,14 @@ pub(crate) fn run(args: PlanArgs) -> Outcome<()> {
         views: args.views,
         size: args.size,
         seed: args.seed,
-        place_cameras: args.place_cameras,
+        place_cameras: args.placing.place_cameras,
+        see: args.placing.see,
         entropy_stride: args.entropy_stride,
         lenient: args.lenient,
         allow: args.allow.allow,
         ..ExportOptions::default()
     };
     on_threads(args.threads, |context| {
-        s3d_dataset::plan(&args.scenes, &args.output, &options, args.shard, context)
+        s3d_dataset::plan(&args.scenes.sources(), &args.output, &options, args.shard, context)
     })
 }

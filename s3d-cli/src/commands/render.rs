@@ -65,7 +65,7 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
         Camera::perspective(pose, args.fov.to_radians(), size, size)
     };
     let options = RenderOptions {
-        up: args.mesh.up(),
+        up: args.mesh.up,
         normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
         compression: args.compression,
         overwrite: args.overwrite,

@@ -4,17 +4,16 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::event::{Stage, UnitKind};
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
+use crate::export::input::AreaInput;
 use crate::export::input::pictures::Pictures;
-use crate::export::input::{AreaInput, Cameras};
-use crate::export::labels::annotate::{Annotated, annotate, hidden_instances};
+use crate::export::labels::annotate::{Annotated, annotate, hidden_instances, unannotated};
 use crate::export::labels::area_plan::{AreaPlan, RoomNames};
 use crate::export::labels::overlap::overlap_doubts;
-use crate::export::location::{Outlook, room_of};
+use crate::export::location::{Located, locate, look_around};
 use crate::export::modality::Channels;
 use crate::export::points::write_points;
-use crate::export::views::{Candidate, Scoring, score_area};
+use crate::export::views::{Candidate, Kinds, Scoring, score_area};
 use crate::options::ExportOptions;
-use crate::place::{Ground, Located, Placement, place_locations};
 use crate::shard::plan::Plan;
 use crate::store::journal::{
     AssetsDone, Done, Journal, LabelsDone, LocationDone, ScoresDone, Unit, tally_of,
@@ -24,14 +23,13 @@ use crate::tables::listing;
 use crate::tables::manifest::{AreaEntry, XyzLoss};
 use crate::tables::records;
 use crate::useful::{judge, label_findings, outlook_findings};
-use rayon::prelude::*;
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::camera::ScanLocation;
 use s3d_io::dataset::{FileRecord, InstanceRecord, InstanceWriter, Layout};
 use s3d_io::fs::create_dir;
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{MeshFile, TextureOut};
-use s3d_label::{LabelTable, Room};
+use s3d_label::LabelTable;
 use s3d_render::{MipMaps, Scene};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -100,43 +98,8 @@ impl<'m> PreparedMesh<'m> {
     }
 }
 
-/// An area's scan locations, each with its room: those that are listed, or some that are placed.
-pub(crate) fn locate(
-    ctx: &Context,
-    area: &AreaInput,
-    scene: &Scene<'_>,
-    nearest: &NearestFaces<'_>,
-    annotated: &Annotated,
-    table: &LabelTable,
-    seed: u64,
-) -> Result<Located> {
-    match &area.cameras {
-        Cameras::Listed(locations, rooms) => {
-            let is_known = |room: &Room| annotated.rooms.iter().any(|r| r.room == *room);
-            let room = |l: &ScanLocation, told: Option<Room>| {
-                told.filter(is_known).unwrap_or_else(|| room_of(&annotated.rooms, l.pose.location))
-            };
-            Ok(locations.iter().zip(rooms).map(|(l, told)| (l.clone(), room(l, *told))).collect())
-        }
-        Cameras::Placed(distance_m) => {
-            let ground = Ground {
-                area: area.number,
-                scene,
-                nearest,
-                label_of_face: &annotated.label_of_face,
-                table,
-                rooms: &annotated.rooms,
-            };
-            let (placed, warnings) = place_locations(&ground, Placement { distance_m: *distance_m, seed })?;
-            warnings.iter().for_each(|w| ctx.warn(w));
-            ctx.info(format_args!("area {}: {} scan locations placed", area.number, placed.len()));
-            Ok(placed)
-        }
-    }
-}
-
-/// The files of an area's labels.
-fn label_files(layout: &Layout, area: u32) -> [PathBuf; 5] {
+/// The files of an area's labels, if it has some.
+pub(crate) fn label_files(layout: &Layout, area: u32) -> [PathBuf; 5] {
     [
         layout.instances_json(area),
         layout.instances_npz(area),
@@ -187,33 +150,35 @@ pub(crate) fn label_area(
     let mut instances = None;
     if writes {
         create_dir(&layout.mesh_dir(number))?;
-        instances = Some(InstanceWriter::create(json, npz)?);
+        if area.is_labelled {
+            instances = Some(InstanceWriter::create(json, npz)?);
+        }
     }
-    let annotated = annotate(ctx, area, &nearest, table, |i| {
-        let Some(instances) = &mut instances else { return Ok(()) };
-        let record = InstanceRecord {
-            label: &i.label.to_string(),
-            label_index: i.id.0,
-            class: i.label.class.name(),
-            room: &i.label.room.to_string(),
-            bbox: i.bbox,
-        };
-        Ok(instances.push(&record, i.points)?)
-    })?;
-    tell_labels(ctx, &annotated, started);
-    if let Some(w) = annotated.skipped.sentence() {
-        ctx.warn(w);
+    let annotated = if area.is_labelled {
+        annotate(ctx, area, &nearest, table, |i| {
+            let Some(instances) = &mut instances else { return Ok(()) };
+            let record = InstanceRecord {
+                label: &i.label.to_string(),
+                label_index: i.id.0,
+                class: i.label.class.name(),
+                room: &i.label.room.to_string(),
+                bbox: i.bbox,
+            };
+            Ok(instances.push(&record, i.points)?)
+        })?
+    } else {
+        unannotated(&nearest, table)?
+    };
+    if area.is_labelled {
+        tell_labels(ctx, &annotated, started);
+        label_doubts(area, &annotated, table).iter().for_each(|w| ctx.warn(w));
+        let mut findings = label_findings(&file.mesh, &annotated, table);
+        findings.extend(area.count_findings(&annotated.rooms));
+        judge(ctx, &findings, &options.allow)?;
     }
-    if let Some(w) = hidden_instances(area, &annotated.label_of_face, table) {
-        ctx.warn(w);
-    }
-    overlap_doubts(&annotated.rooms).iter().for_each(|w| ctx.warn(w));
-    let mut findings = label_findings(&file.mesh, &annotated, table);
-    findings.extend(area.count_findings(&annotated.rooms));
-    judge(ctx, &findings, &options.allow)?;
-    let located = locate(ctx, area, scene, &nearest, &annotated, table, options.seed)?;
+    let Located { locations, rooms: location_rooms, surface_seen } =
+        locate(ctx, area, scene, &nearest, &annotated, table, options.seed)?;
     drop(nearest);
-    let (locations, location_rooms): (Vec<ScanLocation>, Vec<Room>) = located.into_iter().unzip();
     let outlooks = look_around(ctx, scene, &locations)?;
     judge(ctx, &outlook_findings(&outlooks), &options.allow)?;
     for (outlook, location) in outlooks.iter().zip(&locations) {
@@ -225,18 +190,24 @@ pub(crate) fn label_area(
         names: RoomNames::of(&area.rooms),
         locations,
         location_rooms,
+        surface_seen,
         mesh_box: file.mesh.aabb(),
         mesh_area_m2: file.mesh.total_area(),
         faces_left_out: file.mesh.report().zero_area_faces + file.repeated_faces,
     };
     let write = || -> Result<()> {
         plan.write(&common.cache_of(number))?;
-        let Some(instances) = instances else { return Ok(()) };
-        instances.finish()?;
-        records::write_rooms(layout, number, &plan.annotated)?;
-        records::write_votes(layout, number, &plan.annotated.report)?;
-        records::write_instance_numbers(layout, number, &plan.names)?;
-        let files = listing::records(ctx, layout, &paths)?;
+        if !writes {
+            return Ok(());
+        }
+        let mut files = Vec::new();
+        if let Some(instances) = instances {
+            instances.finish()?;
+            records::write_rooms(layout, number, &plan.annotated)?;
+            records::write_votes(layout, number, &plan.annotated.report)?;
+            records::write_instance_numbers(layout, number, &plan.names)?;
+            files = listing::records(ctx, layout, &paths)?;
+        }
         let tally = tally_of(&files);
         journal.write(Done::Labels(labels_done(area, &plan, options, files)))?;
         account.unit_finished(UnitKind::Labels, number, None, &tally, started);
@@ -248,17 +219,12 @@ pub(crate) fn label_area(
     Ok(plan)
 }
 
-/// What each scan location sees.
-pub(crate) fn look_around(
-    ctx: &Context,
-    scene: &Scene<'_>,
-    locations: &[ScanLocation],
-) -> Result<Vec<Outlook>> {
-    let outlooks = locations.par_iter().map(|location| {
-        ctx.check()?;
-        Ok(Outlook::of(scene, location))
-    });
-    outlooks.collect()
+/// What was odd in the annotations, a sentence each.
+pub(crate) fn label_doubts(area: &AreaInput, annotated: &Annotated, table: &LabelTable) -> Vec<String> {
+    let mut doubts: Vec<String> = annotated.skipped.sentence().into_iter().collect();
+    doubts.extend(hidden_instances(area, &annotated.label_of_face, table));
+    doubts.extend(overlap_doubts(&annotated.rooms));
+    doubts
 }
 
 /// Tells the journal of an area's labels, if it does not know of them: their files are another's work.
@@ -338,8 +304,8 @@ pub(crate) fn score(plan: &AreaPlan, prepared: &PreparedMesh<'_>, common: Common
         stride: options.entropy_stride,
         seed: options.seed,
     };
-    let (labels, scene) = (&plan.annotated.label_of_face, &prepared.scene);
-    score_area(ctx, &missing, scene, labels, table, scoring, |uuid, entropies| {
+    let kinds = Kinds::of(table, &plan.annotated.label_of_face, &prepared.file.mesh);
+    score_area(ctx, &missing, &prepared.scene, &kinds, scoring, |uuid, entropies| {
         journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))
     })?;
     step.end();
@@ -370,10 +336,9 @@ fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> Are
         views: 0,
         xyz: XyzLoss::of(plan.mesh_box, options.xyz),
         rgb: area.pictures.as_ref().map_or("texture", |p| p.kind.name()).to_owned(),
-        place_cameras: match area.cameras {
-            Cameras::Placed(distance_m) => Some(distance_m),
-            Cameras::Listed(..) => None,
-        },
+        place_cameras: area.cameras.distance_m(),
+        see: area.cameras.share(),
+        surface_seen: plan.surface_seen,
         offset_m: area.frame.offset(),
         inputs: Vec::new(),
     }
@@ -388,7 +353,9 @@ fn write_area_assets(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common:
     let mesh_dir = layout.mesh_dir(number);
     let label_of_face: Vec<u32> = plan.annotated.label_of_face.iter().map(|l| l.0).collect();
     write_colored_mesh(&mesh_dir, file, options.compression)?;
-    s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &label_of_face, &table.names())?;
+    if area.is_labelled {
+        s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &label_of_face, &table.names())?;
+    }
     meshes.end();
     ctx.check()?;
     let sampling = account.stage(Stage::Points, Some(number));

@@ -107,7 +107,7 @@ pub(crate) fn finish(
     records::write_splits(layout, &folds)?;
     records::write_lists(ctx, layout, &areas, &folds)?;
     write_profiles(ctx, layout, request, &areas, &files)?;
-    Statistics::count(layout, &areas, |_, _| Ok(()))?.write(layout)?;
+    Statistics::count(layout, &areas, manifest.is_labelled(), |_, _| Ok(()))?.write(layout)?;
 
     ctx.check()?;
     let tables = listing::records(ctx, layout, &table_files(layout, &areas)?)?;

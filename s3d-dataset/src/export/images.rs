@@ -3,6 +3,7 @@
 use crate::context::{Context, Progress};
 use crate::error::Result;
 use crate::export::input::pictures::Pictures;
+use crate::export::location::room_name;
 use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::export::views::Candidate;
 use crate::export::work::for_each_in_order;
@@ -25,8 +26,8 @@ pub(crate) struct ImageJob<'a> {
     /// Where colours come from, if not from the mesh.
     pub(crate) pictures: Option<&'a Pictures>,
     pub(crate) locations: &'a [ScanLocation],
-    /// The room of each location.
-    pub(crate) rooms: &'a [Room],
+    /// The room of each location; none if rooms are not known.
+    pub(crate) rooms: &'a [Option<Room>],
     /// Whether a location's images are to be written.
     pub(crate) chosen: &'a [bool],
     pub(crate) modalities: &'a [Domain],
@@ -192,7 +193,7 @@ impl OpenLocation {
 fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Result<WrittenShot> {
     let Memory { caster, hits, buffers } = memory;
     let scan = &job.locations[shot.location];
-    let room = job.rooms[shot.location].to_string();
+    let room = room_name(job.rooms[shot.location]);
     let mut written = WrittenShot::default();
     let write = |domain: Domain, bytes: &[u8]| -> Result<FileRecord> {
         let path = job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain);

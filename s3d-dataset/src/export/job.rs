@@ -5,10 +5,11 @@ use crate::error::{Error, Result};
 use crate::event::Stage;
 use crate::export::area::{self, Common, PreparedMesh};
 use crate::export::finish::{Totals, finish, missing_units};
+use crate::export::input::cameras::Cameras;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::requested::requested_areas;
-use crate::export::input::{AreaInput, Cameras, Inputs};
+use crate::export::input::{AreaInput, Inputs};
 use crate::export::labels::area_plan::AreaPlan;
 use crate::export::views::{Candidate, select_requested};
 use crate::options::ExportOptions;
@@ -43,7 +44,7 @@ pub(crate) struct Job<'a> {
     pub(crate) inputs: Inputs,
     /// What decides the bytes.
     pub(crate) request: Request,
-    options: &'a ExportOptions,
+    options: ExportOptions,
     /// The pictures of each area, if colours are taken from some.
     pictures: Vec<Option<Pictures>>,
     /// The mesh, if there is one area.
@@ -112,18 +113,20 @@ impl<'a> Job<'a> {
     pub(crate) fn open(
         scenes: &[SceneSource],
         layout: &Layout,
-        options: &'a ExportOptions,
+        options: &ExportOptions,
         plan: Option<&'a Plan>,
         account: &Account<'_>,
     ) -> Result<Self> {
         let ctx = account.ctx;
         let loading = account.stage(Stage::Load, None);
         ctx.debug(format_args!("{options:?}"));
-        let (place, lenient) = (options.place_cameras, options.lenient);
+        let (placing, lenient) = (options.placing(), options.lenient);
         let inputs = match plan {
-            Some(plan) => Inputs::open_planned(scenes, place, lenient, plan.table()?)?,
-            None => Inputs::open(scenes, place, lenient)?,
+            Some(plan) => Inputs::open_planned(scenes, placing, lenient, plan.table()?)?,
+            None => Inputs::open(scenes, placing, lenient)?,
         };
+        let options = if inputs.are_labelled() { options.clone() } else { options.without_labels()? };
+        let options = &options;
         check_only(&inputs, &options.only)?;
         output::check_inputs(layout, &inputs)?;
         check_label_count(inputs.table.len() - 1)?;
@@ -157,7 +160,7 @@ impl<'a> Job<'a> {
         loading.end();
         ctx.check()?;
         ctx.debug(format_args!("the data set will have {estimate}"));
-        Ok(Self { estimate, inputs, request, options, pictures, single, plan })
+        Ok(Self { estimate, inputs, request, options: options.clone(), pictures, single, plan })
     }
 
     /// The manifest that says that this export runs.
@@ -183,7 +186,7 @@ impl<'a> Job<'a> {
 
     /// Writes what is known before any unit is done: the label table, `assets`, `conventions.json`.
     pub(crate) fn write_assets(&self, layout: &Layout) -> Result<()> {
-        let options = self.options;
+        let options = &self.options;
         let names = self.inputs.table.names();
         assets::write(
             layout,
@@ -202,7 +205,7 @@ impl<'a> Job<'a> {
         cache: &'b Path,
         is_ours: &'b (dyn Fn(&Unit) -> bool + Sync),
     ) -> Common<'b> {
-        let (table, options) = (&self.inputs.table, self.options);
+        let (table, options) = (&self.inputs.table, &self.options);
         Common { table, layout, options, journal, account, cache, is_ours }
     }
 

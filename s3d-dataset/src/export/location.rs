@@ -1,10 +1,18 @@
-//! What a scan location sees, and in which room it stands.
+//! Where an area's scan locations are, what each sees, and in which room it stands.
 
-use crate::export::labels::annotate::SurveyedRoom;
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::input::AreaInput;
+use crate::export::input::cameras::{Cameras, Placing, SHARE};
+use crate::export::labels::annotate::{Annotated, SurveyedRoom};
+use crate::place::free_space::{FreeSpaceOptions, place_in_free_space};
+use crate::place::{Ground, Placement, place_locations};
+use crate::tables::manifest::SurfaceSeen;
 use glam::DVec3;
-use s3d_geom::Camera;
+use rayon::prelude::*;
+use s3d_geom::{Camera, NearestFaces};
 use s3d_io::camera::ScanLocation;
-use s3d_label::Room;
+use s3d_label::{LabelTable, Room};
 use s3d_render::{NO_FACE, Scene, cast};
 
 /// Width of the small panorama that tells what a location sees.
@@ -91,14 +99,89 @@ impl Outlook {
     }
 }
 
+/// What each scan location sees.
+pub(crate) fn look_around(
+    ctx: &Context,
+    scene: &Scene<'_>,
+    locations: &[ScanLocation],
+) -> Result<Vec<Outlook>> {
+    let outlooks = locations.par_iter().map(|location| {
+        ctx.check()?;
+        Ok(Outlook::of(scene, location))
+    });
+    outlooks.collect()
+}
+
+/// An area's scan locations, each with its room if there are rooms, and what they see if they were placed by
+/// it.
+#[derive(Default)]
+pub(crate) struct Located {
+    pub(crate) locations: Vec<ScanLocation>,
+    pub(crate) rooms: Vec<Option<Room>>,
+    pub(crate) surface_seen: Option<SurfaceSeen>,
+}
+
+/// An area's scan locations: those that are listed, or some that are placed.
+pub(crate) fn locate(
+    ctx: &Context,
+    area: &AreaInput,
+    scene: &Scene<'_>,
+    nearest: &NearestFaces<'_>,
+    annotated: &Annotated,
+    table: &LabelTable,
+    seed: u64,
+) -> Result<Located> {
+    let room = |l: &ScanLocation| room_of(&annotated.rooms, l.pose.location);
+    match &area.cameras {
+        Cameras::Listed(locations, told) => {
+            let is_known = |room: &Room| annotated.rooms.iter().any(|r| r.room == *room);
+            let rooms = locations.iter().zip(told).map(|(l, told)| told.filter(is_known).or_else(|| room(l)));
+            Ok(Located { locations: locations.clone(), rooms: rooms.collect(), surface_seen: None })
+        }
+        Cameras::Placed(Placing::Apart(distance_m)) if area.is_labelled => {
+            let ground = Ground {
+                area: area.number,
+                scene,
+                nearest,
+                label_of_face: &annotated.label_of_face,
+                table,
+                rooms: &annotated.rooms,
+            };
+            let (placed, warnings) = place_locations(&ground, Placement { distance_m: *distance_m, seed })?;
+            warnings.iter().for_each(|w| ctx.warn(w));
+            ctx.info(format_args!("area {}: {} scan locations placed", area.number, placed.len()));
+            let (locations, rooms) = placed.into_iter().map(|(l, room)| (l, Some(room))).unzip();
+            Ok(Located { locations, rooms, surface_seen: None })
+        }
+        Cameras::Placed(_) => {
+            let (distance_m, share) = (area.cameras.distance_m(), area.cameras.share().unwrap_or(SHARE));
+            let wanted = FreeSpaceOptions { share, distance_m, seed };
+            let placed = place_in_free_space(ctx, area.number, scene, nearest, wanted)?;
+            placed.warnings.iter().for_each(|w| ctx.warn(w));
+            let seen = SurfaceSeen::from(placed.seen);
+            let (number, count, floor_m2) = (area.number, placed.locations.len(), placed.floor.inside_m2);
+            ctx.info(format_args!(
+                "area {number}: {count} scan locations placed on {floor_m2:.0} m² of floor: {seen}"
+            ));
+            let rooms = placed.locations.iter().map(room).collect();
+            Ok(Located { locations: placed.locations, rooms, surface_seen: Some(seen) })
+        }
+    }
+}
+
+/// What stands for a room where none is known.
+pub(crate) const UNKNOWN_ROOM: &str = "unknown_1";
+
+/// A room's name in file names and poses.
+pub(crate) fn room_name(room: Option<Room>) -> String {
+    room.map_or_else(|| UNKNOWN_ROOM.to_owned(), |room| room.to_string())
+}
+
 /// The room in which a point stands: the one whose floor outline holds it, or else the nearest outline; the
 /// first by name where several do. A room with too few points for an outline has its points' box instead. A
-/// building of one storey an area is assumed, as in the data set.
-///
-/// # Panics
-/// If there is no room.
-pub(crate) fn room_of(rooms: &[SurveyedRoom], point: DVec3) -> Room {
-    let mut best = (f64::INFINITY, rooms[0].room);
+/// building of one storey an area is assumed, as in the data set. `None` if there is no room.
+pub(crate) fn room_of(rooms: &[SurveyedRoom], point: DVec3) -> Option<Room> {
+    let mut best = (f64::INFINITY, rooms.first()?.room);
     for r in rooms {
         let (min, max) = (r.bbox.min.as_dvec3().truncate(), r.bbox.max.as_dvec3().truncate());
         let mut distance = point.truncate().distance(point.truncate().clamp(min, max));
@@ -113,5 +196,5 @@ pub(crate) fn room_of(rooms: &[SurveyedRoom], point: DVec3) -> Room {
             best = (distance, r.room);
         }
     }
-    best.1
+    Some(best.1)
 }

@@ -19,8 +19,8 @@ const CHUNK: u64 = 1 << 18;
 type Places = BTreeMap<LabelId, (Room, u32)>;
 
 /// Samples the labelled mesh and writes the points, grouped by room and instance: those of faces without a
-/// label come last, and into the PLY file only, whose header tells of `offset_m`, the mesh's. Returns how
-/// many there are.
+/// label come last, and into the PLY file only, whose header tells of `offset_m`, the mesh's. Without any
+/// label there is nothing but that file. Returns how many there are.
 pub(crate) fn write_points(
     ctx: &Context,
     layout: &Layout,
@@ -56,6 +56,11 @@ pub(crate) fn write_points(
         sampler: &sampler,
         cloud: PointCloud::default(),
     };
+    if place.is_empty() {
+        sink.write(0..sampler.len(), LabelId::NULL, |_| Ok(()))?;
+        sink.ply.finish()?;
+        return Ok(sampler.len());
+    }
     let tree = S3disAreaWriter::create(&layout.s3dis_area_dir(number))?;
     let mut mat = MatWriter::create(&layout.point_cloud_mat(number), &format!("Area_{number}"))?;
     let angle_of: BTreeMap<Room, u32> =

@@ -6,7 +6,9 @@ use crate::export::work::for_each_in_order;
 use crate::store::journal::Finished;
 use crate::store::request::Request;
 use crate::tables::summary::ViewTally;
-use s3d_geom::Camera;
+use glam::{Vec3, vec3};
+use rayon::prelude::*;
+use s3d_geom::{Camera, TriMesh};
 use s3d_io::camera::ScanLocation;
 use s3d_label::{Class, LabelId, LabelTable};
 use s3d_render::{Caster, Hits, NO_FACE, Scene};
@@ -30,7 +32,7 @@ pub(crate) struct Candidate {
     pub(crate) yaw_rad: f64,
     pub(crate) pitch_rad: f64,
     pub(crate) fov_rad: f64,
-    /// Shannon entropy of the classes of its pixels, nats.
+    /// Shannon entropy of what its pixels show ([`Kinds`]), nats.
     pub(crate) entropy: f64,
     /// The number in its files' names, if it is kept: kept views of a location count from 0.
     pub(crate) frame_num: Option<u32>,
@@ -41,6 +43,61 @@ impl Candidate {
     pub(crate) fn camera(&self, location: &ScanLocation, size: u32) -> Camera {
         let pose = location.pose.turned(self.yaw_rad, self.pitch_rad);
         Camera::perspective(pose, self.fov_rad, size, size)
+    }
+}
+
+/// What a view shows in a pixel, by the pixel's face: views are scored by the entropy of it.
+pub(crate) enum Kinds {
+    /// The face's class, if it has one.
+    Classes(Vec<Option<Class>>),
+    /// Without labels: which of [`DIRECTIONS`] the face looks in, and how far away it is.
+    Shapes(Vec<u8>),
+}
+
+/// The directions of a cube's faces, edges and corners.
+const DIRECTIONS: usize = 26;
+
+/// Depths are told apart by octaves: below 1 m, 1 to 2 m, and so on; from 16 m on all are one.
+const OCTAVES: usize = 6;
+
+impl Kinds {
+    /// Of a mesh with these labels: shapes if the table has none.
+    pub(crate) fn of(table: &LabelTable, label_of_face: &[LabelId], mesh: &TriMesh) -> Self {
+        if table.len() > 1 {
+            return Self::Classes(label_of_face.iter().map(|l| table.class_of(*l)).collect());
+        }
+        let steps = [-1.0, 0.0, 1.0];
+        let all = steps.iter().flat_map(|x| steps.iter().flat_map(move |y| steps.map(|z| vec3(*x, *y, z))));
+        let directions: Vec<Vec3> = all.filter_map(Vec3::try_normalize).collect();
+        let nearest = |face: u32| {
+            let normal = mesh.normal(face);
+            let cosines = directions.iter().map(|d| d.dot(normal));
+            let best = cosines.enumerate().max_by(|(i, a), (j, b)| a.total_cmp(b).then(j.cmp(i)));
+            best.map_or(0, |(index, _)| index as u8)
+        };
+        Self::Shapes((0..mesh.faces().len() as u32).into_par_iter().map(nearest).collect())
+    }
+
+    /// The entropy of what a view's hits show, nats.
+    fn entropy_of(&self, hits: &Hits) -> f64 {
+        let seen = hits.face.pixels().iter().zip(hits.depth.pixels()).filter(|(face, _)| **face != NO_FACE);
+        match self {
+            Self::Classes(class_of_face) => {
+                let mut histogram = [0u64; 13];
+                seen.filter_map(|(face, _)| class_of_face[*face as usize])
+                    .for_each(|class| histogram[class.index()] += 1);
+                entropy(&histogram)
+            }
+            Self::Shapes(direction_of_face) => {
+                let mut histogram = [0u64; DIRECTIONS * OCTAVES];
+                for (face, depth_m) in seen {
+                    let octave = ((*depth_m as u32).checked_ilog2().map_or(0, |log| log as usize + 1))
+                        .min(OCTAVES - 1);
+                    histogram[usize::from(direction_of_face[*face as usize]) * OCTAVES + octave] += 1;
+                }
+                entropy(&histogram)
+            }
+        }
     }
 }
 
@@ -92,8 +149,7 @@ pub(crate) fn score_area(
     ctx: &Context,
     locations: &[&ScanLocation],
     scene: &Scene<'_>,
-    label_of_face: &[LabelId],
-    table: &LabelTable,
+    kinds: &Kinds,
     scoring: Scoring,
     each: impl Fn(&str, Vec<f64>) -> Result<()> + Sync,
 ) -> Result<()> {
@@ -105,7 +161,6 @@ pub(crate) fn score_area(
         return locations.iter().try_for_each(|location| each(&location.uuid, Vec::new()));
     }
     let left: Vec<AtomicU32> = locations.iter().map(|_| AtomicU32::new(scoring.views)).collect();
-    let classes: Vec<Option<Class>> = label_of_face.iter().map(|l| table.class_of(*l)).collect();
     let progress = ctx.progress("scoring", "views", candidates.len() as u64);
     let scores: Vec<OnceLock<f64>> = candidates.iter().map(|_| OnceLock::new()).collect();
     let items: Vec<usize> = (0..candidates.len()).collect();
@@ -114,15 +169,7 @@ pub(crate) fn score_area(
         let c = &candidates[i];
         let camera = c.camera(locations[c.location], scoring.size);
         caster.cast_into(&camera, scoring.stride, hits);
-        let mut histogram = [0u64; 13];
-        for &face in hits.face.pixels() {
-            if face != NO_FACE
-                && let Some(class) = classes[face as usize]
-            {
-                histogram[class.index()] += 1;
-            }
-        }
-        let _ = scores[i].set(entropy(&histogram));
+        let _ = scores[i].set(kinds.entropy_of(hits));
         progress.add(1);
         // Whoever scores the last of a location hands it on.
         if left[c.location].fetch_sub(1, Ordering::AcqRel) == 1 {

@@ -5,7 +5,7 @@ use super::map_in_order;
 use super::options::SpecificOptions;
 use super::source::Source;
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
 use s3d_io::fs::{create_dir, write_bytes};
@@ -23,9 +23,14 @@ pub(super) fn pack(
     destination: &Destination,
     options: &SpecificOptions,
 ) -> Result<Vec<String>> {
+    let Some(table) = source.labels()? else {
+        let root = source.layout.root().display();
+        return Err(Error::Input(format!(
+            "{root}: COCO needs labels, and the data set was exported without"
+        )));
+    };
     source.require(Domain::Rgb, "COCO")?;
     source.require(Domain::Semantic, "COCO")?;
-    let table = source.labels()?;
     let stuff = options.stuff.clone().unwrap_or_default().0;
     let compression = options.compression.unwrap_or_default();
     let folder = destination.path().join(FOLDER);

@@ -4,11 +4,12 @@ use super::map_in_order;
 use super::source::{DEPTH_MISSING, Source};
 use crate::context::Context;
 use crate::error::Result;
+use crate::export::location::UNKNOWN_ROOM;
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, ViewRecord};
 use s3d_io::package::{ImageRow, SemanticRow, write_image_index};
-use s3d_label::{LabelId, LabelTable, Room, RoomError};
+use s3d_label::{LabelId, LabelTable, Room};
 use s3d_sample::entropy;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -33,9 +34,9 @@ pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
     let rows = map_in_order(
         ctx,
         &source.images,
-        || vec![0u64; table.len()],
+        || vec![0u64; table.as_ref().map_or(0, LabelTable::len)],
         |counts, image| {
-            let row = row(source, image, &views[&image.area], &table, counts)?;
+            let row = row(source, image, &views[&image.area], table.as_ref(), counts)?;
             progress.add(1);
             Ok(row)
         },
@@ -48,20 +49,24 @@ fn row(
     source: &Source,
     image: &DatasetImage,
     views: &Views,
-    table: &LabelTable,
+    table: Option<&LabelTable>,
     counts: &mut [u64],
 ) -> Result<ImageRow> {
     let path = |domain| image.path(&source.layout, domain);
-    // The walk takes any word for a room's type; the data set has eleven.
-    let room: Room = image.room.parse().map_err(|e: RoomError| {
-        FileError::format(&path(image.domains[0]), format!("in the file's name: {e}"))
-    })?;
+    // The walk takes any word for a room's type; the data set has eleven, and one for what is not known.
+    let (room_type, room_number) = match image.room.parse::<Room>() {
+        Ok(room) => (room.room_type.name(), room.number),
+        Err(_) if table.is_none() && image.room == UNKNOWN_ROOM => ("unknown", 1),
+        Err(e) => {
+            return Err(FileError::format(&path(image.domains[0]), format!("in the file's name: {e}")).into());
+        }
+    };
     let mut row = ImageRow {
         area: image.area,
         camera_uuid: image.uuid.clone(),
         room: image.room.clone(),
-        room_type: room.room_type.name().to_owned(),
-        room_number: room.number,
+        room_type: room_type.to_owned(),
+        room_number,
         files: Domain::ALL.map(|d| image.has(d).then(|| image.relative_path(d))),
         size: image.size(&source.layout)?.map(|(w, h)| [w, h]),
         ..ImageRow::default()
@@ -95,7 +100,9 @@ fn row(
     } else if image.has(Domain::Rgb) && !image.has(Domain::Semantic) {
         row.coverage = Some(share(&source.rgb8(image, Domain::Rgb)?, |p| *p != [0; 3]));
     }
-    if image.has(Domain::Semantic) {
+    if let Some(table) = table
+        && image.has(Domain::Semantic)
+    {
         // Depth misses what is beyond 128 m; labels do not.
         let semantic = source.rgb8(image, Domain::Semantic)?;
         row.coverage = Some(share(&semantic, |p| *p != MISSING));

@@ -30,6 +30,8 @@ pub(crate) struct Source {
     pub(crate) depth_units_per_m: f64,
     /// What was subtracted from the coordinates of the areas' scans.
     offsets: WorldOffsets,
+    /// Whether there are labels.
+    is_labelled: bool,
 }
 
 impl Source {
@@ -67,7 +69,8 @@ impl Source {
         files.require(ctx, |path| needed.contains(path))?;
         let depth_units_per_m = manifest.conventions().depth_units.per_m();
         let offsets = manifest.request().world_offsets();
-        Ok(Self { layout, files, areas, images, depth_units_per_m, offsets })
+        let is_labelled = manifest.is_labelled();
+        Ok(Self { layout, files, areas, images, depth_units_per_m, offsets, is_labelled })
     }
 
     /// Which frame coordinates are in, a sentence for each area whose scan has another.
@@ -151,10 +154,13 @@ impl Source {
         Ok(s3d_io::cloud::read_point_sample(self.files.sized(&self.layout.point_cloud(area))?, most)?)
     }
 
-    /// The labels of the data set.
-    pub(crate) fn labels(&self) -> Result<LabelTable> {
+    /// The labels of the data set, if it has some.
+    pub(crate) fn labels(&self) -> Result<Option<LabelTable>> {
+        if !self.is_labelled {
+            return Ok(None);
+        }
         let path = self.layout.labels_json();
-        LabelTable::from_names(&read_labels(self.files.checked(&path)?)?)
-            .map_err(|e| FileError::format(&path, e.to_string()).into())
+        let table = LabelTable::from_names(&read_labels(self.files.checked(&path)?)?);
+        Ok(Some(table.map_err(|e| FileError::format(&path, e.to_string()))?))
     }
 }

@@ -1,8 +1,6 @@
 //! Scan locations for a scan that comes without: on the floor of every room, spread evenly, away from walls
 //! and things; or, for a scan without labels, by the space that is free ([`free_space`]).
 
-// The export of a scan without labels calls it: then this line goes.
-#[cfg_attr(not(test), expect(dead_code, reason = "called by nobody yet"))]
 pub(crate) mod free_space;
 
 use crate::error::{Error, Result};

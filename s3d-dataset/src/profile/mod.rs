@@ -74,6 +74,12 @@ fn add(ctx: &Context, data: &Dataset, wanted: &[Profile], overwrite: bool, call:
     if let Some(dir) = dirs.iter().find(|dir| dir.exists() && !overwrite) {
         return Err(Error::Usage(format!("{} is there already: replace it with --overwrite", dir.display())));
     }
+    if !data.manifest.is_labelled() {
+        let root = layout.root().display();
+        return Err(Error::Input(format!(
+            "{root}: profiles need labels, and the data set was exported without"
+        )));
+    }
     let areas = &data.manifest.area_numbers;
     let trees: Vec<PathBuf> = areas.iter().map(|area| layout.s3dis_area_dir(*area)).collect();
     data.files.require(ctx, |path| trees.iter().any(|tree| path.starts_with(tree)))?;

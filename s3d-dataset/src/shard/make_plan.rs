@@ -36,6 +36,7 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         size: options.size,
         seed: options.seed,
         place_cameras: options.place_cameras,
+        see: options.see,
         entropy_stride: options.entropy_stride,
         lenient: options.lenient,
         modalities: vec![Domain::Pose],

@@ -24,8 +24,11 @@ pub(crate) struct Request {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RequestedArea {
     pub(crate) area: u32,
-    /// How far apart scan locations are placed, metres; null if the scene has its own.
+    /// How far apart scan locations are placed, metres; null if the scene has its own, or `see` is there.
     pub(crate) place_cameras: Option<f64>,
+    /// Which share of the surface they are placed to see, if they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) see: Option<f64>,
     /// What is subtracted from the scan's coordinates, metres; not there if nothing is. It follows from what
     /// is read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -45,6 +48,14 @@ pub(crate) struct InputRecord {
     /// The checksum of its content; of a folder that of a list of its files, a line `path,bytes,xxh3_128`
     /// each, paths from the folder and sorted.
     pub(crate) xxh3_128: Checksum,
+}
+
+impl InputRecord {
+    /// Of a text that stands for a file which nobody wrote.
+    pub(crate) fn of_text(name: &str, text: &str) -> Self {
+        let (bytes, xxh3_128) = (text.len() as u64, Checksum::of(text.as_bytes()));
+        Self { path: format!("memory:{name}"), bytes, xxh3_128 }
+    }
 }
 
 /// What differs between options, a sentence each.
@@ -95,7 +106,8 @@ impl Request {
     /// What is asked for by these options of areas with this input.
     pub(crate) fn new(options: &ExportOptions, areas: Vec<RequestedArea>) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
-        let stored = ExportOptions { seed: 0, place_cameras: None, allow: Vec::new(), ..options.clone() };
+        let stored =
+            ExportOptions { seed: 0, place_cameras: None, see: None, allow: Vec::new(), ..options.clone() };
         Self { version, seed: options.seed, options: stored, areas }
     }
 
@@ -159,14 +171,17 @@ impl Request {
 impl RequestedArea {
     fn differences(&self, now: &Self) -> Vec<String> {
         let mut differences = Vec::new();
-        if self.place_cameras != now.place_cameras {
-            let words =
-                |distance: Option<f64>| distance.map_or("none".to_owned(), |m| format!("{m} m apart"));
+        if (self.place_cameras, self.see) != (now.place_cameras, now.see) {
+            let words = |area: &Self| match (area.place_cameras, area.see) {
+                (Some(m), _) => format!("{m} m apart"),
+                (None, Some(share)) => format!("to see {share} of the surface"),
+                (None, None) => "none".to_owned(),
+            };
             differences.push(format!(
                 "placed scan locations of area {}: {} there, {} now",
                 self.area,
-                words(self.place_cameras),
-                words(now.place_cameras)
+                words(self),
+                words(now)
             ));
         }
         if self.offset_m != now.offset_m {
@@ -231,6 +246,7 @@ pub(crate) mod tests {
         RequestedArea {
             area,
             place_cameras: None,
+            see: None,
             offset_m: None,
             inputs: vec![input("scene.toml"), input("rgb.obj"), input("Area_1/")],
         }
@@ -271,6 +287,10 @@ pub(crate) mod tests {
         assert_eq!(
             changed(&|r| r.areas[0].place_cameras = Some(2.5)),
             ["placed scan locations of area 1: none there, 2.5 m apart now"]
+        );
+        assert_eq!(
+            changed(&|r| r.areas[0].see = Some(0.9)),
+            ["placed scan locations of area 1: none there, to see 0.9 of the surface now"]
         );
         assert_eq!(
             changed(&|r| r.areas[0].offset_m = Some([5e5, 0.0, 1.5])),

@@ -10,8 +10,8 @@ const UTILS_PY: &str = include_str!("../../assets/utils.py");
 const POSE_SCHEMA: &str = include_str!("../../assets/pose.schema.json");
 const MANIFEST_SCHEMA: &str = include_str!("../../assets/manifest.schema.json");
 
-/// Writes the names of a label table, padded to as many as `pad_labels` if there are fewer,
-/// `conventions.json`, `assets/utils.py` and `assets/schema`.
+/// Writes the names of a label table, unless it has the null label alone, padded to as many as `pad_labels`
+/// if there are fewer; `conventions.json`, `assets/utils.py` and `assets/schema`.
 pub(crate) fn write(
     layout: &Layout,
     mut names: Vec<String>,
@@ -20,8 +20,10 @@ pub(crate) fn write(
     offsets: &WorldOffsets,
 ) -> Result<()> {
     create_dir(&layout.assets_dir())?;
-    s3d_io::dataset::pad_labels(&mut names, pad_labels);
-    s3d_io::dataset::write_labels(&layout.labels_json(), &names)?;
+    if names.len() > 1 {
+        s3d_io::dataset::pad_labels(&mut names, pad_labels);
+        s3d_io::dataset::write_labels(&layout.labels_json(), &names)?;
+    }
     conventions.write(&layout.conventions(), offsets)?;
     create_dir(&layout.schema_dir())?;
     for (path, text) in texts(layout) {

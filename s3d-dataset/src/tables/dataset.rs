@@ -47,13 +47,13 @@ pub(crate) fn check_area(folder: &Path) -> Result<()> {
     if !Head::read(&layout.manifest())?.is_some_and(|head| head.is_complete()) {
         return Ok(());
     }
-    let files = Dataset::open(layout)?.files;
+    let Dataset { files, manifest, .. } = Dataset::open(layout)?;
     let mut read: Vec<PathBuf> = Vec::new();
     for part in ["3d", "data/pose", "pano/pose"] {
         read.extend(files.below(&folder.join(part)));
     }
     read.retain(|path| path.extension().is_none_or(|ending| ending != "ply"));
-    read.push(layout.labels_json());
+    read.extend(manifest.is_labelled().then(|| layout.labels_json()));
     for_each_in_order(&Context::default(), &read, || (), |(), path| Ok(files.checked(path).map(drop)?))
 }
 

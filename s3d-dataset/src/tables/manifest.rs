@@ -2,6 +2,7 @@
 
 use crate::error::{Result, passes_io};
 use crate::options::{ExportOptions, by_name};
+use crate::place::free_space;
 use crate::profile::loader::Profile;
 use crate::store::change;
 use crate::store::request::{InputRecord, Request, RequestedArea};
@@ -12,6 +13,7 @@ use s3d_io::fs::{Checksum, read_json, write_json};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use std::fmt;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -41,7 +43,7 @@ pub(crate) struct Manifest {
     /// The areas that are in the folder, or will be.
     pub(crate) area_numbers: Vec<u32>,
     pub(crate) areas: Vec<AreaEntry>,
-    /// Entries of the label table, the null label and no padding included.
+    /// Entries of the label table, the null label and no padding included; 0 if there are no labels.
     pub(crate) labels: usize,
     /// Entries of `semantic_labels.json`: null labels fill it up.
     labels_padded_to: usize,
@@ -100,14 +102,50 @@ pub(crate) struct AreaEntry {
     pub(crate) xyz: XyzLoss,
     /// What its RGB images are made from.
     pub(crate) rgb: String,
-    /// How far apart scan locations were placed, metres; null if the scene has its own.
+    /// How far apart scan locations were placed, metres; null if the scene has its own, or `see` is there.
     pub(crate) place_cameras: Option<f64>,
+    /// Which share of the surface they were placed to see, if they were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) see: Option<f64>,
+    /// How much of the surface placed locations see; not there if they were not placed by what they see.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) surface_seen: Option<SurfaceSeen>,
     /// What was subtracted from the scan's coordinates, metres; not there if nothing was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) offset_m: Option<[f64; 3]>,
     /// What it was made from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) inputs: Vec<InputRecord>,
+}
+
+/// How much of an area's surface placed locations see, m².
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct SurfaceSeen {
+    /// All of it.
+    pub(crate) surface_m2: f64,
+    /// What can be seen from any place where a scanner could stand.
+    pub(crate) visible_m2: f64,
+    /// What one location or more see, two or more, three or more.
+    pub(crate) seen_m2: [f64; 3],
+}
+
+impl From<free_space::SurfaceSeen> for SurfaceSeen {
+    fn from(seen: free_space::SurfaceSeen) -> Self {
+        let free_space::SurfaceSeen { surface_m2, visible_m2, by_locations_m2 } = seen;
+        Self { surface_m2, visible_m2, seen_m2: by_locations_m2 }
+    }
+}
+
+impl fmt::Display for SurfaceSeen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { surface_m2, visible_m2, seen_m2 } = self;
+        let [one, two, three] = seen_m2.map(|m2| 100.0 * m2 / visible_m2);
+        write!(
+            f,
+            "of {visible_m2:.1} m² that can be seen from somewhere ({surface_m2:.1} m² in all), {one:.0} % is seen by one \
+             or more, {two:.0} % by two or more, {three:.0} % by three or more"
+        )
+    }
 }
 
 /// What storing world coordinates loses.
@@ -156,8 +194,10 @@ pub(crate) fn half_step(value: f32) -> f64 {
 }
 
 impl Manifest {
-    /// The manifest of an export that has begun; `labels` is the length of the label table.
-    pub(crate) fn begin(request: &Request, labels: usize) -> Self {
+    /// The manifest of an export that has begun; `table_len` is the length of the label table, 1 if it has
+    /// the null label alone.
+    pub(crate) fn begin(request: &Request, table_len: usize) -> Self {
+        let labels = if table_len > 1 { table_len } else { 0 };
         let padded = request.options.pad_labels.0;
         Self {
             generator: GENERATOR.to_owned(),
@@ -174,6 +214,11 @@ impl Manifest {
         }
     }
 
+    /// Whether the data set has labels: a table of them, and what is made with it.
+    pub(crate) fn is_labelled(&self) -> bool {
+        self.labels > 0
+    }
+
     /// How many entries the file of labels has.
     pub(crate) fn labels_padded_to(&self) -> usize {
         self.labels_padded_to
@@ -184,6 +229,7 @@ impl Manifest {
         let areas = self.areas.iter().map(|entry| RequestedArea {
             area: entry.area,
             place_cameras: entry.place_cameras,
+            see: entry.see,
             offset_m: entry.offset_m,
             inputs: entry.inputs.clone(),
         });
@@ -254,9 +300,12 @@ impl Manifest {
             return Some(format!("area_numbers {:?}, and areas tells of {told:?}", self.area_numbers));
         }
         let padded = self.labels.max(self.options.pad_labels.0);
-        if self.labels == 0 || self.labels_padded_to != padded {
+        if self.labels_padded_to != padded {
             let told = self.labels_padded_to;
             return Some(format!("{} labels, padded to {told}: its options make it {padded}", self.labels));
+        }
+        if !self.is_labelled() && self.options.need_labels() {
+            return Some("no labels, and its options ask for what is made of them".to_owned());
         }
         if let Some(files) = self.files.as_ref().filter(|files| files.list != LIST) {
             return Some(format!("tells of a list {:?}; it is called {LIST}", files.list));

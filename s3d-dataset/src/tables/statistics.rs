@@ -40,6 +40,15 @@ pub struct AreaStatistics {
     pub regular_images: u64,
     /// Panoramas likewise.
     pub panoramas: u64,
+    /// What there is by label; `None` if there are none.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub labels: Option<LabelStatistics>,
+}
+
+/// What an area holds, by label.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct LabelStatistics {
     /// Square metres of all rooms.
     pub floor_m2: f64,
     /// Instances by class.
@@ -69,29 +78,30 @@ pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
     let folders: Vec<PathBuf> = areas.iter().map(|area| layout.area_dir(*area)).collect();
     // Images are counted, and not read.
     data.files.require(&Context::default(), |path| folders.iter().any(|area| path.starts_with(area)))?;
-    Statistics::count(layout, areas, |path, whole| {
+    Statistics::count(layout, areas, data.manifest.is_labelled(), |path, whole| {
         if whole { data.files.checked(path) } else { data.files.sized(path) }.map(drop)
     })
 }
 
 impl Statistics {
-    /// Counts what lies in the folders of a data set of these areas. Before a file is read, as a `whole` or
-    /// not, `check` may refuse it.
+    /// Counts what lies in the folders of a data set of these areas, with labels or without. Before a file is
+    /// read, as a `whole` or not, `check` may refuse it.
     pub(crate) fn count(
         layout: &Layout,
         areas: &[u32],
+        is_labelled: bool,
         check: impl Fn(&Path, bool) -> Result<(), FileError>,
     ) -> Result<Self> {
-        let path = layout.labels_json();
-        check(&path, true)?;
-        let table = LabelTable::from_names(&read_labels(&path)?)
-            .map_err(|e| FileError::format(&path, e.to_string()))?;
-        let classes = ClassCounts::from_table(&table);
-        let areas = areas
-            .iter()
-            .map(|n| AreaStatistics::count(layout, *n, &classes, &check))
-            .collect::<Result<_>>()?;
-        Ok(Self { areas })
+        let mut classes = None;
+        if is_labelled {
+            let path = layout.labels_json();
+            check(&path, true)?;
+            let table = LabelTable::from_names(&read_labels(&path)?)
+                .map_err(|e| FileError::format(&path, e.to_string()))?;
+            classes = Some(ClassCounts::from_table(&table));
+        }
+        let areas = areas.iter().map(|n| AreaStatistics::count(layout, *n, classes.as_ref(), &check));
+        Ok(Self { areas: areas.collect::<Result<_>>()? })
     }
 
     /// Writes the tables as JSON and as Markdown.
@@ -104,29 +114,38 @@ impl Statistics {
     /// The tables as Markdown: a column an area, and their sum.
     pub fn to_markdown(&self) -> String {
         let mut text = String::from("# Statistics\n");
-        self.table(
-            &mut text,
-            "Data",
-            &[
-                ("points", &|a| a.points as f64),
-                ("faces", &|a| a.faces as f64),
-                ("regular images", &|a| a.regular_images as f64),
-                ("panoramas", &|a| a.panoramas as f64),
-                ("floor, m²", &|a| a.floor_m2),
-            ],
-        );
+        let floor_m2 = |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, |labels| labels.floor_m2);
+        let mut data: Vec<Row<'_>> = vec![
+            ("points", &|a| a.points as f64),
+            ("faces", &|a| a.faces as f64),
+            ("regular images", &|a| a.regular_images as f64),
+            ("panoramas", &|a| a.panoramas as f64),
+        ];
+        let is_labelled = self.areas.iter().any(|a| a.labels.is_some());
+        if is_labelled {
+            data.push(("floor, m²", &floor_m2));
+        }
+        self.table(&mut text, "Data", &data);
+        if !is_labelled {
+            text.push_str("\nThere are no labels.\n");
+            return text;
+        }
         let class_rows: Vec<_> = Class::ALL
-            .map(|c| (c.name(), move |a: &AreaStatistics| a.instances_per_class[c.name()] as f64))
+            .map(|c| {
+                let of = move |labels: &LabelStatistics| labels.instances_per_class[c.name()] as f64;
+                (c.name(), move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
+            })
             .into();
         self.table(&mut text, "Instances of each class", &rows(&class_rows));
-        let room_rows: Vec<_> = RoomType::ALL
-            .map(|t| (t.name(), move |a: &AreaStatistics| a.rooms_per_type[t.name()].rooms as f64))
-            .into();
-        self.table(&mut text, "Rooms of each type", &rows(&room_rows));
-        let floor_rows: Vec<_> = RoomType::ALL
-            .map(|t| (t.name(), move |a: &AreaStatistics| a.rooms_per_type[t.name()].floor_m2))
-            .into();
-        self.table(&mut text, "Floor of each room type, m²", &rows(&floor_rows));
+        let of_type = |of: fn(&RoomTypeStatistics) -> f64| -> Vec<_> {
+            let row = |t: RoomType| {
+                let of = move |labels: &LabelStatistics| of(&labels.rooms_per_type[t.name()]);
+                (t.name(), move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
+            };
+            RoomType::ALL.map(row).into()
+        };
+        self.table(&mut text, "Rooms of each type", &rows(&of_type(|of_type| of_type.rooms as f64)));
+        self.table(&mut text, "Floor of each room type, m²", &rows(&of_type(|of_type| of_type.floor_m2)));
         text
     }
 
@@ -168,12 +187,33 @@ impl AreaStatistics {
     fn count(
         layout: &Layout,
         area: u32,
+        classes: Option<&ClassCounts>,
+        check: impl Fn(&Path, bool) -> Result<(), FileError>,
+    ) -> Result<Self> {
+        let labels =
+            classes.map(|classes| LabelStatistics::count(layout, area, classes, &check)).transpose()?;
+        let mesh = if labels.is_some() { layout.semantic_obj(area) } else { layout.rgb_obj(area) };
+        check(&layout.point_cloud(area), false)?;
+        check(&mesh, true)?;
+        Ok(Self {
+            area,
+            points: s3d_io::cloud::read_ply_point_count(&layout.point_cloud(area))?,
+            faces: count_faces(&mesh)?,
+            regular_images: count_images(layout, area, Frame::View(0))?,
+            panoramas: count_images(layout, area, Frame::Panorama)?,
+            labels,
+        })
+    }
+}
+
+impl LabelStatistics {
+    fn count(
+        layout: &Layout,
+        area: u32,
         classes: &ClassCounts,
         check: impl Fn(&Path, bool) -> Result<(), FileError>,
     ) -> Result<Self> {
         check(&layout.rooms_json(area), true)?;
-        check(&layout.point_cloud(area), false)?;
-        check(&layout.semantic_obj(area), true)?;
         let mut rooms_per_type: BTreeMap<_, RoomTypeStatistics> =
             RoomType::ALL.map(|t| (t.name(), RoomTypeStatistics::default())).into();
         let rooms: Vec<RoomRecord> = read_json(&layout.rooms_json(area))?;
@@ -187,11 +227,6 @@ impl AreaStatistics {
             row.floor_m2 += record.floor_m2;
         }
         Ok(Self {
-            area,
-            points: s3d_io::cloud::read_ply_point_count(&layout.point_cloud(area))?,
-            faces: count_faces(&layout.semantic_obj(area))?,
-            regular_images: count_images(layout, area, Frame::View(0))?,
-            panoramas: count_images(layout, area, Frame::Panorama)?,
             floor_m2: rooms.iter().map(|r| r.floor_m2).sum(),
             instances_per_class: Class::ALL.map(|c| (c.name(), classes.of(area, c))).into(),
             rooms_per_type,

@@ -19,8 +19,16 @@ pub(crate) struct Labels {
 }
 
 impl Labels {
+    /// Those of a data set that has none: nothing but the null label.
+    fn none() -> Self {
+        Self { names: vec![NULL_NAME.to_owned()], indices: HashMap::new(), pretty: vec![pretty_color(0)] }
+    }
+
     /// Reads and checks `semantic_labels.json`.
     pub(crate) fn read(layout: &Layout, manifest: &Manifest, report: &Report) -> Option<Self> {
+        if !manifest.is_labelled() {
+            return Some(Self::none());
+        }
         let path = layout.labels_json();
         let mut names = report.read(Topic::Labels, &path, read_labels)?;
         let checks = report.of(ORDER, &path);

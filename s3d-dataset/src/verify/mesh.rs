@@ -48,7 +48,7 @@ pub(crate) fn read_and_check(
         }
         Some(file)
     };
-    let semantic_file = read(&semantic);
+    let semantic_file = if manifest.is_labelled() { read(&semantic) } else { None };
     let names = semantic_file.map(|file| (label_names(&file.mesh, labels, &semantic, report), file.mesh));
     let file = read(&colored)?;
     let faces = file.mesh.faces().len();
@@ -69,6 +69,9 @@ pub(crate) fn read_and_check(
                 )
             },
         );
+    }
+    if !manifest.is_labelled() {
+        return Some(LabelledMesh { file, label_of_face: vec![0; faces] });
     }
     let (label_of_face, other) = names?;
     let same = report.check(faces == other.faces().len(), MESH, &semantic, || {

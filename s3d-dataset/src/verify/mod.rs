@@ -110,9 +110,13 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
 
 fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result<()> {
     let Common { layout, manifest, labels, report, .. } = *common;
-    tables::rooms(layout, area, manifest, report);
+    if manifest.is_labelled() {
+        tables::rooms(layout, area, manifest, report);
+    }
     let mesh = labels.and_then(|labels| {
-        instances::check(layout, area, manifest, labels, report);
+        if manifest.is_labelled() {
+            instances::check(layout, area, manifest, labels, report);
+        }
         mesh::read_and_check(layout, area, manifest, labels, report)
     });
     let (Some(labels), Some(mesh)) = (labels, &mesh) else {
@@ -187,7 +191,8 @@ fn check_images(
             match *work {
                 Work::Points => {
                     if let Some((_, mesh, labels)) = reference {
-                        points::check(layout, area, manifest, mesh, labels, full, report);
+                        let in_all_forms = full && manifest.is_labelled();
+                        points::check(layout, area, manifest, mesh, labels, in_all_forms, report);
                     }
                 }
                 Work::Image(index) => {

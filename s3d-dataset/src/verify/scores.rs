@@ -5,7 +5,7 @@ use super::report::Topic;
 use super::views::Views;
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::views::{Scoring, score_area};
+use crate::export::views::{Kinds, Scoring, score_area};
 use s3d_geom::{Camera, Projection};
 use s3d_io::camera::ScanLocation;
 use s3d_io::dataset::DatasetImage;
@@ -43,9 +43,10 @@ pub(crate) fn check(
         seed: reference.manifest.seed,
     };
     let labels: Vec<LabelId> = reference.mesh.label_of_face.iter().map(|l| LabelId(*l)).collect();
+    let kinds = Kinds::of(&table, &labels, &reference.mesh.file.mesh);
     let path = reference.layout.views_json(area);
     let locations: Vec<&ScanLocation> = located.iter().collect();
-    score_area(ctx, &locations, reference.scene, &labels, &table, scoring, |uuid, scores| {
+    score_area(ctx, &locations, reference.scene, &kinds, scoring, |uuid, scores| {
         let checks = reference.report.of(ENTROPIES, &path);
         for (record, score) in views.of_location(area, uuid).zip(scores) {
             checks.check(record.entropy == score, || {

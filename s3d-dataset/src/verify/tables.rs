@@ -191,7 +191,7 @@ pub(crate) fn splits(layout: &Layout, manifest: &Manifest, images: &[DatasetImag
 /// Holds the statistics against what is counted from the files.
 pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) {
     let check = |path: &Path, _| report.check_size(path);
-    let counted = match Statistics::count(layout, &manifest.area_numbers, check) {
+    let counted = match Statistics::count(layout, &manifest.area_numbers, manifest.is_labelled(), check) {
         Ok(counted) => counted,
         Err(e) => {
             report.fault(

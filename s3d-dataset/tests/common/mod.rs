@@ -45,5 +45,5 @@ pub(crate) fn scene_of(mesh_at: impl Fn(Vec3) -> Vec3, points_at: impl Fn(Vec3) 
     let annotations = Annotations::from_points(instances).unwrap();
     let pose = Pose::level(dvec3(2.0, 1.5, 1.4), 0.3);
     let locations = vec![ScanLocation { uuid: "a".repeat(32), pose, line: 0 }];
-    MemoryScene { area: 2, mesh, annotations, locations }
+    MemoryScene { area: 2, mesh, annotations: Some(annotations), locations }
 }

@@ -44,6 +44,11 @@ impl Domain {
         Self::Pose,
     ];
 
+    /// Whether it shows labels.
+    pub fn is_semantic(self) -> bool {
+        matches!(self, Self::Semantic | Self::SemanticPretty)
+    }
+
     /// Its folder, by which users name it too: "normal".
     pub fn folder(self) -> &'static str {
         match self {

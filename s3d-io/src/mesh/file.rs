@@ -20,11 +20,31 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
+    /// The word for it: `y` or `z`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
+
     /// A point or direction of the file in the world's axes (Z-up).
     pub fn world_from_file(self, v: Vec3) -> Vec3 {
         match self {
             Self::Y => vec3(v.x, -v.z, v.y),
             Self::Z => v,
+        }
+    }
+}
+
+impl std::str::FromStr for UpAxis {
+    type Err = &'static str;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        match word {
+            "y" => Ok(Self::Y),
+            "z" => Ok(Self::Z),
+            _ => Err("must be y or z"),
         }
     }
 }

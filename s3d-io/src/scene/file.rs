@@ -34,6 +34,8 @@ pub struct SceneFile {
     /// What is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing, unless it
     /// lies far from the origin ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
     pub mesh_offset_m: Option<DVec3>,
+    /// Whether there are labels. If not, `annotations` is empty; a published area brings its own.
+    pub is_labelled: bool,
     /// The annotated points: files and folders, see [`Annotations::open`](crate::cloud::Annotations::open).
     /// None: the labels that came with the mesh, see
     /// [`Annotations::of_mesh`](crate::cloud::Annotations::of_mesh).
@@ -46,6 +48,27 @@ pub struct SceneFile {
     pub cameras: Option<CameraSource>,
     /// The scanner's pictures, if RGB images are made from them and not from the mesh's texture.
     pub pictures: Option<PictureSource>,
+}
+
+impl SceneFile {
+    /// A scene of meshes alone, without labels, as area 1. Its `path` is that of the first.
+    pub fn of_meshes(mesh: Vec<PathBuf>, up: UpAxis) -> Self {
+        Self {
+            path: mesh.first().cloned().unwrap_or_default(),
+            area: 1,
+            published: None,
+            world_from_published: DAffine3::IDENTITY,
+            mesh,
+            up,
+            mesh_offset_m: None,
+            is_labelled: false,
+            annotations: Vec::new(),
+            annotation_options: AnnotationOptions::default(),
+            annotations_have_offset: false,
+            cameras: None,
+            pictures: None,
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -83,7 +106,7 @@ struct MeshTable {
 /// path = "rgb.obj"    # or paths = ["floor_1.ply", "floor_2.ply"]
 /// up   = "y"          # or "z"; "y" if it is left out
 /// offset_m = [500000.0, 5400000.0, 300.0]  # subtracted from positions; found by itself if it is left out
-/// [annotations]
+/// [annotations]       # left out: there are no labels
 /// path = "Area_1"     # or mesh = true: the labels that came with the mesh
 /// [cameras]
 /// path = "cameras.csv"  # or place = 2.0: scan locations on the floor, two metres apart
@@ -92,8 +115,7 @@ struct MeshTable {
 /// path = "raw"        # the pictures' folder; named after the source if it is left out
 /// ```
 ///
-/// Without `[cameras]` there is nowhere to stand, unless the caller places scan locations. The list's frame
-/// is the world (Z-up) unless the table says `up = "y"`, or gives a `transform` (four rows of four numbers,
+/// Without `[cameras]` the caller places scan locations. The list's frame is the world (Z-up) unless the table says `up = "y"`, or gives a `transform` (four rows of four numbers,
 /// world from file, applied after `up`).
 ///
 /// Annotations of other kinds, and how they are read (see [`AnnotationOptions`]); every key but the path may
@@ -200,17 +222,12 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
             world_from_published = similarity(rows).map_err(|m| fault(format!("[published]: {m}")))?;
         }
     }
-    let missing = |key: &str| fault(format!("missing field `{key}`"));
-    let files = match (document.mesh, document.annotations) {
-        (mesh, annotations) if published.is_none() => {
-            Some((mesh.ok_or_else(|| missing("mesh"))?, annotations.ok_or_else(|| missing("annotations"))?))
-        }
-        _ => None,
-    };
+    let is_labelled = published.is_some() || document.annotations.is_some();
     let (mut mesh, mut annotations) = (Vec::new(), Vec::new());
     let (mut up, mut annotation_options) = (UpAxis::Y, AnnotationOptions::default());
     let (mut mesh_offset_m, mut annotations_have_offset) = (None, false);
-    if let Some((meshes, labels)) = files {
+    if published.is_none() {
+        let meshes = document.mesh.ok_or_else(|| fault("missing field `mesh`".to_owned()))?;
         mesh = match (&meshes.path, &meshes.paths) {
             (Some(written), None) => vec![found("mesh.path", written, "file", Path::is_file)?],
             (None, Some(paths)) if !paths.is_empty() => paths
@@ -219,11 +236,13 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
                 .collect::<Result<_>>()?,
             _ => return Err(fault("mesh needs either path or paths, a list of at least one".into())),
         };
-        let (key, written) = labels.paths().map_err(fault)?;
-        annotations =
-            written.iter().map(|written| found(key, written, "", Path::exists)).collect::<Result<_>>()?;
-        annotation_options = labels.options().map_err(fault)?;
-        annotations_have_offset = labels.has_offset();
+        if let Some(labels) = &document.annotations {
+            let (key, written) = labels.paths().map_err(fault)?;
+            annotations =
+                written.iter().map(|written| found(key, written, "", Path::exists)).collect::<Result<_>>()?;
+            annotation_options = labels.options().map_err(fault)?;
+            annotations_have_offset = labels.has_offset();
+        }
         mesh_offset_m = meshes.offset_m.map(DVec3::from_array);
         if let Some(offset_m) = mesh_offset_m.filter(|o| !o.is_finite()) {
             return Err(fault(format!("mesh.offset_m = {:?} is not finite", offset_m.to_array())));
@@ -250,6 +269,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         mesh,
         up,
         mesh_offset_m,
+        is_labelled,
         annotations,
         annotation_options,
         annotations_have_offset,
@@ -447,6 +467,8 @@ mod tests {
         let several = GOOD.replace("path = \"a.obj\"", "paths = [\"a.obj\", \"c.csv\"]");
         assert_eq!(read(&several).unwrap().mesh.len(), 2);
         assert!(read(&GOOD.replace("path = \"Area_2\"", "mesh = true")).unwrap().annotations.is_empty());
+        let unlabelled = read(&GOOD.replace("[annotations]\npath = \"Area_2\"\n", "")).unwrap();
+        assert!(!unlabelled.is_labelled && read(GOOD).unwrap().is_labelled);
         for (from, to, words) in [
             ("path = \"a.obj\"", "paths = []", "mesh needs either path or paths"),
             ("path = \"a.obj\"", "", "mesh needs either path or paths"),

@@ -35,7 +35,7 @@ impl Default for PublishedOptions {
 /// | file | |
 /// |---|---|
 /// | `3d/rgb.obj` | the mesh, +Y up; needed |
-/// | `3d/semantic.obj` | the same faces; the names of their materials are labels; needed |
+/// | `3d/semantic.obj` | the same faces; the names of their materials are labels; without it there are none |
 /// | `data/pose/*.json`, `pano/pose/*.json` | scan locations; one file of each is read |
 /// | `3d/pointcloud.mat` | annotated points, if it is there |
 /// | `assets/semantic_labels.json` | beside the area's folder or in it, if it is there |
@@ -49,8 +49,8 @@ pub struct PublishedArea {
     pub area: u32,
     /// The textured mesh.
     pub mesh: PathBuf,
-    /// The labelled mesh.
-    pub semantic_mesh: PathBuf,
+    /// The labelled mesh, if there are labels.
+    pub semantic_mesh: Option<PathBuf>,
     /// Which axis points up in both.
     pub up: UpAxis,
     /// `pointcloud.mat`, if there is one: a source for [`Annotations::open`], in the frame of the files.
@@ -76,7 +76,8 @@ pub struct PublishedMesh {
     pub file: MeshFile,
     /// The different labels, in the order of their first faces.
     pub labels: Vec<Label>,
-    /// One a face of the mesh: its place in `labels`, or [`NO_INDEX`] if it has none.
+    /// One a face of the mesh: its place in `labels`, or [`NO_INDEX`] if it has none. Empty if there are no
+    /// labels.
     pub label_of_face: Vec<u32>,
 }
 
@@ -102,13 +103,11 @@ impl PublishedArea {
                 "is no folder of a published area by its name, as in area_3 or area_5a: rename it",
             ));
         };
-        let needed = |name: &str, what: &str| {
-            let file = path.join(name);
-            if file.is_file() { Ok(file) } else { Err(Error::format(path, format!("has no {name}, {what}"))) }
-        };
-        let mesh = needed("3d/rgb.obj", "the textured mesh of a published area")?;
-        let semantic_mesh = needed("3d/semantic.obj", "which labels the faces of 3d/rgb.obj")?;
         let optional = |file: PathBuf| file.is_file().then_some(file);
+        let Some(mesh) = optional(path.join("3d/rgb.obj")) else {
+            return Err(Error::format(path, "has no 3d/rgb.obj, the textured mesh of a published area"));
+        };
+        let semantic_mesh = optional(path.join("3d/semantic.obj"));
         let labels = "assets/semantic_labels.json";
         let mut this = Self {
             path: path.to_owned(),
@@ -143,10 +142,14 @@ impl PublishedArea {
             ));
         }
         for (file, location) in found {
-            if location.room.is_none() {
+            if location.room.is_none() && this.semantic_mesh.is_some() {
                 this.warnings.push(format!("{}: names no room", file.display()));
             }
             this.locations.push(location);
+        }
+        if this.semantic_mesh.is_none() {
+            this.warnings
+                .push(format!("{}: has no 3d/semantic.obj, so that there are no labels", path.display()));
         }
         Ok(this)
     }
@@ -156,7 +159,7 @@ impl PublishedArea {
         self.path.join("../conventions.json")
     }
 
-    /// Reads both meshes: the textured one, and the labels of its faces from the other.
+    /// Reads both meshes: the textured one, and the labels of its faces from the other, if it is there.
     ///
     /// The two have the same faces, in the same order as a rule. If not, a face gets the label of the one
     /// with the same corners, whichever comes first.
@@ -167,8 +170,9 @@ impl PublishedArea {
     pub fn read_mesh(&self) -> Result<PublishedMesh> {
         let mut file = read_mesh(&self.mesh, self.up)?;
         file.offset_m = self.world_offset_m;
-        let semantic = read_mesh(&self.semantic_mesh, self.up)?.mesh;
-        let fault = |message: String| Error::format(&self.semantic_mesh, message);
+        let Some(path) = &self.semantic_mesh else { return self.moved(file, Vec::new(), Vec::new()) };
+        let semantic = read_mesh(path, self.up)?.mesh;
+        let fault = |message: String| Error::format(path, message);
 
         let parsed: Vec<Option<Label>> =
             semantic.materials().iter().map(|m| parse_name(&m.name).ok().flatten()).collect();
@@ -210,6 +214,10 @@ impl PublishedArea {
         if labels.is_empty() {
             return Err(fault("no material of a face is a label, as in chair_3_office_5_1".into()));
         }
+        self.moved(file, labels, label_of_face)
+    }
+
+    fn moved(&self, file: MeshFile, labels: Vec<Label>, label_of_face: Vec<u32>) -> Result<PublishedMesh> {
         let mut mesh = PublishedMesh { file, labels, label_of_face };
         if self.world_from_area != DAffine3::IDENTITY {
             mesh.turn(&self.world_from_area)
@@ -223,7 +231,8 @@ impl PublishedArea {
     /// # Errors
     /// As there.
     pub fn annotations(&self, mesh: &PublishedMesh) -> Result<Annotations> {
-        Annotations::from_face_labels(&self.semantic_mesh, &mesh.file.mesh, &mesh.labels, &mesh.label_of_face)
+        let path = self.semantic_mesh.as_ref().unwrap_or(&self.mesh);
+        Annotations::from_face_labels(path, &mesh.file.mesh, &mesh.labels, &mesh.label_of_face)
     }
 }
 

@@ -6,8 +6,8 @@ use s3d_geom::{MeshParts, PointCloud, TriMesh, Wrap};
 use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::Annotations;
 use s3d_io::fs::ChecksumOfParts;
-use s3d_io::mesh::MeshFile;
-use std::path::PathBuf;
+use s3d_io::mesh::{MeshFile, UpAxis};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What the mesh of a [`MemoryScene`] is called in messages and the manifest.
@@ -21,28 +21,55 @@ pub struct MemoryScene {
     /// Its surface, world metres, Z-up. No two faces may have the same corners
     /// ([`TriMesh::without_repeated_faces`]).
     pub mesh: TriMesh,
-    /// What its surface is.
-    pub annotations: Annotations,
-    /// Where images are rendered, each with a uuid of its own; may be empty with
-    /// [`ExportOptions::place_cameras`](crate::ExportOptions::place_cameras).
+    /// What its surface is; `None` makes a data set without labels.
+    pub annotations: Option<Annotations>,
+    /// Where images are rendered, each with a uuid of its own. If there are none, some are placed: see
+    /// [`ExportOptions::see`](crate::ExportOptions::see).
     pub locations: Vec<ScanLocation>,
 }
 
 /// One area of an export: a scene file (`scene.toml`) or the folder of a published area (`area_3`), by its
-/// path, or values in memory.
+/// path, the files of a mesh, or values in memory.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum SceneSource {
     /// Read from this path.
     Path(PathBuf),
+    /// The files of a mesh, which are joined: an area without labels. Its number is 1.
+    Meshes {
+        /// OBJ, glTF, GLB or PLY.
+        paths: Vec<PathBuf>,
+        /// Which axis points up; `None`: +Y in glTF, as it defines, and guessed in the others.
+        up: Option<UpAxis>,
+    },
     /// At hand.
     Memory(Arc<SharedScene>),
 }
 
 impl<P: Into<PathBuf>> From<P> for SceneSource {
     fn from(path: P) -> Self {
-        Self::Path(path.into())
+        let path = path.into();
+        if is_mesh(&path) { Self::Meshes { paths: vec![path], up: None } } else { Self::Path(path) }
     }
+}
+
+impl SceneSource {
+    /// One for each path, but one for all meshes among them.
+    pub fn list(paths: impl IntoIterator<Item = PathBuf>, up: Option<UpAxis>) -> Vec<Self> {
+        let (meshes, others): (Vec<PathBuf>, Vec<PathBuf>) =
+            paths.into_iter().partition(|path| is_mesh(path));
+        let mut sources: Vec<Self> = others.into_iter().map(Self::Path).collect();
+        if !meshes.is_empty() {
+            sources.push(Self::Meshes { paths: meshes, up });
+        }
+        sources
+    }
+}
+
+/// Whether a path is that of a mesh, by its ending.
+fn is_mesh(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    ["obj", "gltf", "glb", "ply"].contains(&ending.as_str())
 }
 
 impl From<MemoryScene> for SceneSource {
@@ -58,7 +85,7 @@ impl From<MemoryScene> for SceneSource {
 pub struct SharedScene {
     pub(crate) area: u32,
     pub(crate) mesh: Arc<MeshFile>,
-    pub(crate) annotations: Annotations,
+    pub(crate) annotations: Option<Annotations>,
     pub(crate) locations: Vec<ScanLocation>,
 }
 
@@ -97,26 +124,11 @@ impl SharedScene {
             record.push(InputRecord { path: format!("memory:{name}"), bytes, xxh3_128 });
         };
         push("mesh", sum_of_mesh(self.mesh.mesh.parts()));
-        push("annotations", self.sum_of_annotations()?);
+        if let Some(annotations) = &self.annotations {
+            push("annotations", sum_of_annotations(annotations)?);
+        }
         push("locations", self.sum_of_locations());
         Ok(record)
-    }
-
-    fn sum_of_annotations(&self) -> Result<ChecksumOfParts> {
-        let mut sum = ChecksumOfParts::default();
-        let mut cloud = PointCloud::default();
-        for room in &self.annotations.rooms {
-            for instance in &room.instances {
-                let name = format!("{} {}_{}\n", room.room, instance.class, instance.number);
-                sum.add(name.as_bytes());
-                cloud.clear();
-                instance.read(&mut cloud)?;
-                add(&mut sum, &cloud.positions, |p| p.to_array().map(f32::to_le_bytes));
-                add(&mut sum, &cloud.colors, |c| [*c]);
-                add(&mut sum, &cloud.faces, |f| [f.to_le_bytes()]);
-            }
-        }
-        Ok(sum)
     }
 
     fn sum_of_locations(&self) -> ChecksumOfParts {
@@ -129,6 +141,23 @@ impl SharedScene {
         }
         sum
     }
+}
+
+fn sum_of_annotations(annotations: &Annotations) -> Result<ChecksumOfParts> {
+    let mut sum = ChecksumOfParts::default();
+    let mut cloud = PointCloud::default();
+    for room in &annotations.rooms {
+        for instance in &room.instances {
+            let name = format!("{} {}_{}\n", room.room, instance.class, instance.number);
+            sum.add(name.as_bytes());
+            cloud.clear();
+            instance.read(&mut cloud)?;
+            add(&mut sum, &cloud.positions, |p| p.to_array().map(f32::to_le_bytes));
+            add(&mut sum, &cloud.colors, |c| [*c]);
+            add(&mut sum, &cloud.faces, |f| [f.to_le_bytes()]);
+        }
+    }
+    Ok(sum)
 }
 
 /// The length of a column, and its elements.

@@ -1,14 +1,20 @@
 //! Everything that an export reads, found and checked before anything is written.
 
+pub(crate) mod cameras;
 pub(crate) mod memory;
 pub(crate) mod mesh;
+mod numbering;
 pub(crate) mod pictures;
 pub(crate) mod requested;
+mod up_axis;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::export::input::cameras::{Cameras, Placing};
 use crate::export::input::memory::{SceneSource, SharedScene};
 use crate::export::input::mesh::{MeshFrame, MeshSource};
+use crate::export::input::numbering::{label_table, number, published_numbers};
+use crate::export::input::up_axis::UpGuess;
 use crate::export::labels::annotate::SurveyedRoom;
 use crate::options::ExportOptions;
 use crate::store::request::InputRecord;
@@ -17,11 +23,10 @@ use crate::useful::{Estimate, Finding, count_findings};
 use glam::{DAffine3, DVec3};
 use s3d_geom::TriMesh;
 use s3d_io::Error as FileError;
-use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::{AnnotatedInstance, AnnotationOptions, Annotations, OnFault};
-use s3d_io::mesh::{MeshFile, MeshOptions, MeshOrigin};
+use s3d_io::mesh::{MeshFile, MeshOptions, MeshOrigin, UpAxis};
 use s3d_io::scene::{CameraSource, PictureSource, PublishedArea, PublishedOptions, SceneFile};
-use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
+use s3d_label::{Label, LabelTable, Room};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,12 +44,16 @@ pub(crate) struct AreaInput {
     mesh_file: Option<Arc<MeshFile>>,
     /// The scanner's pictures, if colours are taken from them.
     pub(crate) pictures: Option<PictureSource>,
+    /// Whether there are labels at all.
+    pub(crate) is_labelled: bool,
     /// The rooms, in the order of their names, each with its annotated instances.
     pub(crate) rooms: Vec<RoomInput>,
     /// The scan locations.
     pub(crate) cameras: Cameras,
     /// The list that they come from, for messages.
     pub(crate) cameras_path: PathBuf,
+    /// What was found out about the mesh, as a sentence each.
+    pub(crate) notes: Vec<String>,
     /// What was odd in the annotations, as a sentence each.
     pub(crate) warnings: Vec<String>,
     /// Whether what is not as it should be in the annotations is skipped and counted.
@@ -69,24 +78,6 @@ struct Opened {
     keep_mesh: bool,
 }
 
-/// Where an area is looked at from.
-pub(crate) enum Cameras {
-    /// At these scan locations, in the order of their list, each with its room if the list tells.
-    Listed(Vec<ScanLocation>, Vec<Option<Room>>),
-    /// At places that are chosen once its rooms are known, no two of a room nearer than this, metres.
-    Placed(f64),
-}
-
-impl Cameras {
-    /// The locations that are known before the area is labelled.
-    pub(crate) fn listed(&self) -> &[ScanLocation] {
-        match self {
-            Self::Listed(locations, _) => locations,
-            Self::Placed(_) => &[],
-        }
-    }
-}
-
 /// One room of an area.
 pub(crate) struct RoomInput {
     pub(crate) room: Room,
@@ -108,9 +99,9 @@ pub(crate) struct Inputs {
 
 impl Inputs {
     /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan
-    /// locations, instead of which locations are placed if `place_m` says how far apart.
-    pub(crate) fn open(scenes: &[SceneSource], place_m: Option<f64>, lenient: bool) -> Result<Self> {
-        let mut areas = Self::open_areas(scenes, place_m, lenient, true)?;
+    /// locations, instead of which locations are placed if `asked` says how.
+    pub(crate) fn open(scenes: &[SceneSource], asked: Option<Placing>, lenient: bool) -> Result<Self> {
+        let mut areas = Self::open_areas(scenes, asked, lenient, true)?;
         let table = label_table(&mut areas)?;
         Ok(Self { areas, table })
     }
@@ -119,17 +110,17 @@ impl Inputs {
     /// then.
     pub(crate) fn open_planned(
         scenes: &[SceneSource],
-        place_m: Option<f64>,
+        asked: Option<Placing>,
         lenient: bool,
         table: LabelTable,
     ) -> Result<Self> {
-        let areas = Self::open_areas(scenes, place_m, lenient, false)?;
+        let areas = Self::open_areas(scenes, asked, lenient, false)?;
         Ok(Self { areas, table })
     }
 
     fn open_areas(
         scenes: &[SceneSource],
-        place_m: Option<f64>,
+        asked: Option<Placing>,
         lenient: bool,
         annotations: bool,
     ) -> Result<Vec<AreaInput>> {
@@ -139,17 +130,16 @@ impl Inputs {
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
         for scene in scenes {
             let area = match scene {
-                SceneSource::Memory(scene) => AreaInput::in_memory(scene, place_m, opened)?,
-                SceneSource::Path(path) if path.is_dir() => {
-                    AreaInput::published(path, None, place_m, opened)?
-                }
+                SceneSource::Memory(scene) => AreaInput::in_memory(scene, asked, opened)?,
+                SceneSource::Path(path) if path.is_dir() => AreaInput::published(path, None, asked, opened)?,
+                SceneSource::Meshes { paths, up } => AreaInput::of_meshes(paths, *up, asked, opened)?,
                 SceneSource::Path(path) => {
                     let mut scene = s3d_io::scene::read_scene(path)?;
                     let options = &mut scene.annotation_options;
                     options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
                     // Areas wait beside one another.
                     options.points_in_memory /= scenes.len() as u64;
-                    AreaInput::open(scene, place_m, opened)?
+                    AreaInput::open(scene, asked, opened)?
                 }
             };
             let path = &area.path;
@@ -176,7 +166,20 @@ impl Inputs {
             areas.push(area);
         }
         areas.sort_by_key(|a| a.number);
+        let without = areas.iter().find(|area| !area.is_labelled);
+        if let (Some(without), Some(with)) = (without, areas.iter().find(|area| area.is_labelled)) {
+            return Err(Error::Input(format!(
+                "{} has labels and {} has none: export them into data sets of their own",
+                with.path.display(),
+                without.path.display()
+            )));
+        }
         Ok(areas)
+    }
+
+    /// Whether there are labels at all: all areas have some, or none has.
+    pub(crate) fn are_labelled(&self) -> bool {
+        self.areas.iter().all(|area| area.is_labelled)
     }
 
     /// The numbers of the areas, ascending.
@@ -186,10 +189,10 @@ impl Inputs {
 }
 
 impl AreaInput {
-    fn open(scene: SceneFile, place_m: Option<f64>, opened: Opened) -> Result<Self> {
+    fn open(scene: SceneFile, asked: Option<Placing>, opened: Opened) -> Result<Self> {
         if let Some(folder) = &scene.published {
             let folder = folder.clone();
-            return Self::published(&folder, Some(scene), place_m, opened);
+            return Self::published(&folder, Some(scene), asked, opened);
         }
         let options = &scene.annotation_options;
         let source = MeshSource::Files {
@@ -207,7 +210,7 @@ impl AreaInput {
         let frame = MeshFrame::of(&file);
         let file = Some(file).filter(|_| opened.keep_mesh || scene.annotations.is_empty());
         let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
-        if opened.annotations {
+        if opened.annotations && scene.is_labelled {
             let mut annotations = match &file {
                 Some(file) if scene.annotations.is_empty() => Annotations::of_mesh(file, options)?,
                 _ => {
@@ -226,21 +229,18 @@ impl AreaInput {
                 .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
         }
         let mesh_file = file.filter(|_| opened.keep_mesh);
-        let Some((cameras, cameras_path)) = listed_cameras(&scene, place_m, frame.offset_m)? else {
-            return Err(FileError::format(
-                &scene.path,
-                "has no scan locations: add [cameras] with a path, or place some with --place-cameras 2 (metres)",
-            )
-            .into());
-        };
+        let (cameras, cameras_path) = Cameras::of_scene(&scene, asked, frame.offset_m)?
+            .unwrap_or_else(|| (Cameras::listed_or_placed(Vec::new(), Vec::new()), scene.path.clone()));
         frame.refuse_far_locations(&cameras_path, cameras.listed())?;
         Ok(Self {
             number: scene.area,
             source,
             frame,
             mesh_file,
+            is_labelled: scene.is_labelled,
             rooms,
             cameras,
+            notes: Vec::new(),
             warnings,
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
             files: files_of(&scene),
@@ -253,25 +253,43 @@ impl AreaInput {
         })
     }
 
+    /// An area of meshes alone. Which axis of theirs points up is guessed if nobody says it.
+    fn of_meshes(
+        paths: &[PathBuf],
+        up: Option<UpAxis>,
+        asked: Option<Placing>,
+        opened: Opened,
+    ) -> Result<Self> {
+        let guess = match up {
+            Some(_) => None,
+            None => UpGuess::of_files(paths)?,
+        };
+        let up = up.or(guess.map(|guess| guess.up())).unwrap_or(UpAxis::Y);
+        let scene = SceneFile::of_meshes(paths.to_vec(), up);
+        let text = format!("area = {}\n[mesh]\nup = {:?}\n", scene.area, up.name());
+        let mut area = Self::open(scene, asked, opened)?;
+        area.notes.extend(guess.map(|guess| guess.sentence()));
+        area.warnings.extend(guess.and_then(|guess| guess.doubt()));
+        area.records.push(InputRecord::of_text("scene", &text));
+        Ok(area)
+    }
+
     /// Takes an area that is no file.
-    fn in_memory(scene: &SharedScene, place_m: Option<f64>, opened: Opened) -> Result<Self> {
+    fn in_memory(scene: &SharedScene, asked: Option<Placing>, opened: Opened) -> Result<Self> {
         scene.check()?;
         let name = scene.name();
         let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
         let frame = MeshFrame::of(&scene.mesh);
-        if opened.annotations {
-            frame.refuse_far_points(&name, &scene.annotations)?;
-            let mut annotations = scene.annotations.clone();
+        if let (true, Some(annotations)) = (opened.annotations, &scene.annotations) {
+            frame.refuse_far_points(&name, annotations)?;
+            let mut annotations = annotations.clone();
             warnings = std::mem::take(&mut annotations.warnings);
             rooms = number(scene.area, annotations)
                 .map_err(|e| Error::Input(format!("{}: {e}", name.display())))?;
         }
-        let cameras = match place_m {
-            Some(distance_m) => Cameras::Placed(distance_m),
-            None if scene.locations.is_empty() => {
-                return Err(Error::Input(format!("{}: has no scan locations", name.display())));
-            }
-            None => Cameras::Listed(scene.locations.clone(), vec![None; scene.locations.len()]),
+        let cameras = match asked {
+            Some(placing) => Cameras::Placed(placing),
+            None => Cameras::listed_or_placed(scene.locations.clone(), vec![None; scene.locations.len()]),
         };
         frame.refuse_far_locations(&name, cameras.listed())?;
         Ok(Self {
@@ -280,10 +298,12 @@ impl AreaInput {
             frame,
             mesh_file: Some(Arc::clone(&scene.mesh)),
             pictures: None,
+            is_labelled: scene.annotations.is_some(),
             rooms,
             cameras,
             cameras_path: name.clone(),
             path: name,
+            notes: Vec::new(),
             warnings,
             lenient: false,
             files: Vec::new(),
@@ -297,7 +317,7 @@ impl AreaInput {
     fn published(
         folder: &Path,
         scene: Option<SceneFile>,
-        place_m: Option<f64>,
+        asked: Option<Placing>,
         opened: Opened,
     ) -> Result<Self> {
         let options = PublishedOptions {
@@ -309,7 +329,8 @@ impl AreaInput {
         let mut warnings = std::mem::take(&mut area.warnings);
         let mut rooms = Vec::new();
         let mut mesh = area.read_mesh()?;
-        if opened.annotations {
+        let is_labelled = area.semantic_mesh.is_some();
+        if opened.annotations && is_labelled {
             for label in &mut mesh.labels {
                 label.area = area.area;
             }
@@ -318,8 +339,8 @@ impl AreaInput {
             rooms = published_numbers(&mesh.labels, annotations);
         }
         let listed = match &scene {
-            Some(scene) => listed_cameras(scene, place_m, DVec3::ZERO)?,
-            None => place_m.map(|distance_m| (Cameras::Placed(distance_m), folder.to_owned())),
+            Some(scene) => Cameras::of_scene(scene, asked, DVec3::ZERO)?,
+            None => asked.map(|placing| (Cameras::Placed(placing), folder.to_owned())),
         };
         let (cameras, cameras_path) = listed.unwrap_or_else(|| {
             let (locations, rooms) =
@@ -327,8 +348,8 @@ impl AreaInput {
             (Cameras::Listed(locations, rooms), folder.to_owned())
         });
         let mut files = vec![folder.to_owned()];
-        let mut sources = vec![area.mesh.clone(), area.semantic_mesh.clone()];
-        sources.extend(area.labels.clone());
+        let mut sources = vec![area.mesh.clone()];
+        sources.extend(area.semantic_mesh.iter().chain(&area.labels).cloned());
         if area.world_offset_m != DVec3::ZERO {
             sources.push(area.conventions());
         }
@@ -348,9 +369,11 @@ impl AreaInput {
             frame,
             mesh_file: opened.keep_mesh.then_some(file),
             pictures: scene.and_then(|s| s.pictures),
+            is_labelled,
             rooms,
             cameras,
             cameras_path,
+            notes: Vec::new(),
             warnings,
             lenient: false,
             files,
@@ -365,26 +388,16 @@ impl AreaInput {
         self.mesh_file.as_ref().map_or_else(|| self.source.read(), |file| Ok(Arc::clone(file)))
     }
 
-    /// About how much an export of it writes. Placed locations, which are not known yet, count as one on 4 m² of
-    /// floor, and floors as a fifth of the mesh.
+    /// About how much an export of it writes. Where locations are placed, a fifth of the mesh counts as floor.
     pub(crate) fn estimate(&self, mesh: &TriMesh, options: &ExportOptions) -> Estimate {
         let area_m2 = mesh.total_area();
-        let locations = match &self.cameras {
-            Cameras::Listed(locations, _) => locations.len() as f64,
-            Cameras::Placed(distance_m) => area_m2 / 5.0 / distance_m.max(2.0).powi(2),
-        };
-        Estimate::new(area_m2, locations, options)
+        Estimate::new(area_m2, self.cameras.count_on(area_m2 / 5.0), options)
     }
 
-    /// What looks wrong about the number of its scan locations. Places nearer to each other than a distance
-    /// fill a floor with about one on 0.7 times its square.
+    /// What looks wrong about the number of its scan locations.
     pub(crate) fn count_findings(&self, rooms: &[SurveyedRoom]) -> Vec<Finding> {
         let floor_m2: f64 = rooms.iter().map(|r| r.footprint.area_m2).sum();
-        let count = match &self.cameras {
-            Cameras::Listed(locations, _) => locations.len() as f64,
-            Cameras::Placed(distance_m) => floor_m2 / (0.7 * distance_m.powi(2)),
-        };
-        count_findings(count, rooms)
+        count_findings(self.cameras.count_on(floor_m2), rooms)
     }
 
     /// The data set's list of labels that the area's folder came with.
@@ -398,6 +411,7 @@ impl AreaInput {
     /// Logs what the area's mesh is, and what was odd in mesh and annotations.
     pub(crate) fn tell_mesh(&self, ctx: &Context, file: &MeshFile) {
         self.frame.tell(ctx);
+        self.notes.iter().for_each(|note| ctx.info(note));
         self.warnings.iter().chain(&file.warnings).for_each(|w| ctx.warn(w));
         ctx.info(format_args!(
             "{}: {} faces, {} vertices, {} textures, {:.1} m²",
@@ -410,29 +424,6 @@ impl AreaInput {
     }
 }
 
-/// The scan locations that a scene file names, less the mesh's offset, or that are to be placed, and where
-/// they come from.
-fn listed_cameras(
-    scene: &SceneFile,
-    place_m: Option<f64>,
-    offset_m: DVec3,
-) -> Result<Option<(Cameras, PathBuf)>> {
-    Ok(match (place_m, &scene.cameras) {
-        (Some(distance_m), _) => Some((Cameras::Placed(distance_m), scene.path.clone())),
-        (None, Some(CameraSource::Placed { distance_m })) => {
-            Some((Cameras::Placed(*distance_m), scene.path.clone()))
-        }
-        (None, Some(CameraSource::Listed { path, world_from_file })) => {
-            let moved = DAffine3::from_translation(-offset_m) * *world_from_file;
-            let world_from_file = if offset_m == DVec3::ZERO { world_from_file } else { &moved };
-            let locations = s3d_io::camera::read_scan_locations(path, world_from_file)?;
-            let rooms = vec![None; locations.len()];
-            Some((Cameras::Listed(locations, rooms), path.clone()))
-        }
-        (None, None) => None,
-    })
-}
-
 /// What a scene file names, and itself.
 fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
     let mut files = vec![scene.path.clone()];
@@ -442,66 +433,4 @@ fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
     }
     files.extend(scene.pictures.iter().map(|p| p.path.clone()));
     files
-}
-
-/// The table of all labels. That of a published data set is kept whole if it has them all, so that an index
-/// means the same in its images and in ours; else it is made of the labels at hand.
-fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
-    let labels: Vec<Label> =
-        areas.iter().flat_map(|a| &a.rooms).flat_map(|r| &r.instances).map(|i| i.label).collect();
-    for area in areas.iter_mut() {
-        let Some(path) = area.published_labels().cloned() else { continue };
-        let names = s3d_io::dataset::read_labels(&path)?;
-        match LabelTable::from_names(&names) {
-            Ok(table) if labels.iter().all(|l| table.id_of(l).is_some()) => return Ok(table),
-            Ok(_) => area.warnings.push(format!(
-                "{}: has not every label of the meshes; the table is made anew, so that indices differ from it",
-                path.display()
-            )),
-            Err(e) => area.warnings.push(format!("{}: {e}; the table is made anew", path.display())),
-        }
-    }
-    LabelTable::from_labels(labels).map_err(|e| Error::Input(e.to_string()))
-}
-
-/// Gives every instance, whose numbers run per room, its number in the area.
-fn number(area: u32, annotations: Annotations) -> Result<Vec<RoomInput>, NumberingError> {
-    let keys = annotations.rooms.iter().flat_map(|r| r.instances.iter().map(|i| (r.room, i.class, i.number)));
-    let numbered = number_area(area, keys)?;
-    let labels = numbered.into_iter().map(|n| ((n.room, n.class, n.number_in_room), n.label)).collect();
-    Ok(named(annotations, &labels))
-}
-
-/// Gives every instance the label that it was published with: those of a class and room were numbered there
-/// in the order of their labels.
-fn published_numbers(labels: &[Label], annotations: Annotations) -> Vec<RoomInput> {
-    let mut sorted: Vec<Label> = labels.to_vec();
-    sorted.sort_by_key(|l| (l.room, l.class, l.instance));
-    sorted.dedup();
-    let mut names: BTreeMap<(Room, Class, u32), Label> = BTreeMap::new();
-    for same in sorted.chunk_by(|a, b| (a.room, a.class) == (b.room, b.class)) {
-        names.extend((1..).zip(same).map(|(number, label)| ((label.room, label.class, number), *label)));
-    }
-    named(annotations, &names)
-}
-
-fn named(annotations: Annotations, labels: &BTreeMap<(Room, Class, u32), Label>) -> Vec<RoomInput> {
-    let mut rooms: Vec<RoomInput> = annotations
-        .rooms
-        .into_iter()
-        .map(|r| RoomInput {
-            room: r.room,
-            instances: r
-                .instances
-                .into_iter()
-                .filter_map(|i| {
-                    let label = *labels.get(&(r.room, i.class, i.number))?;
-                    Some(InstanceInput { label, number_in_room: i.number, points: i })
-                })
-                .collect(),
-        })
-        .collect();
-    rooms.iter_mut().for_each(|r| r.instances.sort_by_key(|i| (i.label.class, i.number_in_room)));
-    rooms.sort_by_key(|r| r.room);
-    rooms
 }

@@ -3,7 +3,8 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::input::{AreaInput, Cameras};
+use crate::export::input::AreaInput;
+use crate::export::input::cameras::Cameras;
 use crate::export::modality::Channels;
 use glam::DVec3;
 use s3d_geom::{Camera, Raster};

@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::input::{AreaInput, Cameras};
+use crate::export::input::AreaInput;
 use crate::export::work::for_each_in_order;
 use crate::store::request::{InputRecord, Request, RequestedArea};
 use crate::tables::listing::walk;
@@ -78,10 +78,8 @@ pub(crate) fn requested_areas(
         let inputs = paths.iter().zip(files).map(|(path, files)| record(area, path, files));
         requested.push(RequestedArea {
             area: area.number,
-            place_cameras: match area.cameras {
-                Cameras::Placed(distance_m) => Some(distance_m),
-                Cameras::Listed(..) => None,
-            },
+            place_cameras: area.cameras.distance_m(),
+            see: area.cameras.share(),
             offset_m: area.frame.offset(),
             inputs: inputs.chain(area.records.iter().cloned().map(Ok)).collect::<Result<_>>()?,
         });

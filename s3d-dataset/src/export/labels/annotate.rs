@@ -160,6 +160,14 @@ pub(crate) fn annotate(
     Ok(Annotated { label_of_face, report, rooms, points: total, skipped })
 }
 
+/// An area without annotations: no face has a label, and no room is known.
+pub(crate) fn unannotated(nearest_faces: &NearestFaces<'_>, table: &LabelTable) -> Result<Annotated> {
+    let labels = Labeler::new(nearest_faces).finish();
+    let report = labels.report(table).map_err(|e| Error::Input(e.to_string()))?;
+    let label_of_face = labels.into_label_of_face();
+    Ok(Annotated { label_of_face, report, rooms: Vec::new(), points: 0, skipped: SkippedLines::default() })
+}
+
 /// The rooms so far. The outline of the last one is drawn beside what follows.
 #[derive(Default)]
 struct Rooms {

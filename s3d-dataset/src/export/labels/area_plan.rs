@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::export::input::RoomInput;
 use crate::export::labels::annotate::Annotated;
 use crate::store::checked::{read_checked, write_checked};
+use crate::tables::manifest::SurfaceSeen;
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
 use s3d_io::camera::ScanLocation;
@@ -30,8 +31,10 @@ pub(crate) struct AreaPlan {
     /// The scan locations, listed or placed.
     #[serde(with = "locations_as_data")]
     pub(crate) locations: Vec<ScanLocation>,
-    /// The room of each location.
-    pub(crate) location_rooms: Vec<Room>,
+    /// The room of each location; none in an area without labels.
+    pub(crate) location_rooms: Vec<Option<Room>>,
+    /// What placed locations see.
+    pub(crate) surface_seen: Option<SurfaceSeen>,
     /// The box of the mesh.
     pub(crate) mesh_box: Aabb,
     /// The area of its faces.
@@ -268,7 +271,8 @@ mod tests {
                     },
                     line: 2,
                 }],
-                location_rooms: vec![room("WC_2")],
+                location_rooms: vec![Some(room("WC_2"))],
+                surface_seen: Some(SurfaceSeen { surface_m2: number, visible_m2: 1.0, seen_m2: [number; 3] }),
                 mesh_box: boxes.1,
                 mesh_area_m2: number,
                 faces_left_out: 5,

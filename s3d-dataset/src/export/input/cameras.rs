@@ -1,0 +1,89 @@
+//! Where an area is looked at from.
+
+use crate::error::Result;
+use glam::{DAffine3, DVec3};
+use s3d_io::camera::ScanLocation;
+use s3d_io::scene::{CameraSource, SceneFile};
+use s3d_label::Room;
+use std::path::PathBuf;
+
+/// How scan locations are placed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Placing {
+    /// No two of a room nearer to each other than this, metres.
+    Apart(f64),
+    /// As few as see this share of the surface that can be seen at all.
+    Seeing(f64),
+}
+
+/// The share that is asked for where nothing is said.
+pub(crate) const SHARE: f64 = 0.95;
+
+/// Where an area is looked at from.
+pub(crate) enum Cameras {
+    /// At these scan locations, in the order of their list, each with its room if the list tells.
+    Listed(Vec<ScanLocation>, Vec<Option<Room>>),
+    /// At places that are chosen once its rooms are known.
+    Placed(Placing),
+}
+
+impl Cameras {
+    /// These, or, if there are none, places by free space.
+    pub(super) fn listed_or_placed(locations: Vec<ScanLocation>, rooms: Vec<Option<Room>>) -> Self {
+        if locations.is_empty() {
+            return Self::Placed(Placing::Seeing(SHARE));
+        }
+        Self::Listed(locations, rooms)
+    }
+
+    /// Those that a scene file names, less the mesh's offset, or that are to be placed, and the file that
+    /// says so. What is asked for goes before what the file says.
+    pub(super) fn of_scene(
+        scene: &SceneFile,
+        asked: Option<Placing>,
+        offset_m: DVec3,
+    ) -> Result<Option<(Self, PathBuf)>> {
+        let placed = |placing| Some((Self::Placed(placing), scene.path.clone()));
+        Ok(match (asked, &scene.cameras) {
+            (Some(placing), _) => placed(placing),
+            (None, Some(CameraSource::Placed { distance_m })) => placed(Placing::Apart(*distance_m)),
+            (None, Some(CameraSource::Listed { path, world_from_file })) => {
+                let moved = DAffine3::from_translation(-offset_m) * *world_from_file;
+                let world_from_file = if offset_m == DVec3::ZERO { world_from_file } else { &moved };
+                let locations = s3d_io::camera::read_scan_locations(path, world_from_file)?;
+                let rooms = vec![None; locations.len()];
+                Some((Self::Listed(locations, rooms), path.clone()))
+            }
+            (None, None) => None,
+        })
+    }
+
+    /// The locations that are known before the area is labelled.
+    pub(crate) fn listed(&self) -> &[ScanLocation] {
+        match self {
+            Self::Listed(locations, _) => locations,
+            Self::Placed(_) => &[],
+        }
+    }
+
+    /// How far apart they are placed, metres, if they are placed so.
+    pub(crate) fn distance_m(&self) -> Option<f64> {
+        if let Self::Placed(Placing::Apart(distance_m)) = self { Some(*distance_m) } else { None }
+    }
+
+    /// Which share of the surface they are to see, if they are placed so.
+    pub(crate) fn share(&self) -> Option<f64> {
+        if let Self::Placed(Placing::Seeing(share)) = self { Some(*share) } else { None }
+    }
+
+    /// How many there are, or about how many places are on so many m² of floor: those that keep a distance
+    /// fill a floor with about one on 0.7 times its square; those that are to see a share are about one
+    /// on 15 m².
+    pub(crate) fn count_on(&self, floor_m2: f64) -> f64 {
+        match self {
+            Self::Listed(locations, _) => locations.len() as f64,
+            Self::Placed(Placing::Apart(distance_m)) => floor_m2 / (0.7 * distance_m.powi(2)),
+            Self::Placed(Placing::Seeing(_)) => (floor_m2 / 15.0).max(1.0),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Which axis of a mesh's file points up, where nobody says it.
+
+use crate::error::Result;
+use glam::Vec3;
+use s3d_geom::TriMesh;
+use s3d_io::mesh::{MeshOptions, MeshOrigin, UpAxis, read_mesh_with};
+use std::path::{Path, PathBuf};
+
+/// The cosine of 18°: what is tilted less is level.
+const LEVEL: f32 = 0.95;
+
+/// Axes whose level surfaces differ by less than this factor cannot be told apart.
+const CLEAR: f64 = 1.2;
+
+/// A guess by floors and ceilings: in rooms deeper than high, and with tables, seats and shelves in them,
+/// more of the surface faces up and down than along any other axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct UpGuess {
+    /// The share of the surface that is level if +Y points up, and if +Z does.
+    level: [f64; 2],
+}
+
+impl UpGuess {
+    /// Of the first of a mesh's files; `None` if that says it: by glTF's definition +Y points up.
+    pub(super) fn of_files(paths: &[PathBuf]) -> Result<Option<Self>> {
+        let ending =
+            |path: &Path| path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        match paths.first() {
+            Some(path) if !["gltf", "glb"].contains(&ending(path).as_str()) => {
+                let options = MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() };
+                Ok(Some(Self::of(&read_mesh_with(path, UpAxis::Z, &options)?.mesh)))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// Of a mesh in the axes of its file.
+    fn of(mesh: &TriMesh) -> Self {
+        let level = [Vec3::Y, Vec3::Z].map(|up| {
+            let faces = (0..mesh.faces().len() as u32).filter(|f| mesh.normal(*f).dot(up).abs() > LEVEL);
+            faces.map(|f| mesh.area(f)).sum::<f64>() / mesh.total_area()
+        });
+        Self { level }
+    }
+
+    pub(super) fn up(self) -> UpAxis {
+        if self.level[0] >= self.level[1] { UpAxis::Y } else { UpAxis::Z }
+    }
+
+    /// What was guessed and why.
+    pub(super) fn sentence(self) -> String {
+        let [y, z] = self.level.map(|share| 100.0 * share);
+        format!(
+            "+{} is taken for up: {y:.0} % of the surface is level with +Y, {z:.0} % with +Z (--up y or --up z says it)",
+            self.up().name().to_uppercase()
+        )
+    }
+
+    /// A sentence if it could as well be the other.
+    pub(super) fn doubt(self) -> Option<String> {
+        let [y, z] = self.level;
+        (y.max(z) < CLEAR * y.min(z)).then(|| {
+            format!(
+                "which axis points up is hardly to be seen: look at the first image, or say it (--up {})",
+                { if self.up() == UpAxis::Y { "z" } else { "y" } }
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::TriMesh;
+    use s3d_synth::Building;
+
+    fn turned(mesh: &TriMesh) -> TriMesh {
+        let mut parts = mesh.parts().clone();
+        parts.positions.iter_mut().for_each(|p| *p = Vec3::new(p.x, p.z, -p.y));
+        parts.normals.iter_mut().for_each(|p| *p = Vec3::new(p.x, p.z, -p.y));
+        TriMesh::new(parts).unwrap()
+    }
+
+    #[test]
+    fn floors_and_ceilings_tell_what_is_up() {
+        let mesh = Building::demo().build().unwrap().mesh;
+        let (z, y) = (UpGuess::of(&mesh), UpGuess::of(&turned(&mesh)));
+        assert_eq!((z.up(), y.up()), (UpAxis::Z, UpAxis::Y));
+        assert!(z.doubt().is_none() && z.sentence().starts_with("+Z is taken for up: "), "{}", z.sentence());
+        let even = UpGuess { level: [0.3, 0.31] };
+        assert!(even.doubt().unwrap().contains("--up y"));
+    }
+}
