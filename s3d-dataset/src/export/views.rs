@@ -50,18 +50,15 @@ impl Candidate {
 pub(crate) enum Kinds {
     /// The face's class, if it has one.
     Classes(Vec<Option<Class>>),
-    /// Without labels: which of [`DIRECTIONS`] the face looks in, and how far away it is.
-    Shapes(Vec<u8>),
+    /// Without labels: which of [`DIRECTIONS`] its normal is nearest to.
+    Directions(Vec<u8>),
 }
 
-/// The directions of a cube's faces, edges and corners.
+/// The directions to the faces, edges and corners of a cube.
 const DIRECTIONS: usize = 26;
 
-/// Depths are told apart by octaves: below 1 m, 1 to 2 m, and so on; from 16 m on all are one.
-const OCTAVES: usize = 6;
-
 impl Kinds {
-    /// Of a mesh with these labels: shapes if the table has none.
+    /// Of a mesh with these labels: directions if the table has none.
     pub(crate) fn of(table: &LabelTable, label_of_face: &[LabelId], mesh: &TriMesh) -> Self {
         if table.len() > 1 {
             return Self::Classes(label_of_face.iter().map(|l| table.class_of(*l)).collect());
@@ -75,26 +72,22 @@ impl Kinds {
             let best = cosines.enumerate().max_by(|(i, a), (j, b)| a.total_cmp(b).then(j.cmp(i)));
             best.map_or(0, |(index, _)| index as u8)
         };
-        Self::Shapes((0..mesh.faces().len() as u32).into_par_iter().map(nearest).collect())
+        Self::Directions((0..mesh.faces().len() as u32).into_par_iter().map(nearest).collect())
     }
 
     /// The entropy of what a view's hits show, nats.
     fn entropy_of(&self, hits: &Hits) -> f64 {
-        let seen = hits.face.pixels().iter().zip(hits.depth.pixels()).filter(|(face, _)| **face != NO_FACE);
+        let seen = hits.face.pixels().iter().filter(|face| **face != NO_FACE);
         match self {
             Self::Classes(class_of_face) => {
                 let mut histogram = [0u64; 13];
-                seen.filter_map(|(face, _)| class_of_face[*face as usize])
+                seen.filter_map(|face| class_of_face[*face as usize])
                     .for_each(|class| histogram[class.index()] += 1);
                 entropy(&histogram)
             }
-            Self::Shapes(direction_of_face) => {
-                let mut histogram = [0u64; DIRECTIONS * OCTAVES];
-                for (face, depth_m) in seen {
-                    let octave = ((*depth_m as u32).checked_ilog2().map_or(0, |log| log as usize + 1))
-                        .min(OCTAVES - 1);
-                    histogram[usize::from(direction_of_face[*face as usize]) * OCTAVES + octave] += 1;
-                }
+            Self::Directions(direction_of_face) => {
+                let mut histogram = [0u64; DIRECTIONS];
+                seen.for_each(|face| histogram[usize::from(direction_of_face[*face as usize])] += 1);
                 entropy(&histogram)
             }
         }
@@ -268,6 +261,26 @@ mod tests {
     use super::*;
     use crate::store::journal::{Done, LabelsDone, ScoresDone};
     use crate::store::request::tests::request;
+    use s3d_geom::Raster;
+
+    #[test]
+    fn directions_are_counted_where_there_are_no_labels() {
+        // A floor, a wall, and one between the two.
+        let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [0., -1., 1.]];
+        let mesh = TriMesh::from_faces(
+            corners.map(Vec3::from_array).to_vec(),
+            vec![[0, 1, 2], [0, 1, 3], [0, 1, 4]],
+        );
+        let (mesh, table) = (mesh.unwrap(), LabelTable::from_labels([]).unwrap());
+        let Kinds::Directions(kinds) = Kinds::of(&table, &[LabelId::NULL; 3], &mesh) else { panic!() };
+        assert!(kinds.iter().all(|kind| usize::from(*kind) < DIRECTIONS));
+        assert!(kinds[0] != kinds[1] && kinds[1] != kinds[2] && kinds[0] != kinds[2]);
+        let kinds = Kinds::Directions(kinds);
+        let entropy_of = |face| kinds.entropy_of(&Hits { face, ..Hits::default() });
+        let all = Raster::from_vec(4, 2, vec![0, 0, 1, 1, 2, 2, NO_FACE, NO_FACE]);
+        assert!((entropy_of(all) - 3f64.ln()).abs() < 1e-12);
+        assert_eq!(entropy_of(Raster::filled(4, 2, 1)), 0.0);
+    }
 
     #[test]
     fn as_many_views_are_drawn_as_were_scored() {
