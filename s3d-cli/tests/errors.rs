@@ -30,6 +30,9 @@ fn a_missing_scene_is_named() {
     s3d_fails(&["info", "no/such/scene.toml"], 1, &["no/such/scene.toml"]);
     s3d_fails(&["render", "no/such.obj", "--at", "0,0,0", "-o", "x"], 1, &["no/such.obj"]);
     s3d_fails(&["sample", "no/such.obj", "-o", "x.ply"], 1, &["no/such.obj"]);
+    for name in ["x.las", "x.npy", "x"] {
+        s3d_fails(&["sample", "no/such.obj", "-o", name], 2, &[name, "ends with .ply"]);
+    }
     s3d_fails(&["stats", "no/such"], 1, &["no/such"]);
 }
 
@@ -413,7 +416,7 @@ fn a_log_that_cannot_be_written_ends_nothing() {
 #[cfg(unix)]
 fn a_pipe_is_not_replaced() {
     let scan = Scan::new();
-    let pipe = scan.dir.path().join("pipe");
+    let pipe = scan.dir.path().join("pipe.ply");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     s3d_fails(&["sample", text(&scan.file("room.obj")), "-o", text(&pipe), "--overwrite"], 1, &["pipe"]);
     assert!(!fs::metadata(&pipe).unwrap().is_file());

@@ -97,10 +97,16 @@ fn shards_hold_every_file_once() {
         assert_eq!(bytes.len() as u64, shard["filesize"].as_u64().unwrap());
         assert!(shard["nsamples"].as_u64().unwrap() <= 3);
         // Every file of an image is somewhere in the shards, byte by byte.
+        let mut meta = 0;
         for header in bytes.chunks(512).filter(|b| b.len() == 512 && b[257..262] == *b"ustar") {
+            if header.starts_with(b"__s3d__/") {
+                meta += 1;
+                continue;
+            }
             assert!(header.starts_with(b"area_") || header.starts_with(b"camera_"), "{header:?}");
             found += 1;
         }
+        assert_eq!(meta, 2, "conventions and labels");
     }
     let in_images = |p: &&PathBuf| p.components().any(|c| c.as_os_str() == "data" || c.as_os_str() == "pano");
     assert_eq!(found, all.keys().filter(in_images).count());
@@ -110,10 +116,16 @@ fn shards_hold_every_file_once() {
     let more = ["--prefix", "train", "--images", "views", "--modalities", "rgb,depth", "--areas", "2"];
     let package = pack(dir.path(), "webdataset", &more);
     let names: Vec<_> = package.keys().map(|p| p.to_str().unwrap()).collect();
-    assert_eq!(names, ["pack.json", "shards.json", "train-000000.tar"]);
-    let headers =
-        package[Path::new("train-000000.tar")].chunks(512).filter(|b| b[257..262] == *b"ustar").count();
-    assert_eq!(headers, 2 * image_names(2, "data").len());
+    // A shard for each of a few samples.
+    let samples = image_names(2, "data").len();
+    let shards: Vec<_> = (0..samples).map(|i| format!("train-{i:06}.tar")).collect();
+    assert!(samples > 1 && samples <= 8);
+    assert_eq!(names[..2], ["pack.json", "shards.json"]);
+    assert_eq!(names[2..], shards);
+    for shard in shards {
+        let headers = package[Path::new(&shard)].chunks(512).filter(|b| b[257..262] == *b"ustar").count();
+        assert_eq!(headers, 2 + 2);
+    }
 }
 
 #[test]

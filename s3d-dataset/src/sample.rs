@@ -1,7 +1,7 @@
 //! A mesh's file to a dense coloured point cloud.
 
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::store::staging::Staging;
 use crate::store::{parent_of, refuse_existing};
 use crate::useful::{PLY_POINT_BYTES, check_points, check_space};
@@ -39,9 +39,15 @@ impl Default for SampleOptions {
 /// points.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if the file is there and not to be replaced, or the points are too
-/// many; [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Error::Usage`] if the file's name is not that of a PLY file, if it is there and not to be replaced, or the
+/// points are too many; [`Error::File`]; [`Error::Cancelled`].
 pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
+    if !output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ply")) {
+        return Err(Error::Usage(format!(
+            "{}: a cloud is written as PLY: give it a name that ends with .ply",
+            output.display()
+        )));
+    }
     let (parent, name) = (parent_of(output), Path::new(output.file_name().unwrap_or_default()));
     if !Staging::is_left(&parent, name) {
         refuse_existing(output, options.overwrite)?;

@@ -47,7 +47,7 @@ pub(crate) struct SpecificArgs {
     /// webdataset: megabytes (1,000,000 bytes) of a shard, at most [default: 1000]
     #[arg(long, value_name = "MB", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_size: Option<u32>,
-    /// webdataset: samples of a shard, at most [default: 10000]
+    /// webdataset: samples of a shard, at most [default: an eighth of a series, so that eight workers have work]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_count: Option<u32>,
     /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar

@@ -84,10 +84,27 @@ def test_webdataset_gives_every_image_with_all_its_fields(pack, demo):
         assert sample["pose.json"] == pose_of(demo, stem)[2]
 
 
+def test_workers_share_shards_without_a_word(pack, demo):
+    wds = pytest.importorskip("webdataset")
+    place = pack("webdataset", "--images", "views")
+    shards = json.loads((place / "pack.json").read_text())["notes"][0]
+    name = shards.split('"')[1]
+    assert name == "area_1_views-{000000..000007}.tar"
+    keys = []
+    for worker in range(2):
+        # What a DataLoader with two workers does: each takes every second shard.
+        urls = list(wds.shardlists.expand_urls(str(place / name)))[worker::2]
+        assert urls
+        keys += [sample["__key__"] for sample in wds.WebDataset(urls, shardshuffle=False)]
+    assert sorted(keys) == sorted(f"area_1/{s}" for s in stems(demo, "data"))
+
+
 def test_shards_are_plain_tar_files(pack, demo):
-    place = pack("webdataset", "--prefix", "all", "--shuffle", "3")
+    place = pack("webdataset", "--prefix", "all", "--shuffle", "3", "--max-count", "10000")
     with tarfile.open(place / "all-000000.tar") as archive:
-        members = archive.getmembers()
+        members = [m for m in archive.getmembers() if not m.name.startswith("__s3d__/")]
+        labels = json.load(archive.extractfile("__s3d__/semantic_labels.json"))
+        assert labels == json.loads((demo / "assets/semantic_labels.json").read_text())
         assert {(m.mtime, m.uid, m.gid, m.mode, m.type) for m in members} == {(0, 0, 0, 0o644, tarfile.REGTYPE)}
         keys = list(dict.fromkeys(m.name.split(".")[0] for m in members))
         # The files of a sample stand together.

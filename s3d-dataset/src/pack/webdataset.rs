@@ -13,6 +13,13 @@ use s3d_io::package::{
     ShardEntry, ShardLimits, TarWriter, plan_shards, sample_key, sample_member, write_shard_index,
 };
 
+/// A series has so many shards or more unless limits are given, if it has as many samples: each worker of a loader
+/// reads shards of its own.
+const SHARDS: usize = 8;
+
+/// The folder in a shard of what belongs to all samples. Readers pass over names of this form.
+const META: &str = "__s3d__";
+
 /// A shard to write: its file, and the samples that go into it.
 struct Shard<'a> {
     url: String,
@@ -32,10 +39,12 @@ pub(super) fn pack(
         }
         None => Domain::ALL.to_vec(),
     };
-    let limits = ShardLimits {
-        max_bytes: options.max_size.map_or(ShardLimits::default().max_bytes, |mb| u64::from(mb) * 1_000_000),
-        max_samples: options.max_count.map_or(ShardLimits::default().max_samples, |n| n as usize),
-    };
+    let meta: Vec<(String, Vec<u8>)> =
+        source.tables()?.into_iter().map(|(name, bytes)| (format!("{META}/{name}"), bytes)).collect();
+    let meta_bytes: u64 =
+        meta.iter().map(|(name, bytes)| TarWriter::entry_bytes(name, bytes.len() as u64)).sum();
+    let most = ShardLimits::default();
+    let max_bytes = options.max_size.map_or(most.max_bytes, |mb| u64::from(mb) * 1_000_000);
     let mut shards = Vec::new();
     let mut names = Vec::new();
     for (name, mut images) in series(source, options) {
@@ -43,6 +52,12 @@ pub(super) fn pack(
             shuffle(&mut images, seed);
         }
         let sizes = map_in_order(ctx, &images, || (), |(), image| sample_bytes(source, image, &domains))?;
+        let max_samples = match (options.max_count, options.max_size) {
+            (Some(count), _) => count as usize,
+            (None, Some(_)) => most.max_samples,
+            (None, None) => images.len().div_ceil(SHARDS).clamp(1, most.max_samples),
+        };
+        let limits = ShardLimits { max_bytes: max_bytes.saturating_sub(meta_bytes), max_samples };
         let plan = plan_shards(&sizes, limits);
         names.push(match plan.len() {
             1 => format!("{name}-000000.tar"),
@@ -63,6 +78,7 @@ pub(super) fn pack(
         || (),
         |(), shard| {
             let mut tar = TarWriter::create(&destination.path().join(&shard.url))?;
+            meta.iter().try_for_each(|(name, bytes)| tar.append(name, bytes))?;
             for image in &shard.images {
                 let key = sample_key(image);
                 for domain in present(image, &domains) {
@@ -81,6 +97,7 @@ pub(super) fn pack(
          the number of samples of each shard is in shards.json"
             .into(),
     );
+    notes.push(format!("{META} in each shard holds what its numbers mean: conventions, and the label table if there are labels"));
     notes.push(
         "decode(\"pil\") makes 8-bit RGB of every image: give depth.png (16 bits) and global_xyz.exr decoders of their own, \
          before it, with webdataset.autodecode.handle_extension"
