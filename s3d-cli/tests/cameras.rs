@@ -91,11 +91,12 @@ fn locations_are_placed_by_option_and_by_scene_file() {
     let dir = tempfile::tempdir().unwrap();
     let scene = write_scan(&dir.path().join("scan"), 1);
     let bare = with_cameras(&scene, "");
-    s3d_fails(
-        &["export", text(&bare), "-o", text(&dir.path().join("x"))],
-        1,
-        &["other.toml", "--place-cameras"],
-    );
+    // Without a word they are placed by what they see; the room sees all of itself.
+    let seen = dir.path().join("seen");
+    export(&bare, &seen, &[]);
+    let manifest = fs::read_to_string(seen.join("manifest.json")).unwrap();
+    assert!(manifest.contains("\"see\": 0.95") && manifest.contains("\"surface_seen\""), "{manifest}");
+    assert_eq!(poses(&seen).len(), 1);
     let (a, b, c) = (dir.path().join("a"), dir.path().join("b"), dir.path().join("c"));
     export(&bare, &a, &["--place-cameras", "1.2", "--threads", "1"]);
     let placed = poses(&a);

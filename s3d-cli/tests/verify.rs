@@ -149,6 +149,7 @@ fn a_flipped_bit_in_every_kind_of_file_is_found() {
         ("area_1/3d", "instances.npz"),
         ("area_1/3d", "rooms.json"),
         ("area_1/3d", "votes.json"),
+        ("area_1/3d", "votes.npz"),
         ("area_1/3d", "instance_numbers.json"),
         ("s3dis/Area_1", "_alignmentAngle.txt"),
         ("s3dis/Area_1", "Annotations/wall_1.txt"),

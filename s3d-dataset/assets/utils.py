@@ -160,6 +160,13 @@ def read_instances(path):
     ]
 
 
+def read_votes(path):
+    """votes.npz: by face of rgb.obj, (F,) each: label and runner_up (indices into the label table), votes, total and
+    runner_up_votes, and farthest_m, the distance of the farthest voter."""
+    with np.load(path) as arrays:
+        return {name: arrays[name] for name in arrays.files}
+
+
 def read_s3dis_room(folder):
     """A room of the S3DIS tree: xyz (N, 3) metres, rgb (N, 3) 0..255, class (N,) 0..12, instance (N,) from 1."""
     parts = []
@@ -360,6 +367,10 @@ def main():
         points = read_points(folder / "pointcloud.ply")
         if len(points) and points["label"].max() >= len(data.labels):
             failures.append(f"area {area}: pointcloud.ply has labels beyond the table")
+        if data.is_labelled:
+            votes = read_votes(folder / "votes.npz")
+            if len(votes["label"]) != len(faces) or not set(votes["label"]) <= set(range(len(data.labels))):
+                failures.append(f"area {area}: votes.npz has other faces or labels than semantic.obj")
         instances = read_instances(folder / "instances.npz") if data.is_labelled else []
         if any(i["counts"].sum() != len(i["points"]) for i in instances):
             failures.append(f"area {area}: instances.npz counts other points than it lists")

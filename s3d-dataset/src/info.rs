@@ -136,7 +136,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let mesh = &file.mesh;
     let nearest = NearestFaces::new(mesh);
     let annotated = match area.is_labelled {
-        true => annotate(ctx, area, &nearest, &inputs.table, |_| Ok(()))?,
+        true => annotate(ctx, area, &nearest, &inputs.table, |_| Ok(()))?.0,
         false => unannotated(&nearest, &inputs.table)?,
     };
     let scene = Scene::new(mesh);

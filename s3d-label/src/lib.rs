@@ -72,7 +72,8 @@ pub use statistics::{ClassCounts, RoomCounts};
 pub use table::{LabelId, LabelTable, MAX_LABELS, TableError};
 #[cfg(feature = "vote")]
 pub use voting::{
-    FaceLabels, FaceVotes, Labeler, PointTally, VoteError, VoteOptions, VoteReport, VoteRow, Votes, vote,
+    ClassDispute, DisputedPatch, Disputes, FaceLabels, FaceVotes, Labeler, PointTally, VoteError,
+    VoteOptions, VoteReport, VoteRow, Votes, vote,
 };
 pub use wall_direction::wall_directions_deg;
 

@@ -180,7 +180,7 @@ fn what_is_wrong_in_a_manifest_is_told_by_all_alike() {
         ("area_numbers [2], and areas tells of [1]", |m| m["area_numbers"] = vec![2].into()),
         ("missing field `faces`", |m| drop(m["areas"][0].as_object_mut().unwrap().remove("faces"))),
         ("invalid type: string", |m| m["seed"] = "7".into()),
-        ("0 labels", |m| m["labels"] = 0.into()),
+        ("no labels, and its options ask", |m| m["labels"] = 0.into()),
         ("unknown field `colour`", |m| m["options"]["colour"] = 1.into()),
         ("written by \"s4d\", not by s3d", |m| m["generator"] = "s4d".into()),
         ("tells of no files.csv", |m| drop(m.as_object_mut().unwrap().remove("files"))),

@@ -354,6 +354,40 @@ def test_utils_reads_all_of_it(request, name):
     assert "Warning" not in done.stderr
 
 
+def test_utils_reads_a_data_set_without_labels(s3d, demo, tmp_path):
+    pytest.importorskip("OpenEXR")
+    pytest.importorskip("PIL")
+    out = tmp_path / "out"
+    s3d("export", demo / "scan/rgb.obj", "-o", out, "--views", "4", "--size", "96", "--pano-width", "256", "--points-per-m2", "50")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", out / "assets/utils.py", out], capture_output=True, text=True
+    )
+    assert done.returncode == 0 and "0 instances, 0 rooms" in done.stdout, done.stdout + done.stderr
+    data = utils_of(out).Dataset(out)
+    assert not data.is_labelled and len(data.labels) == 1
+    # Every room of the building has a location.
+    places = np.array([data.pose(image)["camera_location"] for image in data.images("pano")])
+    for room in json.loads((demo / "area_1/3d/rooms.json").read_text()):
+        outer = np.array(room["outline"][0]["outer"])
+        inside = ((places[:, :2] > outer.min(axis=0)) & (places[:, :2] < outer.max(axis=0))).all(axis=1)
+        assert inside.any(), room["room"]
+
+
+def test_votes_are_those_of_the_labels(demo):
+    utils = utils_of(demo)
+    votes = utils.read_votes(demo / "area_1/3d/votes.npz")
+    _, _, materials = utils.read_obj(demo / "area_1/3d/semantic.obj")
+    names = json.loads((demo / "assets/semantic_labels.json").read_text())
+    assert [names[i] for i in votes["label"]] == materials
+    assert (votes["votes"] >= votes["runner_up_votes"]).all()
+    assert (votes["votes"] + votes["runner_up_votes"] <= votes["total"]).all()
+    told = json.loads((demo / "area_1/3d/votes.json").read_text())
+    assert (votes["total"] == 0).sum() == told["faces_without_votes"]
+    disputed = (votes["total"] > 0) & (votes["votes"] < 0.75 * votes["total"])
+    assert disputed.sum() == sum(pair["faces"] for pair in told["disputing_classes"])
+    assert 0 < len(told["disputed_patches"]) <= 50
+
+
 def test_utils_finds_what_is_wrong(demo, tmp_path):
     pytest.importorskip("OpenEXR")
     pytest.importorskip("PIL")

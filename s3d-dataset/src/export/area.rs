@@ -29,7 +29,7 @@ use s3d_io::dataset::{FileRecord, InstanceRecord, InstanceWriter, Layout};
 use s3d_io::fs::create_dir;
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{MeshFile, TextureOut};
-use s3d_label::LabelTable;
+use s3d_label::{Disputes, LabelTable};
 use s3d_render::{MipMaps, Scene};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -99,12 +99,13 @@ impl<'m> PreparedMesh<'m> {
 }
 
 /// The files of an area's labels, if it has some.
-pub(crate) fn label_files(layout: &Layout, area: u32) -> [PathBuf; 5] {
+fn label_files(layout: &Layout, area: u32) -> [PathBuf; 6] {
     [
         layout.instances_json(area),
         layout.instances_npz(area),
         layout.rooms_json(area),
         layout.votes_json(area),
+        layout.votes_npz(area),
         layout.instance_numbers_json(area),
     ]
 }
@@ -155,7 +156,7 @@ pub(crate) fn label_area(
         }
     }
     let annotated = if area.is_labelled {
-        annotate(ctx, area, &nearest, table, |i| {
+        let (annotated, votes) = annotate(ctx, area, &nearest, table, |i| {
             let Some(instances) = &mut instances else { return Ok(()) };
             let record = InstanceRecord {
                 label: &i.label.to_string(),
@@ -165,7 +166,13 @@ pub(crate) fn label_area(
                 bbox: i.bbox,
             };
             Ok(instances.push(&record, i.points)?)
-        })?
+        })?;
+        if writes {
+            let disputes = Disputes::of(&file.mesh, &votes, table);
+            records::write_votes(layout, number, &annotated.report, &disputes, table)?;
+            records::write_face_votes(layout, number, &votes)?;
+        }
+        annotated
     } else {
         unannotated(&nearest, table)?
     };
@@ -204,7 +211,6 @@ pub(crate) fn label_area(
         if let Some(instances) = instances {
             instances.finish()?;
             records::write_rooms(layout, number, &plan.annotated)?;
-            records::write_votes(layout, number, &plan.annotated.report)?;
             records::write_instance_numbers(layout, number, &plan.names)?;
             files = listing::records(ctx, layout, &paths)?;
         }

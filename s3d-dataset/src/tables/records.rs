@@ -7,9 +7,9 @@ use crate::export::labels::annotate::Annotated;
 use crate::export::labels::area_plan::RoomNames;
 use crate::export::views::Candidate;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Domain, Frame, ImageName, Layout, Split};
+use s3d_io::dataset::{Domain, FaceVoteColumns, Frame, ImageName, Layout, Split};
 use s3d_io::fs::{create_dir, write_json};
-use s3d_label::{VoteReport, VoteRow};
+use s3d_label::{Class, ClassDispute, DisputedPatch, Disputes, FaceLabels, LabelTable, VoteReport, VoteRow};
 use s3d_sample::Fold;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -88,8 +88,31 @@ impl From<&VoteRow> for VoteRecord {
     }
 }
 
-/// Writes `area_N/3d/votes.json`: the report on the voting, in all, per room and per class.
-pub(crate) fn write_votes(layout: &Layout, area: u32, report: &VoteReport) -> Result<()> {
+/// Most disputed patches that are named.
+const MOST_PATCHES: usize = 50;
+
+/// Writes `area_N/3d/votes.json`: the report on the voting, in all, per room and per class, and what is disputed.
+pub(crate) fn write_votes(
+    layout: &Layout,
+    area: u32,
+    report: &VoteReport,
+    disputes: &Disputes,
+    table: &LabelTable,
+) -> Result<()> {
+    #[derive(Serialize)]
+    struct Dispute {
+        classes: [&'static str; 2],
+        faces: u64,
+        m2: f64,
+    }
+    #[derive(Serialize)]
+    struct Patch {
+        labels: [String; 2],
+        faces: u64,
+        m2: f64,
+        center: [f64; 3],
+        bbox: [f32; 6],
+    }
     #[derive(Serialize)]
     struct Named {
         name: String,
@@ -103,7 +126,18 @@ pub(crate) fn write_votes(layout: &Layout, area: u32, report: &VoteReport) -> Re
         total: VoteRecord,
         rooms: Vec<Named>,
         classes: Vec<Named>,
+        disputing_classes: Vec<Dispute>,
+        disputed_patches: Vec<Patch>,
     }
+    let dispute =
+        |d: &ClassDispute| Dispute { classes: d.classes.map(Class::name), faces: d.faces, m2: d.area_m2 };
+    let patch = |p: &DisputedPatch| Patch {
+        labels: p.labels.map(|label| table.name_of(label)),
+        faces: p.faces,
+        m2: p.area_m2,
+        center: p.center.to_array(),
+        bbox: p.bbox.to_array(),
+    };
     let votes = Votes {
         faces: report.face_count,
         faces_without_votes: report.faces_without_vote,
@@ -120,8 +154,29 @@ pub(crate) fn write_votes(layout: &Layout, area: u32, report: &VoteReport) -> Re
             .iter()
             .map(|(c, row)| Named { name: c.to_string(), row: row.into() })
             .collect(),
+        disputing_classes: disputes.classes.iter().map(dispute).collect(),
+        disputed_patches: disputes.patches.iter().take(MOST_PATCHES).map(patch).collect(),
     };
     write_json(&layout.votes_json(area), &votes)?;
+    Ok(())
+}
+
+/// Writes `area_N/3d/votes.npz`: how the votes for each face went.
+pub(crate) fn write_face_votes(layout: &Layout, area: u32, votes: &FaceLabels) -> Result<()> {
+    let count = |votes: u64| u32::try_from(votes).unwrap_or(u32::MAX);
+    let mut columns = FaceVoteColumns::default();
+    for face in votes.iter() {
+        let [label, won, total, runner_up, runner_up_votes] = face.as_ref().map_or([0; 5], |v| {
+            [v.label.0, count(v.votes), count(v.total), v.runner_up.0, count(v.runner_up_votes)]
+        });
+        columns.label.push(label);
+        columns.votes.push(won);
+        columns.total.push(total);
+        columns.runner_up.push(runner_up);
+        columns.runner_up_votes.push(runner_up_votes);
+        columns.farthest_m.push(face.map_or(0.0, |v| v.farthest_m));
+    }
+    s3d_io::dataset::write_face_votes(&layout.votes_npz(area), &columns)?;
     Ok(())
 }
 

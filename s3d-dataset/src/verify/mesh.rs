@@ -4,7 +4,7 @@ use super::labels::Labels;
 use super::report::{Report, Topic};
 use crate::tables::manifest::{Manifest, XyzLoss};
 use s3d_geom::TriMesh;
-use s3d_io::dataset::Layout;
+use s3d_io::dataset::{Layout, read_face_votes};
 use s3d_io::fs::read_json;
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_label::{Class, parse_name};
@@ -131,8 +131,20 @@ struct VotesRecord {
     classes: Vec<VoteRecord>,
 }
 
-/// Holds the labels of `semantic.obj` against the report on the votes: faces in all, by room and by class.
+/// Holds the labels of `semantic.obj` against the votes, and against the report on them: faces in all, by room and
+/// by class.
 fn check_votes(layout: &Layout, area: u32, label_of_face: &[u32], labels: &Labels, report: &Report) {
+    let path = layout.votes_npz(area);
+    if let Some(votes) = report.read(Topic::Mesh, &path, read_face_votes) {
+        let won = votes.label == label_of_face;
+        report.check(won, VOTES, &path, || "other labels won than semantic.obj has".to_owned());
+        let sums = votes.votes.iter().zip(&votes.runner_up_votes).zip(&votes.total);
+        let odd = sums.filter(|((first, second), total)| {
+            first < second || u64::from(**first) + u64::from(**second) > u64::from(**total)
+        });
+        let odd = odd.count();
+        report.check(odd == 0, VOTES, &path, || format!("{odd} faces have votes that do not add up"));
+    }
     let path = layout.votes_json(area);
     let Some(votes) = report.read(Topic::Mesh, &path, read_json::<VotesRecord>) else { return };
     let mut per_label = vec![0u64; labels.len()];

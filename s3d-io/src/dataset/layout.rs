@@ -256,6 +256,11 @@ impl Layout {
         self.mesh_dir(area).join("instances.npz")
     }
 
+    /// `area_1/3d/votes.npz`: how the votes for each face went, for numpy.
+    pub fn votes_npz(&self, area: u32) -> PathBuf {
+        self.mesh_dir(area).join("votes.npz")
+    }
+
     /// `area_1/3d/rooms.json`: floor outline, m² and wall direction of each room.
     pub fn rooms_json(&self, area: u32) -> PathBuf {
         self.mesh_dir(area).join("rooms.json")
@@ -488,6 +493,7 @@ mod tests {
             layout.point_cloud_mat(1),
             layout.instances_json(1),
             layout.instances_npz(1),
+            layout.votes_npz(1),
             layout.s3dis_area_dir(1),
             layout.labels_json(),
             layout.splits(),

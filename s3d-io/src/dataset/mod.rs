@@ -29,6 +29,8 @@
 mod conventions;
 pub(crate) mod domain;
 #[cfg(feature = "dataset")]
+mod face_votes;
+#[cfg(feature = "dataset")]
 mod file_list;
 #[cfg(feature = "dataset")]
 pub(crate) mod images;
@@ -37,6 +39,8 @@ mod instances;
 #[cfg(feature = "dataset")]
 mod labels;
 pub(crate) mod layout;
+#[cfg(feature = "dataset")]
+mod npz;
 #[cfg(feature = "dataset")]
 pub(crate) mod pose;
 #[cfg(feature = "dataset")]
@@ -47,6 +51,8 @@ pub use conventions::{
     Conventions, DepthUnits, UnknownWord, WorldOffsets, XyzType, read_conventions, read_world_offsets,
 };
 pub use domain::{Domain, UnknownDomain};
+#[cfg(feature = "dataset")]
+pub use face_votes::{FaceVoteColumns, read_face_votes, read_face_votes_from, write_face_votes};
 #[cfg(feature = "dataset")]
 pub use file_list::{CheckedFile, FileRecord, parse_file_list, read_file_list, write_file_list};
 #[cfg(feature = "dataset")]

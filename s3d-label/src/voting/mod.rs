@@ -1,11 +1,13 @@
 //! Votes of labelled points for the faces of a mesh.
 
 mod corners;
+mod disputes;
 mod face_labels;
 mod labeler;
 mod report;
 mod votes;
 
+pub use disputes::{ClassDispute, DisputedPatch, Disputes};
 pub use face_labels::FaceLabels;
 pub use labeler::{Labeler, VoteError, vote};
 pub use report::{VoteReport, VoteRow};

@@ -6,7 +6,7 @@ use crate::export::input::AreaInput;
 use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance as InstancePoints, InstanceReader, PointPasses};
-use s3d_label::{Label, LabelId, LabelTable, Labeler, Room, VoteReport, wall_directions_deg};
+use s3d_label::{FaceLabels, Label, LabelId, LabelTable, Labeler, Room, VoteReport, wall_directions_deg};
 use serde::{Deserialize, Serialize};
 
 /// Points that are in memory, three times: while some are looked up, those that follow are read.
@@ -72,14 +72,14 @@ pub(crate) struct AnnotatedInstance<'a> {
 
 /// Reads an area's annotated points, one instance at a time and block by block, and lets each vote for its
 /// nearest face. `each` gets every instance with its box and points, in the order of rooms and of numbers in
-/// the room.
+/// the room. Returns the votes behind the labels too.
 pub(crate) fn annotate(
     ctx: &Context,
     area: &AreaInput,
     nearest_faces: &NearestFaces<'_>,
     table: &LabelTable,
     mut each: impl FnMut(AnnotatedInstance<'_>) -> Result<()> + Send,
-) -> Result<Annotated> {
+) -> Result<(Annotated, FaceLabels)> {
     let mesh = nearest_faces.mesh();
     let mut labeler = Labeler::new(nearest_faces);
     let mut rooms = Rooms::default();
@@ -146,18 +146,19 @@ pub(crate) fn annotate(
     if rooms.surveyed.is_empty() {
         return Err(Error::Input(format!("{}: no room in it", area.path.display())));
     }
-    let (label_of_face, directions_deg, report) = rooms.draw_beside(|| {
+    let (labels, directions_deg, report) = rooms.draw_beside(|| {
         let labels = labeler.finish();
         let directions = || wall_directions_deg(mesh, table, labels.label_of_face());
         let (directions_deg, report) = rayon::join(directions, || labels.report(table));
-        (labels.into_label_of_face(), directions_deg, report)
+        (labels, directions_deg, report)
     });
     let mut rooms = rooms.surveyed;
     for room in &mut rooms {
         room.wall_direction_deg = directions_deg.get(&room.room).copied().unwrap_or(0);
     }
     let report = report.map_err(|e| Error::Input(e.to_string()))?;
-    Ok(Annotated { label_of_face, report, rooms, points: total, skipped })
+    let label_of_face = labels.label_of_face().to_vec();
+    Ok((Annotated { label_of_face, report, rooms, points: total, skipped }, labels))
 }
 
 /// An area without annotations: no face has a label, and no room is known.

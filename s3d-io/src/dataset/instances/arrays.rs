@@ -1,11 +1,10 @@
 //! Reads `instances.npz` back.
 
-use crate::cloud::npy::write::npy_header;
+use crate::dataset::npz::{NpzReader, check_header, damaged, numbers};
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
-use std::io::{BufReader, Read, Seek};
+use std::io::{Read, Seek};
 use std::path::Path;
-use zip::ZipArchive;
 
 /// The arrays of `instances.npz`; see [`InstanceWriter`](crate::dataset::InstanceWriter) for their shapes.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,64 +24,6 @@ pub struct InstanceArrays {
     pub point_start: Vec<u64>,
 }
 
-/// The archive, opened.
-struct Archive<'a, R> {
-    path: &'a Path,
-    zip: ZipArchive<BufReader<R>>,
-}
-
-impl<'a, R: Read + Seek> Archive<'a, R> {
-    fn new(file: R, path: &'a Path) -> Result<Self> {
-        let zip = ZipArchive::new(BufReader::with_capacity(1 << 18, file))
-            .map_err(|e| Error::format(path, format!("no readable archive: {e}")))?;
-        Ok(Self { path, zip })
-    }
-
-    /// The header of an array, and its values to be read. The archive's own checksum is looked at where these
-    /// end.
-    fn array(&mut self, name: &str) -> Result<(Vec<u8>, impl Read + '_)> {
-        let path = self.path;
-        let mut entry = self
-            .zip
-            .by_name(&format!("{name}.npy"))
-            .map_err(|e| Error::format(path, format!("the array {name:?}: {e}")))?;
-        let other = |_| Error::format(path, format!("{name:?} is no NPY array"));
-        let (mut start, mut length) = ([0; 8], [0; 2]);
-        entry.read_exact(&mut start).map_err(other)?;
-        entry.read_exact(&mut length).map_err(other)?;
-        let mut text = vec![0; usize::from(u16::from_le_bytes(length))];
-        entry.read_exact(&mut text).map_err(other)?;
-        Ok(([&start[..], &length, &text].concat(), entry))
-    }
-
-    /// The values of an array of this type; `shape` tells its shape from how many bytes there are.
-    fn whole(
-        &mut self,
-        name: &str,
-        kind: impl Fn(usize) -> String,
-        shape: impl Fn(usize) -> Vec<u64>,
-    ) -> Result<Vec<u8>> {
-        let path = self.path;
-        let (header, mut values) = self.array(name)?;
-        let mut bytes = Vec::new();
-        values.read_to_end(&mut bytes).map_err(|e| damaged(path, name, &e))?;
-        let (kind, shape) = (kind(bytes.len()), shape(bytes.len()));
-        check_header(path, name, &header, &kind, &shape)?;
-        Ok(bytes)
-    }
-}
-
-fn damaged(path: &Path, name: &str, e: &std::io::Error) -> Error {
-    Error::format(path, format!("the array {name:?} is damaged: {e}"))
-}
-
-fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, shape: &[u64]) -> Result<()> {
-    if header == npy_header(kind, shape) {
-        return Ok(());
-    }
-    Err(Error::format(path, format!("the array {name:?} is not of type {kind} and shape {shape:?}")))
-}
-
 /// Reads the arrays that [`InstanceWriter`](crate::dataset::InstanceWriter) wrote, but for the members of
 /// voxels, which [`read_instance_members`] reads: a few kilobytes an instance.
 ///
@@ -98,7 +39,7 @@ pub fn read_instance_arrays(path: &Path) -> Result<InstanceArrays> {
 /// As [`read_instance_arrays`].
 pub fn read_instance_arrays_from(reader: impl Read + Seek, name: &Path) -> Result<InstanceArrays> {
     let path = name;
-    let mut archive = Archive::new(reader, path)?;
+    let mut archive = NpzReader::new(reader, path)?;
     let index = archive.whole("label_index", |_| "<u4".into(), |bytes| vec![bytes as u64 / 4])?;
     let n = index.len() / 4;
     let count = n as u64;
@@ -162,7 +103,7 @@ pub fn read_instance_members_from(
     mut each: impl FnMut(usize, &[u32]),
 ) -> Result<()> {
     let path = name;
-    let mut archive = Archive::new(reader, path)?;
+    let mut archive = NpzReader::new(reader, path)?;
     let name = "point_index";
     let total = point_start.last().copied().unwrap_or(0);
     if !point_start.is_sorted() || point_start.first() != Some(&0) {
@@ -190,10 +131,6 @@ pub fn read_instance_members_from(
         Ok(_) => Err(Error::format(path, format!("the array {name:?} goes on behind its {total} points"))),
         Err(e) => Err(damaged(path, name, &e)),
     }
-}
-
-fn numbers<T, const N: usize>(bytes: &[u8], from_le_bytes: impl Fn([u8; N]) -> T) -> Vec<T> {
-    bytes.as_chunks().0.iter().map(|b| from_le_bytes(*b)).collect()
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@
 //! in 6 × 6 × 6 equal voxels, each with its occupancy and its points. Voxel (ix, iy, iz), counted from the
 //! box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "What is written".
 
-use crate::cloud::npy::write::npy_header;
 use crate::cloud::passes::PointPasses;
 use crate::dataset::instances::members::VoxelMembers;
+use crate::dataset::npz::{NpzWriter, bytes};
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
 use crate::fs::json::read_json;
@@ -15,8 +15,6 @@ use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipWriter};
 
 /// Voxels of an instance.
 const CELLS: usize = VoxelGrid::CELLS;
@@ -228,7 +226,7 @@ pub fn read_instances(path: &Path) -> Result<Vec<InstanceEntry>> {
 }
 
 fn write_arrays<N: Write + Seek>(file: N, entries: &[InstanceEntry], spool: File) -> io::Result<N> {
-    let mut archive = Archive { zip: ZipWriter::new(file) };
+    let mut archive = NpzWriter::new(file);
     let n = entries.len() as u64;
 
     // Text of a fixed width, UTF-32, padded with zeros: numpy's own form, which needs no pickle.
@@ -262,7 +260,7 @@ fn write_arrays<N: Write + Seek>(file: N, entries: &[InstanceEntry], spool: File
         4 * total,
         &mut BufReader::with_capacity(1 << 18, spool),
     )?;
-    Ok(archive.zip.finish()?)
+    archive.finish()
 }
 
 /// Where the points of each instance start among those of all, and where they end.
@@ -272,48 +270,6 @@ fn point_starts(entries: &[InstanceEntry]) -> Vec<u64> {
         Some(*sum)
     });
     std::iter::once(0).chain(ends).collect()
-}
-
-fn bytes<T, const N: usize>(values: impl Iterator<Item = T>, to_le_bytes: impl Fn(T) -> [u8; N]) -> Vec<u8> {
-    values.flat_map(to_le_bytes).collect()
-}
-
-/// An `.npz` file: an archive of `.npy` files, stored as they are.
-struct Archive<W: Write + Seek> {
-    zip: ZipWriter<W>,
-}
-
-impl<W: Write + Seek> Archive<W> {
-    fn array(&mut self, name: &str, kind: &str, shape: &[u64], data: impl AsRef<[u8]>) -> io::Result<()> {
-        let mut data = data.as_ref();
-        self.stream(name, kind, shape, data.len() as u64, &mut data)
-    }
-
-    /// Starts an array of about `size` bytes. Beyond 4 GiB its header needs room for 64 bits.
-    fn start(&mut self, name: &str, size: u64) -> io::Result<()> {
-        let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Stored)
-            .last_modified_time(DateTime::default())
-            .large_file(size > 0xf000_0000);
-        Ok(self.zip.start_file(format!("{name}.npy"), options)?)
-    }
-
-    fn stream(
-        &mut self,
-        name: &str,
-        kind: &str,
-        shape: &[u64],
-        size: u64,
-        data: &mut dyn io::Read,
-    ) -> io::Result<()> {
-        self.start(name, size)?;
-        self.zip.write_all(&npy_header(kind, shape))?;
-        let copied = io::copy(data, &mut self.zip)?;
-        if copied != size {
-            return Err(io::Error::other(format!("{copied} of {size} bytes of {name} are left")));
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]
@@ -513,27 +469,6 @@ mod tests {
         };
         let entries = [entry(u64::from(u32::MAX)), entry(7)];
         assert_eq!(point_starts(&entries), [0, u64::from(u32::MAX), (1 << 32) + 6]);
-    }
-
-    #[test]
-    fn an_array_beyond_4_gib_has_a_header_of_64_bits() {
-        for (size, is_large) in [(1 << 33, true), (1 << 20, false)] {
-            let mut archive = Archive { zip: ZipWriter::new(io::Cursor::new(Vec::new())) };
-            archive.start("point_index", size).unwrap();
-            archive.zip.write_all(b"abc").unwrap();
-            let bytes = archive.zip.finish().unwrap().into_inner();
-            // The local header: version 4.5 is needed, the sizes are elsewhere, namely in an extra field of
-            // the kind 1.
-            assert_eq!(bytes[..4], *b"PK\x03\x04");
-            let extra = 30 + "point_index.npy".len();
-            let sizes = if is_large { [0xff; 8] } else { [3, 0, 0, 0, 3, 0, 0, 0] };
-            assert_eq!((bytes[4] == 45, &bytes[18..26]), (is_large, &sizes[..]));
-            assert_eq!(bytes[extra..].starts_with(&[1, 0, 16, 0, 3, 0, 0, 0]), is_large);
-            let mut zip = zip::ZipArchive::new(io::Cursor::new(bytes)).unwrap();
-            let mut text = String::new();
-            zip.by_name("point_index.npy").unwrap().read_to_string(&mut text).unwrap();
-            assert_eq!(text, "abc");
-        }
     }
 
     #[test]

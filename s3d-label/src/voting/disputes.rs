@@ -1,0 +1,213 @@
+//! Where labels dispute a surface.
+
+use crate::{Class, FaceLabels, LabelId, LabelTable};
+use s3d_geom::glam::DVec3;
+use s3d_geom::{Aabb, TriMesh};
+use std::collections::{BTreeMap, HashMap};
+
+/// A face is disputed if its label won less than this share of its votes.
+const CLEAR: f64 = 0.75;
+
+/// Two classes that share the votes of faces.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ClassDispute {
+    /// The two, in the order of [`Class::ALL`]; the same twice if it is two instances of a class.
+    pub classes: [Class; 2],
+    /// How many faces they dispute.
+    pub faces: u64,
+    /// Square metres of these.
+    pub area_m2: f64,
+}
+
+/// Disputed faces of the same two labels that hang together by their corners.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct DisputedPatch {
+    /// The two labels: first the one that won more of its surface.
+    pub labels: [LabelId; 2],
+    /// How many faces it has.
+    pub faces: u64,
+    /// Square metres.
+    pub area_m2: f64,
+    /// Its centre of area, in the mesh's frame.
+    pub center: DVec3,
+    /// Its box.
+    pub bbox: Aabb,
+}
+
+/// Where labels dispute a surface: which classes, and in which places most.
+///
+/// ```
+/// use s3d_geom::{TriMesh, glam::Vec3};
+/// use s3d_label::{Disputes, FaceLabels, LabelId, LabelTable, Votes};
+///
+/// let mesh = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE], vec![[0, 1, 2], [1, 3, 2]])?;
+/// let table = LabelTable::from_labels(["chair_1_office_1_1".parse()?, "wall_1_office_1_1".parse()?])?;
+/// let mut votes = Votes::new(2);
+/// for (face, label, times) in [(0, 1, 2), (0, 2, 1), (1, 2, 9)] {
+///     (0..times).for_each(|_| votes.add(face, LabelId(label), 0.001));
+/// }
+/// let disputes = Disputes::of(&mesh, &FaceLabels::new(votes), &table);
+/// assert_eq!((disputes.classes.len(), disputes.patches[0].labels), (1, [1, 2].map(LabelId)));
+/// assert_eq!((disputes.patches[0].faces, disputes.patches[0].area_m2), (1, 0.5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Disputes {
+    /// Those with most surface first.
+    pub classes: Vec<ClassDispute>,
+    /// The largest first.
+    pub patches: Vec<DisputedPatch>,
+}
+
+/// A disputed face.
+struct Disputed {
+    face: u32,
+    winner: LabelId,
+    /// Winner and runner-up, the smaller first.
+    pair: [LabelId; 2],
+    area_m2: f64,
+}
+
+impl Disputes {
+    /// Of the faces of a mesh that were voted for: those whose label won less than three quarters of the votes.
+    /// Corners are the same where their coordinates are.
+    ///
+    /// # Panics
+    /// If the labels are those of a mesh with more faces.
+    pub fn of(mesh: &TriMesh, labels: &FaceLabels, table: &LabelTable) -> Self {
+        let faces = (0u32..).zip(labels.iter());
+        let disputed: Vec<Disputed> = faces
+            .filter_map(|(face, votes)| {
+                let votes = votes.filter(|votes| votes.share() < CLEAR)?;
+                let pair = [votes.label.min(votes.runner_up), votes.label.max(votes.runner_up)];
+                Some(Disputed { face, winner: votes.label, pair, area_m2: mesh.area(face) })
+            })
+            .collect();
+        Self { classes: class_disputes(&disputed, table), patches: patches(mesh, &disputed) }
+    }
+}
+
+fn class_disputes(disputed: &[Disputed], table: &LabelTable) -> Vec<ClassDispute> {
+    let mut by_class: BTreeMap<[usize; 2], ClassDispute> = BTreeMap::new();
+    for face in disputed {
+        let [Some(a), Some(b)] = face.pair.map(|label| table.class_of(label)) else { continue };
+        let classes = if a.index() <= b.index() { [a, b] } else { [b, a] };
+        let entry = by_class.entry(classes.map(Class::index));
+        let row = entry.or_insert(ClassDispute { classes, faces: 0, area_m2: 0.0 });
+        row.faces += 1;
+        row.area_m2 += face.area_m2;
+    }
+    let mut rows: Vec<ClassDispute> = by_class.into_values().collect();
+    rows.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
+    rows
+}
+
+fn patches(mesh: &TriMesh, disputed: &[Disputed]) -> Vec<DisputedPatch> {
+    // Which disputed face is in whose patch: the first of each stands for it.
+    let mut first: Vec<usize> = (0..disputed.len()).collect();
+    let mut at_corner: HashMap<([u32; 3], [LabelId; 2]), usize> = HashMap::new();
+    for (index, face) in disputed.iter().enumerate() {
+        for corner in mesh.triangle(face.face) {
+            // Adding 0 turns −0 into 0.
+            let key = (corner + 0.0).to_array().map(f32::to_bits);
+            let other = *at_corner.entry((key, face.pair)).or_insert(index);
+            let (a, b) = (root(&mut first, index), root(&mut first, other));
+            if let Some(later) = first.get_mut(a.max(b)) {
+                *later = a.min(b);
+            }
+        }
+    }
+    let mut members: BTreeMap<usize, Vec<&Disputed>> = BTreeMap::new();
+    for (index, face) in disputed.iter().enumerate() {
+        members.entry(root(&mut first, index)).or_default().push(face);
+    }
+    let mut patches: Vec<DisputedPatch> = members.into_values().map(|faces| patch(mesh, &faces)).collect();
+    patches.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
+    patches
+}
+
+/// The first face of the patch that a face is in.
+fn root(first: &mut [usize], mut index: usize) -> usize {
+    while let Some(&parent) = first.get(index)
+        && parent != index
+    {
+        // Halves the way for whoever comes next.
+        let grandparent = first.get(parent).copied().unwrap_or(parent);
+        if let Some(entry) = first.get_mut(index) {
+            *entry = grandparent;
+        }
+        index = grandparent;
+    }
+    index
+}
+
+fn patch(mesh: &TriMesh, faces: &[&Disputed]) -> DisputedPatch {
+    let (mut area_m2, mut weighted, mut bbox) = (0.0, DVec3::ZERO, Aabb::EMPTY);
+    let mut won_m2: BTreeMap<LabelId, f64> = BTreeMap::new();
+    for face in faces {
+        let corners = mesh.triangle(face.face);
+        area_m2 += face.area_m2;
+        weighted += face.area_m2 * corners.map(|c| c.as_dvec3()).iter().sum::<DVec3>() / 3.0;
+        bbox = bbox.union(Aabb::from_points(corners));
+        *won_m2.entry(face.winner).or_default() += face.area_m2;
+    }
+    let [a, b] = faces.first().map_or([LabelId::NULL; 2], |face| face.pair);
+    let won = |label| won_m2.get(&label).copied().unwrap_or(0.0);
+    let labels = if won(a) >= won(b) { [a, b] } else { [b, a] };
+    DisputedPatch { labels, faces: faces.len() as u64, area_m2, center: weighted / area_m2, bbox }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Votes;
+    use s3d_geom::glam::{Vec3, dvec3, vec3};
+
+    /// A strip of squares of 1 m along x, two faces each; corners are not shared.
+    fn strip(squares: usize) -> TriMesh {
+        let (mut positions, mut faces) = (Vec::new(), Vec::new());
+        for i in 0..squares {
+            let (x, n) = (i as f32, 4 * i as u32);
+            positions.extend([vec3(x, 0., 0.), vec3(x + 1., 0., 0.), vec3(x + 1., 1., 0.), vec3(x, 1., 0.)]);
+            faces.extend([[n, n + 1, n + 2], [n, n + 2, n + 3]]);
+        }
+        TriMesh::from_faces(positions, faces).unwrap()
+    }
+
+    #[test]
+    fn patches_hang_together_by_place_and_labels() {
+        let labels = ["chair_1_office_1_1", "chair_2_office_1_1", "wall_1_office_1_1"];
+        let table = LabelTable::from_labels(labels.map(|l| l.parse().unwrap())).unwrap();
+        let mesh = strip(8);
+        let mut votes = Votes::new(16);
+        let mut vote = |square: u32, label: u32, times: u32| {
+            for _ in 0..times {
+                votes.add(2 * square, LabelId(label), 0.0);
+                votes.add(2 * square + 1, LabelId(label), 0.0);
+            }
+        };
+        // Chair 1 and wall: squares 0 to 2, of which the wall wins two, and 6 on its own.
+        for (square, chair, wall) in [(0, 3, 2), (1, 2, 3), (2, 2, 3), (6, 3, 2)] {
+            vote(square, 1, chair);
+            vote(square, 3, wall);
+        }
+        // Two chairs: square 3. Clear: squares 4 and 7; square 5 has no votes.
+        vote(3, 1, 2);
+        vote(3, 2, 2);
+        vote(4, 3, 4);
+        vote(4, 1, 1);
+        vote(7, 3, 1);
+        let disputes = Disputes::of(&mesh, &FaceLabels::new(votes), &table);
+        let classes: Vec<_> = disputes.classes.iter().map(|d| (d.classes, d.faces, d.area_m2)).collect();
+        assert_eq!(classes, [([Class::Wall, Class::Chair], 8, 4.0), ([Class::Chair, Class::Chair], 2, 1.0)]);
+        let patches: Vec<_> = disputes.patches.iter().map(|p| (p.labels.map(|l| l.0), p.faces)).collect();
+        assert_eq!(patches, [([3, 1], 6), ([1, 2], 2), ([1, 3], 2)]);
+        let largest = &disputes.patches[0];
+        assert!(largest.center.abs_diff_eq(dvec3(1.5, 0.5, 0.0), 1e-12) && largest.area_m2 == 3.0);
+        assert_eq!(largest.bbox, Aabb { min: Vec3::ZERO, max: vec3(3.0, 1.0, 0.0) });
+        assert_eq!(Disputes::of(&mesh, &FaceLabels::new(Votes::new(16)), &table), Disputes::default());
+    }
+}
