@@ -20,6 +20,9 @@ use s3d_sample::folds;
 use std::fs;
 use std::path::PathBuf;
 
+/// A share of pixels without a label that is warned of.
+const MUCH_UNLABELLED: f64 = 0.02;
+
 /// What an export has made.
 pub(crate) struct Totals {
     /// All files, the manifest too.
@@ -84,6 +87,14 @@ pub(crate) fn finish(
         let Some(labels) = finished.labels(area) else { continue };
         let tally: UnitTally = finished.locations(area).map(|done| done.tally).sum();
         locations += labels.locations.len();
+        let mut pixels = tally.panoramas;
+        pixels += tally.views;
+        if let Some(share) = pixels.share_unlabelled().filter(|share| *share > MUCH_UNLABELLED) {
+            ctx.warn(format_args!(
+                "area {area}: {:.0} % of the pixels show faces without a label, since no annotated point is next to them",
+                100.0 * share
+            ));
+        }
         entries.push(AreaEntry {
             points: finished.assets(area).map_or(0, |assets| assets.points),
             panoramas: tally.panoramas.images,

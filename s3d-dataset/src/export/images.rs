@@ -176,6 +176,7 @@ struct WrittenShot {
     files: Vec<FileRecord>,
     pixels: u64,
     pixels_missing: u64,
+    pixels_unlabelled: u64,
 }
 
 impl OpenLocation {
@@ -185,7 +186,12 @@ impl OpenLocation {
         self.tally.files += shot.files.len() as u64;
         self.tally.bytes += shot.files.iter().map(|f| f.bytes).sum::<u64>();
         let kind = if frame == Frame::Panorama { &mut self.tally.panoramas } else { &mut self.tally.views };
-        *kind += ImageTally { images: 1, pixels: shot.pixels, pixels_missing: shot.pixels_missing };
+        *kind += ImageTally {
+            images: 1,
+            pixels: shot.pixels,
+            pixels_missing: shot.pixels_missing,
+            pixels_unlabelled: shot.pixels_unlabelled,
+        };
         self.files.extend(shot.files);
     }
 }
@@ -215,7 +221,13 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
     }
     if !images.is_empty() {
         written.pixels = hits.face.len() as u64;
-        written.pixels_missing = hits.face.pixels().iter().filter(|face| **face == NO_FACE).count() as u64;
+        let faces = hits.face.pixels();
+        written.pixels_missing = faces.iter().filter(|face| **face == NO_FACE).count() as u64;
+        if job.modalities.iter().any(|domain| domain.is_semantic()) {
+            let label_of_face = job.channels.label_of_face;
+            let unlabelled = |face: &&u32| label_of_face.get(**face as usize) == Some(&0);
+            written.pixels_unlabelled = faces.iter().filter(unlabelled).count() as u64;
+        }
     }
     Ok(written)
 }

@@ -15,6 +15,8 @@ pub struct ImageTally {
     pub pixels: u64,
     /// Those among them whose ray meets no face: missing in every modality.
     pub pixels_missing: u64,
+    /// Those whose face has no label: 0 where no image of labels is asked for.
+    pub pixels_unlabelled: u64,
 }
 
 /// What a unit of work wrote. Kept in the journal, so that a run that goes on can tell of the whole.
@@ -35,6 +37,7 @@ impl AddAssign for ImageTally {
         self.images += other.images;
         self.pixels += other.pixels;
         self.pixels_missing += other.pixels_missing;
+        self.pixels_unlabelled += other.pixels_unlabelled;
     }
 }
 
@@ -116,6 +119,17 @@ impl Summary {
         if !missing.is_empty() {
             lines.push(format!("missing, for no face is there: {}", missing.join(", ")));
         }
+        let unlabelled: Vec<String> = [("panoramas", tally.panoramas), ("views", tally.views)]
+            .iter()
+            .filter_map(|(kind, t)| Some((kind, t.share_unlabelled().filter(|share| *share > 0.0)?)))
+            .map(|(kind, share)| format!("{} of the pixels of {kind}", percent(share)))
+            .collect();
+        if !unlabelled.is_empty() {
+            lines.push(format!(
+                "without a label, for no point voted for their face: {}",
+                unlabelled.join(", ")
+            ));
+        }
         if views.candidates > views.kept {
             lines.push(format!(
                 "{} of {} candidate views dropped: {} for the lowest entropies of their pool, {} not drawn from its middle",
@@ -139,6 +153,11 @@ impl ImageTally {
     /// The share of missing pixels, if any was cast.
     fn share_missing(&self) -> Option<f64> {
         (self.pixels > 0).then(|| self.pixels_missing as f64 / self.pixels as f64)
+    }
+
+    /// The share of pixels whose face has no label, if any was cast.
+    pub(crate) fn share_unlabelled(&self) -> Option<f64> {
+        (self.pixels > 0).then(|| self.pixels_unlabelled as f64 / self.pixels as f64)
     }
 }
 
@@ -183,7 +202,7 @@ mod tests {
 
     #[test]
     fn tallies_add_up_and_come_back_from_json() {
-        let views = ImageTally { images: 3, pixels: 300, pixels_missing: 30 };
+        let views = ImageTally { images: 3, pixels: 300, pixels_missing: 30, pixels_unlabelled: 6 };
         let a = UnitTally { files: 9, bytes: 1000, views, ..UnitTally::default() };
         let b = UnitTally { files: 1, panoramas: views, ..UnitTally::default() };
         let sum: UnitTally = [a, b, a].into_iter().sum();
@@ -207,7 +226,8 @@ mod tests {
         };
         let lines = summary.lines();
         assert_eq!(lines, ["out: 0 panoramas and 0 views of 2 locations in 1.2 s", "4 files, 2.5 kB"]);
-        summary.tally.views = ImageTally { images: 7, pixels: 1000, pixels_missing: 1 };
+        summary.tally.views =
+            ImageTally { images: 7, pixels: 1000, pixels_missing: 1, pixels_unlabelled: 120 };
         summary.candidate_views =
             ViewTally { candidates: 20, kept: 15, dropped_lowest: 3, dropped_not_drawn: 2, not_asked: 8 };
         summary.stage_seconds = [(Stage::Render, 0.5), (Stage::Load, 0.25)].into();
@@ -215,6 +235,7 @@ mod tests {
         for part in [
             "load 0.2 s, render 0.5 s",
             "0.10 % of the pixels of views",
+            "without a label, for no point voted for their face: 12.00 % of the pixels of views",
             "5 of 20 candidate views dropped: 3 for the lowest entropies of their pool, 2 not drawn",
             "8 kept views are of locations",
         ] {
