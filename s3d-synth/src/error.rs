@@ -93,7 +93,7 @@ pub enum BuildingError {
     Outside {
         /// The room.
         room: Room,
-        /// "item", "lamp" or "ceiling hole".
+        /// "item", "lamp", "ceiling hole" or "stairwell".
         what: &'static str,
         /// Its place in the list, from 0.
         index: usize,

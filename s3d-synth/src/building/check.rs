@@ -1,7 +1,7 @@
 //! What is impossible in a building, found before it is built. What things leave their room is found while
 //! they are built.
 
-use super::{Beam, Building, Filling, Item, Opening, RoomPlan, Thing};
+use super::{Beam, Building, Filling, Item, Opening, RoomPlan, Stairwell, Thing};
 use crate::construct::shell::KNEE_M;
 use crate::{BuildingError, RangeError};
 use s3d_geom::glam::Vec2;
@@ -83,6 +83,12 @@ impl RoomPlan {
             && !(inside(low) && inside(high) && low.cmplt(high).all())
         {
             return Err(outside("ceiling hole", 0));
+        }
+        if let Some(Stairwell { low, high, depth_m }) = self.stairwell {
+            range(depth_m, [0.05, 5.0], "the depth of the stairwell")?;
+            if !(inside(low) && inside(high) && low.cmplt(high).all()) {
+                return Err(outside("stairwell", 0));
+            }
         }
         for (index, &[x, y, length, width]) in self.lamps.iter().enumerate() {
             range(length.min(width), [0.05, LONGEST_M], "the length of a lamp")?;
@@ -198,6 +204,12 @@ impl Thing {
             Self::Plant { height_m, .. } => range(height_m, [0.3, 5.0], "the height of a plant"),
             Self::Carton { size_m } => {
                 size_m.into_iter().try_for_each(|m| range(m, [0.02, LARGE_M], "the side of a box"))
+            }
+            Self::Stairs { width_m, steps, tread_m, riser_m } => {
+                range(width_m, [0.3, LARGE_M], "the width of stairs")?;
+                range(steps as f32, [1.0, 100.0], "the steps of stairs")?;
+                range(tread_m, [0.1, 2.0], "the tread of stairs")?;
+                range(riser_m, [0.05, 1.0], "the riser of stairs")
             }
             Self::Radiator { width_m } => range(width_m, [0.3, LARGE_M], "the width of a radiator"),
             Self::Column { width_m, depth_m, height_m } => [width_m, depth_m, height_m]

@@ -10,7 +10,7 @@ use Thing::{
 use s3d_geom::glam::{DVec3, Vec3, vec2};
 use s3d_label::{Room, RoomType};
 
-const WALL_M: f32 = 0.15;
+pub(super) const WALL_M: f32 = 0.15;
 const DOOR_M: f32 = 2.1;
 
 impl Building {
@@ -49,23 +49,23 @@ const LOCATIONS: [(&str, [f64; 3], f64); 6] = [
 
 // Short words, so that a room can be read as a list.
 
-fn window(wall: Wall, from: f32, to: f32, heights: [f32; 2]) -> Opening {
+pub(super) fn window(wall: Wall, from: f32, to: f32, heights: [f32; 2]) -> Opening {
     Opening { wall, span: [from, to], heights, filling: Filling::Window }
 }
 
-fn door(wall: Wall, from: f32, to: f32, filling: Filling) -> Opening {
+pub(super) fn door(wall: Wall, from: f32, to: f32, filling: Filling) -> Opening {
     Opening { wall, span: [from, to], heights: [0.0, DOOR_M], filling }
 }
 
-fn swung(hinge_left: bool, open_deg: f32) -> Filling {
+pub(super) fn swung(hinge_left: bool, open_deg: f32) -> Filling {
     Filling::Door { thickness_m: WALL_M, hinge_left, open_deg }
 }
 
-fn put(position: [f32; 3], yaw_deg: f32, thing: Thing) -> Item {
+pub(super) fn put(position: [f32; 3], yaw_deg: f32, thing: Thing) -> Item {
     Item::standing(position, yaw_deg, thing)
 }
 
-fn on(wall: Wall, along: f32, thing: Thing) -> Item {
+pub(super) fn on(wall: Wall, along: f32, thing: Thing) -> Item {
     Item::on_wall(wall, along, thing)
 }
 
@@ -73,18 +73,18 @@ fn beam(x: f32, [south, north]: [f32; 2], half_width_m: f32, depth_m: f32, look:
     Item::Beam(Beam { from: vec2(x, south), to: vec2(x, north), half_width_m, depth_m, look })
 }
 
-const DESK: Thing = Thing::Desk { width_m: 1.6, depth_m: 0.78 };
+pub(super) const DESK: Thing = Thing::Desk { width_m: 1.6, depth_m: 0.78 };
 const RADIATOR: Thing = Thing::Radiator { width_m: 1.3 };
 
-fn table([width_m, depth_m, height_m]: [f32; 3], top: Look) -> Thing {
+pub(super) fn table([width_m, depth_m, height_m]: [f32; 3], top: Look) -> Thing {
     Thing::Table { width_m, depth_m, height_m, top }
 }
 
-fn sofa(seats: u32, fabric: Look, cushion: Look) -> Thing {
+pub(super) fn sofa(seats: u32, fabric: Look, cushion: Look) -> Thing {
     Thing::Sofa { seats, fabric, cushion }
 }
 
-fn bookcase(width_m: f32, shelves: u32, wood: Look, seed: u32) -> Thing {
+pub(super) fn bookcase(width_m: f32, shelves: u32, wood: Look, seed: u32) -> Thing {
     Thing::Bookcase { width_m, shelves, wood, seed }
 }
 
@@ -121,6 +121,7 @@ fn office() -> RoomPlan {
             door(Wall::North, 3.9, 4.8, swung(false, 104.0)),
         ],
         ceiling_hole: None,
+        stairwell: None,
         lamps: vec![[1.5, 2.3, 0.6, 1.2], [3.7, 2.3, 0.6, 1.2]],
         paint: Paint { color: [228.0, 226.0, 214.0], band: None, skirting: [196.0, 192.0, 182.0] },
         accent: Some((
@@ -175,6 +176,7 @@ fn conference_room() -> RoomPlan {
         ],
         // The tile that is missing from the ceiling: the seventh along x, the sixth along y.
         ceiling_hole: Some([vec2(5.35 + 3.6, 3.0), vec2(5.35 + 4.2, 3.6)]),
+        stairwell: None,
         lamps: vec![[7.1, 2.1, 1.2, 0.6], [9.25, 2.1, 1.2, 0.6], [12.0, 2.1, 0.6, 1.2]],
         paint: Paint { color: [232.0, 228.0, 218.0], band: None, skirting: [120.0, 84.0, 58.0] },
         accent: Some((
@@ -233,6 +235,7 @@ fn lounge() -> RoomPlan {
             door(Wall::South, 4.2, 5.2, swung(false, 108.0)),
         ],
         ceiling_hole: None,
+        stairwell: None,
         lamps: vec![[5.4, 8.4, 0.4, 0.4], [7.4, 8.4, 0.4, 0.4]],
         paint: Paint { color: [236.0, 226.0, 206.0], band: None, skirting: [236.0, 232.0, 222.0] },
         accent: Some((
@@ -288,6 +291,7 @@ fn hallway() -> RoomPlan {
             door(Wall::East, 5.1, 6.0, Filling::ShutDoor),
         ],
         ceiling_hole: None,
+        stairwell: None,
         lamps: vec![[1.5, 5.55, 1.2, 0.3], [5.6, 5.55, 1.2, 0.3], [10.6, 5.55, 1.2, 0.3]],
         paint: Paint {
             color: [236.0, 232.0, 220.0],

@@ -170,6 +170,17 @@ pub enum Thing {
     },
     /// A copier, 1.04 m high.
     Copier,
+    /// Stairs of solid blocks that climb to the north. The origin is the foot of the first riser.
+    Stairs {
+        /// Along x, at least 0.3.
+        width_m: f32,
+        /// How many treads there are, 1 to 100: the floor above is one riser higher than the last.
+        steps: u32,
+        /// The depth of a tread, at least 0.1.
+        tread_m: f32,
+        /// The height of a riser, at least 0.05.
+        riser_m: f32,
+    },
     /// A fire extinguisher. The origin is on the wall.
     Extinguisher,
     /// A rug of 2.5 m × 2.1 m, 12 mm high.
@@ -228,6 +239,7 @@ impl Thing {
             | Self::Carton { .. }
             | Self::Bin(_)
             | Self::Radiator { .. }
+            | Self::Stairs { .. }
             | Self::Copier
             | Self::Extinguisher
             | Self::Rug => Class::Clutter,

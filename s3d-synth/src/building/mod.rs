@@ -8,6 +8,7 @@
 mod check;
 mod demo;
 mod item;
+mod two_storeys;
 
 pub use item::{Beam, Item, Thing};
 
@@ -63,6 +64,8 @@ pub struct RoomPlan {
     /// A rectangle of the ceiling that is not there, as if it had not been captured: its smallest and largest
     /// corner.
     pub ceiling_hole: Option<[Vec2; 2]>,
+    /// A rectangle of the floor that is not there, for stairs that come up through it.
+    pub stairwell: Option<Stairwell>,
     /// Lamps under the ceiling: x and y of the middle, and the lengths along x and y.
     pub lamps: Vec<[f32; 4]>,
     /// What covers the walls.
@@ -76,6 +79,17 @@ pub struct RoomPlan {
     /// Furniture, structure and all else. Instances of a class are numbered in this order, after those of
     /// openings and lamps.
     pub items: Vec<Item>,
+}
+
+/// A rectangle of a floor that is not there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stairwell {
+    /// Its smallest corner in the plan.
+    pub low: Vec2,
+    /// Its largest corner in the plan.
+    pub high: Vec2,
+    /// How far its sides reach down, metres: to the ceiling below, which has a hole of the same corners.
+    pub depth_m: f32,
 }
 
 /// A wall of a room, by where it stands; in the order in which they pass when one turns right.

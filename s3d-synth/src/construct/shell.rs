@@ -5,8 +5,8 @@ use super::light::{Lamp, Light};
 use super::openings::{doorway, handle, leaf, window};
 use super::things::{beam, construct_thing};
 use crate::BuildingError;
-use crate::building::{Beam, Filling, Item, Opening, RoomPlan, Wall};
-use crate::look::{LAMP, Look, Pattern, to_bytes};
+use crate::building::{Beam, Filling, Item, Opening, RoomPlan, Stairwell, Wall};
+use crate::look::{LAMP, Look, Pattern, WHITE, to_bytes};
 use s3d_geom::{
     MeshParts, NO_INDEX, Raster, Wrap,
     glam::{Vec2, Vec3, vec2, vec3},
@@ -128,7 +128,8 @@ impl RoomPlan {
         if self.heights_m[0] != self.heights_m[1] {
             cuts[2].push(KNEE_M);
         }
-        for corner in self.ceiling_hole.iter().flatten() {
+        let well = self.stairwell.map(|well| [well.low, well.high]);
+        for corner in self.ceiling_hole.iter().chain(&well).flatten() {
             cuts[0].push(corner.x);
             cuts[1].push(corner.y);
         }
@@ -144,7 +145,14 @@ impl RoomPlan {
             |p| self.floor.at(p.x, p.y),
         );
         let floor = b.texture(format!("{name}_floor"), floor, Wrap::Clamp);
-        b.baked(lattice(&xs, &ys, |x, y| (vec3(x, y, 0.0), inside(vec2(x, y))), |_| true), floor);
+        let is_in = |hole: Option<[Vec2; 2]>, p: Vec2| {
+            hole.is_some_and(|[a, c]| p.cmpgt(a).all() && p.cmplt(c).all())
+        };
+        let place = |x, y| (vec3(x, y, 0.0), inside(vec2(x, y)));
+        b.baked(lattice(&xs, &ys, place, |p| !is_in(well, p)), floor);
+        if let Some(well) = self.stairwell {
+            rim(b, well);
+        }
 
         b.begin(Class::Ceiling);
         let slope = (self.heights_m[1] - self.heights_m[0]) / (self.high.y - self.low.y);
@@ -154,11 +162,10 @@ impl RoomPlan {
             self.ceiling.at(p.x - self.low.x, p.y - self.low.y)
         });
         let ceiling = b.texture(format!("{name}_ceiling"), ceiling, Wrap::Clamp);
-        let there = |p: Vec2| !self.ceiling_hole.is_some_and(|[a, c]| p.cmpgt(a).all() && p.cmplt(c).all());
         // Rows from large to small y, so that the front is below.
         let rows: Vec<f32> = ys.iter().rev().copied().collect();
         let place = |x, y| (vec3(x, y, self.squeezed(y, top)), inside(vec2(x, y)));
-        b.baked(lattice(&xs, &rows, place, there), ceiling);
+        b.baked(lattice(&xs, &rows, place, |p| !is_in(self.ceiling_hole, p)), ceiling);
 
         self.build_walls(b, name, [&xs, &ys, &zs]);
     }
@@ -234,6 +241,16 @@ impl RoomPlan {
             let p = self.low + size * vec2(u, 1.0 - v);
             (place(p), normal, color(p))
         })
+    }
+}
+
+/// The sides of a stairwell, seen from within.
+fn rim(b: &mut Builder, Stairwell { low, high, depth_m }: Stairwell) {
+    let ring = [low, vec2(low.x, high.y), high, vec2(high.x, low.y)];
+    for (k, from) in ring.into_iter().enumerate() {
+        let to = ring[(k + 1) % ring.len()];
+        let (top, down) = (|p: Vec2| p.extend(0.0), |p: Vec2| p.extend(-depth_m));
+        b.panel([down(from), down(to), top(to), top(from)], WHITE);
     }
 }
 

@@ -45,6 +45,7 @@ pub(super) fn construct_thing(b: &mut Builder, thing: &Thing) {
         Thing::Copier => copier(b),
         Thing::Extinguisher => extinguisher(b),
         Thing::Rug => rug(b),
+        Thing::Stairs { width_m, steps, tread_m, riser_m } => stairs(b, width_m, steps, tread_m, riser_m),
         Thing::Column { width_m, depth_m, height_m } => column(b, width_m, depth_m, height_m),
     }
 }
@@ -241,6 +242,19 @@ fn rug(b: &mut Builder) {
     b.cuboid([-1.25, -1.05, 0.0], [1.25, 1.05, 0.012], edge, &[Bottom, Top]);
     let corners = [[-1.25, -1.05], [1.25, -1.05], [1.25, 1.05], [-1.25, 1.05]];
     b.panel(corners.map(|[x, y]| vec3(x, y, 0.012)), Look::Fitted(Pattern::Rug));
+}
+
+/// Stairs: a block a step, each as high as its tread, of which only what is not behind another is built.
+fn stairs(b: &mut Builder, width: f32, steps: u32, tread: f32, riser: f32) {
+    b.begin(Class::Clutter);
+    let x = 0.5 * width;
+    for step in 0..steps {
+        let [y0, y1] = [step, step + 1].map(|n| n as f32 * tread);
+        let [z0, z1] = [step, step + 1].map(|n| n as f32 * riser);
+        let omit: &[Side] = if step + 1 == steps { &[Bottom, Front] } else { &[Bottom, Front, Back] };
+        b.cuboid([-x, y0, 0.0], [x, y1, z1], CONCRETE, omit);
+        b.panel([[-x, z0], [x, z0], [x, z1], [-x, z1]].map(|[x, z]| vec3(x, y0, z)), CONCRETE);
+    }
 }
 
 /// A beam under a ceiling from `from` to `to`, which are on the ceiling: `half` its width to either side,

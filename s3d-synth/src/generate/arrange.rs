@@ -151,6 +151,7 @@ fn shell(
         heights_m,
         openings,
         ceiling_hole: None,
+        stairwell: None,
         lamps: lamps(high - low, heights_m)
             .into_iter()
             .map(|l| [l[0] + low.x, l[1] + low.y, l[2], l[3]])
