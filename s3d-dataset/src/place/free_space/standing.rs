@@ -43,6 +43,9 @@ const LEAST_CLEARANCE_M: f32 = 0.1;
 /// Layers of one floor, such as a rug on it, are one foot if nearer than this, metres.
 const LAYER_M: f64 = 0.08;
 
+/// Above a foot what is nearer than this, metres, is the surface itself.
+const SKIN_M: f64 = 0.005;
+
 /// A person climbs this much, metres, and a slope of 35° besides.
 const RISER_M: f64 = 0.13;
 const SLOPE: f64 = 0.7;
@@ -145,10 +148,7 @@ impl Ground {
         ctx.check()?;
         feet.par_iter_mut().try_for_each(|foot| {
             ctx.check()?;
-            let at = grid.at(foot);
-            let way = (HEIGHT_M - FOOT_M) * DVec3::Z;
-            let hit = cast_ray(scene, at + FOOT_M * DVec3::Z, way);
-            foot.has_headroom = hit.is_none_or(|hit| hit.t > 1.0);
+            foot.has_headroom = has_headroom(scene, grid.at(foot), facing);
             Ok::<(), Error>(())
         })?;
         room_around(&grid, nearest, &mut feet);
@@ -236,6 +236,18 @@ impl Ground {
             self.is_place =
                 self.feet.iter().map(|f| f.walkable && f.clearance_m >= LEAST_CLEARANCE_M).collect();
         }
+    }
+
+    /// The lowest and the highest foot of the component that has most.
+    #[cfg(test)]
+    pub(super) fn heights_of_largest(&self) -> [f64; 2] {
+        let mut all: BTreeMap<u32, (usize, [f64; 2])> = BTreeMap::new();
+        for (foot, component) in self.feet.iter().zip(&self.component).filter(|(foot, _)| foot.walkable) {
+            let (feet, [low, high]) = all.entry(*component).or_insert((0, [f64::MAX, f64::MIN]));
+            *feet += 1;
+            (*low, *high) = (low.min(foot.z), high.max(foot.z));
+        }
+        all.into_values().max_by_key(|(feet, _)| *feet).unwrap().1
     }
 
     /// The places with most room around, one for each square of `cell_m` or larger: `most` at the most, or one
@@ -327,6 +339,20 @@ fn root(parents: &mut [u32], mut foot: u32) -> u32 {
         foot = parents[foot as usize];
     }
     foot
+}
+
+/// Whether nothing is above a foot up to the height of a location. Right above it what does not face down like a
+/// ceiling is the floor's own unevenness.
+fn has_headroom(scene: &Scene<'_>, foot: DVec3, facing: Facing) -> bool {
+    let hit_above = |from: f64| {
+        let way = (HEIGHT_M - from) * DVec3::Z;
+        let hit = cast_ray(scene, foot + from * DVec3::Z, way).filter(|hit| hit.t <= 1.0)?;
+        Some((from + hit.t * way.z, facing.normal(scene.mesh(), hit.face)))
+    };
+    match hit_above(SKIN_M) {
+        Some((height, normal)) if height < FOOT_M && normal.z > -LEVEL => hit_above(FOOT_M).is_none(),
+        hit => hit.is_none(),
+    }
 }
 
 /// Measures the free space around feet that have headroom.

@@ -108,6 +108,33 @@ fn every_room_of_the_demo_gets_a_location() {
     assert!(found.warnings.is_empty(), "{:?}", found.warnings);
 }
 
+#[test]
+fn both_storeys_and_every_room_get_a_location() {
+    let building = Building::two_storeys();
+    let scene = built(&building);
+    for distance_m in [None, Some(2.5)] {
+        let found = place(&scene.mesh, FreeSpaceOptions { distance_m, ..SHARE }).unwrap();
+        check(&building, &scene, &found);
+    }
+}
+
+#[test]
+fn stairs_join_storeys() {
+    let heights = |building: &Building| {
+        let scene = built(building);
+        let (rays, nearest) = (Scene::new(&scene.mesh), NearestFaces::new(&scene.mesh));
+        let ground = Ground::find(&Context::default(), &rays, &nearest, Facing::Fronts).unwrap();
+        ground.heights_of_largest()
+    };
+    let mut building = Building::two_storeys();
+    let [low, high] = heights(&building);
+    assert!(low < 0.01 && high > 2.84, "{low} {high}");
+    // Without its stairs.
+    building.rooms[0].items.remove(0);
+    let [low, high] = heights(&building);
+    assert!(high - low < 0.2, "{low} {high}");
+}
+
 fn message(mesh: &TriMesh) -> String {
     place(mesh, SHARE).map(|f| f.floor).unwrap_err().to_string()
 }
