@@ -10,7 +10,8 @@
 //!   overlap ([`stitch()`]).
 //!
 //! **Mesh and camera → hits.** Exact: no pinhole, no leak, no dependence on the order of faces or on the
-//! processor. [`cast_strided`] casts a part of the pixels, to score a view; [`cast_ray`] a single ray.
+//! processor. [`cast_strided`] casts a part of the pixels, to score a view; [`cast_ray`] a single ray;
+//! [`Sight`] tells what is hidden from a place.
 //!
 //! **Hits → images** of the data set (formats.md, "What is written"): [`rgb_image`], [`depth_image`],
 //! [`normal_image`], [`xyz_image`], [`index_image`], [`color_per_face_image`]; or all of them in one walk
@@ -83,7 +84,7 @@ pub use picture::cube_sources::SkyBoxTurn;
 pub use picture::picture_color::{Unseen, picture_image, picture_image_into};
 pub use picture::stitch::{Capture, StitchOptions, stitch};
 pub use raster::visibility::{Caster, cast, cast_ray_by_ray, cast_strided};
-pub use ray::caster::{Hit, cast_ray, cast_ray_brute_force};
+pub use ray::caster::{Hit, Sight, cast_ray, cast_ray_brute_force};
 pub use scene::Scene;
 pub use shade::channels::{
     MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, color_per_face_image, color_per_face_image_into,

@@ -23,8 +23,8 @@ pub fn poisson_disk(points: &[[f64; 3]], distance_m: f64, seed: u64, name: &str)
     poisson_disk_where(points, distance_m, seed, name, |_, _| true)
 }
 
-/// As [`poisson_disk`], but two points count as near only if `is_near` says so too, which is asked for pairs of
-/// indices that are nearer than `distance_m`. So points on both sides of a wall need not keep apart.
+/// As [`poisson_disk`], but two points count as near only if `is_near` says so too, which is asked for pairs
+/// of indices that are nearer than `distance_m`. So points on both sides of a wall need not keep apart.
 ///
 /// # Panics
 /// If `distance_m` is not above 0, or a point is not finite.

@@ -52,6 +52,11 @@ fn is_ray(origin: DVec3, direction: DVec3) -> bool {
     origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO
 }
 
+/// Finite even where a component is 0, so that no 0 · ∞ arises.
+fn inverse(direction: DVec3) -> DVec3 {
+    direction.map(|d| if d.abs() < 1e-290 { 1e290f64.copysign(d) } else { d.recip() })
+}
+
 /// The hits that may still be the nearest.
 #[derive(Default)]
 pub(crate) struct Nearest {
@@ -79,6 +84,48 @@ impl Nearest {
     }
 }
 
+/// Tells what is in sight of one place: many questions cost less than as many rays, since the search ends at
+/// the first face that is in the way, and what hid one point is tried first for the next.
+///
+/// ```
+/// use s3d_geom::{TriMesh, glam::{DVec3, vec3}};
+/// use s3d_render::{Scene, Sight};
+///
+/// let wall = vec![vec3(-1.0, 2.0, 0.0), vec3(1.0, 2.0, 0.0), vec3(0.0, 2.0, 3.0)];
+/// let wall = TriMesh::from_faces(wall, vec![[0, 1, 2]])?;
+/// let scene = Scene::new(&wall);
+/// let mut sight = Sight::from(&scene, DVec3::Z);
+/// assert!(!sight.is_free(DVec3::new(0.0, 4.0, 1.0), 0.0));
+/// assert!(sight.is_free(DVec3::new(0.0, 1.9, 1.0), 0.0));
+/// // A point on the wall is seen from as far as 1 cm before it.
+/// assert!(sight.is_free(DVec3::new(0.0, 2.0, 1.0), 0.01));
+/// # Ok::<(), s3d_geom::MeshError>(())
+/// ```
+pub struct Sight<'s, 'm> {
+    caster: RayCaster<'s, 'm>,
+    /// What was in the way last.
+    hider: Option<u32>,
+}
+
+impl<'s, 'm> Sight<'s, 'm> {
+    /// Looks from `origin`.
+    pub fn from(scene: &'s Scene<'m>, origin: DVec3) -> Self {
+        Self { caster: RayCaster::new(scene, origin), hider: None }
+    }
+
+    /// Whether [`cast_ray`] towards `point` hits nothing, or nothing that is nearer to the origin than
+    /// `point` is by more than `slack_m` metres. Nothing hides what is no place, and what is at the origin.
+    pub fn is_free(&mut self, point: DVec3, slack_m: f64) -> bool {
+        let direction = point - self.caster.origin;
+        let before = 1.0 - slack_m / direction.length();
+        self.hider = self.hider.filter(|&face| self.caster.is_hit(face, direction, before));
+        if self.hider.is_none() {
+            self.hider = self.caster.any_hit(direction, before);
+        }
+        self.hider.is_none()
+    }
+}
+
 /// Casts rays from one origin and keeps its memory between them.
 pub(crate) struct RayCaster<'s, 'm> {
     scene: &'s Scene<'m>,
@@ -101,8 +148,7 @@ impl<'s, 'm> RayCaster<'s, 'm> {
             return None;
         }
         let (mesh, bvh) = (self.scene.mesh(), self.scene.bvh());
-        // Finite even where a component is 0, so that no 0 · ∞ arises.
-        let inverse = direction.map(|d| if d.abs() < 1e-290 { 1e290f64.copysign(d) } else { d.recip() });
+        let inverse = inverse(direction);
         self.nearest.t_min = None;
         self.nearest.candidates.clear();
         self.stack.clear();
@@ -132,6 +178,42 @@ impl<'s, 'm> RayCaster<'s, 'm> {
             }
         }
         self.nearest.hit()
+    }
+
+    /// Some face that is hit before `end`, as a multiple of the direction.
+    fn any_hit(&mut self, direction: DVec3, end: f64) -> Option<u32> {
+        // `end` may be no number.
+        if !is_ray(self.origin, direction) || end.is_nan() || end <= 0.0 {
+            return None;
+        }
+        let bvh = self.scene.bvh();
+        let inverse = inverse(direction);
+        self.stack.clear();
+        self.stack.extend(self.enter(0, inverse).map(|t| (t, 0)));
+        while let Some((_, node)) = self.stack.pop() {
+            let node = &bvh.nodes[node as usize];
+            let first = node.first_index;
+            if node.is_leaf() {
+                let faces = &bvh.primitive_indices[first as usize..(first + node.prim_count) as usize];
+                if let Some(&face) = faces.iter().find(|&&face| self.is_hit(face, direction, end)) {
+                    return Some(face);
+                }
+                continue;
+            }
+            let [left, right] = [first, first + 1].map(|node| {
+                self.enter(node, inverse).filter(|t| *t <= end * (1.0 + SLACK)).map(|t| (t, node))
+            });
+            // The nearer one is looked into first.
+            let (near, far) = if right < left && right.is_some() { (right, left) } else { (left, right) };
+            self.stack.extend(far);
+            self.stack.extend(near);
+        }
+        None
+    }
+
+    fn is_hit(&self, face: u32, direction: DVec3, end: f64) -> bool {
+        Cone::new(self.scene.mesh(), face, self.origin)
+            .is_some_and(|cone| cone.contains(direction) && cone.distance(direction) < end)
     }
 
     /// Where the ray enters the box of a node, at 0 if it starts inside.
@@ -335,7 +417,15 @@ mod tests {
             let faces = (0..corners.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]);
             let Ok(soup) = TriMesh::from_faces(corners, faces.collect()) else { return Ok(()) };
             let origin = far.as_dvec3() + dvec3(0.1, 0.2, 0.3);
+            let scene = Scene::new(&soup);
+            let mut sight = Sight::from(&scene, origin);
             for (hit, d) in check(&soup, origin, d.clone()).into_iter().zip(d) {
+                for (to, slack_m) in [(0.5, 0.0), (3.0, 0.0), (3.0, 0.4)] {
+                    let hidden = hit.is_some_and(|hit| hit.t < to - slack_m / d.length());
+                    let point = origin + to * d;
+                    let margin = hit.is_some_and(|hit| (hit.t - to + slack_m / d.length()).abs() < 1e-9);
+                    prop_assert!(margin || sight.is_free(point, slack_m) != hidden, "{hit:?} {to} {slack_m}");
+                }
                 let all = (0..soup.faces().len() as u32).map(|f| textbook(&soup, f, origin, d));
                 let inside = |w: [f64; 3], by: f64| w.iter().all(|&w| w > by);
                 let hits = all.filter(|(t, w)| *t > 0.0 && inside(*w, 1e-9));

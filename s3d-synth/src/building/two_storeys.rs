@@ -17,8 +17,8 @@ const STAIRS_Y: f32 = 1.2;
 const WELL: [Vec2; 2] = [vec2(0.0, 2.2), vec2(1.15, STAIRS_Y + STEPS as f32 * TREAD_M)];
 
 impl Building {
-    /// A house of two storeys of 45 m² each: a lounge with open stairs, a storage and a pantry below, a hallway
-    /// with the stairwell and two offices above. One walks from every room to every other.
+    /// A house of two storeys of 45 m² each: a lounge with open stairs, a storage and a pantry below, a
+    /// hallway with the stairwell and two offices above. One walks from every room to every other.
     ///
     /// ```
     /// let building = s3d_synth::Building { texture_scale: 0.1, ..s3d_synth::Building::two_storeys() };

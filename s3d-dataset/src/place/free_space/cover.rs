@@ -3,8 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// A candidate of whose view less than this share is seen by the chosen ones asks for one more: so a small room
-/// is not left out because it is little of a large building.
+/// A candidate of whose view less than this share is seen by the chosen ones asks for one more: so a small
+/// room is not left out because it is little of a large building.
 const SHARE_OF_EVERY_VIEW: f64 = 0.5;
 
 /// How many samples are seen.
@@ -29,9 +29,9 @@ impl Cover {
     }
 }
 
-/// Chooses places one by one, each that with the largest `weight` times the number of samples that it sees and
-/// no place before it does; of equal ones the first. Ends when `share` of what all together see is seen, and
-/// of what each of them sees at least half.
+/// Chooses places one by one, each that with the largest `weight` times the number of samples that it sees
+/// and no place before it does; of equal ones the first. Ends when `share` of what all together see is seen,
+/// and of what each of them sees at least half.
 ///
 /// The gain of a place only shrinks, so that it need not be counted again while the old count of another is
 /// smaller than its new one (Minoux 1978).

@@ -1,10 +1,11 @@
 //! Scan locations for a scan without labels: where a tripod could stand inside, few of them, that see much.
 //!
-//! Three steps, a file each: `standing` finds where a person with a tripod can stand and walk, `visibility`
-//! what is seen from there, `cover` which few of these places to take. docs/formats.md ("Scan locations by free
-//! space") has every number.
+//! Three steps, a file each: `standing` (on a `grid`) finds where a person with a tripod can stand and walk, `visibility`
+//! what is seen from there, `cover` which few of these places to take. docs/formats.md ("Scan locations by
+//! free space") has every number.
 
 mod cover;
+mod grid;
 mod standing;
 mod visibility;
 
@@ -13,12 +14,13 @@ use crate::error::{Error, Result};
 use crate::place::HEIGHT_M;
 use cover::Cover;
 use glam::DVec3;
+use grid::{MOST_STEP_M, STEP_M};
 use rayon::prelude::*;
 use s3d_geom::{NearestFaces, Pose, TriMesh};
 use s3d_io::camera::{ScanLocation, uuid_from_name};
 use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk_where;
-use standing::{Facing, Ground, MOST_STEP_M, Place, STEP_M};
+use standing::{Facing, Ground, Place};
 use visibility::{Enclosure, Surface};
 
 /// One candidate a square of this edge, metres, unless there would be more than [`MOST_CANDIDATES`].
@@ -82,10 +84,10 @@ pub(crate) struct FreeSpace {
 }
 
 /// Puts scan locations where a tripod could stand inside: 1.5 m above surfaces that face up, with free space
-/// above and around, where rays end on front sides. They are chosen one by one, each where most surface is seen
-/// that was not seen before, until `share` of what can be seen from anywhere is, and from no place more than
-/// half of what it sees is unseen. With a distance they follow a Poisson-disk pattern instead: no two that see
-/// each other are nearer. All look along +Y.
+/// above and around, where rays end on front sides. They are chosen one by one, each where most surface is
+/// seen that was not seen before, until `share` of what can be seen from anywhere is, and from no place more
+/// than half of what it sees is unseen. With a distance they follow a Poisson-disk pattern instead: no two
+/// that see each other are nearer. All look along +Y.
 ///
 /// The same for the same mesh, options and seed, for any number of threads.
 ///
@@ -123,10 +125,7 @@ pub(crate) fn place_in_free_space(
             cover::greedy(&lists, &weights, surface.len(), options.share)
         }
         Some(distance_m) => {
-            let points: Vec<[f64; 3]> = eyes.iter().map(DVec3::to_array).collect();
-            let is_in_sight = |a: usize, b: usize| sees(scene, eyes[a], eyes[b]);
-            let name = format!("area_{area}");
-            let chosen = poisson_disk_where(&points, distance_m, options.seed, &name, is_in_sight);
+            let chosen = pattern(scene, &found.places, &eyes, distance_m, options.seed, area);
             let at: Vec<DVec3> = chosen.iter().map(|&i| eyes[i]).collect();
             let seen = surface.seen_from(ctx, scene, &at)?;
             let cover = Cover::of(&seen, lists.iter().chain(&seen), surface.len());
@@ -165,6 +164,29 @@ pub(crate) fn place_in_free_space(
     };
     let locations = chosen.iter().enumerate().map(locate).collect();
     Ok(FreeSpace { locations, seen, floor: found.floor, warnings })
+}
+
+/// Places on a Poisson-disk pattern: of those with room enough around, and of narrower ones where none of
+/// these is near. The wall between two rooms lets both have places.
+fn pattern(
+    scene: &Scene<'_>,
+    places: &[Place],
+    eyes: &[DVec3],
+    distance_m: f64,
+    seed: u64,
+    area: u32,
+) -> Vec<usize> {
+    let (wide, narrow): (Vec<usize>, Vec<usize>) = (0..places.len()).partition(|&i| places[i].is_wide());
+    let is_near =
+        |a: usize, b: usize| eyes[a].distance(eyes[b]) < distance_m && sees(scene, eyes[a], eyes[b]);
+    let mut offered: Vec<usize> =
+        narrow.into_par_iter().filter(|&a| !wide.iter().any(|&b| is_near(a, b))).collect();
+    offered.extend(wide);
+    offered.sort_unstable();
+    let points: Vec<[f64; 3]> = offered.iter().map(|&i| eyes[i].to_array()).collect();
+    let is_in_sight = |a: usize, b: usize| sees(scene, eyes[offered[a]], eyes[offered[b]]);
+    let chosen = poisson_disk_where(&points, distance_m, seed, &format!("area_{area}"), is_in_sight);
+    chosen.into_iter().map(|i| offered[i]).collect()
 }
 
 /// What to look at where nothing is found.

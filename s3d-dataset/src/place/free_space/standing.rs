@@ -1,37 +1,26 @@
 //! Where a person with a tripod can stand and walk.
 //!
-//! A grid of vertical lines meets every surface that faces up: each meeting is a foot. A foot that has headroom
-//! and room around is walkable. Walkable feet of neighbouring lines are joined if a person can step from one to
-//! the other; what is joined is a component, such as all floors and stairs of a building. Components that end in
-//! a drop around, table tops for one, are left out.
+//! A grid of vertical lines meets every surface that faces up: each meeting is a foot. A foot that has
+//! headroom and room around is walkable. Walkable feet of neighbouring lines are joined if a person can step
+//! from one to the other; what is joined is a component, such as all floors and stairs of a building.
+//! Components that end in a drop around, table tops for one, are left out.
 
 use super::FloorFound;
+use super::grid::{Foot, Grid, Side, sides_within};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::place::{FOOT_M, HEIGHT_M, LEVEL};
-use glam::{DVec3, Vec3, dvec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use s3d_geom::{NearestFaces, TriMesh};
 use s3d_render::{Scene, cast_ray};
 use std::collections::BTreeMap;
 
-/// The distance of the grid's lines, metres; larger where there is very much floor.
-pub(super) const STEP_M: f64 = 0.1;
-
-/// The largest distance of lines: diagonal neighbours are then as far apart as two balls of [`BODY_M`] reach.
-pub(super) const MOST_STEP_M: f64 = 0.28;
-
-/// With more feet than this the grid is made coarser.
-const MANY_FEET: f64 = 400_000.0;
-
-/// With more feet than this on the coarsest grid nothing is placed: 300,000 m² of floors.
-const MOST_FEET: f64 = 4_000_000.0;
-
 /// Half the width of a person, metres: so much is free around at 1 m and at 1.5 m.
 const BODY_M: f32 = 0.2;
 
 /// Heights above a foot at which room around is looked for, metres: of knees, hips, and the location.
-const KNEE_M: f64 = 0.5;
+const KNEE_M: f64 = 0.6;
 const HIP_M: f64 = 1.0;
 
 /// A location wants this much free around itself; with less a place counts for less.
@@ -40,9 +29,6 @@ const CLEARANCE_M: f32 = 0.5;
 /// A place has at least this much free around.
 const LEAST_CLEARANCE_M: f32 = 0.1;
 
-/// Layers of one floor, such as a rug on it, are one foot if nearer than this, metres.
-const LAYER_M: f64 = 0.08;
-
 /// Above a foot what is nearer than this, metres, is the surface itself.
 const SKIN_M: f64 = 0.005;
 
@@ -50,8 +36,9 @@ const SKIN_M: f64 = 0.005;
 const RISER_M: f64 = 0.13;
 const SLOPE: f64 = 0.7;
 
-/// A tripod stands where the floor around is this level, metres a line.
+/// A tripod stands where the floor differs by no more than this, metres, so far around: not on stairs.
 const UNEVEN_M: f64 = 0.05;
+const LEGS_M: f64 = 0.3;
 
 /// Furniture ends in a drop of at most this, metres: a storey is higher.
 const DROP_M: f64 = 2.2;
@@ -99,21 +86,15 @@ impl Place {
         (self.foot + HEIGHT_M * DVec3::Z).as_vec3().as_dvec3()
     }
 
+    /// Whether there is as much room around as a location wants.
+    pub(super) fn is_wide(&self) -> bool {
+        self.clearance_m >= CLEARANCE_M
+    }
+
     /// What a square metre that it sees counts: less with less clearance than a location wants.
     pub(super) fn weight(&self) -> u64 {
         (1000.0 * self.clearance_m) as u64
     }
-}
-
-/// A meeting of a line of the grid and a surface that faces up.
-#[derive(Clone, Copy, Debug)]
-struct Foot {
-    column: u64,
-    z: f64,
-    has_headroom: bool,
-    /// Free at the hips and above.
-    walkable: bool,
-    clearance_m: f32,
 }
 
 /// All feet, by column and height.
@@ -196,25 +177,16 @@ impl Ground {
         for a in (0..self.feet.len()).filter(|&a| self.feet[a].walkable) {
             let tally = tallies.entry(self.component[a]).or_default();
             tally.feet += 1;
-            let mut is_level = true;
             for side in SIDES {
-                let (mut goes_on, mut has_surface, mut lower) = (false, false, false);
-                for b in self.beside(a, side) {
-                    if self.is_step(a, b, side) {
-                        has_surface = true;
-                        goes_on |= self.component[b] == self.component[a] && self.feet[b].walkable;
-                        is_level &= (self.feet[b].z - self.feet[a].z).abs() <= UNEVEN_M;
-                    } else {
-                        let below = self.feet[a].z - self.feet[b].z;
-                        lower |= below > 0.0 && below < DROP_M;
-                    }
-                }
-                let is_drop = !has_surface && lower;
+                let next = self.beside(a, side);
+                let goes_on = next.clone().any(|b| {
+                    self.is_step(a, b, side)
+                        && self.component[b] == self.component[a]
+                        && self.feet[b].walkable
+                });
                 tally.rim += u64::from(!goes_on);
-                tally.drops += u64::from(is_drop);
-                is_level &= !is_drop;
+                tally.drops += u64::from(self.is_drop(a, side));
             }
-            self.is_place[a] = is_level;
         }
         let square = self.grid.step * self.grid.step;
         let is_floor = |tally: &Tally| {
@@ -225,16 +197,17 @@ impl Ground {
         let floors: Vec<u32> = tallies.iter().filter(|(_, t)| is_floor(t)).map(|(&first, _)| first).collect();
         let mut walkable = 0;
         for a in 0..self.feet.len() {
-            let is_kept = self.feet[a].walkable && floors.binary_search(&self.component[a]).is_ok();
-            self.feet[a].walkable = is_kept;
-            self.is_place[a] &= is_kept && self.feet[a].clearance_m >= LEAST_CLEARANCE_M;
-            walkable += u64::from(is_kept);
+            self.feet[a].walkable &= floors.binary_search(&self.component[a]).is_ok();
+            walkable += u64::from(self.feet[a].walkable);
         }
+        let is_free = |f: &Foot| f.walkable && f.clearance_m >= LEAST_CLEARANCE_M;
+        let around = sides_within(LEGS_M / self.grid.step);
+        let is_place = |a| is_free(&self.feet[a]) && self.is_level(a, &around);
+        self.is_place = (0..self.feet.len()).into_par_iter().map(is_place).collect();
         self.floor.walkable_m2 = walkable as f64 * square;
         if !self.is_place.contains(&true) {
             // Nowhere level, as in a rough scan: then the tripod stands askew.
-            self.is_place =
-                self.feet.iter().map(|f| f.walkable && f.clearance_m >= LEAST_CLEARANCE_M).collect();
+            self.is_place = self.feet.iter().map(is_free).collect();
         }
     }
 
@@ -250,8 +223,8 @@ impl Ground {
         all.into_values().max_by_key(|(feet, _)| *feet).unwrap().1
     }
 
-    /// The places with most room around, one for each square of `cell_m` or larger: `most` at the most, or one
-    /// a component. In the order of the grid.
+    /// The places with most room around, one for each square of `cell_m` or larger: `most` at the most, or
+    /// one a component. In the order of the grid.
     pub(super) fn candidates(&self, cell_m: f64, most: usize) -> Vec<Place> {
         let square = self.grid.step * self.grid.step;
         let mut cell_m = cell_m.max(self.grid.step);
@@ -296,6 +269,21 @@ impl Ground {
         }
     }
 
+    /// Whether the floor goes on at all of some sides, if anything is known there, without a step.
+    fn is_level(&self, a: usize, sides: &[Side]) -> bool {
+        sides.iter().all(|&side| {
+            let mut steps = self.beside(a, side).filter(|&b| self.is_step(a, b, side));
+            steps.all(|b| (self.feet[b].z - self.feet[a].z).abs() <= UNEVEN_M) && !self.is_drop(a, side)
+        })
+    }
+
+    /// Whether at one side there is nothing to step on, but something below that is not the next storey.
+    fn is_drop(&self, a: usize, side: Side) -> bool {
+        let mut next = self.beside(a, side);
+        let below = |b: usize| self.feet[a].z - self.feet[b].z;
+        !next.clone().any(|b| self.is_step(a, b, side)) && next.any(|b| (0.0..DROP_M).contains(&below(b)))
+    }
+
     /// Whether a person can step from `a` to `b` on the line at `side`.
     fn is_step(&self, a: usize, b: usize, side: Side) -> bool {
         let along = self.grid.step * (f64::from(side.0 * side.0 + side.1 * side.1)).sqrt();
@@ -323,9 +311,6 @@ impl Ground {
     }
 }
 
-/// A direction in the grid.
-type Side = (i32, i32);
-
 const SIDES: [Side; 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
 /// Every pair of neighbours once.
@@ -341,8 +326,8 @@ fn root(parents: &mut [u32], mut foot: u32) -> u32 {
     foot
 }
 
-/// Whether nothing is above a foot up to the height of a location. Right above it what does not face down like a
-/// ceiling is the floor's own unevenness.
+/// Whether nothing is above a foot up to the height of a location. Right above it what does not face down
+/// like a ceiling is the floor's own unevenness.
 fn has_headroom(scene: &Scene<'_>, foot: DVec3, facing: Facing) -> bool {
     let hit_above = |from: f64| {
         let way = (HEIGHT_M - from) * DVec3::Z;
@@ -368,96 +353,8 @@ fn room_around(grid: &Grid, nearest: &NearestFaces<'_>, feet: &mut [Foot]) {
             feet[i].walkable = n.distance_m >= least;
         }
     };
-    feet.iter_mut().for_each(|f| f.walkable = f.has_headroom);
+    feet.iter_mut().for_each(|f| (f.walkable, f.clearance_m) = (f.has_headroom, CLEARANCE_M));
     measure(feet, HEIGHT_M, BODY_M);
     measure(feet, HIP_M, BODY_M);
     measure(feet, KNEE_M, 0.0);
-}
-
-/// Vertical lines at equal distances. They miss the lines on which builders of models put their edges.
-#[derive(Clone, Copy)]
-struct Grid {
-    origin: DVec3,
-    step: f64,
-    columns: [u64; 2],
-}
-
-impl Grid {
-    /// A grid for so many square metres that face up.
-    fn new(mesh: &TriMesh, m2: f64) -> Result<Self> {
-        let step = (m2 / MANY_FEET).sqrt().clamp(STEP_M, MOST_STEP_M);
-        if m2 / (step * step) > MOST_FEET {
-            return Err(Error::Input(format!(
-                "{m2:.0} m² of the mesh face up, which is too much floor to place scan locations on: is `units` right? If it is, \
-                 list scan locations or split the scan"
-            )));
-        }
-        let aabb = mesh.aabb();
-        let (min, size) = (aabb.min.as_dvec3(), aabb.size().as_dvec3());
-        let columns = [size.x, size.y].map(|length| (length / step).ceil().min(1e9) as u64 + 1);
-        Ok(Self { origin: min - dvec3(0.618, 0.382, 0.0) * step, step, columns })
-    }
-
-    /// The longer side.
-    fn extent_m(&self) -> f64 {
-        self.columns[0].max(self.columns[1]) as f64 * self.step
-    }
-
-    fn at(&self, foot: &Foot) -> DVec3 {
-        let [i, j] = self.indices(foot.column);
-        dvec3(self.origin.x + i as f64 * self.step, self.origin.y + j as f64 * self.step, foot.z)
-    }
-
-    fn indices(&self, column: u64) -> [u64; 2] {
-        [column / (self.columns[1] + 1), column % (self.columns[1] + 1)]
-    }
-
-    fn column(&self, i: u64, j: u64) -> u64 {
-        i * (self.columns[1] + 1) + j
-    }
-
-    /// The column at one side of another.
-    fn beside(&self, column: u64, side: Side) -> Option<u64> {
-        let [i, j] = self.indices(column);
-        let i = i.checked_add_signed(side.0.into()).filter(|&i| i <= self.columns[0])?;
-        let j = j.checked_add_signed(side.1.into()).filter(|&j| j <= self.columns[1])?;
-        Some(self.column(i, j))
-    }
-
-    /// Where the lines meet some faces, none of them upright; layers of one floor are one foot, the highest.
-    fn feet(&self, mesh: &TriMesh, faces: &[u32]) -> Vec<Foot> {
-        let mut all: Vec<(u64, f64)> =
-            faces.par_iter().flat_map_iter(|&face| self.meetings(mesh.triangle(face))).collect();
-        all.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let mut feet: Vec<Foot> = Vec::new();
-        for (column, z) in all {
-            match feet.last_mut() {
-                Some(last) if last.column == column && z - last.z < LAYER_M => last.z = z,
-                _ => feet.push(Foot {
-                    column,
-                    z,
-                    has_headroom: false,
-                    walkable: false,
-                    clearance_m: CLEARANCE_M,
-                }),
-            }
-        }
-        feet
-    }
-
-    /// Where the lines meet a triangle.
-    fn meetings(&self, corners: [Vec3; 3]) -> impl Iterator<Item = (u64, f64)> {
-        let grid = *self;
-        let [a, b, c] = corners.map(|p| (p.as_dvec3() - grid.origin) / dvec3(grid.step, grid.step, 1.0));
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        let range = move |k: usize| low[k].ceil().max(0.0) as u64..=high[k].floor().max(0.0) as u64;
-        let cross = |p: DVec3, q: DVec3, x: f64, y: f64| (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
-        let area = cross(a, b, c.x, c.y);
-        range(0).flat_map(move |i| range(1).map(move |j| (i, j))).filter_map(move |(i, j)| {
-            let (x, y) = (i as f64, j as f64);
-            let [wa, wb, wc] = [cross(b, c, x, y), cross(c, a, x, y), cross(a, b, x, y)].map(|w| w / area);
-            let is_in = wa >= 0.0 && wb >= 0.0 && wc >= 0.0;
-            is_in.then(|| (grid.column(i, j), grid.origin.z + wa * a.z + wb * b.z + wc * c.z))
-        })
-    }
 }

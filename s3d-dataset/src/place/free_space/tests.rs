@@ -58,7 +58,8 @@ impl Quads {
     }
 }
 
-/// Every place is in a room, free, on a floor, and looks at fronts; every room has one; none is counted twice.
+/// Every place is in a room, free, on a floor, and looks at fronts; every room has one; none is counted
+/// twice.
 fn check(building: &Building, scene: &AnnotatedScene, found: &FreeSpace) {
     let (rays, nearest) = (Scene::new(&scene.mesh), NearestFaces::new(&scene.mesh));
     let mut rooms: BTreeSet<Room> = BTreeSet::new();
@@ -252,6 +253,33 @@ fn a_yard_with_nothing_around_is_no_place_and_says_what_rays_meet() {
 }
 
 #[test]
+fn rooms_behind_shut_doors_get_places_too() {
+    let mut rooms = Quads::default();
+    rooms.room([0.; 3], [9., 7., 2.7]);
+    // 0.2 % of the surface, and nobody else sees it.
+    rooms.room([9.2, 0., 0.], [10.2, 1.2, 2.2]);
+    let found = place(&rooms.mesh(), SHARE).unwrap();
+    let closet = positions(&found).into_iter().filter(|p| p.x > 9.2 && p.x < 10.2);
+    assert_eq!(closet.count(), 1);
+}
+
+#[test]
+fn a_mesh_of_any_measures_ends() {
+    // A room with a needle that is longer than grids go, and one with a needle of 18 km.
+    for (to, is_long) in [([3e7, 3e7, 1.2], true), ([13_000., 13_000., 1.2], false)] {
+        let mut room = Quads::default();
+        room.room([0.; 3], [5., 4., 2.6]);
+        room.add([[1., 1., 1.2], [1.001, 1., 1.2], to, to.map(|c| c + 1e-3)]);
+        let parts = TriMesh::new(room.0).unwrap();
+        let found = place(&parts, SHARE);
+        match is_long {
+            true => assert!(found.map(|f| f.floor).unwrap_err().to_string().contains("`units` right")),
+            false => assert!(!found.unwrap().locations.is_empty()),
+        }
+    }
+}
+
+#[test]
 fn a_room_without_a_ceiling_is_a_room() {
     let mut room = Quads::default();
     room.sides([0.; 3], [5., 4., 2.2], &[0, 2, 3, 4, 5], true);
@@ -270,6 +298,10 @@ fn places_of_a_pattern_keep_apart_where_they_see_each_other_alone() {
     let found = place(&scene.mesh, FreeSpaceOptions { distance_m: Some(3.0), ..SHARE }).unwrap();
     check(&building, &scene, &found);
     let (rays, at) = (Scene::new(&scene.mesh), positions(&found));
+    let nearest = NearestFaces::new(&scene.mesh);
+    let narrow = at.iter().filter(|p| nearest.nearest(p.as_vec3()).distance_m < 0.49);
+    // Here there is room enough almost everywhere.
+    assert!(narrow.count() <= 1);
     let mut through_walls = 0;
     for (i, a) in at.iter().enumerate() {
         for b in at[..i].iter().filter(|b| b.distance(*a) < 3.0) {

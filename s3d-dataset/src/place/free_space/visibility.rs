@@ -6,13 +6,13 @@ use crate::error::Result;
 use glam::{DVec3, dvec3};
 use rayon::prelude::*;
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
-use s3d_render::{Scene, cast_ray};
+use s3d_render::{Scene, Sight, cast_ray};
 use std::f64::consts::PI;
 
 /// Samples of the surface a square metre, and how few and how many there are at least and at most.
-const SAMPLES_PER_M2: f64 = 12.0;
-const FEWEST_SAMPLES: u64 = 4000;
-const MOST_SAMPLES: u64 = 40_000;
+const SAMPLES_PER_M2: f64 = 5.0;
+const FEWEST_SAMPLES: u64 = 3000;
+const MOST_SAMPLES: u64 = 30_000;
 
 /// What is farther is not seen, metres: a texel of a scanner's picture is then a centimetre or so wide.
 const REACH_M: f64 = 10.0;
@@ -72,20 +72,21 @@ impl Surface {
         eyes.par_iter()
             .map(|&eye| {
                 ctx.check()?;
-                let seen =
-                    (0..self.len()).filter(|&i| self.is_seen(scene, eye, i)).map(|i| i as u32).collect();
+                let mut sight = Sight::from(scene, eye);
+                let mut is_seen =
+                    |&i: &u32| self.faces(eye, i as usize) && sight.is_free(self.points[i as usize], HIDES_M);
+                let seen = (0..self.len() as u32).filter(|i| is_seen(i)).collect();
                 progress.add(1);
                 Ok(seen)
             })
             .collect()
     }
 
-    fn is_seen(&self, scene: &Scene<'_>, eye: DVec3, sample: usize) -> bool {
+    /// Whether a sample is near, with its front towards `eye`.
+    fn faces(&self, eye: DVec3, sample: usize) -> bool {
         let way = self.points[sample] - eye;
         let m = way.length();
-        m <= REACH_M
-            && -self.normals[sample].dot(way) >= GRAZING * m
-            && cast_ray(scene, eye, way).is_none_or(|hit| hit.t * m >= m - HIDES_M)
+        m <= REACH_M && -self.normals[sample].dot(way) >= GRAZING * m
     }
 }
 
