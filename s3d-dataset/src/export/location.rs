@@ -5,9 +5,8 @@ use crate::error::Result;
 use crate::export::input::AreaInput;
 use crate::export::input::cameras::{Cameras, Placing, SHARE};
 use crate::export::labels::annotate::{Annotated, SurveyedRoom};
-use crate::place::free_space::{FreeSpaceOptions, place_in_free_space};
+use crate::place::free_space::{FreeSpaceOptions, SurfaceSeen, place_in_free_space};
 use crate::place::{Ground, Placement, place_locations};
-use crate::tables::manifest::SurfaceSeen;
 use glam::DVec3;
 use rayon::prelude::*;
 use s3d_geom::{Camera, NearestFaces};
@@ -158,7 +157,7 @@ pub(crate) fn locate(
             let wanted = FreeSpaceOptions { share, distance_m, seed };
             let placed = place_in_free_space(ctx, area.number, scene, nearest, wanted)?;
             placed.warnings.iter().for_each(|w| ctx.warn(w));
-            let seen = SurfaceSeen::from(placed.seen);
+            let seen = placed.seen;
             let (number, count, floor_m2) = (area.number, placed.locations.len(), placed.floor.inside_m2);
             ctx.info(format_args!(
                 "area {number}: {count} scan locations placed on {floor_m2:.0} m² of floor: {seen}"

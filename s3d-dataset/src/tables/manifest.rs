@@ -2,7 +2,7 @@
 
 use crate::error::{Result, passes_io};
 use crate::options::{ExportOptions, by_name};
-use crate::place::free_space;
+use crate::place::free_space::SurfaceSeen;
 use crate::profile::loader::Profile;
 use crate::store::change;
 use crate::store::request::{InputRecord, Request, RequestedArea};
@@ -13,7 +13,6 @@ use s3d_io::fs::{Checksum, read_json, write_json};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::fmt;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -116,36 +115,6 @@ pub(crate) struct AreaEntry {
     /// What it was made from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) inputs: Vec<InputRecord>,
-}
-
-/// How much of an area's surface placed locations see, m².
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SurfaceSeen {
-    /// All of it.
-    pub(crate) surface_m2: f64,
-    /// What can be seen from any place where a scanner could stand.
-    pub(crate) visible_m2: f64,
-    /// What one location or more see, two or more, three or more.
-    pub(crate) seen_m2: [f64; 3],
-}
-
-impl From<free_space::SurfaceSeen> for SurfaceSeen {
-    fn from(seen: free_space::SurfaceSeen) -> Self {
-        let free_space::SurfaceSeen { surface_m2, visible_m2, by_locations_m2 } = seen;
-        Self { surface_m2, visible_m2, seen_m2: by_locations_m2 }
-    }
-}
-
-impl fmt::Display for SurfaceSeen {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { surface_m2, visible_m2, seen_m2 } = self;
-        let [one, two, three] = seen_m2.map(|m2| 100.0 * m2 / visible_m2);
-        write!(
-            f,
-            "of {visible_m2:.1} m² that can be seen from somewhere ({surface_m2:.1} m² in all), {one:.0} % is seen by one \
-             or more, {two:.0} % by two or more, {three:.0} % by three or more"
-        )
-    }
 }
 
 /// What storing world coordinates loses.

@@ -388,10 +388,15 @@ impl AreaInput {
         self.mesh_file.as_ref().map_or_else(|| self.source.read(), |file| Ok(Arc::clone(file)))
     }
 
-    /// About how much an export of it writes. Where locations are placed, a fifth of the mesh counts as floor.
+    /// About how much an export of it writes. Where locations are placed, a fifth of the mesh counts as floor, with
+    /// no more of them than 2 m apart: a slip in their distance is another finding.
     pub(crate) fn estimate(&self, mesh: &TriMesh, options: &ExportOptions) -> Estimate {
         let area_m2 = mesh.total_area();
-        Estimate::new(area_m2, self.cameras.count_on(area_m2 / 5.0), options)
+        let floor_m2 = area_m2 / 5.0;
+        let most = Cameras::Placed(Placing::Apart(2.0)).count_on(floor_m2).max(1.0);
+        let count = self.cameras.count_on(floor_m2);
+        let is_listed = matches!(self.cameras, Cameras::Listed(..));
+        Estimate::new(area_m2, if is_listed { count } else { count.min(most) }, options)
     }
 
     /// What looks wrong about the number of its scan locations.

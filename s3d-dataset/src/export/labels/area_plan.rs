@@ -8,8 +8,8 @@
 use crate::error::Result;
 use crate::export::input::RoomInput;
 use crate::export::labels::annotate::Annotated;
+use crate::place::free_space::SurfaceSeen;
 use crate::store::checked::{read_checked, write_checked};
-use crate::tables::manifest::SurfaceSeen;
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
 use s3d_io::camera::ScanLocation;

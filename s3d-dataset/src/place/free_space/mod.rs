@@ -20,7 +20,9 @@ use s3d_geom::{NearestFaces, Pose, TriMesh};
 use s3d_io::camera::{ScanLocation, uuid_from_name};
 use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk_where;
+use serde::{Deserialize, Serialize};
 use standing::{Facing, Ground, Place};
+use std::fmt;
 use visibility::{Enclosure, Surface};
 
 /// One candidate a square of this edge, metres, unless there would be more than [`MOST_CANDIDATES`].
@@ -49,14 +51,26 @@ pub(crate) struct FreeSpaceOptions {
 }
 
 /// How much surface is seen, m². A surface is seen where its front is, from 10 m or nearer, not edge-on.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SurfaceSeen {
     /// All of it.
     pub(crate) surface_m2: f64,
     /// By any place at which a location could be.
     pub(crate) visible_m2: f64,
     /// By one location or more, by two or more, by three or more.
-    pub(crate) by_locations_m2: [f64; 3],
+    pub(crate) seen_m2: [f64; 3],
+}
+
+impl fmt::Display for SurfaceSeen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { surface_m2, visible_m2, seen_m2 } = self;
+        let [one, two, three] = seen_m2.map(|m2| 100.0 * m2 / visible_m2);
+        write!(
+            f,
+            "of {visible_m2:.1} m² that can be seen from somewhere ({surface_m2:.1} m² in all), {one:.0} % is seen by one \
+             or more, {two:.0} % by two or more, {three:.0} % by three or more"
+        )
+    }
 }
 
 /// Where a person could be, m² of floor.
@@ -136,16 +150,16 @@ pub(crate) fn place_in_free_space(
     let seen = SurfaceSeen {
         surface_m2: m2(surface.len()),
         visible_m2: m2(cover.visible),
-        by_locations_m2: cover.seen_by.map(m2),
+        seen_m2: cover.seen_by.map(m2),
     };
     let mut warnings = Vec::new();
-    let share = seen.by_locations_m2[0] / seen.surface_m2;
+    let share = seen.seen_m2[0] / seen.surface_m2;
     if share < LEAST_SEEN {
         return Err(Error::Input(format!(
             "area {area}: {} scan locations in free space see only {:.1} of {:.1} m² of surface; {HINTS} If the scan \
              is as it should be, list scan locations",
             chosen.len(),
-            seen.by_locations_m2[0],
+            seen.seen_m2[0],
             seen.surface_m2
         )));
     }

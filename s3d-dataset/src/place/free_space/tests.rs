@@ -87,7 +87,7 @@ fn check(building: &Building, scene: &AnnotatedScene, found: &FreeSpace) {
     }
     assert_eq!(rooms.len(), building.rooms.len(), "{rooms:?}");
     let seen = found.seen;
-    assert!(seen.visible_m2 <= seen.surface_m2 && seen.by_locations_m2.is_sorted_by(|a, b| a >= b));
+    assert!(seen.visible_m2 <= seen.surface_m2 && seen.seen_m2.is_sorted_by(|a, b| a >= b));
     let floor = found.floor;
     let m2 = [floor.up_facing_m2, floor.headroom_m2, floor.walkable_m2, floor.inside_m2];
     assert!(m2.is_sorted_by(|a, b| a >= b) && floor.inside_m2 > 1.0, "{floor:?}");
@@ -104,7 +104,7 @@ fn every_room_of_the_demo_gets_a_location() {
     let found = place(&scene.mesh, SHARE).unwrap();
     check(&building, &scene, &found);
     let seen = found.seen;
-    assert!(seen.by_locations_m2[0] >= 0.95 * seen.visible_m2, "{seen:?}");
+    assert!(seen.seen_m2[0] >= 0.95 * seen.visible_m2, "{seen:?}");
     assert!((8..=20).contains(&found.locations.len()), "{}", found.locations.len());
     assert!(found.warnings.is_empty(), "{:?}", found.warnings);
 }
