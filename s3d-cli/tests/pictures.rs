@@ -60,7 +60,7 @@ impl<'m> Studio<'m> {
         let width = 2 * (reach * lens.focal_px().x).ceil() as u32;
         let straight = Camera::perspective(pose, 2.0 * reach.atan(), 2 * width, 2 * width);
         let image = self.take(&straight);
-        let focal = straight.focal_px();
+        let focal = straight.focal_px().x;
         let at = |p: DVec2| -> [f64; 3] {
             let d = lens.direction(p).expect("the lens sees all of its picture");
             let q = dvec2(d.x, d.y) * focal + f64::from(width) - 0.5;

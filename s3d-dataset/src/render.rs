@@ -6,7 +6,7 @@ use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::store::refuse_existing;
 use crate::store::staging::Staging;
 use glam::DVec3;
-use s3d_geom::{Camera, Projection};
+use s3d_geom::Camera;
 use s3d_io::dataset::Conventions;
 use s3d_io::fs::{create_dir, write_bytes, write_json};
 use s3d_io::image::{Compression, Content, encode_rgb8};
@@ -138,7 +138,7 @@ pub fn render(
             file.mesh.faces().len()
         ));
     }
-    let is_panorama = camera.projection == Projection::Equirectangular;
+    let is_panorama = camera.is_panorama();
     let view = View {
         width: camera.width,
         height: camera.height,

@@ -31,6 +31,10 @@ fn any_ring() -> impl Strategy<Value = Vec<DVec2>> {
     prop::collection::vec((any_f64(), any_f64()).prop_map(|(x, y)| dvec2(x, y)), 0..6)
 }
 
+fn pose_at(location: DVec3) -> Pose {
+    Pose { location, ..Pose::level(DVec3::ZERO, 0.3) }
+}
+
 proptest! {
     #[test]
     fn boxes_and_points(points in prop::collection::vec(any_vec3(), 0..9), distance_m in any::<u16>()) {
@@ -57,6 +61,8 @@ proptest! {
         comes_back(&Camera::perspective(pose, fov_rad, size.0, size.1))?;
         comes_back(&Camera::equirectangular(pose, 2 * size.0))?;
         let middle = dvec2(f64::from(size.0), f64::from(size.1)) * 0.5;
+        let (focal, center) = (middle * dvec2(0.3, fov_rad), dvec2(fov_rad, -7.5));
+        comes_back(&Camera::pinhole(pose_at(pose.location), focal, center, size.0, size.1).unwrap())?;
         let lens = Lens::new(size.into(), middle * 1.7, middle, [0.11, -0.23, 0.0012, fov_rad * 1e-4, 0.05]);
         prop_assert!(lens.is_some());
         comes_back(&lens)?;
@@ -105,6 +111,13 @@ fn what_cannot_be_is_refused() {
     assert!(refusal::<Camera>(&camera("3.2", 4)).contains("angle of view of 3.2"));
     assert!(refusal::<Camera>(&camera("0.0", 4)).contains("angle of view"));
     assert!(refusal::<Camera>(&camera("1.0", 0)).contains("0 × 3 pixels"));
+
+    let pinhole = camera("1.0", 4).replace(
+        r#"{"Perspective":{"fov_rad":1.0}}"#,
+        r#"{"Pinhole":{"focal_px":[500.0,400.0],"center_px":[2.5,-1.0]}}"#,
+    );
+    assert!(serde_json::from_str::<Camera>(&pinhole).is_ok());
+    assert!(refusal::<Camera>(&pinhole.replace("400.0", "0.0")).contains("focal lengths of 500 and 0 px"));
 
     let lens = r#"{"size":[0,480],"focal_px":[500,500],"center_px":[320,240],"distortion":[0,0,0,0,0]}"#;
     assert!(refusal::<Lens>(lens).contains("no picture"));

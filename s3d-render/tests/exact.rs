@@ -48,9 +48,24 @@ fn camera(pose: Pose, kind: u8) -> Camera {
         2 => Camera::perspective(pose, 2.9, 64, 64),
         3 => Camera::equirectangular(pose, 200),
         4 => Camera::equirectangular(pose, 260),
-        _ => Camera::equirectangular(pose, 50),
+        5 => Camera::equirectangular(pose, 50),
+        // As a phone has it; a crop far off the axis; pixels that are far from square, either way; the axis in a
+        // corner, wide; and telephoto.
+        6 => pinhole(pose, [40.0, 43.0], [19.5, 13.0], [37, 23]),
+        7 => pinhole(pose, [60.0, 60.0], [-150.0, 90.0], [50, 41]),
+        8 => pinhole(pose, [900.0, 9.0], [33.0, 20.0], [64, 40]),
+        9 => pinhole(pose, [3.0, 400.0], [31.0, 70.0], [64, 40]),
+        10 => pinhole(pose, [2.0, 2.5], [0.0, 40.0], [64, 40]),
+        _ => pinhole(pose, [90_000.0, 80_000.0], [20.0, 2000.0], [40, 40]),
     }
 }
+
+fn pinhole(pose: Pose, focal: [f64; 2], center: [f64; 2], [width, height]: [u32; 2]) -> Camera {
+    Camera::pinhole(pose, focal.into(), center.into(), width, height).unwrap()
+}
+
+/// How many there are of them.
+const KINDS: u8 = 12;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(160))]
@@ -62,7 +77,7 @@ proptest! {
         points in prop::collection::vec(prop::array::uniform3(-3i8..=3), 3..40),
         picks in prop::collection::vec(any::<prop::sample::Index>(), 3..90),
         at in prop::array::uniform3(-6i8..=6), yaw in -3.2..3.2f64, pitch in -1.5..1.5f64,
-        kind in 0u8..6, turned in any::<bool>(), stride in prop::sample::select(vec![1u32, 1, 1, 3]),
+        kind in 0u8..KINDS, turned in any::<bool>(), stride in prop::sample::select(vec![1u32, 1, 1, 3]),
     ) {
         let Some(mesh) = soup(&corners(&points), &picks) else { return Ok(()) };
         let level = Pose::level(DVec3::from(at.map(f64::from)) * 0.5, 0.0);
@@ -75,7 +90,7 @@ proptest! {
     fn soups(
         points in prop::collection::vec(prop::array::uniform3(-3.0..3.0f32), 3..40),
         picks in prop::collection::vec(any::<prop::sample::Index>(), 3..60),
-        at in prop::array::uniform3(-3.0..3.0f64), yaw in -3.2..3.2f64, pitch in -1.5..1.5f64, kind in 0u8..6,
+        at in prop::array::uniform3(-3.0..3.0f64), yaw in -3.2..3.2f64, pitch in -1.5..1.5f64, kind in 0u8..KINDS,
         scale in prop::sample::select(vec![1.0f32, 1e-3, 1e3]), thin in prop::sample::select(vec![1e-2f32, 1e-5, 1e-7]),
         far in prop::sample::select(vec![Vec3::ZERO, vec3(800.0, -300.0, 20.0)]),
     ) {
@@ -105,7 +120,7 @@ proptest! {
         points in prop::collection::vec(prop::array::uniform3(-3.0..3.0f32), 3..20),
         picks in prop::collection::vec(any::<prop::sample::Index>(), 3..30),
         weights in prop::array::uniform2(0.0..0.5f64), off in -9.0..-2.0f64, on in any::<bool>(),
-        direction in prop::array::uniform3(-1.0..1.0f64), yaw in -3.2..3.2f64, pitch in -1.5..1.5f64, kind in 0u8..6,
+        direction in prop::array::uniform3(-1.0..1.0f64), yaw in -3.2..3.2f64, pitch in -1.5..1.5f64, kind in 0u8..KINDS,
     ) {
         let positions: Vec<Vec3> = points.iter().map(|p| Vec3::from(*p)).collect();
         let Some(mesh) = soup(&positions, &picks) else { return Ok(()) };
@@ -121,9 +136,13 @@ fn the_pass_is_what_trying_every_face_gives() {
     let mesh = scan_like(2000, 11);
     let scene = Scene::new(&mesh);
     let pose = Pose::level(dvec3(3.0, 2.5, 1.5), 1.0);
-    for camera in
-        [Camera::perspective(pose.turned(0.4, -0.5), 1.2, 48, 40), Camera::equirectangular(pose, 192)]
-    {
+    for camera in [
+        Camera::perspective(pose.turned(0.4, -0.5), 1.2, 48, 40),
+        Camera::equirectangular(pose, 192),
+        pinhole(pose.turned(0.4, -0.5), [60.0, 45.0], [-9.5, 31.25], [48, 40]),
+        pinhole(pose, [25.0, 25.0], [24.0, 12.0], [30, 40]),
+        pinhole(pose.turned(0.0, 0.2), [700.0, 20.0], [60.0, 20.0], [48, 40]),
+    ] {
         let hits = Caster::new(&scene).cast(&camera);
         let rays = camera.rays();
         for y in 0..camera.height {
@@ -153,6 +172,8 @@ fn check_images(mesh: &TriMesh, location: DVec3) {
         })
         .collect();
     cameras.push(Camera::equirectangular(level, 512));
+    cameras.push(pinhole(level, [210.0, 214.0], [171.3, 90.8], [320, 180]));
+    cameras.push(pinhole(level.turned(2.0, -0.3), [400.0, 100.0], [-80.0, 300.0], [180, 320]));
     // From a few millimetres off a surface, too.
     let near = mesh.triangle(7).map(|p| p.as_dvec3()).iter().sum::<DVec3>() / 3.0 + DVec3::splat(1e-3);
     cameras.push(Camera::perspective(Pose::level(near, 2.0), 1.5, 135, 135));

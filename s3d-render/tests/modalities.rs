@@ -3,7 +3,7 @@
 #[path = "../benches/common/mod.rs"]
 mod common;
 
-use s3d_geom::glam::{DVec3, Vec2, Vec3, dvec3, vec2, vec3};
+use s3d_geom::glam::{DVec3, Vec2, Vec3, dvec2, dvec3, vec2, vec3};
 use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, TriMesh, Wrap};
 use s3d_render::{
     Hits, MipMaps, Modalities, NO_FACE, Normals, Scene, Shading, TextureFilter, view_images_into,
@@ -202,7 +202,8 @@ fn opencv_axes_turn_the_third_channel_of_views_and_nothing_of_panoramas() {
     let mesh = TriMesh::new(room_parts()).unwrap();
     let scene = Scene::new(&mesh);
     let pose = Pose::level(dvec3(0.3, -0.2, 0.1), 0.7).turned(0.2, -0.3);
-    for camera in [Camera::perspective(pose, 1.2, 40, 30), Camera::equirectangular(pose, 40)] {
+    let pinhole = Camera::pinhole(pose, dvec2(30.0, 34.0), dvec2(9.0, 21.0), 40, 30).unwrap();
+    for camera in [Camera::perspective(pose, 1.2, 40, 30), pinhole, Camera::equirectangular(pose, 40)] {
         let hits = s3d_render::cast(&scene, &camera);
         for normals in [Normals::Flat, Normals::Smooth] {
             let [mut paper, mut opencv] = [0, 0].map(|_| Raster::filled(0, 0, [0u8; 3]));
@@ -422,6 +423,8 @@ fn all_kinds(location: DVec3) -> Vec<Camera> {
         Camera::perspective(pose.turned(2.0, -0.9), 40f64.to_radians(), 97, 61),
         Camera::perspective(pose.turned(-1.0, 0.3), 170f64.to_radians(), 200, 120),
         Camera::perspective(pose, 1.0, 3, 2),
+        Camera::pinhole(pose, dvec2(200.0, 260.0), dvec2(90.0, 201.5), 240, 320).unwrap(),
+        Camera::pinhole(pose.turned(1.0, 0.2), dvec2(90.0, 30.0), dvec2(-60.0, 31.0), 97, 61).unwrap(),
         Camera::equirectangular(pose, 500),
         Camera::equirectangular(pose, 38),
     ]

@@ -6,7 +6,7 @@ use super::views::Views;
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::views::{Kinds, Scoring, score_area};
-use s3d_geom::{Camera, Projection};
+use s3d_geom::Camera;
 use s3d_io::camera::ScanLocation;
 use s3d_io::dataset::DatasetImage;
 use s3d_label::{LabelId, LabelTable};
@@ -29,7 +29,7 @@ pub(crate) fn check(
     }
     let located: Vec<ScanLocation> = cameras
         .iter()
-        .filter(|(_, camera)| camera.projection == Projection::Equirectangular)
+        .filter(|(_, camera)| camera.is_panorama())
         .map(|(i, camera)| ScanLocation { uuid: images[*i].uuid.clone(), pose: camera.pose, line: 0 })
         .collect();
     // Every location of a data set has the same number of candidates.

@@ -3,14 +3,17 @@
 //! Pixel coordinates: x to the right, y down, the centre of pixel (i, j) at (i + ½, j + ½). Source:
 //! formats.md, "What is written".
 
+mod error;
+mod intrinsics;
 mod lens;
 mod pose;
 
+pub use error::CameraError;
 pub use lens::Lens;
 pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
 
 use glam::{DMat3, DVec2, DVec3, dvec2, dvec3};
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 /// How a camera maps directions to pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +23,13 @@ pub enum Projection {
     Perspective {
         /// The full horizontal angle of view, in (0, π).
         fov_rad: f64,
+    },
+    /// A pinhole in general: pixels need not be square, nor the optical axis in the middle of the image.
+    Pinhole {
+        /// Focal lengths in pixels, along the image's width and its height; both above 0.
+        focal_px: DVec2,
+        /// Where the optical axis meets the image, in pixels from its top left corner; may lie outside.
+        center_px: DVec2,
     },
     /// A panorama: columns are longitudes, growing to the right, rows are latitudes, from +90° at the top to
     /// −90°. Its centre column looks along the pose's forward axis projected to the horizon; up is the
@@ -106,37 +116,17 @@ impl Camera {
         Self { pose, projection: Projection::Equirectangular, width, height: width / 2 }
     }
 
-    /// The horizontal angle of view that the pose file states: a panorama's is π/2, as in the published
-    /// files.
-    pub fn fov_rad(&self) -> f64 {
-        match self.projection {
-            Projection::Perspective { fov_rad } => fov_rad,
-            Projection::Equirectangular => FRAC_PI_2,
-        }
-    }
-
-    /// Focal length in pixels: (W/2) / tan(fov/2).
-    pub fn focal_px(&self) -> f64 {
-        0.5 * f64::from(self.width) / libm::tan(0.5 * self.fov_rad())
-    }
-
-    /// `camera_k_matrix`, row by row: focal lengths and the principal point, in the middle of the image.
-    pub fn k_matrix(&self) -> [[f64; 3]; 3] {
-        let f = self.focal_px();
-        [[f, 0.0, 0.5 * f64::from(self.width)], [0.0, f, 0.5 * f64::from(self.height)], [0.0, 0.0, 1.0]]
-    }
-
     /// The directions of the camera's rays, precomputed. Cheap enough to make once an image.
     pub fn rays(&self) -> Rays {
         let (w, h) = (f64::from(self.width), f64::from(self.height));
         match self.projection {
-            Projection::Perspective { .. } => {
-                let f = self.focal_px();
+            Projection::Perspective { .. } | Projection::Pinhole { .. } => {
+                let (f, c) = (self.focal_px(), self.center_px());
                 let (right, down, forward) = (self.pose.right(), -self.pose.up(), self.pose.forward());
                 Rays::Perspective {
-                    x_step: right / f,
-                    y_step: down / f,
-                    origin: forward - right * (0.5 * w / f) - down * (0.5 * h / f),
+                    x_step: right / f.x,
+                    y_step: down / f.y,
+                    origin: forward - right * (c.x / f.x) - down * (c.y / f.y),
                 }
             }
             Projection::Equirectangular => {
@@ -163,9 +153,9 @@ impl Camera {
     /// the optical axis is 1, so that a multiple of it is a z-depth. Panorama: a unit vector.
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
         match self.projection {
-            Projection::Perspective { .. } => {
-                let f = self.focal_px();
-                let (a, b) = ((x - 0.5 * f64::from(self.width)) / f, (y - 0.5 * f64::from(self.height)) / f);
+            Projection::Perspective { .. } | Projection::Pinhole { .. } => {
+                let (f, c) = (self.focal_px(), self.center_px());
+                let (a, b) = ((x - c.x) / f.x, (y - c.y) / f.y);
                 self.pose.right() * a - self.pose.up() * b + self.pose.forward()
             }
             Projection::Equirectangular => {
@@ -184,10 +174,10 @@ impl Camera {
         let (w, h) = (f64::from(self.width), f64::from(self.height));
         let d = point - self.pose.location;
         match self.projection {
-            Projection::Perspective { .. } => {
-                let c: DVec3 = self.pose.opencv_from_world() * d;
-                let f = self.focal_px();
-                (c.z > 0.0).then(|| (dvec2(0.5 * w + f * c.x / c.z, 0.5 * h + f * c.y / c.z), c.z))
+            Projection::Perspective { .. } | Projection::Pinhole { .. } => {
+                let v: DVec3 = self.pose.opencv_from_world() * d;
+                let (f, c) = (self.focal_px(), self.center_px());
+                (v.z > 0.0).then(|| (dvec2(c.x + f.x * v.x / v.z, c.y + f.y * v.y / v.z), v.z))
             }
             Projection::Equirectangular => {
                 let distance = d.length();
@@ -209,7 +199,7 @@ impl Camera {
     /// As [`Camera::normal_image_from_world`], with a choice of axes.
     pub fn normal_axes_from_world(&self, axes: NormalAxes) -> DMat3 {
         match self.projection {
-            Projection::Perspective { .. } => {
+            Projection::Perspective { .. } | Projection::Pinhole { .. } => {
                 let forward = self.pose.forward();
                 let third = if axes == NormalAxes::OpenCv { forward } else { -forward };
                 DMat3::from_cols(self.pose.right(), -self.pose.up(), third).transpose()
@@ -261,7 +251,7 @@ impl Rays {
 
 #[cfg(feature = "serde")]
 mod as_data {
-    use super::{PI, Pose, Projection};
+    use super::{CameraError, Pose, Projection};
 
     /// A camera before it is checked.
     #[derive(serde::Deserialize)]
@@ -273,18 +263,10 @@ mod as_data {
     }
 
     impl TryFrom<Camera> for super::Camera {
-        type Error = String;
+        type Error = CameraError;
 
-        fn try_from(Camera { pose, projection, width, height }: Camera) -> Result<Self, String> {
-            if width == 0 || height == 0 {
-                return Err(format!("an image of {width} × {height} pixels"));
-            }
-            match projection {
-                Projection::Perspective { fov_rad } if !(fov_rad > 0.0 && fov_rad < PI) => {
-                    Err(format!("an angle of view of {fov_rad} rad"))
-                }
-                _ => Ok(Self { pose, projection, width, height }),
-            }
+        fn try_from(Camera { pose, projection, width, height }: Camera) -> Result<Self, CameraError> {
+            Self { pose, projection, width, height }.checked()
         }
     }
 }
@@ -373,6 +355,6 @@ mod tests {
             }
         }
         let camera = Camera::perspective(view, 1.1030245194845198, 1080, 1080);
-        assert!((camera.focal_px() - 877.7806396484375).abs() < 3e-5);
+        assert!((camera.focal_px() - 877.7806396484375).abs().max_element() < 3e-5);
     }
 }

@@ -3,6 +3,7 @@
 //! Camera axes here are Blender's: x right, y up, looking along −z. Angles are Blender's XYZ Euler angles,
 //! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "What is written" (settled on genuine pose files).
 
+use crate::CameraError;
 use glam::{DMat3, DQuat, DVec3, dvec3};
 use std::f64::consts::FRAC_PI_2;
 
@@ -62,6 +63,101 @@ impl Pose {
     /// (towards −X).
     pub fn level(location: DVec3, yaw_rad: f64) -> Self {
         Self::from_scanner(location, DQuat::from_rotation_z(yaw_rad))
+    }
+
+    /// The pose of an OpenCV camera (x right, y down, z forward), from world → camera, 3 × 4, row by row: what
+    /// [`Pose::rt_matrix`] gives.
+    ///
+    /// # Errors
+    /// As [`Pose::from_opengl`].
+    pub fn from_rt(camera_from_world: [[f64; 4]; 3]) -> Result<Self, CameraError> {
+        let [x, y, z] = camera_from_world.map(|[x, y, z, _]| dvec3(x, y, z));
+        let shift = DVec3::from_array(camera_from_world.map(|[.., t]| t));
+        // The rows are the camera's axes in the world.
+        let pose = Self::from_axes(DVec3::ZERO, x, -y, -z)?;
+        let location = -(pose.opencv_from_world().transpose() * shift);
+        if location.is_finite() { Ok(Self { location, ..pose }) } else { Err(CameraError::NotFinite) }
+    }
+
+    /// The pose of an OpenCV camera (x right, y down, z forward), from camera → world, 4 × 4, row by row.
+    ///
+    /// # Errors
+    /// As [`Pose::from_opengl`].
+    pub fn from_opencv(world_from_camera: [[f64; 4]; 4]) -> Result<Self, CameraError> {
+        let [right, down, forward, location] = columns(world_from_camera)?;
+        Self::from_axes(location, right, -down, -forward)
+    }
+
+    /// The pose of an OpenGL camera (x right, y up, z backwards; Blender's and nerfstudio's too), from camera
+    /// → world, 4 × 4, row by row. Axes that are off by less than a thousandth, as rounded files have them,
+    /// are made perpendicular; the viewing direction is kept.
+    ///
+    /// # Errors
+    /// [`CameraError::NotFinite`]; [`CameraError::Transposed`], [`CameraError::LastRow`],
+    /// [`CameraError::Scaled`], [`CameraError::Sheared`] or [`CameraError::Mirrored`] if it is no rotation
+    /// with a shift.
+    ///
+    /// ```
+    /// use s3d_geom::{CameraError, Pose, glam::DVec3};
+    ///
+    /// // 1.5 m above the floor, looking along +Y.
+    /// let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]];
+    /// assert_eq!(Pose::from_opengl(rows)?, Pose::look_at(DVec3::Z * 1.5, DVec3::new(0.0, 9.0, 1.5), DVec3::Z)?);
+    /// // Read by columns, the place stands in the last row.
+    /// let transposed = std::array::from_fn(|i| std::array::from_fn(|j| rows[j][i]));
+    /// assert_eq!(Pose::from_opengl(transposed), Err(CameraError::Transposed));
+    /// # Ok::<(), CameraError>(())
+    /// ```
+    pub fn from_opengl(world_from_camera: [[f64; 4]; 4]) -> Result<Self, CameraError> {
+        let [right, up, back, location] = columns(world_from_camera)?;
+        Self::from_axes(location, right, up, back)
+    }
+
+    /// The camera at `eye` that looks at `target`; `up` points to the top of the image as far as it can.
+    ///
+    /// # Errors
+    /// [`CameraError::NotFinite`]; [`CameraError::TargetAtEye`]; [`CameraError::UpAlongView`].
+    pub fn look_at(eye: DVec3, target: DVec3, up: DVec3) -> Result<Self, CameraError> {
+        if !(eye.is_finite() && target.is_finite() && up.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        let back = (eye - target).try_normalize().ok_or(CameraError::TargetAtEye)?;
+        let up = up.try_normalize().ok_or(CameraError::UpAlongView)?;
+        let right = up.cross(back);
+        if right.length() < 1e-9 {
+            return Err(CameraError::UpAlongView);
+        }
+        let right = right.normalize();
+        Ok(Self { location: eye, world_from_camera: DMat3::from_cols(right, back.cross(right), back) })
+    }
+
+    /// From the camera's axes in the world, which may be rounded.
+    fn from_axes(location: DVec3, right: DVec3, up: DVec3, back: DVec3) -> Result<Self, CameraError> {
+        /// How far axes may be from perpendicular and of length 1: files hold seven decimals, or fewer.
+        const MOST_SKEW: f64 = 1e-3;
+        if ![location, right, up, back].iter().all(|v| v.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        let length = right.length();
+        let skew = [
+            up.length() - length,
+            back.length() - length,
+            right.dot(up) / length,
+            up.dot(back) / length,
+            back.dot(right) / length,
+        ];
+        if !(length > 0.0 && skew.iter().all(|s| s.abs() <= MOST_SKEW * length)) {
+            return Err(CameraError::Sheared);
+        }
+        if right.cross(up).dot(back) <= 0.0 {
+            return Err(CameraError::Mirrored);
+        }
+        if (length - 1.0).abs() > MOST_SKEW {
+            return Err(CameraError::Scaled(length));
+        }
+        let back = back.normalize();
+        let right = (right - back * right.dot(back)).normalize();
+        Ok(Self { location, world_from_camera: DMat3::from_cols(right, back.cross(right), back) })
     }
 
     /// The view at `yaw_rad` to the left of this pose and `pitch_rad` above it, without roll:
@@ -127,6 +223,16 @@ impl Pose {
     }
 }
 
+/// The columns of a 4 × 4 matrix without their last numbers, which are 0 0 0 1.
+fn columns(rows: [[f64; 4]; 4]) -> Result<[DVec3; 4], CameraError> {
+    const LAST: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+    let column = |j: usize| rows.map(|row| row[j]);
+    if rows[3] != LAST {
+        return Err(if column(3) == LAST { CameraError::Transposed } else { CameraError::LastRow });
+    }
+    Ok([0, 1, 2, 3].map(|j| dvec3(rows[0][j], rows[1][j], rows[2][j])))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,6 +255,90 @@ mod tests {
             let (y, p) = original.yaw_pitch_to(&original.turned(yaw, pitch));
             prop_assert!((y - yaw).abs() < 1e-9 && (p - pitch).abs() < 1e-9);
         }
+    }
+
+    /// Camera → world, 4 × 4, of axes whose signs are given.
+    fn rows(pose: &Pose, [x, y, z]: [f64; 3]) -> [[f64; 4]; 4] {
+        let m = pose.world_from_camera;
+        let row = |i: usize| [x * m.x_axis[i], y * m.y_axis[i], z * m.z_axis[i], pose.location[i]];
+        [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
+    }
+
+    proptest! {
+        #[test]
+        fn matrices_come_back(
+            q in prop::array::uniform4(-1.0..1.0f64), at in prop::array::uniform3(-9.0..9.0f64),
+            off in prop::array::uniform9(-2e-4..2e-4f64),
+        ) {
+            let Some(q) = glam::DVec4::from_array(q).try_normalize() else { return Ok(()) };
+            let pose = Pose::from_scanner(DVec3::from_array(at), DQuat::from_vec4(q));
+            let close_to = |other: Pose, tolerance| {
+                other.location.abs_diff_eq(pose.location, tolerance)
+                    && other.world_from_camera.abs_diff_eq(pose.world_from_camera, tolerance)
+            };
+            let opengl = rows(&pose, [1.0, 1.0, 1.0]);
+            prop_assert!(close_to(Pose::from_opengl(opengl).unwrap(), 1e-12));
+            prop_assert!(close_to(Pose::from_opencv(rows(&pose, [1.0, -1.0, -1.0])).unwrap(), 1e-12));
+            prop_assert!(close_to(Pose::from_rt(pose.rt_matrix()).unwrap(), 1e-12));
+            // The axes of one kind are no less a rotation in the other: that a picture shows.
+            prop_assert!(!close_to(Pose::from_opencv(opengl).unwrap(), 0.1));
+            let mut rounded = opengl;
+            (0..9).for_each(|k| rounded[k / 3][k % 3] += off[k]);
+            let back = Pose::from_opengl(rounded).unwrap();
+            prop_assert!(close_to(back, 1e-3));
+            let m = back.world_from_camera;
+            prop_assert!(close(m * m.transpose(), DMat3::IDENTITY) && m.determinant() > 0.0);
+        }
+
+        #[test]
+        fn cameras_look_at_their_targets(
+            eye in prop::array::uniform3(-9.0..9.0f64), target in prop::array::uniform3(-9.0..9.0f64),
+        ) {
+            let [eye, target] = [eye, target].map(DVec3::from_array);
+            let Ok(pose) = Pose::look_at(eye, target, DVec3::Z * 7.0) else { return Ok(()) };
+            prop_assert!(pose.forward().abs_diff_eq((target - eye).normalize(), 1e-9));
+            prop_assert!(pose.right().z.abs() < 1e-9 && pose.up().z > 0.0);
+            let m = pose.world_from_camera;
+            prop_assert!(m.transpose().abs_diff_eq(m.inverse(), 1e-9) && m.determinant() > 0.0);
+        }
+    }
+
+    #[test]
+    fn what_is_no_rotation_is_refused_by_its_fault() {
+        let pose = Pose::level(dvec3(1.0, 2.0, 3.0), 0.4).turned(0.2, 0.3);
+        let good = rows(&pose, [1.0; 3]);
+        let with = |change: fn(&mut [[f64; 4]; 4])| {
+            let mut rows = good;
+            change(&mut rows);
+            Pose::from_opengl(rows).unwrap_err()
+        };
+        let transposed = |rows: &mut [[f64; 4]; 4]| {
+            *rows = std::array::from_fn(|i| std::array::from_fn(|j| rows[j][i]));
+        };
+        assert_eq!(with(transposed), CameraError::Transposed);
+        assert_eq!(with(|rows| rows[3][3] = 2.0), CameraError::LastRow);
+        assert_eq!(with(|rows| rows[1][3] = f64::NEG_INFINITY), CameraError::NotFinite);
+        assert_eq!(with(|rows| rows[1][1] += 0.1), CameraError::Sheared);
+        assert_eq!(with(|rows| *rows = [[0.0; 4], [0.0; 4], [0.0; 4], rows[3]]), CameraError::Sheared);
+        let times = |rows: &mut [[f64; 4]; 4], by: [f64; 3]| {
+            rows[..3].iter_mut().for_each(|row| (0..3).for_each(|k| row[k] *= by[k]));
+        };
+        let mut rows = good;
+        times(&mut rows, [1.0, 1.0, -1.0]);
+        assert_eq!(Pose::from_opengl(rows), Err(CameraError::Mirrored));
+        times(&mut rows, [2.0, 2.0, -2.0]);
+        assert!(matches!(Pose::from_opengl(rows), Err(CameraError::Scaled(s)) if (s - 2.0).abs() < 1e-9));
+        let mut rt = pose.rt_matrix();
+        rt[1] = rt[1].map(|v| -v);
+        assert_eq!(Pose::from_rt(rt), Err(CameraError::Mirrored));
+        rt[0][3] = f64::NAN;
+        rt[1] = rt[1].map(|v| -v);
+        assert_eq!(Pose::from_rt(rt), Err(CameraError::NotFinite));
+        let look = |target, up| Pose::look_at(DVec3::ONE, target, up).unwrap_err();
+        assert_eq!(look(DVec3::ONE, DVec3::Z), CameraError::TargetAtEye);
+        assert_eq!(look(DVec3::ZERO, DVec3::ONE), CameraError::UpAlongView);
+        assert_eq!(look(DVec3::ZERO, DVec3::ZERO), CameraError::UpAlongView);
+        assert_eq!(look(DVec3::ZERO, DVec3::NAN), CameraError::NotFinite);
     }
 
     #[test]

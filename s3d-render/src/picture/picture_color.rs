@@ -385,12 +385,13 @@ mod tests {
         })
     }
 
-    fn cameras() -> [Camera; 5] {
+    fn cameras() -> [Camera; 6] {
         [
             Camera::perspective(pose().turned(0.3, -0.4), 1.2, 301, 203),
             Camera::perspective(pose().turned(2.0, -0.6), 0.2, 67, 65),
             // Far smaller than the cube map.
             Camera::perspective(pose().turned(-0.8, 0.2), 2.4, 37, 31),
+            Camera::pinhole(pose(), glam::dvec2(90.0, 140.0), glam::dvec2(-9.0, 71.5), 130, 99).unwrap(),
             Camera::equirectangular(pose(), 256),
             Camera::equirectangular(pose(), 2048),
         ]

@@ -199,7 +199,7 @@ impl PreparedCapture {
     /// Whether something is in front of the point at `v`, in the camera's axes.
     fn is_hidden(&self, v: DVec3) -> bool {
         let Some((camera, hits)) = &self.surface else { return false };
-        let focal = camera.focal_px();
+        let focal = camera.focal_px().x;
         let middle = 0.5 * f64::from(camera.width);
         let at = dvec2(v.x, v.y) * (focal / v.z) + middle - 0.5;
         let (x, y) = (at.x.floor(), at.y.floor());

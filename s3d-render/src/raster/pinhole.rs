@@ -17,8 +17,8 @@ use crate::raster::window::{Pixels, ProjectionRaster, Window, groups};
 use crate::ray::cone::Cone;
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
 use crate::simd::{Kernel, Simd, dispatch};
-use glam::DVec3;
-use s3d_geom::{Rays, TriMesh};
+use glam::{DVec2, DVec3, dvec2};
+use s3d_geom::{Projection, Rays, TriMesh};
 
 /// Pixels from the window's first that a corner may be away.
 const GUARD: f64 = 16_384.0;
@@ -64,6 +64,8 @@ pub(crate) struct Pinhole<'m> {
     across: DVec3,
     down: DVec3,
     ahead: DVec3,
+    /// Pixels from the first that a corner may be away, at most [`GUARD`].
+    guard: f64,
     /// The direction of the ray in column 0 and row 0, and from column to column and row to row.
     first: DVec3,
     step_x: DVec3,
@@ -91,6 +93,16 @@ impl PinholeCorners {
     }
 }
 
+/// How far out corners may be, in pixels, of a window with these focal lengths and the principal point at
+/// `center`, so that x and y are as good as the module says: where pixels are far from square, or the window is
+/// far from the optical axis, less than [`GUARD`].
+fn guard(focal: DVec2, center: DVec2) -> f64 {
+    // x is off by 2⁻⁵³·(fx + |cx|)·|p|/z, and |p|/z < 1 + (guard + |cx|)/fx + (guard + |cy|)/fy; y likewise.
+    let center = center.abs();
+    let farthest = 8.0 * GUARD / (focal + center).max_element() - 1.0 - (center / focal).element_sum();
+    (farthest / focal.recip().element_sum()).min(GUARD)
+}
+
 impl<'m> Pinhole<'m> {
     /// The window of `window` of a view with the axes `right`, `down` and `forward`.
     pub(crate) fn new(mesh: &'m TriMesh, window: &Window<'_>) -> Self {
@@ -100,18 +112,22 @@ impl<'m> Pinhole<'m> {
             unreachable!("a perspective camera has perspective rays")
         };
         let (pose, stride) = (&camera.pose, f64::from(window.stride));
-        let focal = camera.focal_px() / stride;
+        let (focal, center) = (camera.focal_px() / stride, camera.center_px());
         // Sample i of the window is pixel centre offset + stride · i.
         let offset = |start: usize| f64::from(window.stride / 2) + stride * start as f64 + 0.5;
         let (x, y) = (offset(window.column), offset(window.row));
-        let (cx, cy) = (0.5 * f64::from(camera.width) - x, 0.5 * f64::from(camera.height) - y);
+        let (cx, cy) = ((center.x - x) / stride, (center.y - y) / stride);
         let forward = pose.forward();
         Self {
             mesh,
             origin: pose.location,
-            across: pose.right() * focal + forward * (cx / stride),
-            down: -pose.up() * focal + forward * (cy / stride),
+            across: pose.right() * focal.x + forward * cx,
+            down: -pose.up() * focal.y + forward * cy,
             ahead: forward,
+            guard: match camera.projection {
+                Projection::Pinhole { .. } => guard(focal, dvec2(cx, cy)),
+                _ => GUARD,
+            },
             first: origin + x_step * x + y_step * y,
             step_x: x_step * stride,
             step_y: y_step * stride,
@@ -128,6 +144,7 @@ impl<'m> Pinhole<'m> {
     #[inline(always)]
     fn project(&mut self, corners: &[[[f32; PACKET]; 3]]) {
         let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
+        let guard = self.guard;
         for (k, [x, y, z]) in corners.iter().enumerate() {
             // Arrays of their own, so that all eight go together.
             let (mut xs, mut ys, mut qs) = ([0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
@@ -140,8 +157,8 @@ impl<'m> Pinhole<'m> {
                 xs[i] = px;
                 ys[i] = py;
                 let q = if depth > 0.0 { q } else { 0.0 };
-                let q = if px.abs() < GUARD { q } else { 0.0 };
-                qs[i] = if py.abs() < GUARD { q } else { 0.0 };
+                let q = if px.abs() < guard { q } else { 0.0 };
+                qs[i] = if py.abs() < guard { q } else { 0.0 };
             }
             let at = k * PACKET;
             self.projected.x[at..at + PACKET].copy_from_slice(&xs);

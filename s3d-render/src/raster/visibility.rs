@@ -86,15 +86,13 @@ impl<'s, 'm> Caster<'s, 'm> {
             return;
         }
         let step_rad = TAU / f64::from(camera.width) * f64::from(stride);
-        if camera.projection == Projection::Equirectangular && step_rad > Panorama::WIDEST_STEP_RAD {
+        if camera.is_panorama() && step_rad > Panorama::WIDEST_STEP_RAD {
             *hits = cast_ray_by_ray(self.scene, camera, stride);
             return;
         }
         // A panorama is cast in sectors: what is opposite to a sector's middle is far from it.
-        let max_columns = match camera.projection {
-            Projection::Perspective { .. } => columns.min(MAX_SIDE),
-            Projection::Equirectangular => columns.div_ceil(4).min(MAX_SIDE),
-        };
+        let sectors = if camera.is_panorama() { 4 } else { 1 };
+        let max_columns = columns.div_ceil(sectors).min(MAX_SIDE);
         // As many windows as it takes, of one height but for the last.
         let windows = (rows * max_columns).div_ceil(WINDOW);
         let max_rows = rows.div_ceil(windows).min(MAX_SIDE);
@@ -121,7 +119,7 @@ fn cast_window(
     pitch: usize,
 ) {
     match window.camera.projection {
-        Projection::Perspective { .. } => {
+        Projection::Perspective { .. } | Projection::Pinhole { .. } => {
             let raster = Pinhole::new(scene.mesh(), window);
             dispatch_on(level, VisibilityKernel { scene, raster, scratch, out, pitch });
         }
@@ -184,7 +182,7 @@ fn strided(size: u32, stride: u32) -> Vec<u32> {
 mod tests {
     use super::*;
     use crate::simd::level::all_levels;
-    use glam::DVec3;
+    use glam::{DVec3, dvec2};
     use s3d_geom::Pose;
     use s3d_synth::scenes::scan_like;
 
@@ -196,6 +194,7 @@ mod tests {
         let views = [
             Camera::perspective(pose.turned(0.0, -0.4), 1.4, 203, 131),
             Camera::perspective(pose.turned(2.0, 0.2), 0.7, 203, 131),
+            Camera::pinhole(pose, dvec2(150.0, 90.0), dvec2(30.0, 150.0), 203, 131).unwrap(),
             Camera::equirectangular(pose, 400),
         ];
         for camera in &views {

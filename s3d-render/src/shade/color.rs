@@ -422,6 +422,7 @@ mod tests {
             Camera::perspective(pose.turned(0.3, -0.4), 1.2, 301, 203),
             // Textures that are far too fine for the image.
             Camera::perspective(pose, 1.6, 33, 21),
+            Camera::pinhole(pose, glam::dvec2(150.0, 210.0), glam::dvec2(12.5, 190.0), 203, 301).unwrap(),
             Camera::equirectangular(pose, 256),
         ] {
             let hits = crate::raster::visibility::cast(&scene, &camera);

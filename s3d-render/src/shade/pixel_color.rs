@@ -49,9 +49,9 @@ pub fn rgb_of_ray(
     filter: &TextureFilter,
 ) -> [u8; 3] {
     let steps = match camera.projection {
-        Projection::Perspective { .. } => {
+        Projection::Perspective { .. } | Projection::Pinhole { .. } => {
             let f = camera.focal_px();
-            RayDifferentials::Same(camera.pose.right() / f, -camera.pose.up() / f)
+            RayDifferentials::Same(camera.pose.right() / f.x, -camera.pose.up() / f.y)
         }
         Projection::Equirectangular => RayDifferentials::Turn {
             rad_per_pixel: std::f64::consts::TAU / f64::from(camera.width),
@@ -155,7 +155,7 @@ impl RayDifferentials {
         match camera.rays() {
             Rays::Perspective { x_step, y_step, .. } => Self::Same(x_step, y_step),
             Rays::Equirectangular { rows, .. } => {
-                debug_assert_eq!(camera.projection, Projection::Equirectangular);
+                debug_assert!(camera.is_panorama());
                 let rad_per_pixel = std::f64::consts::TAU / f64::from(camera.width);
                 Self::Turn { rad_per_pixel, rows: rows.into_iter().map(Into::into).collect() }
             }

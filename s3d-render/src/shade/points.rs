@@ -6,7 +6,7 @@ use crate::simd::shade_lanes::{EightRays, LANES, ShadeLanes};
 use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
 use half::f16;
-use s3d_geom::{Camera, Projection, Raster, Rays};
+use s3d_geom::{Camera, Raster, Rays};
 
 /// The points that are seen, in world metres; (0, 0, 0) where nothing is. A point seen exactly at the world's
 /// origin cannot be told from a missing one: that is the format's, not ours.
@@ -81,9 +81,10 @@ impl Coordinate for f16 {
 
 fn points<T: Coordinate>(hits: &Hits, camera: &Camera, out: &mut Raster<[T; 3]>) {
     assert_size(hits, camera);
-    match camera.projection {
-        Projection::Perspective { .. } => dispatch(PointKernel::<T, false> { hits, camera, out }),
-        Projection::Equirectangular => dispatch(PointKernel::<T, true> { hits, camera, out }),
+    if camera.is_panorama() {
+        dispatch(PointKernel::<T, true> { hits, camera, out });
+    } else {
+        dispatch(PointKernel::<T, false> { hits, camera, out });
     }
 }
 

@@ -8,7 +8,7 @@ use crate::verify::images::pixels::Pixels;
 use crate::verify::images::shade::Shade;
 use crate::verify::images::{Mismatch, Reference};
 use glam::{DMat3, DVec3};
-use s3d_geom::{Camera, Pose, Projection};
+use s3d_geom::{Camera, Pose};
 use s3d_io::dataset::{DatasetImage, DepthUnits, Domain, Frame};
 use s3d_render::{Hit, MISSING_DEPTH, cast_ray};
 
@@ -229,7 +229,7 @@ fn diagnosis(
     mismatches: &Mismatch,
 ) -> Vec<Suspect> {
     let camera = &mismatches.camera;
-    let panorama = camera.projection == Projection::Equirectangular;
+    let panorama = camera.is_panorama();
     let mut all = Vec::new();
     let mut of = |words: &str, ray: Ray| all.push(Suspect { words: words.to_owned(), ray, change: as_is });
     of("it is mirrored left to right", Ray::MirroredX);
@@ -342,7 +342,7 @@ fn of_others(
     let mut found: Vec<(bool, usize, Camera)> = others
         .iter()
         .filter(|(i, camera)| {
-            *i != mismatches.image && camera.projection_kind() == mismatches.camera.projection_kind()
+            *i != mismatches.image && camera.is_panorama() == mismatches.camera.is_panorama()
         })
         .map(|(i, camera)| (images[*i].uuid != image.uuid, *i, *camera))
         .collect();
@@ -362,15 +362,4 @@ fn of_others(
             change: as_is,
         })
         .collect()
-}
-
-/// Whether two cameras make images of one kind.
-trait ProjectionKind {
-    fn projection_kind(&self) -> bool;
-}
-
-impl ProjectionKind for Camera {
-    fn projection_kind(&self) -> bool {
-        self.projection == Projection::Equirectangular
-    }
 }
