@@ -1,18 +1,20 @@
-//! The pictures of a COLMAP model: `images.txt` or `images.bin`. Source: COLMAP's documentation, "Output
-//! Format".
+//! The pictures of a COLMAP model: `images.txt` or `images.bin`. Their cameras: `colmap_cameras`. Source:
+//! COLMAP's documentation, "Output Format".
 //!
 //! Own code: lines of ten words, or the same in binary, are eighty lines to read.
 //!
 //! A picture's pose is world → camera in OpenCV's axes (x right, y down, z forward): a quaternion w x y z and
 //! a translation.
 
-use crate::camera::located::{LocatedPicture, pose_from_opencv};
+use crate::camera::colmap_cameras::read_beside;
+use crate::camera::located::{fault, pose_from_opencv, rotation};
+use crate::camera::posed::PosedCamera;
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use crate::fs::quote::quote;
 use s3d_geom::Pose;
-use s3d_geom::glam::{DMat3, DQuat, DVec3};
+use s3d_geom::glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
 
 /// The file of pictures of the model in `dir`: itself, or in `0`, `sparse/0` or `sparse` below it.
@@ -23,8 +25,34 @@ pub(crate) fn find(dir: &Path) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
+/// A picture, and the number of its camera.
+type Picture = (u32, PosedCamera);
+
 /// Reads `images.txt` or `images.bin`; the ending says which.
-pub(crate) fn read(path: &Path) -> Result<Vec<LocatedPicture>> {
+pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
+    Ok(read_pictures(path)?.into_iter().map(|(_, picture)| picture).collect())
+}
+
+/// Reads them and the list of cameras beside it. The pictures lie in a folder `images` beside the model, or
+/// beside the folder `sparse` or `sparse/0` that it is in.
+pub(crate) fn read_posed(path: &Path) -> Result<Vec<PosedCamera>> {
+    let pictures = read_pictures(path)?;
+    let (file, cameras) = read_beside(path)?;
+    let folders = path.ancestors().skip(1).take(3).map(|dir| dir.join("images"));
+    let folder = folders.into_iter().find(|dir| dir.is_dir());
+    let with_camera = |(id, mut picture): Picture| {
+        let (size, optics) = cameras.get(&id).ok_or_else(|| {
+            let name = quote(picture.name.as_bytes());
+            fault(path, picture.line, format!("{name}: its camera {id} is not in {}", file.display()))
+        })?;
+        (picture.size, picture.optics) = (Some(*size), Some(*optics));
+        picture.picture = folder.as_ref().map(|folder| folder.join(&picture.name));
+        Ok(picture)
+    };
+    pictures.into_iter().map(with_camera).collect()
+}
+
+fn read_pictures(path: &Path) -> Result<Vec<Picture>> {
     let bytes = read_file(path)?;
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin")) {
         read_binary(path, &bytes)
@@ -35,7 +63,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<LocatedPicture>> {
 
 /// Two lines a picture: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, and its points, which may be none.
 /// Some programs leave the empty lines out: what follows a picture are its points only if it looks like them.
-fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
+fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<Picture>> {
     const FORM: &str = "a picture is IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and the line after it may hold its points, \
                         X Y POINT3D_ID each";
     let mut pictures = Vec::new();
@@ -63,8 +91,12 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
                 Error::line(path, line, format!("{} is no number: {FORM}", quote(field.as_bytes())))
             })?;
         }
+        let [.., camera] = fields;
+        let camera = camera.parse().map_err(|_| {
+            Error::line(path, line, format!("{} is no number of a camera: {FORM}", quote(camera.as_bytes())))
+        })?;
         let pose = pose(numbers).map_err(|m| Error::line(path, line, m))?;
-        pictures.push(LocatedPicture { name: rest.to_owned(), pose, line });
+        pictures.push((camera, picture(rest.to_owned(), pose, line)));
         may_be_points = true;
     }
     Ok(pictures)
@@ -87,37 +119,41 @@ fn are_points(line: &[u8]) -> bool {
 
 /// Little-endian: a count; for each picture its id (4 bytes), seven numbers (8 each), its camera (4), a name
 /// that ends at a zero, a count of points (8) and 24 bytes each.
-fn read_binary(path: &Path, bytes: &[u8]) -> Result<Vec<LocatedPicture>> {
+fn read_binary(path: &Path, bytes: &[u8]) -> Result<Vec<Picture>> {
     let mut rest = bytes;
     let mut pictures = Vec::new();
     let cut_off =
         |n: u64| Error::format(path, format!("ends in picture {n}: it was cut off, or is no images.bin"));
     let count = u64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(0))?);
     for n in 1..=count {
-        let mut record = || -> Option<([f64; 7], &[u8])> {
+        let mut record = || -> Option<([f64; 7], u32, &[u8])> {
             take::<4>(&mut rest)?;
             let mut numbers = [0.0; 7];
             for number in &mut numbers {
                 *number = f64::from_le_bytes(take(&mut rest)?);
             }
-            take::<4>(&mut rest)?;
+            let camera = u32::from_le_bytes(take(&mut rest)?);
             let end = rest.iter().position(|&b| b == 0)?;
             let (name, behind) = rest.split_at_checked(end)?;
             rest = behind.get(1..)?;
             let points = u64::from_le_bytes(take(&mut rest)?);
             let length = usize::try_from(points).ok()?.checked_mul(24)?;
             rest = rest.get(length..)?;
-            Some((numbers, name))
+            Some((numbers, camera, name))
         };
-        let (numbers, name) = record().ok_or_else(|| cut_off(n))?;
+        let (numbers, camera, name) = record().ok_or_else(|| cut_off(n))?;
         let name = String::from_utf8_lossy(name).into_owned();
         let pose = pose(numbers).map_err(|m| Error::format(path, format!("picture {n}, {name:?}: {m}")))?;
-        pictures.push(LocatedPicture { name, pose, line: 0 });
+        pictures.push((camera, picture(name, pose, 0)));
     }
     Ok(pictures)
 }
 
-fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+fn picture(name: String, pose: Pose, line: u64) -> PosedCamera {
+    PosedCamera { name, pose, size: None, optics: None, picture: None, line }
+}
+
+pub(crate) fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk::<N>()?;
     *rest = tail;
     Some(*head)
@@ -127,9 +163,7 @@ fn pose([qw, qx, qy, qz, tx, ty, tz]: [f64; 7]) -> std::result::Result<Pose, Str
     if ![qw, qx, qy, qz, tx, ty, tz].iter().all(|v| v.is_finite()) {
         return Err("a number of its pose is not finite".into());
     }
-    let q =
-        s3d_geom::glam::DVec4::new(qx, qy, qz, qw).try_normalize().ok_or("the quaternion has no length")?;
-    let world_from_camera = DMat3::from_quat(DQuat::from_vec4(q)).transpose();
+    let world_from_camera = DMat3::from_quat(rotation([qx, qy, qz, qw])?).transpose();
     let location = -(world_from_camera * DVec3::new(tx, ty, tz));
     let [right, down, forward] =
         [world_from_camera.x_axis, world_from_camera.y_axis, world_from_camera.z_axis];
@@ -139,6 +173,7 @@ fn pose([qw, qx, qy, qz, tx, ty, tz]: [f64; 7]) -> std::result::Result<Pose, Str
 #[cfg(test)]
 mod tests {
     use super::*;
+    use s3d_geom::glam::DQuat;
 
     /// The line of a picture whose camera has `pose`.
     fn numbers(pose: &Pose) -> [f64; 7] {
@@ -188,7 +223,8 @@ mod tests {
         let from_binary = read_binary(Path::new("images.bin"), &binary(&poses)).unwrap();
         for read in [from_text, from_binary] {
             assert_eq!(read.len(), 3);
-            for (i, (picture, pose)) in read.iter().zip(&poses).enumerate() {
+            for (i, ((camera, picture), pose)) in read.iter().zip(&poses).enumerate() {
+                assert_eq!(*camera, 1);
                 assert!(is_same(&picture.pose, pose), "{:?} {pose:?}", picture.pose);
                 assert_eq!(picture.name, format!("scan {i}.jpg"));
             }
@@ -199,7 +235,7 @@ mod tests {
     fn pictures_without_lines_of_points_are_all_read() {
         let names = |text: &str| -> Vec<String> {
             let read = read_text(Path::new("images.txt"), text.as_bytes()).unwrap();
-            read.into_iter().map(|picture| picture.name).collect()
+            read.into_iter().map(|(_, picture)| picture.name).collect()
         };
         let picture = |name: &str| format!("1 1 0 0 0 0 0 0 1 {name}\n");
         let [a, b, c] = ["a.jpg", "7", "c d.png"].map(picture);
@@ -216,11 +252,32 @@ mod tests {
     }
 
     #[test]
+    fn pictures_have_their_cameras() {
+        let dir = tempfile::tempdir().unwrap();
+        let model = dir.path().join("sparse/0");
+        std::fs::create_dir_all(&model).unwrap();
+        let at = |name: &str| model.join(name);
+        std::fs::write(at("images.txt"), "1 1 0 0 0 0 0 0 7 a.jpg\n\n2 1 0 0 0 0 0 0 8 b.jpg\n\n").unwrap();
+        let gone = read_posed(&at("images.txt")).unwrap_err();
+        assert!(gone.path().ends_with("cameras.txt"), "{gone}");
+        std::fs::write(at("cameras.txt"), "7 SIMPLE_PINHOLE 64 48 50 32 24\n").unwrap();
+        let other = read_posed(&at("images.txt")).unwrap_err().to_string();
+        assert!(other.contains("images.txt, line 3: `b.jpg`: its camera 8 is not in"), "{other}");
+        std::fs::write(at("cameras.txt"), "8 PINHOLE 32 24 25 26 16 12\n7 SIMPLE_PINHOLE 64 48 50 32 24\n")
+            .unwrap();
+        std::fs::create_dir(dir.path().join("images")).unwrap();
+        let cameras = read_posed(&at("images.txt")).unwrap();
+        assert_eq!([cameras[0].size, cameras[1].size], [Some([64, 48]), Some([32, 24])]);
+        assert_eq!(cameras[1].picture, Some(dir.path().join("images/b.jpg")));
+    }
+
+    #[test]
     fn faults_have_their_place() {
         let good = text(&[some_pose(1.0)]);
         for (more, words) in [
             ("2 1 0 0 0 0 0 0 1\n", "line 4: `2 1 0 0 0 0 0 0 1`: a picture is"),
             ("2 1 0 0 x 0 0 0 1 a.jpg\n", "line 4: `x` is no number"),
+            ("2 1 0 0 0 0 0 0 one a.jpg\n", "line 4: `one` is no number of a camera"),
             ("2 0 0 0 0 0 0 0 1 a.jpg\n", "line 4: the quaternion"),
             ("2 1 0 0 0 0 inf 0 1 a.jpg\n", "line 4: a number"),
         ] {

@@ -1,44 +1,47 @@
 //! Pictures with a pose, as reconstruction programs list them, and the scan locations that they stand for.
 
+use crate::camera::posed::PosedCamera;
 use crate::camera::table::{FARTHEST_M, ScanLocation};
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use s3d_geom::Pose;
-use s3d_geom::glam::DVec3;
+use s3d_geom::glam::{DQuat, DVec3, DVec4};
 use std::collections::HashMap;
 use std::path::Path;
 
 /// Two pictures of one location may be this far apart: the number of decimals that programs write.
 const SAME_PLACE_M: f64 = 0.01;
 
-/// A picture with its pose.
-pub(crate) struct LocatedPicture {
-    /// The name of its file, as the list has it.
-    pub(crate) name: String,
-    /// Where it was taken.
-    pub(crate) pose: Pose,
-    /// Its line in the list, from 1; 0 if the list has no lines.
-    pub(crate) line: u64,
+/// Refuses a camera that is too far from the origin for a building.
+pub(crate) fn check_place(path: &Path, camera: &PosedCamera) -> Result<()> {
+    let at = camera.pose.location;
+    if at.is_finite() && at.abs().max_element() <= FARTHEST_M {
+        return Ok(());
+    }
+    let name = quote(camera.name.as_bytes());
+    let message = format!("{name}: {at} is more than {FARTHEST_M} m from the origin");
+    Err(fault(path, camera.line, message))
+}
+
+/// An error at a line, if there is one.
+pub(crate) fn fault(path: &Path, line: u64, message: String) -> Error {
+    match line {
+        0 => Error::format(path, message),
+        _ => Error::line(path, line, message),
+    }
 }
 
 /// The scan locations of a list of pictures. A location is where a picture was taken, its camera level and
 /// with the picture's heading, since views are drawn around the horizon. Its uuid is the first run of 32
 /// hexadecimal digits in the picture's name, or else follows from the name; pictures of one uuid are one
 /// location, which has the first one's heading.
-pub(crate) fn locations_of(path: &Path, pictures: Vec<LocatedPicture>) -> Result<Vec<ScanLocation>> {
+pub(crate) fn locations_of(path: &Path, pictures: Vec<PosedCamera>) -> Result<Vec<ScanLocation>> {
     let mut locations: Vec<ScanLocation> = Vec::new();
     let mut index: HashMap<String, usize> = HashMap::new();
-    for LocatedPicture { name, pose, line } in pictures {
-        let fault = |message: String| match line {
-            0 => Error::format(path, message),
-            _ => Error::line(path, line, message),
-        };
+    for picture in pictures {
+        check_place(path, &picture)?;
+        let PosedCamera { name, pose, line, .. } = picture;
         let at = pose.location;
-        if !at.is_finite() || at.abs().max_element() > FARTHEST_M {
-            let message =
-                format!("{}: {at} is more than {FARTHEST_M} m from the origin", quote(name.as_bytes()));
-            return Err(fault(message));
-        }
         let uuid = uuid_in(&name).unwrap_or_else(|| uuid_from_name(&name));
         match index.get(&uuid) {
             None => {
@@ -48,10 +51,11 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<LocatedPicture>) -> Result
             Some(&first) => {
                 let distance = locations.get(first).map_or(0.0, |first| first.pose.location.distance(at));
                 if distance > SAME_PLACE_M {
-                    return Err(fault(format!(
+                    let message = format!(
                         "{}: uuid {uuid} is another picture's too, which was taken {distance:.3} m away",
                         quote(name.as_bytes())
-                    )));
+                    );
+                    return Err(fault(path, line, message));
                 }
             }
         }
@@ -81,14 +85,20 @@ pub(crate) fn pose_from_opencv(location: DVec3, right: DVec3, down: DVec3, forwa
     Pose { location, world_from_camera: s3d_geom::glam::DMat3::from_cols(right, -down, -forward) }
 }
 
+/// The rotation of a quaternion x y z w of any length.
+pub(crate) fn rotation(xyzw: [f64; 4]) -> std::result::Result<DQuat, String> {
+    let q = DVec4::from_array(xyzw).try_normalize().ok_or("the quaternion has no length")?;
+    Ok(DQuat::from_vec4(q))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_geom::glam::{DQuat, dvec3};
+    use s3d_geom::glam::dvec3;
 
-    fn picture(name: &str, x: f64, pitch: f64) -> LocatedPicture {
+    fn picture(name: &str, x: f64, pitch: f64) -> PosedCamera {
         let pose = Pose::from_scanner(dvec3(x, 0.0, 1.5), DQuat::from_rotation_z(0.3)).turned(0.0, pitch);
-        LocatedPicture { name: name.into(), pose, line: 0 }
+        PosedCamera { name: name.into(), pose, size: None, optics: None, picture: None, line: 0 }
     }
 
     #[test]
@@ -124,7 +134,7 @@ mod tests {
     #[test]
     fn places_that_cannot_be_are_refused() {
         let hex = "8eb9955b866b4b5f74abb1071416c628";
-        let message = |p: Vec<LocatedPicture>| locations_of(Path::new("p"), p).unwrap_err().to_string();
+        let message = |p: Vec<PosedCamera>| locations_of(Path::new("p"), p).unwrap_err().to_string();
         assert!(message(vec![picture(hex, 0.0, 0.0), picture(hex, 1.0, 0.0)]).contains("1.000 m away"));
         assert!(message(vec![picture("a", f64::NAN, 0.0)]).contains("from the origin"));
         assert!(message(vec![]).contains("no picture"));

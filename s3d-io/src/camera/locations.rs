@@ -1,12 +1,13 @@
 //! Scan locations, from any list of cameras that is read.
 
 use crate::camera::matterport::{PictureFolder, read_matterport_locations};
+use crate::camera::posed::PosedCamera;
 use crate::camera::table::{ScanLocation, read_cameras};
 use crate::camera::{colmap, located, nerfstudio, poses};
 use crate::error::{Error, Result};
 use s3d_geom::Pose;
 use s3d_geom::glam::{DAffine3, DMat3};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What is read, for messages.
 const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files (*.json), the raw captures \
@@ -29,8 +30,7 @@ const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a
 /// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these
 /// in it.
 pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocation>> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let turned = |mut pictures: Vec<located::LocatedPicture>| {
+    let turned = |mut pictures: Vec<PosedCamera>| {
         pictures.iter_mut().for_each(|p| p.pose = moved(&p.pose, world_from_file));
         pictures
     };
@@ -38,8 +38,7 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
         if let Some(images) = colmap::find(path) {
             return located::locations_of(&images, turned(colmap::read(&images)?));
         }
-        let transforms = path.join("transforms.json");
-        if transforms.is_file() {
+        if let Some(transforms) = has_transforms(path) {
             return located::locations_of(&transforms, turned(nerfstudio::read(&transforms)?));
         }
         let found = poses::read(&[path.to_owned()], world_from_file)?;
@@ -55,10 +54,10 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
         locations.iter_mut().for_each(|l| l.line = 0);
         return Ok(locations);
     }
-    if name == "images.txt" || name == "images.bin" {
+    if is_colmap_images(path) {
         return located::locations_of(path, turned(colmap::read(path)?));
     }
-    if name.ends_with(".json") {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return located::locations_of(path, turned(nerfstudio::read(path)?));
     }
     let mut locations = read_cameras(path)?;
@@ -66,8 +65,19 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
     Ok(locations)
 }
 
+/// Whether a file is the list of pictures of a COLMAP model.
+pub(crate) fn is_colmap_images(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    name.eq_ignore_ascii_case("images.txt") || name.eq_ignore_ascii_case("images.bin")
+}
+
+/// The `transforms.json` in a folder.
+pub(crate) fn has_transforms(dir: &Path) -> Option<PathBuf> {
+    Some(dir.join("transforms.json")).filter(|path| path.is_file())
+}
+
 /// A pose of a file's frame in the world. The frame may be scaled, all axes alike.
-fn moved(pose: &Pose, world_from_file: &DAffine3) -> Pose {
+pub(crate) fn moved(pose: &Pose, world_from_file: &DAffine3) -> Pose {
     if *world_from_file == DAffine3::IDENTITY {
         return *pose;
     }

@@ -198,7 +198,7 @@ fn remember(files: &mut BTreeMap<String, PathBuf>, path: PathBuf) {
 }
 
 /// The numbers of a text file, each with its line.
-fn numbers(bytes: &[u8], path: &Path) -> Result<Vec<(u64, f64)>> {
+pub(crate) fn numbers(bytes: &[u8], path: &Path) -> Result<Vec<(u64, f64)>> {
     let bytes = text_of(bytes, path)?;
     let text = std::str::from_utf8(&bytes).map_err(|_| Error::format(path, "is no text"))?;
     let mut numbers = Vec::new();

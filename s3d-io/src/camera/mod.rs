@@ -1,11 +1,12 @@
-//! Lists of cameras as scan locations, and the scanner's own pictures.
+//! Lists of cameras: scan locations, cameras of photographs or of views to render; and the scanner's own
+//! pictures.
 //!
 //! A [`ScanLocation`] is where the scanner stood and how it was turned. [`read_scan_locations`] reads them
 //! from any list:
 //!
 //! | path | what it is |
 //! |---|---|
-//! | `.csv` | a table `uuid,x,y,z,qx,qy,qz,qw`: [`read_cameras`], [`parse_cameras`] |
+//! | `.csv` | a table `uuid,x,y,z,qx,qy,qz,qw`, or with a target or a heading: [`read_cameras`], [`parse_cameras`] |
 //! | `images.txt`, `images.bin` | a COLMAP model |
 //! | `transforms.json` | frames of nerfstudio, Polycam, Record3D, instant-ngp |
 //! | a folder of `*.json` | pose files of a published area |
@@ -13,6 +14,9 @@
 //!
 //! Pictures of a model become locations where they were taken. A location lies at most 10,000 km from the
 //! origin, and a uuid stands in a list once.
+//!
+//! [`read_posed_cameras`] reads cameras as they are, each a [`PosedCamera`] with what is known of its size,
+//! focal lengths and lens: `transforms.json`, COLMAP models, ScanNet's poses, trajectories of TUM, tables.
 //!
 //! [`PictureFolder`] finds the pictures of each location, whatever form they have: raw captures
 //! ([`CaptureFile`], with lens and pose), sky boxes, panoramas. [`read_picture`] reads one, PNG or JPEG.
@@ -32,13 +36,18 @@
 //! ```
 
 mod colmap;
+mod colmap_cameras;
 mod located;
 mod locations;
 mod matterport;
 mod nerfstudio;
 mod picture;
+mod posed;
+mod posed_list;
 pub(crate) mod poses;
+mod scannet;
 mod table;
+mod tum;
 
 pub use located::uuid_from_name;
 pub use locations::read_scan_locations;
@@ -47,5 +56,7 @@ pub use matterport::{
     read_intrinsics, read_matterport_locations,
 };
 pub use picture::{check_picture, decode_picture, read_picture, read_picture_size};
+pub use posed::{Distortion, GivenIntrinsics, IntrinsicsError, Optics, PosedCamera};
+pub use posed_list::{PosedCameras, read_posed_cameras};
 pub use poses::PublishedLocation;
 pub use table::{ScanLocation, parse_cameras, read_cameras};

@@ -1,72 +1,220 @@
 //! The pictures of a `transforms.json`, as nerfstudio, Polycam, Record3D and instant-ngp write it. Source:
 //! nerfstudio's documentation, "Data conventions".
 //!
-//! A frame's `transform_matrix` is camera → world, 4 × 4, in OpenGL's axes: x right, y up, z backwards.
+//! A frame's `transform_matrix` is camera → world, 4 × 4, in OpenGL's axes: x right, y up, z backwards. What the
+//! camera is stands in the frame, or once for all frames.
 
-use crate::camera::located::LocatedPicture;
+use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
 use crate::fs::json::read_json;
 use s3d_geom::Pose;
-use s3d_geom::glam::{DMat3, DMat4, DVec4};
+use s3d_geom::glam::{DVec2, DVec3, dvec2};
 use serde::Deserialize;
+use std::f64::consts::PI;
 use std::path::Path;
-
-/// How far the axes of a camera may be from perpendicular and equally long: files hold seven decimals or so.
-const MOST_SKEW: f64 = 1e-3;
 
 #[derive(Deserialize)]
 struct Document {
     frames: Vec<FrameEntry>,
+    #[serde(flatten)]
+    camera: CameraKeys,
+    /// What was done to the cameras: turned and shifted, then scaled.
+    applied_transform: Option<Vec<Vec<f64>>>,
+    applied_scale: Option<f64>,
+    /// What was subtracted from the coordinates of the mesh before `s3d render` saw it.
+    world_offset_m: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize)]
 struct FrameEntry {
     file_path: String,
     transform_matrix: Vec<Vec<f64>>,
+    #[serde(flatten)]
+    camera: CameraKeys,
 }
 
-/// Reads a `transforms.json`.
-pub(crate) fn read(path: &Path) -> Result<Vec<LocatedPicture>> {
-    let Document { frames } = read_json(path)?;
+/// What the file says of a camera, by its keys.
+#[derive(Default, Deserialize)]
+struct CameraKeys {
+    camera_model: Option<String>,
+    w: Option<f64>,
+    h: Option<f64>,
+    fl_x: Option<f64>,
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    camera_angle_x: Option<f64>,
+    camera_angle_y: Option<f64>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    k4: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+}
+
+/// Reads the pictures of a `transforms.json` and where they were taken. A world in other units has matrices
+/// with a scale, which is left out.
+pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
+    let Document { frames, .. } = read_json(path)?;
     let mut pictures = Vec::with_capacity(frames.len());
-    for (i, frame) in frames.into_iter().enumerate() {
-        let pose = pose(&frame.transform_matrix).map_err(|message| {
-            Error::format(path, format!("frames[{i}], {:?}: transform_matrix {message}", frame.file_path))
-        })?;
-        pictures.push(LocatedPicture { name: frame.file_path, pose, line: 0 });
+    for (i, FrameEntry { file_path: name, transform_matrix, .. }) in frames.into_iter().enumerate() {
+        let pose = square(&transform_matrix)
+            .and_then(|rows| Pose::from_opengl(unscaled(rows)).map_err(|e| e.to_string()))
+            .map_err(|message| at_frame(path, i, &name, &format!("transform_matrix: {message}")))?;
+        pictures.push(PosedCamera { name, pose, size: None, optics: None, picture: None, line: 0 });
     }
     Ok(pictures)
 }
 
-fn pose(rows: &[Vec<f64>]) -> std::result::Result<Pose, String> {
-    let full = rows.iter().map(|row| <[f64; 4]>::try_from(row.as_slice()).ok()).collect::<Option<Vec<_>>>();
-    let (Some([x, y, z]) | Some([x, y, z, _])) = full.as_deref() else {
-        return Err("is no matrix of 4 × 4 or 3 × 4 numbers".into());
+/// Reads the cameras of a `transforms.json`, in the frame that they had before its `applied_transform`.
+pub(crate) fn read_posed(path: &Path) -> Result<Vec<PosedCamera>> {
+    let document: Document = read_json(path)?;
+    let fault = |what: &str, message: String| Error::format(path, format!("{what}: {message}"));
+    let applied = match &document.applied_transform {
+        None => Pose::from_opengl([
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]),
+        Some(rows) => Pose::from_opengl(square(rows).map_err(|m| fault("applied_transform", m))?),
     };
-    if !rows.iter().flatten().all(|v| v.is_finite()) {
-        return Err("holds a number that is not finite".into());
+    let applied = applied.map_err(|e| fault("applied_transform", e.to_string()))?;
+    let scale = document.applied_scale.unwrap_or(1.0);
+    if !(scale > 0.0 && scale.is_finite()) {
+        return Err(fault("applied_scale", format!("{scale} is no scale")));
     }
-    let columns = DMat4::from_cols_array_2d(&[*x, *y, *z, [0.0, 0.0, 0.0, 1.0]]).transpose();
-    let [x, y, z, location] =
-        [columns.x_axis, columns.y_axis, columns.z_axis, columns.w_axis].map(DVec4::truncate);
-    // A world in other units has axes of another length.
-    let length = x.length();
-    let skew =
-        [y.length() - length, z.length() - length, x.dot(y) / length, y.dot(z) / length, z.dot(x) / length];
-    let is_straight = length > 0.0 && skew.iter().all(|s| s.abs() <= MOST_SKEW * length);
-    if !is_straight || x.cross(y).dot(z) <= 0.0 {
-        return Err("is no rotation with a translation".into());
+    let offset_m = document.world_offset_m.map_or(DVec3::ZERO, DVec3::from_array);
+    let before = |pose: Pose| {
+        let turn = applied.world_from_camera.transpose();
+        Pose {
+            location: turn * (pose.location / scale - applied.location) + offset_m,
+            world_from_camera: turn * pose.world_from_camera,
+        }
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut cameras = Vec::with_capacity(document.frames.len());
+    for (i, FrameEntry { file_path: name, transform_matrix, camera }) in
+        document.frames.into_iter().enumerate()
+    {
+        let fault = |message: String| at_frame(path, i, &name, &message);
+        let rows = square(&transform_matrix).map_err(|m| fault(format!("transform_matrix: {m}")))?;
+        let pose = Pose::from_opengl(rows).map_err(|e| fault(format!("transform_matrix: {e}")))?;
+        let keys = camera.or(&document.camera);
+        let size = keys.size().map_err(fault)?;
+        let optics = keys.optics().map_err(fault)?;
+        // A world that was not moved keeps its last digits.
+        let is_moved = document.applied_transform.is_some() || scale != 1.0 || offset_m != DVec3::ZERO;
+        let pose = if is_moved { before(pose) } else { pose };
+        let picture = Some(folder.join(&name));
+        cameras.push(PosedCamera { name, pose, size, optics, picture, line: 0 });
     }
-    // Perpendicular to the last digit, keeping the viewing direction.
-    let back = z.normalize();
-    let right = (x - back * x.dot(back)).normalize();
-    Ok(Pose { location, world_from_camera: DMat3::from_cols(right, back.cross(right), back) })
+    Ok(cameras)
+}
+
+fn at_frame(path: &Path, i: usize, name: &str, message: &str) -> Error {
+    Error::format(path, format!("frames[{i}], {name:?}: {message}"))
+}
+
+/// A matrix of 4 × 4 numbers, or of 3 × 4 without its last row.
+fn square(rows: &[Vec<f64>]) -> std::result::Result<[[f64; 4]; 4], String> {
+    let full = rows.iter().map(|row| <[f64; 4]>::try_from(row.as_slice()).ok()).collect::<Option<Vec<_>>>();
+    match full.as_deref() {
+        Some(&[x, y, z]) => Ok([x, y, z, [0.0, 0.0, 0.0, 1.0]]),
+        Some(&[x, y, z, w]) => Ok([x, y, z, w]),
+        _ => Err("is no matrix of 4 × 4 or 3 × 4 numbers".into()),
+    }
+}
+
+/// The same with axes of length 1, if all have one length.
+fn unscaled(rows: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
+    let [[a, ..], [b, ..], [c, ..], _] = rows;
+    let length = DVec3::new(a, b, c).length();
+    let [x, y, z, last] = rows;
+    let row = |[a, b, c, place]: [f64; 4]| [a / length, b / length, c / length, place];
+    [row(x), row(y), row(z), last]
+}
+
+impl CameraKeys {
+    /// What is said here, and what is not from `shared`.
+    fn or(self, shared: &Self) -> Self {
+        Self {
+            camera_model: self.camera_model.or_else(|| shared.camera_model.clone()),
+            w: self.w.or(shared.w),
+            h: self.h.or(shared.h),
+            fl_x: self.fl_x.or(shared.fl_x),
+            fl_y: self.fl_y.or(shared.fl_y),
+            cx: self.cx.or(shared.cx),
+            cy: self.cy.or(shared.cy),
+            camera_angle_x: self.camera_angle_x.or(shared.camera_angle_x),
+            camera_angle_y: self.camera_angle_y.or(shared.camera_angle_y),
+            k1: self.k1.or(shared.k1),
+            k2: self.k2.or(shared.k2),
+            k3: self.k3.or(shared.k3),
+            k4: self.k4.or(shared.k4),
+            p1: self.p1.or(shared.p1),
+            p2: self.p2.or(shared.p2),
+        }
+    }
+
+    fn size(&self) -> std::result::Result<Option<[u32; 2]>, String> {
+        let (Some(w), Some(h)) = (self.w, self.h) else { return Ok(None) };
+        let side = |v: f64| (v.fract() == 0.0 && (1.0..=1e9).contains(&v)).then_some(v as u32);
+        match (side(w), side(h)) {
+            (Some(w), Some(h)) => Ok(Some([w, h])),
+            _ => Err(format!("a picture of {w} × {h} pixels")),
+        }
+    }
+
+    fn optics(&self) -> std::result::Result<Option<Optics>, String> {
+        let [k1, k2, k3, k4, p1, p2] =
+            [self.k1, self.k2, self.k3, self.k4, self.p1, self.p2].map(|k| k.unwrap_or(0.0));
+        let distortion = match self.camera_model.as_deref() {
+            Some("EQUIRECTANGULAR") => return Ok(Some(Optics::Equirectangular)),
+            Some("OPENCV_FISHEYE") => Distortion::Fisheye([k1, k2, k3, k4]),
+            None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => {
+                if k4 != 0.0 {
+                    return Err(format!(
+                        "k4 is {k4}: of OPENCV cameras only k1, k2, k3, p1, p2 are supported"
+                    ));
+                }
+                Distortion::opencv([k1, k2, p1, p2, k3])
+            }
+            Some(other) => {
+                return Err(format!(
+                    "the camera_model {other:?} is not supported: OPENCV, OPENCV_FISHEYE, PINHOLE and EQUIRECTANGULAR are"
+                ));
+            }
+        };
+        // The focal length that an angle of view of `size` pixels means.
+        let of_angle = |size: Option<f64>, angle: Option<f64>| {
+            size.zip(angle).map(|(size, angle)| 0.5 * size / libm::tan(0.5 * angle))
+        };
+        let angles = [self.camera_angle_x, self.camera_angle_y];
+        if let Some(angle) = angles.into_iter().flatten().find(|angle| !(*angle > 0.0 && *angle < PI)) {
+            return Err(format!("an angle of view of {angle} rad: it must be between 0 and π"));
+        }
+        let fx = self.fl_x.or_else(|| of_angle(self.w, self.camera_angle_x));
+        let fy = self.fl_y.or_else(|| of_angle(self.h, self.camera_angle_y));
+        let (Some(fx), Some(fy)) = (fx.or(fy), fy.or(fx)) else {
+            return Ok(self.camera_angle_x.map(|fov_rad| Optics::AngleOfView { fov_rad }));
+        };
+        let is_focal = |f: f64| f > 0.0 && f.is_finite();
+        if !is_focal(fx) || !is_focal(fy) {
+            return Err(format!("focal lengths of {fx} and {fy} px: both must be above 0"));
+        }
+        let middle = |size: Option<f64>| size.map(|size| 0.5 * size);
+        let (cx, cy) = (self.cx.or_else(|| middle(self.w)), self.cy.or_else(|| middle(self.h)));
+        let center_px: Option<DVec2> = cx.zip(cy).map(|(cx, cy)| dvec2(cx, cy));
+        Ok(Some(Optics::Pinhole { focal_px: dvec2(fx, fy), center_px, distortion }))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_geom::glam::{DQuat, DVec3};
+    use s3d_geom::glam::{DMat3, DQuat};
 
     fn rows(pose: &Pose) -> String {
         let m = pose.world_from_camera;
@@ -76,7 +224,15 @@ mod tests {
         format!("[{}, {}, {}, [0, 0, 0, 1]]", row(0), row(1), row(2))
     }
 
-    fn read_text(text: &str) -> Result<Vec<LocatedPicture>> {
+    fn read_text(text: &str) -> Result<Vec<PosedCamera>> {
+        read_with(text, read)
+    }
+
+    fn posed(text: &str) -> Result<Vec<PosedCamera>> {
+        read_with(text, read_posed)
+    }
+
+    fn read_with(text: &str, read: fn(&Path) -> Result<Vec<PosedCamera>>) -> Result<Vec<PosedCamera>> {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("transforms.json");
         std::fs::write(&path, text).unwrap();
@@ -107,13 +263,88 @@ mod tests {
             ("[[1,0,0,0],[0,1,0,0]]", "is no matrix"),
             ("[[1,0,0],[0,1,0],[0,0,1]]", "is no matrix"),
             ("[[1,0,0,1e999],[0,1,0,0],[0,0,1,0]]", "line 1"),
-            ("[[1,0,0,0],[0,1,0,0],[0,0,-1,0]]", "is no rotation"),
+            ("[[1,0,0,0],[0,1,0,0],[0,0,-1,0]]", "mirrors"),
             ("[[1,0.1,0,0],[0,1,0,0],[0,0,1,0]]", "is no rotation"),
-            ("[[0,0,0,0],[0,0,0,0],[0,0,0,0]]", "is no rotation"),
+            ("[[0,0,0,0],[0,0,0,0],[0,0,0,0]]", "transform_matrix: "),
+            ("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[4,5,6,1]]", "is transposed"),
         ] {
             let message = read_text(&document(matrix)).err().unwrap().to_string();
             assert!(message.contains(words), "{matrix}: {message}");
         }
         assert!(read_text("{}").err().unwrap().to_string().contains("missing field `frames`"));
+    }
+
+    #[test]
+    fn a_world_in_other_units_has_locations_but_no_cameras() {
+        let text = document("[[2,0,0,4],[0,2,0,5],[0,0,2,6]]");
+        assert_eq!(read_text(&text).unwrap()[0].pose.location, DVec3::new(4.0, 5.0, 6.0));
+        let message = posed(&text).unwrap_err().to_string();
+        assert!(message.contains("2 long instead of 1"), "{message}");
+    }
+
+    const FRAME: &str =
+        r#""file_path": "images/a.png", "transform_matrix": [[1,0,0,4],[0,0,-1,5],[0,1,0,6],[0,0,0,1]]"#;
+
+    #[test]
+    fn intrinsics_are_shared_or_the_frames_own() {
+        let text = format!(
+            r#"{{"camera_model": "OPENCV", "w": 640.0, "h": 480, "fl_x": 500, "fl_y": 510, "cx": 320, "cy": 241, "k1": 0.1, "p2": 0.2,
+            "frames": [{{{FRAME}}}, {{{FRAME}, "fl_x": 400, "w": 320, "k1": 0, "p2": 0}},
+            {{{FRAME}, "camera_model": "OPENCV_FISHEYE", "k4": 0.4}}]}}"#
+        );
+        let cameras = posed(&text).unwrap();
+        let pinhole = |focal: [f64; 2], distortion| {
+            Some(Optics::Pinhole { focal_px: focal.into(), center_px: Some(dvec2(320.0, 241.0)), distortion })
+        };
+        assert_eq!(cameras[0].optics, pinhole([500.0, 510.0], Distortion::OpenCv([0.1, 0.0, 0.0, 0.2, 0.0])));
+        assert_eq!(cameras[1].optics, pinhole([400.0, 510.0], Distortion::None));
+        assert_eq!(cameras[2].optics, pinhole([500.0, 510.0], Distortion::Fisheye([0.1, 0.0, 0.0, 0.4])));
+        assert_eq!([cameras[0].size, cameras[1].size], [Some([640, 480]), Some([320, 480])]);
+        assert!(cameras[0].picture.as_ref().unwrap().ends_with("images/a.png"));
+        assert_eq!(
+            (cameras[0].pose.location, cameras[0].pose.forward()),
+            (DVec3::new(4.0, 5.0, 6.0), DVec3::Y)
+        );
+    }
+
+    #[test]
+    fn angles_are_as_good_as_focal_lengths() {
+        let keys =
+            |keys: &str| posed(&format!(r#"{{{keys} "frames": [{{{FRAME}}}]}}"#)).map(|c| c[0].clone());
+        let camera = keys(r#""w": 200, "h": 100, "camera_angle_x": 1.5707963267948966,"#).unwrap();
+        let Some(Optics::Pinhole { focal_px, center_px, .. }) = camera.optics else { panic!() };
+        assert!(focal_px.abs_diff_eq(dvec2(100.0, 100.0), 1e-9) && center_px == Some(dvec2(100.0, 50.0)));
+        let camera = keys(r#""camera_angle_x": 1.5,"#).unwrap();
+        assert_eq!((camera.size, camera.optics), (None, Some(Optics::AngleOfView { fov_rad: 1.5 })));
+        assert_eq!(keys("").unwrap().optics, None);
+        let panorama = keys(r#""camera_model": "EQUIRECTANGULAR", "w": 8, "h": 4,"#).unwrap();
+        assert_eq!(panorama.optics, Some(Optics::Equirectangular));
+        for (text, words) in [
+            (r#""camera_model": "ORTHOPHOTO","#, "the camera_model \"ORTHOPHOTO\" is not supported"),
+            (r#""w": 10.5, "h": 4,"#, "a picture of 10.5 × 4"),
+            (r#""fl_x": -3,"#, "focal lengths of -3"),
+            (r#""camera_angle_x": 3.5,"#, "an angle of view of 3.5"),
+            (r#""fl_x": 3, "k4": 1,"#, "k4 is 1"),
+            (r#""applied_transform": [[1,0],[0,1]],"#, "applied_transform: is no matrix"),
+            (
+                r#""applied_transform": [[1,0,0,0],[0,1,0,0],[0,0,-1,0]],"#,
+                "applied_transform: the matrix mirrors",
+            ),
+            (r#""applied_scale": 0,"#, "applied_scale: 0 is no scale"),
+        ] {
+            let message = keys(text).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+    }
+
+    #[test]
+    fn what_was_applied_to_a_world_is_undone() {
+        // nerfstudio turns COLMAP's worlds by this: x, z, −y; then it scales.
+        let keys = r#""applied_transform": [[1,0,0,1],[0,0,1,2],[0,-1,0,3]], "applied_scale": 0.5,"#;
+        let text = format!(r#"{{{keys} "world_offset_m": [100, 0, 0], "frames": [{{{FRAME}}}]}}"#);
+        let pose = posed(&text).unwrap()[0].pose;
+        // (4, 5, 6) / 0.5 − (1, 2, 3) = (7, 8, 9) = (x, z, −y).
+        assert!(pose.location.abs_diff_eq(DVec3::new(107.0, -9.0, 8.0), 1e-12), "{}", pose.location);
+        assert!(pose.forward().abs_diff_eq(DVec3::Z, 1e-12), "{}", pose.forward());
     }
 }

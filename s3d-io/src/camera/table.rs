@@ -1,20 +1,27 @@
-//! The table of scan locations.
+//! Tables of cameras: scan locations, and views to render.
 
-use crate::camera::located::uuid_from_name;
+use crate::camera::located::{rotation, uuid_from_name};
+use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use csv::{ByteRecord, ReaderBuilder, Trim};
 use s3d_geom::Pose;
-use s3d_geom::glam::{DQuat, DVec3, DVec4};
+use s3d_geom::glam::{DVec3, dvec2};
 use std::collections::HashMap;
 use std::path::Path;
 
 /// A location farther than this from the origin is no place in a building.
 pub(crate) const FARTHEST_M: f64 = 1e7;
 
-/// The columns of the table, in the order that they have without a header.
+/// The columns of a table without a header, in this order.
 const COLUMNS: [&str; 8] = ["uuid", "x", "y", "z", "qx", "qy", "qz", "qw"];
+
+/// The columns that turn a camera: one of these sets, of which `pitch` may be missing.
+const TURNS: [&[&str]; 3] = [&["qx", "qy", "qz", "qw"], &["look_x", "look_y", "look_z"], &["yaw", "pitch"]];
+
+/// The columns of a camera's size and optics, which may be missing, and their cells empty.
+const CAMERA: [&str; 7] = ["width", "height", "fov", "fx", "fy", "cx", "cy"];
 
 /// A place from which the scanner looked around.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,10 +37,11 @@ pub struct ScanLocation {
 /// Reads a table of scan locations: CSV with the columns `uuid,x,y,z,qx,qy,qz,qw`, metres in the Z-up world
 /// and the scanner's rotation, of any length but zero, as a quaternion.
 ///
-/// A first line of those eight names gives their order; without one it is that order. A uuid may be in upper
-/// case and hyphenated; where no location has one, their names ("scan_0") are turned into uuids by
-/// [`uuid_from_name`]. Lines that start with `#` and empty lines do not count. Source: formats.md,
-/// "Scan locations".
+/// A first line with names gives their order; without one it is that order. With names, `name` may stand for
+/// `uuid`, and for the quaternion a place to look at (`look_x,look_y,look_z`) or a heading in degrees
+/// (`yaw`, and perhaps `pitch`). A uuid may be in upper case and hyphenated; where no location has one, their
+/// names ("scan_0") are turned into uuids by [`uuid_from_name`]. Lines that start with `#` and empty lines do
+/// not count. Source: formats.md, "Scan locations".
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a name that is no uuid
@@ -59,12 +67,34 @@ pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
 /// As [`read_cameras`].
 pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
     let path = name;
-    let bytes = text_of(bytes, path)?;
-    let mut locations = Vec::new();
+    let rows = read_rows(path, bytes)?;
+    let written: Vec<String> = rows
+        .iter()
+        .map(|row| row.name.chars().filter(|&c| c != '-').map(|c| c.to_ascii_lowercase()).collect())
+        .collect();
+    let uuids = written.iter().filter(|name| is_uuid(name)).count();
+    if let (true, Some((row, _))) = (uuids > 0, rows.iter().zip(&written).find(|(_, name)| !is_uuid(name))) {
+        let message = format!("{:?} is no uuid of 32 hexadecimal digits, as others here are", row.name);
+        return Err(Error::line(path, row.line, message));
+    }
     let mut lines: HashMap<String, u64> = HashMap::new();
-    let mut order: [usize; 8] = std::array::from_fn(|i| i);
-    let mut is_first = true;
-    let (mut names, mut first_name) = (0, None);
+    let mut locations = Vec::with_capacity(rows.len());
+    for (PosedCamera { name, pose, line, .. }, written) in rows.into_iter().zip(written) {
+        let uuid = if uuids > 0 { written } else { uuid_from_name(&name) };
+        if let Some(first) = lines.insert(uuid.clone(), line) {
+            let name = if uuids > 0 { &uuid } else { &name };
+            return Err(Error::line(path, line, format!("location {name} is on line {first} already")));
+        }
+        locations.push(ScanLocation { uuid, pose, line });
+    }
+    Ok(locations)
+}
+
+/// The cameras of a table. Names are as they are written, and may be there twice.
+pub(crate) fn read_rows(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
+    let bytes = text_of(bytes, path)?;
+    let mut rows = Vec::new();
+    let mut header: Option<Header> = None;
     // Line by line: csv counts the comments and empty lines before a record to the record.
     for (line, text) in (1..).zip(bytes.split(|&b| b == b'\n')) {
         let text = text.trim_ascii();
@@ -72,40 +102,33 @@ pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
             continue;
         }
         let record = fields(text).map_err(|e| Error::line(path, line, e.to_string()))?;
-        if record.len() != COLUMNS.len() {
+        let header = match &header {
+            Some(header) => header,
+            None => {
+                let is_name = |field: &[u8]| {
+                    [&b"uuid"[..], b"name", b"x"].iter().any(|n| field.eq_ignore_ascii_case(n))
+                };
+                if record.iter().any(is_name) {
+                    let read = Header::new(&record).map_err(|message| Error::line(path, line, message))?;
+                    header = Some(read);
+                    continue;
+                }
+                header.insert(Header::plain())
+            }
+        };
+        if record.len() != header.columns.len() {
+            let columns = header.columns.join(",");
             let message =
-                format!("{} fields; a location has {}: {}", record.len(), COLUMNS.len(), COLUMNS.join(","));
+                format!("{} fields; a location has {}: {columns}", record.len(), header.columns.len());
             return Err(Error::line(path, line, message));
         }
-        if std::mem::take(&mut is_first) && record.iter().any(|f| f.eq_ignore_ascii_case(b"uuid")) {
-            order = header(&record).map_err(|message| Error::line(path, line, message))?;
-            continue;
-        }
-        let location = location(&record, order, line).map_err(|message| Error::line(path, line, message))?;
-        if !is_uuid(&location.uuid) {
-            names += 1;
-            first_name.get_or_insert_with(|| (line, location.uuid.clone()));
-        }
-        if let Some(first) = lines.insert(location.uuid.clone(), line) {
-            return Err(Error::line(
-                path,
-                line,
-                format!("location {} is on line {first} already", location.uuid),
-            ));
-        }
-        locations.push(location);
+        let row = Row { record: &record, header };
+        rows.push(row.camera(line).map_err(|message| Error::line(path, line, message))?);
     }
-    if locations.is_empty() {
+    if rows.is_empty() {
         return Err(Error::format(path, format!("has no scan location; a line is {}", COLUMNS.join(","))));
     }
-    if let Some((line, name)) = first_name {
-        if names < locations.len() {
-            let message = format!("{name:?} is no uuid of 32 hexadecimal digits, as others here are");
-            return Err(Error::line(path, line, message));
-        }
-        locations.iter_mut().for_each(|l| l.uuid = uuid_from_name(&l.uuid));
-    }
-    Ok(locations)
+    Ok(rows)
 }
 
 fn is_uuid(text: &str) -> bool {
@@ -124,50 +147,173 @@ fn fields(text: &[u8]) -> csv::Result<ByteRecord> {
     Ok(record)
 }
 
-/// Where each of [`COLUMNS`] is.
-fn header(record: &ByteRecord) -> std::result::Result<[usize; 8], String> {
-    let mut order = [0; 8];
-    for (place, name) in order.iter_mut().zip(COLUMNS) {
-        *place = record
-            .iter()
-            .position(|field| field.eq_ignore_ascii_case(name.as_bytes()))
-            .ok_or_else(|| format!("the header has no column {name}; it needs {}", COLUMNS.join(",")))?;
-    }
-    Ok(order)
+/// How a table's cameras are turned.
+#[derive(Clone, Copy)]
+enum Turn {
+    Quaternion([usize; 4]),
+    Target([usize; 3]),
+    Heading { yaw: usize, pitch: Option<usize> },
 }
 
-fn location(record: &ByteRecord, order: [usize; 8], line: u64) -> std::result::Result<ScanLocation, String> {
-    let fields = order.map(|at| String::from_utf8_lossy(record.get(at).unwrap_or_default()).into_owned());
-    let [written, fields @ ..] = fields;
-    if written.is_empty() {
-        return Err("the location has no name".to_owned());
+/// Which columns a table has, and where.
+struct Header {
+    columns: Vec<String>,
+    name: usize,
+    place: [usize; 3],
+    turn: Turn,
+    /// Those of [`CAMERA`].
+    camera: [Option<usize>; 7],
+}
+
+impl Header {
+    /// Of a table without one.
+    fn plain() -> Self {
+        let columns = COLUMNS.map(str::to_owned).to_vec();
+        let turn = Turn::Quaternion([4, 5, 6, 7]);
+        Self { columns, name: 0, place: [1, 2, 3], turn, camera: [None; 7] }
     }
-    let uuid: String = written.chars().filter(|&c| c != '-').map(|c| c.to_ascii_lowercase()).collect();
-    // Or another name, until it is known what the other lines have.
-    let uuid = if is_uuid(&uuid) { uuid } else { written };
-    let mut numbers = [0.0; 7];
-    for ((number, text), column) in numbers.iter_mut().zip(&fields).zip(&COLUMNS[1..]) {
-        *number = text
-            .parse()
-            .ok()
-            .filter(|v: &f64| v.is_finite())
-            .ok_or_else(|| format!("{column} is {text:?}, which is no finite number"))?;
+
+    fn new(record: &ByteRecord) -> std::result::Result<Self, String> {
+        const FORM: &str = "uuid or name, x,y,z, and qx,qy,qz,qw or look_x,look_y,look_z or yaw,pitch";
+        let columns: Vec<String> =
+            record.iter().map(|field| String::from_utf8_lossy(field).to_ascii_lowercase()).collect();
+        let find = |name: &str| columns.iter().position(|column| column == name);
+        let needed = |name: &str| {
+            find(name).ok_or_else(|| format!("the header has no column {name}; it needs {FORM}"))
+        };
+        let name = find("uuid").map_or_else(|| find("name").ok_or(()), Ok);
+        let name = name.map_err(|()| format!("the header has no column uuid or name; it needs {FORM}"))?;
+        let place = [needed("x")?, needed("y")?, needed("z")?];
+        let kinds: Vec<&&[&str]> =
+            TURNS.iter().filter(|names| names.iter().any(|n| find(n).is_some())).collect();
+        let turn = match kinds.as_slice() {
+            [["qx", ..]] => Turn::Quaternion([needed("qx")?, needed("qy")?, needed("qz")?, needed("qw")?]),
+            [["look_x", ..]] => Turn::Target([needed("look_x")?, needed("look_y")?, needed("look_z")?]),
+            [_] => Turn::Heading { yaw: needed("yaw")?, pitch: find("pitch") },
+            [] => return Err(format!("the header does not say how cameras are turned; it needs {FORM}")),
+            _ => return Err(format!("the header says twice how cameras are turned; it needs {FORM}")),
+        };
+        let known = |column: &str| {
+            let all =
+                COLUMNS.iter().chain(["name"].iter()).chain(TURNS.iter().copied().flatten()).chain(&CAMERA);
+            all.into_iter().any(|name| *name == column)
+        };
+        for (i, column) in columns.iter().enumerate() {
+            if !known(column) || (i != name && ["uuid", "name"].contains(&column.as_str())) {
+                let more = CAMERA.join(",");
+                return Err(format!(
+                    "the header has a column {column:?}; it needs {FORM}, and may have {more}"
+                ));
+            }
+            if find(column) != Some(i) {
+                return Err(format!("the header has two columns {column}"));
+            }
+        }
+        let camera = CAMERA.map(find);
+        Ok(Self { columns, name, place, turn, camera })
     }
-    let [x, y, z, qx, qy, qz, qw] = numbers;
-    if [x, y, z].iter().any(|c| c.abs() > FARTHEST_M) {
-        return Err(format!(
-            "({x}, {y}, {z}) is more than {FARTHEST_M} m from the origin: are these metres?"
-        ));
+}
+
+/// A line of a table.
+struct Row<'a> {
+    record: &'a ByteRecord,
+    header: &'a Header,
+}
+
+impl Row<'_> {
+    fn text(&self, column: usize) -> std::borrow::Cow<'_, str> {
+        String::from_utf8_lossy(self.record.get(column).unwrap_or_default())
     }
-    let rotation = DVec4::new(qx, qy, qz, qw).try_normalize().ok_or("the quaternion has no length")?;
-    let pose = Pose::from_scanner(DVec3::new(x, y, z), DQuat::from_vec4(rotation));
-    Ok(ScanLocation { uuid, pose, line })
+
+    fn number(&self, column: usize) -> std::result::Result<f64, String> {
+        let text = self.text(column);
+        text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| {
+            let name = self.header.columns.get(column).map_or("", String::as_str);
+            format!("{name} is {text:?}, which is no finite number")
+        })
+    }
+
+    fn vector(&self, columns: [usize; 3]) -> std::result::Result<DVec3, String> {
+        let [x, y, z] = columns.map(|column| self.number(column));
+        Ok(DVec3::new(x?, y?, z?))
+    }
+
+    fn camera(&self, line: u64) -> std::result::Result<PosedCamera, String> {
+        let name = self.text(self.header.name).into_owned();
+        if name.is_empty() {
+            return Err("the location has no name".to_owned());
+        }
+        let at = self.vector(self.header.place)?;
+        if at.abs().max_element() > FARTHEST_M {
+            let DVec3 { x, y, z } = at;
+            return Err(format!(
+                "({x}, {y}, {z}) is more than {FARTHEST_M} m from the origin: are these metres?"
+            ));
+        }
+        let pose = match self.header.turn {
+            Turn::Quaternion(columns) => {
+                let [x, y, z, w] = columns.map(|column| self.number(column));
+                Pose::from_scanner(at, rotation([x?, y?, z?, w?])?)
+            }
+            Turn::Target(columns) => {
+                let target = self.vector(columns)?;
+                // Straight up or down the top of the image is north, as that of a heading of 0 is.
+                let flat = (target - at).truncate().length() < 1e-9 * (target - at).length();
+                let up = if flat { DVec3::Y * (at.z - target.z).signum() } else { DVec3::Z };
+                Pose::look_at(at, target, up).map_err(|e| e.to_string())?
+            }
+            Turn::Heading { yaw, pitch } => {
+                let pitch_deg = pitch.map_or(Ok(0.0), |column| self.number(column))?;
+                Pose::level(at, self.number(yaw)?.to_radians()).turned(0.0, pitch_deg.to_radians())
+            }
+        };
+        let (size, optics) = self.intrinsics()?;
+        Ok(PosedCamera { name, pose, size, optics, picture: None, line })
+    }
+
+    fn intrinsics(&self) -> std::result::Result<(Option<[u32; 2]>, Option<Optics>), String> {
+        // An empty cell is as good as no column.
+        let cell = |column: Option<usize>| match column {
+            Some(column) if !self.text(column).is_empty() => self.number(column).map(Some),
+            _ => Ok(None),
+        };
+        let [width, height, fov, fx, fy, cx, cy] = self.header.camera.map(cell);
+        let size = match (width?, height?) {
+            (None, None) => None,
+            (Some(width), Some(height)) => {
+                let side = |v: f64| (v.fract() == 0.0 && (1.0..=1e9).contains(&v)).then_some(v as u32);
+                let size = side(width).zip(side(height));
+                let (width, height) = size.ok_or_else(|| format!("an image of {width} × {height} pixels"))?;
+                Some([width, height])
+            }
+            _ => return Err("width and height go together".to_owned()),
+        };
+        let optics = match (fov?, fx?, fy?, cx?, cy?) {
+            (None, None, None, None, None) => None,
+            (Some(deg), None, None, None, None) if deg > 0.0 && deg < 180.0 => {
+                Some(Optics::AngleOfView { fov_rad: deg.to_radians() })
+            }
+            (Some(deg), None, None, None, None) => {
+                return Err(format!("fov is {deg}, not between 0 and 180 degrees"));
+            }
+            (None, Some(fx), fy, cx, cy) if cx.is_some() == cy.is_some() => {
+                let focal_px = dvec2(fx, fy.unwrap_or(fx));
+                if focal_px.min_element() <= 0.0 {
+                    return Err(format!("fx, fy are {}, {}: both must be above 0", focal_px.x, focal_px.y));
+                }
+                let center_px = cx.zip(cy).map(|(cx, cy)| dvec2(cx, cy));
+                Some(Optics::Pinhole { focal_px, center_px, distortion: Distortion::None })
+            }
+            _ => return Err("a camera has fov, or fx and perhaps fy, cx and cy".to_owned()),
+        };
+        Ok((size, optics))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_geom::glam::dvec3;
+    use s3d_geom::glam::{DQuat, dvec3};
 
     const A: &str = "8eb9955b866b4b5f74abb1071416c628";
     const B: &str = "508160BA-5d80-a2e3-6560-9578a09bab8b";
@@ -199,6 +345,73 @@ mod tests {
         assert!(twice.contains("location scan_0 is on line 1 already"), "{twice}");
         let nameless = read("scan_0,1,2,3,0,0,0,1\n,4,5,6,0,0,0,1\n").unwrap_err().to_string();
         assert!(nameless.contains("line 2: the location has no name"), "{nameless}");
+    }
+
+    #[test]
+    fn cameras_look_at_places_and_along_headings() {
+        let look =
+            read("look_x,name,x,y,z,look_y,look_z\n4,a,1,2,3,2,3\n1,b,1,2,3,2,0\n1,c,1,2,3,2,9\n").unwrap();
+        assert!(look[0].pose.forward().abs_diff_eq(DVec3::X, 1e-12) && look[0].pose.up() == DVec3::Z);
+        // As a camera at heading 0 that is tilted down, and up.
+        for (location, pitch_deg) in [(&look[1], -90f64), (&look[2], 90.0)] {
+            let tilted = Pose::level(DVec3::ZERO, 0.0).turned(0.0, pitch_deg.to_radians());
+            assert!(location.pose.world_from_camera.abs_diff_eq(tilted.world_from_camera, 1e-12));
+        }
+        let yaw = read("name,x,y,z,yaw,pitch\na,1,2,3,90,-30\n").unwrap();
+        let expected = Pose::level(dvec3(1.0, 2.0, 3.0), 90f64.to_radians()).turned(0.0, -30f64.to_radians());
+        assert_eq!((yaw[0].pose, &yaw[0].uuid), (expected, &uuid_from_name("a")));
+        assert_eq!(
+            read("yaw,name,x,y,z\n0,a,1,2,3\n").unwrap()[0].pose,
+            Pose::level(dvec3(1.0, 2.0, 3.0), 0.0)
+        );
+        for (text, words) in [
+            ("name,x,y,z\n", "does not say how cameras are turned"),
+            ("name,x,y,z,yaw,qx,qy,qz,qw\n", "says twice"),
+            ("name,x,y,z,pitch\n", "no column yaw"),
+            ("name,x,y,z,yaw,roll\n", "has a column \"roll\""),
+            ("name,x,y,z,yaw,x\n", "two columns x"),
+            ("name,uuid,x,y,z,yaw\n", "has a column \"name\""),
+            ("x,y,z,yaw\n", "no column uuid or name"),
+            ("name,x,y,z,yaw\na,1,2,3\n", "line 2: 4 fields; a location has 5: name,x,y,z,yaw"),
+            ("name,x,y,z,look_x,look_y,look_z\na,1,2,3,1,2,3\n", "line 2: the target is where the camera is"),
+        ] {
+            let message = read(text).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+    }
+
+    #[test]
+    fn rows_may_have_intrinsics() {
+        let rows = |text: &str| read_rows(Path::new("c.csv"), text.as_bytes());
+        let head = "name,x,y,z,yaw,width,height,fov,fx,fy,cx,cy\n";
+        let text = format!(
+            "{head}a,0,0,1,0,640,480,90,,,,\nb,0,0,1,0,,,,500,510,320,240\nc,0,0,1,0,64,48,,500,,,\n"
+        );
+        let cameras = rows(&text).unwrap();
+        assert_eq!(cameras[0].size, Some([640, 480]));
+        assert_eq!(cameras[0].optics, Some(Optics::AngleOfView { fov_rad: 90f64.to_radians() }));
+        let pinhole = |fx, fy, center_px| {
+            Some(Optics::Pinhole { focal_px: dvec2(fx, fy), center_px, distortion: Distortion::None })
+        };
+        assert_eq!(
+            (cameras[1].size, cameras[1].optics),
+            (None, pinhole(500.0, 510.0, Some(dvec2(320.0, 240.0))))
+        );
+        assert_eq!(cameras[2].optics, pinhole(500.0, 500.0, None));
+        // Names may be there twice: who makes files of them sees to it.
+        assert_eq!(rows("name,x,y,z,yaw\na,0,0,1,0\na,0,0,1,0\n").unwrap().len(), 2);
+        for (row, words) in [
+            ("a,0,0,1,0,640,,,,,,", "line 2: width and height go together"),
+            ("a,0,0,1,0,640.5,480,,,,,", "an image of 640.5 × 480"),
+            ("a,0,0,1,0,,,180,,,,", "fov is 180"),
+            ("a,0,0,1,0,,,90,500,,,", "a camera has fov, or fx"),
+            ("a,0,0,1,0,,,,500,,320,", "a camera has fov, or fx"),
+            ("a,0,0,1,0,,,,500,-1,,", "fx, fy are 500, -1"),
+            ("a,0,0,1,0,,,wide,,,,", "fov is \"wide\""),
+        ] {
+            let message = rows(&format!("{head}{row}\n")).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub(crate) type Feed = fn(&Path, &[u8]);
 
 /// Every reader, by the name of its fuzz target.
-pub(crate) const FEEDS: [(&str, Feed); 19] = [
+pub(crate) const FEEDS: [(&str, Feed); 20] = [
     ("obj", obj),
     ("mtl", mtl),
     ("texture", texture),
@@ -31,6 +31,7 @@ pub(crate) const FEEDS: [(&str, Feed); 19] = [
     ("ply_cloud", ply_cloud),
     ("s3dis", s3dis),
     ("cameras", cameras),
+    ("posed_cameras", posed_cameras),
     ("captures", captures),
     ("json", json),
     ("scene", scene),
@@ -175,6 +176,51 @@ fn cameras(dir: &Path, data: &[u8]) {
     let path = file(dir, name, data);
     if let Some(found) = check(dir, read_scan_locations(&path, &DAffine3::IDENTITY)) {
         assert!(found.iter().all(|l| is_valid_uuid(&l.uuid) && l.pose.location.is_finite()));
+    }
+}
+
+/// Cameras with what is known of them: a table, COLMAP's cameras as text and binary, a transforms.json, a
+/// trajectory, a pose and intrinsics of ScanNet.
+fn posed_cameras(dir: &Path, data: &[u8]) {
+    let (which, data) = choice(data, 7);
+    let folder = |name: &str| {
+        let folder = dir.join(name);
+        fs::create_dir_all(&folder).expect("the folder can be written");
+        folder
+    };
+    let path = match which {
+        0 => file(dir, "table.csv", data),
+        1 => {
+            file(dir, "cameras.txt", data);
+            file(dir, "images.txt", b"1 1 0 0 0 0 0 0 1 a.jpg\n")
+        }
+        2 => {
+            let mut image = vec![1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0];
+            [1f64, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0].iter().for_each(|v| image.extend(v.to_le_bytes()));
+            image.extend([1, 0, 0, 0, b'a', 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+            file(dir, "cameras.bin", data);
+            file(dir, "images.bin", &image)
+        }
+        3 => file(dir, "transforms.json", data),
+        4 => file(dir, "trajectory.txt", data),
+        _ => {
+            let (pose, intrinsics) = (folder("pose"), folder("intrinsic").join("intrinsic_color.txt"));
+            let good = b"1 0 0 1\n0 0 1 2\n0 -1 0 3\n0 0 0 1\n";
+            file(&pose, "0.txt", if which == 5 { data } else { good });
+            fs::write(intrinsics, if which == 5 { b"9 0 4 0 9 3 0 0 1" } else { data }).expect("written");
+            pose
+        }
+    };
+    let Some(found) = check(dir, read_posed_cameras(&path, &DAffine3::IDENTITY)) else { return };
+    assert!(!found.cameras.is_empty());
+    let half = GivenIntrinsics { width: Some(64), height: Some(32), optics: None };
+    for camera in &found.cameras {
+        assert!(camera.pose.location.is_finite());
+        for given in [GivenIntrinsics::default(), half] {
+            if let Ok(camera) = camera.camera(&given) {
+                let _ = (camera.fov_rad(), camera.k_matrix(), camera.project(camera.pose.location));
+            }
+        }
     }
 }
 

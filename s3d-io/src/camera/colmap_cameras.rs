@@ -1,0 +1,223 @@
+//! The cameras of a COLMAP model: `cameras.txt` or `cameras.bin`. Source: COLMAP's documentation, "Output
+//! Format" and "Camera Models".
+
+use crate::camera::colmap::take;
+use crate::camera::posed::{Distortion, Optics};
+use crate::error::{Error, Result};
+use crate::fs::encoding::text_of;
+use crate::fs::open::read_file;
+use crate::fs::quote::quote;
+use s3d_geom::glam::{DVec2, dvec2};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// Size and optics of a camera.
+pub(crate) type Intrinsics = ([u32; 2], Optics);
+
+/// COLMAP's models by number: name, and how many parameters.
+const MODELS: [(&str, usize); 12] = [
+    ("SIMPLE_PINHOLE", 3),
+    ("PINHOLE", 4),
+    ("SIMPLE_RADIAL", 4),
+    ("RADIAL", 5),
+    ("OPENCV", 8),
+    ("OPENCV_FISHEYE", 8),
+    ("FULL_OPENCV", 12),
+    ("FOV", 5),
+    ("SIMPLE_RADIAL_FISHEYE", 4),
+    ("RADIAL_FISHEYE", 5),
+    ("THIN_PRISM_FISHEYE", 12),
+    ("RAD_TAN_THIN_PRISM_FISHEYE", 16),
+];
+
+/// The cameras beside a list of images, by their numbers, and the file that lists them.
+pub(crate) fn read_beside(images: &Path) -> Result<(PathBuf, HashMap<u32, Intrinsics>)> {
+    let is_binary = images.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"));
+    let path = images.with_file_name(if is_binary { "cameras.bin" } else { "cameras.txt" });
+    let bytes = read_file(&path)?;
+    let cameras =
+        if is_binary { read_binary(&path, &bytes) } else { read_text(&path, &text_of(&bytes, &path)?) }?;
+    Ok((path, cameras))
+}
+
+fn read_text(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
+    const FORM: &str = "a camera is CAMERA_ID MODEL WIDTH HEIGHT and its parameters";
+    let mut cameras = HashMap::new();
+    for (line, text) in (1u64..).zip(bytes.split(|&b| b == b'\n')) {
+        let text = text.trim_ascii();
+        if text.is_empty() || text.starts_with(b"#") {
+            continue;
+        }
+        let fault = |message: String| Error::line(path, line, message);
+        let words = std::str::from_utf8(text).map_err(|_| fault("is no text in UTF-8".into()))?;
+        let mut words = words.split_ascii_whitespace();
+        let mut next = || words.next().ok_or_else(|| fault(format!("{}: {FORM}", quote(text))));
+        let (id, model, width, height) = (next()?, next()?, next()?, next()?);
+        let whole = |word: &str| word.parse::<u32>().map_err(|_| fault(format!("{word:?}: {FORM}")));
+        let (id, size) = (whole(id)?, [whole(width)?, whole(height)?]);
+        let numbers: Vec<f64> = words
+            .map(|word| word.parse().map_err(|_| fault(format!("{word:?} is no number: {FORM}"))))
+            .collect::<Result<_>>()?;
+        let intrinsics = intrinsics(model, size, &numbers).map_err(fault)?;
+        if cameras.insert(id, intrinsics).is_some() {
+            return Err(fault(format!("there is a camera {id} already")));
+        }
+    }
+    Ok(cameras)
+}
+
+/// Little-endian: a count; for each camera its number (4 bytes), its model's (4), width and height (8 each) and
+/// the parameters (8 each).
+fn read_binary(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
+    let mut rest = bytes;
+    let mut cameras = HashMap::new();
+    let cut_off =
+        |n: u64| Error::format(path, format!("ends in camera {n}: it was cut off, or is no cameras.bin"));
+    let count = u64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(0))?);
+    for n in 1..=count {
+        let mut head = || -> Option<(u32, u32, [u64; 2])> {
+            let (id, model) = (take(&mut rest)?, take(&mut rest)?);
+            let size = [take(&mut rest)?, take(&mut rest)?].map(u64::from_le_bytes);
+            Some((u32::from_le_bytes(id), u32::from_le_bytes(model), size))
+        };
+        let (id, model, size) = head().ok_or_else(|| cut_off(n))?;
+        let fault = |message: String| Error::format(path, format!("camera {id}: {message}"));
+        let (model, parameters) = *usize::try_from(model)
+            .ok()
+            .and_then(|model| MODELS.get(model))
+            .ok_or_else(|| fault(format!("its model has the number {model}, which is none of COLMAP's")))?;
+        let mut numbers = Vec::with_capacity(parameters);
+        for _ in 0..parameters {
+            numbers.push(f64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(n))?));
+        }
+        // What does not fit is as wrong as 0.
+        let size = size.map(|side| u32::try_from(side).unwrap_or(0));
+        let intrinsics = intrinsics(model, size, &numbers).map_err(fault)?;
+        if cameras.insert(id, intrinsics).is_some() {
+            return Err(fault("there is one of this number already".into()));
+        }
+    }
+    Ok(cameras)
+}
+
+fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Result<Intrinsics, String> {
+    let [width, height] = size;
+    if width == 0 || height == 0 {
+        return Err(format!("a picture of {width} × {height} pixels"));
+    }
+    let known = MODELS.iter().find(|(name, _)| *name == model);
+    let (_, count) =
+        known.ok_or_else(|| format!("{} is no camera model of COLMAP", quote(model.as_bytes())))?;
+    if numbers.len() != *count {
+        return Err(format!("{model} has {count} parameters, not {}", numbers.len()));
+    }
+    if !numbers.iter().all(|v| v.is_finite()) {
+        return Err(format!("a parameter of {model} is not finite"));
+    }
+    let pinhole = |focal_px: DVec2, cx: f64, cy: f64, distortion| Optics::Pinhole {
+        focal_px,
+        center_px: Some(dvec2(cx, cy)),
+        distortion,
+    };
+    let one = DVec2::splat;
+    let (opencv, fisheye) = (Distortion::opencv, Distortion::Fisheye);
+    let optics = match (model, numbers) {
+        ("SIMPLE_PINHOLE", &[f, cx, cy]) => pinhole(one(f), cx, cy, Distortion::None),
+        ("PINHOLE", &[fx, fy, cx, cy]) => pinhole(dvec2(fx, fy), cx, cy, Distortion::None),
+        ("SIMPLE_RADIAL", &[f, cx, cy, k]) => pinhole(one(f), cx, cy, opencv([k, 0.0, 0.0, 0.0, 0.0])),
+        ("RADIAL", &[f, cx, cy, k1, k2]) => pinhole(one(f), cx, cy, opencv([k1, k2, 0.0, 0.0, 0.0])),
+        ("OPENCV", &[fx, fy, cx, cy, k1, k2, p1, p2]) => {
+            pinhole(dvec2(fx, fy), cx, cy, opencv([k1, k2, p1, p2, 0.0]))
+        }
+        ("OPENCV_FISHEYE", &[fx, fy, cx, cy, k1, k2, k3, k4]) => {
+            pinhole(dvec2(fx, fy), cx, cy, fisheye([k1, k2, k3, k4]))
+        }
+        ("SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, k]) => pinhole(one(f), cx, cy, fisheye([k, 0.0, 0.0, 0.0])),
+        ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => pinhole(one(f), cx, cy, fisheye([k1, k2, 0.0, 0.0])),
+        _ => {
+            return Err(format!(
+                "the camera model {model} is not supported: undistort the pictures with colmap image_undistorter, which \
+                 makes a model of PINHOLE cameras"
+            ));
+        }
+    };
+    if let Optics::Pinhole { focal_px, .. } = optics
+        && focal_px.min_element() <= 0.0
+    {
+        return Err(format!("focal lengths of {} and {} px: both must be above 0", focal_px.x, focal_px.y));
+    }
+    Ok((size, optics))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: &str = "# Camera list\n1 PINHOLE 640 480 500 510 320 240\n2 SIMPLE_PINHOLE 640 480 500 320 240\n\
+                       3 SIMPLE_RADIAL 640 480 500 320 240 0.1\r\n4 RADIAL 640 480 500 320 240 0.1 -0.2\n\
+                       5 OPENCV 640 480 500 510 320 240 0.1 -0.2 0.003 0.004\n\
+                       6 OPENCV_FISHEYE 640 480 500 510 320 240 0.1 -0.2 0.03 0.04\n\
+                       7 RADIAL 640 480 500 320 240 0 0\n";
+
+    /// The same in binary.
+    fn binary(text: &str) -> Vec<u8> {
+        let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
+        let mut bytes = (lines.len() as u64).to_le_bytes().to_vec();
+        for line in lines {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let model = MODELS.iter().position(|(name, _)| *name == words[1]).unwrap();
+            bytes.extend(words[0].parse::<u32>().unwrap().to_le_bytes());
+            bytes.extend((model as u32).to_le_bytes());
+            words[2..4].iter().for_each(|w| bytes.extend(w.parse::<u64>().unwrap().to_le_bytes()));
+            words[4..].iter().for_each(|w| bytes.extend(w.parse::<f64>().unwrap().to_le_bytes()));
+        }
+        bytes
+    }
+
+    #[test]
+    fn every_model_is_read_in_both_forms() {
+        let text = read_text(Path::new("cameras.txt"), ALL.as_bytes()).unwrap();
+        assert_eq!(read_binary(Path::new("cameras.bin"), &binary(ALL)).unwrap(), text);
+        let distortion = |id: u32| {
+            let ([640, 480], Optics::Pinhole { focal_px, center_px, distortion }) = text[&id] else {
+                panic!("camera {id}")
+            };
+            assert_eq!(center_px, Some(dvec2(320.0, 240.0)));
+            assert_eq!(focal_px, dvec2(500.0, if [1, 5, 6].contains(&id) { 510.0 } else { 500.0 }));
+            distortion
+        };
+        assert_eq!([1, 2, 7].map(distortion), [Distortion::None; 3]);
+        assert_eq!(distortion(3), Distortion::OpenCv([0.1, 0.0, 0.0, 0.0, 0.0]));
+        assert_eq!(distortion(4), Distortion::OpenCv([0.1, -0.2, 0.0, 0.0, 0.0]));
+        assert_eq!(distortion(5), Distortion::OpenCv([0.1, -0.2, 0.003, 0.004, 0.0]));
+        assert_eq!(distortion(6), Distortion::Fisheye([0.1, -0.2, 0.03, 0.04]));
+    }
+
+    #[test]
+    fn faults_have_their_place() {
+        for (line, words) in [
+            ("1 PINHOLE 640 480 500 510 320", "line 2: PINHOLE has 4 parameters, not 3"),
+            ("1 PINHOLE 640 480 500 510 320 nan", "line 2: a parameter of PINHOLE is not finite"),
+            ("1 PINHOLE 640 480 500 510 320 x", "line 2: \"x\" is no number"),
+            ("1 PINHOLE 0 480 500 510 320 240", "line 2: a picture of 0 × 480"),
+            ("1 PINHOLE 640 480 500 -510 320 240", "line 2: focal lengths of 500 and -510"),
+            ("1 FISHY 640 480 500", "line 2: `FISHY` is no camera model"),
+            ("1 FOV 640 480 500 500 320 240 0.9", "line 2: the camera model FOV is not supported"),
+            ("1 PINHOLE 640", "line 2: `1 PINHOLE 640`: a camera is"),
+            ("9 PINHOLE 640 480 500 510 320 240", "line 2: there is a camera 9 already"),
+        ] {
+            let text = format!("9 SIMPLE_PINHOLE 640 480 500 320 240\n{line}\n");
+            let e = read_text(Path::new("cameras.txt"), text.as_bytes()).unwrap_err().to_string();
+            assert!(e.contains(words), "{e}");
+        }
+        let bytes = binary(ALL);
+        for length in [0, 9, 30, bytes.len() - 1] {
+            let e = read_binary(Path::new("cameras.bin"), &bytes[..length]).unwrap_err().to_string();
+            assert!(e.contains("cut off"), "{e}");
+        }
+        let mut odd = bytes;
+        odd[12] = 77;
+        let e = read_binary(Path::new("cameras.bin"), &odd).unwrap_err().to_string();
+        assert!(e.contains("camera 1: its model has the number 77"), "{e}");
+    }
+}

@@ -1,0 +1,241 @@
+//! Cameras with poses: what photographs were taken with, or what is to be rendered.
+
+use s3d_geom::glam::{DVec2, DVec3, dvec2};
+use s3d_geom::{Camera, CameraError, Pose};
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// A camera of a list: see [`read_posed_cameras`](crate::camera::read_posed_cameras).
+#[derive(Clone, Debug, PartialEq)]
+pub struct PosedCamera {
+    /// Its name in the list: a picture's file, a time stamp, any word.
+    pub name: String,
+    /// Where it is and how it is turned.
+    pub pose: Pose,
+    /// Width and height of its picture in pixels, if the list tells.
+    pub size: Option<[u32; 2]>,
+    /// How directions become pixels, if the list tells.
+    pub optics: Option<Optics>,
+    /// The picture that was taken with it, if the list names one. Whether the file is there was not looked at.
+    pub picture: Option<PathBuf>,
+    /// Its line in the list, from 1; 0 if the list has no lines.
+    pub line: u64,
+}
+
+/// How a camera maps directions to pixels, as far as lists of cameras tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Optics {
+    /// A pinhole, perhaps behind a lens.
+    Pinhole {
+        /// Focal lengths in pixels.
+        focal_px: DVec2,
+        /// The principal point in pixels from the top left corner of the picture; its middle if `None`.
+        center_px: Option<DVec2>,
+        /// What the lens bends.
+        distortion: Distortion,
+    },
+    /// A pinhole with square pixels and its centre in the middle.
+    AngleOfView {
+        /// The full horizontal angle, in (0, π).
+        fov_rad: f64,
+    },
+    /// A panorama, twice as wide as high.
+    Equirectangular,
+}
+
+/// What a lens bends, in OpenCV's terms.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Distortion {
+    /// Nothing: a pinhole's picture.
+    #[default]
+    None,
+    /// k₁ k₂ p₁ p₂ k₃, as [`Lens`](s3d_geom::Lens) has them.
+    OpenCv([f64; 5]),
+    /// k₁ k₂ k₃ k₄ of a fisheye lens: θ (1 + k₁θ² + k₂θ⁴ + k₃θ⁶ + k₄θ⁸) is the distance from the axis.
+    Fisheye([f64; 4]),
+}
+
+impl Distortion {
+    /// OpenCV's numbers; nothing if all are 0.
+    pub(crate) fn opencv(numbers: [f64; 5]) -> Self {
+        if numbers == [0.0; 5] { Self::None } else { Self::OpenCv(numbers) }
+    }
+}
+
+/// What is said beside a list of cameras: instead of what it says, or where it says nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GivenIntrinsics {
+    /// Width of the images in pixels.
+    pub width: Option<u32>,
+    /// Height of the images in pixels.
+    pub height: Option<u32>,
+    /// How directions become pixels in images of that size.
+    pub optics: Option<Optics>,
+}
+
+/// Why a camera of a list has no images.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum IntrinsicsError {
+    /// Neither the list nor its reader's caller tells the size.
+    #[error("the size of its images is not known")]
+    NoSize,
+    /// Neither tells focal lengths or an angle of view.
+    #[error("neither its focal lengths nor its angle of view are known")]
+    NoOptics,
+    /// A panorama is twice as wide as high.
+    #[error("a panorama is twice as wide as high, not {width} × {height} pixels")]
+    PanoramaSize {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+    /// Panoramas here are level.
+    #[error("it is a panorama that is tilted by {tilt_deg:.1}°: only level ones are supported")]
+    TiltedPanorama {
+        /// Degrees between its way up and the world's.
+        tilt_deg: f64,
+    },
+    /// It cannot be.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+}
+
+impl PosedCamera {
+    /// The camera that takes its picture, without what its lens bends. `given` goes before what the list says.
+    /// Where a size alone is given, the picture is scaled to it: focal lengths and principal point follow, and
+    /// so does the height if only a width is given, or the other way round.
+    ///
+    /// # Errors
+    /// [`IntrinsicsError`].
+    pub fn camera(&self, given: &GivenIntrinsics) -> Result<Camera, IntrinsicsError> {
+        let [width, height] = self.size_with(given)?;
+        let pose = self.pose;
+        let size = dvec2(f64::from(width), f64::from(height));
+        let from_list = self.optics.map(|optics| match (optics, self.size) {
+            (Optics::Pinhole { focal_px, center_px, distortion }, Some([w, h])) => {
+                let scale = size / dvec2(f64::from(w), f64::from(h));
+                let center_px = center_px.map(|c| c * scale);
+                Optics::Pinhole { focal_px: focal_px * scale, center_px, distortion }
+            }
+            _ => optics,
+        });
+        match given.optics.or(from_list).ok_or(IntrinsicsError::NoOptics)? {
+            Optics::Pinhole { focal_px, center_px, .. } => {
+                let center_px = center_px.unwrap_or(size * 0.5);
+                Ok(Camera::pinhole(pose, focal_px, center_px, width, height)?)
+            }
+            Optics::AngleOfView { fov_rad } => {
+                let is_angle = fov_rad > 0.0 && fov_rad < std::f64::consts::PI;
+                if !is_angle {
+                    return Err(CameraError::AngleOfView(fov_rad).into());
+                }
+                Ok(Camera::perspective(pose, fov_rad, width, height))
+            }
+            Optics::Equirectangular => {
+                /// As much as a rounded matrix is off.
+                const LEVEL_DEG: f64 = 0.1;
+                if width != height.saturating_mul(2) {
+                    return Err(IntrinsicsError::PanoramaSize { width, height });
+                }
+                let tilt_deg = pose.up().angle_between(DVec3::Z).to_degrees();
+                if tilt_deg > LEVEL_DEG {
+                    return Err(IntrinsicsError::TiltedPanorama { tilt_deg });
+                }
+                Ok(Camera::equirectangular(pose, width))
+            }
+        }
+    }
+
+    /// The size of its images.
+    fn size_with(&self, given: &GivenIntrinsics) -> Result<[u32; 2], IntrinsicsError> {
+        let scaled = |side: u32, by: u32, of: u32| {
+            let scaled = f64::from(side) * f64::from(by) / f64::from(of.max(1));
+            (scaled.round() as u32).max(1)
+        };
+        let size = match (given.width, given.height, self.size) {
+            (Some(width), Some(height), _) => [width, height],
+            (Some(width), None, Some([w, h])) => [width, scaled(h, width, w)],
+            (None, Some(height), Some([w, h])) => [scaled(w, height, h), height],
+            (None, None, Some(size)) => size,
+            _ => return Err(IntrinsicsError::NoSize),
+        };
+        let [width, height] = size;
+        if width == 0 || height == 0 { Err(CameraError::NoPixels { width, height }.into()) } else { Ok(size) }
+    }
+
+    /// Whether a lens bends its picture, which its [`camera`](Self::camera) does not.
+    pub fn is_distorted(&self) -> bool {
+        matches!(self.optics, Some(Optics::Pinhole { distortion, .. }) if distortion != Distortion::None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::Projection;
+
+    fn posed(size: Option<[u32; 2]>, optics: Option<Optics>) -> PosedCamera {
+        let pose = Pose::level(DVec3::ONE, 0.3);
+        PosedCamera { name: "a".into(), pose, size, optics, picture: None, line: 0 }
+    }
+
+    const PHONE: Optics = Optics::Pinhole {
+        focal_px: DVec2::new(1600.0, 1604.0),
+        center_px: Some(DVec2::new(950.0, 530.0)),
+        distortion: Distortion::OpenCv([0.1, 0.0, 0.0, 0.0, 0.0]),
+    };
+
+    fn sized(width: Option<u32>, height: Option<u32>) -> GivenIntrinsics {
+        GivenIntrinsics { width, height, optics: None }
+    }
+
+    #[test]
+    fn a_smaller_picture_shows_the_same() {
+        let posed = posed(Some([1920, 1080]), Some(PHONE));
+        let full = posed.camera(&GivenIntrinsics::default()).unwrap();
+        assert_eq!((full.width, full.height, full.focal_px()), (1920, 1080, dvec2(1600.0, 1604.0)));
+        assert!(posed.is_distorted());
+        for given in [sized(Some(480), None), sized(None, Some(270)), sized(Some(480), Some(270))] {
+            let small = posed.camera(&given).unwrap();
+            assert_eq!((small.width, small.height), (480, 270));
+            // The corner of the picture stays the corner, and so does everything else.
+            let (a, b) = (full.direction(1920.0, 40.0), small.direction(480.0, 10.0));
+            assert!(a.abs_diff_eq(b, 1e-12), "{a} {b}");
+        }
+        let given = GivenIntrinsics {
+            optics: Some(Optics::AngleOfView { fov_rad: 1.0 }),
+            ..sized(Some(100), Some(70))
+        };
+        let other = posed.camera(&given).unwrap();
+        assert_eq!(other.projection, Projection::Perspective { fov_rad: 1.0 });
+    }
+
+    #[test]
+    fn what_is_not_known_is_named() {
+        let none = GivenIntrinsics::default();
+        assert_eq!(posed(None, Some(PHONE)).camera(&none), Err(IntrinsicsError::NoSize));
+        assert_eq!(posed(None, None).camera(&sized(Some(8), None)), Err(IntrinsicsError::NoSize));
+        assert_eq!(posed(Some([8, 8]), None).camera(&none), Err(IntrinsicsError::NoOptics));
+        // Focal lengths are those of the size that is given, where the list has none.
+        let camera = posed(None, Some(PHONE)).camera(&sized(Some(1920), Some(1080))).unwrap();
+        assert_eq!(camera.focal_px(), dvec2(1600.0, 1604.0));
+        let flat = posed(Some([8, 8]), Some(Optics::AngleOfView { fov_rad: 4.0 })).camera(&none);
+        assert_eq!(flat, Err(IntrinsicsError::Camera(CameraError::AngleOfView(4.0))));
+        assert!(posed(Some([0, 8]), Some(PHONE)).camera(&none).is_err());
+    }
+
+    #[test]
+    fn panoramas_are_level_and_twice_as_wide() {
+        let none = GivenIntrinsics::default();
+        let mut panorama = posed(Some([64, 32]), Some(Optics::Equirectangular));
+        assert!(panorama.camera(&none).unwrap().is_panorama());
+        panorama.size = Some([64, 64]);
+        let size = IntrinsicsError::PanoramaSize { width: 64, height: 64 };
+        assert_eq!(panorama.camera(&none), Err(size));
+        panorama.size = Some([64, 32]);
+        panorama.pose = panorama.pose.turned(0.0, 0.1);
+        assert!(panorama.camera(&none).unwrap_err().to_string().contains("tilted by 5.7°"));
+    }
+}

@@ -1,0 +1,144 @@
+//! Cameras with poses, from any list of them that is read.
+
+use crate::camera::locations::{has_transforms, is_colmap_images, moved};
+use crate::camera::posed::PosedCamera;
+use crate::camera::{colmap, located, nerfstudio, scannet, table, tum};
+use crate::error::{Error, Result};
+use crate::fs::encoding::text_of;
+use crate::fs::open::read_file;
+use s3d_geom::glam::DAffine3;
+use std::path::Path;
+
+/// What is read, for messages.
+const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), a folder of ScanNet's poses \
+                     (pose/0.txt), a trajectory of lines `timestamp tx ty tz qx qy qz qw`, or a CSV table";
+
+/// The cameras of a list.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PosedCameras {
+    /// In the list's order; at least one.
+    pub cameras: Vec<PosedCamera>,
+    /// How many entries were left out since the list itself says that their pose is not known.
+    pub untracked: usize,
+}
+
+/// Reads the cameras of `path`, a file or a folder. What it is shows in its name and its first line:
+///
+/// - `transforms.json`, any other `.json`, or a folder that holds one: the frames of nerfstudio and its kin,
+///   brought back to the world before their `applied_transform`;
+/// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a
+///   COLMAP model, with its `cameras` beside them;
+/// - a folder with ScanNet's `pose/0.txt`, or that folder itself; `intrinsic/intrinsic_color.txt` and the
+///   first picture in `color` tell what the camera is;
+/// - any other file whose first line has a comma: a table like that of scan locations (see
+///   [`read_cameras`](crate::camera::read_cameras)), in which `width,height` and `fov` or `fx,fy,cx,cy` may
+///   stand;
+/// - any other file: a trajectory of TUM's benchmark.
+///
+/// `world_from_file` takes the file's frame to the world (metres, Z-up): turns, shifts and scales. Whether each
+/// camera's size and optics are known is for [`PosedCamera::camera`] to say.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these
+/// in it.
+pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<PosedCameras> {
+    let (file, mut cameras, untracked) = read(path)?;
+    cameras.iter_mut().for_each(|camera| camera.pose = moved(&camera.pose, world_from_file));
+    cameras.iter().try_for_each(|camera| located::check_place(&file, camera))?;
+    if cameras.is_empty() {
+        let but =
+            if untracked > 0 { format!(" but {untracked} poses that are not known") } else { String::new() };
+        return Err(Error::format(&file, format!("lists no camera{but}: {FORMS}")));
+    }
+    Ok(PosedCameras { cameras, untracked })
+}
+
+/// The file that was read, its cameras in its own frame, and how many are not known.
+fn read(path: &Path) -> Result<(std::path::PathBuf, Vec<PosedCamera>, usize)> {
+    if path.is_dir() {
+        if let Some(images) = colmap::find(path) {
+            let cameras = colmap::read_posed(&images)?;
+            return Ok((images, cameras, 0));
+        }
+        if let Some(transforms) = has_transforms(path) {
+            let cameras = nerfstudio::read_posed(&transforms)?;
+            return Ok((transforms, cameras, 0));
+        }
+        if let Some((scan, files)) = scannet::find(path)? {
+            let (cameras, untracked) = scannet::read(&scan, files)?;
+            return Ok((path.to_owned(), cameras, untracked));
+        }
+        return Err(Error::unsupported(path, format!("holds no list of cameras: {FORMS}")));
+    }
+    let cameras = if is_colmap_images(path) {
+        colmap::read_posed(path)?
+    } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+        nerfstudio::read_posed(path)?
+    } else {
+        let bytes = read_file(path)?;
+        let text = text_of(&bytes, path)?;
+        let mut lines = text.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
+        let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#")).unwrap_or_default();
+        if first.contains(&b',') { table::read_rows(path, &bytes)? } else { tum::read(path, &text)? }
+    };
+    Ok((path.to_owned(), cameras, 0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::{DMat3, DVec3, dvec3};
+    use std::fs;
+
+    #[test]
+    fn the_form_is_found_by_its_shape() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |p: &str| dir.path().join(p);
+        for folder in ["colmap/sparse/0", "scan/pose", "ns", "empty"] {
+            fs::create_dir_all(at(folder)).unwrap();
+        }
+        // Each looks along +Y from (1, 2, 3).
+        fs::write(at("colmap/sparse/0/images.txt"), "1 0.5 0.5 0 0 -1 3 -2 1 a.jpg\n").unwrap();
+        fs::write(
+            at("colmap/sparse/0/images.txt"),
+            format!("1 {0} {0} 0 0 -1 3 -2 1 a.jpg\n", 0.5f64.sqrt()),
+        )
+        .unwrap();
+        fs::write(at("colmap/sparse/0/cameras.txt"), "1 PINHOLE 64 48 50 51 32 24\n").unwrap();
+        fs::write(at("scan/pose/0.txt"), "1 0 0 1\n0 0 1 2\n0 -1 0 3\n0 0 0 1\n").unwrap();
+        fs::write(at("scan/pose/1.txt"), "-inf -inf -inf -inf\n".repeat(4)).unwrap();
+        let frame = r#"{"file_path": "a.jpg", "transform_matrix": [[1,0,0,1],[0,0,-1,2],[0,1,0,3]]}"#;
+        fs::write(at("ns/transforms.json"), format!("{{\"frames\": [{frame}]}}")).unwrap();
+        let half = 0.5f64.sqrt();
+        fs::write(at("trajectory.txt"), format!("# time\n0.5 1 2 3 {} 0 0 {half}\n", -half)).unwrap();
+        fs::write(at("table.txt"), "\n# a table\nname,x,y,z,yaw\nfirst,1,2,3,0\n").unwrap();
+        fs::write(at("plain.csv"), "first,1,2,3,0,0,0,1\n").unwrap();
+        let read = |p: &str| read_posed_cameras(&at(p), &DAffine3::IDENTITY).unwrap();
+        for (path, name) in [
+            ("colmap", "a.jpg"),
+            ("colmap/sparse/0/images.txt", "a.jpg"),
+            ("scan", "0"),
+            ("ns", "a.jpg"),
+            ("ns/transforms.json", "a.jpg"),
+            ("trajectory.txt", "0.5"),
+            ("table.txt", "first"),
+            ("plain.csv", "first"),
+        ] {
+            let found = read(path);
+            assert_eq!((found.cameras.len(), found.untracked), (1, usize::from(path == "scan")), "{path}");
+            let camera = &found.cameras[0];
+            assert_eq!(camera.name, name, "{path}");
+            assert!(camera.pose.location.abs_diff_eq(dvec3(1.0, 2.0, 3.0), 1e-12), "{path}: {camera:?}");
+            assert!(camera.pose.forward().abs_diff_eq(DVec3::Y, 1e-12), "{path}: {camera:?}");
+            assert!(camera.pose.up().abs_diff_eq(DVec3::Z, 1e-12), "{path}: {camera:?}");
+        }
+        let message = |p: &str| read_posed_cameras(&at(p), &DAffine3::IDENTITY).unwrap_err().to_string();
+        assert!(message("empty").contains("holds no list of cameras: cameras are a transforms.json"));
+        fs::write(at("scan/pose/0.txt"), "-inf -inf -inf -inf\n".repeat(4)).unwrap();
+        assert!(message("scan").contains("lists no camera but 2 poses that are not known"));
+        fs::write(at("far.csv"), "name,x,y,z,yaw\nfirst,1e6,2,3,0\n").unwrap();
+        let scaled = DAffine3::from_mat3(DMat3::from_diagonal(DVec3::splat(100.0)));
+        let far = read_posed_cameras(&at("far.csv"), &scaled).unwrap_err().to_string();
+        assert!(far.contains("line 2: `first`: [100000000, 200, 300] is more than"), "{far}");
+    }
+}
