@@ -62,9 +62,9 @@ pub(crate) enum Command {
     /// Sample a mesh densely and uniformly into a coloured point cloud.
     #[command(after_help = "Example:\n  s3d sample scan/rgb.obj -o cloud.ply --points-per-m2 10000")]
     Sample(sample::SampleArgs),
-    /// Render one view of a mesh, in every modality that needs no annotation.
+    /// Render one view of a mesh, or those of a list of cameras, in every modality that needs no annotation.
     #[command(
-        after_help = "Examples:\n  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --yaw 30 --pitch -10 --fov 75 -o view\n  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --pano -o pano"
+        after_help = "Examples:\n  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --yaw 30 --pitch -10 --fov 75 -o view\n  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --pano -o pano\n  s3d render scan/rgb.obj --poses transforms.json -o views\n  s3d render scan/rgb.obj --poses trajectory.txt --width 640 --height 480 --fov 60 -o views"
     )]
     Render(render::RenderArgs),
     /// Tell what a scene holds, and what looks wrong in it.
@@ -104,7 +104,8 @@ impl Command {
         match self {
             Self::Demo(_) | Self::Export(_) | Self::Sample(_) => true,
             Self::Plan(_) | Self::Merge(_) | Self::Pack(_) | Self::Xyz(_) | Self::Profile(_) => true,
-            Self::Render(_) | Self::Info(_) | Self::Stats(_) | Self::Verify(_) => false,
+            Self::Render(args) => args.poses.is_some(),
+            Self::Info(_) | Self::Stats(_) | Self::Verify(_) => false,
         }
     }
 
@@ -191,10 +192,18 @@ mod tests {
             &["s3d", "export", "a.toml", "--points-per-m2", "nan"],
             &["s3d", "render", "a.obj", "--at", "1,2", "-o", "x"],
             &["s3d", "render", "a.obj", "--at", "1,2,3", "--fov", "180", "-o", "x"],
+            &["s3d", "render", "a.obj", "-o", "x"],
+            &["s3d", "render", "a.obj", "--at", "1,2,3", "--poses", "p", "-o", "x"],
+            &["s3d", "render", "a.obj", "--poses", "p", "--pano", "-o", "x"],
+            &["s3d", "render", "a.obj", "--poses", "p", "--k", "9,9,4", "-o", "x"],
+            &["s3d", "render", "a.obj", "--poses", "p", "--k", "9,0,4,4", "-o", "x"],
+            &["s3d", "render", "a.obj", "--at", "1,2,3", "--width", "64", "-o", "x"],
             &["s3d", "render", "a.obj", "--at", "1,2,3", "--fov", "60", "--pano", "-o", "x"],
         ] {
             assert!(Cli::try_parse_from(bad).is_err(), "{bad:?}");
         }
         assert!(Cli::try_parse_from(["s3d", "render", "a.obj", "--at", "-1,2,3", "-o", "x"]).is_ok());
+        let poses = ["s3d", "render", "a.obj", "--poses", "p", "--k", "9,9,-4,4", "--width", "8", "-o", "x"];
+        assert!(Cli::try_parse_from(poses).is_ok());
     }
 }

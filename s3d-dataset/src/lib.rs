@@ -7,7 +7,7 @@
 //! - [`verify`] reads a data set back, every pixel of it, and returns a [`VerifyReport`]; [`statistics`]
 //!   counts it; [`info`] tells what a scene holds before it is exported.
 //! - [`pack`] makes packages for trainers of it, [`profile`] what loaders of point clouds want; [`xyz`] makes
-//!   its world coordinates again. [`render`] and [`sample`] need a mesh alone.
+//!   its world coordinates again. [`render`], [`render_poses`] and [`sample`] need a mesh alone.
 //!
 //! Every call is handed a [`Context`]: a [`Cancel`] that ends it early, from any thread, and an [`Observer`]
 //! that is told [what happens](Event). Nothing here prints, reads the command line, handles signals or exits;
@@ -69,7 +69,7 @@ pub use pack::{
 };
 pub use profile::loader::Profile;
 pub use profile::{ProfileOptions, profile};
-pub use render::{RenderOptions, render};
+pub use render::{PosesOptions, RenderOptions, RenderedPoses, render, render_poses};
 pub use sample::{SampleOptions, sample};
 pub use shard::assignment::Shard;
 pub use shard::make_plan::plan;

@@ -1,14 +1,16 @@
-//! `s3d render`: one view of a mesh, without any annotation.
+//! `s3d render`: views of a mesh, without any annotation.
 
 use super::on_threads;
 use crate::args::{MeshArgs, Threads};
 use crate::failure::Outcome;
-use crate::values::{field_of_view, finite, parsed, point};
+use crate::values::{field_of_view, finite, intrinsics, parsed, point};
 use clap::{Args, value_parser};
-use glam::DVec3;
-use s3d_dataset::{Error, RenderOptions};
+use glam::{DVec3, dvec2};
+use s3d_dataset::{Condition, Error, PosesOptions, RenderOptions};
 use s3d_geom::{Camera, Pose};
+use s3d_io::camera::{Distortion, GivenIntrinsics, Optics};
 use s3d_io::image::Compression;
+use s3d_io::mesh::UpAxis;
 use s3d_render::Normals;
 use std::path::PathBuf;
 
@@ -17,17 +19,38 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) mesh: MeshArgs,
     /// Where the camera stands: metres, Z-up.
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
-    pub(crate) at: DVec3,
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true,
+        required_unless_present = "poses")]
+    pub(crate) at: Option<DVec3>,
+    /// Render all cameras of a list instead: transforms.json, a COLMAP model, ScanNet's pose folder, a trajectory of
+    /// TUM's, or a CSV table (name,x,y,z and a quaternion, look_x,look_y,look_z or yaw,pitch).
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["at", "yaw", "pitch", "pano", "size"])]
+    pub(crate) poses: Option<PathBuf>,
+    /// Which axis of the list's frame points up.
+    #[arg(long, default_value = "z", value_parser = parsed::<UpAxis>, value_name = "y|z", requires = "poses")]
+    pub(crate) poses_up: UpAxis,
+    /// Width of the images of --poses; what the list says is scaled to it [default: the list's]
+    #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(1..=32_768), requires = "poses")]
+    pub(crate) width: Option<u32>,
+    /// Their height.
+    #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(1..=32_768), requires = "poses")]
+    pub(crate) height: Option<u32>,
+    /// Their focal lengths and principal point in pixels [default: the list's]
+    #[arg(long, value_name = "FX,FY,CX,CY", value_parser = intrinsics, allow_hyphen_values = true,
+        requires = "poses", conflicts_with = "fov")]
+    pub(crate) k: Option<[f64; 4]>,
+    /// Write views of which none sees the mesh.
+    #[arg(long, value_name = "coverage", value_parser = parsed::<Condition>, requires = "poses")]
+    pub(crate) allow: Vec<Condition>,
     /// Heading in degrees: 0 along +Y, growing to the left.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
     pub(crate) yaw: f64,
     /// Degrees above the horizon.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
     pub(crate) pitch: f64,
-    /// Angle of view in degrees.
-    #[arg(long, value_name = "DEG", default_value_t = 75.0, value_parser = field_of_view, conflicts_with = "pano")]
-    pub(crate) fov: f64,
+    /// Horizontal angle of view in degrees [default: 75, or the list's]
+    #[arg(long, value_name = "DEG", value_parser = field_of_view, conflicts_with = "pano")]
+    pub(crate) fov: Option<f64>,
     /// A panorama instead of a perspective view.
     #[arg(long)]
     pub(crate) pano: bool,
@@ -52,7 +75,14 @@ pub(crate) struct RenderArgs {
 }
 
 pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
-    let pose = Pose::level(args.at, args.yaw.to_radians()).turned(0.0, args.pitch.to_radians());
+    let options = RenderOptions {
+        up: args.mesh.up,
+        normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
+        compression: args.compression,
+        overwrite: args.overwrite,
+    };
+    let Some(at) = args.at else { return run_poses(args, options) };
+    let pose = Pose::level(at, args.yaw.to_radians()).turned(0.0, args.pitch.to_radians());
     let camera = if args.pano {
         let width = args.size.unwrap_or(4096);
         if width % 2 == 1 {
@@ -62,15 +92,29 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
         Camera::equirectangular(pose, width)
     } else {
         let size = args.size.unwrap_or(1080);
-        Camera::perspective(pose, args.fov.to_radians(), size, size)
-    };
-    let options = RenderOptions {
-        up: args.mesh.up,
-        normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
-        compression: args.compression,
-        overwrite: args.overwrite,
+        Camera::perspective(pose, args.fov.unwrap_or(75.0).to_radians(), size, size)
     };
     on_threads(args.threads, |context| {
         s3d_dataset::render(&args.mesh.mesh, &camera, &args.output, &options, context)
+    })
+}
+
+fn run_poses(args: RenderArgs, render: RenderOptions) -> Outcome<()> {
+    let of_k = |[fx, fy, cx, cy]: [f64; 4]| Optics::Pinhole {
+        focal_px: dvec2(fx, fy),
+        center_px: Some(dvec2(cx, cy)),
+        distortion: Distortion::None,
+    };
+    let of_fov = |deg: f64| Optics::AngleOfView { fov_rad: deg.to_radians() };
+    let optics = args.k.map(of_k).or(args.fov.map(of_fov));
+    let options = PosesOptions {
+        render,
+        poses_up: args.poses_up,
+        intrinsics: GivenIntrinsics { width: args.width, height: args.height, optics },
+        allow: args.allow,
+    };
+    let poses = args.poses.unwrap_or_default();
+    on_threads(args.threads, |context| {
+        s3d_dataset::render_poses(&args.mesh.mesh, &poses, &args.output, &options, context).map(drop)
     })
 }

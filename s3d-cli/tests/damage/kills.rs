@@ -16,7 +16,7 @@ use tempfile::TempDir;
 
 /// The commands, as they are called in a folder with `scan` (the input), `out` (an export) and `shard_1`,
 /// `shard_2` (its shards). Whoever adds a command that writes adds a line.
-const COMMANDS: [&str; 20] = [
+const COMMANDS: [&str; 22] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -36,6 +36,8 @@ const COMMANDS: [&str; 20] = [
     "sample scan/room.obj -o old.ply --points 200000 --overwrite",
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o new",
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o old --pano --overwrite",
+    "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o new/views",
+    "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o views --overwrite",
     "profile out --to mmdet3d",
 ];
 
@@ -72,6 +74,10 @@ impl Template {
         let view = ["--at", "2,1.2,1.5", "--size", "100", "-o", text(&at("old"))].map(str::to_owned);
         let view: Vec<&str> = view.iter().map(String::as_str).collect();
         s3d_ok(&[&["render", text(&at("scan/room.obj"))], &view[..]].concat());
+        let poses = [text(&at("scan/cameras.csv")), "-o", text(&at("views"))].map(str::to_owned);
+        let [list, o, views] = &poses;
+        let size = ["--width", "50", "--height", "60", "--fov", "60"];
+        s3d_ok(&[&["render", text(&at("scan/room.obj")), "--poses", list, o, views], &size[..]].concat());
         let files = files(&at(""));
         Self { dir, files }
     }

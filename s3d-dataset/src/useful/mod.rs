@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::export::labels::annotate::{Annotated, SurveyedRoom};
 use crate::export::location::{LOW_COVERAGE, Outlook};
 use crate::tables::manifest::half_step;
-use s3d_geom::TriMesh;
+use s3d_geom::{Aabb, TriMesh};
 use s3d_label::{Class, LabelId, LabelTable, VoteReport};
 use std::fmt;
 use std::str::FromStr;
@@ -118,6 +118,16 @@ impl Finding {
 /// # Errors
 /// [`Error::Input`] with all that stops it.
 pub(crate) fn judge(ctx: &Context, findings: &[Finding], allowed: &[Condition]) -> Result<()> {
+    judge_of(("the data set", "export it"), ctx, findings, allowed)
+}
+
+/// As [`judge`], of something else than a data set: what it is, and what is done with it.
+pub(crate) fn judge_of(
+    (what, done): (&str, &str),
+    ctx: &Context,
+    findings: &[Finding],
+    allowed: &[Condition],
+) -> Result<()> {
     let stops = |f: &&Finding| f.stops && !allowed.contains(&f.condition);
     let stopping: Vec<&Finding> = findings.iter().filter(stops).collect();
     findings.iter().filter(|f| !stops(f)).for_each(|f| ctx.warn(&f.text));
@@ -130,7 +140,7 @@ pub(crate) fn judge(ctx: &Context, findings: &[Finding], allowed: &[Condition]) 
     let texts: Vec<&str> = stopping.iter().map(|f| f.text.as_str()).collect();
     let options: Vec<String> = conditions.iter().map(|c| format!("--allow {c}")).collect();
     Err(Error::Input(format!(
-        "the data set would be of no use: {} (to export it all the same: {})",
+        "{what} would be of no use: {} (to {done} all the same: {})",
         texts.join("; "),
         options.join(" ")
     )))
@@ -284,6 +294,26 @@ pub(crate) fn count_findings(count: f64, rooms: &[SurveyedRoom]) -> Vec<Finding>
         "{count:.0} scan locations on {floor_m2:.0} m² of floor are many: the published data set has one on 4 m²"
     );
     vec![Finding::new(Condition::Locations, count > 1000.0 && per_m2 > 4.0, text)]
+}
+
+/// What looks wrong about the views of a list of cameras, of which `blind` see nothing of the mesh.
+pub(crate) fn poses_findings(blind: u64, views: u64, cameras: &Aabb, mesh: &Aabb) -> Vec<Finding> {
+    let boxes = || {
+        let [a, b, c, d] = [cameras.min, cameras.max, mesh.min, mesh.max];
+        format!("cameras stand between {a} and {b}, the mesh lies between {c} and {d} (Z-up metres)")
+    };
+    if blind == 0 {
+        return Vec::new();
+    }
+    let text = if blind == views {
+        format!(
+            "no camera sees anything: {}. Do they share a frame and a unit? See --up and --poses-up",
+            boxes()
+        )
+    } else {
+        format!("{blind} of {views} cameras see nothing of the mesh; {}", boxes())
+    };
+    vec![Finding::new(Condition::Coverage, blind == views, text)]
 }
 
 /// What looks wrong about what all scan locations see together.

@@ -4,7 +4,7 @@ use crate::fs::quote::count;
 use crate::image::texture::TextureFile;
 use crate::mesh::labels::MeshLabels;
 use crate::mesh::origin::MeshOrigin;
-use s3d_geom::glam::{DVec3, Vec3, vec3};
+use s3d_geom::glam::{DMat3, DVec3, Vec3, vec3};
 use s3d_geom::{MeshError, MeshParts, TriMesh};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -34,6 +34,12 @@ impl UpAxis {
             Self::Y => vec3(v.x, -v.z, v.y),
             Self::Z => v,
         }
+    }
+
+    /// The same as a matrix.
+    pub fn rotation(self) -> DMat3 {
+        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| self.world_from_file(axis).as_dvec3());
+        DMat3::from_cols(x, y, z)
     }
 }
 

@@ -46,6 +46,17 @@ pub struct NerfstudioFrame {
 }
 
 impl NerfstudioFrame {
+    /// An image of a camera.
+    pub fn new(file_path: String, camera: &Camera) -> Self {
+        let (w, h) = (camera.width, camera.height);
+        if camera.is_panorama() {
+            return Self::panorama(file_path, &camera.pose, (w, h));
+        }
+        let [[fl_x, _, cx], [_, fl_y, cy], _] = camera.k_matrix();
+        let transform_matrix = matrix(&camera.pose);
+        Self { file_path, depth_file_path: None, fl_x, fl_y, cx, cy, w, h, transform_matrix }
+    }
+
     /// A view, from its pose file.
     pub fn perspective(file_path: String, pose: &PoseFile, (w, h): (u32, u32)) -> Self {
         let [[fl_x, _, cx], [_, fl_y, cy], _] = pose.camera_k_matrix;
@@ -60,10 +71,13 @@ impl NerfstudioFrame {
     /// If the image is not twice as wide as high.
     pub fn equirectangular(file_path: String, pose: &PoseFile, (w, h): (u32, u32)) -> Self {
         assert!(h > 0 && w == 2 * h, "a panorama of {w} × {h}");
-        let camera = Camera::equirectangular(pose.pose(), w);
+        Self::panorama(file_path, &pose.pose(), (w, h))
+    }
+
+    fn panorama(file_path: String, pose: &Pose, (w, h): (u32, u32)) -> Self {
         // A level pose with yaw 0 looks along +Y, which is 90° from +X.
-        let yaw_rad = camera.pose.azimuth_rad() - std::f64::consts::FRAC_PI_2;
-        let level = Pose::level(camera.pose.location, yaw_rad);
+        let yaw_rad = pose.azimuth_rad() - std::f64::consts::FRAC_PI_2;
+        let level = Pose::level(pose.location, yaw_rad);
         Self {
             file_path,
             depth_file_path: None,
@@ -160,10 +174,15 @@ mod tests {
             let camera = Camera::perspective(original().turned(yaw, pitch), 1.1, 64, 32);
             let frame = NerfstudioFrame::perspective("a".into(), &pose_file(&camera, Frame::View(0)), (64, 32));
             prop_assert!(ray(&frame, false, x, y).abs_diff_eq(camera.direction(x, y), 1e-9));
+            let (focal, center) = (glam::dvec2(40.0, 50.0 + y), glam::dvec2(x, -3.0));
+            let pinhole = Camera::pinhole(original().turned(yaw, pitch), focal, center, 64, 32).unwrap();
+            let frame = NerfstudioFrame::new("a".into(), &pinhole);
+            prop_assert!(ray(&frame, false, x, y).abs_diff_eq(pinhole.direction(x, y), 1e-9));
 
             let camera = Camera::equirectangular(original(), 64);
             let frame = NerfstudioFrame::equirectangular("a".into(), &pose_file(&camera, Frame::Panorama), (64, 32));
             prop_assert!(ray(&frame, true, x, y).abs_diff_eq(camera.direction(x, y), 1e-9));
+            prop_assert_eq!(&NerfstudioFrame::new("a".into(), &camera).transform_matrix, &frame.transform_matrix);
             let up = frame.transform_matrix[2];
             prop_assert!(up[0].abs() < 1e-12 && (up[1] - 1.0).abs() < 1e-12 && up[2].abs() < 1e-12);
         }

@@ -46,12 +46,8 @@ impl CamerasTable {
             (None, Some(distance_m)) => Err(format!("place = {distance_m} is no distance in metres")),
             (Some(path), None) => {
                 let up = self.up.unwrap_or(UpAxis::Z);
-                let turn = DMat3::from_cols_array_2d(
-                    &[DVec3::X, DVec3::Y, DVec3::Z]
-                        .map(|axis| up.world_from_file(axis.as_vec3()).as_dvec3().to_array()),
-                );
                 let given = self.transform.map_or(Ok(DAffine3::IDENTITY), similarity)?;
-                Ok(CameraSource::Listed { path, world_from_file: given * DAffine3::from_mat3(turn) })
+                Ok(CameraSource::Listed { path, world_from_file: given * DAffine3::from_mat3(up.rotation()) })
             }
         }
     }

@@ -9,11 +9,12 @@
 
 use crate::error::Result;
 use crate::fs::atomic::{create_dir, write_bytes, write_whole};
+use crate::fs::names::UniqueNames;
 use crate::image::compression::Compression;
 use crate::image::png::{Content, encode_rgb8};
 use crate::image::pretty::pretty_color;
 use crate::mesh::obj::mtl::{WRAP_COMMENT, wrap_name};
-use crate::mesh::obj::names::{UniqueNames, clean_file_name, clean_material_name};
+use crate::mesh::obj::names::{clean_file_name, clean_material_name};
 use s3d_geom::glam::{Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, NO_INDEX, TriMesh, Wrap};
 use std::borrow::Cow;

@@ -1,4 +1,4 @@
-//! One view of a mesh, without any annotation.
+//! One view of a mesh.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -56,6 +56,35 @@ impl Default for RenderOptions {
     }
 }
 
+/// The images of a view that need no annotation, but that of faces.
+pub(super) const IMAGES: [Image; 4] = [Image::Rgb, Image::Depth, Image::Normal, Image::GlobalXyz];
+
+/// What they are made from.
+pub(super) fn channels<'a>(
+    scene: &'a Scene<'a>,
+    textures: &'a MipMaps,
+    options: &RenderOptions,
+) -> Channels<'a> {
+    Channels {
+        scene,
+        textures,
+        pictures: None,
+        normals: options.normals,
+        label_of_face: &[],
+        pretty_of_face: &[],
+        compression: options.compression,
+        conventions: Conventions::default(),
+    }
+}
+
+/// Whether every face has a colour of its own in an image of faces; warns if not.
+pub(super) fn faces_fit(ctx: &Context, faces: usize) -> bool {
+    if faces >= FACES_IN_COLORS {
+        ctx.warn(format_args!("no images of faces: {faces} faces are more than 24 bits can tell apart"));
+    }
+    faces < FACES_IN_COLORS
+}
+
 /// Renders what a camera sees of a mesh's file, in every modality that needs no annotation: `rgb.png`,
 /// `depth.png`, `normals.png`, `global_xyz.exr`, `faces.png` (indices of faces as R·65536 + G·256 + B; 255,
 /// 255, 255 where nothing is seen) and `camera.json` in the folder `output`.
@@ -70,13 +99,13 @@ pub fn render(
     options: &RenderOptions,
     ctx: &Context,
 ) -> Result<()> {
-    let images = [
-        (Image::Rgb, "rgb.png"),
-        (Image::Depth, "depth.png"),
-        (Image::Normal, "normals.png"),
-        (Image::GlobalXyz, "global_xyz.exr"),
-    ];
-    let names = images.iter().map(|(_, name)| *name).chain(["faces.png", "camera.json"]);
+    let name_of = |image: Image| match image {
+        Image::Rgb => "rgb.png",
+        Image::Depth => "depth.png",
+        Image::Normal => "normals.png",
+        _ => "global_xyz.exr",
+    };
+    let names = IMAGES.into_iter().map(name_of).chain(["faces.png", "camera.json"]);
     let refuse =
         |overwrite| names.clone().try_for_each(|name| refuse_existing(&output.join(name), overwrite));
     // For what is made of several files, all of them or none.
@@ -111,32 +140,16 @@ pub fn render(
             camera.pose.location, b.min, b.max
         ));
     }
-    let channels = Channels {
-        scene: &scene,
-        textures: &textures,
-        pictures: None,
-        normals: options.normals,
-        label_of_face: &[],
-        pretty_of_face: &[],
-        compression: options.compression,
-        conventions: Conventions::default(),
-    };
+    let channels = channels(&scene, &textures, options);
     create_dir(output)?;
     let staging = Staging::begin(ctx, output, whole)?;
     refuse(options.overwrite || staging.was_placing())?;
     let folder = staging.path();
-    let kinds = images.map(|(image, _)| image);
-    channels.encode(&kinds, &hits, camera, &mut ImageBuffers::default(), |image, file| {
-        let name = images.iter().find(|(other, _)| *other == image).map_or("image", |(_, name)| name);
-        write_bytes(&folder.join(name), &file).map(drop)
+    channels.encode(&IMAGES, &hits, camera, &mut ImageBuffers::default(), |image, file| {
+        write_bytes(&folder.join(name_of(image)), &file).map(drop)
     })?;
-    if file.mesh.faces().len() < FACES_IN_COLORS {
+    if faces_fit(ctx, file.mesh.faces().len()) {
         write_bytes(&folder.join("faces.png"), &face_image(&hits, options.compression))?;
-    } else {
-        ctx.warn(format_args!(
-            "no faces.png: {} faces are more than 24 bits can tell apart",
-            file.mesh.faces().len()
-        ));
     }
     let is_panorama = camera.is_panorama();
     let view = View {
@@ -163,7 +176,7 @@ pub fn render(
 }
 
 /// Face indices as colours, R·65536 + G·256 + B; (255, 255, 255) where nothing is seen.
-fn face_image(hits: &Hits, compression: Compression) -> Vec<u8> {
+pub(super) fn face_image(hits: &Hits, compression: Compression) -> Vec<u8> {
     let image = hits.face.map(|face| {
         let [_, r, g, b] = if face == NO_FACE { [255; 4] } else { face.to_be_bytes() };
         [r, g, b]

@@ -1,0 +1,53 @@
+//! Names for the files of a list of cameras.
+
+use s3d_io::camera::PosedCamera;
+use s3d_io::fs::{UniqueNames, portable_file_name};
+
+/// Endings of pictures, which the files made of them do not keep. A time stamp keeps its decimals.
+const ENDINGS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "bmp", "tif", "tiff", "exr", "heic"];
+
+/// A file name without ending for each camera, none twice: its name in the list without folders, or with them if
+/// that would not tell cameras apart.
+pub(super) fn frame_names(cameras: &[PosedCamera]) -> Vec<String> {
+    let stem = |name: &str| {
+        let cut = name
+            .rsplit_once('.')
+            .filter(|(_, e)| ENDINGS.iter().any(|ending| e.eq_ignore_ascii_case(ending)));
+        let name = portable_file_name(cut.map_or(name, |(stem, _)| stem));
+        if name.is_empty() { "view".to_owned() } else { name }
+    };
+    let last = |name: &str| stem(name.rsplit(['/', '\\']).next().unwrap_or(name));
+    let mut seen = UniqueNames::default();
+    let short: Vec<String> = cameras.iter().map(|camera| last(&camera.name)).collect();
+    if short.iter().all(|name| seen.add(name) == *name) {
+        return short;
+    }
+    let mut names = UniqueNames::default();
+    cameras.iter().map(|camera| names.add(&stem(camera.name.trim_start_matches("./")))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use s3d_geom::Pose;
+
+    fn names(list: &[&str]) -> Vec<String> {
+        let pose = Pose::level(DVec3::ZERO, 0.0);
+        let camera = |name: &&str| {
+            let name = (*name).to_owned();
+            PosedCamera { name, pose, size: None, optics: None, picture: None, line: 0 }
+        };
+        frame_names(&list.iter().map(camera).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn names_are_short_and_never_twice() {
+        assert_eq!(names(&["./images/a.png", "images/b.JPG"]), ["a", "b"]);
+        assert_eq!(names(&["left/a.png", "right/A.png"]), ["left_a", "right_A"]);
+        assert_eq!(names(&["1305031098.6659", "1305031098.6758"]), ["1305031098.6659", "1305031098.6758"]);
+        assert_eq!(names(&["a", "a", "a.png"]), ["a", "a_2", "a_3"]);
+        assert_eq!(names(&["../../etc/passwd", "..", "con"]), ["passwd", "view", "_con"]);
+        assert_eq!(names(&["C:\\x\\a.png", "Büro 1"]), ["a", "B_ro_1"]);
+    }
+}

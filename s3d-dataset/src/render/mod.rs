@@ -1,0 +1,8 @@
+//! Views of a mesh, without any annotation: one, or those of a list of cameras.
+
+mod frame_names;
+mod poses;
+mod view;
+
+pub use poses::{PosesOptions, RenderedPoses, render_poses};
+pub use view::{RenderOptions, render};

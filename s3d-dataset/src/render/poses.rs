@@ -1,0 +1,278 @@
+//! The views of a list of cameras: the mesh is loaded once, cameras are shared among all threads.
+
+use super::frame_names::frame_names;
+use super::view::{IMAGES, RenderOptions, channels, face_image, faces_fit};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::modality::{Image, ImageBuffers};
+use crate::export::work::for_each_in_order;
+use crate::store::parent_of;
+use crate::store::staging::Staging;
+use crate::useful::{Condition, judge_of, poses_findings};
+use glam::{DAffine3, DVec3};
+use s3d_geom::{Aabb, Camera};
+use s3d_io::Error as FileError;
+use s3d_io::camera::{GivenIntrinsics, IntrinsicsError, PosedCamera, PosedCameras, read_posed_cameras};
+use s3d_io::fs::{create_dir, read_json, write_bytes, write_json};
+use s3d_io::mesh::{MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::package::NerfstudioFrame;
+use s3d_render::{Caster, Hits, MipMaps, NO_FACE, Scene};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// The file that says what the images are.
+const CAMERAS: &str = "transforms.json";
+
+const GENERATOR: &str = "s3d render";
+
+/// The most pixels of a side of an image.
+const MAX_SIDE: u32 = 32_768;
+
+/// How the views of a list of cameras are rendered.
+#[derive(Clone, Debug)]
+pub struct PosesOptions {
+    /// As for one view.
+    pub render: RenderOptions,
+    /// Which axis of the list's frame points up.
+    pub poses_up: UpAxis,
+    /// Size, focal lengths or angle of view, instead of what the list says or where it says nothing.
+    pub intrinsics: GivenIntrinsics,
+    /// Conditions that need not be met: [`Condition::Coverage`] alone is looked at.
+    pub allow: Vec<Condition>,
+}
+
+impl Default for PosesOptions {
+    fn default() -> Self {
+        let intrinsics = GivenIntrinsics::default();
+        Self { render: RenderOptions::default(), poses_up: UpAxis::Z, intrinsics, allow: Vec::new() }
+    }
+}
+
+/// What [`render_poses`] made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct RenderedPoses {
+    /// Cameras, each with an image of every kind.
+    pub views: u64,
+    /// Those that see nothing of the mesh.
+    pub blind: u64,
+    /// Entries of the list that were left out since it says that their pose is not known.
+    pub untracked: u64,
+}
+
+/// `transforms.json`, as nerfstudio reads it. What it does not know it passes over.
+#[derive(Serialize)]
+struct Transforms<'a> {
+    generator: &'static str,
+    camera_model: &'static str,
+    /// What was subtracted from the coordinates of the mesh's file, and from the cameras'.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    world_offset_m: Option<[f64; 3]>,
+    frames: Vec<ListedFrame<'a>>,
+}
+
+#[derive(Serialize)]
+struct ListedFrame<'a> {
+    /// The camera's name in the list that was read.
+    name: &'a str,
+    #[serde(flatten)]
+    frame: NerfstudioFrame,
+}
+
+/// One view.
+struct Frame<'a> {
+    name: &'a str,
+    /// The name of its files, without ending.
+    stem: String,
+    camera: Camera,
+}
+
+/// Renders what the cameras of a list see of a mesh's file: `rgb/NAME.png`, `depth/NAME.png`, `normal/NAME.png`,
+/// `global_xyz/NAME.exr` and `faces/NAME.png` in the folder `output`, and `transforms.json` with every camera. See
+/// [`read_posed_cameras`] for the lists that are read. The folder appears whole or not at all: after a kill the
+/// same call begins anew.
+///
+/// # Errors
+/// [`Error::Usage`] if the folder is not empty and not to be replaced, or the list lacks sizes or focal lengths
+/// that the options do not give; [`Error::File`]; [`Error::Input`] if no camera sees anything;
+/// [`Error::Cancelled`].
+pub fn render_poses(
+    mesh: &Path,
+    poses: &Path,
+    output: &Path,
+    options: &PosesOptions,
+    ctx: &Context,
+) -> Result<RenderedPoses> {
+    let (parent, folder_name) = (parent_of(output), Path::new(output.file_name().unwrap_or_default()));
+    let overwrite = options.render.overwrite;
+    if !Staging::is_left(&parent, folder_name) {
+        check_free(output, overwrite)?;
+    }
+    let world_from_poses = DAffine3::from_mat3(options.poses_up.rotation());
+    let PosedCameras { cameras, untracked } = read_posed_cameras(poses, &world_from_poses)?;
+    let mut frames = frames(poses, &cameras, &options.intrinsics)?;
+    tell_of_list(ctx, &cameras, untracked);
+
+    let near = MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() };
+    let file = s3d_io::mesh::read_mesh_with(mesh, options.render.up, &near)?;
+    ctx.warn_each(&file.warnings);
+    // What is written is in the frame of the mesh as it was read.
+    frames.iter_mut().for_each(|frame| frame.camera.pose.location -= file.offset_m);
+    let world_offset_m = (file.offset_m != DVec3::ZERO).then(|| file.offset_m.to_array());
+    if let Some(offset_m) = world_offset_m {
+        ctx.info(format_args!(
+            "the mesh lies far from the origin: {offset_m:?} is subtracted from its coordinates and the cameras', \
+             which {CAMERAS} tells"
+        ));
+    }
+    create_dir(&parent)?;
+    let staging = Staging::begin(ctx, &parent, folder_name)?;
+    check_free(output, overwrite || staging.was_placing())?;
+    let started = Instant::now();
+    let blind = write_images(ctx, &file.mesh, &frames, staging.path(), &options.render)?;
+    let seconds = started.elapsed().as_secs_f64();
+
+    let places = frames.iter().map(|frame| frame.camera.pose.location.as_vec3());
+    let findings = poses_findings(blind, frames.len() as u64, &Aabb::from_points(places), &file.mesh.aabb());
+    judge_of(("the views", "write them"), ctx, &findings, &options.allow)?;
+    let is_panorama = frames.first().is_some_and(|frame| frame.camera.is_panorama());
+    let listed = |frame: &Frame<'_>| NerfstudioFrame::new(format!("rgb/{}.png", frame.stem), &frame.camera);
+    let transforms = Transforms {
+        generator: GENERATOR,
+        camera_model: if is_panorama { "EQUIRECTANGULAR" } else { "OPENCV" },
+        world_offset_m,
+        frames: frames.iter().map(|f| ListedFrame { name: f.name, frame: listed(f) }).collect(),
+    };
+    write_json(&staging.path().join(CAMERAS), &transforms)?;
+    staging.place_folder(output, is_ours(output))?;
+    ctx.info(format_args!("{}: {} views in {seconds:.1} s", output.display(), frames.len()));
+    Ok(RenderedPoses { views: frames.len() as u64, blind, untracked: untracked as u64 })
+}
+
+/// The views of a list's cameras.
+fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics) -> Result<Vec<Frame<'a>>> {
+    let mut frames = Vec::with_capacity(cameras.len());
+    for (posed, stem) in cameras.iter().zip(frame_names(cameras)) {
+        let at = |message: String| {
+            let message = format!("{:?}: {message}", posed.name);
+            match posed.line {
+                0 => FileError::format(poses, message),
+                line => FileError::line(poses, line, message),
+            }
+        };
+        let camera = posed.camera(given).map_err(|e| match e {
+            IntrinsicsError::NoSize => {
+                Error::Usage(format!("{}: give --width and --height", at(e.to_string())))
+            }
+            IntrinsicsError::NoOptics => {
+                Error::Usage(format!("{}: give --fov DEGREES, or --k FX,FY,CX,CY", at(e.to_string())))
+            }
+            _ => at(e.to_string()).into(),
+        })?;
+        let (w, h) = (camera.width, camera.height);
+        if w > MAX_SIDE || h > MAX_SIDE {
+            let message = format!("images of {w} × {h} pixels: give a --width of at most {MAX_SIDE}");
+            return Err(Error::Usage(at(message).to_string()));
+        }
+        frames.push(Frame { name: &posed.name, stem, camera });
+    }
+    let panoramas = frames.iter().filter(|frame| frame.camera.is_panorama()).count();
+    if panoramas > 0 && panoramas < frames.len() {
+        let message = format!(
+            "lists {panoramas} panoramas and {} other views: {CAMERAS} can hold one kind, so render them in two calls",
+            frames.len() - panoramas
+        );
+        return Err(FileError::format(poses, message).into());
+    }
+    Ok(frames)
+}
+
+/// What is left out of what the list says.
+fn tell_of_list(ctx: &Context, cameras: &[PosedCamera], untracked: usize) {
+    if untracked > 0 {
+        let all = cameras.len() + untracked;
+        ctx.warn(format_args!(
+            "{untracked} of {all} poses are not known (they hold an infinity) and left out"
+        ));
+    }
+    let distorted = cameras.iter().filter(|camera| camera.is_distorted()).count();
+    if distorted > 0 {
+        ctx.warn(format_args!(
+            "{distorted} of {} cameras have a lens that bends: images are those of a pinhole with their focal lengths and \
+             principal points, and fit undistorted pictures",
+            cameras.len()
+        ));
+    }
+}
+
+/// Writes the images of all views into folders by kind; returns how many views see nothing.
+fn write_images(
+    ctx: &Context,
+    mesh: &s3d_geom::TriMesh,
+    frames: &[Frame<'_>],
+    folder: &Path,
+    options: &RenderOptions,
+) -> Result<u64> {
+    let folder_of = |image: Image| folder.join(image.domain().folder());
+    let path_of =
+        |image: Image, stem: &str| folder_of(image).join(format!("{stem}.{}", image.domain().extension()));
+    let faces = faces_fit(ctx, mesh.faces().len()).then(|| folder.join("faces"));
+    let folders: Vec<PathBuf> = IMAGES.into_iter().map(folder_of).chain(faces.clone()).collect();
+    folders.iter().try_for_each(|folder| create_dir(folder))?;
+    let (scene, textures) = (Scene::new(mesh), MipMaps::new(mesh));
+    let channels = channels(&scene, &textures, options);
+    let progress = ctx.progress("rendering", "views", frames.len() as u64);
+    let blind = AtomicU64::new(0);
+    let memory = || (Caster::new(&scene), Hits::default(), ImageBuffers::default());
+    for_each_in_order(ctx, frames, memory, |(caster, hits, buffers), frame| {
+        let Frame { stem, camera, name } = frame;
+        caster.cast_into(camera, 1, hits);
+        channels.encode(&IMAGES, hits, camera, buffers, |image, file| {
+            write_bytes(&path_of(image, stem), &file).map(drop)
+        })?;
+        if let Some(faces) = &faces {
+            write_bytes(&faces.join(format!("{stem}.png")), &face_image(hits, options.compression))?;
+        }
+        if hits.face.pixels().iter().all(|face| *face == NO_FACE) {
+            blind.fetch_add(1, Ordering::Relaxed);
+            ctx.debug(format_args!("{name:?} sees nothing of the mesh"));
+        }
+        progress.add(1);
+        Ok(())
+    })?;
+    Ok(blind.into_inner())
+}
+
+/// Refuses a folder that holds something, unless it is one of ours that may be replaced.
+fn check_free(output: &Path, overwrite: bool) -> Result<()> {
+    let mut entries = match fs::read_dir(output) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(e) => return Err(FileError::io(output, "use as the folder for the views", e).into()),
+        Ok(entries) => entries,
+    };
+    let Some(first) = entries.next() else { return Ok(()) };
+    let first = first.map_err(|e| FileError::io(output, "read", e))?.file_name();
+    let what = format!("{} already holds {}", output.display(), first.display());
+    match (is_ours(output), overwrite) {
+        (true, true) => Ok(()),
+        (true, false) => Err(Error::Usage(format!(
+            "{what}: choose another folder, or replace the views in it with --overwrite"
+        ))),
+        (false, _) => Err(Error::Usage(format!(
+            "{what}, and was not written by s3d render --poses: choose another folder"
+        ))),
+    }
+}
+
+/// Whether a folder was written here.
+fn is_ours(folder: &Path) -> bool {
+    #[derive(Deserialize)]
+    struct Told {
+        generator: String,
+    }
+    read_json::<Told>(&folder.join(CAMERAS)).is_ok_and(|told| told.generator == GENERATOR)
+}
