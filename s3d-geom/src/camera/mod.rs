@@ -4,11 +4,13 @@
 //! formats.md, "What is written".
 
 mod error;
+mod fisheye;
 mod intrinsics;
 mod lens;
 mod pose;
 
 pub use error::CameraError;
+pub use fisheye::FisheyeLens;
 pub use lens::Lens;
 pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
 
