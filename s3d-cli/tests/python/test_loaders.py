@@ -363,6 +363,9 @@ def test_utils_reads_a_data_set_without_labels(s3d, demo, tmp_path):
         [sys.executable, "-W", "error", out / "assets/utils.py", out], capture_output=True, text=True
     )
     assert done.returncode == 0 and "0 instances, 0 rooms" in done.stdout, done.stdout + done.stderr
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads((out / "assets/schema/manifest.schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(json.loads((out / "manifest.json").read_text()))
     data = utils_of(out).Dataset(out)
     assert not data.is_labelled and len(data.labels) == 1
     # Every room of the building has a location.
@@ -476,8 +479,8 @@ def test_schemas_hold(request, name):
     assert set(manifest) <= set(schema["manifest"]["properties"])
     assert set(manifest["options"]) == set(schema["manifest"]["properties"]["options"]["properties"])
     area = schema["manifest"]["properties"]["areas"]["items"]["properties"]
-    # An area whose scan lies near the origin has no offset.
-    assert all(set(entry) == set(area) - {"offset_m"} for entry in manifest["areas"])
+    # An area whose scan lies near the origin has no offset, and one whose locations are listed does not place them.
+    assert all(set(entry) == set(area) - {"offset_m", "see", "surface_seen"} for entry in manifest["areas"])
     poses = sorted(out.glob("area_1/*/pose/*.json"))
     assert len(poses) > 5
     for path in poses:

@@ -55,7 +55,7 @@ pub(super) fn pack(
         let max_samples = match (options.max_count, options.max_size) {
             (Some(count), _) => count as usize,
             (None, Some(_)) => most.max_samples,
-            (None, None) => images.len().div_ceil(SHARDS).clamp(1, most.max_samples),
+            (None, None) => (images.len() / SHARDS).clamp(1, most.max_samples),
         };
         let limits = ShardLimits { max_bytes: max_bytes.saturating_sub(meta_bytes), max_samples };
         let plan = plan_shards(&sizes, limits);
