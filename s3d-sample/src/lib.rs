@@ -22,7 +22,7 @@
 //! let items: Vec<_> = (0u32..72)
 //!     .map(|view| {
 //!         let classes = (views[view as usize].fov_rad * 10.0) as usize;
-//!         let histogram = std::array::from_fn(|class| u64::from(class < classes) * 1000);
+//!         let histogram: [u64; 13] = std::array::from_fn(|class| u64::from(class < classes) * 1000);
 //!         PoolItem { area: 1, location: camera, view, score: entropy(&histogram) }
 //!     })
 //!     .collect();

@@ -14,7 +14,8 @@ impl Camera {
     /// // Looks along +Y. What lies straight ahead is seen in the principal point, not in the middle.
     /// let pose = Pose::level(dvec3(0.0, 0.0, 1.5), 0.0);
     /// let camera = Camera::pinhole(pose, dvec2(500.0, 510.0), dvec2(300.0, 250.0), 640, 480)?;
-    /// assert_eq!(camera.project(dvec3(0.0, 4.0, 1.5)).unwrap(), (dvec2(300.0, 250.0), 4.0));
+    /// let (pixel, depth_m) = camera.project(dvec3(0.0, 4.0, 1.5)).unwrap();
+    /// assert!(pixel.abs_diff_eq(dvec2(300.0, 250.0), 1e-9) && depth_m == 4.0);
     /// # Ok::<(), s3d_geom::CameraError>(())
     /// ```
     ///
