@@ -223,11 +223,7 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
         written.pixels = hits.face.len() as u64;
         let faces = hits.face.pixels();
         written.pixels_missing = faces.iter().filter(|face| **face == NO_FACE).count() as u64;
-        if job.modalities.iter().any(|domain| domain.is_semantic()) {
-            let label_of_face = job.channels.label_of_face;
-            let unlabelled = |face: &&u32| label_of_face.get(**face as usize) == Some(&0);
-            written.pixels_unlabelled = faces.iter().filter(unlabelled).count() as u64;
-        }
+        written.pixels_unlabelled = buffers.unlabelled;
     }
     Ok(written)
 }

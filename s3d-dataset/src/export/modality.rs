@@ -75,6 +75,8 @@ pub(crate) struct ImageBuffers {
     xyz_float: Raster<[f32; 3]>,
     /// Which of `images` are those of the view at hand.
     made: Modalities,
+    /// Pixels of the last semantic image whose face has no label.
+    pub(crate) unlabelled: u64,
 }
 
 impl ImageBuffers {
@@ -85,7 +87,7 @@ impl ImageBuffers {
 impl Default for ImageBuffers {
     fn default() -> Self {
         let xyz_float = Raster::filled(0, 0, [0.0; 3]);
-        Self { images: ViewImages::default(), xyz_float, made: Modalities::default() }
+        Self { images: ViewImages::default(), xyz_float, made: Modalities::default(), unlabelled: 0 }
     }
 }
 
@@ -117,9 +119,13 @@ impl Channels<'_> {
             };
             view_images_into(&shading, hits, camera, buffers.made, &mut buffers.images);
         }
-        let mut done = Vec::new();
+        let (mut done, mut unlabelled) = (Vec::new(), 0);
         for &image in images {
             self.draw(image, hits, camera, buffers);
+            if image == Image::Semantic {
+                let index = buffers.images.faces.index.pixels();
+                unlabelled = index.iter().filter(|index| **index == [0; 3]).count() as u64;
+            }
             if large {
                 done.push(each(image, self.file(image, buffers))?);
                 *buffers = ImageBuffers::default();
@@ -129,6 +135,7 @@ impl Channels<'_> {
             let files = images.par_iter().with_max_len(1);
             done = files.map(|&image| each(image, self.file(image, buffers))).collect::<Result<_, E>>()?;
         }
+        buffers.unlabelled = unlabelled;
         Ok(done)
     }
 
@@ -148,7 +155,7 @@ impl Channels<'_> {
     /// Draws an image, unless it is made already.
     fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
-        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made } = buffers;
+        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made, .. } = buffers;
         let is_made = match image {
             Image::Rgb => made.rgb,
             Image::Depth => made.depth,

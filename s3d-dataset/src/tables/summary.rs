@@ -15,7 +15,7 @@ pub struct ImageTally {
     pub pixels: u64,
     /// Those among them whose ray meets no face: missing in every modality.
     pub pixels_missing: u64,
-    /// Those whose face has no label: 0 where no image of labels is asked for.
+    /// Those whose face has no label: 0 where no semantic image is asked for.
     pub pixels_unlabelled: u64,
 }
 
