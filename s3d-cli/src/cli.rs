@@ -11,9 +11,16 @@ use clap::{Parser, Subcommand};
     name = "s3d",
     version,
     max_term_width = 110,
-    after_help = "\
-Start with the built-in scene:\n  s3d demo\nthen a scan of your own:\n  s3d info scan/scene.toml\n  s3d export scan/scene.toml -o dataset\n\n\
-Exit codes: 0 done, 1 the input or the disk, 2 the call, 75 stopped by a signal or a full disk: call it again."
+    after_help = concat!(
+        "Start with the built-in scene:\n",
+        "  s3d demo\n",
+        "then a scan of your own:\n",
+        "  s3d info scan/scene.toml\n",
+        "  s3d export scan/scene.toml -o dataset\n",
+        "\n",
+        "Exit codes: 0 done, 1 the input or the disk, 2 the call, 75 stopped by a signal or a full disk: ",
+        "call it again.",
+    )
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -41,22 +48,44 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Write the built-in scene as input files and export it: a data set to look at.
     #[command(
-        after_help = "Example:\n  s3d demo -o s3d-demo\nThe scene's own files are in OUT/scan; export them again, larger, with\n  s3d export s3d-demo/scan/scene.toml -o dataset"
+        after_help = concat!(
+            "Example:\n",
+            "  s3d demo -o s3d-demo\n",
+            "The scene's own files are in OUT/scan; export them again, larger, with\n",
+            "  s3d export s3d-demo/scan/scene.toml -o dataset",
+        )
     )]
     Demo(demo::DemoArgs),
     /// Turn scans into a data set: images, poses, meshes, points, labels, tables.
     #[command(
-        after_help = "Examples:\n  s3d export scan/scene.toml -o dataset\n  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\nAn export that was stopped or killed goes on where it was when it is called again with the same arguments."
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d export scan/scene.toml -o dataset\n",
+            "  s3d export scan.glb -o dataset\n",
+            "  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n",
+            "  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\n",
+            "An export that was stopped or killed goes on where it was when it is called again with the same arguments.",
+        )
     )]
     Export(export::ExportArgs),
     /// Label scenes and score their views ahead of an export that many machines share.
     #[command(
-        after_help = "Examples:\n  s3d plan scan/scene.toml -o plan\n  s3d export scan/scene.toml -o dataset --plan plan --shard 1/4\nThe options are those of the export that labels and scores depend on. docs/cluster has files for Slurm and others."
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d plan scan/scene.toml -o plan\n",
+            "  s3d export scan/scene.toml -o dataset --plan plan --shard 1/4\n",
+            "The options are those of the export that labels and scores depend on. docs/cluster has files for Slurm and others.",
+        )
     )]
     Plan(plan::PlanArgs),
     /// Make one data set of what the shards of an export have written.
     #[command(
-        after_help = "Examples:\n  s3d merge dataset -o dataset\n  s3d merge shard_1 shard_2 shard_3 -o dataset\nIt is that of a single run, byte for byte. What is missing is told with the shard to run again."
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d merge dataset -o dataset\n",
+            "  s3d merge shard_1 shard_2 shard_3 -o dataset\n",
+            "It is that of a single run, byte for byte. What is missing is told with the shard to run again.",
+        )
     )]
     Merge(merge::MergeArgs),
     /// Sample a mesh densely and uniformly into a coloured point cloud.
@@ -64,26 +93,48 @@ pub(crate) enum Command {
     Sample(sample::SampleArgs),
     /// Render one view of a mesh, or those of a list of cameras, in every modality that needs no annotation.
     #[command(
-        after_help = "Examples:\n  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --yaw 30 --pitch -10 --fov 75 -o view\n  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --pano -o pano\n  s3d render scan/rgb.obj --poses transforms.json -o views\n  s3d render scan/rgb.obj --poses trajectory.txt --width 640 --height 480 --fov 60 -o views"
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --yaw 30 --pitch -10 --fov 75 -o view\n",
+            "  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --pano -o pano\n",
+            "  s3d render scan/rgb.obj --poses transforms.json -o views\n",
+            "  s3d render scan/rgb.obj --poses trajectory.txt --width 640 --height 480 --fov 60 -o views",
+        )
     )]
     Render(render::RenderArgs),
     /// Tell what a scene holds, and what looks wrong in it.
-    #[command(after_help = "Example:\n  s3d info scan/scene.toml")]
+    #[command(after_help = "Examples:\n  s3d info scan/scene.toml\n  s3d info scan.glb")]
     Info(info::InfoArgs),
     /// Package a data set for a trainer: WebDataset, COLMAP, nerfstudio, COCO panoptic, or a Parquet table of
     /// its images.
     #[command(
-        after_help = "Examples:\n  s3d pack dataset --to webdataset --images views --shuffle 1\n  s3d pack dataset --to colmap -o colmap --areas 1 --copy-images\n  s3d pack dataset --to nerfstudio\n  s3d pack dataset --to coco --areas 1,2,3,4,6 -o coco_train\n  s3d pack dataset --to parquet -o images.parquet"
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d pack dataset --to webdataset --images views --shuffle 1\n",
+            "  s3d pack dataset --to colmap -o colmap --areas 1 --copy-images\n",
+            "  s3d pack dataset --to nerfstudio\n",
+            "  s3d pack dataset --to coco --areas 1,2,3,4,6 -o coco_train\n",
+            "  s3d pack dataset --to parquet -o images.parquet",
+        )
     )]
     Pack(pack::PackArgs),
     /// Make the world coordinates of a data set's images again, from depth and pose.
     #[command(
-        after_help = "Example:\n  s3d xyz dataset --type float --overwrite\nDepth is stored in steps of 2 mm (or 1 mm), so what comes out is off by half of that along the ray; a pixel\nbeyond the depth's range is missing. What `s3d export` writes comes from the hits themselves."
+        after_help = concat!(
+            "Example:\n",
+            "  s3d xyz dataset --type float --overwrite\n",
+            "Depth is stored in steps of 2 mm (or 1 mm), so what comes out is off by half of that along the ray; a pixel\n",
+            "beyond the depth's range is missing. What `s3d export` writes comes from the hits themselves.",
+        )
     )]
     Xyz(xyz::XyzArgs),
     /// Write what a point cloud loader wants from an existing data set.
     #[command(
-        after_help = "Example:\n  s3d profile dataset --to pointnet --to pointcept\nEach comes to dataset/profiles/NAME."
+        after_help = concat!(
+            "Example:\n",
+            "  s3d profile dataset --to pointnet --to pointcept\n",
+            "Each comes to dataset/profiles/NAME.",
+        )
     )]
     Profile(profile::ProfileArgs),
     /// Print the tables of statistics of a data set, counted from its files.
@@ -92,7 +143,12 @@ pub(crate) enum Command {
     /// Read a data set back and check it: against its manifest, against itself, and every image against the
     /// mesh.
     #[command(
-        after_help = "Examples:\n  s3d verify dataset\n  s3d verify dataset --full\nEach fault is a line on standard output; the last line counts. Exit code 0 without faults, 1 with some."
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d verify dataset\n",
+            "  s3d verify dataset --full\n",
+            "Each fault is a line on standard output; the last line counts. Exit code 0 without faults, 1 with some.",
+        )
     )]
     Verify(verify::VerifyArgs),
 }

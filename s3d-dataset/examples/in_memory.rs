@@ -11,7 +11,8 @@ use s3d_io::cloud::Annotations;
 use s3d_label::{Class, Label};
 use std::path::Path;
 
-/// The coloured corners of a room of 4 × 3 × 2.5 m, and its six walls seen from inside, each of two triangles.
+/// The coloured corners of a room of 4 × 3 × 2.5 m, and its six walls seen from inside, each of two
+/// triangles.
 fn room() -> Result<TriMesh, s3d_geom::MeshError> {
     let corner = |i: u32| vec3((i & 1) as f32 * 4.0, (i >> 1 & 1) as f32 * 3.0, (i >> 2) as f32 * 2.5);
     let quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];

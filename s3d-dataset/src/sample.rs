@@ -39,8 +39,8 @@ impl Default for SampleOptions {
 /// points.
 ///
 /// # Errors
-/// [`Error::Usage`] if the file's name is not that of a PLY file, if it is there and not to be replaced, or the
-/// points are too many; [`Error::File`]; [`Error::Cancelled`].
+/// [`Error::Usage`] if the file's name is not that of a PLY file, if it is there and not to be replaced, or
+/// the points are too many; [`Error::File`]; [`Error::Cancelled`].
 pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
     if !output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ply")) {
         return Err(Error::Usage(format!(

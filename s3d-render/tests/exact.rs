@@ -49,8 +49,8 @@ fn camera(pose: Pose, kind: u8) -> Camera {
         3 => Camera::equirectangular(pose, 200),
         4 => Camera::equirectangular(pose, 260),
         5 => Camera::equirectangular(pose, 50),
-        // As a phone has it; a crop far off the axis; pixels that are far from square, either way; the axis in a
-        // corner, wide; and telephoto.
+        // As a phone has it; a crop far off the axis; pixels that are far from square, either way; the axis
+        // in a corner, wide; and telephoto.
         6 => pinhole(pose, [40.0, 43.0], [19.5, 13.0], [37, 23]),
         7 => pinhole(pose, [60.0, 60.0], [-150.0, 90.0], [50, 41]),
         8 => pinhole(pose, [900.0, 9.0], [33.0, 20.0], [64, 40]),

@@ -1,8 +1,8 @@
 //! The score of a view: how evenly it sees what there is to be seen, the semantic classes in the paper.
 
 /// The Shannon entropy of a histogram of classes, in nats: 0 if one class has all pixels, ln of the number of
-/// classes if all have the same number. Pixels without a class are not in the histogram; without any pixel the
-/// entropy is 0. Source: formats.md, "Views".
+/// classes if all have the same number. Pixels without a class are not in the histogram; without any pixel
+/// the entropy is 0. Source: formats.md, "Views".
 ///
 /// ```
 /// // As many pixels of wall as of floor.

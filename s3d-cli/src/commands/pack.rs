@@ -20,7 +20,8 @@ pub(crate) struct PackArgs {
     /// What to make of it.
     #[arg(long, value_parser = parsed::<PackageKind>, value_name = "webdataset|colmap|nerfstudio|coco|parquet")]
     pub(crate) to: PackageKind,
-    /// The package's folder, of parquet its file [default: beside OUT: OUT_webdataset, …, OUT_images.parquet]
+    /// The package's folder, of parquet its file [default: beside OUT: OUT_webdataset, …,
+    /// OUT_images.parquet]
     #[arg(short, long, value_name = "DEST")]
     pub(crate) output: Option<PathBuf>,
     /// Replace an earlier package in DEST.
@@ -47,7 +48,8 @@ pub(crate) struct SpecificArgs {
     /// webdataset: megabytes (1,000,000 bytes) of a shard, at most [default: 1000]
     #[arg(long, value_name = "MB", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_size: Option<u32>,
-    /// webdataset: samples of a shard, at most [default: an eighth of a series, so that eight workers have work]
+    /// webdataset: samples of a shard, at most [default: an eighth of a series, so that eight workers have
+    /// work]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_count: Option<u32>,
     /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar

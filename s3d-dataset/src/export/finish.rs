@@ -91,7 +91,7 @@ pub(crate) fn finish(
         pixels += tally.views;
         if let Some(share) = pixels.share_unlabelled().filter(|share| *share > MUCH_UNLABELLED) {
             ctx.warn(format_args!(
-                "area {area}: {:.0} % of the pixels show faces without a label, since no annotated point is next to them",
+                "area {area}: {:.0} % of the pixels show faces without a label: no annotated point is next to them",
                 100.0 * share
             ));
         }

@@ -154,8 +154,8 @@ impl Source {
         Ok(s3d_io::cloud::read_point_sample(self.files.sized(&self.layout.point_cloud(area))?, most)?)
     }
 
-    /// The files that say what the numbers in images mean, by name: the conventions, and the label table if there
-    /// are labels.
+    /// The files that say what the numbers in images mean, by name: the conventions, and the label table if
+    /// there are labels.
     pub(crate) fn tables(&self) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let mut tables = vec![("conventions.json", self.files.read_bytes(&self.layout.conventions())?)];
         if self.is_labelled {

@@ -13,8 +13,8 @@ use s3d_io::package::{
     ShardEntry, ShardLimits, TarWriter, plan_shards, sample_key, sample_member, write_shard_index,
 };
 
-/// A series has so many shards or more unless limits are given, if it has as many samples: each worker of a loader
-/// reads shards of its own.
+/// A series has so many shards or more unless limits are given, if it has as many samples: each worker of a
+/// loader reads shards of its own.
 const SHARDS: usize = 8;
 
 /// The folder in a shard of what belongs to all samples. Readers pass over names of this form.
@@ -97,7 +97,9 @@ pub(super) fn pack(
          the number of samples of each shard is in shards.json"
             .into(),
     );
-    notes.push(format!("{META} in each shard holds what its numbers mean: conventions, and the label table if there are labels"));
+    notes.push(format!(
+        "{META} in each shard holds what its numbers mean: conventions, and the label table if there are labels"
+    ));
     notes.push(
         "decode(\"pil\") makes 8-bit RGB of every image: give depth.png (16 bits) and global_xyz.exr decoders of their own, \
          before it, with webdataset.autodecode.handle_extension"

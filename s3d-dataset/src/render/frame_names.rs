@@ -6,8 +6,8 @@ use s3d_io::fs::{UniqueNames, portable_file_name};
 /// Endings of pictures, which the files made of them do not keep. A time stamp keeps its decimals.
 const ENDINGS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "bmp", "tif", "tiff", "exr", "heic"];
 
-/// A file name without ending for each camera, none twice: its name in the list without folders, or with them if
-/// that would not tell cameras apart.
+/// A file name without ending for each camera, none twice: its name in the list without folders, or with them
+/// if that would not tell cameras apart.
 pub(super) fn frame_names(cameras: &[PosedCamera]) -> Vec<String> {
     let stem = |name: &str| {
         let cut = name

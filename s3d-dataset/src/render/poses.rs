@@ -91,14 +91,14 @@ struct Frame<'a> {
     camera: Camera,
 }
 
-/// Renders what the cameras of a list see of a mesh's file: `rgb/NAME.png`, `depth/NAME.png`, `normal/NAME.png`,
-/// `global_xyz/NAME.exr` and `faces/NAME.png` in the folder `output`, and `transforms.json` with every camera. See
-/// [`read_posed_cameras`] for the lists that are read. The folder appears whole or not at all: after a kill the
-/// same call begins anew.
+/// Renders what the cameras of a list see of a mesh's file: `rgb/NAME.png`, `depth/NAME.png`,
+/// `normal/NAME.png`, `global_xyz/NAME.exr` and `faces/NAME.png` in the folder `output`, and
+/// `transforms.json` with every camera. See [`read_posed_cameras`] for the lists that are read. The folder
+/// appears whole or not at all: after a kill the same call begins anew.
 ///
 /// # Errors
-/// [`Error::Usage`] if the folder is not empty and not to be replaced, or the list lacks sizes or focal lengths
-/// that the options do not give; [`Error::File`]; [`Error::Input`] if no camera sees anything;
+/// [`Error::Usage`] if the folder is not empty and not to be replaced, or the list lacks sizes or focal
+/// lengths that the options do not give; [`Error::File`]; [`Error::Input`] if no camera sees anything;
 /// [`Error::Cancelled`].
 pub fn render_poses(
     mesh: &Path,

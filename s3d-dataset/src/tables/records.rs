@@ -91,7 +91,8 @@ impl From<&VoteRow> for VoteRecord {
 /// Most disputed patches that are named.
 const MOST_PATCHES: usize = 50;
 
-/// Writes `area_N/3d/votes.json`: the report on the voting, in all, per room and per class, and what is disputed.
+/// Writes `area_N/3d/votes.json`: the report on the voting, in all, per room and per class, and what is
+/// disputed.
 pub(crate) fn write_votes(
     layout: &Layout,
     area: u32,

@@ -8,8 +8,8 @@ use s3d_io::dataset::{Domain, XyzType};
 use std::fmt;
 use std::path::Path;
 
-/// More points than this in one cloud are taken for a slip: the largest area of the published data set has 470
-/// million.
+/// More points than this in one cloud are taken for a slip: the largest area of the published data set has
+/// 470 million.
 const MANY_POINTS: f64 = 3e9;
 
 /// More cannot be meant, and are refused whatever is allowed.
@@ -36,8 +36,8 @@ fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
     }
 }
 
-/// Nanoseconds that one core takes for a pixel of all images of a view, scored, cast, shaded and compressed: on
-/// the machine of docs/performance.md.
+/// Nanoseconds that one core takes for a pixel of all images of a view, scored, cast, shaded and compressed:
+/// on the machine of docs/performance.md.
 const PIXEL_NS: f64 = 50.0;
 
 /// The same for a sampled point: drawn and written in three formats.
@@ -154,15 +154,15 @@ pub(crate) fn check_space(bytes: f64, folder: &Path) -> Result<()> {
     }
 }
 
-/// What looks wrong about writing about so many bytes on the disk of `folder`. How small images become depends
-/// on what they show: what stops is less space than half of what is expected.
+/// What looks wrong about writing about so many bytes on the disk of `folder`. How small images become
+/// depends on what they show: what stops is less space than half of what is expected.
 pub(crate) fn space_findings(bytes: f64, folder: &Path) -> Vec<Finding> {
     let lack = lack_of_space(bytes, folder);
     lack.map(|(free, text)| Finding::new(Condition::Size, bytes > 2.0 * free, text)).into_iter().collect()
 }
 
-/// The free bytes on the disk of `folder`, which need not be there yet, and a sentence, if there are fewer than
-/// `bytes`. Nothing where the system does not tell.
+/// The free bytes on the disk of `folder`, which need not be there yet, and a sentence, if there are fewer
+/// than `bytes`. Nothing where the system does not tell.
 fn lack_of_space(bytes: f64, folder: &Path) -> Option<(f64, String)> {
     let named =
         |folder: &Path| if folder.as_os_str().is_empty() { Path::new(".") } else { folder }.to_owned();

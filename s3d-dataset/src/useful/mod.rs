@@ -1,7 +1,7 @@
 //! Whether a data set would be of use: what looks wrong in a scene, and what stops an export of it.
 //!
-//! Each [`Finding`] belongs to a [`Condition`]. Beyond a limit it stops an export, unless the caller allows the
-//! condition; nearer it is a warning. `info` and `export` find the same.
+//! Each [`Finding`] belongs to a [`Condition`]. Beyond a limit it stops an export, unless the caller allows
+//! the condition; nearer it is a warning. `info` and `export` find the same.
 
 mod estimate;
 

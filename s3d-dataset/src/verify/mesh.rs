@@ -131,8 +131,8 @@ struct VotesRecord {
     classes: Vec<VoteRecord>,
 }
 
-/// Holds the labels of `semantic.obj` against the votes, and against the report on them: faces in all, by room and
-/// by class.
+/// Holds the labels of `semantic.obj` against the votes, and against the report on them: faces in all, by
+/// room and by class.
 fn check_votes(layout: &Layout, area: u32, label_of_face: &[u32], labels: &Labels, report: &Report) {
     let path = layout.votes_npz(area);
     // Data sets of earlier versions have none; where one is listed and gone, the list of files tells.

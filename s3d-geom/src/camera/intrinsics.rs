@@ -5,8 +5,8 @@ use glam::{DVec2, dvec2};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 impl Camera {
-    /// A pinhole camera with focal lengths and principal point in pixels (the centre of the first pixel at (½,
-    /// ½)), as photographs have it after their lens was taken out.
+    /// A pinhole camera with focal lengths and principal point in pixels (the centre of the first pixel at
+    /// (½, ½)), as photographs have it after their lens was taken out.
     ///
     /// ```
     /// use s3d_geom::{Camera, Pose, glam::{dvec2, dvec3}};

@@ -65,8 +65,8 @@ impl Pose {
         Self::from_scanner(location, DQuat::from_rotation_z(yaw_rad))
     }
 
-    /// The pose of an OpenCV camera (x right, y down, z forward), from world → camera, 3 × 4, row by row: what
-    /// [`Pose::rt_matrix`] gives.
+    /// The pose of an OpenCV camera (x right, y down, z forward), from world → camera, 3 × 4, row by row:
+    /// what [`Pose::rt_matrix`] gives.
     ///
     /// # Errors
     /// As [`Pose::from_opengl`].
@@ -102,7 +102,8 @@ impl Pose {
     ///
     /// // 1.5 m above the floor, looking along +Y.
     /// let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]];
-    /// assert_eq!(Pose::from_opengl(rows)?, Pose::look_at(DVec3::Z * 1.5, DVec3::new(0.0, 9.0, 1.5), DVec3::Z)?);
+    /// let along_y = Pose::look_at(DVec3::Z * 1.5, DVec3::new(0.0, 9.0, 1.5), DVec3::Z)?;
+    /// assert_eq!(Pose::from_opengl(rows)?, along_y);
     /// // Read by columns, the place stands in the last row.
     /// let transposed = std::array::from_fn(|i| std::array::from_fn(|j| rows[j][i]));
     /// assert_eq!(Pose::from_opengl(transposed), Err(CameraError::Transposed));

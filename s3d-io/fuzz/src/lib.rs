@@ -1,5 +1,5 @@
-//! What all fuzz targets share: a folder in memory, a limit to what may be allocated, and the feeds of the crate's tests.
-//! The manifest of a data set is read by s3d-dataset, and has its feed here.
+//! What all fuzz targets share: a folder in memory, a limit to what may be allocated, and the feeds of the
+//! crate's tests. The manifest of a data set is read by s3d-dataset, and has its feed here.
 
 #[path = "../../tests/feed/mod.rs"]
 mod feed;
@@ -13,8 +13,9 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// Counts what is allocated, and ends the process when that is more than an input of this size warrants. libFuzzer's own
-/// limits see neither pages that were never touched nor, without a sanitizer, single allocations.
+/// Counts what is allocated, and ends the process when that is more than an input of this size warrants.
+/// libFuzzer's own limits see neither pages that were never touched nor, without a sanitizer, single
+/// allocations.
 struct Limited;
 
 static LIVE: AtomicUsize = AtomicUsize::new(0);
@@ -78,8 +79,8 @@ pub fn start(name: &str) {
         .use_current_thread()
         .build_global()
         .expect("the first pool");
-    // Decoders that are not ours may panic on what is damaged, and are caught where they are called. libfuzzer-sys ends
-    // the process at any panic.
+    // Decoders that are not ours may panic on what is damaged, and are caught where they are called.
+    // libfuzzer-sys ends the process at any panic.
     let aborts = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         if !s3d_io::panic_is_caught() {
@@ -89,7 +90,8 @@ pub fn start(name: &str) {
     let root = std::env::var_os("S3D_FUZZ_DIR").map_or_else(|| "/dev/shm".into(), PathBuf::from);
     let dir = root.join(format!("s3d-fuzz-{name}-{}", std::process::id()));
     fs::create_dir_all(&dir).expect("the folder can be made");
-    // A pixel of a compressed image may take an eighth of a bit; a byte of deflated numbers becomes a thousand.
+    // A pixel of a compressed image may take an eighth of a bit; a byte of deflated numbers becomes a
+    // thousand.
     let per_byte = if matches!(name, "texture" | "gltf" | "png" | "exr") { 32 << 10 } else { 4 << 10 };
     let target = Target { feed, dir, base: 256 << 20, per_byte };
     assert!(TARGET.set(target).is_ok(), "started twice");
@@ -103,13 +105,14 @@ pub fn run(data: &[u8]) {
     LIMIT.store(usize::MAX, Relaxed);
 }
 
-/// A manifest, and after a zero byte the list of files beside it. A checksum of zeros in the manifest stands for that of
-/// the list, so that readers come past it.
+/// A manifest, and after a zero byte the list of files beside it. A checksum of zeros in the manifest stands
+/// for that of the list, so that readers come past it.
 fn manifest(dir: &Path, data: &[u8]) {
     let end = data.iter().position(|b| *b == 0).unwrap_or(data.len());
     let (manifest, list) = data.split_at(end);
     let list = list.get(1..).unwrap_or_default();
-    let manifest = String::from_utf8_lossy(manifest).replace(&"0".repeat(32), &Checksum::of(list).to_string());
+    let manifest =
+        String::from_utf8_lossy(manifest).replace(&"0".repeat(32), &Checksum::of(list).to_string());
     for (name, content) in [("manifest.json", manifest.as_bytes()), ("files.csv", list)] {
         fs::write(dir.join(name), content).expect("the folder can be written");
     }

@@ -66,8 +66,8 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
     Ok(cameras)
 }
 
-/// Little-endian: a count; for each camera its number (4 bytes), its model's (4), width and height (8 each) and
-/// the parameters (8 each).
+/// Little-endian: a count; for each camera its number (4 bytes), its model's (4), width and height (8 each)
+/// and the parameters (8 each).
 fn read_binary(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
     let mut rest = bytes;
     let mut cameras = HashMap::new();

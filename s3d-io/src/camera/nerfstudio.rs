@@ -1,8 +1,8 @@
 //! The pictures of a `transforms.json`, as nerfstudio, Polycam, Record3D and instant-ngp write it. Source:
 //! nerfstudio's documentation, "Data conventions".
 //!
-//! A frame's `transform_matrix` is camera → world, 4 × 4, in OpenGL's axes: x right, y up, z backwards. What the
-//! camera is stands in the frame, or once for all frames.
+//! A frame's `transform_matrix` is camera → world, 4 × 4, in OpenGL's axes: x right, y up, z backwards. What
+//! the camera is stands in the frame, or once for all frames.
 
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};

@@ -16,7 +16,8 @@ pub struct PosedCamera {
     pub size: Option<[u32; 2]>,
     /// How directions become pixels, if the list tells.
     pub optics: Option<Optics>,
-    /// The picture that was taken with it, if the list names one. Whether the file is there was not looked at.
+    /// The picture that was taken with it, if the list names one. Whether the file is there was not looked
+    /// at.
     pub picture: Option<PathBuf>,
     /// Its line in the list, from 1; 0 if the list has no lines.
     pub line: u64,
@@ -103,9 +104,9 @@ pub enum IntrinsicsError {
 }
 
 impl PosedCamera {
-    /// The camera that takes its picture, without what its lens bends. `given` goes before what the list says.
-    /// Where a size alone is given, the picture is scaled to it: focal lengths and principal point follow, and
-    /// so does the height if only a width is given, or the other way round.
+    /// The camera that takes its picture, without what its lens bends. `given` goes before what the list
+    /// says. Where a size alone is given, the picture is scaled to it: focal lengths and principal point
+    /// follow, and so does the height if only a width is given, or the other way round.
     ///
     /// # Errors
     /// [`IntrinsicsError`].

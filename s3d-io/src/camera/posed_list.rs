@@ -35,8 +35,8 @@ pub struct PosedCameras {
 ///   stand;
 /// - any other file: a trajectory of TUM's benchmark.
 ///
-/// `world_from_file` takes the file's frame to the world (metres, Z-up): turns, shifts and scales. Whether each
-/// camera's size and optics are known is for [`PosedCamera::camera`] to say.
+/// `world_from_file` takes the file's frame to the world (metres, Z-up): turns, shifts and scales. Whether
+/// each camera's size and optics are known is for [`PosedCamera::camera`] to say.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these

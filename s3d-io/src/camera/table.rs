@@ -28,7 +28,8 @@ const CAMERA: [&str; 7] = ["width", "height", "fov", "fx", "fy", "cx", "cy"];
 pub struct ScanLocation {
     /// Its name: 32 lower-case hexadecimal digits.
     pub uuid: String,
-    /// Where it is, world metres, and how its camera is turned: E(original) of formats.md, "What is written".
+    /// Where it is, world metres, and how its camera is turned: E(original) of formats.md, "What is
+    /// written".
     pub pose: Pose,
     /// Its line in the table, from 1; 0 if it comes from a file without lines.
     pub line: u64,
@@ -45,8 +46,8 @@ pub struct ScanLocation {
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a name that is no uuid
-/// beside others that are, one that is there twice, a number that is not finite, a quaternion of zeros; for the file, if
-/// it has no location.
+/// beside others that are, one that is there twice, a number that is not finite, a quaternion of zeros; for
+/// the file, if it has no location.
 pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
     parse_cameras(&read_file(path)?, path)
 }

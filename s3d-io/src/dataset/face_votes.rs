@@ -55,7 +55,8 @@ impl FaceVoteColumns {
     }
 }
 
-/// Writes the archive, whole or not at all: `<u4` arrays, and `farthest_m` in `<f4`. Returns its size in bytes.
+/// Writes the archive, whole or not at all: `<u4` arrays, and `farthest_m` in `<f4`. Returns its size in
+/// bytes.
 ///
 /// # Errors
 /// [`Error::Io`].

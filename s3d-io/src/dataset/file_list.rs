@@ -211,8 +211,8 @@ pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Chec
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line: another header, a line that is no path, size and checksum,
-/// a path that leads out of the folder, one that does not sort behind the one before, sizes whose sum does not
-/// fit in 64 bits, a last line without a line feed.
+/// a path that leads out of the folder, one that does not sort behind the one before, sizes whose sum does
+/// not fit in 64 bits, a last line without a line feed.
 pub fn read_file_list(path: &Path) -> Result<Vec<FileRecord>> {
     parse_file_list(BufReader::new(open_file(path)?), path)
 }

@@ -2,7 +2,8 @@
 
 use std::collections::HashSet;
 
-/// The most characters of a portable name: file systems take 255 bytes, and a temporary file's name is longer.
+/// The most characters of a portable name: file systems take 255 bytes, and a temporary file's name is
+/// longer.
 const MAX_NAME: usize = 128;
 
 /// A file name of ASCII letters, digits, `-`, `.` and `_`, not hidden; anything else becomes `_`. One that

@@ -31,8 +31,8 @@ pub struct SceneFile {
     /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published
     /// OBJ files.
     pub up: UpAxis,
-    /// What is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing, unless it
-    /// lies far from the origin ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
+    /// What is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing, unless
+    /// it lies far from the origin ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
     pub mesh_offset_m: Option<DVec3>,
     /// Whether there are labels. If not, `annotations` is empty; a published area brings its own.
     pub is_labelled: bool,
@@ -115,8 +115,9 @@ struct MeshTable {
 /// path = "raw"        # the pictures' folder; named after the source if it is left out
 /// ```
 ///
-/// Without `[cameras]` the caller places scan locations. The list's frame is the world (Z-up) unless the table says `up = "y"`, or gives a `transform` (four rows of four numbers,
-/// world from file, applied after `up`).
+/// Without `[cameras]` the caller places scan locations. The list's frame is the world (Z-up) unless the
+/// table says `up = "y"`, or gives a `transform` (four rows of four numbers, world from file, applied after
+/// `up`).
 ///
 /// Annotations of other kinds, and how they are read (see [`AnnotationOptions`]); every key but the path may
 /// be left out:

@@ -72,8 +72,8 @@ struct Disputed {
 }
 
 impl Disputes {
-    /// Of the faces of a mesh that were voted for: those whose label won less than three quarters of the votes.
-    /// Corners are the same where their coordinates are.
+    /// Of the faces of a mesh that were voted for: those whose label won less than three quarters of the
+    /// votes. Corners are the same where their coordinates are.
     ///
     /// # Panics
     /// If the labels are those of a mesh with more faces.

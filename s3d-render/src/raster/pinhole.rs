@@ -94,8 +94,8 @@ impl PinholeCorners {
 }
 
 /// How far out corners may be, in pixels, of a window with these focal lengths and the principal point at
-/// `center`, so that x and y are as good as the module says: where pixels are far from square, or the window is
-/// far from the optical axis, less than [`GUARD`].
+/// `center`, so that x and y are as good as the module says: where pixels are far from square, or the window
+/// is far from the optical axis, less than [`GUARD`].
 fn guard(focal: DVec2, center: DVec2) -> f64 {
     // x is off by 2⁻⁵³·(fx + |cx|)·|p|/z, and |p|/z < 1 + (guard + |cx|)/fx + (guard + |cy|)/fy; y likewise.
     let center = center.abs();

@@ -388,8 +388,8 @@ impl AreaInput {
         self.mesh_file.as_ref().map_or_else(|| self.source.read(), |file| Ok(Arc::clone(file)))
     }
 
-    /// About how much an export of it writes. Where locations are placed, a fifth of the mesh counts as floor, with
-    /// no more of them than 2 m apart: a slip in their distance is another finding.
+    /// About how much an export of it writes. Where locations are placed, a fifth of the mesh counts as
+    /// floor, with no more of them than 2 m apart: a slip in their distance is another finding.
     pub(crate) fn estimate(&self, mesh: &TriMesh, options: &ExportOptions) -> Estimate {
         let area_m2 = mesh.total_area();
         let floor_m2 = area_m2 / 5.0;

@@ -1,8 +1,8 @@
 //! Scan locations for a scan without labels: where a tripod could stand inside, few of them, that see much.
 //!
-//! Three steps, a file each: `standing` (on a `grid`) finds where a person with a tripod can stand and walk, `visibility`
-//! what is seen from there, `cover` which few of these places to take. docs/formats.md ("Scan locations by
-//! free space") has every number.
+//! Three steps, a file each: `standing` (on a `grid`) finds where a person with a tripod can stand and walk,
+//! `visibility` what is seen from there, `cover` which few of these places to take. docs/formats.md ("Scan
+//! locations by free space") has every number.
 
 mod cover;
 mod grid;
