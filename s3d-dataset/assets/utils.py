@@ -162,7 +162,7 @@ def read_instances(path):
 
 def read_votes(path):
     """votes.npz: by face of rgb.obj, (F,) each: label and runner_up (indices into the label table), votes, total and
-    runner_up_votes, and farthest_m, the distance of the farthest voter."""
+    runner_up_votes, and farthest_m, the distance of the farthest voter. A label without votes was filled in."""
     with np.load(path) as arrays:
         return {name: arrays[name] for name in arrays.files}
 

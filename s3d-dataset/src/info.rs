@@ -3,11 +3,12 @@
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::area::label_doubts;
+use crate::export::finish::MUCH_UNLABELLED;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::{AreaInput, Inputs};
 use crate::export::labels::annotate::{Annotated, annotate, unannotated};
-use crate::export::location::{Located, locate, look_around, room_name};
+use crate::export::location::{Located, locate, look_around, room_name, unlabelled_share};
 use crate::options::ExportOptions;
 use crate::useful::{
     Estimate, Finding, label_findings, mesh_findings, outlook_findings, size_findings, stops_any,
@@ -136,7 +137,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let mesh = &file.mesh;
     let nearest = NearestFaces::new(mesh);
     let annotated = match area.is_labelled {
-        true => annotate(ctx, area, &nearest, &inputs.table, |_| Ok(()))?.0,
+        true => annotate(ctx, area, &nearest, &inputs.table, None, |_| Ok(()))?.0,
         false => unannotated(&nearest, &inputs.table)?,
     };
     let scene = Scene::new(mesh);
@@ -177,6 +178,16 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let mut locations = Vec::with_capacity(at.len());
     if !at.is_empty() {
         findings.extend(outlook_findings(&outlooks));
+    }
+    if let Some(share) = unlabelled_share(&scene, &at, &annotated.label_of_face)
+        && area.is_labelled
+        && share > MUCH_UNLABELLED
+    {
+        doubts.push(format!(
+            "{:.0} % of what scan locations see has no label: no annotated point is next to it (export --fill METRES \
+             gives it the label of the surface beside it)",
+            100.0 * share
+        ));
     }
     doubts.extend(findings.iter().map(Finding::sentence));
     for ((location, room), outlook) in at.into_iter().zip(room_of).zip(outlooks) {

@@ -52,6 +52,10 @@ pub struct ExportOptions {
     pub points_per_m2: f64,
     /// Skip and count what is not as it should be in the annotations instead of stopping at it.
     pub lenient: bool,
+    /// Give faces without a vote the label of the labelled surface next to them, if that is no farther than
+    /// this, metres; see [`s3d_label::fill_labels`]. Nothing is filled where it is not there, as published.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fill: Option<f64>,
     /// The classes of a candidate view are counted on every which pixel of both axes, 1 to 64.
     pub entropy_stride: u32,
     /// Which images are written.
@@ -101,6 +105,7 @@ impl Default for ExportOptions {
             pool: Pool::Dataset,
             points_per_m2: 10_000.0,
             lenient: false,
+            fill: None,
             entropy_stride: 4,
             modalities: Domain::ALL.to_vec(),
             keep_all: false,
@@ -154,7 +159,10 @@ impl ExportOptions {
 
     /// Whether something is asked for that is made of labels.
     pub(crate) fn need_labels(&self) -> bool {
-        self.modalities.iter().any(|d| d.is_semantic()) || !self.profiles.is_empty() || self.pad_labels.0 > 0
+        self.modalities.iter().any(|d| d.is_semantic())
+            || !self.profiles.is_empty()
+            || self.fill.is_some()
+            || self.pad_labels.0 > 0
     }
 
     /// The same for scenes without labels: what is made of them is left out.
@@ -164,6 +172,9 @@ impl ExportOptions {
     pub(crate) fn without_labels(&self) -> Result<Self> {
         if let Some(profile) = self.profiles.first() {
             return Err(Error::Usage(format!("--profile {profile} needs labels, and the scene has none")));
+        }
+        if self.fill.is_some() {
+            return Err(Error::Usage("--fill needs labels, and the scene has none".to_owned()));
         }
         let mut options = Self { pad_labels: PadLabels(0), lenient: false, ..self.clone() };
         options.modalities.retain(|d| !d.is_semantic());
@@ -189,6 +200,7 @@ impl ExportOptions {
             ("place_cameras", self.place_cameras.is_none_or(positive), "above 0"),
             ("see", self.see.is_none_or(|share| positive(share) && share <= 1.0), "above 0, and at most 1"),
             ("see", self.see.is_none() || self.place_cameras.is_none(), "left out beside place_cameras"),
+            ("fill", self.fill.is_none_or(positive), "above 0"),
             ("entropy_stride", (1..=64).contains(&self.entropy_stride), "from 1 to 64"),
             ("pad_labels", self.pad_labels.0 <= 65_536, "at most 65536"),
         ];

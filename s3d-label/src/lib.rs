@@ -73,7 +73,7 @@ pub use table::{LabelId, LabelTable, MAX_LABELS, TableError};
 #[cfg(feature = "vote")]
 pub use voting::{
     ClassDispute, DisputedPatch, Disputes, FaceLabels, FaceVotes, Labeler, PointTally, VoteError,
-    VoteOptions, VoteReport, VoteRow, Votes, vote,
+    VoteOptions, VoteReport, VoteRow, Votes, fill_labels, vote,
 };
 pub use wall_direction::wall_directions_deg;
 

@@ -82,6 +82,10 @@ pub(crate) struct OptionArgs {
     /// unknown classes — instead of stopping at it.
     #[arg(long)]
     pub(crate) lenient: bool,
+    /// Give faces that no annotated point voted for the label of the surface next to them, along the surface
+    /// and not around sharp edges, if it is no farther than this. Left out, nothing is filled, as published.
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub(crate) fill: Option<f64>,
     /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make
     /// them) or small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
@@ -130,6 +134,7 @@ impl From<OptionArgs> for ExportOptions {
             pool: args.pool,
             points_per_m2: args.points_per_m2,
             lenient: args.lenient,
+            fill: args.fill,
             entropy_stride: args.entropy_stride,
             modalities: args.modalities,
             keep_all: args.keep_all,

@@ -3,7 +3,7 @@
 use super::on_threads;
 use crate::args::{Allow, Placing, Scenes, Threads};
 use crate::failure::Outcome;
-use crate::values::parsed;
+use crate::values::{parsed, positive};
 use clap::{Args, value_parser};
 use s3d_dataset::{ExportOptions, Shard};
 use std::path::PathBuf;
@@ -35,6 +35,10 @@ pub(crate) struct PlanArgs {
     /// Skip and count what is not as it should be in the annotations.
     #[arg(long)]
     lenient: bool,
+    /// Give faces that no annotated point voted for the label of the surface next to them, if it is no farther
+    /// than this.
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    fill: Option<f64>,
     #[command(flatten)]
     allow: Allow,
     #[command(flatten)]
@@ -50,6 +54,7 @@ pub(crate) fn run(args: PlanArgs) -> Outcome<()> {
         see: args.placing.see,
         entropy_stride: args.entropy_stride,
         lenient: args.lenient,
+        fill: args.fill,
         allow: args.allow.allow,
         ..ExportOptions::default()
     };

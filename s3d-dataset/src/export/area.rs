@@ -22,6 +22,7 @@ use crate::tables::account::Account;
 use crate::tables::listing;
 use crate::tables::manifest::{AreaEntry, XyzLoss};
 use crate::tables::records;
+use crate::tables::summary::Unlabelled;
 use crate::useful::{judge, label_findings, outlook_findings};
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::camera::ScanLocation;
@@ -156,7 +157,7 @@ pub(crate) fn label_area(
         }
     }
     let annotated = if area.is_labelled {
-        let (annotated, votes) = annotate(ctx, area, &nearest, table, |i| {
+        let (annotated, votes) = annotate(ctx, area, &nearest, table, options.fill, |i| {
             let Some(instances) = &mut instances else { return Ok(()) };
             let record = InstanceRecord {
                 label: &i.label.to_string(),
@@ -169,8 +170,8 @@ pub(crate) fn label_area(
         })?;
         if writes {
             let disputes = Disputes::of(&file.mesh, &votes, table);
-            records::write_votes(layout, number, &annotated.report, &disputes, table)?;
-            records::write_face_votes(layout, number, &votes)?;
+            records::write_votes(layout, number, &annotated, &disputes, table)?;
+            records::write_face_votes(layout, number, &annotated.label_of_face, &votes)?;
         }
         annotated
     } else {
@@ -272,7 +273,7 @@ fn labels_done(
     files: Vec<FileRecord>,
 ) -> LabelsDone {
     let locations = plan.locations.iter().map(|l| l.uuid.clone()).collect();
-    LabelsDone { entry: area_entry(area, plan, options), locations, files }
+    LabelsDone { entry: Box::new(area_entry(area, plan, options)), locations, files }
 }
 
 /// The locations of an area whose candidates are ours to score and are not scored yet.
@@ -336,6 +337,7 @@ fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> Are
         faces_left_out: plan.faces_left_out,
         points: 0,
         annotated_points: plan.annotated.points,
+        unlabelled: area.is_labelled.then_some(plan.annotated.unlabelled),
         rooms: plan.annotated.rooms.len(),
         locations: plan.locations.len(),
         panoramas: 0,
@@ -412,6 +414,15 @@ fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
         total.faces,
         started.elapsed().as_secs_f64()
     ));
+    let Unlabelled { without_votes, without_label } = annotated.unlabelled;
+    if !annotated.filled.is_empty() {
+        ctx.info(format_args!(
+            "{} faces without a vote filled: {:.1} m² without a label instead of {:.1}",
+            annotated.filled.len(),
+            without_label.m2,
+            without_votes.m2
+        ));
+    }
     for (_, room, row) in &annotated.report.rooms {
         ctx.debug(format_args!(
             "{room}: {} points, {} faces, {} of them contested",
@@ -442,6 +453,11 @@ pub(crate) fn render_area(
     let label_of_face: Vec<u32> = annotated.label_of_face.iter().map(|l| l.0).collect();
     let pretty_of_face: Vec<[u8; 3]> =
         label_of_face.iter().map(|l| s3d_io::image::pretty_color(*l)).collect();
+    let mut is_filled = Vec::new();
+    if !annotated.filled.is_empty() {
+        is_filled.resize(label_of_face.len(), false);
+        annotated.filled.iter().for_each(|face| is_filled[*face as usize] = true);
+    }
     let chosen: Vec<bool> =
         locations.iter().map(|l| todo.contains(&Unit::Location(number, l.uuid.clone()))).collect();
     let finish_location = |written: WrittenLocation| {
@@ -467,6 +483,7 @@ pub(crate) fn render_area(
         pictures,
         locations,
         rooms: location_rooms,
+        is_filled: &is_filled,
         chosen: &chosen,
         modalities: &options.modalities,
         size: options.size,

@@ -12,16 +12,16 @@ use crate::tables::listing;
 use crate::tables::manifest::{AreaEntry, Manifest};
 use crate::tables::records;
 use crate::tables::statistics::Statistics;
-use crate::tables::summary::{UnitTally, ViewTally};
+use crate::tables::summary::{UnitTally, Unlabelled, ViewTally};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{FileRecord, Frame, Layout};
+use s3d_io::dataset::{Domain, FileRecord, Frame, Layout};
 use s3d_io::fs::{SyncAhead, create_dir, sync_data_set, sync_file};
 use s3d_sample::folds;
 use std::fs;
 use std::path::PathBuf;
 
 /// A share of pixels without a label that is warned of.
-const MUCH_UNLABELLED: f64 = 0.02;
+pub(crate) const MUCH_UNLABELLED: f64 = 0.02;
 
 /// What an export has made.
 pub(crate) struct Totals {
@@ -31,6 +31,7 @@ pub(crate) struct Totals {
     pub(crate) locations: usize,
     /// What became of the candidate views.
     pub(crate) views: ViewTally,
+    pub(crate) unlabelled: Option<Unlabelled>,
 }
 
 /// The units that are still to be done of a request, as far as they are known: those of an area's locations
@@ -81,6 +82,7 @@ pub(crate) fn finish(
     let areas = request.numbers();
     let (candidates, views) = select_requested(request, finished)?;
     let (mut entries, mut files, mut locations) = (Vec::new(), Vec::new(), 0);
+    let mut all_unlabelled: Option<Unlabelled> = None;
     for requested in &request.areas {
         let area = requested.area;
         records::write_views(layout, area, &candidates)?;
@@ -91,16 +93,28 @@ pub(crate) fn finish(
         pixels += tally.views;
         if let Some(share) = pixels.share_unlabelled().filter(|share| *share > MUCH_UNLABELLED) {
             ctx.warn(format_args!(
-                "area {area}: {:.0} % of the pixels show faces without a label: no annotated point is next to them",
+                "area {area}: {:.0} % of the pixels show faces without a label: no annotated point is next to them \
+                 (--fill METRES gives them the label of the surface beside them)",
                 100.0 * share
             ));
         }
+        let mut unlabelled = labels.entry.unlabelled;
+        if let Some(of) =
+            unlabelled.as_mut().filter(|_| request.options.modalities.contains(&Domain::Semantic))
+        {
+            of.without_label.pixels = Some(pixels.pixels_unlabelled);
+            of.without_votes.pixels = Some(pixels.pixels_unlabelled + pixels.pixels_filled);
+        }
+        if let Some(of) = unlabelled {
+            *all_unlabelled.get_or_insert_default() += of;
+        }
         entries.push(AreaEntry {
+            unlabelled,
             points: finished.assets(area).map_or(0, |assets| assets.points),
             panoramas: tally.panoramas.images,
             views: tally.views.images,
             inputs: requested.inputs.clone(),
-            ..labels.entry.clone()
+            ..(*labels.entry).clone()
         });
     }
     for done in finished.iter().filter(|done| areas.contains(&done.unit().area())) {
@@ -132,7 +146,13 @@ pub(crate) fn finish(
     manifest.complete(layout, entries, list)?;
     sync_file(&layout.manifest())?;
     let own = [layout.file_list(), layout.manifest()].map(|p| fs::metadata(p).map_or(0, |found| found.len()));
-    Ok(Totals { files: count + 2, bytes: listed + own.iter().sum::<u64>(), locations, views })
+    Ok(Totals {
+        files: count + 2,
+        bytes: listed + own.iter().sum::<u64>(),
+        locations,
+        views,
+        unlabelled: all_unlabelled,
+    })
 }
 
 /// Writes the profiles that are asked for, anew: some of their files are second names of files of the tree,

@@ -28,6 +28,8 @@ pub(crate) struct ImageJob<'a> {
     pub(crate) locations: &'a [ScanLocation],
     /// The room of each location; none if rooms are not known.
     pub(crate) rooms: &'a [Option<Room>],
+    /// Whether a face has its label by filling; empty if none has.
+    pub(crate) is_filled: &'a [bool],
     /// Whether a location's images are to be written.
     pub(crate) chosen: &'a [bool],
     pub(crate) modalities: &'a [Domain],
@@ -177,6 +179,7 @@ struct WrittenShot {
     pixels: u64,
     pixels_missing: u64,
     pixels_unlabelled: u64,
+    pixels_filled: u64,
 }
 
 impl OpenLocation {
@@ -191,6 +194,7 @@ impl OpenLocation {
             pixels: shot.pixels,
             pixels_missing: shot.pixels_missing,
             pixels_unlabelled: shot.pixels_unlabelled,
+            pixels_filled: shot.pixels_filled,
         };
         self.files.extend(shot.files);
     }
@@ -224,6 +228,10 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
         let faces = hits.face.pixels();
         written.pixels_missing = faces.iter().filter(|face| **face == NO_FACE).count() as u64;
         written.pixels_unlabelled = buffers.unlabelled;
+        if images.contains(&Image::Semantic) && !job.is_filled.is_empty() {
+            let is_filled = |face: &&u32| **face != NO_FACE && job.is_filled[**face as usize];
+            written.pixels_filled = faces.iter().filter(is_filled).count() as u64;
+        }
     }
     Ok(written)
 }

@@ -105,7 +105,8 @@ pub(crate) fn export(
 /// Tells what a complete data set holds.
 pub(crate) fn summarize(account: Account<'_>, layout: &Layout, request: &Request, made: &Totals) -> Summary {
     account.set_files(made.files, made.bytes);
-    account.summarize(&layout.root().display().to_string(), request.areas.len(), made.locations, made.views)
+    let root = layout.root().display().to_string();
+    account.summarize(&root, request.areas.len(), made.locations, made.views, made.unlabelled)
 }
 
 impl<'a> Job<'a> {

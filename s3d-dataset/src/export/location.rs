@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use s3d_geom::{Camera, NearestFaces};
 use s3d_io::camera::ScanLocation;
-use s3d_label::{LabelTable, Room};
+use s3d_label::{LabelId, LabelTable, Room};
 use s3d_render::{NO_FACE, Scene, cast};
 
 /// Width of the small panorama that tells what a location sees.
@@ -109,6 +109,33 @@ pub(crate) fn look_around(
         Ok(Outlook::of(scene, location))
     });
     outlooks.collect()
+}
+
+/// Of what scan locations see, by solid angle, the share that has no label; nothing if they see nothing.
+pub(crate) fn unlabelled_share(
+    scene: &Scene<'_>,
+    locations: &[ScanLocation],
+    label_of_face: &[LabelId],
+) -> Option<f64> {
+    let seen_and_unlabelled = |location: &ScanLocation| {
+        let camera = Camera::equirectangular(location.pose, PROBE_WIDTH);
+        let faces = cast(scene, &camera).face;
+        let (mut seen, mut unlabelled) = (0.0, 0.0);
+        for y in 0..camera.height {
+            let latitude = (0.5 - (f64::from(y) + 0.5) / f64::from(camera.height)) * std::f64::consts::PI;
+            for x in 0..camera.width {
+                let face = faces.at(x, y);
+                if face != NO_FACE {
+                    seen += latitude.cos();
+                    unlabelled += if label_of_face[face as usize].is_null() { latitude.cos() } else { 0.0 };
+                }
+            }
+        }
+        (seen, unlabelled)
+    };
+    let each: Vec<(f64, f64)> = locations.par_iter().map(seen_and_unlabelled).collect();
+    let (seen, unlabelled) = each.iter().fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
+    (seen > 0.0).then(|| unlabelled / seen)
 }
 
 /// An area's scan locations, each with its room if there are rooms, and what they see if they were placed by

@@ -295,7 +295,7 @@ mod tests {
         });
         let mut finished = Finished::default();
         finished.insert(Done::Labels(LabelsDone {
-            entry: serde_json::from_value(entry).unwrap(),
+            entry: Box::new(serde_json::from_value(entry).unwrap()),
             locations: vec!["a".into()],
             files: Vec::new(),
         }));

@@ -39,6 +39,7 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         see: options.see,
         entropy_stride: options.entropy_stride,
         lenient: options.lenient,
+        fill: options.fill,
         modalities: vec![Domain::Pose],
         // Of panoramas and points nothing is asked.
         pano_width: 8,

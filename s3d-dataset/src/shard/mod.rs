@@ -55,7 +55,7 @@ pub(crate) fn export_shard(
     let locations = session.journal.finished().count_locations(&job.request.numbers());
     drop(session);
     ctx.info(format_args!("{root}: shard {shard} is done; when all are, `s3d merge` makes the data set"));
-    Ok(Some(account.summarize(&root.to_string(), job.request.areas.len(), locations, views)))
+    Ok(Some(account.summarize(&root.to_string(), job.request.areas.len(), locations, views, None)))
 }
 
 impl Job<'_> {

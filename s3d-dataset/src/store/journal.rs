@@ -71,7 +71,7 @@ pub(crate) enum Done {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LabelsDone {
     /// What the manifest will tell of the area: its points, images and inputs are not in it yet.
-    pub(crate) entry: AreaEntry,
+    pub(crate) entry: Box<AreaEntry>,
     /// The uuids of its scan locations, in their order.
     pub(crate) locations: Vec<String>,
     pub(crate) files: Vec<FileRecord>,

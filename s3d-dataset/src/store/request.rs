@@ -6,7 +6,7 @@ use s3d_io::dataset::WorldOffsets;
 use s3d_io::fs::Checksum;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What is asked for. It names neither threads nor folders of the machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,11 +65,11 @@ fn option_differences(there: &ExportOptions, now: &ExportOptions) -> Vec<String>
         _ => serde_json::Map::new(),
     };
     let (there, now) = (fields(there), fields(now));
-    let differ = there.iter().filter_map(|(name, before)| {
-        let after = now.get(name)?;
-        (before != after).then(|| difference(&flag(name), before, after))
-    });
-    differ.collect()
+    // What has its default may not be stored.
+    let names: BTreeSet<&String> = there.keys().chain(now.keys()).collect();
+    let value = |of: &serde_json::Map<String, Value>, name: &str| of.get(name).cloned().unwrap_or_default();
+    let both = names.into_iter().map(|name| (name, value(&there, name), value(&now, name)));
+    both.filter(|(_, a, b)| a != b).map(|(name, a, b)| difference(&flag(name), &a, &b)).collect()
 }
 
 /// The option on the command line that a key stands for.
@@ -98,6 +98,7 @@ fn words(value: &Value) -> String {
         Value::String(text) => text.clone(),
         Value::Array(items) if items.is_empty() => "none".to_owned(),
         Value::Array(items) => items.iter().map(words).collect::<Vec<_>>().join(","),
+        Value::Null => "none".to_owned(),
         other => other.to_string(),
     }
 }
@@ -129,11 +130,12 @@ impl Request {
 
     /// The same request with nothing asked for but labels and scores: what a plan is made for.
     pub(crate) fn of_plan(&self) -> Self {
-        let ExportOptions { views, size, lenient, entropy_stride, .. } = self.options;
+        let ExportOptions { views, size, lenient, fill, entropy_stride, .. } = self.options;
         let options = ExportOptions {
             views,
             size,
             lenient,
+            fill,
             entropy_stride,
             modalities: Vec::new(),
             ..ExportOptions::default()
@@ -271,6 +273,7 @@ pub(crate) mod tests {
         assert_eq!(changed(&|r| r.seed = 7), ["--seed 0 there, 7 now"]);
         assert_eq!(changed(&|r| r.version = "2.0.0".into()), ["version 1.2.3 of s3d there, 2.0.0 now"]);
         assert_eq!(changed(&|r| r.options.pano_width = 64), ["--pano-width 4096 there, 64 now"]);
+        assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["--fill none there, 0.5 now"]);
         assert_eq!(changed(&|r| r.options.keep_all = true), ["--keep-all now, not there"]);
         assert_eq!(changed(&|r| r.options.normals = Normals::Smooth), ["--smooth-normals now, not there"]);
         assert_eq!(
@@ -315,6 +318,7 @@ pub(crate) mod tests {
         };
         assert!(changed(&other_images).is_empty());
         assert_eq!(changed(&|r| r.options.size = 64), ["--size 1080 there, 64 now"]);
+        assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["--fill none there, 0.5 now"]);
         assert_eq!(changed(&|r| r.options.lenient = true), ["--lenient now, not there"]);
         assert_eq!(changed(&|r| r.seed = 7), ["--seed 0 there, 7 now"]);
         let known = request();

@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::event::{Event, Stage, UnitKind};
-use crate::tables::summary::{Summary, UnitTally, ViewTally};
+use crate::tables::summary::{Summary, UnitTally, Unlabelled, ViewTally};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -72,6 +72,7 @@ impl<'c> Account<'c> {
         areas: usize,
         locations: usize,
         candidate_views: ViewTally,
+        unlabelled: Option<Unlabelled>,
     ) -> Summary {
         let State { stage_seconds, tally } = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         let summary = Summary {
@@ -80,6 +81,7 @@ impl<'c> Account<'c> {
             locations: locations as u64,
             tally,
             candidate_views,
+            unlabelled,
             warnings: self.ctx.warnings() - self.warnings_before,
             stage_seconds: stage_seconds.into_iter().map(|(stage, s)| (stage, thousandths(s))).collect(),
             seconds: thousandths(self.started.elapsed().as_secs_f64()),

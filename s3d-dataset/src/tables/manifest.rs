@@ -6,6 +6,7 @@ use crate::place::free_space::SurfaceSeen;
 use crate::profile::loader::Profile;
 use crate::store::change;
 use crate::store::request::{InputRecord, Request, RequestedArea};
+use crate::tables::summary::Unlabelled;
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType};
@@ -94,6 +95,9 @@ pub(crate) struct AreaEntry {
     pub(crate) faces_left_out: usize,
     pub(crate) points: u64,
     pub(crate) annotated_points: u64,
+    /// What of it has no votes and no label; not there without labels, or in data sets of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) unlabelled: Option<Unlabelled>,
     pub(crate) rooms: usize,
     pub(crate) locations: usize,
     pub(crate) panoramas: u64,

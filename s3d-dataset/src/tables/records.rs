@@ -9,7 +9,7 @@ use crate::export::views::Candidate;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FaceVoteColumns, Frame, ImageName, Layout, Split};
 use s3d_io::fs::{create_dir, write_json};
-use s3d_label::{Class, ClassDispute, DisputedPatch, Disputes, FaceLabels, LabelTable, VoteReport, VoteRow};
+use s3d_label::{Class, ClassDispute, DisputedPatch, Disputes, FaceLabels, LabelId, LabelTable, VoteRow};
 use s3d_sample::Fold;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -96,7 +96,7 @@ const MOST_PATCHES: usize = 50;
 pub(crate) fn write_votes(
     layout: &Layout,
     area: u32,
-    report: &VoteReport,
+    annotated: &Annotated,
     disputes: &Disputes,
     table: &LabelTable,
 ) -> Result<()> {
@@ -124,6 +124,9 @@ pub(crate) fn write_votes(
     struct Votes {
         faces: u64,
         faces_without_votes: u64,
+        m2_without_votes: f64,
+        faces_without_label: u64,
+        m2_without_label: f64,
         total: VoteRecord,
         rooms: Vec<Named>,
         classes: Vec<Named>,
@@ -139,9 +142,13 @@ pub(crate) fn write_votes(
         center: p.center.to_array(),
         bbox: p.bbox.to_array(),
     };
+    let (report, unlabelled) = (&annotated.report, &annotated.unlabelled);
     let votes = Votes {
         faces: report.face_count,
         faces_without_votes: report.faces_without_vote,
+        m2_without_votes: unlabelled.without_votes.m2,
+        faces_without_label: unlabelled.without_label.faces,
+        m2_without_label: unlabelled.without_label.m2,
         total: (&report.total).into(),
         rooms: report
             .rooms
@@ -162,15 +169,20 @@ pub(crate) fn write_votes(
     Ok(())
 }
 
-/// Writes `area_N/3d/votes.npz`: how the votes for each face went.
-pub(crate) fn write_face_votes(layout: &Layout, area: u32, votes: &FaceLabels) -> Result<()> {
+/// Writes `area_N/3d/votes.npz`: the label of each face, and how the votes for it went.
+pub(crate) fn write_face_votes(
+    layout: &Layout,
+    area: u32,
+    label_of_face: &[LabelId],
+    votes: &FaceLabels,
+) -> Result<()> {
     let count = |votes: u64| u32::try_from(votes).unwrap_or(u32::MAX);
-    let mut columns = FaceVoteColumns::default();
+    let mut columns =
+        FaceVoteColumns { label: label_of_face.iter().map(|l| l.0).collect(), ..Default::default() };
     for face in votes.iter() {
-        let [label, won, total, runner_up, runner_up_votes] = face.as_ref().map_or([0; 5], |v| {
-            [v.label.0, count(v.votes), count(v.total), v.runner_up.0, count(v.runner_up_votes)]
-        });
-        columns.label.push(label);
+        let [won, total, runner_up, runner_up_votes] = face
+            .as_ref()
+            .map_or([0; 4], |v| [count(v.votes), count(v.total), v.runner_up.0, count(v.runner_up_votes)]);
         columns.votes.push(won);
         columns.total.push(total);
         columns.runner_up.push(runner_up);

@@ -17,6 +17,29 @@ pub struct ImageTally {
     pub pixels_missing: u64,
     /// Those whose face has no label: 0 where no semantic image is asked for.
     pub pixels_unlabelled: u64,
+    /// Those whose face has a label by filling alone: without it they would have none.
+    pub pixels_filled: u64,
+}
+
+/// So much of a mesh, and of what its images show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Surface {
+    /// Faces.
+    pub faces: u64,
+    /// Square metres.
+    pub m2: f64,
+    /// Pixels of panoramas and views together; none without images of labels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixels: Option<u64>,
+}
+
+/// Surface that nobody voted for, and what of it has no label: the rest was filled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Unlabelled {
+    /// Before filling.
+    pub without_votes: Surface,
+    /// After it.
+    pub without_label: Surface,
 }
 
 /// What a unit of work wrote. Kept in the journal, so that a run that goes on can tell of the whole.
@@ -38,6 +61,22 @@ impl AddAssign for ImageTally {
         self.pixels += other.pixels;
         self.pixels_missing += other.pixels_missing;
         self.pixels_unlabelled += other.pixels_unlabelled;
+        self.pixels_filled += other.pixels_filled;
+    }
+}
+
+impl AddAssign for Surface {
+    fn add_assign(&mut self, other: Self) {
+        self.faces += other.faces;
+        self.m2 += other.m2;
+        self.pixels = self.pixels.map_or(other.pixels, |sum| Some(sum + other.pixels.unwrap_or(0)));
+    }
+}
+
+impl AddAssign for Unlabelled {
+    fn add_assign(&mut self, other: Self) {
+        self.without_votes += other.without_votes;
+        self.without_label += other.without_label;
     }
 }
 
@@ -88,6 +127,9 @@ pub struct Summary {
     pub tally: UnitTally,
     /// What became of the candidate views.
     pub candidate_views: ViewTally,
+    /// What has no votes and no label: none of a shard, and of a data set without labels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unlabelled: Option<Unlabelled>,
     /// Warnings of this run.
     pub warnings: u64,
     /// Of this run, by stage.
@@ -128,6 +170,19 @@ impl Summary {
             lines.push(format!(
                 "without a label, for no point voted for their face: {}",
                 unlabelled.join(", ")
+            ));
+        }
+        if let Some(Unlabelled { without_votes, without_label }) = self.unlabelled
+            && without_label.faces < without_votes.faces
+        {
+            let pixels = without_votes.pixels.zip(without_label.pixels);
+            let pixels = pixels.map_or(String::new(), |(a, b)| format!(", {} of {a} such pixels", a - b));
+            lines.push(format!(
+                "filled: {} of {} faces without votes, {:.1} of {:.1} m²{pixels}",
+                without_votes.faces - without_label.faces,
+                without_votes.faces,
+                without_votes.m2 - without_label.m2,
+                without_votes.m2
             ));
         }
         if views.candidates > views.kept {
@@ -202,7 +257,8 @@ mod tests {
 
     #[test]
     fn tallies_add_up_and_come_back_from_json() {
-        let views = ImageTally { images: 3, pixels: 300, pixels_missing: 30, pixels_unlabelled: 6 };
+        let views =
+            ImageTally { images: 3, pixels: 300, pixels_missing: 30, pixels_unlabelled: 6, pixels_filled: 5 };
         let a = UnitTally { files: 9, bytes: 1000, views, ..UnitTally::default() };
         let b = UnitTally { files: 1, panoramas: views, ..UnitTally::default() };
         let sum: UnitTally = [a, b, a].into_iter().sum();
@@ -220,14 +276,23 @@ mod tests {
             locations: 2,
             tally: UnitTally { files: 4, bytes: 2500, ..UnitTally::default() },
             candidate_views: ViewTally::default(),
+            unlabelled: Some(Unlabelled::default()),
             warnings: 0,
             stage_seconds: BTreeMap::new(),
             seconds: 1.25,
         };
         let lines = summary.lines();
         assert_eq!(lines, ["out: 0 panoramas and 0 views of 2 locations in 1.2 s", "4 files, 2.5 kB"]);
-        summary.tally.views =
-            ImageTally { images: 7, pixels: 1000, pixels_missing: 1, pixels_unlabelled: 120 };
+        summary.tally.views = ImageTally {
+            images: 7,
+            pixels: 1000,
+            pixels_missing: 1,
+            pixels_unlabelled: 120,
+            pixels_filled: 30,
+        };
+        let surface = |faces, m2, pixels| Surface { faces, m2, pixels: Some(pixels) };
+        summary.unlabelled =
+            Some(Unlabelled { without_votes: surface(9, 2.5, 150), without_label: surface(4, 0.5, 120) });
         summary.candidate_views =
             ViewTally { candidates: 20, kept: 15, dropped_lowest: 3, dropped_not_drawn: 2, not_asked: 8 };
         summary.stage_seconds = [(Stage::Render, 0.5), (Stage::Load, 0.25)].into();
@@ -236,6 +301,7 @@ mod tests {
             "load 0.2 s, render 0.5 s",
             "0.10 % of the pixels of views",
             "without a label, for no point voted for their face: 12.00 % of the pixels of views",
+            "filled: 5 of 9 faces without votes, 2.0 of 2.5 m², 30 of 150 such pixels",
             "5 of 20 candidate views dropped: 3 for the lowest entropies of their pool, 2 not drawn",
             "8 kept views are of locations",
         ] {

@@ -7,7 +7,7 @@ use s3d_geom::TriMesh;
 use s3d_io::dataset::{Layout, read_face_votes};
 use s3d_io::fs::read_json;
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
-use s3d_label::{Class, parse_name};
+use s3d_label::{Class, LabelId, fill_labels, parse_name};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -90,8 +90,21 @@ pub(crate) fn read_and_check(
         )
     });
     drop(other);
-    check_votes(layout, area, &label_of_face, labels, report);
-    Some(LabelledMesh { file, label_of_face })
+    let labelled = LabelledMesh { file, label_of_face };
+    if let Some(of) = manifest.area(area).and_then(|entry| entry.unlabelled) {
+        let null = (0u32..).zip(&labelled.label_of_face).filter(|(_, label)| **label == 0);
+        let (faces, m2) =
+            null.fold((0, 0.0), |(n, m2), (face, _)| (n + 1, m2 + labelled.file.mesh.area(face)));
+        let same = of.without_label.faces == faces && (of.without_label.m2 - m2).abs() <= 1e-6 * m2;
+        report.check(same, MESH, &semantic, || {
+            format!(
+                "{faces} faces of {m2} m² without a label, and the manifest tells of {:?}",
+                of.without_label
+            )
+        });
+    }
+    check_votes(layout, area, &labelled, (labels, manifest.options.fill), report);
+    Some(labelled)
 }
 
 /// The index of each face's label.
@@ -132,15 +145,35 @@ struct VotesRecord {
 }
 
 /// Holds the labels of `semantic.obj` against the votes, and against the report on them: faces in all, by
-/// room and by class.
-fn check_votes(layout: &Layout, area: u32, label_of_face: &[u32], labels: &Labels, report: &Report) {
+/// room and by class. Labels without votes must be those that filling the others gives.
+fn check_votes(
+    layout: &Layout,
+    area: u32,
+    mesh: &LabelledMesh,
+    (labels, fill_m): (&Labels, Option<f64>),
+    report: &Report,
+) {
+    let LabelledMesh { file, label_of_face } = mesh;
     let path = layout.votes_npz(area);
+    // Labels by votes alone: what is without votes has none.
+    let mut voted = label_of_face.clone();
     // Data sets of earlier versions have none; where one is listed and gone, the list of files tells.
     if path.exists()
         && let Some(votes) = report.read(Topic::Mesh, &path, read_face_votes)
     {
-        let won = votes.label == label_of_face;
+        let won = votes.label == *label_of_face;
         report.check(won, VOTES, &path, || "other labels won than semantic.obj has".to_owned());
+        for (label, _) in voted.iter_mut().zip(&votes.total).filter(|(_, total)| **total == 0) {
+            *label = 0;
+        }
+        let mut filled: Vec<LabelId> = voted.iter().map(|label| LabelId(*label)).collect();
+        if let Some(within_m) = fill_m.filter(|_| won) {
+            fill_labels(&file.mesh, &mut filled, within_m);
+        }
+        let odd = filled.iter().zip(label_of_face).filter(|(filled, label)| filled.0 != **label).count();
+        report.check(!won || odd == 0, VOTES, &path, || {
+            format!("{odd} faces have other labels than votes and filling give them")
+        });
         let sums = votes.votes.iter().zip(&votes.runner_up_votes).zip(&votes.total);
         let odd = sums.filter(|((first, second), total)| {
             first < second || u64::from(**first) + u64::from(**second) > u64::from(**total)
@@ -151,7 +184,7 @@ fn check_votes(layout: &Layout, area: u32, label_of_face: &[u32], labels: &Label
     let path = layout.votes_json(area);
     let Some(votes) = report.read(Topic::Mesh, &path, read_json::<VotesRecord>) else { return };
     let mut per_label = vec![0u64; labels.len()];
-    for &label in label_of_face {
+    for label in voted {
         if let Some(count) = per_label.get_mut(label as usize) {
             *count += 1;
         }

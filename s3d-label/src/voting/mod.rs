@@ -3,12 +3,14 @@
 mod corners;
 mod disputes;
 mod face_labels;
+mod fill;
 mod labeler;
 mod report;
 mod votes;
 
 pub use disputes::{ClassDispute, DisputedPatch, Disputes};
 pub use face_labels::FaceLabels;
+pub use fill::fill_labels;
 pub use labeler::{Labeler, VoteError, vote};
 pub use report::{VoteReport, VoteRow};
 pub use votes::{FaceVotes, PointTally, VoteOptions, Votes};

@@ -3,10 +3,13 @@
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::input::AreaInput;
-use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
+use crate::tables::summary::{Surface, Unlabelled};
+use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance as InstancePoints, InstanceReader, PointPasses};
-use s3d_label::{FaceLabels, Label, LabelId, LabelTable, Labeler, Room, VoteReport, wall_directions_deg};
+use s3d_label::{
+    FaceLabels, Label, LabelId, LabelTable, Labeler, Room, VoteReport, fill_labels, wall_directions_deg,
+};
 use serde::{Deserialize, Serialize};
 
 /// Points that are in memory, three times: while some are looked up, those that follow are read.
@@ -15,10 +18,15 @@ const BLOCK_POINTS: usize = 1 << 19;
 /// An annotated area.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Annotated {
-    /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted. As data it has a file of
-    /// its own.
+    /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted and nothing was filled. As
+    /// data it has a file of its own.
     #[serde(skip)]
     pub(crate) label_of_face: Vec<LabelId>,
+    /// The faces that were filled: they have a label without a vote. Ascending; in that file too.
+    #[serde(skip)]
+    pub(crate) filled: Vec<u32>,
+    /// What has no label.
+    pub(crate) unlabelled: Unlabelled,
     pub(crate) report: VoteReport,
     /// The rooms, in the order of their names.
     pub(crate) rooms: Vec<SurveyedRoom>,
@@ -26,6 +34,24 @@ pub(crate) struct Annotated {
     pub(crate) points: u64,
     #[serde(skip)]
     pub(crate) skipped: SkippedLines,
+}
+
+impl Annotated {
+    /// Gives faces without a label that of the surface next to them, if it is asked for.
+    pub(crate) fn fill(&mut self, mesh: &TriMesh, within_m: Option<f64>) {
+        let null = |labels: &[LabelId]| {
+            let mut sum = Surface::default();
+            for (face, _) in (0u32..).zip(labels).filter(|(_, label)| label.is_null()) {
+                sum += Surface { faces: 1, m2: mesh.area(face), pixels: None };
+            }
+            sum
+        };
+        let without_votes = null(&self.label_of_face);
+        if let Some(within_m) = within_m {
+            self.filled = fill_labels(mesh, &mut self.label_of_face, within_m);
+        }
+        self.unlabelled = Unlabelled { without_votes, without_label: null(&self.label_of_face) };
+    }
 }
 
 /// What a lenient reading left out of the files of instances.
@@ -72,12 +98,14 @@ pub(crate) struct AnnotatedInstance<'a> {
 
 /// Reads an area's annotated points, one instance at a time and block by block, and lets each vote for its
 /// nearest face. `each` gets every instance with its box and points, in the order of rooms and of numbers in
-/// the room. Returns the votes behind the labels too.
+/// the room. Faces without a vote that are nearer to labelled surface than `fill_m` are filled, if that is
+/// there. Returns the votes behind the labels too.
 pub(crate) fn annotate(
     ctx: &Context,
     area: &AreaInput,
     nearest_faces: &NearestFaces<'_>,
     table: &LabelTable,
+    fill_m: Option<f64>,
     mut each: impl FnMut(AnnotatedInstance<'_>) -> Result<()> + Send,
 ) -> Result<(Annotated, FaceLabels)> {
     let mesh = nearest_faces.mesh();
@@ -157,16 +185,32 @@ pub(crate) fn annotate(
         room.wall_direction_deg = directions_deg.get(&room.room).copied().unwrap_or(0);
     }
     let report = report.map_err(|e| Error::Input(e.to_string()))?;
-    let label_of_face = labels.label_of_face().to_vec();
-    Ok((Annotated { label_of_face, report, rooms, points: total, skipped }, labels))
+    let mut annotated = Annotated {
+        label_of_face: labels.label_of_face().to_vec(),
+        filled: Vec::new(),
+        unlabelled: Unlabelled::default(),
+        report,
+        rooms,
+        points: total,
+        skipped,
+    };
+    annotated.fill(mesh, fill_m);
+    Ok((annotated, labels))
 }
 
 /// An area without annotations: no face has a label, and no room is known.
 pub(crate) fn unannotated(nearest_faces: &NearestFaces<'_>, table: &LabelTable) -> Result<Annotated> {
     let labels = Labeler::new(nearest_faces).finish();
     let report = labels.report(table).map_err(|e| Error::Input(e.to_string()))?;
-    let label_of_face = labels.into_label_of_face();
-    Ok(Annotated { label_of_face, report, rooms: Vec::new(), points: 0, skipped: SkippedLines::default() })
+    Ok(Annotated {
+        label_of_face: labels.into_label_of_face(),
+        filled: Vec::new(),
+        unlabelled: Unlabelled::default(),
+        report,
+        rooms: Vec::new(),
+        points: 0,
+        skipped: SkippedLines::default(),
+    })
 }
 
 /// The rooms so far. The outline of the last one is drawn beside what follows.

@@ -2,7 +2,7 @@
 //! again.
 //!
 //! Two files in a folder: `area.jsonl`, small, and `label_of_face.npy`, an array of `<u4` with a label index
-//! a face. The first holds the second's checksum and is written after it, so that an area which can be read
+//! a face, and the highest bit where that was filled. The first holds the second's checksum and is written after it, so that an area which can be read
 //! is whole. Processes that write the same area at the same time write the same bytes.
 
 use crate::error::Result;
@@ -19,6 +19,9 @@ use s3d_io::fs::{Checksum, create_dir};
 use s3d_label::{Label, LabelId, Room};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// Marks the label of a face that nobody voted for. No index is as large.
+const FILLED: u32 = 1 << 31;
 
 /// All that an export needs to know of an area's annotations once it is labelled.
 #[derive(Debug, Serialize, Deserialize)]
@@ -81,8 +84,9 @@ impl AreaPlan {
     /// Writes the area into `folder`.
     pub(crate) fn write(&self, folder: &Path) -> Result<()> {
         create_dir(folder)?;
-        let label_of_face = &self.annotated.label_of_face;
-        let bytes: Vec<u8> = label_of_face.iter().flat_map(|l| l.0.to_le_bytes()).collect();
+        let mut label_of_face: Vec<u32> = self.annotated.label_of_face.iter().map(|l| l.0).collect();
+        self.annotated.filled.iter().for_each(|&face| label_of_face[face as usize] |= FILLED);
+        let bytes: Vec<u8> = label_of_face.iter().flat_map(|l| l.to_le_bytes()).collect();
         let mut array = NpyWriter::create(&labels_file(folder), "<u4", &[label_of_face.len() as u64])?;
         array.put(&bytes)?;
         array.finish()?;
@@ -110,8 +114,10 @@ impl AreaPlan {
         if locations != rooms {
             return refused(format!("has {locations} scan locations, and rooms of {rooms}"));
         }
-        plan.annotated.label_of_face =
-            read_label_of_face(&labels_file(folder), faces, label_of_face_xxh3_128)?;
+        let labels = read_label_of_face(&labels_file(folder), faces, label_of_face_xxh3_128)?;
+        let filled = (0u32..).zip(&labels).filter(|(_, label)| **label & FILLED != 0);
+        plan.annotated.filled = filled.map(|(face, _)| face).collect();
+        plan.annotated.label_of_face = labels.iter().map(|label| LabelId(label & !FILLED)).collect();
         Ok(plan)
     }
 }
@@ -126,7 +132,7 @@ fn labels_file(folder: &Path) -> PathBuf {
 
 /// The labels are what the file ends with, as `area.jsonl` says how many there are and what their checksum
 /// is.
-fn read_label_of_face(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec<LabelId>> {
+fn read_label_of_face(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec<u32>> {
     let bytes = s3d_io::fs::read_file(path)?;
     let labels = usize::try_from(faces)
         .ok()
@@ -138,7 +144,7 @@ fn read_label_of_face(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec
             FileError::format(path, "is damaged: its checksum differs; remove it and area.jsonl")
         })?;
     let (labels, _) = labels.as_chunks::<4>();
-    Ok(labels.iter().map(|b| LabelId(u32::from_le_bytes(*b))).collect())
+    Ok(labels.iter().map(|b| u32::from_le_bytes(*b)).collect())
 }
 
 /// `area.jsonl`.
@@ -175,6 +181,7 @@ mod locations_as_data {
 mod tests {
     use super::*;
     use crate::export::labels::annotate::{SkippedLines, SurveyedRoom};
+    use crate::tables::summary::{Surface, Unlabelled};
     use glam::{DMat3, DVec2, DVec3, Vec3};
     use proptest::prelude::*;
     use proptest::strategy::ValueTree;
@@ -213,7 +220,7 @@ mod tests {
 
     prop_compose! {
         fn any_plan()(
-            labels in prop::collection::vec(any::<u32>(), 0..200),
+            labels in prop::collection::vec((0..FILLED, any::<bool>()), 0..200),
             row in any_row(),
             class_row in any_row(),
             number in any_number(),
@@ -230,7 +237,12 @@ mod tests {
             AreaPlan {
                 area: 3,
                 annotated: Annotated {
-                    label_of_face: labels.iter().copied().map(LabelId).collect(),
+                    label_of_face: labels.iter().map(|(label, _)| LabelId(*label)).collect(),
+                    filled: (0..).zip(&labels).filter(|(_, (_, filled))| *filled).map(|(f, _)| f).collect(),
+                    unlabelled: Unlabelled {
+                        without_votes: Surface { faces: 7, m2: number, pixels: None },
+                        without_label: Surface { faces: 2, m2: 0.1, pixels: Some(3) },
+                    },
                     report: VoteReport {
                         far_m,
                         face_count: labels.len() as u64,
@@ -300,6 +312,7 @@ mod tests {
         let mut runner = proptest::test_runner::TestRunner::deterministic();
         let mut plan = any_plan().new_tree(&mut runner).unwrap().current();
         plan.annotated.label_of_face = (0..100).map(LabelId).collect();
+        plan.annotated.filled = vec![0, 99];
         plan.write(dir.path()).unwrap();
         assert!(AreaPlan::is_in(dir.path()) && AreaPlan::read(dir.path(), 3).is_ok());
         let refusal =
