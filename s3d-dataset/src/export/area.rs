@@ -440,8 +440,7 @@ pub(crate) fn render_area(
     create_dir(&layout.mesh_dir(number))?;
     let textures = MipMaps::new(&file.mesh);
     let label_of_face: Vec<u32> = annotated.label_of_face.iter().map(|l| l.0).collect();
-    let pretty_of_face: Vec<[u8; 3]> =
-        label_of_face.iter().map(|l| s3d_io::image::pretty_color(*l)).collect();
+    let pretty_of_face: Vec<[u8; 3]> = label_of_face.iter().map(|l| s3d_label::pretty_color(*l)).collect();
     let chosen: Vec<bool> =
         locations.iter().map(|l| todo.contains(&Unit::Location(number, l.uuid.clone()))).collect();
     let finish_location = |written: WrittenLocation| {
