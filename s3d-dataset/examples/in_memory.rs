@@ -26,9 +26,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = std::env::args().nth(1).ok_or("give a folder")?;
     let mesh = room()?;
     let label = |class, instance| Label { class, instance, room: "office_1".parse().unwrap(), area: 1 };
-    let labels: Vec<Label> = [(Class::Floor, 1), (Class::Ceiling, 1)]
+    let labels: Vec<Label> = [(Class::FLOOR, 1), (Class::CEILING, 1)]
         .into_iter()
-        .chain((1..=4).map(|wall| (Class::Wall, wall)))
+        .chain((1..=4).map(|wall| (Class::WALL, wall)))
         .map(|(class, instance)| label(class, instance))
         .collect();
     // Two triangles a label.

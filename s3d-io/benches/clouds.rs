@@ -193,7 +193,7 @@ fn clouds(c: &mut Criterion) {
         write_las(dir.path(), &points, "cloud.laz"),
         write_e57(dir.path(), &points),
     ];
-    let classes = (0..72).map(|k: usize| (k.to_string(), Some(Class::ALL[k % 8]))).collect();
+    let classes = (0..72).map(|k: usize| (k.to_string(), Some(Class::S3DIS[k % 8]))).collect();
     let room = Some("office_1".parse().unwrap());
     let memory = AnnotationOptions { classes, room, ..AnnotationOptions::default() };
     let spool = AnnotationOptions { points_in_memory: 0, ..memory.clone() };

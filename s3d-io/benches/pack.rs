@@ -45,7 +45,7 @@ fn poses() -> Vec<(Camera, PoseFile)> {
 /// A semantic image of 1080² that shows 30 instances in patches with ragged edges.
 fn semantic() -> (Raster<[u8; 3]>, LabelTable) {
     let labels = (1..=30).map(|instance| Label {
-        class: Class::ALL[instance as usize % 13],
+        class: Class::S3DIS[instance as usize % 13],
         instance,
         room: "office_1".parse().unwrap(),
         area: 1,
@@ -115,7 +115,7 @@ fn cameras(c: &mut Criterion) {
 fn tables(c: &mut Criterion) {
     let dir = tempfile::tempdir().unwrap();
     let (image, table) = semantic();
-    let stuff = [Class::Ceiling, Class::Floor, Class::Wall];
+    let stuff = [Class::CEILING, Class::FLOOR, Class::WALL];
     let mut group = c.benchmark_group("pack");
     group.throughput(Throughput::Elements(1));
     group.bench_function("coco, an image of 1080²", |b| {

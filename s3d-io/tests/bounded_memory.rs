@@ -39,7 +39,7 @@ fn a_cloud_of_one_instance_is_boxed_and_voxelised_in_little_memory() {
 
     let before = peak();
     let options = AnnotationOptions {
-        classes: [("7".to_owned(), Some(Class::Floor))].into(),
+        classes: [("7".to_owned(), Some(Class::FLOOR))].into(),
         points_in_memory: 100_000,
         spool_dir: Some(dir.path().to_owned()),
         ..AnnotationOptions::default()

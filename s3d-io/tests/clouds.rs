@@ -9,14 +9,14 @@ use s3d_label::Class;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-const CLASSES: [Class; 3] = [Class::Floor, Class::Wall, Class::Chair];
+const CLASSES: [Class; 3] = [Class::FLOOR, Class::WALL, Class::CHAIR];
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/clouds").join(name)
 }
 
 fn options() -> AnnotationOptions {
-    let classes = [("2", Class::Floor), ("6", Class::Wall), ("19", Class::Chair)];
+    let classes = [("2", Class::FLOOR), ("6", Class::WALL), ("19", Class::CHAIR)];
     AnnotationOptions {
         room: Some("office_1".parse().unwrap()),
         classes: classes.into_iter().map(|(key, class)| (key.to_owned(), Some(class))).collect(),
@@ -168,7 +168,7 @@ fn classes_without_a_meaning_stop_or_are_left_out_or_are_clutter() {
     let clutter = AnnotationOptions { unknown_as_clutter: true, ..known };
     let found = open("ascii.ply", &clutter).unwrap();
     let all = contents(&found, "office_1");
-    assert_eq!(all[&(Class::Clutter.index(), 4)], expected(DVec3::ZERO)[&(Class::Chair.index(), 4)]);
+    assert_eq!(all[&(Class::CLUTTER.index(), 4)], expected(DVec3::ZERO)[&(Class::CHAIR.index(), 4)]);
     assert!(found.warnings[0].contains("taken for clutter: \"19\""));
 }
 

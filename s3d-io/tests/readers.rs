@@ -33,7 +33,7 @@ fn contents(annotations: &Annotations) -> Vec<(String, PointCloud)> {
 
 #[test]
 fn annotations_of_any_format_come_from_a_reader() {
-    let classes = [("2", Class::Floor), ("6", Class::Wall), ("19", Class::Chair)];
+    let classes = [("2", Class::FLOOR), ("6", Class::WALL), ("19", Class::CHAIR)];
     let classes = classes.map(|(number, class)| (number.to_owned(), Some(class)));
     let options = AnnotationOptions {
         classes: classes.into(),
@@ -89,7 +89,7 @@ fn a_mat_file_is_written_to_and_read_from_memory() {
     assert_eq!((points.positions, points.colors), (positions, colors));
     let annotations =
         Annotations::from_reader(Cursor::new(bytes), Path::new("a.mat"), &Default::default()).unwrap();
-    assert_eq!(annotations.rooms[0].instances[0].class, Class::Chair);
+    assert_eq!(annotations.rooms[0].instances[0].class, Class::CHAIR);
 }
 
 #[test]

@@ -11,8 +11,8 @@ fn labels(count: u32) -> Vec<Label> {
     for area in 1..=6 {
         let instances = (0..count / 6).map(|i| {
             let room =
-                Room { room_type: RoomType::ALL[(i / 13 % 11) as usize], number: 1 + i / 13 / 11 % 40 };
-            (room, Class::ALL[(i % 13) as usize], 1 + i)
+                Room { room_type: RoomType::S3DIS[(i / 13 % 11) as usize], number: 1 + i / 13 / 11 % 40 };
+            (room, Class::S3DIS[(i % 13) as usize], 1 + i)
         });
         labels.extend(number_area(area, instances).unwrap().into_iter().map(|i| i.label));
     }

@@ -1,117 +1,118 @@
-//! The 13 classes of objects.
+//! Classes of objects.
 
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// A class of object. The order is that of formats.md, "What is written"; [`Class::index`] counts along it.
+/// A class of object: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are S3DIS's 13
+/// classes; [`Taxonomy::class`](crate::Taxonomy::class) finds those of other taxonomies.
+///
+/// `Ord` is the order of the taxonomy; for S3DIS that of formats.md, "What is written".
 ///
 /// ```
 /// use s3d_label::Class;
 ///
-/// assert_eq!("chair".parse(), Ok(Class::Chair));
-/// assert_eq!((Class::Chair.index(), Class::ALL.len()), (8, 13));
+/// assert_eq!("chair".parse(), Ok(Class::CHAIR));
+/// assert_eq!((Class::CHAIR.index(), Class::S3DIS.len()), (8, 13));
 /// assert!("stairs".parse::<Class>().is_err());
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum Class {
-    /// `ceiling`
-    Ceiling,
-    /// `floor`
-    Floor,
-    /// `wall`
-    Wall,
-    /// `beam`
-    Beam,
-    /// `column`
-    Column,
-    /// `window`
-    Window,
-    /// `door`
-    Door,
-    /// `table`
-    Table,
-    /// `chair`
-    Chair,
-    /// `sofa`
-    Sofa,
-    /// `bookcase`
-    Bookcase,
-    /// `board`
-    Board,
-    /// `clutter`: everything that is none of the others.
-    Clutter,
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Class {
+    index: u8,
+    /// What it counts as: a place in [`Class::S3DIS`].
+    s3dis: u8,
+    /// One word wide, since labels are many, and stand in errors.
+    name: &'static &'static str,
 }
 
-/// A word that should be a class and is none of the 13.
+/// A word that should be a class of a taxonomy and is none.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{word:?} is no class; the classes are {valid}", valid = Class::ALL.map(Class::name).join(" "))]
+#[error("{word:?} is no class; the classes are {classes}")]
 pub struct UnknownClass {
     /// The word.
     pub word: String,
+    /// The classes of the taxonomy, with blanks between them.
+    pub classes: String,
+}
+
+macro_rules! s3dis {
+    ($($constant:ident $index:literal $name:literal;)*) => {
+        impl Class {
+            $(
+                #[doc = concat!("`", $name, "` of S3DIS.")]
+                pub const $constant: Self = Self { index: $index, s3dis: $index, name: &$name };
+            )*
+
+            /// The classes of S3DIS, each at its [`Class::index`].
+            pub const S3DIS: [Self; 13] = [$(Self::$constant),*];
+        }
+    };
+}
+
+s3dis! {
+    CEILING 0 "ceiling";
+    FLOOR 1 "floor";
+    WALL 2 "wall";
+    BEAM 3 "beam";
+    COLUMN 4 "column";
+    WINDOW 5 "window";
+    DOOR 6 "door";
+    TABLE 7 "table";
+    CHAIR 8 "chair";
+    SOFA 9 "sofa";
+    BOOKCASE 10 "bookcase";
+    BOARD 11 "board";
+    CLUTTER 12 "clutter";
 }
 
 impl Class {
-    /// All classes, each at its [`Class::index`].
-    pub const ALL: [Self; 13] = [
-        Self::Ceiling,
-        Self::Floor,
-        Self::Wall,
-        Self::Beam,
-        Self::Column,
-        Self::Window,
-        Self::Door,
-        Self::Table,
-        Self::Chair,
-        Self::Sofa,
-        Self::Bookcase,
-        Self::Board,
-        Self::Clutter,
-    ];
+    /// The class at `index` of a taxonomy, which counts as the class of S3DIS at `s3dis`.
+    pub(crate) const fn new(index: u8, s3dis: u8, name: &'static &'static str) -> Self {
+        Self { index, s3dis, name }
+    }
 
-    /// The class as it is spelled in names.
+    /// The class as it is spelled in names of labels: letters, digits and hyphens.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ceiling => "ceiling",
-            Self::Floor => "floor",
-            Self::Wall => "wall",
-            Self::Beam => "beam",
-            Self::Column => "column",
-            Self::Window => "window",
-            Self::Door => "door",
-            Self::Table => "table",
-            Self::Chair => "chair",
-            Self::Sofa => "sofa",
-            Self::Bookcase => "bookcase",
-            Self::Board => "board",
-            Self::Clutter => "clutter",
-        }
+        self.name
     }
 
-    /// The class that is spelled `word`, to the letter.
-    pub fn from_name(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|class| class.name() == word)
-    }
-
-    /// Its place in [`Class::ALL`], 0 to 12: the bin of a histogram of classes.
+    /// Its place in its taxonomy, from 0: the bin of a histogram of classes.
     pub const fn index(self) -> usize {
-        self as usize
+        self.index as usize
+    }
+
+    /// Which class of S3DIS it counts as, where only these will do: for loaders of S3DIS, and for what is a
+    /// floor or a wall. [`Class::CLUTTER`] if it is like none of the others.
+    pub fn s3dis(self) -> Self {
+        Self::S3DIS.get(usize::from(self.s3dis)).copied().unwrap_or(Self::CLUTTER)
+    }
+}
+
+impl fmt::Debug for Class {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
     }
 }
 
 impl fmt::Display for Class {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        f.pad(self.name)
     }
 }
 
 impl FromStr for Class {
     type Err = UnknownClass;
 
+    /// The class of S3DIS that is spelled `word`, to the letter.
     fn from_str(word: &str) -> Result<Self, UnknownClass> {
-        Self::from_name(word).ok_or_else(|| UnknownClass { word: word.to_owned() })
+        let unknown = || UnknownClass { word: word.to_owned(), classes: names(&Self::S3DIS) };
+        Self::S3DIS.into_iter().find(|class| *class.name == word).ok_or_else(unknown)
     }
+}
+
+/// The names of classes, for a message.
+pub(crate) fn names(classes: &[Class]) -> String {
+    classes.iter().map(|class| *class.name).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -121,18 +122,18 @@ mod tests {
     #[test]
     fn names_and_indices_go_both_ways() {
         let names = "ceiling floor wall beam column window door table chair sofa bookcase board clutter";
-        assert_eq!(Class::ALL.map(Class::name).join(" "), names);
-        for (i, class) in Class::ALL.into_iter().enumerate() {
+        assert_eq!(Class::S3DIS.map(Class::name).join(" "), names);
+        for (i, class) in Class::S3DIS.into_iter().enumerate() {
             assert_eq!(class.index(), i);
             assert_eq!(class.to_string().parse(), Ok(class));
+            assert_eq!(class.s3dis(), class);
         }
-        assert_eq!(format!("[{:>6}]", Class::Wall), "[  wall]");
+        assert_eq!(format!("[{:>6}]", Class::WALL), "[  wall]");
     }
 
     #[test]
     fn a_strange_word_is_named_beside_the_valid_ones() {
         for word in ["stairs", "Wall", "wall ", "", "<UNK>"] {
-            assert_eq!(Class::from_name(word), None);
             let message = word.parse::<Class>().unwrap_err().to_string();
             assert!(message.contains(&format!("{word:?}")), "{message}");
             assert!(message.ends_with("sofa bookcase board clutter"), "{message}");

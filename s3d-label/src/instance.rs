@@ -12,7 +12,7 @@ use s3d_geom::Aabb;
 ///
 /// let table = LabelTable::from_labels(["sofa_1_lounge_2_4".parse()?])?;
 /// let sofa = InstanceSummary::from_points(&table, LabelId(1), [Vec3::ZERO, vec3(2.0, 0.9, 0.8)]).unwrap();
-/// assert_eq!((sofa.class, sofa.points, sofa.bbox), (Class::Sofa, 2, [0.0, 0.0, 0.0, 2.0, 0.9, 0.8]));
+/// assert_eq!((sofa.class, sofa.points, sofa.bbox), (Class::SOFA, 2, [0.0, 0.0, 0.0, 2.0, 0.9, 0.8]));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +81,7 @@ mod tests {
     fn a_summary_knows_its_label() {
         let points = [vec3(1.0, 5.0, -1.0), vec3(0.0, 7.0, 2.0)];
         let summary = InstanceSummary::from_points(&table(), LabelId(2), points).unwrap();
-        assert_eq!(summary.class, Class::Wall);
+        assert_eq!(summary.class, Class::WALL);
         assert_eq!(summary.room, "WC_1".parse().unwrap());
         assert_eq!((summary.points, summary.bbox), (2, [0.0, 5.0, -1.0, 1.0, 7.0, 2.0]));
         assert_eq!(InstanceSummary::from_points(&table(), LabelId(1), []), None);

@@ -1,7 +1,7 @@
 //! Labels of instances and their names.
 
 use crate::room::number_from_digits;
-use crate::{Class, Room, RoomType, UnknownClass, UnknownRoomType};
+use crate::{Class, Room, Taxonomy, UnknownClass, UnknownRoomType};
 use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
@@ -21,7 +21,7 @@ pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 /// use s3d_label::{Class, Label, LabelError};
 ///
 /// let label: Label = "board_3_hallway_4_6".parse()?;
-/// assert_eq!((label.class, label.instance, label.area), (Class::Board, 3, 6));
+/// assert_eq!((label.class, label.instance, label.area), (Class::BOARD, 3, 6));
 /// assert_eq!((label.room.to_string(), label.to_string()), ("hallway_4".into(), "board_3_hallway_4_6".into()));
 /// assert!(matches!("board_3_hallway_4".parse::<Label>(), Err(LabelError::Fields { count: 4, .. })));
 /// # Ok::<(), LabelError>(())
@@ -83,38 +83,52 @@ pub enum LabelError {
     Null,
 }
 
-/// The label that `name` spells, `None` for the null label ([`NULL_NAME`]).
+/// The label of S3DIS that `name` spells, `None` for the null label ([`NULL_NAME`]). See
+/// [`Taxonomy::parse_name`] for other classes and room types.
 ///
 /// # Errors
 /// [`LabelError`] says which field is wrong.
 ///
 /// ```
 /// use s3d_label::{Class, NULL_NAME, parse_name};
-/// assert_eq!(parse_name("chair_3_office_5_1").unwrap().unwrap().class, Class::Chair);
+/// assert_eq!(parse_name("chair_3_office_5_1").unwrap().unwrap().class, Class::CHAIR);
 /// assert_eq!(parse_name(NULL_NAME), Ok(None));
 /// assert!(parse_name("chair_3_office_5").is_err());
 /// ```
 pub fn parse_name(name: &str) -> Result<Option<Label>, LabelError> {
-    if name == NULL_NAME {
-        return Ok(None);
+    Taxonomy::s3dis().parse_name(name)
+}
+
+impl Taxonomy {
+    /// The label that `name` spells with this taxonomy's classes and room types, `None` for the null label
+    /// ([`NULL_NAME`]).
+    ///
+    /// # Errors
+    /// [`LabelError`] says which field is wrong.
+    pub fn parse_name(&self, name: &str) -> Result<Option<Label>, LabelError> {
+        if name == NULL_NAME {
+            return Ok(None);
+        }
+        let fields: Vec<&str> = name.split('_').collect();
+        let &[class, instance, room_type, room, area] = fields.as_slice() else {
+            return Err(LabelError::Fields { name: name.to_owned(), count: fields.len() });
+        };
+        let number = |field, word: &str| {
+            number_from_digits(word).ok_or_else(|| LabelError::Number {
+                name: name.to_owned(),
+                field,
+                word: word.to_owned(),
+            })
+        };
+        let class =
+            self.class(class).map_err(|source| LabelError::Class { name: name.to_owned(), source })?;
+        let instance = number("instance", instance)?;
+        let room_type = self
+            .room_type(room_type)
+            .map_err(|source| LabelError::RoomType { name: name.to_owned(), source })?;
+        let room = Room { room_type, number: number("room", room)? };
+        Ok(Some(Label { class, instance, room, area: number("area", area)? }))
     }
-    let fields: Vec<&str> = name.split('_').collect();
-    let &[class, instance, room_type, room, area] = fields.as_slice() else {
-        return Err(LabelError::Fields { name: name.to_owned(), count: fields.len() });
-    };
-    let number = |field, word: &str| {
-        number_from_digits(word).ok_or_else(|| LabelError::Number {
-            name: name.to_owned(),
-            field,
-            word: word.to_owned(),
-        })
-    };
-    let class: Class = class.parse().map_err(|source| LabelError::Class { name: name.to_owned(), source })?;
-    let instance = number("instance", instance)?;
-    let room_type: RoomType =
-        room_type.parse().map_err(|source| LabelError::RoomType { name: name.to_owned(), source })?;
-    let room = Room { room_type, number: number("room", room)? };
-    Ok(Some(Label { class, instance, room, area: number("area", area)? }))
 }
 
 impl Label {
@@ -123,9 +137,9 @@ impl Label {
     pub(crate) fn cmp_key(&self, other: &Self) -> Ordering {
         let instance = |label: &Self| Digits::new(label.instance, Some(b'_'));
         let area = |label: &Self| Digits::new(label.area, None);
-        // No class name is the start of another, so that their order decides before the underscore is
-        // reached.
-        (self.class.name().cmp(other.class.name()))
+        // The underscore counts where one name is the start of the other: `shower_` and `showerCurtain_`.
+        let class = |label: &Self| label.class.name().bytes().chain([b'_']);
+        (class(self).cmp(class(other)))
             .then_with(|| instance(self).as_bytes().cmp(instance(other).as_bytes()))
             .then_with(|| area(self).as_bytes().cmp(area(other).as_bytes()))
     }
@@ -198,6 +212,7 @@ impl Digits {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::RoomType;
     use proptest::prelude::*;
 
     /// Mostly small numbers, so that strings share their starts and instances meet again.
@@ -208,8 +223,8 @@ pub(crate) mod tests {
     pub(crate) fn any_label() -> impl Strategy<Value = Label> {
         (0usize..13, any_number(), 0usize..11, any_number(), any_number()).prop_map(
             |(class, instance, room_type, number, area)| {
-                let room = Room { room_type: RoomType::ALL[room_type], number };
-                Label { class: Class::ALL[class], instance, room, area }
+                let room = Room { room_type: RoomType::S3DIS[room_type], number };
+                Label { class: Class::S3DIS[class], instance, room, area }
             },
         )
     }
@@ -217,8 +232,8 @@ pub(crate) mod tests {
     #[test]
     fn a_name_goes_both_ways() {
         let label = parse_name("board_3_hallway_4_6").unwrap().unwrap();
-        let room = Room { room_type: RoomType::Hallway, number: 4 };
-        assert_eq!(label, Label { class: Class::Board, instance: 3, room, area: 6 });
+        let room = Room { room_type: RoomType::HALLWAY, number: 4 };
+        assert_eq!(label, Label { class: Class::BOARD, instance: 3, room, area: 6 });
         assert_eq!(label.to_string(), "board_3_hallway_4_6");
     }
 

@@ -13,7 +13,7 @@
 //!
 //! // An annotated tree of one area: a wall and a chair of office_1, a chair of office_2.
 //! let office = |number| format!("office_{number}").parse().unwrap();
-//! let found = [(office(1), Class::Wall, 1), (office(2), Class::Chair, 1), (office(1), Class::Chair, 1)];
+//! let found = [(office(1), Class::WALL, 1), (office(2), Class::CHAIR, 1), (office(1), Class::CHAIR, 1)];
 //! let numbered = number_area(5, found)?;
 //! let table = LabelTable::from_labels(numbered.iter().map(|i| i.label))?;
 //! assert_eq!(
@@ -28,7 +28,7 @@
 //! let points = [[0.1, 0.1], [0.2, 0.1], [0.1, 0.3], [0.3, 0.3]].map(|[x, y]| vec3(x, y, 0.002));
 //! let labels = vote(&mesh, &points, &[wall, chair, wall, wall])?;
 //! assert_eq!(labels.label_of_face(), [wall, LabelId::NULL]);
-//! assert_eq!(labels.report(&table)?.classes[Class::Wall.index()].1.points, 3);
+//! assert_eq!(labels.report(&table)?.classes[Class::WALL.index()].1.points, 3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -51,6 +51,7 @@
 )]
 
 mod class;
+mod color;
 mod instance;
 mod label;
 mod numbering;
@@ -59,17 +60,22 @@ mod room;
 mod serde_names;
 mod statistics;
 mod table;
+mod taxonomy;
 #[cfg(feature = "vote")]
 mod voting;
 mod wall_direction;
 
 pub use class::{Class, UnknownClass};
+pub use color::pretty_color;
 pub use instance::InstanceSummary;
 pub use label::{Label, LabelError, NULL_NAME, parse_name};
 pub use numbering::{NumberedInstance, NumberingError, number_area};
-pub use room::{Room, RoomError, RoomType, UnknownRoomType};
+pub use room::{Room, RoomError, RoomType, UNKNOWN_ROOM, UnknownRoomType};
 pub use statistics::{ClassCounts, RoomCounts};
 pub use table::{LabelId, LabelTable, MAX_LABELS, TableError};
+pub use taxonomy::{
+    ClassDefinition, Kind, MAX_CLASSES, RoomTypeDefinition, Taxonomy, TaxonomyDefinition, TaxonomyError,
+};
 #[cfg(feature = "vote")]
 pub use voting::{
     ClassDispute, DisputedPatch, Disputes, FaceLabels, FaceVotes, Labeler, PointTally, VoteError,

@@ -2,6 +2,7 @@
 //! per area.
 
 use crate::{Class, Label, Room};
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// An annotated instance with the label that it gets.
@@ -51,7 +52,7 @@ pub enum NumberingError {
 /// use s3d_label::{Class, number_area};
 ///
 /// let room = |name: &str| name.parse().unwrap();
-/// let found = [(room("office_2"), Class::Chair, 1), (room("lobby_1"), Class::Chair, 4)];
+/// let found = [(room("office_2"), Class::CHAIR, 1), (room("lobby_1"), Class::CHAIR, 4)];
 /// let labels = number_area(3, found)?.iter().map(|i| i.label.to_string()).collect::<Vec<_>>();
 /// assert_eq!(labels, ["chair_1_lobby_1_3", "chair_2_office_2_3"]);
 /// # Ok::<(), s3d_label::NumberingError>(())
@@ -65,12 +66,11 @@ pub fn number_area(
     if let Some(&[(room, class, number_in_room), _]) = instances.array_windows().find(|[a, b]| a == b) {
         return Err(NumberingError::Duplicate { area, room, class, number_in_room });
     }
-    let mut last = [0u32; Class::ALL.len()];
+    let mut last: BTreeMap<Class, u32> = BTreeMap::new();
     Ok(instances
         .into_iter()
         .map(|(room, class, number_in_room)| {
-            #[expect(clippy::indexing_slicing, reason = "there is a number for each class")]
-            let instance = &mut last[class.index()];
+            let instance = last.entry(class).or_default();
             *instance += 1;
             let label = Label { class, instance: *instance, room, area };
             NumberedInstance { room, class, number_in_room, label }
@@ -83,7 +83,6 @@ mod tests {
     use super::*;
     use crate::RoomType;
     use proptest::prelude::*;
-    use std::collections::BTreeMap;
 
     fn room(name: &str) -> Room {
         name.parse().unwrap()
@@ -94,11 +93,11 @@ mod tests {
         let found = number_area(
             3,
             [
-                (room("WC_1"), Class::Wall, 1),
-                (room("office_10"), Class::Wall, 2),
-                (room("office_10"), Class::Chair, 7),
-                (room("office_2"), Class::Wall, 12),
-                (room("office_2"), Class::Wall, 4),
+                (room("WC_1"), Class::WALL, 1),
+                (room("office_10"), Class::WALL, 2),
+                (room("office_10"), Class::CHAIR, 7),
+                (room("office_2"), Class::WALL, 12),
+                (room("office_2"), Class::WALL, 4),
             ],
         )
         .unwrap();
@@ -116,8 +115,8 @@ mod tests {
 
     #[test]
     fn an_instance_twice_is_an_error() {
-        let chair = (room("office_2"), Class::Chair, 3);
-        let message = number_area(6, [chair, (room("office_2"), Class::Wall, 3), chair]).unwrap_err();
+        let chair = (room("office_2"), Class::CHAIR, 3);
+        let message = number_area(6, [chair, (room("office_2"), Class::WALL, 3), chair]).unwrap_err();
         assert_eq!(message.to_string(), "area 6, room office_2: chair_3 is there twice");
         assert_eq!(number_area(6, []), Ok(vec![]));
     }
@@ -130,7 +129,7 @@ mod tests {
         ) {
             let mut input: Vec<(Room, Class, u32)> = raw
                 .into_iter()
-                .map(|(t, number, c, n)| (Room { room_type: RoomType::ALL[t], number }, Class::ALL[c], n))
+                .map(|(t, number, c, n)| (Room { room_type: RoomType::S3DIS[t], number }, Class::S3DIS[c], n))
                 .collect();
             let found = number_area(1, input.iter().copied()).unwrap();
             let turn = turn % input.len().max(1);

@@ -1,41 +1,26 @@
-//! The 11 types of rooms, and rooms.
+//! Types of rooms, and rooms.
 
 use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// A type of room.
+/// A type of room: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are S3DIS's 11
+/// types; [`Taxonomy::room_type`](crate::Taxonomy::room_type) finds those of other taxonomies.
 ///
-/// [`RoomType::ALL`] and [`RoomType::index`] follow the list of formats.md, "What is written". `Ord` follows
-/// the names in the alphabet, whatever their case, so that `WC` is last: the order in which the published
-/// instance numbers run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum RoomType {
-    /// `office`
-    Office,
-    /// `conferenceRoom`
-    ConferenceRoom,
-    /// `hallway`
-    Hallway,
-    /// `auditorium`
-    Auditorium,
-    /// `openspace`
-    Openspace,
-    /// `lobby`
-    Lobby,
-    /// `lounge`
-    Lounge,
-    /// `pantry`
-    Pantry,
-    /// `copyRoom`
-    CopyRoom,
-    /// `storage`
-    Storage,
-    /// `WC`
-    Wc,
+/// `Ord` follows the names in the alphabet, whatever their case, so that `WC` is last: the order in which the
+/// published instance numbers run.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RoomType {
+    index: u8,
+    /// What it counts as: a place in [`RoomType::S3DIS`]; beyond that, nothing.
+    s3dis: u8,
+    /// One word wide, since labels are many, and stand in errors.
+    name: &'static &'static str,
 }
+
+/// What stands in names in place of a room where none is known.
+pub const UNKNOWN_ROOM: &str = "unknown_1";
 
 /// A room of an area: its type and its number among the area's rooms of that type. Written `office_3`.
 ///
@@ -45,7 +30,7 @@ pub enum RoomType {
 /// use s3d_label::{Room, RoomError, RoomType};
 ///
 /// let room: Room = "copyRoom_1".parse()?;
-/// assert_eq!(room, Room { room_type: RoomType::CopyRoom, number: 1 });
+/// assert_eq!(room, Room { room_type: RoomType::COPY_ROOM, number: 1 });
 /// assert!(matches!("kitchen_1".parse::<Room>(), Err(RoomError::Type { .. })));
 /// # Ok::<(), RoomError>(())
 /// ```
@@ -57,12 +42,14 @@ pub struct Room {
     pub number: u32,
 }
 
-/// A word that should be a type of room and is none of the 11.
+/// A word that should be a type of room of a taxonomy and is none.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{word:?} is no type of room; the types are {valid}", valid = RoomType::ALL.map(RoomType::name).join(" "))]
+#[error("{word:?} is no type of room; the types are {types}")]
 pub struct UnknownRoomType {
     /// The word.
     pub word: String,
+    /// The types of the taxonomy, with blanks between them.
+    pub types: String,
 }
 
 /// Why a word names no room.
@@ -93,54 +80,61 @@ pub enum RoomError {
     },
 }
 
-impl RoomType {
-    /// All types, each at its [`RoomType::index`].
-    pub const ALL: [Self; 11] = [
-        Self::Office,
-        Self::ConferenceRoom,
-        Self::Hallway,
-        Self::Auditorium,
-        Self::Openspace,
-        Self::Lobby,
-        Self::Lounge,
-        Self::Pantry,
-        Self::CopyRoom,
-        Self::Storage,
-        Self::Wc,
-    ];
+macro_rules! s3dis {
+    ($($constant:ident $index:literal $name:literal;)*) => {
+        impl RoomType {
+            $(
+                #[doc = concat!("`", $name, "` of S3DIS.")]
+                pub const $constant: Self = Self { index: $index, s3dis: $index, name: &$name };
+            )*
 
-    /// The type as it is spelled in names.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Office => "office",
-            Self::ConferenceRoom => "conferenceRoom",
-            Self::Hallway => "hallway",
-            Self::Auditorium => "auditorium",
-            Self::Openspace => "openspace",
-            Self::Lobby => "lobby",
-            Self::Lounge => "lounge",
-            Self::Pantry => "pantry",
-            Self::CopyRoom => "copyRoom",
-            Self::Storage => "storage",
-            Self::Wc => "WC",
+            /// The types of S3DIS, each at its [`RoomType::index`].
+            pub const S3DIS: [Self; 11] = [$(Self::$constant),*];
         }
+    };
+}
+
+s3dis! {
+    OFFICE 0 "office";
+    CONFERENCE_ROOM 1 "conferenceRoom";
+    HALLWAY 2 "hallway";
+    AUDITORIUM 3 "auditorium";
+    OPENSPACE 4 "openspace";
+    LOBBY 5 "lobby";
+    LOUNGE 6 "lounge";
+    PANTRY 7 "pantry";
+    COPY_ROOM 8 "copyRoom";
+    STORAGE 9 "storage";
+    WC 10 "WC";
+}
+
+impl RoomType {
+    /// The type at `index` of a taxonomy, which counts as the type of S3DIS at `s3dis`.
+    pub(crate) const fn new(index: u8, s3dis: u8, name: &'static &'static str) -> Self {
+        Self { index, s3dis, name }
     }
 
-    /// The type that is spelled `word`, to the letter.
-    pub fn from_name(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|room_type| room_type.name() == word)
+    /// The type as it is spelled in names of rooms: letters, digits and hyphens.
+    pub const fn name(self) -> &'static str {
+        self.name
     }
 
-    /// Its place in [`RoomType::ALL`], 0 to 10.
+    /// Its place in its taxonomy, from 0.
     pub const fn index(self) -> usize {
-        self as usize
+        self.index as usize
+    }
+
+    /// Which type of S3DIS it counts as, `None` if none is like it.
+    pub fn s3dis(self) -> Option<Self> {
+        Self::S3DIS.get(usize::from(self.s3dis)).copied()
     }
 }
 
 impl Ord for RoomType {
     fn cmp(&self, other: &Self) -> Ordering {
-        let letters = |t: &Self| t.name().bytes().map(|b| b.to_ascii_lowercase());
-        letters(self).cmp(letters(other))
+        let letters = |t: &Self| t.name.bytes().map(|b| b.to_ascii_lowercase());
+        let rest = |t: &Self| (t.name, t.index, t.s3dis);
+        letters(self).cmp(letters(other)).then_with(|| rest(self).cmp(&rest(other)))
     }
 }
 
@@ -150,18 +144,33 @@ impl PartialOrd for RoomType {
     }
 }
 
+impl fmt::Debug for RoomType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
 impl fmt::Display for RoomType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        f.pad(self.name)
     }
 }
 
 impl FromStr for RoomType {
     type Err = UnknownRoomType;
 
+    /// The type of S3DIS that is spelled `word`, to the letter.
     fn from_str(word: &str) -> Result<Self, UnknownRoomType> {
-        Self::from_name(word).ok_or_else(|| UnknownRoomType { word: word.to_owned() })
+        find_type(&Self::S3DIS, word)
     }
+}
+
+/// The type of `types` that is spelled `word`, to the letter.
+pub(crate) fn find_type(types: &[RoomType], word: &str) -> Result<RoomType, UnknownRoomType> {
+    types.iter().copied().find(|t| *t.name == word).ok_or_else(|| UnknownRoomType {
+        word: word.to_owned(),
+        types: types.iter().map(|t| *t.name).collect::<Vec<_>>().join(" "),
+    })
 }
 
 impl fmt::Display for Room {
@@ -173,17 +182,23 @@ impl fmt::Display for Room {
 impl FromStr for Room {
     type Err = RoomError;
 
+    /// The room whose type is one of S3DIS's.
     fn from_str(word: &str) -> Result<Self, RoomError> {
-        let (room_type, number) = match word.split_once('_') {
-            Some((room_type, number)) if !number.contains('_') => (room_type, number),
-            _ => return Err(RoomError::Form { word: word.to_owned() }),
-        };
-        let room_type =
-            room_type.parse().map_err(|source| RoomError::Type { word: word.to_owned(), source })?;
-        let number = number_from_digits(number)
-            .ok_or_else(|| RoomError::Number { word: word.to_owned(), number: number.to_owned() })?;
-        Ok(Self { room_type, number })
+        parse_room(&RoomType::S3DIS, word)
     }
+}
+
+/// The room that `word` spells, with one of these types.
+pub(crate) fn parse_room(types: &[RoomType], word: &str) -> Result<Room, RoomError> {
+    let (room_type, number) = match word.split_once('_') {
+        Some((room_type, number)) if !number.contains('_') => (room_type, number),
+        _ => return Err(RoomError::Form { word: word.to_owned() }),
+    };
+    let room_type =
+        find_type(types, room_type).map_err(|source| RoomError::Type { word: word.to_owned(), source })?;
+    let number = number_from_digits(number)
+        .ok_or_else(|| RoomError::Number { word: word.to_owned(), number: number.to_owned() })?;
+    Ok(Room { room_type, number })
 }
 
 /// The number that `digits` spell in the only way that names allow: from 1, decimal, no sign, no leading
@@ -201,8 +216,8 @@ mod tests {
     fn types_go_both_ways() {
         let names =
             "office conferenceRoom hallway auditorium openspace lobby lounge pantry copyRoom storage WC";
-        assert_eq!(RoomType::ALL.map(RoomType::name).join(" "), names);
-        for (i, room_type) in RoomType::ALL.into_iter().enumerate() {
+        assert_eq!(RoomType::S3DIS.map(RoomType::name).join(" "), names);
+        for (i, room_type) in RoomType::S3DIS.into_iter().enumerate() {
             assert_eq!(room_type.index(), i);
             assert_eq!(room_type.to_string().parse(), Ok(room_type));
         }
@@ -230,7 +245,7 @@ mod tests {
 
     #[test]
     fn only_one_spelling_is_a_room() {
-        assert_eq!("WC_4294967295".parse(), Ok(Room { room_type: RoomType::Wc, number: u32::MAX }));
+        assert_eq!("WC_4294967295".parse(), Ok(Room { room_type: RoomType::WC, number: u32::MAX }));
         for (word, part) in [
             ("office", "as in"),
             ("office_3_5", "as in"),

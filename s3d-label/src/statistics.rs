@@ -14,23 +14,25 @@ use std::collections::{BTreeMap, BTreeSet};
 /// let names = ["chair_1_office_1_1", "chair_2_office_1_1", "chair_1_office_1_2"];
 /// let table = LabelTable::from_labels(names.map(|name| name.parse().unwrap()))?;
 /// let counts = ClassCounts::from_table(&table);
-/// assert_eq!((counts.of(1, Class::Chair), counts.total()[Class::Chair.index()]), (2, 3));
+/// assert_eq!((counts.of(1, Class::CHAIR), counts.total()[Class::CHAIR.index()]), (2, 3));
 /// # Ok::<(), s3d_label::TableError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClassCounts {
-    /// Each area with its counts, by area; a count stands at its class's [`Class::index`].
-    pub areas: Vec<(u32, [u64; 13])>,
+    /// Each area with its counts, by area; a count stands at its class's [`Class::index`]. All areas have as
+    /// many as the taxonomy has classes.
+    pub areas: Vec<(u32, Vec<u64>)>,
 }
 
 impl ClassCounts {
     /// Counts the labels of `table`.
     pub fn from_table(table: &LabelTable) -> Self {
-        let mut areas: BTreeMap<u32, [u64; 13]> = BTreeMap::new();
+        let classes = table.taxonomy().classes().len();
+        let mut areas: BTreeMap<u32, Vec<u64>> = BTreeMap::new();
         for (_, label) in table.iter() {
             #[expect(clippy::indexing_slicing, reason = "there is a column for each class")]
-            let count = &mut areas.entry(label.area).or_default()[label.class.index()];
+            let count = &mut areas.entry(label.area).or_insert_with(|| vec![0; classes])[label.class.index()];
             *count += 1;
         }
         Self { areas: areas.into_iter().collect() }
@@ -41,8 +43,8 @@ impl ClassCounts {
         of(&self.areas, area, class.index())
     }
 
-    /// The instances of each class over all areas.
-    pub fn total(&self) -> [u64; 13] {
+    /// The instances of each class over all areas; empty without an area.
+    pub fn total(&self) -> Vec<u64> {
         total(&self.areas)
     }
 }
@@ -54,18 +56,20 @@ impl ClassCounts {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoomCounts {
-    /// Each area with its counts, by area; a count stands at its type's [`RoomType::index`].
-    pub areas: Vec<(u32, [u64; 11])>,
+    /// Each area with its counts, by area; a count stands at its type's [`RoomType::index`]. All areas have as
+    /// many as the taxonomy has room types.
+    pub areas: Vec<(u32, Vec<u64>)>,
 }
 
 impl RoomCounts {
     /// Counts the rooms of `table`.
     pub fn from_table(table: &LabelTable) -> Self {
         let rooms: BTreeSet<(u32, Room)> = table.iter().map(|(_, label)| (label.area, label.room)).collect();
-        let mut areas: BTreeMap<u32, [u64; 11]> = BTreeMap::new();
+        let types = table.taxonomy().room_types().len();
+        let mut areas: BTreeMap<u32, Vec<u64>> = BTreeMap::new();
         for (area, room) in rooms {
             #[expect(clippy::indexing_slicing, reason = "there is a column for each type")]
-            let count = &mut areas.entry(area).or_default()[room.room_type.index()];
+            let count = &mut areas.entry(area).or_insert_with(|| vec![0; types])[room.room_type.index()];
             *count += 1;
         }
         Self { areas: areas.into_iter().collect() }
@@ -76,21 +80,22 @@ impl RoomCounts {
         of(&self.areas, area, room_type.index())
     }
 
-    /// The rooms of each type over all areas.
-    pub fn total(&self) -> [u64; 11] {
+    /// The rooms of each type over all areas; empty without an area.
+    pub fn total(&self) -> Vec<u64> {
         total(&self.areas)
     }
 }
 
-fn of<const N: usize>(areas: &[(u32, [u64; N])], area: u32, column: usize) -> u64 {
+fn of(areas: &[(u32, Vec<u64>)], area: u32, column: usize) -> u64 {
     areas.iter().find(|(a, _)| *a == area).and_then(|(_, counts)| counts.get(column)).copied().unwrap_or(0)
 }
 
-fn total<const N: usize>(areas: &[(u32, [u64; N])]) -> [u64; N] {
-    areas.iter().fold([0; N], |mut sum, (_, counts)| {
-        sum.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
-        sum
-    })
+fn total(areas: &[(u32, Vec<u64>)]) -> Vec<u64> {
+    let mut total = vec![0; areas.first().map_or(0, |(_, counts)| counts.len())];
+    for (_, counts) in areas {
+        total.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
+    }
+    total
 }
 
 #[cfg(test)]
@@ -110,21 +115,21 @@ mod tests {
         let table = LabelTable::from_labels(names.map(|name| name.parse().unwrap())).unwrap();
         let classes = ClassCounts::from_table(&table);
         assert_eq!(classes.areas.iter().map(|(area, _)| *area).collect::<Vec<_>>(), [1, 5]);
-        assert_eq!((classes.of(1, Class::Chair), classes.of(1, Class::Wall)), (2, 2));
+        assert_eq!((classes.of(1, Class::CHAIR), classes.of(1, Class::WALL)), (2, 2));
         assert_eq!(
-            (classes.of(5, Class::Chair), classes.of(5, Class::Sofa), classes.of(2, Class::Wall)),
+            (classes.of(5, Class::CHAIR), classes.of(5, Class::SOFA), classes.of(2, Class::WALL)),
             (1, 0, 0)
         );
-        assert_eq!((classes.total()[Class::Chair.index()], classes.total().iter().sum::<u64>()), (3, 6));
+        assert_eq!((classes.total()[Class::CHAIR.index()], classes.total().iter().sum::<u64>()), (3, 6));
         let rooms = RoomCounts::from_table(&table);
-        assert_eq!((rooms.of(1, RoomType::Office), rooms.of(5, RoomType::Office)), (2, 1));
-        assert_eq!((rooms.of(5, RoomType::Wc), rooms.of(9, RoomType::Wc)), (1, 0));
-        assert_eq!((rooms.total()[RoomType::Office.index()], rooms.total().iter().sum::<u64>()), (3, 4));
+        assert_eq!((rooms.of(1, RoomType::OFFICE), rooms.of(5, RoomType::OFFICE)), (2, 1));
+        assert_eq!((rooms.of(5, RoomType::WC), rooms.of(9, RoomType::WC)), (1, 0));
+        assert_eq!((rooms.total()[RoomType::OFFICE.index()], rooms.total().iter().sum::<u64>()), (3, 4));
     }
 
     #[test]
     fn an_empty_table_has_no_areas() {
         assert_eq!(ClassCounts::from_table(&LabelTable::default()), ClassCounts::default());
-        assert_eq!(RoomCounts::from_table(&LabelTable::default()).total(), [0; 11]);
+        assert!(RoomCounts::from_table(&LabelTable::default()).total().is_empty());
     }
 }

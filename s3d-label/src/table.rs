@@ -1,6 +1,6 @@
 //! The label table: from indices to labels and back.
 
-use crate::{Class, Label, LabelError, NULL_NAME, parse_name};
+use crate::{Class, Label, LabelError, NULL_NAME, Taxonomy};
 use std::cmp::Ordering;
 use std::fmt;
 use thiserror::Error;
@@ -45,13 +45,14 @@ impl fmt::Display for LabelId {
 ///
 /// let table = LabelTable::from_labels(["wall_1_office_1_5".parse()?, "chair_1_office_1_5".parse()?])?;
 /// assert_eq!(table.names(), [NULL_NAME, "chair_1_office_1_5", "wall_1_office_1_5"]);
-/// assert_eq!(table.class_of(LabelId(2)), Some(Class::Wall));
+/// assert_eq!(table.class_of(LabelId(2)), Some(Class::WALL));
 /// assert_eq!(table.get(LabelId::NULL), None);
 /// assert_eq!(LabelTable::from_names(&table.names())?, table);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LabelTable {
+    taxonomy: Taxonomy,
     /// Sorted; the label of index i is at i − 1.
     labels: Vec<Label>,
 }
@@ -119,22 +120,53 @@ pub enum TableError {
 }
 
 impl LabelTable {
+    /// The table of `labels` of S3DIS, in whatever order they come. [`Taxonomy::table`] is for others.
+    ///
+    /// # Errors
+    /// As [`Taxonomy::table`].
+    pub fn from_labels(labels: impl IntoIterator<Item = Label>) -> Result<Self, TableError> {
+        Taxonomy::s3dis().table(labels)
+    }
+
+    /// Reads a table of labels of S3DIS. [`Taxonomy::table_from_names`] is for others.
+    ///
+    /// # Errors
+    /// As [`Taxonomy::table_from_names`].
+    pub fn from_names(names: &[String]) -> Result<Self, TableError> {
+        Taxonomy::s3dis().table_from_names(names)
+    }
+
+    /// What its classes and room types are.
+    pub fn taxonomy(&self) -> &Taxonomy {
+        &self.taxonomy
+    }
+}
+
+impl Taxonomy {
     /// The table of `labels`, in whatever order they come.
     ///
     /// # Errors
     /// [`TableError::Duplicate`] if two are the same instance, [`TableError::Zero`] for a number 0,
     /// [`TableError::TooMany`] above [`MAX_LABELS`].
-    pub fn from_labels(labels: impl IntoIterator<Item = Label>) -> Result<Self, TableError> {
+    ///
+    /// # Panics
+    /// If a label's class or type of room is not this taxonomy's.
+    pub fn table(&self, labels: impl IntoIterator<Item = Label>) -> Result<LabelTable, TableError> {
         let mut labels: Vec<Label> = labels.into_iter().collect();
         if let Some(&label) = labels.iter().find(|l| l.instance == 0 || l.room.number == 0 || l.area == 0) {
             return Err(TableError::Zero { label });
         }
+        let is_ours = |l: &Label| {
+            self.classes().get(l.class.index()) == Some(&l.class)
+                && self.room_types().get(l.room.room_type.index()) == Some(&l.room.room_type)
+        };
+        assert!(labels.iter().all(is_ours), "labels of another taxonomy than {}", self.name());
         labels.sort_unstable();
         let mut pairs = (1..).zip(labels.array_windows());
         if let Some((first, &[other, label])) = pairs.find(|(_, [a, b])| a.cmp_key(b).is_eq()) {
             return Err(TableError::Duplicate { index: first + 1, label, first, other });
         }
-        Self { labels }.checked_count()
+        LabelTable { taxonomy: self.clone(), labels }.checked_count()
     }
 
     /// Reads a table from its names, index by index, as `semantic_labels.json` holds them. Null labels behind
@@ -143,14 +175,15 @@ impl LabelTable {
     /// # Errors
     /// [`TableError`] says at which index the order, a name or a duplicate is wrong; the first such index
     /// counts.
-    pub fn from_names(names: &[String]) -> Result<Self, TableError> {
+    pub fn table_from_names(&self, names: &[String]) -> Result<LabelTable, TableError> {
         if names.first().is_none_or(|name| name != NULL_NAME) {
             return Err(TableError::NoNull { found: names.first().cloned().unwrap_or_default() });
         }
         let last = names.iter().rposition(|name| name != NULL_NAME).unwrap_or(0);
         let mut labels: Vec<Label> = Vec::with_capacity(last);
         for (index, name) in names.iter().enumerate().take(last + 1).skip(1) {
-            let label = parse_name(name)
+            let label = self
+                .parse_name(name)
                 .map_err(|source| TableError::Name { index, source })?
                 .ok_or(TableError::Null { index })?;
             if let Some(&before) = labels.last()
@@ -165,9 +198,11 @@ impl LabelTable {
             }
             labels.push(label);
         }
-        Self { labels }.checked_count()
+        LabelTable { taxonomy: self.clone(), labels }.checked_count()
     }
+}
 
+impl LabelTable {
     fn checked_count(self) -> Result<Self, TableError> {
         let count = self.len();
         if count <= MAX_LABELS { Ok(self) } else { Err(TableError::TooMany { count }) }
@@ -263,7 +298,7 @@ mod tests {
             assert_eq!(table.name_of(id), PUBLISHED[id.index()]);
         }
         assert_eq!(table.len(), 16);
-        assert_eq!(table.class_of(LabelId(12)), Some(Class::Board));
+        assert_eq!(table.class_of(LabelId(12)), Some(Class::BOARD));
         assert_eq!(table.id_of(&"board_3_hallway_5_6".parse().unwrap()), None);
     }
 

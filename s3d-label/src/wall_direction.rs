@@ -6,7 +6,7 @@ use s3d_geom::{TriMesh, dominant_wall_direction_deg};
 use std::collections::BTreeMap;
 
 /// The dominant horizontal direction of the walls of each room, whole degrees in [0, 90) from +X towards +Y
-/// (see [`dominant_wall_direction_deg`]). Of a room without a face that is labelled as wall, all faces count.
+/// (see [`dominant_wall_direction_deg`]). Of a room without a face that is labelled as wall ([`Class::s3dis`]), all faces count.
 /// A room none of whose faces stands upright has the direction 0; a room without a labelled face is not
 /// there. `mesh` is one area's.
 ///
@@ -33,7 +33,7 @@ pub fn wall_directions_deg(
     for (face, label) in (0u32..).zip(label_of_face) {
         if let Some(label) = table.get(*label) {
             let room = rooms.entry(label.room).or_default();
-            let faces = if label.class == Class::Wall { &mut room.walls } else { &mut room.others };
+            let faces = if label.class.s3dis() == Class::WALL { &mut room.walls } else { &mut room.others };
             faces.push((mesh.normal(face), mesh.area(face)));
         }
     }

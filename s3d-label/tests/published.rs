@@ -75,11 +75,11 @@ fn tables_of_statistics_are_those_of_the_published_labels() {
     let classes = ClassCounts::from_table(&table);
     let total = classes.total();
     assert_eq!(total.iter().sum::<u64>(), 9815);
-    assert_eq!(total.iter().sum::<u64>() - total[Class::Clutter.index()], 5933);
-    assert_eq!((classes.of(2, Class::Chair), classes.of(4, Class::Beam)), (545, 3));
+    assert_eq!(total.iter().sum::<u64>() - total[Class::CLUTTER.index()], 5933);
+    assert_eq!((classes.of(2, Class::CHAIR), classes.of(4, Class::BEAM)), (545, 3));
 
     let rooms = RoomCounts::from_table(&table);
     let by_area: Vec<(u32, u64)> = rooms.areas.iter().map(|(area, n)| (*area, n.iter().sum())).collect();
     assert_eq!(by_area, [(1, 44), (2, 40), (3, 23), (4, 49), (5, 68), (6, 48)]);
-    assert_eq!((rooms.of(5, RoomType::Office), rooms.of(6, RoomType::Openspace)), (42, 1));
+    assert_eq!((rooms.of(5, RoomType::OFFICE), rooms.of(6, RoomType::OPENSPACE)), (42, 1));
 }

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use s3d_label::{
     Class, ClassCounts, InstanceSummary, Label, LabelId, LabelTable, NULL_NAME, Room, RoomCounts, RoomType,
-    VoteOptions, VoteReport, Votes, number_area,
+    Taxonomy, VoteOptions, VoteReport, Votes, number_area,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -40,8 +40,8 @@ proptest! {
 
 #[test]
 fn names_are_words() {
-    comes_back(&Class::ALL);
-    comes_back(&RoomType::ALL);
+    comes_back(&Class::S3DIS);
+    comes_back(&RoomType::S3DIS);
     let label: Label = "chair_3_office_5_1".parse().unwrap();
     comes_back(&(label, label.room, LabelId(7)));
     let json = serde_json::to_string(&(label.class, label.room, label, LabelId(7))).unwrap();
@@ -51,14 +51,38 @@ fn names_are_words() {
     comes_back(&table());
     comes_back(&LabelTable::default());
     comes_back(&(ClassCounts::from_table(&table()), RoomCounts::from_table(&table())));
-    comes_back(&number_area(5, [(label.room, Class::Wall, 3), (label.room, Class::Wall, 9)]).unwrap());
+    comes_back(&number_area(5, [(label.room, Class::WALL, 3), (label.room, Class::WALL, 9)]).unwrap());
     comes_back(&InstanceSummary {
         label: LabelId(2),
         room: label.room,
-        class: Class::Chair,
+        class: Class::CHAIR,
         points: u64::MAX,
         bbox: [0.1, -0.0, 1e-40, f32::MAX, 2.0, 3.0],
     });
+}
+
+#[test]
+fn names_are_those_of_the_taxonomy_that_reads() {
+    let taxonomy = Taxonomy::built_in("nyu40").unwrap();
+    let label = taxonomy.label("bed_3_bedroom_5_1").unwrap();
+    let table = taxonomy.table([label]).unwrap();
+    let report = VoteReport::new(&Votes::new(1), &table).unwrap();
+    let json = serde_json::to_string(&(label, label.room, label.class, &table, &report)).unwrap();
+    type All = (Label, Room, Class, LabelTable, VoteReport);
+    let read = || serde_json::from_str::<All>(&json);
+    assert_eq!(
+        taxonomy.reading(read).unwrap(),
+        (label, label.room, label.class, table.clone(), report.clone())
+    );
+    assert!(read().unwrap_err().to_string().contains("\"bed\" is no class"));
+    // The innermost call counts, and nothing of it is left after a panic.
+    let inner = taxonomy.reading(|| Taxonomy::s3dis().reading(read));
+    assert!(inner.is_err());
+    let _ = std::panic::catch_unwind(|| taxonomy.reading(|| panic!("as a reader should not")));
+    assert!(read().is_err());
+    // A class of the same name is another one.
+    let wall = taxonomy.reading(|| serde_json::from_str::<Class>("\"wall\"")).unwrap();
+    assert_eq!((wall.index(), wall == Class::WALL, wall.s3dis()), (0, false, Class::WALL));
 }
 
 fn refusal<T: DeserializeOwned + Debug>(json: &str) -> String {
@@ -82,7 +106,7 @@ fn what_is_no_name_or_report_is_refused() {
     classes.swap(0, 1);
     assert!(refusal::<VoteReport>(&value.to_string()).contains("not in their order"));
     value["classes"].as_array_mut().unwrap().pop();
-    assert!(refusal::<VoteReport>(&value.to_string()).contains("length 12"));
+    assert!(refusal::<VoteReport>(&value.to_string()).contains("not in their order"));
     let mut value = serde_json::to_value(&report).unwrap();
     value["rooms"][0][1] = "kitchen_1".into();
     assert!(refusal::<VoteReport>(&value.to_string()).contains("kitchen_1"));

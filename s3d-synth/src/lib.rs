@@ -19,7 +19,7 @@
 //!
 //! let scene = building.build()?;
 //! assert_eq!(scene.instance_of_face.len(), scene.mesh.faces().len());
-//! assert!(scene.instances.iter().filter(|i| i.class == Class::Floor).count() == 10);
+//! assert!(scene.instances.iter().filter(|i| i.class == Class::FLOOR).count() == 10);
 //! # Ok::<(), s3d_synth::BuildingError>(())
 //! ```
 

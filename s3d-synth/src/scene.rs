@@ -17,7 +17,7 @@ use s3d_label::{Class, Room};
 /// // Every face is one of an instance.
 /// assert_eq!(scene.instance_of_face.len(), scene.mesh.faces().len());
 /// let first = &scene.instances[scene.instance_of_face[0] as usize];
-/// assert_eq!((first.class, first.number, first.room.to_string()), (Class::Window, 1, "office_1".into()));
+/// assert_eq!((first.class, first.number, first.room.to_string()), (Class::WINDOW, 1, "office_1".into()));
 /// assert_eq!(scene.locations.len(), 6);
 /// # Ok::<(), s3d_synth::BuildingError>(())
 /// ```

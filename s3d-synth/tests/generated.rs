@@ -11,14 +11,14 @@ use s3d_synth::{Building, BuildingError, BuildingOptions, RoomOptions, ScanOptio
 use std::collections::{BTreeMap, BTreeSet};
 
 const TYPES: [RoomType; 8] = [
-    RoomType::Office,
-    RoomType::ConferenceRoom,
-    RoomType::Lounge,
-    RoomType::Lobby,
-    RoomType::Openspace,
-    RoomType::Pantry,
-    RoomType::CopyRoom,
-    RoomType::Storage,
+    RoomType::OFFICE,
+    RoomType::CONFERENCE_ROOM,
+    RoomType::LOUNGE,
+    RoomType::LOBBY,
+    RoomType::OPENSPACE,
+    RoomType::PANTRY,
+    RoomType::COPY_ROOM,
+    RoomType::STORAGE,
 ];
 
 fn room() -> impl Strategy<Value = RoomOptions> {
@@ -56,14 +56,14 @@ fn planned(building: &Building) -> BTreeMap<(String, Class), usize> {
     let mut count = BTreeMap::new();
     for plan in &building.rooms {
         let mut add = |class| *count.entry((plan.room.to_string(), class)).or_insert(0) += 1;
-        [Class::Floor, Class::Ceiling].into_iter().for_each(&mut add);
-        [Class::Wall; 4].into_iter().for_each(&mut add);
-        plan.lamps.iter().for_each(|_| add(Class::Clutter));
+        [Class::FLOOR, Class::CEILING].into_iter().for_each(&mut add);
+        [Class::WALL; 4].into_iter().for_each(&mut add);
+        plan.lamps.iter().for_each(|_| add(Class::CLUTTER));
         plan.items.iter().for_each(|item| add(item.class()));
         for opening in &plan.openings {
             match opening.filling {
-                Filling::Window => add(Class::Window),
-                Filling::Door { .. } | Filling::ShutDoor => add(Class::Door),
+                Filling::Window => add(Class::WINDOW),
+                Filling::Door { .. } | Filling::ShutDoor => add(Class::DOOR),
                 _ => {}
             }
         }
@@ -88,7 +88,7 @@ fn check(options: &BuildingOptions) {
 
     // As many rooms as wanted, of the types wanted, and a hallway a storey.
     let mut types: Vec<RoomType> = options.rooms.iter().map(|room| room.room_type).collect();
-    types.extend(vec![RoomType::Hallway; options.storeys as usize]);
+    types.extend(vec![RoomType::HALLWAY; options.storeys as usize]);
     let mut built: Vec<RoomType> = building.rooms.iter().map(|plan| plan.room.room_type).collect();
     types.sort();
     built.sort();
@@ -121,7 +121,7 @@ fn bookcases_keep_away_from_window_sills() {
         furnishing: 0.6225713,
         locations: 2,
         heights_m: [2.4; 2],
-        ..RoomOptions::new(RoomType::Storage)
+        ..RoomOptions::new(RoomType::STORAGE)
     };
     check(&BuildingOptions {
         rooms: vec![storage],
@@ -180,12 +180,12 @@ fn full_rooms_have_what_their_type_has() {
             assert!(found >= least, "{found} of {class} in {room_type:?}, seed {seed}");
         }
     };
-    full(RoomType::Office, Class::Table, 2);
-    full(RoomType::Office, Class::Board, 1);
-    full(RoomType::ConferenceRoom, Class::Chair, 4);
-    full(RoomType::Lounge, Class::Sofa, 1);
-    full(RoomType::Storage, Class::Bookcase, 4);
-    full(RoomType::CopyRoom, Class::Clutter, 5);
+    full(RoomType::OFFICE, Class::TABLE, 2);
+    full(RoomType::OFFICE, Class::BOARD, 1);
+    full(RoomType::CONFERENCE_ROOM, Class::CHAIR, 4);
+    full(RoomType::LOUNGE, Class::SOFA, 1);
+    full(RoomType::STORAGE, Class::BOOKCASE, 4);
+    full(RoomType::COPY_ROOM, Class::CLUTTER, 5);
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn storeys_lie_above_one_another() {
     let building = Building::generate(&options).unwrap();
     let floors: BTreeSet<String> = building.rooms.iter().map(|r| r.floor_m.to_string()).collect();
     assert_eq!(floors.len(), 2, "{floors:?}");
-    let hallways = building.rooms.iter().filter(|r| r.room.room_type == RoomType::Hallway);
+    let hallways = building.rooms.iter().filter(|r| r.room.room_type == RoomType::HALLWAY);
     assert_eq!(hallways.map(|r| r.room.number).collect::<Vec<_>>(), [1, 2]);
 }
 
@@ -243,7 +243,7 @@ fn impossible_wishes_are_told() {
     let one = |room: RoomOptions| {
         Building::generate(&BuildingOptions { rooms: vec![room], ..BuildingOptions::default() }).unwrap_err()
     };
-    let office = RoomOptions::new(RoomType::Office);
+    let office = RoomOptions::new(RoomType::OFFICE);
     let message = |room: RoomOptions| one(room).to_string();
     assert_eq!(
         message(RoomOptions { size_m: [1.0, 4.0], ..office.clone() }),
@@ -253,7 +253,7 @@ fn impossible_wishes_are_told() {
     assert!(message(nan).contains("away from the hallway is NaN"));
     assert!(message(RoomOptions { heights_m: [2.8, 2.0], ..office.clone() }).contains("ceiling is 2"));
     assert!(message(RoomOptions { windows: 9, ..office.clone() }).contains("windows is 9"));
-    for room_type in [RoomType::Hallway, RoomType::Auditorium, RoomType::Wc] {
+    for room_type in [RoomType::HALLWAY, RoomType::AUDITORIUM, RoomType::WC] {
         let error = one(RoomOptions { room_type, ..office.clone() });
         assert_eq!(error, BuildingError::RoomType { room_type });
     }

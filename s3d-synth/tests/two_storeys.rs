@@ -41,7 +41,7 @@ fn stairs_lead_from_one_floor_to_the_other() {
         let (next, class) = height(1.0 + 0.07 * f64::from(k), z + 1.0);
         assert!(next - z > -1e-4 && next - z < 0.179, "from {z} to {next}");
         risers += u32::from(next - z > 0.1);
-        assert_eq!(class == Class::Floor, risers == 0 || risers == 16);
+        assert_eq!(class == Class::FLOOR, risers == 0 || risers == 16);
         // Free above a head.
         let up = seen.first_hit(DVec3::new(0.6, 1.0 + 0.07 * f64::from(k), next + 0.1), DVec3::Z).unwrap();
         assert!(up.1 > 1.85, "{up:?} at {next}");

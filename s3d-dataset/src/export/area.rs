@@ -451,8 +451,7 @@ pub(crate) fn render_area(
     create_dir(&layout.mesh_dir(number))?;
     let textures = MipMaps::new(&file.mesh);
     let label_of_face: Vec<u32> = annotated.label_of_face.iter().map(|l| l.0).collect();
-    let pretty_of_face: Vec<[u8; 3]> =
-        label_of_face.iter().map(|l| s3d_io::image::pretty_color(*l)).collect();
+    let pretty_of_face: Vec<[u8; 3]> = label_of_face.iter().map(|l| s3d_label::pretty_color(*l)).collect();
     let mut is_filled = Vec::new();
     if !annotated.filled.is_empty() {
         is_filled.resize(label_of_face.len(), false);

@@ -196,7 +196,7 @@ pub struct ClassList(pub Vec<Class>);
 impl Default for ClassList {
     /// What rooms are made of.
     fn default() -> Self {
-        Self(vec![Class::Ceiling, Class::Floor, Class::Wall])
+        Self(vec![Class::CEILING, Class::FLOOR, Class::WALL])
     }
 }
 
@@ -210,7 +210,7 @@ impl FromStr for ClassList {
         }
         let parse = |word: &str| word.trim().parse::<Class>().map_err(|e| e.to_string());
         let asked = text.split(',').map(parse).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self(Class::ALL.into_iter().filter(|c| asked.contains(c)).collect()))
+        Ok(Self(Class::S3DIS.into_iter().filter(|c| asked.contains(c)).collect()))
     }
 }
 
@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn options_belong_to_their_package() {
         let stuff: ClassList = "wall,floor,wall".parse().unwrap();
-        assert_eq!(stuff, ClassList(vec![Class::Floor, Class::Wall]));
+        assert_eq!(stuff, ClassList(vec![Class::FLOOR, Class::WALL]));
         let coco = SpecificOptions { stuff: Some(stuff), ..SpecificOptions::default() };
         coco.check(PackageKind::Coco).unwrap();
         let e = coco.check(PackageKind::Parquet).unwrap_err().to_string();

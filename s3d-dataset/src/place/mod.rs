@@ -112,7 +112,7 @@ fn floor_faces(ground: &Ground<'_>) -> BTreeMap<Room, Vec<u32>> {
     let mut floors: BTreeMap<Room, Vec<u32>> = BTreeMap::new();
     for (face, label) in (0u32..).zip(ground.label_of_face) {
         if let Some(label) = ground.table.get(*label)
-            && label.class == Class::Floor
+            && label.class == Class::FLOOR
             && ground.scene.mesh().normal(face).z.abs() > LEVEL
         {
             floors.entry(label.room).or_default().push(face);
@@ -211,13 +211,13 @@ mod tests {
             classes.extend([class; 2]);
         };
         let (w, d, h) = (width, depth, 2.5);
-        quad([[0., 0., 0.], [w, 0., 0.], [w, d, 0.], [0., d, 0.]], Class::Floor);
-        quad([[0., 0., h], [0., d, h], [w, d, h], [w, 0., h]], Class::Ceiling);
-        quad([[0., 0., 0.], [0., 0., h], [w, 0., h], [w, 0., 0.]], Class::Wall);
-        quad([[0., d, 0.], [w, d, 0.], [w, d, h], [0., d, h]], Class::Wall);
-        quad([[0., 0., 0.], [0., d, 0.], [0., d, h], [0., 0., h]], Class::Wall);
-        quad([[w, 0., 0.], [w, 0., h], [w, d, h], [w, d, 0.]], Class::Wall);
-        quad([[0., 0., 0.7], [1., 0., 0.7], [1., 1., 0.7], [0., 1., 0.7]], Class::Table);
+        quad([[0., 0., 0.], [w, 0., 0.], [w, d, 0.], [0., d, 0.]], Class::FLOOR);
+        quad([[0., 0., h], [0., d, h], [w, d, h], [w, 0., h]], Class::CEILING);
+        quad([[0., 0., 0.], [0., 0., h], [w, 0., h], [w, 0., 0.]], Class::WALL);
+        quad([[0., d, 0.], [w, d, 0.], [w, d, h], [0., d, h]], Class::WALL);
+        quad([[0., 0., 0.], [0., d, 0.], [0., d, h], [0., 0., h]], Class::WALL);
+        quad([[w, 0., 0.], [w, 0., h], [w, d, h], [w, d, 0.]], Class::WALL);
+        quad([[0., 0., 0.7], [1., 0., 0.7], [1., 1., 0.7], [0., 1., 0.7]], Class::TABLE);
         (TriMesh::from_faces(positions, faces).unwrap(), classes)
     }
 
@@ -225,12 +225,12 @@ mod tests {
         let (mesh, classes) = room(width, depth);
         let of: Room = "office_1".parse().unwrap();
         let label = |class| Label { class, instance: 1, room: of, area: 1 };
-        let used = [Class::Floor, Class::Ceiling, Class::Wall, Class::Table].map(label);
+        let used = [Class::FLOOR, Class::CEILING, Class::WALL, Class::TABLE].map(label);
         let table = LabelTable::from_labels(used).unwrap();
         let label_of_face: Vec<LabelId> = classes
             .iter()
             .map(|&c| {
-                if c == Class::Floor && !has_floor { LabelId::NULL } else { table.id_of(&label(c)).unwrap() }
+                if c == Class::FLOOR && !has_floor { LabelId::NULL } else { table.id_of(&label(c)).unwrap() }
             })
             .collect();
         let mut builder = FootprintBuilder::new(FootprintOptions::default());

@@ -141,7 +141,7 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             let files = Listed::of(dir.path(), [FileRecord::of_file(dir.path(), &path).unwrap()]);
             let (ctx, layout) = (&Context::default(), &Layout::new(dir.path()));
-            let table = TreeInstance { class: Class::Table, path: path.clone() };
+            let table = TreeInstance { class: Class::TABLE, path: path.clone() };
             OrientedBox::of(&Source { ctx, layout, files: &files }, &table).unwrap()
         };
         let b = of(text);

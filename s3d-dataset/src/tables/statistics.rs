@@ -130,7 +130,7 @@ impl Statistics {
             text.push_str("\nThere are no labels.\n");
             return text;
         }
-        let class_rows: Vec<_> = Class::ALL
+        let class_rows: Vec<_> = Class::S3DIS
             .map(|c| {
                 let of = move |labels: &LabelStatistics| labels.instances_per_class[c.name()] as f64;
                 (c.name(), move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
@@ -142,7 +142,7 @@ impl Statistics {
                 let of = move |labels: &LabelStatistics| of(&labels.rooms_per_type[t.name()]);
                 (t.name(), move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
             };
-            RoomType::ALL.map(row).into()
+            RoomType::S3DIS.map(row).into()
         };
         self.table(&mut text, "Rooms of each type", &rows(&of_type(|of_type| of_type.rooms as f64)));
         self.table(&mut text, "Floor of each room type, m²", &rows(&of_type(|of_type| of_type.floor_m2)));
@@ -215,7 +215,7 @@ impl LabelStatistics {
     ) -> Result<Self> {
         check(&layout.rooms_json(area), true)?;
         let mut rooms_per_type: BTreeMap<_, RoomTypeStatistics> =
-            RoomType::ALL.map(|t| (t.name(), RoomTypeStatistics::default())).into();
+            RoomType::S3DIS.map(|t| (t.name(), RoomTypeStatistics::default())).into();
         let rooms: Vec<RoomRecord> = read_json(&layout.rooms_json(area))?;
         for record in &rooms {
             let room: Room = record
@@ -228,7 +228,7 @@ impl LabelStatistics {
         }
         Ok(Self {
             floor_m2: rooms.iter().map(|r| r.floor_m2).sum(),
-            instances_per_class: Class::ALL.map(|c| (c.name(), classes.of(area, c))).into(),
+            instances_per_class: Class::S3DIS.map(|c| (c.name(), classes.of(area, c))).into(),
             rooms_per_type,
         })
     }

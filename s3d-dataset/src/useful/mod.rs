@@ -242,7 +242,7 @@ fn level_finding(mesh: &TriMesh, label_of_face: &[LabelId], table: &LabelTable) 
     let (mut level_m2, mut all_m2) = (0.0, 0.0);
     for (face, label) in (0u32..).zip(label_of_face) {
         let class = table.get(*label).map(|label| label.class);
-        if matches!(class, Some(Class::Floor | Class::Ceiling)) {
+        if matches!(class, Some(Class::FLOOR | Class::CEILING)) {
             let area_m2 = mesh.area(face);
             all_m2 += area_m2;
             if mesh.normal(face).z.abs() > LEVEL {

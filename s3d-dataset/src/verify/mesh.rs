@@ -190,7 +190,7 @@ fn check_votes(
         }
     }
     let mut rooms: BTreeMap<String, u64> = BTreeMap::new();
-    let mut classes: BTreeMap<&str, u64> = Class::ALL.map(|c| (c.name(), 0)).into();
+    let mut classes: BTreeMap<&str, u64> = Class::S3DIS.map(|c| (c.name(), 0)).into();
     let mut others = 0;
     for (name, count) in labels.names.iter().zip(&per_label).filter(|(_, count)| **count > 0) {
         match parse_name(name) {

@@ -33,13 +33,13 @@ pub(crate) fn scene_of(mesh_at: impl Fn(Vec3) -> Vec3, points_at: impl Fn(Vec3) 
     let mut parts = TriMesh::from_faces(positions, faces).unwrap().into_parts();
     parts.colors = (0..8).map(|i| [30 * i, 200, 100]).collect();
     let mesh = TriMesh::new(parts).unwrap();
-    let classes = [Class::Floor, Class::Ceiling, Class::Wall, Class::Wall, Class::Wall, Class::Wall];
+    let classes = [Class::FLOOR, Class::CEILING, Class::WALL, Class::WALL, Class::WALL, Class::WALL];
     let instances = classes.iter().enumerate().map(|(i, &class)| {
         let [a, b, _, d] = quads[i].map(corner);
         let at = |u: u32, v: u32| points_at(a + (b - a) * (u as f32 / 20.0) + (d - a) * (v as f32 / 20.0));
         let positions = (0..=20).flat_map(|u| (0..=20).map(move |v| (u, v))).map(|(u, v)| at(u, v)).collect();
         let points = PointCloud { positions, ..PointCloud::default() };
-        let number = if class == Class::Wall { i as u32 - 1 } else { 1 };
+        let number = if class == Class::WALL { i as u32 - 1 } else { 1 };
         AnnotatedPoints { room: "office_1".parse().unwrap(), class, number, points }
     });
     let annotations = Annotations::from_points(instances).unwrap();

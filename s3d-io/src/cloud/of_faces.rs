@@ -154,9 +154,9 @@ mod tests {
         let label =
             |class, instance, room: &str| Label { class, instance, room: room.parse().unwrap(), area: 3 };
         let labels = [
-            label(Class::Wall, 9, "office_2"),
-            label(Class::Wall, 4, "office_2"),
-            label(Class::Wall, 5, "WC_1"),
+            label(Class::WALL, 9, "office_2"),
+            label(Class::WALL, 4, "office_2"),
+            label(Class::WALL, 5, "WC_1"),
         ];
         let path = Path::new("semantic.obj");
         let found = Annotations::from_face_labels(path, &mesh, &labels, &[0, 1, NO_INDEX]).unwrap();

@@ -36,9 +36,9 @@ impl Annotations {
     /// use s3d_label::Class;
     ///
     /// let points = PointCloud { positions: vec![vec3(0.0, 0.0, 0.4)], ..PointCloud::default() };
-    /// let chair = AnnotatedPoints { room: "office_1".parse()?, class: Class::Chair, number: 1, points };
+    /// let chair = AnnotatedPoints { room: "office_1".parse()?, class: Class::CHAIR, number: 1, points };
     /// let annotations = Annotations::from_points([chair])?;
-    /// assert_eq!(annotations.rooms[0].instances[0].class, Class::Chair);
+    /// assert_eq!(annotations.rooms[0].instances[0].class, Class::CHAIR);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -145,15 +145,15 @@ mod tests {
     #[test]
     fn points_come_back_in_blocks_and_whole() {
         let given = [
-            instance("office_2", Class::Wall, 1, 3),
-            instance("WC_1", Class::Floor, 1, 1),
-            instance("office_2", Class::Chair, 7, 5),
+            instance("office_2", Class::WALL, 1, 3),
+            instance("WC_1", Class::FLOOR, 1, 1),
+            instance("office_2", Class::CHAIR, 7, 5),
         ];
         let found = Annotations::from_points(given).unwrap();
         let names: Vec<String> = found.rooms.iter().map(|r| r.room.to_string()).collect();
         assert_eq!(names.len(), 2);
         let office = found.rooms.iter().find(|r| r.instances.len() == 2).unwrap();
-        let chair = office.instances.iter().find(|i| i.class == Class::Chair).unwrap();
+        let chair = office.instances.iter().find(|i| i.class == Class::CHAIR).unwrap();
         assert_eq!(chair.number, 7);
         let (mut whole, mut blocks) = (PointCloud::default(), PointCloud::default());
         chair.read(&mut whole).unwrap();
@@ -169,9 +169,9 @@ mod tests {
     fn what_is_no_annotation_is_refused() {
         let refused = |given: Vec<AnnotatedPoints>| Annotations::from_points(given).unwrap_err().to_string();
         assert!(refused(vec![]).contains("no instance"));
-        assert!(refused(vec![instance("WC_1", Class::Wall, 0, 1)]).contains("count from 1"));
-        assert!(refused(vec![instance("WC_1", Class::Wall, 1, 0)]).contains("wall_1 of WC_1: has no points"));
-        let twice = instance("WC_1", Class::Wall, 1, 1);
+        assert!(refused(vec![instance("WC_1", Class::WALL, 0, 1)]).contains("count from 1"));
+        assert!(refused(vec![instance("WC_1", Class::WALL, 1, 0)]).contains("wall_1 of WC_1: has no points"));
+        let twice = instance("WC_1", Class::WALL, 1, 1);
         assert!(refused(vec![twice.clone(), twice.clone()]).contains("twice"));
         let mut bad = twice.clone();
         bad.points.colors = vec![[0; 3]; 2];

@@ -168,7 +168,7 @@ mod tests {
     }
 
     fn options() -> AnnotationOptions {
-        let classes = [("2", Some(Class::Floor)), ("5", Some(Class::Chair)), ("0", None)];
+        let classes = [("2", Some(Class::FLOOR)), ("5", Some(Class::CHAIR)), ("0", None)];
         let classes = classes.map(|(key, class)| (key.to_owned(), class)).into();
         AnnotationOptions { classes, room: "office_7".parse().ok(), ..Default::default() }
     }
@@ -194,8 +194,8 @@ mod tests {
                     (i.class, i.number, cloud.faces)
                 })
                 .collect();
-            let chairs = [(Class::Chair, 1, vec![4, 5]), (Class::Chair, 2, vec![2, 3, 10, 11])];
-            assert_eq!(seen[0], (Class::Floor, 1, vec![0, 1, 8, 9]));
+            let chairs = [(Class::CHAIR, 1, vec![4, 5]), (Class::CHAIR, 2, vec![2, 3, 10, 11])];
+            assert_eq!(seen[0], (Class::FLOOR, 1, vec![0, 1, 8, 9]));
             assert_eq!(seen[1..], chairs);
         }
     }

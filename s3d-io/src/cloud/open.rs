@@ -92,10 +92,10 @@ impl Annotations {
     ///
     /// let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
     ///            property uchar class\nend_header\n1 2 3 7\n";
-    /// let classes = [("7".to_owned(), Some(s3d_label::Class::Chair))].into();
+    /// let classes = [("7".to_owned(), Some(s3d_label::Class::CHAIR))].into();
     /// let options = AnnotationOptions { classes, ..Default::default() };
     /// let area = Annotations::from_reader(Cursor::new(ply), Path::new("office_3.ply"), &options)?;
-    /// assert_eq!(area.rooms[0].instances[0].class, s3d_label::Class::Chair);
+    /// assert_eq!(area.rooms[0].instances[0].class, s3d_label::Class::CHAIR);
     /// # Ok::<(), s3d_io::Error>(())
     /// ```
     ///
@@ -410,7 +410,7 @@ mod tests {
             ("WC_1/Annotations/floor_1.txt", "1 2 3 4 5 6\n"),
             ("WC_1/Annotations/person_1.txt", "1 2 3 4 5 6\n"),
         ]);
-        let classes = [("stairs".to_owned(), Some(Class::Floor)), ("person".to_owned(), None)];
+        let classes = [("stairs".to_owned(), Some(Class::FLOOR)), ("person".to_owned(), None)];
         let options = AnnotationOptions { classes: BTreeMap::from(classes), ..AnnotationOptions::default() };
         let found = open(&[&a], &options).unwrap();
         assert_eq!(contents(&found), [("WC_1 floor_1".into(), 1), ("WC_1 floor_2".into(), 1)]);

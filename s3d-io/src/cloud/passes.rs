@@ -279,7 +279,7 @@ mod tests {
         fs::write(folder.join("wall_1.txt"), text).unwrap();
         fs::write(dir.join("office_1.ply"), ply).unwrap();
         let options = AnnotationOptions {
-            classes: [("1".to_owned(), Some(s3d_label::Class::Wall))].into(),
+            classes: [("1".to_owned(), Some(s3d_label::Class::WALL))].into(),
             points_in_memory: 3,
             ..AnnotationOptions::default()
         };

@@ -18,17 +18,17 @@ use std::path::{Path, PathBuf};
 
 /// What the annotators' words mean. Words that are not here are none of the 13 classes.
 const CATEGORIES: [(Class, &[&str]); 12] = [
-    (Class::Ceiling, &["ceiling"]),
-    (Class::Floor, &["floor", "carpet", "rug", "mat", "doormat", "yoga mat"]),
+    (Class::CEILING, &["ceiling"]),
+    (Class::FLOOR, &["floor", "carpet", "rug", "mat", "doormat", "yoga mat"]),
     (
-        Class::Wall,
+        Class::WALL,
         &["wall", "closet wall", "closet walls", "shower wall", "shower walls", "divider", "room divider"],
     ),
-    (Class::Beam, &["beam"]),
-    (Class::Column, &["column", "pillar", "structure column"]),
-    (Class::Window, &["window", "windows", "windowframe"]),
+    (Class::BEAM, &["beam"]),
+    (Class::COLUMN, &["column", "pillar", "structure column"]),
+    (Class::WINDOW, &["window", "windows", "windowframe"]),
     (
-        Class::Door,
+        Class::DOOR,
         &[
             "door",
             "doors",
@@ -44,7 +44,7 @@ const CATEGORIES: [(Class, &[&str]); 12] = [
         ],
     ),
     (
-        Class::Table,
+        Class::TABLE,
         &[
             "table",
             "desk",
@@ -65,7 +65,7 @@ const CATEGORIES: [(Class, &[&str]); 12] = [
         ],
     ),
     (
-        Class::Chair,
+        Class::CHAIR,
         &[
             "chair",
             "chairs",
@@ -88,9 +88,9 @@ const CATEGORIES: [(Class, &[&str]); 12] = [
             "footstool",
         ],
     ),
-    (Class::Sofa, &["sofa", "couch", "loveseat", "futon", "sofa chair", "sofa bed", "beanbag chair"]),
+    (Class::SOFA, &["sofa", "couch", "loveseat", "futon", "sofa chair", "sofa bed", "beanbag chair"]),
     (
-        Class::Bookcase,
+        Class::BOOKCASE,
         &[
             "bookshelf",
             "bookshelves",
@@ -102,7 +102,7 @@ const CATEGORIES: [(Class, &[&str]); 12] = [
             "storage shelf",
         ],
     ),
-    (Class::Board, &["whiteboard", "whiteboards", "blackboard", "bulletin board", "board", "poster board"]),
+    (Class::BOARD, &["whiteboard", "whiteboards", "blackboard", "bulletin board", "board", "poster board"]),
 ];
 
 /// The three files of a scan.

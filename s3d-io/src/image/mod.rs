@@ -31,7 +31,6 @@ pub(crate) mod find;
 mod jpeg;
 #[cfg(feature = "png")]
 pub(crate) mod png;
-pub(crate) mod pretty;
 #[cfg(feature = "texture")]
 pub(crate) mod texture;
 
@@ -45,6 +44,6 @@ pub use self::png::{
     write_rgb8,
 };
 pub use compression::{Compression, UnknownCompression};
-pub use pretty::pretty_color;
+pub use s3d_label::pretty_color;
 #[cfg(feature = "texture")]
 pub use texture::TextureFile;

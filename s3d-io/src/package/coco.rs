@@ -20,7 +20,7 @@ const MISSING: [u8; 3] = [13; 3];
 /// Segments that stand for all of a class in an image have numbers from here on, above those of all labels.
 const FIRST_STUFF_ID: u32 = 0x00ff_0000;
 
-/// The category of a class: 1 to 13, in the order of [`Class::ALL`].
+/// The category of a class: 1 to 13, in the order of [`Class::S3DIS`].
 pub fn coco_category_id(class: Class) -> u32 {
     class.index() as u32 + 1
 }
@@ -43,24 +43,24 @@ pub struct CocoCategory {
 /// The 13 categories; `stuff` are the classes whose instances are not told apart.
 pub fn coco_categories(stuff: &[Class]) -> Vec<CocoCategory> {
     let supercategory = |class| match class {
-        Class::Ceiling
-        | Class::Floor
-        | Class::Wall
-        | Class::Beam
-        | Class::Column
-        | Class::Window
-        | Class::Door => "structure",
-        Class::Table | Class::Chair | Class::Sofa | Class::Bookcase | Class::Board => "furniture",
-        Class::Clutter => "clutter",
+        Class::CEILING
+        | Class::FLOOR
+        | Class::WALL
+        | Class::BEAM
+        | Class::COLUMN
+        | Class::WINDOW
+        | Class::DOOR => "structure",
+        Class::TABLE | Class::CHAIR | Class::SOFA | Class::BOOKCASE | Class::BOARD => "furniture",
+        _ => "clutter",
     };
     let category = |class: Class| CocoCategory {
         id: coco_category_id(class),
         name: class.name(),
         supercategory: supercategory(class),
         isthing: u8::from(!stuff.contains(&class)),
-        color: crate::image::pretty::pretty_color(coco_category_id(class)),
+        color: s3d_label::pretty_color(coco_category_id(class)),
     };
-    Class::ALL.map(category).into()
+    Class::S3DIS.map(category).into()
 }
 
 /// A segment of an image. The fields bear the file's names.
@@ -270,7 +270,7 @@ mod tests {
     fn segments_cover_their_pixels() {
         let [m, w, v, c] = [MISSING, pixel(4), pixel(5), pixel(2)];
         let semantic = Raster::from_vec(4, 3, vec![m, w, w, v, c, [0; 3], w, c, m, m, c, c]);
-        let (image, segments) = coco_panoptic(&semantic, &table(), &[Class::Wall]).unwrap();
+        let (image, segments) = coco_panoptic(&semantic, &table(), &[Class::WALL]).unwrap();
         let wall = FIRST_STUFF_ID + 3;
         let ids: Vec<u32> = image.pixels().iter().map(|p| id_of(*p)).collect();
         assert_eq!(ids, [0, wall, wall, wall, 2, 0, wall, 2, 0, 0, 2, 2]);
@@ -299,7 +299,7 @@ mod tests {
                 labels.iter().map(|l| if *l == 6 { MISSING } else { pixel(*l) }).collect();
             pixels.resize(width * height, MISSING);
             let semantic = Raster::from_vec(width as u32, height as u32, pixels);
-            let (image, segments) = coco_panoptic(&semantic, &table(), &[Class::Wall]).unwrap();
+            let (image, segments) = coco_panoptic(&semantic, &table(), &[Class::WALL]).unwrap();
             let mut seen = 0;
             for s in &segments {
                 let at: Vec<(u32, u32)> = (0..image.height())
@@ -324,7 +324,7 @@ mod tests {
         let segment = CocoSegment { id: 2, category_id: 9, area: 4, bbox: [0, 1, 4, 2], iscrowd: 0 };
         let image =
             CocoImage { id: 1, file_name: "a.png".into(), width: 4, height: 3, segments: vec![segment] };
-        let categories = coco_categories(&[Class::Wall, Class::Floor]);
+        let categories = coco_categories(&[Class::WALL, Class::FLOOR]);
         write_coco(&path, "demo", &[image], &categories).unwrap();
         let json: serde_json::Value = crate::fs::json::read_json(&path).unwrap();
         assert_eq!(json["images"][0]["file_name"], json["annotations"][0]["file_name"]);

@@ -63,7 +63,7 @@ pub struct ImageRow {
 /// What the pixels of an image show.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SemanticRow {
-    /// The share of pixels of each class, in the order of [`Class::ALL`].
+    /// The share of pixels of each class, in the order of [`Class::S3DIS`].
     pub shares: [f64; 13],
     /// The share of pixels in which something without a label was seen.
     pub unlabelled: f64,
@@ -118,7 +118,7 @@ fn columns(rows: &[ImageRow]) -> Vec<(String, bool, Column)> {
     column!("selection_entropy".to_owned(), false, Float, |r| r.selection_entropy);
     column!("entropy".to_owned(), false, Float, |r| r.semantic.as_ref().map(|s| s.entropy));
     column!("coverage".to_owned(), false, Float, |r| r.coverage);
-    for class in Class::ALL {
+    for class in Class::S3DIS {
         column!(format!("share_{class}"), false, Float, |r| {
             r.semantic.as_ref().map(|s| s.shares[class.index()])
         });
@@ -327,7 +327,7 @@ mod tests {
             assert_eq!(*field(&table, i, "pitch_rad"), float(row.yaw_pitch_rad.map(|v| v[1])));
             assert_eq!(*field(&table, i, "coverage"), float(row.coverage));
             let shares = row.semantic.as_ref().map(|s| s.shares);
-            assert_eq!(*field(&table, i, "share_chair"), float(shares.map(|s| s[Class::Chair.index()])));
+            assert_eq!(*field(&table, i, "share_chair"), float(shares.map(|s| s[Class::CHAIR.index()])));
             assert_eq!(*field(&table, i, "depth_max_m"), float(row.depth_m.map(|d| d[2])));
             for (name, list) in [("k", row.k.map(|k| k.to_vec())), ("rt", row.rt.map(|m| m.to_vec()))] {
                 match (field(&table, i, name), list) {

@@ -430,7 +430,7 @@ mod tests {
             columns: vec!["x".into(), "y".into()],
             offset_m: DVec3::new(5e5, -1.0, 0.5),
             unknown_as_clutter: true,
-            classes: BTreeMap::from([("2".into(), Some(Class::Floor)), ("7".into(), None)]),
+            classes: BTreeMap::from([("2".into(), Some(Class::FLOOR)), ("7".into(), None)]),
             ..AnnotationOptions::default()
         };
         assert_eq!(scene.annotation_options, expected);

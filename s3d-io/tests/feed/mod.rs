@@ -84,7 +84,7 @@ fn check_mesh(dir: &Path, result: Result<MeshFile>) -> Option<MeshFile> {
 /// Annotations whose classes are numbers, and whose room is said.
 fn numbered() -> AnnotationOptions {
     let classes =
-        [("2", Some(Class::Floor)), ("6", Some(Class::Wall)), ("19", Some(Class::Chair)), ("1", None)];
+        [("2", Some(Class::FLOOR)), ("6", Some(Class::WALL)), ("19", Some(Class::CHAIR)), ("1", None)];
     AnnotationOptions {
         room: Some("office_1".parse().expect("a room")),
         classes: classes.into_iter().map(|(key, class)| (key.to_owned(), class)).collect(),

@@ -12,7 +12,7 @@ const CLEAR: f64 = 0.75;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ClassDispute {
-    /// The two, in the order of [`Class::ALL`]; the same twice if it is two instances of a class.
+    /// The two, in the order of the taxonomy; the same twice if it is two instances of a class.
     pub classes: [Class; 2],
     /// How many faces they dispute.
     pub faces: u64,
@@ -202,7 +202,7 @@ mod tests {
         vote(7, 3, 1);
         let disputes = Disputes::of(&mesh, &FaceLabels::new(votes), &table);
         let classes: Vec<_> = disputes.classes.iter().map(|d| (d.classes, d.faces, d.area_m2)).collect();
-        assert_eq!(classes, [([Class::Wall, Class::Chair], 8, 4.0), ([Class::Chair, Class::Chair], 2, 1.0)]);
+        assert_eq!(classes, [([Class::WALL, Class::CHAIR], 8, 4.0), ([Class::CHAIR, Class::CHAIR], 2, 1.0)]);
         let patches: Vec<_> = disputes.patches.iter().map(|p| (p.labels.map(|l| l.0), p.faces)).collect();
         assert_eq!(patches, [([3, 1], 6), ([1, 2], 2), ([1, 3], 2)]);
         let largest = &disputes.patches[0];

@@ -56,7 +56,7 @@ impl VoteRow {
 /// let report = VoteReport::new(&votes, &table)?;
 /// assert_eq!((report.total.points, report.total.far_points, report.faces_without_vote), (3, 1, 1));
 /// // The face is the wall's, by less than three quarters of its votes.
-/// let walls = report.classes[Class::Wall.index()].1;
+/// let walls = report.classes[Class::WALL.index()].1;
 /// assert_eq!((walls.faces, walls.face_votes, walls.contested_below_three_quarters), (1, 3, 1));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -77,7 +77,7 @@ pub struct VoteReport {
     pub rooms: Vec<(u32, Room, VoteRow)>,
     /// Every class, each at its [`Class::index`].
     #[cfg_attr(feature = "serde", serde(deserialize_with = "as_data::classes"))]
-    pub classes: [(Class, VoteRow); 13],
+    pub classes: Vec<(Class, VoteRow)>,
 }
 
 impl VoteReport {
@@ -94,7 +94,8 @@ impl VoteReport {
         }
         let mut total = VoteRow::default();
         let mut rooms: BTreeMap<(u32, Room), VoteRow> = BTreeMap::new();
-        let mut classes = Class::ALL.map(|class| (class, VoteRow::default()));
+        let mut classes: Vec<(Class, VoteRow)> =
+            table.taxonomy().classes().iter().map(|class| (*class, VoteRow::default())).collect();
         for (id, label) in table.iter() {
             let tally = votes.points_of(id);
             let room = rooms.entry((label.area, label.room)).or_default();
@@ -134,9 +135,9 @@ mod as_data {
 
     pub(super) fn classes<'de, D: Deserializer<'de>>(
         deserializer: D,
-    ) -> Result<[(Class, VoteRow); 13], D::Error> {
-        let rows = <[(Class, VoteRow); 13]>::deserialize(deserializer)?;
-        if rows.iter().map(|(class, _)| *class).eq(Class::ALL) {
+    ) -> Result<Vec<(Class, VoteRow)>, D::Error> {
+        let rows = Vec::<(Class, VoteRow)>::deserialize(deserializer)?;
+        if rows.iter().map(|(class, _)| class).eq(crate::serde_names::taxonomy().classes()) {
             Ok(rows)
         } else {
             Err(D::Error::custom("the classes of a report are not in their order"))
@@ -206,8 +207,8 @@ mod tests {
         assert_eq!(report.rooms[0].2, office_1);
         assert_eq!(report.rooms[2].2, VoteRow::default());
         assert_eq!(report.rooms[2].2.mean_votes_per_face(), 0.0);
-        let (class, chairs) = report.classes[Class::Chair.index()];
-        assert_eq!((class, chairs.points, chairs.far_points, chairs.faces), (Class::Chair, 12, 1, 3));
+        let (class, chairs) = report.classes[Class::CHAIR.index()];
+        assert_eq!((class, chairs.points, chairs.far_points, chairs.faces), (Class::CHAIR, 12, 1, 3));
     }
 
     #[test]

@@ -110,7 +110,7 @@ fn column([width_m, depth_m, height_m]: [f32; 3]) -> Thing {
 
 fn office() -> RoomPlan {
     RoomPlan {
-        room: Room { room_type: RoomType::Office, number: 1 },
+        room: Room { room_type: RoomType::OFFICE, number: 1 },
         low: vec2(0.0, 0.0),
         high: vec2(5.2, 4.5),
         floor_m: 0.0,
@@ -163,7 +163,7 @@ fn office() -> RoomPlan {
 
 fn conference_room() -> RoomPlan {
     RoomPlan {
-        room: Room { room_type: RoomType::ConferenceRoom, number: 1 },
+        room: Room { room_type: RoomType::CONFERENCE_ROOM, number: 1 },
         low: vec2(5.35, 0.0),
         high: vec2(13.0, 4.5),
         floor_m: 0.0,
@@ -224,7 +224,7 @@ fn conference_room() -> RoomPlan {
 
 fn lounge() -> RoomPlan {
     RoomPlan {
-        room: Room { room_type: RoomType::Lounge, number: 1 },
+        room: Room { room_type: RoomType::LOUNGE, number: 1 },
         low: vec2(3.0, 6.6),
         high: vec2(10.0, 11.0),
         floor_m: 0.0,
@@ -278,7 +278,7 @@ fn lounge() -> RoomPlan {
 
 fn hallway() -> RoomPlan {
     RoomPlan {
-        room: Room { room_type: RoomType::Hallway, number: 1 },
+        room: Room { room_type: RoomType::HALLWAY, number: 1 },
         low: vec2(0.0, 4.65),
         high: vec2(13.0, 6.45),
         floor_m: 0.0,

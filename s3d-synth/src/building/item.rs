@@ -211,7 +211,7 @@ impl Item {
     pub fn class(&self) -> Class {
         match self {
             Self::Standing { thing, .. } | Self::OnWall { thing, .. } => thing.class(),
-            Self::Beam(_) => Class::Beam,
+            Self::Beam(_) => Class::BEAM,
         }
     }
 }
@@ -220,12 +220,12 @@ impl Thing {
     /// The class that it is annotated as.
     pub fn class(&self) -> Class {
         match self {
-            Self::Table { .. } | Self::Desk { .. } | Self::RoundTable { .. } => Class::Table,
-            Self::OfficeChair(_) | Self::Chair(_) | Self::Stool(_) => Class::Chair,
-            Self::Sofa { .. } => Class::Sofa,
-            Self::Bookcase { .. } => Class::Bookcase,
-            Self::Board { .. } => Class::Board,
-            Self::Column { .. } => Class::Column,
+            Self::Table { .. } | Self::Desk { .. } | Self::RoundTable { .. } => Class::TABLE,
+            Self::OfficeChair(_) | Self::Chair(_) | Self::Stool(_) => Class::CHAIR,
+            Self::Sofa { .. } => Class::SOFA,
+            Self::Bookcase { .. } => Class::BOOKCASE,
+            Self::Board { .. } => Class::BOARD,
+            Self::Column { .. } => Class::COLUMN,
             Self::Picture { .. }
             | Self::WallScreen { .. }
             | Self::Monitor(_)
@@ -242,7 +242,7 @@ impl Thing {
             | Self::Stairs { .. }
             | Self::Copier
             | Self::Extinguisher
-            | Self::Rug => Class::Clutter,
+            | Self::Rug => Class::CLUTTER,
         }
     }
 }

@@ -28,7 +28,7 @@ use s3d_label::Room;
 /// building.rooms[0].low = vec2(-1.0, 0.0);
 /// let scene = building.build()?;
 /// assert_eq!(scene.mesh.aabb().min.x, building.origin.x - 1.0);
-/// assert!(!scene.instances.iter().any(|i| i.class == s3d_label::Class::Chair));
+/// assert!(!scene.instances.iter().any(|i| i.class == s3d_label::Class::CHAIR));
 /// # Ok::<(), s3d_synth::BuildingError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

@@ -104,7 +104,7 @@ fn lounge() -> RoomPlan {
             put([2.7, 1.2, 0.0], 0.0, table([1.4, 0.8, 0.74], WALNUT)),
             put([2.7, 2.0, 0.0], 0.0, Thing::Chair(RUST_FABRIC)),
         ],
-        ..room(RoomType::Lounge, 1, [vec2(0.0, 0.0), vec2(4.0, 6.5)], 0.0, openings)
+        ..room(RoomType::LOUNGE, 1, [vec2(0.0, 0.0), vec2(4.0, 6.5)], 0.0, openings)
     }
 }
 
@@ -116,7 +116,7 @@ fn storage() -> RoomPlan {
             put([5.2, 0.4, 0.0], 0.0, Thing::Carton { size_m: [0.6, 0.5, 0.5] }),
             put([5.2, 0.4, 0.5], 12.0, Thing::Carton { size_m: [0.5, 0.4, 0.4] }),
         ],
-        ..room(RoomType::Storage, 1, [vec2(4.0 + WALL_M, 0.0), vec2(7.0, 3.2)], 0.0, openings)
+        ..room(RoomType::STORAGE, 1, [vec2(4.0 + WALL_M, 0.0), vec2(7.0, 3.2)], 0.0, openings)
     }
 }
 
@@ -139,7 +139,7 @@ fn pantry() -> RoomPlan {
                 },
             ),
         ],
-        ..room(RoomType::Pantry, 1, [vec2(4.0 + WALL_M, 3.2 + WALL_M), vec2(7.0, 6.5)], 0.0, openings)
+        ..room(RoomType::PANTRY, 1, [vec2(4.0 + WALL_M, 3.2 + WALL_M), vec2(7.0, 6.5)], 0.0, openings)
     }
 }
 
@@ -155,7 +155,7 @@ fn hallway() -> RoomPlan {
     RoomPlan {
         stairwell: Some(Stairwell { low, high, depth_m: SLAB_M }),
         items: vec![put([2.7, 0.5, 0.0], 0.0, Thing::Plant { height_m: 1.1, pot: CLAY })],
-        ..room(RoomType::Hallway, 1, [vec2(0.0, 0.0), vec2(3.0, 6.5)], UPPER_M, openings)
+        ..room(RoomType::HALLWAY, 1, [vec2(0.0, 0.0), vec2(3.0, 6.5)], UPPER_M, openings)
     }
 }
 
@@ -170,6 +170,6 @@ fn office(number: u32) -> RoomPlan {
             put([6.2, y + 1.5, 0.0], -90.0, DESK),
             put([5.5, y + 1.5, 0.0], 90.0, Thing::OfficeChair(GREY_FABRIC)),
         ],
-        ..room(RoomType::Office, number, [vec2(3.0 + WALL_M, y), vec2(7.0, y + 3.15)], UPPER_M, openings)
+        ..room(RoomType::OFFICE, number, [vec2(3.0 + WALL_M, y), vec2(7.0, y + 3.15)], UPPER_M, openings)
     }
 }

@@ -69,7 +69,7 @@ impl Builder {
             parts: MeshParts::default(),
             instance_of_face: Vec::new(),
             instances: Vec::new(),
-            room: Room { room_type: RoomType::Office, number: 0 },
+            room: Room { room_type: RoomType::OFFICE, number: 0 },
             floor_m: 0.0,
             light: Light::default(),
             frame: Frame { origin: Vec3::ZERO, x_axis: Vec2::X },

@@ -10,7 +10,7 @@ use Side::{Back, Bottom, Front, Left, Right, Top};
 
 /// A table: a top on four legs.
 pub(super) fn table(b: &mut Builder, width: f32, depth: f32, height: f32, top: Look) {
-    b.begin(Class::Table);
+    b.begin(Class::TABLE);
     let (x, y) = (0.5 * width, 0.5 * depth);
     b.cuboid([-x, -y, height - 0.035], [x, y, height], top, &[]);
     for (sx, sy) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
@@ -39,7 +39,7 @@ pub(super) fn desk(b: &mut Builder, width: f32, depth: f32) {
 
 /// A round table on one foot.
 pub(super) fn round_table(b: &mut Builder, radius: f32, height: f32, top: Look) {
-    b.begin(Class::Table);
+    b.begin(Class::TABLE);
     b.stump([0.0, 0.0, height - 0.03], [radius; 2], 0.03, 32, top, &[]);
     b.stump([0.0, 0.0, 0.02], [0.035; 2], height - 0.05, 12, STEEL, &[Top, Bottom]);
     b.stump([0.0, 0.0, 0.0], [0.26, 0.22], 0.02, 24, STEEL, &[Bottom]);
@@ -47,7 +47,7 @@ pub(super) fn round_table(b: &mut Builder, radius: f32, height: f32, top: Look) 
 
 /// An office chair on a star of five feet.
 pub(super) fn office_chair(b: &mut Builder, fabric: Look) {
-    b.begin(Class::Chair);
+    b.begin(Class::CHAIR);
     for arm in 0..5 {
         b.place(vec3(0.0, 0.0, 0.0), 72.0 * arm as f32 + 18.0, |b| {
             b.cuboid([0.036, -0.025, 0.05], [0.31, 0.025, 0.09], BLACK, &[Left]);
@@ -80,7 +80,7 @@ fn tilted_back(b: &mut Builder, half_width: f32, y: f32, span: [f32; 2], lean: f
 
 /// A chair with four wooden legs.
 pub(super) fn chair(b: &mut Builder, fabric: Look) {
-    b.begin(Class::Chair);
+    b.begin(Class::CHAIR);
     for (x, y) in [(-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)] {
         b.cuboid([x - 0.02, y - 0.02, 0.0], [x + 0.02, y + 0.02, 0.42], WALNUT, &[Top, Bottom]);
     }
@@ -93,7 +93,7 @@ pub(super) fn chair(b: &mut Builder, fabric: Look) {
 
 /// A bar stool.
 pub(super) fn stool(b: &mut Builder, seat: Look) {
-    b.begin(Class::Chair);
+    b.begin(Class::CHAIR);
     b.stump([0.0, 0.0, 0.0], [0.2, 0.17], 0.025, 20, STEEL, &[Bottom]);
     b.stump([0.0, 0.0, 0.025], [0.025; 2], 0.675, 10, STEEL, &[Top, Bottom]);
     b.stump([0.0, 0.0, 0.7], [0.17, 0.18], 0.06, 20, seat, &[]);
@@ -102,7 +102,7 @@ pub(super) fn stool(b: &mut Builder, seat: Look) {
 
 /// A sofa for `seats` people.
 pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
-    b.begin(Class::Sofa);
+    b.begin(Class::SOFA);
     let half = 0.5 * 0.66 * seats as f32;
     for (x, y) in [(-half, -0.36), (half, -0.36), (half, 0.36), (-half, 0.36)] {
         b.cuboid([x - 0.03, y - 0.03, 0.0], [x + 0.03, y + 0.03, 0.1], WALNUT, &[Top, Bottom]);
@@ -161,7 +161,7 @@ pub(super) fn bookcase(b: &mut Builder, width: f32, shelves: u32, wood: Look, se
     const ROW: f32 = 0.36;
     const BOARD: f32 = 0.025;
     const DEPTH: f32 = 0.3;
-    b.begin(Class::Bookcase);
+    b.begin(Class::BOOKCASE);
     let (x, y) = (0.5 * width, 0.5 * DEPTH);
     let height = 0.08 + ROW * shelves as f32 + BOARD;
     b.cuboid([-x, -y, 0.0], [-x + BOARD, y, height], wood, &[Bottom]);

@@ -24,7 +24,7 @@ pub(crate) fn window(b: &mut Builder, width: f32, heights: [f32; 2]) {
     const DEPTH: f32 = 0.16;
     const BAR: f32 = 0.05;
     let [z0, z1] = heights;
-    b.begin(Class::Window);
+    b.begin(Class::WINDOW);
     reveal(b, width, heights, DEPTH, WHITE, WHITE);
     let pane = [[0.0, z0], [width, z0], [width, z1], [0.0, z1]].map(|[x, z]| vec3(x, DEPTH, z));
     b.panel(pane, Look::Fitted(Pattern::Sky));
@@ -48,7 +48,7 @@ pub(crate) fn window(b: &mut Builder, width: f32, heights: [f32; 2]) {
 pub(crate) fn doorway(b: &mut Builder, width: f32, height: f32, depth: f32) {
     const TRIM: f32 = 0.06;
     use Side::{Back, Bottom};
-    b.begin(Class::Door);
+    b.begin(Class::DOOR);
     reveal(b, width, [0.0, height], depth, WHITE, OAK);
     b.cuboid([-TRIM, -0.015, 0.0], [0.0, 0.0, height + TRIM], WHITE, &[Back, Bottom]);
     b.cuboid([width, -0.015, 0.0], [width + TRIM, 0.0, height + TRIM], WHITE, &[Back, Bottom]);

@@ -109,7 +109,7 @@ impl RoomPlan {
             });
         }
         for &[x, y, length, width] in &self.lamps {
-            b.begin(Class::Clutter);
+            b.begin(Class::CLUTTER);
             let z = self.ceiling_at(y) - 0.02;
             let (l, w) = (0.5 * length, 0.5 * width);
             b.cuboid([x - l, y - w, z - 0.05], [x + l, y + w, z], LAMP, &[]);
@@ -136,7 +136,7 @@ impl RoomPlan {
         let [xs, ys, zs] = cuts.map(subdivided);
 
         let inside = |p: Vec2| (p - self.low) / (self.high - self.low);
-        b.begin(Class::Floor);
+        b.begin(Class::FLOOR);
         let floor = self.bake_level(
             b.light(),
             |p| p.extend(0.0),
@@ -154,7 +154,7 @@ impl RoomPlan {
             rim(b, well);
         }
 
-        b.begin(Class::Ceiling);
+        b.begin(Class::CEILING);
         let slope = (self.heights_m[1] - self.heights_m[0]) / (self.high.y - self.low.y);
         let normal = vec3(0.0, slope, -1.0).normalize();
         let height = |p: Vec2| p.extend(self.ceiling_at(p.y));
@@ -213,7 +213,7 @@ impl RoomPlan {
                 let (s, z) = (o.span, o.heights);
                 o.wall == wall && p.x > s[0] && p.x < s[1] && p.y > z[0] && p.y < z[1]
             };
-            b.begin(Class::Wall);
+            b.begin(Class::WALL);
             b.baked(lattice(&along, zs, place, |p| !self.openings.iter().any(|o| open(o, p))), texture);
         }
     }

@@ -22,13 +22,13 @@ pub(super) fn construct_thing(b: &mut Builder, thing: &Thing) {
         Thing::Sofa { seats, fabric, cushion } => sofa(b, seats, fabric, cushion),
         Thing::Bookcase { width_m, shelves, wood, seed } => bookcase(b, width_m, shelves, wood, seed),
         Thing::Board { width_m, heights_m, picture, frame, tray_m } => {
-            hanging(b, Class::Board, width_m, heights_m, picture, frame);
+            hanging(b, Class::BOARD, width_m, heights_m, picture, frame);
             if let Some(tray_m) = tray_m {
                 pen_tray(b, tray_m, heights_m[0]);
             }
         }
         Thing::Picture { width_m, heights_m, picture, frame } => {
-            hanging(b, Class::Clutter, width_m, heights_m, picture, frame);
+            hanging(b, Class::CLUTTER, width_m, heights_m, picture, frame);
         }
         Thing::WallScreen { width_m, heights_m } => wall_screen(b, width_m, heights_m),
         Thing::Monitor(picture) => monitor(b, picture),
@@ -79,7 +79,7 @@ fn pen_tray(b: &mut Builder, width: f32, z: f32) {
 
 /// A screen on a foot, on a table top.
 fn monitor(b: &mut Builder, picture: Pattern) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.cuboid([-0.12, -0.02, 0.0], [0.12, 0.14, 0.012], BLACK, &[Bottom]);
     b.cuboid([-0.02, 0.05, 0.012], [0.02, 0.07, 0.2], BLACK, &[Bottom]);
     b.cuboid([-0.3, 0.015, 0.13], [0.3, 0.05, 0.49], BLACK, &[Front]);
@@ -102,13 +102,13 @@ fn screen(b: &mut Builder, half: f32, y: f32, z: [f32; 2], picture: Pattern) {
 
 /// A large screen on a wall, 3 cm off it.
 fn wall_screen(b: &mut Builder, width: f32, z: [f32; 2]) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.cuboid([-0.5 * width, -0.08, z[0]], [0.5 * width, -0.03, z[1]], BLACK, &[Front]);
     screen(b, 0.5 * width, -0.08, z, Pattern::Chart);
 }
 
 fn keyboard(b: &mut Builder) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.cuboid([-0.22, -0.075, 0.0], [0.22, 0.075, 0.018], BLACK, &[Bottom, Top]);
     let corners = [[-0.22, -0.075], [0.22, -0.075], [0.22, 0.075], [-0.22, 0.075]];
     b.panel(corners.map(|[x, y]| vec3(x, y, 0.018)), Look::Fitted(Pattern::Keyboard));
@@ -116,7 +116,7 @@ fn keyboard(b: &mut Builder) {
 
 /// An open laptop.
 fn laptop(b: &mut Builder) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.cuboid([-0.17, -0.12, 0.0], [0.17, 0.12, 0.018], STEEL, &[Bottom, Top]);
     let keys = [[-0.17, -0.12], [0.17, -0.12], [0.17, 0.12], [-0.17, 0.12]];
     b.panel(keys.map(|[x, y]| vec3(x, y, 0.018)), Look::Fitted(Pattern::Keyboard));
@@ -137,7 +137,7 @@ fn laptop(b: &mut Builder) {
 }
 
 fn mug(b: &mut Builder, look: Look) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.stump([0.0, 0.0, 0.0], [0.036, 0.042], 0.095, 14, look, &[Top, Bottom]);
     b.disc([0.0, 0.0, 0.095], 0.042, 14, COFFEE);
     b.cuboid([0.036, -0.008, 0.02], [0.07, 0.008, 0.08], look, &[Left]);
@@ -145,7 +145,7 @@ fn mug(b: &mut Builder, look: Look) {
 
 /// Sheets of paper, one a little askew.
 fn papers(b: &mut Builder) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.cuboid([-0.105, -0.15, 0.0], [0.105, 0.15, 0.012], PAPER, &[Bottom]);
     b.place(vec3(0.02, 0.01, 0.012), 14.0, |b| {
         b.cuboid([-0.1, -0.14, 0.0], [0.1, 0.14, 0.004], PAPER, &[Bottom]);
@@ -154,7 +154,7 @@ fn papers(b: &mut Builder) {
 
 /// A lamp for a desk: a foot, an arm and a cone.
 fn desk_lamp(b: &mut Builder) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.stump([0.0, 0.0, 0.0], [0.08, 0.075], 0.02, 20, RED, &[Bottom]);
     b.stump([0.0, 0.0, 0.02], [0.01; 2], 0.37, 8, STEEL, &[Top, Bottom]);
     b.cuboid([-0.01, -0.2, 0.38], [0.01, 0.02, 0.4], STEEL, &[]);
@@ -163,7 +163,7 @@ fn desk_lamp(b: &mut Builder) {
 
 /// A lamp that stands on the floor.
 fn floor_lamp(b: &mut Builder) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.stump([0.0, 0.0, 0.0], [0.16, 0.15], 0.02, 24, BLACK, &[Bottom]);
     b.stump([0.0, 0.0, 0.02], [0.014; 2], 1.4, 8, BLACK, &[Bottom]);
     b.stump([0.0, 0.0, 1.36], [0.24, 0.15], 0.3, 24, SHADE, &[]);
@@ -171,7 +171,7 @@ fn floor_lamp(b: &mut Builder) {
 
 /// A plant in a pot: leaves in all directions, the lower ones longer.
 fn plant(b: &mut Builder, height: f32, pot: Look) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.stump([0.0, 0.0, 0.0], [0.13, 0.17], 0.3, 20, pot, &[Bottom]);
     b.stump([0.0, 0.0, 0.301], [0.15; 2], 0.006, 20, SOIL, &[Bottom]);
     b.stump([0.0, 0.0, 0.307], [0.016, 0.01], 0.45 * height, 8, WALNUT, &[Bottom]);
@@ -187,20 +187,20 @@ fn plant(b: &mut Builder, height: f32, pot: Look) {
 
 /// A closed cardboard box.
 fn carton(b: &mut Builder, size: [f32; 3]) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     let [x, y, z] = size;
     b.cuboid([-0.5 * x, -0.5 * y, 0.0], [0.5 * x, 0.5 * y, z], CARDBOARD, &[Bottom]);
 }
 
 fn bin(b: &mut Builder, look: Look) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.stump([0.0, 0.0, 0.0], [0.11, 0.14], 0.3, 20, look, &[Top, Bottom]);
     b.disc([0.0, 0.0, 0.3], 0.14, 20, SOIL);
 }
 
 /// A radiator under a window; its origin is on the wall.
 fn radiator(b: &mut Builder, width: f32) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     let x = 0.5 * width;
     b.cuboid([-x, -0.09, 0.14], [x, -0.03, 0.66], WHITE, &[]);
     let ribs = (width / 0.1) as u32;
@@ -212,7 +212,7 @@ fn radiator(b: &mut Builder, width: f32) {
 
 /// A copier: a cabinet with trays, a lid and a panel.
 fn copier(b: &mut Builder) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     let grey = Look::Plain("copier_grey", [214, 216, 216]);
     b.cuboid([-0.32, -0.3, 0.04], [0.32, 0.3, 0.92], grey, &[]);
     for tray in 0..3 {
@@ -228,7 +228,7 @@ fn copier(b: &mut Builder) {
 
 /// A fire extinguisher on the wall.
 fn extinguisher(b: &mut Builder) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     b.stump([0.0, -0.1, 0.62], [0.075; 2], 0.42, 18, RED, &[Top]);
     b.stump([0.0, -0.1, 1.04], [0.075, 0.03], 0.07, 18, RED, &[Bottom]);
     b.cuboid([-0.02, -0.14, 1.105], [0.02, -0.03, 1.16], BLACK, &[]);
@@ -237,7 +237,7 @@ fn extinguisher(b: &mut Builder) {
 
 /// A rug of 2.5 m × 2.1 m.
 fn rug(b: &mut Builder) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     let edge = Look::Plain("rug_edge", [198, 184, 158]);
     b.cuboid([-1.25, -1.05, 0.0], [1.25, 1.05, 0.012], edge, &[Bottom, Top]);
     let corners = [[-1.25, -1.05], [1.25, -1.05], [1.25, 1.05], [-1.25, 1.05]];
@@ -246,7 +246,7 @@ fn rug(b: &mut Builder) {
 
 /// Stairs: a block a step, each as high as its tread, of which only what is not behind another is built.
 fn stairs(b: &mut Builder, width: f32, steps: u32, tread: f32, riser: f32) {
-    b.begin(Class::Clutter);
+    b.begin(Class::CLUTTER);
     let x = 0.5 * width;
     for step in 0..steps {
         let [y0, y1] = [step, step + 1].map(|n| n as f32 * tread);
@@ -260,7 +260,7 @@ fn stairs(b: &mut Builder, width: f32, steps: u32, tread: f32, riser: f32) {
 /// A beam under a ceiling from `from` to `to`, which are on the ceiling: `half` its width to either side,
 /// `depth` down.
 pub(super) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32, look: Look) {
-    b.begin(Class::Beam);
+    b.begin(Class::BEAM);
     // The ends touch walls, and the top the ceiling.
     let side = (to - from).cross(Vec3::Z).normalize() * half;
     let down = Vec3::Z * depth;
@@ -275,6 +275,6 @@ pub(super) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32,
 
 /// A column against a wall (the origin is on it), up to the ceiling.
 fn column(b: &mut Builder, width: f32, depth: f32, height: f32) {
-    b.begin(Class::Column);
+    b.begin(Class::COLUMN);
     b.cuboid([-0.5 * width, -depth, 0.0], [0.5 * width, 0.0, height], CONCRETE, &[Top, Bottom, Back]);
 }

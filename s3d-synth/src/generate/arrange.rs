@@ -110,7 +110,7 @@ fn arrange_storey(
     hallway_openings.push(end(Wall::East, 0.5 * DOOR_M[0], [0.0, DOOR_M[1]], Filling::ShutDoor));
     let corners = [vec2(0.0, south), vec2(length, north)];
     let heights = [options.hallway_height_m; 2];
-    let plan = shell(options, RoomType::Hallway, corners, heights, hallway_openings, rng);
+    let plan = shell(options, RoomType::HALLWAY, corners, heights, hallway_openings, rng);
     let locations = (length / 8.0).ceil() as u32;
     sites.push(Site { plan, furnishing: 1.0, locations });
 }

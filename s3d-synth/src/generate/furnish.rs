@@ -39,7 +39,7 @@ enum Group {
 
 /// Whether rooms of this type can be furnished.
 pub(super) fn can_furnish(room_type: RoomType) -> bool {
-    room_type != RoomType::Hallway && !groups(room_type, 20.0).is_empty()
+    room_type != RoomType::HALLWAY && !groups(room_type, 20.0).is_empty()
 }
 
 /// What a room of so many square metres has, the largest first, and how much of it.
@@ -47,7 +47,7 @@ fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
     use Group::*;
     let (low, high) = (Bookcase { most_shelves: 2 }, Bookcase { most_shelves: 5 });
     match room_type {
-        RoomType::Office => vec![
+        RoomType::OFFICE => vec![
             (Workplace, (area_m2 / 9.0).min(4.0)),
             (Board, 1.0),
             (high, area_m2 / 14.0),
@@ -57,7 +57,7 @@ fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
             (Carton, 1.5),
             (Bin, 1.0),
         ],
-        RoomType::ConferenceRoom => vec![
+        RoomType::CONFERENCE_ROOM => vec![
             (MeetingTable, 1.0),
             (Board, 1.6),
             (WallScreen, 1.0),
@@ -67,7 +67,7 @@ fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
             (Plant, 1.6),
             (Bin, 1.0),
         ],
-        RoomType::Lounge | RoomType::Lobby => vec![
+        RoomType::LOUNGE | RoomType::LOBBY => vec![
             (CoffeeTable, area_m2 / 30.0),
             (SofaCorner, (area_m2 / 14.0).min(4.0)),
             (BarTable, 1.0),
@@ -78,7 +78,7 @@ fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
             (Plant, 2.0),
             (Bin, 1.0),
         ],
-        RoomType::Openspace => vec![
+        RoomType::OPENSPACE => vec![
             (Workplace, area_m2 / 7.0),
             (SofaCorner, 0.5),
             (Board, 2.0),
@@ -88,14 +88,14 @@ fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
             (Carton, 2.0),
             (Bin, area_m2 / 20.0),
         ],
-        RoomType::Pantry => {
+        RoomType::PANTRY => {
             vec![(BarTable, area_m2 / 9.0), (high, 1.0), (low, 1.0), (Board, 0.6), (Plant, 1.0), (Bin, 1.0)]
         }
-        RoomType::CopyRoom => {
+        RoomType::COPY_ROOM => {
             vec![(Copier, area_m2 / 6.0), (high, area_m2 / 6.0), (Board, 0.7), (Carton, 2.5), (Bin, 1.0)]
         }
-        RoomType::Storage => vec![(high, area_m2 / 4.0), (low, 0.5), (Carton, area_m2 / 3.0), (Bin, 0.5)],
-        RoomType::Hallway => vec![
+        RoomType::STORAGE => vec![(high, area_m2 / 4.0), (low, 0.5), (Carton, area_m2 / 3.0), (Bin, 0.5)],
+        RoomType::HALLWAY => vec![
             (Copier, 0.3),
             (Board, area_m2 / 20.0),
             (Extinguisher, 1.0 + area_m2 / 60.0),
@@ -106,7 +106,7 @@ fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
             (Bin, area_m2 / 30.0),
             (Carton, 0.5),
         ],
-        RoomType::Auditorium | RoomType::Wc => Vec::new(),
+        _ => Vec::new(),
     }
 }
 

@@ -31,9 +31,9 @@ impl Building {
     /// use s3d_synth::{Building, BuildingOptions, RoomOptions};
     ///
     /// let rooms = vec![
-    ///     RoomOptions { size_m: [5.0, 4.2], ..RoomOptions::new(RoomType::Office) },
-    ///     RoomOptions { heights_m: [2.4, 3.4], ..RoomOptions::new(RoomType::Lounge) },
-    ///     RoomOptions::new(RoomType::Storage),
+    ///     RoomOptions { size_m: [5.0, 4.2], ..RoomOptions::new(RoomType::OFFICE) },
+    ///     RoomOptions { heights_m: [2.4, 3.4], ..RoomOptions::new(RoomType::LOUNGE) },
+    ///     RoomOptions::new(RoomType::STORAGE),
     /// ];
     /// let options = BuildingOptions { rooms, seed: 7, texture_scale: 0.1, ..BuildingOptions::default() };
     /// let scene = Building::generate(&options)?.build()?;

@@ -48,17 +48,17 @@ pub struct RoomOptions {
 
 /// The types that can be generated, common ones more than once; and between which sizes they lie.
 const DRAWN: [(RoomType, [[f32; 2]; 2]); 11] = [
-    (RoomType::Office, [[3.0, 5.6], [3.6, 5.2]]),
-    (RoomType::Office, [[3.0, 5.6], [3.6, 5.2]]),
-    (RoomType::Office, [[3.0, 5.6], [3.6, 5.2]]),
-    (RoomType::Office, [[3.0, 5.6], [3.6, 5.2]]),
-    (RoomType::ConferenceRoom, [[5.0, 8.5], [4.2, 6.0]]),
-    (RoomType::Lounge, [[5.0, 8.0], [4.4, 6.0]]),
-    (RoomType::Openspace, [[7.0, 12.0], [5.0, 8.0]]),
-    (RoomType::Pantry, [[3.2, 4.6], [3.2, 4.6]]),
-    (RoomType::CopyRoom, [[2.4, 3.6], [2.6, 4.0]]),
-    (RoomType::Storage, [[2.2, 4.0], [2.6, 4.4]]),
-    (RoomType::Lobby, [[5.0, 8.0], [4.4, 6.5]]),
+    (RoomType::OFFICE, [[3.0, 5.6], [3.6, 5.2]]),
+    (RoomType::OFFICE, [[3.0, 5.6], [3.6, 5.2]]),
+    (RoomType::OFFICE, [[3.0, 5.6], [3.6, 5.2]]),
+    (RoomType::OFFICE, [[3.0, 5.6], [3.6, 5.2]]),
+    (RoomType::CONFERENCE_ROOM, [[5.0, 8.5], [4.2, 6.0]]),
+    (RoomType::LOUNGE, [[5.0, 8.0], [4.4, 6.0]]),
+    (RoomType::OPENSPACE, [[7.0, 12.0], [5.0, 8.0]]),
+    (RoomType::PANTRY, [[3.2, 4.6], [3.2, 4.6]]),
+    (RoomType::COPY_ROOM, [[2.4, 3.6], [2.6, 4.0]]),
+    (RoomType::STORAGE, [[2.2, 4.0], [2.6, 4.4]]),
+    (RoomType::LOBBY, [[5.0, 8.0], [4.4, 6.5]]),
 ];
 
 impl RoomOptions {

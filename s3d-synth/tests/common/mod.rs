@@ -32,7 +32,7 @@ impl Seen {
     /// The boxes of the rooms, from their walls.
     pub fn rooms(&self) -> BTreeMap<Room, Aabb> {
         let mut rooms = BTreeMap::new();
-        for face in self.faces().filter(|&f| self.instance_of(f).class == Class::Wall) {
+        for face in self.faces().filter(|&f| self.instance_of(f).class == Class::WALL) {
             let room = rooms.entry(self.instance_of(face).room).or_insert(Aabb::EMPTY);
             *room = self.scene.mesh.triangle(face).into_iter().fold(*room, Aabb::with);
         }
@@ -65,7 +65,7 @@ impl Seen {
             assert_eq!(i.number, *number, "{i:?}");
         }
         for room in s.instances.iter().map(|i| i.room) {
-            for (class, n) in [(Class::Floor, 1), (Class::Ceiling, 1), (Class::Wall, 4)] {
+            for (class, n) in [(Class::FLOOR, 1), (Class::CEILING, 1), (Class::WALL, 4)] {
                 assert_eq!(next[&(class, room)], n, "{class} in {room}");
             }
         }
@@ -76,7 +76,7 @@ impl Seen {
         let rooms = self.rooms();
         for f in self.faces() {
             let (instance, room) = (self.instance_of(f), rooms[&self.instance_of(f).room]);
-            let deep = if matches!(instance.class, Class::Window | Class::Door) { 0.161 } else { 2e-3 };
+            let deep = if matches!(instance.class, Class::WINDOW | Class::DOOR) { 0.161 } else { 2e-3 };
             let room = Aabb { min: room.min - deep, max: room.max + deep };
             for p in self.scene.mesh.triangle(f) {
                 assert!(room.contains(p), "{instance:?} at {p}");

@@ -231,7 +231,7 @@ mod tests {
             count in any::<u32>(),
         ) -> AreaPlan {
             let ring: Vec<DVec2> = ring.into_iter().map(|(x, y)| DVec2::new(x, y)).collect();
-            let mut classes = Class::ALL.map(|class| (class, row));
+            let mut classes = Class::S3DIS.map(|class| (class, row));
             classes[3].1 = class_row;
             let [x, y, z, turn @ ..] = place;
             AreaPlan {
@@ -250,7 +250,7 @@ mod tests {
                         unlabeled_points: 7,
                         total: row,
                         rooms: vec![(3, room("office_1"), class_row), (4, room("WC_2"), row)],
-                        classes,
+                        classes: classes.into(),
                     },
                     rooms: vec![SurveyedRoom {
                         room: room("office_1"),

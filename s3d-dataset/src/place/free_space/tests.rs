@@ -78,9 +78,9 @@ fn check(building: &Building, scene: &AnnotatedScene, found: &FreeSpace) {
         assert!(clearance > 0.19, "{at}: {clearance} m");
         let below = cast_ray(&rays, at, -DVec3::Z).unwrap();
         let on = scene.instances[scene.instance_of_face[below.face as usize] as usize];
-        let is_rug = on.class == Class::Clutter && below.t > 1.48;
+        let is_rug = on.class == Class::CLUTTER && below.t > 1.48;
         assert!((below.t - 1.5).abs() < 0.03, "{at}: {} m above {on:?}", below.t);
-        assert!(on.class == Class::Floor || is_rug, "{at}: on {on:?}");
+        assert!(on.class == Class::FLOOR || is_rug, "{at}: on {on:?}");
         let outlook = Outlook::of(&rays, location);
         assert!(outlook.coverage > 0.9 && outlook.back_sides < 0.1, "{at}: {outlook:?}");
         assert!(uuids.insert(&location.uuid));

@@ -130,7 +130,7 @@ fn named(name: &str, options: &AnnotationOptions) -> std::result::Result<Named, 
         (Some(Some(class)), Ok(own)) if *class == own => Ok(Named::Instance(own, number)),
         (Some(Some(class)), _) => Ok(Named::Other(*class)),
         (None, Ok(class)) => Ok(Named::Instance(class, number)),
-        (None, Err(_)) if options.unknown_as_clutter => Ok(Named::Other(Class::Clutter)),
+        (None, Err(_)) if options.unknown_as_clutter => Ok(Named::Other(Class::CLUTTER)),
         (None, Err(e)) => Err(format!("{e}")),
     }
 }
@@ -225,7 +225,7 @@ mod tests {
         let clutter = AnnotationOptions { unknown_as_clutter: true, ..Default::default() };
         let found = Annotations::open(&path, &clutter).unwrap();
         assert_eq!(names(&found)[..2], ["hallway_2 door_1", "hallway_2 clutter_1"]);
-        let classes = BTreeMap::from([("stairs".to_owned(), Some(Class::Floor)), ("wall".to_owned(), None)]);
+        let classes = BTreeMap::from([("stairs".to_owned(), Some(Class::FLOOR)), ("wall".to_owned(), None)]);
         let found = Annotations::open(&path, &AnnotationOptions { classes, ..Default::default() }).unwrap();
         assert_eq!(names(&found), ["hallway_2 floor_1", "hallway_2 door_1", "office_1 chair_3"]);
     }

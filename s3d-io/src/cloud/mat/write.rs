@@ -6,9 +6,9 @@
 use crate::cloud::mat::hdf5::write::{Attribute, Hdf5Writer, Kind};
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
-use crate::image::pretty::pretty_color;
 use s3d_geom::glam::Vec3;
 use s3d_geom::{VoxelGrid, Voxels};
+use s3d_label::pretty_color;
 use std::io::{Seek, Write};
 use std::path::Path;
 

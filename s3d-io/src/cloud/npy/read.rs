@@ -185,7 +185,7 @@ impl Cloud for NpyCloud<'_> {
     fn class_of(&self, tag: &Tag) -> Option<Class> {
         match tag {
             Tag::Number(n) if self.s3dis_numbers.get() => {
-                usize::try_from(*n).ok().and_then(|n| Class::ALL.get(n)).copied()
+                usize::try_from(*n).ok().and_then(|n| Class::S3DIS.get(n)).copied()
             }
             _ => None,
         }

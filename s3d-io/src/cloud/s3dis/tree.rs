@@ -192,7 +192,7 @@ fn instance_of(path: &Path, options: &TreeOptions) -> Result<Named> {
         (Some(Some(meant)), class) if class != Ok(*meant) => Ok(Named::Other(*meant)),
         (Some(None), _) => Ok(Named::Unlabelled),
         (_, Ok(class)) => Ok(Named::Instance(class, number)),
-        (_, Err(_)) if options.unknown_as_clutter => Ok(Named::Other(Class::Clutter)),
+        (_, Err(_)) if options.unknown_as_clutter => Ok(Named::Other(Class::CLUTTER)),
         (_, Err(e)) => Err(Error::format(path, format!("{e}"))),
     }
 }

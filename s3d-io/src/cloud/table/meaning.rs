@@ -82,7 +82,7 @@ impl Meaning {
                 }
                 None => {
                     unknown_classes.add(tag.key(), group);
-                    options.unknown_as_clutter.then_some(Class::Clutter)
+                    options.unknown_as_clutter.then_some(Class::CLUTTER)
                 }
             };
             // Unlabelled points need no room.
@@ -136,7 +136,7 @@ fn class_of(cloud: &dyn Cloud, options: &AnnotationOptions, tag: &Tag) -> Option
         return Some(*class);
     }
     let by_name = match tag {
-        Tag::Name(name) => Class::from_name(name),
+        Tag::Name(name) => name.parse().ok(),
         Tag::Number(_) => None,
     };
     by_name.or_else(|| cloud.class_of(tag)).map(Some)

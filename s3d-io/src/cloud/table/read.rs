@@ -363,7 +363,7 @@ mod tests {
 
     fn options() -> AnnotationOptions {
         let classes =
-            [("0", None), ("1", Some(Class::Wall)), ("2", Some(Class::Chair)), ("3", Some(Class::Chair))];
+            [("0", None), ("1", Some(Class::WALL)), ("2", Some(Class::CHAIR)), ("3", Some(Class::CHAIR))];
         AnnotationOptions {
             room: Some("office_7".parse().unwrap()),
             classes: classes.into_iter().map(|(k, c)| (k.to_owned(), c)).collect(),
@@ -551,9 +551,9 @@ mod tests {
         for rows in clouds {
             for (i, (class, instance, room)) in rows.iter().enumerate() {
                 let number = if *room == 0 { 7 } else { *room as u32 };
-                let room = Room { number, room_type: s3d_label::RoomType::Office };
+                let room = Room { number, room_type: s3d_label::RoomType::OFFICE };
                 let Some(meant) =
-                    [None, Some(Class::Wall), Some(Class::Chair), Some(Class::Chair)][*class as usize]
+                    [None, Some(Class::WALL), Some(Class::CHAIR), Some(Class::CHAIR)][*class as usize]
                 else {
                     continue;
                 };

@@ -1,4 +1,4 @@
-//! A colour for each instance, for looking at.
+//! Colours that differ from one another, for looking at.
 
 #![expect(clippy::indexing_slicing, reason = "places are taken modulo the length")]
 

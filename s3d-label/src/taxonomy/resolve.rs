@@ -1,0 +1,253 @@
+//! From a definition to a taxonomy: every check, and what is left out.
+
+use crate::color::pretty_color;
+use crate::taxonomy::definition::{ClassDefinition, Kind, RoomTypeDefinition, TaxonomyDefinition};
+use crate::taxonomy::{Details, MAX_CLASSES, Parts, Taxonomy, TaxonomyError};
+use crate::{Class, RoomType};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The most characters of a name: file names hold one of a class or a room, and more.
+const MAX_NAME: usize = 40;
+
+const CLASS: &str = "class";
+const ROOM_TYPE: &str = "type of room";
+
+/// What stands for "counts as no type of S3DIS".
+const NOTHING: u8 = u8::MAX;
+
+impl Taxonomy {
+    /// Checks a definition and fills in what it leaves out.
+    ///
+    /// Names stay in memory as long as the process: a word once, however often taxonomies are made of it.
+    ///
+    /// # Errors
+    /// [`TaxonomyError`] says which entry is wrong, and how to mend it.
+    pub fn new(definition: TaxonomyDefinition) -> Result<Self, TaxonomyError> {
+        if definition.name == Self::S3DIS {
+            return Err(TaxonomyError::Reserved);
+        }
+        Self::any(definition)
+    }
+
+    /// As [`Taxonomy::new`], whatever its name.
+    pub(super) fn any(mut definition: TaxonomyDefinition) -> Result<Self, TaxonomyError> {
+        check_name(CLASS, 0, &definition.name)?;
+        if definition.classes.is_empty() {
+            return Err(TaxonomyError::Empty);
+        }
+        if definition.rooms.is_empty() {
+            let room = |t: RoomType| RoomTypeDefinition { name: t.name().to_owned(), ..Default::default() };
+            definition.rooms = RoomType::S3DIS.map(room).into();
+        }
+        let classes = resolve_classes(&mut definition.classes)?;
+        let room_types = resolve_room_types(&mut definition.rooms)?;
+        let named = |word: &str, place: String| {
+            let find = classes.iter().copied().find(|class| class.name() == word);
+            find.ok_or_else(|| TaxonomyError::Unknown {
+                what: CLASS,
+                place,
+                word: word.to_owned(),
+                names: crate::class::names(&classes),
+            })
+        };
+
+        let mut words: HashMap<String, Option<Class>> = HashMap::new();
+        let name_of = |class: &Option<Class>| class.map_or("none", Class::name).to_owned();
+        let mut add = |word: &str, class: Option<Class>| match words.insert(word.to_owned(), class) {
+            Some(other) if other != class => Err(TaxonomyError::Word {
+                what: CLASS,
+                word: word.to_owned(),
+                first: name_of(&other),
+                second: name_of(&class),
+            }),
+            _ => Ok(()),
+        };
+        for (class, entry) in classes.iter().zip(&definition.classes) {
+            for word in std::iter::once(&entry.name).chain(&entry.aliases) {
+                add(word, Some(*class))?;
+            }
+        }
+        for (word, meant) in &definition.aliases {
+            let meant = match meant.as_str() {
+                "" => None,
+                name => Some(named(name, format!("the alias {word:?}"))?),
+            };
+            add(word, meant)?;
+        }
+
+        for (class, entry) in classes.iter().zip(&definition.classes) {
+            let id = entry.id.unwrap_or_default().to_string();
+            if let Some(other) = words.get(&id).filter(|other| **other != Some(*class)) {
+                let (first, second) = (format!("{class} (its id)"), name_of(other));
+                return Err(TaxonomyError::Word { what: CLASS, word: id, first, second });
+            }
+        }
+
+        let clutter = match &definition.clutter {
+            Some(word) => Some(named(word, "clutter".to_owned())?),
+            None => classes.iter().copied().find(|class| class.name() == Class::CLUTTER.name()),
+        };
+        definition.clutter = clutter.map(|class| class.name().to_owned());
+
+        let mut room_words: HashMap<String, RoomType> = HashMap::new();
+        for (room_type, entry) in room_types.iter().zip(&definition.rooms) {
+            for word in std::iter::once(&entry.name).chain(&entry.aliases) {
+                if let Some(other) = room_words.insert(word.clone(), *room_type).filter(|t| t != room_type) {
+                    return Err(TaxonomyError::Word {
+                        what: ROOM_TYPE,
+                        word: word.clone(),
+                        first: other.name().to_owned(),
+                        second: room_type.name().to_owned(),
+                    });
+                }
+            }
+        }
+        let details = definition.classes.iter().map(details).collect();
+        Ok(Self(Arc::new(Parts { definition, classes, details, room_types, words, room_words, clutter })))
+    }
+}
+
+/// The details of an entry that is filled in.
+fn details(entry: &ClassDefinition) -> Details {
+    Details {
+        id: entry.id.unwrap_or_default(),
+        color: entry.color.unwrap_or_default(),
+        is_stuff: entry.kind == Some(Kind::Stuff),
+    }
+}
+
+/// The classes of a taxonomy; its entries are filled in.
+fn resolve_classes(entries: &mut [ClassDefinition]) -> Result<Vec<Class>, TaxonomyError> {
+    let names: Vec<String> = entries.iter().map(|entry| entry.name.clone()).collect();
+    check_names(CLASS, &names)?;
+    let counts_as: Vec<Option<String>> = entries.iter().map(|entry| entry.counts_as.clone()).collect();
+    let s3dis = counts_as_s3dis(CLASS, &names, &counts_as, &Class::S3DIS.map(Class::name))?;
+
+    let mut by_id: BTreeMap<u32, &str> = BTreeMap::new();
+    let mut by_color: BTreeMap<[u8; 3], &str> = BTreeMap::new();
+    for (place, (entry, name)) in entries.iter_mut().zip(&names).enumerate() {
+        let id = *entry.id.get_or_insert(place as u32 + 1);
+        if id > 0xffff {
+            return Err(TaxonomyError::LargeId { name: name.clone(), id });
+        }
+        if let Some(first) = by_id.insert(id, name) {
+            return Err(TaxonomyError::Id { id, first: first.to_owned(), second: name.clone() });
+        }
+        if let Some(color) = entry.color
+            && let Some(first) = by_color.insert(color, name)
+        {
+            return Err(TaxonomyError::Color { color, first: first.to_owned(), second: name.clone() });
+        }
+    }
+
+    let mut used: BTreeSet<[u8; 3]> = by_color.into_keys().collect();
+    let mut free = 1..;
+    let mut classes = Vec::with_capacity(entries.len());
+    for (index, ((entry, name), s3dis)) in (0u8..).zip(entries.iter_mut().zip(&names).zip(s3dis)) {
+        let s3dis = s3dis.unwrap_or(Class::CLUTTER.index() as u8);
+        let class = Class::new(index, s3dis, intern(name));
+        let is_shell = [Class::CEILING, Class::FLOOR, Class::WALL].contains(&class.s3dis());
+        entry.kind.get_or_insert(if is_shell { Kind::Stuff } else { Kind::Thing });
+        entry.counts_as.get_or_insert_with(|| class.s3dis().name().to_owned());
+        if entry.color.is_none() {
+            entry.color = free.by_ref().map(pretty_color).find(|color| used.insert(*color));
+        }
+        classes.push(class);
+    }
+    Ok(classes)
+}
+
+/// The types of rooms of a taxonomy.
+fn resolve_room_types(entries: &mut [RoomTypeDefinition]) -> Result<Vec<RoomType>, TaxonomyError> {
+    let names: Vec<String> = entries.iter().map(|entry| entry.name.clone()).collect();
+    check_names(ROOM_TYPE, &names)?;
+    let counts_as: Vec<Option<String>> = entries.iter().map(|entry| entry.counts_as.clone()).collect();
+    let s3dis = counts_as_s3dis(ROOM_TYPE, &names, &counts_as, &RoomType::S3DIS.map(RoomType::name))?;
+    let room_type = |(index, (name, s3dis)): (u8, (&String, Option<u8>))| {
+        RoomType::new(index, s3dis.unwrap_or(NOTHING), intern(name))
+    };
+    Ok((0u8..).zip(names.iter().zip(s3dis)).map(room_type).collect())
+}
+
+fn check_name(what: &'static str, place: usize, name: &str) -> Result<(), TaxonomyError> {
+    let plain = name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
+    let starts = name.bytes().next().is_some_and(|b| b.is_ascii_alphabetic());
+    // The word is what stands in names where no room is known.
+    let taken = what == ROOM_TYPE && name.eq_ignore_ascii_case("unknown");
+    if plain && starts && name.len() <= MAX_NAME && !taken {
+        return Ok(());
+    }
+    Err(TaxonomyError::Name { what, place, name: name.to_owned() })
+}
+
+fn check_names(what: &'static str, names: &[String]) -> Result<(), TaxonomyError> {
+    if names.len() > MAX_CLASSES {
+        return Err(TaxonomyError::TooMany { what, count: names.len() });
+    }
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    for (place, name) in (1..).zip(names) {
+        check_name(what, place, name)?;
+        if let Some(first) = places.insert(name.to_ascii_lowercase(), place) {
+            return Err(TaxonomyError::SameName { what, place, name: name.clone(), first });
+        }
+    }
+    Ok(())
+}
+
+/// Follows what each entry counts as to a place in `s3dis`. `None`: it counts as nothing there.
+fn counts_as_s3dis(
+    what: &'static str,
+    names: &[String],
+    counts_as: &[Option<String>],
+    s3dis: &[&str],
+) -> Result<Vec<Option<u8>>, TaxonomyError> {
+    let place_of = |name: &str| (0u8..).zip(s3dis).find(|(_, word)| **word == name).map(|(place, _)| place);
+    let entries: BTreeMap<&str, Option<&str>> =
+        names.iter().map(String::as_str).zip(counts_as.iter().map(Option::as_deref)).collect();
+    let follow = |start: &str| {
+        let mut way = vec![start.to_owned()];
+        let mut name = start;
+        loop {
+            // That an entry counts as its own name means the one of S3DIS with this name.
+            match entries
+                .get(name)
+                .copied()
+                .flatten()
+                .filter(|next| *next != name || place_of(next).is_none())
+            {
+                None => return Ok(place_of(name)),
+                Some(next) if !entries.contains_key(next) => {
+                    return place_of(next).map(Some).ok_or_else(|| TaxonomyError::Unknown {
+                        what,
+                        place: format!("counts_as of {name:?}"),
+                        word: next.to_owned(),
+                        names: format!("{} and {} of this taxonomy", s3dis.join(" "), names.join(" ")),
+                    });
+                }
+                Some(next) => {
+                    let before = way.iter().position(|earlier| earlier == next);
+                    way.push(next.to_owned());
+                    if let Some(before) = before {
+                        return Err(TaxonomyError::Circle { what, names: way.split_off(before) });
+                    }
+                    name = next;
+                }
+            }
+        }
+    };
+    names.iter().map(|name| follow(name)).collect()
+}
+
+/// The word for as long as the process lives.
+fn intern(word: &str) -> &'static &'static str {
+    static WORDS: Mutex<BTreeMap<&'static str, &'static &'static str>> = Mutex::new(BTreeMap::new());
+    let mut words = WORDS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = words.get(word) {
+        return known;
+    }
+    let text: &'static str = Box::leak(word.into());
+    let word: &'static &'static str = Box::leak(Box::new(text));
+    words.insert(text, word);
+    word
+}
