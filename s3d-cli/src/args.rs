@@ -3,7 +3,7 @@
 use crate::values::{parsed, positive};
 use clap::{Args, value_parser};
 use s3d_dataset::{Condition, SceneSource};
-use s3d_io::mesh::UpAxis;
+use s3d_io::mesh::{LengthUnit, UpAxis};
 use std::path::PathBuf;
 
 #[derive(Clone, Copy, Debug, Args)]
@@ -30,6 +30,9 @@ pub(crate) struct MeshArgs {
     /// Which axis of the file points up.
     #[arg(long, default_value = "y", value_parser = parsed::<UpAxis>, value_name = "y|z")]
     pub(crate) up: UpAxis,
+    /// The unit of the file [default: what the file says, or else metres]
+    #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
+    pub(crate) units: Option<LengthUnit>,
 }
 
 /// The scenes of a data set.
@@ -42,11 +45,15 @@ pub(crate) struct Scenes {
     /// Which axis of the files of a mesh points up [default: y in glTF, guessed in others]
     #[arg(long, value_parser = parsed::<UpAxis>, value_name = "y|z")]
     pub(crate) up: Option<UpAxis>,
+    /// The unit of the files of a mesh [default: metres in glTF; in others what the file says, or else
+    /// guessed by the height of rooms]
+    #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
+    pub(crate) units: Option<LengthUnit>,
 }
 
 impl Scenes {
     pub(crate) fn sources(&self) -> Vec<SceneSource> {
-        SceneSource::list(self.scenes.iter().cloned(), self.up)
+        SceneSource::list(self.scenes.iter().cloned(), self.up, self.units)
     }
 }
 

@@ -11,7 +11,8 @@ use crate::export::labels::annotate::{Annotated, annotate, unannotated};
 use crate::export::location::{Located, locate, look_around, room_name, unlabelled_share};
 use crate::options::ExportOptions;
 use crate::useful::{
-    Estimate, Finding, label_findings, mesh_findings, outlook_findings, size_findings, stops_any,
+    Estimate, Finding, Headroom, Storey, label_findings, mesh_findings, outlook_findings, size_findings,
+    stops_any,
 };
 use s3d_geom::{Aabb, NearestFaces};
 use s3d_io::camera::ScanLocation;
@@ -43,6 +44,8 @@ pub struct SceneInfo {
     pub area: u32,
     /// Its mesh.
     pub mesh: MeshInfo,
+    /// Its storeys, from below.
+    pub storeys: Vec<Storey>,
     /// What was found out about it, a sentence each.
     pub notes: Vec<String>,
     /// Whether there are labels: if not, it has no rooms either.
@@ -200,6 +203,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     Ok(SceneInfo {
         area: area.number,
         mesh: MeshInfo::of(&file),
+        storeys: Headroom::of(&scene, glam::DVec3::Z).storeys(),
         notes: area.notes.clone(),
         is_labelled: area.is_labelled,
         rooms: rooms(area, &annotated),
@@ -249,6 +253,11 @@ impl MeshInfo {
 impl fmt::Display for SceneInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "area {}\n\n{}", self.area, self.mesh)?;
+        if !self.storeys.is_empty() {
+            let storeys: Vec<String> = self.storeys.iter().map(Storey::to_string).collect();
+            let plural = if storeys.len() == 1 { "storey" } else { "storeys" };
+            writeln!(f, "  {} {plural}: {}", storeys.len(), storeys.join("; "))?;
+        }
         self.notes.iter().try_for_each(|note| writeln!(f, "  {note}"))?;
         if self.is_labelled {
             writeln!(f, "annotations: {} points, {} rooms", self.points, self.rooms.len())?;

@@ -76,7 +76,7 @@ pub use shard::make_plan::plan;
 pub use shard::merge::merge;
 pub use tables::statistics::{AreaStatistics, RoomTypeStatistics, Statistics, statistics};
 pub use tables::summary::{ImageTally, Summary, Surface, UnitTally, Unlabelled, ViewTally};
-pub use useful::{Condition, Estimate};
+pub use useful::{Condition, Estimate, Storey};
 pub use verify::{FaultGroup, VerifyOptions, VerifyReport, verify};
 pub use xyz::{XyzOptions, xyz};
 

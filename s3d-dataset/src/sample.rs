@@ -8,7 +8,7 @@ use crate::useful::{PLY_POINT_BYTES, check_points, check_space};
 use glam::DVec3;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use s3d_io::cloud::PlyPointWriter;
-use s3d_io::mesh::{MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::mesh::{LengthUnit, MeshOptions, MeshOrigin, UpAxis};
 use std::path::Path;
 use std::time::Instant;
 
@@ -20,6 +20,8 @@ const CHUNK: u64 = 1 << 20;
 pub struct SampleOptions {
     /// Which axis of the mesh's file points up.
     pub up: UpAxis,
+    /// The unit of the mesh's file; `None`: what it says, or else metres.
+    pub units: Option<LengthUnit>,
     /// How many points there are.
     pub density: Density,
     /// Everything random comes from it.
@@ -30,7 +32,7 @@ pub struct SampleOptions {
 
 impl Default for SampleOptions {
     fn default() -> Self {
-        Self { up: UpAxis::Y, density: Density::PerM2(10_000.0), seed: 0, overwrite: false }
+        Self { up: UpAxis::Y, units: None, density: Density::PerM2(10_000.0), seed: 0, overwrite: false }
     }
 }
 
@@ -52,7 +54,7 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     if !Staging::is_left(&parent, name) {
         refuse_existing(output, options.overwrite)?;
     }
-    let near = MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() };
+    let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
     let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
     ctx.warn_each(&file.warnings);
     let points = match options.density {

@@ -6,7 +6,7 @@ use crate::failure::Outcome;
 use crate::values::parsed;
 use clap::Args;
 use s3d_dataset::{InfoOptions, SceneSource};
-use s3d_io::mesh::UpAxis;
+use s3d_io::mesh::{LengthUnit, UpAxis};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -17,6 +17,10 @@ pub(crate) struct InfoArgs {
     /// Which axis of a mesh points up [default: y in glTF, guessed in others]
     #[arg(long, value_parser = parsed::<UpAxis>, value_name = "y|z")]
     pub(crate) up: Option<UpAxis>,
+    /// The unit of a mesh [default: metres in glTF; in others what the file says, or else guessed by the
+    /// height of rooms]
+    #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
+    pub(crate) units: Option<LengthUnit>,
     #[command(flatten)]
     pub(crate) placing: Placing,
     /// The seed by which they would be placed.
@@ -32,7 +36,7 @@ pub(crate) struct InfoArgs {
 pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
     let Placing { place_cameras, see } = args.placing;
     let options = InfoOptions { place_cameras, see, seed: args.seed, lenient: args.lenient };
-    let scene = SceneSource::list([args.scene], args.up).remove(0);
+    let scene = SceneSource::list([args.scene], args.up, args.units).remove(0);
     let info = on_threads(args.threads, |context| s3d_dataset::info(scene, &options, context))?;
     print(&info.to_string())
 }

@@ -78,6 +78,7 @@ pub(crate) struct RenderArgs {
 pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
     let options = RenderOptions {
         up: args.mesh.up,
+        units: args.mesh.units,
         normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
         compression: args.compression,
         overwrite: args.overwrite,

@@ -117,7 +117,8 @@ pub fn render_poses(
     let mut frames = frames(poses, &cameras, &options.intrinsics)?;
     tell_of_list(ctx, &cameras, untracked);
 
-    let near = MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() };
+    let near =
+        MeshOptions { origin: MeshOrigin::Near, units: options.render.units, ..MeshOptions::default() };
     let file = s3d_io::mesh::read_mesh_with(mesh, options.render.up, &near)?;
     ctx.warn_each(&file.warnings);
     // What is written is in the frame of the mesh as it was read.

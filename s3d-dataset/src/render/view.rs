@@ -10,7 +10,7 @@ use s3d_geom::Camera;
 use s3d_io::dataset::Conventions;
 use s3d_io::fs::{create_dir, write_bytes, write_json};
 use s3d_io::image::{Compression, Content, encode_rgb8};
-use s3d_io::mesh::{MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::mesh::{LengthUnit, MeshOptions, MeshOrigin, UpAxis};
 use s3d_render::{Hits, MipMaps, NO_FACE, Normals, Scene, cast, coverage};
 use serde::Serialize;
 use std::path::Path;
@@ -42,6 +42,8 @@ struct View {
 pub struct RenderOptions {
     /// Which axis of the mesh's file points up.
     pub up: UpAxis,
+    /// The unit of the mesh's file; `None`: what it says, or else metres.
+    pub units: Option<LengthUnit>,
     /// The faces' normals, or those interpolated from the mesh's own where it has some.
     pub normals: Normals,
     /// How much time the images' files may take.
@@ -52,7 +54,13 @@ pub struct RenderOptions {
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { up: UpAxis::Y, normals: Normals::Flat, compression: Compression::default(), overwrite: false }
+        Self {
+            up: UpAxis::Y,
+            units: None,
+            normals: Normals::Flat,
+            compression: Compression::default(),
+            overwrite: false,
+        }
     }
 }
 
@@ -114,7 +122,7 @@ pub fn render(
         refuse(options.overwrite)?;
     }
 
-    let near = MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() };
+    let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
     let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
     // What is written is in the frame of the mesh as it was read.
     let mut camera = *camera;

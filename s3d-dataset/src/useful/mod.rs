@@ -4,9 +4,12 @@
 //! the condition; nearer it is a warning. `info` and `export` find the same.
 
 mod estimate;
+mod headroom;
 
 pub use estimate::Estimate;
 pub(crate) use estimate::{PLY_POINT_BYTES, check_points, check_space, size_findings, space_findings};
+pub(crate) use headroom::Headroom;
+pub use headroom::Storey;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -161,15 +164,16 @@ fn percent(share: f64) -> String {
 pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
     /// The largest number that a half float can hold.
     const LARGEST_HALF_M: f32 = 65_504.0;
+    const UNITS: &str = "--units of a mesh, or units = \"cm\" under [mesh], says another unit";
     let mut findings = Vec::new();
     let bbox = mesh.aabb();
     let (length, farthest) = (bbox.size().max_element(), bbox.min.abs().max(bbox.max.abs()).max_element());
     if length > 1000.0 {
-        let text = format!("the mesh is {length:.0} m long: is it in metres?");
+        let text = format!("the mesh is {length:.0} m long: is it in metres? ({UNITS})");
         findings.push(Finding::new(Condition::Scale, length > 3000.0, text));
     }
     if length < 0.5 {
-        let text = format!("the mesh is only {:.1} cm long: is it in metres?", 100.0 * length);
+        let text = format!("the mesh is only {:.1} cm long: is it in metres? ({UNITS})", 100.0 * length);
         findings.push(Finding::new(Condition::Scale, length < 0.1, text));
     }
     let moving = "give [mesh] offset_m, or move mesh, points and cameras nearer to it";

@@ -3,7 +3,7 @@
 use crate::fs::quote::count;
 use crate::image::texture::TextureFile;
 use crate::mesh::labels::MeshLabels;
-use crate::mesh::origin::MeshOrigin;
+use crate::mesh::origin::{FileFrame, MeshOrigin};
 use s3d_geom::glam::{DMat3, DVec3, Vec3, vec3};
 use s3d_geom::{MeshError, MeshParts, TriMesh};
 use std::ops::Range;
@@ -74,6 +74,8 @@ pub struct MeshFile {
     /// What was subtracted from the positions of its files, in the world's axes: add it to a position to have
     /// that of the scan. Source: [`MeshOptions::origin`].
     pub offset_m: DVec3,
+    /// The unit that a comment in the (first) file says it is in.
+    pub unit_said: Option<LengthUnit>,
     /// How many faces of the file had more than three corners.
     pub polygons_triangulated: usize,
     /// How many faces were left out because an earlier one has the same corners.
@@ -100,6 +102,7 @@ impl MeshFile {
             sources,
             companions,
             offset_m: DVec3::ZERO,
+            unit_said: None,
             polygons_triangulated,
             repeated_faces,
         }
@@ -145,6 +148,81 @@ pub struct MeshSource {
     pub first_vertex: u32,
 }
 
+/// The unit of a file's coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "toml", derive(serde::Deserialize))]
+pub enum LengthUnit {
+    /// `m`
+    #[default]
+    #[cfg_attr(feature = "toml", serde(rename = "m"))]
+    Metre,
+    /// `cm`
+    #[cfg_attr(feature = "toml", serde(rename = "cm"))]
+    Centimetre,
+    /// `mm`
+    #[cfg_attr(feature = "toml", serde(rename = "mm"))]
+    Millimetre,
+    /// `ft`, of 0.3048 m.
+    #[cfg_attr(feature = "toml", serde(rename = "ft"))]
+    Foot,
+    /// `in`, of 2.54 cm.
+    #[cfg_attr(feature = "toml", serde(rename = "in"))]
+    Inch,
+}
+
+impl LengthUnit {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Metre, Self::Centimetre, Self::Millimetre, Self::Foot, Self::Inch];
+
+    /// The word for it: `m`, `cm`, `mm`, `ft` or `in`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Metre => "m",
+            Self::Centimetre => "cm",
+            Self::Millimetre => "mm",
+            Self::Foot => "ft",
+            Self::Inch => "in",
+        }
+    }
+
+    /// How many metres it is.
+    pub const fn metres(self) -> f64 {
+        match self {
+            Self::Metre => 1.0,
+            Self::Centimetre => 0.01,
+            Self::Millimetre => 0.001,
+            Self::Foot => 0.3048,
+            Self::Inch => 0.0254,
+        }
+    }
+
+    /// The unit that programs mean by a word, such as `meters`, `Inches` or `cm`.
+    pub(crate) fn of_word(word: &str) -> Option<Self> {
+        Some(match word.to_ascii_lowercase().trim_end_matches('s') {
+            "m" | "meter" | "metre" => Self::Metre,
+            "cm" | "centimeter" | "centimetre" => Self::Centimetre,
+            "mm" | "millimeter" | "millimetre" => Self::Millimetre,
+            "ft" | "foot" | "feet" => Self::Foot,
+            "in" | "inch" | "inche" => Self::Inch,
+            _ => return None,
+        })
+    }
+}
+
+impl std::fmt::Display for LengthUnit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl std::str::FromStr for LengthUnit {
+    type Err = &'static str;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        Self::ALL.into_iter().find(|unit| unit.name() == word).ok_or("must be m, cm, mm, ft or in")
+    }
+}
+
 /// How a mesh is read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshOptions {
@@ -156,13 +234,18 @@ pub struct MeshOptions {
     pub instance_column: Option<String>,
     /// Which place becomes the origin.
     pub origin: MeshOrigin,
+    /// The unit of the coordinates. `None`: that which a comment in the head of the file says, as modellers
+    /// write `# File units = inches` into OBJ files; else metres.
+    pub units: Option<LengthUnit>,
 }
 
-/// Makes the mesh, and tells in `warnings` what was mended.
+/// Makes the mesh of parts in the file's unit, and tells in `warnings` what was mended.
 pub(crate) fn checked_mesh(
-    parts: MeshParts,
+    mut parts: MeshParts,
+    frame: FileFrame,
     warnings: &mut Vec<String>,
 ) -> std::result::Result<TriMesh, MeshError> {
+    frame.scale(&mut parts.positions);
     let mesh = TriMesh::new(parts)?;
     let report = mesh.report();
     if report.zero_area_faces > 0 {

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 ///
 /// A column that only some files have is filled up as [`s3d_geom::MeshParts::append`] tells; vertex labels
 /// become labels of faces if other files label faces, and what a file does not label has [`NO_LABEL`]. The
-/// origin that is found for the first file is that of all.
+/// origin that is found for the first file is that of all, and so is the unit that it says.
 ///
 /// # Errors
 /// As [`read_mesh_with`] for each file; [`Error::Format`] if `paths` is empty or the meshes have too many
@@ -36,7 +36,11 @@ pub fn read_meshes_with(paths: &[PathBuf], up: UpAxis, options: &MeshOptions) ->
         return Ok(joined);
     }
     name_warnings(&mut joined.warnings, first);
-    let options = MeshOptions { origin: MeshOrigin::behind(joined.offset_m), ..options.clone() };
+    let options = MeshOptions {
+        origin: MeshOrigin::behind(joined.offset_m),
+        units: options.units.or(joined.unit_said),
+        ..options.clone()
+    };
     for path in others {
         let mut next = read_mesh_with(path, up, &options)?;
         name_warnings(&mut next.warnings, path);
@@ -73,6 +77,7 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
         first_vertex: first_vertex + s.first_vertex,
     }));
     Ok(MeshFile {
+        unit_said: joined.unit_said,
         mesh: joined.mesh.join(next.mesh),
         texture_files: [joined.texture_files, next.texture_files].concat(),
         warnings: [joined.warnings, next.warnings].concat(),

@@ -50,7 +50,7 @@ pub(crate) mod ply;
 pub(crate) mod read;
 
 #[cfg(feature = "mesh")]
-pub use file::{MeshFile, MeshOptions, MeshSource, UpAxis};
+pub use file::{LengthUnit, MeshFile, MeshOptions, MeshSource, UpAxis};
 #[cfg(feature = "mesh")]
 pub use join::{read_meshes, read_meshes_with};
 #[cfg(feature = "mesh")]

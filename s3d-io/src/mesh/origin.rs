@@ -4,7 +4,7 @@
 //! are read in `f64`, and an offset is subtracted before positions are rounded.
 
 use crate::bounds::Bounds;
-use crate::mesh::file::UpAxis;
+use crate::mesh::file::{LengthUnit, UpAxis};
 use s3d_geom::glam::{DVec3, Vec3};
 
 /// Farther from the origin than this, metres, `f32` steps by more than a tenth of a millimetre.
@@ -47,6 +47,43 @@ impl MeshOrigin {
             Self::OfFile => DVec3::ZERO,
             Self::At(offset_m) => offset_m,
             Self::Near => found(Bounds::of(corners)),
+        }
+    }
+}
+
+/// What becomes of a file's coordinates, beside their axes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FileFrame {
+    origin: MeshOrigin,
+    unit: LengthUnit,
+}
+
+impl FileFrame {
+    pub(crate) fn new(origin: MeshOrigin, unit: LengthUnit) -> Self {
+        Self { origin, unit }
+    }
+
+    /// Whether positions that may be as large as `largest`, in the file's unit, are needed in `f64`.
+    pub(crate) fn needs_exact(self, largest: f64) -> bool {
+        self.origin.needs_exact(largest * self.unit.metres())
+    }
+
+    /// What is subtracted from positions, metres in the world's axes, of a mesh whose faces have these
+    /// corners in the file's unit.
+    pub(crate) fn offset_m(self, corners: impl IntoIterator<Item = DVec3>) -> DVec3 {
+        self.origin.offset_m(corners.into_iter().map(|corner| corner * self.unit.metres()))
+    }
+
+    /// An offset in the file's unit.
+    pub(crate) fn in_units(self, offset_m: DVec3) -> DVec3 {
+        offset_m / self.unit.metres()
+    }
+
+    /// Takes positions from the file's unit to metres.
+    pub(crate) fn scale(self, positions: &mut [Vec3]) {
+        if self.unit != LengthUnit::Metre {
+            let metres = |p: Vec3| (p.as_dvec3() * self.unit.metres()).as_vec3();
+            positions.iter_mut().for_each(|p| *p = metres(*p));
         }
     }
 }
@@ -223,5 +260,53 @@ mod tests {
         let file = read("a.obj", text.as_bytes(), UpAxis::Z, MeshOrigin::Near).unwrap();
         let positions: Vec<[f32; 3]> = file.mesh.positions().iter().map(|p| p.to_array()).collect();
         assert_eq!(positions, [[0.25, 0.5, 0.0], [1.25, 0.5, 0.125], [0.0, 1.0, 0.5]]);
+    }
+
+    #[test]
+    fn units_are_taken_to_metres_near_the_origin_and_far() {
+        let inches = LengthUnit::Inch;
+        let read = |name: &str, bytes: &[u8], units, origin| {
+            let options = MeshOptions { origin, units, ..MeshOptions::default() };
+            read_mesh_from(bytes, Path::new(name), UpAxis::Z, &options).unwrap()
+        };
+        for (name, file) in
+            [("a.obj", (|at| obj(at, UpAxis::Z)) as fn(DVec3) -> Vec<u8>), ("a.ply", ply), ("a.gltf", gltf)]
+        {
+            let near = read(name, &file(DVec3::ZERO), None, MeshOrigin::Near);
+            let scaled = read(name, &file(DVec3::ZERO), Some(inches), MeshOrigin::Near);
+            for (a, b) in near.mesh.positions().iter().zip(scaled.mesh.positions()) {
+                assert_eq!((a.as_dvec3() * 0.0254).as_vec3(), *b, "{name}");
+            }
+            assert_eq!((scaled.offset_m, scaled.mesh.faces().len()), (DVec3::ZERO, 38), "{name}");
+            // 12.7 km away, in steps of a millionth of an inch, as exact as near the origin.
+            let far = read(name, &file(UTM), Some(inches), MeshOrigin::Near);
+            assert_eq!(far.offset_m, dvec3(12_700.0, 137_200.0, 0.0), "{name}");
+            let at = UTM * 0.0254 - far.offset_m;
+            for (a, b) in near.mesh.positions().iter().zip(far.mesh.positions()).skip(1) {
+                let expected = a.as_dvec3() * 0.0254 + at;
+                assert!(b.as_dvec3().distance(expected) < 1e-5, "{name}: {b} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_comment_in_the_head_of_an_obj_tells_the_unit() {
+        let with = |head: &str| [head.as_bytes(), &obj(DVec3::ZERO, UpAxis::Z)].concat();
+        let read = |bytes: &[u8], units| {
+            let options = MeshOptions { units, ..MeshOptions::default() };
+            read_mesh_from(bytes, Path::new("a.obj"), UpAxis::Z, &options).unwrap()
+        };
+        let size = |file: &MeshFile| file.mesh.aabb().size().y;
+        let said = read(&with("# made by hand\n\n# File units = inches\n"), None);
+        assert_eq!((said.unit_said, size(&said)), (Some(LengthUnit::Inch), 0.0254));
+        assert!(said.warnings.iter().any(|w| w.contains("its unit is in:")), "{:?}", said.warnings);
+        let other = read(&with("# File units = inches\n"), Some(LengthUnit::Metre));
+        assert_eq!((size(&other), other.warnings.len()), (1.0, 0));
+        for head in ["# File units = meters\n", "# File units: parsecs\n", "v 0 0 0\n# file units = mm\n", ""]
+        {
+            let file = read(&with(head), None);
+            assert_eq!(size(&file), 1.0, "{head}");
+            assert!(!file.warnings.iter().any(|w| w.contains("unit")), "{:?}", file.warnings);
+        }
     }
 }

@@ -18,7 +18,7 @@ pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
     read_mesh_with(path, up, &MeshOptions::default())
 }
 
-/// As [`read_mesh`], with another origin, and the names of the columns of labels. Only PLY files have such
+/// As [`read_mesh`], with another origin or unit, and the names of the columns of labels. Only PLY files have such
 /// columns.
 ///
 /// # Errors
@@ -63,9 +63,9 @@ fn read<R: Read>(
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let file: Result<MeshFile> = match ending.as_str() {
         #[cfg(feature = "obj")]
-        "obj" => crate::mesh::obj::read::read_bytes(whole(open, path)?, path, up, options.origin),
+        "obj" => crate::mesh::obj::read::read_bytes(whole(open, path)?, path, up, options),
         #[cfg(feature = "gltf")]
-        "gltf" | "glb" => crate::mesh::gltf::read::read_bytes(whole(open, path)?, path, up, options.origin),
+        "gltf" | "glb" => crate::mesh::gltf::read::read_bytes(whole(open, path)?, path, up, options),
         #[cfg(feature = "ply")]
         "ply" => {
             let (file, bytes) = open()?;

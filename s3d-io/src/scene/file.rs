@@ -4,7 +4,7 @@ use crate::cloud::annotations::AnnotationOptions;
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
-use crate::mesh::file::UpAxis;
+use crate::mesh::file::{LengthUnit, UpAxis};
 use crate::scene::annotations::AnnotationTable;
 use crate::scene::cameras::{CameraSource, CamerasTable, similarity};
 use crate::scene::rgb::{PictureSource, RgbEntry};
@@ -31,6 +31,9 @@ pub struct SceneFile {
     /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published
     /// OBJ files.
     pub up: UpAxis,
+    /// The unit of the mesh's coordinates: metres if neither this nor the mesh's file says it. Points and scan
+    /// locations are in metres.
+    pub units: Option<LengthUnit>,
     /// What is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing, unless
     /// it lies far from the origin ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
     pub mesh_offset_m: Option<DVec3>,
@@ -60,6 +63,7 @@ impl SceneFile {
             world_from_published: DAffine3::IDENTITY,
             mesh,
             up,
+            units: None,
             mesh_offset_m: None,
             is_labelled: false,
             annotations: Vec::new(),
@@ -95,6 +99,7 @@ struct MeshTable {
     path: Option<PathBuf>,
     paths: Option<Vec<PathBuf>>,
     up: Option<UpAxis>,
+    units: Option<LengthUnit>,
     offset_m: Option<[f64; 3]>,
 }
 
@@ -105,6 +110,7 @@ struct MeshTable {
 /// [mesh]
 /// path = "rgb.obj"    # or paths = ["floor_1.ply", "floor_2.ply"]
 /// up   = "y"          # or "z"; "y" if it is left out
+/// units = "cm"        # or "m", "mm", "ft", "in"; metres if it is left out and the mesh's file does not say it
 /// offset_m = [500000.0, 5400000.0, 300.0]  # subtracted from positions; found by itself if it is left out
 /// [annotations]       # left out: there are no labels
 /// path = "Area_1"     # or mesh = true: the labels that came with the mesh
@@ -226,7 +232,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
     let is_labelled = published.is_some() || document.annotations.is_some();
     let (mut mesh, mut annotations) = (Vec::new(), Vec::new());
     let (mut up, mut annotation_options) = (UpAxis::Y, AnnotationOptions::default());
-    let (mut mesh_offset_m, mut annotations_have_offset) = (None, false);
+    let (mut mesh_offset_m, mut annotations_have_offset, mut units) = (None, false, None);
     if published.is_none() {
         let meshes = document.mesh.ok_or_else(|| fault("missing field `mesh`".to_owned()))?;
         mesh = match (&meshes.path, &meshes.paths) {
@@ -249,6 +255,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
             return Err(fault(format!("mesh.offset_m = {:?} is not finite", offset_m.to_array())));
         }
         up = meshes.up.unwrap_or(UpAxis::Y);
+        units = meshes.units;
     }
     let cameras = match document.cameras.map(CamerasTable::source).transpose() {
         Ok(Some(CameraSource::Listed { path: written, world_from_file })) => {
@@ -269,6 +276,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         world_from_published,
         mesh,
         up,
+        units,
         mesh_offset_m,
         is_labelled,
         annotations,
@@ -316,6 +324,10 @@ mod tests {
         assert_eq!((scene.area, scene.up), (2, UpAxis::Z));
         assert_eq!(read(&GOOD.replace("up = \"z\"\n", "")).unwrap().up, UpAxis::Y);
         assert_eq!((scene.mesh_offset_m, scene.annotations_have_offset), (None, false));
+        assert_eq!(scene.units, None);
+        let scaled = read(&GOOD.replace("up = \"z\"\n", "units = \"in\"\n")).unwrap();
+        assert_eq!(scaled.units, Some(LengthUnit::Inch));
+        assert!(read(&GOOD.replace("up = \"z\"\n", "units = \"km\"\n")).is_err());
         let moved = read(&GOOD.replace("up = \"z\"\n", "offset_m = [5e5, 0, 7]\n")).unwrap();
         assert_eq!(moved.mesh_offset_m, Some(DVec3::new(5e5, 0.0, 7.0)));
     }

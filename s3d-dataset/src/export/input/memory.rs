@@ -6,7 +6,7 @@ use s3d_geom::{MeshParts, PointCloud, TriMesh, Wrap};
 use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::Annotations;
 use s3d_io::fs::ChecksumOfParts;
-use s3d_io::mesh::{MeshFile, UpAxis};
+use s3d_io::mesh::{LengthUnit, MeshFile, UpAxis};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -41,6 +41,9 @@ pub enum SceneSource {
         paths: Vec<PathBuf>,
         /// Which axis points up; `None`: +Y in glTF, as it defines, and guessed in the others.
         up: Option<UpAxis>,
+        /// The unit of the coordinates; `None`: metres in glTF, as it defines, and in the others what the file
+        /// says, or else guessed by the height of rooms.
+        units: Option<LengthUnit>,
     },
     /// At hand.
     Memory(Arc<SharedScene>),
@@ -49,18 +52,26 @@ pub enum SceneSource {
 impl<P: Into<PathBuf>> From<P> for SceneSource {
     fn from(path: P) -> Self {
         let path = path.into();
-        if is_mesh(&path) { Self::Meshes { paths: vec![path], up: None } } else { Self::Path(path) }
+        if is_mesh(&path) {
+            Self::Meshes { paths: vec![path], up: None, units: None }
+        } else {
+            Self::Path(path)
+        }
     }
 }
 
 impl SceneSource {
     /// One for each path, but one for all meshes among them.
-    pub fn list(paths: impl IntoIterator<Item = PathBuf>, up: Option<UpAxis>) -> Vec<Self> {
+    pub fn list(
+        paths: impl IntoIterator<Item = PathBuf>,
+        up: Option<UpAxis>,
+        units: Option<LengthUnit>,
+    ) -> Vec<Self> {
         let (meshes, others): (Vec<PathBuf>, Vec<PathBuf>) =
             paths.into_iter().partition(|path| is_mesh(path));
         let mut sources: Vec<Self> = others.into_iter().map(Self::Path).collect();
         if !meshes.is_empty() {
-            sources.push(Self::Meshes { paths: meshes, up });
+            sources.push(Self::Meshes { paths: meshes, up, units });
         }
         sources
     }

@@ -6,6 +6,7 @@ pub(crate) mod mesh;
 mod numbering;
 pub(crate) mod pictures;
 pub(crate) mod requested;
+mod unit;
 mod up_axis;
 
 use crate::context::Context;
@@ -14,6 +15,7 @@ use crate::export::input::cameras::{Cameras, Placing};
 use crate::export::input::memory::{SceneSource, SharedScene};
 use crate::export::input::mesh::{MeshFrame, MeshSource};
 use crate::export::input::numbering::{label_table, number, published_numbers};
+use crate::export::input::unit::UnitGuess;
 use crate::export::input::up_axis::UpGuess;
 use crate::export::labels::annotate::SurveyedRoom;
 use crate::options::ExportOptions;
@@ -24,7 +26,7 @@ use glam::{DAffine3, DVec3};
 use s3d_geom::TriMesh;
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance, AnnotationOptions, Annotations, OnFault};
-use s3d_io::mesh::{MeshFile, MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis};
 use s3d_io::scene::{CameraSource, PictureSource, PublishedArea, PublishedOptions, SceneFile};
 use s3d_label::{Label, LabelTable, Room};
 use std::collections::BTreeMap;
@@ -132,7 +134,9 @@ impl Inputs {
             let area = match scene {
                 SceneSource::Memory(scene) => AreaInput::in_memory(scene, asked, opened)?,
                 SceneSource::Path(path) if path.is_dir() => AreaInput::published(path, None, asked, opened)?,
-                SceneSource::Meshes { paths, up } => AreaInput::of_meshes(paths, *up, asked, opened)?,
+                SceneSource::Meshes { paths, up, units } => {
+                    AreaInput::of_meshes(paths, (*up, *units), asked, opened)?
+                }
                 SceneSource::Path(path) => {
                     let mut scene = s3d_io::scene::read_scene(path)?;
                     let options = &mut scene.annotation_options;
@@ -203,6 +207,7 @@ impl AreaInput {
                 class_column: options.class_column.clone().filter(|_| scene.annotations.is_empty()),
                 instance_column: options.instance_column.clone().filter(|_| scene.annotations.is_empty()),
                 origin: scene.mesh_offset_m.map_or(MeshOrigin::Near, MeshOrigin::At),
+                units: scene.units,
             },
         };
         // The mesh comes first: what lies far from it need not be read.
@@ -253,23 +258,39 @@ impl AreaInput {
         })
     }
 
-    /// An area of meshes alone. Which axis of theirs points up is guessed if nobody says it.
+    /// An area of meshes alone. Which axis of theirs points up, and in which unit they are, is guessed if
+    /// nobody says it.
     fn of_meshes(
         paths: &[PathBuf],
-        up: Option<UpAxis>,
+        (up, units): (Option<UpAxis>, Option<LengthUnit>),
         asked: Option<Placing>,
         opened: Opened,
     ) -> Result<Self> {
-        let guess = match up {
-            Some(_) => None,
-            None => UpGuess::of_files(paths)?,
+        let ending =
+            |path: &Path| path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        // By glTF's definition +Y points up, and the unit is the metre.
+        let first = paths.first().filter(|path| !["gltf", "glb"].contains(&ending(path).as_str()));
+        let first = match first.filter(|_| up.is_none() || units.is_none()) {
+            Some(path) => {
+                let options = MeshOptions { origin: MeshOrigin::Near, units, ..MeshOptions::default() };
+                Some(s3d_io::mesh::read_mesh_with(path, UpAxis::Z, &options)?)
+            }
+            None => None,
         };
+        let guess = first.as_ref().filter(|_| up.is_none()).map(|file| UpGuess::of(&file.mesh));
         let up = up.or(guess.map(|guess| guess.up())).unwrap_or(UpAxis::Y);
-        let scene = SceneFile::of_meshes(paths.to_vec(), up);
-        let text = format!("area = {}\n[mesh]\nup = {:?}\n", scene.area, up.name());
+        let unsaid = first.as_ref().filter(|file| units.is_none() && file.unit_said.is_none());
+        let unit_guess = unsaid.map(|file| UnitGuess::of(&file.mesh, up));
+        let units = units.or(unit_guess.map(|guess| guess.unit()).filter(|unit| *unit != LengthUnit::Metre));
+        drop(first);
+        let scene = SceneFile { units, ..SceneFile::of_meshes(paths.to_vec(), up) };
+        let mut text = format!("area = {}\n[mesh]\nup = {:?}\n", scene.area, up.name());
+        text.extend(units.map(|unit| format!("units = {:?}\n", unit.name())));
         let mut area = Self::open(scene, asked, opened)?;
         area.notes.extend(guess.map(|guess| guess.sentence()));
+        area.notes.extend(unit_guess.and_then(|guess| guess.sentence()));
         area.warnings.extend(guess.and_then(|guess| guess.doubt()));
+        area.warnings.extend(unit_guess.and_then(|guess| guess.doubt()));
         area.records.push(InputRecord::of_text("scene", &text));
         Ok(area)
     }

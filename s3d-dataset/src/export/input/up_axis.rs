@@ -1,10 +1,8 @@
 //! Which axis of a mesh's file points up, where nobody says it.
 
-use crate::error::Result;
 use glam::Vec3;
 use s3d_geom::TriMesh;
-use s3d_io::mesh::{MeshOptions, MeshOrigin, UpAxis, read_mesh_with};
-use std::path::{Path, PathBuf};
+use s3d_io::mesh::UpAxis;
 
 /// The cosine of 18°: what is tilted less is level.
 const LEVEL: f32 = 0.95;
@@ -21,21 +19,8 @@ pub(super) struct UpGuess {
 }
 
 impl UpGuess {
-    /// Of the first of a mesh's files; `None` if that says it: by glTF's definition +Y points up.
-    pub(super) fn of_files(paths: &[PathBuf]) -> Result<Option<Self>> {
-        let ending =
-            |path: &Path| path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        match paths.first() {
-            Some(path) if !["gltf", "glb"].contains(&ending(path).as_str()) => {
-                let options = MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() };
-                Ok(Some(Self::of(&read_mesh_with(path, UpAxis::Z, &options)?.mesh)))
-            }
-            _ => Ok(None),
-        }
-    }
-
     /// Of a mesh in the axes of its file.
-    fn of(mesh: &TriMesh) -> Self {
+    pub(super) fn of(mesh: &TriMesh) -> Self {
         let level = [Vec3::Y, Vec3::Z].map(|up| {
             let faces = (0..mesh.faces().len() as u32).filter(|f| mesh.normal(*f).dot(up).abs() > LEVEL);
             faces.map(|f| mesh.area(f)).sum::<f64>() / mesh.total_area()

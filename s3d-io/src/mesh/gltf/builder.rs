@@ -24,7 +24,7 @@ pub(crate) struct Builder<'a> {
     looks: &'a GltfLooks,
     up: UpAxis,
     /// What is subtracted from positions, in the world's axes.
-    offset_m: DVec3,
+    offset: DVec3,
     /// Whether the mesh has colours of vertices.
     colored: bool,
     parts: MeshParts,
@@ -58,7 +58,7 @@ impl<'a> Builder<'a> {
         looks: &'a GltfLooks,
         up: UpAxis,
         instances: &[Instance],
-        offset_m: DVec3,
+        offset: DVec3,
     ) -> Result<Self> {
         let mut colored = false;
         let mut elements = 0u64;
@@ -80,7 +80,7 @@ impl<'a> Builder<'a> {
             colored |= mesh.primitives.iter().any(|p| color_accessor(p).is_some() && !is_textured(p, looks));
         }
         let (parts, uv_starts, notes) = Default::default();
-        Ok(Self { document, looks, up, offset_m, colored, parts, uv_starts, notes })
+        Ok(Self { document, looks, up, offset, colored, parts, uv_starts, notes })
     }
 
     /// The vertices so far, in the world's axes.
@@ -210,7 +210,7 @@ impl<'a> Builder<'a> {
         let matrix = instance.world_from_node;
         self.parts.positions.extend(vertices.iter().map(|&v| {
             let moved = matrix.transform_point3(Vec3::from_array(v).as_dvec3());
-            (self.up.exact_world_from_file(moved) - self.offset_m).as_vec3()
+            (self.up.exact_world_from_file(moved) - self.offset).as_vec3()
         }));
         let base = match material {
             Some(m) => self.looks.linear_colors.get(m).copied(),

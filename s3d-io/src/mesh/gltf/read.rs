@@ -5,12 +5,12 @@
 //! what does no harm, such as a missing bounding box. Here each index is checked before it is followed.
 
 use crate::error::{Error, Result};
-use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
+use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
 use crate::mesh::gltf::builder::Builder;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::material::GltfLooks;
 use crate::mesh::gltf::scene::{Instance, Precision, instances};
-use crate::mesh::origin::{MeshOrigin, largest};
+use crate::mesh::origin::{FileFrame, largest};
 use s3d_geom::MeshParts;
 use s3d_geom::glam::DVec3;
 use std::path::Path;
@@ -20,7 +20,8 @@ use std::path::Path;
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
-pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, origin: MeshOrigin) -> Result<MeshFile> {
+pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
+    let frame = FileFrame::new(options.origin, options.units.unwrap_or_default());
     let document = GltfDocument::read(bytes, path)?;
     let mut warnings = Vec::new();
     let instances = instances(&document, Precision::OfFile, &mut warnings)?;
@@ -35,14 +36,14 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, origin: MeshOr
     }
     let looks = GltfLooks::load(&document, &used, &mut warnings)?;
     let build = |instances: &[Instance], offset_m: DVec3| {
-        let mut builder = Builder::new(&document, &looks, up, instances, offset_m)?;
+        let mut builder = Builder::new(&document, &looks, up, instances, frame.in_units(offset_m))?;
         instances.iter().try_for_each(|instance| builder.add(instance))?;
         Ok::<_, Error>(builder)
     };
     let mut builder = build(&instances, DVec3::ZERO)?;
     let mut offset_m = DVec3::ZERO;
-    if origin.needs_exact(largest(builder.positions())) {
-        offset_m = origin.offset_m(builder.corners());
+    if frame.needs_exact(largest(builder.positions())) {
+        offset_m = frame.offset_m(builder.corners());
         if offset_m != DVec3::ZERO {
             // Not two meshes at once. What is to be told was told.
             drop(builder);
@@ -57,15 +58,15 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, origin: MeshOr
         return Err(document.fail(format!("has no {what} in its scene{why}")));
     }
     let parts = MeshParts { materials: looks.materials, textures: looks.textures, ..parts };
-    let mesh =
-        checked_mesh(parts, &mut warnings).map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
+    let mesh = checked_mesh(parts, frame, &mut warnings)
+        .map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
     let companions = document.companions();
     Ok(MeshFile { texture_files: looks.files, warnings, companions, offset_m, ..MeshFile::new(path, mesh) })
 }
 
 #[cfg(test)]
 pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
-    read_bytes(crate::fs::open::read_file(path)?, path, up, MeshOrigin::OfFile)
+    read_bytes(crate::fs::open::read_file(path)?, path, up, &MeshOptions::default())
 }
 
 #[cfg(test)]

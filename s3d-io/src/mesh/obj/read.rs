@@ -6,13 +6,13 @@
 use crate::error::{Error, Result};
 use crate::fs::encoding::into_utf8;
 use crate::fs::quote::count;
-use crate::mesh::file::{MeshFile, UpAxis, checked_mesh};
+use crate::mesh::file::{LengthUnit, MeshFile, MeshOptions, UpAxis, checked_mesh};
 use crate::mesh::obj::diagnose::{face_line, fault, vertex_error};
 use crate::mesh::obj::lines::{end_lines_in_lf, logical_lines};
 use crate::mesh::obj::looks::ObjLooks;
 use crate::mesh::obj::normal::NormalObj;
 use crate::mesh::obj::statement::exact_vertex;
-use crate::mesh::origin::{MeshOrigin, largest};
+use crate::mesh::origin::{FileFrame, largest};
 use s3d_geom::glam::{DVec3, Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
 use std::borrow::Cow;
@@ -24,7 +24,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// As [`crate::mesh::read_mesh`].
-pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, origin: MeshOrigin) -> Result<MeshFile> {
+pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let mut bytes = into_utf8(bytes);
     end_lines_in_lf(&mut bytes);
     refuse_other_files(path, &bytes)?;
@@ -45,7 +45,10 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, origin: MeshOr
         || ObjLooks::load(path, &obj.names, &mut remarks),
     );
     let (mut columns, looks) = (geometry?, looks?);
-    let offset_m = columns.bring_near(&bytes, up, origin);
+    let unit_said = unit_in_comments(&bytes);
+    warnings.extend(unit_said.filter(|_| options.units.is_none()).and_then(told));
+    let frame = FileFrame::new(options.origin, options.units.or(unit_said).unwrap_or_default());
+    let offset_m = columns.bring_near(&bytes, up, frame);
     let faces = Triangles::new(&obj, &columns)
         .map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
     let polygons_triangulated = faces.polygons;
@@ -76,12 +79,13 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, origin: MeshOr
         textures: looks.textures,
         ..MeshParts::default()
     };
-    let mesh = checked_mesh(parts, &mut warnings).map_err(|e| match e {
+    let mesh = checked_mesh(parts, frame, &mut warnings).map_err(|e| match e {
         MeshError::NonFinite { vertex, position } => vertex_error(path, &bytes, vertex, position),
         source => Error::Mesh { path: path.to_owned(), source },
     })?;
     let (texture_files, companions) = (looks.files, looks.companions);
     Ok(MeshFile {
+        unit_said,
         texture_files,
         warnings,
         companions,
@@ -158,12 +162,12 @@ impl Columns {
 impl Columns {
     /// Brings the vertices near the origin, if they are to be; their positions are read again for it, in
     /// `f64`, which tobj does not give. Returns what was subtracted, in the world's axes.
-    fn bring_near(&mut self, bytes: &[u8], up: UpAxis, origin: MeshOrigin) -> DVec3 {
-        if !origin.needs_exact(largest(&self.positions)) {
+    fn bring_near(&mut self, bytes: &[u8], up: UpAxis, frame: FileFrame) -> DVec3 {
+        if !frame.needs_exact(largest(&self.positions)) {
             return DVec3::ZERO;
         }
         let corners = self.corners[0].iter().filter_map(|&v| self.positions.get(v as usize));
-        let offset_m = origin.offset_m(corners.map(|p| up.exact_world_from_file(p.as_dvec3())));
+        let offset_m = frame.offset_m(corners.map(|p| up.exact_world_from_file(p.as_dvec3())));
         if offset_m == DVec3::ZERO {
             return offset_m;
         }
@@ -171,11 +175,31 @@ impl Columns {
         for (position, line) in self.positions.iter_mut().zip(statements) {
             let exact = exact_vertex(line.keyword().1).unwrap_or(position.as_dvec3());
             // In the world's axes, in which a difference of 0 has no sign.
-            let near = up.exact_world_from_file(exact) - offset_m;
+            let near = up.exact_world_from_file(exact) - frame.in_units(offset_m);
             *position = up.exact_file_from_world(near).as_vec3();
         }
         offset_m
     }
+}
+
+/// The unit that a comment in the head of the file tells, as in `# File units = inches`.
+fn unit_in_comments(bytes: &[u8]) -> Option<LengthUnit> {
+    let head = bytes
+        .split(|b| *b == b'\n')
+        .take_while(|line| line.starts_with(b"#") || line.trim_ascii().is_empty());
+    head.filter_map(|line| {
+        let text = String::from_utf8_lossy(line).to_ascii_lowercase();
+        let word = text.split_once("file units")?.1.trim_start_matches([' ', '=', ':']);
+        LengthUnit::of_word(word.trim())
+    })
+    .next()
+}
+
+/// What is said of a unit that is none of ours.
+fn told(unit: LengthUnit) -> Option<String> {
+    (unit != LengthUnit::Metre).then(|| {
+        format!("a comment says that its unit is {unit}: positions are taken to metres (units says another)")
+    })
 }
 
 fn triples(flat: &[f32]) -> impl Iterator<Item = [f32; 3]> {
@@ -277,7 +301,7 @@ fn vertex_colors(written: &[[f32; 3]], warnings: &mut Vec<String>) -> Vec<[u8; 3
 
 #[cfg(test)]
 pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
-    read_bytes(crate::fs::open::read_file(path)?, path, up, MeshOrigin::OfFile)
+    read_bytes(crate::fs::open::read_file(path)?, path, up, &MeshOptions::default())
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use crate::image::find::find_image;
 use crate::image::texture::{TextureFile, read_textures};
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
 use crate::mesh::labels::LabelElement;
+use crate::mesh::origin::FileFrame;
 use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::faces::{PlyFaces, PlyTriangles};
 use crate::mesh::ply::header::PlyHeader;
@@ -41,6 +42,7 @@ pub(crate) fn read(
     if vertex_count >= u64::from(NO_INDEX) {
         return Err(Error::format(path, "has more vertices than 32 bits count; cut the scan into parts"));
     }
+    let frame = FileFrame::new(options.origin, options.units.unwrap_or_default());
     let mut labels = PlyLabels::find(path, &header, options)?;
     let mut vertices = PlyVertices::default();
     let mut faces = PlyFaces::default();
@@ -54,7 +56,7 @@ pub(crate) fn read(
         match known.filter(is_first) {
             Some(0) => {
                 let labels = labels.as_mut().filter(|l| belongs(l, LabelElement::Vertex));
-                vertices = PlyVertices::read(path, &mut reader, &element, (up, options.origin), labels)?;
+                vertices = PlyVertices::read(path, &mut reader, &element, (up, frame), labels)?;
             }
             Some(1) => {
                 let labels = labels.as_mut().filter(|l| belongs(l, LabelElement::Face));
@@ -71,7 +73,7 @@ pub(crate) fn read(
     if reader.has_more()? {
         warnings.push("the file goes on after its last element; the rest is not read".into());
     }
-    let offset_m = vertices.bring_near(options.origin, faces.corners());
+    let offset_m = vertices.bring_near(frame, faces.corners());
     let triangles = faces.triangles(&vertices.positions);
     tell_triangles(path, &triangles, &mut warnings)?;
     if faces.odd_uvs > 0 {
@@ -103,8 +105,8 @@ pub(crate) fn read(
         textures: looks.textures,
         ..parts
     };
-    let mesh =
-        checked_mesh(parts, &mut warnings).map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
+    let mesh = checked_mesh(parts, frame, &mut warnings)
+        .map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
     Ok(MeshFile {
         polygons_triangulated: cut,
         offset_m,

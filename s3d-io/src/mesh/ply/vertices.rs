@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::file::UpAxis;
-use crate::mesh::origin::MeshOrigin;
+use crate::mesh::origin::FileFrame;
 use crate::mesh::ply::batch::PlyBatch;
 use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::header::{PlyElement, PlyType};
@@ -49,7 +49,7 @@ impl PlyVertices {
         path: &Path,
         reader: &mut PlyReader<'_>,
         element: &PlyElement,
-        (up, origin): (UpAxis, MeshOrigin),
+        (up, frame): (UpAxis, FileFrame),
         mut labels: Option<&mut PlyLabels>,
     ) -> Result<Self> {
         let Some(xyz) = places(element, &POSITIONS) else {
@@ -68,7 +68,7 @@ impl PlyVertices {
         while reader.read_batch(&mut batch)? {
             // The first rows tell how far all are: of those that are used no one knows yet.
             let is_far =
-                || origin.needs_exact(vectors(&batch, xyz).fold(0.0, |m, v| m.max(v.abs().max_element())));
+                || frame.needs_exact(vectors(&batch, xyz).fold(0.0, |m, v| m.max(v.abs().max_element())));
             if !out.exact.is_empty() || out.positions.is_empty() && is_far() {
                 out.exact.extend(vectors(&batch, xyz).map(|v| up.exact_world_from_file(v)));
             }
@@ -95,14 +95,14 @@ impl PlyVertices {
 
     /// Brings the vertices near the origin, if they are to be; `corners` are those of faces. Returns what was
     /// subtracted, in the world's axes.
-    pub(crate) fn bring_near(&mut self, origin: MeshOrigin, corners: &[u32]) -> DVec3 {
+    pub(crate) fn bring_near(&mut self, frame: FileFrame, corners: &[u32]) -> DVec3 {
         let exact = std::mem::take(&mut self.exact);
         if exact.is_empty() {
             return DVec3::ZERO;
         }
-        let offset_m = origin.offset_m(corners.iter().filter_map(|&v| exact.get(v as usize).copied()));
+        let offset_m = frame.offset_m(corners.iter().filter_map(|&v| exact.get(v as usize).copied()));
         if offset_m != DVec3::ZERO {
-            self.positions = exact.into_iter().map(|p| (p - offset_m).as_vec3()).collect();
+            self.positions = exact.into_iter().map(|p| (p - frame.in_units(offset_m)).as_vec3()).collect();
         }
         offset_m
     }

@@ -1,0 +1,146 @@
+//! What is above level surfaces: how high rooms are, and on how many storeys.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use s3d_geom::{Density, PointCloud, SurfaceSampler};
+use s3d_render::{Scene, cast_ray};
+use std::fmt;
+
+/// The cosine of 18°: what is tilted less is level.
+const LEVEL: f32 = 0.95;
+
+/// Points from which is looked up.
+const POINTS: u64 = 20_000;
+
+/// Who stands needs as much, metres.
+const STANDING_M: f64 = 1.8;
+
+/// Floors that are nearer than this belong to one storey, metres.
+const STOREY_M: f64 = 1.5;
+
+/// A smaller floor, square metres, or one with a smaller share of the largest, is no storey.
+const SMALL_M2: f64 = 3.0;
+const SMALL_SHARE: f64 = 0.1;
+
+/// Uniform samples of a mesh's level surfaces that face up, with what is above each.
+pub(crate) struct Headroom {
+    /// The height of each, the free height above it (infinite under the sky), and whether it ends at an
+    /// underside.
+    samples: Vec<(f64, f64, bool)>,
+    /// The area that each stands for.
+    m2: f64,
+}
+
+impl Headroom {
+    /// Of a mesh in any unit, where `up` points up.
+    pub(crate) fn of(scene: &Scene<'_>, up: DVec3) -> Self {
+        let mesh = scene.mesh();
+        let is_level = |face: &u32| mesh.normal(*face).dot(up.as_vec3()) > LEVEL;
+        let faces: Vec<u32> = (0..mesh.faces().len() as u32).filter(is_level).collect();
+        let area: f64 = faces.iter().map(|face| mesh.area(*face)).sum();
+        if faces.is_empty() {
+            return Self { samples: Vec::new(), m2: 0.0 };
+        }
+        let mut cloud = PointCloud::default();
+        SurfaceSampler::over_faces(mesh, faces, Density::Total(POINTS), 0).sample(0..POINTS, &mut cloud);
+        let above = 1e-5 * f64::from(mesh.aabb().size().max_element());
+        let look_up = |point: &glam::Vec3| {
+            let from = point.as_dvec3() + up * above;
+            let hit = cast_ray(scene, from, up);
+            let ends_below = hit.is_some_and(|hit| mesh.normal(hit.face).dot(up.as_vec3()) < -LEVEL);
+            (from.dot(up), hit.map_or(f64::INFINITY, |hit| hit.t), ends_below)
+        };
+        let samples: Vec<_> = cloud.positions.par_iter().map(look_up).collect();
+        Self { m2: area / samples.len().max(1) as f64, samples }
+    }
+
+    /// How high ceilings are above floors, in the unit of the mesh; `None` without a ceiling. Floors are most
+    /// of what lies beneath ceilings, and lower than all else: three quarters lie less deep.
+    pub(crate) fn of_rooms(&self) -> Option<f64> {
+        let mut free: Vec<f64> = self.samples.iter().filter(|s| s.2).map(|s| s.1).collect();
+        free.sort_by(f64::total_cmp);
+        free.get(free.len() * 3 / 4).copied()
+    }
+
+    /// The storeys of a mesh in metres, from below.
+    pub(crate) fn storeys(&self) -> Vec<Storey> {
+        let standing = || self.samples.iter().filter(|s| s.1 >= STANDING_M);
+        // Where ceilings were captured, what lies under the sky is a roof.
+        let covered = 4 * standing().filter(|s| s.2).count() >= standing().count();
+        let mut heights: Vec<(f64, f64)> =
+            standing().filter(|s| s.2 || !covered).map(|s| (s.0, s.1)).collect();
+        heights.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut storeys: Vec<Storey> = Vec::new();
+        while let Some(storey) = self.largest_floor(&heights) {
+            let largest = storeys.first().map_or(storey.floor_m2, |first| first.floor_m2);
+            if storey.floor_m2 < SMALL_M2.max(SMALL_SHARE * largest) {
+                break;
+            }
+            heights.retain(|(z, _)| (z - storey.z_m).abs() >= STOREY_M);
+            storeys.push(storey);
+        }
+        storeys.sort_by(|a, b| a.z_m.total_cmp(&b.z_m));
+        storeys
+    }
+
+    /// The largest surface within 20 cm of height, of samples sorted by it.
+    fn largest_floor(&self, heights: &[(f64, f64)]) -> Option<Storey> {
+        let end = |start: usize| {
+            let top = heights.get(start).map_or(0.0, |(z, _)| z + 0.2);
+            heights.partition_point(|(z, _)| *z <= top)
+        };
+        let start = (0..heights.len()).max_by_key(|start| (end(*start) - start, usize::MAX - start))?;
+        let floor = heights.get(start..end(start))?;
+        let mut free: Vec<f64> = floor.iter().map(|(_, free)| *free).collect();
+        free.sort_by(f64::total_cmp);
+        let middle = free.get(free.len() / 2).copied();
+        Some(Storey {
+            z_m: floor.get(floor.len() / 2)?.0,
+            floor_m2: floor.len() as f64 * self.m2,
+            height_m: middle.filter(|height| height.is_finite()),
+        })
+    }
+}
+
+/// A storey of a building: floors at one height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Storey {
+    /// The height of its floor, world metres.
+    pub z_m: f64,
+    /// About how large its floor is where a person can stand.
+    pub floor_m2: f64,
+    /// From its floor to its ceiling; `None` under the sky.
+    pub height_m: Option<f64>,
+}
+
+impl fmt::Display for Storey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // A floor at −1 mm is at 0.
+        let z_m = (100.0 * self.z_m).round() / 100.0 + 0.0;
+        write!(f, "{:.0} m² at z = {z_m:.2} m", self.floor_m2)?;
+        self.height_m.map_or(Ok(()), |height| write!(f, ", {height:.2} m high"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_synth::Building;
+
+    #[test]
+    fn storeys_are_floors_and_neither_tables_nor_shelves() {
+        let storeys = |building: Building| {
+            let mesh = building.build().unwrap().mesh;
+            Headroom::of(&Scene::new(&mesh), DVec3::Z).storeys()
+        };
+        let demo = storeys(Building::demo());
+        assert!(demo.len() == 1 && demo[0].z_m.abs() < 0.05, "{demo:?}");
+        assert!((80.0..140.0).contains(&demo[0].floor_m2), "{demo:?}");
+        let house = storeys(Building::two_storeys());
+        assert_eq!(house.len(), 2, "{house:?}");
+        assert!(house[0].z_m.abs() < 0.05 && (2.4..3.5).contains(&house[1].z_m), "{house:?}");
+        assert!(house.iter().all(|storey| (2.2..3.5).contains(&storey.height_m.unwrap())), "{house:?}");
+        assert!(house[0].to_string().contains(" m² at z = 0.00 m, 2."), "{}", house[0]);
+    }
+}
