@@ -11,7 +11,7 @@ What the numbers mean stands in OUT/conventions.json; this module follows it. As
         rgb, depth = data.rgb(image), data.depth(image)      # uint8, metres with NaN where missing
         world = data.world_points(image)                     # from depth and pose: (H, W, 3) metres, Z up
         index = data.semantic(image)                         # -1 where nothing was seen, 0 without a label
-        classes = data.class_of_label[index]                 # 0..12 as in CLASSES, -1 for none (index -1 too)
+        classes = data.class_of_label[index]                 # places in data.classes, -1 for none (index -1 too)
 """
 
 import argparse
@@ -167,13 +167,15 @@ def read_votes(path):
         return {name: arrays[name] for name in arrays.files}
 
 
-def read_s3dis_room(folder):
-    """A room of the S3DIS tree: xyz (N, 3) metres, rgb (N, 3) 0..255, class (N,) 0..12, instance (N,) from 1."""
+def read_s3dis_room(folder, classes=CLASSES):
+    """A room of the S3DIS tree: xyz (N, 3) metres, rgb (N, 3) 0..255, class (N,) as a place in classes, -1 for a word that is
+    none of them and no clutter, instance (N,) from 1."""
     parts = []
     for number, path in enumerate(sorted(Path(folder, "Annotations").glob("*.txt")), 1):
         rows = np.loadtxt(path, ndmin=2)
         name = path.name.split("_")[0]
-        kind = CLASSES.index(name if name in CLASSES else "clutter")
+        name = name if name in classes else "clutter"
+        kind = classes.index(name) if name in classes else -1
         parts.append(np.column_stack([rows[:, :6], np.full(len(rows), kind), np.full(len(rows), number)]))
     rows = np.concatenate(parts) if parts else np.empty((0, 8))
     return rows[:, :3], rows[:, 3:6].astype(np.uint8), rows[:, 6].astype(np.int64), rows[:, 7].astype(np.int64)
@@ -225,13 +227,18 @@ class Dataset:
         self.manifest = read_json(self.root / "manifest.json")
         self.areas = self.manifest["area_numbers"]
         self.is_labelled = self.manifest["labels"] > 0
+        # Class names, and all that is known of them where they are not S3DIS's: ids, colours, what they count as.
+        self.classes, self.taxonomy = CLASSES, None
+        if "taxonomy" in self.manifest:
+            self.taxonomy = read_json(self.root / "assets/taxonomy.json")
+            self.classes = [entry["name"] for entry in self.taxonomy["classes"]]
         # Without labels: nothing but the one that means that there is none.
         self.label_names = ["<UNK>_0_<UNK>_0_0"]
         if self.is_labelled:
             self.label_names = read_json(self.root / "assets/semantic_labels.json")
         self.labels = [parse_label(name) for name in self.label_names]
         # One entry more: index -1, nothing seen, has no class either.
-        kinds = [CLASSES.index(label.class_name) if label else -1 for label in self.labels]
+        kinds = [self.classes.index(label.class_name) if label else -1 for label in self.labels]
         self.class_of_label = np.array(kinds + [-1], np.int64)
         self.files = {folder: (suffix, ext) for folder, suffix, ext in self.conventions["files"]["folder_suffix_ext"]}
 

@@ -134,7 +134,10 @@ fn tables(c: &mut Criterion) {
     group.throughput(Throughput::Elements(IMAGES));
     let path = dir.path().join("panoptic.json");
     group.bench_function("coco, the file", |b| {
-        b.iter(|| write_coco(&path, "bench", &images, &coco_categories(&stuff)).unwrap());
+        b.iter(|| {
+            write_coco(&path, "bench", &images, &coco_categories(&s3d_label::Taxonomy::s3dis(), &stuff))
+                .unwrap()
+        });
     });
     let rows: Vec<ImageRow> = (0..IMAGES as u32)
         .map(|i| ImageRow {
@@ -153,12 +156,17 @@ fn tables(c: &mut Criterion) {
             rt: Some(std::array::from_fn(|k| k as f64 + f64::from(i))),
             selection_entropy: Some(1.0),
             coverage: Some(0.9),
-            semantic: Some(SemanticRow { shares: [0.07; 13], unlabelled: 0.0, entropy: 1.0, instances: 12 }),
+            semantic: Some(SemanticRow {
+                shares: vec![0.07; 13],
+                unlabelled: 0.0,
+                entropy: 1.0,
+                instances: 12,
+            }),
             depth_m: Some([0.5, 2.0 + f64::from(i), 9.0]),
         })
         .collect();
     let path = dir.path().join("images.parquet");
-    group.bench_function("parquet", |b| b.iter(|| write_image_index(&path, &rows).unwrap()));
+    group.bench_function("parquet", |b| b.iter(|| write_image_index(&path, &Class::S3DIS, &rows).unwrap()));
 }
 
 /// The array of a room as loaders of S3DIS read it: seven 64-bit floats a point.

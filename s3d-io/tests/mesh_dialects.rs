@@ -421,7 +421,7 @@ fn obj_materials_repeated_spaced_and_missing() {
     assert_eq!(file.mesh.faces().len(), 4);
     assert!(file.warnings[0].contains("my scan (1).mtl"), "{:?}", file.warnings);
     // Ordinary materials are no labels.
-    assert_eq!(MeshLabels::from_materials(&file.mesh), None);
+    assert_eq!(MeshLabels::from_materials(&file.mesh, &Default::default()), None);
 }
 
 /// As the published areas have it: labels are the names of materials, switched to and fro.
@@ -434,7 +434,7 @@ fn a_published_semantic_obj_has_labels() {
          usemtl wall_10_hallway_2_1\nf 1 1 2\nf 1 2 5\nusemtl chair_3_office_5_1\nf 1 4 5\n"
     );
     let file = read_file("semantic.obj", obj.as_bytes(), &[]).unwrap();
-    let (labels, warnings) = MeshLabels::from_materials(&file.mesh).unwrap();
+    let (labels, warnings) = MeshLabels::from_materials(&file.mesh, &Default::default()).unwrap();
     let MeshLabels::Names { labels, faces } = labels else { panic!("{labels:?}") };
     let names: Vec<String> = labels.iter().map(ToString::to_string).collect();
     assert_eq!(names, ["chair_3_office_5_1", "wall_10_hallway_2_1"]);

@@ -71,7 +71,7 @@ impl Class {
         Self { index, s3dis, name }
     }
 
-    /// The class as it is spelled in names of labels: letters, digits and hyphens.
+    /// The class as it is spelled in names of labels: letters and digits.
     pub const fn name(self) -> &'static str {
         self.name
     }

@@ -114,7 +114,7 @@ impl RoomType {
         Self { index, s3dis, name }
     }
 
-    /// The type as it is spelled in names of rooms: letters, digits and hyphens.
+    /// The type as it is spelled in names of rooms: letters.
     pub const fn name(self) -> &'static str {
         self.name
     }

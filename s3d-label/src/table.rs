@@ -111,6 +111,14 @@ pub enum TableError {
         /// The label.
         label: Label,
     },
+    /// A label's class or type of room is another taxonomy's.
+    #[error("{label} is no label of {taxonomy}: its class or its type of room is another taxonomy's")]
+    Foreign {
+        /// The label.
+        label: Label,
+        /// The name of the taxonomy.
+        taxonomy: String,
+    },
     /// There are more labels than colours to write them with.
     #[error("{count} labels (the null label included): a semantic image can tell {MAX_LABELS} apart")]
     TooMany {
@@ -147,10 +155,8 @@ impl Taxonomy {
     ///
     /// # Errors
     /// [`TableError::Duplicate`] if two are the same instance, [`TableError::Zero`] for a number 0,
-    /// [`TableError::TooMany`] above [`MAX_LABELS`].
-    ///
-    /// # Panics
-    /// If a label's class or type of room is not this taxonomy's.
+    /// [`TableError::TooMany`] above [`MAX_LABELS`], [`TableError::Foreign`] for a class or type of room of
+    /// another taxonomy.
     pub fn table(&self, labels: impl IntoIterator<Item = Label>) -> Result<LabelTable, TableError> {
         let mut labels: Vec<Label> = labels.into_iter().collect();
         if let Some(&label) = labels.iter().find(|l| l.instance == 0 || l.room.number == 0 || l.area == 0) {
@@ -160,7 +166,9 @@ impl Taxonomy {
             self.classes().get(l.class.index()) == Some(&l.class)
                 && self.room_types().get(l.room.room_type.index()) == Some(&l.room.room_type)
         };
-        assert!(labels.iter().all(is_ours), "labels of another taxonomy than {}", self.name());
+        if let Some(&label) = labels.iter().find(|l| !is_ours(l)) {
+            return Err(TableError::Foreign { label, taxonomy: self.name().to_owned() });
+        }
         labels.sort_unstable();
         let mut pairs = (1..).zip(labels.array_windows());
         if let Some((first, &[other, label])) = pairs.find(|(_, [a, b])| a.cmp_key(b).is_eq()) {

@@ -121,7 +121,7 @@ pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<AreaPlan
     if writes || !AreaPlan::is_in(&folder) {
         return None;
     }
-    match AreaPlan::read(&folder, area) {
+    match common.table.taxonomy().reading(|| AreaPlan::read(&folder, area)) {
         Ok(plan) => Some(plan),
         Err(e) => {
             ctx.warn(format_args!("{e}; the area is labelled again"));

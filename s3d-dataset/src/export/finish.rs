@@ -16,6 +16,7 @@ use crate::tables::summary::{UnitTally, Unlabelled, ViewTally};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FileRecord, Frame, Layout};
 use s3d_io::fs::{SyncAhead, create_dir, sync_data_set, sync_file};
+use s3d_label::Taxonomy;
 use s3d_sample::folds;
 use std::fs;
 use std::path::PathBuf;
@@ -131,8 +132,10 @@ pub(crate) fn finish(
     let folds = folds(&areas);
     records::write_splits(layout, &folds)?;
     records::write_lists(ctx, layout, &areas, &folds)?;
-    write_profiles(ctx, layout, request, &areas, &files)?;
-    Statistics::count(layout, &areas, manifest.is_labelled(), |_, _| Ok(()))?.write(layout)?;
+    let taxonomy = manifest.read_taxonomy(layout, |_| Ok(()))?;
+    write_profiles(ctx, layout, request, &areas, &files, &taxonomy)?;
+    let of_labels = Some(&taxonomy).filter(|_| manifest.is_labelled());
+    Statistics::count(layout, &areas, of_labels, |_, _| Ok(()))?.write(layout)?;
 
     ctx.check()?;
     let tables = listing::records(ctx, layout, &table_files(layout, &areas)?)?;
@@ -163,6 +166,7 @@ fn write_profiles(
     request: &Request,
     areas: &[u32],
     files: &[FileRecord],
+    taxonomy: &Taxonomy,
 ) -> Result<()> {
     let wanted = &request.options.profiles;
     for profile in wanted {
@@ -178,7 +182,8 @@ fn write_profiles(
         return Ok(());
     }
     let files = Listed::of(layout.root(), files.iter().cloned());
-    profile::write(ctx, layout, &files, layout, areas, wanted)
+    let source = profile::Source { ctx, layout, files: &files, taxonomy };
+    profile::write(&source, layout, areas, wanted)
 }
 
 /// The files of a data set that no unit wrote.

@@ -166,7 +166,7 @@ impl<'a> Job<'a> {
 
     /// The manifest that says that this export runs.
     pub(crate) fn manifest(&self) -> Manifest {
-        Manifest::begin(&self.request, self.inputs.table.len())
+        Manifest::begin(&self.request, &self.inputs.table)
     }
 
     /// Does all units that are not done yet. What it has written goes to the disk meanwhile, and on after it.
@@ -188,10 +188,9 @@ impl<'a> Job<'a> {
     /// Writes what is known before any unit is done: the label table, `assets`, `conventions.json`.
     pub(crate) fn write_assets(&self, layout: &Layout) -> Result<()> {
         let options = &self.options;
-        let names = self.inputs.table.names();
         assets::write(
             layout,
-            names,
+            &self.inputs.table,
             options.pad_labels.0,
             options.conventions(),
             &self.request.world_offsets(),

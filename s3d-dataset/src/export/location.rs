@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use s3d_geom::{Camera, NearestFaces};
 use s3d_io::camera::ScanLocation;
-use s3d_label::{LabelId, LabelTable, Room};
+use s3d_label::{LabelId, LabelTable, Room, UNKNOWN_ROOM};
 use s3d_render::{NO_FACE, Scene, cast};
 
 /// Width of the small panorama that tells what a location sees.
@@ -194,9 +194,6 @@ pub(crate) fn locate(
         }
     }
 }
-
-/// What stands for a room where none is known.
-pub(crate) const UNKNOWN_ROOM: &str = "unknown_1";
 
 /// A room's name in file names and poses.
 pub(crate) fn room_name(room: Option<Room>) -> String {

@@ -10,7 +10,7 @@ use glam::{Vec3, vec3};
 use rayon::prelude::*;
 use s3d_geom::{Camera, TriMesh};
 use s3d_io::camera::ScanLocation;
-use s3d_label::{Class, LabelId, LabelTable};
+use s3d_label::{LabelId, LabelTable, MAX_CLASSES};
 use s3d_render::{Caster, Hits, NO_FACE, Scene};
 use s3d_sample::{Pool, PoolItem, Selection, View, ViewDistribution, draw_view, entropy, select_pooled};
 use serde::Serialize;
@@ -48,11 +48,14 @@ impl Candidate {
 
 /// What a view shows in a pixel, by the pixel's face: views are scored by the entropy of it.
 pub(crate) enum Kinds {
-    /// The face's class, if it has one.
-    Classes(Vec<Option<Class>>),
+    /// The place of the face's class among so many, or [`NO_CLASS`].
+    Classes(Vec<u8>, usize),
     /// Without labels: which of [`DIRECTIONS`] its normal is nearest to.
     Directions(Vec<u8>),
 }
+
+/// In place of a class's: a face without one.
+const NO_CLASS: u8 = MAX_CLASSES as u8;
 
 /// The directions to the faces, edges and corners of a cube.
 const DIRECTIONS: usize = 26;
@@ -61,7 +64,10 @@ impl Kinds {
     /// Of a mesh with these labels: directions if the table has none.
     pub(crate) fn of(table: &LabelTable, label_of_face: &[LabelId], mesh: &TriMesh) -> Self {
         if table.len() > 1 {
-            return Self::Classes(label_of_face.iter().map(|l| table.class_of(*l)).collect());
+            let class =
+                |label: &LabelId| table.class_of(*label).map_or(NO_CLASS, |class| class.index() as u8);
+            let class_of_face = label_of_face.iter().map(class).collect();
+            return Self::Classes(class_of_face, table.taxonomy().classes().len());
         }
         let steps = [-1.0, 0.0, 1.0];
         let all = steps.iter().flat_map(|x| steps.iter().flat_map(move |y| steps.map(|z| vec3(*x, *y, z))));
@@ -79,11 +85,10 @@ impl Kinds {
     fn entropy_of(&self, hits: &Hits) -> f64 {
         let seen = hits.face.pixels().iter().filter(|face| **face != NO_FACE);
         match self {
-            Self::Classes(class_of_face) => {
-                let mut histogram = [0u64; 13];
-                seen.filter_map(|face| class_of_face[*face as usize])
-                    .for_each(|class| histogram[class.index()] += 1);
-                entropy(&histogram)
+            Self::Classes(class_of_face, classes) => {
+                let mut histogram = [0u64; MAX_CLASSES + 1];
+                seen.for_each(|face| histogram[usize::from(class_of_face[*face as usize])] += 1);
+                entropy(&histogram[..*classes])
             }
             Self::Directions(direction_of_face) => {
                 let mut histogram = [0u64; DIRECTIONS];

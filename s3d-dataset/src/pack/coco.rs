@@ -11,6 +11,7 @@ use s3d_io::dataset::{DatasetImage, Domain};
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::{Content, encode_rgb8};
 use s3d_io::package::{CocoImage, coco_categories, coco_panoptic, write_coco};
+use s3d_label::{Class, Taxonomy};
 use std::path::Path;
 
 /// The folder of panoptic images, and the file about them.
@@ -31,7 +32,8 @@ pub(super) fn pack(
     };
     source.require(Domain::Rgb, "COCO")?;
     source.require(Domain::Semantic, "COCO")?;
-    let stuff = options.stuff.clone().unwrap_or_default().0;
+    let taxonomy = table.taxonomy();
+    let stuff = stuff(options, taxonomy)?;
     let compression = options.compression.unwrap_or_default();
     let folder = destination.path().join(FOLDER);
     for image in &source.images {
@@ -60,7 +62,7 @@ pub(super) fn pack(
         &destination.path().join(FILE),
         "2D-3D-Semantic data set, exported by s3d",
         &images,
-        &coco_categories(&stuff),
+        &coco_categories(taxonomy, &stuff),
     )?;
     Ok(vec![
         format!(
@@ -69,4 +71,12 @@ pub(super) fn pack(
         "a segment's id is its label's index, or 16711680 + category of a class that is stuff; 0 is void"
             .into(),
     ])
+}
+
+/// The classes of which all instances in an image are one segment.
+pub(super) fn stuff(options: &SpecificOptions, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
+    match &options.stuff {
+        Some(list) => list.classes(taxonomy),
+        None => Ok(taxonomy.classes().iter().copied().filter(|class| taxonomy.is_stuff(*class)).collect()),
+    }
 }

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use s3d_io::dataset::Domain;
 use s3d_io::image::Compression;
-use s3d_label::Class;
+use s3d_label::{Class, Taxonomy};
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -48,8 +48,8 @@ pub struct SpecificOptions {
     /// files, for which ns-train's --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels
     /// seem to be 128 m away; or none [default: millimetres]
     pub depth: Option<DepthFiles>,
-    /// coco: classes of which all instances in an image are one segment, or none [default:
-    /// ceiling,floor,wall]
+    /// coco: classes of which all instances in an image are one segment, or none [default: those that the
+    /// taxonomy calls stuff: ceiling,floor,wall]
     pub stuff: Option<ClassList>,
     /// coco, nerfstudio: how much time the images' files may take: fast, balanced or small [default:
     /// balanced]
@@ -120,7 +120,7 @@ impl fmt::Display for PackageKind {
 impl FromStr for PackageKind {
     type Err = String;
 
-    fn from_str(word: &str) -> Result<Self, String> {
+    fn from_str(word: &str) -> std::result::Result<Self, String> {
         choice(&Self::ALL, word)
     }
 }
@@ -150,7 +150,7 @@ impl fmt::Display for PackedImages {
 impl FromStr for PackedImages {
     type Err = String;
 
-    fn from_str(word: &str) -> Result<Self, String> {
+    fn from_str(word: &str) -> std::result::Result<Self, String> {
         choice(&Self::ALL, word)
     }
 }
@@ -174,7 +174,7 @@ impl DepthFiles {
 impl FromStr for DepthFiles {
     type Err = String;
 
-    fn from_str(word: &str) -> Result<Self, String> {
+    fn from_str(word: &str) -> std::result::Result<Self, String> {
         choice(&Self::ALL, word)
     }
 }
@@ -183,20 +183,27 @@ fn name_of<T: PartialEq>(all: &[(&'static str, T)], value: T) -> &'static str {
     all.iter().find(|(_, v)| *v == value).map_or("", |(name, _)| name)
 }
 
-fn choice<T: Copy>(all: &[(&'static str, T)], word: &str) -> Result<T, String> {
+fn choice<T: Copy>(all: &[(&'static str, T)], word: &str) -> std::result::Result<T, String> {
     let found = all.iter().find(|(name, _)| *name == word).map(|(_, value)| *value);
     let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
     found.ok_or_else(|| format!("there are {}", names.join(", ")))
 }
 
-/// Some classes, in their order and once each.
+/// Names of classes, of whatever taxonomy the data set has.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ClassList(pub Vec<Class>);
+pub struct ClassList(pub Vec<String>);
 
-impl Default for ClassList {
-    /// What rooms are made of.
-    fn default() -> Self {
-        Self(vec![Class::CEILING, Class::FLOOR, Class::WALL])
+impl ClassList {
+    /// The classes, in their order and once each.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a name that is none of a class.
+    pub(crate) fn classes(&self, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
+        let class = |name: &String| taxonomy.class(name).map_err(|e| Error::Usage(format!("--stuff: {e}")));
+        let mut classes = self.0.iter().map(class).collect::<Result<Vec<_>>>()?;
+        classes.sort_unstable();
+        classes.dedup();
+        Ok(classes)
     }
 }
 
@@ -204,13 +211,15 @@ impl FromStr for ClassList {
     type Err = String;
 
     /// Names of classes between commas, or `none`.
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         if text.trim() == "none" {
             return Ok(Self(Vec::new()));
         }
-        let parse = |word: &str| word.trim().parse::<Class>().map_err(|e| e.to_string());
-        let asked = text.split(',').map(parse).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self(Class::S3DIS.into_iter().filter(|c| asked.contains(c)).collect()))
+        let names: Vec<String> = text.split(',').map(|word| word.trim().to_owned()).collect();
+        if names.iter().any(String::is_empty) {
+            return Err("must be names of classes between commas, or none".to_owned());
+        }
+        Ok(Self(names))
     }
 }
 
@@ -227,7 +236,7 @@ impl ShardPrefix {
 impl FromStr for ShardPrefix {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         let fits = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
         if text.is_empty() || text.starts_with('.') || !text.chars().all(fits) {
             return Err("must be letters, digits, _, - and ., and not begin with a .".to_owned());
@@ -243,7 +252,7 @@ mod tests {
     #[test]
     fn options_belong_to_their_package() {
         let stuff: ClassList = "wall,floor,wall".parse().unwrap();
-        assert_eq!(stuff, ClassList(vec![Class::FLOOR, Class::WALL]));
+        assert_eq!(stuff.classes(&Taxonomy::s3dis()).unwrap(), [Class::FLOOR, Class::WALL]);
         let coco = SpecificOptions { stuff: Some(stuff), ..SpecificOptions::default() };
         coco.check(PackageKind::Coco).unwrap();
         let e = coco.check(PackageKind::Parquet).unwrap_err().to_string();
@@ -260,6 +269,12 @@ mod tests {
             assert_eq!((name.parse(), kind.to_string().as_str()), (Ok(kind), name));
         }
         assert!("{0..9}".parse::<ShardPrefix>().is_err() && "a/b".parse::<ShardPrefix>().is_err());
-        assert!("grass".parse::<ClassList>().is_err());
+        assert!("wall,".parse::<ClassList>().is_err());
+        let grass: ClassList = "wall,grass".parse().unwrap();
+        let e = grass.classes(&Taxonomy::s3dis()).unwrap_err();
+        assert!(e.to_string().contains("--stuff: \"grass\" is no class; the classes are ceiling"), "{e}");
+        let beds: ClassList = "bed,wall".parse().unwrap();
+        let nyu40 = Taxonomy::built_in("nyu40").unwrap();
+        assert_eq!(beds.classes(&nyu40).unwrap().iter().map(|c| c.index()).collect::<Vec<_>>(), [0, 3]);
     }
 }

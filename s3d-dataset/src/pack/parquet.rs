@@ -4,12 +4,11 @@ use super::map_in_order;
 use super::source::{DEPTH_MISSING, Source};
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::location::UNKNOWN_ROOM;
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, ViewRecord};
 use s3d_io::package::{ImageRow, SemanticRow, write_image_index};
-use s3d_label::{LabelId, LabelTable, Room};
+use s3d_label::{LabelId, LabelTable, UNKNOWN_ROOM};
 use s3d_sample::entropy;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -41,7 +40,7 @@ pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
             Ok(row)
         },
     )?;
-    write_image_index(place, &rows)?;
+    write_image_index(place, source.taxonomy.classes(), &rows)?;
     Ok(())
 }
 
@@ -53,8 +52,8 @@ fn row(
     counts: &mut [u64],
 ) -> Result<ImageRow> {
     let path = |domain| image.path(&source.layout, domain);
-    // The walk takes any word for a room's type; the data set has eleven, and one for what is not known.
-    let (room_type, room_number) = match image.room.parse::<Room>() {
+    // The walk takes any word for a room's type; the data set has some, and one for what is not known.
+    let (room_type, room_number) = match source.taxonomy.room(&image.room) {
         Ok(room) => (room.room_type.name(), room.number),
         Err(_) if table.is_none() && image.room == UNKNOWN_ROOM => ("unknown", 1),
         Err(e) => {
@@ -163,7 +162,8 @@ fn semantic_row(
             None => unknown = unknown.or(Some(index)),
         }
     }
-    let (mut histogram, mut unlabelled, mut instances) = ([0u64; 13], 0, 0);
+    let mut histogram = vec![0u64; table.taxonomy().classes().len()];
+    let (mut unlabelled, mut instances) = (0, 0);
     for index in seen {
         let count = std::mem::take(&mut counts[index as usize]);
         match table.class_of(LabelId(index)) {
@@ -178,7 +178,7 @@ fn semantic_row(
         return Err(index);
     }
     let share = |count: u64| count as f64 / semantic.len() as f64;
-    let shares = histogram.map(share);
+    let shares = histogram.iter().copied().map(share).collect();
     Ok(SemanticRow { shares, unlabelled: share(unlabelled), entropy: entropy(&histogram), instances })
 }
 

@@ -12,7 +12,7 @@ use s3d_io::dataset::{
 };
 use s3d_io::fs::write_bytes;
 use s3d_io::image::{decode_gray16, decode_rgb8};
-use s3d_label::LabelTable;
+use s3d_label::{LabelTable, Taxonomy};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,8 @@ pub(crate) const DEPTH_MISSING: u16 = u16::MAX;
 pub(crate) struct Source {
     pub(crate) layout: Layout,
     files: Listed,
+    /// Which classes and types of rooms there are.
+    pub(crate) taxonomy: Taxonomy,
     /// The areas that are packed, and all of their images that are.
     pub(crate) areas: Vec<u32>,
     pub(crate) images: Vec<DatasetImage>,
@@ -37,7 +39,7 @@ pub(crate) struct Source {
 impl Source {
     /// Opens the complete data set in `root`.
     pub(crate) fn open(ctx: &Context, root: &Path, areas: &[u32], which: PackedImages) -> Result<Self> {
-        let Dataset { layout, manifest, files } = Dataset::open(&Layout::new(root))?;
+        let Dataset { layout, manifest, files, taxonomy } = Dataset::open(&Layout::new(root))?;
         let there = &manifest.area_numbers;
         if let Some(area) = areas.iter().find(|a| !there.contains(a)) {
             let there: Vec<String> = there.iter().map(u32::to_string).collect();
@@ -70,7 +72,7 @@ impl Source {
         let depth_units_per_m = manifest.conventions().depth_units.per_m();
         let offsets = manifest.request().world_offsets();
         let is_labelled = manifest.is_labelled();
-        Ok(Self { layout, files, areas, images, depth_units_per_m, offsets, is_labelled })
+        Ok(Self { layout, files, taxonomy, areas, images, depth_units_per_m, offsets, is_labelled })
     }
 
     /// Which frame coordinates are in, a sentence for each area whose scan has another.
@@ -154,12 +156,15 @@ impl Source {
         Ok(s3d_io::cloud::read_point_sample(self.files.sized(&self.layout.point_cloud(area))?, most)?)
     }
 
-    /// The files that say what the numbers in images mean, by name: the conventions, and the label table if
-    /// there are labels.
+    /// The files that say what the numbers in images mean, by name: the conventions; if there are
+    /// labels their table, and their taxonomy unless it is S3DIS's.
     pub(crate) fn tables(&self) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let mut tables = vec![("conventions.json", self.files.read_bytes(&self.layout.conventions())?)];
         if self.is_labelled {
             tables.push(("semantic_labels.json", self.files.read_bytes(&self.layout.labels_json())?));
+        }
+        if !self.taxonomy.is_s3dis() {
+            tables.push(("taxonomy.json", self.files.read_bytes(&self.layout.taxonomy_json())?));
         }
         Ok(tables)
     }
@@ -170,7 +175,7 @@ impl Source {
             return Ok(None);
         }
         let path = self.layout.labels_json();
-        let table = LabelTable::from_names(&read_labels(self.files.checked(&path)?)?);
+        let table = self.taxonomy.table_from_names(&read_labels(self.files.checked(&path)?)?);
         Ok(Some(table.map_err(|e| FileError::format(&path, e.to_string()))?))
     }
 }

@@ -98,7 +98,7 @@ pub(super) fn pack(
             .into(),
     );
     notes.push(format!(
-        "{META} in each shard holds what its numbers mean: conventions, and the label table if there are labels"
+        "{META} in each shard holds what its numbers mean: conventions, the label table if there are labels, and the taxonomy if it is not S3DIS's"
     ));
     notes.push(
         "decode(\"pil\") makes 8-bit RGB of every image: give depth.png (16 bits) and global_xyz.exr decoders of their own, \

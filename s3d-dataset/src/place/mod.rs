@@ -112,7 +112,7 @@ fn floor_faces(ground: &Ground<'_>) -> BTreeMap<Room, Vec<u32>> {
     let mut floors: BTreeMap<Room, Vec<u32>> = BTreeMap::new();
     for (face, label) in (0u32..).zip(ground.label_of_face) {
         if let Some(label) = ground.table.get(*label)
-            && label.class == Class::FLOOR
+            && label.class.s3dis() == Class::FLOOR
             && ground.scene.mesh().normal(face).z.abs() > LEVEL
         {
             floors.entry(label.room).or_default().push(face);

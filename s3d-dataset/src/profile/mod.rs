@@ -23,6 +23,7 @@ use room::{TreeRoom, rooms_of};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::{create_dir, write_whole};
+use s3d_label::Taxonomy;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -85,7 +86,7 @@ fn add(ctx: &Context, data: &Dataset, wanted: &[Profile], overwrite: bool, call:
     data.files.require(ctx, |path| trees.iter().any(|tree| path.starts_with(tree)))?;
     let change = Change::begin(layout)?;
     let staged = change.staged();
-    write(ctx, layout, &data.files, staged, areas, wanted)?;
+    write(&Source { ctx, layout, files: &data.files, taxonomy: &data.taxonomy }, staged, areas, wanted)?;
     let mut files = Vec::new();
     for profile in wanted {
         files.extend(listing::walk(&staged.profile_dir(profile.name()))?);
@@ -101,42 +102,36 @@ fn add(ctx: &Context, data: &Dataset, wanted: &[Profile], overwrite: bool, call:
 
 /// Writes the profiles of a data set of these areas, whose S3DIS tree is written, to where they have their
 /// places in `staged`.
-pub(crate) fn write(
-    ctx: &Context,
-    layout: &Layout,
-    files: &Listed,
-    staged: &Layout,
-    areas: &[u32],
-    profiles: &[Profile],
-) -> Result<()> {
+pub(crate) fn write(source: &Source<'_>, staged: &Layout, areas: &[u32], profiles: &[Profile]) -> Result<()> {
     if profiles.is_empty() {
         return Ok(());
     }
-    let source = Source { ctx, layout, files };
     let mut rooms = Vec::new();
     for area in areas {
-        rooms.extend(rooms_of(layout, *area)?);
+        rooms.extend(rooms_of(source, *area)?);
     }
     for profile in profiles {
         let dir = staged.profile_dir(profile.name());
         create_dir(&dir)?;
         match profile {
-            Profile::PointNet => arrays::write_pointnet(&source, &dir, &rooms)?,
-            Profile::Mmdet3d => arrays::write_mmdet3d(&source, &dir, &rooms)?,
-            Profile::Open3dMl => open3d_ml::write(&source, &dir, &rooms)?,
-            Profile::Pointcept => pointcept::write(&source, &dir, areas, &rooms)?,
+            Profile::PointNet => arrays::write_pointnet(source, &dir, &rooms)?,
+            Profile::Mmdet3d => arrays::write_mmdet3d(source, &dir, &rooms)?,
+            Profile::Open3dMl => open3d_ml::write(source, &dir, &rooms)?,
+            Profile::Pointcept => pointcept::write(source, &dir, areas, &rooms)?,
         }
-        let place = layout.profile_dir(profile.name());
-        ctx.info(format_args!("{}: {} rooms for {profile}", place.display(), rooms.len()));
+        let place = source.layout.profile_dir(profile.name());
+        source.ctx.info(format_args!("{}: {} rooms for {profile}", place.display(), rooms.len()));
     }
     Ok(())
 }
 
 /// What profiles are made from.
-struct Source<'a> {
-    ctx: &'a Context,
-    layout: &'a Layout,
-    files: &'a Listed,
+pub(crate) struct Source<'a> {
+    pub(crate) ctx: &'a Context,
+    pub(crate) layout: &'a Layout,
+    pub(crate) files: &'a Listed,
+    /// What the tree's names of classes and rooms are of.
+    pub(crate) taxonomy: &'a Taxonomy,
 }
 
 impl Source<'_> {

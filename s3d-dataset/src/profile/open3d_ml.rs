@@ -141,8 +141,10 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             let files = Listed::of(dir.path(), [FileRecord::of_file(dir.path(), &path).unwrap()]);
             let (ctx, layout) = (&Context::default(), &Layout::new(dir.path()));
-            let table = TreeInstance { class: Class::TABLE, path: path.clone() };
-            OrientedBox::of(&Source { ctx, layout, files: &files }, &table).unwrap()
+            let table =
+                TreeInstance { class: Class::TABLE, name: "table_1.txt".to_owned(), path: path.clone() };
+            OrientedBox::of(&Source { ctx, layout, files: &files, taxonomy: &Default::default() }, &table)
+                .unwrap()
         };
         let b = of(text);
         assert_eq!(b.points, 2 * 101 * 41);

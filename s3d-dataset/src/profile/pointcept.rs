@@ -72,7 +72,7 @@ fn write_room(source: &Source<'_>, dir: &Path, room: &TreeRoom) -> Result<()> {
     let name = format!("{}.txt", room.name);
     source.link(&source.layout.s3dis_area_dir(room.area).join(&room.name).join(&name), &dir.join(&name))?;
     for instance in &room.instances {
-        let to = dir.join("Annotations").join(instance.path.file_name().unwrap_or_default());
+        let to = dir.join("Annotations").join(&instance.name);
         // A line is at most some hundred bytes.
         let size = source.files.bytes(&instance.path)?;
         if size < 1024 && count_and_min(source, &instance.path)?.0 == 1 {

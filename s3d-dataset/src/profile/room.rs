@@ -3,9 +3,9 @@
 use super::Source;
 use crate::error::Result;
 use s3d_geom::PointCloud;
-use s3d_io::cloud::{AnnotationTree, OnFault, PointReader};
-use s3d_io::dataset::Layout;
+use s3d_io::cloud::{AnnotationTree, OnFault, PointReader, TreeOptions};
 use s3d_label::Class;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Points that are read at a time.
@@ -23,7 +23,10 @@ pub(super) struct TreeRoom {
 
 /// An instance of a room.
 pub(super) struct TreeInstance {
+    /// Which class of S3DIS it counts as: loaders of S3DIS know no others.
     pub(super) class: Class,
+    /// The name of its file for them, `chair_1.txt`.
+    pub(super) name: String,
     pub(super) path: PathBuf,
 }
 
@@ -40,17 +43,25 @@ impl TreeRoom {
 }
 
 /// The rooms of an area that hold points, by type and number.
-pub(super) fn rooms_of(layout: &Layout, area: u32) -> Result<Vec<TreeRoom>> {
-    let dir = layout.s3dis_area_dir(area);
+pub(super) fn rooms_of(source: &Source<'_>, area: u32) -> Result<Vec<TreeRoom>> {
+    let dir = source.layout.s3dis_area_dir(area);
     let is_empty = std::fs::read_dir(&dir).is_ok_and(|mut e| !e.any(|e| e.is_ok_and(|e| e.path().is_dir())));
     if is_empty {
         return Ok(Vec::new());
     }
-    let tree = AnnotationTree::open(&dir)?;
+    let options = TreeOptions { taxonomy: source.taxonomy.clone(), ..TreeOptions::default() };
+    let tree = AnnotationTree::open_with(&dir, &options)?;
     let rooms = tree.rooms.into_iter().map(|room| {
-        let mut instances: Vec<TreeInstance> =
-            room.instances.into_iter().map(|i| TreeInstance { class: i.class, path: i.path }).collect();
-        instances.sort_by(|a, b| a.path.cmp(&b.path));
+        // Classes that count as one share its numbers.
+        let mut last: BTreeMap<Class, u32> = BTreeMap::new();
+        let named = room.instances.into_iter().map(|i| {
+            let class = i.class.s3dis();
+            let number = last.entry(class).and_modify(|number| *number += 1).or_insert(1);
+            let number = if source.taxonomy.is_s3dis() { i.number } else { *number };
+            TreeInstance { class, name: format!("{class}_{number}.txt"), path: i.path }
+        });
+        let mut instances: Vec<TreeInstance> = named.collect();
+        instances.sort_by(|a, b| a.name.cmp(&b.name));
         TreeRoom { area, name: room.room.to_string(), instances }
     });
     Ok(rooms.collect())

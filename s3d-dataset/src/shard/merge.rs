@@ -84,7 +84,8 @@ pub fn merge(
     stage.end();
 
     output::check(ctx, layout, target.overwrite, &target.allowed)?;
-    let manifest = Manifest::begin(request, labels.len());
+    let table = labels.table(&LabelList::path(layout))?;
+    let manifest = Manifest::begin(request, &table);
     let session = match output::begin(layout, target.overwrite, request, &manifest, &account)? {
         Begin::NothingToDo => {
             ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
@@ -100,8 +101,8 @@ pub fn merge(
         stage.end();
         let stage = account.stage(Stage::Tables, None);
         let options = &request.options;
-        let (names, padded) = (labels.names().to_vec(), manifest.labels_padded_to());
-        assets::write(layout, names, padded, options.conventions(), &request.world_offsets())?;
+        let padded = manifest.labels_padded_to();
+        assets::write(layout, &table, padded, options.conventions(), &request.world_offsets())?;
         let made = finish(ctx, layout, request, manifest, &session.journal.finished(), None)?;
         stage.end();
         Ok(made)

@@ -111,7 +111,8 @@ impl Plan {
 
     /// A labelled area.
     pub(crate) fn area(&self, area: u32) -> Result<AreaPlan> {
-        AreaPlan::read(&area_folder(self.layout.root(), area), area)
+        let taxonomy = self.file.labels.taxonomy(&plan_file(self.layout.root()))?;
+        taxonomy.reading(|| AreaPlan::read(&area_folder(self.layout.root(), area), area))
     }
 
     /// Brings the files of an area's labels into a data set.

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use s3d_io::dataset::{Conventions, Layout, WorldOffsets};
 use s3d_io::fs::{create_dir, write_bytes};
+use s3d_label::LabelTable;
 use std::path::PathBuf;
 
 /// Reads every kind of file of a data set, in Python.
@@ -11,18 +12,22 @@ const POSE_SCHEMA: &str = include_str!("../../assets/pose.schema.json");
 const MANIFEST_SCHEMA: &str = include_str!("../../assets/manifest.schema.json");
 
 /// Writes the names of a label table, unless it has the null label alone, padded to as many as `pad_labels`
-/// if there are fewer; `conventions.json`, `assets/utils.py` and `assets/schema`.
+/// if there are fewer, and their taxonomy if it is not S3DIS's; `conventions.json`, `assets/utils.py` and `assets/schema`.
 pub(crate) fn write(
     layout: &Layout,
-    mut names: Vec<String>,
+    table: &LabelTable,
     pad_labels: usize,
     conventions: Conventions,
     offsets: &WorldOffsets,
 ) -> Result<()> {
     create_dir(&layout.assets_dir())?;
-    if names.len() > 1 {
+    if table.len() > 1 {
+        let mut names = table.names();
         s3d_io::dataset::pad_labels(&mut names, pad_labels);
         s3d_io::dataset::write_labels(&layout.labels_json(), &names)?;
+        if !table.taxonomy().is_s3dis() {
+            s3d_io::dataset::write_taxonomy(&layout.taxonomy_json(), table.taxonomy())?;
+        }
     }
     conventions.write(&layout.conventions(), offsets)?;
     create_dir(&layout.schema_dir())?;

@@ -9,6 +9,7 @@ use s3d_io::dataset::{
     CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, read_conventions, read_file_list,
 };
 use s3d_io::fs::checksum_of_file;
+use s3d_label::Taxonomy;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -18,6 +19,8 @@ pub(crate) struct Dataset {
     pub(crate) layout: Layout,
     pub(crate) manifest: Manifest,
     pub(crate) files: Listed,
+    /// Which classes and types of rooms its labels have.
+    pub(crate) taxonomy: Taxonomy,
 }
 
 impl Dataset {
@@ -31,10 +34,16 @@ impl Dataset {
         let files = Listed::read(layout, &manifest)?;
         let path = layout.conventions();
         let found = read_conventions(files.checked(&path)?)?;
-        match manifest.contradiction_of(found) {
-            Some(message) => Err(FileError::format(&path, message).into()),
-            None => Ok(Self { layout: layout.clone(), manifest, files }),
+        if let Some(message) = manifest.contradiction_of(found) {
+            return Err(FileError::format(&path, message).into());
         }
+        let taxonomy = manifest.read_taxonomy(layout, |path| files.checked(path).map(drop))?;
+        Ok(Self { layout: layout.clone(), manifest, files, taxonomy })
+    }
+
+    /// The taxonomy of its labels, if it has some.
+    pub(crate) fn label_taxonomy(&self) -> Option<&Taxonomy> {
+        self.manifest.is_labelled().then_some(&self.taxonomy)
     }
 }
 

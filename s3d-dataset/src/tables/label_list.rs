@@ -5,20 +5,24 @@ use crate::store::checked::{read_checked, write_checked};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;
-use s3d_label::LabelTable;
+use s3d_label::{LabelTable, Taxonomy, TaxonomyDefinition};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The names of a label table, in order, without padding.
+/// The names of a label table, in order, without padding, and their taxonomy.
 #[derive(Serialize, Deserialize)]
-#[serde(transparent)]
 pub(crate) struct LabelList {
     names: Vec<String>,
+    /// S3DIS's if it is not there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    taxonomy: Option<TaxonomyDefinition>,
 }
 
 impl LabelList {
     pub(crate) fn of(table: &LabelTable) -> Self {
-        Self { names: table.names() }
+        let taxonomy = table.taxonomy();
+        let taxonomy = (!taxonomy.is_s3dis()).then(|| taxonomy.definition().clone());
+        Self { names: table.names(), taxonomy }
     }
 
     /// Where an unfinished export keeps it.
@@ -36,14 +40,13 @@ impl LabelList {
         read_checked(path)
     }
 
-    /// How many there are, the null label included.
-    pub(crate) fn len(&self) -> usize {
-        self.names.len()
-    }
-
-    /// The names, the null label first.
-    pub(crate) fn names(&self) -> &[String] {
-        &self.names
+    /// The taxonomy of its labels.
+    ///
+    /// # Errors
+    /// If what the file at `path` holds is none.
+    pub(crate) fn taxonomy(&self, path: &Path) -> Result<Taxonomy> {
+        let Some(definition) = self.taxonomy.clone() else { return Ok(Taxonomy::s3dis()) };
+        Taxonomy::new(definition).map_err(|e| FileError::format(path, e.to_string()).into())
     }
 
     /// The table.
@@ -51,7 +54,8 @@ impl LabelList {
     /// # Errors
     /// If the file at `path` holds names that make no table.
     pub(crate) fn table(&self, path: &Path) -> Result<LabelTable> {
-        LabelTable::from_names(&self.names).map_err(|e| FileError::format(path, e.to_string()).into())
+        let table = self.taxonomy(path)?.table_from_names(&self.names);
+        table.map_err(|e| FileError::format(path, e.to_string()).into())
     }
 }
 
@@ -67,9 +71,14 @@ mod tests {
         let path = LabelList::path(&Layout::new(dir.path()));
         LabelList::of(&table).write(&path).unwrap();
         let list = LabelList::read(&path).unwrap();
-        assert_eq!((list.len(), list.names()[0].as_str()), (4, s3d_label::NULL_NAME));
+        assert_eq!((list.names.len(), list.names[0].as_str()), (4, s3d_label::NULL_NAME));
         assert_eq!(list.table(&path).unwrap(), table);
-        write_checked(&path, &["floor_1_office_1_1"]).unwrap();
+        let nyu40 = Taxonomy::built_in("nyu40").unwrap();
+        let table = nyu40.table([nyu40.label("bed_1_bedroom_1_1").unwrap()]).unwrap();
+        LabelList::of(&table).write(&path).unwrap();
+        assert_eq!(LabelList::read(&path).unwrap().table(&path).unwrap(), table);
+        let names = vec!["floor_1_office_1_1".to_owned()];
+        LabelList { names, taxonomy: None }.write(&path).unwrap();
         assert!(LabelList::read(&path).unwrap().table(&path).is_err());
     }
 }

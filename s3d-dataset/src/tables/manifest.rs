@@ -9,8 +9,9 @@ use crate::store::request::{InputRecord, Request, RequestedArea};
 use crate::tables::summary::Unlabelled;
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType};
+use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType, read_taxonomy};
 use s3d_io::fs::{Checksum, read_json, write_json};
+use s3d_label::{LabelTable, Taxonomy};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -47,6 +48,9 @@ pub(crate) struct Manifest {
     pub(crate) labels: usize,
     /// Entries of `semantic_labels.json`: null labels fill it up.
     labels_padded_to: usize,
+    /// The name of the taxonomy that `assets/taxonomy.json` holds; not there if the classes are S3DIS's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) taxonomy: Option<String>,
     /// The list of all other files; not while the export runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) files: Option<FileList>,
@@ -167,10 +171,11 @@ pub(crate) fn half_step(value: f32) -> f64 {
 }
 
 impl Manifest {
-    /// The manifest of an export that has begun; `table_len` is the length of the label table, 1 if it has
-    /// the null label alone.
-    pub(crate) fn begin(request: &Request, table_len: usize) -> Self {
-        let labels = if table_len > 1 { table_len } else { 0 };
+    /// The manifest of an export that has begun, with this label table: the null label alone stands for no
+    /// labels.
+    pub(crate) fn begin(request: &Request, table: &LabelTable) -> Self {
+        let labels = if table.len() > 1 { table.len() } else { 0 };
+        let taxonomy = Some(table.taxonomy()).filter(|t| labels > 0 && !t.is_s3dis());
         let padded = request.options.pad_labels.0;
         Self {
             generator: GENERATOR.to_owned(),
@@ -182,6 +187,7 @@ impl Manifest {
             areas: Vec::new(),
             labels,
             labels_padded_to: labels.max(padded),
+            taxonomy: taxonomy.map(|t| t.name().to_owned()),
             files: None,
             xyz_from_depth: None,
         }
@@ -190,6 +196,27 @@ impl Manifest {
     /// Whether the data set has labels: a table of them, and what is made with it.
     pub(crate) fn is_labelled(&self) -> bool {
         self.labels > 0
+    }
+
+    /// The taxonomy of the labels: S3DIS's, or that in a file of its own, which `check` may refuse before it is
+    /// read.
+    ///
+    /// # Errors
+    /// If the file is not as it should be, or holds a taxonomy of another name.
+    pub(crate) fn read_taxonomy(
+        &self,
+        layout: &Layout,
+        check: impl Fn(&Path) -> Result<(), FileError>,
+    ) -> Result<Taxonomy, FileError> {
+        let Some(name) = &self.taxonomy else { return Ok(Taxonomy::s3dis()) };
+        let path = layout.taxonomy_json();
+        check(&path)?;
+        let taxonomy = read_taxonomy(&path)?;
+        if taxonomy.name() != name {
+            let message = format!("is {}, and the manifest tells of {name}", taxonomy.name());
+            return Err(FileError::format(&path, message));
+        }
+        Ok(taxonomy)
     }
 
     /// How many entries the file of labels has.

@@ -7,7 +7,7 @@ use crate::tables::records::RoomRecord;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, Frame, ImageName, Layout, read_labels};
 use s3d_io::fs::{open_file, read_json, write_bytes, write_json};
-use s3d_label::{Class, ClassCounts, LabelTable, Room, RoomError, RoomType};
+use s3d_label::{Class, ClassCounts, LabelTable, RoomType, Taxonomy};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -24,6 +24,9 @@ const LONGEST_PART: u64 = 1 << 16;
 pub struct Statistics {
     /// By number.
     pub areas: Vec<AreaStatistics>,
+    /// Which classes and types of rooms are counted.
+    #[serde(skip)]
+    pub taxonomy: Taxonomy,
 }
 
 /// What an area holds.
@@ -78,30 +81,29 @@ pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
     let folders: Vec<PathBuf> = areas.iter().map(|area| layout.area_dir(*area)).collect();
     // Images are counted, and not read.
     data.files.require(&Context::default(), |path| folders.iter().any(|area| path.starts_with(area)))?;
-    Statistics::count(layout, areas, data.manifest.is_labelled(), |path, whole| {
+    Statistics::count(layout, areas, data.label_taxonomy(), |path, whole| {
         if whole { data.files.checked(path) } else { data.files.sized(path) }.map(drop)
     })
 }
 
 impl Statistics {
-    /// Counts what lies in the folders of a data set of these areas, with labels or without. Before a file is
+    /// Counts what lies in the folders of a data set of these areas, with labels of a taxonomy or without. Before a file is
     /// read, as a `whole` or not, `check` may refuse it.
     pub(crate) fn count(
         layout: &Layout,
         areas: &[u32],
-        is_labelled: bool,
+        taxonomy: Option<&Taxonomy>,
         check: impl Fn(&Path, bool) -> Result<(), FileError>,
     ) -> Result<Self> {
-        let mut classes = None;
-        if is_labelled {
+        let mut table = None;
+        if let Some(taxonomy) = taxonomy {
             let path = layout.labels_json();
             check(&path, true)?;
-            let table = LabelTable::from_names(&read_labels(&path)?)
-                .map_err(|e| FileError::format(&path, e.to_string()))?;
-            classes = Some(ClassCounts::from_table(&table));
+            let read = taxonomy.table_from_names(&read_labels(&path)?);
+            table = Some(read.map_err(|e| FileError::format(&path, e.to_string()))?);
         }
-        let areas = areas.iter().map(|n| AreaStatistics::count(layout, *n, classes.as_ref(), &check));
-        Ok(Self { areas: areas.collect::<Result<_>>()? })
+        let areas = areas.iter().map(|n| AreaStatistics::count(layout, *n, table.as_ref(), &check));
+        Ok(Self { areas: areas.collect::<Result<_>>()?, taxonomy: taxonomy.cloned().unwrap_or_default() })
     }
 
     /// Writes the tables as JSON and as Markdown.
@@ -130,19 +132,20 @@ impl Statistics {
             text.push_str("\nThere are no labels.\n");
             return text;
         }
-        let class_rows: Vec<_> = Class::S3DIS
-            .map(|c| {
-                let of = move |labels: &LabelStatistics| labels.instances_per_class[c.name()] as f64;
-                (c.name(), move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
-            })
-            .into();
+        let class_row = |c: &Class| {
+            let name = c.name();
+            let of = move |labels: &LabelStatistics| labels.instances_per_class[name] as f64;
+            (name, move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
+        };
+        let class_rows: Vec<_> = self.taxonomy.classes().iter().map(class_row).collect();
         self.table(&mut text, "Instances of each class", &rows(&class_rows));
         let of_type = |of: fn(&RoomTypeStatistics) -> f64| -> Vec<_> {
-            let row = |t: RoomType| {
-                let of = move |labels: &LabelStatistics| of(&labels.rooms_per_type[t.name()]);
-                (t.name(), move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
+            let row = |t: &RoomType| {
+                let name = t.name();
+                let of = move |labels: &LabelStatistics| of(&labels.rooms_per_type[name]);
+                (name, move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
             };
-            RoomType::S3DIS.map(row).into()
+            self.taxonomy.room_types().iter().map(row).collect()
         };
         self.table(&mut text, "Rooms of each type", &rows(&of_type(|of_type| of_type.rooms as f64)));
         self.table(&mut text, "Floor of each room type, m²", &rows(&of_type(|of_type| of_type.floor_m2)));
@@ -187,11 +190,10 @@ impl AreaStatistics {
     fn count(
         layout: &Layout,
         area: u32,
-        classes: Option<&ClassCounts>,
+        table: Option<&LabelTable>,
         check: impl Fn(&Path, bool) -> Result<(), FileError>,
     ) -> Result<Self> {
-        let labels =
-            classes.map(|classes| LabelStatistics::count(layout, area, classes, &check)).transpose()?;
+        let labels = table.map(|table| LabelStatistics::count(layout, area, table, &check)).transpose()?;
         let mesh = if labels.is_some() { layout.semantic_obj(area) } else { layout.rgb_obj(area) };
         check(&layout.point_cloud(area), false)?;
         check(&mesh, true)?;
@@ -210,25 +212,29 @@ impl LabelStatistics {
     fn count(
         layout: &Layout,
         area: u32,
-        classes: &ClassCounts,
+        table: &LabelTable,
         check: impl Fn(&Path, bool) -> Result<(), FileError>,
     ) -> Result<Self> {
         check(&layout.rooms_json(area), true)?;
+        let (taxonomy, classes) = (table.taxonomy(), ClassCounts::from_table(table));
         let mut rooms_per_type: BTreeMap<_, RoomTypeStatistics> =
-            RoomType::S3DIS.map(|t| (t.name(), RoomTypeStatistics::default())).into();
+            taxonomy.room_types().iter().map(|t| (t.name(), RoomTypeStatistics::default())).collect();
         let rooms: Vec<RoomRecord> = read_json(&layout.rooms_json(area))?;
         for record in &rooms {
-            let room: Room = record
-                .room
-                .parse()
-                .map_err(|e: RoomError| FileError::format(&layout.rooms_json(area), e.to_string()))?;
+            let room = taxonomy
+                .room(&record.room)
+                .map_err(|e| FileError::format(&layout.rooms_json(area), e.to_string()))?;
             let row = rooms_per_type.entry(room.room_type.name()).or_default();
             row.rooms += 1;
             row.floor_m2 += record.floor_m2;
         }
         Ok(Self {
             floor_m2: rooms.iter().map(|r| r.floor_m2).sum(),
-            instances_per_class: Class::S3DIS.map(|c| (c.name(), classes.of(area, c))).into(),
+            instances_per_class: taxonomy
+                .classes()
+                .iter()
+                .map(|c| (c.name(), classes.of(area, *c)))
+                .collect(),
             rooms_per_type,
         })
     }

@@ -245,7 +245,7 @@ fn level_finding(mesh: &TriMesh, label_of_face: &[LabelId], table: &LabelTable) 
     const LEVEL: f32 = 0.866;
     let (mut level_m2, mut all_m2) = (0.0, 0.0);
     for (face, label) in (0u32..).zip(label_of_face) {
-        let class = table.get(*label).map(|label| label.class);
+        let class = table.get(*label).map(|label| label.class.s3dis());
         if matches!(class, Some(Class::FLOOR | Class::CEILING)) {
             let area_m2 = mesh.area(face);
             all_m2 += area_m2;

@@ -5,7 +5,6 @@ use super::report::{OfFile, Report, Topic};
 use crate::tables::manifest::Manifest;
 use s3d_io::dataset::{InstanceArrays, Layout, read_instance_arrays, read_instance_members, read_instances};
 use s3d_io::fs::read_json;
-use s3d_label::parse_name;
 use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -24,7 +23,7 @@ pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &La
             let name = &e.label;
             checks.check(seen.insert(name), || format!("{name} stands there twice"));
             label(name, e.label_index, labels, &checks);
-            if let Ok(Some(l)) = parse_name(name) {
+            if let Ok(Some(l)) = labels.taxonomy.parse_name(name) {
                 checks.check(
                     l.class.name() == e.class && l.room.to_string() == e.room && l.area == area,
                     || format!("{name} has the class {:?} and the room {:?} in area {area}", e.class, e.room),
@@ -124,7 +123,7 @@ fn numbers(layout: &Layout, area: u32, labels: &Labels, report: &Report) {
         checks.check(places.insert((&n.room, &n.class, n.number_in_room)), || {
             format!("{}_{} of {} stands there twice", n.class, n.number_in_room, n.room)
         });
-        if let Ok(Some(l)) = parse_name(&n.label) {
+        if let Ok(Some(l)) = labels.taxonomy.parse_name(&n.label) {
             checks.check(l.class.name() == n.class && l.room.to_string() == n.room && l.area == area, || {
                 format!("{} is {} of {}", n.label, n.class, n.room)
             });

@@ -4,7 +4,7 @@ use super::report::{Report, Topic};
 use crate::tables::manifest::Manifest;
 use s3d_io::dataset::{Layout, read_labels};
 use s3d_io::image::pretty_color;
-use s3d_label::{LabelTable, NULL_NAME};
+use s3d_label::{NULL_NAME, Taxonomy};
 use std::collections::HashMap;
 
 const ORDER: (Topic, &str) = (Topic::Labels, "the label table");
@@ -14,6 +14,8 @@ pub(crate) struct Labels {
     /// All, without the null labels at the end that fill the table up.
     pub(crate) names: Vec<String>,
     indices: HashMap<String, u32>,
+    /// What the names are of.
+    pub(crate) taxonomy: Taxonomy,
     /// A colour an index.
     pub(crate) pretty: Vec<[u8; 3]>,
 }
@@ -21,7 +23,12 @@ pub(crate) struct Labels {
 impl Labels {
     /// Those of a data set that has none: nothing but the null label.
     fn none() -> Self {
-        Self { names: vec![NULL_NAME.to_owned()], indices: HashMap::new(), pretty: vec![pretty_color(0)] }
+        Self {
+            names: vec![NULL_NAME.to_owned()],
+            indices: HashMap::new(),
+            taxonomy: Taxonomy::s3dis(),
+            pretty: vec![pretty_color(0)],
+        }
     }
 
     /// Reads and checks `semantic_labels.json`.
@@ -29,10 +36,12 @@ impl Labels {
         if !manifest.is_labelled() {
             return Some(Self::none());
         }
+        let taxonomy = manifest.read_taxonomy(layout, |path| report.check_size(path));
+        let taxonomy = report.ok(Topic::Labels, taxonomy)?;
         let path = layout.labels_json();
         let mut names = report.read(Topic::Labels, &path, read_labels)?;
         let checks = report.of(ORDER, &path);
-        if let Err(e) = LabelTable::from_names(&names) {
+        if let Err(e) = taxonomy.table_from_names(&names) {
             checks.check(false, || format!("out of order, or no table: {e}"));
         }
         checks.check(names.len() == manifest.labels_padded_to(), || {
@@ -45,7 +54,7 @@ impl Labels {
         });
         let indices = names.iter().enumerate().map(|(i, name)| (name.clone(), i as u32)).collect();
         let pretty = (0..names.len() as u32).map(pretty_color).collect();
-        Some(Self { names, indices, pretty })
+        Some(Self { names, indices, taxonomy, pretty })
     }
 
     /// The index of a name.

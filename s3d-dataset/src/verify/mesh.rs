@@ -7,7 +7,7 @@ use s3d_geom::TriMesh;
 use s3d_io::dataset::{Layout, read_face_votes};
 use s3d_io::fs::read_json;
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
-use s3d_label::{Class, LabelId, fill_labels, parse_name};
+use s3d_label::{LabelId, fill_labels};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -190,10 +190,10 @@ fn check_votes(
         }
     }
     let mut rooms: BTreeMap<String, u64> = BTreeMap::new();
-    let mut classes: BTreeMap<&str, u64> = Class::S3DIS.map(|c| (c.name(), 0)).into();
+    let mut classes: BTreeMap<&str, u64> = labels.taxonomy.classes().iter().map(|c| (c.name(), 0)).collect();
     let mut others = 0;
     for (name, count) in labels.names.iter().zip(&per_label).filter(|(_, count)| **count > 0) {
-        match parse_name(name) {
+        match labels.taxonomy.parse_name(name) {
             Ok(Some(label)) => {
                 *rooms.entry(label.room.to_string()).or_default() += count;
                 *classes.entry(label.class.name()).or_default() += count;

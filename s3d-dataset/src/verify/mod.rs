@@ -111,7 +111,7 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
 fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result<()> {
     let Common { layout, manifest, labels, report, .. } = *common;
     if manifest.is_labelled() {
-        tables::rooms(layout, area, manifest, report);
+        tables::rooms(layout, area, manifest, labels, report);
     }
     let mesh = labels.and_then(|labels| {
         if manifest.is_labelled() {

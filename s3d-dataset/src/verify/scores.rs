@@ -9,7 +9,7 @@ use crate::export::views::{Kinds, Scoring, score_area};
 use s3d_geom::Camera;
 use s3d_io::camera::ScanLocation;
 use s3d_io::dataset::DatasetImage;
-use s3d_label::{LabelId, LabelTable};
+use s3d_label::LabelId;
 
 const ENTROPIES: (Topic, &str) = (Topic::Views, "entropies");
 
@@ -23,7 +23,8 @@ pub(crate) fn check(
     cameras: &[(usize, Camera)],
     views: &Views,
 ) -> Result<()> {
-    let Ok(table) = LabelTable::from_names(&reference.labels.names) else { return Ok(()) };
+    let labels = reference.labels;
+    let Ok(table) = labels.taxonomy.table_from_names(&labels.names) else { return Ok(()) };
     if reference.mesh.label_of_face.iter().any(|l| *l as usize >= table.len()) {
         return Ok(());
     }

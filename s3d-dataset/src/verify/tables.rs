@@ -1,5 +1,6 @@
 //! The tables beside the images: rooms, folds, lists, statistics, conventions.
 
+use super::labels::Labels;
 use super::report::{Report, Topic};
 use crate::profile::loader::Profile;
 use crate::tables::assets;
@@ -9,7 +10,6 @@ use s3d_io::dataset::{
     DatasetImage, Domain, Frame, Layout, read_conventions, read_splits, read_world_offsets,
 };
 use s3d_io::fs::{read_file, read_json};
-use s3d_label::Room;
 use s3d_sample::folds;
 use serde::Deserialize;
 use serde_json::Value;
@@ -92,7 +92,13 @@ struct RoomRecord {
 }
 
 /// Checks `rooms.json` of an area, and the angles of its S3DIS tree.
-pub(crate) fn rooms(layout: &Layout, area: u32, manifest: &Manifest, report: &Report) {
+pub(crate) fn rooms(
+    layout: &Layout,
+    area: u32,
+    manifest: &Manifest,
+    labels: Option<&Labels>,
+    report: &Report,
+) {
     let path = layout.rooms_json(area);
     let Some(rooms) = report.read(Topic::Tables, &path, read_json::<Vec<RoomRecord>>) else { return };
     let checks = report.of(ROOMS, &path);
@@ -103,7 +109,8 @@ pub(crate) fn rooms(layout: &Layout, area: u32, manifest: &Manifest, report: &Re
     }
     let mut names = BTreeSet::new();
     for r in &rooms {
-        checks.check(r.room.parse::<Room>().is_ok(), || format!("{:?} is no room", r.room));
+        let is_room = labels.is_none_or(|labels| labels.taxonomy.room(&r.room).is_ok());
+        checks.check(is_room, || format!("{:?} is no room", r.room));
         checks.check(names.insert(&r.room), || format!("{} stands there twice", r.room));
         checks.check(r.wall_direction_deg < 90, || {
             format!("{}: wall_direction_deg {}", r.room, r.wall_direction_deg)
@@ -190,8 +197,11 @@ pub(crate) fn splits(layout: &Layout, manifest: &Manifest, images: &[DatasetImag
 
 /// Holds the statistics against what is counted from the files.
 pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) {
+    // A taxonomy that cannot be read is told of where the labels are.
+    let Ok(taxonomy) = manifest.read_taxonomy(layout, |_| Ok(())) else { return };
+    let taxonomy = Some(&taxonomy).filter(|_| manifest.is_labelled());
     let check = |path: &Path, _| report.check_size(path);
-    let counted = match Statistics::count(layout, &manifest.area_numbers, manifest.is_labelled(), check) {
+    let counted = match Statistics::count(layout, &manifest.area_numbers, taxonomy, check) {
         Ok(counted) => counted,
         Err(e) => {
             report.fault(

@@ -41,7 +41,7 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
         if let Some(transforms) = has_transforms(path) {
             return located::locations_of(&transforms, turned(nerfstudio::read(&transforms)?));
         }
-        let found = poses::read(&[path.to_owned()], world_from_file)?;
+        let found = poses::read(&[path.to_owned()], world_from_file, &Default::default())?;
         if !found.is_empty() {
             return Ok(found.into_iter().map(|(_, published)| published.location).collect());
         }

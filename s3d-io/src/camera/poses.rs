@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::fs::json::read_json;
 use s3d_geom::glam::{DAffine3, DVec3};
 use s3d_geom::{Pose, rotation_from_euler};
-use s3d_label::Room;
+use s3d_label::{Room, Taxonomy};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -32,10 +32,12 @@ struct PoseOf {
 
 /// The scan locations of the pose files in `folders`, by uuid, each with the file that tells of it: one of
 /// each location's files is read, that in the first folder. `world_from_file` turns, shifts and scales.
-/// Folders that are not there do not count.
+/// Rooms are those of `taxonomy`. Folders
+/// that are not there do not count.
 pub(crate) fn read(
     folders: &[PathBuf],
     world_from_file: &DAffine3,
+    taxonomy: &Taxonomy,
 ) -> Result<Vec<(PathBuf, PublishedLocation)>> {
     let mut files: BTreeMap<String, (PathBuf, PoseOf)> = BTreeMap::new();
     for folder in folders {
@@ -69,7 +71,7 @@ pub(crate) fn read(
         if !angles.is_finite() || location.abs().max_element() > FARTHEST_M || !location.is_finite() {
             return Err(Error::format(&file, format!("has its camera at {location}, turned by {angles}")));
         }
-        let room = pose.room.as_deref().and_then(room_of);
+        let room = pose.room.as_deref().and_then(|name| room_of(name, taxonomy));
         let pose = Pose {
             location: world_from_file.transform_point3(location),
             world_from_camera: turn * rotation_from_euler(angles),
@@ -80,8 +82,8 @@ pub(crate) fn read(
 }
 
 /// The room of "office_5_3", of which the last field is the area.
-fn room_of(name: &str) -> Option<Room> {
-    name.rsplit_once('_')?.0.parse().ok()
+fn room_of(name: &str, taxonomy: &Taxonomy) -> Option<Room> {
+    taxonomy.room(name.rsplit_once('_')?.0).ok()
 }
 
 /// The `.json` files of a folder by name; none if there is no such folder.

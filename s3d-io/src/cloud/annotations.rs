@@ -4,7 +4,7 @@ use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
 use s3d_geom::glam::DVec3;
 use s3d_geom::{Aabb, PointCloud};
-use s3d_label::{Class, Room};
+use s3d_label::{Class, Room, Taxonomy};
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,12 @@ use std::sync::Arc;
 /// How annotated points are read, whatever the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnnotationOptions {
+    /// Which classes and types of rooms there are, what they are called, and what numbers mean.
+    pub taxonomy: Taxonomy,
     /// What to do at a name, a line or a record that is not as it should be, and at a class that is none.
     pub on_fault: OnFault,
-    /// Whether a class that is unknown, and not in [`AnnotationOptions::classes`], is taken for clutter.
+    /// Whether a class that is unknown, and not in [`AnnotationOptions::classes`], is taken for clutter:
+    /// [`Taxonomy::clutter`], if there is such a class.
     pub unknown_as_clutter: bool,
     /// Which class a name or number in the files means; `None`: points of it are left out, as if they were
     /// not annotated. Names are compared to the letter, numbers as decimals: `"2"`.
@@ -45,9 +48,10 @@ pub struct AnnotationOptions {
 }
 
 impl Default for AnnotationOptions {
-    /// Faults stop, classes are the 13 by name, and 20 million points (300 MB) fit in memory.
+    /// Faults stop, classes are S3DIS's by name, and 20 million points (300 MB) fit in memory.
     fn default() -> Self {
         Self {
+            taxonomy: Taxonomy::s3dis(),
             on_fault: OnFault::Stop,
             unknown_as_clutter: false,
             classes: BTreeMap::new(),
@@ -67,6 +71,8 @@ impl Default for AnnotationOptions {
 /// The annotated instances of an area, by room.
 #[derive(Clone, Debug)]
 pub struct Annotations {
+    /// Which taxonomy the classes and rooms are of.
+    pub taxonomy: Taxonomy,
     /// The rooms, by type and number, each once. At least one.
     pub rooms: Vec<AnnotatedRoom>,
     /// What was left out or taken for something else: a sentence each, for the user.

@@ -6,7 +6,7 @@ use crate::cloud::annotations::{
 use crate::error::{Error, Result};
 use s3d_geom::glam::Vec3;
 use s3d_geom::{NO_INDEX, PointCloud, TriMesh};
-use s3d_label::{Class, Label, Room};
+use s3d_label::{Class, Label, Room, Taxonomy};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,6 +27,8 @@ impl Annotations {
     /// each says which face it is of ([`PointCloud::faces`]): no other face gets its vote. Instances are
     /// numbered in each room in the order of their numbers in the area. `path` is the file that messages
     /// name.
+    ///
+    /// Labels of classes other than S3DIS's need their taxonomy: assign [`Annotations::taxonomy`].
     ///
     /// # Errors
     /// [`Error::Format`] for `path` if no face has a label.
@@ -65,7 +67,7 @@ impl Annotations {
         if rooms.is_empty() {
             return Err(Error::format(path, "labels no face"));
         }
-        Ok(Self { rooms, warnings: Vec::new() })
+        Ok(Self { taxonomy: Taxonomy::s3dis(), rooms, warnings: Vec::new() })
     }
 }
 

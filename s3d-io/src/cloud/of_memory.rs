@@ -5,7 +5,7 @@ use crate::cloud::annotations::{
 };
 use crate::error::{Error, Result};
 use s3d_geom::PointCloud;
-use s3d_label::{Class, Room};
+use s3d_label::{Class, Room, Taxonomy};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -28,7 +28,8 @@ pub struct AnnotatedPoints {
 }
 
 impl Annotations {
-    /// The annotations that these points are, in any order.
+    /// The annotations that these points are, in any order. If their classes are not S3DIS's, assign
+    /// [`Annotations::taxonomy`].
     ///
     /// ```
     /// use s3d_geom::{PointCloud, glam::vec3};
@@ -79,7 +80,7 @@ impl Annotations {
             });
             AnnotatedRoom { room, instances: instances.collect() }
         });
-        Ok(Self { rooms: rooms.collect(), warnings: Vec::new() })
+        Ok(Self { taxonomy: Taxonomy::s3dis(), rooms: rooms.collect(), warnings: Vec::new() })
     }
 }
 

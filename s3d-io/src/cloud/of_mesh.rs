@@ -32,7 +32,7 @@ impl Annotations {
         let path = &file.sources[0].path;
         let (labels, mut warnings) = match &file.labels {
             Some(labels) => (labels.clone().into_faces(&file.mesh), Vec::new()),
-            None => MeshLabels::from_materials(&file.mesh).ok_or_else(|| {
+            None => MeshLabels::from_materials(&file.mesh, &options.taxonomy).ok_or_else(|| {
                 Error::format(
                     path,
                     "came without labels: neither has it a column of classes of faces or vertices (name it with class = \"…\"), \
@@ -52,6 +52,7 @@ impl Annotations {
             }
         };
         let mut found = Self::from_face_labels(path, &file.mesh, &labels, &faces)?;
+        found.taxonomy = options.taxonomy.clone();
         found.warnings = warnings;
         Ok(found)
     }
@@ -75,7 +76,7 @@ fn of_numbers(
     for (source, cloud) in clouds.iter().enumerate() {
         let path = cloud.path();
         let too_many = || Error::format(path, "has too many different classes: is the column another one?");
-        let room = match options.room.or(cloud.room()) {
+        let room = match options.room.or(cloud.room(&options.taxonomy)) {
             Some(room) => room_tags.name(&room.to_string()).ok_or_else(too_many)?,
             None => NO_TAG,
         };

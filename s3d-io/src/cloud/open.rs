@@ -59,7 +59,8 @@ impl Annotations {
     /// If `paths` is empty.
     pub fn open(paths: &[PathBuf], options: &AnnotationOptions) -> Result<Self> {
         assert!(!paths.is_empty(), "no path of annotations");
-        let mut all = Self { rooms: Vec::new(), warnings: Vec::new() };
+        let taxonomy = options.taxonomy.clone();
+        let mut all = Self { taxonomy, rooms: Vec::new(), warnings: Vec::new() };
         let mut clouds: Vec<Box<dyn Cloud + '_>> = Vec::new();
         for path in paths {
             if path.is_dir() && !is_scannet(path) {
@@ -174,6 +175,7 @@ impl Annotations {
         let tree = AnnotationTree::open_with(
             dir,
             &TreeOptions {
+                taxonomy: options.taxonomy.clone(),
                 on_fault,
                 unknown_as_clutter: options.unknown_as_clutter,
                 classes: options.classes.clone(),
@@ -196,7 +198,8 @@ impl Annotations {
                 })
                 .collect(),
         });
-        Ok(Self { rooms: rooms.collect(), warnings: tree.warnings })
+        let (taxonomy, rooms) = (options.taxonomy.clone(), rooms.collect());
+        Ok(Self { taxonomy, rooms, warnings: tree.warnings })
     }
 }
 

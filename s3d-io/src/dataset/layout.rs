@@ -185,7 +185,8 @@ impl Layout {
     pub fn entries(&self, areas: &[u32]) -> Vec<PathBuf> {
         let mut entries: Vec<PathBuf> =
             areas.iter().flat_map(|a| [self.area_dir(*a), self.s3dis_area_dir(*a)]).collect();
-        entries.extend([self.labels_json(), self.utils_py(), self.pose_schema(), self.manifest_schema()]);
+        entries.extend([self.labels_json(), self.taxonomy_json(), self.utils_py()]);
+        entries.extend([self.pose_schema(), self.manifest_schema()]);
         entries.extend([self.splits(), self.list_of_all()]);
         for fold in 1..=3 {
             entries.extend([true, false].map(|train| self.list_of_fold(fold, train)));
@@ -299,6 +300,11 @@ impl Layout {
     /// `assets/semantic_labels.json`
     pub fn labels_json(&self) -> PathBuf {
         self.assets_dir().join("semantic_labels.json")
+    }
+
+    /// `assets/taxonomy.json`: the classes, if they are not S3DIS's.
+    pub fn taxonomy_json(&self) -> PathBuf {
+        self.assets_dir().join("taxonomy.json")
     }
 
     /// `assets/utils.py`: functions that read every file.

@@ -7,6 +7,7 @@
 //! - [`PoseFile`]: the camera of an image, as `*.json`.
 //! - [`read_labels`], [`write_labels`]: `semantic_labels.json`. Loaders of the field hold at most
 //!   [`MAX_LABELS_OF_LOADERS`].
+//! - [`read_taxonomy`], [`write_taxonomy`]: `taxonomy.json`, where the classes are not S3DIS's.
 //! - [`InstanceWriter`]: boxes and voxels of instances, as `instances.json` and `instances.npz`;
 //!   [`read_instances`], [`read_instance_arrays`].
 //! - [`Split`]: folds of areas; [`write_image_list`]: lists of images.
@@ -45,6 +46,8 @@ mod npz;
 pub(crate) mod pose;
 #[cfg(feature = "dataset")]
 mod splits;
+#[cfg(feature = "dataset")]
+pub(crate) mod taxonomy;
 
 #[cfg(feature = "dataset")]
 pub use conventions::{
@@ -71,3 +74,5 @@ pub use layout::{Frame, ImageName, Layout, PROFILES, image_stem, is_valid_room, 
 pub use pose::{PoseFile, read_pose};
 #[cfg(feature = "dataset")]
 pub use splits::{Split, read_splits, write_image_list, write_splits};
+#[cfg(feature = "dataset")]
+pub use taxonomy::{read_taxonomy, read_taxonomy_or_s3dis, write_taxonomy};

@@ -2,7 +2,7 @@
 
 use crate::fs::quote::{count, quote};
 use s3d_geom::{NO_INDEX, TriMesh};
-use s3d_label::{Label, parse_name};
+use s3d_label::{Label, Taxonomy};
 use std::collections::HashMap;
 
 /// In place of a number: this face or vertex has none.
@@ -63,11 +63,11 @@ impl MeshLabels {
     ///     face_materials: vec![0],
     ///     ..MeshParts::default()
     /// })?;
-    /// let Some((MeshLabels::Names { labels, faces }, warnings)) = MeshLabels::from_materials(&mesh) else { panic!() };
+    /// let Some((MeshLabels::Names { labels, faces }, warnings)) = MeshLabels::from_materials(&mesh, &Default::default()) else { panic!() };
     /// assert_eq!((labels[faces[0] as usize].instance, warnings.len()), (3, 0));
     /// # Ok::<(), s3d_geom::MeshError>(())
     /// ```
-    pub fn from_materials(mesh: &TriMesh) -> Option<(Self, Vec<String>)> {
+    pub fn from_materials(mesh: &TriMesh, taxonomy: &Taxonomy) -> Option<(Self, Vec<String>)> {
         let mut labels = Vec::new();
         let mut known: HashMap<Label, u32> = HashMap::new();
         let mut is_name = Vec::new();
@@ -75,7 +75,7 @@ impl MeshLabels {
             .materials()
             .iter()
             .map(|material| {
-                let parsed = parse_name(&material.name);
+                let parsed = taxonomy.parse_name(&material.name);
                 is_name.push(parsed.is_ok());
                 let Ok(Some(label)) = parsed else { return NO_INDEX };
                 *known.entry(label).or_insert_with(|| {
@@ -248,7 +248,8 @@ mod tests {
     #[test]
     fn materials_named_as_labels_are_labels() {
         let names = ["chair_3_office_5_1", "<UNK>_0_<UNK>_0_0", "wall_1_office_5_1", "default"];
-        let (labels, warnings) = MeshLabels::from_materials(&mesh(&names, vec![2, 1, 0, 3])).unwrap();
+        let (labels, warnings) =
+            MeshLabels::from_materials(&mesh(&names, vec![2, 1, 0, 3]), &Taxonomy::s3dis()).unwrap();
         let MeshLabels::Names { labels, faces } = labels else { panic!("{labels:?}") };
         assert_eq!(
             labels.iter().map(Label::to_string).collect::<Vec<_>>(),
@@ -259,17 +260,18 @@ mod tests {
             warnings,
             ["1 face without a label: the names of their materials are none, the first is `default`"]
         );
-        let (_, warnings) = MeshLabels::from_materials(&mesh(&names, vec![2, 1, 0, NO_INDEX])).unwrap();
+        let (_, warnings) =
+            MeshLabels::from_materials(&mesh(&names, vec![2, 1, 0, NO_INDEX]), &Taxonomy::s3dis()).unwrap();
         assert_eq!(warnings, ["1 face without a label: no material"]);
     }
 
     #[test]
     fn ordinary_materials_are_no_labels() {
         let names = ["chair_3_office_5_1", "wood", "<UNK>_0_<UNK>_0_0"];
-        assert_eq!(MeshLabels::from_materials(&mesh(&names, vec![0, 1, 1])), None);
-        assert_eq!(MeshLabels::from_materials(&mesh(&names[1..], vec![0, 0])), None);
+        assert_eq!(MeshLabels::from_materials(&mesh(&names, vec![0, 1, 1]), &Taxonomy::s3dis()), None);
+        assert_eq!(MeshLabels::from_materials(&mesh(&names[1..], vec![0, 0]), &Taxonomy::s3dis()), None);
         // The null label alone labels nothing.
-        assert_eq!(MeshLabels::from_materials(&mesh(&names[2..], vec![0, 0])), None);
+        assert_eq!(MeshLabels::from_materials(&mesh(&names[2..], vec![0, 0]), &Taxonomy::s3dis()), None);
     }
 
     #[test]

@@ -8,7 +8,7 @@
 use crate::error::Result;
 use crate::fs::atomic::write_whole;
 use s3d_geom::Raster;
-use s3d_label::{Class, LabelId, LabelTable};
+use s3d_label::{Class, LabelId, LabelTable, Taxonomy};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,19 +20,15 @@ const MISSING: [u8; 3] = [13; 3];
 /// Segments that stand for all of a class in an image have numbers from here on, above those of all labels.
 const FIRST_STUFF_ID: u32 = 0x00ff_0000;
 
-/// The category of a class: 1 to 13, in the order of [`Class::S3DIS`].
-pub fn coco_category_id(class: Class) -> u32 {
-    class.index() as u32 + 1
-}
-
 /// A category. The fields bear the file's names.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CocoCategory {
-    /// See [`coco_category_id`].
+    /// [`Taxonomy::id`]: for S3DIS 1 to 13, in the order of its classes.
     pub id: u32,
     /// The class's name.
     pub name: &'static str,
-    /// "structure" for what a building is made of, "furniture", or "clutter".
+    /// "structure" for what a building is made of, "furniture", or "clutter", by the class of S3DIS that it
+    /// counts as.
     pub supercategory: &'static str,
     /// 1 if each instance is a segment, 0 if all of the class in an image is one.
     pub isthing: u8,
@@ -40,9 +36,9 @@ pub struct CocoCategory {
     pub color: [u8; 3],
 }
 
-/// The 13 categories; `stuff` are the classes whose instances are not told apart.
-pub fn coco_categories(stuff: &[Class]) -> Vec<CocoCategory> {
-    let supercategory = |class| match class {
+/// The categories, one a class; `stuff` are the classes whose instances are not told apart.
+pub fn coco_categories(taxonomy: &Taxonomy, stuff: &[Class]) -> Vec<CocoCategory> {
+    let supercategory = |class: Class| match class.s3dis() {
         Class::CEILING
         | Class::FLOOR
         | Class::WALL
@@ -53,14 +49,14 @@ pub fn coco_categories(stuff: &[Class]) -> Vec<CocoCategory> {
         Class::TABLE | Class::CHAIR | Class::SOFA | Class::BOOKCASE | Class::BOARD => "furniture",
         _ => "clutter",
     };
-    let category = |class: Class| CocoCategory {
-        id: coco_category_id(class),
+    let category = |&class: &Class| CocoCategory {
+        id: taxonomy.id(class),
         name: class.name(),
         supercategory: supercategory(class),
         isthing: u8::from(!stuff.contains(&class)),
-        color: s3d_label::pretty_color(coco_category_id(class)),
+        color: taxonomy.color(class),
     };
-    Class::S3DIS.map(category).into()
+    taxonomy.classes().iter().map(category).collect()
 }
 
 /// A segment of an image. The fields bear the file's names.
@@ -69,7 +65,7 @@ pub struct CocoSegment {
     /// Its number in the image: the index of its label, which is the same in all images of the data set; of a
     /// class that is stuff 16,711,680 and its category.
     pub id: u32,
-    /// See [`coco_category_id`].
+    /// Its class's: [`CocoCategory::id`].
     pub category_id: u32,
     /// Its pixels.
     pub area: u64,
@@ -108,7 +104,7 @@ pub fn coco_panoptic(
     let mut segments: BTreeMap<u32, Extent> = BTreeMap::new();
     let mut pixels = Vec::with_capacity(semantic.len());
     // A label's segment; labels repeat from row to row.
-    let mut known: BTreeMap<[u8; 3], Option<(u32, Class)>> = BTreeMap::from([(MISSING, None)]);
+    let mut known: BTreeMap<[u8; 3], Option<(u32, u32)>> = BTreeMap::from([(MISSING, None)]);
     for (y, row) in semantic.pixels().chunks(width.max(1)).enumerate() {
         let mut x = 0;
         for run in row.chunk_by(|a, b| a == b) {
@@ -122,15 +118,16 @@ pub fn coco_panoptic(
                         return Err(UnknownLabelIndex { x, y, index, labels });
                     }
                     let segment = table.class_of(LabelId(index)).map(|class| {
-                        let whole = FIRST_STUFF_ID + coco_category_id(class);
-                        (if stuff.contains(&class) { whole } else { index }, class)
+                        let category = table.taxonomy().id(class);
+                        let whole = FIRST_STUFF_ID + category;
+                        (if stuff.contains(&class) { whole } else { index }, category)
                     });
                     known.insert(label, segment);
                     segment
                 }
             };
-            if let Some((id, class)) = segment {
-                segments.entry(id).or_insert_with(|| Extent::new(class)).add(
+            if let Some((id, category)) = segment {
+                segments.entry(id).or_insert_with(|| Extent::new(category)).add(
                     x as u32,
                     y as u32,
                     run.len() as u32,
@@ -147,15 +144,15 @@ pub fn coco_panoptic(
 
 /// What a segment covers.
 struct Extent {
-    class: Class,
+    category_id: u32,
     area: u64,
     x: (u32, u32),
     y: (u32, u32),
 }
 
 impl Extent {
-    fn new(class: Class) -> Self {
-        Self { class, area: 0, x: (u32::MAX, 0), y: (u32::MAX, 0) }
+    fn new(category_id: u32) -> Self {
+        Self { category_id, area: 0, x: (u32::MAX, 0), y: (u32::MAX, 0) }
     }
 
     /// Adds pixels of a row.
@@ -167,7 +164,7 @@ impl Extent {
 
     fn segment(&self, id: u32) -> CocoSegment {
         let bbox = [self.x.0, self.y.0, self.x.1 - self.x.0, self.y.1 - self.y.0];
-        CocoSegment { id, category_id: coco_category_id(self.class), area: self.area, bbox, iscrowd: 0 }
+        CocoSegment { id, category_id: self.category_id, area: self.area, bbox, iscrowd: 0 }
     }
 }
 
@@ -324,7 +321,7 @@ mod tests {
         let segment = CocoSegment { id: 2, category_id: 9, area: 4, bbox: [0, 1, 4, 2], iscrowd: 0 };
         let image =
             CocoImage { id: 1, file_name: "a.png".into(), width: 4, height: 3, segments: vec![segment] };
-        let categories = coco_categories(&[Class::WALL, Class::FLOOR]);
+        let categories = coco_categories(&Taxonomy::s3dis(), &[Class::WALL, Class::FLOOR]);
         write_coco(&path, "demo", &[image], &categories).unwrap();
         let json: serde_json::Value = crate::fs::json::read_json(&path).unwrap();
         assert_eq!(json["images"][0]["file_name"], json["annotations"][0]["file_name"]);

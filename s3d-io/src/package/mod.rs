@@ -36,8 +36,7 @@ mod webdataset;
 pub use self::parquet::{ImageRow, SemanticRow, write_image_index, write_image_index_to};
 #[cfg(feature = "coco")]
 pub use coco::{
-    CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_category_id,
-    coco_panoptic, write_coco,
+    CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_panoptic, write_coco,
 };
 #[cfg(feature = "colmap")]
 pub use colmap::{ColmapImage, ColmapModel};

@@ -63,8 +63,8 @@ pub struct ImageRow {
 /// What the pixels of an image show.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SemanticRow {
-    /// The share of pixels of each class, in the order of [`Class::S3DIS`].
-    pub shares: [f64; 13],
+    /// The share of pixels of each class, at its [`Class::index`].
+    pub shares: Vec<f64>,
     /// The share of pixels in which something without a label was seen.
     pub unlabelled: f64,
     /// Shannon entropy of the classes, nats.
@@ -82,7 +82,7 @@ enum Column {
 }
 
 /// The columns of some rows. Those that are never null are `required`.
-fn columns(rows: &[ImageRow]) -> Vec<(String, bool, Column)> {
+fn columns(classes: &[Class], rows: &[ImageRow]) -> Vec<(String, bool, Column)> {
     let mut all = Vec::new();
     macro_rules! column {
         ($name:expr, $required:expr, $kind:ident, $value:expr) => {
@@ -118,9 +118,9 @@ fn columns(rows: &[ImageRow]) -> Vec<(String, bool, Column)> {
     column!("selection_entropy".to_owned(), false, Float, |r| r.selection_entropy);
     column!("entropy".to_owned(), false, Float, |r| r.semantic.as_ref().map(|s| s.entropy));
     column!("coverage".to_owned(), false, Float, |r| r.coverage);
-    for class in Class::S3DIS {
+    for class in classes {
         column!(format!("share_{class}"), false, Float, |r| {
-            r.semantic.as_ref().map(|s| s.shares[class.index()])
+            r.semantic.as_ref().and_then(|s| s.shares.get(class.index()).copied())
         });
     }
     column!("share_unlabelled".to_owned(), false, Float, |r| r.semantic.as_ref().map(|s| s.unlabelled));
@@ -156,15 +156,15 @@ fn schema(columns: &[(String, bool, Column)]) -> String {
 /// `area`, `camera_uuid`, `room`, `room_type`, `room_number`, `kind` ("view" or "panorama"), `frame_num`
 /// (null for panoramas); the path of each modality below the data set's folder, named as its folder (`rgb`,
 /// `depth`, `normal`, …); `width`, `height`, `fov_rad`, `yaw_rad`, `pitch_rad`, `x`, `y`, `z`; `k` (9
-/// numbers) and `rt` (12), row by row; `selection_entropy`, `entropy`, `coverage`, `share_ceiling` …
-/// `share_clutter`, `share_unlabelled` (with the 13 they make the coverage), `instances`; `depth_min_m`,
+/// numbers) and `rt` (12), row by row; `selection_entropy`, `entropy`, `coverage`, `share_CLASS` of each of
+/// `classes`, `share_unlabelled` (with these they make the coverage), `instances`; `depth_min_m`,
 /// `depth_mean_m`, `depth_max_m`. See [`ImageRow`].
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn write_image_index(path: &Path, rows: &[ImageRow]) -> Result<u64> {
+pub fn write_image_index(path: &Path, classes: &[Class], rows: &[ImageRow]) -> Result<u64> {
     let mut file = AtomicFile::create(path)?;
-    write_image_index_to(&mut file, path, rows)?;
+    write_image_index_to(&mut file, path, classes, rows)?;
     file.commit()
 }
 
@@ -172,7 +172,12 @@ pub fn write_image_index(path: &Path, rows: &[ImageRow]) -> Result<u64> {
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn write_image_index_to(file: impl Write + Send, name: &Path, rows: &[ImageRow]) -> Result<()> {
+pub fn write_image_index_to(
+    file: impl Write + Send,
+    name: &Path,
+    classes: &[Class],
+    rows: &[ImageRow],
+) -> Result<()> {
     let path = name;
     let failed = |e: ParquetError| match e {
         ParquetError::External(e) => match e.downcast::<std::io::Error>() {
@@ -188,12 +193,12 @@ pub fn write_image_index_to(file: impl Write + Send, name: &Path, rows: &[ImageR
         .set_created_by(concat!("s3d version ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_key_value_metadata(Some(vec![KeyValue::new("description".to_owned(), about.to_owned())]))
         .build();
-    let schema = parse_message_type(&schema(&columns(&[]))).map_err(failed)?;
+    let schema = parse_message_type(&schema(&columns(classes, &[]))).map_err(failed)?;
     let mut writer =
         SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
     for rows in rows.chunks(GROUP) {
         let mut group = writer.next_row_group().map_err(failed)?;
-        for (_, required, column) in columns(rows) {
+        for (_, required, column) in columns(classes, rows) {
             let fewer = || failed(ParquetError::General("the schema has fewer columns".to_owned()));
             let mut out = group.next_column().map_err(failed)?.ok_or_else(fewer)?;
             write_column(&mut out, required, column).map_err(failed)?;
@@ -269,7 +274,7 @@ mod tests {
             selection_entropy: Some(0.25),
             coverage: Some(0.75),
             semantic: Some(SemanticRow {
-                shares: std::array::from_fn(|k| k as f64 / 100.0),
+                shares: (0..13).map(|k| f64::from(k) / 100.0).collect(),
                 unlabelled: 0.125,
                 entropy: 1.5,
                 instances: 17,
@@ -305,7 +310,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("images.parquet");
         let rows = [row(5), bare(), row(2000)];
-        let bytes = write_image_index(&path, &rows).unwrap();
+        let bytes = write_image_index(&path, &Class::S3DIS, &rows).unwrap();
         assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
         let table = read(&path);
         assert_eq!((table.0.len(), table.1.len()), (7 + 7 + 2 + 1 + 2 + 3 + 2 + 3 + 13 + 2 + 3, 3));
@@ -326,7 +331,7 @@ mod tests {
             assert_eq!(*field(&table, i, "z"), float(row.location.map(|l| l[2])));
             assert_eq!(*field(&table, i, "pitch_rad"), float(row.yaw_pitch_rad.map(|v| v[1])));
             assert_eq!(*field(&table, i, "coverage"), float(row.coverage));
-            let shares = row.semantic.as_ref().map(|s| s.shares);
+            let shares = row.semantic.as_ref().map(|s| s.shares.clone());
             assert_eq!(*field(&table, i, "share_chair"), float(shares.map(|s| s[Class::CHAIR.index()])));
             assert_eq!(*field(&table, i, "depth_max_m"), float(row.depth_m.map(|d| d[2])));
             for (name, list) in [("k", row.k.map(|k| k.to_vec())), ("rt", row.rt.map(|m| m.to_vec()))] {
@@ -349,8 +354,8 @@ mod tests {
         let rows: Vec<ImageRow> =
             (0..GROUP as u32 + 10).map(|i| if i % 7 == 0 { bare() } else { row(i) }).collect();
         let (a, b) = (dir.path().join("a.parquet"), dir.path().join("b.parquet"));
-        write_image_index(&a, &rows).unwrap();
-        write_image_index(&b, &rows).unwrap();
+        write_image_index(&a, &Class::S3DIS, &rows).unwrap();
+        write_image_index(&b, &Class::S3DIS, &rows).unwrap();
         assert_eq!(std::fs::read(&a).unwrap(), std::fs::read(&b).unwrap());
         let reader = SerializedFileReader::new(File::open(&a).unwrap()).unwrap();
         assert_eq!(reader.num_row_groups(), 2);
@@ -363,9 +368,9 @@ mod tests {
     fn no_rows_and_no_folder() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.parquet");
-        write_image_index(&path, &[]).unwrap();
+        write_image_index(&path, &Class::S3DIS, &[]).unwrap();
         assert!(read(&path).1.is_empty());
-        let e = write_image_index(&dir.path().join("no/a.parquet"), &[]).unwrap_err();
+        let e = write_image_index(&dir.path().join("no/a.parquet"), &Class::S3DIS, &[]).unwrap_err();
         assert!(e.to_string().contains("a.parquet: cannot write"), "{e}");
     }
 }

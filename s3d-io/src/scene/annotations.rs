@@ -2,7 +2,7 @@
 
 use crate::cloud::annotations::AnnotationOptions;
 use s3d_geom::glam::DVec3;
-use s3d_label::{Class, Room};
+use s3d_label::{Class, Room, Taxonomy};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -44,16 +44,23 @@ impl AnnotationTable {
     }
 
     /// How they are read.
-    pub(crate) fn options(&self) -> std::result::Result<AnnotationOptions, String> {
+    pub(crate) fn options(&self, taxonomy: &Taxonomy) -> std::result::Result<AnnotationOptions, String> {
         let room: Option<Room> = match &self.room {
-            Some(name) => Some(name.parse().map_err(|e| format!("annotations.room: {e}"))?),
+            Some(name) => Some(taxonomy.room_of_word(name).map_err(|e| format!("annotations.room: {e}"))?),
             None => None,
         };
         let mut classes = BTreeMap::new();
         for (key, word) in &self.classes {
             let class: Option<Class> = match word.as_str() {
                 "" => None,
-                word => Some(word.parse().map_err(|e| format!("annotations.classes.{key:?}: {e}"))?),
+                word => match taxonomy.meaning(word) {
+                    Some(meant) => meant,
+                    None => {
+                        let unknown =
+                            taxonomy.class(word).map_err(|e| format!("annotations.classes.{key:?}: {e}"));
+                        Some(unknown?)
+                    }
+                },
             };
             classes.insert(key.clone(), class);
         }
@@ -61,7 +68,15 @@ impl AnnotationTable {
         if !offset_m.iter().all(|v| v.is_finite()) {
             return Err(format!("annotations.offset_m = {offset_m:?} is not finite"));
         }
+        if self.unknown_as_clutter && taxonomy.clutter().is_none() {
+            return Err(format!(
+                "annotations.unknown_as_clutter = true: the taxonomy {} has no class for it: say which it is, with clutter = \
+                 \"…\" in the taxonomy",
+                taxonomy.name()
+            ));
+        }
         Ok(AnnotationOptions {
+            taxonomy: taxonomy.clone(),
             unknown_as_clutter: self.unknown_as_clutter,
             classes,
             room,

@@ -8,7 +8,9 @@ use crate::mesh::file::{LengthUnit, UpAxis};
 use crate::scene::annotations::AnnotationTable;
 use crate::scene::cameras::{CameraSource, CamerasTable, similarity};
 use crate::scene::rgb::{PictureSource, RgbEntry};
+use crate::scene::taxonomy::TaxonomyEntry;
 use s3d_geom::glam::{DAffine3, DVec3};
+use s3d_label::Taxonomy;
 use serde::Deserialize;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -37,6 +39,10 @@ pub struct SceneFile {
     /// What is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing, unless
     /// it lies far from the origin ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
     pub mesh_offset_m: Option<DVec3>,
+    /// Which classes and types of rooms there are; a published area brings its own.
+    pub taxonomy: Taxonomy,
+    /// The file that the taxonomy is read from, if it is in one of its own.
+    pub taxonomy_file: Option<PathBuf>,
     /// Whether there are labels. If not, `annotations` is empty; a published area brings its own.
     pub is_labelled: bool,
     /// The annotated points: files and folders, see [`Annotations::open`](crate::cloud::Annotations::open).
@@ -65,6 +71,8 @@ impl SceneFile {
             up,
             units: None,
             mesh_offset_m: None,
+            taxonomy: Taxonomy::s3dis(),
+            taxonomy_file: None,
             is_labelled: false,
             annotations: Vec::new(),
             annotation_options: AnnotationOptions::default(),
@@ -79,6 +87,7 @@ impl SceneFile {
 #[serde(deny_unknown_fields)]
 struct Document {
     area: NonZeroU32,
+    taxonomy: Option<TaxonomyEntry>,
     published: Option<PublishedTable>,
     mesh: Option<MeshTable>,
     annotations: Option<AnnotationTable>,
@@ -120,6 +129,9 @@ struct MeshTable {
 /// source = "captures" # or "texture", "skybox", "panorama"
 /// path = "raw"        # the pictures' folder; named after the source if it is left out
 /// ```
+///
+/// Before the first table, `taxonomy = "scannet20"` names the classes: S3DIS's if it is left out, one of
+/// [`Taxonomy::BUILT_IN`], or a file (see [`read_taxonomy`](crate::scene::read_taxonomy)).
 ///
 /// Without `[cameras]` the caller places scan locations. The list's frame is the world (Z-up) unless the
 /// table says `up = "y"`, or gives a `transform` (four rows of four numbers, world from file, applied after
@@ -186,23 +198,26 @@ fn other_kind(path: &Path) -> Option<&'static str> {
     })
 }
 
+/// What is wrong in a TOML file, with the line.
+pub(crate) fn toml_fault(e: &toml::de::Error, text: &str, path: &Path) -> Error {
+    let message = e.message().replace('\n', "; ");
+    match e.span() {
+        // An error at the very start is about the file as a whole: a table that is missing.
+        Some(span) if span.end > 0 => {
+            let line = text.bytes().take(span.start).filter(|b| *b == b'\n').count() + 1;
+            Error::line(path, line as u64, message)
+        }
+        _ => Error::format(path, message),
+    }
+}
+
 /// As [`read_scene`], from the text of a scene file. Errors call it `path`, and the files that it names are
 /// looked for in the folder of `path`.
 ///
 /// # Errors
 /// As [`read_scene`].
 pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
-    let document: Document = toml::from_str(text).map_err(|e| {
-        let message = e.message().replace('\n', "; ");
-        match e.span() {
-            // An error at the very start is about the file as a whole: a table that is missing.
-            Some(span) if span.end > 0 => {
-                let line = text.bytes().take(span.start).filter(|b| *b == b'\n').count() + 1;
-                Error::line(path, line as u64, message)
-            }
-            _ => Error::format(path, message),
-        }
-    })?;
+    let document: Document = toml::from_str(text).map_err(|e| toml_fault(&e, text, path))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let fault = |message: String| Error::format(path, message);
     let found = |key: &str, written: &Path, what: &str, fits: fn(&Path) -> bool| {
@@ -229,6 +244,11 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
             world_from_published = similarity(rows).map_err(|m| fault(format!("[published]: {m}")))?;
         }
     }
+    if published.is_some() && document.taxonomy.is_some() {
+        return Err(fault("[published] brings a taxonomy: leave out the key".into()));
+    }
+    let (taxonomy, taxonomy_file) =
+        document.taxonomy.map_or(Ok((Taxonomy::s3dis(), None)), |entry| entry.taxonomy(path))?;
     let is_labelled = published.is_some() || document.annotations.is_some();
     let (mut mesh, mut annotations) = (Vec::new(), Vec::new());
     let (mut up, mut annotation_options) = (UpAxis::Y, AnnotationOptions::default());
@@ -247,7 +267,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
             let (key, written) = labels.paths().map_err(fault)?;
             annotations =
                 written.iter().map(|written| found(key, written, "", Path::exists)).collect::<Result<_>>()?;
-            annotation_options = labels.options().map_err(fault)?;
+            annotation_options = labels.options(&taxonomy).map_err(fault)?;
             annotations_have_offset = labels.has_offset();
         }
         mesh_offset_m = meshes.offset_m.map(DVec3::from_array);
@@ -278,6 +298,8 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         up,
         units,
         mesh_offset_m,
+        taxonomy,
+        taxonomy_file,
         is_labelled,
         annotations,
         annotation_options,

@@ -4,7 +4,7 @@
 //! ([`SceneFile`]); the files themselves are read by [`mesh`](crate::mesh), [`cloud`](crate::cloud) and
 //! [`camera`](crate::camera). [`PublishedArea`] finds the same in the folder of a published area, or of an
 //! export. [`PictureSource`] tells what the colours of images are taken from. A key that is not known is an
-//! error, with its line. Source: formats.md, "The scene file".
+//! error, with its line. [`read_taxonomy`] reads the classes that a scene may have in place of S3DIS's. Source: formats.md, "The scene file".
 //!
 //! ```
 //! use s3d_io::scene::parse_scene;
@@ -32,8 +32,10 @@ mod cameras;
 mod file;
 mod published;
 mod rgb;
+mod taxonomy;
 
 pub use cameras::CameraSource;
 pub use file::{SceneFile, parse_scene, read_scene};
 pub use published::{PublishedArea, PublishedMesh, PublishedOptions};
 pub use rgb::{PictureKind, PictureOptions, PictureSource, SkyBoxCaps, UnseenColor};
+pub use taxonomy::{parse_taxonomy, read_taxonomy};

@@ -3,13 +3,13 @@
 use crate::camera::poses;
 use crate::camera::poses::PublishedLocation;
 use crate::cloud::annotations::Annotations;
-use crate::dataset::read_world_offsets;
+use crate::dataset::{read_taxonomy_or_s3dis, read_world_offsets};
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, UpAxis};
 use crate::mesh::read::read_mesh;
 use s3d_geom::glam::{DAffine3, DVec3, Vec3};
 use s3d_geom::{NO_INDEX, TriMesh};
-use s3d_label::{Label, parse_name};
+use s3d_label::{Label, Taxonomy};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -38,6 +38,7 @@ impl Default for PublishedOptions {
 /// | `3d/semantic.obj` | the same faces; the names of their materials are labels; without it there are none |
 /// | `data/pose/*.json`, `pano/pose/*.json` | scan locations; one file of each is read |
 /// | `3d/pointcloud.mat` | annotated points, if it is there |
+/// | `assets/taxonomy.json` | beside the area's folder, if the classes are not S3DIS's |
 /// | `assets/semantic_labels.json` | beside the area's folder or in it, if it is there |
 ///
 /// Source: formats.md, "What is written", "World and meshes".
@@ -55,6 +56,8 @@ pub struct PublishedArea {
     pub up: UpAxis,
     /// `pointcloud.mat`, if there is one: a source for [`Annotations::open`], in the frame of the files.
     pub point_cloud: Option<PathBuf>,
+    /// The classes of the data set.
+    pub taxonomy: Taxonomy,
     /// The data set's list of labels, if there is one.
     pub labels: Option<PathBuf>,
     /// The scan locations, by uuid; in the world.
@@ -116,6 +119,7 @@ impl PublishedArea {
             semantic_mesh,
             up: UpAxis::Y,
             point_cloud: optional(path.join("3d/pointcloud.mat")),
+            taxonomy: read_taxonomy_or_s3dis(&path.join("../assets/taxonomy.json"))?,
             labels: optional(path.join("..").join(labels)).or_else(|| optional(path.join(labels))),
             locations: Vec::new(),
             world_from_area: options.world_from_area,
@@ -134,7 +138,7 @@ impl PublishedArea {
             }
         }
         let folders = ["data/pose", "pano/pose"].map(|folder| path.join(folder));
-        let found = poses::read(&folders, &this.world_from_area)?;
+        let found = poses::read(&folders, &this.world_from_area, &this.taxonomy)?;
         if found.is_empty() {
             return Err(Error::format(
                 path,
@@ -152,6 +156,11 @@ impl PublishedArea {
                 .push(format!("{}: has no 3d/semantic.obj, so that there are no labels", path.display()));
         }
         Ok(this)
+    }
+
+    /// The file beside the area's folder that holds its taxonomy; there is none for S3DIS's.
+    pub fn taxonomy_json(&self) -> PathBuf {
+        self.path.join("../assets/taxonomy.json")
     }
 
     /// The file beside the area's folder that tells of its frame; there may be none.
@@ -175,7 +184,7 @@ impl PublishedArea {
         let fault = |message: String| Error::format(path, message);
 
         let parsed: Vec<Option<Label>> =
-            semantic.materials().iter().map(|m| parse_name(&m.name).ok().flatten()).collect();
+            semantic.materials().iter().map(|m| self.taxonomy.parse_name(&m.name).ok().flatten()).collect();
         let other = |f: u32| semantic.material_of(f).and_then(|m| *parsed.get(m as usize)?);
         let mut labels = Vec::new();
         let mut places: HashMap<Label, u32> = HashMap::new();
@@ -232,7 +241,10 @@ impl PublishedArea {
     /// As there.
     pub fn annotations(&self, mesh: &PublishedMesh) -> Result<Annotations> {
         let path = self.semantic_mesh.as_ref().unwrap_or(&self.mesh);
-        Annotations::from_face_labels(path, &mesh.file.mesh, &mesh.labels, &mesh.label_of_face)
+        let mut found =
+            Annotations::from_face_labels(path, &mesh.file.mesh, &mesh.labels, &mesh.label_of_face)?;
+        found.taxonomy = self.taxonomy.clone();
+        Ok(found)
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 /// A taxonomy as it is written down. [`Taxonomy::new`](crate::Taxonomy::new) checks it and fills in what is left out.
 ///
-/// Names hold letters, digits and hyphens, start with a letter and have 40 characters at most: labels are
+/// Names hold letters (those of classes also digits, behind a letter), and 40 characters at most: labels are
 /// joined of them by underscores.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]

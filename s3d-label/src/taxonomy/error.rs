@@ -27,8 +27,8 @@ pub enum TaxonomyError {
     },
     /// A name that would make labels that cannot be taken apart.
     #[error(
-        "{what} {place}: {name:?} is no name: names have letters, digits and hyphens, start with a letter and are not longer \
-         than 40 characters, as in \"showerCurtain\"; other spellings are aliases"
+        "{what} {place}: {name:?} is no name: names have letters (those of classes also digits, behind a letter), 40 characters \
+         at most, and nowhere \"rgb\"; \"unknown\" is no type of room. Write \"showerCurtain\", and other spellings as aliases"
     )]
     Name {
         /// Of what.

@@ -171,10 +171,14 @@ fn resolve_room_types(entries: &mut [RoomTypeDefinition]) -> Result<Vec<RoomType
 }
 
 fn check_name(what: &'static str, place: usize, name: &str) -> Result<(), TaxonomyError> {
-    let plain = name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
+    let is_room = what == ROOM_TYPE;
+    // In the names of images a room ends where digits begin.
+    let plain =
+        name.bytes().all(|b| if is_room { b.is_ascii_alphabetic() } else { b.is_ascii_alphanumeric() });
     let starts = name.bytes().next().is_some_and(|b| b.is_ascii_alphabetic());
-    // The word is what stands in names where no room is known.
-    let taken = what == ROOM_TYPE && name.eq_ignore_ascii_case("unknown");
+    let lower = name.to_ascii_lowercase();
+    // "unknown" stands in names where no room is known; loaders look for "rgb" in paths.
+    let taken = lower.contains("rgb") || is_room && lower == "unknown";
     if plain && starts && name.len() <= MAX_NAME && !taken {
         return Ok(());
     }

@@ -137,6 +137,11 @@ impl SharedScene {
         push("mesh", sum_of_mesh(self.mesh.mesh.parts()));
         if let Some(annotations) = &self.annotations {
             push("annotations", sum_of_annotations(annotations)?);
+            if !annotations.taxonomy.is_s3dis() {
+                let mut sum = ChecksumOfParts::default();
+                sum.add(format!("{:?}", annotations.taxonomy.definition()).as_bytes());
+                push("taxonomy", sum);
+            }
         }
         push("locations", self.sum_of_locations());
         Ok(record)

@@ -28,7 +28,7 @@ use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance, AnnotationOptions, Annotations, OnFault};
 use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis};
 use s3d_io::scene::{CameraSource, PictureSource, PublishedArea, PublishedOptions, SceneFile};
-use s3d_label::{Label, LabelTable, Room};
+use s3d_label::{Label, LabelTable, Room, Taxonomy};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -48,6 +48,8 @@ pub(crate) struct AreaInput {
     pub(crate) pictures: Option<PictureSource>,
     /// Whether there are labels at all.
     pub(crate) is_labelled: bool,
+    /// Which classes and types of rooms it has.
+    pub(crate) taxonomy: Taxonomy,
     /// The rooms, in the order of their names, each with its annotated instances.
     pub(crate) rooms: Vec<RoomInput>,
     /// The scan locations.
@@ -178,6 +180,17 @@ impl Inputs {
                 without.path.display()
             )));
         }
+        let taxonomy = areas.first().map(|area| (&area.taxonomy, &area.path));
+        let other = |area: &&AreaInput| taxonomy.is_some_and(|(first, _)| area.taxonomy != *first);
+        if let (Some((taxonomy, path)), Some(other)) = (taxonomy, areas.iter().find(other)) {
+            return Err(Error::Input(format!(
+                "{} has the classes of {} and {} those of {}: export them into data sets of their own",
+                path.display(),
+                taxonomy.name(),
+                other.path.display(),
+                other.taxonomy.name()
+            )));
+        }
         Ok(areas)
     }
 
@@ -243,6 +256,7 @@ impl AreaInput {
             frame,
             mesh_file,
             is_labelled: scene.is_labelled,
+            taxonomy: scene.taxonomy.clone(),
             rooms,
             cameras,
             notes: Vec::new(),
@@ -320,6 +334,7 @@ impl AreaInput {
             mesh_file: Some(Arc::clone(&scene.mesh)),
             pictures: None,
             is_labelled: scene.annotations.is_some(),
+            taxonomy: scene.annotations.as_ref().map(|a| a.taxonomy.clone()).unwrap_or_default(),
             rooms,
             cameras,
             cameras_path: name.clone(),
@@ -359,6 +374,7 @@ impl AreaInput {
             warnings.append(&mut annotations.warnings);
             rooms = published_numbers(&mesh.labels, annotations);
         }
+        let taxonomy = area.taxonomy.clone();
         let listed = match &scene {
             Some(scene) => Cameras::of_scene(scene, asked, DVec3::ZERO)?,
             None => asked.map(|placing| (Cameras::Placed(placing), folder.to_owned())),
@@ -371,6 +387,9 @@ impl AreaInput {
         let mut files = vec![folder.to_owned()];
         let mut sources = vec![area.mesh.clone()];
         sources.extend(area.semantic_mesh.iter().chain(&area.labels).cloned());
+        if !area.taxonomy.is_s3dis() {
+            sources.push(area.taxonomy_json());
+        }
         if area.world_offset_m != DVec3::ZERO {
             sources.push(area.conventions());
         }
@@ -391,6 +410,7 @@ impl AreaInput {
             mesh_file: opened.keep_mesh.then_some(file),
             pictures: scene.and_then(|s| s.pictures),
             is_labelled,
+            taxonomy,
             rooms,
             cameras,
             cameras_path,
@@ -458,5 +478,6 @@ fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
         files.push(path.clone());
     }
     files.extend(scene.pictures.iter().map(|p| p.path.clone()));
+    files.extend(scene.taxonomy_file.clone());
     files
 }

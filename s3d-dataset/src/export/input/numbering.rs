@@ -14,7 +14,7 @@ pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
     for area in areas.iter_mut() {
         let Some(path) = area.published_labels().cloned() else { continue };
         let names = s3d_io::dataset::read_labels(&path)?;
-        match LabelTable::from_names(&names) {
+        match area.taxonomy.table_from_names(&names) {
             Ok(table) if labels.iter().all(|l| table.id_of(l).is_some()) => return Ok(table),
             Ok(_) => area.warnings.push(format!(
                 "{}: has not every label of the meshes; the table is made anew, so that indices differ from it",
@@ -23,7 +23,8 @@ pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
             Err(e) => area.warnings.push(format!("{}: {e}; the table is made anew", path.display())),
         }
     }
-    LabelTable::from_labels(labels).map_err(|e| Error::Input(e.to_string()))
+    let taxonomy = areas.first().map(|area| area.taxonomy.clone()).unwrap_or_default();
+    taxonomy.table(labels).map_err(|e| Error::Input(e.to_string()))
 }
 
 /// Gives every instance, whose numbers run per room, its number in the area.

@@ -4,7 +4,7 @@ use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
 use crate::cloud::mat::read::{MatArea, MatObject, MatRoom};
-use crate::cloud::s3dis::tree::OnFault;
+use crate::cloud::s3dis::tree::{ClassOfWord, OnFault, class_of_word};
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use crate::fs::source::Source;
@@ -36,7 +36,8 @@ impl Annotations {
                 "names rooms, classes and instances itself: columns and a room are for clouds",
             ));
         }
-        let mut all = Self { rooms: Vec::new(), warnings: Vec::new() };
+        let taxonomy = options.taxonomy.clone();
+        let mut all = Self { taxonomy, rooms: Vec::new(), warnings: Vec::new() };
         for room in MatArea::read(&source)?.rooms {
             if let Some(room) = all.mat_room(path, room, options)? {
                 match all.rooms.binary_search_by_key(&room.room, |r| r.room) {
@@ -57,7 +58,7 @@ impl Annotations {
         found: MatRoom,
         options: &AnnotationOptions,
     ) -> Result<Option<AnnotatedRoom>> {
-        let room: Room = match found.name.parse() {
+        let room: Room = match options.taxonomy.room_of_word(&found.name) {
             Ok(room) => room,
             Err(e) => {
                 self.fault(path, options, format!("{e}"))?;
@@ -124,15 +125,12 @@ fn named(name: &str, options: &AnnotationOptions) -> std::result::Result<Named, 
         let name = quote(name.as_bytes());
         return Err(format!("{name} names no instance: a name is CLASS_N, with N from 1, as in chair_3"));
     };
-    match (options.classes.get(word), word.parse::<Class>()) {
-        (Some(None), _) => Ok(Named::Unlabelled),
-        // A word that is a class already keeps its number.
-        (Some(Some(class)), Ok(own)) if *class == own => Ok(Named::Instance(own, number)),
-        (Some(Some(class)), _) => Ok(Named::Other(*class)),
-        (None, Ok(class)) => Ok(Named::Instance(class, number)),
-        (None, Err(_)) if options.unknown_as_clutter => Ok(Named::Other(Class::CLUTTER)),
-        (None, Err(e)) => Err(format!("{e}")),
-    }
+    Ok(match class_of_word(&options.taxonomy, &options.classes, options.unknown_as_clutter, word) {
+        Ok(Some(ClassOfWord::Own(class))) => Named::Instance(class, number),
+        Ok(Some(ClassOfWord::Other(class))) => Named::Other(class),
+        Ok(None) => Named::Unlabelled,
+        Err(e) => return Err(format!("{e}")),
+    })
 }
 
 /// The points of an object.

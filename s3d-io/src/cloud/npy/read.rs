@@ -57,11 +57,16 @@ impl<'a> NpyCloud<'a> {
         if !is_structured {
             self.name_plain(&mut fields)?;
             if self.options.columns.is_empty() && self.options.classes.is_empty() {
-                self.s3dis_numbers.set(true);
+                let taxonomy = &self.options.taxonomy;
+                self.s3dis_numbers.set(taxonomy.is_s3dis());
                 let path = self.source.name().display();
+                let numbers = if taxonomy.is_s3dis() {
+                    "S3DIS's, 0 ceiling to 12 clutter".to_owned()
+                } else {
+                    format!("the ids of {}", taxonomy.name())
+                };
                 reading.notes.push(format!(
-                    "{path}: a plain array: its columns are taken for {}, and class numbers for S3DIS's, 0 ceiling to 12 \
-                     clutter",
+                    "{path}: a plain array: its columns are taken for {}, and class numbers for {numbers}",
                     fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(" ")
                 ));
             }

@@ -3,7 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
-use s3d_label::{Class, Room};
+use s3d_label::{Class, Room, Taxonomy, UnknownClass};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,12 +21,14 @@ pub enum OnFault {
 /// How [`AnnotationTree::open_with`] takes what it finds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TreeOptions {
+    /// Which classes and types of rooms there are.
+    pub taxonomy: Taxonomy,
     /// At a folder that names no room, a room without annotations, or a file that names no instance.
     pub on_fault: OnFault,
-    /// Whether an unknown class (`stairs_1.txt` in the published area) is taken for clutter, as its loaders
-    /// do: its instances get the numbers after those of the room's clutter.
+    /// Whether an unknown class (`stairs_1.txt` in the published area) is taken for clutter
+    /// ([`Taxonomy::clutter`]), as its loaders do: its instances get the numbers after those of the room's clutter.
     pub unknown_as_clutter: bool,
-    /// Which class a word of a file's name means, even if it is one of the 13; `None`: such files are left
+    /// Which class a word of a file's name means, even if it is a class; `None`: such files are left
     /// out without a warning. Instances of another class than the word's get the numbers after those of the
     /// room's own, as with clutter.
     pub classes: BTreeMap<String, Option<Class>>,
@@ -112,7 +114,8 @@ impl AnnotationTree {
     }
 
     fn open_room(&mut self, path: &Path, options: &TreeOptions) -> Result<RoomFiles> {
-        let room: Room = name_of(path).parse().map_err(|e| Error::format(path, format!("{e}")))?;
+        let room = options.taxonomy.room_of_word(&name_of(path));
+        let room = room.map_err(|e| Error::format(path, format!("{e}")))?;
         let annotations = path.join("Annotations");
         if !annotations.is_dir() {
             return Err(Error::format(path, "is a room without a folder Annotations"));
@@ -187,13 +190,37 @@ fn instance_of(path: &Path, options: &TreeOptions) -> Result<Named> {
         }
         return Err(Error::format(path, message));
     };
-    let class = word.parse::<Class>();
-    match (options.classes.get(word), class) {
-        (Some(Some(meant)), class) if class != Ok(*meant) => Ok(Named::Other(*meant)),
-        (Some(None), _) => Ok(Named::Unlabelled),
-        (_, Ok(class)) => Ok(Named::Instance(class, number)),
-        (_, Err(_)) if options.unknown_as_clutter => Ok(Named::Other(Class::CLUTTER)),
-        (_, Err(e)) => Err(Error::format(path, format!("{e}"))),
+    match class_of_word(&options.taxonomy, &options.classes, options.unknown_as_clutter, word) {
+        Ok(Some(ClassOfWord::Own(class))) => Ok(Named::Instance(class, number)),
+        Ok(Some(ClassOfWord::Other(class))) => Ok(Named::Other(class)),
+        Ok(None) => Ok(Named::Unlabelled),
+        Err(e) => Err(Error::format(path, format!("{e}"))),
+    }
+}
+
+/// What the word in an instance's name says of its class.
+pub(crate) enum ClassOfWord {
+    /// It is the class's name: the instance keeps its number.
+    Own(Class),
+    /// It is another word for the class: the number may be that of an instance with the class's name.
+    Other(Class),
+}
+
+/// The class of an instance that is named after `word`; `None`: it is unlabelled.
+pub(crate) fn class_of_word(
+    taxonomy: &Taxonomy,
+    classes: &BTreeMap<String, Option<Class>>,
+    unknown_as_clutter: bool,
+    word: &str,
+) -> std::result::Result<Option<ClassOfWord>, UnknownClass> {
+    let own = taxonomy.class(word);
+    let meant = classes.get(word).copied().or_else(|| taxonomy.meaning(word));
+    match (meant, &own, taxonomy.clutter()) {
+        (Some(None), ..) => Ok(None),
+        (Some(Some(class)), Ok(own), _) if class == *own => Ok(Some(ClassOfWord::Own(class))),
+        (Some(Some(class)), ..) => Ok(Some(ClassOfWord::Other(class))),
+        (None, _, Some(clutter)) if unknown_as_clutter => Ok(Some(ClassOfWord::Other(clutter))),
+        (None, ..) => own.map(|class| Some(ClassOfWord::Own(class))),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::cloud::table::rows::{Reading, Tag};
 use crate::error::Result;
-use s3d_label::{Class, Room};
+use s3d_label::{Class, Room, Taxonomy};
 use std::path::Path;
 
 /// What a format's colours are taken for. Where a format leaves it open, the narrow range is tried first.
@@ -20,11 +20,11 @@ pub(crate) trait Cloud {
     fn path(&self) -> &Path;
 
     /// The room that the file itself names, by its own name for instance.
-    fn room(&self) -> Option<Room> {
-        room_of_name(self.path())
+    fn room(&self, taxonomy: &Taxonomy) -> Option<Room> {
+        room_of_name(self.path(), taxonomy)
     }
 
-    /// The class that a tag means in this kind of file, where the user says nothing.
+    /// The class of S3DIS that a tag means in this kind of file, where the user says nothing.
     fn class_of(&self, _tag: &Tag) -> Option<Class> {
         None
     }
@@ -40,11 +40,11 @@ pub(crate) trait Cloud {
 }
 
 /// The room that a file is named after: `office_3.ply`, `Area_1_office_3.npy`.
-fn room_of_name(path: &Path) -> Option<Room> {
+fn room_of_name(path: &Path, taxonomy: &Taxonomy) -> Option<Room> {
     let stem = path.file_stem()?.to_str()?;
     let name = match stem.strip_prefix("Area_").and_then(|rest| rest.split_once('_')) {
         Some((area, name)) if area.bytes().all(|b| b.is_ascii_digit()) => name,
         _ => stem,
     };
-    name.parse().ok()
+    taxonomy.room(name).ok()
 }

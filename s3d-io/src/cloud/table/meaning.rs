@@ -82,7 +82,7 @@ impl Meaning {
                 }
                 None => {
                     unknown_classes.add(tag.key(), group);
-                    options.unknown_as_clutter.then_some(Class::CLUTTER)
+                    if options.unknown_as_clutter { options.taxonomy.clutter() } else { None }
                 }
             };
             // Unlabelled points need no room.
@@ -135,17 +135,18 @@ fn class_of(cloud: &dyn Cloud, options: &AnnotationOptions, tag: &Tag) -> Option
     if let Some(class) = options.classes.get(&tag.key()) {
         return Some(*class);
     }
-    let by_name = match tag {
-        Tag::Name(name) => name.parse().ok(),
-        Tag::Number(_) => None,
+    let meant = match tag {
+        Tag::Name(name) => options.taxonomy.meaning(name),
+        Tag::Number(number) => options.taxonomy.meaning_of_number(*number),
     };
-    by_name.or_else(|| cloud.class_of(tag)).map(Some)
+    // What formats know of themselves is told in classes of S3DIS.
+    meant.or_else(|| if options.taxonomy.is_s3dis() { cloud.class_of(tag).map(Some) } else { None })
 }
 
 /// The room that a tag means.
 fn room_of(options: &AnnotationOptions, tag: Option<&Tag>) -> Option<Room> {
     match tag? {
-        Tag::Name(name) => name.parse().ok(),
+        Tag::Name(name) => options.taxonomy.room_of_word(name).ok(),
         Tag::Number(number) => {
             let number = u32::try_from(*number).ok().filter(|n| *n > 0)?;
             options.room.map(|room| Room { number, ..room })
@@ -187,8 +188,8 @@ impl Unknown {
         warnings: &mut Vec<String>,
     ) -> Result<()> {
         let Some((path, list, points)) = self.list(clouds) else { return Ok(()) };
-        if options.unknown_as_clutter {
-            warnings.push(format!("{}: classes taken for clutter: {list}", path.display()));
+        if let (true, Some(clutter)) = (options.unknown_as_clutter, options.taxonomy.clutter()) {
+            warnings.push(format!("{}: classes taken for {clutter}: {list}", path.display()));
         } else if options.on_fault == OnFault::Skip && any_known {
             let message = format!("{points} points left out, whose class is none: {list}");
             warnings.push(format!("{}: {message}", path.display()));
@@ -200,11 +201,19 @@ impl Unknown {
             } else {
                 ". No point has another: if the classes are in another column, name it, as in class = \"label\""
             };
+            let taxonomy = &options.taxonomy;
+            let of = if taxonomy.is_s3dis() {
+                "the 13".to_owned()
+            } else {
+                format!("the {} of {}", taxonomy.classes().len(), taxonomy.name())
+            };
+            let example = taxonomy.classes().get(Class::CHAIR.index()).or(taxonomy.classes().first());
+            let example = example.map_or("chair", |class| class.name());
             return Err(Error::format(
                 path,
                 format!(
-                    "classes that are none of the 13: {list}. Say what they are in [annotations.classes], as in \
-                     {first:?} = \"chair\", or \"\" for points without a label; or take all of them for clutter with \
+                    "classes that are none of {of}: {list}. Say what they are in [annotations.classes], as in \
+                     {first:?} = {example:?}, or \"\" for points without a label; or take all of them for clutter with \
                      unknown_as_clutter = true{column}"
                 ),
             ));

@@ -91,7 +91,7 @@ pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> R
             None => found.push(AnnotatedRoom { room: instance.room, instances: vec![points] }),
         }
     }
-    Ok(Annotations { rooms: found, warnings })
+    Ok(Annotations { taxonomy: options.taxonomy.clone(), rooms: found, warnings })
 }
 
 /// Reads every file once. `Some`: that file's colours are wide.
@@ -130,7 +130,7 @@ fn gather(
 }
 
 fn default_room(cloud: &dyn Cloud, options: &AnnotationOptions, rooms: &mut Tags) -> u32 {
-    let room = options.room.or_else(|| cloud.room());
+    let room = options.room.or_else(|| cloud.room(&options.taxonomy));
     room.and_then(|r| rooms.name(&r.to_string())).unwrap_or(NO_TAG)
 }
 

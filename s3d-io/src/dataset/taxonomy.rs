@@ -1,0 +1,62 @@
+//! `assets/taxonomy.json`: the classes and types of rooms of a data set that has others than S3DIS.
+
+use crate::error::{Error, Result};
+use crate::fs::json::{read_json, write_json};
+use s3d_label::{Taxonomy, TaxonomyDefinition};
+use std::path::Path;
+
+/// Writes what a taxonomy is made of, and returns the file's size in bytes.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_taxonomy(path: &Path, taxonomy: &Taxonomy) -> Result<u64> {
+    write_json(path, taxonomy.definition())
+}
+
+/// Reads a taxonomy in JSON.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] with the line if the file is no JSON or has other fields, with the entry
+/// for what is no taxonomy.
+pub fn read_taxonomy(path: &Path) -> Result<Taxonomy> {
+    taxonomy(path, read_json(path)?)
+}
+
+/// As [`read_taxonomy`]; S3DIS's if there is no such file, as in data sets that have S3DIS's classes.
+///
+/// # Errors
+/// As [`read_taxonomy`].
+pub fn read_taxonomy_or_s3dis(path: &Path) -> Result<Taxonomy> {
+    match path.try_exists() {
+        Ok(false) => Ok(Taxonomy::s3dis()),
+        _ => read_taxonomy(path),
+    }
+}
+
+/// The taxonomy of a definition that a file holds.
+pub(crate) fn taxonomy(path: &Path, definition: TaxonomyDefinition) -> Result<Taxonomy> {
+    Taxonomy::new(definition).map_err(|e| Error::format(path, e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn taxonomies_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("taxonomy.json");
+        assert_eq!(read_taxonomy_or_s3dis(&path).unwrap(), Taxonomy::s3dis());
+        for name in ["nyu40", "scannet20", "scannet200", "matterport40"] {
+            let taxonomy = Taxonomy::built_in(name).unwrap();
+            write_taxonomy(&path, &taxonomy).unwrap();
+            assert_eq!(read_taxonomy_or_s3dis(&path).unwrap(), taxonomy);
+        }
+        std::fs::write(&path, "{\"name\": \"x\",\n\"classes\": [{\"nam\": \"bed\"}]}").unwrap();
+        let message = read_taxonomy(&path).unwrap_err().to_string();
+        assert!(message.contains("taxonomy.json, line 2: unknown field `nam`"), "{message}");
+        std::fs::write(&path, "{\"name\": \"x\", \"classes\": []}").unwrap();
+        let message = read_taxonomy_or_s3dis(&path).unwrap_err().to_string();
+        assert!(message.contains("taxonomy.json: has no classes"), "{message}");
+    }
+}
