@@ -6,7 +6,8 @@ use crate::export::work::for_each_in_order;
 use crate::tables::manifest::{Head, Manifest};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, read_conventions, read_file_list,
+    CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, PhotographRecord, read_conventions,
+    read_file_list, read_photographs,
 };
 use s3d_io::fs::checksum_of_file;
 use std::collections::BTreeMap;
@@ -35,6 +36,14 @@ impl Dataset {
             Some(message) => Err(FileError::format(&path, message).into()),
             None => Ok(Self { layout: layout.clone(), manifest, files }),
         }
+    }
+
+    /// The photographs of an area.
+    pub(crate) fn photographs(&self, area: u32) -> Result<Vec<PhotographRecord>> {
+        if self.manifest.area(area).is_none_or(|area| area.frames == 0) {
+            return Ok(Vec::new());
+        }
+        Ok(read_photographs(self.files.checked(&self.layout.frames_json(area))?)?)
     }
 }
 

@@ -55,7 +55,7 @@ pub use matterport::{
     CAPTURES_A_LOCATION, CaptureFile, PictureFolder, parse_capture_pose, parse_intrinsics, read_capture_pose,
     read_intrinsics, read_matterport_locations,
 };
-pub use picture::{check_picture, decode_picture, read_picture, read_picture_size};
+pub use picture::{check_picture, decode_picture, read_picture, read_picture_size, read_picture_turn};
 pub use posed::{Distortion, GivenIntrinsics, IntrinsicsError, Optics, PosedCamera};
 pub use posed_list::{PosedCameras, read_posed_cameras};
 pub use poses::PublishedLocation;

@@ -4,6 +4,7 @@ pub(crate) mod cameras;
 pub(crate) mod memory;
 pub(crate) mod mesh;
 mod numbering;
+pub(crate) mod photographs;
 pub(crate) mod pictures;
 pub(crate) mod requested;
 mod up_axis;
@@ -14,6 +15,7 @@ use crate::export::input::cameras::{Cameras, Placing};
 use crate::export::input::memory::{SceneSource, SharedScene};
 use crate::export::input::mesh::{MeshFrame, MeshSource};
 use crate::export::input::numbering::{label_table, number, published_numbers};
+use crate::export::input::photographs::Photographs;
 use crate::export::input::up_axis::UpGuess;
 use crate::export::labels::annotate::SurveyedRoom;
 use crate::options::ExportOptions;
@@ -21,7 +23,7 @@ use crate::store::request::InputRecord;
 use crate::tables::dataset::check_area;
 use crate::useful::{Estimate, Finding, count_findings};
 use glam::{DAffine3, DVec3};
-use s3d_geom::TriMesh;
+use s3d_geom::{Camera, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance, AnnotationOptions, Annotations, OnFault};
 use s3d_io::mesh::{MeshFile, MeshOptions, MeshOrigin, UpAxis};
@@ -52,6 +54,8 @@ pub(crate) struct AreaInput {
     pub(crate) cameras: Cameras,
     /// The list that they come from, for messages.
     pub(crate) cameras_path: PathBuf,
+    /// Photographs with poses.
+    pub(crate) photographs: Photographs,
     /// What was found out about the mesh, as a sentence each.
     pub(crate) notes: Vec<String>,
     /// What was odd in the annotations, as a sentence each.
@@ -229,8 +233,16 @@ impl AreaInput {
                 .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
         }
         let mesh_file = file.filter(|_| opened.keep_mesh);
-        let (cameras, cameras_path) = Cameras::of_scene(&scene, asked, frame.offset_m)?
-            .unwrap_or_else(|| (Cameras::listed_or_placed(Vec::new(), Vec::new()), scene.path.clone()));
+        let photographs = photographs_of(&scene, &frame)?;
+        let (cameras, cameras_path) =
+            Cameras::of_scene(&scene, asked, frame.offset_m)?.unwrap_or_else(|| {
+                // Who has photographs asks for nothing else.
+                let cameras = match photographs.all.is_empty() {
+                    true => Cameras::listed_or_placed(Vec::new(), Vec::new()),
+                    false => Cameras::Listed(Vec::new(), Vec::new()),
+                };
+                (cameras, scene.path.clone())
+            });
         frame.refuse_far_locations(&cameras_path, cameras.listed())?;
         Ok(Self {
             number: scene.area,
@@ -243,10 +255,11 @@ impl AreaInput {
             notes: Vec::new(),
             warnings,
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
-            files: files_of(&scene),
-            sources: files_of(&scene),
+            files: files_of(&scene).into_iter().chain(photographs.files().cloned()).collect(),
+            sources: files_of(&scene).into_iter().chain(photographs.by_folder().into_keys()).collect(),
             annotations: scene.annotations,
             records: Vec::new(),
+            photographs,
             cameras_path,
             pictures: scene.pictures,
             path: scene.path,
@@ -302,6 +315,7 @@ impl AreaInput {
             rooms,
             cameras,
             cameras_path: name.clone(),
+            photographs: Photographs::default(),
             path: name,
             notes: Vec::new(),
             warnings,
@@ -362,6 +376,12 @@ impl AreaInput {
         let file = Arc::new(mesh.file);
         let frame = MeshFrame::of(&file);
         frame.refuse_far_locations(&cameras_path, cameras.listed())?;
+        let photographs = match &scene {
+            Some(scene) => photographs_of(scene, &MeshFrame { offset_m: DVec3::ZERO, ..frame })?,
+            None => Photographs::default(),
+        };
+        files.extend(photographs.files().cloned());
+        sources.extend(photographs.by_folder().into_keys());
         Ok(Self {
             number: area.area,
             path: scene.as_ref().map_or(folder, |s| &s.path).to_owned(),
@@ -373,6 +393,7 @@ impl AreaInput {
             rooms,
             cameras,
             cameras_path,
+            photographs,
             notes: Vec::new(),
             warnings,
             lenient: false,
@@ -396,7 +417,10 @@ impl AreaInput {
         let most = Cameras::Placed(Placing::Apart(2.0)).count_on(floor_m2).max(1.0);
         let count = self.cameras.count_on(floor_m2);
         let is_listed = matches!(self.cameras, Cameras::Listed(..));
-        Estimate::new(area_m2, if is_listed { count } else { count.min(most) }, options)
+        let locations = if is_listed { count } else { count.min(most) };
+        let pixels = |c: &Camera| f64::from(c.width) * f64::from(c.height);
+        let photographs = self.photographs.all.iter().map(|p| pixels(&p.camera));
+        Estimate::new(area_m2, locations, options).with_views(photographs, options)
     }
 
     /// What looks wrong about the number of its scan locations.
@@ -417,7 +441,9 @@ impl AreaInput {
     pub(crate) fn tell_mesh(&self, ctx: &Context, file: &MeshFile) {
         self.frame.tell(ctx);
         self.notes.iter().for_each(|note| ctx.info(note));
-        self.warnings.iter().chain(&file.warnings).for_each(|w| ctx.warn(w));
+        self.photographs.notes.iter().for_each(|note| ctx.info(note));
+        let doubts = self.warnings.iter().chain(&self.photographs.warnings).chain(&file.warnings);
+        doubts.for_each(|w| ctx.warn(w));
         ctx.info(format_args!(
             "{}: {} faces, {} vertices, {} textures, {:.1} m²",
             self.source.describe(),
@@ -427,6 +453,14 @@ impl AreaInput {
             file.mesh.total_area()
         ));
     }
+}
+
+/// The photographs that a scene file names.
+fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Photographs> {
+    let Some(source) = &scene.frames else { return Ok(Photographs::default()) };
+    let photographs = Photographs::open(source, scene.area, frame.offset_m)?;
+    frame.refuse_far_locations(&source.path, &photographs.locations())?;
+    Ok(photographs)
 }
 
 /// What a scene file names, and itself.
