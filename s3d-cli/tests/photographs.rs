@@ -455,3 +455,117 @@ fn first_of(out: &Path, name: &str) -> PathBuf {
     let names = files(&folder).into_keys();
     folder.join(names.into_iter().find(|p| p.to_string_lossy().contains(&uuid)).unwrap())
 }
+
+/// Polycam's folders: optimized cameras, Y-up, with what takes them to the mesh's frame.
+#[test]
+fn a_polycam_capture_lies_on_its_mesh() {
+    let project = Project::new("[frames]\npath = \"capture\"\nmax = 1\n");
+    let pinhole = PhotoLens::Straight(Lens::new(SIZE, FOCAL, CENTER, [0.0; 5]).unwrap());
+    let pose = poses()[1];
+    write(&project.at("capture/keyframes/corrected_images/77.png"), &take(&pose, &pinhole));
+    // Z-up (x, y, z) is Y-up (x, z, −y); the capture's frame lies 5 m beside the mesh's.
+    let rows = rows(&pose, 1.0);
+    let y_up = [rows[0], rows[2], rows[1].map(|v| -v)];
+    let mut camera =
+        json!({"fx": FOCAL.x, "fy": FOCAL.y, "cx": CENTER.x, "cy": CENTER.y, "width": 320, "height": 240});
+    for (i, j) in (0..3).flat_map(|i| (0..4).map(move |j| (i, j))) {
+        camera[format!("t_{i}{j}")] = json!(y_up[i][j] - if (i, j) == (0, 3) { 5.0 } else { 0.0 });
+    }
+    project.write("capture/keyframes/corrected_cameras/77.json", &camera.to_string());
+    let aligned = json!({"alignmentTransform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]});
+    project.write("capture/mesh_info.json", &aligned.to_string());
+    let (out, _) = project.export("out", &[]);
+    let records = photographs(&out);
+    assert_eq!((records.len(), records[0].name.as_str()), (1, "77"));
+    assert!(records[0].agreement.unwrap() > 0.6, "{records:?}");
+}
+
+/// Packages have the photographs with their own cameras; where a view lies outside of its photograph they say so.
+#[test]
+fn packages_know_photographs_and_their_masks() {
+    let project = Project::with_photographs(&format!("[cameras]\nplace = 6.0\n{LISTED}"));
+    // Pincushion distortion: the view reaches beyond the photograph.
+    let mut list = transforms(&poses());
+    (list["k1"], list["k2"]) = (json!(0.3), json!(0.0));
+    project.write("transforms.json", &list.to_string());
+    let (out, _) = project.export("out", &[]);
+    let records = photographs(&out);
+    assert!(records.iter().all(|r| r.masked > 0.02), "{records:?}");
+    let pack = |kind: &str| {
+        let place = project.at(kind);
+        s3d_ok(&["pack", text(&out), "--to", kind, "-o", text(&place), "--images", "views"]);
+        place
+    };
+    let nerfstudio = pack("nerfstudio").join("area_1");
+    let packed: Value =
+        serde_json::from_slice(&fs::read(nerfstudio.join("transforms.json")).unwrap()).unwrap();
+    let frames = packed["frames"].as_array().unwrap();
+    let mut own = 0;
+    for frame in frames {
+        let mask = nerfstudio.join(frame["mask_path"].as_str().unwrap());
+        // The kind of its pixels: gray.
+        assert_eq!(fs::read(&mask).unwrap()[24..26], [8, 0]);
+        let mask = s3d_io::camera::read_picture(&mask).unwrap();
+        let zeros = mask.pixels().iter().filter(|p| **p == [0; 3]).count();
+        let path = frame["file_path"].as_str().unwrap();
+        match records.iter().find(|r| path.contains(&r.camera_uuid)) {
+            Some(record) => {
+                own += 1;
+                let share = zeros as f64 / f64::from(record.width * record.height);
+                assert!((share - record.masked).abs() < 1e-6);
+                assert_eq!([&frame["fl_x"], &frame["fl_y"]], [FOCAL.x, FOCAL.y]);
+                assert_eq!(
+                    [&frame["cx"], &frame["cy"], &frame["w"]],
+                    [&json!(CENTER.x), &json!(CENTER.y), &json!(320)]
+                );
+            }
+            None => assert_eq!(zeros, 0),
+        }
+    }
+    assert!(own == 4 && frames.len() > 8, "{own} of {}", frames.len());
+    let cameras = fs::read_to_string(pack("colmap").join("area_1/sparse/0/cameras.txt")).unwrap();
+    assert_eq!(cameras.matches("PINHOLE 320 240 210 212 163.25 117.5").count(), 4, "{cameras}");
+    pack("webdataset");
+    let table = project.at("images.parquet");
+    s3d_ok(&["pack", text(&out), "--to", "parquet", "-o", text(&table)]);
+    let bytes = fs::read(&table).unwrap();
+    assert!(bytes.windows(14).any(|w| w == b"images/3.png\0\0" || w.starts_with(b"images/3.png")));
+    // Coordinates that are made again are those of the photographs' own cameras, but for steps of depth.
+    let layout = Layout::new(&out);
+    let all = dataset_images(&layout, 1).unwrap();
+    let of_photographs = all.iter().filter(|image| records.iter().any(|r| r.camera_uuid == image.uuid));
+    let paths: Vec<PathBuf> =
+        of_photographs.map(|i| i.path(&layout, s3d_io::dataset::Domain::GlobalXyz)).collect();
+    let world = || paths.iter().map(|path| s3d_io::image::read_xyz(path).unwrap()).collect::<Vec<_>>();
+    let before = world();
+    s3d_ok(&["xyz", text(&out), "--type", "half", "--overwrite"]);
+    s3d_ok(&["verify", text(&out)]);
+    for (a, b) in before.iter().zip(world()) {
+        let off = a
+            .pixels()
+            .iter()
+            .zip(b.pixels())
+            .map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max));
+        assert!(off.fold(0.0, f32::max) < 0.03);
+    }
+    assert_eq!(before.len(), 4);
+    // Exported anew, its photographs are no scan locations.
+    let again = project.at("again");
+    let small = [
+        "--points-per-m2",
+        "20",
+        "--size",
+        "32",
+        "--pano-width",
+        "64",
+        "--views",
+        "2",
+        "--modalities",
+        "pose",
+    ];
+    s3d_ok(&[&["export", text(&out.join("area_1")), "-o", text(&again)][..], &small].concat());
+    let poses = files(&again.join("area_1/pano/pose"));
+    assert!(!poses.is_empty());
+    assert!(poses.keys().all(|p| records.iter().all(|r| !p.to_string_lossy().contains(&r.camera_uuid))));
+}
+

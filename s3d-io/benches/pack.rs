@@ -155,6 +155,7 @@ fn tables(c: &mut Criterion) {
             coverage: Some(0.9),
             semantic: Some(SemanticRow { shares: [0.07; 13], unlabelled: 0.0, entropy: 1.0, instances: 12 }),
             depth_m: Some([0.5, 2.0 + f64::from(i), 9.0]),
+            photograph: None,
         })
         .collect();
     let path = dir.path().join("images.parquet");

@@ -316,7 +316,7 @@ mod tests {
         assert!(outside.contains("(950, 530) lies outside of the photograph of 640 × 480"), "{outside}");
         assert_eq!(
             PosedCamera { optics: None, ..camera.clone() }.photo_lens([8, 8]).err(),
-            Some({ IntrinsicsError::OtherSize { found: [8, 8], told: [1920, 1080] } })
+            Some(IntrinsicsError::OtherSize { found: [8, 8], told: [1920, 1080] })
         );
         let of = |optics| PosedCamera { optics, size: None, ..camera.clone() }.photo_lens([64, 32]);
         assert_eq!(of(None), Err(IntrinsicsError::NoOptics));

@@ -2,7 +2,7 @@
 
 use crate::camera::locations::{has_transforms, is_colmap_images, moved};
 use crate::camera::posed::PosedCamera;
-use crate::camera::{colmap, located, nerfstudio, scannet, table, tum};
+use crate::camera::{colmap, located, nerfstudio, polycam, scannet, table, tum};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// What is read, for messages.
 const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), a folder of ScanNet's poses \
-                     (pose/0.txt), a trajectory of lines `timestamp tx ty tz qx qy qz qw`, or a CSV table";
+                     (pose/0.txt) or of Polycam's keyframes, a trajectory of lines `timestamp tx ty tz qx qy qz qw`, or a CSV table";
 
 /// The cameras of a list.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +41,7 @@ struct ReadList {
 ///   COLMAP model, with its `cameras` beside them;
 /// - a folder with ScanNet's `pose/0.txt`, or that folder itself; `intrinsic/intrinsic_color.txt` and the
 ///   first picture in `color` tell what the camera is;
+/// - a folder with Polycam's `keyframes`, or that folder itself: the corrected cameras, if there are some;
 /// - any other file whose first line has a comma: a table like that of scan locations (see
 ///   [`read_cameras`](crate::camera::read_cameras)), in which `width,height` and `fov` or `fx,fy,cx,cy` may
 ///   stand;
@@ -82,6 +83,10 @@ fn read(path: &Path) -> Result<ReadList> {
         if let Some((scan, files)) = scannet::find(path)? {
             let (cameras, untracked, files) = scannet::read(&scan, files)?;
             return Ok(ReadList { cameras, untracked, files, named: path.to_owned() });
+        }
+        if let Some((files, images)) = polycam::find(path)? {
+            let (cameras, files) = polycam::read(files, &images)?;
+            return Ok(ReadList { cameras, untracked: 0, files, named: path.to_owned() });
         }
         return Err(Error::unsupported(path, format!("holds no list of cameras: {FORMS}")));
     }

@@ -58,6 +58,8 @@ pub struct ImageRow {
     pub semantic: Option<SemanticRow>,
     /// The least, the mean and the greatest depth, metres, of the pixels that have one.
     pub depth_m: Option<[f64; 3]>,
+    /// The name of the photograph that it is the view of. If no image is one, the table has no such column.
+    pub photograph: Option<String>,
 }
 
 /// What the pixels of an image show.
@@ -82,7 +84,7 @@ enum Column {
 }
 
 /// The columns of some rows. Those that are never null are `required`.
-fn columns(rows: &[ImageRow]) -> Vec<(String, bool, Column)> {
+fn columns(rows: &[ImageRow], with_photographs: bool) -> Vec<(String, bool, Column)> {
     let mut all = Vec::new();
     macro_rules! column {
         ($name:expr, $required:expr, $kind:ident, $value:expr) => {
@@ -128,6 +130,9 @@ fn columns(rows: &[ImageRow]) -> Vec<(String, bool, Column)> {
     for (i, name) in ["depth_min_m", "depth_mean_m", "depth_max_m"].into_iter().enumerate() {
         column!(name.to_owned(), false, Float, |r| r.depth_m.map(|v| v[i]));
     }
+    if with_photographs {
+        column!("photograph".to_owned(), false, Text, |r| r.photograph.as_deref().map(text));
+    }
     all
 }
 
@@ -158,7 +163,7 @@ fn schema(columns: &[(String, bool, Column)]) -> String {
 /// `depth`, `normal`, …); `width`, `height`, `fov_rad`, `yaw_rad`, `pitch_rad`, `x`, `y`, `z`; `k` (9
 /// numbers) and `rt` (12), row by row; `selection_entropy`, `entropy`, `coverage`, `share_ceiling` …
 /// `share_clutter`, `share_unlabelled` (with the 13 they make the coverage), `instances`; `depth_min_m`,
-/// `depth_mean_m`, `depth_max_m`. See [`ImageRow`].
+/// `depth_mean_m`, `depth_max_m`; and `photograph`, if there are some. See [`ImageRow`].
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -188,12 +193,13 @@ pub fn write_image_index_to(file: impl Write + Send, name: &Path, rows: &[ImageR
         .set_created_by(concat!("s3d version ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_key_value_metadata(Some(vec![KeyValue::new("description".to_owned(), about.to_owned())]))
         .build();
-    let schema = parse_message_type(&schema(&columns(&[]))).map_err(failed)?;
+    let with_photographs = rows.iter().any(|r| r.photograph.is_some());
+    let schema = parse_message_type(&schema(&columns(&[], with_photographs))).map_err(failed)?;
     let mut writer =
         SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
     for rows in rows.chunks(GROUP) {
         let mut group = writer.next_row_group().map_err(failed)?;
-        for (_, required, column) in columns(rows) {
+        for (_, required, column) in columns(rows, with_photographs) {
             let fewer = || failed(ParquetError::General("the schema has fewer columns".to_owned()));
             let mut out = group.next_column().map_err(failed)?.ok_or_else(fewer)?;
             write_column(&mut out, required, column).map_err(failed)?;
@@ -275,6 +281,7 @@ mod tests {
                 instances: 17,
             }),
             depth_m: Some([0.5, 2.0, 9.0]),
+            photograph: Some("images/1.jpg".into()),
         }
     }
 
@@ -329,6 +336,8 @@ mod tests {
             let shares = row.semantic.as_ref().map(|s| s.shares);
             assert_eq!(*field(&table, i, "share_chair"), float(shares.map(|s| s[Class::CHAIR.index()])));
             assert_eq!(*field(&table, i, "depth_max_m"), float(row.depth_m.map(|d| d[2])));
+            let photograph = row.photograph.clone().map_or(Field::Null, Field::Str);
+            assert_eq!(*field(&table, i, "photograph"), photograph);
             for (name, list) in [("k", row.k.map(|k| k.to_vec())), ("rt", row.rt.map(|m| m.to_vec()))] {
                 match (field(&table, i, name), list) {
                     (Field::ListInternal(found), Some(list)) => {
@@ -364,7 +373,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.parquet");
         write_image_index(&path, &[]).unwrap();
-        assert!(read(&path).1.is_empty());
+        let (names, rows) = read(&path);
+        assert!(rows.is_empty() && !names.contains(&"photograph".to_owned()));
         let e = write_image_index(&dir.path().join("no/a.parquet"), &[]).unwrap_err();
         assert!(e.to_string().contains("a.parquet: cannot write"), "{e}");
     }
