@@ -569,3 +569,26 @@ fn packages_know_photographs_and_their_masks() {
     assert!(poses.keys().all(|p| records.iter().all(|r| !p.to_string_lossy().contains(&r.camera_uuid))));
 }
 
+/// Colours with more samples at edges differ there alone; everything else is the same, and verify knows.
+#[test]
+fn samples_at_edges_change_colours_alone() {
+    let project = Project::new("[cameras]\nplace = 6.0\n");
+    let export = |name: &str, more: &[&str]| {
+        let all = [&["--modalities", "rgb,depth,normal,pose"][..], more].concat();
+        files(&project.export(name, &all).0)
+    };
+    let one = export("one", &[]);
+    assert!(export("same", &["--rgb-samples", "1"]) == one, "one sample is the default");
+    let four = export("four", &["--rgb-samples", "4"]);
+    let differs = |path: &PathBuf| one[path] != four[path];
+    let is_rgb = |path: &Path| path.components().any(|part| part.as_os_str() == "rgb");
+    let images: Vec<&PathBuf> =
+        one.keys().filter(|p| p.starts_with("area_1/data") || p.starts_with("area_1/pano")).collect();
+    let is_panorama = |path: &Path| is_rgb(path) && path.starts_with("area_1/pano");
+    assert!(images.iter().filter(|p| is_panorama(p)).all(|p| differs(p)), "every panorama has edges");
+    assert!(images.iter().filter(|p| !is_rgb(p)).all(|p| !differs(p)));
+    assert!(String::from_utf8_lossy(&four[Path::new("manifest.json")]).contains("\"rgb_samples\": 4"));
+    assert!(!String::from_utf8_lossy(&one[Path::new("manifest.json")]).contains("rgb_samples"));
+    let scene = project.at("scene.toml");
+    s3d_fails(&["export", text(&scene), "--rgb-samples", "0"], 2, &["--rgb-samples"]);
+}

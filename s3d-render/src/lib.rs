@@ -70,6 +70,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod edge_samples;
 mod hits;
 mod picture;
 mod raster;
@@ -78,6 +79,7 @@ mod scene;
 mod shade;
 mod simd;
 
+pub use edge_samples::sample_edges;
 pub use hits::{Hits, NO_FACE};
 pub use picture::cube_map::CubeMap;
 pub use picture::cube_sources::SkyBoxTurn;

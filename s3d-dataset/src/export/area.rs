@@ -499,6 +499,7 @@ pub(crate) fn render_area(
             textures: &textures,
             pictures: None,
             normals: options.normals,
+            rgb_samples: options.rgb_samples,
             label_of_face: &label_of_face,
             pretty_of_face: &pretty_of_face,
             compression: options.compression,
