@@ -19,9 +19,9 @@ const FLAT: f32 = 0.966;
 const STEP: f64 = 0.01;
 
 /// Replaces the colour of each pixel at an edge by the mean of `samples` places in it, spread alike in each.
-/// `image` is that of [`crate::rgb_image_with`] for the same arguments. At an edge is a pixel one of whose four
-/// neighbours shows nothing, another material, or another face that lies behind it, before it, or turned away by
-/// more than 15°. Pixels that show nothing stay.
+/// `image` is that of [`crate::rgb_image_with`] for the same arguments. At an edge is a pixel one of whose
+/// four neighbours shows nothing, another material, or another face that lies behind it, before it, or turned
+/// away by more than 15°. Pixels that show nothing stay.
 ///
 /// # Panics
 /// If `hits` and `image` are not of the camera's size.
@@ -160,8 +160,8 @@ impl Sampler<'_, '_> {
         })
     }
 
-    /// Takes the faces of a pixel and of those around it. Whether each is seen in two of them or more: then none
-    /// is so small that a ray between them may meet another.
+    /// Takes the faces of a pixel and of those around it. Whether each is seen in two of them or more: then
+    /// none is so small that a ray between them may meet another.
     fn gather(&mut self, x: u32, y: u32) -> bool {
         let (width, height) = (self.camera.width, self.camera.height);
         self.cones.clear();
@@ -202,8 +202,8 @@ mod tests {
     use glam::vec3;
     use s3d_geom::{Material, MeshParts, Pose, TriMesh};
 
-    /// A white wall at y = 4 and, a metre before it, a black board whose lower edge rises by one in ten; beside
-    /// the wall is nothing.
+    /// A white wall at y = 4 and, a metre before it, a black board whose lower edge rises by one in ten;
+    /// beside the wall is nothing.
     fn board() -> TriMesh {
         let quad = |y: f32, [a, b, c, d]: [(f32, f32); 4]| [a, b, c, d].map(|(x, z)| vec3(x, y, z));
         let wall = quad(4.0, [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)]);
@@ -241,7 +241,8 @@ mod tests {
         assert_eq!(plain.pixels(), image.pixels());
     }
 
-    /// The board's lower edge is z = x / 10, at x = −1 to 1: how much of each pixel the board covers is known.
+    /// The board's lower edge is z = x / 10, at x = −1 to 1: how much of each pixel the board covers is
+    /// known.
     #[test]
     fn edges_have_the_mean_of_what_their_pixels_show() {
         let camera = Camera::perspective(pose(), 0.5, 64, 64);

@@ -38,8 +38,8 @@ impl PhotoLens {
         }
     }
 
-    /// A pinhole of the same focal lengths and principal point, whose image is `width` pixels wide and has the
-    /// photograph's proportions.
+    /// A pinhole of the same focal lengths and principal point, whose image is `width` pixels wide and has
+    /// the photograph's proportions.
     ///
     /// # Errors
     /// As [`Camera::pinhole`].
@@ -50,8 +50,8 @@ impl PhotoLens {
         Camera::pinhole(pose, self.focal_px() * scale, self.center_px() * scale, width, height)
     }
 
-    /// Where a direction in OpenCV's axes (x right, y down, z forward), of any length, comes to in the plane of
-    /// the photograph. `None` if no place is that of this direction.
+    /// Where a direction in OpenCV's axes (x right, y down, z forward), of any length, comes to in the plane
+    /// of the photograph. `None` if no place is that of this direction.
     #[inline]
     pub fn project(&self, direction: DVec3) -> Option<DVec2> {
         match self {
@@ -69,7 +69,8 @@ impl PhotoLens {
         self.project(direction).filter(is_within)
     }
 
-    /// The direction, of any length, that comes to a place of the photograph's plane. `None` if there is none.
+    /// The direction, of any length, that comes to a place of the photograph's plane. `None` if there is
+    /// none.
     pub fn direction(&self, pixel: DVec2) -> Option<DVec3> {
         match self {
             Self::Straight(lens) => lens.direction(pixel),

@@ -16,8 +16,8 @@
 //! origin, and a uuid stands in a list once.
 //!
 //! [`read_posed_cameras`] reads cameras as they are, each a [`PosedCamera`] with what is known of its size,
-//! focal lengths and lens: `transforms.json`, COLMAP models, ScanNet's poses, Polycam's keyframes, trajectories
-//! of TUM, tables.
+//! focal lengths and lens: `transforms.json`, COLMAP models, ScanNet's poses, Polycam's keyframes,
+//! trajectories of TUM, tables.
 //!
 //! [`PictureFolder`] finds the pictures of each location, whatever form they have: raw captures
 //! ([`CaptureFile`], with lens and pose), sky boxes, panoramas. [`read_picture`] reads one, PNG or JPEG.

@@ -46,9 +46,9 @@ pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
     size.map_err(|e| failed(&e.to_string()))
 }
 
-/// How a PNG or JPEG file asks to be turned before it is shown, as EXIF numbers it: 1 as it is, 3 upside down,
-/// 6 and 8 on a side; 2, 4, 5 and 7 mirrored, too. 1 where nothing is said. [`read_picture`] gives pixels as
-/// they are stored, which is what programs that reconstruct from photographs see.
+/// How a PNG or JPEG file asks to be turned before it is shown, as EXIF numbers it: 1 as it is, 3 upside
+/// down, 6 and 8 on a side; 2, 4, 5 and 7 mirrored, too. 1 where nothing is said. [`read_picture`] gives
+/// pixels as they are stored, which is what programs that reconstruct from photographs see.
 ///
 /// # Errors
 /// As [`read_picture`].

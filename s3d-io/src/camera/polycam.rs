@@ -8,9 +8,8 @@
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
 use crate::fs::json::read_json;
-use crate::mesh::file::UpAxis;
 use s3d_geom::Pose;
-use s3d_geom::glam::dvec2;
+use s3d_geom::glam::{DMat3, DVec3, dvec2};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -78,7 +77,8 @@ pub(crate) fn find(dir: &Path) -> Result<Option<(Vec<PathBuf>, PathBuf)>> {
 pub(crate) fn read(files: Vec<PathBuf>, images: &Path) -> Result<(Vec<PosedCamera>, Vec<PathBuf>)> {
     let info = images.join("../../mesh_info.json");
     let aligned = if info.is_file() { alignment(&info)? } else { None };
-    let z_up = UpAxis::Y.rotation();
+    // (x, y, z) becomes (x, −z, y).
+    let z_up = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y);
     let mut cameras = Vec::with_capacity(files.len());
     for path in &files {
         let k: Keyframe = read_json(path)?;
@@ -138,7 +138,7 @@ fn alignment(path: &Path) -> Result<Option<Pose>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_geom::glam::{DVec3, dvec3};
+    use s3d_geom::glam::dvec3;
     use std::fs;
 
     /// A keyframe at (1, 2, 3) of ARKit's world that looks along its −Z.

@@ -176,8 +176,9 @@ impl PosedCamera {
         }
     }
 
-    /// The lens that its photograph of `found` pixels was taken through. Intrinsics of another size are scaled,
-    /// as photographs are before they are handed on; those of an unknown size are for the photograph itself.
+    /// The lens that its photograph of `found` pixels was taken through. Intrinsics of another size are
+    /// scaled, as photographs are before they are handed on; those of an unknown size are for the photograph
+    /// itself.
     ///
     /// # Errors
     /// [`IntrinsicsError`]; [`OtherSize`](IntrinsicsError::OtherSize) for a photograph of other proportions,

@@ -143,8 +143,8 @@ pub fn read_views(path: &Path) -> Result<Vec<ViewRecord>> {
     read_json(path)
 }
 
-/// A photograph that became a view, as `frames.json` tells of it. The fields bear the file's names. Its view is
-/// [`Frame::View`] 0 of a camera of its own.
+/// A photograph that became a view, as `frames.json` tells of it. The fields bear the file's names. Its view
+/// is [`Frame::View`] 0 of a camera of its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhotographRecord {
     /// The camera of its view: follows from the number of the area and the name.
@@ -161,8 +161,8 @@ pub struct PhotographRecord {
     pub masked: f64,
     /// The share of the view's pixels that see the mesh.
     pub seen: f64,
-    /// How well the edges of photograph and mesh agree: the correlation of both, at most 1. Nothing where there
-    /// are no edges.
+    /// How well the edges of photograph and mesh agree: the correlation of both, at most 1. Nothing where
+    /// there are no edges.
     pub agreement: Option<f64>,
     /// The same of photograph and mesh displaced against each other: what chance gives.
     pub chance: Option<f64>,

@@ -57,7 +57,8 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
     encode(image.width(), image.height(), format, image.pixels().as_flattened(), plans)
 }
 
-/// An image as the bytes of an 8-bit gray PNG file, set for images that are constant in pieces, such as masks.
+/// An image as the bytes of an 8-bit gray PNG file, set for images that are constant in pieces, such as
+/// masks.
 ///
 /// # Panics
 /// If it has no pixel.

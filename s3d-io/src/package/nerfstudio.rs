@@ -29,8 +29,8 @@ pub struct NerfstudioFrame {
     /// optical axis, in panoramas the distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth_file_path: Option<String>,
-    /// Its mask, an 8-bit gray PNG file: 0 where the image has nothing to say. All images of a file have one, or
-    /// none.
+    /// Its mask, an 8-bit gray PNG file: 0 where the image has nothing to say. All images of a file have one,
+    /// or none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mask_path: Option<String>,
     /// Focal length along x; a panorama's height.

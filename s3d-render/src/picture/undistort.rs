@@ -10,8 +10,8 @@ const MOST_SAMPLES: f64 = 16.0;
 const LITTLE_MORE: f64 = 0.2;
 
 /// What `camera`, a pinhole, would have taken from the place and in the direction in which `photo` was taken
-/// through `lens`: its focal lengths, principal point and size count, its pose does not. A pixel is the mean of
-/// what it sees of the photograph, of values as they are stored; 0, 0, 0 if its centre lies outside of the
+/// through `lens`: its focal lengths, principal point and size count, its pose does not. A pixel is the mean
+/// of what it sees of the photograph, of values as they are stored; 0, 0, 0 if its centre lies outside of the
 /// photograph, and else at least 1, 1, 1. Where lens and camera agree, pixels are those of the photograph.
 ///
 /// ```
@@ -38,8 +38,8 @@ pub fn undistort(photo: &Raster<[u8; 3]>, lens: &PhotoLens, camera: &Camera) -> 
     assert!(!camera.is_panorama(), "a photograph is undistorted to a pinhole");
     let (width, height) = (camera.width, camera.height);
     let (f, c) = (camera.focal_px(), camera.center_px());
-    // Places of the photograph's plane, by row: one column and one row more than there are pixels, so that each
-    // pixel knows how large it is.
+    // Places of the photograph's plane, by row: one column and one row more than there are pixels, so that
+    // each pixel knows how large it is.
     let places_of = |y: u32, places: &mut Vec<Option<DVec2>>| {
         places.clear();
         let down = (f64::from(y) + 0.5 - c.y) / f.y;
@@ -128,8 +128,8 @@ mod tests {
         assert!(image.pixels().iter().zip(noise.pixels()).all(|(a, b)| *a == b.map(|v| v.max(1))));
     }
 
-    /// Every pixel against the formulas of OpenCV, written out again: those of projectPoints, and of the fisheye
-    /// module.
+    /// Every pixel against the formulas of OpenCV, written out again: those of projectPoints, and of the
+    /// fisheye module.
     #[test]
     fn pixels_come_from_where_the_formulas_put_them() {
         let (size, f, c) = ([160, 120], dvec2(90.0, 92.0), dvec2(78.0, 61.0));

@@ -66,9 +66,7 @@ impl Photographs {
             ));
         }
         let chosen = choose(cameras, source);
-        if chosen.len() < listed {
-            notes.push(format!("{}: {} of {listed} photographs are taken", list.display(), chosen.len()));
-        }
+        notes.push(format!("{}: {} of {listed} photographs are taken", list.display(), chosen.len()));
         let mut names = HashSet::new();
         if let Some(twice) = chosen.iter().find(|camera| !names.insert(camera.name.as_str())) {
             return Err(at(list, twice, "is listed twice: each photograph needs a name of its own".into()));

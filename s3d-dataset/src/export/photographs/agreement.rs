@@ -1,11 +1,11 @@
 //! How well a photograph and the mesh agree: by their edges, since light and shade differ.
 //!
-//! The view is looked at small, its longer side [`SIDE`] pixels, so that an error of a pixel or two in a pose does
-//! not count, and one of a few degrees does. An edge of the photograph is where its grey changes; an edge of the
-//! mesh where its colours do, or its depth, or the direction of its surface. Both are blurred by a pixel or so, and
-//! made less dependent on how strong an edge is. The agreement is the correlation of the photograph's edges with
-//! those of the mesh, over the pixels that show both; chance is the mean of the same with the two displaced against
-//! each other in eight directions.
+//! The view is looked at small, its longer side [`SIDE`] pixels, so that an error of a pixel or two in a pose
+//! does not count, and one of a few degrees does. An edge of the photograph is where its grey changes; an
+//! edge of the mesh where its colours do, or its depth, or the direction of its surface. Both are blurred by
+//! a pixel or so, and made less dependent on how strong an edge is. The agreement is the correlation of the
+//! photograph's edges with those of the mesh, over the pixels that show both; chance is the mean of the same
+//! with the two displaced against each other in eight directions.
 
 use crate::export::input::photographs::Photograph;
 use glam::DVec3;
@@ -98,8 +98,8 @@ fn grey(image: &Raster<[u8; 3]>) -> Vec<f64> {
     image.pixels().iter().map(of).collect()
 }
 
-/// How much a picture changes at each pixel: the length of its gradient by central differences, 0 beside what is
-/// not valid.
+/// How much a picture changes at each pixel: the length of its gradient by central differences, 0 beside what
+/// is not valid.
 fn edges(values: &[f64], size: [usize; 2], valid: &[bool]) -> Vec<f64> {
     let found = at_inner(size, |i| {
         let [left, right, up, down] = around(i, size[0]);
