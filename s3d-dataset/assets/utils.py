@@ -265,6 +265,17 @@ class Dataset:
     def depth(self, image):
         return read_depth(self.path(image, "depth"), self.conventions["depth"]["units_per_m"])
 
+    def photographs(self, area):
+        """What frames.json tells of the photographs of an area: a dict each, with the Image of its view as "image"."""
+        path = self.root / f"area_{area}" / "frames.json"
+        records = read_json(path) if path.exists() else []
+        stem = "camera_{camera_uuid}_{room}_frame_0"
+        return [{**r, "image": Image(area, "data", stem.format(**r))} for r in records]
+
+    def mask(self, image):
+        """Where an image has colours, (H, W) of bool: of a photograph all but what lies outside of it."""
+        return (self.rgb(image) != 0).any(axis=-1)
+
     def normals(self, image):
         return read_normals(self.path(image, "normal"))
 
@@ -364,6 +375,12 @@ def main():
             off = [d for d in (check_image(data, image, failures.append) for image in picked) if d is not None]
             text = f", depth and coordinates at most {max(off) * 1000:.1f} mm apart" if off else ""
             print(f"area {area} {kind}: {len(images)} images, {len(picked)} read{text}")
+        for photograph in data.photographs(area):
+            image = photograph["image"]
+            if not any(data.path(image, folder).exists() for folder in data.files):
+                failures.append(f"area {area}: the view of photograph {photograph['name']} is not there")
+            elif data.path(image, "rgb").exists() and abs(1 - data.mask(image).mean() - photograph["masked"]) > 1e-6:
+                failures.append(f"area {area}: frames.json tells of another mask of {photograph['name']}")
         folder = data.root / f"area_{area}" / "3d"
         name = "semantic.obj" if data.is_labelled else "rgb.obj"
         vertices, faces, materials = read_obj(folder / name)

@@ -116,6 +116,8 @@ pub enum UnitKind {
     Labels,
     /// All images of a scan location.
     Location,
+    /// The view of a photograph.
+    Photograph,
     /// The meshes and points of an area.
     #[serde(rename = "rest")]
     Assets,
@@ -165,6 +167,7 @@ impl fmt::Display for UnitKind {
         f.write_str(match self {
             Self::Labels => "labels",
             Self::Location => "location",
+            Self::Photograph => "photograph",
             Self::Assets => "rest",
         })
     }

@@ -136,7 +136,8 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let inputs = Inputs::open(&[scene.into()], placing, lenient)?;
     let area = &inputs.areas[0];
     let file = area.read_mesh()?;
-    let mut doubts: Vec<String> = area.warnings.iter().chain(&file.warnings).cloned().collect();
+    let mut doubts: Vec<String> =
+        area.warnings.iter().chain(&area.photographs.warnings).chain(&file.warnings).cloned().collect();
     let mesh = &file.mesh;
     let nearest = NearestFaces::new(mesh);
     let annotated = match area.is_labelled {
@@ -204,7 +205,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
         area: area.number,
         mesh: MeshInfo::of(&file),
         storeys: Headroom::of(&scene, glam::DVec3::Z).storeys(),
-        notes: area.notes.clone(),
+        notes: area.notes.iter().chain(&area.photographs.notes).cloned().collect(),
         is_labelled: area.is_labelled,
         rooms: rooms(area, &annotated),
         points: annotated.points,

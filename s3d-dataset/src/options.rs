@@ -69,6 +69,11 @@ pub struct ExportOptions {
     /// The faces' normals, or those interpolated from the mesh's own where it has some.
     #[serde(with = "normals")]
     pub normals: Normals,
+    /// How many places of a pixel its colour in views and panoramas is the mean of where surfaces end or
+    /// turn, 1 to 64: 1 is its centre, as in every other modality, and leaves stair-steps. Colours of
+    /// pictures have none.
+    #[serde(skip_serializing_if = "is_one")]
+    pub rgb_samples: u32,
     /// How much time the images' files may take. The pixels are the same.
     #[serde(with = "by_name")]
     pub compression: Compression,
@@ -111,6 +116,7 @@ impl Default for ExportOptions {
             keep_all: false,
             only: Vec::new(),
             normals: Normals::Flat,
+            rgb_samples: 1,
             compression: Compression::default(),
             xyz: XyzType::default(),
             normal_axes: NormalAxes::default(),
@@ -120,6 +126,10 @@ impl Default for ExportOptions {
             allow: Vec::new(),
         }
     }
+}
+
+fn is_one(samples: &u32) -> bool {
+    *samples == 1
 }
 
 fn is_zero(seed: &u64) -> bool {
@@ -202,6 +212,7 @@ impl ExportOptions {
             ("see", self.see.is_none() || self.place_cameras.is_none(), "left out beside place_cameras"),
             ("fill", self.fill.is_none_or(positive), "above 0"),
             ("entropy_stride", (1..=64).contains(&self.entropy_stride), "from 1 to 64"),
+            ("rgb_samples", (1..=64).contains(&self.rgb_samples), "from 1 to 64"),
             ("pad_labels", self.pad_labels.0 <= 65_536, "at most 65536"),
         ];
         match fits.iter().find(|(_, fits, _)| !fits) {

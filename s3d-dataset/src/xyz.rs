@@ -53,7 +53,7 @@ pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Res
     // Nobody may replace the data set meanwhile.
     Lock::during(ctx, layout, |completed| {
         let data = Dataset::open(layout)?;
-        let works = works(&data);
+        let works = works(&data)?;
         if completed.as_ref() == Some(&call) {
             ctx.info(format_args!(
                 "{}: what a killed process had begun is complete",
@@ -71,21 +71,24 @@ struct Work {
     depth: PathBuf,
     xyz: PathBuf,
     frame: Frame,
+    is_photograph: bool,
 }
 
 /// The images that have depth and pose, by area.
-fn works(data: &Dataset) -> Vec<Work> {
+fn works(data: &Dataset) -> Result<Vec<Work>> {
     let mut works = Vec::new();
     for area in &data.manifest.area_numbers {
+        let photographs = data.photographs(*area)?;
         for image in data.files.images(&data.layout, *area) {
             if image.has(Domain::Pose) && image.has(Domain::Depth) {
                 let path = |domain| image.path(&data.layout, domain);
                 let [pose, depth, xyz] = [Domain::Pose, Domain::Depth, Domain::GlobalXyz].map(path);
-                works.push(Work { pose, depth, xyz, frame: image.frame });
+                let is_photograph = photographs.iter().any(|p| p.camera_uuid == image.uuid);
+                works.push(Work { pose, depth, xyz, frame: image.frame, is_photograph });
             }
         }
     }
-    works
+    Ok(works)
 }
 
 fn make(ctx: &Context, data: &Dataset, works: &[Work], args: &XyzOptions, call: &str) -> Result<usize> {
@@ -163,7 +166,15 @@ fn make_one(
             let message = format!("field_of_view_rads {fov} is no angle of view");
             return Err(FileError::format(&work.pose, message).into());
         }
-        Camera::perspective(pose.pose(), fov, depth.width(), depth.height())
+        let camera = Camera::perspective(pose.pose(), fov, depth.width(), depth.height());
+        // A photograph's focal lengths and principal point are its own.
+        if !work.is_photograph {
+            camera
+        } else {
+            Camera::from_k_rt(pose.camera_k_matrix, camera.pose.rt_matrix(), depth.width(), depth.height())
+                .map(|of_k| Camera { pose: camera.pose, ..of_k })
+                .map_err(|e| FileError::format(&work.pose, e.to_string()))?
+        }
     };
     let points = points(&camera, &depth, units);
     Ok(match kind {

@@ -163,6 +163,7 @@ fn tables(c: &mut Criterion) {
                 instances: 12,
             }),
             depth_m: Some([0.5, 2.0 + f64::from(i), 9.0]),
+            photograph: None,
         })
         .collect();
     let path = dir.path().join("images.parquet");

@@ -70,6 +70,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod edge_samples;
 mod hits;
 mod picture;
 mod raster;
@@ -78,11 +79,13 @@ mod scene;
 mod shade;
 mod simd;
 
+pub use edge_samples::sample_edges;
 pub use hits::{Hits, NO_FACE};
 pub use picture::cube_map::CubeMap;
 pub use picture::cube_sources::SkyBoxTurn;
 pub use picture::picture_color::{Unseen, picture_image, picture_image_into};
 pub use picture::stitch::{Capture, StitchOptions, stitch};
+pub use picture::undistort::undistort;
 pub use raster::visibility::{Caster, cast, cast_ray_by_ray, cast_strided};
 pub use ray::caster::{Hit, Sight, cast_ray, cast_ray_brute_force};
 pub use scene::Scene;

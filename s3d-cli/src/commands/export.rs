@@ -78,6 +78,10 @@ pub(crate) struct OptionArgs {
     /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
     #[arg(long)]
     pub(crate) smooth_normals: bool,
+    /// Take N samples of the colour of a pixel where surfaces end or turn, so that there are no stair-steps;
+    /// all other images keep one.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=64))]
+    pub(crate) rgb_samples: u32,
     /// Skip and count what is not as it should be in the annotations — odd names, lines that are no points,
     /// unknown classes — instead of stopping at it.
     #[arg(long)]
@@ -140,6 +144,7 @@ impl From<OptionArgs> for ExportOptions {
             keep_all: args.keep_all,
             only: args.only,
             normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
+            rgb_samples: args.rgb_samples,
             compression: args.compression,
             xyz,
             normal_axes,

@@ -61,6 +61,9 @@ pub(crate) struct RenderArgs {
     /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
     #[arg(long)]
     pub(crate) smooth_normals: bool,
+    /// Take N samples of the colour of a pixel where surfaces end or turn; all other images keep one.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=64))]
+    pub(crate) rgb_samples: u32,
     /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make
     /// them) or small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
@@ -80,6 +83,7 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
         up: args.mesh.up,
         units: args.mesh.units,
         normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
+        rgb_samples: args.rgb_samples,
         compression: args.compression,
         overwrite: args.overwrite,
     };

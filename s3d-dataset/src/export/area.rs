@@ -9,8 +9,9 @@ use crate::export::input::pictures::Pictures;
 use crate::export::labels::annotate::{Annotated, annotate, hidden_instances, unannotated};
 use crate::export::labels::area_plan::{AreaPlan, RoomNames};
 use crate::export::labels::overlap::overlap_doubts;
-use crate::export::location::{Located, locate, look_around};
+use crate::export::location::{Located, locate, look_around, room_of};
 use crate::export::modality::Channels;
+use crate::export::photographs::{self, WrittenPhotograph, judge_sight};
 use crate::export::points::write_points;
 use crate::export::views::{Candidate, Kinds, Scoring, score_area};
 use crate::options::ExportOptions;
@@ -188,7 +189,11 @@ pub(crate) fn label_area(
         locate(ctx, area, scene, &nearest, &annotated, table, options.seed)?;
     drop(nearest);
     let outlooks = look_around(ctx, scene, &locations)?;
-    judge(ctx, &outlook_findings(&outlooks), &options.allow)?;
+    // Photographs need no locations beside them.
+    if !outlooks.is_empty() {
+        judge(ctx, &outlook_findings(&outlooks), &options.allow)?;
+    }
+    judge_sight(ctx, &area.photographs, scene, &options.allow)?;
     for (outlook, location) in outlooks.iter().zip(&locations) {
         ctx.warn_each(outlook.warnings(location));
     }
@@ -273,7 +278,8 @@ fn labels_done(
     files: Vec<FileRecord>,
 ) -> LabelsDone {
     let locations = plan.locations.iter().map(|l| l.uuid.clone()).collect();
-    LabelsDone { entry: Box::new(area_entry(area, plan, options)), locations, files }
+    let photographs = area.photographs.all.iter().map(|p| p.uuid.clone()).collect();
+    LabelsDone { entry: Box::new(area_entry(area, plan, options)), locations, photographs, files }
 }
 
 /// The locations of an area whose candidates are ours to score and are not scored yet.
@@ -342,6 +348,7 @@ fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> Are
         locations: plan.locations.len(),
         panoramas: 0,
         views: 0,
+        frames: area.photographs.all.len() as u64,
         xyz: XyzLoss::of(plan.mesh_box, options.xyz),
         rgb: area.pictures.as_ref().map_or("texture", |p| p.kind.name()).to_owned(),
         place_cameras: area.cameras.distance_m(),
@@ -466,6 +473,24 @@ pub(crate) fn render_area(
         account.unit_finished(UnitKind::Location, number, Some(uuid), &tally, started);
         Ok(())
     };
+    let is_asked = |uuid: &str| todo.contains(&Unit::Photograph(number, uuid.to_owned()));
+    let photographs: Vec<photographs::Shot<'_>> = area
+        .photographs
+        .all
+        .iter()
+        .filter(|p| is_asked(&p.uuid))
+        .map(|photograph| {
+            let room = room_of(&annotated.rooms, photograph.camera.pose.location);
+            photographs::Shot { photograph, room }
+        })
+        .collect();
+    let finish_photograph = |written: WrittenPhotograph| {
+        let WrittenPhotograph { done, started } = written;
+        let (uuid, tally) = (done.record.camera_uuid.clone(), done.tally);
+        journal.write(Done::Photograph(done))?;
+        account.unit_finished(UnitKind::Photograph, number, Some(&uuid), &tally, started);
+        Ok(())
+    };
     let job = ImageJob {
         layout,
         area: number,
@@ -474,6 +499,7 @@ pub(crate) fn render_area(
             textures: &textures,
             pictures: None,
             normals: options.normals,
+            rgb_samples: options.rgb_samples,
             label_of_face: &label_of_face,
             pretty_of_face: &pretty_of_face,
             compression: options.compression,
@@ -484,11 +510,13 @@ pub(crate) fn render_area(
         rooms: location_rooms,
         is_filled: &is_filled,
         chosen: &chosen,
+        photographs: &photographs,
         modalities: &options.modalities,
         size: options.size,
         pano_width: options.pano_width,
         offset_m: area.frame.offset(),
         each: &finish_location,
+        each_photograph: &finish_photograph,
     };
     let rendering = account.stage(Stage::Render, Some(number));
     let assets = || write_area_assets(area, file, plan, common);

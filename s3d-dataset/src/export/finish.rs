@@ -3,6 +3,7 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::export::photographs::doubts;
 use crate::export::views::select_requested;
 use crate::profile::{self};
 use crate::store::journal::{Finished, Unit};
@@ -14,8 +15,8 @@ use crate::tables::records;
 use crate::tables::statistics::Statistics;
 use crate::tables::summary::{UnitTally, Unlabelled, ViewTally};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Domain, FileRecord, Frame, Layout};
-use s3d_io::fs::{SyncAhead, create_dir, sync_data_set, sync_file};
+use s3d_io::dataset::{Domain, FileRecord, Frame, Layout, PhotographRecord};
+use s3d_io::fs::{SyncAhead, create_dir, sync_data_set, sync_file, write_json};
 use s3d_label::Taxonomy;
 use s3d_sample::folds;
 use std::fs;
@@ -50,6 +51,8 @@ pub(crate) fn missing_units(request: &Request, finished: &Finished) -> Vec<Unit>
                 missing.push(Unit::Location(area, uuid.clone()));
             }
         }
+        let photographs = labels.photographs.iter().filter(|uuid| is_chosen(request, uuid));
+        missing.extend(photographs.map(|uuid| Unit::Photograph(area, uuid.clone())));
         missing.push(Unit::Assets(area));
     }
     missing.retain(|unit| !finished.has(unit));
@@ -88,7 +91,15 @@ pub(crate) fn finish(
         let area = requested.area;
         records::write_views(layout, area, &candidates)?;
         let Some(labels) = finished.labels(area) else { continue };
-        let tally: UnitTally = finished.locations(area).map(|done| done.tally).sum();
+        let photographs: Vec<&PhotographRecord> =
+            finished.photographs(area).map(|done| &done.record).collect();
+        if !labels.photographs.is_empty() {
+            write_json(&layout.frames_json(area), &photographs)?;
+            doubts(area, &photographs).iter().for_each(|doubt| ctx.warn(doubt));
+        }
+        let of_photographs = finished.photographs(area).map(|done| done.tally);
+        let of_locations = finished.locations(area).map(|done| done.tally);
+        let tally: UnitTally = of_locations.chain(of_photographs).sum();
         locations += labels.locations.len();
         let mut pixels = tally.panoramas;
         pixels += tally.views;
@@ -114,6 +125,7 @@ pub(crate) fn finish(
             points: finished.assets(area).map_or(0, |assets| assets.points),
             panoramas: tally.panoramas.images,
             views: tally.views.images,
+            frames: photographs.len() as u64,
             inputs: requested.inputs.clone(),
             ..(*labels.entry).clone()
         });
@@ -189,6 +201,7 @@ fn write_profiles(
 /// The files of a data set that no unit wrote.
 fn table_files(layout: &Layout, areas: &[u32]) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = areas.iter().map(|area| layout.views_json(*area)).collect();
+    files.extend(areas.iter().map(|area| layout.frames_json(*area)).filter(|path| path.is_file()));
     for entry in layout.entries(&[]) {
         if entry == layout.manifest() || entry == layout.file_list() {
             continue;

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::export::input::pictures::Pictures;
 use crate::export::location::room_name;
 use crate::export::modality::{Channels, Image, ImageBuffers};
+use crate::export::photographs::{self, WrittenPhotograph, write_photograph};
 use crate::export::views::Candidate;
 use crate::export::work::for_each_in_order;
 use crate::tables::summary::{ImageTally, UnitTally};
@@ -32,6 +33,8 @@ pub(crate) struct ImageJob<'a> {
     pub(crate) is_filled: &'a [bool],
     /// Whether a location's images are to be written.
     pub(crate) chosen: &'a [bool],
+    /// Photographs whose views are to be written.
+    pub(crate) photographs: &'a [photographs::Shot<'a>],
     pub(crate) modalities: &'a [Domain],
     pub(crate) size: u32,
     pub(crate) pano_width: u32,
@@ -39,6 +42,8 @@ pub(crate) struct ImageJob<'a> {
     pub(crate) offset_m: Option<[f64; 3]>,
     /// ReadManifest of every location whose images are all there, by whichever thread wrote the last.
     pub(crate) each: &'a (dyn Fn(WrittenLocation) -> Result<()> + Sync),
+    /// Told of every photograph whose view is there.
+    pub(crate) each_photograph: &'a (dyn Fn(WrittenPhotograph) -> Result<()> + Sync),
 }
 
 /// A location all of whose images are there.
@@ -76,6 +81,7 @@ type AssetsWriter<'a> = &'a (dyn Fn() -> Result<()> + Sync);
 enum Work<'a> {
     Assets(AssetsWriter<'a>),
     Shot(&'a Shot),
+    Photograph(&'a photographs::Shot<'a>),
 }
 
 /// Renders and writes the panoramas of the chosen locations and their kept views. `assets` is done once, by
@@ -97,19 +103,20 @@ pub(crate) fn write_images(
             create_dir(&job.layout.image_dir(job.area, frame, *domain))?;
         }
     }
-    let progress = ctx.progress("rendering", "images", shots.len() as u64);
+    let progress = ctx.progress("rendering", "images", (shots.len() + job.photographs.len()) as u64);
     let Some(pictures) = job.pictures else {
         return write_shots(ctx, job, &shots, &open, assets, &progress);
     };
+    let alone = ImageJob { photographs: &[], ..*job };
     // A location after another: one cube map is in memory, and all threads work with it.
     let mut assets = assets;
     for shots in shots.chunk_by(|a, b| a.location == b.location) {
         let location = shots[0].location;
         let cube = pictures.cube(ctx, location, &job.locations[location], job.channels.scene)?;
         let channels = Channels { pictures: cube.as_ref().map(|cube| pictures.colors(cube)), ..job.channels };
-        write_shots(ctx, &ImageJob { channels, ..*job }, shots, &open, assets.take(), &progress)?;
+        write_shots(ctx, &ImageJob { channels, ..alone }, shots, &open, assets.take(), &progress)?;
     }
-    assets.map_or(Ok(()), |assets| assets())
+    write_shots(ctx, job, &[], &open, assets, &progress)
 }
 
 fn write_shots(
@@ -125,10 +132,16 @@ fn write_shots(
         hits: Hits::default(),
         buffers: ImageBuffers::default(),
     };
+    let photographs = job.photographs.iter().map(Work::Photograph);
     let works: Vec<Work<'_>> =
-        assets.map(Work::Assets).into_iter().chain(shots.iter().map(Work::Shot)).collect();
+        assets.map(Work::Assets).into_iter().chain(shots.iter().map(Work::Shot)).chain(photographs).collect();
     for_each_in_order(ctx, &works, memory, |memory, work| match work {
         Work::Assets(assets) => assets(),
+        Work::Photograph(shot) => {
+            let written = write_photograph(job, shot, memory)?;
+            progress.add(1);
+            (job.each_photograph)(written)
+        }
         Work::Shot(shot) => {
             let started = Instant::now();
             let written = write_shot(job, shot, memory)?;
@@ -166,20 +179,17 @@ fn shots(job: &ImageJob<'_>, candidates: &[Candidate]) -> Vec<Shot> {
 }
 
 /// What a thread keeps from image to image.
-struct Memory<'s> {
-    caster: Caster<'s, 's>,
-    hits: Hits,
-    buffers: ImageBuffers,
+pub(crate) struct Memory<'s> {
+    pub(crate) caster: Caster<'s, 's>,
+    pub(crate) hits: Hits,
+    pub(crate) buffers: ImageBuffers,
 }
 
 /// What was written of a shot.
 #[derive(Default)]
 struct WrittenShot {
     files: Vec<FileRecord>,
-    pixels: u64,
-    pixels_missing: u64,
-    pixels_unlabelled: u64,
-    pixels_filled: u64,
+    tally: ImageTally,
 }
 
 impl OpenLocation {
@@ -189,13 +199,7 @@ impl OpenLocation {
         self.tally.files += shot.files.len() as u64;
         self.tally.bytes += shot.files.iter().map(|f| f.bytes).sum::<u64>();
         let kind = if frame == Frame::Panorama { &mut self.tally.panoramas } else { &mut self.tally.views };
-        *kind += ImageTally {
-            images: 1,
-            pixels: shot.pixels,
-            pixels_missing: shot.pixels_missing,
-            pixels_unlabelled: shot.pixels_unlabelled,
-            pixels_filled: shot.pixels_filled,
-        };
+        *kind += ImageTally { images: 1, ..shot.tally };
         self.files.extend(shot.files);
     }
 }
@@ -224,14 +228,21 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
         written.files.push(write(Domain::Pose, &pose.to_json())?);
     }
     if !images.is_empty() {
-        written.pixels = hits.face.len() as u64;
-        let faces = hits.face.pixels();
-        written.pixels_missing = faces.iter().filter(|face| **face == NO_FACE).count() as u64;
-        written.pixels_unlabelled = buffers.unlabelled;
-        if images.contains(&Image::Semantic) && !job.is_filled.is_empty() {
-            let is_filled = |face: &&u32| **face != NO_FACE && job.is_filled[**face as usize];
-            written.pixels_filled = faces.iter().filter(is_filled).count() as u64;
-        }
+        written.tally = count(job, &images, hits, buffers);
     }
     Ok(written)
+}
+
+/// The pixels of an image that was cast and encoded; it counts for none itself.
+pub(crate) fn count(job: &ImageJob<'_>, images: &[Image], hits: &Hits, buffers: &ImageBuffers) -> ImageTally {
+    let faces = hits.face.pixels();
+    let is_filled = |face: &&u32| **face != NO_FACE && job.is_filled[**face as usize];
+    let counts_filled = images.contains(&Image::Semantic) && !job.is_filled.is_empty();
+    ImageTally {
+        images: 0,
+        pixels: hits.face.len() as u64,
+        pixels_missing: faces.iter().filter(|face| **face == NO_FACE).count() as u64,
+        pixels_unlabelled: buffers.unlabelled,
+        pixels_filled: if counts_filled { faces.iter().filter(is_filled).count() as u64 } else { 0 },
+    }
 }

@@ -226,7 +226,8 @@ impl<'a> Job<'a> {
         }
         let finished = common.journal.finished();
         let labels = self.request.areas.iter().filter_map(|a| finished.labels(a.area));
-        only_known(labels.flat_map(|l| &l.locations).map(String::as_str), &self.options.only)?;
+        let uuids = labels.flat_map(|l| l.locations.iter().chain(&l.photographs));
+        only_known(uuids.map(String::as_str), &self.options.only)?;
         Ok(labelled)
     }
 
@@ -344,7 +345,9 @@ fn check_only(inputs: &Inputs, only: &[String]) -> Result<()> {
     if inputs.areas.iter().any(|a| matches!(a.cameras, Cameras::Placed(_))) {
         return Ok(());
     }
-    only_known(inputs.areas.iter().flat_map(|a| a.cameras.listed()).map(|l| l.uuid.as_str()), only)
+    let locations = inputs.areas.iter().flat_map(|a| a.cameras.listed()).map(|l| l.uuid.as_str());
+    let photographs = inputs.areas.iter().flat_map(|a| &a.photographs.all).map(|p| p.uuid.as_str());
+    only_known(locations.chain(photographs), only)
 }
 
 fn only_known<'a>(uuids: impl Iterator<Item = &'a str>, only: &[String]) -> Result<()> {

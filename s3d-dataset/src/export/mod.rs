@@ -12,6 +12,7 @@ pub(crate) mod job;
 pub(crate) mod labels;
 pub(crate) mod location;
 pub(crate) mod modality;
+pub(crate) mod photographs;
 pub(crate) mod points;
 pub(crate) mod transfer;
 pub(crate) mod views;

@@ -8,7 +8,7 @@ use s3d_io::dataset::{Conventions, DepthUnits, Domain, XyzType};
 use s3d_io::image::{Compression, Content, encode_gray16, encode_rgb8, encode_xyz_float, encode_xyz_half};
 use s3d_render::{
     Hits, MipMaps, Modalities, Normals, Scene, Shading, TextureFilter, ViewImages, color_per_face_image_into,
-    depth_image_into, depth_image_mm_into, index_image_into, normal_image_into, rgb_image_into,
+    depth_image_into, depth_image_mm_into, index_image_into, normal_image_into, rgb_image_into, sample_edges,
     view_images_into, xyz_image_half_into, xyz_image_into,
 };
 
@@ -20,6 +20,8 @@ pub(crate) struct Channels<'a> {
     /// Colours that are not the textures'.
     pub(crate) pictures: Option<PictureColors<'a>>,
     pub(crate) normals: Normals,
+    /// How many places of a pixel at an edge its colour is the mean of; 1 for its centre alone.
+    pub(crate) rgb_samples: u32,
     /// The label index of each face; may be empty if no semantic image is asked for.
     pub(crate) label_of_face: &'a [u32],
     /// The colour of each face in pretty images; may be empty likewise.
@@ -163,6 +165,9 @@ impl Channels<'_> {
             Image::GlobalXyz => made.xyz,
         };
         if is_made {
+            if image == Image::Rgb {
+                self.sample_edges(hits, camera, rgb);
+            }
             return;
         }
         match image {
@@ -171,6 +176,7 @@ impl Channels<'_> {
                 None => {
                     let filter = TextureFilter::default();
                     rgb_image_into(self.scene, self.textures, hits, camera, &filter, rgb);
+                    self.sample_edges(hits, camera, rgb);
                 }
             },
             Image::Depth => match depth_units {
@@ -187,6 +193,12 @@ impl Channels<'_> {
             Image::GlobalXyz if xyz_type == XyzType::Float => xyz_image_into(hits, camera, xyz_float),
             Image::GlobalXyz => xyz_image_half_into(hits, camera, xyz),
         }
+    }
+
+    /// Takes more samples at the edges of colours that are the mesh's, if they are asked for.
+    fn sample_edges(&self, hits: &Hits, camera: &Camera, rgb: &mut Raster<[u8; 3]>) {
+        let filter = TextureFilter::default();
+        sample_edges(self.scene, self.textures, hits, camera, &filter, self.rgb_samples, rgb);
     }
 
     /// The file of an image that is drawn.

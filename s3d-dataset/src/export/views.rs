@@ -302,6 +302,7 @@ mod tests {
         finished.insert(Done::Labels(LabelsDone {
             entry: Box::new(serde_json::from_value(entry).unwrap()),
             locations: vec!["a".into()],
+            photographs: Vec::new(),
             files: Vec::new(),
         }));
         let scores = |n| Done::Scores(ScoresDone { area, location: "a".into(), entropies: vec![1.0; n] });

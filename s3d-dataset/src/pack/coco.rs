@@ -12,6 +12,7 @@ use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::{Content, encode_rgb8};
 use s3d_io::package::{CocoImage, coco_categories, coco_panoptic, write_coco};
 use s3d_label::{Class, Taxonomy};
+use s3d_render::MISSING_INDEX;
 use std::path::Path;
 
 /// The folder of panoptic images, and the file about them.
@@ -48,7 +49,13 @@ pub(super) fn pack(
         || (),
         |(), (id, image)| {
             let path = image.path(&source.layout, Domain::Semantic);
-            let semantic = source.rgb8(image, Domain::Semantic)?;
+            let mut semantic = source.rgb8(image, Domain::Semantic)?;
+            // What is not in the photograph is nothing that could be learnt.
+            if source.photograph(image).is_some_and(|p| p.masked > 0.0) {
+                let color = source.rgb8(image, Domain::Rgb)?;
+                let pairs = semantic.pixels_mut().iter_mut().zip(color.pixels());
+                pairs.filter(|(_, color)| **color == [0; 3]).for_each(|(label, _)| *label = MISSING_INDEX);
+            }
             let (panoptic, segments) = coco_panoptic(&semantic, &table, &stuff).map_err(|e| {
                 FileError::format(&path, format!("{e} in {}", source.layout.labels_json().display()))
             })?;

@@ -12,11 +12,14 @@ use s3d_io::Error as FileError;
 use s3d_io::cloud::write_colored_points;
 use s3d_io::dataset::{DatasetImage, Domain, Frame};
 use s3d_io::fs::{create_dir, write_bytes};
-use s3d_io::image::encode_gray16;
+use s3d_io::image::{encode_gray8, encode_gray16};
 use s3d_io::package::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 use std::path::{Path, PathBuf};
 
 const PLY: &str = "points.ply";
+
+/// The folder of masks.
+const MASKS: &str = "masks";
 
 pub(super) fn pack(
     ctx: &Context,
@@ -43,7 +46,15 @@ pub(super) fn pack(
             continue;
         }
         let below = format!("area_{area}");
-        let job = Job::new(source, destination, &below, depth, options)?;
+        let is_masked = |image: &&DatasetImage| source.photograph(image).is_some_and(|p| p.masked > 0.0);
+        let masks = images.iter().any(is_masked);
+        let job = Job { masks, ..Job::new(source, destination, &below, depth, options)? };
+        if masks {
+            create_dir(&job.folder.join(MASKS))?;
+            notes.push(format!(
+                "{below}: {MASKS} are 0 where a view lies outside of its photograph; all its views have one"
+            ));
+        }
         let points = area_points(source, area, options.points)?;
         let ply = (!points.is_empty()).then_some(PLY);
         if ply.is_some() {
@@ -95,6 +106,8 @@ struct Job<'a> {
     place: PathBuf,
     root: PathBuf,
     depth: DepthFiles,
+    /// Whether views have masks.
+    masks: bool,
     options: &'a SpecificOptions,
 }
 
@@ -116,7 +129,7 @@ impl<'a> Job<'a> {
             create_dir(&folder.join("depths"))?;
         }
         let (place, root) = (absolute(destination.place())?.join(below), absolute(source.layout.root())?);
-        Ok(Self { source, folder, place, root, depth, options })
+        Ok(Self { source, folder, place, root, depth, masks: false, options })
     }
 
     /// Writes what belongs to an image, and tells of it.
@@ -135,6 +148,11 @@ impl<'a> Job<'a> {
                 NerfstudioFrame::equirectangular(rgb, &pose, size)
             }
         };
+        if self.masks && camera == NerfstudioCamera::Perspective {
+            let name = format!("{MASKS}/{}_mask.png", image.stem());
+            write_bytes(&self.folder.join(&name), &encode_gray8(&self.mask(image, size)?))?;
+            frame.mask_path = Some(name);
+        }
         frame.depth_file_path = match self.depth {
             DepthFiles::None => None,
             DepthFiles::Original => Some(self.file(image, Domain::Depth, "depths")?),
@@ -150,6 +168,15 @@ impl<'a> Job<'a> {
             }
         };
         Ok(frame)
+    }
+
+    /// 255 where an image has something to say: of a photograph where it is, of others everywhere.
+    fn mask(&self, image: &DatasetImage, (width, height): (u32, u32)) -> Result<Raster<u8>> {
+        if self.source.photograph(image).is_none() {
+            return Ok(Raster::filled(width, height, 255));
+        }
+        let color = self.source.rgb8(image, Domain::Rgb)?;
+        Ok(color.map(|color| if color == [0; 3] { 0 } else { 255 }))
     }
 
     /// The path of an image's file from the area's folder: the data set's, or a copy in `copies`.

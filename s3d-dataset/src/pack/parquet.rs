@@ -68,6 +68,7 @@ fn row(
         room_number,
         files: Domain::ALL.map(|d| image.has(d).then(|| image.relative_path(d))),
         size: image.size(&source.layout)?.map(|(w, h)| [w, h]),
+        photograph: source.photograph(image).map(|p| p.name.clone()),
         ..ImageRow::default()
     };
     let view = match image.frame {
@@ -83,7 +84,7 @@ fn row(
         row.location = Some(pose.camera_location);
         row.k = Some(flat(&pose.camera_k_matrix));
         row.rt = Some(flat(&pose.camera_rt_matrix));
-        if row.frame_num.is_some() {
+        if row.frame_num.is_some() && row.photograph.is_none() {
             let (yaw, pitch) = pose.original().yaw_pitch_to(&pose.pose());
             row.yaw_pitch_rad = Some([yaw, pitch]);
         }

@@ -7,13 +7,13 @@ use crate::tables::dataset::{Dataset, Listed};
 use s3d_geom::{PointCloud, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    DatasetImage, Domain, Frame, Layout, PoseFile, ViewRecord, WorldOffsets, check_images_complete,
-    read_labels, read_pose, read_views,
+    DatasetImage, Domain, Frame, Layout, PhotographRecord, PoseFile, ViewRecord, WorldOffsets,
+    check_images_complete, read_labels, read_pose, read_views,
 };
 use s3d_io::fs::write_bytes;
 use s3d_io::image::{decode_gray16, decode_rgb8};
 use s3d_label::{LabelTable, Taxonomy};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The depth of a pixel that shows nothing, or something farther than can be said.
@@ -34,12 +34,20 @@ pub(crate) struct Source {
     offsets: WorldOffsets,
     /// Whether there are labels.
     is_labelled: bool,
+    /// What is told of photographs, by area and camera.
+    photographs: BTreeMap<(u32, String), PhotographRecord>,
 }
 
 impl Source {
     /// Opens the complete data set in `root`.
     pub(crate) fn open(ctx: &Context, root: &Path, areas: &[u32], which: PackedImages) -> Result<Self> {
-        let Dataset { layout, manifest, files, taxonomy } = Dataset::open(&Layout::new(root))?;
+        let data = Dataset::open(&Layout::new(root))?;
+        let mut photographs = BTreeMap::new();
+        for &area in &data.manifest.area_numbers {
+            let of_area = data.photographs(area)?.into_iter();
+            photographs.extend(of_area.map(|record| ((area, record.camera_uuid.clone()), record)));
+        }
+        let Dataset { layout, manifest, files, taxonomy } = data;
         let there = &manifest.area_numbers;
         if let Some(area) = areas.iter().find(|a| !there.contains(a)) {
             let there: Vec<String> = there.iter().map(u32::to_string).collect();
@@ -72,7 +80,17 @@ impl Source {
         let depth_units_per_m = manifest.conventions().depth_units.per_m();
         let offsets = manifest.request().world_offsets();
         let is_labelled = manifest.is_labelled();
-        Ok(Self { layout, files, taxonomy, areas, images, depth_units_per_m, offsets, is_labelled })
+        Ok(Self {
+            layout,
+            files,
+            taxonomy,
+            areas,
+            images,
+            depth_units_per_m,
+            offsets,
+            is_labelled,
+            photographs,
+        })
     }
 
     /// Which frame coordinates are in, a sentence for each area whose scan has another.
@@ -82,6 +100,12 @@ impl Source {
             format!("area {area}: coordinates are those of its scan less offset_m = {offset_m:?}")
         };
         packed.map(note).collect()
+    }
+
+    /// What is told of the photograph that an image is the view of.
+    pub(crate) fn photograph(&self, image: &DatasetImage) -> Option<&PhotographRecord> {
+        let record = self.photographs.get(&(image.area, image.uuid.clone()));
+        record.filter(|_| image.frame == Frame::View(0))
     }
 
     /// The images of an area.

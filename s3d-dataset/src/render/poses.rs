@@ -113,7 +113,7 @@ pub fn render_poses(
         check_free(output, overwrite)?;
     }
     let world_from_poses = DAffine3::from_mat3(options.poses_up.rotation());
-    let PosedCameras { cameras, untracked } = read_posed_cameras(poses, &world_from_poses)?;
+    let PosedCameras { cameras, untracked, .. } = read_posed_cameras(poses, &world_from_poses)?;
     let mut frames = frames(poses, &cameras, &options.intrinsics)?;
     tell_of_list(ctx, &cameras, untracked);
 
@@ -138,7 +138,8 @@ pub fn render_poses(
     let seconds = started.elapsed().as_secs_f64();
 
     let places = frames.iter().map(|frame| frame.camera.pose.location.as_vec3());
-    let findings = poses_findings(blind, frames.len() as u64, &Aabb::from_points(places), &file.mesh.aabb());
+    let (places, count) = (Aabb::from_points(places), frames.len() as u64);
+    let findings = poses_findings(blind, count, &places, &file.mesh.aabb(), "--up and --poses-up");
     judge_of(("the views", "write them"), ctx, &findings, &options.allow)?;
     let is_panorama = frames.first().is_some_and(|frame| frame.camera.is_panorama());
     let listed = |frame: &Frame<'_>| NerfstudioFrame::new(format!("rgb/{}.png", frame.stem), &frame.camera);

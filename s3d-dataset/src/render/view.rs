@@ -46,6 +46,8 @@ pub struct RenderOptions {
     pub units: Option<LengthUnit>,
     /// The faces' normals, or those interpolated from the mesh's own where it has some.
     pub normals: Normals,
+    /// As [`ExportOptions::rgb_samples`](crate::ExportOptions::rgb_samples).
+    pub rgb_samples: u32,
     /// How much time the images' files may take.
     pub compression: Compression,
     /// Replace images that are there.
@@ -54,13 +56,8 @@ pub struct RenderOptions {
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self {
-            up: UpAxis::Y,
-            units: None,
-            normals: Normals::Flat,
-            compression: Compression::default(),
-            overwrite: false,
-        }
+        let (normals, compression) = (Normals::Flat, Compression::default());
+        Self { up: UpAxis::Y, units: None, normals, rgb_samples: 1, compression, overwrite: false }
     }
 }
 
@@ -78,6 +75,7 @@ pub(super) fn channels<'a>(
         textures,
         pictures: None,
         normals: options.normals,
+        rgb_samples: options.rgb_samples,
         label_of_face: &[],
         pretty_of_face: &[],
         compression: options.compression,

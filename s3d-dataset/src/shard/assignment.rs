@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::store::checked::{read_checked, write_checked};
 use crate::store::journal::Unit;
 use crate::tables::listing::walk;
+use s3d_geom::Camera;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;
 use serde::{Deserialize, Serialize};
@@ -112,6 +113,11 @@ pub(crate) fn location_cost(pano_width: u32, size: u32, kept_views: u64) -> u64 
     let view = u64::from(size) * u64::from(size);
     let views = NS_PER_PIXEL.saturating_mul(view).saturating_mul(kept_views);
     NS_PER_PIXEL.saturating_mul(panorama).saturating_add(views)
+}
+
+/// The cost of a photograph's view: its photograph is read and undistorted, too.
+pub(crate) fn photograph_cost(camera: &Camera) -> u64 {
+    2 * NS_PER_PIXEL * u64::from(camera.width) * u64::from(camera.height)
 }
 
 /// The cost of an area's meshes and points.

@@ -78,7 +78,7 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         let is_ours = |unit: &Unit| match unit {
             Unit::Scores(_, uuid) => position_of(uuid).is_some_and(|position| part.takes(position)),
             Unit::Labels(_) => true,
-            Unit::Location(..) | Unit::Assets(_) => false,
+            Unit::Location(..) | Unit::Photograph(..) | Unit::Assets(_) => false,
         };
         job.plan_area(area, &layout, &journal, &account, &is_ours)?;
     }

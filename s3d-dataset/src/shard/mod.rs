@@ -13,7 +13,7 @@ use crate::export::input::memory::SceneSource;
 use crate::export::job::{Job, Labelled, Scope, Target};
 use crate::export::views::{Candidate, select_requested};
 use crate::options::ExportOptions;
-use crate::shard::assignment::{Assignment, Shard, assets_cost, location_cost};
+use crate::shard::assignment::{Assignment, Shard, assets_cost, location_cost, photograph_cost};
 use crate::shard::plan::Plan;
 use crate::store::journal::{Done, Journal, Unit};
 use crate::store::output::{self, Begin};
@@ -88,7 +88,7 @@ impl Job<'_> {
         let is_ours = |unit: &Unit| match unit {
             Unit::Labels(_) => labels_are_ours(unit),
             Unit::Scores(_, uuid) => self.plan.is_none() || keeper(uuid, shard.of) == shard.number,
-            Unit::Location(..) | Unit::Assets(_) => false,
+            Unit::Location(..) | Unit::Photograph(..) | Unit::Assets(_) => false,
         };
         journal.check(ctx, layout, |unit| matches!(unit, Unit::Labels(_)) && is_ours(unit))?;
         let labelled = self.label(self.common(layout, journal, account, &cache, &is_ours), Scope::All)?;
@@ -119,6 +119,12 @@ impl Job<'_> {
                 let views = kept.get(&(plan.area, location.uuid.as_str())).copied().unwrap_or(0);
                 let cost = location_cost(options.pano_width, options.size, views);
                 units.push((Unit::Location(plan.area, location.uuid.clone()), cost));
+            }
+        }
+        for area in &self.inputs.areas {
+            for photograph in area.photographs.all.iter().filter(|p| is_chosen(&self.request, &p.uuid)) {
+                let cost = photograph_cost(&photograph.camera);
+                units.push((Unit::Photograph(area.number, photograph.uuid.clone()), cost));
             }
         }
         let mut assignment = Assignment::new(units, shards);

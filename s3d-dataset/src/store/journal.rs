@@ -11,7 +11,7 @@ use crate::tables::listing::faults;
 use crate::tables::manifest::AreaEntry;
 use crate::tables::summary::UnitTally;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{FileRecord, Layout};
+use s3d_io::dataset::{FileRecord, Layout, PhotographRecord};
 use s3d_io::fs::{Checksum, create_dir, read_file};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,6 +31,8 @@ pub(crate) enum Unit {
     Scores(u32, String),
     /// All images of a scan location: area, uuid.
     Location(u32, String),
+    /// The view of a photograph: area, uuid of its camera.
+    Photograph(u32, String),
     /// The meshes and points of an area.
     Assets(u32),
 }
@@ -39,9 +41,11 @@ impl Unit {
     /// The area that it is of.
     pub(crate) fn area(&self) -> u32 {
         match self {
-            Self::Labels(area) | Self::Scores(area, _) | Self::Location(area, _) | Self::Assets(area) => {
-                *area
-            }
+            Self::Labels(area)
+            | Self::Scores(area, _)
+            | Self::Location(area, _)
+            | Self::Photograph(area, _)
+            | Self::Assets(area) => *area,
         }
     }
 }
@@ -52,6 +56,7 @@ impl fmt::Display for Unit {
             Self::Labels(area) => write!(f, "labels of area {area}"),
             Self::Scores(area, uuid) => write!(f, "scores of location {uuid} of area {area}"),
             Self::Location(area, uuid) => write!(f, "images of location {uuid} of area {area}"),
+            Self::Photograph(area, uuid) => write!(f, "view of photograph {uuid} of area {area}"),
             Self::Assets(area) => write!(f, "meshes and points of area {area}"),
         }
     }
@@ -64,6 +69,7 @@ pub(crate) enum Done {
     Labels(LabelsDone),
     Scores(ScoresDone),
     Location(LocationDone),
+    Photograph(PhotographDone),
     Assets(AssetsDone),
 }
 
@@ -74,6 +80,9 @@ pub(crate) struct LabelsDone {
     pub(crate) entry: Box<AreaEntry>,
     /// The uuids of its scan locations, in their order.
     pub(crate) locations: Vec<String>,
+    /// The uuids of the cameras of its photographs, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) photographs: Vec<String>,
     pub(crate) files: Vec<FileRecord>,
 }
 
@@ -95,6 +104,16 @@ pub(crate) struct LocationDone {
     pub(crate) files: Vec<FileRecord>,
 }
 
+/// The view of a photograph is there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PhotographDone {
+    pub(crate) area: u32,
+    /// What `frames.json` tells of it.
+    pub(crate) record: PhotographRecord,
+    pub(crate) tally: UnitTally,
+    pub(crate) files: Vec<FileRecord>,
+}
+
 /// The meshes and points of an area are there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct AssetsDone {
@@ -111,6 +130,7 @@ impl Done {
             Self::Labels(done) => Unit::Labels(done.entry.area),
             Self::Scores(done) => Unit::Scores(done.area, done.location.clone()),
             Self::Location(done) => Unit::Location(done.area, done.location.clone()),
+            Self::Photograph(done) => Unit::Photograph(done.area, done.record.camera_uuid.clone()),
             Self::Assets(done) => Unit::Assets(done.area),
         }
     }
@@ -121,6 +141,7 @@ impl Done {
             Self::Labels(done) => &done.files,
             Self::Scores(_) => &[],
             Self::Location(done) => &done.files,
+            Self::Photograph(done) => &done.files,
             Self::Assets(done) => &done.files,
         }
     }
@@ -129,6 +150,7 @@ impl Done {
     pub(crate) fn tally(&self) -> UnitTally {
         match self {
             Self::Location(done) => done.tally,
+            Self::Photograph(done) => done.tally,
             _ => tally_of(self.files()),
         }
     }
@@ -222,6 +244,15 @@ impl Finished {
     pub(crate) fn locations(&self, area: u32) -> impl Iterator<Item = &LocationDone> {
         self.units.values().filter_map(move |done| match done {
             Done::Location(done) if done.area == area => Some(done),
+            _ => None,
+        })
+    }
+
+    /// What is known of an area's photographs whose views are there, in their order.
+    pub(crate) fn photographs(&self, area: u32) -> impl Iterator<Item = &PhotographDone> {
+        let uuids = self.labels(area).map_or(&[][..], |labels| &labels.photographs);
+        uuids.iter().filter_map(move |uuid| match self.units.get(&Unit::Photograph(area, uuid.clone())) {
+            Some(Done::Photograph(done)) => Some(done),
             _ => None,
         })
     }

@@ -6,7 +6,8 @@ use crate::export::work::for_each_in_order;
 use crate::tables::manifest::{Head, Manifest};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, read_conventions, read_file_list,
+    CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, PhotographRecord, read_conventions,
+    read_file_list, read_photographs,
 };
 use s3d_io::fs::checksum_of_file;
 use s3d_label::Taxonomy;
@@ -44,6 +45,14 @@ impl Dataset {
     /// The taxonomy of its labels, if it has some.
     pub(crate) fn label_taxonomy(&self) -> Option<&Taxonomy> {
         self.manifest.is_labelled().then_some(&self.taxonomy)
+    }
+
+    /// The photographs of an area.
+    pub(crate) fn photographs(&self, area: u32) -> Result<Vec<PhotographRecord>> {
+        if self.manifest.area(area).is_none_or(|area| area.frames == 0) {
+            return Ok(Vec::new());
+        }
+        Ok(read_photographs(self.files.checked(&self.layout.frames_json(area))?)?)
     }
 }
 

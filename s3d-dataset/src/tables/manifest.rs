@@ -106,6 +106,9 @@ pub(crate) struct AreaEntry {
     pub(crate) locations: usize,
     pub(crate) panoramas: u64,
     pub(crate) views: u64,
+    /// Those among the views that are of photographs; not there if none is.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub(crate) frames: u64,
     pub(crate) xyz: XyzLoss,
     /// What its RGB images are made from.
     pub(crate) rgb: String,
@@ -123,6 +126,11 @@ pub(crate) struct AreaEntry {
     /// What it was made from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) inputs: Vec<InputRecord>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "what serde calls")]
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// What storing world coordinates loses.

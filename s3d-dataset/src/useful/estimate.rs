@@ -86,6 +86,20 @@ impl Estimate {
         }
     }
 
+    /// The same with views of so many pixels each besides.
+    pub(crate) fn with_views(self, views: impl Iterator<Item = f64>, options: &ExportOptions) -> Self {
+        let (count, pixels) = views.fold((0.0, 0.0), |(count, sum), pixels| (count + 1.0, sum + pixels));
+        let bytes_per_pixel: f64 = options.modalities.iter().map(|d| pixel_bytes(*d, options.xyz)).sum();
+        let images = count * options.modalities.len() as f64;
+        self.add(Self {
+            points: 0.0,
+            images,
+            files: images,
+            bytes: pixels * bytes_per_pixel,
+            core_seconds: 1e-9 * pixels * PIXEL_NS,
+        })
+    }
+
     pub(crate) fn add(self, other: Self) -> Self {
         Self {
             points: self.points + other.points,

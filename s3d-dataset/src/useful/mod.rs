@@ -301,7 +301,13 @@ pub(crate) fn count_findings(count: f64, rooms: &[SurveyedRoom]) -> Vec<Finding>
 }
 
 /// What looks wrong about the views of a list of cameras, of which `blind` see nothing of the mesh.
-pub(crate) fn poses_findings(blind: u64, views: u64, cameras: &Aabb, mesh: &Aabb) -> Vec<Finding> {
+pub(crate) fn poses_findings(
+    blind: u64,
+    views: u64,
+    cameras: &Aabb,
+    mesh: &Aabb,
+    hint: &str,
+) -> Vec<Finding> {
     let boxes = || {
         let [a, b, c, d] = [cameras.min, cameras.max, mesh.min, mesh.max];
         format!("cameras stand between {a} and {b}, the mesh lies between {c} and {d} (Z-up metres)")
@@ -310,10 +316,7 @@ pub(crate) fn poses_findings(blind: u64, views: u64, cameras: &Aabb, mesh: &Aabb
         return Vec::new();
     }
     let text = if blind == views {
-        format!(
-            "no camera sees anything: {}. Do they share a frame and a unit? See --up and --poses-up",
-            boxes()
-        )
+        format!("no camera sees anything: {}. Do they share a frame and a unit? See {hint}", boxes())
     } else {
         format!("{blind} of {views} cameras see nothing of the mesh; {}", boxes())
     };

@@ -14,6 +14,7 @@ mod images;
 mod instances;
 mod labels;
 mod mesh;
+mod photographs;
 mod points;
 mod pose;
 mod report;
@@ -29,6 +30,7 @@ use files::Files;
 use images::{ImageCheck, Mismatch, Reference, Scratch};
 use labels::Labels;
 use mesh::{LabelledMesh, NOT_IN_TABLE};
+use photographs::Photographs;
 pub use report::{FaultGroup, VerifyReport};
 use report::{Report, Topic};
 use s3d_geom::Camera;
@@ -58,6 +60,7 @@ struct Common<'a> {
     manifest: &'a Manifest,
     labels: Option<&'a Labels>,
     views: &'a Views,
+    photographs: &'a Photographs,
     files: &'a Files,
     full: bool,
     report: &'a Report,
@@ -85,12 +88,14 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
     let labels = Labels::read(layout, &manifest, &report);
     tables::conventions(layout, &manifest, &report);
     let views = Views::read(layout, &manifest, &report);
+    let photographs = Photographs::read(layout, &manifest, &report);
     let common = Common {
         ctx,
         layout,
         manifest: &manifest,
         labels: labels.as_ref(),
         views: &views,
+        photographs: &photographs,
         files: &files,
         full,
         report: &report,
@@ -101,7 +106,7 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
         check_area(&common, area, &images)?;
         all.extend(images);
     }
-    views.check_images(layout, &manifest, &all, &report);
+    views.check_images(layout, &manifest, &all, &photographs, &report);
     tables::splits(layout, &manifest, &all, &report);
     tables::statistics(layout, &manifest, &report);
     files.check_rest(ctx, layout, &manifest, &report)?;
@@ -132,6 +137,13 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     if source != "texture" && domains.contains(&Domain::Rgb) {
         report.note(format!(
             "area {area}: the colours of its images come from pictures ({source}), which are not in the data set; they were \
+             not compared"
+        ));
+    }
+    let photographs = common.photographs.count(area);
+    if photographs > 0 && domains.contains(&Domain::Rgb) {
+        report.note(format!(
+            "area {area}: the colours of {photographs} photographs are their own, which are not in the data set; they were \
              not compared"
         ));
     }
@@ -166,7 +178,7 @@ fn check_images(
     reference: Option<(&Reference<'_>, &LabelledMesh, &Labels)>,
 ) -> Result<()> {
     let ctx = common.ctx;
-    let Common { layout, manifest, labels, views, files, full, report, .. } = *common;
+    let Common { layout, manifest, labels, views, photographs, files, full, report, .. } = *common;
     let (mismatches, cameras) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
     let domains = manifest.domains();
     let check = ImageCheck {
@@ -174,6 +186,7 @@ fn check_images(
         manifest,
         labels,
         views,
+        photographs,
         files,
         reference: reference.map(|(reference, ..)| reference),
         report,
@@ -217,6 +230,7 @@ fn check_images(
         images,
         &cameras,
         mismatches.into_inner().unwrap_or_else(PoisonError::into_inner),
+        photographs,
     )
 }
 
@@ -227,6 +241,7 @@ fn diagnose_mismatches(
     images: &[DatasetImage],
     cameras: &[(usize, Camera)],
     mut mismatches: Vec<Mismatch>,
+    photographs: &Photographs,
 ) -> Result<()> {
     let report = reference.report;
     mismatches.sort_by_key(|o| (o.domain, o.image));
@@ -265,10 +280,9 @@ fn diagnose_mismatches(
     // Where all files of an image say the same of its camera, it is the pose that is wrong.
     for (image, guesses) in guesses.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let image = &images[image];
-        let files = image
-            .domains
-            .iter()
-            .filter(|d| **d != Domain::Pose && (reference.rgb_from_mesh || **d != Domain::Rgb));
+        let rgb_from_mesh = reference.rgb_from_mesh && photographs.of(image).is_none();
+        let files =
+            image.domains.iter().filter(|d| **d != Domain::Pose && (rgb_from_mesh || **d != Domain::Rgb));
         if let Some(Some(first)) = guesses.first()
             && guesses.len() == files.count()
             && guesses.iter().all(|g| g.as_ref() == Some(first))

@@ -15,7 +15,8 @@ const ROTATION: f64 = 1e-7;
 const FAULT: (Topic, &str) = (Topic::Poses, "contradictions in a pose file");
 
 /// Reads an image's pose and holds it against itself and the image's name. `size` is that of the image's
-/// files.
+/// files. A photograph's focal lengths and principal point are its own; those of other views follow from the
+/// angle of view.
 ///
 /// The result's pose is exact to the bit, that of `camera_rt_matrix`, unless the file contradicts itself:
 /// then `is_consistent` is false, and the pose is that of its angles.
@@ -23,6 +24,7 @@ pub(crate) fn read_and_check(
     layout: &Layout,
     image: &DatasetImage,
     size: (u32, u32),
+    is_photograph: bool,
     report: &Report,
 ) -> Option<CheckedPose> {
     let path = image.path(layout, Domain::Pose);
@@ -39,7 +41,11 @@ pub(crate) fn read_and_check(
     misspelt_key(&raw, &checks);
     let exact = matrix(&file, &checks);
     angles(&file, &checks);
-    let camera = camera(&file, exact, image.frame, size, &checks)?;
+    let pose = exact.unwrap_or_else(|| file.pose());
+    let camera = match is_photograph {
+        true => photographs_camera(&file, pose, size, &checks)?,
+        false => camera(&file, pose, image.frame, size, &checks)?,
+    };
     Some(CheckedPose { is_consistent: checks.all_hold(), file, camera })
 }
 
@@ -155,15 +161,33 @@ fn angles(file: &PoseFile, checks: &OfFile<'_>) {
     });
 }
 
+/// The camera of a photograph's view, and whether its angle of view is that of K.
+fn photographs_camera(
+    file: &PoseFile,
+    pose: Pose,
+    (width, height): (u32, u32),
+    checks: &OfFile<'_>,
+) -> Option<Camera> {
+    let rt = pose.rt_matrix();
+    let camera = Camera::from_k_rt(file.camera_k_matrix, rt, width, height).map(|c| Camera { pose, ..c });
+    let told = camera.as_ref().err().map(ToString::to_string);
+    checks.check(told.is_none(), || format!("no camera: {}", told.unwrap_or_default()));
+    let camera = camera.ok()?;
+    let fov = file.field_of_view_rads;
+    checks.check((camera.fov_rad() - fov).abs() <= 1e-12, || {
+        format!("field_of_view_rads is {fov}; camera_k_matrix and the width make it {}", camera.fov_rad())
+    });
+    Some(camera)
+}
+
 fn camera(
     file: &PoseFile,
-    exact: Option<Pose>,
+    pose: Pose,
     frame: Frame,
     (width, height): (u32, u32),
     checks: &OfFile<'_>,
 ) -> Option<Camera> {
     let fov = file.field_of_view_rads;
-    let pose = exact.unwrap_or_else(|| file.pose());
     let finite = pose.location.is_finite() && pose.world_from_camera.is_finite();
     let usable = finite && fov > 0.0 && fov < std::f64::consts::PI;
     if !checks.check(usable, || format!("no camera: field_of_view_rads {fov}, location {}", pose.location)) {
@@ -245,7 +269,7 @@ mod tests {
         create_dir(&layout.image_dir(2, image.frame, Domain::Pose)).unwrap();
         file.write(&image.path(&layout, Domain::Pose)).unwrap();
         let report = Report::new(&layout);
-        let pose = read_and_check(&layout, &image, (64, 64), &report).unwrap();
+        let pose = read_and_check(&layout, &image, (64, 64), false, &report).unwrap();
         if pose.is_consistent {
             // To the bit, so that images can be.
             assert_eq!(pose.camera, camera);

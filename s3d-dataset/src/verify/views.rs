@@ -1,5 +1,6 @@
 //! The list of views against its own draws and selection, and against the images that are there.
 
+use super::photographs::Photographs;
 use super::report::{Report, Topic};
 use crate::export::views::{Candidate, select};
 use crate::tables::manifest::Manifest;
@@ -136,6 +137,7 @@ impl Views {
         layout: &Layout,
         manifest: &Manifest,
         images: &[DatasetImage],
+        photographs: &Photographs,
         report: &Report,
     ) {
         let mut locations: BTreeMap<u32, BTreeSet<&str>> = BTreeMap::new();
@@ -147,13 +149,18 @@ impl Views {
         for image in images {
             let path = image.path(layout, image.domains.first().copied().unwrap_or(Domain::Pose));
             let known = match image.frame {
-                Frame::View(_) => self.draw_of(image).is_some() || !self.by_area.contains_key(&image.area),
+                Frame::View(_) => {
+                    let is_listed = self.draw_of(image).is_some() || photographs.of(image).is_some();
+                    is_listed || !self.by_area.contains_key(&image.area)
+                }
                 // Without candidates there is no list of locations.
                 Frame::Panorama => locations
                     .get(&image.area)
                     .is_none_or(|known| known.is_empty() || known.contains(image.uuid.as_str())),
             };
-            report.check(known, THERE, &path, || "views.json does not tell of this image".to_owned());
+            report.check(known, THERE, &path, || {
+                "neither views.json nor frames.json tells of this image".to_owned()
+            });
             report.check(manifest.is_chosen(&image.uuid), THERE, &path, || {
                 "the manifest's option only does not name this location".to_owned()
             });
@@ -183,6 +190,7 @@ impl Views {
         for (area, uuid, number) in self.kept.keys().filter(|(_, uuid, _)| manifest.is_chosen(uuid)) {
             missing(*area, uuid, Frame::View(*number));
         }
+        photographs.cameras().for_each(|(area, uuid)| missing(area, uuid, Frame::View(0)));
         for area in &manifest.areas {
             let path = layout.manifest();
             let checks = report.of((Topic::Manifest, "counts"), &path);

@@ -70,6 +70,11 @@ impl FisheyeLens {
         self.focal_px
     }
 
+    /// The principal point in pixels from the picture's top left corner.
+    pub fn center_px(&self) -> DVec2 {
+        self.center_px
+    }
+
     /// Where a direction in OpenCV's axes, of any length, comes to in the picture's plane. `None` so far off
     /// the axis that the polynomial folds back, and for no direction.
     pub fn project(&self, direction: DVec3) -> Option<DVec2> {

@@ -84,6 +84,11 @@ impl Lens {
         self.focal_px
     }
 
+    /// The principal point in pixels from the picture's top left corner.
+    pub fn center_px(&self) -> DVec2 {
+        self.center_px
+    }
+
     /// Where a direction in OpenCV's axes, of any length, comes to in the picture's plane. `None` behind the
     /// camera, and so far out that the polynomial folds back.
     #[inline]

@@ -7,11 +7,13 @@ mod error;
 mod fisheye;
 mod intrinsics;
 mod lens;
+mod photo_lens;
 mod pose;
 
 pub use error::CameraError;
 pub use fisheye::FisheyeLens;
 pub use lens::Lens;
+pub use photo_lens::PhotoLens;
 pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
 
 use glam::{DMat3, DVec2, DVec3, dvec2, dvec3};

@@ -34,8 +34,8 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
 }
 
 /// Reads them and the list of cameras beside it. The pictures lie in a folder `images` beside the model, or
-/// beside the folder `sparse` or `sparse/0` that it is in.
-pub(crate) fn read_posed(path: &Path) -> Result<Vec<PosedCamera>> {
+/// beside the folder `sparse` or `sparse/0` that it is in. Returns the path of the list of cameras, too.
+pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, PathBuf)> {
     let pictures = read_pictures(path)?;
     let (file, cameras) = read_beside(path)?;
     let folders = path.ancestors().skip(1).take(3).map(|dir| dir.join("images"));
@@ -49,7 +49,8 @@ pub(crate) fn read_posed(path: &Path) -> Result<Vec<PosedCamera>> {
         picture.picture = folder.as_ref().map(|folder| folder.join(&picture.name));
         Ok(picture)
     };
-    pictures.into_iter().map(with_camera).collect()
+    let cameras = pictures.into_iter().map(with_camera).collect::<Result<_>>()?;
+    Ok((cameras, file))
 }
 
 fn read_pictures(path: &Path) -> Result<Vec<Picture>> {
@@ -266,7 +267,7 @@ mod tests {
         std::fs::write(at("cameras.txt"), "8 PINHOLE 32 24 25 26 16 12\n7 SIMPLE_PINHOLE 64 48 50 32 24\n")
             .unwrap();
         std::fs::create_dir(dir.path().join("images")).unwrap();
-        let cameras = read_posed(&at("images.txt")).unwrap();
+        let (cameras, _) = read_posed(&at("images.txt")).unwrap();
         assert_eq!([cameras[0].size, cameras[1].size], [Some([64, 48]), Some([32, 24])]);
         assert_eq!(cameras[1].picture, Some(dir.path().join("images/b.jpg")));
     }

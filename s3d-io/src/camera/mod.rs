@@ -16,7 +16,8 @@
 //! origin, and a uuid stands in a list once.
 //!
 //! [`read_posed_cameras`] reads cameras as they are, each a [`PosedCamera`] with what is known of its size,
-//! focal lengths and lens: `transforms.json`, COLMAP models, ScanNet's poses, trajectories of TUM, tables.
+//! focal lengths and lens: `transforms.json`, COLMAP models, ScanNet's poses, Polycam's keyframes,
+//! trajectories of TUM, tables.
 //!
 //! [`PictureFolder`] finds the pictures of each location, whatever form they have: raw captures
 //! ([`CaptureFile`], with lens and pose), sky boxes, panoramas. [`read_picture`] reads one, PNG or JPEG.
@@ -42,6 +43,7 @@ mod locations;
 mod matterport;
 mod nerfstudio;
 mod picture;
+mod polycam;
 mod posed;
 mod posed_list;
 pub(crate) mod poses;
@@ -55,7 +57,7 @@ pub use matterport::{
     CAPTURES_A_LOCATION, CaptureFile, PictureFolder, parse_capture_pose, parse_intrinsics, read_capture_pose,
     read_intrinsics, read_matterport_locations,
 };
-pub use picture::{check_picture, decode_picture, read_picture, read_picture_size};
+pub use picture::{check_picture, decode_picture, read_picture, read_picture_size, read_picture_turn};
 pub use posed::{Distortion, GivenIntrinsics, IntrinsicsError, Optics, PosedCamera};
 pub use posed_list::{PosedCameras, read_posed_cameras};
 pub use poses::PublishedLocation;

@@ -4,7 +4,8 @@ use crate::error::{Error, Result};
 use crate::fs::open::{open_file, read_file};
 use crate::guarded::guarded;
 use crate::image::texture::{TextureFault, decode_texture};
-use image::ImageReader;
+use image::metadata::Orientation;
+use image::{ImageDecoder, ImageReader};
 use s3d_geom::Raster;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -45,6 +46,21 @@ pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
     size.map_err(|e| failed(&e.to_string()))
 }
 
+/// How a PNG or JPEG file asks to be turned before it is shown, as EXIF numbers it: 1 as it is, 3 upside
+/// down, 6 and 8 on a side; 2, 4, 5 and 7 mirrored, too. 1 where nothing is said. [`read_picture`] gives
+/// pixels as they are stored, which is what programs that reconstruct from photographs see.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn read_picture_turn(path: &Path) -> Result<u8> {
+    let file = BufReader::new(open_file(path)?);
+    let reader = ImageReader::new(file).with_guessed_format().map_err(|e| Error::io(path, "read", e))?;
+    let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
+    let turn =
+        guarded(|| reader.into_decoder()?.orientation()).ok_or_else(|| failed("its header is damaged"))?;
+    turn.map(Orientation::to_exif).map_err(|e| failed(&e.to_string()))
+}
+
 /// As [`read_picture_size`], of a picture that is there to its end: one that does not look so is decoded, and
 /// is an error if rows of it are missing. Quick for all others.
 ///
@@ -70,6 +86,37 @@ pub fn check_picture(path: &Path) -> Result<(u32, u32)> {
 mod tests {
     use super::*;
     use image::{DynamicImage, ImageBuffer, ImageFormat, Rgb};
+
+    /// The JPEG with an EXIF block that says how it is to be turned.
+    fn turned(jpeg: &[u8], turn: u8) -> Vec<u8> {
+        let tiff =
+            [b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".as_slice(), &[turn, 0, 0, 0, 0, 0, 0]];
+        let exif = [b"Exif\0\0".as_slice(), &tiff.concat()].concat();
+        let length = (exif.len() as u16 + 2).to_be_bytes();
+        [&jpeg[..2], &[0xff, 0xe1], &length, &exif, &jpeg[2..]].concat()
+    }
+
+    #[test]
+    fn how_a_picture_is_to_be_turned_is_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("photo.jpg");
+        let image = DynamicImage::from(ImageBuffer::from_pixel(24, 16, Rgb([50u8, 60, 70])));
+        image.save_with_format(&path, ImageFormat::Jpeg).unwrap();
+        assert_eq!(read_picture_turn(&path).unwrap(), 1);
+        let plain = std::fs::read(&path).unwrap();
+        for turn in 1..=8 {
+            std::fs::write(&path, turned(&plain, turn)).unwrap();
+            assert_eq!(read_picture_turn(&path).unwrap(), turn);
+            // Pixels are those that are stored.
+            assert_eq!(check_picture(&path).unwrap(), (24, 16));
+            let read = read_picture(&path).unwrap();
+            assert_eq!((read.width(), read.height()), (24, 16));
+        }
+        image.save_with_format(&path, ImageFormat::Png).unwrap();
+        assert_eq!(read_picture_turn(&path).unwrap(), 1);
+        std::fs::write(&path, b"none").unwrap();
+        assert!(read_picture_turn(&path).unwrap_err().to_string().contains("no picture that can be read"));
+    }
 
     #[test]
     fn cut_pictures_are_errors_before_they_are_needed() {

@@ -1,7 +1,7 @@
 //! Cameras with poses: what photographs were taken with, or what is to be rendered.
 
 use s3d_geom::glam::{DVec2, DVec3, dvec2};
-use s3d_geom::{Camera, CameraError, Pose};
+use s3d_geom::{Camera, CameraError, FisheyeLens, Lens, PhotoLens, Pose};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -98,6 +98,33 @@ pub enum IntrinsicsError {
         /// Degrees between its way up and the world's.
         tilt_deg: f64,
     },
+    /// A photograph has another shape than its camera's pictures.
+    #[error("the photograph has {} × {} pixels, and its camera is for {} × {}", found[0], found[1], told[0], told[1])]
+    OtherSize {
+        /// Width and height of the photograph.
+        found: [u32; 2],
+        /// Those that the list tells.
+        told: [u32; 2],
+    },
+    /// The principal point lies beside the photograph.
+    #[error(
+        "the principal point ({}, {}) lies outside of the photograph of {} × {} pixels: is the camera for a picture of \
+         another size?", center_px.x, center_px.y, size[0], size[1]
+    )]
+    CenterOutside {
+        /// In pixels of the photograph.
+        center_px: DVec2,
+        /// Width and height of the photograph.
+        size: [u32; 2],
+    },
+    /// Photographs are taken through lenses.
+    #[error("it is a panorama: photographs are those of cameras with focal lengths")]
+    NoLens,
+    /// Its numbers make no lens.
+    #[error(
+        "no direction comes to the middle of its picture: focal lengths, principal point or distortion are wrong"
+    )]
+    BadLens,
     /// It cannot be.
     #[error(transparent)]
     Camera(#[from] CameraError),
@@ -147,6 +174,49 @@ impl PosedCamera {
                 Ok(Camera::equirectangular(pose, width))
             }
         }
+    }
+
+    /// The lens that its photograph of `found` pixels was taken through. Intrinsics of another size are
+    /// scaled, as photographs are before they are handed on; those of an unknown size are for the photograph
+    /// itself.
+    ///
+    /// # Errors
+    /// [`IntrinsicsError`]; [`OtherSize`](IntrinsicsError::OtherSize) for a photograph of other proportions,
+    /// beyond a pixel of rounding.
+    pub fn photo_lens(&self, found: [u32; 2]) -> Result<PhotoLens, IntrinsicsError> {
+        let told = self.size.unwrap_or(found);
+        let [size, of] = [found, told].map(|[w, h]| dvec2(f64::from(w), f64::from(h)));
+        if found.contains(&0) || told.contains(&0) {
+            return Err(CameraError::NoPixels {
+                width: found[0].min(told[0]),
+                height: found[1].min(told[1]),
+            }
+            .into());
+        }
+        let scale = size / of;
+        let off = [(size.y - of.y * scale.x).abs(), (size.x - of.x * scale.y).abs()];
+        if off.iter().all(|off| *off > 1.0) {
+            return Err(IntrinsicsError::OtherSize { found, told });
+        }
+        let (focal_px, center_px, distortion) = match self.optics.ok_or(IntrinsicsError::NoOptics)? {
+            Optics::Pinhole { focal_px, center_px, distortion } => {
+                (focal_px * scale, center_px.map_or(size * 0.5, |c| c * scale), distortion)
+            }
+            Optics::AngleOfView { fov_rad } if fov_rad > 0.0 && fov_rad < std::f64::consts::PI => {
+                (DVec2::splat(0.5 * size.x / libm::tan(0.5 * fov_rad)), size * 0.5, Distortion::None)
+            }
+            Optics::AngleOfView { fov_rad } => return Err(CameraError::AngleOfView(fov_rad).into()),
+            Optics::Equirectangular => return Err(IntrinsicsError::NoLens),
+        };
+        if center_px.cmplt(DVec2::ZERO).any() || center_px.cmpgt(size).any() {
+            return Err(IntrinsicsError::CenterOutside { center_px, size: found });
+        }
+        let lens = match distortion {
+            Distortion::None => Lens::new(found, focal_px, center_px, [0.0; 5]).map(PhotoLens::Straight),
+            Distortion::OpenCv(k) => Lens::new(found, focal_px, center_px, k).map(PhotoLens::Straight),
+            Distortion::Fisheye(k) => FisheyeLens::new(found, focal_px, center_px, k).map(PhotoLens::Fisheye),
+        };
+        lens.ok_or(IntrinsicsError::BadLens)
     }
 
     /// The size of its images.
@@ -225,6 +295,37 @@ mod tests {
         let flat = posed(Some([8, 8]), Some(Optics::AngleOfView { fov_rad: 4.0 })).camera(&none);
         assert_eq!(flat, Err(IntrinsicsError::Camera(CameraError::AngleOfView(4.0))));
         assert!(posed(Some([0, 8]), Some(PHONE)).camera(&none).is_err());
+    }
+
+    #[test]
+    fn photographs_have_the_shape_that_their_camera_tells() {
+        let camera = posed(Some([1920, 1080]), Some(PHONE));
+        let lens = |found| posed(Some([1920, 1080]), Some(PHONE)).photo_lens(found);
+        let full = lens([1920, 1080]).unwrap();
+        // A third of the size, rounded: the corner stays the corner.
+        let small = lens([641, 360]).unwrap();
+        let (a, b) =
+            (full.direction(dvec2(1800.0, 90.0)), small.direction(dvec2(1800.0 * 641.0 / 1920.0, 30.0)));
+        assert!(a.unwrap().abs_diff_eq(b.unwrap(), 1e-9));
+        for found in [[1080, 1920], [1920, 1088], [640, 480]] {
+            assert_eq!(lens(found), Err(IntrinsicsError::OtherSize { found, told: [1920, 1080] }));
+        }
+        // Intrinsics without a size are the photograph's; a centre beside it says that they are not.
+        let unsized_camera = PosedCamera { size: None, ..camera.clone() };
+        assert_eq!(unsized_camera.photo_lens([1920, 1080]), Ok(full));
+        let outside = unsized_camera.photo_lens([640, 480]).unwrap_err().to_string();
+        assert!(outside.contains("(950, 530) lies outside of the photograph of 640 × 480"), "{outside}");
+        assert_eq!(
+            PosedCamera { optics: None, ..camera.clone() }.photo_lens([8, 8]).err(),
+            Some(IntrinsicsError::OtherSize { found: [8, 8], told: [1920, 1080] })
+        );
+        let of = |optics| PosedCamera { optics, size: None, ..camera.clone() }.photo_lens([64, 32]);
+        assert_eq!(of(None), Err(IntrinsicsError::NoOptics));
+        assert_eq!(of(Some(Optics::Equirectangular)), Err(IntrinsicsError::NoLens));
+        assert!(of(Some(Optics::AngleOfView { fov_rad: 1.0 })).is_ok());
+        let distortion = Distortion::Fisheye([f64::NAN; 4]);
+        let bad = Optics::Pinhole { focal_px: DVec2::ONE, center_px: None, distortion };
+        assert_eq!(of(Some(bad)), Err(IntrinsicsError::BadLens));
     }
 
     #[test]

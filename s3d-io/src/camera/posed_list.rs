@@ -2,16 +2,16 @@
 
 use crate::camera::locations::{has_transforms, is_colmap_images, moved};
 use crate::camera::posed::PosedCamera;
-use crate::camera::{colmap, located, nerfstudio, scannet, table, tum};
+use crate::camera::{colmap, located, nerfstudio, polycam, scannet, table, tum};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use s3d_geom::glam::DAffine3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What is read, for messages.
 const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), a folder of ScanNet's poses \
-                     (pose/0.txt), a trajectory of lines `timestamp tx ty tz qx qy qz qw`, or a CSV table";
+                     (pose/0.txt) or of Polycam's keyframes, a trajectory of lines `timestamp tx ty tz qx qy qz qw`, or a CSV table";
 
 /// The cameras of a list.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +20,17 @@ pub struct PosedCameras {
     pub cameras: Vec<PosedCamera>,
     /// How many entries were left out since the list itself says that their pose is not known.
     pub untracked: usize,
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
+}
+
+/// What a list was read as.
+struct ReadList {
+    cameras: Vec<PosedCamera>,
+    untracked: usize,
+    files: Vec<PathBuf>,
+    /// The file or folder that messages name.
+    named: PathBuf,
 }
 
 /// Reads the cameras of `path`, a file or a folder. What it is shows in its name and its first line:
@@ -30,6 +41,7 @@ pub struct PosedCameras {
 ///   COLMAP model, with its `cameras` beside them;
 /// - a folder with ScanNet's `pose/0.txt`, or that folder itself; `intrinsic/intrinsic_color.txt` and the
 ///   first picture in `color` tell what the camera is;
+/// - a folder with Polycam's `keyframes`, or that folder itself: the corrected cameras, if there are some;
 /// - any other file whose first line has a comma: a table like that of scan locations (see
 ///   [`read_cameras`](crate::camera::read_cameras)), in which `width,height` and `fov` or `fx,fy,cx,cy` may
 ///   stand;
@@ -42,7 +54,7 @@ pub struct PosedCameras {
 /// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these
 /// in it.
 pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<PosedCameras> {
-    let (file, mut cameras, untracked) = read(path)?;
+    let ReadList { mut cameras, untracked, files, named: file } = read(path)?;
     cameras.iter_mut().for_each(|camera| camera.pose = moved(&camera.pose, world_from_file));
     cameras.iter().try_for_each(|camera| located::check_place(&file, camera))?;
     if cameras.is_empty() {
@@ -50,28 +62,39 @@ pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<Pos
             if untracked > 0 { format!(" but {untracked} poses that are not known") } else { String::new() };
         return Err(Error::format(&file, format!("lists no camera{but}: {FORMS}")));
     }
-    Ok(PosedCameras { cameras, untracked })
+    Ok(PosedCameras { cameras, untracked, files })
 }
 
-/// The file that was read, its cameras in its own frame, and how many are not known.
-fn read(path: &Path) -> Result<(std::path::PathBuf, Vec<PosedCamera>, usize)> {
+/// The cameras of a list in its own frame.
+fn read(path: &Path) -> Result<ReadList> {
+    let known = |cameras, files: Vec<PathBuf>| {
+        let named = files.first().cloned().unwrap_or_default();
+        ReadList { cameras, untracked: 0, files, named }
+    };
     if path.is_dir() {
         if let Some(images) = colmap::find(path) {
-            let cameras = colmap::read_posed(&images)?;
-            return Ok((images, cameras, 0));
+            let (cameras, intrinsics) = colmap::read_posed(&images)?;
+            return Ok(known(cameras, vec![images, intrinsics]));
         }
         if let Some(transforms) = has_transforms(path) {
             let cameras = nerfstudio::read_posed(&transforms)?;
-            return Ok((transforms, cameras, 0));
+            return Ok(known(cameras, vec![transforms]));
         }
         if let Some((scan, files)) = scannet::find(path)? {
-            let (cameras, untracked) = scannet::read(&scan, files)?;
-            return Ok((path.to_owned(), cameras, untracked));
+            let (cameras, untracked, files) = scannet::read(&scan, files)?;
+            return Ok(ReadList { cameras, untracked, files, named: path.to_owned() });
+        }
+        if let Some((files, images)) = polycam::find(path)? {
+            let (cameras, files) = polycam::read(files, &images)?;
+            return Ok(ReadList { cameras, untracked: 0, files, named: path.to_owned() });
         }
         return Err(Error::unsupported(path, format!("holds no list of cameras: {FORMS}")));
     }
+    let mut files = vec![path.to_owned()];
     let cameras = if is_colmap_images(path) {
-        colmap::read_posed(path)?
+        let (cameras, intrinsics) = colmap::read_posed(path)?;
+        files.push(intrinsics);
+        cameras
     } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         nerfstudio::read_posed(path)?
     } else {
@@ -81,7 +104,7 @@ fn read(path: &Path) -> Result<(std::path::PathBuf, Vec<PosedCamera>, usize)> {
         let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#")).unwrap_or_default();
         if first.contains(&b',') { table::read_rows(path, &bytes)? } else { tum::read(path, &text)? }
     };
-    Ok((path.to_owned(), cameras, 0))
+    Ok(known(cameras, files))
 }
 
 #[cfg(test)]

@@ -38,14 +38,16 @@ pub(crate) fn find(dir: &Path) -> Result<Option<(PathBuf, NumberedFiles)>> {
     Ok(None)
 }
 
-/// The cameras of a scan that [`find`] found, by number, and how many poses are left out since ScanNet marks
-/// them as not known: they hold −∞.
-pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera>, usize)> {
+/// The cameras of a scan that [`find`] found, by number; how many poses are left out since ScanNet marks
+/// them as not known: they hold −∞; and the files that were read.
+pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera>, usize, Vec<PathBuf>)> {
     let intrinsics = scan.join("intrinsic").join("intrinsic_color.txt");
     let optics = if intrinsics.exists() { Some(optics(&intrinsics)?) } else { None };
     let (mut cameras, mut untracked) = (Vec::new(), 0);
+    let mut read: Vec<PathBuf> = optics.iter().map(|_| intrinsics.clone()).collect();
     for (number, path) in files {
         let bytes = read_file(&path)?;
+        read.push(path.clone());
         if is_unknown(&text_of(&bytes, &path)?) {
             untracked += 1;
             continue;
@@ -60,7 +62,7 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
         let (width, height) = read_picture_size(picture)?;
         cameras.iter_mut().for_each(|camera| camera.size = Some([width, height]));
     }
-    Ok((cameras, untracked))
+    Ok((cameras, untracked, read))
 }
 
 /// Whether a matrix holds an infinity or no number.
@@ -113,8 +115,8 @@ mod tests {
         let dir = scan();
         for path in [dir.path().to_owned(), dir.path().join("pose")] {
             let (scan, files) = find(&path).unwrap().unwrap();
-            let (cameras, untracked) = read(&scan, files).unwrap();
-            assert_eq!((cameras.len(), untracked), (2, 1));
+            let (cameras, untracked, read) = read(&scan, files).unwrap();
+            assert_eq!((cameras.len(), untracked, read.len()), (2, 1, 4));
             assert_eq!([&cameras[0].name, &cameras[1].name], ["2", "10"]);
             assert_eq!(cameras[0].pose.forward(), -DVec3::Z);
             assert_eq!((cameras[1].pose.forward(), cameras[1].pose.location.z), (DVec3::Y, 1.5));
@@ -137,7 +139,7 @@ mod tests {
         )
         .unwrap();
         let (scan, files) = find(dir.path()).unwrap().unwrap();
-        let (cameras, _) = read(&scan, files).unwrap();
+        let (cameras, ..) = read(&scan, files).unwrap();
         assert!(cameras.iter().all(|camera| camera.size == Some([13, 9])));
         assert_eq!((&cameras[0].picture, cameras[1].picture.as_ref()), (&None, Some(&picture)));
     }

@@ -1,7 +1,7 @@
 //! The images of a data set on the disk: which there are, and which of their files.
 
 use crate::dataset::domain::Domain;
-use crate::dataset::layout::{Frame, ImageName, Layout, image_stem};
+use crate::dataset::layout::{Frame, ImageName, Layout, image_stem, is_valid_uuid};
 use crate::error::{Error, Result};
 use crate::fs::json::read_json;
 use crate::fs::open::open_file;
@@ -143,6 +143,43 @@ pub fn read_views(path: &Path) -> Result<Vec<ViewRecord>> {
     read_json(path)
 }
 
+/// A photograph that became a view, as `frames.json` tells of it. The fields bear the file's names. Its view
+/// is [`Frame::View`] 0 of a camera of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhotographRecord {
+    /// The camera of its view: follows from the number of the area and the name.
+    pub camera_uuid: String,
+    /// What the list of photographs calls it.
+    pub name: String,
+    /// Type and number of the room that it was taken in.
+    pub room: String,
+    /// Width of its view in pixels.
+    pub width: u32,
+    /// Height of its view in pixels.
+    pub height: u32,
+    /// The share of the view's pixels that lie outside of the photograph: 0, 0, 0 in its colours.
+    pub masked: f64,
+    /// The share of the view's pixels that see the mesh.
+    pub seen: f64,
+    /// How well the edges of photograph and mesh agree: the correlation of both, at most 1. Nothing where
+    /// there are no edges.
+    pub agreement: Option<f64>,
+    /// The same of photograph and mesh displaced against each other: what chance gives.
+    pub chance: Option<f64>,
+}
+
+/// Reads `area_N/frames.json`.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if the file holds something else, or a uuid that is none.
+pub fn read_photographs(path: &Path) -> Result<Vec<PhotographRecord>> {
+    let records: Vec<PhotographRecord> = read_json(path)?;
+    match records.iter().find(|r| !is_valid_uuid(&r.camera_uuid)) {
+        None => Ok(records),
+        Some(r) => Err(Error::format(path, format!("{:?} is no uuid of a camera", r.camera_uuid))),
+    }
+}
+
 /// Width and height of a PNG file, from its first 24 bytes.
 ///
 /// # Errors
@@ -235,6 +272,19 @@ mod tests {
             let e = read_png_size(&path).unwrap_err().to_string();
             assert!(e.contains(words), "{e}");
         }
+    }
+
+    #[test]
+    fn photographs_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frames.json");
+        let text = r#"[{"camera_uuid": "a", "name": "images/1.jpg", "room": "unknown_1", "width": 4, "height": 3,
+            "masked": 0.25, "seen": 1, "agreement": 0.5, "chance": null}]"#;
+        write_bytes(&path, text.as_bytes()).unwrap();
+        let records = read_photographs(&path).unwrap();
+        assert_eq!((records[0].agreement, records[0].chance, records[0].masked), (Some(0.5), None, 0.25));
+        write_bytes(&path, text.replace("\"a\"", "\"../a\"").as_bytes()).unwrap();
+        assert!(read_photographs(&path).unwrap_err().to_string().contains("\"../a\" is no uuid"));
     }
 
     #[test]

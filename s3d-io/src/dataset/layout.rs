@@ -282,6 +282,11 @@ impl Layout {
         self.area_dir(area).join("views.json")
     }
 
+    /// `area_1/frames.json`: every photograph that became a view.
+    pub fn frames_json(&self, area: u32) -> PathBuf {
+        self.area_dir(area).join("frames.json")
+    }
+
     /// `s3dis`: the S3DIS tree.
     pub fn s3dis_dir(&self) -> PathBuf {
         self.root.join("s3dis")

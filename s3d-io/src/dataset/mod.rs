@@ -60,7 +60,8 @@ pub use face_votes::{FaceVoteColumns, read_face_votes, read_face_votes_from, wri
 pub use file_list::{CheckedFile, FileRecord, parse_file_list, read_file_list, write_file_list};
 #[cfg(feature = "dataset")]
 pub use images::{
-    DatasetImage, ViewRecord, check_images_complete, dataset_images, read_png_size, read_views,
+    DatasetImage, PhotographRecord, ViewRecord, check_images_complete, dataset_images, read_photographs,
+    read_png_size, read_views,
 };
 #[cfg(feature = "dataset")]
 pub use instances::{

@@ -1,4 +1,4 @@
-//! PNG images: 8-bit colour and 16-bit gray.
+//! PNG images: 8-bit colour, 8-bit and 16-bit gray.
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_bytes;
@@ -55,6 +55,17 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
     };
     let format = Format { color: ColorType::Rgb, depth: BitDepth::Eight, pixel: 3 };
     encode(image.width(), image.height(), format, image.pixels().as_flattened(), plans)
+}
+
+/// An image as the bytes of an 8-bit gray PNG file, set for images that are constant in pieces, such as
+/// masks.
+///
+/// # Panics
+/// If it has no pixel.
+pub fn encode_gray8(image: &Raster<u8>) -> Vec<u8> {
+    let search = Search::patches(1 + image.width() as usize);
+    let format = Format { color: ColorType::Grayscale, depth: BitDepth::Eight, pixel: 1 };
+    encode(image.width(), image.height(), format, image.pixels(), &[(Filter::Up, search)])
 }
 
 /// An image as the bytes of a 16-bit gray PNG file, set for smooth images such as depth.
@@ -267,6 +278,16 @@ fn describe(color: ColorType, depth: BitDepth) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn masks_come_back() {
+        let mask =
+            Raster::from_vec(37, 11, (0..37 * 11).map(|i| if i % 37 < i / 20 { 255 } else { 0 }).collect());
+        let image = image::load_from_memory(&encode_gray8(&mask)).unwrap();
+        assert_eq!(image.color(), image::ColorType::L8);
+        assert_eq!(image.into_luma8().as_raw(), mask.pixels());
+    }
+
     use proptest::prelude::*;
 
     fn in_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {

@@ -29,6 +29,10 @@ pub struct NerfstudioFrame {
     /// optical axis, in panoramas the distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth_file_path: Option<String>,
+    /// Its mask, an 8-bit gray PNG file: 0 where the image has nothing to say. All images of a file have one,
+    /// or none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mask_path: Option<String>,
     /// Focal length along x; a panorama's height.
     pub fl_x: f64,
     /// Focal length along y; a panorama's height.
@@ -54,14 +58,14 @@ impl NerfstudioFrame {
         }
         let [[fl_x, _, cx], [_, fl_y, cy], _] = camera.k_matrix();
         let transform_matrix = matrix(&camera.pose);
-        Self { file_path, depth_file_path: None, fl_x, fl_y, cx, cy, w, h, transform_matrix }
+        Self { file_path, depth_file_path: None, mask_path: None, fl_x, fl_y, cx, cy, w, h, transform_matrix }
     }
 
     /// A view, from its pose file.
     pub fn perspective(file_path: String, pose: &PoseFile, (w, h): (u32, u32)) -> Self {
         let [[fl_x, _, cx], [_, fl_y, cy], _] = pose.camera_k_matrix;
         let transform_matrix = matrix(&pose.pose());
-        Self { file_path, depth_file_path: None, fl_x, fl_y, cx, cy, w, h, transform_matrix }
+        Self { file_path, depth_file_path: None, mask_path: None, fl_x, fl_y, cx, cy, w, h, transform_matrix }
     }
 
     /// A panorama, from its pose file. Panoramas of the data set are level whatever the scanner's tilt: the
@@ -81,6 +85,7 @@ impl NerfstudioFrame {
         Self {
             file_path,
             depth_file_path: None,
+            mask_path: None,
             fl_x: f64::from(h),
             fl_y: f64::from(h),
             cx: 0.5 * f64::from(w),

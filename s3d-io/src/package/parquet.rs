@@ -58,6 +58,8 @@ pub struct ImageRow {
     pub semantic: Option<SemanticRow>,
     /// The least, the mean and the greatest depth, metres, of the pixels that have one.
     pub depth_m: Option<[f64; 3]>,
+    /// The name of the photograph that it is the view of. If no image is one, the table has no such column.
+    pub photograph: Option<String>,
 }
 
 /// What the pixels of an image show.
@@ -82,7 +84,7 @@ enum Column {
 }
 
 /// The columns of some rows. Those that are never null are `required`.
-fn columns(classes: &[Class], rows: &[ImageRow]) -> Vec<(String, bool, Column)> {
+fn columns(classes: &[Class], rows: &[ImageRow], with_photographs: bool) -> Vec<(String, bool, Column)> {
     let mut all = Vec::new();
     macro_rules! column {
         ($name:expr, $required:expr, $kind:ident, $value:expr) => {
@@ -128,6 +130,9 @@ fn columns(classes: &[Class], rows: &[ImageRow]) -> Vec<(String, bool, Column)> 
     for (i, name) in ["depth_min_m", "depth_mean_m", "depth_max_m"].into_iter().enumerate() {
         column!(name.to_owned(), false, Float, |r| r.depth_m.map(|v| v[i]));
     }
+    if with_photographs {
+        column!("photograph".to_owned(), false, Text, |r| r.photograph.as_deref().map(text));
+    }
     all
 }
 
@@ -158,7 +163,7 @@ fn schema(columns: &[(String, bool, Column)]) -> String {
 /// `depth`, `normal`, …); `width`, `height`, `fov_rad`, `yaw_rad`, `pitch_rad`, `x`, `y`, `z`; `k` (9
 /// numbers) and `rt` (12), row by row; `selection_entropy`, `entropy`, `coverage`, `share_CLASS` of each of
 /// `classes`, `share_unlabelled` (with these they make the coverage), `instances`; `depth_min_m`,
-/// `depth_mean_m`, `depth_max_m`. See [`ImageRow`].
+/// `depth_mean_m`, `depth_max_m`; and `photograph`, if there are some. See [`ImageRow`].
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -193,12 +198,13 @@ pub fn write_image_index_to(
         .set_created_by(concat!("s3d version ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_key_value_metadata(Some(vec![KeyValue::new("description".to_owned(), about.to_owned())]))
         .build();
-    let schema = parse_message_type(&schema(&columns(classes, &[]))).map_err(failed)?;
+    let with_photographs = rows.iter().any(|r| r.photograph.is_some());
+    let schema = parse_message_type(&schema(&columns(classes, &[], with_photographs))).map_err(failed)?;
     let mut writer =
         SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
     for rows in rows.chunks(GROUP) {
         let mut group = writer.next_row_group().map_err(failed)?;
-        for (_, required, column) in columns(classes, rows) {
+        for (_, required, column) in columns(classes, rows, with_photographs) {
             let fewer = || failed(ParquetError::General("the schema has fewer columns".to_owned()));
             let mut out = group.next_column().map_err(failed)?.ok_or_else(fewer)?;
             write_column(&mut out, required, column).map_err(failed)?;
@@ -280,6 +286,7 @@ mod tests {
                 instances: 17,
             }),
             depth_m: Some([0.5, 2.0, 9.0]),
+            photograph: Some("images/1.jpg".into()),
         }
     }
 
@@ -313,7 +320,7 @@ mod tests {
         let bytes = write_image_index(&path, &Class::S3DIS, &rows).unwrap();
         assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
         let table = read(&path);
-        assert_eq!((table.0.len(), table.1.len()), (7 + 7 + 2 + 1 + 2 + 3 + 2 + 3 + 13 + 2 + 3, 3));
+        assert_eq!((table.0.len(), table.1.len()), (7 + 7 + 2 + 1 + 2 + 3 + 2 + 3 + 13 + 2 + 3 + 1, 3));
         let text = |t: &str| Field::Str(t.to_owned());
         for (i, row) in rows.iter().enumerate() {
             assert_eq!(*field(&table, i, "area"), Field::Int(row.area as i32));
@@ -334,6 +341,8 @@ mod tests {
             let shares = row.semantic.as_ref().map(|s| s.shares.clone());
             assert_eq!(*field(&table, i, "share_chair"), float(shares.map(|s| s[Class::CHAIR.index()])));
             assert_eq!(*field(&table, i, "depth_max_m"), float(row.depth_m.map(|d| d[2])));
+            let photograph = row.photograph.clone().map_or(Field::Null, Field::Str);
+            assert_eq!(*field(&table, i, "photograph"), photograph);
             for (name, list) in [("k", row.k.map(|k| k.to_vec())), ("rt", row.rt.map(|m| m.to_vec()))] {
                 match (field(&table, i, name), list) {
                     (Field::ListInternal(found), Some(list)) => {
@@ -369,7 +378,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.parquet");
         write_image_index(&path, &Class::S3DIS, &[]).unwrap();
-        assert!(read(&path).1.is_empty());
+        let (names, rows) = read(&path);
+        assert!(rows.is_empty() && !names.contains(&"photograph".to_owned()));
         let e = write_image_index(&dir.path().join("no/a.parquet"), &Class::S3DIS, &[]).unwrap_err();
         assert!(e.to_string().contains("a.parquet: cannot write"), "{e}");
     }

@@ -7,6 +7,7 @@ use crate::fs::open::read_file;
 use crate::mesh::file::{LengthUnit, UpAxis};
 use crate::scene::annotations::AnnotationTable;
 use crate::scene::cameras::{CameraSource, CamerasTable, similarity};
+use crate::scene::frames::{FrameSource, FramesTable};
 use crate::scene::rgb::{PictureSource, RgbEntry};
 use crate::scene::taxonomy::TaxonomyEntry;
 use s3d_geom::glam::{DAffine3, DVec3};
@@ -57,6 +58,8 @@ pub struct SceneFile {
     pub cameras: Option<CameraSource>,
     /// The scanner's pictures, if RGB images are made from them and not from the mesh's texture.
     pub pictures: Option<PictureSource>,
+    /// Photographs with poses, each of which becomes a view.
+    pub frames: Option<FrameSource>,
 }
 
 impl SceneFile {
@@ -79,6 +82,7 @@ impl SceneFile {
             annotations_have_offset: false,
             cameras: None,
             pictures: None,
+            frames: None,
         }
     }
 }
@@ -93,6 +97,7 @@ struct Document {
     annotations: Option<AnnotationTable>,
     cameras: Option<CamerasTable>,
     rgb: Option<RgbEntry>,
+    frames: Option<FramesTable>,
 }
 
 #[derive(Deserialize)]
@@ -128,6 +133,8 @@ struct MeshTable {
 /// [rgb]               # or, before the first table, rgb = "texture"; that, if it is left out
 /// source = "captures" # or "texture", "skybox", "panorama"
 /// path = "raw"        # the pictures' folder; named after the source if it is left out
+/// [frames]            # photographs with poses: see `FrameSource`
+/// path = "transforms.json"
 /// ```
 ///
 /// Before the first table, `taxonomy = "scannet20"` names the classes: S3DIS's if it is left out, one of
@@ -165,7 +172,8 @@ struct MeshTable {
 /// transform = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]   # to the frame of 5a; may be left out
 /// ```
 ///
-/// Further keys of `[rgb]` are those of [`crate::scene::PictureOptions`].
+/// Further keys of `[rgb]` are those of [`crate::scene::PictureOptions`], of `[frames]` those of
+/// [`FrameSource`], with `up` and `transform` as in `[cameras]`.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line for a key that is missing or unknown and for a wrong value;
@@ -289,6 +297,14 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
     if let Some(source) = &mut pictures {
         source.path = found("rgb.path", &source.path, "folder", Path::is_dir)?;
     }
+    let mut frames = document.frames.map(FramesTable::source).transpose();
+    if let Ok(Some(source)) = &mut frames {
+        source.path = found("frames.path", &source.path, "", Path::exists)?;
+        if let Some(images) = &mut source.images {
+            *images = found("frames.images", images, "folder", Path::is_dir)?;
+        }
+    }
+    let frames = frames.map_err(|message| fault(format!("[frames]: {message}")))?;
     Ok(SceneFile {
         path: path.to_owned(),
         area: document.area.get(),
@@ -306,6 +322,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         annotations_have_offset,
         cameras,
         pictures,
+        frames,
     })
 }
 

@@ -3,8 +3,9 @@
 //! [`read_scene`] reads the names of an area's mesh, annotations and scan locations, and how they are read
 //! ([`SceneFile`]); the files themselves are read by [`mesh`](crate::mesh), [`cloud`](crate::cloud) and
 //! [`camera`](crate::camera). [`PublishedArea`] finds the same in the folder of a published area, or of an
-//! export. [`PictureSource`] tells what the colours of images are taken from. A key that is not known is an
-//! error, with its line. [`read_taxonomy`] reads the classes that a scene may have in place of S3DIS's. Source: formats.md, "The scene file".
+//! export. [`PictureSource`] tells what the colours of images are taken from, [`FrameSource`] which
+//! photographs become views. A key that is not known is an error, with its line. [`read_taxonomy`] reads the
+//! classes that a scene may have in place of S3DIS's. Source: formats.md, "The scene file".
 //!
 //! ```
 //! use s3d_io::scene::parse_scene;
@@ -30,12 +31,14 @@
 mod annotations;
 mod cameras;
 mod file;
+mod frames;
 mod published;
 mod rgb;
 mod taxonomy;
 
 pub use cameras::CameraSource;
 pub use file::{SceneFile, parse_scene, read_scene};
+pub use frames::FrameSource;
 pub use published::{PublishedArea, PublishedMesh, PublishedOptions};
 pub use rgb::{PictureKind, PictureOptions, PictureSource, SkyBoxCaps, UnseenColor};
 pub use taxonomy::{parse_taxonomy, read_taxonomy};

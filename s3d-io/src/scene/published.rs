@@ -3,7 +3,7 @@
 use crate::camera::poses;
 use crate::camera::poses::PublishedLocation;
 use crate::cloud::annotations::Annotations;
-use crate::dataset::{read_taxonomy_or_s3dis, read_world_offsets};
+use crate::dataset::{read_photographs, read_taxonomy_or_s3dis, read_world_offsets};
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, UpAxis};
 use crate::mesh::read::read_mesh;
@@ -138,7 +138,13 @@ impl PublishedArea {
             }
         }
         let folders = ["data/pose", "pano/pose"].map(|folder| path.join(folder));
-        let found = poses::read(&folders, &this.world_from_area, &this.taxonomy)?;
+        let mut found = poses::read(&folders, &this.world_from_area, &this.taxonomy)?;
+        // Where photographs were taken nobody stood with a scanner.
+        let photographs = path.join("frames.json");
+        if photographs.is_file() {
+            let photographs = read_photographs(&photographs)?;
+            found.retain(|(_, l)| photographs.iter().all(|p| p.camera_uuid != l.location.uuid));
+        }
         if found.is_empty() {
             return Err(Error::format(
                 path,

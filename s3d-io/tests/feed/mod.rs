@@ -134,6 +134,7 @@ fn texture(dir: &Path, data: &[u8]) {
     file(dir, "m.mtl", b"newmtl wall\nmap_Kd wall.png\n");
     check_mesh(dir, read_mesh(&file(dir, "mesh.obj", OBJ.as_bytes()), UpAxis::Z));
     check(dir, read_picture_size(&image));
+    check(dir, read_picture_turn(&image));
 }
 
 /// Binary glTF and the JSON form by what the bytes begin with.
@@ -201,7 +202,14 @@ fn posed_cameras(dir: &Path, data: &[u8]) {
             file(dir, "cameras.bin", data);
             file(dir, "images.bin", &image)
         }
-        3 => file(dir, "transforms.json", data),
+        3 => {
+            // A keyframe of Polycam's, and what its mesh was turned by, are JSON too.
+            folder("capture/keyframes/images");
+            file(&folder("capture/keyframes/cameras"), "1.json", data);
+            file(&dir.join("capture"), "mesh_info.json", data);
+            check(dir, read_posed_cameras(&dir.join("capture"), &DAffine3::IDENTITY));
+            file(dir, "transforms.json", data)
+        }
         4 => file(dir, "trajectory.txt", data),
         _ => {
             let (pose, intrinsics) = (folder("pose"), folder("intrinsic").join("intrinsic_color.txt"));
@@ -214,6 +222,9 @@ fn posed_cameras(dir: &Path, data: &[u8]) {
     let Some(found) = check(dir, read_posed_cameras(&path, &DAffine3::IDENTITY)) else { return };
     assert!(!found.cameras.is_empty());
     let half = GivenIntrinsics { width: Some(64), height: Some(32), optics: None };
+    for camera in &found.cameras {
+        let _ = camera.photo_lens([640, 480]);
+    }
     for camera in &found.cameras {
         assert!(camera.pose.location.is_finite());
         for given in [GivenIntrinsics::default(), half] {
@@ -257,7 +268,10 @@ fn json(dir: &Path, data: &[u8]) {
             }
         }
         2 => drop(check(dir, read_instances(&file(dir, "instances.json", data)))),
-        3 => drop(check(dir, read_views(&file(dir, "views.json", data)))),
+        3 => {
+            check(dir, read_views(&file(dir, "views.json", data)));
+            check(dir, read_photographs(&file(dir, "frames.json", data)));
+        }
         4 => drop(check(dir, read_splits(&file(dir, "splits.json", data)))),
         _ => drop(check(dir, read_conventions(&file(dir, "conventions.json", data)))),
     }

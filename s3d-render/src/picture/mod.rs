@@ -5,3 +5,4 @@ pub(crate) mod cube_sources;
 pub(crate) mod fill;
 pub(crate) mod picture_color;
 pub(crate) mod stitch;
+pub(crate) mod undistort;

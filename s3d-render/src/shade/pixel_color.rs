@@ -87,11 +87,15 @@ impl<'a> PixelByPixel<'a> {
 
     /// What pixel (i, j), which sees `face`, shows of it.
     pub(crate) fn color(&mut self, face: u32, i: usize, j: usize) -> [u8; 3] {
+        self.along(face, self.rays.at(i as u32, j as u32), j)
+    }
+
+    /// What the ray along `direction`, in row j, shows of `face`, which it hits.
+    pub(crate) fn along(&mut self, face: u32, direction: DVec3, j: usize) -> [u8; 3] {
         let Self { scene, mip_maps, origin, .. } = *self;
         let paints = self.paints.get_or_insert_with(FaceCache::new);
         let paint = paints.get(face, || FacePaint::new(scene, mip_maps, face, origin));
-        let d = self.rays.at(i as u32, j as u32);
-        seen_color(paint.at(d, j, &self.steps, self.filter))
+        seen_color(paint.at(direction, j, &self.steps, self.filter))
     }
 }
 

@@ -4,6 +4,7 @@ pub(crate) mod cameras;
 pub(crate) mod memory;
 pub(crate) mod mesh;
 mod numbering;
+pub(crate) mod photographs;
 pub(crate) mod pictures;
 pub(crate) mod requested;
 mod unit;
@@ -15,6 +16,7 @@ use crate::export::input::cameras::{Cameras, Placing};
 use crate::export::input::memory::{SceneSource, SharedScene};
 use crate::export::input::mesh::{MeshFrame, MeshSource};
 use crate::export::input::numbering::{label_table, number, published_numbers};
+use crate::export::input::photographs::Photographs;
 use crate::export::input::unit::UnitGuess;
 use crate::export::input::up_axis::UpGuess;
 use crate::export::labels::annotate::SurveyedRoom;
@@ -23,7 +25,7 @@ use crate::store::request::InputRecord;
 use crate::tables::dataset::check_area;
 use crate::useful::{Estimate, Finding, count_findings};
 use glam::{DAffine3, DVec3};
-use s3d_geom::TriMesh;
+use s3d_geom::{Camera, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance, AnnotationOptions, Annotations, OnFault};
 use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis};
@@ -56,6 +58,8 @@ pub(crate) struct AreaInput {
     pub(crate) cameras: Cameras,
     /// The list that they come from, for messages.
     pub(crate) cameras_path: PathBuf,
+    /// Photographs with poses.
+    pub(crate) photographs: Photographs,
     /// What was found out about the mesh, as a sentence each.
     pub(crate) notes: Vec<String>,
     /// What was odd in the annotations, as a sentence each.
@@ -247,8 +251,16 @@ impl AreaInput {
                 .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
         }
         let mesh_file = file.filter(|_| opened.keep_mesh);
-        let (cameras, cameras_path) = Cameras::of_scene(&scene, asked, frame.offset_m)?
-            .unwrap_or_else(|| (Cameras::listed_or_placed(Vec::new(), Vec::new()), scene.path.clone()));
+        let photographs = photographs_of(&scene, &frame)?;
+        let (cameras, cameras_path) =
+            Cameras::of_scene(&scene, asked, frame.offset_m)?.unwrap_or_else(|| {
+                // Who has photographs asks for nothing else.
+                let cameras = match photographs.all.is_empty() {
+                    true => Cameras::listed_or_placed(Vec::new(), Vec::new()),
+                    false => Cameras::Listed(Vec::new(), Vec::new()),
+                };
+                (cameras, scene.path.clone())
+            });
         frame.refuse_far_locations(&cameras_path, cameras.listed())?;
         Ok(Self {
             number: scene.area,
@@ -262,10 +274,11 @@ impl AreaInput {
             notes: Vec::new(),
             warnings,
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
-            files: files_of(&scene),
-            sources: files_of(&scene),
+            files: files_of(&scene).into_iter().chain(photographs.files().cloned()).collect(),
+            sources: files_of(&scene).into_iter().chain(photographs.by_folder().into_keys()).collect(),
             annotations: scene.annotations,
             records: Vec::new(),
+            photographs,
             cameras_path,
             pictures: scene.pictures,
             path: scene.path,
@@ -338,6 +351,7 @@ impl AreaInput {
             rooms,
             cameras,
             cameras_path: name.clone(),
+            photographs: Photographs::default(),
             path: name,
             notes: Vec::new(),
             warnings,
@@ -402,6 +416,12 @@ impl AreaInput {
         let file = Arc::new(mesh.file);
         let frame = MeshFrame::of(&file);
         frame.refuse_far_locations(&cameras_path, cameras.listed())?;
+        let photographs = match &scene {
+            Some(scene) => photographs_of(scene, &MeshFrame { offset_m: DVec3::ZERO, ..frame })?,
+            None => Photographs::default(),
+        };
+        files.extend(photographs.files().cloned());
+        sources.extend(photographs.by_folder().into_keys());
         Ok(Self {
             number: area.area,
             path: scene.as_ref().map_or(folder, |s| &s.path).to_owned(),
@@ -414,6 +434,7 @@ impl AreaInput {
             rooms,
             cameras,
             cameras_path,
+            photographs,
             notes: Vec::new(),
             warnings,
             lenient: false,
@@ -437,7 +458,10 @@ impl AreaInput {
         let most = Cameras::Placed(Placing::Apart(2.0)).count_on(floor_m2).max(1.0);
         let count = self.cameras.count_on(floor_m2);
         let is_listed = matches!(self.cameras, Cameras::Listed(..));
-        Estimate::new(area_m2, if is_listed { count } else { count.min(most) }, options)
+        let locations = if is_listed { count } else { count.min(most) };
+        let pixels = |c: &Camera| f64::from(c.width) * f64::from(c.height);
+        let photographs = self.photographs.all.iter().map(|p| pixels(&p.camera));
+        Estimate::new(area_m2, locations, options).with_views(photographs, options)
     }
 
     /// What looks wrong about the number of its scan locations.
@@ -458,7 +482,9 @@ impl AreaInput {
     pub(crate) fn tell_mesh(&self, ctx: &Context, file: &MeshFile) {
         self.frame.tell(ctx);
         self.notes.iter().for_each(|note| ctx.info(note));
-        self.warnings.iter().chain(&file.warnings).for_each(|w| ctx.warn(w));
+        self.photographs.notes.iter().for_each(|note| ctx.info(note));
+        let doubts = self.warnings.iter().chain(&self.photographs.warnings).chain(&file.warnings);
+        doubts.for_each(|w| ctx.warn(w));
         ctx.info(format_args!(
             "{}: {} faces, {} vertices, {} textures, {:.1} m²",
             self.source.describe(),
@@ -468,6 +494,14 @@ impl AreaInput {
             file.mesh.total_area()
         ));
     }
+}
+
+/// The photographs that a scene file names.
+fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Photographs> {
+    let Some(source) = &scene.frames else { return Ok(Photographs::default()) };
+    let photographs = Photographs::open(source, scene.area, frame.offset_m)?;
+    frame.refuse_far_locations(&source.path, &photographs.locations())?;
+    Ok(photographs)
 }
 
 /// What a scene file names, and itself.

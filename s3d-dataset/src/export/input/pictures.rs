@@ -159,7 +159,7 @@ impl Pictures {
 
     /// The colours that a cube map gives.
     pub(crate) fn colors<'a>(&self, cube: &'a CubeMap) -> PictureColors<'a> {
-        PictureColors { cube, unseen: self.source.options.unseen }
+        PictureColors::Cube { cube, unseen: self.source.options.unseen }
     }
 }
 
@@ -233,11 +233,17 @@ fn check_sky_box(first: &Path, sizes: [(u32, u32); 6]) -> Result<()> {
     }
 }
 
-/// Colours from a cube map.
+/// Colours that are not the mesh's.
 #[derive(Clone, Copy)]
-pub(crate) struct PictureColors<'a> {
-    cube: &'a CubeMap,
-    unseen: UnseenColor,
+pub(crate) enum PictureColors<'a> {
+    /// From a cube map of the scanner's pictures.
+    Cube {
+        cube: &'a CubeMap,
+        /// What is shown where it has nothing.
+        unseen: UnseenColor,
+    },
+    /// The view itself, of a photograph.
+    Photograph(&'a Raster<[u8; 3]>),
 }
 
 impl PictureColors<'_> {
@@ -249,10 +255,16 @@ impl PictureColors<'_> {
         camera: &Camera,
         out: &mut Raster<[u8; 3]>,
     ) {
-        let unseen = match self.unseen {
-            UnseenColor::Mesh => Unseen::Mesh(channels.scene, channels.textures),
-            UnseenColor::Nearby => Unseen::Nearby,
+        let (cube, unseen) = match self {
+            Self::Cube { cube, unseen: UnseenColor::Mesh } => {
+                (cube, Unseen::Mesh(channels.scene, channels.textures))
+            }
+            Self::Cube { cube, unseen: UnseenColor::Nearby } => (cube, Unseen::Nearby),
+            Self::Photograph(image) => {
+                out.clone_from(image);
+                return;
+            }
         };
-        picture_image_into(self.cube, unseen, hits, camera, &TextureFilter::default(), out);
+        picture_image_into(cube, unseen, hits, camera, &TextureFilter::default(), out);
     }
 }

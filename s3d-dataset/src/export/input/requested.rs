@@ -29,8 +29,14 @@ pub(crate) fn requested_areas(
     let mut taken: BTreeMap<(u32, &Path), InputRecord> = BTreeMap::new();
     for (area, of_area) in areas.iter().zip(&paths) {
         let mut listed = Vec::new();
+        // A folder of photographs may hold much that is not read.
+        let mut photographs = area.photographs.by_folder();
         for path in of_area {
-            let files = if path.is_dir() { walk(path)? } else { vec![path.clone()] };
+            let files = match photographs.remove(path) {
+                Some(files) => files,
+                None if path.is_dir() => walk(path)?,
+                None => vec![path.clone()],
+            };
             let record = known.and_then(|known| known.input(area.number, &name_of(&area.path, path)));
             if (path.is_dir() || area.annotations.contains(path))
                 && let Some(record) = record

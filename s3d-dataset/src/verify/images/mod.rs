@@ -11,12 +11,13 @@ use crate::verify::images::pixels::{Difference, Pixels};
 use crate::verify::images::rays::difference;
 use crate::verify::labels::Labels;
 use crate::verify::mesh::LabelledMesh;
+use crate::verify::photographs::{Photographs, check_share};
 use crate::verify::pose::{self, CheckedPose};
 use crate::verify::report::{Report, Topic};
 use crate::verify::views::Views;
 use s3d_geom::{Camera, Raster};
-use s3d_io::dataset::{Conventions, DatasetImage, Domain, Frame, Layout, XyzType};
-use s3d_render::{Caster, Hits, MISSING_INDEX, MipMaps, Scene, ViewImages};
+use s3d_io::dataset::{Conventions, DatasetImage, Domain, Frame, Layout, PhotographRecord, XyzType};
+use s3d_render::{Caster, Hits, MISSING_INDEX, MipMaps, NO_FACE, Scene, ViewImages};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -58,6 +59,7 @@ pub(crate) struct ImageCheck<'a> {
     pub(crate) manifest: &'a Manifest,
     pub(crate) labels: Option<&'a Labels>,
     pub(crate) views: &'a Views,
+    pub(crate) photographs: &'a Photographs,
     pub(crate) files: &'a Files,
     /// None if the meshes cannot be used.
     pub(crate) reference: Option<&'a Reference<'a>>,
@@ -101,9 +103,13 @@ impl ImageCheck<'_> {
     /// Checks all files of an image.
     pub(crate) fn check(&self, index: usize, image: &DatasetImage, memory: &mut Scratch<'_>) {
         let report = self.report;
-        let size = match image.frame {
-            Frame::View(_) => (self.manifest.options.size, self.manifest.options.size),
-            Frame::Panorama => (self.manifest.options.pano_width, self.manifest.options.pano_width / 2),
+        let photograph = self.photographs.of(image);
+        let size = match (image.frame, photograph) {
+            (_, Some(record)) => (record.width, record.height),
+            (Frame::View(_), None) => (self.manifest.options.size, self.manifest.options.size),
+            (Frame::Panorama, None) => {
+                (self.manifest.options.pano_width, self.manifest.options.pano_width / 2)
+            }
         };
         for &domain in self.domains {
             let path = image.path(self.layout, domain);
@@ -122,8 +128,8 @@ impl ImageCheck<'_> {
                 "the manifest does not tell of this modality",
             );
         }
-        let pose =
-            image.has(Domain::Pose).then(|| pose::read_and_check(self.layout, image, size, report)).flatten();
+        let read = || pose::read_and_check(self.layout, image, size, photograph.is_some(), report);
+        let pose = image.has(Domain::Pose).then(read).flatten();
         if let Some(pose) = &pose {
             let path = image.path(self.layout, Domain::Pose);
             let offset_m = self.manifest.area(image.area).and_then(|area| area.offset_m);
@@ -144,6 +150,7 @@ impl ImageCheck<'_> {
         let mut files = ImageFiles {
             check: self,
             index,
+            photograph,
             pose: pose.as_ref(),
             cast,
             seen: None,
@@ -170,6 +177,8 @@ impl ImageCheck<'_> {
 struct ImageFiles<'a> {
     check: &'a ImageCheck<'a>,
     index: usize,
+    /// What is told of the photograph that it is the view of.
+    photograph: Option<&'a PhotographRecord>,
     pose: Option<&'a CheckedPose>,
     /// Whether the memory holds the image's hits.
     cast: bool,
@@ -181,8 +190,14 @@ struct ImageFiles<'a> {
 
 impl ImageFiles<'_> {
     fn domain(&mut self, domain: Domain, pixels: Pixels, path: &Path, memory: &mut Scratch<'_>) {
-        self.against_mesh(domain, &pixels, memory);
-        self.nothing(domain, &pixels, path);
+        // What a photograph shows need not be in the mesh, and the other way round.
+        match self.photograph.filter(|_| domain == Domain::Rgb) {
+            Some(record) => self.photograph(record, &pixels, path, memory),
+            None => {
+                self.against_mesh(domain, &pixels, memory);
+                self.nothing(domain, &pixels, path);
+            }
+        }
         match (domain, pixels) {
             (Domain::Depth, Pixels::Depth(depth)) => self.depth = Some(depth),
             (Domain::Semantic, Pixels::Color(indices)) => {
@@ -192,6 +207,18 @@ impl ImageFiles<'_> {
             (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path),
             (Domain::GlobalXyz, Pixels::Xyz(points)) => self.coordinates(&points, path),
             _ => {}
+        }
+    }
+
+    /// A photograph's colours against what is told of it.
+    fn photograph(&self, record: &PhotographRecord, pixels: &Pixels, path: &Path, memory: &Scratch<'_>) {
+        let report = self.check.report;
+        let share = |count: usize| count as f64 / f64::from(record.width) / f64::from(record.height);
+        let masked = pixels.missing(Domain::Rgb).into_iter().filter(|missing| *missing).count();
+        check_share("the masked share", (record.masked, share(masked)), record, path, report);
+        if self.cast {
+            let seen = memory.hits.face.pixels().iter().filter(|face| **face != NO_FACE).count();
+            check_share("the seen share", (record.seen, share(seen)), record, path, report);
         }
     }
 

@@ -9,7 +9,7 @@ use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{DepthUnits, Domain, XyzType};
 use s3d_render::{
     MISSING_INDEX, TextureFilter, color_per_face_image_into, depth_image_into, depth_image_mm_into,
-    index_image_into, normal_image_into, rgb_image_into, xyz_image_half_into, xyz_image_into,
+    index_image_into, normal_image_into, rgb_image_into, sample_edges, xyz_image_half_into, xyz_image_into,
 };
 
 /// How a file differs from what the mesh shows: exactly, for the meshes of an export are those that it was
@@ -31,7 +31,10 @@ pub(super) fn difference(
         Pixels::Color(found) => match domain {
             Domain::Rgb => {
                 let filter = TextureFilter::default();
-                rgb_image_into(reference.scene, reference.textures, hits, camera, &filter, &mut images.rgb);
+                let (scene, textures) = (reference.scene, reference.textures);
+                rgb_image_into(scene, textures, hits, camera, &filter, &mut images.rgb);
+                let samples = reference.manifest.options.rgb_samples;
+                sample_edges(scene, textures, hits, camera, &filter, samples, &mut images.rgb);
                 colors(found, &images.rgb)
             }
             Domain::Normal => {

@@ -1,0 +1,266 @@
+//! Photographs with poses: found, each with its lens and the camera of its view, before anything is written.
+
+use crate::error::{Error, Result};
+use glam::DVec3;
+use rayon::prelude::*;
+use s3d_geom::{Camera, PhotoLens};
+use s3d_io::Error as FileError;
+use s3d_io::camera::{
+    IntrinsicsError, PosedCamera, PosedCameras, ScanLocation, check_picture, read_picture_turn,
+    read_posed_cameras, uuid_from_name,
+};
+use s3d_io::scene::FrameSource;
+use std::collections::{BTreeMap, HashSet};
+use std::path::{Path, PathBuf};
+
+/// How many photographs that are not there are named in a message.
+const MAX_NAMED: usize = 20;
+
+/// The endings that a name in a list may lack.
+const ENDINGS: [&str; 6] = ["jpg", "png", "jpeg", "JPG", "PNG", "JPEG"];
+
+/// An area's photographs.
+#[derive(Default)]
+pub(crate) struct Photographs {
+    /// The list that they come from, for messages.
+    pub(crate) list: PathBuf,
+    /// In the list's order.
+    pub(crate) all: Vec<Photograph>,
+    /// What is to be said of them, a sentence each.
+    pub(crate) notes: Vec<String>,
+    /// What was odd about them, a sentence each.
+    pub(crate) warnings: Vec<String>,
+    /// The files that the list is: it may be a folder with much besides.
+    list_files: Vec<PathBuf>,
+}
+
+/// A photograph and its view.
+#[derive(Clone, Debug)]
+pub(crate) struct Photograph {
+    /// What the list calls it.
+    pub(crate) name: String,
+    /// The camera of its view.
+    pub(crate) uuid: String,
+    pub(crate) picture: PathBuf,
+    /// What it was taken through, in its own pixels.
+    pub(crate) lens: PhotoLens,
+    /// What takes the view: a pinhole.
+    pub(crate) camera: Camera,
+}
+
+impl Photographs {
+    /// Finds the photographs that a scene of this area names, in a world less `offset_m`.
+    ///
+    /// # Errors
+    /// For those that are not there, all of them; for the first whose camera or size is not as it should be.
+    pub(crate) fn open(source: &FrameSource, area: u32, offset_m: DVec3) -> Result<Self> {
+        let PosedCameras { cameras, untracked, files } =
+            read_posed_cameras(&source.path, &source.world_from_file)?;
+        let (listed, list) = (cameras.len(), &source.path);
+        let mut notes = Vec::new();
+        if untracked > 0 {
+            notes.push(format!(
+                "{}: {untracked} of {} photographs are left out: their poses are not known (they hold an infinity)",
+                list.display(),
+                listed + untracked
+            ));
+        }
+        let chosen = choose(cameras, source);
+        notes.push(format!("{}: {} of {listed} photographs are taken", list.display(), chosen.len()));
+        let mut names = HashSet::new();
+        if let Some(twice) = chosen.iter().find(|camera| !names.insert(camera.name.as_str())) {
+            return Err(at(list, twice, "is listed twice: each photograph needs a name of its own".into()));
+        }
+        let pictures = find(source, &chosen)?;
+        let found: Vec<(Photograph, u8)> = chosen
+            .par_iter()
+            .zip(pictures)
+            .map(|(posed, picture)| open_one(source, area, offset_m, posed, picture))
+            .collect::<Result<_>>()?;
+        let mut warnings = Vec::new();
+        let turned = found.iter().filter(|(_, turn)| *turn != 1).count();
+        if let Some((first, turn)) = found.iter().find(|(_, turn)| *turn != 1) {
+            warnings.push(format!(
+                "{turned} photographs ask to be turned when they are shown ({}: EXIF orientation {turn}): they are taken as \
+                 they are stored, which is what the sizes of their cameras fit",
+                first.picture.display()
+            ));
+        }
+        let all = found.into_iter().map(|(photograph, _)| photograph).collect();
+        Ok(Self { list: list.clone(), all, notes, warnings, list_files: files })
+    }
+
+    /// Where they were taken, as a list of locations.
+    pub(crate) fn locations(&self) -> Vec<ScanLocation> {
+        let location = |p: &Photograph| ScanLocation { uuid: p.uuid.clone(), pose: p.camera.pose, line: 0 };
+        self.all.iter().map(location).collect()
+    }
+
+    /// All files that are read of them.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.list_files.iter().chain(self.all.iter().map(|p| &p.picture))
+    }
+
+    /// The same by folder: the list's, if it is one, or else each one's own; and files that have no folder's
+    /// place in a record stand for themselves.
+    pub(crate) fn by_folder(&self) -> BTreeMap<PathBuf, Vec<PathBuf>> {
+        let mut folders: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
+        for file in self.files() {
+            let folder = match file.starts_with(&self.list) {
+                true => self.list.as_path(),
+                false => file.parent().unwrap_or(Path::new("")),
+            };
+            folders.entry(folder.to_owned()).or_default().push(file.clone());
+        }
+        folders
+    }
+}
+
+/// Every which photograph, and of those at most so many, evenly spread.
+fn choose(cameras: Vec<PosedCamera>, source: &FrameSource) -> Vec<PosedCamera> {
+    let mut chosen: Vec<PosedCamera> = cameras.into_iter().step_by(source.every.get() as usize).collect();
+    let (count, most) = (chosen.len(), source.max.map_or(usize::MAX, |max| max.get() as usize));
+    if count > most {
+        let mut kept = vec![false; count];
+        (0..most).for_each(|i| kept[i * count / most] = true);
+        let mut kept = kept.into_iter();
+        chosen.retain(|_| kept.next().unwrap_or(false));
+    }
+    chosen
+}
+
+/// An error about a camera of the list.
+fn at(list: &Path, camera: &PosedCamera, message: String) -> Error {
+    let message = format!("{:?}: {message}", camera.name);
+    match camera.line {
+        0 => FileError::format(list, message),
+        line => FileError::line(list, line, message),
+    }
+    .into()
+}
+
+/// The file of each photograph.
+fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
+    let (mut found, mut missing) = (Vec::new(), Vec::new());
+    for camera in cameras {
+        let candidates: Vec<PathBuf> = match (&source.images, &camera.picture) {
+            (Some(folder), picture) => {
+                let name = Path::new(&camera.name);
+                let of_picture = picture.as_deref().and_then(Path::file_name);
+                let last = of_picture.or(name.file_name()).unwrap_or_default();
+                vec![folder.join(name), folder.join(last)]
+            }
+            (None, Some(picture)) => vec![picture.clone()],
+            (None, None) => Vec::new(),
+        };
+        if candidates.is_empty() && source.images.is_none() {
+            let message =
+                "no photograph was found for it: say which folder they are in, images = \"…\" under [frames]";
+            return Err(at(&source.path, camera, message.into()));
+        }
+        match candidates.iter().find_map(|path| with_ending(path)) {
+            Some(path) => found.push(path),
+            None => {
+                missing.push(candidates.first().map_or_else(String::new, |path| path.display().to_string()))
+            }
+        }
+    }
+    if missing.is_empty() {
+        return Ok(found);
+    }
+    let (count, more) = (missing.len(), missing.len().saturating_sub(MAX_NAMED));
+    missing.truncate(MAX_NAMED);
+    let mut names = missing.join(", ");
+    if more > 0 {
+        names += &format!(" and {more} more");
+    }
+    let message = format!(
+        "{count} of {} photographs are not there: {names}; images = \"…\" under [frames] names another folder",
+        cameras.len()
+    );
+    Err(FileError::format(&source.path, message).into())
+}
+
+/// The file of this name, which may lack its ending.
+fn with_ending(path: &Path) -> Option<PathBuf> {
+    let longer = |ending: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".");
+        name.push(ending);
+        PathBuf::from(name)
+    };
+    std::iter::once(path.to_owned()).chain(ENDINGS.map(longer)).find(|path| path.is_file())
+}
+
+/// A photograph with its lens and the camera of its view, and how it asks to be turned.
+fn open_one(
+    source: &FrameSource,
+    area: u32,
+    offset_m: DVec3,
+    posed: &PosedCamera,
+    picture: PathBuf,
+) -> Result<(Photograph, u8)> {
+    let (width, height) = check_picture(&picture)?;
+    let turn = read_picture_turn(&picture)?;
+    let lens = posed.photo_lens([width, height]).map_err(|e| match e {
+        IntrinsicsError::NoOptics => at(
+            &source.path,
+            posed,
+            format!("{e}: photographs need fl_x or camera_angle_x in a transforms.json, a COLMAP model's cameras, ScanNet's \
+                     intrinsic/intrinsic_color.txt, or fx or fov in a table"),
+        ),
+        // The four turns to a side.
+        IntrinsicsError::OtherSize { told, .. } if turn >= 5 && posed.photo_lens([height, width]).is_ok() => {
+            let message = format!(
+                "is stored with {width} × {height} pixels, to be turned when it is shown (EXIF orientation {turn}), and its \
+                 camera is for {} × {}: store it upright, as `mogrify -auto-orient` does",
+                told[0], told[1]
+            );
+            FileError::format(&picture, message).into()
+        }
+        IntrinsicsError::OtherSize { .. } => FileError::format(&picture, e.to_string()).into(),
+        _ => at(&source.path, posed, e.to_string()),
+    })?;
+    let mut pose = posed.pose;
+    pose.location -= offset_m;
+    let camera = lens
+        .pinhole(pose, source.width.unwrap_or(width))
+        .map_err(|e| at(&source.path, posed, e.to_string()))?;
+    let (name, uuid) = (posed.name.clone(), uuid_from_name(&format!("area_{area}/{}", posed.name)));
+    Ok((Photograph { name, uuid, picture, lens, camera }, turn))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DAffine3;
+    use s3d_geom::Pose;
+    use std::num::NonZeroU32;
+
+    fn source(every: u32, max: Option<u32>) -> FrameSource {
+        let (every, max) = (NonZeroU32::new(every).unwrap(), max.and_then(NonZeroU32::new));
+        let (path, world_from_file) = (PathBuf::from("list"), DAffine3::IDENTITY);
+        FrameSource { path, images: None, world_from_file, every, max, width: None }
+    }
+
+    #[test]
+    fn photographs_are_chosen_evenly() {
+        let pose = Pose::level(DVec3::ZERO, 0.0);
+        let camera = |i: u32| PosedCamera {
+            name: i.to_string(),
+            pose,
+            size: None,
+            optics: None,
+            picture: None,
+            line: 0,
+        };
+        let chosen = |every, max| -> Vec<String> {
+            choose((0..10).map(camera).collect(), &source(every, max)).into_iter().map(|c| c.name).collect()
+        };
+        assert_eq!(chosen(1, None).len(), 10);
+        assert_eq!(chosen(4, None), ["0", "4", "8"]);
+        assert_eq!(chosen(1, Some(3)), ["0", "3", "6"]);
+        assert_eq!(chosen(2, Some(2)), ["0", "4"]);
+        assert_eq!(chosen(5, Some(7)), ["0", "5"]);
+    }
+}

@@ -1,0 +1,216 @@
+//! Views of photographs: their own colours, and what the mesh shows from where they were taken.
+
+pub(crate) mod agreement;
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::images::{ImageJob, Memory, count};
+use crate::export::input::photographs::{Photograph, Photographs};
+use crate::export::input::pictures::PictureColors;
+use crate::export::location::room_name;
+use crate::export::modality::{Channels, Image};
+use crate::store::journal::PhotographDone;
+use crate::tables::summary::{ImageTally, UnitTally};
+use crate::useful::{Condition, judge_of, poses_findings};
+use agreement::Agreement;
+use rayon::prelude::*;
+use s3d_geom::Aabb;
+use s3d_io::Error as FileError;
+use s3d_io::camera::read_picture;
+use s3d_io::dataset::{Domain, FileRecord, Frame, PhotographRecord, PoseFile};
+use s3d_io::fs::write_bytes;
+use s3d_label::Room;
+use s3d_render::{Caster, Hits, NO_FACE, Scene, undistort};
+use std::time::Instant;
+
+/// The number of a photograph's view: each has a camera of its own.
+pub(crate) const VIEW: Frame = Frame::View(0);
+
+/// A photograph whose view is to be written.
+pub(crate) struct Shot<'a> {
+    pub(crate) photograph: &'a Photograph,
+    /// Where it was taken; none if rooms are not known.
+    pub(crate) room: Option<Room>,
+}
+
+/// A photograph whose files are all there, and when they were begun.
+pub(crate) struct WrittenPhotograph {
+    pub(crate) done: PhotographDone,
+    pub(crate) started: Instant,
+}
+
+/// Refuses photographs none of which sees the mesh, and warns of some that do not.
+pub(crate) fn judge_sight(
+    ctx: &Context,
+    photographs: &Photographs,
+    scene: &Scene<'_>,
+    allow: &[Condition],
+) -> Result<()> {
+    /// Pixels across that are looked at.
+    const ACROSS: u32 = 48;
+    let see = photographs.all.par_iter().map_init(
+        || (Caster::new(scene), Hits::default()),
+        |(caster, hits), photograph| {
+            let camera = &photograph.camera;
+            caster.cast_into(camera, (camera.width / ACROSS).max(1), hits);
+            u64::from(hits.face.pixels().iter().all(|face| *face == NO_FACE))
+        },
+    );
+    let (blind, all): (u64, u64) = (see.sum(), photographs.all.len() as u64);
+    let places = Aabb::from_points(photographs.all.iter().map(|p| p.camera.pose.location.as_vec3()));
+    let hint = "up and transform under [frames]";
+    let findings = poses_findings(blind, all, &places, &scene.mesh().aabb(), hint);
+    judge_of(("the photographs", "take them"), ctx, &findings, allow)
+}
+
+/// Writes the files of a photograph's view.
+pub(crate) fn write_photograph(
+    job: &ImageJob<'_>,
+    shot: &Shot<'_>,
+    memory: &mut Memory<'_>,
+) -> Result<WrittenPhotograph> {
+    let started = Instant::now();
+    let Memory { caster, hits, buffers } = memory;
+    let Shot { photograph, room } = shot;
+    let Photograph { name, uuid, picture, lens, camera } = photograph;
+    let room = room_name(*room);
+    let write = |domain: Domain, bytes: &[u8]| -> Result<FileRecord> {
+        let path = job.layout.image_path(job.area, uuid, &room, VIEW, domain);
+        write_bytes(&path, bytes)?;
+        Ok(FileRecord::of_bytes(job.layout.root(), &path, bytes)?)
+    };
+    let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
+    let mut tally =
+        UnitTally { views: ImageTally { images: 1, ..ImageTally::default() }, ..UnitTally::default() };
+    let (mut files, mut agreement, mut masked, mut seen) = (Vec::new(), Agreement::default(), 0.0, 0.0);
+    // Poses alone need no photograph.
+    if !images.is_empty() {
+        let photo = read_picture(picture)?;
+        if [photo.width(), photo.height()] != lens.size() {
+            return Err(FileError::format(picture, "has another size than when the export began").into());
+        }
+        agreement = Agreement::of(&photo, photograph, job.channels.scene, job.channels.textures);
+        let colors = undistort(&photo, lens, camera);
+        drop(photo);
+        caster.cast_into(camera, 1, hits);
+        let channels = Channels { pictures: Some(PictureColors::Photograph(&colors)), ..job.channels };
+        let each = |image: Image, file: Vec<u8>| write(image.domain(), &file);
+        files = channels.encode(&images, hits, camera, buffers, each)?;
+        let pixels = count(job, &images, hits, buffers);
+        let share = |count: u64| count as f64 / colors.len() as f64;
+        masked = share(colors.pixels().iter().filter(|color| **color == [0; 3]).count() as u64);
+        seen = 1.0 - share(pixels.pixels_missing);
+        tally.views += pixels;
+    }
+    if job.modalities.contains(&Domain::Pose) {
+        let room = format!("{room}_{}", job.area);
+        let mut pose = PoseFile::new(camera, &camera.pose, uuid, &room, VIEW);
+        pose.world_offset_m = job.offset_m;
+        files.push(write(Domain::Pose, &pose.to_json())?);
+    }
+    files.sort();
+    tally.files = files.len() as u64;
+    tally.bytes = files.iter().map(|f| f.bytes).sum();
+    // To the sixth digit, so that the last bits of a sum do not show.
+    let rounded = |value: f64| (value * 1e6).round() / 1e6;
+    let record = PhotographRecord {
+        camera_uuid: uuid.clone(),
+        name: name.clone(),
+        room,
+        width: camera.width,
+        height: camera.height,
+        masked: rounded(masked),
+        seen: rounded(seen),
+        agreement: agreement.correlation.map(rounded),
+        chance: agreement.chance.map(rounded),
+    };
+    Ok(WrittenPhotograph { done: PhotographDone { area: job.area, record, tally, files }, started })
+}
+
+/// What the agreement of an area's photographs with the mesh says, a sentence each.
+pub(crate) fn doubts(area: u32, records: &[&PhotographRecord]) -> Vec<String> {
+    let mut doubts: Vec<String> = mask_doubt(area, records).into_iter().collect();
+    doubts.extend(agreement_doubt(area, records));
+    doubts
+}
+
+/// Whether views show little of their photographs.
+fn mask_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
+    let count = records.iter().filter(|r| r.masked > 0.5).count();
+    let worst = records.iter().max_by(|a, b| a.masked.total_cmp(&b.masked)).filter(|_| count > 0)?;
+    Some(format!(
+        "area {area}: {count} of {} photographs fill less than half of their views, {} {:.0} %: are focal lengths and \
+         distortion those of the lens?",
+        records.len(),
+        worst.name,
+        100.0 * (1.0 - worst.masked)
+    ))
+}
+
+/// Whether poses fit, as edges tell.
+fn agreement_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
+    let mut known: Vec<(f64, f64, &str)> = records
+        .iter()
+        .filter_map(|r| Some((r.agreement?, r.chance.unwrap_or(0.0), r.name.as_str())))
+        .collect();
+    known.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(b.2)));
+    let &(median, of_chance, _) = known.get(known.len() / 2)?;
+    if Agreement::is_chance(median, of_chance) {
+        return Some(format!(
+            "area {area}: photographs and mesh agree no more than by chance: the median correlation of their edges is \
+             {median:.2}, and {of_chance:.2} where the two are displaced. Are the poses in the mesh's frame, is a matrix \
+             transposed, or camera axes exchanged? frames.json has each one's"
+        ));
+    }
+    let bad: Vec<&(f64, f64, &str)> = known.iter().filter(|(a, c, _)| Agreement::is_chance(*a, *c)).collect();
+    let named: Vec<String> = bad.iter().take(3).map(|(a, _, name)| format!("{name} ({a:.2})")).collect();
+    if bad.is_empty() {
+        return None;
+    }
+    Some(format!(
+        "area {area}: {} of {} photographs agree with the mesh no more than by chance, the worst {}; the median correlation \
+         of edges is {median:.2}. frames.json has each one's",
+        bad.len(),
+        known.len(),
+        named.join(", ")
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_few_bad_poses_are_named_and_many_are_told_as_one() {
+        let record = |name: &str, agreement: Option<f64>| PhotographRecord {
+            camera_uuid: "a".into(),
+            name: name.into(),
+            room: "unknown_1".into(),
+            width: 8,
+            height: 8,
+            masked: 0.0,
+            seen: 1.0,
+            agreement,
+            chance: Some(0.1),
+        };
+        let of = |scores: &[Option<f64>]| {
+            let records: Vec<_> =
+                scores.iter().zip(1..).map(|(s, i)| record(&format!("{i}.jpg"), *s)).collect();
+            doubts(3, &records.iter().collect::<Vec<_>>())
+        };
+        assert!(of(&[]).is_empty() && of(&[None]).is_empty() && of(&[Some(0.5), Some(0.4), None]).is_empty());
+        let some = of(&[Some(0.5), Some(0.12), Some(0.4), Some(0.6)]);
+        assert!(
+            some[0].contains("1 of 4 photographs") && some[0].contains("the worst 2.jpg (0.12)"),
+            "{some:?}"
+        );
+        let masked = PhotographRecord { masked: 0.75, ..record("m.jpg", Some(0.5)) };
+        let of_mask = doubts(3, &[&record("a.jpg", Some(0.5)), &masked]);
+        assert!(of_mask[0].contains("1 of 2 photographs fill less than half of their views, m.jpg 25 %"));
+        let most = of(&[Some(0.5), Some(0.12), Some(0.0)]);
+        assert!(
+            most[0].contains("no more than by chance: the median") && most[0].contains("0.12"),
+            "{most:?}"
+        );
+    }
+}

@@ -1,0 +1,232 @@
+//! The photographs of a capture as Polycam exports its raw data: `keyframes/corrected_images/N.jpg` and
+//! `keyframes/corrected_cameras/N.json`, or, where the capture was not optimized, `images` and `cameras`.
+//! Source: Polycam's polyform, README, "Polycam's data format".
+//!
+//! A file of `cameras` has fx, fy, cx, cy, width, height and the first three rows of camera → world, t_00 to
+//! t_23, in ARKit's axes: the world's +Y points up, the camera looks along its −Z.
+
+use crate::camera::posed::{Distortion, Optics, PosedCamera};
+use crate::error::{Error, Result};
+use crate::fs::json::read_json;
+use s3d_geom::Pose;
+use s3d_geom::glam::{DMat3, DVec3, dvec2};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Cameras and their photographs, the better first.
+const FOLDERS: [(&str, &str); 2] = [("corrected_cameras", "corrected_images"), ("cameras", "images")];
+
+#[derive(Deserialize)]
+struct Keyframe {
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    width: u32,
+    height: u32,
+    t_00: f64,
+    t_01: f64,
+    t_02: f64,
+    t_03: f64,
+    t_10: f64,
+    t_11: f64,
+    t_12: f64,
+    t_13: f64,
+    t_20: f64,
+    t_21: f64,
+    t_22: f64,
+    t_23: f64,
+}
+
+/// What Polycam turned the mesh by, and not the cameras: column by column.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct MeshInfo {
+    alignment_transform: Option<Vec<f64>>,
+}
+
+/// The files of the cameras of a capture in `dir`, which may be its folder `keyframes`, by number, and the
+/// folder of their photographs.
+pub(crate) fn find(dir: &Path) -> Result<Option<(Vec<PathBuf>, PathBuf)>> {
+    for keyframes in [dir.join("keyframes"), dir.to_owned()] {
+        for (cameras, images) in FOLDERS {
+            let (folder, images) = (keyframes.join(cameras), keyframes.join(images));
+            if !folder.is_dir() || !images.is_dir() {
+                continue;
+            }
+            let failed = |e| Error::io(&folder, "read the folder", e);
+            let mut files = Vec::new();
+            for entry in std::fs::read_dir(&folder).map_err(failed)? {
+                let path = entry.map_err(failed)?.path();
+                let number = path.file_stem().and_then(|stem| stem.to_str()?.parse::<u64>().ok());
+                if let (Some(number), true) = (number, path.extension().is_some_and(|e| e == "json")) {
+                    files.push((number, path));
+                }
+            }
+            files.sort();
+            if !files.is_empty() {
+                return Ok(Some((files.into_iter().map(|(_, path)| path).collect(), images)));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// The cameras that [`find`] found, in the frame of the capture's mesh turned Z-up, and the files that were
+/// read.
+pub(crate) fn read(files: Vec<PathBuf>, images: &Path) -> Result<(Vec<PosedCamera>, Vec<PathBuf>)> {
+    let info = images.join("../../mesh_info.json");
+    let aligned = if info.is_file() { alignment(&info)? } else { None };
+    // (x, y, z) becomes (x, −z, y).
+    let z_up = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y);
+    let mut cameras = Vec::with_capacity(files.len());
+    for path in &files {
+        let k: Keyframe = read_json(path)?;
+        let rows = [
+            [k.t_00, k.t_01, k.t_02, k.t_03],
+            [k.t_10, k.t_11, k.t_12, k.t_13],
+            [k.t_20, k.t_21, k.t_22, k.t_23],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        let mut pose = Pose::from_opengl(rows).map_err(|e| Error::format(path, e.to_string()))?;
+        if let Some(by) = &aligned {
+            pose.location = by.world_from_camera * pose.location + by.location;
+            pose.world_from_camera = by.world_from_camera * pose.world_from_camera;
+        }
+        pose.location = z_up * pose.location;
+        pose.world_from_camera = z_up * pose.world_from_camera;
+        let is_focal = |f: f64| f > 0.0 && f.is_finite();
+        if !is_focal(k.fx) || !is_focal(k.fy) || !k.cx.is_finite() || !k.cy.is_finite() {
+            let message = format!("focal lengths of {} and {} px, centre ({}, {})", k.fx, k.fy, k.cx, k.cy);
+            return Err(Error::format(path, message));
+        }
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let picture = ["jpg", "png"].map(|ending| images.join(format!("{name}.{ending}")));
+        let [first, _] = &picture;
+        let picture = picture.iter().find(|path| path.is_file()).unwrap_or(first).clone();
+        let optics = Optics::Pinhole {
+            focal_px: dvec2(k.fx, k.fy),
+            center_px: Some(dvec2(k.cx, k.cy)),
+            distortion: Distortion::None,
+        };
+        cameras.push(PosedCamera {
+            name,
+            pose,
+            size: Some([k.width, k.height]),
+            optics: Some(optics),
+            picture: Some(picture),
+            line: 0,
+        });
+    }
+    let info = aligned.is_some().then_some(info);
+    Ok((cameras, files.into_iter().chain(info).collect()))
+}
+
+/// What takes the cameras' frame to the mesh's, if the file says so.
+fn alignment(path: &Path) -> Result<Option<Pose>> {
+    let MeshInfo { alignment_transform } = read_json(path)?;
+    let Some(columns) = alignment_transform else { return Ok(None) };
+    let fault = |message: String| Error::format(path, format!("alignmentTransform: {message}"));
+    let Ok([a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3]) = <[f64; 16]>::try_from(columns)
+    else {
+        return Err(fault("is no matrix of 16 numbers".into()));
+    };
+    let rows = [[a0, b0, c0, d0], [a1, b1, c1, d1], [a2, b2, c2, d2], [a3, b3, c3, d3]];
+    Pose::from_opengl(rows).map(Some).map_err(|e| fault(e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::dvec3;
+    use std::fs;
+
+    /// A keyframe at (1, 2, 3) of ARKit's world that looks along its −Z.
+    const KEYFRAME: &str = r#"{"fx": 700.5, "fy": 701.5, "cx": 510.25, "cy": 384.5, "width": 1024, "height": 768,
+        "t_00": 1, "t_01": 0, "t_02": 0, "t_03": 1, "t_10": 0, "t_11": 1, "t_12": 0, "t_13": 2,
+        "t_20": 0, "t_21": 0, "t_22": 1, "t_23": 3, "blur_score": 99.5, "timestamp": 7}"#;
+
+    fn capture(folders: &[&str]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        for folder in folders {
+            fs::create_dir_all(dir.path().join("keyframes").join(folder)).unwrap();
+            if folder.ends_with("cameras") {
+                for name in ["10.json", "9.json", "notes.json"] {
+                    fs::write(dir.path().join("keyframes").join(folder).join(name), KEYFRAME).unwrap();
+                }
+            }
+        }
+        dir
+    }
+
+    #[test]
+    fn keyframes_are_read_by_number_and_turned_z_up() {
+        let dir = capture(&["cameras", "images", "corrected_cameras", "corrected_images"]);
+        for path in [dir.path().to_owned(), dir.path().join("keyframes")] {
+            let (files, images) = find(&path).unwrap().unwrap();
+            assert!(images.ends_with("corrected_images"));
+            let (cameras, read) = read(files, &images).unwrap();
+            assert_eq!((cameras.len(), read.len()), (2, 2));
+            assert_eq!((cameras[0].name.as_str(), cameras[1].name.as_str()), ("9", "10"));
+            let PosedCamera { pose, size, optics, picture, .. } = &cameras[0];
+            // Y-up (x, y, z) is Z-up (x, −z, y); −Z becomes +Y.
+            assert_eq!(
+                (pose.location, pose.forward(), pose.up()),
+                (dvec3(1.0, -3.0, 2.0), DVec3::Y, DVec3::Z)
+            );
+            assert!(
+                picture.as_ref().unwrap().ends_with("corrected_images/9.jpg") && *size == Some([1024, 768])
+            );
+            let Some(Optics::Pinhole { focal_px, center_px, distortion }) = optics else { panic!() };
+            assert_eq!((*focal_px, center_px.unwrap()), (dvec2(700.5, 701.5), dvec2(510.25, 384.5)));
+            assert_eq!(*distortion, Distortion::None);
+        }
+        // A capture that was not optimized has the other two alone.
+        let plain = capture(&["cameras", "images"]);
+        assert!(find(plain.path()).unwrap().unwrap().1.ends_with("keyframes/images"));
+        assert!(find(capture(&["cameras"]).path()).unwrap().is_none());
+    }
+
+    #[test]
+    fn cameras_go_where_the_mesh_was_aligned_to() {
+        let dir = capture(&["cameras", "images"]);
+        // A quarter turn around +Y and a shift, column by column.
+        let write = |text: &str| fs::write(dir.path().join("mesh_info.json"), text).unwrap();
+        write(
+            r#"{"alignmentTransform": [0, 0, -1, 0, 0, 1, 0, 0, 1, 0, 0, 0, 10, 20, 30, 1], "faceCount": 5}"#,
+        );
+        let cameras = || {
+            let (files, images) = find(dir.path()).unwrap().unwrap();
+            read(files, &images)
+        };
+        let (found, files) = cameras().unwrap();
+        // (1, 2, 3) → (3, 2, −1) + (10, 20, 30) = (13, 22, 29), Y-up; −Z → −X.
+        assert_eq!(found[0].pose.location, dvec3(13.0, -29.0, 22.0));
+        assert_eq!((found[0].pose.forward(), files.len()), (-DVec3::X, 3));
+        write(r#"{"faceCount": 5}"#);
+        assert_eq!(cameras().unwrap().0[0].pose.location, dvec3(1.0, -3.0, 2.0));
+        for (text, words) in [
+            ("{\"alignmentTransform\": [1, 2]}", "is no matrix of 16 numbers"),
+            ("{\"alignmentTransform\": [2,0,0,0, 0,2,0,0, 0,0,2,0, 0,0,0,1]}", "alignmentTransform: "),
+        ] {
+            write(text);
+            let message = cameras().unwrap_err().to_string();
+            assert!(message.contains(words) && message.contains("mesh_info.json"), "{message}");
+        }
+    }
+
+    #[test]
+    fn faults_name_their_file() {
+        let dir = capture(&["cameras", "images"]);
+        for (from, to, words) in [
+            ("\"t_22\": 1", "\"t_22\": -1", "mirrors"),
+            ("\"fx\": 700.5", "\"fx\": 0", "focal lengths of 0"),
+            ("\"fy\": 701.5,", "", "missing field `fy`"),
+        ] {
+            fs::write(dir.path().join("keyframes/cameras/9.json"), KEYFRAME.replace(from, to)).unwrap();
+            let (files, images) = find(dir.path()).unwrap().unwrap();
+            let message = read(files, &images).unwrap_err().to_string();
+            assert!(message.contains("9.json") && message.contains(words), "{message}");
+        }
+    }
+}
