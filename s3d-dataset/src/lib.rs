@@ -62,7 +62,9 @@ pub use error::{Error, Result};
 pub use event::{Event, Level, Stage, Task, UnitKind};
 pub use export::Export;
 pub use export::input::memory::{MemoryScene, SceneSource, SharedScene};
-pub use info::{InfoOptions, LocationInfo, MeshInfo, RoomInfo, SceneInfo, info};
+pub use info::{
+    DataSetInfo, InfoOptions, LocationInfo, MeshInfo, RoomInfo, SceneInfo, data_set_info, info, is_data_set,
+};
 pub use options::{ExportOptions, PadLabels, canonical_uuid};
 pub use pack::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions, pack,

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// The scene file, the folder of a published area, or a mesh.
+    /// The scene file, a mesh, the folder of a data set, or that of a published area.
     #[arg(value_name = "SCENE.toml")]
     pub(crate) scene: PathBuf,
     /// Which axis of a mesh points up [default: y in glTF, guessed in others]
@@ -36,6 +36,10 @@ pub(crate) struct InfoArgs {
 pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
     let Placing { place_cameras, see } = args.placing;
     let options = InfoOptions { place_cameras, see, seed: args.seed, lenient: args.lenient };
+    if s3d_dataset::is_data_set(&args.scene) {
+        let info = on_threads(args.threads, |context| s3d_dataset::data_set_info(&args.scene, context))?;
+        return print(&info.to_string());
+    }
     let scene = SceneSource::list([args.scene], args.up, args.units).remove(0);
     let info = on_threads(args.threads, |context| s3d_dataset::info(scene, &options, context))?;
     print(&info.to_string())

@@ -231,7 +231,7 @@ fn percent(share: f64) -> String {
 }
 
 /// Bytes in powers of 1000, as disks are sold.
-fn size(bytes: u64) -> String {
+pub(crate) fn size(bytes: u64) -> String {
     let mut value = bytes as f64;
     for unit in ["bytes", "kB", "MB", "GB"] {
         // What would be rounded up to 1000 is of the next unit.

@@ -1,7 +1,11 @@
 //! What a scene holds, and what looks wrong in it.
 
+mod data_set;
+
+pub use data_set::{DataSetInfo, data_set_info, is_data_set};
+
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::export::area::label_doubts;
 use crate::export::finish::MUCH_UNLABELLED;
 use crate::export::input::memory::SceneSource;
@@ -170,7 +174,15 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let located = match stops_any(&too_many) {
         // They would take hours to place.
         true => Located::default(),
-        false => locate(ctx, area, &scene, &nearest, &annotated, &inputs.table, seed)?,
+        false => match locate(ctx, area, &scene, &nearest, &annotated, &inputs.table, seed) {
+            Ok(located) => located,
+            // An export stops there; what else there is to know is no less true.
+            Err(Error::Input(why)) => {
+                doubts.push(format!("{why}; an export stops here"));
+                Located::default()
+            }
+            Err(other) => return Err(other),
+        },
     };
     findings.extend(too_many);
     let Located { locations: at, rooms: room_of, surface_seen } = located;

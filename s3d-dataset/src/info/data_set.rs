@@ -1,0 +1,95 @@
+//! What a data set holds, and what looks wrong in it.
+
+use super::{InfoOptions, SceneInfo, info};
+use crate::context::Context;
+use crate::error::Result;
+use crate::tables::dataset::Dataset;
+use crate::tables::summary::{Surface, Unlabelled, size};
+use s3d_io::dataset::Layout;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// What a data set holds. Displayed, it is the text that `s3d info OUT` prints.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct DataSetInfo {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// The version of s3d that made it.
+    pub version: String,
+    /// The seed that it was made with.
+    pub seed: u64,
+    /// Files, all but `manifest.json` and `files.csv`.
+    pub files: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// Labels, the null label included; 0 if it has none.
+    pub labels: usize,
+    /// The name of the taxonomy of its labels.
+    pub taxonomy: String,
+    /// What of all areas has no votes and no label; `None` without labels, and of earlier versions.
+    pub unlabelled: Option<Unlabelled>,
+    /// Number of panoramas.
+    pub panoramas: u64,
+    /// Number of views.
+    pub views: u64,
+    /// Its areas: what their scenes would be told of.
+    pub areas: Vec<SceneInfo>,
+}
+
+/// Looks at a complete data set: its manifest, and each of its areas as the scene that it is in itself.
+///
+/// # Errors
+/// [`Error::File`](crate::Error::File) if it is not complete, or not as it was written;
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn data_set_info(folder: &Path, ctx: &Context) -> Result<DataSetInfo> {
+    let layout = Layout::new(folder);
+    let Dataset { manifest, taxonomy, .. } = Dataset::open(&layout)?;
+    let of_areas = manifest.areas.iter();
+    let unlabelled = of_areas.clone().filter_map(|area| area.unlabelled).reduce(|mut sum, area| {
+        sum += area;
+        sum
+    });
+    let area = |number: &u32| info(layout.area_dir(*number), &InfoOptions::default(), ctx);
+    let list = manifest.files.as_ref();
+    Ok(DataSetInfo {
+        folder: folder.to_owned(),
+        version: manifest.version.clone(),
+        seed: manifest.seed,
+        files: list.map_or(0, |list| list.count),
+        bytes: list.map_or(0, |list| list.bytes),
+        labels: manifest.labels,
+        taxonomy: taxonomy.name().to_owned(),
+        unlabelled,
+        panoramas: of_areas.clone().map(|area| area.panoramas).sum(),
+        views: of_areas.map(|area| area.views).sum(),
+        areas: manifest.area_numbers.iter().map(area).collect::<Result<_>>()?,
+    })
+}
+
+/// Whether a folder is that of a data set, complete or not.
+pub fn is_data_set(folder: &Path) -> bool {
+    folder.is_dir() && Layout::new(folder).manifest().is_file()
+}
+
+impl fmt::Display for DataSetInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { version, seed, files, panoramas, views, .. } = self;
+        writeln!(f, "{}: a complete data set of s3d {version}, seed {seed}", self.folder.display())?;
+        writeln!(
+            f,
+            "  {files} files, {}; {panoramas} panoramas and {views} views of {} areas",
+            size(self.bytes),
+            self.areas.len()
+        )?;
+        match self.labels {
+            0 => writeln!(f, "  without labels")?,
+            labels => writeln!(f, "  {labels} labels of the taxonomy {}", self.taxonomy)?,
+        }
+        if let Some(Unlabelled { without_label: Surface { faces, m2, pixels }, .. }) = self.unlabelled {
+            let pixels = pixels.map_or(String::new(), |pixels| format!(", {pixels} pixels"));
+            writeln!(f, "  without a label: {faces} faces, {m2:.1} m²{pixels}")?;
+        }
+        self.areas.iter().try_for_each(|area| write!(f, "\n{area}"))
+    }
+}
