@@ -69,9 +69,9 @@ pub struct ExportOptions {
     /// The faces' normals, or those interpolated from the mesh's own where it has some.
     #[serde(with = "normals")]
     pub normals: Normals,
-    /// How many places of a pixel its colour in views and panoramas is the mean of where surfaces end or
-    /// turn, 1 to 64: 1 is its centre, as in every other modality, and leaves stair-steps. Colours of
-    /// pictures have none.
+    /// How many places of a pixel tell how much of each face its colour shows, where surfaces end or turn; 1
+    /// to 64. 1 is its centre alone, as in every other modality, and leaves stair-steps. Colours of pictures
+    /// stay.
     #[serde(skip_serializing_if = "is_one")]
     pub rgb_samples: u32,
     /// How much time the images' files may take. The pixels are the same.

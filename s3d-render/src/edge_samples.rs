@@ -1,16 +1,19 @@
-//! More samples a pixel where surfaces end or turn: the RGB image without stair-steps.
+//! The RGB image without stair-steps: where surfaces end or turn, more places of a pixel count.
 //!
-//! One sample in the centre is what every modality has, so that they are registered. Within a surface the
-//! texture's filter makes its colour smooth; where another surface begins, only more samples do.
+//! One ray through the centre is what every modality has, so that they are registered. Within a surface the
+//! texture's filter makes its colour smooth; where another surface begins, several places of the pixel tell
+//! how much it shows of each. Each surface's colour is taken once, in the middle of its places, since its
+//! filter sees a whole pixel.
 
 use crate::hits::{Hits, NO_FACE};
-use crate::ray::caster::{Hit, RayCaster};
-use crate::ray::cone::Cone;
+use crate::ray::caster::RayCaster;
+use crate::ray::cone::{Cone, Plane};
 use crate::scene::Scene;
 use crate::shade::mip_maps::{MipMaps, TextureFilter};
+use crate::shade::patch::FaceCache;
 use crate::shade::pixel_color::PixelByPixel;
 use glam::{DVec2, DVec3, dvec2};
-use s3d_geom::{Camera, Projection, Raster, Rays};
+use s3d_geom::{Camera, Raster, Rays, TriMesh};
 
 /// Neighbours whose surfaces meet at more than this angle, 15°, are at an edge.
 const FLAT: f32 = 0.966;
@@ -18,10 +21,10 @@ const FLAT: f32 = 0.966;
 /// Or one of which lies farther than this from the other's plane, as a share of its distance.
 const STEP: f64 = 0.01;
 
-/// Replaces the colour of each pixel at an edge by the mean of `samples` places in it, spread alike in each.
-/// `image` is that of [`crate::rgb_image_with`] for the same arguments. At an edge is a pixel one of whose
-/// four neighbours shows nothing, another material, or another face that lies behind it, before it, or turned
-/// away by more than 15°. Pixels that show nothing stay.
+/// Replaces the colour of each pixel at an edge by those of all faces that it shows, each by its share of
+/// `samples` places, spread alike in each pixel. `image` is that of [`crate::rgb_image_with`] for the same
+/// arguments. At an edge is a pixel one of whose four neighbours shows nothing, another material, or another
+/// face that lies behind it, before it, or turned away by more than 15°. Pixels that show nothing stay.
 ///
 /// # Panics
 /// If `hits` and `image` are not of the camera's size.
@@ -40,26 +43,24 @@ pub fn sample_edges(
     if samples < 2 {
         return;
     }
-    // A sample is as large as its part of the pixel.
-    let finer = f64::from(samples).sqrt().round().max(1.0);
-    let fine = finer_camera(camera, finer as u32);
+    let rays = camera.rays();
+    let edges = Edges { mesh: scene.mesh(), hits, rays: &rays, pairs: vec![Pair::NONE; PAIRS] }
+        .find(camera.is_panorama());
     let mut sampler = Sampler {
-        scene,
+        mesh: scene.mesh(),
         hits,
         camera,
-        rays: camera.rays(),
+        rays: &rays,
         places: places(samples),
-        rows: finer,
-        colors: PixelByPixel::new(scene, mip_maps, &fine, filter),
+        colors: PixelByPixel::new(scene, mip_maps, camera, filter),
         caster: RayCaster::new(scene, camera.pose.location),
-        cones: Vec::with_capacity(9),
+        fronts: FaceCache::new(),
+        near: Vec::with_capacity(9),
+        shown: Vec::with_capacity(9),
     };
-    let edges = sampler.edges();
     let width = camera.width as usize;
-    for (pixel, color) in image.pixels_mut().iter_mut().enumerate() {
-        if edges[pixel] {
-            *color = sampler.mean((pixel % width) as u32, (pixel / width) as u32).unwrap_or(*color);
-        }
+    for (pixel, color) in image.pixels_mut().iter_mut().enumerate().filter(|(pixel, _)| edges[*pixel]) {
+        *color = sampler.color((pixel % width) as u32, (pixel / width) as u32, *color);
     }
 }
 
@@ -73,47 +74,58 @@ fn places(samples: u32) -> Vec<DVec2> {
     (0..samples).zip(columns).map(|(row, column)| dvec2(middle(column), middle(row))).collect()
 }
 
-/// The same camera with more and smaller pixels.
-fn finer_camera(camera: &Camera, times: u32) -> Camera {
-    let projection = match camera.projection {
-        Projection::Pinhole { focal_px, center_px } => {
-            let by = f64::from(times);
-            Projection::Pinhole { focal_px: focal_px * by, center_px: center_px * by }
-        }
-        other => other,
-    };
-    Camera { projection, width: camera.width * times, height: camera.height * times, ..*camera }
+/// How many pairs of faces are remembered, a power of two: neighbours meet in many pixels.
+const PAIRS: usize = 4096;
+
+/// More faces than this in nine pixels may be so small that others lie between them.
+const FEW: usize = 4;
+
+/// What is known of two faces whose pixels are neighbours.
+#[derive(Clone, Copy)]
+struct Pair {
+    faces: [u32; 2],
+    meeting: Meeting,
 }
 
-struct Sampler<'a, 'm> {
-    scene: &'a Scene<'m>,
+#[derive(Clone, Copy, PartialEq)]
+enum Meeting {
+    /// An edge, wherever they meet.
+    Edge,
+    /// They go on into each other.
+    Smooth,
+    /// They look the same way: how far apart they are tells.
+    Parallel,
+}
+
+impl Pair {
+    const NONE: Self = Self { faces: [NO_FACE; 2], meeting: Meeting::Edge };
+}
+
+/// Which pixels are at an edge.
+struct Edges<'a> {
+    mesh: &'a TriMesh,
     hits: &'a Hits,
-    camera: &'a Camera,
-    rays: Rays,
-    places: Vec<DVec2>,
-    /// Rows of the finer camera in one of this.
-    rows: f64,
-    colors: PixelByPixel<'a>,
-    caster: RayCaster<'a, 'm>,
-    /// The faces around the pixel at hand.
-    cones: Vec<(u32, Option<Cone>)>,
+    rays: &'a Rays,
+    pairs: Vec<Pair>,
 }
 
-impl Sampler<'_, '_> {
-    /// Which pixels are at an edge.
-    fn edges(&self) -> Vec<bool> {
-        let (width, height) = (self.camera.width, self.camera.height);
+impl Edges<'_> {
+    /// By pixel; in a panorama the last column is beside the first.
+    fn find(mut self, wraps: bool) -> Vec<bool> {
         let faces = self.hits.face.pixels();
+        let (width, height) = (self.hits.face.width() as usize, self.hits.face.height() as usize);
         let mut edges = vec![false; faces.len()];
-        let at = |x: u32, y: u32| y as usize * width as usize + x as usize;
-        let wraps = self.camera.is_panorama();
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let right = if x + 1 < width { Some((x + 1, y)) } else { wraps.then_some((0, y)) };
-            let down = (y + 1 < height).then_some((x, y + 1));
-            for other in [right, down].into_iter().flatten() {
-                let (a, b) = (at(x, y), at(other.0, other.1));
-                if faces[a] != faces[b] && self.is_edge((x, y), other) {
-                    (edges[a], edges[b]) = (true, true);
+        for y in 0..height {
+            let row = y * width;
+            for i in row..row + width {
+                let right = if i + 1 < row + width { i + 1 } else { row };
+                let is_beside = right > i || wraps;
+                if is_beside && faces[i] != faces[right] && self.is_edge(i, right) {
+                    (edges[i], edges[right]) = (true, true);
+                }
+                let below = i + width;
+                if below < faces.len() && faces[i] != faces[below] && self.is_edge(i, below) {
+                    (edges[i], edges[below]) = (true, true);
                 }
             }
         }
@@ -122,76 +134,155 @@ impl Sampler<'_, '_> {
     }
 
     /// Whether an edge passes between two pixels that show different faces.
-    fn is_edge(&self, a: (u32, u32), b: (u32, u32)) -> bool {
-        let (f, g) = (self.hits.face.at(a.0, a.1), self.hits.face.at(b.0, b.1));
-        let mesh = self.scene.mesh();
-        if f == NO_FACE || g == NO_FACE || mesh.material_of(f) != mesh.material_of(g) {
+    fn is_edge(&mut self, i: usize, j: usize) -> bool {
+        let faces = self.hits.face.pixels();
+        let (f, g) = (faces[i], faces[j]);
+        if f == NO_FACE || g == NO_FACE {
             return true;
         }
-        let (n, m) = (mesh.normal(f), mesh.normal(g));
-        if n.dot(m).abs() < FLAT {
-            return true;
+        let place = (f ^ g.wrapping_mul(0x9e37_79b1)) as usize % PAIRS;
+        if self.pairs[place].faces != [f, g] {
+            self.pairs[place] = Pair { faces: [f, g], meeting: meeting(self.mesh, f, g) };
         }
-        let point = |p: (u32, u32)| self.rays.at(p.0, p.1) * f64::from(self.hits.depth.at(p.0, p.1));
-        let (p, q) = (point(a), point(b));
-        let off = |n: DVec3| n.dot(q - p).abs();
-        off(n.as_dvec3()).min(off(m.as_dvec3())) > STEP * p.length().min(q.length())
-    }
-
-    /// The mean colour of a pixel's places that see something.
-    fn mean(&mut self, x: u32, y: u32) -> Option<[u8; 3]> {
-        let are_large = self.gather(x, y);
-        let (mut sum, mut seen) = ([0u32; 3], 0);
-        for k in 0..self.places.len() {
-            let place = self.places[k];
-            let at = dvec2(f64::from(x), f64::from(y)) + place;
-            let direction = self.camera.direction(at.x, at.y);
-            let near = if are_large { self.nearest(direction) } else { None };
-            let Some(hit) = near.or_else(|| self.caster.cast(direction)) else { continue };
-            let row = (at.y * self.rows) as usize;
-            let color = self.colors.along(hit.face, direction, row);
-            sum = std::array::from_fn(|c| sum[c] + u32::from(color[c]));
-            seen += 1;
-        }
-        let mean = |sum: u32| ((sum + seen / 2) / seen) as u8;
-        (seen > 0).then(|| match sum.map(mean) {
-            [0, 0, 0] => [1; 3],
-            color => color,
-        })
-    }
-
-    /// Takes the faces of a pixel and of those around it. Whether each is seen in two of them or more: then
-    /// none is so small that a ray between them may meet another.
-    fn gather(&mut self, x: u32, y: u32) -> bool {
-        let (width, height) = (self.camera.width, self.camera.height);
-        self.cones.clear();
-        let mut counts = [0; 9];
-        for v in y.saturating_sub(1)..=(y + 1).min(height - 1) {
-            for u in x.saturating_sub(1)..=(x + 1).min(width - 1) {
-                let face = self.hits.face.at(u, v);
-                let index = self.cones.iter().position(|(known, _)| *known == face).unwrap_or_else(|| {
-                    self.cones.push((face, None));
-                    self.cones.len() - 1
-                });
-                counts[index] += 1;
+        match self.pairs[place].meeting {
+            Meeting::Edge => true,
+            Meeting::Smooth => false,
+            Meeting::Parallel => {
+                let (width, depth) = (self.hits.face.width(), self.hits.depth.pixels());
+                let point = |i: usize| {
+                    let (x, y) = (i as u32 % width, i as u32 / width);
+                    self.rays.at(x, y) * f64::from(depth[i])
+                };
+                let (p, q) = (point(i), point(j));
+                let off = |face| self.mesh.normal(face).as_dvec3().dot(q - p).abs();
+                off(f).min(off(g)) > STEP * p.length().min(q.length())
             }
         }
-        let is_large = |(cone, count): (&(u32, Option<Cone>), &u32)| *count > 1 && cone.0 != NO_FACE;
-        let are_large = self.cones.iter().zip(&counts).all(is_large);
-        if are_large {
-            let (mesh, origin) = (self.scene.mesh(), self.camera.pose.location);
-            self.cones.iter_mut().for_each(|(face, cone)| *cone = Cone::new(mesh, *face, origin));
-        }
-        are_large
+    }
+}
+
+/// How two faces meet, as far as it does not depend on where.
+fn meeting(mesh: &TriMesh, f: u32, g: u32) -> Meeting {
+    if mesh.material_of(f) != mesh.material_of(g) || mesh.normal(f).dot(mesh.normal(g)).abs() < FLAT {
+        return Meeting::Edge;
+    }
+    let (a, b) = (mesh.triangle(f), mesh.triangle(g));
+    if a.iter().any(|corner| b.contains(corner)) { Meeting::Smooth } else { Meeting::Parallel }
+}
+
+/// A face before the camera, ready to be met by many rays.
+#[derive(Clone, Copy)]
+struct Front {
+    /// A direction meets the face if it is on the inner side of each.
+    sides: [DVec3; 3],
+    plane: Plane,
+}
+
+impl Front {
+    fn new(mesh: &TriMesh, face: u32, origin: DVec3) -> Option<Self> {
+        let Cone { corners: [a, b, c], plane } = Cone::new(mesh, face, origin)?;
+        Some(Self { sides: [b.cross(c), c.cross(a), a.cross(b)], plane })
     }
 
-    /// The nearest of the gathered faces.
-    fn nearest(&self, direction: DVec3) -> Option<Hit> {
-        let hit = |(face, cone): &(u32, Option<Cone>)| {
-            let cone = cone.as_ref().filter(|cone| cone.contains(direction))?;
-            Some(Hit { face: *face, t: cone.distance(direction) })
-        };
-        self.cones.iter().filter_map(hit).min_by(|a, b| a.t.total_cmp(&b.t).then(a.face.cmp(&b.face)))
+    /// How far along `direction` it is met. Rounding decides at its rim: what meets no face there is asked
+    /// exactly.
+    fn distance(&self, direction: DVec3) -> Option<f64> {
+        let is_inside = self.sides.iter().all(|side| side.dot(direction) >= 0.0);
+        if is_inside { self.plane.distance(direction) } else { None }
+    }
+}
+
+struct Sampler<'a, 'm> {
+    mesh: &'a TriMesh,
+    hits: &'a Hits,
+    camera: &'a Camera,
+    rays: &'a Rays,
+    places: Vec<DVec2>,
+    colors: PixelByPixel<'a>,
+    caster: RayCaster<'a, 'm>,
+    fronts: FaceCache<Option<Front>>,
+    /// The faces of the pixel at hand and of those around it.
+    near: Vec<(u32, Option<Front>)>,
+    /// The faces that it shows: in how many places, and the sum of those.
+    shown: Vec<(u32, u32, DVec2)>,
+}
+
+impl Sampler<'_, '_> {
+    /// The colour of a pixel whose centre has the colour `center`.
+    fn color(&mut self, x: u32, y: u32, center: [u8; 3]) -> [u8; 3] {
+        let are_few = self.gather(x, y);
+        self.shown.clear();
+        for k in 0..self.places.len() {
+            let place = self.places[k];
+            let direction = self.direction(x, y, place);
+            let near = if are_few { self.nearest(direction) } else { None };
+            let Some(face) = near.or_else(|| self.caster.cast(direction).map(|hit| hit.face)) else {
+                continue;
+            };
+            match self.shown.iter_mut().find(|shown| shown.0 == face) {
+                Some(shown) => (shown.1, shown.2) = (shown.1 + 1, shown.2 + place),
+                None => self.shown.push((face, 1, place)),
+            }
+        }
+        let (mut sum, mut seen) = ([0u32; 3], 0);
+        for i in 0..self.shown.len() {
+            let (face, count, places) = self.shown[i];
+            let color = if face == self.hits.face.at(x, y) {
+                center
+            } else {
+                let direction = self.direction(x, y, places / f64::from(count));
+                self.colors.along(face, direction, y as usize)
+            };
+            sum = std::array::from_fn(|c| sum[c] + count * u32::from(color[c]));
+            seen += count;
+        }
+        if seen == 0 {
+            return center;
+        }
+        match sum.map(|sum| ((sum + seen / 2) / seen) as u8) {
+            [0, 0, 0] => [1; 3],
+            color => color,
+        }
+    }
+
+    /// Through a place of a pixel.
+    fn direction(&self, x: u32, y: u32, place: DVec2) -> DVec3 {
+        let at = dvec2(f64::from(x), f64::from(y)) + place;
+        match self.rays {
+            Rays::Perspective { x_step, y_step, origin } => *origin + *x_step * at.x + *y_step * at.y,
+            Rays::Equirectangular { .. } => self.camera.direction(at.x, at.y),
+        }
+    }
+
+    /// Takes the faces of a pixel and of those around it. Whether they are few: then they are so large that no
+    /// ray between their centres meets another.
+    fn gather(&mut self, x: u32, y: u32) -> bool {
+        let (width, height) = (self.camera.width, self.camera.height);
+        self.near.clear();
+        for v in y.saturating_sub(1)..=(y + 1).min(height - 1) {
+            let row = self.hits.face.row(v);
+            for &face in &row[x.saturating_sub(1) as usize..=(x + 1).min(width - 1) as usize] {
+                if self.near.iter().all(|near| near.0 != face) {
+                    self.near.push((face, None));
+                }
+            }
+        }
+        let are_few = self.near.len() <= FEW && self.near.iter().all(|(face, _)| *face != NO_FACE);
+        if are_few {
+            let (mesh, origin) = (self.mesh, self.camera.pose.location);
+            for (face, front) in &mut self.near {
+                *front = *self.fronts.get(*face, || Front::new(mesh, *face, origin));
+            }
+        }
+        are_few
+    }
+
+    /// The nearest of the gathered faces; the lowest of equally near ones.
+    fn nearest(&self, direction: DVec3) -> Option<u32> {
+        let hit =
+            |(face, front): &(u32, Option<Front>)| front.as_ref()?.distance(direction).map(|t| (*face, t));
+        let hits = self.near.iter().filter_map(hit);
+        hits.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(face, _)| face)
     }
 }
 

@@ -95,7 +95,10 @@ pub(crate) fn rows(pose: &Pose, s: f64) -> [[f64; 4]; 4] {
 /// The frames of nerfstudio's list, `images/0.png` …, of the first lens.
 pub(crate) fn transforms(poses: &[Pose]) -> Value {
     let [k1, k2, p1, p2, k3] = RADIAL;
-    let frame = |(i, pose): (usize, &Pose)| json!({"file_path": format!("images/{i}.png"), "transform_matrix": rows(pose, 1.0)});
+    let frame = |(i, pose): (usize, &Pose)| {
+        let name = format!("images/{i}.png");
+        json!({"file_path": name, "transform_matrix": rows(pose, 1.0)})
+    };
     json!({
         "camera_model": "OPENCV", "w": SIZE[0], "h": SIZE[1], "fl_x": FOCAL.x, "fl_y": FOCAL.y,
         "cx": CENTER.x, "cy": CENTER.y, "k1": k1, "k2": k2, "p1": p1, "p2": p2, "k3": k3,

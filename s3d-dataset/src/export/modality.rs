@@ -20,7 +20,7 @@ pub(crate) struct Channels<'a> {
     /// Colours that are not the textures'.
     pub(crate) pictures: Option<PictureColors<'a>>,
     pub(crate) normals: Normals,
-    /// How many places of a pixel at an edge its colour is the mean of; 1 for its centre alone.
+    /// How many places of a pixel at an edge tell its colour; 1 for its centre alone.
     pub(crate) rgb_samples: u32,
     /// The label index of each face; may be empty if no semantic image is asked for.
     pub(crate) label_of_face: &'a [u32],

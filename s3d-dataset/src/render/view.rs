@@ -56,8 +56,14 @@ pub struct RenderOptions {
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        let (normals, compression) = (Normals::Flat, Compression::default());
-        Self { up: UpAxis::Y, units: None, normals, rgb_samples: 1, compression, overwrite: false }
+        Self {
+            up: UpAxis::Y,
+            units: None,
+            normals: Normals::Flat,
+            rgb_samples: 1,
+            compression: Compression::default(),
+            overwrite: false,
+        }
     }
 }
 

@@ -143,7 +143,8 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     let photographs = common.photographs.count(area);
     if photographs > 0 && domains.contains(&Domain::Rgb) {
         report.note(format!(
-            "area {area}: the colours of {photographs} photographs are their own, which are not in the data set; they were \
+            "area {area}: the colours of {photographs} photographs are their own, which are not in the data \
+             set; they were \
              not compared"
         ));
     }

@@ -142,7 +142,8 @@ mod tests {
     use std::fs;
 
     /// A keyframe at (1, 2, 3) of ARKit's world that looks along its −Z.
-    const KEYFRAME: &str = r#"{"fx": 700.5, "fy": 701.5, "cx": 510.25, "cy": 384.5, "width": 1024, "height": 768,
+    const KEYFRAME: &str = r#"{"fx": 700.5, "fy": 701.5, "cx": 510.25, "cy": 384.5,
+        "width": 1024, "height": 768,
         "t_00": 1, "t_01": 0, "t_02": 0, "t_03": 1, "t_10": 0, "t_11": 1, "t_12": 0, "t_13": 2,
         "t_20": 0, "t_21": 0, "t_22": 1, "t_23": 3, "blur_score": 99.5, "timestamp": 7}"#;
 

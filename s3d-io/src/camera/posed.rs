@@ -99,7 +99,10 @@ pub enum IntrinsicsError {
         tilt_deg: f64,
     },
     /// A photograph has another shape than its camera's pictures.
-    #[error("the photograph has {} × {} pixels, and its camera is for {} × {}", found[0], found[1], told[0], told[1])]
+    #[error(
+        "the photograph has {} × {} pixels, and its camera is for {} × {}",
+        found[0], found[1], told[0], told[1]
+    )]
     OtherSize {
         /// Width and height of the photograph.
         found: [u32; 2],
@@ -108,7 +111,8 @@ pub enum IntrinsicsError {
     },
     /// The principal point lies beside the photograph.
     #[error(
-        "the principal point ({}, {}) lies outside of the photograph of {} × {} pixels: is the camera for a picture of \
+        "the principal point ({}, {}) lies outside of the photograph of {} × {} pixels: is the camera for a \
+         picture of \
          another size?", center_px.x, center_px.y, size[0], size[1]
     )]
     CenterOutside {
@@ -122,7 +126,8 @@ pub enum IntrinsicsError {
     NoLens,
     /// Its numbers make no lens.
     #[error(
-        "no direction comes to the middle of its picture: focal lengths, principal point or distortion are wrong"
+        "no direction comes to the middle of its picture: focal lengths, principal point or distortion are \
+         wrong"
     )]
     BadLens,
     /// It cannot be.

@@ -278,7 +278,8 @@ mod tests {
     fn photographs_are_read() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("frames.json");
-        let text = r#"[{"camera_uuid": "a", "name": "images/1.jpg", "room": "unknown_1", "width": 4, "height": 3,
+        let text = r#"[{"camera_uuid": "a", "name": "images/1.jpg", "room": "unknown_1",
+            "width": 4, "height": 3,
             "masked": 0.25, "seen": 1, "agreement": 0.5, "chance": null}]"#;
         write_bytes(&path, text.as_bytes()).unwrap();
         let records = read_photographs(&path).unwrap();

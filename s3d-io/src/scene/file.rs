@@ -297,14 +297,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
     if let Some(source) = &mut pictures {
         source.path = found("rgb.path", &source.path, "folder", Path::is_dir)?;
     }
-    let mut frames = document.frames.map(FramesTable::source).transpose();
-    if let Ok(Some(source)) = &mut frames {
-        source.path = found("frames.path", &source.path, "", Path::exists)?;
-        if let Some(images) = &mut source.images {
-            *images = found("frames.images", images, "folder", Path::is_dir)?;
-        }
-    }
-    let frames = frames.map_err(|message| fault(format!("[frames]: {message}")))?;
+    let frames = document.frames.map(|table| table.source(&found, &fault)).transpose()?;
     Ok(SceneFile {
         path: path.to_owned(),
         area: document.area.get(),

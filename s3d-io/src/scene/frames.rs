@@ -1,11 +1,12 @@
 //! The table `[frames]` of a `scene.toml`.
 
+use crate::error::{Error, Result};
 use crate::mesh::file::UpAxis;
 use crate::scene::cameras::similarity;
 use s3d_geom::glam::DAffine3;
 use serde::Deserialize;
 use std::num::NonZeroU32;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Photographs with poses, each of which becomes a view.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,15 +40,22 @@ pub(crate) struct FramesTable {
     width: Option<u32>,
 }
 
+/// Finds what a key of the scene file names, which should be of a kind.
+type Find<'f> = &'f dyn Fn(&str, &Path, &str, fn(&Path) -> bool) -> Result<PathBuf>;
+
 impl FramesTable {
-    /// What it asks for; a message if that cannot be. Paths are as they are written.
-    pub(crate) fn source(self) -> std::result::Result<FrameSource, String> {
+    /// What it asks for, its files found; an error about the scene file if that cannot be.
+    pub(crate) fn source(self, found: Find<'_>, fault: &dyn Fn(String) -> Error) -> Result<FrameSource> {
+        let fault = |message: String| fault(format!("[frames]: {message}"));
         let Self { path, images, up, transform, every, max, width } = self;
         if let Some(width) = width.filter(|width| !WIDTHS.contains(width)) {
             let (least, most) = (WIDTHS.start(), WIDTHS.end());
-            return Err(format!("width = {width}: must be from {least} to {most} pixels"));
+            return Err(fault(format!("width = {width}: must be from {least} to {most} pixels")));
         }
-        let given = transform.map_or(Ok(DAffine3::IDENTITY), similarity)?;
+        let given = transform.map_or(Ok(DAffine3::IDENTITY), similarity).map_err(fault)?;
+        let path = found("frames.path", &path, "", Path::exists)?;
+        let find_images = |images: PathBuf| found("frames.images", &images, "folder", Path::is_dir);
+        let images = images.map(find_images).transpose()?;
         let world_from_file = given * DAffine3::from_mat3(up.unwrap_or(UpAxis::Z).rotation());
         Ok(FrameSource { path, images, world_from_file, every: every.unwrap_or(NonZeroU32::MIN), max, width })
     }
@@ -56,7 +64,6 @@ impl FramesTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Result;
     use crate::scene::parse_scene;
     use s3d_geom::glam::DVec3;
     use std::fs;

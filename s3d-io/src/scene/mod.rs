@@ -4,8 +4,8 @@
 //! ([`SceneFile`]); the files themselves are read by [`mesh`](crate::mesh), [`cloud`](crate::cloud) and
 //! [`camera`](crate::camera). [`PublishedArea`] finds the same in the folder of a published area, or of an
 //! export. [`PictureSource`] tells what the colours of images are taken from, [`FrameSource`] which
-//! photographs become views. A key that is not known is an error, with its line. [`read_taxonomy`] reads the
-//! classes that a scene may have in place of S3DIS's. Source: formats.md, "The scene file".
+//! photographs become views. [`read_taxonomy`] reads the classes that a scene may have in place of S3DIS's. A
+//! key that is not known is an error, with its line. Source: formats.md, "The scene file".
 //!
 //! ```
 //! use s3d_io::scene::parse_scene;

@@ -60,7 +60,8 @@ impl Photographs {
         let mut notes = Vec::new();
         if untracked > 0 {
             notes.push(format!(
-                "{}: {untracked} of {} photographs are left out: their poses are not known (they hold an infinity)",
+                "{}: {untracked} of {} photographs are left out: their poses are not known (they hold an \
+                 infinity)",
                 list.display(),
                 listed + untracked
             ));
@@ -81,7 +82,8 @@ impl Photographs {
         let turned = found.iter().filter(|(_, turn)| *turn != 1).count();
         if let Some((first, turn)) = found.iter().find(|(_, turn)| *turn != 1) {
             warnings.push(format!(
-                "{turned} photographs ask to be turned when they are shown ({}: EXIF orientation {turn}): they are taken as \
+                "{turned} photographs ask to be turned when they are shown ({}: EXIF orientation {turn}): \
+                 they are taken as \
                  they are stored, which is what the sizes of their cameras fit",
                 first.picture.display()
             ));
@@ -175,7 +177,8 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
         names += &format!(" and {more} more");
     }
     let message = format!(
-        "{count} of {} photographs are not there: {names}; images = \"…\" under [frames] names another folder",
+        "{count} of {} photographs are not there: {names}; images = \"…\" under [frames] names another \
+         folder",
         cameras.len()
     );
     Err(FileError::format(&source.path, message).into())
@@ -206,13 +209,17 @@ fn open_one(
         IntrinsicsError::NoOptics => at(
             &source.path,
             posed,
-            format!("{e}: photographs need fl_x or camera_angle_x in a transforms.json, a COLMAP model's cameras, ScanNet's \
-                     intrinsic/intrinsic_color.txt, or fx or fov in a table"),
+            format!(
+                "{e}: photographs need fl_x or camera_angle_x in a transforms.json, a COLMAP model's \
+                     cameras, ScanNet's \
+                     intrinsic/intrinsic_color.txt, or fx or fov in a table"
+            ),
         ),
         // The four turns to a side.
         IntrinsicsError::OtherSize { told, .. } if turn >= 5 && posed.photo_lens([height, width]).is_ok() => {
             let message = format!(
-                "is stored with {width} × {height} pixels, to be turned when it is shown (EXIF orientation {turn}), and its \
+                "is stored with {width} × {height} pixels, to be turned when it is shown (EXIF orientation \
+                 {turn}), and its \
                  camera is for {} × {}: store it upright, as `mogrify -auto-orient` does",
                 told[0], told[1]
             );

@@ -139,7 +139,8 @@ fn mask_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
     let count = records.iter().filter(|r| r.masked > 0.5).count();
     let worst = records.iter().max_by(|a, b| a.masked.total_cmp(&b.masked)).filter(|_| count > 0)?;
     Some(format!(
-        "area {area}: {count} of {} photographs fill less than half of their views, {} {:.0} %: are focal lengths and \
+        "area {area}: {count} of {} photographs fill less than half of their views, {} {:.0} %: are focal \
+         lengths and \
          distortion those of the lens?",
         records.len(),
         worst.name,
@@ -157,8 +158,10 @@ fn agreement_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
     let &(median, of_chance, _) = known.get(known.len() / 2)?;
     if Agreement::is_chance(median, of_chance) {
         return Some(format!(
-            "area {area}: photographs and mesh agree no more than by chance: the median correlation of their edges is \
-             {median:.2}, and {of_chance:.2} where the two are displaced. Are the poses in the mesh's frame, is a matrix \
+            "area {area}: photographs and mesh agree no more than by chance: the median correlation of \
+             their edges is \
+             {median:.2}, and {of_chance:.2} where the two are displaced. Are the poses in the mesh's \
+             frame, is a matrix \
              transposed, or camera axes exchanged? frames.json has each one's"
         ));
     }
@@ -168,7 +171,8 @@ fn agreement_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
         return None;
     }
     Some(format!(
-        "area {area}: {} of {} photographs agree with the mesh no more than by chance, the worst {}; the median correlation \
+        "area {area}: {} of {} photographs agree with the mesh no more than by chance, the worst {}; the \
+         median correlation \
          of edges is {median:.2}. frames.json has each one's",
         bad.len(),
         known.len(),
