@@ -155,6 +155,15 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
     // Labels by their indices; walls and floors by the ids of their classes.
     let of_labels = [(1, 4), (3, 28), (4, 6), (0xff_0001, 1), (0xff_0002, 2)];
     assert_eq!(category_of, BTreeMap::from(of_labels));
+    let instances = json(&coco.join("instances.json"));
+    let found = instances["annotations"].as_array().unwrap();
+    assert!(
+        found.iter().all(|a| [4, 6, 28].contains(&a["category_id"].as_u64().unwrap())) && found.len() > 5
+    );
+    assert!(
+        found.iter().all(|a| a["segmentation"]["counts"].as_str().is_some_and(|counts| !counts.is_empty()))
+    );
+    assert_eq!(instances["categories"].as_array().unwrap().len(), 18);
     s3d_fails(
         &["pack", text(&out), "--to", "coco", "-o", text(&dir.path().join("x")), "--stuff", "board"],
         2,
@@ -224,6 +233,80 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
         1,
         &["taxonomy.json"],
     );
+}
+
+#[test]
+fn images_of_classes_have_the_taxonomys_places_and_colours() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = write_scannet(&dir.path().join("scan"), "taxonomy = \"scannet20\"\n");
+    let (out, plain) = (dir.path().join("out"), dir.path().join("plain"));
+    export(&scene, &plain, &[]);
+    let asked = ["--modalities", "rgb,depth,normal,semantic,semantic_pretty,semantic_class,global_xyz,pose"];
+    export(&scene, &out, &asked);
+    // Nobody gets them without asking, and nothing else changes.
+    let (with, without) = (files(&out), files(&plain));
+    let is_new = |path: &Path| {
+        path.to_string_lossy().contains("semantic_class") || path.to_string_lossy().contains("class_legend")
+    };
+    assert!(without.keys().all(|path| !is_new(path)));
+    let tables = ["manifest.json", "files.csv"].map(PathBuf::from);
+    let rest = with.keys().filter(|path| !is_new(path));
+    assert!(rest.eq(without.keys()));
+    let same =
+        without.iter().filter(|(path, _)| !tables.contains(path)).all(|(path, bytes)| with[path] == *bytes);
+    assert!(same);
+
+    let names = names(&json(&out.join("assets/semantic_labels.json")))
+        .into_iter()
+        .map(str::to_owned)
+        .collect::<Vec<_>>();
+    let taxonomy = s3d_label::Taxonomy::built_in("scannet20").unwrap();
+    let mut images = 0;
+    for (path, _) in
+        with.iter().filter(|(path, _)| path.to_string_lossy().ends_with("domain_semantic_class.png"))
+    {
+        let (places, palette) = s3d_io::image::read_palette8(&out.join(path)).unwrap();
+        assert_eq!(
+            (palette.len(), palette[0], palette[15], palette[255]),
+            (256, [174, 199, 232], [158, 218, 229], [0; 3])
+        );
+        let labels = path.to_string_lossy().replace("semantic_class", "semantic");
+        let labels = s3d_io::image::read_rgb8(&out.join(labels)).unwrap();
+        for (place, [r, g, b]) in places.pixels().iter().zip(labels.pixels()) {
+            let index = u32::from_be_bytes([0, *r, *g, *b]) as usize;
+            let label = names.get(index).and_then(|name| taxonomy.parse_name(name).unwrap());
+            assert_eq!(*place, label.map_or(255, |label| label.class.index() as u8));
+        }
+        images += 1;
+    }
+    assert!(images > 6, "{images}");
+    let legend = fs::read_to_string(out.join("assets/class_legend.csv")).unwrap();
+    assert!(legend.contains("\n15,28,showerCurtain,158,218,229,thing,clutter\n"), "{legend}");
+    assert!(s3d_io::image::read_rgb8(&out.join("assets/class_legend.png")).is_ok());
+    s3d_ok(&["verify", text(&out), "--full"]);
+    // One place wrong in an image, another palette, and a legend that is gone.
+    let path =
+        with.keys().find(|path| path.to_string_lossy().ends_with("domain_semantic_class.png")).unwrap();
+    let (mut places, mut palette) = s3d_io::image::read_palette8(&out.join(path)).unwrap();
+    let compression = s3d_io::image::Compression::Balanced;
+    places.pixels_mut()[7] ^= 1;
+    fs::write(out.join(path), s3d_io::image::encode_palette8(&places, &palette, compression)).unwrap();
+    let told = |what: &str| {
+        let verified = s3d(&["verify", text(&out)]);
+        let told = String::from_utf8_lossy(&verified.stdout).into_owned()
+            + &String::from_utf8_lossy(&verified.stderr);
+        assert_eq!(verified.status.code(), Some(1));
+        assert!(told.contains(what), "{told}");
+    };
+    told("are not the classes of the labels in the semantic image");
+    places.pixels_mut()[7] ^= 1;
+    palette[3] = [9, 9, 9];
+    fs::write(out.join(path), s3d_io::image::encode_palette8(&places, &palette, compression)).unwrap();
+    told("its palette has not the colours of scannet20");
+    fs::write(out.join(path), &with[path]).unwrap();
+    s3d_ok(&["verify", text(&out)]);
+    fs::remove_file(out.join("assets/class_legend.csv")).unwrap();
+    told("class_legend.csv");
 }
 
 #[test]

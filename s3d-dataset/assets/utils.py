@@ -113,6 +113,18 @@ def read_semantic(path):
     return np.where(index == 0x0D0D0D, -1, index)
 
 
+def read_semantic_class(path):
+    """Places of classes in the taxonomy (H, W): -1 where nothing was seen, or what was seen has no class. The file is a PNG
+    with a palette, which readers of colours turn into the classes' colours."""
+    from PIL import Image as Pillow
+
+    with Pillow.open(path) as image:
+        if image.mode != "P":
+            raise ValueError(f"{path}: no image with a palette")
+        place = np.asarray(image).astype(np.int32)
+    return np.where(place == 255, -1, place)
+
+
 def read_xyz(path):
     """World coordinates (H, W, 3) in metres, NaN where missing; float16 or float32 as stored."""
     import OpenEXR
@@ -282,6 +294,9 @@ class Dataset:
     def semantic(self, image):
         return read_semantic(self.path(image, "semantic"))
 
+    def semantic_class(self, image):
+        return read_semantic_class(self.path(image, "semantic_class"))
+
     def xyz(self, image):
         return read_xyz(self.path(image, "global_xyz"))
 
@@ -336,6 +351,9 @@ def check_image(data, image, fail):
         # Depth may be missing where it is too far; the other way round never.
         if seen is not None and (seen & (index < 0)).any():
             fail(f"{image.stem}: depth where semantics has nothing")
+    if {"semantic", "semantic_class"} <= there:
+        if (data.semantic_class(image) != data.class_of_label[data.semantic(image)]).any():
+            fail(f"{image.stem}: classes that are not those of the labels")
     if "normal" in there and {"depth", "pose"} <= there:
         points, normals = data.world_points(image), data.world_normals(image)
         rays = points - np.array(data.pose(image)["camera_location"])

@@ -112,7 +112,7 @@ impl Default for ExportOptions {
             lenient: false,
             fill: None,
             entropy_stride: 4,
-            modalities: Domain::ALL.to_vec(),
+            modalities: Domain::PUBLISHED.to_vec(),
             keep_all: false,
             only: Vec::new(),
             normals: Normals::Flat,

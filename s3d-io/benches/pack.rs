@@ -129,6 +129,7 @@ fn tables(c: &mut Criterion) {
             width: 1080,
             height: 1080,
             segments: segments.clone(),
+            masks: Default::default(),
         })
         .collect();
     group.throughput(Throughput::Elements(IMAGES));

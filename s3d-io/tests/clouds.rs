@@ -5,8 +5,8 @@ use s3d_geom::PointCloud;
 use s3d_geom::glam::{DVec3, Vec3, vec3};
 use s3d_io::cloud::{AnnotationOptions, Annotations, OnFault};
 use s3d_io::{Error, Result};
-use s3d_label::Class;
-use std::collections::BTreeMap;
+use s3d_label::{Class, Taxonomy};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 const CLASSES: [Class; 3] = [Class::FLOOR, Class::WALL, Class::CHAIR];
@@ -98,6 +98,36 @@ fn names_of_classes_need_no_table() {
     let classes = BTreeMap::from([("office chair".to_owned(), None)]);
     let found = open("scene0000_00", &AnnotationOptions { classes, ..options.clone() }).unwrap();
     assert_eq!(contents(&found, "office_1").len(), 8);
+}
+
+#[test]
+fn words_and_numbers_mean_what_the_taxonomy_says() {
+    let of = |name: &str, taxonomy: &str| {
+        let taxonomy = Taxonomy::built_in(taxonomy).unwrap();
+        let room = taxonomy.room("bedroom_1").ok();
+        let options = AnnotationOptions { taxonomy, room, ..Default::default() };
+        let found = open(name, &options).map_err(|e| e.to_string())?;
+        assert_eq!(found.taxonomy, options.taxonomy);
+        assert_eq!(found.rooms[0].room.to_string(), "bedroom_1");
+        let classes: BTreeSet<Class> = found.rooms[0].instances.iter().map(|i| i.class).collect();
+        Ok::<_, String>(classes.into_iter().map(|c| (c.name(), c.s3dis().name())).collect::<Vec<_>>())
+    };
+    // "floor", "wall" and "office chair"; S3DIS has its words from a table of the reader.
+    let words = [("wall", "wall"), ("floor", "floor"), ("chair", "chair")];
+    assert_eq!(of("scene0000_00", "scannet20").unwrap(), words);
+    assert_eq!(of("scene0000_00", "nyu40").unwrap(), words);
+    let own = [("wall", "wall"), ("floor", "floor"), ("officeChair", "chair")];
+    assert_eq!(of("scene0000_00", "scannet200").unwrap(), own);
+    // 2, 6 and 19 are numbers: NYU's floor, sofa and mirror, of which ScanNet's benchmark leaves out the last.
+    for name in NUMBERED {
+        let nyu = [("floor", "floor"), ("sofa", "sofa"), ("mirror", "clutter")];
+        assert_eq!(of(name, "nyu40").unwrap(), nyu, "{name}");
+        assert_eq!(of(name, "scannet20").unwrap(), nyu[..2], "{name}");
+        let matterport = [("floor", "floor"), ("picture", "clutter"), ("stool", "chair")];
+        assert_eq!(of(name, "matterport40").unwrap(), matterport, "{name}");
+        let scannet = [("chair", "chair"), ("couch", "sofa"), ("monitor", "clutter")];
+        assert_eq!(of(name, "scannet200").unwrap(), scannet, "{name}");
+    }
 }
 
 #[test]

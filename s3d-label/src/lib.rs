@@ -1,7 +1,8 @@
 //! Labels of the 2D-3D-S data set (Armeni et al. 2017): what they are called, in which order they are
 //! numbered, and how the points of a scan give them to the faces of a mesh.
 //!
-//! The nouns: [`Class`], [`Room`] and [`Label`] with its name; the [`LabelTable`], which numbers the labels
+//! The nouns: the [`Taxonomy`], which says which classes and types of rooms there are (S3DIS's, those of other
+//! data sets, or one's own); [`Class`], [`Room`] and [`Label`] with its name; the [`LabelTable`], which numbers the labels
 //! of a data set in the published order ([`LabelId`]); [`number_area`], which turns the numbers of an
 //! annotated tree into those of labels; the [`Labeler`], which takes labelled points block by block and gives
 //! the [`FaceLabels`] of a mesh (or [`vote`], for points that are all there), the [`Votes`] behind them and
@@ -34,7 +35,8 @@
 //!
 //! With the cargo feature `serde`, classes, rooms and labels are data by their names, a table is the list of
 //! its names, and votes, reports, summaries and statistics are structs of their fields. What is read is
-//! checked: a name that is none, or a table out of order, is refused. The feature `vote`, on by default, is
+//! checked: a name that is none, or a table out of order, is refused. Names are S3DIS's, or those of the
+//! taxonomy that reads ([`Taxonomy::reading`](crate::Taxonomy)). The feature `vote`, on by default, is
 //! the [`Labeler`] with what belongs to it.
 
 // Nothing panics but what a caller did wrong, which "Panics" tells: names and numbers come from files.

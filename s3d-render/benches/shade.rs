@@ -36,6 +36,8 @@ fn shade(c: &mut Criterion) {
             let (mut rgb, mut normal) = (Raster::filled(1, 1, [0; 3]), Raster::filled(1, 1, [0; 3]));
             let (mut semantic, mut colored) = (normal.clone(), normal.clone());
             let mut depth = Raster::filled(1, 1, 0);
+            let class: Vec<u8> = index.iter().map(|i| (i % 13) as u8).collect();
+            let mut classes = Raster::filled(1, 1, 0);
             let mut xyz = s3d_render::xyz_image_half(&shots[0].1, &shots[0].0);
             let mut images = ViewImages::default();
             let shading = Shading {
@@ -61,6 +63,7 @@ fn shade(c: &mut Criterion) {
                 );
             });
             bench("semantic", &mut |_, h| s3d_render::index_image_into(h, &index, &mut semantic));
+            bench("class", &mut |_, h| s3d_render::byte_per_face_image_into(h, &class, 255, &mut classes));
             bench("pretty", &mut |_, h| s3d_render::color_per_face_image_into(h, &pretty, &mut colored));
             let faces = Modalities { faces: true, ..Modalities::default() };
             bench("normal, semantic and pretty at once", &mut |c, h| {

@@ -156,6 +156,7 @@ fn what_is_missing_is_missing_everywhere() {
         [Normals::Flat, Normals::Smooth].map(|n| s3d_render::normal_image(&scene, &hits, &camera, n));
     let index = s3d_render::index_image(&hits, &[0, 0x01_02_03]);
     let pretty = s3d_render::color_per_face_image(&hits, &[[7, 8, 9], [0, 0, 1]]);
+    let bytes = s3d_render::byte_per_face_image(&hits, &[7, 9], 255);
     let (xyz, half) = (s3d_render::xyz_image(&hits, &camera), s3d_render::xyz_image_half(&hits, &camera));
     for (k, &face) in hits.face.pixels().iter().enumerate() {
         let missing = face == NO_FACE;
@@ -166,6 +167,7 @@ fn what_is_missing_is_missing_everywhere() {
             "black paint is nearly black"
         );
         assert_eq!(depth.pixels()[k] == 65_535, missing);
+        assert_eq!(bytes.pixels()[k], if missing { 255 } else { [7, 9][face as usize] });
         assert_eq!(flat.pixels()[k] == [128; 3], missing);
         assert_eq!(smooth.pixels()[k], flat.pixels()[k], "without corner normals faces are flat");
         let expected = [[13, 13, 13], [0, 0, 0], [1, 2, 3]][face.wrapping_add(1) as usize];

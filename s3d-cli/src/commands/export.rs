@@ -64,9 +64,10 @@ pub(crate) struct OptionArgs {
     /// kept.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = value_parser!(u32).range(1..=64))]
     pub(crate) entropy_stride: u32,
-    /// Which images to write, such as rgb,depth,pose [default: all of rgb, depth, normal, semantic,
-    /// semantic_pretty, global_xyz, pose]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = Domain::ALL,
+    /// Which images to write, such as rgb,depth,pose [default: rgb, depth, normal, semantic,
+    /// semantic_pretty, global_xyz, pose; besides there is semantic_class: PNG with a palette, a colour a
+    /// class]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = Domain::PUBLISHED,
         hide_default_value = true, value_parser = parsed::<Domain>)]
     pub(crate) modalities: Vec<Domain>,
     /// Write every candidate view, whatever its entropy.

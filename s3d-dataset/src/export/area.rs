@@ -10,7 +10,7 @@ use crate::export::labels::annotate::{Annotated, annotate, hidden_instances, una
 use crate::export::labels::area_plan::{AreaPlan, RoomNames};
 use crate::export::labels::overlap::overlap_doubts;
 use crate::export::location::{Located, locate, look_around, room_of};
-use crate::export::modality::Channels;
+use crate::export::modality::{Channels, classes_of_labels, palette};
 use crate::export::photographs::{self, WrittenPhotograph, judge_sight};
 use crate::export::points::write_points;
 use crate::export::views::{Candidate, Kinds, Scoring, score_area};
@@ -27,7 +27,7 @@ use crate::tables::summary::Unlabelled;
 use crate::useful::{judge, label_findings, outlook_findings};
 use s3d_geom::{Density, NearestFaces};
 use s3d_io::camera::ScanLocation;
-use s3d_io::dataset::{FileRecord, InstanceRecord, InstanceWriter, Layout};
+use s3d_io::dataset::{Domain, FileRecord, InstanceRecord, InstanceWriter, Layout};
 use s3d_io::fs::create_dir;
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{MeshFile, TextureOut};
@@ -459,6 +459,12 @@ pub(crate) fn render_area(
     let textures = MipMaps::new(&file.mesh);
     let label_of_face: Vec<u32> = annotated.label_of_face.iter().map(|l| l.0).collect();
     let pretty_of_face: Vec<[u8; 3]> = label_of_face.iter().map(|l| s3d_label::pretty_color(*l)).collect();
+    let mut class_of_face = Vec::new();
+    if options.modalities.contains(&Domain::SemanticClass) {
+        let classes = classes_of_labels(common.table);
+        class_of_face.extend(label_of_face.iter().map(|label| classes[*label as usize]));
+    }
+    let palette = palette(common.table.taxonomy());
     let mut is_filled = Vec::new();
     if !annotated.filled.is_empty() {
         is_filled.resize(label_of_face.len(), false);
@@ -502,6 +508,8 @@ pub(crate) fn render_area(
             rgb_samples: options.rgb_samples,
             label_of_face: &label_of_face,
             pretty_of_face: &pretty_of_face,
+            class_of_face: &class_of_face,
+            palette: &palette,
             compression: options.compression,
             conventions: options.conventions(),
         },

@@ -191,6 +191,7 @@ impl<'a> Job<'a> {
         assets::write(
             layout,
             &self.inputs.table,
+            &options.modalities,
             options.pad_labels.0,
             options.conventions(),
             &self.request.world_offsets(),

@@ -5,12 +5,31 @@ use crate::export::input::pictures::PictureColors;
 use rayon::prelude::*;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, XyzType};
-use s3d_io::image::{Compression, Content, encode_gray16, encode_rgb8, encode_xyz_float, encode_xyz_half};
-use s3d_render::{
-    Hits, MipMaps, Modalities, Normals, Scene, Shading, TextureFilter, ViewImages, color_per_face_image_into,
-    depth_image_into, depth_image_mm_into, index_image_into, normal_image_into, rgb_image_into, sample_edges,
-    view_images_into, xyz_image_half_into, xyz_image_into,
+use s3d_io::image::{
+    Compression, Content, encode_gray16, encode_palette8, encode_rgb8, encode_xyz_float, encode_xyz_half,
 };
+use s3d_label::{LabelId, LabelTable, MAX_CLASSES, Taxonomy};
+use s3d_render::{
+    Hits, MipMaps, Modalities, Normals, Scene, Shading, TextureFilter, ViewImages, byte_per_face_image_into,
+    color_per_face_image_into, depth_image_into, depth_image_mm_into, index_image_into, normal_image_into,
+    rgb_image_into, sample_edges, view_images_into, xyz_image_half_into, xyz_image_into,
+};
+
+/// In `semantic_class` images: no class, or nothing.
+pub(crate) const NO_CLASS: u8 = MAX_CLASSES as u8;
+
+/// The place of each label's class in the taxonomy, or [`NO_CLASS`].
+pub(crate) fn classes_of_labels(table: &LabelTable) -> Vec<u8> {
+    let class = |index| table.class_of(LabelId(index)).map_or(NO_CLASS, |class| class.index() as u8);
+    (0..table.len() as u32).map(class).collect()
+}
+
+/// The palette of `semantic_class` images: a colour for each byte, black for what is no class.
+pub(crate) fn palette(taxonomy: &Taxonomy) -> Vec<[u8; 3]> {
+    let mut palette: Vec<[u8; 3]> = taxonomy.classes().iter().map(|c| taxonomy.color(*c)).collect();
+    palette.resize(MAX_CLASSES + 1, [0; 3]);
+    palette
+}
 
 /// What images of a mesh are made from.
 #[derive(Clone, Copy)]
@@ -26,6 +45,10 @@ pub(crate) struct Channels<'a> {
     pub(crate) label_of_face: &'a [u32],
     /// The colour of each face in pretty images; may be empty likewise.
     pub(crate) pretty_of_face: &'a [[u8; 3]],
+    /// The place of each face's class in the taxonomy, or [`NO_CLASS`]; may be empty likewise.
+    pub(crate) class_of_face: &'a [u8],
+    /// The colours of `semantic_class` images, [`NO_CLASS`]'s last.
+    pub(crate) palette: &'a [[u8; 3]],
     /// How much time their files may take.
     pub(crate) compression: Compression,
     /// Units of depth, axes of normals, type of coordinates (of which none counts as half: it is not asked
@@ -41,6 +64,7 @@ pub(crate) enum Image {
     Normal,
     Semantic,
     SemanticPretty,
+    SemanticClass,
     GlobalXyz,
 }
 
@@ -53,6 +77,7 @@ impl Image {
             Domain::Normal => Self::Normal,
             Domain::Semantic => Self::Semantic,
             Domain::SemanticPretty => Self::SemanticPretty,
+            Domain::SemanticClass => Self::SemanticClass,
             Domain::GlobalXyz => Self::GlobalXyz,
             Domain::Pose => return None,
         })
@@ -66,6 +91,7 @@ impl Image {
             Self::Normal => Domain::Normal,
             Self::Semantic => Domain::Semantic,
             Self::SemanticPretty => Domain::SemanticPretty,
+            Self::SemanticClass => Domain::SemanticClass,
             Self::GlobalXyz => Domain::GlobalXyz,
         }
     }
@@ -74,6 +100,7 @@ impl Image {
 /// Memory of the images of a view, for one view after another.
 pub(crate) struct ImageBuffers {
     images: ViewImages,
+    class: Raster<u8>,
     xyz_float: Raster<[f32; 3]>,
     /// Which of `images` are those of the view at hand.
     made: Modalities,
@@ -89,7 +116,8 @@ impl ImageBuffers {
 impl Default for ImageBuffers {
     fn default() -> Self {
         let xyz_float = Raster::filled(0, 0, [0.0; 3]);
-        Self { images: ViewImages::default(), xyz_float, made: Modalities::default(), unlabelled: 0 }
+        let class = Raster::filled(0, 0, 0);
+        Self { images: ViewImages::default(), class, xyz_float, made: Modalities::default(), unlabelled: 0 }
     }
 }
 
@@ -157,11 +185,13 @@ impl Channels<'_> {
     /// Draws an image, unless it is made already.
     fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
-        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, made, .. } = buffers;
+        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, made, .. } =
+            buffers;
         let is_made = match image {
             Image::Rgb => made.rgb,
             Image::Depth => made.depth,
             Image::Normal | Image::Semantic | Image::SemanticPretty => made.faces,
+            Image::SemanticClass => false,
             Image::GlobalXyz => made.xyz,
         };
         if is_made {
@@ -190,6 +220,7 @@ impl Channels<'_> {
             Image::SemanticPretty => {
                 color_per_face_image_into(hits, self.pretty_of_face, &mut faces.color);
             }
+            Image::SemanticClass => byte_per_face_image_into(hits, self.class_of_face, NO_CLASS, class),
             Image::GlobalXyz if xyz_type == XyzType::Float => xyz_image_into(hits, camera, xyz_float),
             Image::GlobalXyz => xyz_image_half_into(hits, camera, xyz),
         }
@@ -204,13 +235,14 @@ impl Channels<'_> {
     /// The file of an image that is drawn.
     fn file(&self, image: Image, buffers: &ImageBuffers) -> Vec<u8> {
         let compression = self.compression;
-        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, xyz_float, .. } = buffers;
+        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, .. } = buffers;
         match image {
             Image::Rgb => encode_rgb8(rgb, Content::Photo, compression),
             Image::Depth => encode_gray16(depth, compression),
             Image::Normal => encode_rgb8(&faces.normal, Content::Normals, compression),
             Image::Semantic => encode_rgb8(&faces.index, Content::Labels, compression),
             Image::SemanticPretty => encode_rgb8(&faces.color, Content::Labels, compression),
+            Image::SemanticClass => encode_palette8(class, self.palette, compression),
             Image::GlobalXyz if self.conventions.xyz == XyzType::Float => {
                 encode_xyz_float(xyz_float, compression)
             }

@@ -10,7 +10,9 @@ use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::{Content, encode_rgb8};
-use s3d_io::package::{CocoImage, coco_categories, coco_panoptic, write_coco};
+use s3d_io::package::{
+    CocoImage, coco_categories, coco_masks, coco_panoptic, write_coco, write_coco_instances,
+};
 use s3d_label::{Class, Taxonomy};
 use s3d_render::MISSING_INDEX;
 use std::path::Path;
@@ -18,6 +20,9 @@ use std::path::Path;
 /// The folder of panoptic images, and the file about them.
 const FOLDER: &str = "panoptic";
 const FILE: &str = "panoptic.json";
+/// Boxes and masks of things.
+const INSTANCES: &str = "instances.json";
+const ABOUT: &str = "2D-3D-Semantic data set, exported by s3d";
 
 pub(super) fn pack(
     ctx: &Context,
@@ -62,21 +67,22 @@ pub(super) fn pack(
             let file_name = image.relative_path(Domain::Rgb);
             write_bytes(&folder.join(&file_name), &encode_rgb8(&panoptic, Content::Labels, compression))?;
             progress.add(1);
-            Ok(CocoImage { id: *id, file_name, width: semantic.width(), height: semantic.height(), segments })
+            let is_thing = |id: u32| segments.iter().any(|s| s.id == id && !s.is_stuff());
+            let masks = coco_masks(&panoptic, is_thing);
+            let (width, height) = (semantic.width(), semantic.height());
+            Ok(CocoImage { id: *id, file_name, width, height, segments, masks })
         },
     )?;
-    write_coco(
-        &destination.path().join(FILE),
-        "2D-3D-Semantic data set, exported by s3d",
-        &images,
-        &coco_categories(taxonomy, &stuff),
-    )?;
+    let categories = coco_categories(taxonomy, &stuff);
+    write_coco(&destination.path().join(FILE), ABOUT, &images, &categories)?;
+    write_coco_instances(&destination.path().join(INSTANCES), ABOUT, &images, &categories)?;
     Ok(vec![
         format!(
             "images are below the data set's folder, and their panoptic images, of the same names, below {FOLDER}"
         ),
         "a segment's id is its label's index, or 16711680 + category of a class that is stuff; 0 is void"
             .into(),
+        format!("{INSTANCES} has boxes and masks of the same things, as pycocotools reads them"),
     ])
 }
 

@@ -84,6 +84,8 @@ pub(super) fn channels<'a>(
         rgb_samples: options.rgb_samples,
         label_of_face: &[],
         pretty_of_face: &[],
+        class_of_face: &[],
+        palette: &[],
         compression: options.compression,
         conventions: Conventions::default(),
     }

@@ -102,7 +102,14 @@ pub fn merge(
         let stage = account.stage(Stage::Tables, None);
         let options = &request.options;
         let padded = manifest.labels_padded_to();
-        assets::write(layout, &table, padded, options.conventions(), &request.world_offsets())?;
+        assets::write(
+            layout,
+            &table,
+            &options.modalities,
+            padded,
+            options.conventions(),
+            &request.world_offsets(),
+        )?;
         let made = finish(ctx, layout, request, manifest, &session.journal.finished(), None)?;
         stage.end();
         Ok(made)

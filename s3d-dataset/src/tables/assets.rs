@@ -1,7 +1,8 @@
 //! What a data set tells of itself: conventions, schemas, and a Python module that reads it.
 
 use crate::error::Result;
-use s3d_io::dataset::{Conventions, Layout, WorldOffsets};
+use crate::tables::legend;
+use s3d_io::dataset::{Conventions, Domain, Layout, WorldOffsets};
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_label::LabelTable;
 use std::path::PathBuf;
@@ -12,10 +13,12 @@ const POSE_SCHEMA: &str = include_str!("../../assets/pose.schema.json");
 const MANIFEST_SCHEMA: &str = include_str!("../../assets/manifest.schema.json");
 
 /// Writes the names of a label table, unless it has the null label alone, padded to as many as `pad_labels`
-/// if there are fewer, and their taxonomy if it is not S3DIS's; `conventions.json`, `assets/utils.py` and `assets/schema`.
+/// if there are fewer, their taxonomy if it is not S3DIS's, and the legend of images of classes if there are
+/// some; `conventions.json`, `assets/utils.py` and `assets/schema`.
 pub(crate) fn write(
     layout: &Layout,
     table: &LabelTable,
+    modalities: &[Domain],
     pad_labels: usize,
     conventions: Conventions,
     offsets: &WorldOffsets,
@@ -26,8 +29,11 @@ pub(crate) fn write(
         s3d_io::dataset::pad_labels(&mut names, pad_labels);
         s3d_io::dataset::write_labels(&layout.labels_json(), &names)?;
         if !table.taxonomy().is_s3dis() {
-            s3d_io::dataset::write_taxonomy(&layout.taxonomy_json(), table.taxonomy())?;
+            s3d_io::dataset::write_taxonomy_json(&layout.taxonomy_json(), table.taxonomy())?;
         }
+    }
+    if table.len() > 1 && modalities.contains(&Domain::SemanticClass) {
+        legend::write(layout, table.taxonomy())?;
     }
     conventions.write(&layout.conventions(), offsets)?;
     create_dir(&layout.schema_dir())?;
@@ -50,7 +56,6 @@ pub(crate) fn texts(layout: &Layout) -> [(PathBuf, &'static str); 3] {
 mod tests {
     use super::*;
     use crate::profile::Profile;
-    use s3d_io::dataset::Domain;
 
     #[test]
     fn the_schema_of_manifests_knows_all_modalities_and_profiles() {

@@ -9,7 +9,7 @@ use crate::store::request::{InputRecord, Request, RequestedArea};
 use crate::tables::summary::Unlabelled;
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType, read_taxonomy};
+use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType, read_taxonomy_json};
 use s3d_io::fs::{Checksum, read_json, write_json};
 use s3d_label::{LabelTable, Taxonomy};
 use serde::de::DeserializeOwned;
@@ -219,7 +219,7 @@ impl Manifest {
         let Some(name) = &self.taxonomy else { return Ok(Taxonomy::s3dis()) };
         let path = layout.taxonomy_json();
         check(&path)?;
-        let taxonomy = read_taxonomy(&path)?;
+        let taxonomy = read_taxonomy_json(&path)?;
         if taxonomy.name() != name {
             let message = format!("is {}, and the manifest tells of {name}", taxonomy.name());
             return Err(FileError::format(&path, message));

@@ -2,6 +2,7 @@ pub(crate) mod account;
 pub(crate) mod assets;
 pub(crate) mod dataset;
 pub(crate) mod label_list;
+pub(crate) mod legend;
 pub(crate) mod listing;
 pub(crate) mod manifest;
 pub(crate) mod records;

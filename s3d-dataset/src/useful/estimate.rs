@@ -30,6 +30,7 @@ fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
         Domain::Normal => 0.11,
         Domain::Semantic => 0.02,
         Domain::SemanticPretty => 0.025,
+        Domain::SemanticClass => 0.01,
         Domain::GlobalXyz if xyz == XyzType::Float => 1.2,
         Domain::GlobalXyz => 0.5,
         Domain::Pose => 0.001,

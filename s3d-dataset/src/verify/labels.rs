@@ -1,6 +1,7 @@
 //! The label table, and the labels that the meshes give their faces.
 
 use super::report::{Report, Topic};
+use crate::export::modality::NO_CLASS;
 use crate::tables::manifest::Manifest;
 use s3d_io::dataset::{Layout, read_labels};
 use s3d_io::image::pretty_color;
@@ -18,6 +19,8 @@ pub(crate) struct Labels {
     pub(crate) taxonomy: Taxonomy,
     /// A colour an index.
     pub(crate) pretty: Vec<[u8; 3]>,
+    /// By index the place of its class in the taxonomy, or [`NO_CLASS`].
+    pub(crate) classes: Vec<u8>,
 }
 
 impl Labels {
@@ -28,6 +31,7 @@ impl Labels {
             indices: HashMap::new(),
             taxonomy: Taxonomy::s3dis(),
             pretty: vec![pretty_color(0)],
+            classes: vec![NO_CLASS],
         }
     }
 
@@ -54,7 +58,12 @@ impl Labels {
         });
         let indices = names.iter().enumerate().map(|(i, name)| (name.clone(), i as u32)).collect();
         let pretty = (0..names.len() as u32).map(pretty_color).collect();
-        Some(Self { names, indices, taxonomy, pretty })
+        let class = |name: &String| match taxonomy.parse_name(name) {
+            Ok(Some(label)) => label.class.index() as u8,
+            _ => NO_CLASS,
+        };
+        let classes = names.iter().map(class).collect();
+        Some(Self { names, indices, taxonomy, pretty, classes })
     }
 
     /// The index of a name.
@@ -65,6 +74,12 @@ impl Labels {
     /// The name at an index.
     pub(crate) fn name_of(&self, index: u32) -> &str {
         self.names.get(index as usize).map_or("nothing", String::as_str)
+    }
+
+    /// The name of the class at a place of the taxonomy.
+    pub(crate) fn class_name(&self, place: u8) -> String {
+        let name = self.taxonomy.classes().get(usize::from(place)).map_or("no class", |class| class.name());
+        format!("{place} ({name})")
     }
 
     /// How many there are, the null label included.

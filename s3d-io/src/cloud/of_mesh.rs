@@ -175,6 +175,24 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_ids_of_the_taxonomy() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("bedroom_2.ply");
+        fs::write(&path, strip(&[(4, -1), (28, 1), (0, 1), (22, 1)], false)).unwrap();
+        let file = read_mesh(&path, UpAxis::Z).unwrap();
+        let taxonomy = s3d_label::Taxonomy::built_in("scannet20").unwrap();
+        let found =
+            Annotations::of_mesh(&file, &AnnotationOptions { taxonomy, ..Default::default() }).unwrap();
+        let [room] = &found.rooms[..] else { panic!("{found:?}") };
+        // 0 is unannotated, and the ceiling, 22, none of the benchmark's.
+        let names: Vec<&str> = room.instances.iter().map(|i| i.class.name()).collect();
+        assert_eq!(
+            (room.room.to_string().as_str(), &names[..]),
+            ("bedroom_2", &["bed", "showerCurtain"][..])
+        );
+    }
+
+    #[test]
     fn numbers_of_faces_and_of_vertices_are_labels() {
         let dir = tempfile::tempdir().unwrap();
         for of_vertices in [false, true] {

@@ -209,6 +209,12 @@ impl Conventions {
                 "missing": [13, 13, 13],
             },
             "semantic_pretty": { "missing": [0, 0, 0] },
+            "semantic_class": {
+                "decode": "the place of the class in the taxonomy, from 0; the palette has its colours",
+                "legend": "assets/class_legend.csv",
+                "unlabelled": 255,
+                "missing": 255,
+            },
             "global_xyz": {
                 "type": self.xyz.name(),
                 "channels": { "R": "X", "G": "Y", "B": "Z" },

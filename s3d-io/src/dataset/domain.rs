@@ -18,6 +18,8 @@ pub enum Domain {
     Semantic,
     /// A colour per instance, for looking at.
     SemanticPretty,
+    /// Places of classes in the taxonomy, as an image with a palette. Not in the published data set.
+    SemanticClass,
     /// World coordinates.
     GlobalXyz,
     /// The camera.
@@ -34,7 +36,19 @@ pub struct UnknownDomain {
 
 impl Domain {
     /// All of them, in the order of formats.md: that of options, of manifests, and of the columns of tables.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
+        Self::Rgb,
+        Self::Depth,
+        Self::Normal,
+        Self::Semantic,
+        Self::SemanticPretty,
+        Self::SemanticClass,
+        Self::GlobalXyz,
+        Self::Pose,
+    ];
+
+    /// Those of the published data set, in their order: what is written if nobody says otherwise.
+    pub const PUBLISHED: [Self; 7] = [
         Self::Rgb,
         Self::Depth,
         Self::Normal,
@@ -46,7 +60,7 @@ impl Domain {
 
     /// Whether it shows labels.
     pub fn is_semantic(self) -> bool {
-        matches!(self, Self::Semantic | Self::SemanticPretty)
+        matches!(self, Self::Semantic | Self::SemanticPretty | Self::SemanticClass)
     }
 
     /// Its folder, by which users name it too: "normal".
@@ -57,6 +71,7 @@ impl Domain {
             Self::Normal => "normal",
             Self::Semantic => "semantic",
             Self::SemanticPretty => "semantic_pretty",
+            Self::SemanticClass => "semantic_class",
             Self::GlobalXyz => "global_xyz",
             Self::Pose => "pose",
         }
@@ -70,7 +85,8 @@ impl Domain {
     /// The ending of its files, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
-            Self::Rgb | Self::Depth | Self::Normal | Self::Semantic | Self::SemanticPretty => "png",
+            Self::Rgb | Self::Depth | Self::Normal => "png",
+            Self::Semantic | Self::SemanticPretty | Self::SemanticClass => "png",
             Self::GlobalXyz => "exr",
             Self::Pose => "json",
         }
@@ -109,7 +125,8 @@ mod tests {
             assert_eq!(domain.to_string().parse(), Ok(domain));
         }
         let message = "normals".parse::<Domain>().unwrap_err().to_string();
-        let all = "there are rgb, depth, normal, semantic, semantic_pretty, global_xyz and pose";
+        let all =
+            "there are rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz and pose";
         assert_eq!(message, format!("no modality is called \"normals\"; {all}"));
     }
 }

@@ -186,6 +186,7 @@ impl Layout {
         let mut entries: Vec<PathBuf> =
             areas.iter().flat_map(|a| [self.area_dir(*a), self.s3dis_area_dir(*a)]).collect();
         entries.extend([self.labels_json(), self.taxonomy_json(), self.utils_py()]);
+        entries.extend([self.class_legend_csv(), self.class_legend_png()]);
         entries.extend([self.pose_schema(), self.manifest_schema()]);
         entries.extend([self.splits(), self.list_of_all()]);
         for fold in 1..=3 {
@@ -310,6 +311,16 @@ impl Layout {
     /// `assets/taxonomy.json`: the classes, if they are not S3DIS's.
     pub fn taxonomy_json(&self) -> PathBuf {
         self.assets_dir().join("taxonomy.json")
+    }
+
+    /// `assets/class_legend.csv`: what the numbers and colours of `semantic_class` images mean.
+    pub fn class_legend_csv(&self) -> PathBuf {
+        self.assets_dir().join("class_legend.csv")
+    }
+
+    /// `assets/class_legend.png`: the same to look at.
+    pub fn class_legend_png(&self) -> PathBuf {
+        self.assets_dir().join("class_legend.png")
     }
 
     /// `assets/utils.py`: functions that read every file.

@@ -7,7 +7,7 @@
 //! - [`PoseFile`]: the camera of an image, as `*.json`.
 //! - [`read_labels`], [`write_labels`]: `semantic_labels.json`. Loaders of the field hold at most
 //!   [`MAX_LABELS_OF_LOADERS`].
-//! - [`read_taxonomy`], [`write_taxonomy`]: `taxonomy.json`, where the classes are not S3DIS's.
+//! - [`read_taxonomy_json`], [`write_taxonomy_json`]: `taxonomy.json`, where the classes are not S3DIS's.
 //! - [`InstanceWriter`]: boxes and voxels of instances, as `instances.json` and `instances.npz`;
 //!   [`read_instances`], [`read_instance_arrays`].
 //! - [`Split`]: folds of areas; [`write_image_list`]: lists of images.
@@ -76,4 +76,4 @@ pub use pose::{PoseFile, read_pose};
 #[cfg(feature = "dataset")]
 pub use splits::{Split, read_splits, write_image_list, write_splits};
 #[cfg(feature = "dataset")]
-pub use taxonomy::{read_taxonomy, read_taxonomy_or_s3dis, write_taxonomy};
+pub use taxonomy::{read_taxonomy_json, read_taxonomy_json_or_s3dis, write_taxonomy_json};

@@ -9,7 +9,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn write_taxonomy(path: &Path, taxonomy: &Taxonomy) -> Result<u64> {
+pub fn write_taxonomy_json(path: &Path, taxonomy: &Taxonomy) -> Result<u64> {
     write_json(path, taxonomy.definition())
 }
 
@@ -18,18 +18,18 @@ pub fn write_taxonomy(path: &Path, taxonomy: &Taxonomy) -> Result<u64> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line if the file is no JSON or has other fields, with the entry
 /// for what is no taxonomy.
-pub fn read_taxonomy(path: &Path) -> Result<Taxonomy> {
+pub fn read_taxonomy_json(path: &Path) -> Result<Taxonomy> {
     taxonomy(path, read_json(path)?)
 }
 
-/// As [`read_taxonomy`]; S3DIS's if there is no such file, as in data sets that have S3DIS's classes.
+/// As [`read_taxonomy_json`]; S3DIS's if there is no such file, as in data sets that have S3DIS's classes.
 ///
 /// # Errors
-/// As [`read_taxonomy`].
-pub fn read_taxonomy_or_s3dis(path: &Path) -> Result<Taxonomy> {
+/// As [`read_taxonomy_json`].
+pub fn read_taxonomy_json_or_s3dis(path: &Path) -> Result<Taxonomy> {
     match path.try_exists() {
         Ok(false) => Ok(Taxonomy::s3dis()),
-        _ => read_taxonomy(path),
+        _ => read_taxonomy_json(path),
     }
 }
 
@@ -46,17 +46,17 @@ mod tests {
     fn taxonomies_come_back() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("taxonomy.json");
-        assert_eq!(read_taxonomy_or_s3dis(&path).unwrap(), Taxonomy::s3dis());
+        assert_eq!(read_taxonomy_json_or_s3dis(&path).unwrap(), Taxonomy::s3dis());
         for name in ["nyu40", "scannet20", "scannet200", "matterport40"] {
             let taxonomy = Taxonomy::built_in(name).unwrap();
-            write_taxonomy(&path, &taxonomy).unwrap();
-            assert_eq!(read_taxonomy_or_s3dis(&path).unwrap(), taxonomy);
+            write_taxonomy_json(&path, &taxonomy).unwrap();
+            assert_eq!(read_taxonomy_json_or_s3dis(&path).unwrap(), taxonomy);
         }
         std::fs::write(&path, "{\"name\": \"x\",\n\"classes\": [{\"nam\": \"bed\"}]}").unwrap();
-        let message = read_taxonomy(&path).unwrap_err().to_string();
+        let message = read_taxonomy_json(&path).unwrap_err().to_string();
         assert!(message.contains("taxonomy.json, line 2: unknown field `nam`"), "{message}");
         std::fs::write(&path, "{\"name\": \"x\", \"classes\": []}").unwrap();
-        let message = read_taxonomy_or_s3dis(&path).unwrap_err().to_string();
+        let message = read_taxonomy_json_or_s3dis(&path).unwrap_err().to_string();
         assert!(message.contains("taxonomy.json: has no classes"), "{message}");
     }
 }

@@ -7,6 +7,7 @@
 //! | kind | samples | of a data set |
 //! |---|---|---|
 //! | [`encode_rgb8`] | 3 × 8 bits | `rgb`, `normal`, `semantic`, `semantic_pretty` |
+//! | [`encode_palette8`] | 8 bits and a palette | `semantic_class` |
 //! | [`encode_gray16`] | 16 bits | `depth` |
 //! | [`encode_xyz_half`], [`encode_xyz_float`] | 3 × 16 or 32 bits, floats | `global_xyz` |
 //!
@@ -40,8 +41,8 @@ pub use self::exr::{
 };
 #[cfg(feature = "png")]
 pub use self::png::{
-    Content, decode_gray16, decode_rgb8, encode_gray8, encode_gray16, encode_rgb8, read_gray16, read_rgb8,
-    write_gray16, write_rgb8,
+    Content, decode_gray16, decode_rgb8, encode_gray8, encode_gray16, encode_palette8, encode_rgb8,
+    read_gray16, read_palette8, read_rgb8, write_gray16, write_rgb8,
 };
 pub use compression::{Compression, UnknownCompression};
 pub use s3d_label::pretty_color;

@@ -1,4 +1,4 @@
-//! PNG images: 8-bit colour, 8-bit and 16-bit gray.
+//! PNG images: 8-bit colour, 8 bits with a palette, 8-bit and 16-bit gray.
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_bytes;
@@ -53,7 +53,7 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
         (Content::Labels, Compression::Balanced) => &[(Filter::Up, Search::labels(line))],
         (Content::Labels, Compression::Small) => &[(Filter::Up, small), (Filter::Paeth, small)],
     };
-    let format = Format { color: ColorType::Rgb, depth: BitDepth::Eight, pixel: 3 };
+    let format = Format { color: ColorType::Rgb, depth: BitDepth::Eight, pixel: 3, palette: &[] };
     encode(image.width(), image.height(), format, image.pixels().as_flattened(), plans)
 }
 
@@ -64,8 +64,26 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
 /// If it has no pixel.
 pub fn encode_gray8(image: &Raster<u8>) -> Vec<u8> {
     let search = Search::patches(1 + image.width() as usize);
-    let format = Format { color: ColorType::Grayscale, depth: BitDepth::Eight, pixel: 1 };
+    let format = Format { color: ColorType::Grayscale, depth: BitDepth::Eight, pixel: 1, palette: &[] };
     encode(image.width(), image.height(), format, image.pixels(), &[(Filter::Up, search)])
+}
+
+/// An image of places in a palette as the bytes of an 8-bit PNG file with it.
+///
+/// # Panics
+/// If it has no pixel, or the palette no colour or more than 256.
+pub fn encode_palette8(image: &Raster<u8>, palette: &[[u8; 3]], compression: Compression) -> Vec<u8> {
+    assert!((1..=256).contains(&palette.len()), "a palette of {} colours", palette.len());
+    let line = 1 + image.width() as usize;
+    let small = Search::thorough(line, 1);
+    let plans: &[(Filter, Search)] = match compression {
+        Compression::Fast => &[(Filter::Up, Search::patches(line))],
+        Compression::Balanced => &[(Filter::Up, Search::labels(line))],
+        Compression::Small => &[(Filter::Up, small), (Filter::None, small)],
+    };
+    let palette = palette.as_flattened();
+    let format = Format { color: ColorType::Indexed, depth: BitDepth::Eight, pixel: 1, palette };
+    encode(image.width(), image.height(), format, image.pixels(), plans)
 }
 
 /// An image as the bytes of a 16-bit gray PNG file, set for smooth images such as depth.
@@ -82,15 +100,17 @@ pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
         Compression::Fast | Compression::Balanced => &[(Filter::Paeth, balanced)],
         Compression::Small => &[(Filter::Paeth, small), (Filter::Paeth, balanced)],
     };
-    let format = Format { color: ColorType::Grayscale, depth: BitDepth::Sixteen, pixel: 2 };
+    let format = Format { color: ColorType::Grayscale, depth: BitDepth::Sixteen, pixel: 2, palette: &[] };
     encode(image.width(), image.height(), format, &bytes, plans)
 }
 
-struct Format {
+struct Format<'a> {
     color: ColorType,
     depth: BitDepth,
     /// Bytes a pixel.
     pixel: usize,
+    /// Colours of a palette, three bytes each; empty if there is none.
+    palette: &'a [u8],
 }
 
 /// Lines of which it is tried out how they compress best, and from how many they are.
@@ -104,7 +124,7 @@ const FEW_LINES: usize = 512;
     clippy::expect_used,
     reason = "a writer, into memory: bands are cut by their own lengths, and there is a plan"
 )]
-fn encode(width: u32, height: u32, format: Format, bytes: &[u8], plans: &[(Filter, Search)]) -> Vec<u8> {
+fn encode(width: u32, height: u32, format: Format<'_>, bytes: &[u8], plans: &[(Filter, Search)]) -> Vec<u8> {
     assert!(!bytes.is_empty(), "a PNG image needs pixels: {width} × {height}");
     let line = width as usize * format.pixel;
     let compress = |bytes: &[u8], (by, search): (Filter, Search)| {
@@ -127,6 +147,9 @@ fn encode(width: u32, height: u32, format: Format, bytes: &[u8], plans: &[(Filte
     let mut encoder = png::Encoder::new(&mut file, width, height);
     encoder.set_color(format.color);
     encoder.set_depth(format.depth);
+    if !format.palette.is_empty() {
+        encoder.set_palette(format.palette);
+    }
     let written = encoder.write_header().and_then(|mut writer| {
         // A chunk's length has 31 bits.
         compressed.chunks(1 << 30).try_for_each(|piece| writer.write_chunk(png::chunk::IDAT, piece))?;
@@ -183,8 +206,29 @@ pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
 }
 
 fn rgb8(file: impl BufRead + Seek, size: u64, path: &Path) -> Result<Raster<[u8; 3]>> {
-    let (width, height, bytes) = decode(file, size, path, ColorType::Rgb, BitDepth::Eight)?;
+    let (width, height, bytes, _) = decode(file, size, path, ColorType::Rgb, BitDepth::Eight)?;
     Ok(Raster::from_vec(width, height, bytes.as_chunks().0.to_vec()))
+}
+
+/// Reads an 8-bit PNG file with a palette, and nothing else: the places in the palette, and its colours.
+///
+/// ```
+/// use s3d_geom::Raster;
+/// use s3d_io::image::{Compression, encode_palette8, read_palette8};
+///
+/// let file = tempfile::NamedTempFile::new()?;
+/// let (image, palette) = (Raster::from_vec(2, 1, vec![1, 0]), [[0, 0, 0], [255, 128, 0]]);
+/// std::fs::write(file.path(), encode_palette8(&image, &palette, Compression::Balanced))?;
+/// assert_eq!(read_palette8(file.path())?, (image, palette.to_vec()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// As [`read_rgb8`].
+pub fn read_palette8(path: &Path) -> Result<(Raster<u8>, Vec<[u8; 3]>)> {
+    let (file, size) = open(path)?;
+    let (width, height, bytes, palette) = decode(file, size, path, ColorType::Indexed, BitDepth::Eight)?;
+    Ok((Raster::from_vec(width, height, bytes), palette.as_chunks().0.to_vec()))
 }
 
 /// Reads a 16-bit gray PNG file, and nothing else: its values are numbers, which must not be converted.
@@ -215,7 +259,7 @@ pub fn decode_gray16(bytes: &[u8], name: &Path) -> Result<Raster<u16>> {
 }
 
 fn gray16(file: impl BufRead + Seek, size: u64, path: &Path) -> Result<Raster<u16>> {
-    let (width, height, bytes) = decode(file, size, path, ColorType::Grayscale, BitDepth::Sixteen)?;
+    let (width, height, bytes, _) = decode(file, size, path, ColorType::Grayscale, BitDepth::Sixteen)?;
     let values = bytes.as_chunks().0.iter().map(|&pair| u16::from_be_bytes(pair)).collect();
     Ok(Raster::from_vec(width, height, values))
 }
@@ -227,14 +271,14 @@ fn open(path: &Path) -> Result<(BufReader<File>, u64)> {
     Ok((BufReader::new(file), size))
 }
 
-/// Width, height and samples of a file of `size` bytes.
+/// Width, height, samples and palette of a file of `size` bytes.
 fn decode(
     file: impl BufRead + Seek,
     size: u64,
     path: &Path,
     color: ColorType,
     depth: BitDepth,
-) -> Result<(u32, u32, Vec<u8>)> {
+) -> Result<(u32, u32, Vec<u8>, Vec<u8>)> {
     let failed = |e| match e {
         png::DecodingError::IoError(e) if e.kind() != std::io::ErrorKind::UnexpectedEof => {
             Error::io(path, "read", e)
@@ -245,6 +289,7 @@ fn decode(
     let mut reader = png::Decoder::new(file).read_info().map_err(failed)?;
     let info = reader.info();
     let (width, height) = (info.width, info.height);
+    let palette = info.palette.as_deref().unwrap_or_default().to_vec();
     if (info.color_type, info.bit_depth) != (color, depth) {
         let (found, wanted) = (describe(info.color_type, info.bit_depth), describe(color, depth));
         return Err(Error::format(path, format!("the image is {found}, not {wanted}")));
@@ -261,7 +306,7 @@ fn decode(
     }
     let mut bytes = vec![0; needed as usize];
     reader.next_frame(&mut bytes).map_err(failed)?;
-    Ok((width, height, bytes))
+    Ok((width, height, bytes, palette))
 }
 
 fn describe(color: ColorType, depth: BitDepth) -> String {

@@ -7,6 +7,7 @@
 
 use crate::error::Result;
 use crate::fs::atomic::write_whole;
+use crate::package::coco_instances::CocoMask;
 use s3d_geom::Raster;
 use s3d_label::{Class, LabelId, LabelTable, Taxonomy};
 use serde::Serialize;
@@ -73,6 +74,13 @@ pub struct CocoSegment {
     pub bbox: [u32; 4],
     /// 0.
     pub iscrowd: u8,
+}
+
+impl CocoSegment {
+    /// Whether it stands for all of a class in the image, and not for an instance.
+    pub fn is_stuff(&self) -> bool {
+        self.id >= FIRST_STUFF_ID
+    }
 }
 
 /// A pixel whose label is in no table.
@@ -182,6 +190,8 @@ pub struct CocoImage {
     pub height: u32,
     /// Its segments.
     pub segments: Vec<CocoSegment>,
+    /// The masks of some of them, by their numbers: of those that are instances.
+    pub masks: BTreeMap<u32, CocoMask>,
 }
 
 /// Writes a panoptic annotation file (`info`, `images`, `annotations`, `categories`) and returns its size in
@@ -319,8 +329,14 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("panoptic.json");
         let segment = CocoSegment { id: 2, category_id: 9, area: 4, bbox: [0, 1, 4, 2], iscrowd: 0 };
-        let image =
-            CocoImage { id: 1, file_name: "a.png".into(), width: 4, height: 3, segments: vec![segment] };
+        let image = CocoImage {
+            id: 1,
+            file_name: "a.png".into(),
+            width: 4,
+            height: 3,
+            segments: vec![segment],
+            masks: BTreeMap::new(),
+        };
         let categories = coco_categories(&Taxonomy::s3dis(), &[Class::WALL, Class::FLOOR]);
         write_coco(&path, "demo", &[image], &categories).unwrap();
         let json: serde_json::Value = crate::fs::json::read_json(&path).unwrap();

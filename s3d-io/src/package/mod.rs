@@ -23,6 +23,8 @@
 
 #[cfg(feature = "coco")]
 mod coco;
+#[cfg(feature = "coco")]
+mod coco_instances;
 #[cfg(feature = "colmap")]
 mod colmap;
 #[cfg(feature = "nerfstudio")]
@@ -38,6 +40,8 @@ pub use self::parquet::{ImageRow, SemanticRow, write_image_index, write_image_in
 pub use coco::{
     CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_panoptic, write_coco,
 };
+#[cfg(feature = "coco")]
+pub use coco_instances::{CocoMask, coco_masks, write_coco_instances};
 #[cfg(feature = "colmap")]
 pub use colmap::{ColmapImage, ColmapModel};
 #[cfg(feature = "nerfstudio")]

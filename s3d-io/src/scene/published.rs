@@ -3,7 +3,7 @@
 use crate::camera::poses;
 use crate::camera::poses::PublishedLocation;
 use crate::cloud::annotations::Annotations;
-use crate::dataset::{read_photographs, read_taxonomy_or_s3dis, read_world_offsets};
+use crate::dataset::{read_photographs, read_taxonomy_json_or_s3dis, read_world_offsets};
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, UpAxis};
 use crate::mesh::read::read_mesh;
@@ -119,7 +119,7 @@ impl PublishedArea {
             semantic_mesh,
             up: UpAxis::Y,
             point_cloud: optional(path.join("3d/pointcloud.mat")),
-            taxonomy: read_taxonomy_or_s3dis(&path.join("../assets/taxonomy.json"))?,
+            taxonomy: read_taxonomy_json_or_s3dis(&path.join("../assets/taxonomy.json"))?,
             labels: optional(path.join("..").join(labels)).or_else(|| optional(path.join(labels))),
             locations: Vec::new(),
             world_from_area: options.world_from_area,

@@ -1,6 +1,6 @@
 //! The key `taxonomy` of a `scene.toml`, and taxonomies in files of their own.
 
-use crate::dataset::taxonomy::{read_taxonomy as read_json, taxonomy};
+use crate::dataset::taxonomy::{read_taxonomy_json, taxonomy};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
@@ -89,7 +89,7 @@ impl TaxonomyEntry {
 /// what is no taxonomy.
 pub fn read_taxonomy(path: &Path) -> Result<Taxonomy> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-        return read_json(path);
+        return read_taxonomy_json(path);
     }
     let bytes = read_file(path)?;
     let no_text = |_| Error::format(path, "is no text in UTF-8; a taxonomy is a text file in TOML");

@@ -284,6 +284,7 @@ fn scene(dir: &Path, data: &[u8]) {
         file(dir, name, b"");
     }
     check(dir, read_scene(&file(dir, "scene.toml", data)));
+    check(dir, read_taxonomy(&file(dir, "taxonomy.toml", data)));
 }
 
 /// An array, or an archive of arrays, by what the bytes begin with.

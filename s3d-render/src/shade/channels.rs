@@ -254,6 +254,26 @@ pub fn color_per_face_image_into(hits: &Hits, color_of_face: &[[u8; 3]], out: &m
     by_face(None, hits, [0; 3], out, |faces| faces.map(|face| color_of_face[face as usize]));
 }
 
+/// A byte a face, `missing` where nothing is seen: for images with a palette.
+///
+/// # Panics
+/// If there is not a byte for each face that is seen.
+pub fn byte_per_face_image(hits: &Hits, byte_of_face: &[u8], missing: u8) -> Raster<u8> {
+    let mut out = Raster::filled(0, 0, 0);
+    byte_per_face_image_into(hits, byte_of_face, missing, &mut out);
+    out
+}
+
+/// As [`byte_per_face_image`], into an image that is used again.
+///
+/// # Panics
+/// As [`byte_per_face_image`].
+pub fn byte_per_face_image_into(hits: &Hits, byte_of_face: &[u8], missing: u8, out: &mut Raster<u8>) {
+    fit(out, &hits.face, 0);
+    let byte = |face: u32| if face == NO_FACE { missing } else { byte_of_face[face as usize] };
+    out.pixels_mut().iter_mut().zip(hits.face.pixels()).for_each(|(out, face)| *out = byte(*face));
+}
+
 /// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.
 pub fn coverage(hits: &Hits) -> f64 {
     let seen = hits.face.pixels().iter().filter(|&&face| face != NO_FACE).count();

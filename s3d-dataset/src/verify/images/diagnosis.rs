@@ -186,7 +186,7 @@ fn near(domain: Domain, found: [f64; 3], expected: [f64; 3]) -> bool {
         Domain::Normal => 2.0,
         Domain::Rgb => 14.0,
         Domain::GlobalXyz => 2e-4 + 1e-3 * expected[k].abs(),
-        Domain::Semantic | Domain::SemanticPretty | Domain::Pose => 0.0,
+        Domain::Semantic | Domain::SemanticPretty | Domain::SemanticClass | Domain::Pose => 0.0,
     };
     (0..3).all(|k| (found[k] - expected[k]).abs() <= within(k))
 }

@@ -5,6 +5,7 @@ mod pixels;
 pub(crate) mod rays;
 mod shade;
 
+use crate::export::modality::{NO_CLASS, palette};
 use crate::tables::manifest::Manifest;
 use crate::verify::files::Files;
 use crate::verify::images::pixels::{Difference, Pixels};
@@ -22,6 +23,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 const SIZES: (Topic, &str) = (Topic::Images, "sizes");
+const CLASSES: (Topic, &str) = (Topic::Images, "classes");
 const MISSING: (Topic, &str) = (Topic::Images, "missing modalities");
 const INDICES: (Topic, &str) = (Topic::Images, "label indices");
 const PRETTY: (Topic, &str) = (Topic::Images, "colours of labels");
@@ -205,6 +207,7 @@ impl ImageFiles<'_> {
                 self.semantic = Some(indices);
             }
             (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path),
+            (Domain::SemanticClass, Pixels::Class(places, palette)) => self.classes(&places, &palette, path),
             (Domain::GlobalXyz, Pixels::Xyz(points)) => self.coordinates(&points, path),
             _ => {}
         }
@@ -224,9 +227,9 @@ impl ImageFiles<'_> {
 
     /// Modalities agree on where nothing is seen. Depth also is missing where it is too large, and
     /// coordinates that are made from depth are missing with it: those two are compared in
-    /// [`Self::coordinates`].
+    /// [`Self::coordinates`]. Images of classes do not tell nothing from no class.
     fn nothing(&mut self, domain: Domain, pixels: &Pixels, path: &Path) {
-        if domain == Domain::GlobalXyz {
+        if matches!(domain, Domain::GlobalXyz | Domain::SemanticClass) {
             return;
         }
         let missing = pixels.missing(domain);
@@ -283,6 +286,25 @@ impl ImageFiles<'_> {
         self.check.report.check(difference.is_none(), PRETTY, path, || {
             difference
                 .map_or(String::new(), |d| d.sentence("the colours of the labels in the semantic image"))
+        });
+    }
+
+    /// Classes are those of the indices, and their colours those of the taxonomy.
+    fn classes(&self, places: &Raster<u8>, colors: &[[u8; 3]], path: &Path) {
+        let Some(labels) = self.check.labels else { return };
+        self.check.report.check(colors == palette(&labels.taxonomy), CLASSES, path, || {
+            format!("its palette has not the colours of {}", labels.taxonomy.name())
+        });
+        let Some(indices) = &self.semantic else { return };
+        let expected = |[r, g, b]: [u8; 3]| {
+            labels.classes.get(u32::from_be_bytes([0, r, g, b]) as usize).copied().unwrap_or(NO_CLASS)
+        };
+        let same = |c: u8, i: [u8; 3]| c == expected(i);
+        let text = |c: u8| labels.class_name(c);
+        let difference = Difference::of(places, indices, same, text, |i| text(expected(i)));
+        self.check.report.check(difference.is_none(), CLASSES, path, || {
+            difference
+                .map_or(String::new(), |d| d.sentence("the classes of the labels in the semantic image"))
         });
     }
 

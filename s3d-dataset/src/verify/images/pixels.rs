@@ -1,9 +1,10 @@
 //! The files of one image: what each should hold, and where it does not.
 
+use crate::export::modality::NO_CLASS;
 use s3d_geom::Raster;
 use s3d_io::Result;
 use s3d_io::dataset::Domain;
-use s3d_io::image::{read_gray16, read_rgb8, read_xyz};
+use s3d_io::image::{read_gray16, read_palette8, read_rgb8, read_xyz};
 use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
 use std::path::Path;
 
@@ -12,6 +13,8 @@ pub(crate) enum Pixels {
     /// 8-bit R G B.
     Color(Raster<[u8; 3]>),
     Depth(Raster<u16>),
+    /// Places in a palette, and the palette.
+    Class(Raster<u8>, Vec<[u8; 3]>),
     Xyz(Raster<[f32; 3]>),
 }
 
@@ -26,6 +29,10 @@ impl Pixels {
                 Self::Color(read_rgb8(path)?)
             }
             Domain::Depth => Self::Depth(read_gray16(path)?),
+            Domain::SemanticClass => {
+                let (places, palette) = read_palette8(path)?;
+                Self::Class(places, palette)
+            }
             Domain::GlobalXyz => Self::Xyz(read_xyz(path)?),
             Domain::Pose => unreachable!("a pose has no pixels"),
         })
@@ -36,15 +43,17 @@ impl Pixels {
         match self {
             Self::Color(r) => (r.width(), r.height()),
             Self::Depth(r) => (r.width(), r.height()),
+            Self::Class(r, _) => (r.width(), r.height()),
             Self::Xyz(r) => (r.width(), r.height()),
         }
     }
 
-    /// A pixel's numbers as they stand in the file; a depth is the first of the three.
+    /// A pixel's numbers as they stand in the file; a depth or a class is the first of the three.
     pub(crate) fn value(&self, x: u32, y: u32) -> [f64; 3] {
         match self {
             Self::Color(r) => r.at(x, y).map(f64::from),
             Self::Depth(r) => [f64::from(r.at(x, y)), 0.0, 0.0],
+            Self::Class(r, _) => [f64::from(r.at(x, y)), 0.0, 0.0],
             Self::Xyz(r) => r.at(x, y).map(f64::from),
         }
     }
@@ -56,11 +65,12 @@ impl Pixels {
             Domain::Semantic => MISSING_INDEX,
             Domain::Rgb | Domain::SemanticPretty => [0; 3],
             // These have no colours.
-            Domain::Depth | Domain::GlobalXyz | Domain::Pose => [0; 3],
+            Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => [0; 3],
         };
         match self {
             Self::Color(r) => r.pixels().iter().map(|p| *p == color).collect(),
             Self::Depth(r) => r.pixels().iter().map(|p| *p == MISSING_DEPTH).collect(),
+            Self::Class(r, _) => r.pixels().iter().map(|p| *p == NO_CLASS).collect(),
             Self::Xyz(r) => r.pixels().iter().map(|p| *p == [0.0; 3]).collect(),
         }
     }

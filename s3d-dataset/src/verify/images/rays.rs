@@ -1,5 +1,6 @@
 //! What the mesh shows: the pixels that a file should have.
 
+use crate::export::modality::NO_CLASS;
 use crate::verify::images::pixels::{Difference, Pixels};
 use crate::verify::images::{Reference, Scratch};
 use crate::verify::pose::CheckedPose;
@@ -8,8 +9,9 @@ use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{DepthUnits, Domain, XyzType};
 use s3d_render::{
-    MISSING_INDEX, TextureFilter, color_per_face_image_into, depth_image_into, depth_image_mm_into,
-    index_image_into, normal_image_into, rgb_image_into, sample_edges, xyz_image_half_into, xyz_image_into,
+    MISSING_INDEX, TextureFilter, byte_per_face_image, color_per_face_image_into, depth_image_into,
+    depth_image_mm_into, index_image_into, normal_image_into, rgb_image_into, sample_edges,
+    xyz_image_half_into, xyz_image_into,
 };
 
 /// How a file differs from what the mesh shows: exactly, for the meshes of an export are those that it was
@@ -56,8 +58,18 @@ pub(super) fn difference(
                 color_per_face_image_into(hits, reference.pretty_of_face, &mut images.faces.color);
                 colors(found, &images.faces.color)
             }
-            Domain::Depth | Domain::GlobalXyz | Domain::Pose => unreachable!("{domain} has no colours"),
+            Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => {
+                unreachable!("{domain} has no colours")
+            }
         },
+        Pixels::Class(found, _) => {
+            let classes = &reference.labels.classes;
+            let class_of = |label: &u32| classes.get(*label as usize).copied().unwrap_or(NO_CLASS);
+            let class_of_face: Vec<u8> = reference.mesh.label_of_face.iter().map(class_of).collect();
+            let expected = byte_per_face_image(hits, &class_of_face, NO_CLASS);
+            let text = |place: u8| reference.labels.class_name(place);
+            Difference::of(found, &expected, |a, b| a == b, text, text)
+        }
         Pixels::Depth(found) => {
             match conventions.depth_units {
                 DepthUnits::Per512 => depth_image_into(hits, &mut images.depth),

@@ -1,5 +1,6 @@
 //! What single rays should write into the files of a domain: slower than images, for any ray.
 
+use crate::export::modality::NO_CLASS;
 use crate::verify::images::Reference;
 use glam::DVec3;
 use s3d_geom::Camera;
@@ -26,6 +27,7 @@ impl<'a> Shade<'a> {
                 Domain::Depth => [f64::from(MISSING_DEPTH), 0.0, 0.0],
                 Domain::Normal => MISSING_NORMAL.map(f64::from),
                 Domain::Semantic => MISSING_INDEX.map(f64::from),
+                Domain::SemanticClass => [f64::from(NO_CLASS), 0.0, 0.0],
                 Domain::Rgb | Domain::SemanticPretty | Domain::GlobalXyz | Domain::Pose => [0.0; 3],
             };
         };
@@ -44,6 +46,11 @@ impl<'a> Shade<'a> {
                 [r, g, b].map(f64::from)
             }
             Domain::SemanticPretty => reference.pretty_of_face[hit.face as usize].map(f64::from),
+            Domain::SemanticClass => {
+                let label = reference.mesh.label_of_face[hit.face as usize] as usize;
+                let place = reference.labels.classes.get(label).copied().unwrap_or(NO_CLASS);
+                [f64::from(place), 0.0, 0.0]
+            }
             Domain::GlobalXyz => (camera.pose.location + direction * hit.t).to_array(),
             Domain::Rgb => {
                 let filter = TextureFilter::default();

@@ -1,0 +1,90 @@
+//! The legend of `semantic_class` images: a table for programs, and a picture of names and colours.
+
+use crate::error::Result;
+use font8x8::legacy::BASIC_LEGACY;
+use s3d_geom::Raster;
+use s3d_io::dataset::Layout;
+use s3d_io::fs::write_bytes;
+use s3d_io::image::{Compression, Content, encode_rgb8};
+use s3d_label::Taxonomy;
+use std::fmt::Write as _;
+
+/// Pixels of a dot of a letter.
+const DOT: usize = 2;
+/// Pixels of the height of a line.
+const LINE: usize = 22;
+/// Pixels of the side of a square of colour.
+const SQUARE: usize = 18;
+
+/// Writes `assets/class_legend.csv` and `assets/class_legend.png`.
+pub(crate) fn write(layout: &Layout, taxonomy: &Taxonomy) -> Result<()> {
+    write_bytes(&layout.class_legend_csv(), csv(taxonomy).as_bytes())?;
+    let png = encode_rgb8(&picture(taxonomy), Content::Labels, Compression::Balanced);
+    write_bytes(&layout.class_legend_png(), &png)?;
+    Ok(())
+}
+
+/// A line a class: what a pixel of it holds, its id, name, colour, whether it is a thing or stuff, and which
+/// class of S3DIS it counts as.
+fn csv(taxonomy: &Taxonomy) -> String {
+    let mut text = String::from("index,id,name,red,green,blue,kind,counts_as\n");
+    for class in taxonomy.classes() {
+        let ([r, g, b], id) = (taxonomy.color(*class), taxonomy.id(*class));
+        let kind = if taxonomy.is_stuff(*class) { "stuff" } else { "thing" };
+        let _ = writeln!(text, "{},{id},{class},{r},{g},{b},{kind},{}", class.index(), class.s3dis());
+    }
+    text
+}
+
+/// A line a class: its colour, its place and its name.
+fn picture(taxonomy: &Taxonomy) -> Raster<[u8; 3]> {
+    let text = |(place, name): (usize, &str)| format!("{place:3} {name}");
+    let lines: Vec<String> = taxonomy.classes().iter().map(|c| text((c.index(), c.name()))).collect();
+    let longest = lines.iter().map(String::len).max().unwrap_or(0);
+    let width = LINE + 8 * DOT * (longest + 1);
+    let mut pixels = vec![[255; 3]; width * LINE * lines.len()];
+    for ((line, class), rows) in lines.iter().zip(taxonomy.classes()).zip(pixels.chunks_mut(width * LINE)) {
+        let margin = (LINE - SQUARE) / 2;
+        for row in rows.chunks_mut(width).skip(margin).take(SQUARE) {
+            row[margin..margin + SQUARE].fill(taxonomy.color(*class));
+        }
+        for (column, letter) in line.bytes().enumerate() {
+            // A byte a row, the lowest bit first.
+            let glyph = BASIC_LEGACY.get(usize::from(letter)).copied().unwrap_or_default();
+            for (y, bits) in glyph.iter().enumerate() {
+                for x in (0..8).filter(|x| bits >> x & 1 == 1) {
+                    let (left, top) = (LINE + 8 * DOT * column + DOT * x, (LINE - 8 * DOT) / 2 + DOT * y);
+                    for row in rows.chunks_mut(width).skip(top).take(DOT) {
+                        row[left..left + DOT].fill([0; 3]);
+                    }
+                }
+            }
+        }
+    }
+    Raster::from_vec(width as u32, (LINE * lines.len()) as u32, pixels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_a_class() {
+        let taxonomy = Taxonomy::built_in("scannet20").unwrap();
+        let text = csv(&taxonomy);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!((lines.len(), lines[1]), (21, "0,1,wall,174,199,232,stuff,wall"));
+        assert_eq!(lines[16], "15,28,showerCurtain,158,218,229,thing,clutter");
+        let picture = picture(&taxonomy);
+        assert_eq!(picture.height(), 20 * LINE as u32);
+        assert_eq!(picture.at(10, 10), [174, 199, 232]);
+        // The names differ, and are all within the picture.
+        let row = |line: u32| -> Vec<[u8; 3]> {
+            (line * LINE as u32..(line + 1) * LINE as u32)
+                .flat_map(|y| picture.row(y)[LINE..].to_vec())
+                .collect()
+        };
+        let black = |line| row(line).iter().filter(|p| **p == [0; 3]).count();
+        assert!((0..20).all(|line| black(line) > 100 && (line == 0 || row(line) != row(line - 1))));
+    }
+}
