@@ -24,22 +24,26 @@ pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> B
     let (width, height) = (panoptic.width(), panoptic.height());
     // By segment: its runs so far, and where the last one ends.
     let mut runs: BTreeMap<u32, (Vec<u32>, u32)> = BTreeMap::new();
-    let mut at = 0;
+    let mut add = |id: u32, start: u32, end: u32| {
+        if id != 0 && start < end && wanted(id) {
+            let (counts, last) = runs.entry(id).or_default();
+            counts.extend([start - *last, end - start]);
+            *last = end;
+        }
+    };
+    let (mut at, mut start, mut current) = (0, 0, 0);
     for x in 0..width {
         for y in 0..height {
             let [r, g, b] = panoptic.at(x, y);
             let id = u32::from_le_bytes([r, g, b, 0]);
-            if id != 0 && wanted(id) {
-                let (counts, end) = runs.entry(id).or_default();
-                match counts.last_mut() {
-                    Some(last) if *end == at => *last += 1,
-                    _ => counts.extend([at - *end, 1]),
-                }
-                *end = at + 1;
+            if id != current {
+                add(current, start, at);
+                (start, current) = (at, id);
             }
             at += 1;
         }
     }
+    add(current, start, at);
     let mask = |(id, (mut counts, end)): (u32, (Vec<u32>, u32))| {
         if end < at {
             counts.push(at - end);

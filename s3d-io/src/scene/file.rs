@@ -10,6 +10,7 @@ use crate::scene::cameras::{CameraSource, CamerasTable, similarity};
 use crate::scene::frames::{FrameSource, FramesTable};
 use crate::scene::rgb::{PictureSource, RgbEntry};
 use crate::scene::taxonomy::TaxonomyEntry;
+use crate::scene::toml_fault::toml_fault;
 use s3d_geom::glam::{DAffine3, DVec3};
 use s3d_label::Taxonomy;
 use serde::Deserialize;
@@ -204,19 +205,6 @@ fn other_kind(path: &Path) -> Option<&'static str> {
         "json" => "JSON, not a scene",
         _ => return None,
     })
-}
-
-/// What is wrong in a TOML file, with the line.
-pub(crate) fn toml_fault(e: &toml::de::Error, text: &str, path: &Path) -> Error {
-    let message = e.message().replace('\n', "; ");
-    match e.span() {
-        // An error at the very start is about the file as a whole: a table that is missing.
-        Some(span) if span.end > 0 => {
-            let line = text.bytes().take(span.start).filter(|b| *b == b'\n').count() + 1;
-            Error::line(path, line as u64, message)
-        }
-        _ => Error::format(path, message),
-    }
 }
 
 /// As [`read_scene`], from the text of a scene file. Errors call it `path`, and the files that it names are

@@ -35,6 +35,7 @@ mod frames;
 mod published;
 mod rgb;
 mod taxonomy;
+mod toml_fault;
 
 pub use cameras::CameraSource;
 pub use file::{SceneFile, parse_scene, read_scene};

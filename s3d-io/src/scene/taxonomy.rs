@@ -4,7 +4,7 @@ use crate::dataset::taxonomy::{read_taxonomy_json, taxonomy};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
-use crate::scene::file::toml_fault;
+use crate::scene::toml_fault::toml_fault;
 use s3d_label::{Taxonomy, TaxonomyDefinition};
 use serde::de::value::MapAccessDeserializer;
 use serde::{Deserialize, Deserializer, de};
