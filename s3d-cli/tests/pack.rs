@@ -206,7 +206,7 @@ fn coco_has_a_panoptic_image_for_each_image() {
         let name = image["file_name"].as_str().unwrap();
         assert!(dataset().join(name).is_file() && package.contains_key(&Path::new("panoptic").join(name)));
     }
-    assert_eq!(package.len(), 2 + images.len());
+    assert_eq!(package.len(), 3 + images.len());
 }
 
 #[test]

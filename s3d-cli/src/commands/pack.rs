@@ -142,7 +142,7 @@ mod tests {
         for bad in [
             &[] as &[&str],
             &["--to", "zip"],
-            &["--to", "coco", "--stuff", "grass"],
+            &["--to", "coco", "--stuff", "wall,,floor"],
             &["--to", "webdataset", "--prefix", "a/b"],
             &["--to", "webdataset", "--prefix", "{0..9}"],
             &["--to", "webdataset", "--max-count", "0"],

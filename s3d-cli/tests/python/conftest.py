@@ -30,7 +30,10 @@ for name in ["open3d", "pye57"]:
 def s3d():
     """Runs the binary: `s3d("info", path)` gives its CompletedProcess and fails the test unless it ends with `code`."""
     binary = os.environ.get("S3D_BIN")
-    if binary is None:
+    if binary is not None:
+        # Tests may change the folder.
+        binary = Path(binary).resolve()
+    else:
         subprocess.run(["cargo", "build", "-q", "-p", "s3d-cli"], cwd=ROOT, check=True)
         binary = ROOT / "target" / "debug" / "s3d"
 

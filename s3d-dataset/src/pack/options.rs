@@ -215,7 +215,9 @@ impl FromStr for ClassList {
         if text.trim() == "none" {
             return Ok(Self(Vec::new()));
         }
-        let names: Vec<String> = text.split(',').map(|word| word.trim().to_owned()).collect();
+        let mut names: Vec<String> = text.split(',').map(|word| word.trim().to_owned()).collect();
+        names.sort_unstable();
+        names.dedup();
         if names.iter().any(String::is_empty) {
             return Err("must be names of classes between commas, or none".to_owned());
         }

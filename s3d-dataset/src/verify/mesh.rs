@@ -3,6 +3,7 @@
 use super::labels::Labels;
 use super::report::{Report, Topic};
 use crate::tables::manifest::{Manifest, XyzLoss};
+use crate::tables::summary::Surface;
 use s3d_geom::TriMesh;
 use s3d_io::dataset::{Layout, read_face_votes};
 use s3d_io::fs::read_json;
@@ -23,6 +24,8 @@ pub(crate) struct LabelledMesh {
     pub(crate) file: MeshFile,
     /// Its index in the label table, or [`NOT_IN_TABLE`].
     pub(crate) label_of_face: Vec<u32>,
+    /// Whether each face has votes, and not its label by filling.
+    pub(crate) is_voted: Vec<bool>,
 }
 
 /// Reads and checks both meshes of an area.
@@ -71,7 +74,7 @@ pub(crate) fn read_and_check(
         );
     }
     if !manifest.is_labelled() {
-        return Some(LabelledMesh { file, label_of_face: vec![0; faces] });
+        return Some(LabelledMesh { file, label_of_face: vec![0; faces], is_voted: vec![false; faces] });
     }
     let (label_of_face, other) = names?;
     let same = report.check(faces == other.faces().len(), MESH, &semantic, || {
@@ -90,20 +93,25 @@ pub(crate) fn read_and_check(
         )
     });
     drop(other);
-    let labelled = LabelledMesh { file, label_of_face };
-    if let Some(of) = manifest.area(area).and_then(|entry| entry.unlabelled) {
-        let null = (0u32..).zip(&labelled.label_of_face).filter(|(_, label)| **label == 0);
-        let (faces, m2) =
-            null.fold((0, 0.0), |(n, m2), (face, _)| (n + 1, m2 + labelled.file.mesh.area(face)));
-        let same = of.without_label.faces == faces && (of.without_label.m2 - m2).abs() <= 1e-6 * m2;
-        report.check(same, MESH, &semantic, || {
-            format!(
-                "{faces} faces of {m2} m² without a label, and the manifest tells of {:?}",
-                of.without_label
-            )
-        });
+    let mut labelled = LabelledMesh { file, label_of_face, is_voted: Vec::new() };
+    labelled.is_voted = check_votes(layout, area, &labelled, (labels, manifest.options.fill), report);
+    if let Some(told) = manifest.area(area).and_then(|entry| entry.unlabelled) {
+        let LabelledMesh { file, label_of_face, is_voted } = &labelled;
+        let surface = |is_without: &dyn Fn(usize) -> bool| {
+            let faces = (0..label_of_face.len()).filter(|face| is_without(*face));
+            faces.fold((0, 0.0), |(n, m2), face| (n + 1, m2 + file.mesh.area(face as u32)))
+        };
+        for (what, told, (faces, m2)) in [
+            ("votes", told.without_votes, surface(&|face| !is_voted[face])),
+            ("a label", told.without_label, surface(&|face| label_of_face[face] == 0)),
+        ] {
+            let same = told.faces == faces && (told.m2 - m2).abs() <= 1e-6 * m2;
+            report.check(same, MESH, &layout.manifest(), || {
+                let Surface { faces: n, m2: area, .. } = told;
+                format!("{n} faces of {area} m² without {what}, and the mesh has {faces} of {m2} m²")
+            });
+        }
     }
-    check_votes(layout, area, &labelled, (labels, manifest.options.fill), report);
     Some(labelled)
 }
 
@@ -152,8 +160,8 @@ fn check_votes(
     mesh: &LabelledMesh,
     (labels, fill_m): (&Labels, Option<f64>),
     report: &Report,
-) {
-    let LabelledMesh { file, label_of_face } = mesh;
+) -> Vec<bool> {
+    let LabelledMesh { file, label_of_face, .. } = mesh;
     let path = layout.votes_npz(area);
     // Labels by votes alone: what is without votes has none.
     let mut voted = label_of_face.clone();
@@ -181,8 +189,9 @@ fn check_votes(
         let odd = odd.count();
         report.check(odd == 0, VOTES, &path, || format!("{odd} faces have votes that do not add up"));
     }
+    let is_voted = voted.iter().map(|label| *label != 0).collect();
     let path = layout.votes_json(area);
-    let Some(votes) = report.read(Topic::Mesh, &path, read_json::<VotesRecord>) else { return };
+    let Some(votes) = report.read(Topic::Mesh, &path, read_json::<VotesRecord>) else { return is_voted };
     let mut per_label = vec![0u64; labels.len()];
     for label in voted {
         if let Some(count) = per_label.get_mut(label as usize) {
@@ -222,4 +231,5 @@ fn check_votes(
             classes.get(&*class.name).copied().unwrap_or(0),
         );
     }
+    is_voted
 }

@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 use crate::export::work::for_each_in_order;
 use crate::tables::manifest::Manifest;
 use files::Files;
-use images::{ImageCheck, Mismatch, Reference, Scratch};
+use images::{ImageCheck, Mismatch, Reference, Scratch, UnlabelledPixels};
 use labels::Labels;
 use mesh::{LabelledMesh, NOT_IN_TABLE};
 use photographs::Photographs;
@@ -39,6 +39,7 @@ use s3d_io::image::pretty_color;
 use s3d_render::{MipMaps, Scene};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use views::Views;
 
@@ -172,6 +173,27 @@ enum Work {
     Image(usize),
 }
 
+/// Holds what the manifest tells of pixels without votes and without a label against the images, if all of
+/// them could be read.
+fn check_unlabelled(common: &Common<'_>, area: u32, images: &[DatasetImage], found: &UnlabelledPixels) {
+    let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
+    let with_labels = images.iter().filter(|image| image.has(Domain::Semantic)).count() as u64;
+    let told = common.manifest.area(area).and_then(|entry| entry.unlabelled);
+    let Some(told) = told.filter(|_| count(&found.images) == with_labels) else { return };
+    for (what, told, found) in [
+        ("votes", told.without_votes.pixels, count(&found.without_votes)),
+        ("a label", told.without_label.pixels, count(&found.without_label)),
+    ] {
+        let Some(told) = told else { continue };
+        common.report.check(
+            told == found,
+            (Topic::Manifest, "pixels without a label"),
+            &common.layout.manifest(),
+            || format!("area {area}: {told} pixels without {what}, and images have {found}"),
+        );
+    }
+}
+
 fn check_images(
     common: &Common<'_>,
     area: u32,
@@ -181,6 +203,7 @@ fn check_images(
     let ctx = common.ctx;
     let Common { layout, manifest, labels, views, photographs, files, full, report, .. } = *common;
     let (mismatches, cameras) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
+    let unlabelled = UnlabelledPixels::default();
     let domains = manifest.domains();
     let check = ImageCheck {
         layout,
@@ -194,6 +217,7 @@ fn check_images(
         domains: &domains,
         mismatches: &mismatches,
         cameras: &cameras,
+        unlabelled: &unlabelled,
     };
     let progress = ctx.progress("verifying", "images", images.len() as u64);
     let works: Vec<Work> = std::iter::once(Work::Points).chain((0..images.len()).map(Work::Image)).collect();
@@ -218,6 +242,7 @@ fn check_images(
         },
     )?;
     drop(progress);
+    check_unlabelled(common, area, images, &unlabelled);
     let unlocked = |e: PoisonError<_>| e.into_inner();
     let mut cameras = cameras.into_inner().unwrap_or_else(unlocked);
     cameras.sort_by_key(|(index, _)| *index);

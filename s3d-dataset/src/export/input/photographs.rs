@@ -73,11 +73,13 @@ impl Photographs {
             return Err(at(list, twice, "is listed twice: each photograph needs a name of its own".into()));
         }
         let pictures = find(source, &chosen)?;
-        let found: Vec<(Photograph, u8)> = chosen
+        // Of several faults the first of the list is told, whichever thread finds its own first.
+        let opened: Vec<Result<_>> = chosen
             .par_iter()
             .zip(pictures)
             .map(|(posed, picture)| open_one(source, area, offset_m, posed, picture))
-            .collect::<Result<_>>()?;
+            .collect();
+        let found: Vec<(Photograph, u8)> = opened.into_iter().collect::<Result<_>>()?;
         let mut warnings = Vec::new();
         let turned = found.iter().filter(|(_, turn)| *turn != 1).count();
         if let Some((first, turn)) = found.iter().find(|(_, turn)| *turn != 1) {

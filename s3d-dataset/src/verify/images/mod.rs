@@ -21,6 +21,7 @@ use s3d_io::dataset::{Conventions, DatasetImage, Domain, Frame, Layout, Photogra
 use s3d_render::{Caster, Hits, MISSING_INDEX, MipMaps, NO_FACE, Scene, ViewImages};
 use std::path::Path;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 const SIZES: (Topic, &str) = (Topic::Images, "sizes");
 const CLASSES: (Topic, &str) = (Topic::Images, "classes");
@@ -71,6 +72,17 @@ pub(crate) struct ImageCheck<'a> {
     pub(crate) mismatches: &'a Mutex<Vec<Mismatch>>,
     /// The cameras of the images, as far as they could be read.
     pub(crate) cameras: &'a Mutex<Vec<(usize, Camera)>>,
+    /// What images of labels show without votes and without a label.
+    pub(crate) unlabelled: &'a UnlabelledPixels,
+}
+
+/// Counts of the images of labels of an area, from all threads.
+#[derive(Default)]
+pub(crate) struct UnlabelledPixels {
+    /// Images whose rays were cast.
+    pub(crate) images: AtomicU64,
+    pub(crate) without_votes: AtomicU64,
+    pub(crate) without_label: AtomicU64,
 }
 
 /// A file that differs from the mesh.
@@ -204,6 +216,7 @@ impl ImageFiles<'_> {
             (Domain::Depth, Pixels::Depth(depth)) => self.depth = Some(depth),
             (Domain::Semantic, Pixels::Color(indices)) => {
                 self.indices(&indices, path);
+                self.unlabelled(&indices, memory);
                 self.semantic = Some(indices);
             }
             (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path),
@@ -253,6 +266,19 @@ impl ImageFiles<'_> {
                 at / width
             )
         });
+    }
+
+    /// Counts what has no votes, and no label.
+    fn unlabelled(&self, indices: &Raster<[u8; 3]>, memory: &Scratch<'_>) {
+        let Some(reference) = self.check.reference.filter(|_| self.cast) else { return };
+        let UnlabelledPixels { images, without_votes, without_label } = self.check.unlabelled;
+        let is_voted = &reference.mesh.is_voted;
+        let unvoted = |face: &&u32| **face != NO_FACE && !is_voted[**face as usize];
+        let faces = memory.hits.face.pixels().iter().filter(unvoted).count();
+        without_votes.fetch_add(faces as u64, Ordering::Relaxed);
+        let null = indices.pixels().iter().filter(|index| **index == [0; 3]).count();
+        without_label.fetch_add(null as u64, Ordering::Relaxed);
+        images.fetch_add(1, Ordering::Relaxed);
     }
 
     fn indices(&self, indices: &Raster<[u8; 3]>, path: &Path) {
