@@ -52,9 +52,9 @@ mod tests {
             write_taxonomy_json(&path, &taxonomy).unwrap();
             assert_eq!(read_taxonomy_json_or_s3dis(&path).unwrap(), taxonomy);
         }
-        std::fs::write(&path, "{\"name\": \"x\",\n\"classes\": [{\"nam\": \"bed\"}]}").unwrap();
+        std::fs::write(&path, "{\"name\": \"x\",\n\"classes\": [{\"title\": \"bed\"}]}").unwrap();
         let message = read_taxonomy_json(&path).unwrap_err().to_string();
-        assert!(message.contains("taxonomy.json, line 2: unknown field `nam`"), "{message}");
+        assert!(message.contains("taxonomy.json, line 2: unknown field `title`"), "{message}");
         std::fs::write(&path, "{\"name\": \"x\", \"classes\": []}").unwrap();
         let message = read_taxonomy_json_or_s3dis(&path).unwrap_err().to_string();
         assert!(message.contains("taxonomy.json: has no classes"), "{message}");

@@ -57,8 +57,8 @@ pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> B
 /// first; a sixth bit says that more follow, and 48 makes it a letter. The last group has the sign.
 fn text_of(counts: &[u32]) -> String {
     let mut text = String::new();
-    let befores = [None; 3].into_iter().chain(counts.iter().skip(1).map(Some));
-    for (count, before) in counts.iter().zip(befores) {
+    let earlier = [None; 3].into_iter().chain(counts.iter().skip(1).map(Some));
+    for (count, before) in counts.iter().zip(earlier) {
         let mut rest = i64::from(*count) - before.map_or(0, |before| i64::from(*before));
         loop {
             let group = (rest & 31) as u8;
