@@ -158,3 +158,32 @@ fn more_than_the_disk_holds() {
     let large = ExportOptions { views: 100_000, size: 16_384, ..options(0) };
     stops(memory_scene, &large, Condition::Size, "are free at");
 }
+
+#[test]
+fn a_data_set_is_told_of_as_a_whole_and_by_area() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    Export::new([memory_scene()]).options(options(5)).run(&out, &Context::default()).unwrap();
+    assert!(s3d_dataset::is_data_set(&out) && !s3d_dataset::is_data_set(dir.path()));
+    let info = s3d_dataset::data_set_info(&out, &Context::default()).unwrap();
+    assert_eq!((info.seed, info.panoramas, info.areas.len(), &*info.taxonomy), (5, 1, 1, "s3dis"));
+    assert_eq!((info.areas[0].area, info.areas[0].storeys.len()), (2, 1));
+    let text = info.to_string();
+    for part in ["a complete data set of s3d ", "seed 5", "7 labels of the taxonomy s3dis", "\narea 2\n"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    std::fs::write(out.join("files.csv"), "").unwrap();
+    let refused = s3d_dataset::data_set_info(&out, &Context::default()).unwrap_err();
+    assert!(refused.to_string().contains("files.csv"), "{refused}");
+}
+
+/// A mesh without a place for a scanner: what else there is to know is told all the same.
+#[test]
+fn a_table_top_is_no_room_but_is_told_of() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("top.obj");
+    std::fs::write(&path, "v 0 0 0\nv 2 0 0\nv 2 0 -1\nv 0 0 -1\nf 1 2 3 4\n").unwrap();
+    let info = s3d_dataset::info(&path, &InfoOptions::default(), &Context::default()).unwrap();
+    assert_eq!((info.mesh.faces, info.locations.len()), (2, 0));
+    assert!(info.doubts.iter().any(|d| d.contains("an export stops here")), "{info}");
+}
