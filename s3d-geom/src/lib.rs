@@ -41,6 +41,8 @@ pub mod primitives;
 mod raster;
 #[cfg(feature = "sampling")]
 mod surface;
+#[cfg(feature = "nearest")]
+mod vertex_colors;
 mod voxel;
 #[cfg(any(feature = "nearest", feature = "sampling"))]
 mod wide;
@@ -65,6 +67,8 @@ pub use outline::{
 pub use raster::Raster;
 #[cfg(feature = "sampling")]
 pub use surface::{Density, SurfaceSampler};
+#[cfg(feature = "nearest")]
+pub use vertex_colors::{ColoredVertices, VertexColors};
 pub use voxel::{VoxelGrid, Voxels};
 
 /// The example of the README, compiled.

@@ -3,7 +3,7 @@
 //! A process that is killed leaves the folder, and the next that makes the same thing takes it over: what was
 //! written goes, and an earlier thing that was just being replaced comes back. If it was killed after it had
 //! begun to put the new thing in its place, [`Staging::was_placing`] says so: what is there is its own, and
-//! may be replaced by the same call.
+//! may be replaced by the same call. It says so until a call has come to its end, however many are killed.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -78,7 +78,7 @@ impl Staging {
         if old.exists() && !place.exists() {
             rename(&old, &place)?;
         }
-        staging.clear()?;
+        [&staging.new, &old].into_iter().try_for_each(|path| remove(path))?;
         create_dir(&staging.new)?;
         Ok(staging)
     }
@@ -99,17 +99,18 @@ impl Staging {
         let failed = |e| FileError::io(place, "move what is finished to this name", e);
         self.begin_placing()?;
         let old = old_in(&self.folder);
-        if replaced {
-            fs::rename(place, &old).map_err(failed)?;
+        let moved = if replaced {
+            fs::rename(place, &old)
         } else {
-            match fs::remove_dir(place) {
-                Err(e) if e.kind() != ErrorKind::NotFound => return Err(failed(e).into()),
-                _ => {}
-            }
-        }
-        if let Err(e) = fs::rename(&self.new, place) {
-            if replaced {
+            fs::remove_dir(place).or_else(|e| if e.kind() == ErrorKind::NotFound { Ok(()) } else { Err(e) })
+        };
+        if let Err(e) = moved.and_then(|()| fs::rename(&self.new, place)) {
+            if old.exists() {
                 fs::rename(old, place).map_err(failed)?;
+            }
+            // All is as it was found.
+            if !self.was_placing {
+                remove(&placing_in(&self.folder))?;
             }
             return Err(failed(e).into());
         }
@@ -150,12 +151,9 @@ impl Staging {
 }
 
 impl Drop for Staging {
-    /// Leaves nothing behind, unless something that was replaced could not be put back.
+    /// Leaves nothing behind, unless things are half in their place or what was replaced could not be put back.
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.new);
-        if !old_in(&self.folder).exists() {
-            let _ = fs::remove_file(placing_in(&self.folder));
-        }
         if let Some(lock) = self.lock.take() {
             lock.abandon();
         }
@@ -202,8 +200,33 @@ mod tests {
         let staging = begin(dir.path());
         assert!(staging.was_placing());
         assert_eq!(fs::read_to_string(place.join("file")).unwrap(), "1");
-        drop(staging);
+        fs::write(staging.path().join("file"), "2").unwrap();
+        staging.place_folder(&place, true).unwrap();
+        assert_eq!(fs::read_to_string(place.join("file")).unwrap(), "2");
         assert!(!Staging::is_left(dir.path(), Path::new("thing")));
+    }
+
+    #[test]
+    fn what_is_half_in_its_place_is_told_until_a_call_has_ended() {
+        let dir = tempfile::tempdir().unwrap();
+        let staging = begin(dir.path());
+        staging.begin_placing().unwrap();
+        fs::write(dir.path().join("a"), "new").unwrap();
+        killed(staging);
+        // The next is killed before it places anything, and the one after that is stopped.
+        let staging = begin(dir.path());
+        assert!(staging.was_placing());
+        killed(staging);
+        let staging = begin(dir.path());
+        assert!(staging.was_placing());
+        drop(staging);
+        assert!(Staging::is_left(dir.path(), Path::new("thing")));
+        let staging = begin(dir.path());
+        assert!(staging.was_placing());
+        fs::write(staging.path().join("b"), "new").unwrap();
+        staging.place_files(dir.path()).unwrap();
+        assert!(!Staging::is_left(dir.path(), Path::new("thing")));
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2);
     }
 
     #[test]

@@ -191,7 +191,8 @@ pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
     }
     if makes_rgb && !has_colors(mesh) {
         let text = "the mesh has no texture and no colours, so that its RGB images would be flat: leave rgb out of \
-                    --modalities, or name the scanner's pictures";
+                    --modalities, name the scanner's pictures, or write colors = \"points\" under [mesh] if annotated \
+                    points have colours";
         findings.push(Finding::new(Condition::Colour, true, text.to_owned()));
     }
     findings

@@ -274,6 +274,22 @@ impl TriMesh {
         self
     }
 
+    /// The mesh with other colours of its vertices. Faces with a texture keep that.
+    ///
+    /// # Panics
+    /// If `colors` is neither empty nor has one entry a vertex.
+    #[must_use]
+    pub fn with_vertex_colors(mut self, colors: Vec<[u8; 3]>) -> Self {
+        let vertices = self.parts.positions.len();
+        assert!(
+            colors.is_empty() || colors.len() == vertices,
+            "{} colours for {vertices} vertices",
+            colors.len()
+        );
+        self.parts.colors = colors;
+        self
+    }
+
     /// The column [`MeshParts::face_tags`], which the mesh has no more after that.
     #[must_use]
     pub fn take_face_tags(&mut self) -> Vec<u32> {

@@ -41,6 +41,8 @@ pub struct SceneFile {
     /// What is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing, unless
     /// it lies far from the origin ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
     pub mesh_offset_m: Option<DVec3>,
+    /// Where its colours come from.
+    pub mesh_colors: MeshColors,
     /// Which classes and types of rooms there are; a published area brings its own.
     pub taxonomy: Taxonomy,
     /// The file that the taxonomy is read from, if it is in one of its own.
@@ -63,6 +65,18 @@ pub struct SceneFile {
     pub frames: Option<FrameSource>,
 }
 
+/// Where the colours of a mesh come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MeshColors {
+    /// The mesh's own: its textures, the colours of its vertices or materials.
+    #[default]
+    File,
+    /// The annotated points, for a mesh without textures
+    /// ([`VertexColors`](s3d_geom::VertexColors)).
+    Points,
+}
+
 impl SceneFile {
     /// A scene of meshes alone, without labels, as area 1. Its `path` is that of the first.
     pub fn of_meshes(mesh: Vec<PathBuf>, up: UpAxis) -> Self {
@@ -75,6 +89,7 @@ impl SceneFile {
             up,
             units: None,
             mesh_offset_m: None,
+            mesh_colors: MeshColors::File,
             taxonomy: Taxonomy::s3dis(),
             taxonomy_file: None,
             is_labelled: false,
@@ -116,6 +131,8 @@ struct MeshTable {
     up: Option<UpAxis>,
     units: Option<LengthUnit>,
     offset_m: Option<[f64; 3]>,
+    #[serde(default)]
+    colors: MeshColors,
 }
 
 /// Reads a `scene.toml`:
@@ -127,6 +144,7 @@ struct MeshTable {
 /// up   = "y"          # or "z"; "y" if it is left out
 /// units = "cm"        # or "m", "mm", "ft", "in"; metres if it is left out and the mesh's file does not say it
 /// offset_m = [500000.0, 5400000.0, 300.0]  # subtracted from positions; found by itself if it is left out
+/// colors = "points"   # a mesh without textures takes the colours of the annotated points
 /// [annotations]       # left out: there are no labels
 /// path = "Area_1"     # or mesh = true: the labels that came with the mesh
 /// [cameras]
@@ -249,6 +267,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
     let (mut mesh, mut annotations) = (Vec::new(), Vec::new());
     let (mut up, mut annotation_options) = (UpAxis::Y, AnnotationOptions::default());
     let (mut mesh_offset_m, mut annotations_have_offset, mut units) = (None, false, None);
+    let mut mesh_colors = MeshColors::File;
     if published.is_none() {
         let meshes = document.mesh.ok_or_else(|| fault("missing field `mesh`".to_owned()))?;
         mesh = match (&meshes.path, &meshes.paths) {
@@ -269,6 +288,12 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         mesh_offset_m = meshes.offset_m.map(DVec3::from_array);
         if let Some(offset_m) = mesh_offset_m.filter(|o| !o.is_finite()) {
             return Err(fault(format!("mesh.offset_m = {:?} is not finite", offset_m.to_array())));
+        }
+        mesh_colors = meshes.colors;
+        if mesh_colors == MeshColors::Points && annotations.is_empty() {
+            return Err(fault(
+                "mesh.colors = \"points\" needs the path of a cloud under [annotations]".into(),
+            ));
         }
         up = meshes.up.unwrap_or(UpAxis::Y);
         units = meshes.units;
@@ -295,6 +320,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         up,
         units,
         mesh_offset_m,
+        mesh_colors,
         taxonomy,
         taxonomy_file,
         is_labelled,

@@ -38,7 +38,7 @@ mod taxonomy;
 mod toml_fault;
 
 pub use cameras::CameraSource;
-pub use file::{SceneFile, parse_scene, read_scene};
+pub use file::{MeshColors, SceneFile, parse_scene, read_scene};
 pub use frames::FrameSource;
 pub use published::{PublishedArea, PublishedMesh, PublishedOptions};
 pub use rgb::{PictureKind, PictureOptions, PictureSource, SkyBoxCaps, UnseenColor};

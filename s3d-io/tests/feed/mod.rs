@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub(crate) type Feed = fn(&Path, &[u8]);
 
 /// Every reader, by the name of its fuzz target.
-pub(crate) const FEEDS: [(&str, Feed); 20] = [
+pub(crate) const FEEDS: [(&str, Feed); 21] = [
     ("obj", obj),
     ("mtl", mtl),
     ("texture", texture),
@@ -35,6 +35,7 @@ pub(crate) const FEEDS: [(&str, Feed); 20] = [
     ("captures", captures),
     ("json", json),
     ("scene", scene),
+    ("taxonomy", taxonomy),
     ("file_list", file_list),
     ("npy", npy),
     ("las", las),
@@ -284,7 +285,16 @@ fn scene(dir: &Path, data: &[u8]) {
         file(dir, name, b"");
     }
     check(dir, read_scene(&file(dir, "scene.toml", data)));
-    check(dir, read_taxonomy(&file(dir, "taxonomy.toml", data)));
+}
+
+/// A taxonomy as TOML and as JSON: one that is read is written, and read again as itself.
+fn taxonomy(dir: &Path, data: &[u8]) {
+    let name = if data.starts_with(b"{") { "classes.json" } else { "classes.toml" };
+    let Some(found) = check(dir, read_taxonomy(&file(dir, name, data))) else { return };
+    let again = dir.join("taxonomy.json");
+    write_taxonomy_json(&again, &found).expect("what was read can be written");
+    assert!(read_taxonomy_json(&again).is_ok_and(|read| read == found), "another taxonomy comes back");
+    assert!(found.classes().iter().all(|class| found.class(class.name()) == Ok(*class)));
 }
 
 /// An array, or an archive of arrays, by what the bytes begin with.

@@ -13,7 +13,13 @@ use std::sync::Arc;
 
 /// Where an area's mesh comes from.
 pub(crate) enum MeshSource {
-    Files { paths: Vec<PathBuf>, up: UpAxis, options: MeshOptions },
+    Files {
+        paths: Vec<PathBuf>,
+        up: UpAxis,
+        options: MeshOptions,
+        /// Colours of its vertices in place of those of the files, if there are any.
+        colors: Vec<[u8; 3]>,
+    },
     Published(Box<PublishedArea>),
     Memory(Arc<MeshFile>),
 }
@@ -22,7 +28,13 @@ impl MeshSource {
     pub(crate) fn read(&self) -> Result<Arc<MeshFile>> {
         let file = match self {
             Self::Memory(file) => return Ok(Arc::clone(file)),
-            Self::Files { paths, up, options } => s3d_io::mesh::read_meshes_with(paths, *up, options)?,
+            Self::Files { paths, up, options, colors } => {
+                let mut file = s3d_io::mesh::read_meshes_with(paths, *up, options)?;
+                if !colors.is_empty() {
+                    file.mesh = file.mesh.with_vertex_colors(colors.clone());
+                }
+                file
+            }
             Self::Published(area) => area.read_mesh()?.file,
         };
         Ok(Arc::new(file))

@@ -1,6 +1,7 @@
 //! Everything that an export reads, found and checked before anything is written.
 
 pub(crate) mod cameras;
+mod colors;
 pub(crate) mod memory;
 pub(crate) mod mesh;
 mod numbering;
@@ -13,6 +14,7 @@ mod up_axis;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::input::cameras::{Cameras, Placing};
+use crate::export::input::colors::PointColors;
 use crate::export::input::memory::{SceneSource, SharedScene};
 use crate::export::input::mesh::{MeshFrame, MeshSource};
 use crate::export::input::numbering::{label_table, number, published_numbers};
@@ -29,7 +31,7 @@ use s3d_geom::{Camera, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance, AnnotationOptions, Annotations, OnFault};
 use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis};
-use s3d_io::scene::{CameraSource, PictureSource, PublishedArea, PublishedOptions, SceneFile};
+use s3d_io::scene::{CameraSource, MeshColors, PictureSource, PublishedArea, PublishedOptions, SceneFile};
 use s3d_label::{Label, LabelTable, Room, Taxonomy};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -216,7 +218,7 @@ impl AreaInput {
             return Self::published(&folder, Some(scene), asked, opened);
         }
         let options = &scene.annotation_options;
-        let source = MeshSource::Files {
+        let mut source = MeshSource::Files {
             paths: scene.mesh.clone(),
             up: scene.up,
             // The columns that are named are those of the annotations.
@@ -226,16 +228,17 @@ impl AreaInput {
                 origin: scene.mesh_offset_m.map_or(MeshOrigin::Near, MeshOrigin::At),
                 units: scene.units,
             },
+            colors: Vec::new(),
         };
         // The mesh comes first: what lies far from it need not be read.
-        let file = source.read()?;
+        let mut file = source.read()?;
         let frame = MeshFrame::of(&file);
-        let file = Some(file).filter(|_| opened.keep_mesh || scene.annotations.is_empty());
-        let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
-        if opened.annotations && scene.is_labelled {
-            let mut annotations = match &file {
-                Some(file) if scene.annotations.is_empty() => Annotations::of_mesh(file, options)?,
-                _ => {
+        let takes_colors = scene.mesh_colors == MeshColors::Points;
+        let (mut rooms, mut notes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+        if (opened.annotations || takes_colors) && scene.is_labelled {
+            let mut annotations = match scene.annotations.is_empty() {
+                true => Annotations::of_mesh(&file, options)?,
+                false => {
                     let given = Some(options.offset_m).filter(|_| scene.annotations_have_offset);
                     let options = AnnotationOptions {
                         offset_m: given.unwrap_or(frame.offset_m),
@@ -246,11 +249,22 @@ impl AreaInput {
                 }
             };
             warnings = std::mem::take(&mut annotations.warnings);
+            if let (true, MeshSource::Files { colors, .. }) = (takes_colors, &mut source) {
+                let found = PointColors::of(&scene.path, &file.mesh, &annotations)?;
+                notes.push(found.sentence());
+                warnings.extend(found.doubts());
+                *colors = found.vertices.colors;
+                let mut colored = Arc::unwrap_or_clone(file);
+                colored.mesh = colored.mesh.with_vertex_colors(colors.clone());
+                file = Arc::new(colored);
+            }
             let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
-            rooms = number(scene.area, annotations)
-                .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
+            if opened.annotations {
+                rooms = number(scene.area, annotations)
+                    .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
+            }
         }
-        let mesh_file = file.filter(|_| opened.keep_mesh);
+        let mesh_file = opened.keep_mesh.then_some(file);
         let photographs = photographs_of(&scene, &frame)?;
         let (cameras, cameras_path) =
             Cameras::of_scene(&scene, asked, frame.offset_m)?.unwrap_or_else(|| {
@@ -271,7 +285,7 @@ impl AreaInput {
             taxonomy: scene.taxonomy.clone(),
             rooms,
             cameras,
-            notes: Vec::new(),
+            notes,
             warnings,
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
             files: files_of(&scene).into_iter().chain(photographs.files().cloned()).collect(),

@@ -1,0 +1,87 @@
+//! The colours of a mesh from annotated points: `colors = "points"` in a scene file.
+
+use crate::error::{Error, Result};
+use s3d_geom::{ColoredVertices, NearestFaces, TriMesh, VertexColors};
+use s3d_io::cloud::{Annotations, InstanceReader};
+use std::path::Path;
+
+/// Points that are in memory, three times.
+const BLOCK_POINTS: usize = 1 << 19;
+
+/// The shares of a mesh's surface without points of its own that are worth a word.
+const MUCH_BARE: f64 = 0.01;
+const MUCH_SPREAD: f64 = 0.1;
+
+/// So many points to a vertex show far more than vertices can hold.
+const MANY_POINTS: u64 = 100;
+
+/// What the points gave.
+pub(super) struct PointColors {
+    pub(super) vertices: ColoredVertices,
+    area_m2: f64,
+}
+
+impl PointColors {
+    /// Of all points of `annotations`, which the scene file `scene` asks for.
+    pub(super) fn of(scene: &Path, mesh: &TriMesh, annotations: &Annotations) -> Result<Self> {
+        let fault =
+            |message: &str| Error::Input(format!("{}: mesh.colors = \"points\": {message}", scene.display()));
+        if !mesh.textures().is_empty() {
+            return Err(fault("the mesh has textures, which would cover these colours: leave the key out"));
+        }
+        let nearest_faces = NearestFaces::new(mesh);
+        let mut colors = VertexColors::new(&nearest_faces);
+        let mut reader = InstanceReader::new(BLOCK_POINTS);
+        let mut is_black = true;
+        let mut instances = annotations.rooms.iter().flat_map(|room| &room.instances).peekable();
+        while let Some(instance) = instances.next() {
+            reader.read(instance, instances.peek().copied(), |block, _| {
+                is_black &= block.colors.iter().all(|color| *color == [0; 3]);
+                colors.add(block);
+                Ok::<(), Error>(())
+            })?;
+        }
+        if is_black {
+            return Err(fault("the annotated points have no colours"));
+        }
+        let vertices = colors.finish();
+        if vertices.far_points == vertices.points {
+            return Err(fault("no annotated point is within 10 cm of the mesh: do they share a frame?"));
+        }
+        Ok(Self { vertices, area_m2: mesh.total_area() })
+    }
+
+    /// What was done, for the log.
+    pub(super) fn sentence(&self) -> String {
+        let ColoredVertices { colors, points, far_points, .. } = &self.vertices;
+        format!(
+            "the mesh takes its colours from {} points for {} vertices",
+            points - far_points,
+            colors.len()
+        )
+    }
+
+    /// What looks wrong, a sentence each.
+    pub(super) fn doubts(&self) -> Vec<String> {
+        let ColoredVertices { colors, points, far_points, spread_m2, bare_m2 } = &self.vertices;
+        let percent = |part: f64| format!("{:.0} %", 100.0 * part / self.area_m2);
+        let mut doubts = Vec::new();
+        if *bare_m2 > MUCH_BARE * self.area_m2 {
+            let share = percent(*bare_m2);
+            doubts.push(format!("no annotated point is near {share} of the mesh: it stays flat grey there"));
+        }
+        if *spread_m2 > MUCH_SPREAD * self.area_m2 {
+            let share = percent(*spread_m2);
+            doubts
+                .push(format!("{share} of the mesh have no point at a corner, and the colours around them"));
+        }
+        let of_vertex = (points - far_points) / colors.len() as u64;
+        if of_vertex > MANY_POINTS {
+            doubts.push(format!(
+                "{of_vertex} points are behind the colour of each vertex: what is finer than the faces is lost. A mesh \
+                 of smaller faces would show it"
+            ));
+        }
+        doubts
+    }
+}
