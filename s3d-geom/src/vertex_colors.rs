@@ -11,6 +11,9 @@ const FAR_M: f32 = 0.1;
 /// Points whose nearest faces are in memory at once.
 const CHUNK_POINTS: usize = 1 << 20;
 
+/// A face with more points than this shows more than three corners can hold.
+const MANY_POINTS: u32 = 16;
+
 /// What a weight of 1 counts as. Sums of whole numbers are the same in any order.
 const ONE: f64 = 4096.0;
 
@@ -44,6 +47,7 @@ pub struct VertexColors<'m> {
     place_of_group: Vec<u32>,
     /// Of each group: the weighted sums of R, G, B, and the weights.
     sums: Vec<[u64; 4]>,
+    points_of_face: Vec<u32>,
     points: u64,
     far_points: u64,
     /// Of a chunk of points; kept for its memory.
@@ -63,6 +67,8 @@ pub struct ColoredVertices {
     pub spread_m2: f64,
     /// The area of the faces that no colour reaches: they are [`DEFAULT_COLOR`].
     pub bare_m2: f64,
+    /// The area of the faces with more than 16 points: what is finer than these faces is lost.
+    pub blurred_m2: f64,
 }
 
 impl<'m> VertexColors<'m> {
@@ -75,6 +81,7 @@ impl<'m> VertexColors<'m> {
             group_of_vertex,
             place_of_group,
             sums,
+            points_of_face: vec![0; nearest_faces.mesh().faces().len()],
             points: 0,
             far_points: 0,
             nearest: Vec::new(),
@@ -96,6 +103,8 @@ impl<'m> VertexColors<'m> {
                     self.far_points += 1;
                     continue;
                 }
+                let points = &mut self.points_of_face[nearest.face as usize];
+                *points = points.saturating_add(1);
                 let corners = mesh.triangle(nearest.face).map(|p| p.as_dvec3());
                 let vertices = mesh.faces()[nearest.face as usize];
                 for (vertex, share) in
@@ -138,6 +147,11 @@ impl<'m> VertexColors<'m> {
             far_points: self.far_points,
             spread_m2: unseen_m2 - bare_m2,
             bare_m2,
+            blurred_m2: (0u32..)
+                .zip(&self.points_of_face)
+                .filter(|(_, points)| **points > MANY_POINTS)
+                .map(|(face, _)| mesh.area(face))
+                .sum(),
         }
     }
 }
@@ -300,6 +314,7 @@ mod tests {
         });
         let found = colored(&mesh, &[cloud(points.collect(), ramp)]);
         assert_eq!((found.points, found.far_points, found.spread_m2, found.bare_m2), (100_000, 0, 0.0, 0.0));
+        assert!((found.blurred_m2 - 1.0).abs() < 1e-6, "{}", found.blurred_m2);
         for (p, color) in mesh.positions().iter().zip(&found.colors) {
             let is_inside = [p.x, p.y].iter().all(|v| (0.05..0.95).contains(v));
             // At the border the mean of a one-sided neighbourhood is a fraction of a cell further in.
@@ -331,7 +346,7 @@ mod tests {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X, vec3(1.0, 1.0, 0.0), vec3(-0.0, 1.0, -0.0)];
         let mesh = TriMesh::from_faces(corners.to_vec(), vec![[0, 1, 2], [3, 4, 5]]).unwrap();
         let found = colored(&mesh, &[cloud(vec![vec3(0.6, 0.3, 0.0)], |_| [90, 80, 70])]);
-        assert_eq!(found.colors, [[90, 80, 70]; 6]);
+        assert_eq!((found.colors, found.blurred_m2), (vec![[90, 80, 70]; 6], 0.0));
     }
 
     #[test]

@@ -21,10 +21,14 @@ const FLAT: f32 = 0.966;
 /// Or one of which lies farther than this from the other's plane, as a share of its distance.
 const STEP: f64 = 0.01;
 
+/// Neighbours whose colours differ by no more than this in any channel make no stair-step that could be seen.
+const CONTRAST: u8 = 8;
+
 /// Replaces the colour of each pixel at an edge by those of all faces that it shows, each by its share of
 /// `samples` places, spread alike in each pixel. `image` is that of [`crate::rgb_image_with`] for the same
-/// arguments. At an edge is a pixel one of whose four neighbours shows nothing, another material, or another
-/// face that lies behind it, before it, or turned away by more than 15°. Pixels that show nothing stay.
+/// arguments. At an edge is a pixel one of whose four neighbours shows nothing, or another colour (by more than 8
+/// of 255 in a channel) of another material or of a face that lies behind it, before it, or turned away by more
+/// than 15°. Pixels that show nothing stay.
 ///
 /// # Panics
 /// If `hits` and `image` are not of the camera's size.
@@ -44,7 +48,8 @@ pub fn sample_edges(
         return;
     }
     let rays = camera.rays();
-    let edges = Edges { mesh: scene.mesh(), hits, rays: &rays, pairs: vec![Pair::NONE; PAIRS] }
+    let pairs = vec![Pair::NONE; PAIRS];
+    let edges = Edges { mesh: scene.mesh(), hits, colors: image.pixels(), rays: &rays, pairs }
         .find(camera.is_panorama());
     let mut sampler = Sampler {
         mesh: scene.mesh(),
@@ -77,9 +82,6 @@ fn places(samples: u32) -> Vec<DVec2> {
 /// How many pairs of faces are remembered, a power of two: neighbours meet in many pixels.
 const PAIRS: usize = 4096;
 
-/// More faces than this in nine pixels may be so small that others lie between them.
-const FEW: usize = 4;
-
 /// What is known of two faces whose pixels are neighbours.
 #[derive(Clone, Copy)]
 struct Pair {
@@ -105,6 +107,8 @@ impl Pair {
 struct Edges<'a> {
     mesh: &'a TriMesh,
     hits: &'a Hits,
+    /// What the pixels' centres show.
+    colors: &'a [[u8; 3]],
     rays: &'a Rays,
     pairs: Vec<Pair>,
 }
@@ -139,6 +143,10 @@ impl Edges<'_> {
         let (f, g) = (faces[i], faces[j]);
         if f == NO_FACE || g == NO_FACE {
             return true;
+        }
+        let (color, other) = (self.colors[i], self.colors[j]);
+        if color.iter().zip(other).all(|(a, b)| a.abs_diff(b) <= CONTRAST) {
+            return false;
         }
         let place = (f ^ g.wrapping_mul(0x9e37_79b1)) as usize % PAIRS;
         if self.pairs[place].faces != [f, g] {
@@ -210,12 +218,12 @@ struct Sampler<'a, 'm> {
 impl Sampler<'_, '_> {
     /// The colour of a pixel whose centre has the colour `center`.
     fn color(&mut self, x: u32, y: u32, center: [u8; 3]) -> [u8; 3] {
-        let are_few = self.gather(x, y);
+        self.gather(x, y);
         self.shown.clear();
         for k in 0..self.places.len() {
             let place = self.places[k];
             let direction = self.direction(x, y, place);
-            let near = if are_few { self.nearest(direction) } else { None };
+            let near = self.nearest(direction);
             let Some(face) = near.or_else(|| self.caster.cast(direction).map(|hit| hit.face)) else {
                 continue;
             };
@@ -254,27 +262,19 @@ impl Sampler<'_, '_> {
         }
     }
 
-    /// Takes the faces of a pixel and of those around it. Whether they are few: then they are so large that no
-    /// ray between their centres meets another.
-    fn gather(&mut self, x: u32, y: u32) -> bool {
+    /// Takes the faces of a pixel and of those around it: few rays between their centres meet another first.
+    fn gather(&mut self, x: u32, y: u32) {
         let (width, height) = (self.camera.width, self.camera.height);
         self.near.clear();
         for v in y.saturating_sub(1)..=(y + 1).min(height - 1) {
             let row = self.hits.face.row(v);
             for &face in &row[x.saturating_sub(1) as usize..=(x + 1).min(width - 1) as usize] {
-                if self.near.iter().all(|near| near.0 != face) {
-                    self.near.push((face, None));
+                if face != NO_FACE && self.near.iter().all(|near| near.0 != face) {
+                    let front = || Front::new(self.mesh, face, self.camera.pose.location);
+                    self.near.push((face, *self.fronts.get(face, front)));
                 }
             }
         }
-        let are_few = self.near.len() <= FEW && self.near.iter().all(|(face, _)| *face != NO_FACE);
-        if are_few {
-            let (mesh, origin) = (self.mesh, self.camera.pose.location);
-            for (face, front) in &mut self.near {
-                *front = *self.fronts.get(*face, || Front::new(mesh, *face, origin));
-            }
-        }
-        are_few
     }
 
     /// The nearest of the gathered faces; the lowest of equally near ones.

@@ -16,10 +16,11 @@ use tempfile::TempDir;
 
 /// The commands, as they are called in a folder with `scan` (the input), `out` (an export) and `shard_1`,
 /// `shard_2` (its shards). Whoever adds a command that writes adds a line.
-const COMMANDS: [&str; 22] = [
+const COMMANDS: [&str; 23] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
+    "export scan/photographs.toml -o new SMALL --place-cameras 2",
     "plan scan/scene.toml -o new --views 3 --size 32",
     "merge shard_1 shard_2 -o new",
     "demo -o new --views 1 --size 32 --pano-width 64 --points-per-m2 5",
@@ -78,6 +79,9 @@ impl Template {
         let [list, o, views] = &poses;
         let size = ["--width", "50", "--height", "60", "--fov", "60"];
         s3d_ok(&[&["render", text(&at("scan/room.obj")), "--poses", list, o, views], &size[..]].concat());
+        let photographs =
+            "area = 1\n[mesh]\npath = \"room.obj\"\n[frames]\npath = \"../views/transforms.json\"\n";
+        fs::write(at("scan/photographs.toml"), photographs).unwrap();
         let files = files(&at(""));
         Self { dir, files }
     }

@@ -381,6 +381,37 @@ fn packages_know_photographs_and_their_masks() {
     assert!(poses.keys().all(|p| records.iter().all(|r| !p.to_string_lossy().contains(&r.camera_uuid))));
 }
 
+/// COCO's images are void where a view lies outside of its photograph, whatever the mesh shows there.
+#[test]
+fn coco_is_void_outside_of_a_photograph() {
+    let tree = text(&demo().join("Area_1")).to_owned();
+    let project = Project::with_photographs(&format!("[annotations]\npath = {tree:?}\n{LISTED}"));
+    let mut list = transforms(&poses());
+    (list["k1"], list["k2"]) = (json!(0.3), json!(0.0));
+    project.write("transforms.json", &list.to_string());
+    let (out, _) = project.export("out", &[]);
+    let place = project.at("coco");
+    s3d_ok(&["pack", text(&out), "--to", "coco", "-o", text(&place), "--images", "views"]);
+    let layout = Layout::new(&out);
+    let all = dataset_images(&layout, 1).unwrap();
+    assert_eq!(all.len(), 4);
+    for image in all {
+        let read = |domain| read_rgb8(&image.path(&layout, domain)).unwrap();
+        let (color, label) = (read(Domain::Rgb), read(Domain::Semantic));
+        let packed = files(&place).into_keys().find(|p| text(p).contains(&image.uuid)).unwrap();
+        let panoptic = read_rgb8(&place.join(packed)).unwrap();
+        let pixels = color.pixels().iter().zip(label.pixels()).zip(panoptic.pixels());
+        let (mut outside, mut labelled) = (0, 0);
+        for ((color, label), segment) in pixels {
+            let has_label = *label != [0; 3] && *label != s3d_render::MISSING_INDEX;
+            outside += usize::from(*color == [0; 3] && has_label);
+            labelled += usize::from(*color != [0; 3] && has_label);
+            assert_eq!(*segment != [0; 3], *color != [0; 3] && has_label, "{label:?} in {color:?}");
+        }
+        assert!(outside > color.len() / 50 && labelled > color.len() / 2, "{outside}, {labelled}");
+    }
+}
+
 /// Colours with more samples at edges differ there alone; everything else is the same, and verify knows.
 #[test]
 fn samples_at_edges_change_colours_alone() {

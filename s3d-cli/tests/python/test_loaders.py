@@ -157,8 +157,8 @@ def test_folds_have_lists_of_both_sides(s3d, scan, tmp_path):
     assert sorted(lists["fold_1_train.txt"] + lists["fold_1_test.txt"]) == sorted(lists["all.txt"])
     assert all((out / path).is_file() for pairs in lists.values() for pair in pairs for path in pair)
     # Where Pointcept looks for area 5's mesh.
-    assert (out / "profiles/pointcept/raw/area_5a/3d/rgb.obj").is_file()
-    assert not (out / "profiles/pointcept/raw/area_5").exists()
+    assert (out / "profiles/pointcept/raw/Area_5a/3d/rgb.obj").is_file()
+    assert not (out / "profiles/pointcept/raw/Area_5").exists()
 
 
 # ---- Rooms ------------------------------------------------------------------------------------------------------------
@@ -223,10 +223,10 @@ def test_mmdetection3d_arrays_are_what_its_script_makes(variant):
             assert kinds.min() == kinds.max(), "an instance has one class, and points"
 
 
-def pointcept_rooms(root):
-    """Its preprocessing: the six areas, the rooms of their angle files, all annotations of each."""
+def pointcept_rooms(root, splits=range(1, 7)):
+    """Its preprocessing: the areas of --splits, the rooms of their angle files, all annotations of each."""
     found = {}
-    for area in range(1, 7):
+    for area in splits:
         table = np.loadtxt(root / f"Area_{area}" / f"Area_{area}_alignmentAngle.txt", dtype=str)
         for line in table:
             room, angle = f"Area_{area}/{line[0]}", int(line[1])
@@ -247,7 +247,8 @@ def test_pointcept_reads_its_tree(variant):
     for name, (coords, colors, kinds, angle) in found.items():
         assert len(coords) == len(kinds) > 100 and 0 <= angle < 90
         assert colors.min() >= 0 and colors.max() <= 255
-    mesh = root / "raw/area_1/3d/rgb.obj"
+    assert set(pointcept_rooms(root, [1])) == set(found)  # `--splits Area_1`; up to 1.5.1 all six are read
+    mesh = root / "raw/Area_1/3d/rgb.obj"
     assert mesh.read_bytes() == (variant / "area_1/3d/rgb.obj").read_bytes()
 
 

@@ -1,9 +1,10 @@
 //! Pointcept: the S3DIS tree as its preprocessing wants it.
 //!
-//! `preprocess_s3dis.py --dataset_root profiles/pointcept` reads, for each k from 1 to 6,
-//! `Area_k/Area_k_alignmentAngle.txt` with `numpy.loadtxt`, and of every room that it names all
+//! `preprocess_s3dis.py --splits Area_1 Area_2 … --dataset_root profiles/pointcept` reads, for each area that is
+//! named, `Area_k/Area_k_alignmentAngle.txt` with `numpy.loadtxt`, and of every room that it names all
 //! `Area_k/ROOM/Annotations/*.txt`, with `numpy.loadtxt` too. So it stops
-//! - where one of the six areas has no angle file: areas that are not in the data set get one without rooms;
+//! - where an area has no angle file: areas 1 to 6 that are not in the data set get one without rooms (up to
+//!   version 1.5.1 all six are read);
 //! - at an angle file with one room, since its two words are no table: the room is named twice, and processed
 //!   twice with the same result;
 //! - at a room of the angle file without points: it is not named;
@@ -11,9 +12,9 @@
 //!
 //! All but these are second names of the files in `s3dis/` (copies where the file system has none).
 //!
-//! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `area_k/3d/rgb.obj`, and for
-//! area 5 `area_5a` and `area_5b`, moving 5b: area 5 of a data set is in one frame already and comes as
-//! `area_5a` alone.
+//! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `Area_k/3d/rgb.obj` (`area_k` up to
+//! version 1.5.1), and for area 5 `Area_5a` and `Area_5b`, moving 5b: area 5 of a data set is in one frame
+//! already and comes as `Area_5a` alone.
 
 use super::room::{TreeRoom, count_and_min};
 use super::{AREAS_OF_LOADERS, Source, write_lines};
@@ -88,7 +89,7 @@ fn write_room(source: &Source<'_>, dir: &Path, room: &TreeRoom) -> Result<()> {
 /// The mesh of an area with its materials and textures, where the preprocessing looks for it.
 fn link_mesh(source: &Source<'_>, area: u32, raw: &Path) -> Result<()> {
     let from = source.layout.mesh_dir(area);
-    let name = if area == 5 { "area_5a".to_owned() } else { format!("area_{area}") };
+    let name = if area == 5 { "Area_5a".to_owned() } else { format!("Area_{area}") };
     let to = raw.join(name).join("3d");
     create_dir(&to)?;
     let textures = from.join("rgb_textures");

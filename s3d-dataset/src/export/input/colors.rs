@@ -12,8 +12,8 @@ const BLOCK_POINTS: usize = 1 << 19;
 const MUCH_BARE: f64 = 0.01;
 const MUCH_SPREAD: f64 = 0.1;
 
-/// So many points to a vertex show far more than vertices can hold.
-const MANY_POINTS: u64 = 100;
+/// The share of it whose points show more than its vertices can hold.
+const MUCH_BLURRED: f64 = 0.2;
 
 /// What the points gave.
 pub(super) struct PointColors {
@@ -63,7 +63,7 @@ impl PointColors {
 
     /// What looks wrong, a sentence each.
     pub(super) fn doubts(&self) -> Vec<String> {
-        let ColoredVertices { colors, points, far_points, spread_m2, bare_m2 } = &self.vertices;
+        let ColoredVertices { spread_m2, bare_m2, blurred_m2, .. } = &self.vertices;
         let percent = |part: f64| format!("{:.0} %", 100.0 * part / self.area_m2);
         let mut doubts = Vec::new();
         if *bare_m2 > MUCH_BARE * self.area_m2 {
@@ -75,11 +75,11 @@ impl PointColors {
             doubts
                 .push(format!("{share} of the mesh have no point at a corner, and the colours around them"));
         }
-        let of_vertex = (points - far_points) / colors.len() as u64;
-        if of_vertex > MANY_POINTS {
+        if *blurred_m2 > MUCH_BLURRED * self.area_m2 {
             doubts.push(format!(
-                "{of_vertex} points are behind the colour of each vertex: what is finer than the faces is lost. A mesh \
-                 of smaller faces would show it"
+                "{} of the mesh are faces with more than 16 points: what is finer than these faces is lost. A mesh of \
+                 smaller faces, or one with a texture, would show it",
+                percent(*blurred_m2)
             ));
         }
         doubts

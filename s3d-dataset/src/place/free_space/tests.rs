@@ -239,6 +239,26 @@ fn nobody_stands_outside_under_or_in_a_wall() {
     }
 }
 
+/// Under eaves there is a floor, a ceiling and a wall, in the corner of two wings two of them: outside it is.
+#[test]
+fn nobody_stands_under_eaves() {
+    let mut house = Quads::default();
+    for (low, high) in [([0., 0., 0.], [8., 5., 2.6]), ([0., 5.4, 0.], [4., 10., 2.6])] {
+        house.room(low, high);
+        let out = |corner: [f32; 3], by: f32| [corner[0] + by, corner[1] + by, corner[2]];
+        house.sides(out(low, -0.2), out(high, 0.2), &[2, 3, 4, 5], false);
+    }
+    house.block([-2.0, -2.0, -0.3], [10.0, 12.0, -0.01]);
+    house.block([-2.0, -2.0, 2.65], [10.0, 12.0, 2.9]);
+    let found = place(&house.mesh(), FreeSpaceOptions { share: 1.0, ..SHARE }).unwrap();
+    let places = positions(&found);
+    let is_in = |at: &DVec3| at.x > 0. && at.y > 0. && (at.x < 8. && at.y < 5. || at.x < 4. && at.y < 10.);
+    assert!(places.iter().all(is_in), "{places:?}");
+    for room in [0.0..5.0, 5.4..10.0] {
+        assert!(places.iter().any(|at| room.contains(&at.y)), "{places:?}");
+    }
+}
+
 #[test]
 fn a_yard_with_nothing_around_is_no_place_and_says_what_rays_meet() {
     // The same house without its room.

@@ -30,11 +30,9 @@ const DIRECTIONS: u32 = 256;
 const FRONT_SHARE: f64 = 0.5;
 /// … on back sides in no more than this share of those in which they end, …
 const BACK_SHARE: f64 = 0.25;
-/// … in this share of directions a little above the horizon on front sides, and above it likewise, …
-const AROUND_SHARE: f64 = 0.5;
-const ABOVE_SHARE: f64 = 0.5;
-/// … or, under the open sky as where a ceiling was not captured, in this share around.
-const WALLED_SHARE: f64 = 0.75;
+/// … and on front sides in this share of directions a little above the horizon. A ceiling may not have been
+/// captured; and one that reaches over a wall, as eaves do, makes no room outside of it.
+const AROUND_SHARE: f64 = 0.85;
 
 /// Samples of the surface of a mesh, each of the same area.
 pub(super) struct Surface {
@@ -96,15 +94,14 @@ pub(super) struct Enclosure {
     /// Front sides and back sides, of all directions.
     front: f64,
     back: f64,
-    /// Front sides, of directions up to 15° above the horizon, and of those above 30°.
+    /// Front sides, of directions up to 15° above the horizon.
     around: f64,
-    above: f64,
 }
 
 impl Enclosure {
     pub(super) fn of(scene: &Scene<'_>, eye: DVec3, facing: Facing) -> Self {
         // How many directions, and in how many of them a front side is hit.
-        let (mut all, mut around, mut above) = ([0.0; 3], [0.0; 2], [0.0; 2]);
+        let (mut all, mut around) = ([0.0; 3], [0.0; 2]);
         for direction in directions() {
             let hit = cast_ray(scene, eye, direction);
             let is_front = |face| facing.normal(scene.mesh(), face).as_dvec3().dot(direction) < 0.0;
@@ -113,13 +110,10 @@ impl Enclosure {
             if (0.0..0.26).contains(&direction.z) {
                 around[usize::from(kind != 0)] += 1.0;
             }
-            if direction.z > 0.5 {
-                above[usize::from(kind != 0)] += 1.0;
-            }
         }
-        let share = |[front, other]: [f64; 2]| front / (front + other);
         let n = f64::from(DIRECTIONS);
-        Self { front: all[0] / n, back: all[1] / n, around: share(around), above: share(above) }
+        let [front, other] = around;
+        Self { front: all[0] / n, back: all[1] / n, around: front / (front + other) }
     }
 
     /// Whether a place is in a room or in a yard that is walled all around.
@@ -127,18 +121,12 @@ impl Enclosure {
         self.front >= FRONT_SHARE
             && self.back <= BACK_SHARE * (self.front + self.back)
             && self.around >= AROUND_SHARE
-            && (self.above >= ABOVE_SHARE || self.around >= WALLED_SHARE)
     }
 
     pub(super) fn mean(all: &[Self]) -> Self {
         let n = all.len().max(1) as f64;
         let mean = |of: fn(&Self) -> f64| all.iter().map(of).sum::<f64>() / n;
-        Self {
-            front: mean(|e| e.front),
-            back: mean(|e| e.back),
-            around: mean(|e| e.around),
-            above: mean(|e| e.above),
-        }
+        Self { front: mean(|e| e.front), back: mean(|e| e.back), around: mean(|e| e.around) }
     }
 
     /// In how many of a hundred directions there is a front side, a back side, nothing.
