@@ -116,7 +116,13 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
         (&2.into(), &1.into())
     );
     let markdown = fs::read_to_string(out.join("statistics.md")).unwrap();
-    assert!(markdown.contains("| showerCurtain | 1 | 1 |") && !markdown.contains("clutter"));
+    let (own, as_s3dis) = markdown.split_once("## Instances by what they count as in S3DIS").unwrap();
+    assert!(own.contains("| showerCurtain | 1 | 1 |") && !own.contains("clutter"));
+    let (clutter, walls) = (&of_area["as_s3dis"]["instances_per_class"]["clutter"], "| wall | 2 | 2 |");
+    assert!(clutter.as_u64() > Some(1) && as_s3dis.contains(walls) && !as_s3dis.contains("showerCurtain"));
+    assert!(
+        as_s3dis.contains("| lounge |") && as_s3dis.contains(&format!("| clutter | {clutter} | {clutter} |"))
+    );
     let votes = json(&out.join("area_3/3d/votes.json"));
     assert_eq!(
         (votes["classes"].as_array().unwrap().len(), &votes["classes"][0]["name"]),

@@ -140,7 +140,7 @@ fn values_in_memory_become_a_data_set_that_verifies_and_packs() {
     assert_eq!((info.area, info.mesh.faces, info.rooms.len(), info.labelled_faces), (2, 12, 1, 12));
     assert!((info.rooms[0].floor_m2 - 12.0).abs() < 0.5, "{info}");
     let statistics = s3d_dataset::statistics(&out).unwrap();
-    assert_eq!(statistics.areas[0].labels.as_ref().unwrap().instances_per_class["wall"], 4);
+    assert_eq!(statistics.areas[0].labels.as_ref().unwrap().tally.instances_per_class["wall"], 4);
 
     let packed = PackOptions { output: Some(dir.path().join("packed")), ..PackOptions::default() };
     let place = s3d_dataset::pack(&out, PackageKind::Webdataset, &packed, &context).unwrap();

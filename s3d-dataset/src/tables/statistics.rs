@@ -54,6 +54,19 @@ pub struct AreaStatistics {
 pub struct LabelStatistics {
     /// Square metres of all rooms.
     pub floor_m2: f64,
+    /// Instances by class, rooms by type.
+    #[serde(flatten)]
+    pub tally: LabelTally,
+    /// The same by what these count as in S3DIS, for the paper's tables; `None` where they are S3DIS's. Rooms
+    /// of types that count as none are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub as_s3dis: Option<LabelTally>,
+}
+
+/// Instances and rooms, counted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct LabelTally {
     /// Instances by class.
     pub instances_per_class: BTreeMap<&'static str, u64>,
     /// Rooms by type.
@@ -132,24 +145,47 @@ impl Statistics {
             text.push_str("\nThere are no labels.\n");
             return text;
         }
+        let titles = ["Instances of each class", "Rooms of each type", "Floor of each room type, m²"];
+        let own = (self.taxonomy.classes(), self.taxonomy.room_types());
+        self.tally_tables(&mut text, titles, own, |labels| Some(&labels.tally));
+        if !self.taxonomy.is_s3dis() {
+            let titles = [
+                "Instances by what they count as in S3DIS",
+                "Rooms by what they count as in S3DIS",
+                "Floor by what its room counts as in S3DIS, m²",
+            ];
+            let s3dis: (&[Class], &[RoomType]) = (&Class::S3DIS, &RoomType::S3DIS);
+            self.tally_tables(&mut text, titles, s3dis, |labels| labels.as_s3dis.as_ref());
+        }
+        text
+    }
+
+    /// The tables of instances, rooms and floor, a row for each of the classes and types.
+    fn tally_tables(
+        &self,
+        text: &mut String,
+        [instances, rooms, floor]: [&str; 3],
+        (classes, types): (&[Class], &[RoomType]),
+        tally: fn(&LabelStatistics) -> Option<&LabelTally>,
+    ) {
+        let of = move |a: &AreaStatistics, value: &dyn Fn(&LabelTally) -> f64| {
+            a.labels.as_ref().and_then(tally).map_or(0.0, value)
+        };
         let class_row = |c: &Class| {
             let name = c.name();
-            let of = move |labels: &LabelStatistics| labels.instances_per_class[name] as f64;
-            (name, move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
+            (name, move |a: &AreaStatistics| of(a, &|tally| tally.instances_per_class[name] as f64))
         };
-        let class_rows: Vec<_> = self.taxonomy.classes().iter().map(class_row).collect();
-        self.table(&mut text, "Instances of each class", &rows(&class_rows));
-        let of_type = |of: fn(&RoomTypeStatistics) -> f64| -> Vec<_> {
+        let class_rows: Vec<_> = classes.iter().map(class_row).collect();
+        self.table(text, instances, &rows_of(&class_rows));
+        let type_rows = |value: fn(&RoomTypeStatistics) -> f64| -> Vec<_> {
             let row = |t: &RoomType| {
                 let name = t.name();
-                let of = move |labels: &LabelStatistics| of(&labels.rooms_per_type[name]);
-                (name, move |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, of))
+                (name, move |a: &AreaStatistics| of(a, &|tally| value(&tally.rooms_per_type[name])))
             };
-            self.taxonomy.room_types().iter().map(row).collect()
+            types.iter().map(row).collect()
         };
-        self.table(&mut text, "Rooms of each type", &rows(&of_type(|of_type| of_type.rooms as f64)));
-        self.table(&mut text, "Floor of each room type, m²", &rows(&of_type(|of_type| of_type.floor_m2)));
-        text
+        self.table(text, rooms, &rows_of(&type_rows(|of_type| of_type.rooms as f64)));
+        self.table(text, floor, &rows_of(&type_rows(|of_type| of_type.floor_m2)));
     }
 
     fn table(&self, text: &mut String, title: &str, rows: &[Row<'_>]) {
@@ -182,7 +218,7 @@ impl Statistics {
 
 type Row<'a> = (&'a str, &'a dyn Fn(&AreaStatistics) -> f64);
 
-fn rows<'a, F: Fn(&AreaStatistics) -> f64>(rows: &'a [(&'static str, F)]) -> Vec<Row<'a>> {
+fn rows_of<'a, F: Fn(&AreaStatistics) -> f64>(rows: &'a [(&'static str, F)]) -> Vec<Row<'a>> {
     rows.iter().map(|(name, f)| (*name, f as &dyn Fn(&AreaStatistics) -> f64)).collect()
 }
 
@@ -217,26 +253,39 @@ impl LabelStatistics {
     ) -> Result<Self> {
         check(&layout.rooms_json(area), true)?;
         let (taxonomy, classes) = (table.taxonomy(), ClassCounts::from_table(table));
-        let mut rooms_per_type: BTreeMap<_, RoomTypeStatistics> =
-            taxonomy.room_types().iter().map(|t| (t.name(), RoomTypeStatistics::default())).collect();
+        let mut tally = LabelTally::of_none(taxonomy.classes(), taxonomy.room_types());
+        let mut as_s3dis = LabelTally::of_none(&Class::S3DIS, &RoomType::S3DIS);
+        for class in taxonomy.classes() {
+            let count = classes.of(area, *class);
+            *tally.instances_per_class.entry(class.name()).or_default() += count;
+            *as_s3dis.instances_per_class.entry(class.s3dis().name()).or_default() += count;
+        }
         let rooms: Vec<RoomRecord> = read_json(&layout.rooms_json(area))?;
         for record in &rooms {
             let room = taxonomy
                 .room(&record.room)
                 .map_err(|e| FileError::format(&layout.rooms_json(area), e.to_string()))?;
-            let row = rooms_per_type.entry(room.room_type.name()).or_default();
-            row.rooms += 1;
-            row.floor_m2 += record.floor_m2;
+            tally.add_room(room.room_type, record.floor_m2);
+            room.room_type.s3dis().into_iter().for_each(|t| as_s3dis.add_room(t, record.floor_m2));
         }
-        Ok(Self {
-            floor_m2: rooms.iter().map(|r| r.floor_m2).sum(),
-            instances_per_class: taxonomy
-                .classes()
-                .iter()
-                .map(|c| (c.name(), classes.of(area, *c)))
-                .collect(),
-            rooms_per_type,
-        })
+        let as_s3dis = Some(as_s3dis).filter(|_| !taxonomy.is_s3dis());
+        Ok(Self { floor_m2: rooms.iter().map(|r| r.floor_m2).sum(), tally, as_s3dis })
+    }
+}
+
+impl LabelTally {
+    /// A row of nothing for each class and type.
+    fn of_none(classes: &[Class], types: &[RoomType]) -> Self {
+        Self {
+            instances_per_class: classes.iter().map(|class| (class.name(), 0)).collect(),
+            rooms_per_type: types.iter().map(|t| (t.name(), RoomTypeStatistics::default())).collect(),
+        }
+    }
+
+    fn add_room(&mut self, room_type: RoomType, floor_m2: f64) {
+        let row = self.rooms_per_type.entry(room_type.name()).or_default();
+        row.rooms += 1;
+        row.floor_m2 += floor_m2;
     }
 }
 

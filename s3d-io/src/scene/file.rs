@@ -8,6 +8,7 @@ use crate::mesh::file::{LengthUnit, UpAxis};
 use crate::scene::annotations::AnnotationTable;
 use crate::scene::cameras::{CameraSource, CamerasTable, similarity};
 use crate::scene::frames::{FrameSource, FramesTable};
+use crate::scene::other_kind::{SCENE, other_kind};
 use crate::scene::rgb::{PictureSource, RgbEntry};
 use crate::scene::taxonomy::TaxonomyEntry;
 use crate::scene::toml_fault::toml_fault;
@@ -204,25 +205,6 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
     let bytes = read_file(path)?;
     let no_text = |_| Error::format(path, format!("is no text in UTF-8; {SCENE}"));
     parse_scene(std::str::from_utf8(&text_of(&bytes, path)?).map_err(no_text)?, path)
-}
-
-/// What a scene is, for who gives something else.
-const SCENE: &str = "a scene is a text file, scene.toml, that names the parts of a scan: `area = 1`, `[mesh]` with `path = \
-                     \"scan.obj\"`, `[annotations]` with a path, `[cameras]` with a path or `place = 2.0`, each on a line";
-
-/// What a file is that users give in place of a scene, by its ending.
-fn other_kind(path: &Path) -> Option<&'static str> {
-    Some(match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
-        "obj" | "gltf" | "glb" | "stl" | "fbx" | "dae" | "off" | "usd" | "usdz" => "a mesh, not a scene",
-        "ply" => "a mesh or a cloud, not a scene",
-        "las" | "laz" | "e57" | "npy" | "npz" | "mat" | "pcd" | "pts" | "xyz" => {
-            "a cloud of points, not a scene"
-        }
-        "mtl" | "png" | "jpg" | "jpeg" => "a part of a mesh, not a scene",
-        "csv" => "a table, not a scene",
-        "json" => "JSON, not a scene",
-        _ => return None,
-    })
 }
 
 /// As [`read_scene`], from the text of a scene file. Errors call it `path`, and the files that it names are

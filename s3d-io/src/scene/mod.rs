@@ -32,6 +32,7 @@ mod annotations;
 mod cameras;
 mod file;
 mod frames;
+mod other_kind;
 mod published;
 mod rgb;
 mod taxonomy;
