@@ -3,7 +3,7 @@
 import type { Index, Rgb } from "./data.js";
 
 /** Where nothing was seen. */
-export const MISSING: Rgb = [24, 24, 27];
+export const MISSING: Rgb = [0, 0, 0];
 /** Surface without a label, in pictures of classes and instances. */
 export const NULL_LABEL: Rgb = [128, 128, 128];
 

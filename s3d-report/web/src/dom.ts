@@ -87,6 +87,9 @@ export function percent(share: number): string {
   return `${(100 * share).toFixed(share > 0 && share < 0.0995 ? 1 : 0)} %`;
 }
 
+/** `1 room`, `2 rooms`. */
+export const several = (n: number, noun: string): string => `${count(n)} ${noun}${n === 1 ? "" : "s"}`;
+
 /** `conferenceRoom_1` as people write it. */
 export function roomName(room: string): string {
   if (room === "" || room === "unknown_1") return "unknown room";

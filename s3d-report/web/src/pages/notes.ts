@@ -1,7 +1,7 @@
 // What should be looked at: files that are missing or damaged, surface without labels, classes in dispute.
 
 import type { Index } from "../data.js";
-import { append, count, h, metres2, percent, table } from "../dom.js";
+import { append, count, h, metres2, percent, several, table } from "../dom.js";
 import { link } from "../route.js";
 
 /** The terms of the page; whoever bundles code of others adds theirs here. */
@@ -20,7 +20,7 @@ function faults(index: Index): HTMLElement {
   }
   const rows = index.faults.map(({ path, message }) => [h("code", {}, path), message]);
   append(section, [
-    h("p", {}, `${index.faults.length} files are missing or damaged:`),
+    h("p", {}, `${several(index.faults.length, "file")} missing or damaged:`),
     table(["File", "What is wrong"], rows),
   ]);
   return section;

@@ -1,7 +1,7 @@
 // The plan: rooms from above, and where panoramas and photographs were taken.
 
 import type { Index, Location } from "../data.js";
-import { append, h, metres2, roomName, s } from "../dom.js";
+import { append, h, metres2, roomName, s, several } from "../dom.js";
 import { link } from "../route.js";
 
 interface PlanOptions {
@@ -174,9 +174,9 @@ export function planPage(index: Index): HTMLElement {
     const stands = index.locations.filter((location) => location.area === area).length;
     const photographs = index.views.filter((view) => view.area === area && view.photograph !== null).length;
     const words = [
-      rooms.length > 0 && `${rooms.length} rooms, ${metres2(floor)}`,
-      stands > 0 && `${stands} scan locations`,
-      photographs > 0 && `${photographs} photographs`,
+      rooms.length > 0 && `${several(rooms.length, "room")}, ${metres2(floor)}`,
+      stands > 0 && several(stands, "scan location"),
+      photographs > 0 && several(photographs, "photograph"),
     ].filter(Boolean);
     const found = stands + photographs + rooms.length > 0;
     append(page, [
