@@ -1,6 +1,8 @@
 //! The command line as a whole.
 
-use crate::commands::{demo, export, info, merge, pack, plan, profile, render, sample, stats, verify, xyz};
+use crate::commands::{
+    demo, export, info, merge, pack, plan, profile, render, report, sample, stats, verify, xyz,
+};
 use crate::console::LogFormat;
 use crate::failure::Outcome;
 use clap::{Parser, Subcommand};
@@ -137,6 +139,15 @@ pub(crate) enum Command {
         )
     )]
     Profile(profile::ProfileArgs),
+    /// Write a page that shows a data set: panoramas, views, plan, numbers, warnings. It opens from the disk.
+    #[command(
+        after_help = concat!(
+            "Example:\n",
+            "  s3d report dataset\n",
+            "Then open dataset_report/index.html. It needs no server and no network.",
+        )
+    )]
+    Report(report::ReportArgs),
     /// Print the tables of statistics of a data set, counted from its files.
     #[command(after_help = "Example:\n  s3d stats dataset")]
     Stats(stats::StatsArgs),
@@ -159,7 +170,12 @@ impl Command {
     pub(crate) fn stops_between_files(&self) -> bool {
         match self {
             Self::Demo(_) | Self::Export(_) | Self::Sample(_) => true,
-            Self::Plan(_) | Self::Merge(_) | Self::Pack(_) | Self::Xyz(_) | Self::Profile(_) => true,
+            Self::Plan(_)
+            | Self::Merge(_)
+            | Self::Pack(_)
+            | Self::Xyz(_)
+            | Self::Profile(_)
+            | Self::Report(_) => true,
             Self::Render(args) => args.poses.is_some(),
             Self::Info(_) | Self::Stats(_) | Self::Verify(_) => false,
         }
@@ -177,6 +193,7 @@ impl Command {
             Self::Pack(args) => pack::run(args),
             Self::Xyz(args) => xyz::run(args),
             Self::Profile(args) => profile::run(args),
+            Self::Report(args) => report::run(args),
             Self::Stats(args) => stats::run(&args),
             Self::Verify(args) => verify::run(args),
         }
@@ -243,6 +260,8 @@ mod tests {
             &["s3d", "export", "a.toml", "--profile", "sea"],
             &["s3d", "xyz", "out", "--type", "none"],
             &["s3d", "profile", "out"],
+            &["s3d", "report", "out", "--pano-width", "15"],
+            &["s3d", "report", "out", "--thumbs", "4096"],
             &["s3d", "export", "a.toml", "--compression", "9"],
             &["s3d", "export", "--only", "00112233445566778899aabbccddeeff", "a.toml"],
             &["s3d", "export", "a.toml", "--points-per-m2", "nan"],

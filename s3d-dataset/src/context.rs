@@ -122,12 +122,14 @@ impl Context {
         self.warnings.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn warn(&self, text: impl fmt::Display) {
+    /// Tells of something that should be looked at, and counts it.
+    pub fn warn(&self, text: impl fmt::Display) {
         self.warnings.fetch_add(1, Ordering::Relaxed);
         self.message(Level::Warning, text);
     }
 
-    pub(crate) fn info(&self, text: impl fmt::Display) {
+    /// Tells of what was done.
+    pub fn info(&self, text: impl fmt::Display) {
         self.message(Level::Info, text);
     }
 
@@ -141,7 +143,8 @@ impl Context {
     }
 
     /// Begins `total` units of long work, named by what is done ("rendering") to what ("images").
-    pub(crate) fn progress(&self, what: &'static str, unit: &'static str, total: u64) -> Progress<'_> {
+    /// What is returned is told of every unit, and ends the task when it is dropped.
+    pub fn progress(&self, what: &'static str, unit: &'static str, total: u64) -> Progress<'_> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let task = Task { id: NEXT.fetch_add(1, Ordering::Relaxed), what, unit, total };
         self.tell(&Event::TaskStarted { task });
@@ -150,7 +153,7 @@ impl Context {
 }
 
 /// Tells how far a [`Task`] is, by any thread; dropped, the task has ended.
-pub(crate) struct Progress<'a> {
+pub struct Progress<'a> {
     pub(crate) context: &'a Context,
     task: Task,
     done: AtomicU64,
@@ -158,7 +161,7 @@ pub(crate) struct Progress<'a> {
 
 impl Progress<'_> {
     /// `n` more units are done.
-    pub(crate) fn add(&self, n: u64) {
+    pub fn add(&self, n: u64) {
         let done = self.done.fetch_add(n, Ordering::Relaxed) + n;
         self.context.tell(&Event::TaskAdvanced { task: self.task, done });
     }

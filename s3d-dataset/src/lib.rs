@@ -7,7 +7,8 @@
 //! - [`verify`] reads a data set back, every pixel of it, and returns a [`VerifyReport`]; [`statistics`]
 //!   counts it; [`info`] tells what a scene holds before it is exported.
 //! - [`pack`] makes packages for trainers of it, [`profile`] what loaders of point clouds want; [`xyz`] makes
-//!   its world coordinates again. [`render`], [`render_poses`] and [`sample`] need a mesh alone.
+//!   its world coordinates again; [`DataSet`] reads it for other crates, and [`NewFolder`] is what they make
+//!   of it, whole or not at all. [`render`], [`render_poses`] and [`sample`] need a mesh alone.
 //!
 //! Every call is handed a [`Context`]: a [`Cancel`] that ends it early, from any thread, and an [`Observer`]
 //! that is told [what happens](Event). Nothing here prints, reads the command line, handles signals or exits;
@@ -48,6 +49,7 @@ mod options;
 mod pack;
 mod place;
 mod profile;
+mod reader;
 mod render;
 mod sample;
 mod shard;
@@ -57,11 +59,12 @@ mod useful;
 mod verify;
 mod xyz;
 
-pub use context::{Cancel, Context, Observer};
+pub use context::{Cancel, Context, Observer, Progress};
 pub use error::{Error, Result};
 pub use event::{Event, Level, Stage, Task, UnitKind};
 pub use export::Export;
 pub use export::input::memory::{MemoryScene, SceneSource, SharedScene};
+pub use export::work::map_in_order;
 pub use info::{
     DataSetInfo, InfoOptions, LocationInfo, MeshInfo, RoomInfo, SceneInfo, data_set_info, info, is_data_set,
 };
@@ -71,11 +74,13 @@ pub use pack::{
 };
 pub use profile::loader::Profile;
 pub use profile::{ProfileOptions, profile};
+pub use reader::DataSet;
 pub use render::{PosesOptions, RenderOptions, RenderedPoses, render, render_poses};
 pub use sample::{SampleOptions, sample};
 pub use shard::assignment::Shard;
 pub use shard::make_plan::plan;
 pub use shard::merge::merge;
+pub use store::new_folder::{FolderKind, NewFolder, beside};
 pub use tables::statistics::{AreaStatistics, RoomTypeStatistics, Statistics, statistics};
 pub use tables::summary::{ImageTally, Summary, Surface, UnitTally, Unlabelled, ViewTally};
 pub use useful::{Condition, Estimate, Storey};

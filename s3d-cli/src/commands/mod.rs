@@ -8,6 +8,7 @@ pub(crate) mod pack;
 pub(crate) mod plan;
 pub(crate) mod profile;
 pub(crate) mod render;
+pub(crate) mod report;
 pub(crate) mod sample;
 pub(crate) mod stats;
 pub(crate) mod verify;

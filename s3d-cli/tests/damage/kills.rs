@@ -16,7 +16,7 @@ use tempfile::TempDir;
 
 /// The commands, as they are called in a folder with `scan` (the input), `out` (an export) and `shard_1`,
 /// `shard_2` (its shards). Whoever adds a command that writes adds a line.
-const COMMANDS: [&str; 23] = [
+const COMMANDS: [&str; 24] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -40,6 +40,7 @@ const COMMANDS: [&str; 23] = [
     "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o new/views",
     "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o views --overwrite",
     "profile out --to mmdet3d",
+    "report out --pano-width 32 --thumbs 16",
 ];
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;

@@ -3,7 +3,7 @@
 use crate::context::Context;
 use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Does `work` on every item, on every thread of the current pool. Items are handed out one at a time and in
 /// order, so that a slow one delays nobody else; at most one an item a thread is under way. After a failure,
@@ -43,6 +43,28 @@ pub(crate) fn for_each_in_order<T: Sync, S>(
     }
 }
 
+/// Does `work` on every item, on every thread of the current rayon pool; the results are in the order of the
+/// items. Items are handed out one at a time and in order. After a failure no further item is begun, and the
+/// failure of the first item that failed is returned. `state` makes what a thread works with: memory to be
+/// used again, nothing that a result depends on.
+///
+/// # Errors
+/// What `work` returns; [`Error::Cancelled`].
+pub fn map_in_order<T: Sync, S, R: Send + Sync>(
+    ctx: &Context,
+    items: &[T],
+    state: impl Fn() -> S + Sync,
+    work: impl Fn(&mut S, &T) -> Result<R> + Sync,
+) -> Result<Vec<R>> {
+    let results: Vec<OnceLock<R>> = items.iter().map(|_| OnceLock::new()).collect();
+    let jobs: Vec<(&T, &OnceLock<R>)> = items.iter().zip(&results).collect();
+    for_each_in_order(ctx, &jobs, state, |state, (item, result)| {
+        let _ = result.set(work(state, item)?);
+        Ok(())
+    })?;
+    Ok(results.into_iter().map(|r| r.into_inner().expect("every item was done")).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,5 +99,12 @@ mod tests {
             },
         );
         assert_eq!(e.unwrap_err().to_string(), "item 7");
+    }
+
+    #[test]
+    fn results_are_in_order() {
+        let items: Vec<u32> = (0..500).collect();
+        let squares = map_in_order(&Context::default(), &items, || (), |(), i| Ok(i * i)).unwrap();
+        assert!(squares.iter().enumerate().all(|(i, s)| *s as usize == i * i));
     }
 }

@@ -1,11 +1,12 @@
 //! `s3d pack --to colmap`: a model of cameras, images and points for each area.
 
+use super::area_points;
 use super::destination::Destination;
 use super::options::SpecificOptions;
 use super::source::Source;
-use super::{area_points, map_in_order};
 use crate::context::Context;
 use crate::error::Result;
+use crate::export::work::map_in_order;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::create_dir;
 use s3d_io::package::{ColmapImage, ColmapModel};

@@ -1,16 +1,12 @@
 //! Where a package goes: whole, or not at all.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
-use crate::store::parent_of;
-use crate::store::staging::Staging;
-use s3d_io::Error as FileError;
-use s3d_io::fs::{create_dir, read_json, write_json};
+use crate::error::Result;
+use crate::store::new_folder::{FolderKind, NewFolder};
+use s3d_io::fs::write_json;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
-use std::fs;
-use std::io::ErrorKind;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 
 /// The file in a package's folder that says what it is.
 const ABOUT: &str = "pack.json";
@@ -37,97 +33,35 @@ impl About {
     }
 }
 
-/// A folder that is made beside its place and moved there when it is complete. Dropped before, it leaves
-/// nothing behind.
-pub(crate) struct Destination {
-    place: PathBuf,
-    staging: Staging,
-}
+const KIND: FolderKind =
+    FolderKind { about: ABOUT, generator: GENERATOR, noun: "package", action: "use as the package's folder" };
+
+/// The folder of a package: there whole, or not at all.
+pub(crate) struct Destination(NewFolder);
 
 impl Destination {
     /// Begins the package that will be the folder `place`.
     ///
     /// # Errors
-    /// [`Error::Usage`] if it lies in the data set `root` or holds it, or if there is something in it that is
-    /// not to be, or may not be, replaced; as [`Staging::begin`].
+    /// As [`NewFolder::begin`].
     pub(crate) fn begin(ctx: &Context, place: &Path, root: &Path, overwrite: bool) -> Result<Self> {
-        check_apart(place, root)?;
-        let (parent, name) = (parent_of(place), Path::new(place.file_name().unwrap_or_default()));
-        // What a killed process left may be about to come back.
-        if !Staging::is_left(&parent, name) {
-            check_free(place, overwrite)?;
-        }
-        create_dir(&parent)?;
-        let staging = Staging::begin(ctx, &parent, name)?;
-        check_free(place, overwrite || staging.was_placing())?;
-        Ok(Self { place: place.to_owned(), staging })
+        NewFolder::begin(ctx, place, root, KIND, overwrite).map(Self)
     }
 
     /// The folder to write to.
     pub(crate) fn path(&self) -> &Path {
-        self.staging.path()
+        self.0.path()
     }
 
     /// The folder that it will be.
     pub(crate) fn place(&self) -> &Path {
-        &self.place
+        self.0.place()
     }
 
     /// Moves the package to its place, instead of an earlier one.
     pub(crate) fn finish(self, about: &About) -> Result<()> {
         write_json(&self.path().join(ABOUT), about)?;
-        self.staging.place_folder(&self.place, is_package(&self.place))
-    }
-}
-
-/// Refuses a place in the data set, or one that holds it.
-pub(crate) fn check_apart(place: &Path, root: &Path) -> Result<()> {
-    let (Ok(place_at), Ok(root_at)) = (resolved(place), resolved(root)) else { return Ok(()) };
-    if place_at.starts_with(&root_at) || root_at.starts_with(&place_at) {
-        return Err(Error::Usage(format!(
-            "{} and the data set {} would lie in one another: choose another folder with -o",
-            place.display(),
-            root.display()
-        )));
-    }
-    Ok(())
-}
-
-fn check_free(place: &Path, overwrite: bool) -> Result<()> {
-    let mut entries = match fs::read_dir(place) {
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
-        Err(e) => return Err(FileError::io(place, "use as the package's folder", e).into()),
-        Ok(entries) => entries,
-    };
-    let Some(first) = entries.next() else { return Ok(()) };
-    let first = first.map_err(|e| FileError::io(place, "read", e))?.file_name();
-    let what = format!("{} already holds {}", place.display(), first.display());
-    match (is_package(place), overwrite) {
-        (true, true) => Ok(()),
-        (true, false) => Err(Error::Usage(format!(
-            "{what}: choose another folder, or replace the package in it with --overwrite"
-        ))),
-        (false, _) => {
-            Err(Error::Usage(format!("{what}, and was not written by s3d pack: choose another folder")))
-        }
-    }
-}
-
-fn is_package(folder: &Path) -> bool {
-    read_json::<About>(&folder.join(ABOUT)).is_ok_and(|about| about.generator == GENERATOR)
-}
-
-/// An absolute path without links, also if its end is not there yet.
-pub(crate) fn resolved(path: &Path) -> std::io::Result<PathBuf> {
-    match fs::canonicalize(path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => {
-            let absolute = std::path::absolute(path)?;
-            match (absolute.parent(), absolute.file_name()) {
-                (Some(parent), Some(name)) => Ok(resolved(parent)?.join(name)),
-                _ => Err(e),
-            }
-        }
-        other => other,
+        self.0.finish()
     }
 }
 
@@ -156,6 +90,7 @@ pub(crate) fn relative_path(from: &Path, target: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn about() -> About {
         About::new("colmap".into(), &[1], 3, Vec::new())

@@ -11,19 +11,17 @@ mod webdataset;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::work::for_each_in_order;
+use crate::store::new_folder::{beside, check_apart};
 use crate::store::staging::Staging;
 use crate::store::{parent_of, refuse_existing};
-use destination::{About, Destination, check_apart, resolved};
+use destination::{About, Destination};
 pub use options::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions,
 };
 use s3d_geom::PointCloud;
-use s3d_io::Error as FileError;
 use s3d_io::fs::create_dir;
 use source::Source;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Points of an area's cloud in a package, if nothing else is said.
@@ -98,34 +96,10 @@ fn which_images(ctx: &Context, kind: PackageKind, images: Option<PackedImages>) 
 
 /// Where a package goes if nothing is said: beside the data set, named after it.
 fn default_place(dataset: &Path, kind: PackageKind) -> Result<PathBuf> {
-    // The name of "." is that of the folder it is.
-    let named = match dataset.file_name() {
-        Some(_) => dataset.to_owned(),
-        None => resolved(dataset).map_err(|e| FileError::io(dataset, "look for", e))?,
-    };
-    let mut name = named.file_name().unwrap_or("dataset".as_ref()).to_owned();
-    if kind == PackageKind::Parquet {
-        name.push("_images.parquet");
-    } else {
-        name.push(format!("_{kind}"));
+    match kind {
+        PackageKind::Parquet => beside(dataset, "_images.parquet"),
+        kind => beside(dataset, &format!("_{kind}")),
     }
-    Ok(named.with_file_name(name))
-}
-
-/// `work` on every item on all threads; the results in the order of the items.
-fn map_in_order<T: Sync, S, R: Send + Sync>(
-    ctx: &Context,
-    items: &[T],
-    state: impl Fn() -> S + Sync,
-    work: impl Fn(&mut S, &T) -> Result<R> + Sync,
-) -> Result<Vec<R>> {
-    let results: Vec<OnceLock<R>> = items.iter().map(|_| OnceLock::new()).collect();
-    let jobs: Vec<(&T, &OnceLock<R>)> = items.iter().zip(&results).collect();
-    for_each_in_order(ctx, &jobs, state, |state, (item, result)| {
-        let _ = result.set(work(state, item)?);
-        Ok(())
-    })?;
-    Ok(results.into_iter().map(|r| r.into_inner().expect("every item was done")).collect())
 }
 
 /// Some points of an area's cloud; none if none are asked for.
@@ -148,12 +122,5 @@ mod tests {
         let here = std::env::current_dir().unwrap();
         let name = format!("{}_coco", here.file_name().unwrap().to_str().unwrap());
         assert_eq!(place(".", PackageKind::Coco), here.canonicalize().unwrap().with_file_name(name));
-    }
-
-    #[test]
-    fn results_are_in_order() {
-        let items: Vec<u32> = (0..500).collect();
-        let squares = map_in_order(&Context::default(), &items, || (), |(), i| Ok(i * i)).unwrap();
-        assert!(squares.iter().enumerate().all(|(i, s)| *s as usize == i * i));
     }
 }

@@ -1,12 +1,14 @@
 //! `s3d pack --to nerfstudio`: `transforms.json` for each area, another for its panoramas, and a cloud to
 //! begin from.
 
-use super::destination::{Destination, relative_path, resolved};
+use super::area_points;
+use super::destination::{Destination, relative_path};
 use super::options::{DepthFiles, SpecificOptions};
 use super::source::{DEPTH_MISSING, Source};
-use super::{area_points, map_in_order};
 use crate::context::Context;
 use crate::error::Result;
+use crate::export::work::map_in_order;
+use crate::store::new_folder::resolved;
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::cloud::write_colored_points;

@@ -1,9 +1,9 @@
 //! `s3d pack --to parquet`: a table of all images, with what their pixels show.
 
-use super::map_in_order;
 use super::source::{DEPTH_MISSING, Source};
 use crate::context::Context;
 use crate::error::Result;
+use crate::export::work::map_in_order;
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, ViewRecord};

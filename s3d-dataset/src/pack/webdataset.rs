@@ -1,11 +1,11 @@
 //! `s3d pack --to webdataset`: tar shards, one sample an image.
 
 use super::destination::Destination;
-use super::map_in_order;
 use super::options::{ShardPrefix, SpecificOptions};
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
+use crate::export::work::map_in_order;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use s3d_io::dataset::{DatasetImage, Domain, Frame};

@@ -182,8 +182,12 @@ impl Listed {
         found.into_iter().map(image).collect()
     }
 
-    /// Refuses a data set in which a file that is `needed` is gone, or is of another size.
-    pub(crate) fn require(&self, ctx: &Context, needed: impl Fn(&Path) -> bool) -> Result<()> {
+    /// What is wrong with the files that are `needed`, by path: they are gone, or of another size.
+    pub(crate) fn faults(
+        &self,
+        ctx: &Context,
+        needed: impl Fn(&Path) -> bool,
+    ) -> Result<BTreeMap<String, String>> {
         let path = |record: &&FileRecord| needed(&record.path_in(&self.root));
         let records: Vec<&FileRecord> = self.records().filter(path).collect();
         let faults = Mutex::new(BTreeMap::new());
@@ -207,7 +211,12 @@ impl Listed {
                 Ok(())
             },
         )?;
-        let faults = faults.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        Ok(faults.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+
+    /// Refuses a data set in which a file that is `needed` is gone, or is of another size.
+    pub(crate) fn require(&self, ctx: &Context, needed: impl Fn(&Path) -> bool) -> Result<()> {
+        let faults = self.faults(ctx, needed)?;
         let Some(first) = faults.values().next() else { return Ok(()) };
         let them = match faults.len() {
             1 => "a file that is needed is".to_owned(),

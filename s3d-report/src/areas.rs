@@ -1,0 +1,98 @@
+//! What the tables of a data set tell: labels, classes, rooms, votes, statistics.
+
+use crate::faults::Faults;
+use crate::index::{AreaVotes, ClassHead, LabelHead, RoomHead, rounded};
+use s3d_dataset::{DataSet, Result};
+use s3d_io::Error as FileError;
+use s3d_label::{LabelId, LabelTable, pretty_color};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use std::path::Path;
+
+/// A room of `rooms.json`.
+#[derive(Deserialize)]
+struct Room {
+    room: String,
+    floor_m2: f64,
+    outline: Vec<Polygon>,
+}
+
+#[derive(Deserialize)]
+struct Polygon {
+    outer: Vec<[f64; 2]>,
+    holes: Vec<Vec<[f64; 2]>>,
+}
+
+/// A JSON file of the data set; nothing if it has none, or one that is wrong, which is told.
+fn json<T: DeserializeOwned>(data: &DataSet, path: &Path, faults: &mut Faults) -> Result<Option<T>> {
+    if !data.names(path) {
+        return Ok(None);
+    }
+    let read = data.read(path).and_then(|bytes| {
+        serde_json::from_slice(&bytes)
+            .map_err(|e| FileError::line(path, e.line() as u64, e.to_string()).into())
+    });
+    faults.keep(data.layout().root(), read)
+}
+
+pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomHead>> {
+    let mut rooms = Vec::new();
+    for &area in data.areas() {
+        let path = data.layout().rooms_json(area);
+        let found: Vec<Room> = json(data, &path, faults)?.unwrap_or_default();
+        rooms.extend(found.into_iter().map(|Room { room: name, floor_m2, outline }| {
+            let rings = outline.into_iter().flat_map(|p| std::iter::once(p.outer).chain(p.holes));
+            let millimetres = |ring: Vec<[f64; 2]>| ring.iter().map(|p| p.map(|c| rounded(c, 3))).collect();
+            RoomHead { area, name, floor_m2, outline: rings.map(millimetres).collect() }
+        }));
+    }
+    Ok(rooms)
+}
+
+pub(crate) fn votes(data: &DataSet, faults: &mut Faults) -> Result<Vec<AreaVotes>> {
+    let mut all = Vec::new();
+    for &area in data.areas() {
+        if let Some(votes) = json(data, &data.layout().votes_json(area), faults)? {
+            all.push(AreaVotes { area, votes });
+        }
+    }
+    Ok(all)
+}
+
+pub(crate) fn statistics(data: &DataSet, faults: &mut Faults) -> Result<Option<Value>> {
+    json(data, &data.layout().statistics_json(), faults)
+}
+
+/// What the manifest tells of each area, but for the list of its input.
+pub(crate) fn areas(data: &DataSet) -> Result<Vec<Value>> {
+    let entry = |area| {
+        let failed = |e: serde_json::Error| FileError::format(&data.layout().manifest(), e.to_string());
+        let mut value = serde_json::to_value(area).map_err(failed)?;
+        if let Some(members) = value.as_object_mut() {
+            members.remove("inputs");
+        }
+        Ok(value)
+    };
+    data.area_entries().map(entry).collect()
+}
+
+pub(crate) fn classes(data: &DataSet) -> Vec<ClassHead> {
+    let of = |t: &s3d_label::Taxonomy| {
+        t.classes().iter().map(|c| ClassHead { name: c.name(), color: t.color(*c) }).collect()
+    };
+    data.taxonomy().map(of).unwrap_or_default()
+}
+
+pub(crate) fn labels(table: &LabelTable) -> Vec<LabelHead> {
+    let names = table.names().into_iter().enumerate();
+    let label = |(i, name)| {
+        let index = u32::try_from(i).unwrap_or(u32::MAX);
+        LabelHead {
+            name,
+            class: table.class_of(LabelId(index)).map(|c| c.index()),
+            color: pretty_color(index),
+        }
+    };
+    names.map(label).collect()
+}

@@ -1,0 +1,396 @@
+//! What a data set holds, and its way into the files of a report, on all threads.
+
+use crate::areas;
+use crate::faults::Faults;
+use crate::index::{DataSetHead, FORM, Index, LocationHead, ViewHead, degrees, rounded};
+use crate::pixels::{Picture, Seen, Widths, nothing_left, show};
+use crate::script::write_script;
+use crate::selection::{Place, places};
+use crate::write::ReportOptions;
+use s3d_dataset::{Context, DataSet, Result, map_in_order};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{DatasetImage, Domain, Frame, PhotographRecord, ViewRecord};
+use s3d_label::LabelTable;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Pictures of views in a file, which a page loads to show one of them large.
+const VIEWS_PER_FILE: usize = 12;
+
+/// Small images in a file, for the grid.
+const THUMBS_PER_FILE: usize = 48;
+
+/// What a data set holds, before its images are read.
+pub(crate) struct Content<'a> {
+    data: &'a DataSet,
+    table: Option<LabelTable>,
+    photographs: BTreeMap<(u32, String), PhotographRecord>,
+    /// Area and uuid of scan locations, in order, each with its room if it has an image.
+    locations: Vec<(u32, String, Option<String>)>,
+    /// Panoramas with their locations.
+    panoramas: Vec<(usize, DatasetImage)>,
+    views: Vec<DatasetImage>,
+    /// All that `views.json` lists, by area.
+    candidates: Vec<(u32, ViewRecord)>,
+}
+
+/// Where the camera of an image is.
+struct Located {
+    position: [f64; 3],
+    azimuth_rad: f64,
+    angles_deg: [f64; 3],
+    original: ([f64; 3], f64),
+}
+
+/// What became of an image.
+pub(crate) struct Made {
+    located: Option<Located>,
+    pub(crate) seen: Option<Seen>,
+}
+
+/// What became of all images.
+pub(crate) struct MadeAll {
+    pub(crate) bytes: u64,
+    /// By place in `Content::panoramas` and `Content::views`.
+    pub(crate) panoramas: Vec<Made>,
+    pub(crate) views: Vec<Made>,
+}
+
+/// A pinhole camera, for the page to compute rays by.
+#[derive(Serialize)]
+struct Pinhole {
+    /// Focal lengths and principal point, pixels of the data set's image.
+    k: [f64; 4],
+    /// World → camera, OpenCV's axes.
+    rt: [[f64; 4]; 3],
+}
+
+#[derive(Serialize)]
+struct ViewPicture {
+    #[serde(flatten)]
+    picture: Picture,
+    camera: Option<Pinhole>,
+}
+
+/// One or more images whose files are made by one thread.
+enum Job<'a> {
+    Panorama(usize, &'a DatasetImage),
+    Views(usize, &'a [DatasetImage]),
+}
+
+impl<'a> Content<'a> {
+    pub(crate) fn read(data: &'a DataSet, faults: &mut Faults) -> Result<Self> {
+        let root = data.layout().root();
+        let mut content = Content {
+            data,
+            table: data.labels()?,
+            photographs: BTreeMap::new(),
+            locations: Vec::new(),
+            panoramas: Vec::new(),
+            views: Vec::new(),
+            candidates: Vec::new(),
+        };
+        let mut rooms: BTreeMap<(u32, String), Option<String>> = BTreeMap::new();
+        let mut images = Vec::new();
+        for &area in data.areas() {
+            let photographs = faults.keep(root, data.photographs(area))?.unwrap_or_default();
+            let of_area = photographs.into_iter().map(|p| ((area, p.camera_uuid.clone()), p));
+            content.photographs.extend(of_area);
+            for view in faults.keep(root, data.views(area))?.unwrap_or_default() {
+                rooms.entry((area, view.camera_uuid.clone())).or_default();
+                content.candidates.push((area, view));
+            }
+            for image in data.images(area) {
+                let key = (area, image.uuid.clone());
+                if !content.photographs.contains_key(&key) {
+                    rooms.insert(key, Some(image.room.clone()));
+                }
+                images.push(image);
+            }
+        }
+        content.locations = rooms.into_iter().map(|((area, uuid), room)| (area, uuid, room)).collect();
+        for image in images {
+            match image.frame {
+                Frame::View(_) => content.views.push(image),
+                Frame::Panorama => {
+                    if let Some(i) = content.location_of(image.area, &image.uuid) {
+                        content.panoramas.push((i, image));
+                    }
+                }
+            }
+        }
+        Ok(content)
+    }
+
+    fn location_of(&self, area: u32, uuid: &str) -> Option<usize> {
+        self.locations.binary_search_by(|(a, u, _)| (*a, u.as_str()).cmp(&(area, uuid))).ok()
+    }
+
+    pub(crate) fn write_pictures(
+        &self,
+        ctx: &Context,
+        options: &ReportOptions,
+        folder: &Path,
+        faults: &mut Faults,
+    ) -> Result<MadeAll> {
+        let mut jobs: Vec<Job<'_>> =
+            self.panoramas.iter().map(|(i, image)| Job::Panorama(*i, image)).collect();
+        let chunks = self.views.chunks(THUMBS_PER_FILE).enumerate();
+        jobs.extend(chunks.map(|(i, images)| Job::Views(i, images)));
+        let progress = ctx.progress("reporting", "images", (self.panoramas.len() + self.views.len()) as u64);
+        let pano_width = options.pano_width;
+        let of_panorama = Widths { lossless: pano_width, rgb: pano_width, thumb: None };
+        let (small, large) = (options.thumbs, 2 * options.thumbs);
+        let of_view = Widths { lossless: small, rgb: large, thumb: Some(small) };
+        let results = map_in_order(
+            ctx,
+            &jobs,
+            || (),
+            |(), job| {
+                let mut faults = Faults::default();
+                let (mut made, mut bytes) = (Vec::new(), 0);
+                match job {
+                    Job::Panorama(i, image) => {
+                        let (one, picture, _) = self.make(image, of_panorama, &mut faults)?;
+                        if let Some(ViewPicture { picture, .. }) = picture {
+                            bytes += write_script(folder, &format!("pano_{i}"), &picture)?;
+                        }
+                        made.push(one);
+                        progress.add(1);
+                    }
+                    Job::Views(chunk, images) => {
+                        let mut thumbs = Vec::with_capacity(images.len());
+                        for (k, some) in images.chunks(VIEWS_PER_FILE).enumerate() {
+                            let mut pictures = Vec::with_capacity(some.len());
+                            for image in some {
+                                ctx.check()?;
+                                let (one, picture, thumb) = self.make(image, of_view, &mut faults)?;
+                                made.push(one);
+                                pictures.push(picture);
+                                thumbs.push(thumb);
+                                progress.add(1);
+                            }
+                            let file = chunk * (THUMBS_PER_FILE / VIEWS_PER_FILE) + k;
+                            bytes += write_script(folder, &format!("views_{file}"), &pictures)?;
+                        }
+                        bytes += write_script(folder, &format!("thumbs_{chunk}"), &thumbs)?;
+                    }
+                }
+                Ok((made, bytes, faults.into_vec()))
+            },
+        )?;
+        drop(progress);
+        let mut all = MadeAll { bytes: 0, panoramas: Vec::new(), views: Vec::new() };
+        for (job, (made, bytes, found)) in jobs.iter().zip(results) {
+            all.bytes += bytes;
+            faults.extend(found);
+            match job {
+                Job::Panorama(..) => all.panoramas.extend(made),
+                Job::Views(..) => all.views.extend(made),
+            }
+        }
+        Ok(all)
+    }
+
+    /// An image as the page shows it, its small image, and what is known of it.
+    fn make(
+        &self,
+        image: &DatasetImage,
+        widths: Widths,
+        faults: &mut Faults,
+    ) -> Result<(Made, Option<ViewPicture>, Option<String>)> {
+        let root = self.data.layout().root();
+        let shown = show(self.data, image, self.table.as_ref(), widths, faults)?;
+        if shown.is_none() {
+            nothing_left(self.data, image, faults);
+        }
+        let mut pose = None;
+        if image.has(Domain::Pose) {
+            pose = faults.keep(root, self.data.pose(image))?;
+        }
+        let size = shown.as_ref().map(|shown| shown.picture.of);
+        let mut camera = None;
+        if let (Some(pose), Some(size)) = (&pose, size) {
+            camera = faults.keep(root, self.data.camera(image, pose, size))?;
+        }
+        let located = pose.as_ref().map(|pose| {
+            let (original, this) = (pose.original(), pose.pose());
+            let (yaw, pitch) = original.yaw_pitch_to(&this);
+            // The full horizontal angle; of a photograph whose centre is off, that of its focal length.
+            let half_width = size.map_or(pose.camera_k_matrix[0][2], |[w, _]| f64::from(w) / 2.0);
+            let fov = 2.0 * (half_width / pose.camera_k_matrix[0][0]).atan();
+            Located {
+                position: this.location.to_array(),
+                azimuth_rad: this.azimuth_rad(),
+                angles_deg: [yaw, pitch, fov].map(degrees),
+                original: (original.location.to_array(), original.azimuth_rad()),
+            }
+        });
+        let (mut picture, mut thumb, mut seen) = (None, None, None);
+        if let Some(shown) = shown {
+            let pinhole = camera.filter(|_| image.frame != Frame::Panorama).map(|camera| {
+                let [[fx, _, cx], [_, fy, cy], _] = camera.k_matrix();
+                Pinhole { k: [fx, fy, cx, cy], rt: camera.pose.rt_matrix() }
+            });
+            picture = Some(ViewPicture { picture: shown.picture, camera: pinhole });
+            (thumb, seen) = (shown.thumb, Some(shown.seen));
+        }
+        Ok((Made { located, seen }, picture, thumb))
+    }
+
+    pub(crate) fn index(&self, out: &Path, made: &MadeAll, mut faults: Faults) -> Result<Index> {
+        let data = self.data;
+        let classes = areas::classes(data);
+        let mut pixels_by_class = vec![0; classes.len()];
+        let mut pixels_unlabelled = 0;
+        for seen in made.panoramas.iter().chain(&made.views).filter_map(|made| made.seen.as_ref()) {
+            pixels_unlabelled += seen.pixels_unlabelled;
+            for (class, pixels) in &seen.pixels_by_class {
+                if let Some(sum) = pixels_by_class.get_mut(*class) {
+                    *sum += pixels;
+                }
+            }
+        }
+        let (files, bytes) = data.size();
+        let manifest = data.layout().manifest();
+        let options = serde_json::to_value(data.options());
+        let canonical = std::fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
+        let head = DataSetHead {
+            name: canonical.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            version: data.version().to_owned(),
+            seed: data.seed(),
+            files,
+            bytes,
+            taxonomy: data.taxonomy().map(|t| t.name().to_owned()),
+            depth_units_per_m: data.options().depth_units.per_m(),
+            options: options.map_err(|e| FileError::format(&manifest, e.to_string()))?,
+        };
+        let locations = self.locations(made);
+        let views = self.view_heads(made);
+        let labels = self.table.as_ref().map(areas::labels).unwrap_or_default();
+        let (rooms, votes) = (areas::rooms(data, &mut faults)?, areas::votes(data, &mut faults)?);
+        let statistics = areas::statistics(data, &mut faults)?;
+        Ok(Index {
+            form: FORM,
+            data_set: head,
+            areas: areas::areas(data)?,
+            classes,
+            labels,
+            rooms,
+            locations,
+            views,
+            views_per_file: VIEWS_PER_FILE,
+            thumbs_per_file: THUMBS_PER_FILE,
+            statistics,
+            votes,
+            pixels_by_class,
+            pixels_unlabelled,
+            faults: faults.into_vec(),
+        })
+    }
+
+    fn locations(&self, made: &MadeAll) -> Vec<LocationHead> {
+        let head = |(area, uuid, room): &(u32, String, Option<String>)| LocationHead {
+            area: *area,
+            uuid: uuid.clone(),
+            room: room.clone().unwrap_or_default(),
+            position: None,
+            azimuth_rad: None,
+            pano: false,
+            seen: None,
+        };
+        let mut heads: Vec<LocationHead> = self.locations.iter().map(head).collect();
+        // A location without a panorama stands where its views do.
+        for (image, made) in self.views.iter().zip(&made.views) {
+            let head = self.location_of(image.area, &image.uuid).and_then(|i| heads.get_mut(i));
+            if let (Some(head), Some(located)) = (head, &made.located) {
+                (head.position, head.azimuth_rad) = (Some(located.original.0), Some(located.original.1));
+            }
+        }
+        for ((i, _), made) in self.panoramas.iter().zip(&made.panoramas) {
+            let Some(head) = heads.get_mut(*i) else { continue };
+            if let Some(located) = &made.located {
+                (head.position, head.azimuth_rad) = (Some(located.position), Some(located.azimuth_rad));
+            }
+            head.pano = made.seen.is_some();
+            head.seen.clone_from(&made.seen);
+        }
+        heads
+    }
+
+    /// Kept views and photographs in the order of their files, then the candidates that were dropped.
+    fn view_heads(&self, made: &MadeAll) -> Vec<ViewHead> {
+        let options = self.data.options();
+        let listed: Vec<(u32, &ViewRecord)> =
+            self.candidates.iter().map(|(area, view)| (*area, view)).collect();
+        let places = places(&listed, options.pool, options.keep_all);
+        let mut kept = BTreeMap::new();
+        let mut dropped = Vec::new();
+        for ((area, view), place) in listed.into_iter().zip(places) {
+            match view.frame_num {
+                Some(frame) => drop(kept.insert((area, view.camera_uuid.as_str(), frame), (view, place))),
+                None => dropped.push((area, view, place)),
+            }
+        }
+        let of_record = |head: ViewHead, view: &ViewRecord, place: Place| ViewHead {
+            candidate: Some(view.candidate),
+            yaw_deg: Some(degrees(view.yaw_rad)),
+            pitch_deg: Some(degrees(view.pitch_rad)),
+            fov_deg: Some(degrees(view.fov_rad)),
+            entropy: Some(rounded(view.entropy, 4)),
+            place: Some(place),
+            ..head
+        };
+        let mut heads = Vec::with_capacity(self.views.len() + dropped.len());
+        for (i, (image, made)) in self.views.iter().zip(&made.views).enumerate() {
+            let photograph = self.photographs.get(&(image.area, image.uuid.clone()));
+            let Frame::View(frame) = image.frame else { continue };
+            let angles = made.located.as_ref().map(|located| located.angles_deg);
+            let is_photograph = photograph.is_some();
+            let head = ViewHead {
+                area: image.area,
+                location: self.location_of(image.area, &image.uuid),
+                room: image.room.clone(),
+                photograph: photograph.map(|p| p.name.clone()),
+                frame: Some(frame),
+                candidate: None,
+                picture: Some(i).filter(|_| made.seen.is_some()),
+                yaw_deg: angles.filter(|_| !is_photograph).map(|[yaw, ..]| yaw),
+                pitch_deg: angles.filter(|_| !is_photograph).map(|[_, pitch, _]| pitch),
+                fov_deg: angles.map(|[.., fov]| fov),
+                entropy: None,
+                place: None,
+                position: made.located.as_ref().filter(|_| is_photograph).map(|located| located.position),
+                seen: made.seen.clone(),
+            };
+            let record = kept.get(&(image.area, image.uuid.as_str(), frame)).filter(|_| !is_photograph);
+            heads.push(match record {
+                Some((view, place)) => of_record(head, view, *place),
+                None => head,
+            });
+        }
+        for (area, view, place) in dropped {
+            let location = self.location_of(area, &view.camera_uuid);
+            let room = location.and_then(|i| self.locations.get(i)).and_then(|(.., room)| room.clone());
+            let head = ViewHead {
+                area,
+                location,
+                room: room.unwrap_or_default(),
+                photograph: None,
+                frame: None,
+                candidate: None,
+                picture: None,
+                yaw_deg: None,
+                pitch_deg: None,
+                fov_deg: None,
+                entropy: None,
+                place: None,
+                position: None,
+                seen: None,
+            };
+            heads.push(of_record(head, view, place));
+        }
+        heads
+    }
+}

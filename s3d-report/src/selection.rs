@@ -1,0 +1,125 @@
+//! Why a candidate view was kept or dropped, as far as its entropy tells.
+
+use s3d_io::dataset::ViewRecord;
+use s3d_sample::{Pool, Selection};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Why a view is in the data set, or is not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Reason {
+    /// Every candidate is kept.
+    All,
+    /// Its entropy is among the highest of its pool.
+    Highest,
+    /// It was drawn from the middle of its pool.
+    Drawn,
+    /// It was not drawn from the middle.
+    NotDrawn,
+    /// Its entropy is among the lowest.
+    Lowest,
+}
+
+/// The place of a view in its pool.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub(crate) struct Place {
+    pub(crate) reason: Reason,
+    /// From 1, the highest entropy.
+    pub(crate) rank: usize,
+    /// Members of the pool.
+    pub(crate) pool: usize,
+}
+
+/// The places of candidates, each with its area, in their order.
+pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -> Vec<Place> {
+    let mut pools: BTreeMap<(u32, &str), Vec<usize>> = BTreeMap::new();
+    for (i, (area, view)) in views.iter().enumerate() {
+        let key = match pool {
+            Pool::Dataset => (0, ""),
+            Pool::Area => (*area, ""),
+            Pool::Location => (*area, view.camera_uuid.as_str()),
+        };
+        pools.entry(key).or_default().push(i);
+    }
+    let selection = Selection::default();
+    let mut ranked: Vec<(usize, Place)> = Vec::with_capacity(views.len());
+    for members in pools.into_values() {
+        let mut members: Vec<(usize, u32, &ViewRecord)> =
+            members.into_iter().filter_map(|i| views.get(i).map(|(area, view)| (i, *area, *view))).collect();
+        // Of equal entropies the one that is named first counts as the higher, as in the selection.
+        let name = |(_, area, v): &(usize, u32, &ViewRecord)| (*area, v.camera_uuid.clone(), v.candidate);
+        members.sort_by_cached_key(name);
+        members.sort_by(|a, b| b.2.entropy.total_cmp(&a.2.entropy));
+        let n = members.len();
+        let dropped = selection.discarded(n);
+        // The rule of `select`: a share of the pool, rounded to the nearest.
+        let certain = ((selection.keep * n as f64 + 0.5 + 1e-9).floor() as usize).min(n - dropped);
+        for (at, (i, _, view)) in members.into_iter().enumerate() {
+            let reason = match view.frame_num.is_some() {
+                true if keep_all => Reason::All,
+                true if at < certain => Reason::Highest,
+                true => Reason::Drawn,
+                false if at + dropped >= n => Reason::Lowest,
+                false => Reason::NotDrawn,
+            };
+            ranked.push((i, Place { reason, rank: at + 1, pool: n }));
+        }
+    }
+    ranked.sort_by_key(|(i, _)| *i);
+    ranked.into_iter().map(|(_, place)| place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_sample::{PoolItem, select_pooled};
+
+    #[test]
+    fn reasons_fit_what_the_selection_does() {
+        let mut views: Vec<(u32, ViewRecord)> = Vec::new();
+        for candidate in 0..60 {
+            for (area, uuid) in [(1, "b"), (2, "a")] {
+                let entropy = f64::from((candidate * 7 + area) % 11) / 8.0;
+                let view = ViewRecord {
+                    camera_uuid: uuid.into(),
+                    candidate,
+                    yaw_rad: 0.0,
+                    pitch_rad: 0.0,
+                    fov_rad: 1.0,
+                    entropy,
+                    frame_num: None,
+                };
+                views.push((area, view));
+            }
+        }
+        for pool in [Pool::Dataset, Pool::Area, Pool::Location] {
+            let item = |(area, view): &(u32, ViewRecord)| {
+                (*area, view.camera_uuid.clone(), view.candidate, view.entropy)
+            };
+            let items: Vec<_> = views.iter().map(item).collect();
+            let items: Vec<PoolItem<'_>> = items
+                .iter()
+                .map(|(area, location, view, score)| PoolItem {
+                    area: *area,
+                    location,
+                    view: *view,
+                    score: *score,
+                })
+                .collect();
+            let stays = select_pooled(&items, pool, &Selection::default(), 7);
+            for ((_, view), stays) in views.iter_mut().zip(stays) {
+                view.frame_num = stays.then_some(0);
+            }
+            let listed: Vec<(u32, &ViewRecord)> = views.iter().map(|(area, view)| (*area, view)).collect();
+            let places = places(&listed, pool, false);
+            let count = |reason| places.iter().filter(|place| place.reason == reason).count();
+            let pools = if pool == Pool::Dataset { 1 } else { 2 };
+            let size = 120 / pools;
+            assert!(places.iter().all(|place| place.pool == size));
+            assert_eq!(count(Reason::Highest), 72, "{pool}");
+            assert_eq!(count(Reason::Lowest), 18, "{pool}");
+            assert_eq!(count(Reason::Drawn) + count(Reason::NotDrawn), 30, "{pool}");
+        }
+    }
+}

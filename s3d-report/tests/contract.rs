@@ -1,0 +1,251 @@
+//! A report that is read back by its contract (docs/report.md), and held against the data set's own files.
+
+mod common;
+
+use common::{data_set, files, numbers, pair, url_bytes, value};
+use s3d_dataset::{Context, DataSet, Error};
+use s3d_geom::Raster;
+use s3d_geom::glam::{DMat3, DVec3, dvec3};
+use s3d_io::dataset::{DatasetImage, Domain, Frame};
+use s3d_io::image::{decode_gray16, decode_rgb8, decode_xyz};
+use s3d_report::{Report, ReportOptions, report};
+use serde_json::Value;
+use std::f64::consts::PI;
+use std::fs;
+use std::path::Path;
+
+const SMALL: ReportOptions = ReportOptions { pano_width: 64, thumbs: 24, overwrite: false };
+
+fn made(out: &Path, to: &Path, options: &ReportOptions) -> Report {
+    report(out, to, options, &Context::default()).unwrap()
+}
+
+fn numbers3(value: &Value) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|i| value[i].as_f64().unwrap()))
+}
+
+/// The images of the data set that a picture was made of.
+struct Own {
+    depth: Raster<u16>,
+    label: Raster<[u8; 3]>,
+    rgb: Raster<[u8; 3]>,
+    xyz: Raster<[f32; 3]>,
+}
+
+impl Own {
+    fn read(data: &DataSet, image: &DatasetImage) -> Self {
+        let path = |domain| image.path(data.layout(), domain);
+        let bytes = |domain| data.read(&path(domain)).unwrap();
+        Self {
+            depth: decode_gray16(&bytes(Domain::Depth), &path(Domain::Depth)).unwrap(),
+            label: decode_rgb8(&bytes(Domain::Semantic), &path(Domain::Semantic)).unwrap(),
+            rgb: decode_rgb8(&bytes(Domain::Rgb), &path(Domain::Rgb)).unwrap(),
+            xyz: decode_xyz(&bytes(Domain::GlobalXyz), &path(Domain::GlobalXyz)).unwrap(),
+        }
+    }
+
+    /// Holds some pixels of a picture against these images; `point` is the world point of a place of the
+    /// image, in pixels, at a depth.
+    fn hold(&self, picture: &Value, count: u32, point: impl Fn(f64, f64, f64) -> DVec3) {
+        let (of, size) = (pair(&picture["of"]), pair(&picture["size"]));
+        let (depth, label) = (numbers(&picture["depth"]), numbers(&picture["label"]));
+        assert_eq!([self.depth.width(), self.depth.height()], of);
+        assert_eq!([depth.width(), depth.height()], size);
+        assert!(size[0] < of[0], "the test is of reduced images");
+        let mut seen = 0;
+        for k in 0..count {
+            // Spread over the image, in no line.
+            let (i, j) = ((k * 37 + 5) % size[0], (k * 23 + 3) % size[1]);
+            let source = |i: u32, axis: usize| (2 * i + 1) * of[axis] / (2 * size[axis]);
+            let (x, y) = (source(i, 0), source(j, 1));
+            assert_eq!(depth.at(i, j), u32::from(self.depth.at(x, y)), "depth of {i}, {j}");
+            let [r, g, b] = self.label.at(x, y);
+            assert_eq!(label.at(i, j), u32::from_be_bytes([0, r, g, b]), "label of {i}, {j}");
+            if depth.at(i, j) != 65_535 {
+                let metres = f64::from(depth.at(i, j)) / 512.0;
+                let found = point(f64::from(x) + 0.5, f64::from(y) + 0.5, metres);
+                let own = DVec3::from_array(self.xyz.at(x, y).map(f64::from));
+                // Half a step of half floats below 32 m is 8 mm, of depth 1 mm.
+                assert!((found - own).abs().max_element() < 0.01, "{i}, {j}: {found} and {own}");
+                seen += 1;
+            }
+        }
+        assert!(seen > count / 2, "{seen} of {count} pixels see something");
+        // Colours are means, as good as JPEG has them.
+        let rgb = image::load_from_memory(&url_bytes(&picture["rgb"], "jpeg")).unwrap().to_rgb8();
+        let mean = |pixels: &mut dyn Iterator<Item = [u8; 3]>| {
+            let (mut sum, mut count) = ([0.0; 3], 0.0);
+            for pixel in pixels {
+                (0..3).for_each(|c| sum[c] += f64::from(pixel[c]));
+                count += 1.0;
+            }
+            sum.map(|sum| sum / count)
+        };
+        let (theirs, ours) =
+            (mean(&mut rgb.pixels().map(|p| p.0)), mean(&mut self.rgb.pixels().iter().copied()));
+        assert!((0..3).all(|c| (theirs[c] - ours[c]).abs() < 3.0), "{theirs:?} and {ours:?}");
+    }
+}
+
+#[test]
+fn pictures_are_the_data_sets_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), true);
+    let to = dir.path().join("report");
+    let made = made(&out, &to, &SMALL);
+    assert_eq!(made.faults, []);
+    assert_eq!(made.bytes, files(&to).values().map(|bytes| bytes.len() as u64).sum::<u64>());
+    let data = DataSet::open(&out).unwrap();
+    let images = data.images(1);
+    let index = value(&to, "index");
+
+    let locations = index["locations"].as_array().unwrap();
+    assert_eq!((locations.len(), made.panoramas), (6, 6));
+    for (i, location) in locations.iter().enumerate() {
+        let named = |image: &&DatasetImage| image.frame == Frame::Panorama && location["uuid"] == image.uuid;
+        let image = images.iter().find(named).unwrap();
+        assert_eq!(location["room"], image.room);
+        let (from, azimuth) = (numbers3(&location["position"]), location["azimuth_rad"].as_f64().unwrap());
+        Own::read(&data, image).hold(&value(&to, &format!("pano_{i}")), 20, |x, y, distance| {
+            let (lon, lat) = ((x / 160.0 - 0.5) * 2.0 * PI, (0.5 - y / 80.0) * PI);
+            let a = azimuth - lon;
+            from + distance * dvec3(lat.cos() * a.cos(), lat.cos() * a.sin(), lat.sin())
+        });
+    }
+
+    let views = index["views"].as_array().unwrap();
+    let kept: Vec<&Value> = views.iter().filter(|view| !view["picture"].is_null()).collect();
+    assert_eq!((kept.len(), views.len()), (made.views, 36));
+    assert!(made.views > 12, "several files");
+    for view in &kept {
+        let n = usize::try_from(view["picture"].as_u64().unwrap()).unwrap();
+        let uuid = &locations[usize::try_from(view["location"].as_u64().unwrap()).unwrap()]["uuid"];
+        let named = |image: &&DatasetImage| {
+            matches!(image.frame, Frame::View(frame) if view["frame"] == frame) && *uuid == image.uuid
+        };
+        let image = images.iter().find(named).unwrap();
+        let picture = &value(&to, &format!("views_{}", n / 12))[n % 12];
+        let rows = |column: usize| {
+            DVec3::from_array([0, 1, 2].map(|r| picture["camera"]["rt"][r][column].as_f64().unwrap()))
+        };
+        let rotation = DMat3::from_cols(rows(0), rows(1), rows(2));
+        let k: Vec<f64> = (0..4).map(|i| picture["camera"]["k"][i].as_f64().unwrap()).collect();
+        Own::read(&data, image).hold(picture, 20, |x, y, depth| {
+            let camera = dvec3((x - k[2]) / k[0], (y - k[3]) / k[1], 1.0) * depth;
+            rotation.transpose() * (camera - rows(3))
+        });
+        let thumb = &value(&to, &format!("thumbs_{}", n / 48))[n % 48];
+        let thumb = image::load_from_memory(&url_bytes(thumb, "jpeg")).unwrap();
+        assert_eq!((thumb.width(), thumb.height()), (24, 24));
+        let reason = view["place"]["reason"].as_str().unwrap();
+        assert!(["highest", "drawn"].contains(&reason), "{reason}");
+    }
+    let dropped = views.iter().filter(|view| view["picture"].is_null());
+    let reasons: Vec<&str> = dropped.map(|view| view["place"]["reason"].as_str().unwrap()).collect();
+    assert!(reasons.len() == 36 - made.views && reasons.iter().all(|r| ["lowest", "not_drawn"].contains(r)));
+
+    // Pixels by class are those of full-size images.
+    let mut pixels = 0;
+    for image in &images {
+        let path = image.path(data.layout(), Domain::Semantic);
+        let label = decode_rgb8(&data.read(&path).unwrap(), &path).unwrap();
+        pixels += label.pixels().iter().filter(|p| **p != [13; 3]).count() as u64;
+    }
+    let by_class =
+        index["pixels_by_class"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).sum::<u64>();
+    assert_eq!(by_class + index["pixels_unlabelled"].as_u64().unwrap(), pixels);
+    assert_eq!(index["rooms"].as_array().unwrap().len(), 4);
+    assert_eq!(index["votes"][0]["area"], 1);
+    assert!(index["areas"][0]["inputs"].is_null());
+}
+
+#[test]
+fn bytes_do_not_depend_on_threads_and_earlier_reports_are_replaced_when_asked() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), true);
+    let to = dir.path().join("report");
+    let on = |threads, to: &Path| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| made(&out, to, &SMALL))
+    };
+    on(1, &to);
+    on(3, &dir.path().join("other"));
+    let first = files(&to);
+    assert!(first == files(&dir.path().join("other")));
+
+    let again = report(&out, &to, &SMALL, &Context::default()).unwrap_err();
+    assert!(matches!(&again, Error::Usage(text) if text.contains("--overwrite")), "{again}");
+    assert!(first == files(&to));
+    let larger = ReportOptions { thumbs: 32, overwrite: true, ..SMALL };
+    made(&out, &to, &larger);
+    assert!(first != files(&to));
+    // What is not ours stays, and so does the data set.
+    let strange = dir.path().join("thesis");
+    fs::create_dir(&strange).unwrap();
+    fs::write(strange.join("chapter.tex"), "").unwrap();
+    for place in [&strange, &out.join("report")] {
+        let e = report(&out, place, &larger, &Context::default()).unwrap_err();
+        assert!(matches!(e, Error::Usage(_)), "{e}");
+    }
+    assert_eq!(files(&strange).len(), 1);
+}
+
+#[test]
+fn what_is_missing_or_damaged_is_told_and_the_rest_is_shown() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), true);
+    let data = DataSet::open(&out).unwrap();
+    let images = data.images(1);
+    let panorama = images.iter().find(|image| image.frame == Frame::Panorama).unwrap();
+    let view = images.iter().find(|image| image.frame == Frame::View(0)).unwrap();
+    let gone = panorama.path(data.layout(), Domain::Depth);
+    fs::remove_file(&gone).unwrap();
+    let flipped = view.path(data.layout(), Domain::Semantic);
+    let mut bytes = fs::read(&flipped).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(&flipped, bytes).unwrap();
+    fs::write(data.layout().rooms_json(1), "[").unwrap();
+
+    let to = dir.path().join("report");
+    let context = Context::default();
+    let made = report(&out, &to, &SMALL, &context).unwrap();
+    let told: Vec<&str> = made.faults.iter().map(|fault| fault.path.as_str()).collect();
+    let mut expected = [
+        panorama.relative_path(Domain::Depth),
+        view.relative_path(Domain::Semantic),
+        "area_1/3d/rooms.json".into(),
+    ];
+    expected.sort();
+    assert_eq!(told, expected);
+    assert_eq!(context.warnings(), 3);
+    assert!(
+        made.faults.iter().all(|fault| !fault.message.is_empty() && !fault.message.contains("data set/"))
+    );
+    let index = value(&to, "index");
+    assert_eq!(index["faults"].as_array().unwrap().len(), 3);
+    assert!(index["rooms"].as_array().unwrap().is_empty());
+    let at = index["locations"].as_array().unwrap().iter().position(|l| l["uuid"] == panorama.uuid).unwrap();
+    let picture = value(&to, &format!("pano_{at}"));
+    assert!(picture["depth"].is_null() && picture["rgb"].is_string() && picture["label"].is_string());
+
+    // Without its list of files nothing can be held against anything.
+    fs::remove_file(out.join("files.csv")).unwrap();
+    let e = report(&out, &dir.path().join("none"), &SMALL, &context).unwrap_err().to_string();
+    assert!(e.contains("files.csv") && !dir.path().join("none").exists(), "{e}");
+}
+
+#[test]
+fn without_labels_there_is_all_that_needs_none() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), false);
+    let to = dir.path().join("report");
+    let made = made(&out, &to, &SMALL);
+    assert_eq!((made.faults.len(), made.panoramas), (0, 6));
+    let index = value(&to, "index");
+    for none in ["classes", "labels", "rooms", "votes", "pixels_by_class"] {
+        assert!(index[none].as_array().unwrap().is_empty(), "{none}");
+    }
+    assert!(index["data_set"]["taxonomy"].is_null());
+    let picture = value(&to, "pano_0");
+    assert!(picture["label"].is_null() && picture["depth"].is_string());
+}

@@ -1,0 +1,98 @@
+// Elements. All text goes in as text nodes: a name cannot be markup.
+
+type Child = Node | string | number | null | undefined | false;
+type Properties = Record<string, string | number | boolean | null | undefined | ((event: never) => void)>;
+
+const SVG = "http://www.w3.org/2000/svg";
+
+function fill(element: Element, properties: Properties, children: Child[]): void {
+  for (const [name, value] of Object.entries(properties)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (typeof value === "function") element.addEventListener(name, value as EventListener);
+    else element.setAttribute(name, value === true ? "" : String(value));
+  }
+  append(element, children);
+}
+
+export function append(element: Element, children: Child[]): void {
+  for (const child of children) {
+    if (child === null || child === undefined || child === false) continue;
+    element.append(typeof child === "number" ? String(child) : child);
+  }
+}
+
+/** An HTML element. Functions become listeners, all else attributes. */
+export function h<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  properties: Properties = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  fill(element, properties, children);
+  return element;
+}
+
+/** An SVG element. */
+export function s<K extends keyof SVGElementTagNameMap>(
+  tag: K,
+  properties: Properties = {},
+  ...children: Child[]
+): SVGElementTagNameMap[K] {
+  const element = document.createElementNS(SVG, tag);
+  fill(element, properties, children);
+  return element;
+}
+
+/** A list to choose from: value and text of each entry. */
+export function choice(
+  label: string,
+  entries: [string, string][],
+  value: string,
+  chosen: (value: string) => void,
+): HTMLSelectElement {
+  const list = h("select", { "aria-label": label, change: () => chosen(list.value) });
+  for (const [entry, text] of entries) list.append(h("option", { value: entry }, text));
+  list.value = value;
+  return list;
+}
+
+/** A column of which the first cell is a `.number` is one of numbers. */
+export function table(head: string[], rows: Child[][]): HTMLTableElement {
+  const isNumber = (column: number): boolean => {
+    const cell = rows[0]?.[column];
+    return cell instanceof Element && cell.classList.contains("number");
+  };
+  return h(
+    "table",
+    {},
+    h(
+      "thead",
+      {},
+      h(
+        "tr",
+        {},
+        ...head.map((text, i) => h("th", { scope: "col", class: isNumber(i) && "of-numbers" }, text)),
+      ),
+    ),
+    h("tbody", {}, ...rows.map((row) => h("tr", {}, ...row.map((cell) => h("td", {}, cell))))),
+  );
+}
+
+const GROUPED = new Intl.NumberFormat("en", { maximumFractionDigits: 0 });
+
+export const count = (n: number): string => GROUPED.format(n);
+export const metres2 = (n: number): string => `${n.toFixed(1)} m²`;
+export function percent(share: number): string {
+  if (share > 0 && share < 0.001) return "< 0.1 %";
+  return `${(100 * share).toFixed(share > 0 && share < 0.0995 ? 1 : 0)} %`;
+}
+
+/** `1 room`, `2 rooms`. */
+export const several = (n: number, noun: string): string => `${count(n)} ${noun}${n === 1 ? "" : "s"}`;
+
+/** `conferenceRoom_1` as people write it. */
+export function roomName(room: string): string {
+  if (room === "" || room === "unknown_1") return "unknown room";
+  const words = room.replace(/([a-z])([A-Z])/g, "$1 $2").replaceAll("_", " ");
+  return words === words.toUpperCase() ? words : words.toLowerCase().replace(/^wc/, "WC");
+}

@@ -1,0 +1,296 @@
+// A picture on a WebGL2 canvas: two of its modalities, left and right of a line, on a sphere or flat.
+
+import { MISSING, TABLE_WIDTH, depthRamp, labelTable } from "./colors.js";
+import type { Index, Picture } from "./data.js";
+import { type Gaze, focal } from "./geometry.js";
+
+export const MODALITIES = ["rgb", "depth", "normal", "class", "instance", "unlabelled"] as const;
+export type Modality = (typeof MODALITIES)[number];
+
+const VERTICES = `#version 300 es
+void main() {
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+  gl_Position = vec4(4.0 * corner - 1.0, 0.0, 1.0);
+}`;
+
+const PIXELS = `#version 300 es
+precision highp float;
+uniform sampler2D rgb, normal, depth, label, classes, instances, ramp;
+uniform vec2 size;
+uniform float line, focal, nearest, farthest;
+uniform int left, right;
+uniform bool sphere, colored;
+uniform vec2 gaze, origin, extent;
+uniform vec3 missing;
+out vec4 color;
+const float PI = 3.14159265358979;
+
+float number(vec4 pixel) {
+  vec3 bytes = floor(pixel.rgb * 255.0 + 0.5);
+  return bytes.r * 65536.0 + bytes.g * 256.0 + bytes.b;
+}
+
+vec3 named(sampler2D table, float index) {
+  ivec2 place = ivec2(int(index) % ${TABLE_WIDTH}, int(index) / ${TABLE_WIDTH});
+  return texelFetch(table, place, 0).rgb;
+}
+
+vec3 show(int modality, vec2 uv) {
+  vec3 seen = texture(rgb, uv).rgb;
+  if (modality == 0) return seen;
+  if (modality == 2) return texture(normal, uv).rgb;
+  if (modality == 1) {
+    float units = number(texture(depth, uv));
+    float place = clamp((units - nearest) / (farthest - nearest), 0.0, 1.0);
+    return units == 65535.0 ? missing : texture(ramp, vec2(place, 0.5)).rgb;
+  }
+  float index = number(texture(label, uv));
+  if (index == 855309.0) return missing;
+  float light = colored ? dot(seen, vec3(0.2126, 0.7152, 0.0722)) : 0.6;
+  if (modality == 5) return index == 0.0 ? vec3(1.0, 0.0, 1.0) : vec3(0.12 + 0.7 * light);
+  vec3 flat_color = modality == 3 ? named(classes, index) : named(instances, index);
+  return colored ? mix(flat_color, seen, 0.3) : flat_color;
+}
+
+void main() {
+  vec2 at = vec2(gl_FragCoord.x, size.y - gl_FragCoord.y);
+  vec2 uv;
+  if (sphere) {
+    vec2 ray = vec2(at.x - size.x / 2.0, size.y / 2.0 - at.y) / focal;
+    float forward = cos(gaze.y) - ray.y * sin(gaze.y);
+    float rise = sin(gaze.y) + ray.y * cos(gaze.y);
+    float lon = gaze.x + atan(ray.x, forward);
+    uv = vec2(fract(lon / (2.0 * PI) + 0.5), 0.5 - atan(rise, length(vec2(ray.x, forward))) / PI);
+  } else {
+    uv = (at - origin) / extent;
+    if (any(lessThan(uv, vec2(0.0))) || any(greaterThanEqual(uv, vec2(1.0)))) {
+      color = vec4(0.0);
+      return;
+    }
+  }
+  color = vec4(show(at.x < line ? left : right, uv), 1.0);
+}`;
+
+/** Numbers of a picture's pixels, as far as it has them. */
+export interface Numbers {
+  width: number;
+  height: number;
+  /** Units of depth; 65,535 where nothing was seen. */
+  depth: Uint16Array | null;
+  /** Indices of labels; `NO_LABEL` where nothing was seen. */
+  label: Uint32Array | null;
+}
+
+export const NO_DEPTH = 65_535;
+export const NO_LABEL = 0x0d0d0d;
+
+export interface Scene {
+  left: Modality;
+  right: Modality;
+  /** Where the line is, a share of the width. */
+  split: number;
+  /** Where a panorama is looked at; a view is flat. */
+  gaze: Gaze | null;
+}
+
+/** Where a flat picture of this shape lies on a canvas: left, top, width, height. */
+export function placeOf(
+  of: [number, number],
+  width: number,
+  height: number,
+): [number, number, number, number] {
+  const scale = Math.min(width / of[0], height / of[1]);
+  const [w, h] = [of[0] * scale, of[1] * scale];
+  return [(width - w) / 2, (height - h) / 2, w, h];
+}
+
+async function image(url: string): Promise<HTMLImageElement> {
+  const element = new Image();
+  element.src = url;
+  await element.decode();
+  return element;
+}
+
+/** The pixels of an image as numbers of 24 bits. */
+function numbers(element: HTMLImageElement): { width: number; height: number; values: Uint32Array } {
+  const { naturalWidth: width, naturalHeight: height } = element;
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [width, height];
+  const context = canvas.getContext("2d", { willReadFrequently: true, colorSpace: "srgb" });
+  if (!context) throw new Error("this browser draws on no canvas");
+  context.drawImage(element, 0, 0);
+  const bytes = context.getImageData(0, 0, width, height).data;
+  const values = new Uint32Array(width * height);
+  for (let i = 0; i < values.length; i++) {
+    values[i] = ((bytes[4 * i] ?? 0) << 16) | ((bytes[4 * i + 1] ?? 0) << 8) | (bytes[4 * i + 2] ?? 0);
+  }
+  return { width, height, values };
+}
+
+export class Renderer {
+  private readonly gl: WebGL2RenderingContext;
+  private readonly program: WebGLProgram;
+  private readonly textures = new Map<string, WebGLTexture>();
+  private picture: Picture | null = null;
+  private ends: [number, number] = [0, 1];
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    index: Index,
+  ) {
+    const gl = canvas.getContext("webgl2", { antialias: false, alpha: true, premultipliedAlpha: true });
+    if (!gl) throw new Error("This browser has no WebGL 2, which panoramas and views need.");
+    this.gl = gl;
+    this.program = this.link();
+    gl.useProgram(this.program);
+    gl.bindVertexArray(gl.createVertexArray());
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
+    for (const by of ["class", "instance"] as const) {
+      const { pixels, rows } = labelTable(index, by);
+      this.upload(by === "class" ? "classes" : "instances", pixels, TABLE_WIDTH, rows, gl.NEAREST);
+    }
+    this.upload("ramp", depthRamp(256), 256, 1, gl.LINEAR);
+    this.forget();
+  }
+
+  private link(): WebGLProgram {
+    const { gl } = this;
+    const program = gl.createProgram();
+    for (const [kind, text] of [
+      [gl.VERTEX_SHADER, VERTICES],
+      [gl.FRAGMENT_SHADER, PIXELS],
+    ] as const) {
+      const shader = gl.createShader(kind);
+      if (!shader) throw new Error("WebGL 2 was lost");
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+      const log = gl.getShaderInfoLog(shader);
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS))
+        throw new Error(`WebGL 2: ${log ?? "no shader"}`);
+    }
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error("WebGL 2 links no program");
+    return program;
+  }
+
+  private upload(
+    name: string,
+    source: Uint8Array | HTMLImageElement,
+    width: number,
+    height: number,
+    filter: number,
+  ): void {
+    const { gl } = this;
+    const texture = this.textures.get(name) ?? gl.createTexture();
+    this.textures.set(name, texture);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    if (source instanceof Uint8Array) {
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, width, height, 0, gl.RGBA, gl.UNSIGNED_BYTE, source);
+    } else {
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, source);
+    }
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, filter);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, filter);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, name === "ramp" ? gl.CLAMP_TO_EDGE : gl.REPEAT);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+  }
+
+  private forget(): void {
+    const nothing = new Uint8Array([0x0d, 0x0d, 0x0d, 255]);
+    for (const name of ["rgb", "normal", "depth", "label"]) this.upload(name, nothing, 1, 1, this.gl.NEAREST);
+    this.picture = null;
+  }
+
+  /** Takes a picture, and returns the numbers of its pixels. */
+  async take(picture: Picture): Promise<Numbers> {
+    const [rgb, normal, depth, label] = await Promise.all(
+      [picture.rgb, picture.normal, picture.depth, picture.label].map((url) =>
+        url === null ? null : image(url),
+      ),
+    );
+    this.forget();
+    const { LINEAR, NEAREST } = this.gl;
+    const all = {
+      rgb: [rgb, LINEAR],
+      normal: [normal, LINEAR],
+      depth: [depth, NEAREST],
+      label: [label, NEAREST],
+    } as const;
+    for (const [name, [element, filter]] of Object.entries(all)) {
+      if (element) this.upload(name, element, 0, 0, filter);
+    }
+    this.picture = picture;
+    const depths = depth ? numbers(depth) : null;
+    const labels = label ? numbers(label) : null;
+    this.ends = depths ? endsOf(depths.values) : [0, 1];
+    const { width, height } = depths ?? labels ?? { width: 0, height: 0 };
+    return {
+      width,
+      height,
+      depth: depths ? Uint16Array.from(depths.values) : null,
+      label: labels?.values ?? null,
+    };
+  }
+
+  /** The ends of the ramp of depths, units. */
+  get range(): [number, number] {
+    return this.ends;
+  }
+
+  draw(scene: Scene): void {
+    const { gl, program, canvas, picture } = this;
+    const [width, height] = [canvas.width, canvas.height];
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    if (!picture) return;
+    const at = (name: string): WebGLUniformLocation | null => gl.getUniformLocation(program, name);
+    [...this.textures].forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(at(name), unit);
+    });
+    gl.uniform2f(at("size"), width, height);
+    gl.uniform1f(at("line"), scene.split * width);
+    gl.uniform1i(at("left"), MODALITIES.indexOf(scene.left));
+    gl.uniform1i(at("right"), MODALITIES.indexOf(scene.right));
+    gl.uniform1i(at("sphere"), scene.gaze ? 1 : 0);
+    gl.uniform1i(at("colored"), picture.rgb ? 1 : 0);
+    gl.uniform1f(at("nearest"), this.ends[0]);
+    gl.uniform1f(at("farthest"), this.ends[1]);
+    gl.uniform3f(at("missing"), MISSING[0] / 255, MISSING[1] / 255, MISSING[2] / 255);
+    if (scene.gaze) {
+      gl.uniform1f(at("focal"), focal(scene.gaze, width, height));
+      gl.uniform2f(at("gaze"), scene.gaze.lon, scene.gaze.lat);
+    } else {
+      const [left, top, w, h] = placeOf(picture.of, width, height);
+      gl.uniform2f(at("origin"), left, top);
+      gl.uniform2f(at("extent"), w, h);
+    }
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** Gives the graphics card back what it holds. */
+  close(): void {
+    this.gl.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+}
+
+/** The depths that 1 and 98 of 100 pixels do not reach. */
+function endsOf(values: Uint32Array): [number, number] {
+  const bins = new Uint32Array(1024);
+  let all = 0;
+  for (const value of values) {
+    if (value >= NO_DEPTH) continue;
+    const bin = value >> 6;
+    bins[bin] = (bins[bin] ?? 0) + 1;
+    all += 1;
+  }
+  const reached = (share: number): number => {
+    let below = 0;
+    return bins.findIndex((count) => (below += count) >= share * all);
+  };
+  return all === 0 ? [0, 1] : [reached(0.01) << 6, (reached(0.98) + 1) << 6];
+}

@@ -1,0 +1,112 @@
+// The page as a whole: its tabs, and which of them is open.
+
+import { FORM, type Index, load } from "./data.js";
+import { append, h } from "./dom.js";
+import { faultCount, notesPage } from "./pages/notes.js";
+import { numbersPage } from "./pages/numbers.js";
+import { panoPage } from "./pages/pano.js";
+import { planPage } from "./pages/plan.js";
+import { link, parseRoute } from "./route.js";
+import { viewPage } from "./pages/view.js";
+import { viewsPage } from "./pages/views.js";
+
+interface Page {
+  element: HTMLElement;
+  close: () => void;
+}
+
+const still = (element: HTMLElement): Page => ({ element, close: () => {} });
+
+function tabs(index: Index): [string, string][] {
+  const all: [string, string, boolean][] = [
+    ["pano", "Panoramas", index.locations.some((l) => l.pano)],
+    ["views", "Views", index.views.length > 0],
+    [
+      "plan",
+      "Plan",
+      index.rooms.length > 0 || index.locations.length > 0 || index.views.some((v) => v.position),
+    ],
+    ["numbers", "Numbers", true],
+    ["notes", "Notes", true],
+  ];
+  return all.filter(([, , there]) => there).map(([page, name]) => [page, name]);
+}
+
+async function open(index: Index): Promise<Page> {
+  const route = parseRoute(window.location.hash);
+  switch (route.page || tabs(index)[0]?.[0]) {
+    case "pano":
+      return panoPage(index, route);
+    case "views":
+      return viewsPage(index, route);
+    case "view":
+      return viewPage(index, route);
+    case "plan":
+      return still(planPage(index));
+    case "numbers":
+      return still(numbersPage(index));
+    case "notes":
+      return still(notesPage(index));
+    default:
+      return still(failure("There is no such page in this report."));
+  }
+}
+
+function failure(words: string): HTMLElement {
+  return h("main", { class: "page" }, h("h1", {}, "Nothing to show"), h("p", { role: "alert" }, words));
+}
+
+async function start(): Promise<void> {
+  const index = await load<Index>("index");
+  if (index.form !== FORM)
+    throw new Error(
+      `data/index.js has form ${index.form}, and this page reads ${FORM}: make the report again`,
+    );
+  // Photographs are numbered by their names.
+  const numbered = new Intl.Collator("en", { numeric: true });
+  index.views.sort((a, b) => numbered.compare(a.photograph ?? "", b.photograph ?? ""));
+  document.title = `${index.data_set.name} · s3d report`;
+  const header = h("header", {}, h("a", { class: "title", href: link("") }, index.data_set.name));
+  const nav = h("nav", { "aria-label": "Parts of the report" });
+  for (const [page, name] of tabs(index)) {
+    const faults = page === "notes" ? faultCount(index) : 0;
+    const badge =
+      faults > 0 &&
+      h("span", { class: "badge", "aria-label": `${faults} files are missing or damaged` }, faults);
+    nav.append(h("a", { href: link(page), "data-page": page }, name, badge || ""));
+  }
+  header.append(nav);
+  const place = h("div", { id: "place" });
+  document.body.replaceChildren(header, place);
+  let now: Page | null = null;
+  let turn = 0;
+  const show = async (): Promise<void> => {
+    const mine = ++turn;
+    now?.element.setAttribute("inert", "");
+    const page = await open(index).catch((e: unknown) =>
+      still(failure(e instanceof Error ? e.message : String(e))),
+    );
+    if (mine !== turn) {
+      page.close();
+      return;
+    }
+    now?.close();
+    now = page;
+    place.replaceChildren(page.element);
+    window.scrollTo(0, 0);
+    const current = parseRoute(window.location.hash).page || tabs(index)[0]?.[0];
+    for (const tab of nav.querySelectorAll("a")) {
+      const is = tab.dataset["page"] === (current === "view" ? "views" : current);
+      if (is) tab.setAttribute("aria-current", "page");
+      else tab.removeAttribute("aria-current");
+    }
+    document.body.dataset["ready"] = String(mine);
+  };
+  window.addEventListener("hashchange", () => void show());
+  await show();
+}
+
+start().catch((e: unknown) => {
+  document.body.replaceChildren();
+  append(document.body, [failure(e instanceof Error ? e.message : String(e))]);
+});

@@ -1,0 +1,155 @@
+// A scan location: its panorama, its neighbours, and where it is on the plan.
+
+import { type Index, type Location, type Picture, load } from "../data.js";
+import { append, choice, h, percent, roomName } from "../dom.js";
+import { type Gaze, directionIn, panoramaPoint, screenAt } from "../geometry.js";
+import { plan } from "./plan.js";
+import { type Route, link, numberOf, replaceRoute } from "../route.js";
+import { Viewer, lookFrom, queryOf } from "../viewer.js";
+
+const RADIANS = Math.PI / 180;
+
+/** How much farther than what is seen a neighbour may be, metres: pixels are coarse. */
+const SLACK = 0.3;
+
+/** The location that sees most: some stand outside of what was scanned. */
+function best(index: Index): number {
+  const seen = (l: Location): number => (l.pano ? (l.seen?.coverage ?? 0) : -1);
+  const most = index.locations.reduce((max, l) => Math.max(max, seen(l)), -1);
+  return most < 0 ? -1 : index.locations.findIndex((l) => seen(l) === most);
+}
+
+/** Where a panorama that nobody has turned yet looks: straight ahead, unless little was seen there. */
+function firstLook(depthAt: (u: number, v: number) => number | null): number {
+  const shareAt = (lon: number): number => {
+    const turns = Array.from({ length: 15 }, (_, i) => (lon + (i - 7) * 6) / 360 + 0.5);
+    const rows = [0.38, 0.44, 0.5, 0.56, 0.62];
+    const seen = turns.flatMap((u) => rows.filter((v) => depthAt(u - Math.floor(u), v) !== null));
+    return seen.length / (turns.length * rows.length);
+  };
+  if (shareAt(0) > 0.75) return 0;
+  const turns = Array.from({ length: 24 }, (_, i) => 15 * (i - 12));
+  const shares = turns.map(shareAt);
+  return turns[shares.indexOf(Math.max(...shares))] ?? 0;
+}
+
+export function locationAt(index: Index, route: Route): number {
+  const [area, uuid] = route.path;
+  const named = index.locations.findIndex((l) => String(l.area) === area && l.uuid === uuid);
+  return route.path.length === 0 ? best(index) : named;
+}
+
+/** The other locations of the area that nothing hides, with direction and distance, the farthest first. */
+function neighbours(
+  index: Index,
+  from: Location,
+  depthAt: (u: number, v: number) => number | null,
+): { location: Location; lon: number; lat: number; distance: number }[] {
+  const here = from.position;
+  if (!here || from.azimuth_rad === null) return [];
+  const found = [];
+  for (const location of index.locations) {
+    if (location === from || location.area !== from.area || !location.pano || !location.position) continue;
+    const [x, y, z] = location.position.map((c, axis) => c - (here[axis] ?? 0)) as [number, number, number];
+    const distance = Math.hypot(x, y, z);
+    const [lon, lat] = directionIn(from, [x, y, z]);
+    const units = depthAt(lon / (2 * Math.PI) + 0.5, 0.5 - lat / Math.PI);
+    const free = units === null ? 10 : units / index.data_set.depth_units_per_m;
+    if (distance > 1e-3 && distance < free + SLACK) found.push({ location, lon, lat, distance });
+  }
+  return found.sort((a, b) => b.distance - a.distance);
+}
+
+export async function panoPage(
+  index: Index,
+  route: Route,
+): Promise<{ element: HTMLElement; close: () => void }> {
+  const at = locationAt(index, route);
+  const location = index.locations[at];
+  if (!location) {
+    const words =
+      route.path.length === 0 ? "This data set has no panoramas." : "There is no such scan location.";
+    return {
+      element: h("main", { class: "page" }, h("h1", {}, "Panoramas"), h("p", {}, words)),
+      close: () => {},
+    };
+  }
+  const entries = index.locations
+    .filter((l) => l.pano)
+    .map((l): [string, string] => {
+      const area = index.areas.length > 1 ? `area ${l.area}, ` : "";
+      return [link("pano", [l.area, l.uuid]), `${area}${roomName(l.room)} · ${l.uuid.slice(0, 8)}`];
+    });
+  const name = choice("Scan location", entries, link("pano", [location.area, location.uuid]), (to) => {
+    window.location.hash = to;
+  });
+  const facts = [
+    location.seen?.coverage != null && `sees ${percent(location.seen.coverage)}`,
+    location.seen?.instances != null && `${location.seen.instances} instances`,
+    location.seen?.unlabelled != null && `${percent(location.seen.unlabelled)} without a label`,
+  ].filter(Boolean);
+  const element = h("main", { class: "look" });
+  const head = h("div", { class: "look-head" }, h("h1", { class: "hidden" }, roomName(location.room)), name);
+  append(head, [h("p", { class: "quiet" }, facts.join(" · "))]);
+  element.append(head);
+  if (!location.pano) {
+    append(element, [h("p", {}, "This location has no panorama in the report.")]);
+    return { element, close: () => {} };
+  }
+  const picture = await load<Picture>(`pano_${at}`);
+  const gaze: Gaze = {
+    lon: numberOf(route.query, "lon", -360, 360, 0) * RADIANS,
+    lat: numberOf(route.query, "lat", -90, 90, -4) * RADIANS,
+    fov: numberOf(route.query, "fov", 8, 120, 90) * RADIANS,
+  };
+  const map = location.position ? plan(index, location.area, { small: true, current: at }) : null;
+  const marks: { button: HTMLElement; lon: number; lat: number }[] = [];
+  const look = lookFrom(route.query, picture, gaze);
+  let viewer: Viewer | null = null;
+  const opened = await Viewer.open(index, picture, look, {
+    title: `Panorama of ${roomName(location.room)}; arrow keys turn, plus and minus zoom`,
+    room: location.room,
+    point: (i, j, distance) => panoramaPoint(location, picture, i, j, distance),
+    position: location.position,
+    changed: (now) => {
+      replaceRoute("pano", [location.area, location.uuid], queryOf(now));
+      if (now.gaze) map?.look((location.azimuth_rad ?? 0) - now.gaze.lon, now.gaze.fov);
+    },
+    drawn: (width, height) => {
+      for (const { button, lon, lat } of marks) {
+        const place = viewer?.gaze ? screenAt(viewer.gaze, width, height, lon, lat) : null;
+        const inside = place && place[0] > 0 && place[0] < width && place[1] > 0 && place[1] < height;
+        button.hidden = !inside;
+        if (inside) button.style.transform = `translate(${place[0]}px, ${place[1]}px)`;
+      }
+    },
+  });
+  viewer = opened;
+  for (const { location: other, lon, lat, distance } of neighbours(index, location, (u, v) =>
+    opened.depthAt(u, v),
+  )) {
+    const words = `${roomName(other.room)}, ${distance.toFixed(1)} m`;
+    // Whoever walks keeps looking where he looked.
+    const walk = (): void => {
+      const now = opened.gaze ?? gaze;
+      const turned = now.lon + (other.azimuth_rad ?? 0) - (location.azimuth_rad ?? 0);
+      window.location.hash = link(
+        "pano",
+        [other.area, other.uuid],
+        queryOf({ ...look, gaze: { ...now, lon: turned } }),
+      );
+    };
+    const button = h("button", { class: "walk", "aria-label": `Walk to ${words}`, click: walk });
+    button.append(h("span", { class: "walk-name" }, words));
+    marks.push({ button, lon, lat });
+    opened.overlay.append(button);
+  }
+  if (map) opened.overlay.append(h("div", { class: "inset" }, map.element));
+  if (picture.depth !== null && !route.query.has("lon")) {
+    gaze.lon = firstLook((u, v) => opened.depthAt(u, v)) * RADIANS;
+    opened.lookAt(gaze);
+  }
+  map?.look((location.azimuth_rad ?? 0) - gaze.lon, gaze.fov);
+  element.append(opened.element);
+  return { element, close: () => opened.close() };
+}

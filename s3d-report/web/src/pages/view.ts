@@ -1,0 +1,118 @@
+// One view, large: the slider, what is under the pointer, and why it was kept.
+
+import { type Index, type View, loadPicture } from "../data.js";
+import { append, h, percent, roomName } from "../dom.js";
+import { viewPoint } from "../geometry.js";
+import { type Route, link, replaceRoute } from "../route.js";
+import { Viewer, lookFrom, queryOf } from "../viewer.js";
+
+/** Why a view is in the data set, or is not: a sentence. */
+export function reasonOf(view: View): string {
+  if (view.photograph !== null) return "A photograph: every one is a view.";
+  if (!view.place) return "views.json does not tell of it.";
+  const { reason, rank, pool } = view.place;
+  const place = `its entropy is number ${rank} of ${pool} candidates`;
+  switch (reason) {
+    case "all":
+      return `Kept, as all candidates are: ${place}.`;
+    case "highest":
+      return `Kept: ${place}, among the highest 60 %.`;
+    case "drawn":
+      return `Kept: ${place}, between the highest and the lowest, and it was drawn.`;
+    case "not_drawn":
+      return `Dropped: ${place}, between the highest and the lowest, and it was not drawn.`;
+    case "lowest":
+      return `Dropped: ${place}, among the lowest 15 %.`;
+  }
+}
+
+/** What a view is called. */
+export function nameOf(index: Index, view: View): string {
+  if (view.photograph !== null) return view.photograph;
+  const uuid = view.location === null ? "" : (index.locations[view.location]?.uuid.slice(0, 8) ?? "");
+  const number = view.frame === null ? `candidate ${view.candidate ?? "?"}` : `view ${view.frame}`;
+  return `${roomName(view.room)} · ${uuid} · ${number}`;
+}
+
+/** The panorama of a view's location, turned to where the view looks. */
+export function inPanorama(index: Index, view: View): string | null {
+  const location = view.location === null ? undefined : index.locations[view.location];
+  if (!location?.pano || view.yaw_deg === null || view.pitch_deg === null || view.fov_deg === null)
+    return null;
+  // Yaw grows to the left, longitude to the right.
+  const gaze = {
+    lon: String(-view.yaw_deg),
+    lat: String(view.pitch_deg),
+    fov: String(Math.max(view.fov_deg, 60)),
+  };
+  return link("pano", [location.area, location.uuid], gaze);
+}
+
+function facts(index: Index, view: View): HTMLElement {
+  const list = h("dl", { class: "facts" });
+  const add = (name: string, value: string | null | undefined | false): void => {
+    if (value) append(list, [h("dt", {}, name), h("dd", {}, value)]);
+  };
+  const degrees = (value: number | null): string | null => (value === null ? null : `${value.toFixed(1)}°`);
+  const share = (value: number | null | undefined): string | null => (value == null ? null : percent(value));
+  add("Room", roomName(view.room));
+  add("Entropy", view.entropy === null ? null : `${view.entropy.toFixed(3)} nats`);
+  add("Yaw", degrees(view.yaw_deg));
+  add("Pitch", degrees(view.pitch_deg));
+  add("Angle of view", degrees(view.fov_deg));
+  add("Sees the mesh", share(view.seen?.coverage));
+  add("Without a label", share(view.seen?.unlabelled));
+  add("Instances", view.seen?.instances == null ? null : String(view.seen.instances));
+  const shares = [...(view.seen?.classes ?? [])].sort((a, b) => b[1] - a[1]).slice(0, 6);
+  add(
+    "Classes",
+    shares
+      .map(([c, n]) => `${index.classes[c]?.name ?? "?"} ${percent(n)}`.replaceAll(" ", "\u00a0"))
+      .join(", "),
+  );
+  return list;
+}
+
+export async function viewPage(
+  index: Index,
+  route: Route,
+): Promise<{ element: HTMLElement; close: () => void }> {
+  const at = Number(route.path[0] ?? "");
+  const view = index.views.find((v) => v.picture === at);
+  if (!view || view.picture === null) {
+    const page = h("main", { class: "page" }, h("h1", {}, "View"), h("p", {}, "There is no such view."));
+    return { element: page, close: () => {} };
+  }
+  const pictures = index.views.filter((v) => v.picture !== null);
+  const place = pictures.indexOf(view);
+  const step = (by: number, words: string, sign: string): HTMLElement | null => {
+    const to = pictures[place + by];
+    return to
+      ? h("a", { class: "step", href: link("view", [to.picture ?? 0]), "aria-label": words }, sign)
+      : null;
+  };
+  const there = inPanorama(index, view);
+  const head = h("div", { class: "look-head" }, h("h1", {}, nameOf(index, view)));
+  append(head, [step(-1, "Previous view", "←"), step(1, "Next view", "→")]);
+  const aside = h("aside", {}, h("p", {}, reasonOf(view)), facts(index, view));
+  append(aside, [there && h("p", {}, h("a", { href: there }, "Look there in the panorama"))]);
+  const body = h("div", { class: "view-body" });
+  const element = h("main", { class: "look" }, head, body);
+  const picture = await loadPicture(index, view.picture);
+  if (!picture) {
+    append(body, [h("p", {}, "Its images are missing or damaged; see Notes."), aside]);
+    return { element, close: () => {} };
+  }
+  const location = view.location === null ? undefined : index.locations[view.location];
+  const viewer = await Viewer.open(index, picture, lookFrom(route.query, picture, null), {
+    title: nameOf(index, view),
+    room: view.room,
+    point: (i, j, depth) => viewPoint(picture, i, j, depth),
+    position: view.position ?? location?.position ?? null,
+    changed: (now) => replaceRoute("view", [at], queryOf(now)),
+  });
+  viewer.element.classList.add("flat");
+  viewer.element.style.setProperty("--shape", String(picture.of[0] / picture.of[1]));
+  append(body, [viewer.element, aside]);
+  return { element, close: () => viewer.close() };
+}

@@ -1,0 +1,268 @@
+// The grid of views: sorted, filtered, loaded as it is scrolled.
+
+import { css } from "../colors.js";
+import { type Index, type View, loadThumb } from "../data.js";
+import { append, choice, h, percent, roomName } from "../dom.js";
+import { type Route, link, replaceRoute } from "../route.js";
+import { inPanorama, nameOf, reasonOf } from "./view.js";
+
+/** What can be sorted by and filtered: a number, or nothing where a view has none. */
+interface Property {
+  key: string;
+  name: string;
+  of: (view: View) => number | null;
+  step: number;
+}
+
+const PROPERTIES: Property[] = [
+  { key: "entropy", name: "Entropy", of: (v) => v.entropy, step: 0.05 },
+  { key: "coverage", name: "Coverage %", of: (v) => hundred(v.seen?.coverage), step: 1 },
+  { key: "unlabelled", name: "Unlabelled %", of: (v) => hundred(v.seen?.unlabelled), step: 1 },
+  { key: "instances", name: "Instances", of: (v) => v.seen?.instances ?? null, step: 1 },
+  { key: "yaw", name: "Yaw °", of: (v) => v.yaw_deg, step: 5 },
+  { key: "pitch", name: "Pitch °", of: (v) => v.pitch_deg, step: 5 },
+  { key: "fov", name: "Angle of view °", of: (v) => v.fov_deg, step: 5 },
+];
+
+const hundred = (share: number | null | undefined): number | null => (share == null ? null : 100 * share);
+
+/** So many cards are added at a time. */
+const BATCH = 60;
+
+export function viewsPage(index: Index, route: Route): { element: HTMLElement; close: () => void } {
+  const query = Object.fromEntries(route.query) as Record<string, string>;
+  const there = PROPERTIES.filter((p) => index.views.some((v) => p.of(v) !== null));
+  const shareOf = (view: View): number => {
+    const wanted = Number(query["class"] ?? -1);
+    return view.seen?.classes.find(([c]) => c === wanted)?.[1] ?? 0;
+  };
+  const grid = h("div", { class: "grid", role: "list" });
+  const total = h("p", { class: "quiet", role: "status" });
+  const more = h("div", { class: "more" });
+  let shown: View[] = [];
+  let cards = 0;
+
+  const thumbs = new IntersectionObserver(
+    (seen) => {
+      for (const { isIntersecting, target } of seen) {
+        if (!isIntersecting) continue;
+        thumbs.unobserve(target);
+        const picture = Number((target as HTMLElement).dataset["picture"]);
+        loadThumb(index, picture).then(
+          (url) => {
+            if (url !== null) (target as HTMLImageElement).src = url;
+            else target.replaceWith(h("span", { class: "no-thumb" }, "no colours"));
+          },
+          (e: unknown) => target.replaceWith(h("span", { class: "no-thumb" }, String(e))),
+        );
+      }
+    },
+    { rootMargin: "400px" },
+  );
+  const bottom = new IntersectionObserver(
+    (seen) => {
+      if (seen.some((entry) => entry.isIntersecting)) addCards();
+    },
+    { rootMargin: "800px" },
+  );
+
+  function addCards(): void {
+    for (const view of shown.slice(cards, cards + BATCH)) grid.append(card(index, view, thumbs));
+    cards = Math.min(shown.length, cards + BATCH);
+    bottom.unobserve(more);
+    if (cards < shown.length) bottom.observe(more);
+  }
+
+  function update(): void {
+    replaceRoute("views", [], query);
+    const ranges = there.map((p) => ({
+      p,
+      min: bound(query[`${p.key}_min`]),
+      max: bound(query[`${p.key}_max`]),
+    }));
+    shown = index.views.filter((view) => {
+      const kind = view.photograph !== null ? "photograph" : view.frame === null ? "dropped" : "kept";
+      if ((query["show"] ?? "pictures") === "pictures" ? kind === "dropped" : query["show"] !== kind)
+        return false;
+      if (query["room"] && `${view.area}/${view.room}` !== query["room"]) return false;
+      if (query["location"] && String(view.location) !== query["location"]) return false;
+      if (query["class"] && shareOf(view) < (bound(query["share"]) ?? 1) / 100) return false;
+      return ranges.every(({ p, min, max }) => {
+        const value = p.of(view);
+        if (min === null && max === null) return true;
+        return value !== null && value >= (min ?? -Infinity) && value <= (max ?? Infinity);
+      });
+    });
+    const by = there.find((p) => p.key === query["sort"]);
+    const sign = query["order"] === "up" ? 1 : -1;
+    const value = query["sort"] === "share" ? shareOf : by?.of;
+    if (value) {
+      // Those without a number come last, either way.
+      const number = (view: View): number => value(view) ?? -sign * Infinity;
+      shown.sort((a, b) => sign * (number(a) - number(b)) || 0);
+    }
+    total.textContent = `${shown.length} of ${index.views.length}`;
+    grid.replaceChildren();
+    cards = 0;
+    addCards();
+  }
+
+  const set =
+    (name: string) =>
+    (value: string): void => {
+      if (value === "") delete query[name];
+      else query[name] = value;
+      update();
+    };
+  const element = h("main", { class: "page wide" }, h("h1", {}, "Views"));
+  element.append(controls(index, there, query, set), total, grid, more);
+  update();
+  return {
+    element,
+    close: () => {
+      thumbs.disconnect();
+      bottom.disconnect();
+    },
+  };
+}
+
+const bound = (text: string | undefined): number | null => {
+  const value = text === undefined || text.trim() === "" ? Number.NaN : Number(text);
+  return Number.isFinite(value) ? value : null;
+};
+
+function controls(
+  index: Index,
+  there: Property[],
+  query: Record<string, string>,
+  set: (name: string) => (value: string) => void,
+): HTMLElement {
+  const rooms = [...new Set(index.views.map((v) => `${v.area}/${v.room}`))].sort();
+  const areas = index.areas.length > 1;
+  const roomWords = (key: string): string => {
+    const [area, room] = key.split("/");
+    return `${areas ? `area ${area}, ` : ""}${roomName(room ?? "")}`;
+  };
+  const present = index.classes
+    .map((c, i): [string, string] => [String(i), c.name])
+    .filter(([i]) => index.pixels_by_class[Number(i)]);
+  const dropped = index.views.some((v) => v.frame === null);
+  const photographs = index.views.some((v) => v.photograph !== null);
+  const kinds: [string, string][] = [["pictures", "All pictures"]];
+  if (photographs && index.views.some((v) => v.frame !== null && v.photograph === null))
+    kinds.push(["kept", "Kept views"], ["photograph", "Photographs"]);
+  if (dropped) kinds.push(["dropped", "Dropped candidates"]);
+  const sorts: [string, string][] = [
+    ["", "In order"],
+    ...there.map((p): [string, string] => [p.key, p.name]),
+  ];
+  if (present.length > 0) sorts.push(["share", "Share of the class"]);
+  const orders: [string, string][] = [
+    ["", "highest first"],
+    ["up", "lowest first"],
+  ];
+  const order = choice("Order", orders, query["order"] ?? "", set("order"));
+  order.hidden = !query["sort"];
+  const bar = h("div", { class: "controls" });
+  append(bar, [
+    kinds.length > 1 && choice("Which views", kinds, query["show"] ?? "pictures", set("show")),
+    choice("Sort by", sorts, query["sort"] ?? "", (by) => {
+      order.hidden = by === "";
+      set("sort")(by);
+    }),
+    order,
+    rooms.length > 1 &&
+      choice(
+        "Room",
+        [["", "All rooms"], ...rooms.map((r): [string, string] => [r, roomWords(r)])],
+        query["room"] ?? "",
+        set("room"),
+      ),
+    index.locations.length > 1 &&
+      choice(
+        "Scan location",
+        [
+          ["", "All locations"],
+          ...index.locations.map((l, i): [string, string] => [
+            String(i),
+            `${roomName(l.room)} · ${l.uuid.slice(0, 8)}`,
+          ]),
+        ],
+        query["location"] ?? "",
+        set("location"),
+      ),
+    present.length > 0 &&
+      choice("Class", [["", "All classes"], ...present], query["class"] ?? "", set("class")),
+  ]);
+  const number = (name: string, label: string, step: number): HTMLElement => {
+    const input = h("input", {
+      type: "number",
+      step,
+      value: query[name] ?? "",
+      "aria-label": label,
+      input: () => set(name)(input.value),
+    });
+    return input;
+  };
+  const ranges = h("div", { class: "ranges" });
+  for (const p of there) {
+    append(ranges, [
+      h(
+        "label",
+        {},
+        h("span", {}, p.name),
+        number(`${p.key}_min`, `${p.name}, at least`, p.step),
+        "to",
+        number(`${p.key}_max`, `${p.name}, at most`, p.step),
+      ),
+    ]);
+  }
+  if (present.length > 0)
+    append(ranges, [
+      h(
+        "label",
+        {},
+        h("span", {}, "Class, at least %"),
+        number("share", "Share of the class, at least, %", 1),
+      ),
+    ]);
+  const open = Object.keys(query).some((key) => /_(min|max)$|^share$/.test(key));
+  return h("div", {}, bar, h("details", { open }, h("summary", {}, "Filter by numbers"), ranges));
+}
+
+/** What stands in place of a picture. */
+function placeholder(view: View): string {
+  if (view.frame !== null) return "missing";
+  return view.place?.reason === "lowest" ? "dropped: lowest entropy" : "dropped: not drawn";
+}
+
+function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLElement {
+  const name = nameOf(index, view);
+  const to = view.picture === null ? inPanorama(index, view) : link("view", [view.picture]);
+  const image = h("img", { alt: "", "data-picture": view.picture, decoding: "async" });
+  if (view.picture !== null) thumbs.observe(image);
+  const strip = h("span", { class: "strip", "aria-hidden": "true" });
+  for (const [place, share] of view.seen?.classes ?? []) {
+    const part = h("span", {});
+    part.style.flexGrow = String(share);
+    part.style.background = css(index.classes[place]?.color ?? [128, 128, 128]);
+    strip.append(part);
+  }
+  const numbers = [
+    view.entropy !== null && `entropy ${view.entropy.toFixed(2)}`,
+    view.fov_deg !== null && `${view.fov_deg.toFixed(0)}°`,
+    view.seen?.unlabelled && view.seen.unlabelled >= 0.005
+      ? `${percent(view.seen.unlabelled)} unlabelled`
+      : null,
+  ].filter(Boolean);
+  const body = [
+    view.picture === null ? h("span", { class: "no-thumb" }, placeholder(view)) : image,
+    strip,
+    h("span", { class: "card-name" }, view.photograph ?? roomName(view.room)),
+    h("span", { class: "quiet" }, numbers.join(" · ")),
+  ];
+  const label = `${name}. ${reasonOf(view)}`;
+  const inner =
+    to === null ? h("div", {}, ...body) : h("a", { href: to, "aria-label": label, title: label }, ...body);
+  return h("div", { class: "card", role: "listitem" }, inner);
+}

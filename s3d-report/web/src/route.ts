@@ -1,0 +1,54 @@
+// The part of the address behind `#`: a page, what it shows, and how.
+
+export interface Route {
+  page: string;
+  path: string[];
+  query: URLSearchParams;
+}
+
+export function parseRoute(hash: string): Route {
+  const text = hash.replace(/^#\/?/, "");
+  const at = text.indexOf("?");
+  const path = (at < 0 ? text : text.slice(0, at)).split("/").map(decode);
+  return {
+    page: path[0] ?? "",
+    path: path.slice(1),
+    query: new URLSearchParams(at < 0 ? "" : text.slice(at + 1)),
+  };
+}
+
+function decode(part: string): string {
+  try {
+    return decodeURIComponent(part);
+  } catch {
+    return part;
+  }
+}
+
+export function link(
+  page: string,
+  path: (string | number)[] = [],
+  query: Record<string, string> = {},
+): string {
+  const parts = [page, ...path.map((part) => encodeURIComponent(part))].join("/");
+  const words = new URLSearchParams(query).toString();
+  return `#/${parts}${words === "" ? "" : `?${words}`}`;
+}
+
+/** Changes the address without a step back to the former one, and without a call of the page. */
+export function replaceRoute(page: string, path: (string | number)[], query: Record<string, string>): void {
+  history.replaceState(null, "", link(page, path, query));
+}
+
+/** A number of the address within bounds; else the one given. */
+export function numberOf(
+  query: URLSearchParams,
+  name: string,
+  min: number,
+  max: number,
+  otherwise: number,
+): number {
+  const text = query.get(name);
+  const value = text === null || text.trim() === "" ? Number.NaN : Number(text);
+  return Number.isFinite(value) ? Math.min(max, Math.max(min, value)) : otherwise;
+}
