@@ -81,7 +81,9 @@ pub use shard::assignment::Shard;
 pub use shard::make_plan::plan;
 pub use shard::merge::merge;
 pub use store::new_folder::{FolderKind, NewFolder, beside};
-pub use tables::statistics::{AreaStatistics, RoomTypeStatistics, Statistics, statistics};
+pub use tables::statistics::{
+    AreaStatistics, LabelStatistics, LabelTally, RoomTypeStatistics, Statistics, statistics,
+};
 pub use tables::summary::{ImageTally, Summary, Surface, UnitTally, Unlabelled, ViewTally};
 pub use useful::{Condition, Estimate, Storey};
 pub use verify::{FaultGroup, VerifyOptions, VerifyReport, verify};
