@@ -25,6 +25,12 @@ interface Box {
   h: number;
 }
 
+/** Other places of a room's name, in hundredths of the plan's size. */
+const BESIDE: [number, number][] = [
+  [13, -0.5],
+  [-13, -0.5],
+];
+
 function boxOf(points: number[][]): Box {
   let [x0, y0, x1, y1] = [Infinity, Infinity, -Infinity, -Infinity];
   for (const [x = 0, y = 0] of points) {
@@ -129,17 +135,21 @@ export function plan(index: Index, area: number, options: PlanOptions = {}): Pla
       const largest = [...room.outline].sort((a, b) => sizeOf(b) - sizeOf(a))[0];
       if (!largest) continue;
       const [x, y] = at(...middleOf(largest));
-      // Above or below the middle if somebody stands there.
-      const taken = (shift: number): boolean =>
+      // Beside the middle, or above or below it, if somebody stands there.
+      const taken = ([right, down]: [number, number]): boolean =>
         stands.some(([location]) => {
           const [sx, sy] = at(location.position?.[0] ?? 0, location.position?.[1] ?? 0);
-          return Math.abs(sx - x) < 9 * unit && Math.abs(sy - y - (shift + 0.5) * unit) < 3.2 * unit;
+          const [dx, dy] = [sx - x - right * unit, sy - y - (down + 0.5) * unit];
+          return Math.abs(dx) < 9 * unit && Math.abs(dy) < 3.2 * unit;
         });
-      const shift = [-0.5, -5, 4].find((free) => !taken(free)) ?? -0.5;
-      const text = s("text", { class: "name", x, y: y + shift * unit, "font-size": 2 * unit });
+      const wide = boxOf(largest).w > 50 * unit;
+      const places: [number, number][] = [[0, -0.5], ...(wide ? BESIDE : []), [0, -5], [0, 4], [0, -0.5]];
+      const [right, down] = places.find((place) => !taken(place)) ?? [0, -0.5];
+      const [tx, ty] = [x + right * unit, y + down * unit];
+      const text = s("text", { class: "name", x: tx, y: ty, "font-size": 2 * unit });
       text.append(
         roomName(room.name),
-        s("tspan", { class: "size", x, dy: 2.2 * unit }, metres2(room.floor_m2)),
+        s("tspan", { class: "size", x: tx, dy: 2.2 * unit }, metres2(room.floor_m2)),
       );
       element.append(text);
     }
