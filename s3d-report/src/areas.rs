@@ -1,7 +1,7 @@
 //! What the tables of a data set tell: labels, classes, rooms, votes, statistics.
 
 use crate::faults::Faults;
-use crate::index::{AreaVotes, ClassHead, LabelHead, RoomHead, rounded};
+use crate::index::{AreaVotes, ClassEntry, LabelEntry, RoomEntry, rounded};
 use s3d_dataset::{DataSet, Result};
 use s3d_io::Error as FileError;
 use s3d_label::{LabelId, LabelTable, pretty_color};
@@ -36,7 +36,7 @@ fn json<T: DeserializeOwned>(data: &DataSet, path: &Path, faults: &mut Faults) -
     faults.keep(data.layout().root(), read)
 }
 
-pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomHead>> {
+pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomEntry>> {
     let mut rooms = Vec::new();
     for &area in data.areas() {
         let path = data.layout().rooms_json(area);
@@ -44,7 +44,7 @@ pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomHead>
         rooms.extend(found.into_iter().map(|Room { room: name, floor_m2, outline }| {
             let rings = outline.into_iter().flat_map(|p| std::iter::once(p.outer).chain(p.holes));
             let millimetres = |ring: Vec<[f64; 2]>| ring.iter().map(|p| p.map(|c| rounded(c, 3))).collect();
-            RoomHead { area, name, floor_m2, outline: rings.map(millimetres).collect() }
+            RoomEntry { area, name, floor_m2, outline: rings.map(millimetres).collect() }
         }));
     }
     Ok(rooms)
@@ -77,18 +77,18 @@ pub(crate) fn areas(data: &DataSet) -> Result<Vec<Value>> {
     data.area_entries().map(entry).collect()
 }
 
-pub(crate) fn classes(data: &DataSet) -> Vec<ClassHead> {
+pub(crate) fn classes(data: &DataSet) -> Vec<ClassEntry> {
     let of = |t: &s3d_label::Taxonomy| {
-        t.classes().iter().map(|c| ClassHead { name: c.name(), color: t.color(*c) }).collect()
+        t.classes().iter().map(|c| ClassEntry { name: c.name(), color: t.color(*c) }).collect()
     };
     data.taxonomy().map(of).unwrap_or_default()
 }
 
-pub(crate) fn labels(table: &LabelTable) -> Vec<LabelHead> {
+pub(crate) fn labels(table: &LabelTable) -> Vec<LabelEntry> {
     let names = table.names().into_iter().enumerate();
     let label = |(i, name)| {
         let index = u32::try_from(i).unwrap_or(u32::MAX);
-        LabelHead {
+        LabelEntry {
             name,
             class: table.class_of(LabelId(index)).map(|c| c.index()),
             color: pretty_color(index),

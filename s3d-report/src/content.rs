@@ -2,8 +2,8 @@
 
 use crate::areas;
 use crate::faults::Faults;
-use crate::index::{DataSetHead, FORM, Index, LocationHead, ViewHead, degrees, rounded};
-use crate::pixels::{Picture, Seen, Widths, nothing_left, show};
+use crate::index::{DataSetEntry, FORM, Index, LocationEntry, ViewEntry, degrees, rounded};
+use crate::pixels::{Picture, Shares, Widths, nothing_left, show};
 use crate::script::write_script;
 use crate::selection::{Place, places};
 use crate::write::ReportOptions;
@@ -44,17 +44,17 @@ struct Located {
 }
 
 /// What became of an image.
-pub(crate) struct Made {
+pub(crate) struct ReadImage {
     located: Option<Located>,
-    pub(crate) seen: Option<Seen>,
+    pub(crate) seen: Option<Shares>,
 }
 
 /// What became of all images.
-pub(crate) struct MadeAll {
+pub(crate) struct ReadImages {
     pub(crate) bytes: u64,
     /// By place in `Content::panoramas` and `Content::views`.
-    pub(crate) panoramas: Vec<Made>,
-    pub(crate) views: Vec<Made>,
+    pub(crate) panoramas: Vec<ReadImage>,
+    pub(crate) views: Vec<ReadImage>,
 }
 
 /// A pinhole camera, for the page to compute rays by.
@@ -133,7 +133,7 @@ impl<'a> Content<'a> {
         options: &ReportOptions,
         folder: &Path,
         faults: &mut Faults,
-    ) -> Result<MadeAll> {
+    ) -> Result<ReadImages> {
         let mut jobs: Vec<Job<'_>> =
             self.panoramas.iter().map(|(i, image)| Job::Panorama(*i, image)).collect();
         let chunks = self.views.chunks(THUMBS_PER_FILE).enumerate();
@@ -181,7 +181,7 @@ impl<'a> Content<'a> {
             },
         )?;
         drop(progress);
-        let mut all = MadeAll { bytes: 0, panoramas: Vec::new(), views: Vec::new() };
+        let mut all = ReadImages { bytes: 0, panoramas: Vec::new(), views: Vec::new() };
         for (job, (made, bytes, found)) in jobs.iter().zip(results) {
             all.bytes += bytes;
             faults.extend(found);
@@ -199,7 +199,7 @@ impl<'a> Content<'a> {
         image: &DatasetImage,
         widths: Widths,
         faults: &mut Faults,
-    ) -> Result<(Made, Option<ViewPicture>, Option<String>)> {
+    ) -> Result<(ReadImage, Option<ViewPicture>, Option<String>)> {
         let root = self.data.layout().root();
         let shown = show(self.data, image, self.table.as_ref(), widths, faults)?;
         if shown.is_none() {
@@ -236,10 +236,10 @@ impl<'a> Content<'a> {
             picture = Some(ViewPicture { picture: shown.picture, camera: pinhole });
             (thumb, seen) = (shown.thumb, Some(shown.seen));
         }
-        Ok((Made { located, seen }, picture, thumb))
+        Ok((ReadImage { located, seen }, picture, thumb))
     }
 
-    pub(crate) fn index(&self, out: &Path, made: &MadeAll, mut faults: Faults) -> Result<Index> {
+    pub(crate) fn index(&self, out: &Path, made: &ReadImages, mut faults: Faults) -> Result<Index> {
         let data = self.data;
         let classes = areas::classes(data);
         let mut pixels_by_class = vec![0; classes.len()];
@@ -256,7 +256,7 @@ impl<'a> Content<'a> {
         let manifest = data.layout().manifest();
         let options = serde_json::to_value(data.options());
         let canonical = std::fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-        let head = DataSetHead {
+        let data_set = DataSetEntry {
             name: canonical.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             version: data.version().to_owned(),
             seed: data.seed(),
@@ -267,13 +267,13 @@ impl<'a> Content<'a> {
             options: options.map_err(|e| FileError::format(&manifest, e.to_string()))?,
         };
         let locations = self.locations(made);
-        let views = self.view_heads(made);
+        let views = self.view_entries(made);
         let labels = self.table.as_ref().map(areas::labels).unwrap_or_default();
         let (rooms, votes) = (areas::rooms(data, &mut faults)?, areas::votes(data, &mut faults)?);
         let statistics = areas::statistics(data, &mut faults)?;
         Ok(Index {
             form: FORM,
-            data_set: head,
+            data_set,
             areas: areas::areas(data)?,
             classes,
             labels,
@@ -290,37 +290,34 @@ impl<'a> Content<'a> {
         })
     }
 
-    fn locations(&self, made: &MadeAll) -> Vec<LocationHead> {
-        let head = |(area, uuid, room): &(u32, String, Option<String>)| LocationHead {
+    fn locations(&self, made: &ReadImages) -> Vec<LocationEntry> {
+        let entry = |(area, uuid, room): &(u32, String, Option<String>)| LocationEntry {
             area: *area,
             uuid: uuid.clone(),
             room: room.clone().unwrap_or_default(),
-            position: None,
-            azimuth_rad: None,
-            pano: false,
-            seen: None,
+            ..LocationEntry::default()
         };
-        let mut heads: Vec<LocationHead> = self.locations.iter().map(head).collect();
+        let mut entries: Vec<LocationEntry> = self.locations.iter().map(entry).collect();
         // A location without a panorama stands where its views do.
         for (image, made) in self.views.iter().zip(&made.views) {
-            let head = self.location_of(image.area, &image.uuid).and_then(|i| heads.get_mut(i));
-            if let (Some(head), Some(located)) = (head, &made.located) {
-                (head.position, head.azimuth_rad) = (Some(located.original.0), Some(located.original.1));
+            let entry = self.location_of(image.area, &image.uuid).and_then(|i| entries.get_mut(i));
+            if let (Some(entry), Some(located)) = (entry, &made.located) {
+                (entry.position, entry.azimuth_rad) = (Some(located.original.0), Some(located.original.1));
             }
         }
         for ((i, _), made) in self.panoramas.iter().zip(&made.panoramas) {
-            let Some(head) = heads.get_mut(*i) else { continue };
+            let Some(entry) = entries.get_mut(*i) else { continue };
             if let Some(located) = &made.located {
-                (head.position, head.azimuth_rad) = (Some(located.position), Some(located.azimuth_rad));
+                (entry.position, entry.azimuth_rad) = (Some(located.position), Some(located.azimuth_rad));
             }
-            head.pano = made.seen.is_some();
-            head.seen.clone_from(&made.seen);
+            entry.pano = made.seen.is_some();
+            entry.seen.clone_from(&made.seen);
         }
-        heads
+        entries
     }
 
     /// Kept views and photographs in the order of their files, then the candidates that were dropped.
-    fn view_heads(&self, made: &MadeAll) -> Vec<ViewHead> {
+    fn view_entries(&self, made: &ReadImages) -> Vec<ViewEntry> {
         let options = self.data.options();
         let listed: Vec<(u32, &ViewRecord)> =
             self.candidates.iter().map(|(area, view)| (*area, view)).collect();
@@ -333,64 +330,47 @@ impl<'a> Content<'a> {
                 None => dropped.push((area, view, place)),
             }
         }
-        let of_record = |head: ViewHead, view: &ViewRecord, place: Place| ViewHead {
+        let of_record = |entry: ViewEntry, view: &ViewRecord, place: Place| ViewEntry {
             candidate: Some(view.candidate),
             yaw_deg: Some(degrees(view.yaw_rad)),
             pitch_deg: Some(degrees(view.pitch_rad)),
             fov_deg: Some(degrees(view.fov_rad)),
             entropy: Some(rounded(view.entropy, 4)),
             place: Some(place),
-            ..head
+            ..entry
         };
-        let mut heads = Vec::with_capacity(self.views.len() + dropped.len());
+        let mut entries = Vec::with_capacity(self.views.len() + dropped.len());
         for (i, (image, made)) in self.views.iter().zip(&made.views).enumerate() {
             let photograph = self.photographs.get(&(image.area, image.uuid.clone()));
             let Frame::View(frame) = image.frame else { continue };
             let angles = made.located.as_ref().map(|located| located.angles_deg);
             let is_photograph = photograph.is_some();
-            let head = ViewHead {
+            let entry = ViewEntry {
                 area: image.area,
                 location: self.location_of(image.area, &image.uuid),
                 room: image.room.clone(),
                 photograph: photograph.map(|p| p.name.clone()),
                 frame: Some(frame),
-                candidate: None,
                 picture: Some(i).filter(|_| made.seen.is_some()),
                 yaw_deg: angles.filter(|_| !is_photograph).map(|[yaw, ..]| yaw),
                 pitch_deg: angles.filter(|_| !is_photograph).map(|[_, pitch, _]| pitch),
                 fov_deg: angles.map(|[.., fov]| fov),
-                entropy: None,
-                place: None,
                 position: made.located.as_ref().filter(|_| is_photograph).map(|located| located.position),
                 seen: made.seen.clone(),
+                ..ViewEntry::default()
             };
             let record = kept.get(&(image.area, image.uuid.as_str(), frame)).filter(|_| !is_photograph);
-            heads.push(match record {
-                Some((view, place)) => of_record(head, view, *place),
-                None => head,
+            entries.push(match record {
+                Some((view, place)) => of_record(entry, view, *place),
+                None => entry,
             });
         }
         for (area, view, place) in dropped {
             let location = self.location_of(area, &view.camera_uuid);
             let room = location.and_then(|i| self.locations.get(i)).and_then(|(.., room)| room.clone());
-            let head = ViewHead {
-                area,
-                location,
-                room: room.unwrap_or_default(),
-                photograph: None,
-                frame: None,
-                candidate: None,
-                picture: None,
-                yaw_deg: None,
-                pitch_deg: None,
-                fov_deg: None,
-                entropy: None,
-                place: None,
-                position: None,
-                seen: None,
-            };
-            heads.push(of_record(head, view, place));
+            let entry = ViewEntry { area, location, room: room.unwrap_or_default(), ..ViewEntry::default() };
+            entries.push(of_record(entry, view, place));
         }
-        heads
+        entries
     }
 }

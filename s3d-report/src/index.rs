@@ -1,7 +1,7 @@
 //! The index of a report: all but the images. `docs/report.md` describes it, and `web/src/data.ts` reads it.
 
 use crate::faults::Fault;
-use crate::pixels::Seen;
+use crate::pixels::Shares;
 use crate::selection::Place;
 use serde::Serialize;
 use serde_json::Value;
@@ -13,14 +13,14 @@ pub(crate) const FORM: u32 = 1;
 #[derive(Serialize)]
 pub(crate) struct Index {
     pub(crate) form: u32,
-    pub(crate) data_set: DataSetHead,
+    pub(crate) data_set: DataSetEntry,
     pub(crate) areas: Vec<Value>,
-    pub(crate) classes: Vec<ClassHead>,
+    pub(crate) classes: Vec<ClassEntry>,
     /// By index, the null label first.
-    pub(crate) labels: Vec<LabelHead>,
-    pub(crate) rooms: Vec<RoomHead>,
-    pub(crate) locations: Vec<LocationHead>,
-    pub(crate) views: Vec<ViewHead>,
+    pub(crate) labels: Vec<LabelEntry>,
+    pub(crate) rooms: Vec<RoomEntry>,
+    pub(crate) locations: Vec<LocationEntry>,
+    pub(crate) views: Vec<ViewEntry>,
     /// How many pictures a file `data/views_N.js` has, and a file `data/thumbs_N.js`.
     pub(crate) views_per_file: usize,
     pub(crate) thumbs_per_file: usize,
@@ -35,7 +35,7 @@ pub(crate) struct Index {
 }
 
 #[derive(Serialize)]
-pub(crate) struct DataSetHead {
+pub(crate) struct DataSetEntry {
     /// That of its folder.
     pub(crate) name: String,
     pub(crate) version: String,
@@ -49,13 +49,13 @@ pub(crate) struct DataSetHead {
 }
 
 #[derive(Serialize)]
-pub(crate) struct ClassHead {
+pub(crate) struct ClassEntry {
     pub(crate) name: &'static str,
     pub(crate) color: [u8; 3],
 }
 
 #[derive(Serialize)]
-pub(crate) struct LabelHead {
+pub(crate) struct LabelEntry {
     pub(crate) name: String,
     /// A place in `classes`; nothing for the null label.
     pub(crate) class: Option<usize>,
@@ -64,7 +64,7 @@ pub(crate) struct LabelHead {
 }
 
 #[derive(Serialize)]
-pub(crate) struct RoomHead {
+pub(crate) struct RoomEntry {
     pub(crate) area: u32,
     pub(crate) name: String,
     pub(crate) floor_m2: f64,
@@ -73,8 +73,8 @@ pub(crate) struct RoomHead {
     pub(crate) outline: Vec<Vec<[f64; 2]>>,
 }
 
-#[derive(Serialize)]
-pub(crate) struct LocationHead {
+#[derive(Default, Serialize)]
+pub(crate) struct LocationEntry {
     pub(crate) area: u32,
     pub(crate) uuid: String,
     pub(crate) room: String,
@@ -84,11 +84,11 @@ pub(crate) struct LocationHead {
     pub(crate) azimuth_rad: Option<f64>,
     /// Whether there is a file `data/pano_N.js`, N being the location's place in the list.
     pub(crate) pano: bool,
-    pub(crate) seen: Option<Seen>,
+    pub(crate) seen: Option<Shares>,
 }
 
-#[derive(Serialize)]
-pub(crate) struct ViewHead {
+#[derive(Default, Serialize)]
+pub(crate) struct ViewEntry {
     pub(crate) area: u32,
     /// A place in `locations`; nothing for photographs.
     pub(crate) location: Option<usize>,
@@ -110,7 +110,7 @@ pub(crate) struct ViewHead {
     pub(crate) place: Option<Place>,
     /// Where its camera stands; only for photographs, since others stand at their location.
     pub(crate) position: Option<[f64; 3]>,
-    pub(crate) seen: Option<Seen>,
+    pub(crate) seen: Option<Shares>,
 }
 
 #[derive(Serialize)]

@@ -14,6 +14,7 @@ use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
 use s3d_io::image::{Compression, Content, decode_gray16, decode_rgb8, encode_rgb8};
 use s3d_label::{LabelId, LabelTable};
+use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,11 +22,8 @@ use std::path::Path;
 /// Of JPEG files, 1 to 100.
 const QUALITY: u8 = 85;
 
-/// What is no pixel of a surface, by modality.
-const NO_COLOR: [u8; 3] = [0; 3];
-const NO_NORMAL: [u8; 3] = [128; 3];
-const NO_LABEL: [u8; 3] = [13; 3];
-const NO_DEPTH: u16 = u16::MAX;
+/// The colour of a pixel that sees nothing; in a photograph also of one beside it.
+const MISSING_COLOR: [u8; 3] = [0; 3];
 
 /// The images of a picture as `data:` URLs.
 #[derive(Serialize)]
@@ -42,7 +40,7 @@ pub(crate) struct Picture {
 
 /// What the pixels of an image show, as shares of all of them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Seen {
+pub(crate) struct Shares {
     /// Those that see the mesh.
     pub(crate) coverage: Option<f64>,
     pub(crate) unlabelled: Option<f64>,
@@ -70,7 +68,7 @@ pub(crate) struct Widths {
 pub(crate) struct Shown {
     pub(crate) picture: Picture,
     pub(crate) thumb: Option<String>,
-    pub(crate) seen: Seen,
+    pub(crate) seen: Shares,
 }
 
 /// The decoded images, those that are there and whole.
@@ -113,14 +111,14 @@ pub(crate) fn show(
     };
     let rgb = images.rgb.as_ref();
     let thumb = match (rgb, widths.thumb) {
-        (Some(rgb), Some(width)) => Some(jpeg(rgb, reduced_size(images.size, width), NO_COLOR)?),
+        (Some(rgb), Some(width)) => Some(jpeg(rgb, reduced_size(images.size, width), MISSING_COLOR)?),
         _ => None,
     };
     let picture = Picture {
         of: images.size,
         size,
-        rgb: rgb.map(|rgb| jpeg(rgb, rgb_size, NO_COLOR)).transpose()?,
-        normal: images.normal.as_ref().map(|normal| jpeg(normal, size, NO_NORMAL)).transpose()?,
+        rgb: rgb.map(|rgb| jpeg(rgb, rgb_size, MISSING_COLOR)).transpose()?,
+        normal: images.normal.as_ref().map(|normal| jpeg(normal, size, MISSING_NORMAL)).transpose()?,
         depth: images.depth.as_ref().map(|depth| {
             let packed = nearest(depth, size).map(|v| pack(u32::from(v)));
             png(&packed, Content::Photo)
@@ -177,7 +175,7 @@ fn count(label: &Raster<[u8; 3]>, table: &LabelTable, path: &Path) -> Result<Cou
     let mut missing = 0;
     for run in label.pixels().chunk_by(|a, b| a == b) {
         match run.first() {
-            Some(&[r, g, b]) if [r, g, b] != NO_LABEL => {
+            Some(&[r, g, b]) if [r, g, b] != MISSING_INDEX => {
                 *by_label.entry(u32::from_be_bytes([0, r, g, b])).or_default() += run.len() as u64;
             }
             _ => missing += run.len() as u64,
@@ -201,18 +199,20 @@ fn count(label: &Raster<[u8; 3]>, table: &LabelTable, path: &Path) -> Result<Cou
 }
 
 impl Decoded {
-    fn seen(&self, counted: Option<Counted>) -> Seen {
+    fn seen(&self, counted: Option<Counted>) -> Shares {
         let pixels = (u64::from(self.size[0]) * u64::from(self.size[1])) as f64;
         let share = |count: u64| rounded(count as f64 / pixels, 4);
         // Depth misses what is beyond its range; labels do not.
         let missing = match (&counted, &self.depth, &self.rgb) {
             (Some(counted), ..) => Some(counted.missing),
-            (_, Some(depth), _) => Some(depth.pixels().iter().filter(|v| **v == NO_DEPTH).count() as u64),
-            (.., Some(rgb)) => Some(rgb.pixels().iter().filter(|v| **v == NO_COLOR).count() as u64),
+            (_, Some(depth), _) => {
+                Some(depth.pixels().iter().filter(|v| **v == MISSING_DEPTH).count() as u64)
+            }
+            (.., Some(rgb)) => Some(rgb.pixels().iter().filter(|v| **v == MISSING_COLOR).count() as u64),
             _ => None,
         };
         let classes = counted.iter().flat_map(|c| &c.by_class).map(|(class, n)| (*class, share(*n)));
-        Seen {
+        Shares {
             coverage: missing.map(|missing| rounded(1.0 - missing as f64 / pixels, 4)),
             unlabelled: counted.as_ref().map(|c| share(c.unlabelled)),
             instances: counted.as_ref().map(|c| c.instances),
@@ -257,7 +257,7 @@ mod tests {
         let names = ["<UNK>_0_<UNK>_0_0", "chair_1_office_1_1", "chair_2_office_1_1", "wall_1_office_1_1"];
         let table = LabelTable::from_names(&names.map(String::from)).unwrap();
         let [n, a, b, w] = [[0; 3], [0, 0, 1], [0, 0, 2], [0, 0, 3]];
-        let label = Raster::from_vec(4, 2, vec![NO_LABEL, n, a, a, b, w, w, a]);
+        let label = Raster::from_vec(4, 2, vec![MISSING_INDEX, n, a, a, b, w, w, a]);
         let counted = count(&label, &table, Path::new("a.png")).unwrap();
         let images = Decoded { size: [4, 2], rgb: None, normal: None, label: None, depth: None };
         let seen = images.seen(Some(counted));

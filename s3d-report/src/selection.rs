@@ -52,9 +52,7 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
         members.sort_by_cached_key(name);
         members.sort_by(|a, b| b.2.entropy.total_cmp(&a.2.entropy));
         let n = members.len();
-        let dropped = selection.discarded(n);
-        // The rule of `select`: a share of the pool, rounded to the nearest.
-        let certain = ((selection.keep * n as f64 + 0.5 + 1e-9).floor() as usize).min(n - dropped);
+        let (certain, dropped) = (selection.certain(n), selection.discarded(n));
         for (at, (i, _, view)) in members.into_iter().enumerate() {
             let reason = match view.frame_num.is_some() {
                 true if keep_all => Reason::All,

@@ -73,7 +73,7 @@ struct About {
 pub fn report(out: &Path, to: &Path, options: &ReportOptions, ctx: &Context) -> Result<Report> {
     if !(16..=16_384).contains(&options.pano_width) || !(16..=2048).contains(&options.thumbs) {
         return Err(Error::Usage(format!(
-            "--pano-width {} --thumbs {}: panoramas are 16 to 16384 pixels wide, views 16 to 2048",
+            "panoramas of {} and views of {} pixels across: 16 to 16384 and 16 to 2048 are possible",
             options.pano_width, options.thumbs
         )));
     }
@@ -87,7 +87,7 @@ pub fn report(out: &Path, to: &Path, options: &ReportOptions, ctx: &Context) -> 
     }
     let content = Content::read(&data, &mut faults)?;
     let made = content.write_pictures(ctx, options, folder.path(), &mut faults)?;
-    let shown = |made: &[crate::content::Made]| made.iter().filter(|made| made.seen.is_some()).count();
+    let shown = |made: &[crate::content::ReadImage]| made.iter().filter(|made| made.seen.is_some()).count();
     let (panoramas, views) = (shown(&made.panoramas), shown(&made.views));
     let index = content.index(out, &made, faults)?;
     let mut bytes = made.bytes + write_script(folder.path(), "index", &index)?;
@@ -116,7 +116,7 @@ mod tests {
         for (pano_width, thumbs) in [(15, 256), (2048, 8), (20_000, 256), (2048, 4096)] {
             let options = ReportOptions { pano_width, thumbs, overwrite: false };
             let e = report("none".as_ref(), "to".as_ref(), &options, &Context::default()).unwrap_err();
-            assert!(matches!(e, Error::Usage(_)) && e.to_string().contains("--thumbs"), "{e}");
+            assert!(matches!(e, Error::Usage(_)) && e.to_string().contains("16 to 2048"), "{e}");
         }
     }
 }

@@ -10,7 +10,7 @@ use thiserror::Error;
 ///
 /// let paper = Selection::default();
 /// assert!((paper.share() - 0.725).abs() < 1e-12);
-/// assert_eq!(paper.discarded(20), 3);
+/// assert_eq!((paper.discarded(20), paper.certain(20)), (3, 12));
 /// assert!(Selection { discard: 0.6, ..paper }.check().is_err());
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,8 @@ impl Default for Selection {
 /// Shares that no [`Selection`] can have.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error(
-    "shares {discard} to discard, {keep} to keep and {half_of_rest} of the rest: each is 0 to 1, the first two at most 1 together"
+    "shares {discard} to discard, {keep} to keep and {half_of_rest} of the rest: each is 0 to 1, the first \
+     two at most 1 together"
 )]
 pub struct SelectionError {
     /// `discard`.
@@ -74,6 +75,12 @@ impl Selection {
     /// rest.
     pub fn discarded(&self, n: usize) -> usize {
         self.counts(n).discard
+    }
+
+    /// How many of a pool of `n` views stay for the highest scores; the others that stay are drawn from the
+    /// rest.
+    pub fn certain(&self, n: usize) -> usize {
+        self.counts(n).keep
     }
 
     fn counts(&self, n: usize) -> Counts {

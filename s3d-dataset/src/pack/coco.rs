@@ -78,7 +78,8 @@ pub(super) fn pack(
     write_coco_instances(&destination.path().join(INSTANCES), ABOUT, &images, &categories)?;
     Ok(vec![
         format!(
-            "images are below the data set's folder, and their panoptic images, of the same names, below {FOLDER}"
+            "images are below the data set's folder, and their panoptic images, of the same names, below \
+             {FOLDER}"
         ),
         "a segment's id is its label's index, or 16711680 + category of a class that is stuff; 0 is void"
             .into(),

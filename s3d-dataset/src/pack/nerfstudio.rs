@@ -4,7 +4,7 @@
 use super::area_points;
 use super::destination::{Destination, relative_path};
 use super::options::{DepthFiles, SpecificOptions};
-use super::source::{DEPTH_MISSING, Source};
+use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::work::map_in_order;
@@ -16,6 +16,7 @@ use s3d_io::dataset::{DatasetImage, Domain, Frame};
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::{encode_gray8, encode_gray16};
 use s3d_io::package::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
+use s3d_render::MISSING_DEPTH;
 use std::path::{Path, PathBuf};
 
 const PLY: &str = "points.ply";
@@ -92,7 +93,7 @@ pub(super) fn pack(
         DepthFiles::Original => notes.push(format!(
             "depth needs --depth-unit-scale-factor {}; missing pixels seem to be {:.0} m away",
             1.0 / source.depth_units_per_m,
-            f64::from(DEPTH_MISSING) / source.depth_units_per_m
+            f64::from(MISSING_DEPTH) / source.depth_units_per_m
         )),
         DepthFiles::None => {}
     }
@@ -196,7 +197,7 @@ impl<'a> Job<'a> {
 fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
     let convert = |v: &u16| {
         let mm = (f64::from(*v) * (1000.0 / units_per_m)).round();
-        if *v == DEPTH_MISSING || mm > f64::from(u16::MAX) { 0 } else { mm as u16 }
+        if *v == MISSING_DEPTH || mm > f64::from(u16::MAX) { 0 } else { mm as u16 }
     };
     Raster::from_vec(depth.width(), depth.height(), depth.pixels().iter().map(convert).collect())
 }

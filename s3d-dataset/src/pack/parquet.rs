@@ -1,6 +1,6 @@
 //! `s3d pack --to parquet`: a table of all images, with what their pixels show.
 
-use super::source::{DEPTH_MISSING, Source};
+use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::work::map_in_order;
@@ -9,6 +9,7 @@ use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, ViewRecord};
 use s3d_io::package::{ImageRow, SemanticRow, write_image_index};
 use s3d_label::{LabelId, LabelTable, UNKNOWN_ROOM};
+use s3d_render::MISSING_DEPTH;
 use s3d_sample::entropy;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -129,7 +130,7 @@ fn share<T: Copy>(image: &Raster<T>, is: impl Fn(&T) -> bool) -> f64 {
 /// The share of pixels with a depth, and the least, mean and greatest of them in metres.
 fn depth_row(depth: &Raster<u16>, units_per_m: f64) -> (f64, Option<[f64; 3]>) {
     let (mut min, mut max, mut sum, mut count) = (u16::MAX, 0, 0u64, 0u64);
-    for &v in depth.pixels().iter().filter(|v| **v != DEPTH_MISSING) {
+    for &v in depth.pixels().iter().filter(|v| **v != MISSING_DEPTH) {
         (min, max) = (min.min(v), max.max(v));
         sum += u64::from(v);
         count += 1;
@@ -207,8 +208,8 @@ mod tests {
 
     #[test]
     fn depths_are_in_metres() {
-        let depth = Raster::from_vec(2, 2, vec![512, DEPTH_MISSING, 1024, 0]);
+        let depth = Raster::from_vec(2, 2, vec![512, MISSING_DEPTH, 1024, 0]);
         assert_eq!(depth_row(&depth, 512.0), (0.75, Some([0.0, 1.0, 2.0])));
-        assert_eq!(depth_row(&Raster::filled(2, 2, DEPTH_MISSING), 1000.0), (0.0, None));
+        assert_eq!(depth_row(&Raster::filled(2, 2, MISSING_DEPTH), 1000.0), (0.0, None));
     }
 }

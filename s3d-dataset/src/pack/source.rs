@@ -16,9 +16,6 @@ use s3d_label::{LabelTable, Taxonomy};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// The depth of a pixel that shows nothing, or something farther than can be said.
-pub(crate) const DEPTH_MISSING: u16 = u16::MAX;
-
 /// A data set, or some of it. All that is read of it is held against its list of files.
 pub(crate) struct Source {
     pub(crate) layout: Layout,

@@ -93,16 +93,17 @@ pub(super) fn pack(
     write_shard_index(&destination.path().join("shards.json"), "s3d", &entries)?;
     let mut notes: Vec<String> = names.iter().map(|n| format!("webdataset.WebDataset(\"{n}\")")).collect();
     notes.push(
-        "a sample's key is area_N/camera_UUID_ROOM_frame_J, its fields are rgb.png, depth.png, normals.png, … pose.json; \
-         the number of samples of each shard is in shards.json"
+        "a sample's key is area_N/camera_UUID_ROOM_frame_J, its fields are rgb.png, depth.png, normals.png, \
+         … pose.json; the number of samples of each shard is in shards.json"
             .into(),
     );
     notes.push(format!(
-        "{META} in each shard holds what its numbers mean: conventions, the label table if there are labels, and the taxonomy if it is not S3DIS's"
+        "{META} in each shard holds what its numbers mean: conventions, the label table if there are labels, \
+         and the taxonomy if it is not S3DIS's"
     ));
     notes.push(
-        "decode(\"pil\") makes 8-bit RGB of every image: give depth.png (16 bits) and global_xyz.exr decoders of their own, \
-         before it, with webdataset.autodecode.handle_extension"
+        "decode(\"pil\") makes 8-bit RGB of every image: give depth.png (16 bits) and global_xyz.exr \
+         decoders of their own, before it, with webdataset.autodecode.handle_extension"
             .into(),
     );
     Ok(notes)
