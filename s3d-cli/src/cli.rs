@@ -66,7 +66,8 @@ pub(crate) enum Command {
             "  s3d export scan.glb -o dataset\n",
             "  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n",
             "  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\n",
-            "An export that was stopped or killed goes on where it was when it is called again with the same arguments.",
+            "An export that was stopped or killed goes on where it was when it is called again with the same \
+             arguments.",
         )
     )]
     Export(export::ExportArgs),
@@ -76,7 +77,8 @@ pub(crate) enum Command {
             "Examples:\n",
             "  s3d plan scan/scene.toml -o plan\n",
             "  s3d export scan/scene.toml -o dataset --plan plan --shard 1/4\n",
-            "The options are those of the export that labels and scores depend on. docs/cluster has files for Slurm and others.",
+            "The options are those of the export that labels and scores depend on. docs/cluster has files \
+             for Slurm and others.",
         )
     )]
     Plan(plan::PlanArgs),
@@ -125,7 +127,8 @@ pub(crate) enum Command {
         after_help = concat!(
             "Example:\n",
             "  s3d xyz dataset --type float --overwrite\n",
-            "Depth is stored in steps of 2 mm (or 1 mm), so what comes out is off by half of that along the ray; a pixel\n",
+            "Depth is stored in steps of 2 mm (or 1 mm), so what comes out is off by half of that along the \
+             ray; a pixel\n",
             "beyond the depth's range is missing. What `s3d export` writes comes from the hits themselves.",
         )
     )]
@@ -158,7 +161,8 @@ pub(crate) enum Command {
             "Examples:\n",
             "  s3d verify dataset\n",
             "  s3d verify dataset --full\n",
-            "Each fault is a line on standard output; the last line counts. Exit code 0 without faults, 1 with some.",
+            "Each fault is a line on standard output; the last line counts. Exit code 0 without faults, 1 \
+             with some.",
         )
     )]
     Verify(verify::VerifyArgs),

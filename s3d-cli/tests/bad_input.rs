@@ -360,8 +360,10 @@ fn counts_that_a_header_claims_are_not_believed() {
     scan.write(
         "m.gltf",
         format!(
-            "{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{{\"mesh\":0}}],\"meshes\":[{{\"primitives\":[{{\"attributes\":\
-             {{\"POSITION\":0}},\"indices\":0}}]}}],\"accessors\":[{accessor}],\"buffers\":[{{\"byteLength\":9000000000}}]}}"
+            "{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{{\"mesh\":0}}],\
+             \"meshes\":[{{\"primitives\":[{{\"attributes\":\
+             {{\"POSITION\":0}},\"indices\":0}}]}}],\"accessors\":[{accessor}],\
+             \"buffers\":[{{\"byteLength\":9000000000}}]}}"
         ),
     );
     scan.use_mesh("m.gltf");

@@ -21,7 +21,8 @@ fn gltf_with_names(names: &[&str]) -> String {
         let comma = if i == 0 { "" } else { "," };
         let _ = write!(
             materials,
-            "{comma}{{\"name\":\"{name}\",\"pbrMetallicRoughness\":{{\"baseColorTexture\":{{\"index\":{i}}}}}}}"
+            "{comma}{{\"name\":\"{name}\",\
+             \"pbrMetallicRoughness\":{{\"baseColorTexture\":{{\"index\":{i}}}}}}}"
         );
         let _ = write!(textures, "{comma}{{\"source\":{i}}}");
         let _ = write!(images, "{comma}{{\"name\":\"{name}\",\"uri\":\"data:image/png;base64,{png}\"}}");
@@ -37,9 +38,12 @@ fn gltf_with_names(names: &[&str]) -> String {
             .join(",");
     format!(
         "{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0}}],\
-         \"meshes\":[{{\"primitives\":[{primitives}]}}],\"materials\":[{materials}],\"textures\":[{textures}],\
-         \"images\":[{images}],\"accessors\":[{accessors}],\"bufferViews\":[{{\"buffer\":0,\"byteLength\":36}}],\
-         \"buffers\":[{{\"byteLength\":36,\"uri\":\"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAAAAAIC/\"}}]}}"
+         \"meshes\":[{{\"primitives\":[{primitives}]}}],\"materials\":[{materials}],\
+         \"textures\":[{textures}],\
+         \"images\":[{images}],\"accessors\":[{accessors}],\"bufferViews\":[{{\"buffer\":0,\
+         \"byteLength\":36}}],\
+         \"buffers\":[{{\"byteLength\":36,\"uri\":\"data:;base64,\
+         AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAAAAAIC/\"}}]}}"
     )
 }
 
@@ -128,7 +132,8 @@ fn names_in_lists_and_annotations_lead_nowhere() {
         scan.write(
             "poses/pose.json",
             format!(
-                "{{\"camera_uuid\":\"{uuid}\",\"camera_original_rotation\":[1.57,0,0],\"camera_location\":[2,1.2,1.5],\
+                "{{\"camera_uuid\":\"{uuid}\",\"camera_original_rotation\":[1.57,0,0],\"camera_location\":[2,\
+                 1.2,1.5],\
                  \"room\":\"../../x_1_1\"}}"
             ),
         );
@@ -149,7 +154,8 @@ fn names_in_lists_and_annotations_lead_nowhere() {
         scan.write(
             &format!("poses/{name}.json"),
             format!(
-                "{{\"camera_uuid\":\"{uuid}\",\"camera_original_rotation\":[1.57,0,0],\"camera_location\":[2,1.2,1.5]}}"
+                "{{\"camera_uuid\":\"{uuid}\",\"camera_original_rotation\":[1.57,0,0],\"camera_location\":[2,\
+                 1.2,1.5]}}"
             ),
         );
     }

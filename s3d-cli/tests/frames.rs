@@ -127,7 +127,8 @@ fn a_cloud_in_another_frame_is_refused_before_it_is_read() {
     let scan = Scan::new();
     // Its last row is no point, which nobody finds out.
     let mut ply = String::from(
-        "ply\nformat ascii 1.0\nelement vertex 70001\nproperty double x\nproperty double y\nproperty double z\n\
+        "ply\nformat ascii 1.0\nelement vertex 70001\nproperty double x\nproperty double y\n\
+         property double z\n\
          property uchar class\nend_header\n",
     );
     let points = points(&scan);

@@ -256,7 +256,8 @@ fn assert_list_is_true(out: &Path) {
     let manifest = fs::read_to_string(layout.manifest()).unwrap();
     let bytes: u64 = listed.iter().map(|record| record.bytes).sum();
     let files = format!(
-        "\"files\": {{\n    \"list\": \"files.csv\",\n    \"count\": {},\n    \"bytes\": {bytes},\n    \"xxh3_128\": \"{}\"\n  }}",
+        "\"files\": {{\n    \"list\": \"files.csv\",\n    \"count\": {},\n    \"bytes\": {bytes},\n    \
+         \"xxh3_128\": \"{}\"\n  }}",
         listed.len(),
         Checksum::of(&list)
     );

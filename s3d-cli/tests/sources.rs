@@ -104,8 +104,10 @@ fn write_ply(scan: &Path, parts: usize) -> Vec<PathBuf> {
         .enumerate()
         .map(|(part, quads)| {
             let mut ply = format!(
-                "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-                 element face {}\nproperty list uchar int vertex_indices\nproperty int label\nproperty int instance\nend_header\n",
+                "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+                 property float z\n\
+                 element face {}\nproperty list uchar int vertex_indices\nproperty int label\n\
+                 property int instance\nend_header\n",
                 4 * quads.len(),
                 quads.len()
             );
@@ -135,8 +137,10 @@ fn labels_of_the_mesh_give_what_the_tree_gives() {
         let names: Vec<String> = write_ply(&scan, parts).iter().map(|p| format!("{:?}", text(p))).collect();
         let toml = scan.join(format!("ply_{parts}.toml"));
         let table = format!(
-            "area = 3\n[mesh]\npaths = [{}]\n[annotations]\nmesh = true\nroom = \"office_1\"\n[annotations.classes]\n\
-             0 = \"floor\"\n1 = \"ceiling\"\n2 = \"wall\"\n3 = \"table\"\n[cameras]\npath = \"cameras.csv\"\n",
+            "area = 3\n[mesh]\npaths = [{}]\n[annotations]\nmesh = true\nroom = \"office_1\"\n\
+             [annotations.classes]\n\
+             0 = \"floor\"\n1 = \"ceiling\"\n2 = \"wall\"\n3 = \"table\"\n[cameras]\n\
+             path = \"cameras.csv\"\n",
             names.join(", ")
         );
         fs::write(&toml, &table).unwrap();
@@ -169,7 +173,8 @@ fn columns_of_a_cloud_are_not_looked_for_in_the_mesh() {
     }
     fs::write(scan.join("cloud.ply"), cloud).unwrap();
     let toml = scan.join("cloud.toml");
-    let table = "area = 3\n[mesh]\npath = \"part_0.ply\"\n[annotations]\npath = \"cloud.ply\"\nclass = \"what\"\nroom = \"office_1\"\n\
+    let table = "area = 3\n[mesh]\npath = \"part_0.ply\"\n[annotations]\npath = \"cloud.ply\"\n\
+                 class = \"what\"\nroom = \"office_1\"\n\
                  classes = { 5 = \"floor\" }\n[cameras]\npath = \"cameras.csv\"\n";
     fs::write(&toml, table).unwrap();
     let out = dir.path().join("out");
@@ -221,7 +226,8 @@ fn vertices_of_a_scannet_scan_vote_for_all_faces_around_them() {
         format!("{{\"sceneId\": \"scannet.scene0000_00\", \"segGroups\": [{}]}}", groups.join(", "));
     fs::write(folder.join("scene0000_00.aggregation.json"), aggregation).unwrap();
     let toml = scan.join("scannet.toml");
-    let table = "area = 3\n[mesh]\npath = \"scene0000_00/scene0000_00_vh_clean_2.ply\"\nup = \"z\"\n[annotations]\n\
+    let table = "area = 3\n[mesh]\npath = \"scene0000_00/scene0000_00_vh_clean_2.ply\"\nup = \"z\"\n\
+                 [annotations]\n\
                  path = \"scene0000_00\"\nroom = \"office_1\"\n[cameras]\npath = \"cameras.csv\"\n";
     fs::write(&toml, table).unwrap();
     let out = dir.path().join("out");

@@ -59,7 +59,8 @@ fn write_scannet(dir: &Path, taxonomy: &str) -> PathBuf {
     fs::write(folder.join("scene0000_00.aggregation.json"), aggregation).unwrap();
     let scene = dir.join("scannet.toml");
     let toml = format!(
-        "area = 3\n{taxonomy}[mesh]\npath = \"scene0000_00/scene0000_00_vh_clean_2.ply\"\nup = \"z\"\n[annotations]\n\
+        "area = 3\n{taxonomy}[mesh]\npath = \"scene0000_00/scene0000_00_vh_clean_2.ply\"\nup = \"z\"\n\
+         [annotations]\n\
          path = \"scene0000_00\"\nroom = \"bedroom_1\"\n[cameras]\npath = \"cameras.csv\"\n"
     );
     fs::write(&scene, toml).unwrap();
@@ -319,8 +320,10 @@ fn images_of_classes_have_the_taxonomys_places_and_colours() {
 fn a_taxonomy_of_ones_own_in_a_file_or_in_the_scene() {
     let dir = tempfile::tempdir().unwrap();
     let scan = dir.path().join("scan");
-    let mine = "name = \"hotel\"\nclutter = \"thingy\"\n[[classes]]\nname = \"wall\"\nid = 7\naliases = [\"ceiling\", \"floor\"]\n\
-                [[classes]]\nname = \"bed\"\ncolor = [1, 2, 3]\n[[classes]]\nname = \"thingy\"\ncounts_as = \"bed\"\n\
+    let mine = "name = \"hotel\"\nclutter = \"thingy\"\n[[classes]]\nname = \"wall\"\nid = 7\n\
+                aliases = [\"ceiling\", \"floor\"]\n\
+                [[classes]]\nname = \"bed\"\ncolor = [1, 2, 3]\n[[classes]]\nname = \"thingy\"\n\
+                counts_as = \"bed\"\n\
                 [[rooms]]\nname = \"suite\"\naliases = [\"bedroom\"]\n[aliases]\ncouch = \"\"\n";
     let scene = write_scannet(&scan, "taxonomy = \"mine.toml\"\n");
     let toml =

@@ -407,7 +407,8 @@ fn a_person_reads_the_same_summary() {
         "1 panoramas and 9 views of 2 locations",
         &format!("{} files, ", files(&out).len()),
         &format!("{share:.2} % of the pixels of panoramas"),
-        "6 of 24 candidate views dropped: 2 for the lowest entropies of their pool, 4 not drawn from its middle",
+        "6 of 24 candidate views dropped: 2 for the lowest entropies of their pool, 4 not drawn from its \
+         middle",
         "9 kept views are of locations that --only leaves out",
         "load ",
     ] {

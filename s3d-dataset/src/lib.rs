@@ -25,7 +25,8 @@
 //! let scene = Building::demo().build()?.write_scan(&folder.join("scan"), &ScanOptions::default(), || true)?;
 //!
 //! let out = folder.join("dataset");
-//! let options = ExportOptions { views: 2, size: 64, pano_width: 128, points_per_m2: 20.0, ..ExportOptions::default() };
+//! let small = ExportOptions { views: 2, size: 64, pano_width: 128, ..ExportOptions::default() };
+//! let options = ExportOptions { points_per_m2: 20.0, ..small };
 //! let export = Export::new([scene]).options(options);
 //! let summary = export.run(&out, &Context::default())?.expect("a new folder");
 //! assert_eq!((summary.areas, summary.tally.panoramas.images), (1, summary.locations));

@@ -68,8 +68,8 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     check_space(points * PLY_POINT_BYTES, output)?;
     if file.offset_m != DVec3::ZERO {
         ctx.info(format_args!(
-            "the mesh lies far from the origin: {:?} is subtracted from its coordinates, which the cloud's header \
-             tells",
+            "the mesh lies far from the origin: {:?} is subtracted from its coordinates, which the cloud's \
+             header tells",
             file.offset_m.to_array()
         ));
     }

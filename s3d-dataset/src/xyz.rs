@@ -41,8 +41,8 @@ impl Default for XyzOptions {
 /// # Errors
 /// [`Error::Usage`] if coordinates are there and not to be replaced; [`Error::File`] if there is no data set,
 /// or no image with both depth and pose, or one of these is damaged; [`Error::Cancelled`];
-/// [`Error::Temporary`]. The data set stays as it was then; so it does when the process is killed, or the same
-/// call completes what it had begun.
+/// [`Error::Temporary`]. The data set stays as it was then; so it does when the process is killed, or the
+/// same call completes what it had begun.
 pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Result<usize> {
     if options.xyz == XyzType::None {
         return Err(Error::Usage("world coordinates are made as half or float".to_owned()));

@@ -8,8 +8,8 @@ use s3d_geom::glam::{Vec3, dvec3, vec3};
 use s3d_geom::{Pose, TriMesh};
 use std::sync::{Arc, Mutex};
 
-/// Refused by this condition, with these words; `info` names it too, and with the condition allowed there is a
-/// data set, and a warning in the same words.
+/// Refused by this condition, with these words; `info` names it too, and with the condition allowed there is
+/// a data set, and a warning in the same words.
 #[track_caller]
 fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Condition, words: &str) {
     let dir = tempfile::tempdir().unwrap();

@@ -510,7 +510,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_range_may_be_split_anywhere(total in 1u64..9000, cuts in prop::collection::vec(0.0..1.0f64, 0..6)) {
+        fn a_range_may_be_split_anywhere(
+            total in 1u64..9000,
+            cuts in prop::collection::vec(0.0..1.0f64, 0..6),
+        ) {
             let mesh = fan(5);
             let sampler = SurfaceSampler::new(&mesh, Density::Total(total), 8);
             let mut at: Vec<u64> = cuts.iter().map(|c| (c * total as f64) as u64).chain([0, total]).collect();

@@ -365,7 +365,10 @@ mod tests {
     proptest! {
         #[test]
         fn blocks_and_their_order_change_nothing(
-            points in prop::collection::vec(((-0.1..1.1f32), (-0.1..1.1f32), (-0.15..0.15f32), any::<[u8; 3]>()), 1..200),
+            points in prop::collection::vec(
+                ((-0.1..1.1f32), (-0.1..1.1f32), (-0.15..0.15f32), any::<[u8; 3]>()),
+                1..200,
+            ),
             at in 0usize..200,
         ) {
             let mesh = floor();

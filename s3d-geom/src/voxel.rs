@@ -279,7 +279,9 @@ mod tests {
                 prop_assert_eq!(v.occupancy()[cell], v.count(cell) > 0);
                 for &m in v.members_of(cell) {
                     let p = points[m as usize];
-                    prop_assert!(v.grid.voxel_aabb(cell).contains(p), "{} in {:?}", p, v.grid.voxel_aabb(cell));
+                    prop_assert!(
+                        v.grid.voxel_aabb(cell).contains(p), "{} in {:?}", p, v.grid.voxel_aabb(cell)
+                    );
                     prop_assert_eq!(v.grid.cell_of(p), cell);
                     prop_assert!(!std::mem::replace(&mut seen[m as usize], true));
                 }

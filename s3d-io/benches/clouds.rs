@@ -53,8 +53,9 @@ fn write_ply(dir: &Path, points: &[Point], ascii: bool) -> PathBuf {
     let format = if ascii { "ascii" } else { "binary_little_endian" };
     write!(
         file,
-        "ply\nformat {format} 1.0\nelement vertex {POINTS}\nproperty float x\nproperty float y\nproperty float z\nproperty \
-         uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar class\nproperty ushort instance\nend_header\n"
+        "ply\nformat {format} 1.0\nelement vertex {POINTS}\nproperty float x\nproperty float y\n\
+         property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+         property uchar class\nproperty ushort instance\nend_header\n"
     )
     .unwrap();
     if ascii {
@@ -72,8 +73,8 @@ fn write_ply(dir: &Path, points: &[Point], ascii: bool) -> PathBuf {
 fn write_npy(dir: &Path, points: &[Point]) -> PathBuf {
     let path = dir.join("structured.npy");
     let mut header = format!(
-        "{{'descr': [('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('rgb', '|u1', (3,)), ('class', '|u1'), ('instance', '<u2')], \
-         'fortran_order': False, 'shape': ({POINTS},), }}"
+        "{{'descr': [('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('rgb', '|u1', (3,)), ('class', '|u1'), \
+         ('instance', '<u2')], 'fortran_order': False, 'shape': ({POINTS},), }}"
     );
     while !(header.len() + 11).is_multiple_of(64) {
         header.push(' ');

@@ -105,7 +105,8 @@ fn write_ply(dir: &Path, n: usize, encoding: &str, labels: bool) -> PathBuf {
     let mut random = Numbers(7);
     let columns = if labels { "property int category_id\nproperty int object_id\n" } else { "" };
     let mut file = format!(
-        "ply\nformat {encoding} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+        "ply\nformat {encoding} 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\nelement face {}\n\
          property list uchar int vertex_indices\n{columns}end_header\n",
         (n + 1) * (n + 1),

@@ -18,7 +18,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (faces, textures) = (file.mesh.faces().len(), file.mesh.textures().len());
     let mib = peak_mib().unwrap_or(0.0);
     println!(
-        "RESULT {{\"wall\": {wall:.4}, \"user\": {user:.4}, \"faces\": {faces}, \"textures\": {textures}, \"mib\": {mib:.1}}}"
+        "RESULT {{\"wall\": {wall:.4}, \"user\": {user:.4}, \"faces\": {faces}, \"textures\": {textures}, \
+         \"mib\": {mib:.1}}}"
     );
     Ok(())
 }

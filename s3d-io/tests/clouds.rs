@@ -118,7 +118,8 @@ fn words_and_numbers_mean_what_the_taxonomy_says() {
     assert_eq!(of("scene0000_00", "nyu40").unwrap(), words);
     let own = [("wall", "wall"), ("floor", "floor"), ("officeChair", "chair")];
     assert_eq!(of("scene0000_00", "scannet200").unwrap(), own);
-    // 2, 6 and 19 are numbers: NYU's floor, sofa and mirror, of which ScanNet's benchmark leaves out the last.
+    // 2, 6 and 19 are numbers: NYU's floor, sofa and mirror, of which ScanNet's benchmark leaves out the
+    // last.
     for name in NUMBERED {
         let nyu = [("floor", "floor"), ("sofa", "sofa"), ("mirror", "clutter")];
         assert_eq!(of(name, "nyu40").unwrap(), nyu, "{name}");

@@ -78,8 +78,10 @@ fn meshes_that_are_placed_without_end_are_refused() {
     let gltf = |nodes: usize, accessor: &str| {
         let children: Vec<String> = (0..nodes).map(|n| n.to_string()).collect();
         format!(
-            "{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[{}]}}],\"nodes\":[{}],\"meshes\":[{{\"primitives\":\
-             [{{\"attributes\":{{\"POSITION\":0}}}}]}}],\"accessors\":[{accessor}],\"bufferViews\":[{{\"buffer\":0,\
+            "{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[{}]}}],\"nodes\":[{}],\
+             \"meshes\":[{{\"primitives\":\
+             [{{\"attributes\":{{\"POSITION\":0}}}}]}}],\"accessors\":[{accessor}],\
+             \"bufferViews\":[{{\"buffer\":0,\
              \"byteLength\":36}}],\"buffers\":[{{\"byteLength\":36,\"uri\":\"data:;base64,{}\"}}]}}",
             children.join(","),
             vec!["{\"mesh\":0}"; nodes].join(","),
@@ -90,7 +92,8 @@ fn meshes_that_are_placed_without_end_are_refused() {
     let large = "{\"bufferView\":0,\"componentType\":5126,\"count\":11000000,\"type\":\"VEC3\"}";
     says(read(&gltf(100, large)), "places 100 meshes of more than 1073741824 vertices");
     says(read(&gltf(2, large)), "11000000 elements of 12 bytes");
-    let zeros = "{\"componentType\":5126,\"count\":1048577,\"type\":\"MAT4\",\"sparse\":{\"count\":1,\"indices\":{\
+    let zeros = "{\"componentType\":5126,\"count\":1048577,\"type\":\"MAT4\",\"sparse\":{\"count\":1,\
+                 \"indices\":{\
                  \"bufferView\":0,\"componentType\":5125},\"values\":{\"bufferView\":0}}}";
     says(read(&gltf(1, zeros)), "claims 1048577 elements without data");
 }

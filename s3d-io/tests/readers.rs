@@ -127,8 +127,10 @@ fn points_are_written_to_and_read_from_memory() {
 #[test]
 fn meshes_come_from_a_reader_with_the_files_beside_their_name() {
     let folder = tempfile::tempdir().unwrap();
-    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-               element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+               property float z\n\
+               element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n\
+               3 0 1 2\n";
     let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
     fs::write(folder.path().join("a.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
     for (name, text) in [("a.ply", ply), ("a.OBJ", obj)] {

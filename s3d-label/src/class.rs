@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// A class of object: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are S3DIS's 13
-/// classes; [`Taxonomy::class`](crate::Taxonomy::class) finds those of other taxonomies.
+/// A class of object: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are S3DIS's
+/// 13 classes; [`Taxonomy::class`](crate::Taxonomy::class) finds those of other taxonomies.
 ///
 /// `Ord` is the order of the taxonomy; for S3DIS that of formats.md, "What is written".
 ///

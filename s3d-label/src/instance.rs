@@ -101,7 +101,8 @@ mod tests {
         ) {
             let points: Vec<Vec3> = points.into_iter().map(Vec3::from).collect();
             let table = table();
-            let of = |p: &[Vec3]| InstanceSummary::from_points(&table, LabelId(1), p.iter().copied()).unwrap();
+            let of =
+                |p: &[Vec3]| InstanceSummary::from_points(&table, LabelId(1), p.iter().copied()).unwrap();
             let (front, back) = points.split_at(cut.min(points.len() - 1));
             prop_assert_eq!(of(front).union(of(back)), of(&points));
         }

@@ -22,7 +22,9 @@ pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 ///
 /// let label: Label = "board_3_hallway_4_6".parse()?;
 /// assert_eq!((label.class, label.instance, label.area), (Class::BOARD, 3, 6));
-/// assert_eq!((label.room.to_string(), label.to_string()), ("hallway_4".into(), "board_3_hallway_4_6".into()));
+/// assert_eq!(
+///     (label.room.to_string(), label.to_string()), ("hallway_4".into(), "board_3_hallway_4_6".into())
+/// );
 /// assert!(matches!("board_3_hallway_4".parse::<Label>(), Err(LabelError::Fields { count: 4, .. })));
 /// # Ok::<(), LabelError>(())
 /// ```
@@ -44,7 +46,8 @@ pub struct Label {
 pub enum LabelError {
     /// It has not five fields.
     #[error(
-        "{name:?} is no label: it has {count} fields between underscores, not the five of class_instance_roomType_room_area"
+        "{name:?} is no label: it has {count} fields between underscores, not the five of \
+         class_instance_roomType_room_area"
     )]
     Fields {
         /// The word.

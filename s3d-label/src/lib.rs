@@ -1,12 +1,13 @@
 //! Labels of the 2D-3D-S data set (Armeni et al. 2017): what they are called, in which order they are
 //! numbered, and how the points of a scan give them to the faces of a mesh.
 //!
-//! The nouns: the [`Taxonomy`], which says which classes and types of rooms there are (S3DIS's, those of other
-//! data sets, or one's own); [`Class`], [`Room`] and [`Label`] with its name; the [`LabelTable`], which numbers the labels
-//! of a data set in the published order ([`LabelId`]); [`number_area`], which turns the numbers of an
-//! annotated tree into those of labels; the [`Labeler`], which takes labelled points block by block and gives
-//! the [`FaceLabels`] of a mesh (or [`vote`], for points that are all there), the [`Votes`] behind them and
-//! the [`VoteReport`] on these; [`ClassCounts`] and [`RoomCounts`], the paper's tables of statistics.
+//! The nouns: the [`Taxonomy`], which says which classes and types of rooms there are (S3DIS's, those of
+//! other data sets, or one's own); [`Class`], [`Room`] and [`Label`] with its name; the [`LabelTable`], which
+//! numbers the labels of a data set in the published order ([`LabelId`]); [`number_area`], which turns the
+//! numbers of an annotated tree into those of labels; the [`Labeler`], which takes labelled points block by
+//! block and gives the [`FaceLabels`] of a mesh (or [`vote`], for points that are all there), the [`Votes`]
+//! behind them and the [`VoteReport`] on these; [`ClassCounts`] and [`RoomCounts`], the paper's tables of
+//! statistics.
 //!
 //! ```
 //! use s3d_geom::{TriMesh, glam::{Vec3, vec3}};

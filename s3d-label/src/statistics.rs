@@ -56,8 +56,8 @@ impl ClassCounts {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoomCounts {
-    /// Each area with its counts, by area; a count stands at its type's [`RoomType::index`]. All areas have as
-    /// many as the taxonomy has room types.
+    /// Each area with its counts, by area; a count stands at its type's [`RoomType::index`]. All areas have
+    /// as many as the taxonomy has room types.
     pub areas: Vec<(u32, Vec<u64>)>,
 }
 

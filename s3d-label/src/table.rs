@@ -83,7 +83,8 @@ pub enum TableError {
     },
     /// An entry stands behind one that it should stand before.
     #[error(
-        "index {index}: {label} stands behind {before}; labels are sorted by class_instance_, then by area, as strings"
+        "index {index}: {label} stands behind {before}; labels are sorted by class_instance_, then by area, \
+         as strings"
     )]
     Order {
         /// Its index.
@@ -359,7 +360,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_table_survives_its_names(mut labels in prop::collection::vec(any_label(), 0..40), one_area in any::<bool>()) {
+        fn a_table_survives_its_names(
+            mut labels in prop::collection::vec(any_label(), 0..40),
+            one_area in any::<bool>(),
+        ) {
             for label in labels.iter_mut().filter(|_| one_area) {
                 label.area = 1;
             }

@@ -6,9 +6,9 @@ use s3d_geom::{TriMesh, dominant_wall_direction_deg};
 use std::collections::BTreeMap;
 
 /// The dominant horizontal direction of the walls of each room, whole degrees in [0, 90) from +X towards +Y
-/// (see [`dominant_wall_direction_deg`]). Of a room without a face that is labelled as wall ([`Class::s3dis`]), all faces count.
-/// A room none of whose faces stands upright has the direction 0; a room without a labelled face is not
-/// there. `mesh` is one area's.
+/// (see [`dominant_wall_direction_deg`]). Of a room without a face that is labelled as wall
+/// ([`Class::s3dis`]), all faces count. A room none of whose faces stands upright has the direction 0; a room
+/// without a labelled face is not there. `mesh` is one area's.
 ///
 /// # Panics
 /// If `label_of_face` has not one label a face.

@@ -26,9 +26,9 @@ const CONTRAST: u8 = 8;
 
 /// Replaces the colour of each pixel at an edge by those of all faces that it shows, each by its share of
 /// `samples` places, spread alike in each pixel. `image` is that of [`crate::rgb_image_with`] for the same
-/// arguments. At an edge is a pixel one of whose four neighbours shows nothing, or another colour (by more than 8
-/// of 255 in a channel) of another material or of a face that lies behind it, before it, or turned away by more
-/// than 15°. Pixels that show nothing stay.
+/// arguments. At an edge is a pixel one of whose four neighbours shows nothing, or another colour (by more
+/// than 8 of 255 in a channel) of another material or of a face that lies behind it, before it, or turned
+/// away by more than 15°. Pixels that show nothing stay.
 ///
 /// # Panics
 /// If `hits` and `image` are not of the camera's size.

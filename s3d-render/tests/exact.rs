@@ -90,8 +90,10 @@ proptest! {
     fn soups(
         points in prop::collection::vec(prop::array::uniform3(-3.0..3.0f32), 3..40),
         picks in prop::collection::vec(any::<prop::sample::Index>(), 3..60),
-        at in prop::array::uniform3(-3.0..3.0f64), yaw in -3.2..3.2f64, pitch in -1.5..1.5f64, kind in 0u8..KINDS,
-        scale in prop::sample::select(vec![1.0f32, 1e-3, 1e3]), thin in prop::sample::select(vec![1e-2f32, 1e-5, 1e-7]),
+        at in prop::array::uniform3(-3.0..3.0f64), yaw in -3.2..3.2f64,
+        pitch in -1.5..1.5f64, kind in 0u8..KINDS,
+        scale in prop::sample::select(vec![1.0f32, 1e-3, 1e3]),
+        thin in prop::sample::select(vec![1e-2f32, 1e-5, 1e-7]),
         far in prop::sample::select(vec![Vec3::ZERO, vec3(800.0, -300.0, 20.0)]),
     ) {
         let mut positions: Vec<Vec3> = points.iter().map(|p| Vec3::from(*p) * scale + far).collect();
@@ -120,7 +122,8 @@ proptest! {
         points in prop::collection::vec(prop::array::uniform3(-3.0..3.0f32), 3..20),
         picks in prop::collection::vec(any::<prop::sample::Index>(), 3..30),
         weights in prop::array::uniform2(0.0..0.5f64), off in -9.0..-2.0f64, on in any::<bool>(),
-        direction in prop::array::uniform3(-1.0..1.0f64), yaw in -3.2..3.2f64, pitch in -1.5..1.5f64, kind in 0u8..KINDS,
+        direction in prop::array::uniform3(-1.0..1.0f64), yaw in -3.2..3.2f64,
+        pitch in -1.5..1.5f64, kind in 0u8..KINDS,
     ) {
         let positions: Vec<Vec3> = points.iter().map(|p| Vec3::from(*p)).collect();
         let Some(mesh) = soup(&positions, &picks) else { return Ok(()) };

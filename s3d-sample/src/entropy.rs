@@ -58,7 +58,8 @@ mod tests {
             let total: u64 = histogram.iter().sum();
             prop_assume!(total > 0);
             let n = total as f64;
-            let sum: f64 = histogram.iter().filter(|&&k| k > 0).map(|&k| k as f64 * libm::log(k as f64)).sum();
+            let sum: f64 =
+                histogram.iter().filter(|&&k| k > 0).map(|&k| k as f64 * libm::log(k as f64)).sum();
             prop_assert!((entropy(&histogram) - (libm::log(n) - sum / n)).abs() < 1e-12);
         }
     }

@@ -16,7 +16,9 @@ pub const CANDIDATES_PER_LOCATION: u32 = 72;
 /// let narrow = ViewDistribution { fov_max_deg: 40.0, ..ViewDistribution::default() };
 /// assert!(narrow.check().is_ok());
 /// let none = ViewDistribution { fov_min_deg: 80.0, ..ViewDistribution::default() };
-/// assert_eq!(none.check().unwrap_err().to_string().split(':').next(), Some("angles of view from 80 to 75 degrees"));
+/// assert_eq!(
+///     none.check().unwrap_err().to_string().split(':').next(), Some("angles of view from 80 to 75 degrees")
+/// );
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewDistribution {
@@ -52,7 +54,8 @@ pub enum DistributionError {
     },
     /// The angles of view are out of range, the wrong way round, or not numbers.
     #[error(
-        "angles of view from {min} to {max} degrees: they lie between 0 and 180, and the first is not the larger"
+        "angles of view from {min} to {max} degrees: they lie between 0 and 180, and the first is not the \
+         larger"
     )]
     Fov {
         /// `fov_min_deg`.
@@ -105,7 +108,8 @@ pub struct View {
 /// ```
 /// use s3d_sample::{ViewDistribution, draw_view};
 ///
-/// let draw = |number| draw_view(&ViewDistribution::default(), 42, "8eb9955b866b4b5f74abb1071416c628", number);
+/// let draw =
+///     |number| draw_view(&ViewDistribution::default(), 42, "8eb9955b866b4b5f74abb1071416c628", number);
 /// assert_eq!(draw(3), draw(3));
 /// assert_ne!(draw(3), draw(4));
 /// assert!((10f64.to_radians()..=75f64.to_radians()).contains(&draw(3).fov_rad));

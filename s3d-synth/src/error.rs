@@ -69,7 +69,8 @@ pub enum BuildingError {
         second: Room,
     },
     /// An opening is not within its wall.
-    #[error("{room}: the opening from {from} to {to} of its {wall:?} wall is not within that wall", from = span[0], to = span[1])]
+    #[error("{room}: the opening from {from} to {to} of its {wall:?} wall is not within that \
+             wall", from = span[0], to = span[1])]
     OpeningOutside {
         /// The room.
         room: Room,
@@ -79,7 +80,8 @@ pub enum BuildingError {
         span: [f32; 2],
     },
     /// Two openings of a wall overlap.
-    #[error("{room}: two openings of its {wall:?} wall overlap, from {from} to {to}", from = span[0], to = span[1])]
+    #[error("{room}: two openings of its {wall:?} wall overlap, from {from} to \
+             {to}", from = span[0], to = span[1])]
     OpeningsOverlap {
         /// The room.
         room: Room,

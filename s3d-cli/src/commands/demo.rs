@@ -42,7 +42,8 @@ pub(crate) struct SizeArgs {
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = value_parser!(u32).range(0..=100_000))]
     pub(crate) views: u32,
     /// Width and height of a view in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 540, value_parser = value_parser!(u32).range(8..=16_384))]
+    #[arg(long, value_name = "PX", default_value_t = 540,
+        value_parser = value_parser!(u32).range(8..=16_384))]
     pub(crate) size: u32,
     /// Width of a panorama in pixels, even; it is half as high.
     #[arg(long, value_name = "PX", default_value_t = 2048, value_parser = even_width)]
@@ -117,7 +118,8 @@ fn put(part: &Path, scan: &Path, overwrite: bool, cancel: &Cancel) -> Result<()>
         if !overwrite {
             remove(part)?;
             return Err(Error::Usage(format!(
-                "{} is there and differs from the built-in scene: choose another folder, or replace it with --overwrite",
+                "{} is there and differs from the built-in scene: choose another folder, or replace it with \
+                 --overwrite",
                 scan.display()
             )));
         }

@@ -43,7 +43,8 @@ pub(crate) struct OptionArgs {
     #[arg(long, value_name = "N", default_value_t = 72, value_parser = value_parser!(u32).range(0..=100_000))]
     pub(crate) views: u32,
     /// Width and height of a view in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 1080, value_parser = value_parser!(u32).range(8..=16_384))]
+    #[arg(long, value_name = "PX", default_value_t = 1080,
+        value_parser = value_parser!(u32).range(8..=16_384))]
     pub(crate) size: u32,
     /// Width of a panorama in pixels, even; it is half as high.
     #[arg(long, value_name = "PX", default_value_t = 4096, value_parser = even_width)]
@@ -54,7 +55,8 @@ pub(crate) struct OptionArgs {
     #[command(flatten)]
     pub(crate) placing: Placing,
     /// Among which candidates views are selected: of the whole data set, of an area, or of a location.
-    #[arg(long, default_value = "dataset", value_parser = parsed::<Pool>, value_name = "dataset|area|location")]
+    #[arg(long, default_value = "dataset", value_parser = parsed::<Pool>,
+        value_name = "dataset|area|location")]
     pub(crate) pool: Pool,
     /// Density of the point cloud.
     #[arg(long, value_name = "N", default_value_t = 10_000.0, value_parser = positive)]

@@ -18,7 +18,8 @@ pub(crate) struct PackArgs {
     #[arg(value_name = "OUT")]
     pub(crate) dataset: PathBuf,
     /// What to make of it.
-    #[arg(long, value_parser = parsed::<PackageKind>, value_name = "webdataset|colmap|nerfstudio|coco|parquet")]
+    #[arg(long, value_parser = parsed::<PackageKind>,
+        value_name = "webdataset|colmap|nerfstudio|coco|parquet")]
     pub(crate) to: PackageKind,
     /// The package's folder, of parquet its file [default: beside OUT: OUT_webdataset, …,
     /// OUT_images.parquet]

@@ -22,7 +22,8 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "N", default_value_t = 72, value_parser = value_parser!(u32).range(0..=100_000))]
     views: u32,
     /// Width and height of a view in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 1080, value_parser = value_parser!(u32).range(8..=16_384))]
+    #[arg(long, value_name = "PX", default_value_t = 1080,
+        value_parser = value_parser!(u32).range(8..=16_384))]
     size: u32,
     /// Everything random comes from it.
     #[arg(long, default_value_t = 0)]
@@ -35,8 +36,8 @@ pub(crate) struct PlanArgs {
     /// Skip and count what is not as it should be in the annotations.
     #[arg(long)]
     lenient: bool,
-    /// Give faces that no annotated point voted for the label of the surface next to them, if it is no farther
-    /// than this.
+    /// Give faces that no annotated point voted for the label of the surface next to them, if it is no
+    /// farther than this.
     #[arg(long, value_name = "METRES", value_parser = positive)]
     fill: Option<f64>,
     #[command(flatten)]

@@ -28,13 +28,16 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["at", "yaw", "pitch", "pano", "size"])]
     pub(crate) poses: Option<PathBuf>,
     /// Which axis of the list's frame points up.
-    #[arg(long, default_value = "z", value_parser = parsed::<UpAxis>, value_name = "y|z", conflicts_with = "at")]
+    #[arg(long, default_value = "z", value_parser = parsed::<UpAxis>, value_name = "y|z",
+        conflicts_with = "at")]
     pub(crate) poses_up: UpAxis,
     /// Width of the images of --poses; what the list says is scaled to it [default: the list's]
-    #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(1..=32_768), conflicts_with = "at")]
+    #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(1..=32_768),
+        conflicts_with = "at")]
     pub(crate) width: Option<u32>,
     /// Their height.
-    #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(1..=32_768), conflicts_with = "at")]
+    #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(1..=32_768),
+        conflicts_with = "at")]
     pub(crate) height: Option<u32>,
     /// Their focal lengths and principal point in pixels [default: the list's]
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = intrinsics, allow_hyphen_values = true,

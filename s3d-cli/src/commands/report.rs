@@ -16,10 +16,12 @@ pub(crate) struct ReportArgs {
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Width of panoramas in the report, pixels; the data set's own if that is less.
-    #[arg(long, value_name = "PIXELS", default_value_t = 2048, value_parser = value_parser!(u32).range(16..=16_384))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 2048,
+        value_parser = value_parser!(u32).range(16..=16_384))]
     pub(crate) pano_width: u32,
     /// Width of views in the report, pixels; their colours are twice as wide where they are shown large.
-    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = value_parser!(u32).range(16..=2048))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 256,
+        value_parser = value_parser!(u32).range(16..=2048))]
     pub(crate) thumbs: u32,
     /// Replace an earlier report in DIR.
     #[arg(long)]

@@ -17,7 +17,8 @@ pub(crate) struct SampleArgs {
     #[arg(short, long, value_name = "CLOUD.ply")]
     pub(crate) output: PathBuf,
     /// Density of the points.
-    #[arg(long, value_name = "N", default_value_t = 10_000.0, value_parser = positive, conflicts_with = "points")]
+    #[arg(long, value_name = "N", default_value_t = 10_000.0, value_parser = positive,
+        conflicts_with = "points")]
     pub(crate) points_per_m2: f64,
     /// How many points in all, instead of a density.
     #[arg(long, value_name = "N")]

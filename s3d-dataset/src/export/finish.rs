@@ -105,8 +105,8 @@ pub(crate) fn finish(
         pixels += tally.views;
         if let Some(share) = pixels.share_unlabelled().filter(|share| *share > MUCH_UNLABELLED) {
             ctx.warn(format_args!(
-                "area {area}: {:.0} % of the pixels show faces without a label: no annotated point is next to them \
-                 (--fill METRES gives them the label of the surface beside them)",
+                "area {area}: {:.0} % of the pixels show faces without a label: no annotated point is next \
+                 to them (--fill METRES gives them the label of the surface beside them)",
                 100.0 * share
             ));
         }

@@ -335,8 +335,8 @@ fn check_label_count(labels: usize) -> Result<()> {
         return Ok(());
     }
     Err(Error::Input(format!(
-        "{labels} labels are more than {}: loaders of the data set take a label's index from G and B of a pixel alone, and a \
-         pixel with an R for one without a label; export the areas in several data sets",
+        "{labels} labels are more than {}: loaders of the data set take a label's index from G and B of a \
+         pixel alone, and a pixel with an R for one without a label; export the areas in several data sets",
         s3d_io::dataset::MAX_LABELS_OF_LOADERS
     )))
 }

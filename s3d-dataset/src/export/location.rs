@@ -74,22 +74,23 @@ impl Outlook {
             ));
         } else if self.coverage < LOW_COVERAGE {
             warnings.push(format!(
-                "location {name} sees the mesh in only part of its panorama (coverage {}): it may stand outside, or near a \
-                 hole",
+                "location {name} sees the mesh in only part of its panorama (coverage {}): it may stand \
+                 outside, or near a hole",
                 percent(self.coverage)
             ));
         }
         if self.back_sides > MANY_BACK_SIDES {
             warnings.push(format!(
-                "location {name} sees back sides in {} of what it sees (coverage {}): it may stand inside something \
-                 solid, or the faces are wound the other way",
+                "location {name} sees back sides in {} of what it sees (coverage {}): it may stand inside \
+                 something solid, or the faces are wound the other way",
                 percent(self.back_sides),
                 percent(self.coverage)
             ));
         }
         if self.nearest_m < VERY_NEAR_M {
             warnings.push(format!(
-                "location {name} is {:.0} mm from a surface (coverage {}): it may stand inside a wall or a thing",
+                "location {name} is {:.0} mm from a surface (coverage {}): it may stand inside a wall or a \
+                 thing",
                 1000.0 * self.nearest_m,
                 percent(self.coverage)
             ));

@@ -200,8 +200,8 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
         && share > MUCH_UNLABELLED
     {
         doubts.push(format!(
-            "{:.0} % of what scan locations see has no label: no annotated point is next to it (export --fill METRES \
-             gives it the label of the surface beside it)",
+            "{:.0} % of what scan locations see has no label: no annotated point is next to it (export \
+             --fill METRES gives it the label of the surface beside it)",
             100.0 * share
         ));
     }
@@ -277,7 +277,8 @@ impl fmt::Display for SceneInfo {
             self.rooms.iter().try_for_each(|room| writeln!(f, "{room}"))?;
             writeln!(
                 f,
-                "  {} of {} faces get a label, {} of them contested; {} points are farther than 5 cm from every face",
+                "  {} of {} faces get a label, {} of them contested; {} points are farther than 5 cm from \
+                 every face",
                 self.labelled_faces, self.mesh.faces, self.contested_faces, self.far_points
             )?;
         } else {
@@ -291,7 +292,8 @@ impl fmt::Display for SceneInfo {
             let (uuid, at, room) = (&location.uuid, location.pose.location, room_name(*room));
             writeln!(
                 f,
-                "  {uuid}  ({:.2}, {:.2}, {:.2})  {room}  sees the mesh in {:.0} %, the nearest of it at {nearest_m:.2} m",
+                "  {uuid}  ({:.2}, {:.2}, {:.2})  {room}  sees the mesh in {:.0} %, the nearest of it at \
+                 {nearest_m:.2} m",
                 at.x,
                 at.y,
                 at.z,

@@ -85,7 +85,8 @@ pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Resu
         let free = free_places(ground.scene, ground.nearest, &feet);
         if free.is_empty() {
             warnings.push(format!(
-                "{name}: no place for a scan location, since none of its floor is free up to {HEIGHT_M} m with {} m around",
+                "{name}: no place for a scan location, since none of its floor is free up to {HEIGHT_M} m \
+                 with {} m around",
                 CLEARANCES_M[CLEARANCES_M.len() - 1]
             ));
             continue;

@@ -1,7 +1,7 @@
 //! Pointcept: the S3DIS tree as its preprocessing wants it.
 //!
-//! `preprocess_s3dis.py --splits Area_1 Area_2 … --dataset_root profiles/pointcept` reads, for each area that is
-//! named, `Area_k/Area_k_alignmentAngle.txt` with `numpy.loadtxt`, and of every room that it names all
+//! `preprocess_s3dis.py --splits Area_1 Area_2 … --dataset_root profiles/pointcept` reads, for each area that
+//! is named, `Area_k/Area_k_alignmentAngle.txt` with `numpy.loadtxt`, and of every room that it names all
 //! `Area_k/ROOM/Annotations/*.txt`, with `numpy.loadtxt` too. So it stops
 //! - where an area has no angle file: areas 1 to 6 that are not in the data set get one without rooms (up to
 //!   version 1.5.1 all six are read);
@@ -12,8 +12,8 @@
 //!
 //! All but these are second names of the files in `s3dis/` (copies where the file system has none).
 //!
-//! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `Area_k/3d/rgb.obj` (`area_k` up to
-//! version 1.5.1), and for area 5 `Area_5a` and `Area_5b`, moving 5b: area 5 of a data set is in one frame
+//! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `Area_k/3d/rgb.obj` (`area_k` up
+//! to version 1.5.1), and for area 5 `Area_5a` and `Area_5b`, moving 5b: area 5 of a data set is in one frame
 //! already and comes as `Area_5a` alone.
 
 use super::room::{TreeRoom, count_and_min};
@@ -44,8 +44,8 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, areas: &[u32], rooms: &[Tre
         }
         if let [only] = &named[..] {
             ctx.warn(format_args!(
-                "area {area} has one room: Pointcept's preprocessing stops at such an area, so its angle file in {} names \
-                 the room twice",
+                "area {area} has one room: Pointcept's preprocessing stops at such an area, so its angle \
+                 file in {} names the room twice",
                 dir.display()
             ));
             named.push(only.clone());

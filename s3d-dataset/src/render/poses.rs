@@ -126,8 +126,8 @@ pub fn render_poses(
     let world_offset_m = (file.offset_m != DVec3::ZERO).then(|| file.offset_m.to_array());
     if let Some(offset_m) = world_offset_m {
         ctx.info(format_args!(
-            "the mesh lies far from the origin: {offset_m:?} is subtracted from its coordinates and the cameras', \
-             which {CAMERAS} tells"
+            "the mesh lies far from the origin: {offset_m:?} is subtracted from its coordinates and the \
+             cameras', which {CAMERAS} tells"
         ));
     }
     create_dir(&parent)?;
@@ -185,7 +185,8 @@ fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics)
     let panoramas = frames.iter().filter(|frame| frame.camera.is_panorama()).count();
     if panoramas > 0 && panoramas < frames.len() {
         let message = format!(
-            "lists {panoramas} panoramas and {} other views: {CAMERAS} can hold one kind, so render them in two calls",
+            "lists {panoramas} panoramas and {} other views: {CAMERAS} can hold one kind, so render them in \
+             two calls",
             frames.len() - panoramas
         );
         return Err(FileError::format(poses, message).into());
@@ -204,8 +205,8 @@ fn tell_of_list(ctx: &Context, cameras: &[PosedCamera], untracked: usize) {
     let distorted = cameras.iter().filter(|camera| camera.is_distorted()).count();
     if distorted > 0 {
         ctx.warn(format_args!(
-            "{distorted} of {} cameras have a lens that bends: images are those of a pinhole with their focal lengths and \
-             principal points, and fit undistorted pictures",
+            "{distorted} of {} cameras have a lens that bends: images are those of a pinhole with their \
+             focal lengths and principal points, and fit undistorted pictures",
             cameras.len()
         ));
     }

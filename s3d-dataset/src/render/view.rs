@@ -137,8 +137,8 @@ pub fn render(
     let world_offset_m = (file.offset_m != DVec3::ZERO).then(|| file.offset_m.to_array());
     if let Some(offset_m) = world_offset_m {
         ctx.info(format_args!(
-            "the mesh lies far from the origin: {offset_m:?} is subtracted from its coordinates and the camera's, \
-             which camera.json tells"
+            "the mesh lies far from the origin: {offset_m:?} is subtracted from its coordinates and the \
+             camera's, which camera.json tells"
         ));
     }
     file.warnings.iter().for_each(|w| ctx.warn(w));

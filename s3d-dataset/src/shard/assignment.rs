@@ -230,7 +230,8 @@ mod tests {
             let mut opened = vec![0; counts.len()];
             for number in 1..=shards {
                 for (position, owners) in owners.iter_mut().enumerate() {
-                    let Some(part) = (Shard { number, of: shards }).within(position, counts.len()) else { continue };
+                    let part = (Shard { number, of: shards }).within(position, counts.len());
+                    let Some(part) = part else { continue };
                     opened[position] += 1;
                     prop_assert!(part.number >= 1 && part.number <= part.of);
                     owners.iter_mut().enumerate().filter(|(i, _)| part.takes(*i)).for_each(|(_, n)| *n += 1);

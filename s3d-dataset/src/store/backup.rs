@@ -98,7 +98,8 @@ fn take_back(from: &Layout, layout: &Layout, head: Option<Head>) -> Result<()> {
     let Some(head) = head else {
         return match fs::remove_dir(from.root()) {
             Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::Input(format!(
-                "{} holds an earlier data set, or a part of it, without its manifest: move it to another folder",
+                "{} holds an earlier data set, or a part of it, without its manifest: move it to another \
+                 folder",
                 from.root().display()
             ))),
             _ => Ok(()),

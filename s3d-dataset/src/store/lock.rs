@@ -56,7 +56,8 @@ impl Lock {
                 }
                 Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {
                     ctx.warn(format_args!(
-                        "{}: no locks on this file system; see to it that one process at a time exports into it",
+                        "{}: no locks on this file system; see to it that one process at a time exports into \
+                         it",
                         path.display()
                     ));
                     return Ok(Self { layout: layout.clone(), _file: file });

@@ -110,7 +110,8 @@ impl NewFolder {
     }
 }
 
-/// The path beside the folder of a data set that is called after it: `…/OUT` and `_report` give `…/OUT_report`.
+/// The path beside the folder of a data set that is called after it: `…/OUT` and `_report` give
+/// `…/OUT_report`.
 ///
 /// # Errors
 /// [`Error::File`] if the folder has no name of its own, as `.` has none, and is not there to be asked.

@@ -42,7 +42,8 @@ pub(crate) fn check(ctx: &Context, layout: &Layout, overwrite: bool, allowed: &[
     let root = layout.root();
     if layout.root_misleads_loaders() {
         ctx.warn(format_args!(
-            "{}: \"rgb\" in the folder's name misleads loaders that swap it for another modality in whole paths",
+            "{}: \"rgb\" in the folder's name misleads loaders that swap it for another modality in whole \
+             paths",
             root.display()
         ));
     }
@@ -351,7 +352,8 @@ fn refuse(layout: &Layout, found: &Found, overwrite: bool) -> Result<()> {
         named += &format!("; and {} more", differences.len() - MAX_NAMED);
     }
     Err(Error::Usage(format!(
-        "{} already holds {what} of another call ({named}): choose another folder, or replace it with --overwrite",
+        "{} already holds {what} of another call ({named}): choose another folder, or replace it with \
+         --overwrite",
         layout.root().display()
     )))
 }
@@ -444,8 +446,8 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
         return Ok(false);
     }
     Err(Error::Input(format!(
-        "{}: the data set was complete, but {} of its files are missing or cut, the first: {first}; make it again with \
-         --overwrite",
+        "{}: the data set was complete, but {} of its files are missing or cut, the first: {first}; make it \
+         again with --overwrite",
         layout.root().display(),
         faults.len()
     )))

@@ -151,7 +151,8 @@ impl Staging {
 }
 
 impl Drop for Staging {
-    /// Leaves nothing behind, unless things are half in their place or what was replaced could not be put back.
+    /// Leaves nothing behind, unless things are half in their place or what was replaced could not be put
+    /// back.
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.new);
         if let Some(lock) = self.lock.take() {

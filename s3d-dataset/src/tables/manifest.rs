@@ -206,8 +206,8 @@ impl Manifest {
         self.labels > 0
     }
 
-    /// The taxonomy of the labels: S3DIS's, or that in a file of its own, which `check` may refuse before it is
-    /// read.
+    /// The taxonomy of the labels: S3DIS's, or that in a file of its own, which `check` may refuse before it
+    /// is read.
     ///
     /// # Errors
     /// If the file is not as it should be, or holds a taxonomy of another name.
@@ -268,8 +268,8 @@ impl Manifest {
         }
         if !head.is_complete() {
             return fault(format!(
-                "status {:?}: the export into this folder did not finish, call it again, with the same arguments, and it \
-                 goes on",
+                "status {:?}: the export into this folder did not finish, call it again, with the same \
+                 arguments, and it goes on",
                 head.status
             ));
         }

@@ -265,7 +265,8 @@ pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: 
     }
     if folds.is_empty() {
         ctx.info(format_args!(
-            "these areas leave every fold without its training or its test areas: splits/ lists all panoramas only"
+            "these areas leave every fold without its training or its test areas: splits/ lists all \
+             panoramas only"
         ));
     }
     Ok(())

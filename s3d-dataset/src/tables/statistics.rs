@@ -100,8 +100,8 @@ pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
 }
 
 impl Statistics {
-    /// Counts what lies in the folders of a data set of these areas, with labels of a taxonomy or without. Before a file is
-    /// read, as a `whole` or not, `check` may refuse it.
+    /// Counts what lies in the folders of a data set of these areas, with labels of a taxonomy or without.
+    /// Before a file is read, as a `whole` or not, `check` may refuse it.
     pub(crate) fn count(
         layout: &Layout,
         areas: &[u32],

@@ -187,7 +187,8 @@ impl Summary {
         }
         if views.candidates > views.kept {
             lines.push(format!(
-                "{} of {} candidate views dropped: {} for the lowest entropies of their pool, {} not drawn from its middle",
+                "{} of {} candidate views dropped: {} for the lowest entropies of their pool, {} not drawn \
+                 from its middle",
                 views.candidates - views.kept,
                 views.candidates,
                 views.dropped_lowest,

@@ -152,8 +152,8 @@ pub(crate) fn check_points(points: f64) -> Result<()> {
 pub(crate) fn size_findings(mesh: &TriMesh, points_per_m2: f64) -> Result<Vec<Finding>> {
     let (area_m2, points) = (mesh.total_area(), mesh.total_area() * points_per_m2);
     let text = format!(
-        "{points_per_m2} points a m² on {area_m2:.1} m² are {points:.1e} points: is the mesh in metres? or lower \
-         --points-per-m2"
+        "{points_per_m2} points a m² on {area_m2:.1} m² are {points:.1e} points: is the mesh in metres? or \
+         lower --points-per-m2"
     );
     if points > MOST_POINTS {
         return Err(Error::Input(text));

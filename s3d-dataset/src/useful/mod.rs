@@ -179,20 +179,22 @@ pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
     let moving = "give [mesh] offset_m, or move mesh, points and cameras nearer to it";
     if farthest > LARGEST_HALF_M {
         let text = format!(
-            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates end at 65504; {moving}"
+            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates end at 65504; \
+             {moving}"
         );
         findings.push(Finding::new(Condition::Scale, false, text));
     } else if farthest > 1000.0 {
         let text = format!(
-            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates step by {} m there; {moving}",
+            "the mesh lies {farthest:.0} m from the origin: half floats of world coordinates step by {} m \
+             there; {moving}",
             half_step(farthest)
         );
         findings.push(Finding::new(Condition::Scale, false, text));
     }
     if makes_rgb && !has_colors(mesh) {
-        let text = "the mesh has no texture and no colours, so that its RGB images would be flat: leave rgb out of \
-                    --modalities, name the scanner's pictures, or write colors = \"points\" under [mesh] if annotated \
-                    points have colours";
+        let text = "the mesh has no texture and no colours, so that its RGB images would be flat: leave rgb \
+                    out of --modalities, name the scanner's pictures, or write colors = \"points\" under \
+                    [mesh] if annotated points have colours";
         findings.push(Finding::new(Condition::Colour, true, text.to_owned()));
     }
     findings
@@ -222,8 +224,8 @@ fn vote_findings(report: &VoteReport) -> Vec<Finding> {
     let far = report.total.far_points as f64 / report.total.points.max(1) as f64;
     if far > 0.05 {
         let text = format!(
-            "{} of the annotated points are farther than 5 cm from every face: do mesh and annotations share a frame? \
-             see `up` in the scene file",
+            "{} of the annotated points are farther than 5 cm from every face: do mesh and annotations share \
+             a frame? see `up` in the scene file",
             percent(far)
         );
         findings.push(Finding::new(Condition::Frame, far > 0.5, text));
@@ -259,7 +261,8 @@ fn level_finding(mesh: &TriMesh, label_of_face: &[LabelId], table: &LabelTable) 
     // Without floors and ceilings it is no number, and no less than anything.
     (share < 0.5).then(|| {
         let text = format!(
-            "only {} of the floors and ceilings are level: does another axis point up? see `up` in the scene file",
+            "only {} of the floors and ceilings are level: does another axis point up? see `up` in the scene \
+             file",
             percent(share)
         );
         Finding::new(Condition::Up, share < 0.25, text)
@@ -296,7 +299,8 @@ pub(crate) fn count_findings(count: f64, rooms: &[SurveyedRoom]) -> Vec<Finding>
         return Vec::new();
     }
     let text = format!(
-        "{count:.0} scan locations on {floor_m2:.0} m² of floor are many: the published data set has one on 4 m²"
+        "{count:.0} scan locations on {floor_m2:.0} m² of floor are many: the published data set has one on \
+         4 m²"
     );
     vec![Finding::new(Condition::Locations, count > 1000.0 && per_m2 > 4.0, text)]
 }
@@ -339,8 +343,8 @@ pub(crate) fn outlook_findings(outlooks: &[Outlook]) -> Vec<Finding> {
     }
     if back_sides > 0.5 {
         let text = format!(
-            "{} of what scan locations see are back sides: the faces are wound the other way, or the locations stand in \
-             walls",
+            "{} of what scan locations see are back sides: the faces are wound the other way, or the \
+             locations stand in walls",
             percent(back_sides)
         );
         findings.push(Finding::new(Condition::InsideOut, back_sides > 0.75, text));

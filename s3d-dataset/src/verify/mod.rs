@@ -137,8 +137,8 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     let domains = manifest.domains();
     if source != "texture" && domains.contains(&Domain::Rgb) {
         report.note(format!(
-            "area {area}: the colours of its images come from pictures ({source}), which are not in the data set; they were \
-             not compared"
+            "area {area}: the colours of its images come from pictures ({source}), which are not in the data \
+             set; they were not compared"
         ));
     }
     let photographs = common.photographs.count(area);
@@ -315,7 +315,8 @@ fn diagnose_mismatches(
         {
             let path = image.path(reference.layout, Domain::Pose);
             let message = format!(
-                "all images of it differ from the mesh in the same way: {first}; is it the pose that is wrong?"
+                "all images of it differ from the mesh in the same way: {first}; is it the pose that is \
+                 wrong?"
             );
             report.fault(Topic::Poses, "poses that do not fit their images", &path, message);
         }

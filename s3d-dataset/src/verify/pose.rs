@@ -213,8 +213,8 @@ fn camera(
         let [[fx, _, cx], [_, fy, cy], _] = k;
         let [[f, _, x], [.., y], _] = expected;
         format!(
-            "camera_k_matrix has the focal lengths {fx} and {fy} px and the centre ({cx}, {cy}); field of view and size \
-             make that {f} px and ({x}, {y})"
+            "camera_k_matrix has the focal lengths {fx} and {fy} px and the centre ({cx}, {cy}); field of \
+             view and size make that {f} px and ({x}, {y})"
         )
     });
     Some(camera)

@@ -30,7 +30,8 @@ impl Views {
                     let expected = locations.saturating_mul(manifest.options.views.into());
                     report.check(records.len() as u64 == expected, DRAWS, &layout.views_json(area), || {
                         format!(
-                            "{} candidates; the manifest tells of {locations} locations and {} candidates each",
+                            "{} candidates; the manifest tells of {locations} locations and {} candidates \
+                             each",
                             records.len(),
                             manifest.options.views
                         )

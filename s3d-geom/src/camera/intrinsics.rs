@@ -172,7 +172,12 @@ mod tests {
         }
 
         #[test]
-        fn rays_are_those_of_directions(i in 0u32..64, j in 0u32..32, fx in 5.0..300.0f64, cy in -99.0..99.0f64) {
+        fn rays_are_those_of_directions(
+            i in 0u32..64,
+            j in 0u32..32,
+            fx in 5.0..300.0f64,
+            cy in -99.0..99.0f64,
+        ) {
             let camera = Camera::pinhole(pose(), dvec2(fx, 80.0), dvec2(20.0, cy), 64, 32).unwrap();
             let direction = camera.direction(f64::from(i) + 0.5, f64::from(j) + 0.5);
             prop_assert!(camera.rays().at(i, j).abs_diff_eq(direction, 1e-11 * direction.length()));

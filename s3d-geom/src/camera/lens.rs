@@ -25,7 +25,8 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 /// use s3d_geom::{Lens, glam::{dvec2, dvec3}};
 ///
 /// // k₁ < 0 draws what is off the axis to the middle.
-/// let lens = Lens::new([640, 480], dvec2(500.0, 500.0), dvec2(320.0, 240.0), [-0.1, 0.0, 0.0, 0.0, 0.0]).unwrap();
+/// let lens =
+///     Lens::new([640, 480], dvec2(500.0, 500.0), dvec2(320.0, 240.0), [-0.1, 0.0, 0.0, 0.0, 0.0]).unwrap();
 /// let pixel = lens.project(dvec3(1.0, 0.0, 2.0)).unwrap();
 /// assert!(pixel.x < 320.0 + 500.0 * 0.5 && (pixel.y - 240.0).abs() < 1e-9);
 /// assert!(lens.direction(pixel).unwrap().abs_diff_eq(dvec3(0.5, 0.0, 1.0), 1e-9));

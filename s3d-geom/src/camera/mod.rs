@@ -80,7 +80,8 @@ impl NormalAxes {
 /// ```
 /// use s3d_geom::{Camera, Pose, glam::dvec3};
 ///
-/// // It looks along +Y: a point ahead and to the right (+X) is right of the middle, whatever lies behind is nowhere.
+/// // It looks along +Y: a point ahead and to the right (+X) is right of the middle, whatever lies behind
+/// // is nowhere.
 /// let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 90f64.to_radians(), 200, 100);
 /// let (pixel, depth) = camera.project(dvec3(1.0, 2.0, 1.5)).unwrap();
 /// assert!((pixel.x - 150.0).abs() < 1e-9 && (pixel.y - 50.0).abs() < 1e-9 && (depth - 2.0).abs() < 1e-9);
@@ -288,7 +289,10 @@ mod tests {
     proptest! {
         #[test]
         fn pixels_come_back(i in 0u32..64, j in 0u32..32, t in 0.1..50.0f64, pano in any::<bool>()) {
-            let c = if pano { Camera::equirectangular(pose(), 64) } else { Camera::perspective(pose(), 1.2, 64, 32) };
+            let c = match pano {
+                true => Camera::equirectangular(pose(), 64),
+                false => Camera::perspective(pose(), 1.2, 64, 32),
+            };
             let d = c.rays().at(i, j);
             prop_assert!(d.abs_diff_eq(c.direction(f64::from(i) + 0.5, f64::from(j) + 0.5), 1e-12));
             let (px, depth) = c.project(c.pose.location + d * t).unwrap();

@@ -252,7 +252,8 @@ mod tests {
 
         #[test]
         fn yaw_and_pitch_come_back(yaw in -3.1..3.1f64, pitch in -1.5..1.5f64, q in -3.0..3.0f64) {
-            let original = Pose::from_scanner(DVec3::ONE, DQuat::from_rotation_z(q) * DQuat::from_rotation_x(0.1));
+            let original =
+                Pose::from_scanner(DVec3::ONE, DQuat::from_rotation_z(q) * DQuat::from_rotation_x(0.1));
             let (y, p) = original.yaw_pitch_to(&original.turned(yaw, pitch));
             prop_assert!((y - yaw).abs() < 1e-9 && (p - pitch).abs() < 1e-9);
         }

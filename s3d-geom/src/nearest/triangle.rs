@@ -186,7 +186,10 @@ mod tests {
         }
 
         #[test]
-        fn the_order_of_corners_does_not_matter([a, b, c] in [corner(), corner(), corner()], point in corner()) {
+        fn the_order_of_corners_does_not_matter(
+            [a, b, c] in [corner(), corner(), corner()],
+            point in corner(),
+        ) {
             let point = point.as_dvec3();
             let d2 = SortedTriangle::new([a, b, c]).closest(point);
             for turned in [[b, c, a], [c, a, b], [c, b, a]] {

@@ -226,7 +226,11 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(4000))]
 
         #[test]
-        fn bounds_hold(corners in [anywhere(), anywhere(), anywhere()], point in anywhere(), scale in -24..24i32) {
+        fn bounds_hold(
+            corners in [anywhere(), anywhere(), anywhere()],
+            point in anywhere(),
+            scale in -24..24i32,
+        ) {
             let scale = 10f32.powi(scale);
             check(corners.map(|c| c * scale), point * scale)?;
             check(corners.map(|c| c * 0.01), point)?;
@@ -234,7 +238,11 @@ mod tests {
         }
 
         #[test]
-        fn bounds_hold_far_from_the_origin(corners in [anywhere(), anywhere(), anywhere()], point in anywhere(), away in anywhere()) {
+        fn bounds_hold_far_from_the_origin(
+            corners in [anywhere(), anywhere(), anywhere()],
+            point in anywhere(),
+            away in anywhere(),
+        ) {
             let away = away * 2000.0;
             check(corners.map(|c| c * 0.1 + away), point * 0.1 + away)?;
         }
@@ -247,12 +255,18 @@ mod tests {
             (near, off, distance) in (-0.5..1.5f32, anywhere(), -9..1i32),
         ) {
             let corners = [a, b, a.lerp(b, along) + aside * 10f32.powi(thinness)];
-            prop_assume!(corners[0] != corners[1] && SortedTriangle::new(corners).longest_and_normal_squared().1 > 0.0);
+            prop_assume!(
+                corners[0] != corners[1] && SortedTriangle::new(corners).longest_and_normal_squared().1 > 0.0
+            );
             check(corners, a.lerp(b, near) + off * 10f32.powi(distance))?;
         }
 
         #[test]
-        fn bounds_hold_on_the_triangle(corners in [anywhere(), anywhere(), anywhere()], s in 0.0..1.0f32, t in 0.0..1.0f32) {
+        fn bounds_hold_on_the_triangle(
+            corners in [anywhere(), anywhere(), anywhere()],
+            s in 0.0..1.0f32,
+            t in 0.0..1.0f32,
+        ) {
             let [a, b, c] = corners;
             for point in [a, a.lerp(b, s), c.lerp(a, t), a.lerp(b, s).lerp(c, t)] {
                 check(corners, point)?;

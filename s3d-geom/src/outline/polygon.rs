@@ -58,7 +58,8 @@ pub enum PolygonError {
 /// ```
 /// use s3d_geom::{Polygon, PolygonError, glam::{DVec2, dvec2}};
 ///
-/// let square = |min: f64, max: f64| vec![dvec2(min, min), dvec2(max, min), dvec2(max, max), dvec2(min, max)];
+/// let square =
+///     |min: f64, max: f64| vec![dvec2(min, min), dvec2(max, min), dvec2(max, max), dvec2(min, max)];
 /// let ring = Polygon { outer: square(0.0, 3.0), holes: vec![square(1.0, 2.0)] };
 /// assert_eq!((ring.area(), ring.triangulate()?.len()), (8.0, 8));
 /// assert!(ring.contains(dvec2(0.5, 0.5)) && !ring.contains(dvec2(1.5, 1.5)));
@@ -552,10 +553,14 @@ mod tests {
         #[test]
         fn wild_outlines_never_panic(corners in prop::collection::vec((0..5i8, 0..5i8, 0..2i8), 0..14)) {
             let corners: Vec<Vec3> =
-                corners.iter().map(|&(x, y, z)| vec3(f32::from(x), f32::from(y), f32::from(z) * 0.25)).collect();
+                corners
+                    .iter()
+                    .map(|&(x, y, z)| vec3(f32::from(x), f32::from(y), f32::from(z) * 0.25))
+                    .collect();
             if let Ok(triangles) = triangulate_face(&corners) {
                 // What the triangles cover, seen along the normal, is what the outline encloses.
-                let normal = edges(&corners).map(|(a, b)| a.as_dvec3().cross(b.as_dvec3())).sum::<DVec3>() / 2.0;
+                let normal =
+                    edges(&corners).map(|(a, b)| a.as_dvec3().cross(b.as_dvec3())).sum::<DVec3>() / 2.0;
                 let covered: DVec3 = triangles.iter().map(|&t| triangle_area(&corners, t)).sum();
                 prop_assert!((covered.dot(normal.normalize()) - normal.length()).abs() < 1e-6);
             }

@@ -65,8 +65,8 @@ fn read_pictures(path: &Path) -> Result<Vec<Picture>> {
 /// Two lines a picture: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, and its points, which may be none.
 /// Some programs leave the empty lines out: what follows a picture are its points only if it looks like them.
 fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<Picture>> {
-    const FORM: &str = "a picture is IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and the line after it may hold its points, \
-                        X Y POINT3D_ID each";
+    const FORM: &str = "a picture is IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and the line after it may \
+                        hold its points, X Y POINT3D_ID each";
     let mut pictures = Vec::new();
     let mut may_be_points = false;
     for (line, text) in (1u64..).zip(bytes.split(|&b| b == b'\n')) {

@@ -136,8 +136,8 @@ fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Resu
         ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => pinhole(one(f), cx, cy, fisheye([k1, k2, 0.0, 0.0])),
         _ => {
             return Err(format!(
-                "the camera model {model} is not supported: undistort the pictures with colmap image_undistorter, which \
-                 makes a model of PINHOLE cameras"
+                "the camera model {model} is not supported: undistort the pictures with colmap \
+                 image_undistorter, which makes a model of PINHOLE cameras"
             ));
         }
     };
@@ -153,7 +153,8 @@ fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Resu
 mod tests {
     use super::*;
 
-    const ALL: &str = "# Camera list\n1 PINHOLE 640 480 500 510 320 240\n2 SIMPLE_PINHOLE 640 480 500 320 240\n\
+    const ALL: &str = "# Camera list\n1 PINHOLE 640 480 500 510 320 240\n\
+                       2 SIMPLE_PINHOLE 640 480 500 320 240\n\
                        3 SIMPLE_RADIAL 640 480 500 320 240 0.1\r\n4 RADIAL 640 480 500 320 240 0.1 -0.2\n\
                        5 OPENCV 640 480 500 510 320 240 0.1 -0.2 0.003 0.004\n\
                        6 OPENCV_FISHEYE 640 480 500 510 320 240 0.1 -0.2 0.03 0.04\n\

@@ -10,8 +10,9 @@ use s3d_geom::glam::{DAffine3, DMat3};
 use std::path::{Path, PathBuf};
 
 /// What is read, for messages.
-const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files (*.json), the raw captures \
-                     of a Matterport, a COLMAP model (images.txt or images.bin) or a transforms.json";
+const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files \
+                     (*.json), the raw captures of a Matterport, a COLMAP model (images.txt or images.bin) \
+                     or a transforms.json";
 
 /// Reads the scan locations of `path`, a file or a folder:
 ///

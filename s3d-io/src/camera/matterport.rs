@@ -243,8 +243,8 @@ pub fn parse_intrinsics(bytes: &[u8], name: &Path) -> Result<Lens> {
     };
     Lens::new([w, h], DVec2::new(fx, fy), DVec2::new(cx, cy), [k1, k2, p1, p2, k3]).ok_or_else(|| {
         let message = format!(
-            "no lens: fx {fx} fy {fy} cx {cx} cy {cy}, distortion {k1} {k2} {p1} {p2} {k3} (focal lengths are above 0, and the \
-             middle of the picture is seen)"
+            "no lens: fx {fx} fy {fy} cx {cx} cy {cy}, distortion {k1} {k2} {p1} {p2} {k3} (focal lengths \
+             are above 0, and the middle of the picture is seen)"
         );
         Error::line(path, lines[2], message)
     })
@@ -285,7 +285,8 @@ pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
         .fold(0.0, |a: f64, v| a.max(v.abs()));
     if off > ROTATION_ERROR {
         let message = format!(
-            "the upper left 3×3 part is no rotation: its axes are off by {off:.4} of being square and of length 1"
+            "the upper left 3×3 part is no rotation: its axes are off by {off:.4} of being square and of \
+             length 1"
         );
         return Err(Error::line(path, lines[0], message));
     }
@@ -327,7 +328,8 @@ pub fn read_matterport_locations(dir: &Path) -> Result<Vec<ScanLocation>> {
                 poses.push(read_capture_pose(path)?);
             } else if yaw == 0 {
                 let message = format!(
-                    "location {uuid} has no {uuid}_pose_{LEVEL}_0.txt, from which its original camera would be taken"
+                    "location {uuid} has no {uuid}_pose_{LEVEL}_0.txt, from which its original camera would \
+                     be taken"
                 );
                 return Err(Error::format(dir, message));
             }

@@ -183,7 +183,8 @@ impl CameraKeys {
             }
             Some(other) => {
                 return Err(format!(
-                    "the camera_model {other:?} is not supported: OPENCV, OPENCV_FISHEYE, PINHOLE and EQUIRECTANGULAR are"
+                    "the camera_model {other:?} is not supported: OPENCV, OPENCV_FISHEYE, PINHOLE and \
+                     EQUIRECTANGULAR are"
                 ));
             }
         };

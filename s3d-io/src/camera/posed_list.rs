@@ -10,9 +10,9 @@ use s3d_geom::glam::DAffine3;
 use std::path::{Path, PathBuf};
 
 /// What is read, for messages.
-const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), a folder of ScanNet's poses \
-                     (pose/0.txt) or of Polycam's keyframes, a trajectory of lines `timestamp tx ty tz qx \
-                     qy qz qw`, or a CSV table";
+const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), a \
+                     folder of ScanNet's poses (pose/0.txt) or of Polycam's keyframes, a trajectory of lines \
+                     `timestamp tx ty tz qx qy qz qw`, or a CSV table";
 
 /// The cameras of a list.
 #[derive(Clone, Debug, PartialEq)]

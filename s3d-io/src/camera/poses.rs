@@ -61,8 +61,8 @@ pub(crate) fn read(
     for (uuid, (file, pose)) in files {
         if let Some(other) = in_lower_case.insert(uuid.to_ascii_lowercase(), uuid.clone()) {
             let message = format!(
-                "its camera_uuid {uuid} differs from {other} of another file in case only; where case does not count, files \
-                 of both would have one name: rename one"
+                "its camera_uuid {uuid} differs from {other} of another file in case only; where case does \
+                 not count, files of both would have one name: rename one"
             );
             return Err(Error::format(&file, message));
         }

@@ -52,7 +52,8 @@ mod tests {
         // As the benchmark writes it. Both look along +Y: the first level, the second with its right side
         // down.
         let text = "# ground truth trajectory\n# timestamp tx ty tz qx qy qz qw\n\
-                    1305031098.6659 1.3563 0.6305 1.6380 -0.70710678 0 0 0.70710678\n\n1305031098.6758 0 0 0 -0.5 0.5 0.5 0.5\r\n";
+                    1305031098.6659 1.3563 0.6305 1.6380 -0.70710678 0 0 0.70710678\n\n\
+                    1305031098.6758 0 0 0 -0.5 0.5 0.5 0.5\r\n";
         let cameras = read(Path::new("groundtruth.txt"), text.as_bytes()).unwrap();
         let names: Vec<&str> = cameras.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["1305031098.6659", "1305031098.6758"]);

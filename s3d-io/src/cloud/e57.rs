@@ -103,8 +103,8 @@ impl<'a> Scan<'a> {
             Error::Format { message, .. } if message.contains("no column of classes") => Error::format(
                 path,
                 format!(
-                    "{message}. E57 itself knows no classes: export the labelled points with an attribute for them, or as \
-                     LAS or PLY"
+                    "{message}. E57 itself knows no classes: export the labelled points with an attribute \
+                     for them, or as LAS or PLY"
                 ),
             ),
             e => e,

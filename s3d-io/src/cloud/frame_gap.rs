@@ -165,8 +165,8 @@ impl FrameWatch {
 pub(crate) fn refusal(path: &Path, gap: &FrameGap) -> Error {
     let offset = gap.offset_in_toml();
     let message = format!(
-        "its points lie {gap}, in metres, Z-up. Points and mesh need one frame: if they are of one scan, write \
-         {offset} under [annotations] in the scene file; it is subtracted from the points"
+        "its points lie {gap}, in metres, Z-up. Points and mesh need one frame: if they are of one scan, \
+         write {offset} under [annotations] in the scene file; it is subtracted from the points"
     );
     Error::format(path, message)
 }

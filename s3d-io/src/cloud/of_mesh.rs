@@ -35,8 +35,8 @@ impl Annotations {
             None => MeshLabels::from_materials(&file.mesh, &options.taxonomy).ok_or_else(|| {
                 Error::format(
                     path,
-                    "came without labels: neither has it a column of classes of faces or vertices (name it with class = \"…\"), \
-                     nor are its materials named as labels, as in chair_3_office_5_1",
+                    "came without labels: neither has it a column of classes of faces or vertices (name it \
+                     with class = \"…\"), nor are its materials named as labels, as in chair_3_office_5_1",
                 )
             })?,
         };
@@ -145,8 +145,8 @@ mod tests {
         let columns = "property int label\nproperty int instance\n";
         let (v, f) = if of_vertices { (columns, "") } else { ("", columns) };
         let mut ply = format!(
-            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n{v}\
-             element face {n}\nproperty list uchar int vertex_indices\n{f}end_header\n",
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+             {v}element face {n}\nproperty list uchar int vertex_indices\n{f}end_header\n",
             4 * n
         );
         for (i, (class, instance)) in labels.iter().enumerate() {

@@ -166,8 +166,8 @@ impl Annotations {
         if columns.iter().any(|c| c.is_some()) || options.room.is_some() {
             return Err(Error::format(
                 dir,
-                "is a folder: its rooms, classes and instances are named by its files; columns and a room are for \
-                 clouds",
+                "is a folder: its rooms, classes and instances are named by its files; columns and a room \
+                 are for clouds",
             ));
         }
         let (on_fault, offset_m) = (options.on_fault, options.offset_m);
@@ -276,8 +276,8 @@ fn table(source: Source, options: &AnnotationOptions) -> Result<Box<dyn Cloud + 
         extension if let Some(feature) = feature_of(extension) => Err(Error::not_built_in(&path, feature)),
         _ => Err(Error::unsupported(
             &path,
-            "is no kind of annotations that is read: an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, or \
-             ScanNet's .aggregation.json",
+            "is no kind of annotations that is read: an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, \
+             .e57, or ScanNet's .aggregation.json",
         )),
     }
 }

@@ -269,7 +269,8 @@ mod tests {
         fs::create_dir_all(&folder).unwrap();
         let mut text = String::new();
         let mut ply = format!(
-            "ply\nformat ascii 1.0\nelement vertex {points}\nproperty float x\nproperty float y\nproperty float z\n\
+            "ply\nformat ascii 1.0\nelement vertex {points}\nproperty float x\nproperty float y\n\
+             property float z\n\
              property uchar class\nend_header\n"
         );
         for i in 0..points {

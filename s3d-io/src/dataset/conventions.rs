@@ -160,7 +160,8 @@ impl Conventions {
             "world": { "unit": "m", "up": "+Z", "handedness": "right" },
             "files": {
                 "pattern": "area_{area}/{kind}/{folder}/camera_{uuid}_{roomType}_{roomNum}_frame_{frame}_domain_{suffix}.{ext}",
-                "kinds": { "data": "perspective views, frame counts from 0", "pano": "panoramas, frame is \"equirectangular\"" },
+                "kinds": { "data": "perspective views, frame counts from 0", "pano": "panoramas, frame is \
+                    \"equirectangular\"" },
                 "folder_suffix_ext": Domain::ALL.map(|d| [d.folder(), d.suffix(), d.extension()]),
             },
             "meshes": {
@@ -173,7 +174,8 @@ impl Conventions {
                 "angle_unit": "rad",
                 "euler": "R = Rz @ Ry @ Rx of [x, y, z]",
                 "rotations": "camera to world; the camera looks along -Z, +Y is up",
-                "composition": "R(final_camera_rotation) = R(rotation_from_original_to_point) @ R(camera_original_rotation)",
+                "composition": "R(final_camera_rotation) = R(rotation_from_original_to_point) @ \
+                                R(camera_original_rotation)",
                 "camera_rt_matrix": "3x4, world to camera, OpenCV axes: x right, y down, z forward",
                 "opencv_from_camera": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
                 "camera_k_matrix": "fx = fy = (W / 2) / tan(field_of_view_rads / 2), cx = W / 2, cy = H / 2",
@@ -182,8 +184,10 @@ impl Conventions {
             "panorama": {
                 "longitude": "((column + 0.5) / W - 0.5) * 2 * pi, growing to the right",
                 "latitude": "(0.5 - (row + 0.5) / H) * pi",
-                "center": "the pose's forward axis projected to the horizon; up is +Z, whatever the pose's tilt",
-                "direction": "[cos(lat) * cos(a - lon), cos(lat) * sin(a - lon), sin(lat)], a = atan2(forward.y, forward.x)",
+                "center": "the pose's forward axis projected to the horizon; up is +Z, whatever the pose's \
+                           tilt",
+                "direction": "[cos(lat) * cos(a - lon), cos(lat) * sin(a - lon), sin(lat)], a = \
+                              atan2(forward.y, forward.x)",
             },
             "rgb": { "missing": [0, 0, 0] },
             "depth": {
@@ -227,7 +231,8 @@ impl Conventions {
             },
             "s3dis": {
                 "line": "x y z r g b, world metres",
-                "alignment": "degrees in [0, 90): the direction of the walls; turn the room by minus the angle about Z",
+                "alignment": "degrees in [0, 90): the direction of the walls; turn the room by minus the \
+                              angle about Z",
             },
         })
     }

@@ -29,8 +29,8 @@ use std::path::Path;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaceVoteColumns {
-    /// Index of the face's label in `semantic_labels.json`: of the one with most votes. Without votes it is 0,
-    /// or the label that the face was filled with.
+    /// Index of the face's label in `semantic_labels.json`: of the one with most votes. Without votes it is
+    /// 0, or the label that the face was filled with.
     pub label: Vec<u32>,
     /// Its votes.
     pub votes: Vec<u32>,

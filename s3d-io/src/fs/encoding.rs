@@ -55,7 +55,8 @@ pub(crate) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
 pub(crate) fn text_of<'a>(bytes: &'a [u8], path: &Path) -> crate::error::Result<Cow<'a, [u8]>> {
     let text = utf8(bytes);
     if text.iter().take(4096).any(|b| *b == 0) {
-        let message = "is no text: it holds zero bytes. If it is text in UTF-16, save it with its mark in front, or in UTF-8";
+        let message = "is no text: it holds zero bytes. If it is text in UTF-16, save it with its mark in \
+                       front, or in UTF-8";
         return Err(Error::format(path, message));
     }
     Ok(text)
@@ -195,7 +196,8 @@ pub(crate) mod tests {
 
     proptest! {
         #[test]
-        fn every_encoding_is_one_text(text in "[a-z0-9 \n\u{e4}\u{20ac}\u{1f600}]{0,40}", at_once in 1usize..9) {
+        fn every_encoding_is_one_text(text in "[a-z0-9 \
+                                               \n\u{e4}\u{20ac}\u{1f600}]{0,40}", at_once in 1usize..9) {
             for bytes in encoded(&text) {
                 prop_assert_eq!(utf8(&bytes), text.as_bytes());
                 prop_assert_eq!(into_utf8(bytes.clone()), text.as_bytes());

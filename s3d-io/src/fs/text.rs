@@ -100,23 +100,33 @@ mod tests {
 
     proptest! {
         #[test]
-        fn numbers_are_those_that_the_standard_library_reads(digits in 0u64..1_000_000_000_000_000, decimals in 0usize..15) {
+        fn numbers_are_those_that_the_standard_library_reads(
+            digits in 0u64..1_000_000_000_000_000,
+            decimals in 0usize..15,
+        ) {
             let mut word = format!("{digits:015}");
             word.insert(15 - decimals, '.');
             for from in 0..word.len() {
                 let word = &word[from..];
-                prop_assert_eq!(number(word.as_bytes()).map(f32::to_bits), word.parse().ok().map(f32::to_bits), "{}", word);
+                prop_assert_eq!(
+                    number(word.as_bytes()).map(f32::to_bits), word.parse().ok().map(f32::to_bits), "{}", word
+                );
             }
         }
 
         #[test]
-        fn halfway_cases_round_as_the_standard_library_does(bits in 0x3a00_0000u32..0x4b00_0000, off in -2i64..3) {
+        fn halfway_cases_round_as_the_standard_library_does(
+            bits in 0x3a00_0000u32..0x4b00_0000,
+            off in -2i64..3,
+        ) {
             // The middle of two neighbours in f32, and what is next to it, in 14 digits.
             let middle = f64::from_bits(f64::from(f32::from_bits(bits)).to_bits() + 0x1000_0000);
             let decimals = 13 - (middle.log10().floor() as usize).min(13);
             let scaled = (middle * 10f64.powi(decimals as i32)).round() as i64 + off;
             let word = format!("{:.*}", decimals.min(12), scaled as f64 / 10f64.powi(decimals as i32));
-            prop_assert_eq!(number(word.as_bytes()).map(f32::to_bits), word.parse().ok().map(f32::to_bits), "{}", word);
+            prop_assert_eq!(
+                number(word.as_bytes()).map(f32::to_bits), word.parse().ok().map(f32::to_bits), "{}", word
+            );
         }
     }
 }

@@ -121,8 +121,8 @@ fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static s
     }
     if pixels > MAX_PIXELS {
         return Err(TextureFault::TooLarge(format!(
-            "is {width} × {height} pixels large, and a texture has {MAX_PIXELS} at most (32,768 × 16,384): scale it down, or \
-             cut it in parts"
+            "is {width} × {height} pixels large, and a texture has {MAX_PIXELS} at most (32,768 × 16,384): \
+             scale it down, or cut it in parts"
         )));
     }
     if pixels > (bytes.len() as u64).saturating_mul(MAX_PIXELS_PER_BYTE) {
@@ -181,8 +181,8 @@ impl Together {
             return Ok(());
         }
         Err(format!(
-            "is the texture that makes {} of them with {} pixels: all textures of a file have {MAX_PIXELS_TOGETHER} at most; \
-             scale them down, or cut the scene in parts",
+            "is the texture that makes {} of them with {} pixels: all textures of a file have \
+             {MAX_PIXELS_TOGETHER} at most; scale them down, or cut the scene in parts",
             self.textures, self.pixels
         ))
     }

@@ -62,7 +62,8 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
     let together = sizes(&joined.mesh).into_iter().zip(sizes(&next.mesh)).map(|(a, b)| a + b);
     if together.max() >= Some(NO_INDEX as usize) {
         let path = next.sources.first().map_or(Path::new(""), |s| &s.path);
-        let message = "makes more vertices or faces than 32 bits count, with the meshes before it; cut the scene in parts";
+        let message = "makes more vertices or faces than 32 bits count, with the meshes before it; cut the \
+                       scene in parts";
         return Err(Error::format(path, message));
     }
     let [first_face, first_vertex] = [joined.mesh.faces().len() as u32, joined.mesh.positions().len() as u32];
@@ -152,7 +153,8 @@ mod tests {
     fn labelled_vertices() -> String {
         let square = SQUARE.replace(" 0\n", " 2 7\n").replacen(" 7", " 6", 1);
         format!(
-            "{HEAD}property uchar label\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n{square}4 0 1 2 3\n"
+            "{HEAD}property uchar label\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+             {square}4 0 1 2 3\n"
         )
     }
 

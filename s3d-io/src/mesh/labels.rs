@@ -63,7 +63,8 @@ impl MeshLabels {
     ///     face_materials: vec![0],
     ///     ..MeshParts::default()
     /// })?;
-    /// let Some((MeshLabels::Names { labels, faces }, warnings)) = MeshLabels::from_materials(&mesh, &Default::default()) else { panic!() };
+    /// let Some((MeshLabels::Names { labels, faces }, warnings)) =
+    ///     MeshLabels::from_materials(&mesh, &Default::default()) else { panic!() };
     /// assert_eq!((labels[faces[0] as usize].instance, warnings.len()), (3, 0));
     /// # Ok::<(), s3d_geom::MeshError>(())
     /// ```

@@ -19,8 +19,8 @@ pub enum MeshOrigin {
     /// The file's.
     #[default]
     OfFile,
-    /// The file's, unless the mesh goes farther than 1,024 m from it: then the place next to the middle of its
-    /// box whose coordinates are multiples of 100 m, if that halves the distance at least.
+    /// The file's, unless the mesh goes farther than 1,024 m from it: then the place next to the middle of
+    /// its box whose coordinates are multiples of 100 m, if that halves the distance at least.
     Near,
     /// This place of the file's frame, in the world's axes: metres, Z-up.
     At(DVec3),
@@ -256,7 +256,8 @@ mod tests {
 
     #[test]
     fn vertices_with_weights_colours_and_comments_keep_their_digits() {
-        let text = "v 1000000.5 10800001 600 2 # half of it\nv 500001.25 5400000.5 300.125 1 0 0\nv 500000 \\\n5400001 300.5 # x\nf 1 2 3\n";
+        let text = "v 1000000.5 10800001 600 2 # half of it\nv 500001.25 5400000.5 300.125 1 0 0\n\
+                    v 500000 \\\n5400001 300.5 # x\nf 1 2 3\n";
         let file = read("a.obj", text.as_bytes(), UpAxis::Z, MeshOrigin::Near).unwrap();
         let positions: Vec<[f32; 3]> = file.mesh.positions().iter().map(|p| p.to_array()).collect();
         assert_eq!(positions, [[0.25, 0.5, 0.0], [1.25, 0.5, 0.125], [0.0, 1.0, 0.5]]);

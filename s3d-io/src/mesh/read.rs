@@ -18,8 +18,8 @@ pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
     read_mesh_with(path, up, &MeshOptions::default())
 }
 
-/// As [`read_mesh`], with another origin or unit, and the names of the columns of labels. Only PLY files have such
-/// columns.
+/// As [`read_mesh`], with another origin or unit, and the names of the columns of labels. Only PLY files have
+/// such columns.
 ///
 /// # Errors
 /// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that

@@ -175,7 +175,8 @@ mod tests {
             height in 1u32..40,
         ) {
             let width = (ids.len() as u32).div_ceil(height);
-            let mut pixels: Vec<[u8; 3]> = ids.iter().map(|id| [*id as u8, 0, 7 * u8::from(*id > 0)]).collect();
+            let mut pixels: Vec<[u8; 3]> =
+                ids.iter().map(|id| [*id as u8, 0, 7 * u8::from(*id > 0)]).collect();
             pixels.resize((width * height) as usize, [0; 3]);
             let image = Raster::from_vec(width, height, pixels);
             let id_of = |x, y| { let [r, g, b] = image.at(x, y); u32::from_le_bytes([r, g, b, 0]) };

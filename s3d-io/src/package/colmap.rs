@@ -251,7 +251,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn points_fall_on_the_pixels_of_our_camera(k in 0usize..40, x in -3.0..3.0f64, y in -3.0..3.0f64, z in 0.1..9.0f64) {
+        fn points_fall_on_the_pixels_of_our_camera(
+            k in 0usize..40,
+            x in -3.0..3.0f64,
+            y in -3.0..3.0f64,
+            z in 0.1..9.0f64,
+        ) {
             let camera = cameras()[k];
             let point = camera.pose.location
                 + camera.pose.right() * x + camera.pose.up() * y + camera.pose.forward() * z;
@@ -259,7 +264,9 @@ mod tests {
             let (q, t) = image.pose();
             let (u, v, depth) = project(q, t, image.intrinsics(), point);
             let (ours, our_depth) = camera.project(point).unwrap();
-            prop_assert!((u - ours.x).abs() < 1e-8 && (v - ours.y).abs() < 1e-8 && (depth - our_depth).abs() < 1e-10);
+            prop_assert!(
+                (u - ours.x).abs() < 1e-8 && (v - ours.y).abs() < 1e-8 && (depth - our_depth).abs() < 1e-10
+            );
             prop_assert!(q[0] >= 0.0);
         }
     }

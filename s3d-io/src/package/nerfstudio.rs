@@ -177,7 +177,8 @@ mod tests {
         #[test]
         fn rays_are_ours(x in 0.0..64.0f64, y in 0.0..32.0f64, yaw in -3.0..3.0f64, pitch in -0.7..0.7f64) {
             let camera = Camera::perspective(original().turned(yaw, pitch), 1.1, 64, 32);
-            let frame = NerfstudioFrame::perspective("a".into(), &pose_file(&camera, Frame::View(0)), (64, 32));
+            let frame =
+                NerfstudioFrame::perspective("a".into(), &pose_file(&camera, Frame::View(0)), (64, 32));
             prop_assert!(ray(&frame, false, x, y).abs_diff_eq(camera.direction(x, y), 1e-9));
             let (focal, center) = (glam::dvec2(40.0, 50.0 + y), glam::dvec2(x, -3.0));
             let pinhole = Camera::pinhole(original().turned(yaw, pitch), focal, center, 64, 32).unwrap();
@@ -185,9 +186,12 @@ mod tests {
             prop_assert!(ray(&frame, false, x, y).abs_diff_eq(pinhole.direction(x, y), 1e-9));
 
             let camera = Camera::equirectangular(original(), 64);
-            let frame = NerfstudioFrame::equirectangular("a".into(), &pose_file(&camera, Frame::Panorama), (64, 32));
+            let frame =
+                NerfstudioFrame::equirectangular("a".into(), &pose_file(&camera, Frame::Panorama), (64, 32));
             prop_assert!(ray(&frame, true, x, y).abs_diff_eq(camera.direction(x, y), 1e-9));
-            prop_assert_eq!(&NerfstudioFrame::new("a".into(), &camera).transform_matrix, &frame.transform_matrix);
+            prop_assert_eq!(
+                &NerfstudioFrame::new("a".into(), &camera).transform_matrix, &frame.transform_matrix
+            );
             let up = frame.transform_matrix[2];
             prop_assert!(up[0].abs() < 1e-12 && (up[1] - 1.0).abs() < 1e-12 && up[2].abs() < 1e-12);
         }

@@ -34,7 +34,11 @@ impl AnnotationTable {
             (Some(path), None, false) => Ok(("annotations.path", std::slice::from_ref(path))),
             (None, Some(paths), false) if !paths.is_empty() => Ok(("annotations.paths", paths)),
             (None, None, true) => Ok(("annotations.mesh", &[])),
-            _ => Err("annotations needs one of path, paths (a list of at least one) and mesh = true (its own labels)".into()),
+            _ => {
+                Err("annotations needs one of path, paths (a list of at least one) and mesh = true (its own \
+                      labels)"
+                    .into())
+            }
         }
     }
 
@@ -70,8 +74,8 @@ impl AnnotationTable {
         }
         if self.unknown_as_clutter && taxonomy.clutter().is_none() {
             return Err(format!(
-                "annotations.unknown_as_clutter = true: the taxonomy {} has no class for it: say which it is, with clutter = \
-                 \"…\" in the taxonomy",
+                "annotations.unknown_as_clutter = true: the taxonomy {} has no class for it: say which it \
+                 is, with clutter = \"…\" in the taxonomy",
                 taxonomy.name()
             ));
         }

@@ -55,7 +55,8 @@ impl CamerasTable {
 
 /// The rows of a 4 × 4 matrix as what it does: turn, shift and scale, nothing else.
 pub(crate) fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, String> {
-    const FORM: &str = "transform is no rotation with a scale and a shift: its rows are [x, y, z, shift], the last [0, 0, 0, 1]";
+    const FORM: &str = "transform is no rotation with a scale and a shift: its rows are [x, y, z, shift], \
+                        the last [0, 0, 0, 1]";
 
     let columns = DMat4::from_cols_array_2d(&rows).transpose();
     let m = DMat3::from_mat4(columns);

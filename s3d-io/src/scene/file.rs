@@ -36,8 +36,8 @@ pub struct SceneFile {
     /// Which axis of the mesh points up. Not said, it is +Y: by glTF's definition, and as in the published
     /// OBJ files.
     pub up: UpAxis,
-    /// The unit of the mesh's coordinates: metres if neither this nor the mesh's file says it. Points and scan
-    /// locations are in metres.
+    /// The unit of the mesh's coordinates: metres if neither this nor the mesh's file says it. Points and
+    /// scan locations are in metres.
     pub units: Option<LengthUnit>,
     /// What is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing, unless
     /// it lies far from the origin ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
@@ -143,7 +143,7 @@ struct MeshTable {
 /// [mesh]
 /// path = "rgb.obj"    # or paths = ["floor_1.ply", "floor_2.ply"]
 /// up   = "y"          # or "z"; "y" if it is left out
-/// units = "cm"        # or "m", "mm", "ft", "in"; metres if it is left out and the mesh's file does not say it
+/// units = "cm"        # or "m", "mm", "ft", "in"; left out: what the mesh's file says, or metres
 /// offset_m = [500000.0, 5400000.0, 300.0]  # subtracted from positions; found by itself if it is left out
 /// colors = "points"   # a mesh without textures takes the colours of the annotated points
 /// [annotations]       # left out: there are no labels
@@ -189,7 +189,8 @@ struct MeshTable {
 /// area = 5
 /// [published]
 /// path      = "area_5b"
-/// transform = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]   # to the frame of 5a; may be left out
+/// # to the frame of 5a; may be left out
+/// transform = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 /// ```
 ///
 /// Further keys of `[rgb]` are those of [`crate::scene::PictureOptions`], of `[frames]` those of
@@ -323,7 +324,8 @@ mod tests {
     use std::collections::BTreeMap;
     use std::fs;
 
-    const GOOD: &str = "area = 2\n[mesh]\npath = \"a.obj\"\nup = \"z\"\n[annotations]\npath = \"Area_2\"\n[cameras]\npath = \"c.csv\"\n";
+    const GOOD: &str = "area = 2\n[mesh]\npath = \"a.obj\"\nup = \"z\"\n[annotations]\npath = \"Area_2\"\n\
+                        [cameras]\npath = \"c.csv\"\n";
 
     fn read(text: &str) -> Result<SceneFile> {
         let dir = tempfile::tempdir().unwrap();
@@ -457,8 +459,10 @@ mod tests {
     fn clouds_and_how_they_are_read() {
         let scene = read(GOOD).unwrap();
         assert_eq!(scene.annotation_options, AnnotationOptions::default());
-        let table = "paths = [\"Area_2\", \"c.csv\"]\nclass = \"classification\"\ninstance = \"point_source_id\"\n\
-                     room = \"office_1\"\nrooms = \"room\"\ncolumns = [\"x\", \"y\"]\noffset_m = [5e5, -1, 0.5]\n\
+        let table = "paths = [\"Area_2\", \"c.csv\"]\nclass = \"classification\"\n\
+                     instance = \"point_source_id\"\n\
+                     room = \"office_1\"\nrooms = \"room\"\ncolumns = [\"x\", \"y\"]\n\
+                     offset_m = [5e5, -1, 0.5]\n\
                      unknown_as_clutter = true\n[annotations.classes]\n\"2\" = \"floor\"\n7 = \"\"";
         let scene = read(&GOOD.replace("path = \"Area_2\"", table)).unwrap();
         assert!(scene.annotations[1].ends_with("c.csv"));

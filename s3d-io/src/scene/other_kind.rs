@@ -3,8 +3,9 @@
 use std::path::Path;
 
 /// What a scene is, for who gives something else.
-pub(crate) const SCENE: &str = "a scene is a text file, scene.toml, that names the parts of a scan: `area = 1`, `[mesh]` with `path = \
-                     \"scan.obj\"`, `[annotations]` with a path, `[cameras]` with a path or `place = 2.0`, each on a line";
+pub(crate) const SCENE: &str = "a scene is a text file, scene.toml, that names the parts of a scan: `area = \
+                                1`, `[mesh]` with `path = \"scan.obj\"`, `[annotations]` with a path, \
+                                `[cameras]` with a path or `place = 2.0`, each on a line";
 
 /// What a file is that users give in place of a scene, by its ending.
 pub(crate) fn other_kind(path: &Path) -> Option<&'static str> {

@@ -221,8 +221,8 @@ impl PublishedArea {
                 )));
             }
             file.warnings.push(format!(
-                "the faces of semantic.obj stand in another order than those of rgb.obj: matched by their corners, {missing} \
-                 without a label"
+                "the faces of semantic.obj stand in another order than those of rgb.obj: matched by their \
+                 corners, {missing} without a label"
             ));
             found.into_iter().map(|f| place(f.flatten())).collect()
         };

@@ -135,7 +135,10 @@ impl<'de> Deserialize<'de> for RgbEntry {
         impl<'de> de::Visitor<'de> for Visitor {
             type Value = RgbEntry;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("\"texture\", \"skybox\", \"captures\", \"panorama\", or a table with `source` and `path`")
+                f.write_str(
+                    "\"texture\", \"skybox\", \"captures\", \"panorama\", or a table with `source` \
+                             and `path`",
+                )
             }
             fn visit_str<E: de::Error>(self, word: &str) -> Result<RgbEntry, E> {
                 let source = Source::deserialize(StrDeserializer::new(word))?;

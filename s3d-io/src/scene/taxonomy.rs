@@ -23,7 +23,10 @@ impl<'de> Deserialize<'de> for TaxonomyEntry {
         impl<'de> de::Visitor<'de> for Visitor {
             type Value = TaxonomyEntry;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a taxonomy, a file such as \"my_classes.toml\", or a table with `name` and `classes`")
+                f.write_str(
+                    "the name of a taxonomy, a file such as \"my_classes.toml\", or a table with \
+                             `name` and `classes`",
+                )
             }
             fn visit_str<E: de::Error>(self, word: &str) -> std::result::Result<TaxonomyEntry, E> {
                 Ok(TaxonomyEntry::Named(word.to_owned()))
@@ -85,8 +88,8 @@ impl TaxonomyEntry {
 /// ```
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the line for what is no TOML and for unknown keys, with the entry for
-/// what is no taxonomy.
+/// [`Error::Io`]; [`Error::Format`] with the line for what is no TOML and for unknown keys, with the entry
+/// for what is no taxonomy.
 pub fn read_taxonomy(path: &Path) -> Result<Taxonomy> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return read_taxonomy_json(path);

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-/// A taxonomy as it is written down. [`Taxonomy::new`](crate::Taxonomy::new) checks it and fills in what is left out.
+/// A taxonomy as it is written down. [`Taxonomy::new`](crate::Taxonomy::new) checks it and fills in what is
+/// left out.
 ///
 /// Names hold letters (those of classes also digits, behind a letter), and 40 characters at most: labels are
 /// joined of them by underscores.

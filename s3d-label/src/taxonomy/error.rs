@@ -12,12 +12,14 @@ pub enum TaxonomyError {
     Reserved,
     /// It has no class.
     #[error(
-        "has no classes: a class is written [[classes]], and on lines of their own name = \"bed\" and what else is known"
+        "has no classes: a class is written [[classes]], and on lines of their own name = \"bed\" and what \
+         else is known"
     )]
     Empty,
     /// It has more classes or types of rooms than an image with a palette has colours.
     #[error(
-        "has {count} of the kind \"{what}\", and at most {MAX_CLASSES} fit in an image with a palette: join some"
+        "has {count} of the kind \"{what}\", and at most {MAX_CLASSES} fit in an image with a palette: join \
+         some"
     )]
     TooMany {
         /// Of what.
@@ -27,8 +29,9 @@ pub enum TaxonomyError {
     },
     /// A name that would make labels that cannot be taken apart.
     #[error(
-        "{what} {place}: {name:?} is no name: names have letters (those of classes also digits, behind a letter), 40 characters \
-         at most, and nowhere \"rgb\"; \"unknown\" is no type of room. Write \"showerCurtain\", and other spellings as aliases"
+        "{what} {place}: {name:?} is no name: names have letters (those of classes also digits, behind a \
+         letter), 40 characters at most, and nowhere \"rgb\"; \"unknown\" is no type of room. Write \
+         \"showerCurtain\", and other spellings as aliases"
     )]
     Name {
         /// Of what.
@@ -40,7 +43,8 @@ pub enum TaxonomyError {
     },
     /// A word is the name or an alias of two.
     #[error(
-        "{word:?} is a word for {first} and for {second}: which {what} is meant would be open; take it from one of them"
+        "{word:?} is a word for {first} and for {second}: which {what} is meant would be open; take it from \
+         one of them"
     )]
     Word {
         /// Of what.
@@ -54,7 +58,8 @@ pub enum TaxonomyError {
     },
     /// A name is there twice, or twice but for upper and lower case, which file systems do not tell apart.
     #[error(
-        "{what} {place}: {name:?} has the name of {what} {first}: names differ, and in more than upper and lower case"
+        "{what} {place}: {name:?} has the name of {what} {first}: names differ, and in more than upper and \
+         lower case"
     )]
     SameName {
         /// Of what.
@@ -86,8 +91,8 @@ pub enum TaxonomyError {
     },
     /// Two classes have the same colour.
     #[error(
-        "class {second:?} has the colour {color:?} of class {first:?}: pictures could not tell them apart; change one, or leave \
-         it out for one that is free"
+        "class {second:?} has the colour {color:?} of class {first:?}: pictures could not tell them apart; \
+         change one, or leave it out for one that is free"
     )]
     Color {
         /// The colour.
@@ -110,7 +115,8 @@ pub enum TaxonomyError {
         names: String,
     },
     /// Classes count as one another in a circle.
-    #[error("counts_as goes in a circle, so that these count as nothing: {}; let one of them count as a {what} of S3DIS", names.join(" counts as "))]
+    #[error("counts_as goes in a circle, so that these count as nothing: {}; let one of them count as a \
+             {what} of S3DIS", names.join(" counts as "))]
     Circle {
         /// Of what.
         what: &'static str,

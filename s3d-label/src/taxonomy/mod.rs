@@ -15,19 +15,21 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
-/// The most classes that a taxonomy can have: an image with a palette has 256 colours, and the last means that
-/// nothing was hit.
+/// The most classes that a taxonomy can have: an image with a palette has 256 colours, and the last means
+/// that nothing was hit.
 pub const MAX_CLASSES: usize = 255;
 
-/// The classes and types of rooms of a data set: S3DIS's, those of another data set, or a user's own. Cheap to
-/// clone.
+/// The classes and types of rooms of a data set: S3DIS's, those of another data set, or a user's own. Cheap
+/// to clone.
 ///
 /// ```
 /// use s3d_label::{Class, Taxonomy};
 ///
 /// let taxonomy = Taxonomy::built_in("scannet20").unwrap();
 /// let curtain = taxonomy.class("showerCurtain")?;
-/// assert_eq!((taxonomy.id(curtain), taxonomy.is_stuff(curtain), curtain.s3dis()), (28, false, Class::CLUTTER));
+/// assert_eq!(
+///     (taxonomy.id(curtain), taxonomy.is_stuff(curtain), curtain.s3dis()), (28, false, Class::CLUTTER)
+/// );
 /// assert_eq!(taxonomy.meaning("shower curtain"), Some(Some(curtain)));
 /// assert_eq!(taxonomy.parse_name("bed_2_bedroom_1_7")?.unwrap().room.to_string(), "bedroom_1");
 /// assert!("bed_2_bedroom_1_7".parse::<s3d_label::Label>().is_err());

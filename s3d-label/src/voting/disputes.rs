@@ -42,7 +42,8 @@ pub struct DisputedPatch {
 /// use s3d_geom::{TriMesh, glam::Vec3};
 /// use s3d_label::{Disputes, FaceLabels, LabelId, LabelTable, Votes};
 ///
-/// let mesh = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE], vec![[0, 1, 2], [1, 3, 2]])?;
+/// let mesh =
+///     TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE], vec![[0, 1, 2], [1, 3, 2]])?;
 /// let table = LabelTable::from_labels(["chair_1_office_1_1".parse()?, "wall_1_office_1_1".parse()?])?;
 /// let mut votes = Votes::new(2);
 /// for (face, label, times) in [(0, 1, 2), (0, 2, 1), (1, 2, 9)] {

@@ -22,8 +22,9 @@ const MOST_CELLS: f64 = 1000.0;
 /// and at which their normals differ by no more than 45°, so that no label goes around a sharp edge. The way
 /// leads from the edge of the labelled surface through the middles of edges and faces. What no such way
 /// reaches, for the mesh is in pieces there, takes the label of the nearest labelled face by straight line
-/// if that is flush with it: normals differ by no more than 45°, and it lies no more than 5 mm above or below.
-/// Among equally near labels the smallest wins, so that the result is the same for any number of threads.
+/// if that is flush with it: normals differ by no more than 45°, and it lies no more than 5 mm above or
+/// below. Among equally near labels the smallest wins, so that the result is the same for any number of
+/// threads.
 ///
 /// # Panics
 /// If there is not one label a face, or `within_m` is not a number.

@@ -117,8 +117,8 @@ impl Space {
         true
     }
 
-    /// A place for a group with its back to any wall: `size` along the wall and away from it. `tall` ones, which
-    /// reach the sill of a window, do not stand before windows or what hangs.
+    /// A place for a group with its back to any wall: `size` along the wall and away from it. `tall` ones,
+    /// which reach the sill of a window, do not stand before windows or what hangs.
     pub(super) fn find_at_wall(&mut self, rng: &mut ChaCha8Rng, size: [f32; 2], tall: bool) -> Option<Frame> {
         (0..TRIES).find_map(|_| {
             let (wall, along) = self.draw_on_wall(rng, size[0])?;

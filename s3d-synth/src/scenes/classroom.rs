@@ -8,8 +8,8 @@ use s3d_geom::{Material, MeshParts, Raster, Texture, TriMesh};
 pub const CLASSROOM_LOCATION: DVec3 = DVec3::new(4.03, 3.07, 1.5);
 
 /// A furnished room of 8 × 6 × 3 m whose surfaces are noisy grids like a scan's, textured with a grain of 2
-/// cm. About `faces` faces, and more where cells are larger than parts of the furniture: 1.35 times as many of
-/// 20,000. Its texture repeats every 2 m and has 1024² texels. The same every time.
+/// cm. About `faces` faces, and more where cells are larger than parts of the furniture: 1.35 times as many
+/// of 20,000. Its texture repeats every 2 m and has 1024² texels. The same every time.
 ///
 /// # Panics
 /// If `faces` is 0 or beyond 100 million.

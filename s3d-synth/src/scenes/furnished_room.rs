@@ -59,7 +59,8 @@ mod tests {
             let m = furnished_room(seed);
             prop_assert_eq!(open_edges(m.parts()), 0);
             prop_assert_eq!(digest(&m), digest(&furnished_room(seed)));
-            let textured = (0..m.faces().len() as u32).filter(|&f| matches!(m.color_of(f), FaceColor::Texture(..))).count();
+            let is_textured = |f: &u32| matches!(m.color_of(*f), FaceColor::Texture(..));
+            let textured = (0..m.faces().len() as u32).filter(is_textured).count();
             prop_assert!(textured * 2 > m.faces().len());
             let (middle, height) = (m.aabb().center(), m.aabb().max.z);
             for p in m.positions() {

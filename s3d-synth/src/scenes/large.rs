@@ -400,7 +400,9 @@ impl Rooms {
 
 /// What ties mesh, points and locations together.
 fn scene_file(format: PointFormat) -> String {
-    let mut text = "area = 1\n[mesh]\npath = \"building.obj\"\nup = \"z\"\n[cameras]\npath = \"cameras.csv\"\n[annotations]\n".to_owned();
+    let mut text = "area = 1\n[mesh]\npath = \"building.obj\"\nup = \"z\"\n[cameras]\n\
+                    path = \"cameras.csv\"\n[annotations]\n"
+        .to_owned();
     let cloud = match format {
         PointFormat::S3dis => return text + "path = \"Area_1\"\n",
         PointFormat::Npy => "cloud.npy",
@@ -416,8 +418,10 @@ fn scene_file(format: PointFormat) -> String {
 
 fn ply_header(points: u64) -> Vec<u8> {
     format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {points}\nproperty float x\nproperty float y\nproperty float z\n\
-         property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar class\nproperty ushort instance\n\
+        "ply\nformat binary_little_endian 1.0\nelement vertex {points}\nproperty float x\nproperty float y\n\
+         property float z\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar class\n\
+         property ushort instance\n\
          property ushort room\nend_header\n"
     )
     .into_bytes()

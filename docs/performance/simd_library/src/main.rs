@@ -4,10 +4,10 @@
 //! cargo run --release --manifest-path docs/performance/simd_library/Cargo.toml
 //! ```
 //!
-//! The kernel (`s3d-render/src/raster/chunk.rs`, as it is there) draws 4,000 chunks of 16 columns and 4 to 16 rows on a
-//! window of 256 × 128, with our registers and with those of `fearless_simd`, taking turns. Printed are milliseconds of
-//! processor time; the pixels must be the same. Needs a processor with AVX-512 as of Ice Lake, which is what the
-//! library asks for.
+//! The kernel (`s3d-render/src/raster/chunk.rs`, as it is there) draws 4,000 chunks of 16 columns and 4 to 16
+//! rows on a window of 256 × 128, with our registers and with those of `fearless_simd`, taking turns. Printed
+//! are milliseconds of processor time; the pixels must be the same. Needs a processor with AVX-512 as of Ice
+//! Lake, which is what the library asks for.
 
 #![allow(dead_code)]
 

@@ -77,8 +77,8 @@ impl PointColors {
         }
         if *blurred_m2 > MUCH_BLURRED * self.area_m2 {
             doubts.push(format!(
-                "{} of the mesh are faces with more than 16 points: what is finer than these faces is lost. A mesh of \
-                 smaller faces, or one with a texture, would show it",
+                "{} of the mesh are faces with more than 16 points: what is finer than these faces is lost. \
+                 A mesh of smaller faces, or one with a texture, would show it",
                 percent(*blurred_m2)
             ));
         }

@@ -41,8 +41,8 @@ pub enum SceneSource {
         paths: Vec<PathBuf>,
         /// Which axis points up; `None`: +Y in glTF, as it defines, and guessed in the others.
         up: Option<UpAxis>,
-        /// The unit of the coordinates; `None`: metres in glTF, as it defines, and in the others what the file
-        /// says, or else guessed by the height of rooms.
+        /// The unit of the coordinates; `None`: metres in glTF, as it defines, and in the others what the
+        /// file says, or else guessed by the height of rooms.
         units: Option<LengthUnit>,
     },
     /// At hand.
@@ -116,7 +116,8 @@ impl SharedScene {
         let (_, repeated) = self.mesh.mesh.clone().without_repeated_faces();
         if repeated > 0 {
             return refuse(format!(
-                "{repeated} faces have the corners of earlier ones: leave them out (TriMesh::without_repeated_faces)"
+                "{repeated} faces have the corners of earlier ones: leave them out \
+                 (TriMesh::without_repeated_faces)"
             ));
         }
         for location in &self.locations {

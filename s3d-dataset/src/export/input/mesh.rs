@@ -79,8 +79,9 @@ impl MeshFrame {
     pub(crate) fn tell(&self, ctx: &Context) {
         if let Some(offset) = self.offset() {
             ctx.info(format_args!(
-                "offset_m = {offset:?} is subtracted from the coordinates of mesh, points and scan locations: the world \
-                 of the data set is the scan's frame less it ([mesh] offset_m in the scene file says another)"
+                "offset_m = {offset:?} is subtracted from the coordinates of mesh, points and scan \
+                 locations: the world of the data set is the scan's frame less it ([mesh] offset_m in the \
+                 scene file says another)"
             ));
         }
     }
@@ -102,9 +103,9 @@ impl MeshFrame {
         let Some(gap) = FrameGap::between([min, max], DVec3::ZERO, self.bounds) else { return Ok(()) };
         let [x, y, z] = (-gap.offset_m + DVec3::ZERO).to_array();
         Err(Error::Input(format!(
-            "{}: the scan locations lie {gap}, in metres, Z-up. Locations and mesh need one frame: if they are of one \
-             scan, write transform = [[1, 0, 0, {x:?}], [0, 1, 0, {y:?}], [0, 0, 1, {z:?}], [0, 0, 0, 1]] under \
-             [cameras] in the scene file",
+            "{}: the scan locations lie {gap}, in metres, Z-up. Locations and mesh need one frame: if they \
+             are of one scan, write transform = [[1, 0, 0, {x:?}], [0, 1, 0, {y:?}], [0, 0, 1, {z:?}], [0, \
+             0, 0, 1]] under [cameras] in the scene file",
             list.display()
         )))
     }

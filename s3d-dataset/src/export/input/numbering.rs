@@ -17,7 +17,8 @@ pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
         match area.taxonomy.table_from_names(&names) {
             Ok(table) if labels.iter().all(|l| table.id_of(l).is_some()) => return Ok(table),
             Ok(_) => area.warnings.push(format!(
-                "{}: has not every label of the meshes; the table is made anew, so that indices differ from it",
+                "{}: has not every label of the meshes; the table is made anew, so that indices differ from \
+                 it",
                 path.display()
             )),
             Err(e) => area.warnings.push(format!("{}: {e}; the table is made anew", path.display())),

@@ -51,8 +51,8 @@ impl Pictures {
             return Err(FileError::format(
                 &area.path,
                 format!(
-                    "takes colours from {} pictures, but its scan locations are placed where none was taken: give it the \
-                     locations of the pictures, or rgb = \"texture\"",
+                    "takes colours from {} pictures, but its scan locations are placed where none was taken: \
+                     give it the locations of the pictures, or rgb = \"texture\"",
                     source.kind
                 ),
             )
@@ -71,7 +71,8 @@ impl Pictures {
                         && captures.len() < CAPTURES_A_LOCATION
                     {
                         warnings.push(format!(
-                            "location {uuid} has {} captures of {CAPTURES_A_LOCATION}: what none sees is taken from elsewhere",
+                            "location {uuid} has {} captures of {CAPTURES_A_LOCATION}: what none sees is \
+                             taken from elsewhere",
                             captures.len()
                         ));
                     }
@@ -225,7 +226,8 @@ fn check_sky_box(first: &Path, sizes: [(u32, u32); 6]) -> Result<()> {
         None => Ok(()),
         Some(((w, h), k)) => {
             let message = format!(
-                "has {} × {} pixels, and picture {k} of its sky box {w} × {h}: six are square and of one size",
+                "has {} × {} pixels, and picture {k} of its sky box {w} × {h}: six are square and of one \
+                 size",
                 sizes[0].0, sizes[0].1
             );
             Err(FileError::format(first, message).into())

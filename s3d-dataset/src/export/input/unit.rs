@@ -41,8 +41,8 @@ impl UnitGuess {
         let (unit, height) = (self.unit(), self.height?);
         (unit != LengthUnit::Metre).then(|| {
             format!(
-                "its unit is taken for the {unit}: ceilings are {height:.0} above floors, which makes rooms {:.2} m high \
-                 (--units says it)",
+                "its unit is taken for the {unit}: ceilings are {height:.0} above floors, which makes rooms \
+                 {:.2} m high (--units says it)",
                 height * unit.metres()
             )
         })

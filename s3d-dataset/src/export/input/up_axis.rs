@@ -36,7 +36,8 @@ impl UpGuess {
     pub(super) fn sentence(self) -> String {
         let [y, z] = self.level.map(|share| 100.0 * share);
         format!(
-            "+{} is taken for up: {y:.0} % of the surface is level with +Y, {z:.0} % with +Z (--up y or --up z says it)",
+            "+{} is taken for up: {y:.0} % of the surface is level with +Y, {z:.0} % with +Z (--up y or --up \
+             z says it)",
             self.up().name().to_uppercase()
         )
     }

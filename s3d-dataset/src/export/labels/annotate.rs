@@ -265,7 +265,8 @@ pub(crate) fn hidden_instances(
     let mut hidden = instances.filter(|i| table.id_of(&i.label).is_none_or(|id| !seen[id.0 as usize]));
     let first = hidden.next()?;
     Some(format!(
-        "{} annotated instances win no face of the mesh, the first {}: they are in no image and no sampled point",
+        "{} annotated instances win no face of the mesh, the first {}: they are in no image and no sampled \
+         point",
         1 + hidden.count(),
         first.points.source()
     ))

@@ -2,8 +2,9 @@
 //! again.
 //!
 //! Two files in a folder: `area.jsonl`, small, and `label_of_face.npy`, an array of `<u4` with a label index
-//! a face, and the highest bit where that was filled. The first holds the second's checksum and is written after it, so that an area which can be read
-//! is whole. Processes that write the same area at the same time write the same bytes.
+//! a face, and the highest bit where that was filled. The first holds the second's checksum and is written
+//! after it, so that an area which can be read is whole. Processes that write the same area at the same time
+//! write the same bytes.
 
 use crate::error::Result;
 use crate::export::input::RoomInput;

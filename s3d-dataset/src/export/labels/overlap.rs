@@ -19,8 +19,8 @@ pub(crate) fn overlap_doubts(rooms: &[SurveyedRoom]) -> Vec<String> {
             let share = shared(small, large);
             if share > MUCH {
                 doubts.push(format!(
-                    "rooms {} and {} overlap: {:.0} % of the floor of {} is in {} too; a face there is of the room with \
-                     the max points on it",
+                    "rooms {} and {} overlap: {:.0} % of the floor of {} is in {} too; a face there is of \
+                     the room with the max points on it",
                     a.room,
                     b.room,
                     100.0 * share,

@@ -61,8 +61,8 @@ impl Grid {
         let size = mesh.aabb().size().as_dvec3();
         if m2 / (step * step) > MOST_FEET || size.x.max(size.y) > MOST_EXTENT_M {
             return Err(Error::Input(format!(
-                "the mesh is {:.0} × {:.0} m large, and {m2:.0} m² of it face up: that is too much to place scan locations on; \
-                 is `units` right? If it is, list scan locations or split the scan",
+                "the mesh is {:.0} × {:.0} m large, and {m2:.0} m² of it face up: that is too much to place \
+                 scan locations on; is `units` right? If it is, list scan locations or split the scan",
                 size.x, size.y
             )));
         }

@@ -67,8 +67,8 @@ impl fmt::Display for SurfaceSeen {
         let [one, two, three] = seen_m2.map(|m2| 100.0 * m2 / visible_m2);
         write!(
             f,
-            "of {visible_m2:.1} m² that can be seen from somewhere ({surface_m2:.1} m² in all), {one:.0} % is seen by one \
-             or more, {two:.0} % by two or more, {three:.0} % by three or more"
+            "of {visible_m2:.1} m² that can be seen from somewhere ({surface_m2:.1} m² in all), {one:.0} % \
+             is seen by one or more, {two:.0} % by two or more, {three:.0} % by three or more"
         )
     }
 }
@@ -156,8 +156,8 @@ pub(crate) fn place_in_free_space(
     let share = seen.seen_m2[0] / seen.surface_m2;
     if share < LEAST_SEEN {
         return Err(Error::Input(format!(
-            "area {area}: {} scan locations in free space see only {:.1} of {:.1} m² of surface; {HINTS} If the scan \
-             is as it should be, list scan locations",
+            "area {area}: {} scan locations in free space see only {:.1} of {:.1} m² of surface; {HINTS} If \
+             the scan is as it should be, list scan locations",
             chosen.len(),
             seen.seen_m2[0],
             seen.surface_m2
@@ -165,8 +165,8 @@ pub(crate) fn place_in_free_space(
     }
     if share < FEW_SEEN {
         warnings.push(format!(
-            "area {area}: {} scan locations in free space see {:.0} % of the surface; the rest shows its back, is hidden, \
-             or is where no place is free inside",
+            "area {area}: {} scan locations in free space see {:.0} % of the surface; the rest shows its \
+             back, is hidden, or is where no place is free inside",
             chosen.len(),
             100.0 * share
         ));
@@ -268,15 +268,15 @@ impl Search<'_> {
         if floor.walkable_m2 > 0.0 {
             let [front, back, none] = found.around.percent();
             text += &format!(
-                ", and none of these is inside: rays from there end on a front side in {front:.0} % of all directions, on a \
-                 back side in {back:.0} %, on nothing in {none:.0} %"
+                ", and none of these is inside: rays from there end on a front side in {front:.0} % of all \
+                 directions, on a back side in {back:.0} %, on nothing in {none:.0} %"
             );
         }
         let turned = self.run(Facing::Backs)?;
         text += &if turned.floor.inside_m2 > 0.0 {
             format!(
-                "; it is either an object seen from outside or a room whose faces are inside out: with fronts and backs exchanged \
-                 {:.2} m² are inside",
+                "; it is either an object seen from outside or a room whose faces are inside out: with \
+                 fronts and backs exchanged {:.2} m² are inside",
                 turned.floor.inside_m2
             )
         } else {

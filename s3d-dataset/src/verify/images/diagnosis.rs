@@ -215,7 +215,8 @@ fn other_table(reference: &Reference<'_>, sample: &[Probe]) -> Option<String> {
     let one_to_one = labels.len() == meanings.len() && meanings.len() > 1;
     (one_to_one && f64::from(best) >= 0.99 * f64::from(all)).then(|| {
         format!(
-            "its indices are those of another label table: {found} stands for {} there, and for {} in semantic_labels.json",
+            "its indices are those of another label table: {found} stands for {} there, and for {} in \
+             semantic_labels.json",
             reference.labels.name_of(label),
             reference.labels.name_of(found)
         )

@@ -291,7 +291,8 @@ impl ImageFiles<'_> {
             let count = indices.pixels().iter().filter(|p| wrong(p)).count();
             let value = indices.pixels()[at];
             format!(
-                "{count} pixels have an index that the table of {} labels does not; the first is ({}, {}): {}",
+                "{count} pixels have an index that the table of {} labels does not; the first is ({}, {}): \
+                 {}",
                 labels.len(),
                 at % width,
                 at / width,
@@ -376,10 +377,12 @@ impl ImageFiles<'_> {
         }
         self.check.report.check(count == 0, COORDINATES, path, || {
             let (x, y) = first.unwrap_or_default();
-            let seen = units.metres(depth.at(x, y)).map(|m| (origin + rays.at(x, y) * m).as_vec3().to_array());
+            let seen =
+                units.metres(depth.at(x, y)).map(|m| (origin + rays.at(x, y) * m).as_vec3().to_array());
             let expected = seen.map_or("nothing".to_owned(), |p| format!("{p:?}"));
             format!(
-                "{count} of {} pixels are not where depth and pose put them; the first is ({x}, {y}): {:?} for {expected}",
+                "{count} of {} pixels are not where depth and pose put them; the first is ({x}, {y}): {:?} \
+                 for {expected}",
                 points.len(),
                 points.at(x, y)
             )

@@ -127,7 +127,8 @@ impl Difference {
         let percent = 100.0 * *count as f64 / *of as f64;
         let percent = if percent < 0.1 { "less than 0.1".to_owned() } else { format!("{percent:.1}") };
         format!(
-            "{count} of {of} pixels ({percent} %) are not {what}; the first is ({x}, {y}): {found}, should be {expected}"
+            "{count} of {of} pixels ({percent} %) are not {what}; the first is ({x}, {y}): {found}, should \
+             be {expected}"
         )
     }
 }

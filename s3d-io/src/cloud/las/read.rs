@@ -117,7 +117,8 @@ impl<'a> LasCloud<'a> {
         let there = records(&mut source, start..offset, claimed).map_err(|e| Error::io(path, "read", e))?;
         if there < claimed {
             notes.push(format!(
-                "{}: its header counts {claimed} records before the points, and {there} are there; those are read",
+                "{}: its header counts {claimed} records before the points, and {there} are there; those are \
+                 read",
                 path.display()
             ));
             mends.push((VLRS_AT, there));
@@ -135,7 +136,8 @@ impl<'a> LasCloud<'a> {
             let is_behind = is_compressed || end.is_some_and(|end| end <= start);
             if start > 0 && (read.is_err() || !is_inside || !is_behind) {
                 notes.push(format!(
-                    "{}: its header tells of extended records at byte {start}, where none are; it is read without them",
+                    "{}: its header tells of extended records at byte {start}, where none are; it is read \
+                     without them",
                     path.display()
                 ));
                 mends.push((EVLRS_AT, 0));

@@ -205,7 +205,8 @@ impl MatFile {
         let Some(address) = found else {
             let names: Vec<&str> = variables.iter().map(|(name, _)| name.as_str()).take(8).collect();
             return Err(self.hdf5.fault(format!(
-                "has no variable Area with a field Disjoint_Space, but {names:?}: is it the pointcloud.mat of an area?"
+                "has no variable Area with a field Disjoint_Space, but {names:?}: is it the pointcloud.mat \
+                 of an area?"
             )));
         };
         let mut areas = self.structs(address, "Area")?;

@@ -242,8 +242,8 @@ mod tests {
     #[test]
     fn structured_and_plain_arrays() {
         let h = header(
-            "{'descr': [('x', '<f4'), ('rgb', '|u1', (3,)), ('pad', '|V2'), ('name', '>U4')], 'fortran_order': False, \
-             'shape': (7,), }   \n",
+            "{'descr': [('x', '<f4'), ('rgb', '|u1', (3,)), ('pad', '|V2'), ('name', '>U4')], \
+             'fortran_order': False, 'shape': (7,), }   \n",
         )
         .unwrap();
         let fields: Vec<_> = h.fields.iter().map(|f| (f.name.as_str(), f.at, f.kind, f.big_endian)).collect();

@@ -88,8 +88,8 @@ impl<'a> NpyCloud<'a> {
                 return Err(Error::format(
                     self.source.name(),
                     format!(
-                        "has {n} columns, and {said}, as in columns = [\"x\", \"y\", \"z\", \"r\", \"g\", \"b\", \"class\", \
-                         \"instance\"] in [annotations]"
+                        "has {n} columns, and {said}, as in columns = [\"x\", \"y\", \"z\", \"r\", \"g\", \
+                         \"b\", \"class\", \"instance\"] in [annotations]"
                     ),
                 ));
             }

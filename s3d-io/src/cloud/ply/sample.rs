@@ -239,8 +239,10 @@ mod tests {
     fn other_columns_are_passed_over() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("cloud.ply");
-        let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double t\nproperty float32 z\n\
-            property float32 y\nproperty float32 x\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n"
+        let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double t\n\
+                          property float32 z\n\
+            property float32 y\nproperty float32 x\nelement face 0\nproperty list uchar int vertex_indices\n\
+            end_header\n"
             .to_vec();
         bytes.extend(9f64.to_le_bytes());
         [3f32, 2.0, 1.0].iter().for_each(|v| bytes.extend(v.to_le_bytes()));

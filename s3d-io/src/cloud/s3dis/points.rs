@@ -443,8 +443,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_is_read(points in proptest::collection::vec((any::<[f32; 3]>(), any::<[u8; 3]>()), 0..50)) {
-            let finite: Vec<_> = points.into_iter().filter(|(p, _)| p.iter().all(|v| v.is_finite())).collect();
+        fn what_is_written_is_read(
+            points in proptest::collection::vec((any::<[f32; 3]>(), any::<[u8; 3]>()), 0..50),
+        ) {
+            let finite: Vec<_> =
+                points.into_iter().filter(|(p, _)| p.iter().all(|v| v.is_finite())).collect();
             let text: String = finite
                 .iter()
                 .map(|(p, c)| format!("{:?} {:?} {:e} {} {} {}\n", p[0], p[1], p[2], c[0], c[1], c[2]))

@@ -26,7 +26,8 @@ pub struct TreeOptions {
     /// At a folder that names no room, a room without annotations, or a file that names no instance.
     pub on_fault: OnFault,
     /// Whether an unknown class (`stairs_1.txt` in the published area) is taken for clutter
-    /// ([`Taxonomy::clutter`]), as its loaders do: its instances get the numbers after those of the room's clutter.
+    /// ([`Taxonomy::clutter`]), as its loaders do: its instances get the numbers after those of the room's
+    /// clutter.
     pub unknown_as_clutter: bool,
     /// Which class a word of a file's name means, even if it is a class; `None`: such files are left
     /// out without a warning. Instances of another class than the word's get the numbers after those of the
@@ -185,7 +186,8 @@ fn instance_of(path: &Path, options: &TreeOptions) -> Result<Named> {
             "names no instance: a name is CLASS_N.txt, with N from 1, as in chair_3.txt".to_owned();
         if let Some((original, _)) = stem.split_once([' ', '(']) {
             message += &format!(
-                "; it looks like a copy of {original}.txt: delete it if it is one, or else give it a number of its own"
+                "; it looks like a copy of {original}.txt: delete it if it is one, or else give it a number \
+                 of its own"
             );
         }
         return Err(Error::format(path, message));

@@ -284,7 +284,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn fast_digits_are_those_of_the_formatter(metres in prop_oneof![-1e3..1e3f32, -1e6..1e6f32, -1e-2..1e-2f32]) {
+        fn fast_digits_are_those_of_the_formatter(
+            metres in prop_oneof![-1e3..1e3f32, -1e6..1e6f32, -1e-2..1e-2f32],
+        ) {
             // `{:.3}` rounds the exact value, and a half that comes up exactly to even; ours goes away from
             // zero.
             let plain = format!("{metres:.3}");

@@ -98,8 +98,8 @@ impl Columns {
                 Error::format(
                     path,
                     format!(
-                        "has no column of classes; {}. If one of them is it, name it, as in class = \"label\" in \
-                         [annotations]; a cloud without labels cannot label a mesh",
+                        "has no column of classes; {}. If one of them is it, name it, as in class = \
+                         \"label\" in [annotations]; a cloud without labels cannot label a mesh",
                         there()
                     ),
                 )

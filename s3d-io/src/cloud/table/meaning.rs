@@ -199,7 +199,8 @@ impl Unknown {
             let column = if any_known {
                 ""
             } else {
-                ". No point has another: if the classes are in another column, name it, as in class = \"label\""
+                ". No point has another: if the classes are in another column, name it, as in class = \
+                 \"label\""
             };
             let taxonomy = &options.taxonomy;
             let of = if taxonomy.is_s3dis() {
@@ -212,9 +213,9 @@ impl Unknown {
             return Err(Error::format(
                 path,
                 format!(
-                    "classes that are none of {of}: {list}. Say what they are in [annotations.classes], as in \
-                     {first:?} = {example:?}, or \"\" for points without a label; or take all of them for clutter with \
-                     unknown_as_clutter = true{column}"
+                    "classes that are none of {of}: {list}. Say what they are in [annotations.classes], as \
+                     in {first:?} = {example:?}, or \"\" for points without a label; or take all of them for \
+                     clutter with unknown_as_clutter = true{column}"
                 ),
             ));
         }
@@ -231,15 +232,15 @@ impl Unknown {
         let Some((path, list, points)) = self.list(clouds) else { return Ok(()) };
         let message = match (self.0.get(""), options.room) {
             (Some((nowhere, _)), _) => format!(
-                "{nowhere} points are in no room: name it, as in room = \"office_1\", or name the file after it, or say which \
-                 column holds it (`rooms`)"
+                "{nowhere} points are in no room: name it, as in room = \"office_1\", or name the file after \
+                 it, or say which column holds it (`rooms`)"
             ),
             (None, Some(_)) => {
                 format!("rooms that are none: {list}. A room is named as in office_1, or numbered from 1")
             }
             (None, None) => format!(
-                "rooms that are none: {list}. A room is named as in office_1; if they are numbers, say what type of room \
-                 they are, as in room = \"office_1\""
+                "rooms that are none: {list}. A room is named as in office_1; if they are numbers, say what \
+                 type of room they are, as in room = \"office_1\""
             ),
         };
         if options.on_fault == OnFault::Skip && any_left && !self.0.contains_key("") {

@@ -119,8 +119,8 @@ fn gather(
         }
         if farthest_m > FAR_M {
             warnings.push(format!(
-                "{}: coordinates up to {farthest_m:.0} m from the origin are rounded by up to {:.1} mm; give an offset \
-                 (`offset_m`) that brings them near to it, the mesh's",
+                "{}: coordinates up to {farthest_m:.0} m from the origin are rounded by up to {:.1} mm; give \
+                 an offset (`offset_m`) that brings them near to it, the mesh's",
                 path.display(),
                 1e3 * farthest_m * f64::from(f32::EPSILON)
             ));
@@ -522,7 +522,8 @@ mod tests {
             }
         }
         let said = read_flat(&[&Halves], &lenient).unwrap_err().to_string();
-        let expected = "a.las: holds no point that can be used: 1 records left out; record 1: class: 0.5 is no whole number";
+        let expected = "a.las: holds no point that can be used: 1 records left out; record 1: class: 0.5 is \
+                        no whole number";
         assert_eq!(said, expected);
         assert!(message(&[], &lenient).contains("a.las: holds no point that can be used"));
     }
@@ -574,7 +575,10 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn memory_and_temporary_file_give_what_the_plain_version_gives(
-            clouds in prop::collection::vec(prop::collection::vec((0i64..4, -2i64..5, 0i64..3), 0..200), 1..4),
+            clouds in prop::collection::vec(
+                prop::collection::vec((0i64..4, -2i64..5, 0i64..3), 0..200),
+                1..4,
+            ),
             in_memory in 0u64..300,
         ) {
             let files: Vec<TestCloud> = clouds.iter().map(|rows| TestCloud::new("a.las", rows)).collect();

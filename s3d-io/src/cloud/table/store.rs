@@ -41,7 +41,8 @@ impl FlatStore {
         clippy::indexing_slicing,
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
-        reason = "places and counts are those by which the store was filled; what is in memory is counted by usize"
+        reason = "places and counts are those by which the store was filled; what is in memory is counted by \
+                  usize"
     )]
     pub(crate) fn read(&self, start: u64, count: u64, out: &mut PointCloud) -> Result<()> {
         match self {

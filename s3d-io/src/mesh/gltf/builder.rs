@@ -73,7 +73,8 @@ impl<'a> Builder<'a> {
             }
             if elements > MAX_ELEMENTS {
                 return Err(document.fail(format!(
-                    "places {} meshes of more than {MAX_ELEMENTS} vertices and corners together: cut the scene in parts",
+                    "places {} meshes of more than {MAX_ELEMENTS} vertices and corners together: cut the \
+                     scene in parts",
                     instances.len()
                 )));
             }

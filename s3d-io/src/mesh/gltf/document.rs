@@ -326,8 +326,8 @@ fn check_version(path: &Path, asset: &serde_json::Value) -> Result<()> {
         None | Some("") => {
             return Err(Error::format(
                 path,
-                "does not say that it is glTF 2.0: asset.version is missing or empty. If it is, put \"asset\": \
-                 {\"version\": \"2.0\"} into its JSON",
+                "does not say that it is glTF 2.0: asset.version is missing or empty. If it is, put \
+                 \"asset\": {\"version\": \"2.0\"} into its JSON",
             ));
         }
         Some(v) if v == "2" || v.starts_with("2.") => {}

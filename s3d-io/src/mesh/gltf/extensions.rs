@@ -114,7 +114,8 @@ impl GltfDocument {
                 return Err(Error::unsupported(
                     self.path(),
                     format!(
-                        "{who} has the extension {extension}, which changes its geometry and is not read; {way_out}"
+                        "{who} has the extension {extension}, which changes its geometry and is not read; \
+                         {way_out}"
                     ),
                 ));
             }

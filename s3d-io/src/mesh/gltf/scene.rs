@@ -77,7 +77,8 @@ pub(crate) fn instances(
             // Before there is memory for them.
             if total > MAX_INSTANCES {
                 return Err(document.fail(format!(
-                    "node {index} makes {total} meshes in the scene, and {MAX_INSTANCES} are read at most: cut it in parts"
+                    "node {index} makes {total} meshes in the scene, and {MAX_INSTANCES} are read at most: \
+                     cut it in parts"
                 )));
             }
             placed.push((Instance { mesh, world_from_node, skinned: node.skin.is_some() }, many));

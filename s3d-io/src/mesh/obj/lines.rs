@@ -60,7 +60,8 @@ pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
-/// The content of a text file, in UTF-8 if its mark says what it is; if its lines end in CR alone, they end in LF now.
+/// The content of a text file, in UTF-8 if its mark says what it is; if its lines end in CR alone, they end
+/// in LF now.
 pub(crate) fn read_text(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = into_utf8(read_file(path)?);
     end_lines_in_lf(&mut bytes);

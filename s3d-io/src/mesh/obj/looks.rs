@@ -198,12 +198,15 @@ mod tests {
 
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n";
 
-    const LIBRARY: &[u8] = b"newmtl a\nKd 1 0 0\nmap_Kd -clamp on tex\\two words.png\nnewmtl b\nKd 0 1 0\nmap_Kd tex/two words.png\nnewmtl c\nKd 0 0 1\nmap_Kd gone.png\nnewmtl d\nKd 0 0.2 0\nmap_Kd bad.png\n";
+    const LIBRARY: &[u8] = b"newmtl a\nKd 1 0 0\nmap_Kd -clamp on tex\\two words.png\nnewmtl b\nKd 0 1 0\n\
+                             map_Kd tex/two words.png\nnewmtl c\nKd 0 0 1\nmap_Kd gone.png\nnewmtl d\n\
+                             Kd 0 0.2 0\nmap_Kd bad.png\n";
 
     #[test]
     fn materials_and_textures() {
         let obj = format!(
-            "mtllib no lib.mtl\nmtllib lib.mtl other.mtl\n{SQUARE}usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\nusemtl c\nf 1/1 2/2 3/3\n\
+            "mtllib no lib.mtl\nmtllib lib.mtl other.mtl\n{SQUARE}usemtl a\nf 1/1 2/2 3/3\nusemtl b\n\
+             f 1/1 2/2 3/3\nusemtl c\nf 1/1 2/2 3/3\n\
             usemtl d\nf 1/1 2/2 3/3\nusemtl e\nf 1/1 2/2 3/3\nusemtl a\nf 1 2 3\nusemtl f\nf 1 2 3\n"
         );
         let png = two_pixels([10, 20, 30], [40, 50, 60]);

@@ -149,7 +149,8 @@ mod tests {
     #[test]
     fn colours_and_maps() {
         let (m, warnings) = parse_mtl(
-            b"# head\nKd 1 1 1\nnewmtl a b \n\tKd 0.5 0 2 # note\n map_Kd  my photo #1.jpg \r\nnewmtl\nKd 1\nillum x\n",
+            b"# head\nKd 1 1 1\nnewmtl a b \n\tKd 0.5 0 2 # note\n map_Kd  my photo #1.jpg \r\nnewmtl\nKd 1\n\
+              illum x\n",
         );
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!(m[0].name, "a b");
@@ -178,7 +179,8 @@ mod tests {
     #[test]
     fn a_comment_of_ours_tells_how_a_texture_goes_on() {
         let (m, warnings) = parse_mtl(
-            b"newmtl a\n# s3d wrap mirror clamp\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n# s3d wrap odd clamp\nmap_Kd c.png\n",
+            b"newmtl a\n# s3d wrap mirror clamp\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n# s3d wrap odd clamp\n\
+              map_Kd c.png\n",
         );
         assert!(warnings.is_empty());
         let wraps: Vec<_> = m.iter().map(|m| m.map.as_ref().unwrap().wrap).collect();

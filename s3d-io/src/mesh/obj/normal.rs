@@ -350,7 +350,8 @@ mod tests {
 
     #[test]
     fn plain_text_stays() {
-        let text = "v 0 0 0\nv 1 0 0 2\nv\t0 1e-3 -.5\r\nvt 0 1\nvt 0 1 0\nvn 0 +1 0\nf 1/1/1 2/2/1 3/1/1\nf 1 2 3 2\nf 1// 2//1 3";
+        let text = "v 0 0 0\nv 1 0 0 2\nv\t0 1e-3 -.5\r\nvt 0 1\nvt 0 1 0\nvn 0 +1 0\nf 1/1/1 2/2/1 3/1/1\n\
+                    f 1 2 3 2\nf 1// 2//1 3";
         let (rest, obj) = normal(text).unwrap();
         assert_eq!(rest, text);
         assert_eq!((obj.pieces.len(), obj.faces), (1, 3));
@@ -360,11 +361,13 @@ mod tests {
     #[test]
     fn dialects_become_plain() {
         let text = format!(
-            "\u{feff}{THREE}vt 0.5\nvn 0 0 1 x\nusemtl a b \nf 1/1/1 2/1/1 \\\n 3/1/1 # c\nusemtl c\nf -3//-1 -2//-1 -1//-1\n\
+            "\u{feff}{THREE}vt 0.5\nvn 0 0 1 x\nusemtl a b \nf 1/1/1 2/1/1 \\\n 3/1/1 # c\nusemtl c\n\
+             f -3//-1 -2//-1 -1//-1\n\
              usemtl a b\nl 1 2 3\np 1\nf 1 2\nf\ng x\nf 1/1 2 +3"
         );
         let (rest, obj) = normal(&text).unwrap();
-        let expected = "v 0 0 0\nv 1 0 0\nv\t0 1 0\nvt 0.5 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1//1 2//1 3//1\nf 1/1/ 2// 3//\n";
+        let expected = "v 0 0 0\nv 1 0 0\nv\t0 1 0\nvt 0.5 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n\
+                        f 1//1 2//1 3//1\nf 1/1/ 2// 3//\n";
         assert_eq!(rest, expected);
         let kind = |material, has_uv, has_normal| FaceKind { material, has_uv, has_normal };
         assert_eq!(

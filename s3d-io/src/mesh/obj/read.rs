@@ -223,7 +223,8 @@ impl Triangles {
     /// A vertex of a polygon that is not finite is the error.
     #[expect(
         clippy::indexing_slicing,
-        reason = "tobj checked indices and counted corners; cuts index their polygon; a face is of the first kind or a later one"
+        reason = "tobj checked indices and counted corners; cuts index their polygon; a face is of the first \
+                  kind or a later one"
     )]
     fn new(obj: &NormalObj<'_>, columns: &Columns) -> std::result::Result<Self, (u32, Vec3)> {
         let mut out = Self::default();
@@ -355,7 +356,8 @@ mod tests {
     #[test]
     fn polygons_are_cut_with_their_attributes() {
         // An L, concave at its fourth corner, then a square that repeats its outline, then a triangle.
-        let obj = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nvt 0 0\nvt 2 0\nvt 2 1\nvt 1 1\nvt 1 2\nvt 0 2\n\
+        let obj = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nvt 0 0\nvt 2 0\nvt 2 1\nvt 1 1\n\
+                   vt 1 2\nvt 0 2\n\
             usemtl l\nf 1/1 2/2 3/3 4/4 5/5 6/6\nusemtl bad\nf 1 4 2 3 1 4\nusemtl t\nf 1/1 2/2 3/3\n";
         let file = read_obj(obj).unwrap();
         assert_eq!((file.polygons_triangulated, file.mesh.faces().len()), (1, 5));
@@ -445,7 +447,8 @@ mod tests {
 
     #[test]
     fn columns_keep_what_is_used_in_the_order_of_its_use() {
-        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 1 0\nvt 2 0\nvt 3 0\nvt 4 0\nf 1/4 2/2 3/4\nf 1 2/3 3/3\nf 1/2 2/4 3/2\n";
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 1 0\nvt 2 0\nvt 3 0\nvt 4 0\nf 1/4 2/2 3/4\nf 1 2/3 3/3\n\
+                   f 1/2 2/4 3/2\n";
         let mesh = read_obj(obj).unwrap().mesh;
         assert_eq!(mesh.parts().uvs.iter().map(|uv| uv.x).collect::<Vec<_>>(), [1.0, 4.0, 2.0, 3.0]);
         assert_eq!(mesh.parts().face_uvs, [[1, 2, 1], [NO_INDEX; 3], [2, 1, 2]]);
@@ -470,8 +473,10 @@ mod tests {
     proptest! {
         #[test]
         fn any_words_load_or_are_refused(words in proptest::collection::vec(proptest::sample::select(vec![
-            "v", "vt", "vn", "f", "l", "usemtl", "mtllib", "#", "\\", "\n", "\n", "\nf", "\nv", "\nv 1 2 3\n", "\nf 1 2 3\n",
-            "\nvt 0 0\n", "0", "1", "2", "3", "-1", "-2", "1/1", "-1/-1/-1", "2//1", "1/", "//", "1.5", "nan", "inf", "1e99",
+            "v", "vt", "vn", "f", "l", "usemtl", "mtllib", "#", "\\", "\n", "\n", "\nf", "\nv", "\nv 1 2 \
+                3\n", "\nf 1 2 3\n",
+            "\nvt 0 0\n", "0", "1", "2", "3", "-1", "-2", "1/1", "-1/-1/-1",
+            "2//1", "1/", "//", "1.5", "nan", "inf", "1e99",
             "-9223372036854775808", "9223372036854775807", "4294967296", "x", "\u{e4}", "0.5", "\r",
         ]), 0..60)) {
             // Whatever tobj refuses has a line.
@@ -497,7 +502,9 @@ mod tests {
                     prop_assert_eq!(file.mesh.faces(), mesh.faces());
                 }
                 (Err(Error::Mesh { source, .. }), Err(e)) => prop_assert_eq!(source, e),
-                (found, expected) => prop_assert!(false, "{:?} {:?}", found.map(|_| ()), expected.map(|_| ())),
+                (found, expected) => {
+                    prop_assert!(false, "{:?} {:?}", found.map(|_| ()), expected.map(|_| ()));
+                }
             }
         }
     }

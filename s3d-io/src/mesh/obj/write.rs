@@ -577,10 +577,12 @@ mod tests {
         #[test]
         fn positions_come_back_bit_by_bit(points in proptest::collection::vec(any::<[f32; 3]>(), 3..60)) {
             let positions: Vec<Vec3> = points.into_iter().map(Vec3::from).filter(|p| p.is_finite()).collect();
-            let faces: Vec<[u32; 3]> = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let faces: Vec<[u32; 3]> =
+                (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
             if let Ok(mesh) = TriMesh::from_faces(positions, faces) {
                 let dir = tempfile::tempdir().unwrap();
-                write_semantic_obj(dir.path(), &mesh, &vec![0; mesh.faces().len()], &["wall_1_WC_1_1".into()]).unwrap();
+                let labels = vec![0; mesh.faces().len()];
+                write_semantic_obj(dir.path(), &mesh, &labels, &["wall_1_WC_1_1".into()]).unwrap();
                 check_faces(&mesh, &read(&dir.path().join("semantic.obj")).0);
             }
         }

@@ -204,7 +204,8 @@ impl<'r> PlyReader<'r> {
             Fault::End => Error::format(
                 &self.path,
                 format!(
-                    "is cut off: its header claims {count} rows of the element \"{name}\", and it ends after {row}"
+                    "is cut off: its header claims {count} rows of the element \"{name}\", and it ends after \
+                     {row}"
                 ),
             ),
             Fault::Line(line, message) => Error::line(&self.path, line, format!("{name} {row}: {message}")),
@@ -324,8 +325,8 @@ impl<'r> PlyReader<'r> {
             return Ok(());
         }
         if self.line == self.row_end {
-            let message = "this line has more numbers than the row before needs; are properties missing in the header, \
-                or numbers on the line before?";
+            let message = "this line has more numbers than the row before needs; are properties missing in \
+                           the header, or numbers on the line before?";
             return Err(Fault::Line(self.line, message.into()));
         }
         batch.lines.push(self.line);
@@ -378,7 +379,8 @@ mod tests {
         format!(
             "ply\nformat {format} 1.0\nelement a 3\nproperty char p0\nproperty uchar p1\nproperty short p2\n\
              property ushort p3\nproperty int p4\nproperty uint p5\nproperty float p6\nproperty double p7\n\
-             element empty 9\nelement b 2\nproperty list uchar short s\nproperty uchar k\nproperty list uint double d\n\
+             element empty 9\nelement b 2\nproperty list uchar short s\nproperty uchar k\n\
+             property list uint double d\n\
              end_header\n"
         )
     }
@@ -496,7 +498,8 @@ mod tests {
     fn faults_of_rows_are_named() {
         let file = |rows: &str| {
             format!(
-                "ply\nformat ascii 1.0\nelement v 2\nproperty float x\nproperty uchar c\nproperty list char int l\nend_header\n{rows}"
+                "ply\nformat ascii 1.0\nelement v 2\nproperty float x\nproperty uchar c\n\
+                 property list char int l\nend_header\n{rows}"
             )
         };
         for (rows, words) in [
@@ -529,7 +532,8 @@ mod tests {
         assert!(
             all(negative, |_| true).unwrap_err().to_string().contains("v 0: the list l has a length of -1")
         );
-        let huge = b"ply\nformat binary_little_endian 1.0\nelement v 1\nproperty list uint int l\nend_header\n\xff\xff\xff\xff";
+        let huge = b"ply\nformat binary_little_endian 1.0\nelement v 1\nproperty list uint int l\n\
+                     end_header\n\xff\xff\xff\xff";
         assert!(all(huge, |_| true).unwrap_err().to_string().contains("4294967295 entries"));
         assert!(all(huge, |_| false).unwrap_err().to_string().contains("cut off"));
     }

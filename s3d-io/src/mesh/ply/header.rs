@@ -285,8 +285,10 @@ mod tests {
 
     #[test]
     fn both_families_of_type_names_and_every_part() {
-        let text = "ply\nformat binary_big_endian 1.0\ncomment  made by hand \nobj_info n 1\nelement vertex 3\n\
-            property char a\nproperty uint8 b\nproperty short c\nproperty uint16 d\nproperty int e\nproperty uint32 f\n\
+        let text = "ply\nformat binary_big_endian 1.0\ncomment  made by hand \nobj_info n 1\n\
+                    element vertex 3\n\
+            property char a\nproperty uint8 b\nproperty short c\nproperty uint16 d\nproperty int e\n\
+            property uint32 f\n\
             comment between\nproperty float g\nproperty float64 h\nelement face 18446744073709551615\n\
             property list uchar int Vertex_Indices\nelement none 0\nend_header\nrest";
         let header = parse(text).unwrap();

@@ -125,7 +125,8 @@ fn no_faces(header: &PlyHeader, vertices: u64) -> String {
         if others.is_empty() { String::new() } else { format!(" and the elements {}", others.join(", ")) };
     let n = count(vertices as usize, "vertex");
     format!(
-        "has no face, only {n}{others}; a mesh is needed: mesh the points first, or give the file as annotations"
+        "has no face, only {n}{others}; a mesh is needed: mesh the points first, or give the file as \
+         annotations"
     )
 }
 
@@ -225,7 +226,9 @@ fn lay_textures(
     if looks.by_comment.is_empty() {
         if uvs.is_some() || !vertices.uvs.is_empty() {
             warnings.push(
-                "texture coordinates are not used: no \"comment TextureFile NAME\" in the header names an image".into(),
+                "texture coordinates are not used: no \"comment TextureFile NAME\" in the header names an \
+                 image"
+                    .into(),
             );
         }
         return;
@@ -292,7 +295,8 @@ mod tests {
     fn elements_in_any_order_and_polygons_of_any_size() {
         // An L, concave at its fourth corner, before its vertices and behind an element of no interest.
         let elements = format!(
-            "element camera 1\nproperty float f\nproperty list int int l\nelement face 4\nproperty float other\n\
+            "element camera 1\nproperty float f\nproperty list int int l\nelement face 4\n\
+             property float other\n\
              property list uint short Vertex_Index\nelement vertex 6\nproperty double q\n{XYZ}"
         );
         let rows = "0.5 2 1 1\n7 6 0 1 2 3 4 5\n7 3 0 1 2\n7 2 0 1\n7 6 0 3 1 2 0 3\n\
@@ -367,7 +371,8 @@ mod tests {
         let list = "property list uchar float texcoord\nproperty int texnumber\n";
         let comments = "comment TextureFile two words.png\ncomment TextureFile b.png\n";
         let rows = format!(
-            "{SQUARE}4 0 1 2 3 8 0 0 0.5 0 0.5 0.5 0 0.5 1\n3 0 1 2 6 0 0 1 0 1 1 0\n3 1 2 3 6 0 0 1 0 1 1 -1\n\
+            "{SQUARE}4 0 1 2 3 8 0 0 0.5 0 0.5 0.5 0 0.5 1\n3 0 1 2 6 0 0 1 0 1 1 0\n\
+             3 1 2 3 6 0 0 1 0 1 1 -1\n\
              3 2 3 0 6 0 0 1 0 1 1 2\n3 3 0 1 0 0\n3 3 1 0 5 0 0 0 0 0 1\n"
         );
         // Four different planes, so that no face repeats another.
@@ -422,10 +427,12 @@ mod tests {
         // A quad, a face without area, one with two corners, one that repeats the first half of the quad, a
         // triangle.
         let elements = format!(
-            "element vertex 5\n{XYZ}element face 5\nproperty int material_id\nproperty short category_id\n{FACE}property uint object_id\n"
+            "element vertex 5\n{XYZ}element face 5\nproperty int material_id\nproperty short category_id\n\
+             {FACE}property uint object_id\n"
         );
         let rows = format!(
-            "{SQUARE}2 2 2\n1 10 4 0 1 2 3 100\n1 11 3 1 1 2 101\n1 12 2 0 1 102\n1 13 3 2 1 0 103\n1 -1 3 0 1 4 4294967295\n"
+            "{SQUARE}2 2 2\n1 10 4 0 1 2 3 100\n1 11 3 1 1 2 101\n1 12 2 0 1 102\n1 13 3 2 1 0 103\n\
+             1 -1 3 0 1 4 4294967295\n"
         );
         let file = read_ply(&elements, &rows).unwrap();
         assert_eq!(file.mesh.faces(), [[0, 1, 2], [0, 2, 3], [0, 1, 4]]);
@@ -496,7 +503,8 @@ mod tests {
         assert_eq!(file.mesh.faces(), [[0, 1, 3], [3, 1, 2], [1, 0, 2]]);
         // Strips before faces with labels, whose order stays.
         let elements = format!(
-            "element tristrips 1\nproperty list int int vertex_indices\nelement vertex 4\n{XYZ}element face 1\n{FACE}property int label\n"
+            "element tristrips 1\nproperty list int int vertex_indices\nelement vertex 4\n\
+             {XYZ}element face 1\n{FACE}property int label\n"
         );
         let file = read_ply(&elements, &format!("3 1 2 3\n{SQUARE}3 0 1 2 9\n")).unwrap();
         assert_eq!(file.mesh.faces(), [[0, 1, 2], [1, 2, 3]]);
@@ -516,7 +524,8 @@ mod tests {
             (
                 read_ply(
                     &format!(
-                        "element vertex 1\n{XYZ}element range_grid 1\nproperty list uchar int vertex_indices\n"
+                        "element vertex 1\n{XYZ}element range_grid 1\n\
+                         property list uchar int vertex_indices\n"
                     ),
                     "1 2 3\n1 0\n",
                 ),
@@ -524,7 +533,8 @@ mod tests {
             ),
             (
                 read_ply(
-                    "element vertex 1\nproperty float x\nelement face 1\nproperty list uchar int vertex_indices\n",
+                    "element vertex 1\nproperty float x\nelement face 1\n\
+                     property list uchar int vertex_indices\n",
                     "1\n3 0 0 0\n",
                 ),
                 "its vertices have no x, y and z",

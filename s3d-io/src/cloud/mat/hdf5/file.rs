@@ -161,7 +161,8 @@ impl Hdf5File {
         let inside = start.filter(|s| s.checked_add(len).is_some_and(|end| end <= self.file_len));
         inside.zip(usize::try_from(len).ok()).ok_or_else(|| {
             self.fault(format!(
-                "points to {len} bytes at {address}, beyond its end: it is damaged, or its download is not complete"
+                "points to {len} bytes at {address}, beyond its end: it is damaged, or its download is not \
+                 complete"
             ))
         })
     }
