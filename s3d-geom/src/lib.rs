@@ -3,7 +3,8 @@
 //! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Lens`],
 //! [`Pose`], [`Raster`] — and the geometry that needs nothing else: a surface's points ([`SurfaceSampler`]),
 //! a point's nearest face ([`NearestFaces`]), polygons and their triangles ([`Polygon`],
-//! [`triangulate_face`]), a room's floor ([`FootprintBuilder`]) and the voxels of an instance ([`Voxels`]).
+//! [`triangulate_face`]), a room's floor ([`FootprintBuilder`]), the voxels of an instance
+//! ([`Voxels`]), and meshes of fewer faces to look at ([`simplify()`]).
 //! World frame everywhere: metres, Z-up, right-handed.
 //!
 //! ```
@@ -37,8 +38,10 @@ mod mesh;
 #[cfg(feature = "nearest")]
 mod nearest;
 mod outline;
+mod patches;
 pub mod primitives;
 mod raster;
+mod simplify;
 #[cfg(feature = "sampling")]
 mod surface;
 #[cfg(feature = "nearest")]
@@ -64,7 +67,9 @@ pub use outline::{
     Footprint, FootprintBuilder, FootprintOptions, Polygon, PolygonError, dominant_wall_direction_deg,
     triangulate_face,
 };
+pub use patches::face_patches;
 pub use raster::Raster;
+pub use simplify::{SimplifiedMesh, simplify};
 #[cfg(feature = "sampling")]
 pub use surface::{Density, SurfaceSampler};
 #[cfg(feature = "nearest")]

@@ -93,6 +93,16 @@ impl Error {
         Self::unsupported(path, message)
     }
 
+    /// What is wrong, without the file: "line 3: …", "cannot read: …".
+    pub fn message(&self) -> String {
+        match self {
+            Self::Io { action, source, .. } => format!("cannot {action}: {source}"),
+            Self::Format { message, place: Place::Line(line), .. } => format!("line {line}: {message}"),
+            Self::Format { message, .. } | Self::Unsupported { message, .. } => message.clone(),
+            Self::Mesh { source, .. } => source.to_string(),
+        }
+    }
+
     /// The file that it is about.
     pub fn path(&self) -> &Path {
         match self {

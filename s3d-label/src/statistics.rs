@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// How many instances of each class each area holds.
 ///
 /// The paper's table of object classes; it counts every cell one higher than the published labels do
-/// (formats.md, "What is written").
+/// (docs/paper.md, "Objects by class").
 ///
 /// ```
 /// use s3d_label::{Class, ClassCounts, LabelTable};
@@ -51,8 +51,8 @@ impl ClassCounts {
 
 /// How many rooms of each type each area holds: the rooms that have at least one instance.
 ///
-/// The paper's table of rooms; its total of area 5 (55) is not the sum of its row (68; formats.md, "What is
-/// written").
+/// The paper's table of rooms; its total of area 5 (55) is not the sum of its row (68; docs/paper.md, "Rooms
+/// by type").
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoomCounts {

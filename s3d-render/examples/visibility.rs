@@ -1,7 +1,8 @@
 //! How fast the visibility pass is, and what it saw, for a comparison with other ray casters:
 //!
 //! ```text
-//! cargo run --release -p s3d-render --example visibility -- MESH X Y Z [--up y|z] [--rounds N] [--threads N] [--dump DIR]
+//! cargo run --release -p s3d-render --example visibility -- MESH X Y Z
+//!     [--up y|z] [--rounds N] [--threads N] [--dump DIR]
 //! ```
 //!
 //! MESH is an OBJ file (Y up unless said otherwise) or `scan-like:FACES`, a generated scan. From (X, Y, Z) in
@@ -13,13 +14,14 @@
 //! With `--dump` it also writes what `docs/performance/embree_cast.cpp` needs to cast the same rays and
 //! compare, all little-endian:
 //!
-//! | file | holds |
-//! |---|---|
-//! | `dump.txt` | vertices, faces, views, their width and height, the panorama's width and height, the origin |
-//! | `positions.f32`, `faces.u32` | three numbers a vertex or face |
-//! | `views.f64` | a view in nine numbers: `corner`, `x_step`, `y_step`: the direction of pixel (i, j) is corner + x_step·(i + ½) + y_step·(j + ½) |
-//! | `columns.f64`, `rows.f64` | the panorama's: cosine and sine of each column's azimuth c and row's latitude r; the direction is (r.cos·c.cos, r.cos·c.sin, r.sin) |
-//! | `view_00.face`, `view_00.depth`, …, `pano.face`, `pano.depth` | `u32` and `f32` by row; 4,294,967,295 and infinity where nothing is hit |
+//! - `dump.txt`: vertices, faces, views, their width and height, the panorama's width and height, the origin.
+//! - `positions.f32`, `faces.u32`: three numbers a vertex or face.
+//! - `views.f64`: a view in nine numbers, `corner`, `x_step`, `y_step`. The direction of pixel (i, j) is
+//!   corner + x_step·(i + ½) + y_step·(j + ½).
+//! - `columns.f64`, `rows.f64`: of the panorama, cosine and sine of the azimuth c of each column and of the
+//!   latitude r of each row. The direction is (r.cos·c.cos, r.cos·c.sin, r.sin).
+//! - `view_00.face`, `view_00.depth`, …, `pano.face`, `pano.depth`: `u32` and `f32` by row; 4,294,967,295 and
+//!   infinity where nothing is hit.
 
 #[path = "../benches/common/mod.rs"]
 mod common;

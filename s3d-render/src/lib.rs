@@ -92,7 +92,7 @@ pub use scene::Scene;
 pub use shade::channels::{
     MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, byte_per_face_image, byte_per_face_image_into,
     color_per_face_image, color_per_face_image_into, coverage, depth_image, depth_image_into,
-    depth_image_mm_into, index_image, index_image_into, normal_image, normal_image_into,
+    depth_image_mm_into, index_image, index_image_into, normal_image, normal_image_into, normal_vectors,
 };
 pub use shade::color::{rgb_image, rgb_image_into, rgb_image_with};
 pub use shade::mip_maps::{MipMaps, TextureFilter};

@@ -247,6 +247,35 @@ fn normals_face_the_camera_from_either_side() {
 }
 
 #[test]
+fn vectors_of_normals_are_what_bytes_round() {
+    let mesh = s3d_synth::scenes::scan_like(3000, 5);
+    let scene = Scene::new(&mesh);
+    let pose = Pose::level(dvec3(3.0, 2.5, 1.5), 0.7).turned(0.0, -0.3);
+    for camera in [Camera::perspective(pose, 1.3, 97, 61), Camera::equirectangular(pose, 128)] {
+        let hits = s3d_render::cast(&scene, &camera);
+        for (normals, axes) in [
+            (Normals::Flat, s3d_geom::NormalAxes::Paper),
+            (Normals::Flat, s3d_geom::NormalAxes::OpenCv),
+            (Normals::Smooth, s3d_geom::NormalAxes::Paper),
+        ] {
+            let mut bytes = Raster::filled(0, 0, [0; 3]);
+            s3d_render::normal_image_into(&scene, &hits, &camera, normals, axes, &mut bytes);
+            let vectors = s3d_render::normal_vectors(&scene, &hits, &camera, normals, axes);
+            for ((byte, n), face) in bytes.pixels().iter().zip(vectors.pixels()).zip(hits.face.pixels()) {
+                if *face == NO_FACE {
+                    assert!(*byte == s3d_render::MISSING_NORMAL && n.iter().all(|n| n.is_nan()));
+                    continue;
+                }
+                assert!((n.iter().map(|n| n * n).sum::<f32>() - 1.0).abs() < 1e-5);
+                // Half a step, and what 32 bits round.
+                let far = |k: usize| (127.5 + 127.5 * f64::from(n[k]) - f64::from(byte[k])).abs();
+                assert!((0..3).all(|k| far(k) < 0.5 + 1e-4), "{n:?} {byte:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn smooth_normals_are_interpolated_and_never_point_away() {
     // The wall at +Y bulges: its corner normals lean outwards, the second time beyond what the camera can
     // see.

@@ -24,7 +24,8 @@ pub struct Selection {
 }
 
 impl Default for Selection {
-    /// The paper's: 15 % go, 60 % stay, and half of the 25 % between: 72.5 % in all.
+    /// The paper's: 15 % go, 60 % stay; and half of the 25 % between, 72.5 % in all. Of the published views
+    /// 69.3 % stayed (docs/paper.md, "Which views").
     fn default() -> Self {
         Self { discard: 0.15, keep: 0.60, half_of_rest: 0.5 }
     }
@@ -106,12 +107,12 @@ const WEIGHT_SIGMA: f64 = 0.5;
 /// smaller index counts as the higher.
 ///
 /// The draw is without replacement. "Half-normal with mean 1 and deviation ½ on the entropy scaled to \[0,
-/// 1\]" is read as the lower half of that normal distribution: a view of score e has the weight exp(−(s − 1)²
-/// / (2·½²)), with s = e / (the pool's highest score), 1 at the top and e⁻² = 0.135 at s = 0. (If all scores
-/// are 0, all weights are equal.) By the method of Efraimidis and Spirakis (2006), view i gets the key ln(uᵢ)
-/// / weightᵢ, and the largest keys stay; uᵢ, in (0, 1], is from the i-th 64 bits of a ChaCha8 stream keyed by
-/// `seed`. So the draw has one result, in whatever order keys are computed, but it knows a view by its index:
-/// see [`select_pooled`](crate::select_pooled) for views that are known by name.
+/// 1\]" is read as the lower half of that normal distribution: a view of score e has the weight
+/// exp(−(s − 1)² / (2·½²)), with s = e / (the pool's highest score), 1 at the top and e⁻² = 0.135 at s = 0.
+/// (If all scores are 0, all weights are equal.) By the method of Efraimidis and Spirakis (2006), view i gets
+/// the key ln(uᵢ) / weightᵢ, and the largest keys stay; uᵢ, in (0, 1], is from the i-th 64 bits of a ChaCha8
+/// stream keyed by `seed`. So the draw has one result, in whatever order keys are computed, but it knows a
+/// view by its index: see [`select_pooled`](crate::select_pooled) for views that are known by name.
 ///
 /// # Panics
 /// If a score is negative or not finite, or [`Selection::check`] fails.

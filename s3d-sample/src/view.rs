@@ -34,7 +34,7 @@ pub struct ViewDistribution {
 }
 
 impl Default for ViewDistribution {
-    /// The paper's: pitch N(0, 15°), angle of view 75° − |N(0, 30°)| but at least 10°.
+    /// The paper's: pitch N(0, 15°), angle of view 75° − |N(0, 30°)|; and at least 10°, which is ours.
     fn default() -> Self {
         Self { pitch_sigma_deg: 15.0, fov_max_deg: 75.0, fov_sigma_deg: 30.0, fov_min_deg: 10.0 }
     }

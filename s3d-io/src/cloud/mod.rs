@@ -19,7 +19,8 @@
 //! `f32`: for georeferenced clouds, [`AnnotationOptions::offset_m`] is subtracted before.
 //!
 //! Writers take points piece by piece, to a path (whole or not at all) or to any `Write`: [`PlyPointWriter`],
-//! read back by [`LabelledPoints`], [`S3disAreaWriter`], [`MatWriter`], and [`NpyWriter`] for arrays. Source:
+//! read back by [`LabelledPoints`], [`S3disAreaWriter`], [`MatWriter`], and [`NpyWriter`] for arrays, read back
+//! by [`NpyArray`] and [`NpzArchive`]. Source:
 //! formats.md, "Annotations".
 //!
 //! ```
@@ -67,7 +68,7 @@ pub use frame_gap::FrameGap;
 #[cfg(feature = "mat")]
 pub use mat::{MatArea, MatObject, MatRoom, MatWriter};
 #[cfg(feature = "npy")]
-pub use npy::NpyWriter;
+pub use npy::{NpyArray, NpyWriter, NpzArchive};
 pub use of_memory::AnnotatedPoints;
 pub use passes::{InstancePasses, InstanceReader, PointPasses};
 #[cfg(feature = "ply")]

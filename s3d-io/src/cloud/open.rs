@@ -91,7 +91,8 @@ impl Annotations {
     /// use s3d_io::cloud::{AnnotationOptions, Annotations};
     /// use std::{io::Cursor, path::Path};
     ///
-    /// let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+    /// let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n\
+    ///            property float y\nproperty float z\n\
     ///            property uchar class\nend_header\n1 2 3 7\n";
     /// let classes = [("7".to_owned(), Some(s3d_label::Class::CHAIR))].into();
     /// let options = AnnotationOptions { classes, ..Default::default() };

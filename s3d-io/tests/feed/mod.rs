@@ -16,6 +16,7 @@ use s3d_io::mesh::*;
 use s3d_io::scene::*;
 use s3d_label::Class;
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// What a name of a fuzz target means: puts `data` in the folder and reads it.
@@ -300,7 +301,24 @@ fn taxonomy(dir: &Path, data: &[u8]) {
 /// An array, or an archive of arrays, by what the bytes begin with.
 fn npy(dir: &Path, data: &[u8]) {
     let name = if data.starts_with(b"PK") { "cloud.npz" } else { "cloud.npy" };
-    annotations(dir, &file(dir, name, data));
+    let path = file(dir, name, data);
+    annotations(dir, &path);
+    if let Ok(array) = NpyArray::open(&path) {
+        numbers(array);
+    }
+    if let Ok(mut archive) = NpzArchive::open(&path) {
+        for name in archive.names().to_vec() {
+            let _ = archive.array(&name).map(numbers);
+        }
+    }
+}
+
+/// The first of an array's numbers: an archive may unpack to any number of them.
+fn numbers(mut array: NpyArray<impl Read>) {
+    let (mut integers, mut floats) = (Vec::new(), Vec::new());
+    for _ in 0..4 {
+        let _ = (array.read_integers(&mut integers), array.read_floats(&mut floats));
+    }
 }
 
 /// LAS and LAZ: the header tells which it is, whatever the name.

@@ -2,8 +2,8 @@
 
 use crate::{Class, FaceLabels, LabelId, LabelTable};
 use s3d_geom::glam::DVec3;
-use s3d_geom::{Aabb, TriMesh};
-use std::collections::{BTreeMap, HashMap};
+use s3d_geom::{Aabb, TriMesh, face_patches};
+use std::collections::BTreeMap;
 
 /// A face is disputed if its label won less than this share of its votes.
 const CLEAR: f64 = 0.75;
@@ -107,42 +107,14 @@ fn class_disputes(disputed: &[Disputed], table: &LabelTable) -> Vec<ClassDispute
 }
 
 fn patches(mesh: &TriMesh, disputed: &[Disputed]) -> Vec<DisputedPatch> {
-    // Which disputed face is in whose patch: the first of each stands for it.
-    let mut first: Vec<usize> = (0..disputed.len()).collect();
-    let mut at_corner: HashMap<([u32; 3], [LabelId; 2]), usize> = HashMap::new();
-    for (index, face) in disputed.iter().enumerate() {
-        for corner in mesh.triangle(face.face) {
-            // Adding 0 turns −0 into 0.
-            let key = (corner + 0.0).to_array().map(f32::to_bits);
-            let other = *at_corner.entry((key, face.pair)).or_insert(index);
-            let (a, b) = (root(&mut first, index), root(&mut first, other));
-            if let Some(later) = first.get_mut(a.max(b)) {
-                *later = a.min(b);
-            }
-        }
-    }
-    let mut members: BTreeMap<usize, Vec<&Disputed>> = BTreeMap::new();
-    for (index, face) in disputed.iter().enumerate() {
-        members.entry(root(&mut first, index)).or_default().push(face);
-    }
-    let mut patches: Vec<DisputedPatch> = members.into_values().map(|faces| patch(mesh, &faces)).collect();
+    let faces: Vec<(u32, [LabelId; 2])> = disputed.iter().map(|face| (face.face, face.pair)).collect();
+    let members = |places: Vec<usize>| -> Vec<&Disputed> {
+        places.into_iter().filter_map(|place| disputed.get(place)).collect()
+    };
+    let mut patches: Vec<DisputedPatch> =
+        face_patches(mesh, &faces).into_iter().map(|places| patch(mesh, &members(places))).collect();
     patches.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
     patches
-}
-
-/// The first face of the patch that a face is in.
-fn root(first: &mut [usize], mut index: usize) -> usize {
-    while let Some(&parent) = first.get(index)
-        && parent != index
-    {
-        // Halves the way for whoever comes next.
-        let grandparent = first.get(parent).copied().unwrap_or(parent);
-        if let Some(entry) = first.get_mut(index) {
-            *entry = grandparent;
-        }
-        index = grandparent;
-    }
-    index
 }
 
 fn patch(mesh: &TriMesh, faces: &[&Disputed]) -> DisputedPatch {

@@ -118,7 +118,11 @@ pub fn normal_image_into(
     let image_from_world = camera.normal_axes_from_world(axes);
     match normals {
         Normals::Flat => flat_normals(scene, hits, camera, image_from_world, out),
-        Normals::Smooth => *out = smooth_normals(scene, hits, camera, image_from_world),
+        Normals::Smooth => {
+            *out = smooth_normals(scene, hits, camera, MISSING_NORMAL, |normal| {
+                quantized(image_from_world * normal)
+            });
+        }
     }
 }
 
@@ -160,12 +164,46 @@ pub(crate) fn flat_normals_of(
     std::array::from_fn(|k| channels.map(|channel| channel[k] as u8))
 }
 
-fn smooth_normals(
+/// Surface normals as vectors of length 1, before [`normal_image`] makes bytes of them; NaN where nothing is
+/// seen.
+///
+/// # Panics
+/// As [`normal_image`].
+pub fn normal_vectors(
     scene: &Scene<'_>,
     hits: &Hits,
     camera: &Camera,
-    image_from_world: DMat3,
-) -> Raster<[u8; 3]> {
+    normals: Normals,
+    axes: NormalAxes,
+) -> Raster<[f32; 3]> {
+    assert_size(hits, camera);
+    let image_from_world = camera.normal_axes_from_world(axes);
+    let vector = |normal: DVec3| (image_from_world * normal).as_vec3().to_array();
+    if normals == Normals::Smooth {
+        return smooth_normals(scene, hits, camera, [f32::NAN; 3], vector);
+    }
+    let mut vectors = FaceCache::new();
+    hits.face.map(|face| {
+        if face == NO_FACE {
+            return [f32::NAN; 3];
+        }
+        *vectors.get(face, || {
+            // The same side and the same arithmetic as in the image of bytes.
+            let [a, b, c] = scene.mesh().triangle(face).map(|p| p.as_dvec3());
+            let normal = (b - a).cross(c - a).normalize();
+            vector(if normal.dot(a - camera.pose.location) > 0.0 { -normal } else { normal })
+        })
+    })
+}
+
+/// What `pixel` makes of the normal that each pixel sees.
+fn smooth_normals<T: Copy>(
+    scene: &Scene<'_>,
+    hits: &Hits,
+    camera: &Camera,
+    missing: T,
+    pixel: impl Fn(DVec3) -> T,
+) -> Raster<T> {
     let mesh = scene.mesh();
     let mut patches = FaceCache::new();
     let rays = camera.rays();
@@ -173,12 +211,12 @@ fn smooth_normals(
     for (j, faces) in hits.face.rows().enumerate() {
         for (i, &face) in faces.iter().enumerate() {
             if face == NO_FACE {
-                out.push(MISSING_NORMAL);
+                out.push(missing);
                 continue;
             }
             let patch = patches.get(face, || Patch::new(mesh, face, camera.pose.location));
             let normal = smooth_normal(patch, mesh.corner_normals(face), rays.at(i as u32, j as u32));
-            out.push(quantized(image_from_world * normal));
+            out.push(pixel(normal));
         }
     }
     Raster::from_vec(hits.face.width(), hits.face.height(), out)

@@ -40,51 +40,11 @@ impl NpyHeader {
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] and [`Error::Unsupported`] for what is no table of numbers and texts.
     pub(crate) fn read(path: &Path, source: &mut impl Read) -> Result<Self> {
-        let mut start = [0; 8];
-        let short = |e: std::io::Error| match e.kind() {
-            std::io::ErrorKind::UnexpectedEof => {
-                Error::format(path, "is no NPY array: it ends in its header")
-            }
-            std::io::ErrorKind::InvalidData => Error::format(path, format!("cannot be unpacked: {e}")),
-            _ => Error::io(path, "read", e),
-        };
-        source.read_exact(&mut start).map_err(short)?;
-        if &start[..6] != b"\x93NUMPY" {
-            return Err(Error::format(path, "is no NPY array: it does not begin with \\x93NUMPY"));
-        }
-        let mut length = [0; 4];
-        let digits = match start[6] {
-            1 => 2,
-            2 | 3 => 4,
-            other => return Err(Error::format(path, format!("is of NPY version {other}; 1 to 3 are read"))),
-        };
-        source.read_exact(length.get_mut(..digits).unwrap_or_default()).map_err(short)?;
-        let length = u32::from_le_bytes(length) as usize;
-        if length > LONGEST_HEADER {
-            return Err(Error::format(path, format!("claims a header of {length} bytes")));
-        }
-        let mut text = vec![0; length];
-        source.read_exact(&mut text).map_err(short)?;
-        let text = String::from_utf8_lossy(&text);
-        Self::parse(&text).map_err(|why| match why {
-            Refused::Bad(why) => Error::format(path, format!("has a header that is none of numpy: {why}")),
-            Refused::Unsupported(why) => Error::unsupported(path, why),
-        })
+        Self::parse(&read_text(path, source)?).map_err(|why| why.of(path))
     }
 
     fn parse(text: &str) -> std::result::Result<Self, Refused> {
-        let text = tame(text)?;
-        let mut bytes = b"\x93NUMPY\x03\x00".to_vec();
-        // It is longer than it was by at most twice: see `String::from_utf8_lossy`.
-        bytes.extend(u32::try_from(text.len()).unwrap_or(u32::MAX).to_le_bytes());
-        bytes.extend(text);
-        // npyz multiplies the numbers of the shape.
-        let header = guarded(|| npyz::NpyHeader::from_reader(&bytes[..]))
-            .ok_or_else(|| bad("its shape is too large"))?
-            // The parser draws an arrow below its place, on lines of their own.
-            .map_err(|e| bad(e.to_string().split(" -->").next().unwrap_or_default()))?;
-        let rows = header.shape().iter().try_fold(1u64, |rows, side| rows.checked_mul(*side));
-        rows.ok_or_else(|| bad("its shape is too large"))?;
+        let header = parse(text)?;
         let (rows, columns) = match *header.shape() {
             [] => (1, None),
             [n] => (n, None),
@@ -130,6 +90,54 @@ impl NpyHeader {
         }
         Ok(Self { rows, stride: at, fields, is_structured })
     }
+}
+
+/// The text of a header; `source` is left at the first number.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] for what is no NPY file.
+pub(super) fn read_text(path: &Path, source: &mut impl Read) -> Result<String> {
+    let mut start = [0; 8];
+    let short = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::UnexpectedEof => Error::format(path, "is no NPY array: it ends in its header"),
+        std::io::ErrorKind::InvalidData => Error::format(path, format!("cannot be unpacked: {e}")),
+        _ => Error::io(path, "read", e),
+    };
+    source.read_exact(&mut start).map_err(short)?;
+    if &start[..6] != b"\x93NUMPY" {
+        return Err(Error::format(path, "is no NPY array: it does not begin with \\x93NUMPY"));
+    }
+    let mut length = [0; 4];
+    let digits = match start[6] {
+        1 => 2,
+        2 | 3 => 4,
+        other => return Err(Error::format(path, format!("is of NPY version {other}; 1 to 3 are read"))),
+    };
+    source.read_exact(length.get_mut(..digits).unwrap_or_default()).map_err(short)?;
+    let length = u32::from_le_bytes(length) as usize;
+    if length > LONGEST_HEADER {
+        return Err(Error::format(path, format!("claims a header of {length} bytes")));
+    }
+    let mut text = vec![0; length];
+    source.read_exact(&mut text).map_err(short)?;
+    Ok(String::from_utf8_lossy(&text).into_owned())
+}
+
+/// What a header says, of a shape whose numbers can be counted.
+pub(super) fn parse(text: &str) -> std::result::Result<npyz::NpyHeader, Refused> {
+    let text = tame(text)?;
+    let mut bytes = b"\x93NUMPY\x03\x00".to_vec();
+    // It is longer than it was by at most twice: see `String::from_utf8_lossy`.
+    bytes.extend(u32::try_from(text.len()).unwrap_or(u32::MAX).to_le_bytes());
+    bytes.extend(text);
+    // npyz multiplies the numbers of the shape.
+    let header = guarded(|| npyz::NpyHeader::from_reader(&bytes[..]))
+        .ok_or_else(|| bad("its shape is too large"))?
+        // The parser draws an arrow below its place, on lines of their own.
+        .map_err(|e| bad(e.to_string().split(" -->").next().unwrap_or_default()))?;
+    let count = header.shape().iter().try_fold(1u64, |count, side| count.checked_mul(*side));
+    count.ok_or_else(|| bad("its shape is too large"))?;
+    Ok(header)
 }
 
 /// A header's text without the `L` of Python 2's numbers, if npyz reads it in little time and stack.
@@ -188,25 +196,11 @@ fn push_fields(
     kind: &TypeStr,
 ) -> std::result::Result<(), Refused> {
     let big_endian = kind.endianness() == Endianness::Big;
-    let size = usize::try_from(kind.size_field()).unwrap_or(usize::MAX);
-    let bytes =
-        kind.num_bytes().filter(|_| size <= 1 << 16).ok_or_else(|| bad(&format!("the type {kind}")))?;
-    let kind = match (kind.type_char(), size) {
-        (TypeChar::Int, 1) => Some(Kind::I8),
-        (TypeChar::Uint | TypeChar::Bool, 1) => Some(Kind::U8),
-        (TypeChar::Int, 2) => Some(Kind::I16),
-        (TypeChar::Uint, 2) => Some(Kind::U16),
-        (TypeChar::Float, 2) => Some(Kind::F16),
-        (TypeChar::Int, 4) => Some(Kind::I32),
-        (TypeChar::Uint, 4) => Some(Kind::U32),
-        (TypeChar::Float, 4) => Some(Kind::F32),
-        (TypeChar::Int, 8) => Some(Kind::I64),
-        (TypeChar::Uint, 8) => Some(Kind::U64),
-        (TypeChar::Float, 8) => Some(Kind::F64),
-        (TypeChar::ByteStr, n) => Some(Kind::Bytes(n)),
-        (TypeChar::UnicodeStr, n) => Some(Kind::Utf32(n)),
-        _ => None,
-    };
+    let bytes = kind
+        .num_bytes()
+        .filter(|_| kind.size_field() <= 1 << 16)
+        .ok_or_else(|| bad(&format!("the type {kind}")))?;
+    let kind = kind_of(kind);
     for name in names {
         if let Some(kind) = kind {
             fields.push(Field { name, at: *at, kind, big_endian });
@@ -219,14 +213,43 @@ fn push_fields(
     Ok(())
 }
 
+/// How a type's values are stored; `None` if it holds no label.
+pub(super) fn kind_of(kind: &TypeStr) -> Option<Kind> {
+    Some(match (kind.type_char(), usize::try_from(kind.size_field()).ok()?) {
+        (TypeChar::Int, 1) => Kind::I8,
+        (TypeChar::Uint | TypeChar::Bool, 1) => Kind::U8,
+        (TypeChar::Int, 2) => Kind::I16,
+        (TypeChar::Uint, 2) => Kind::U16,
+        (TypeChar::Float, 2) => Kind::F16,
+        (TypeChar::Int, 4) => Kind::I32,
+        (TypeChar::Uint, 4) => Kind::U32,
+        (TypeChar::Float, 4) => Kind::F32,
+        (TypeChar::Int, 8) => Kind::I64,
+        (TypeChar::Uint, 8) => Kind::U64,
+        (TypeChar::Float, 8) => Kind::F64,
+        (TypeChar::ByteStr, n) => Kind::Bytes(n),
+        (TypeChar::UnicodeStr, n) => Kind::Utf32(n),
+        _ => return None,
+    })
+}
+
 /// Why a header is not read.
 #[derive(Debug)]
-enum Refused {
+pub(super) enum Refused {
     Bad(String),
     Unsupported(String),
 }
 
-fn bad(why: &str) -> Refused {
+impl Refused {
+    pub(super) fn of(self, path: &Path) -> Error {
+        match self {
+            Self::Bad(why) => Error::format(path, format!("has a header that is none of numpy: {why}")),
+            Self::Unsupported(why) => Error::unsupported(path, why),
+        }
+    }
+}
+
+pub(super) fn bad(why: &str) -> Refused {
     Refused::Bad(why.to_owned())
 }
 

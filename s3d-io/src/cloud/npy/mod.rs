@@ -1,7 +1,9 @@
 //! numpy's arrays, NPY and NPZ.
 
+mod array;
 mod header;
 pub(crate) mod read;
 pub(crate) mod write;
 
+pub use array::{NpyArray, NpzArchive};
 pub use write::NpyWriter;

@@ -241,7 +241,8 @@ mod tests {
         fn words_are_read_as_the_standard_library_does(value: f64, decimals in 0usize..20) {
             for text in [value.to_string(), format!("{:.decimals$}", value % 1e6), format!("{value:e}")] {
                 let expected: Option<f64> = text.parse().ok();
-                prop_assert_eq!(parse_f64(text.as_bytes()).map(f64::to_bits), expected.map(f64::to_bits), "{}", text);
+                let found = parse_f64(text.as_bytes());
+            prop_assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "{}", text);
             }
         }
 

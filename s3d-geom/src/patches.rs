@@ -1,0 +1,57 @@
+//! Faces that hang together.
+
+use crate::TriMesh;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::Hash;
+
+/// Which of some faces of the same key hang together by their corners: places in `faces`, patch by patch, in
+/// the order of their first faces. Corners are the same where their coordinates are.
+///
+/// ```
+/// use s3d_geom::{TriMesh, face_patches, glam::Vec3};
+///
+/// let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE, 2.0 * Vec3::ONE, 3.0 * Vec3::Z];
+/// let mesh = TriMesh::from_faces(corners, vec![[0, 1, 2], [3, 4, 5], [2, 1, 3], [0, 1, 3]])?;
+/// assert_eq!(face_patches(&mesh, &[(0, 'a'), (1, 'a'), (3, 'b')]), [[0], [1], [2]]);
+/// assert_eq!(face_patches(&mesh, &[(0, 'a'), (1, 'a'), (2, 'a')]), [[0, 1, 2]]);
+/// # Ok::<(), s3d_geom::MeshError>(())
+/// ```
+///
+/// # Panics
+/// If the mesh has not so many faces.
+pub fn face_patches<K: Copy + Eq + Hash>(mesh: &TriMesh, faces: &[(u32, K)]) -> Vec<Vec<usize>> {
+    // Which face is in whose patch: the first of each stands for it.
+    let mut first: Vec<usize> = (0..faces.len()).collect();
+    let mut at_corner: HashMap<([u32; 3], K), usize> = HashMap::new();
+    for (place, (face, key)) in faces.iter().enumerate() {
+        for corner in mesh.triangle(*face) {
+            // Adding 0 turns −0 into 0.
+            let corner = (corner + 0.0).to_array().map(f32::to_bits);
+            let other = *at_corner.entry((corner, *key)).or_insert(place);
+            let (a, b) = (root(&mut first, place), root(&mut first, other));
+            if let Some(later) = first.get_mut(a.max(b)) {
+                *later = a.min(b);
+            }
+        }
+    }
+    let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for place in 0..faces.len() {
+        members.entry(root(&mut first, place)).or_default().push(place);
+    }
+    members.into_values().collect()
+}
+
+/// The first face of the patch that a face is in.
+fn root(first: &mut [usize], mut place: usize) -> usize {
+    while let Some(&parent) = first.get(place)
+        && parent != place
+    {
+        // Halves the way for whoever comes next.
+        let grandparent = first.get(parent).copied().unwrap_or(parent);
+        if let Some(entry) = first.get_mut(place) {
+            *entry = grandparent;
+        }
+        place = grandparent;
+    }
+    place
+}

@@ -1,0 +1,235 @@
+use super::{Content, encode_gray8, encode_gray16, encode_rgb8, read_gray16, read_numbers8, read_rgb8};
+use crate::error::Error;
+use crate::fs::atomic::write_bytes;
+use crate::image::compression::Compression;
+use png::{BitDepth, ColorType};
+use proptest::prelude::*;
+use s3d_geom::Raster;
+use std::path::Path;
+
+#[test]
+fn masks_come_back() {
+    let mask =
+        Raster::from_vec(37, 11, (0..37 * 11).map(|i| if i % 37 < i / 20 { 255 } else { 0 }).collect());
+    let image = image::load_from_memory(&encode_gray8(&mask)).unwrap();
+    assert_eq!(image.color(), image::ColorType::L8);
+    assert_eq!(image.into_luma8().as_raw(), mask.pixels());
+}
+
+fn in_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("image.png");
+    write_bytes(&path, bytes).unwrap();
+    read(&path)
+}
+
+const CONTENTS: [Content; 3] = [Content::Photo, Content::Normals, Content::Labels];
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn pixels_come_back((w, h, data) in (1u32..40, 1u32..40).prop_flat_map(|(w, h)| {
+        // Noise, or few colours, in which there are repetitions.
+        let color = prop_oneof![any::<[u8; 3]>(), proptest::array::uniform3(0u8..2)];
+        (Just(w), Just(h), proptest::collection::vec(color, (w * h) as usize))
+    })) {
+        let image = Raster::from_vec(w, h, data);
+        let gray = image.map(|[a, b, _]| u16::from_be_bytes([a, b]));
+        for compression in Compression::ALL {
+            for content in CONTENTS {
+                let bytes = encode_rgb8(&image, content, compression);
+                prop_assert_eq!(&in_file(&bytes, read_rgb8).unwrap(), &image);
+            }
+            prop_assert_eq!(&in_file(&encode_gray16(&gray, compression), read_gray16).unwrap(), &gray);
+        }
+    }
+}
+
+#[test]
+fn lines_longer_than_a_repetition_reaches_come_back() {
+    for (width, height) in [(40_000, 3), (1, 70_000)] {
+        let image = Raster::from_vec(
+            width,
+            height,
+            (0..width * height).map(|i| [(i % 251) as u8, (i / 7) as u8, 3]).collect(),
+        );
+        let gray = image.map(|[a, b, _]| u16::from_be_bytes([b, a]));
+        for compression in Compression::ALL {
+            for content in CONTENTS {
+                let bytes = encode_rgb8(&image, content, compression);
+                assert_eq!(in_file(&bytes, read_rgb8).unwrap(), image, "{content:?}, {compression}");
+            }
+            assert_eq!(
+                in_file(&encode_gray16(&gray, compression), read_gray16).unwrap(),
+                gray,
+                "{compression}"
+            );
+        }
+    }
+}
+
+#[test]
+fn sixteen_bits_are_big_endian_in_the_file() {
+    // The `image` crate is the other reader.
+    for compression in Compression::ALL {
+        let image = Raster::from_vec(3, 1, vec![1, 0x1234, u16::MAX]);
+        let other = image::load_from_memory(&encode_gray16(&image, compression)).unwrap();
+        assert_eq!(other.as_luma16().unwrap().as_raw(), image.pixels());
+        let image = Raster::from_vec(2, 1, vec![[1, 2, 3], [250, 251, 252]]);
+        let other = image::load_from_memory(&encode_rgb8(&image, Content::Photo, compression)).unwrap();
+        assert_eq!(other.as_rgb8().unwrap().as_raw(), &[1, 2, 3, 250, 251, 252]);
+    }
+}
+
+fn noise() -> impl FnMut() -> u8 {
+    let mut state = 1u32;
+    move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 24) as u8
+    }
+}
+
+#[test]
+fn noise_is_stored() {
+    let mut byte = noise();
+    let image = Raster::from_vec(300, 200, (0..60_000).map(|_| [byte(), byte(), byte()]).collect());
+    let gray = image.map(|[a, b, _]| u16::from_be_bytes([a, b]));
+    for compression in Compression::ALL {
+        for content in CONTENTS {
+            let bytes = encode_rgb8(&image, content, compression);
+            assert!(bytes.len() < 300 * 200 * 3 + 1000, "{content:?}, {compression}: {}", bytes.len());
+            assert_eq!(in_file(&bytes, read_rgb8).unwrap(), image);
+        }
+        let bytes = encode_gray16(&gray, compression);
+        assert!(bytes.len() < 300 * 200 * 2 + 1000, "{compression}: {}", bytes.len());
+    }
+}
+
+/// A wall and a floor under a lamp, with a noisy texture: colours, depth, normals and labels.
+struct View {
+    rgb: Raster<[u8; 3]>,
+    depth: Raster<u16>,
+    normals: Raster<[u8; 3]>,
+    labels: Raster<[u8; 3]>,
+}
+
+fn view() -> View {
+    let (width, height) = (320, 240);
+    let mut byte = noise();
+    // Across, depth, whether it is the floor.
+    type Seen = (f32, f32, bool);
+    let pixels: Vec<Seen> = (0..width * height)
+        .map(|i| {
+            let (x, y) = ((i % width) as f32 / width as f32 - 0.5, (i / width) as f32 / height as f32 - 0.5);
+            let floor = y > 0.1 + 0.1 * x;
+            (x, if floor { 0.3 / y.max(0.01) } else { 2.0 + 0.7 * x }, floor)
+        })
+        .collect();
+    let raster = |of: &mut dyn FnMut(&Seen) -> [u8; 3]| {
+        Raster::from_vec(width, height, pixels.iter().map(of).collect())
+    };
+    View {
+        rgb: raster(&mut |&(x, depth, _)| {
+            let light = 120.0 - 60.0 * x * x + 30.0 * depth;
+            [1.0, 0.9, 0.8].map(|k| ((k * light) as u8).saturating_add(byte() % 8))
+        }),
+        depth: Raster::from_vec(width, height, pixels.iter().map(|p| (512.0 * p.1) as u16).collect()),
+        // Triangles of noisy vertices: each its own normal.
+        normals: raster(&mut |&(x, depth, floor)| {
+            let (u, v) = (9.0 * (x + 1.0), 11.0 * depth + 3.0 * x);
+            let upper = u32::from(u.fract() > v.fract());
+            let face = (u as u32 * 7919 + v as u32 * 104_729 + upper).wrapping_mul(0x9e37_79b1);
+            let tilt = [face >> 28, face >> 20 & 15, face >> 12 & 3].map(|t| t as u8);
+            let facing = if floor { [128, 10, 128] } else { [128, 128, 250] };
+            [facing[0] + tilt[0], facing[1] + tilt[1], facing[2] + tilt[2]]
+        }),
+        labels: raster(&mut |&(x, depth, floor)| {
+            [0, u8::from(floor), ((3.0 * depth + 2.0 * x) as u8).min(9)]
+        }),
+    }
+}
+
+/// What the `png` crate makes of it, by the heuristic of libpng and with zlib's level 6.
+fn peer(width: u32, height: u32, color: ColorType, depth: BitDepth, bytes: &[u8]) -> usize {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_filter(png::Filter::Adaptive);
+    encoder.set_deflate_compression(png::DeflateCompression::Level(6));
+    encoder.write_header().unwrap().write_image_data(bytes).unwrap();
+    file.len()
+}
+
+#[test]
+fn more_time_makes_smaller_files_about_as_small_as_libpngs() {
+    let view = view();
+    let (w, h) = (view.rgb.width(), view.rgb.height());
+    let images = [
+        (&view.rgb, Content::Photo, 115),
+        (&view.normals, Content::Normals, 112),
+        (&view.labels, Content::Labels, 110),
+    ];
+    let sizes = |encode: &dyn Fn(Compression) -> Vec<u8>| Compression::ALL.map(|c| encode(c).len());
+    for (image, content, percent) in images {
+        let [fast, balanced, small] = sizes(&|c| encode_rgb8(image, content, c));
+        let peer = peer(w, h, ColorType::Rgb, BitDepth::Eight, image.pixels().as_flattened());
+        let ordered = 102 * fast >= 100 * balanced && balanced >= small;
+        assert!(ordered, "{content:?}: {fast}, {balanced}, {small}");
+        assert!(100 * balanced <= percent * peer, "{content:?}: {balanced}, the peer {peer}");
+        assert!(100 * small <= 102 * peer, "{content:?}: {small}, the peer {peer}");
+    }
+    let [fast, balanced, small] = sizes(&|c| encode_gray16(&view.depth, c));
+    let bytes: Vec<u8> = view.depth.pixels().iter().flat_map(|v| v.to_be_bytes()).collect();
+    let peer = peer(w, h, ColorType::Grayscale, BitDepth::Sixteen, &bytes);
+    assert!(fast >= balanced && balanced >= small, "depth: {fast}, {balanced}, {small}");
+    assert!(100 * balanced <= 110 * peer, "depth: {balanced}, the peer {peer}");
+    assert!(small <= peer, "depth: {small}, the peer {peer}");
+}
+
+#[test]
+fn numbers_of_few_bits_are_unpacked() {
+    for (depth, packed, numbers) in [
+        (BitDepth::One, vec![0b1011_0000, 0b1000_0000, 0b0000_0000, 0], vec![1, 0, 1, 1, 0, 0, 0, 0, 1]),
+        (BitDepth::Four, [[0x12, 0xf4, 0, 0, 0x50], [0; 5]].concat(), vec![1, 2, 15, 4, 0, 0, 0, 0, 5]),
+    ] {
+        let mut file = Vec::new();
+        let mut encoder = png::Encoder::new(&mut file, 9, 2);
+        encoder.set_color(ColorType::Indexed);
+        encoder.set_depth(depth);
+        encoder.set_palette(vec![0; 6]);
+        encoder.write_header().unwrap().write_image_data(&packed).unwrap();
+        assert_eq!(in_file(&file, read_numbers8).unwrap().into_vec(), [&numbers[..], &[0; 9]].concat());
+    }
+    let gray = encode_gray16(&Raster::filled(2, 2, 5), Compression::Balanced);
+    let e = in_file(&gray, read_numbers8).unwrap_err().to_string();
+    assert!(e.ends_with("the image is 16-bit gray, not 8-bit gray or with a palette"), "{e}");
+}
+
+#[test]
+fn other_kinds_are_refused_by_name() {
+    let gray = encode_gray16(&Raster::filled(2, 2, 5), Compression::Balanced);
+    let e = in_file(&gray, read_rgb8).unwrap_err().to_string();
+    assert!(e.ends_with("image.png: the image is 16-bit gray, not 8-bit RGB"), "{e}");
+    let rgb = encode_rgb8(&Raster::filled(2, 2, [5; 3]), Content::Labels, Compression::Balanced);
+    let e = in_file(&rgb, read_gray16).unwrap_err().to_string();
+    assert!(e.ends_with("the image is 8-bit RGB, not 16-bit gray"), "{e}");
+}
+
+#[test]
+fn broken_files_are_format_errors() {
+    let whole = encode_rgb8(&Raster::filled(9, 9, [1, 2, 3]), Content::Photo, Compression::Balanced);
+    for cut in [0, 5, 20, 40, whole.len() - 20] {
+        let e = in_file(&whole[..cut], read_rgb8).unwrap_err();
+        assert!(matches!(e, Error::Format { .. }), "{cut}: {e}");
+    }
+    let mut damaged = whole.clone();
+    damaged[50] ^= 0x55;
+    assert!(matches!(in_file(&damaged, read_rgb8), Err(Error::Format { .. })));
+    // A header that promises more than anybody has.
+    let mut huge = whole;
+    huge[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
+    assert!(in_file(&huge, read_rgb8).is_err());
+    let missing = read_rgb8(Path::new("/nowhere/image.png")).unwrap_err();
+    assert!(matches!(missing, Error::Io { action: "read", .. }));
+}
