@@ -13,9 +13,21 @@ const SCENE_FILE: &str = "scene.toml";
 /// How the scene file of the demo begins: what tells it from a user's own.
 const DEMO: &str = "# The built-in scene of s3d";
 
+/// The same of the scenes of [`BuildingOptions::area`](crate::BuildingOptions::area).
+const AREA: &str = "# A generated area of s3d";
+
 /// Whether `folder` holds a scan of the demo's building, and may be written again.
 pub fn is_demo_scan(folder: &Path) -> bool {
-    std::fs::read_to_string(folder.join(SCENE_FILE)).is_ok_and(|text| text.starts_with(DEMO))
+    begins_with(folder, DEMO)
+}
+
+/// Whether `folder` holds a scan of a generated area, and may be written again.
+pub fn is_area_scan(folder: &Path) -> bool {
+    begins_with(folder, AREA)
+}
+
+fn begins_with(folder: &Path, words: &str) -> bool {
+    std::fs::read_to_string(folder.join(SCENE_FILE)).is_ok_and(|text| text.starts_with(words))
 }
 
 impl AnnotatedScene {
@@ -85,6 +97,9 @@ impl AnnotatedScene {
             let room = self.instances[*first].room;
             let mut files = tree.room(&room.to_string())?;
             while let Some((index, cloud)) = scan.next_if(|(index, _)| self.instances[*index].room == room) {
+                if cloud.is_empty() {
+                    continue;
+                }
                 let instance = &self.instances[index];
                 let mut file = files.instance(instance.class.name(), instance.number)?;
                 file.append(&cloud.positions, &cloud.colors)?;

@@ -40,16 +40,18 @@ pub mod look;
 mod scan;
 mod scene;
 pub mod scenes;
+mod sight;
 
 pub use building::Building;
 #[cfg(feature = "files")]
 pub use error::ScanError;
 pub use error::{BuildingError, RangeError};
 #[cfg(feature = "files")]
-pub use files::is_demo_scan;
-pub use generate::{BuildingOptions, RoomOptions, Style};
+pub use files::{is_area_scan, is_demo_scan};
+pub use generate::{BuildingOptions, FloorPlan, Models, RoomOptions, Style};
 pub use scan::{Scan, ScanOptions};
 pub use scene::{AnnotatedScene, Instance};
+pub use sight::SightOptions;
 
 /// The example of the README, compiled.
 #[cfg(doctest)]

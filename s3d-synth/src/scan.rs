@@ -1,9 +1,13 @@
 //! The points that a scanner would have measured on a scene, instance by instance.
 
-use crate::{AnnotatedScene, RangeError};
+use crate::sight::Sight;
+use crate::{AnnotatedScene, RangeError, SightOptions};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
+use std::fmt;
+use std::sync::Arc;
 
 /// How a scene is scanned. Its `Default` is that of the demo: 3,000 points a square metre, about what S3DIS
 /// has.
@@ -17,17 +21,20 @@ pub struct ScanOptions {
     pub seed: u64,
     /// The number of the area in files.
     pub area: u32,
+    /// Measure only what the scan locations see, and as densely as they see it; the noise then lies along the
+    /// rays and grows with their length. Everything alike where it is not there.
+    pub sight: Option<SightOptions>,
 }
 
 impl Default for ScanOptions {
     fn default() -> Self {
-        Self { points_per_m2: 3000.0, noise_m: 0.003, seed: 20170203, area: 1 }
+        Self { points_per_m2: 3000.0, noise_m: 0.003, seed: 20170203, area: 1, sight: None }
     }
 }
 
 /// The points of a scene's instances: yields the index of an instance and its points, in the order of the
 /// rooms' names and in a room in that of the instances. See [`AnnotatedScene::scan`].
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Scan<'a> {
     scene: &'a AnnotatedScene,
     options: ScanOptions,
@@ -35,11 +42,19 @@ pub struct Scan<'a> {
     /// Instances that are still to come, the next one last.
     rest: Vec<usize>,
     noise: ChaCha8Rng,
+    sight: Option<Arc<Sight>>,
+}
+
+impl fmt::Debug for Scan<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scan").field("options", &self.options).field("rest", &self.rest).finish()
+    }
 }
 
 impl AnnotatedScene {
     /// Scans every instance: uniformly drawn points with colours, each with the face that it lies on, off its
-    /// surface by a uniform noise. An instance gets one point at least. World metres.
+    /// surface by a uniform noise. An instance gets one point at least; where only what is seen is measured,
+    /// one that nobody sees gets none. World metres.
     ///
     /// ```
     /// use s3d_synth::{Building, ScanOptions};
@@ -58,6 +73,8 @@ impl AnnotatedScene {
     pub fn scan(&self, options: &ScanOptions) -> Result<Scan<'_>, RangeError> {
         RangeError::check(options.points_per_m2, [0.0, 1e6], || "points a square metre".to_owned())?;
         RangeError::check(options.noise_m, [0.0, 0.1], || "the noise of points".to_owned())?;
+        options.sight.as_ref().map_or(Ok(()), SightOptions::check)?;
+        let sight = options.sight.as_ref().map(|sight| Arc::new(Sight::new(self, sight)));
         let mut faces_of = vec![Vec::new(); self.instances.len()];
         for (face, &instance) in (0..).zip(&self.instance_of_face) {
             if let Some(faces) = faces_of.get_mut(instance as usize) {
@@ -68,7 +85,7 @@ impl AnnotatedScene {
         let mut rest: Vec<usize> = (0..self.instances.len()).collect();
         rest.sort_by(|&a, &b| names[a].cmp(&names[b]).then(a.cmp(&b)).reverse());
         let noise = ChaCha8Rng::seed_from_u64(options.seed);
-        Ok(Scan { scene: self, options: options.clone(), faces_of, rest, noise })
+        Ok(Scan { scene: self, options: options.clone(), faces_of, rest, noise, sight })
     }
 }
 
@@ -77,7 +94,8 @@ impl Iterator for Scan<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let instance = self.rest.pop()?;
-        let (mesh, faces) = (&self.scene.mesh, std::mem::take(&mut self.faces_of[instance]));
+        let mesh = &self.scene.mesh;
+        let faces = std::mem::take(&mut self.faces_of[instance]);
         let seed = self.options.seed.wrapping_add(instance as u64);
         let sampler = |density| SurfaceSampler::over_faces(mesh, faces.clone(), density, seed);
         let mut points = sampler(Density::PerM2(self.options.points_per_m2));
@@ -87,7 +105,9 @@ impl Iterator for Scan<'_> {
         let mut cloud = PointCloud::default();
         points.sample(0..points.len(), &mut cloud);
         let noise_m = self.options.noise_m;
-        if noise_m > 0.0 {
+        if let Some(sight) = self.sight.clone() {
+            cloud = self.measured(&sight, &cloud, &faces, seed);
+        } else if noise_m > 0.0 {
             for (position, face) in cloud.positions.iter_mut().zip(&cloud.faces) {
                 *position += mesh.normal(*face) * self.noise.random_range(-noise_m..noise_m);
             }
@@ -97,6 +117,51 @@ impl Iterator for Scan<'_> {
 
     fn size_hint(&self) -> (usize, Option<usize>) {
         (self.rest.len(), Some(self.rest.len()))
+    }
+}
+
+/// Points that one task measures.
+const CHUNK: usize = 2048;
+
+impl Scan<'_> {
+    /// Those points that come back, off their places along the rays. An instance of which anything is seen
+    /// keeps one.
+    fn measured(&self, sight: &Sight, drawn: &PointCloud, faces: &[u32], seed: u64) -> PointCloud {
+        let mesh = &self.scene.mesh;
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(1);
+        let chances: Vec<[f32; 2]> = drawn.faces.iter().map(|_| [rng.random(), rng.random()]).collect();
+        let mut at = vec![None; drawn.len()];
+        at.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, at)| {
+            let mut memory = sight.memory();
+            for (i, at) in (chunk * CHUNK..).zip(at) {
+                let (p, face, [chance, noise]) = (drawn.positions[i], drawn.faces[i], chances[i]);
+                *at = sight.measures((p, face), mesh.normal(face), chance, &mut memory).map(|location| {
+                    let ray = p - location;
+                    // Half as much close by, as much at 5 m.
+                    let noise_m = self.options.noise_m * (0.5 + 0.1 * ray.length());
+                    p + ray.normalize() * (2.0 * noise - 1.0) * noise_m
+                });
+            }
+        });
+        let mut cloud = PointCloud::default();
+        for (i, p) in (0..).zip(at) {
+            if let Some(p) = p {
+                cloud.positions.push(p);
+                cloud.colors.push(drawn.colors[i]);
+                cloud.faces.push(drawn.faces[i]);
+            }
+        }
+        let mut memory = sight.memory();
+        let mut seen = faces.iter().filter_map(|&f| Some((sight.seen_place(mesh, f, &mut memory)?, f)));
+        if cloud.is_empty()
+            && let Some((p, face)) = seen.next()
+        {
+            cloud.positions.push(p);
+            cloud.colors.push(drawn.colors.first().copied().unwrap_or_default());
+            cloud.faces.push(face);
+        }
+        cloud
     }
 }
 

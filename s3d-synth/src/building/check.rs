@@ -1,7 +1,7 @@
 //! What is impossible in a building, found before it is built. What things leave their room is found while
 //! they are built.
 
-use super::{Beam, Building, Filling, Item, Opening, RoomPlan, Stairwell, Thing};
+use super::{Beam, Building, Filling, Item, Opening, RoomPlan, Stairwell, TableBase, Thing};
 use crate::construct::shell::KNEE_M;
 use crate::{BuildingError, RangeError};
 use s3d_geom::glam::Vec2;
@@ -105,7 +105,7 @@ impl RoomPlan {
         let (start, end) = if wall.along_x() { (self.low.x, self.high.x) } else { (self.low.y, self.high.y) };
         // Under a slanted ceiling walls are upright up to the knee only.
         let top = if self.heights_m[0] == self.heights_m[1] { self.top() } else { KNEE_M };
-        let is_door = filling != Filling::Window;
+        let is_door = !filling.is_window();
         // Bars and linings need room.
         let fits = from >= start
             && to <= end
@@ -117,10 +117,26 @@ impl RoomPlan {
         if !fits {
             return Err(BuildingError::OpeningOutside { room: self.room, wall, span: [from, to] });
         }
-        if let Filling::Door { thickness_m, open_deg, .. } = filling {
-            let what = |what: &str| format!("{}: {what}", self.room);
-            RangeError::check(thickness_m, [0.01, 5.0], || what("the thickness of a doorway"))?;
-            RangeError::check(open_deg, [0.0, 180.0], || what("how far a door is open"))?;
+        let what = |what: &str| format!("{}: {what}", self.room);
+        let thickness = |m: f32| RangeError::check(m, [0.01, 5.0], || what("the thickness of a doorway"));
+        match filling {
+            Filling::Door { thickness_m, open_deg, .. } => {
+                thickness(thickness_m)?;
+                RangeError::check(open_deg, [0.0, 180.0], || what("how far a door is open"))?;
+            }
+            Filling::Leaf { depth_m, open_deg, .. } => {
+                RangeError::check(depth_m, [0.05, 5.0], || what("the thickness of a doorway"))?;
+                RangeError::check(open_deg, [0.0, 180.0], || what("how far a door is open"))?;
+            }
+            Filling::Frame { depth_m } => thickness(depth_m)?,
+            Filling::Glazing { panes, depth_m } => {
+                let [columns, rows] = panes.map(|n| n as f32);
+                RangeError::check(depth_m, [0.06, 5.0], || what("the depth of a window"))?;
+                let most = |m: f32| [1.0, f64::from((m / 0.2).floor()).max(1.0)];
+                RangeError::check(columns, most(to - from), || what("the panes beside one another"))?;
+                RangeError::check(rows, most(high - low), || what("the panes above one another"))?;
+            }
+            Filling::Window | Filling::ShutDoor | Filling::Nothing => {}
         }
         Ok(())
     }
@@ -176,11 +192,37 @@ impl Thing {
             range(low, [0.0, LARGE_M], &format!("the lower edge of {what}"))?;
             range(high - low, [0.1, LARGE_M], &format!("the height of {what}"))
         };
+        let measures = |size: [f32; 3], least: [(&str, f64); 3], what: &str| {
+            size.into_iter().zip(least).try_for_each(|(m, (word, least))| {
+                range(m, [least, LARGE_M], &format!("the {word} of {what}"))
+            })
+        };
         match *self {
             Self::Table { width_m, depth_m, height_m, .. } => {
                 range(width_m.min(depth_m), [0.2, LARGE_M], "the width or depth of a table")?;
                 range(width_m.max(depth_m), [0.2, LARGE_M], "the width or depth of a table")?;
                 range(height_m, [0.1, LARGE_M], "the height of a table")
+            }
+            Self::ModelTable { size_m, base, .. } => {
+                let least = if base == TableBase::Trestles { 0.9 } else { 0.5 };
+                measures(size_m, [("width", least), ("depth", 0.4), ("height", 0.3)], "a table")
+            }
+            Self::Seat { size_m: [width, seat, back], .. } => measures(
+                [width, seat, back - seat],
+                [("width", 0.35), ("seat", 0.35), ("back", 0.25)],
+                "a chair",
+            ),
+            Self::Couch { seats, size_m, .. } => {
+                range(seats as f32, [1.0, 20.0], "the seats of a sofa")?;
+                measures(size_m, [("width of a seat", 0.45), ("depth", 0.6), ("height", 0.55)], "a sofa")
+            }
+            Self::Shelves { size_m, .. } => {
+                measures(size_m, [("width", 0.4), ("depth", 0.2), ("height", 0.5)], "a bookcase")
+            }
+            Self::PlainBoard { width_m, heights_m, .. } => hanging(width_m, heights_m, "a board"),
+            Self::Partition { depth_m, height_m } => {
+                range(depth_m, [0.2, LARGE_M], "the depth of a partition")?;
+                range(height_m, [0.5, LARGE_M], "the height of a partition")
             }
             Self::Desk { width_m, depth_m } => {
                 range(width_m, [1.0, LARGE_M], "the width of a desk")?;
@@ -228,6 +270,8 @@ impl Thing {
             | Self::Bin(_)
             | Self::Copier
             | Self::Extinguisher
+            | Self::Toilet
+            | Self::Basin
             | Self::Rug => Ok(()),
         }
     }

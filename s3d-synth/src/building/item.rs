@@ -185,6 +185,70 @@ pub enum Thing {
     Extinguisher,
     /// A rug of 2.5 m × 2.1 m, 12 mm high.
     Rug,
+    /// A table of some model.
+    ModelTable {
+        /// What the top rests on.
+        base: TableBase,
+        /// Width, depth and height of the top's upper side: at least 0.5 (0.9 on trestles), 0.4
+        /// and 0.3.
+        size_m: [f32; 3],
+        /// The top.
+        top: Look,
+    },
+    /// A chair of some model.
+    Seat {
+        /// What the seat rests on.
+        base: SeatBase,
+        /// Width of the seat, height of its upper side, height of the back's upper edge: at least 0.35, 0.35,
+        /// and 0.25 more than the seat's.
+        size_m: [f32; 3],
+        /// Whether it has arms, which stand out 5 cm to either side.
+        has_arms: bool,
+        /// What it is covered with.
+        fabric: Look,
+    },
+    /// A sofa of some model.
+    Couch {
+        /// How many people find room, 1 to 20.
+        seats: u32,
+        /// Width of a seat, depth of the whole, height of the back: at least 0.45, 0.6 and 0.55.
+        size_m: [f32; 3],
+        /// Whether it has arms, which stand out 14 cm to either side.
+        has_arms: bool,
+        /// What it is covered with.
+        fabric: Look,
+    },
+    /// A bookcase of some model.
+    Shelves {
+        /// What is before its rows.
+        front: ShelfFront,
+        /// Width, depth and height: at least 0.4, 0.2 and 0.5.
+        size_m: [f32; 3],
+        /// What it is made of.
+        wood: Look,
+        /// Which books are in it.
+        seed: u32,
+    },
+    /// A board without a frame. The origin is on the wall, at its foot.
+    PlainBoard {
+        /// Along the wall, at least 0.1.
+        width_m: f32,
+        /// From which height to which, at least 0.1 apart.
+        heights_m: [f32; 2],
+        /// What is on it.
+        picture: Pattern,
+    },
+    /// A toilet, 70 cm deep. The origin is on the wall.
+    Toilet,
+    /// A wash-basin, 45 cm deep, with a mirror above it. The origin is on the wall.
+    Basin,
+    /// A thin screen that stands out of a wall, such as between toilets. The origin is on the wall.
+    Partition {
+        /// Out of the wall, at least 0.2.
+        depth_m: f32,
+        /// From the floor, at least 0.5: its upper edge.
+        height_m: f32,
+    },
     /// A column at a wall. The origin is on the wall.
     Column {
         /// Along the wall, at least 0.05.
@@ -194,6 +258,43 @@ pub enum Thing {
         /// Up to the ceiling, or to a beam: its top is open. At least 0.05.
         height_m: f32,
     },
+}
+
+/// What a table's top rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableBase {
+    /// Four legs of steel.
+    Legs,
+    /// Two trestles.
+    Trestles,
+    /// A panel at either end, and one at the back.
+    Panels,
+    /// One column on a plate.
+    Pedestal,
+}
+
+/// What a chair's seat rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SeatBase {
+    /// Four legs.
+    Legs,
+    /// A column on a star of five feet.
+    Star,
+    /// Two runners that bend up at the front.
+    Sled,
+    /// A solid block down to the floor.
+    Block,
+}
+
+/// What is before the rows of a bookcase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShelfFront {
+    /// Nothing: books are seen in all rows.
+    Open,
+    /// Doors.
+    Doors,
+    /// Doors before the lower half.
+    HalfDoors,
 }
 
 impl Item {
@@ -220,11 +321,13 @@ impl Thing {
     /// The class that it is annotated as.
     pub fn class(&self) -> Class {
         match self {
-            Self::Table { .. } | Self::Desk { .. } | Self::RoundTable { .. } => Class::TABLE,
-            Self::OfficeChair(_) | Self::Chair(_) | Self::Stool(_) => Class::CHAIR,
-            Self::Sofa { .. } => Class::SOFA,
-            Self::Bookcase { .. } => Class::BOOKCASE,
-            Self::Board { .. } => Class::BOARD,
+            Self::Table { .. } | Self::Desk { .. } | Self::RoundTable { .. } | Self::ModelTable { .. } => {
+                Class::TABLE
+            }
+            Self::OfficeChair(_) | Self::Chair(_) | Self::Stool(_) | Self::Seat { .. } => Class::CHAIR,
+            Self::Sofa { .. } | Self::Couch { .. } => Class::SOFA,
+            Self::Bookcase { .. } | Self::Shelves { .. } => Class::BOOKCASE,
+            Self::Board { .. } | Self::PlainBoard { .. } => Class::BOARD,
             Self::Column { .. } => Class::COLUMN,
             Self::Picture { .. }
             | Self::WallScreen { .. }
@@ -242,6 +345,9 @@ impl Thing {
             | Self::Stairs { .. }
             | Self::Copier
             | Self::Extinguisher
+            | Self::Toilet
+            | Self::Basin
+            | Self::Partition { .. }
             | Self::Rug => Class::CLUTTER,
         }
     }

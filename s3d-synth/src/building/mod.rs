@@ -10,11 +10,11 @@ mod demo;
 mod item;
 mod two_storeys;
 
-pub use item::{Beam, Item, Thing};
+pub use item::{Beam, Item, SeatBase, ShelfFront, TableBase, Thing};
 
-use crate::look::{CeilingFinish, FloorFinish, Paint};
+use crate::look::{CeilingFinish, FloorFinish, Look, Paint};
 use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};
-use s3d_label::Room;
+use s3d_label::{Class, Room};
 
 /// A building: what [`Building::build`] makes a scene of. Its `Default` is [`Building::demo`].
 ///
@@ -134,8 +134,45 @@ pub enum Filling {
     },
     /// A door that is shut.
     ShutDoor,
+    /// A window whose opaque pane is divided by mullions.
+    Glazing {
+        /// How many panes lie beside and above one another: one for each 20 cm at most.
+        panes: [u32; 2],
+        /// How far the pane is behind the wall, at least 0.06 m.
+        depth_m: f32,
+    },
+    /// A doorway with a door of some model, open into the room or shut. What is beyond `depth_m` belongs to
+    /// the room on the other side: [`Filling::Frame`], or another leaf where both are shut.
+    Leaf {
+        /// How the leaf is made.
+        model: LeafModel,
+        /// What it is made of.
+        look: Look,
+        /// How deep this side of the doorway is, metres, at least 0.05: half of the wall.
+        depth_m: f32,
+        /// Whether the door hangs on the left for who looks at the wall, or else on the right.
+        hinge_left: bool,
+        /// How far it stands open, degrees: 0 is shut, 2 cm before the end of this side.
+        open_deg: f32,
+    },
+    /// The far side of a doorway whose leaf is in the other room: lining and frame, a door of this room too.
+    Frame {
+        /// How deep this side of the doorway is, metres.
+        depth_m: f32,
+    },
     /// Nothing: the doorway belongs to the room on the other side.
     Nothing,
+}
+
+/// How the leaf of a door is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LeafModel {
+    /// Flat.
+    Flush,
+    /// With two raised panels on either side.
+    Panelled,
+    /// A wide frame around a pane that lies 1 cm deeper.
+    Glazed,
 }
 
 /// A place from which a scene was captured.
@@ -147,6 +184,22 @@ pub struct ScanLocation {
     pub position: DVec3,
     /// Heading of the level camera in [0, 2π) or any other turn: 0 along +Y, growing to the left.
     pub yaw_rad: f64,
+}
+
+impl Filling {
+    /// Whether it is a window, or else belongs to a doorway.
+    pub fn is_window(self) -> bool {
+        matches!(self, Self::Window | Self::Glazing { .. })
+    }
+
+    /// The class that it is annotated as, if there is something.
+    pub fn class(self) -> Option<Class> {
+        match self {
+            Self::Window | Self::Glazing { .. } => Some(Class::WINDOW),
+            Self::Door { .. } | Self::ShutDoor | Self::Leaf { .. } | Self::Frame { .. } => Some(Class::DOOR),
+            Self::Nothing => None,
+        }
+    }
 }
 
 impl Default for Building {

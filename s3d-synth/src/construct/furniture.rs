@@ -195,7 +195,7 @@ pub(super) fn bookcase(b: &mut Builder, width: f32, shelves: u32, wood: Look, se
 }
 
 /// A block of books: spines in front, `start` shifts which ones.
-fn books(b: &mut Builder, x: [f32; 2], y: [f32; 2], z: [f32; 2], start: f32) {
+pub(super) fn books(b: &mut Builder, x: [f32; 2], y: [f32; 2], z: [f32; 2], start: f32) {
     let paper = Look::Plain("pages", [226, 216, 194]);
     b.cuboid([x[0], y[0], z[0]], [x[1], y[1], z[1]], paper, &[Bottom, Front, Back]);
     let corners = [[x[0], z[0]], [x[1], z[0]], [x[1], z[1]], [x[0], z[1]]].map(|[x, z]| vec3(x, y[0], z));

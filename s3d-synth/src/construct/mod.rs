@@ -3,6 +3,7 @@
 pub(crate) mod builder;
 mod furniture;
 mod light;
+mod models;
 mod openings;
 pub(crate) mod shell;
 mod things;

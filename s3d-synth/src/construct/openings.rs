@@ -1,7 +1,8 @@
 //! What fills the openings of walls: windows and doors.
 
 use super::builder::{Builder, Side};
-use crate::look::{Look, OAK, Pattern, STEEL, WHITE};
+use crate::building::LeafModel;
+use crate::look::{BLACK, Look, OAK, Pattern, STEEL, WHITE};
 use s3d_geom::glam::vec3;
 use s3d_label::Class;
 
@@ -71,4 +72,70 @@ pub(crate) fn leaf(b: &mut Builder, width: f32, height: f32) {
 pub(crate) fn handle(b: &mut Builder, x: f32, y: f32) {
     b.cuboid([x - 0.01, y - 0.05, 1.02], [x + 0.01, y, 1.04], STEEL, &[Side::Front, Side::Back]);
     b.cuboid([x - 0.12, y - 0.06, 1.015], [x + 0.01, y - 0.05, 1.045], STEEL, &[]);
+}
+
+/// A window whose pane, `depth` behind the wall, is divided into `panes` beside and above one another.
+pub(crate) fn glazing(b: &mut Builder, width: f32, [z0, z1]: [f32; 2], panes: [u32; 2], depth: f32) {
+    const BAR: f32 = 0.045;
+    use Side::{Back, Bottom, Left, Right, Top};
+    b.begin(Class::WINDOW);
+    reveal(b, width, [z0, z1], depth, WHITE, WHITE);
+    let (front, columns, rows) = (depth - 0.05, panes[0], panes[1]);
+    let pane = [(width - BAR) / columns as f32 - BAR, (z1 - z0 - BAR) / rows as f32 - BAR];
+    let x_of = |k: u32| k as f32 * (pane[0] + BAR);
+    let z_of = |k: u32| z0 + k as f32 * (pane[1] + BAR);
+    for k in 0..=columns {
+        let omit = [Back, Top, Bottom, if k == 0 { Left } else { Right }];
+        let omit = if k == 0 || k == columns { &omit[..] } else { &omit[..3] };
+        b.cuboid([x_of(k), front, z0], [x_of(k) + BAR, depth, z1], WHITE, omit);
+    }
+    for i in 0..columns {
+        let (x0, x1) = (x_of(i) + BAR, x_of(i + 1));
+        for k in 0..=rows {
+            let omit = [Back, Left, Right, if k == 0 { Bottom } else { Top }];
+            let omit = if k == 0 || k == rows { &omit[..] } else { &omit[..3] };
+            b.cuboid([x0, front, z_of(k)], [x1, depth, z_of(k) + BAR], WHITE, omit);
+        }
+        for k in 0..rows {
+            let (low, high) = (z_of(k) + BAR, z_of(k + 1));
+            let corners = [[x0, low], [x1, low], [x1, high], [x0, high]];
+            b.panel(corners.map(|[x, z]| vec3(x, depth - 0.02, z)), Look::Fitted(Pattern::Sky));
+        }
+    }
+}
+
+/// A door leaf of a model, as [`leaf`], 4 cm thick. A shut one is seen from the front alone.
+pub(crate) fn model_leaf(
+    b: &mut Builder,
+    model: LeafModel,
+    [width, height]: [f32; 2],
+    wood: Look,
+    shut: bool,
+) {
+    let (w, h) = if shut { (width, height) } else { (width - 0.02, height - 0.02) };
+    let low = if shut { 0.0 } else { 0.01 };
+    let all = [Side::Left, Side::Right, Side::Top, Side::Bottom, Side::Back];
+    b.cuboid([0.0, -0.04, low], [w, 0.0, h], wood, if shut { &all } else { &[] });
+    let sides = if shut { 1 } else { 2 };
+    for side in 0..sides {
+        let (origin, yaw) = if side == 0 { (vec3(0.0, -0.04, 0.0), 0.0) } else { (vec3(w, 0.0, 0.0), 180.0) };
+        let hang = if side == 0 { w - 0.08 } else { 0.15 };
+        b.place(origin, yaw, |b| {
+            let mut raised = |z: [f32; 2], out: f32, look: Look| {
+                b.cuboid([0.17, -out, z[0]], [w - 0.17, 0.0, z[1]], look, &[Side::Back]);
+            };
+            match model {
+                LeafModel::Flush => {}
+                LeafModel::Panelled => {
+                    raised([0.2, 0.9], 0.018, wood);
+                    raised([1.1, h - 0.15], 0.018, wood);
+                }
+                LeafModel::Glazed => {
+                    raised([0.25, h - 0.2], 0.004, Look::Plain("dark_glass", [92, 112, 120]));
+                    raised([0.06, 0.16], 0.006, BLACK);
+                }
+            }
+            handle(b, hang, 0.0);
+        });
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::builder::Builder;
 use super::light::{Lamp, Light};
-use super::openings::{doorway, handle, leaf, window};
+use super::openings::{doorway, glazing, handle, leaf, model_leaf, window};
 use super::things::{beam, construct_thing};
 use crate::BuildingError;
 use crate::building::{Beam, Filling, Item, Opening, RoomPlan, Stairwell, Wall};
@@ -60,7 +60,7 @@ impl RoomPlan {
     fn light(&self) -> Light {
         let windows = self.openings.iter().map(|o| {
             let ([a, b], [z0, z1]) = (o.span, o.heights);
-            let brightness = if o.filling == Filling::Window { 1.5 } else { 0.25 };
+            let brightness = if o.filling.is_window() { 1.5 } else { 0.25 };
             let center = self.on_wall(o.wall, 0.5 * (a + b)).extend(0.5 * (z0 + z1));
             Lamp { center, normal: o.wall.normal(), power: brightness * (b - a) * (z1 - z0) }
         });
@@ -105,6 +105,22 @@ impl RoomPlan {
                         handle(b, width - 0.1, -0.04);
                     });
                 }
+                Filling::Glazing { panes, depth_m } => glazing(b, width, o.heights, panes, depth_m),
+                Filling::Leaf { model, look, depth_m, hinge_left, open_deg } => {
+                    doorway(b, width, o.heights[1], depth_m);
+                    let (height, shut) = (o.heights[1], open_deg == 0.0);
+                    let (origin, yaw, y) = match (shut, hinge_left) {
+                        (true, _) => (vec3(0.0, depth_m + 0.02, 0.0), 0.0, 0.0),
+                        (false, true) => (vec3(0.0, -0.03, 0.0), -open_deg, 0.0),
+                        (false, false) => (vec3(width, -0.03, 0.0), 180.0 + open_deg, 0.04),
+                    };
+                    b.place(origin, yaw, |b| {
+                        b.place(vec3(0.0, y, 0.0), 0.0, |b| {
+                            model_leaf(b, model, [width, height], look, shut)
+                        });
+                    });
+                }
+                Filling::Frame { depth_m } => doorway(b, width, o.heights[1], depth_m),
                 Filling::Nothing => {}
             });
         }

@@ -3,6 +3,7 @@
 
 use super::builder::{Builder, Side};
 use super::furniture::*;
+use super::models;
 use crate::building::Thing;
 use crate::look::*;
 use s3d_geom::glam::{Vec2, Vec3, vec3};
@@ -46,6 +47,16 @@ pub(super) fn construct_thing(b: &mut Builder, thing: &Thing) {
         Thing::Extinguisher => extinguisher(b),
         Thing::Rug => rug(b),
         Thing::Stairs { width_m, steps, tread_m, riser_m } => stairs(b, width_m, steps, tread_m, riser_m),
+        Thing::ModelTable { base, size_m, top } => models::table(b, base, size_m, top),
+        Thing::Seat { base, size_m, has_arms, fabric } => models::seat(b, base, size_m, has_arms, fabric),
+        Thing::Couch { seats, size_m, has_arms, fabric } => models::couch(b, seats, size_m, has_arms, fabric),
+        Thing::Shelves { front, size_m, wood, seed } => models::shelves(b, front, size_m, wood, seed),
+        Thing::PlainBoard { width_m, heights_m, picture } => {
+            models::plain_board(b, width_m, heights_m, picture)
+        }
+        Thing::Toilet => models::toilet(b),
+        Thing::Basin => models::basin(b),
+        Thing::Partition { depth_m, height_m } => models::partition(b, depth_m, height_m),
         Thing::Column { width_m, depth_m, height_m } => column(b, width_m, depth_m, height_m),
     }
 }

@@ -1,6 +1,7 @@
 //! Where rooms are, and how they are joined: a hallway a storey, with rooms to its south and north.
 
-use super::{BuildingOptions, RoomOptions, between, pick, rng};
+use super::wings::arrange_wings;
+use super::{BuildingOptions, FloorPlan, RoomOptions, between, pick, rng};
 use crate::BuildingError;
 use crate::building::{Filling, Opening, RoomPlan, Wall};
 use crate::look::{CeilingFinish, FloorFinish, Paint};
@@ -13,6 +14,8 @@ use std::collections::BTreeMap;
 /// A room without anything in it, and what is wanted of it.
 pub(super) struct Site {
     pub(super) plan: RoomPlan,
+    /// Its place in the list of rooms; of a hallway the largest number.
+    pub(super) index: usize,
     pub(super) furnishing: f32,
     pub(super) locations: u32,
 }
@@ -34,7 +37,10 @@ pub(super) fn arrange(options: &BuildingOptions) -> Result<Vec<Site>, BuildingEr
     for storey in 0..storeys {
         let here = &rooms[rooms.len() * storey / storeys..rooms.len() * (storey + 1) / storeys];
         let first = sites.len();
-        arrange_storey(options, here, &mut rng, &mut sites);
+        match options.plan {
+            FloorPlan::OneHallway => arrange_storey(options, here, &mut rng, &mut sites),
+            FloorPlan::Wings { .. } => arrange_wings(options, here, &mut rng, &mut sites),
+        }
         let mut top = 0f32;
         for site in &mut sites[first..] {
             let number = numbers.entry(site.plan.room.room_type).or_insert(0);
@@ -76,7 +82,7 @@ fn arrange_storey(
     let length = (ends[0].max(ends[1]) - wall_m).max(2.0);
 
     let mut hallway_openings = Vec::new();
-    for (room, &(side, from)) in rooms.iter().zip(&places) {
+    for (index, (room, &(side, from))) in rooms.iter().zip(&places).enumerate() {
         let to = from + room.size_m[0];
         let (low, high, inner, outer) = if side == 0 {
             let y = south - wall_m;
@@ -95,7 +101,7 @@ fn arrange_storey(
         // The hallway's wall is opposite to the room's.
         hallway_openings.push(opening(outer, Filling::Nothing));
         let plan = shell(options, room.room_type, [low, high], room.heights_m, openings, rng);
-        sites.push(Site { plan, furnishing: room.furnishing, locations: room.locations });
+        sites.push(Site { plan, index, furnishing: room.furnishing, locations: room.locations });
     }
 
     let middle = 0.5 * (south + north);
@@ -112,7 +118,7 @@ fn arrange_storey(
     let heights = [options.hallway_height_m; 2];
     let plan = shell(options, RoomType::HALLWAY, corners, heights, hallway_openings, rng);
     let locations = (length / 8.0).ceil() as u32;
-    sites.push(Site { plan, furnishing: 1.0, locations });
+    sites.push(Site { plan, index: usize::MAX, furnishing: 1.0, locations });
 }
 
 fn windows(room: &RoomOptions, wall: Wall, [from, to]: [f32; 2], rng: &mut ChaCha8Rng) -> Vec<Opening> {
@@ -128,7 +134,7 @@ fn windows(room: &RoomOptions, wall: Wall, [from, to]: [f32; 2], rng: &mut ChaCh
 }
 
 /// A room with finishes and lamps.
-fn shell(
+pub(super) fn shell(
     options: &BuildingOptions,
     room_type: RoomType,
     [low, high]: [Vec2; 2],

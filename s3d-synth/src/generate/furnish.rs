@@ -1,9 +1,10 @@
 //! What rooms of each type have in them.
 
 use super::arrange::{Site, lamp_cells};
+use super::outfit::outfit;
 use super::space::{Frame, Space};
-use super::{Style, between, pick};
-use crate::building::{Beam, Filling, Item, RoomPlan, ScanLocation, Thing, Wall};
+use super::{BuildingOptions, Style, between, pick};
+use crate::building::{Beam, Item, RoomPlan, ScanLocation, Thing, Wall};
 use crate::look::{BLACK, CONCRETE, Look, Pattern};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,12 +14,14 @@ use std::f32::consts::TAU;
 
 /// Half of the free square around a scanner.
 const STAND_M: f32 = 0.45;
+/// The same between furniture that is there already.
+const BETWEEN_M: f32 = 0.3;
 const BEAM_DEPTH_M: f32 = 0.2;
 const BEAM_HALF_M: f32 = 0.17;
 
 /// A group of things that is placed as a whole.
 #[derive(Clone, Copy, PartialEq)]
-enum Group {
+pub(super) enum Group {
     Workplace,
     MeetingTable,
     SofaCorner,
@@ -111,20 +114,27 @@ fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
 }
 
 /// The room with what is in it, and where a scanner stands.
-pub(super) fn furnish(site: Site, style: &Style, rng: &mut ChaCha8Rng) -> (RoomPlan, Vec<ScanLocation>) {
-    let Site { plan: mut room, furnishing, locations } = site;
+pub(super) fn furnish(
+    site: Site,
+    options: &BuildingOptions,
+    rng: &mut ChaCha8Rng,
+) -> (RoomPlan, Vec<ScanLocation>) {
+    let Site { plan: mut room, furnishing, locations, .. } = site;
+    let style = &options.style;
     let mut space = Space::new(&room);
-    // First, so that every room has one.
-    let stands = (0..locations).map_while(|_| space.find_stand(rng, STAND_M));
-    let stands: Vec<_> = stands.collect();
+    // First, so that every room has one. Where furniture is as dense as in published rooms, the others find a
+    // place between it.
+    let find = |space: &mut Space, rng: &mut ChaCha8Rng| {
+        let by_wall = options.models.as_ref().and_then(|_| space.find_stand_at_wall(rng, STAND_M));
+        by_wall.or_else(|| space.find_stand(rng, STAND_M))
+    };
+    let first = if options.models.is_some() { 1 } else { locations };
+    let stands: Vec<Vec2> = (0..first).map_while(|_| find(&mut space, rng)).collect();
     space.keep_ways_free(&room);
-    let locations = stands.into_iter().map(|p| ScanLocation {
-        uuid: format!("{:016x}{:016x}", rng.random::<u64>(), rng.random::<u64>()),
-        position: p.extend(room.floor_m + between(rng, 1.4, 1.6)).as_dvec3(),
-        yaw_rad: f64::from(between(rng, -180.0, 180.0)).to_radians(),
-    });
-    let locations = locations.collect();
-    if furnishing > 0.0 {
+    let mut places = stand_at(&stands, room.floor_m, rng);
+    if let Some(models) = options.models.as_ref().filter(|_| furnishing > 0.0) {
+        outfit(&mut room, &mut space, (models, style), furnishing, rng);
+    } else if furnishing > 0.0 {
         add_structure(&mut room, &mut space, rng);
         let size = room.high - room.low;
         for (group, count) in groups(room.room.room_type, size.x * size.y) {
@@ -136,7 +146,20 @@ pub(super) fn furnish(site: Site, style: &Style, rng: &mut ChaCha8Rng) -> (RoomP
             }
         }
     }
-    (room, locations)
+    let more = (first..locations).map_while(|_| space.find_stand(rng, BETWEEN_M));
+    let more: Vec<Vec2> = more.collect();
+    places.extend(stand_at(&more, room.floor_m, rng));
+    (room, places)
+}
+
+/// Scanners at places in the plan.
+fn stand_at(plan: &[Vec2], floor_m: f32, rng: &mut ChaCha8Rng) -> Vec<ScanLocation> {
+    let location = |p: &Vec2| ScanLocation {
+        uuid: format!("{:016x}{:016x}", rng.random::<u64>(), rng.random::<u64>()),
+        position: p.extend(floor_m + between(rng, 1.4, 1.6)).as_dvec3(),
+        yaw_rad: f64::from(between(rng, -180.0, 180.0)).to_radians(),
+    };
+    plan.iter().map(location).collect()
 }
 
 /// Beams between the lamps, columns under them at outer walls, radiators under windows.
@@ -144,12 +167,7 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, rng: &mut ChaCha8Rng) {
     let (low, high) = (room.low, room.high);
     let lowest = room.heights_m[0].min(room.heights_m[1]);
     let cells = lamp_cells(high.x - low.x);
-    let windows: Vec<(Wall, [f32; 2])> = room
-        .openings
-        .iter()
-        .filter(|opening| opening.filling == Filling::Window)
-        .map(|opening| (opening.wall, opening.span))
-        .collect();
+    let windows = windows(room);
     if lowest >= 2.6 && rng.random_bool(0.6) {
         for k in 1..cells {
             let x = low.x + (high.x - low.x) * k as f32 / cells as f32;
@@ -167,7 +185,18 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, rng: &mut ChaCha8Rng) {
             }
         }
     }
-    for (wall, [from, to]) in windows {
+    add_radiators(room, space, &windows);
+}
+
+/// The windows of a room: the wall, and from where to where along it.
+pub(super) fn windows(room: &RoomPlan) -> Vec<(Wall, [f32; 2])> {
+    let windows = room.openings.iter().filter(|opening| opening.filling.is_window());
+    windows.map(|opening| (opening.wall, opening.span)).collect()
+}
+
+/// Radiators under windows.
+pub(super) fn add_radiators(room: &mut RoomPlan, space: &mut Space, windows: &[(Wall, [f32; 2])]) {
+    for &(wall, [from, to]) in windows {
         let (middle, width_m) = (0.5 * (from + to), (to - from - 0.1).clamp(0.4, 1.3));
         let span = [middle - 0.5 * width_m, middle + 0.5 * width_m];
         if space.take_at_wall(wall, span, 0.14, false) {
@@ -177,7 +206,13 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, rng: &mut ChaCha8Rng) {
 }
 
 /// A group where there is space for it, or nothing.
-fn place(group: Group, space: &mut Space, room: [f32; 2], style: &Style, rng: &mut ChaCha8Rng) -> Vec<Item> {
+pub(super) fn place(
+    group: Group,
+    space: &mut Space,
+    room: [f32; 2],
+    style: &Style,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Item> {
     let wood = pick(rng, &style.woods);
     let fabric = pick(rng, &style.fabrics);
     let glaze = pick(rng, &style.glazes);
@@ -299,20 +334,13 @@ fn workplace(f: &Frame, width_m: f32, [fabric, glaze]: [Look; 2], rng: &mut ChaC
 fn meeting_table(f: &Frame, seats: u32, [wood, fabric, glaze]: [Look; 3], rng: &mut ChaCha8Rng) -> Vec<Item> {
     let (width_m, depth_m, height_m) = (0.9 * seats as f32 + 0.3, 1.2, 0.74);
     let mut items = vec![f.put([0.0; 3], 0.0, Thing::Table { width_m, depth_m, height_m, top: wood })];
-    let wobble = |rng: &mut ChaCha8Rng| between(rng, -8.0, 8.0);
     for seat in 0..seats {
         let x = 0.9 * (seat as f32 - 0.5 * (seats - 1) as f32);
         for (side, yaw) in [(-1.0, 180.0), (1.0, 0.0)] {
             let chair = f.put([x, side * 0.98, 0.0], yaw + wobble(rng), Thing::Chair(fabric));
             items.push(chair);
-            let what = rng.random_range(0..4);
             let at = [x, side * 0.33, height_m];
-            match what {
-                0 => items.push(f.put(at, yaw + wobble(rng), Thing::Laptop)),
-                1 => items.push(f.put(at, yaw + wobble(rng), Thing::Papers)),
-                2 => items.push(f.put(at, yaw, Thing::Mug(glaze))),
-                _ => {}
-            }
+            items.extend(at_a_seat(f, at, yaw, rng.random_range(0..4), glaze, rng));
         }
     }
     for (side, yaw) in [(-1.0, 90.0), (1.0, -90.0)] {
@@ -322,6 +350,28 @@ fn meeting_table(f: &Frame, seats: u32, [wood, fabric, glaze]: [Look; 3], rng: &
         }
     }
     items
+}
+
+/// What lies on a table before a seat, by a number: nothing from 3 on.
+pub(super) fn at_a_seat(
+    f: &Frame,
+    at: [f32; 3],
+    yaw: f32,
+    number: u32,
+    glaze: Look,
+    rng: &mut ChaCha8Rng,
+) -> Option<Item> {
+    match number {
+        0 => Some(f.put(at, yaw + wobble(rng), Thing::Laptop)),
+        1 => Some(f.put(at, yaw + wobble(rng), Thing::Papers)),
+        2 => Some(f.put(at, yaw, Thing::Mug(glaze))),
+        _ => None,
+    }
+}
+
+/// How far a thing is turned from where it should look, in degrees.
+pub(super) fn wobble(rng: &mut ChaCha8Rng) -> f32 {
+    between(rng, -8.0, 8.0)
 }
 
 /// A low table, on a rug where there is space for one.

@@ -1,16 +1,22 @@
 //! Buildings by rule: from a list of rooms and a seed to what stands where.
 //!
-//! A storey is a hallway with rooms on both sides, each with a door to it and windows in its outer wall.
-//! `arrange` places rooms, `furnish` fills one with what its type has, `space` knows where there is room for
-//! it. Other floor plans are other ways to arrange; furnishing knows nothing of them.
+//! A storey is a hallway with rooms on both sides, each with a door to it and windows in its outer wall
+//! (`arrange`), or several such wings, joined by a cross hallway (`wings`). `furnish` fills a room with what
+//! its type has, `outfit` does so with furniture of several `models`, and `space` knows where there is room
+//! for it. `areas` has the options of six areas in three buildings. Furnishing knows nothing of floor plans.
 
+mod areas;
 mod arrange;
 mod furnish;
+mod models;
 mod options;
+mod outfit;
 mod space;
 mod style;
+mod wings;
 
-pub use options::{BuildingOptions, RoomOptions};
+pub use models::Models;
+pub use options::{BuildingOptions, FloorPlan, RoomOptions};
 pub use style::Style;
 
 use crate::BuildingError;
@@ -59,7 +65,7 @@ impl Building {
         };
         for (index, site) in (0..).zip(arrange::arrange(options)?) {
             let mut rng = rng(options.seed, index);
-            let (room, locations) = furnish(site, &options.style, &mut rng);
+            let (room, locations) = furnish(site, options, &mut rng);
             building.rooms.push(room);
             building.locations.extend(locations);
         }

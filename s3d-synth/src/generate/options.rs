@@ -1,7 +1,8 @@
 //! What one may wish of a building.
 
 use super::furnish::can_furnish;
-use super::{Style, between, pick, rng};
+use super::outfit::can_outfit;
+use super::{Models, Style, between, pick, rng};
 use crate::{BuildingError, RangeError};
 use s3d_label::RoomType;
 
@@ -21,18 +22,42 @@ pub struct BuildingOptions {
     pub hallway_height_m: f32,
     /// How thick walls are: 0.1 to 1 m.
     pub wall_m: f32,
+    /// How rooms lie.
+    pub plan: FloorPlan,
     /// What rooms and furniture are made of.
     pub style: Style,
+    /// Furniture, doors and windows of several models, in numbers like those of the published areas. Where it
+    /// is not there, they are those of the demo.
+    pub models: Option<Models>,
     /// How fine the images of floors, walls and ceilings are: at 1 a floor has 100 texels a metre.
     pub texture_scale: f32,
     /// From which all random choices come.
     pub seed: u64,
 }
 
+/// How the rooms of a storey lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FloorPlan {
+    /// On both sides of one hallway.
+    OneHallway,
+    /// On both sides of the hallways of several wings, which a hallway at their west ends joins. It needs
+    /// [`BuildingOptions::models`].
+    Wings {
+        /// How many: 1 to 20; one has no cross hallway.
+        wings: u32,
+        /// How many hallways there are in all, one at least in each wing, and as many in the cross hallway:
+        /// doors divide them. Fewer are made where doors of rooms leave no place.
+        hallways: u32,
+        /// What is between two wings, metres: 0.5 to 100.
+        courtyard_m: f32,
+    },
+}
+
 /// A room that a building should have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomOptions {
-    /// Its type: any but hallways (which join the rooms), auditoriums and WCs.
+    /// Its type: any but hallways, which join the rooms; auditoriums and WCs need
+    /// [`BuildingOptions::models`].
     pub room_type: RoomType,
     /// How long it is along the hallway (at least 1.8) and away from it (at least 2.2): up to 40 m.
     pub size_m: [f32; 2],
@@ -103,7 +128,9 @@ impl BuildingOptions {
             hallway_width_m: 1.8,
             hallway_height_m: 2.6,
             wall_m: 0.15,
+            plan: FloorPlan::OneHallway,
             style: Style::default(),
+            models: None,
             texture_scale: 1.0,
             seed,
         }
@@ -120,7 +147,18 @@ impl BuildingOptions {
         RangeError::check(self.hallway_width_m, [1.2, 10.0], || words("the width of hallways"))?;
         RangeError::check(self.hallway_height_m, HEIGHTS, || words("the height of hallways"))?;
         RangeError::check(self.wall_m, [0.1, 1.0], || words("the thickness of walls"))?;
-        self.rooms.iter().enumerate().try_for_each(|(index, room)| room.check(index))?;
+        let with_models = self.models.is_some();
+        self.rooms.iter().enumerate().try_for_each(|(index, room)| room.check(index, with_models))?;
+        if let FloorPlan::Wings { wings, hallways, courtyard_m } = self.plan {
+            if !with_models {
+                return Err(BuildingError::EmptyStyle { what: "models, which wings need" });
+            }
+            RangeError::check(wings, [1.0, 20.0], || words("the number of wings"))?;
+            let least = if wings > 1 { 2 * wings } else { 1 };
+            RangeError::check(hallways, [f64::from(least), 200.0], || words("the number of hallways"))?;
+            RangeError::check(courtyard_m, [0.5, 100.0], || words("what is between wings"))?;
+        }
+        self.models.as_ref().map_or(Ok(()), |models| models.check(self))?;
         self.style.check()
     }
 }
@@ -129,8 +167,9 @@ impl BuildingOptions {
 const HEIGHTS: [f64; 2] = [2.4, 10.0];
 
 impl RoomOptions {
-    fn check(&self, index: usize) -> Result<(), BuildingError> {
-        if !can_furnish(self.room_type) {
+    fn check(&self, index: usize, with_models: bool) -> Result<(), BuildingError> {
+        let is_known = can_furnish(self.room_type) || (with_models && can_outfit(self.room_type));
+        if !is_known {
             return Err(BuildingError::RoomType { room_type: self.room_type });
         }
         let room = |what: &str| format!("room {index}, {}: {what}", self.room_type.name());

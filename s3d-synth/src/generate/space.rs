@@ -45,6 +45,12 @@ impl Frame {
     }
 }
 
+/// Whether a door stands open into the room.
+fn has_open_leaf(filling: Filling) -> bool {
+    matches!(filling, Filling::Door { .. } | Filling::Leaf { .. })
+        && !matches!(filling, Filling::Leaf { open_deg: 0.0, .. })
+}
+
 impl Space {
     /// A room without furniture: what windows and the leaves of doors need is taken.
     pub(super) fn new(room: &RoomPlan) -> Self {
@@ -52,9 +58,9 @@ impl Space {
         let mut space = Self { low, high, taken: Vec::new(), walls: Default::default() };
         for opening in &room.openings {
             let [from, to] = opening.span;
-            let beside = if opening.filling == Filling::Window { 0.1 } else { 0.4 };
+            let beside = if opening.filling.is_window() { 0.1 } else { 0.4 };
             space.walls[opening.wall as usize].push([from - beside, to + beside]);
-            if matches!(opening.filling, Filling::Door { .. }) {
+            if has_open_leaf(opening.filling) {
                 let leaf =
                     space.at_wall(opening.wall, [from - beside, to + beside], [-GAP_M, to - from + 0.1]);
                 space.taken.push(leaf);
@@ -67,7 +73,7 @@ impl Space {
     /// not.
     pub(super) fn keep_ways_free(&mut self, room: &RoomPlan) {
         for opening in &room.openings {
-            if matches!(opening.filling, Filling::ShutDoor | Filling::Nothing) {
+            if !opening.filling.is_window() && !has_open_leaf(opening.filling) {
                 let [from, to] = opening.span;
                 let way = self.at_wall(opening.wall, [from - 0.15, to + 0.15], [-GAP_M, to - from]);
                 self.taken.push(way);
@@ -130,6 +136,15 @@ impl Space {
         })
     }
 
+    /// Takes the square around a place if it is free.
+    pub(super) fn take_around(&mut self, at: Vec2, half: Vec2) -> Option<Frame> {
+        let rect = [at - half, at + half];
+        self.is_free(rect).then(|| {
+            self.taken.push(rect);
+            Frame { origin: at, yaw_deg: 0.0 }
+        })
+    }
+
     /// A place to hang something `width` wide, up to 20 cm deep where `depth` says so: the wall, and where
     /// along it.
     pub(super) fn find_on_wall(
@@ -175,6 +190,13 @@ impl Space {
             self.taken.push(rect);
             Some(Frame { origin, yaw_deg: if turned { 90.0 } else { 0.0 } })
         })
+    }
+
+    /// A place at a wall that stays free for a scanner, `half` to each side.
+    pub(super) fn find_stand_at_wall(&mut self, rng: &mut ChaCha8Rng, half: f32) -> Option<Vec2> {
+        let frame = self.find_at_wall(rng, [2.0 * half; 2], false)?;
+        // Back goes to the wall: away from it is the frame's −y.
+        Some(frame.origin + Vec2::from_angle(frame.yaw_deg.to_radians()).perp() * -half)
     }
 
     /// A place that stays free for a scanner, `half` to each side: drawn, or else the first of a fine grid.

@@ -1,0 +1,295 @@
+//! Six areas in three buildings, so that one can train on some and test on others.
+//!
+//! Areas 1, 3 and 6 are of one building, 2 and 4 of another, 5 of a third, as in 2D-3D-S. How many rooms of
+//! each type an area has, and how many beams, columns and windows, is counted from the names in the published
+//! table of labels; area 5 has 60 of its 68 rooms. What is in a room follows `outfit`. All else is made up.
+
+use super::models::Models;
+use super::{BuildingOptions, FloorPlan, RoomOptions, Style, between, rng};
+use crate::RangeError;
+use crate::building::{LeafModel, SeatBase, ShelfFront, TableBase};
+use crate::look::*;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use s3d_label::RoomType;
+
+/// The types of rooms, and between which sizes they lie in the first building: along the hallway, and away
+/// from it.
+const TYPES: [(RoomType, [[f32; 2]; 2]); 10] = [
+    (RoomType::CONFERENCE_ROOM, [[6.8, 9.0], [5.2, 6.6]]),
+    (RoomType::AUDITORIUM, [[13.5, 15.0], [12.0, 13.0]]),
+    (RoomType::LOBBY, [[9.0, 11.5], [7.0, 8.5]]),
+    (RoomType::LOUNGE, [[8.0, 10.0], [6.5, 7.8]]),
+    (RoomType::OFFICE, [[3.7, 5.3], [4.2, 5.8]]),
+    (RoomType::OPENSPACE, [[9.5, 11.5], [6.5, 8.0]]),
+    (RoomType::PANTRY, [[3.4, 4.6], [3.2, 4.4]]),
+    (RoomType::COPY_ROOM, [[3.4, 4.4], [3.8, 4.6]]),
+    (RoomType::STORAGE, [[2.6, 4.2], [2.8, 4.4]]),
+    (RoomType::WC, [[4.0, 5.0], [4.2, 5.4]]),
+];
+
+/// What is counted of an area.
+struct Area {
+    /// Which building it is of.
+    building: usize,
+    /// Rooms by type, in the order of `TYPES`.
+    rooms: [u32; 10],
+    hallways: u32,
+    /// Not counted: made up.
+    wings: u32,
+    beams: u32,
+    columns: u32,
+    windows: u32,
+}
+
+/// Areas 1 to 6.
+const AREAS: [Area; 6] = [
+    area(0, [2, 0, 0, 0, 31, 0, 1, 1, 0, 1], [8, 3], [61, 57, 29]),
+    area(1, [1, 2, 0, 0, 14, 0, 0, 0, 9, 2], [12, 3], [11, 19, 8]),
+    area(0, [1, 0, 0, 2, 10, 0, 0, 0, 2, 2], [6, 2], [13, 12, 8]),
+    area(1, [3, 0, 2, 0, 22, 0, 0, 0, 4, 4], [14, 3], [3, 38, 40]),
+    area(2, [3, 0, 1, 0, 36, 0, 1, 0, 4, 2], [13, 4], [3, 65, 46]),
+    area(0, [1, 0, 0, 1, 37, 1, 1, 1, 0, 0], [6, 2], [68, 54, 31]),
+];
+
+const fn area(
+    building: usize,
+    rooms: [u32; 10],
+    [hallways, wings]: [u32; 2],
+    [beams, columns, windows]: [u32; 3],
+) -> Area {
+    Area { building, rooms, hallways, wings, beams, columns, windows }
+}
+
+/// A building: what sizes are multiplied by, its hallways' width and height, walls, ceilings, courtyards.
+struct Proportions {
+    rooms: f32,
+    hallway_m: [f32; 2],
+    wall_m: f32,
+    ceiling_m: [f32; 2],
+    courtyard_m: f32,
+}
+
+impl BuildingOptions {
+    /// How many areas there are.
+    pub const AREAS: u32 = 6;
+
+    /// One of six areas in three buildings (1, 3 and 6; 2 and 4; 5): of 23 to 60 rooms, hallways among them,
+    /// whose types are as frequent as in the published areas of the same numbers, and what is in them as in
+    /// rooms of their type there. Proportions, materials and models of furniture are a building's own. Same
+    /// number and seed, same options.
+    ///
+    /// ```
+    /// use s3d_synth::{Building, BuildingOptions};
+    ///
+    /// let options = BuildingOptions { texture_scale: 0.05, ..BuildingOptions::area(3, 7)? };
+    /// let building = Building::generate(&options)?;
+    /// assert_eq!(building.rooms.len(), 23);
+    /// # Ok::<(), s3d_synth::BuildingError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`RangeError`] if there is no area of this number.
+    pub fn area(number: u32, seed: u64) -> Result<Self, RangeError> {
+        RangeError::check(number, [1.0, f64::from(Self::AREAS)], || "the number of an area".to_owned())?;
+        let area = &AREAS[number as usize - 1];
+        let mut rng = rng(seed, u64::MAX - 1 - u64::from(number));
+        let proportions = proportions(area.building);
+        let with_windows = area.rooms[0] + area.rooms[2] + area.rooms[3] + area.rooms[4];
+        let windows = area.windows as f32 / with_windows as f32;
+        let mut rooms = Vec::new();
+        for (&(room_type, size), &count) in TYPES.iter().zip(&area.rooms) {
+            for _ in 0..count {
+                rooms.push(room(room_type, size, &proportions, windows, &mut rng));
+            }
+        }
+        for i in (1..rooms.len()).rev() {
+            rooms.swap(i, rng.random_range(0..=i));
+        }
+        let surface: f32 = rooms.iter().map(|room| room.size_m[0] * room.size_m[1]).sum();
+        let hallways = 0.2 * surface;
+        let a_room = |count: u32| count as f32 / ((surface + hallways) / 20.0);
+        let models =
+            Models { beams: a_room(area.beams), columns: a_room(area.columns), ..models(area.building) };
+        let [hallway_width_m, hallway_height_m] = proportions.hallway_m;
+        Ok(Self {
+            title: format!("A generated area of s3d: area {number}, seed {seed}"),
+            rooms,
+            storeys: 1,
+            hallway_width_m,
+            hallway_height_m,
+            wall_m: proportions.wall_m,
+            plan: FloorPlan::Wings {
+                wings: area.wings,
+                hallways: area.hallways,
+                courtyard_m: proportions.courtyard_m,
+            },
+            style: style(area.building),
+            models: Some(models),
+            texture_scale: 0.4,
+            // Areas of one building differ.
+            seed: rng.random(),
+        })
+    }
+}
+
+fn room(
+    room_type: RoomType,
+    [along, away]: [[f32; 2]; 2],
+    proportions: &Proportions,
+    windows: f32,
+    rng: &mut ChaCha8Rng,
+) -> RoomOptions {
+    let size_m = [along, away].map(|[from, to]| between(rng, from, to) * proportions.rooms);
+    let height = between(rng, proportions.ceiling_m[0], proportions.ceiling_m[1]);
+    let has_windows =
+        [RoomType::OFFICE, RoomType::CONFERENCE_ROOM, RoomType::LOBBY, RoomType::LOUNGE].contains(&room_type);
+    let wanted = (windows * between(rng, 0.4, 1.6) + rng.random::<f32>()).floor();
+    let most = ((size_m[0] - 0.8) / 1.1).floor();
+    let surface = size_m[0] * size_m[1];
+    RoomOptions {
+        room_type,
+        size_m,
+        heights_m: [height; 2],
+        windows: if has_windows { wanted.min(most) as u32 } else { 0 },
+        furnishing: 1.0,
+        locations: 1 + ((surface / 14.0) as u32).min(7),
+    }
+}
+
+fn proportions(building: usize) -> Proportions {
+    match building {
+        0 => Proportions {
+            rooms: 1.0,
+            hallway_m: [1.9, 2.6],
+            wall_m: 0.2,
+            ceiling_m: [2.6, 2.9],
+            courtyard_m: 3.0,
+        },
+        1 => Proportions {
+            rooms: 1.12,
+            hallway_m: [2.7, 3.0],
+            wall_m: 0.36,
+            ceiling_m: [3.1, 3.8],
+            courtyard_m: 5.0,
+        },
+        _ => Proportions {
+            rooms: 0.95,
+            hallway_m: [2.2, 2.8],
+            wall_m: 0.26,
+            ceiling_m: [2.75, 3.2],
+            courtyard_m: 1.0,
+        },
+    }
+}
+
+fn models(building: usize) -> Models {
+    let common = |tables, seats, couches, shelves, leaves, panes| Models {
+        tables,
+        table_m: [[1.4, 1.7], [0.68, 0.8], [0.72, 0.75]],
+        seats,
+        seat_m: [[0.44, 0.48], [0.44, 0.48], [0.86, 1.02]],
+        couches,
+        couch_m: [[0.6, 0.68], [0.82, 0.9], [0.78, 0.86]],
+        shelves,
+        shelf_m: [[0.8, 1.0], [0.28, 0.34], [1.9, 2.15]],
+        plain_boards: 0.1,
+        board_m: [[1.2, 2.4], [1.0, 1.2]],
+        leaves,
+        leaf_looks: vec![OAK],
+        door_m: [0.9, 2.05],
+        shut: 0.3,
+        panes,
+        window_m: [0.85, 2.1],
+        beams: 0.0,
+        columns: 0.0,
+        end_windows: 0.3,
+    };
+    match building {
+        0 => common(
+            vec![TableBase::Legs, TableBase::Legs, TableBase::Pedestal],
+            vec![(SeatBase::Star, true), (SeatBase::Star, false), (SeatBase::Legs, false)],
+            vec![true],
+            vec![ShelfFront::Open, ShelfFront::Open, ShelfFront::HalfDoors],
+            vec![LeafModel::Panelled],
+            vec![[2, 1]],
+        ),
+        1 => Models {
+            table_m: [[1.7, 2.2], [0.8, 0.98], [0.74, 0.78]],
+            seat_m: [[0.5, 0.58], [0.45, 0.5], [0.8, 0.92]],
+            couch_m: [[0.68, 0.78], [0.92, 1.05], [0.7, 0.78]],
+            shelf_m: [[1.0, 1.4], [0.4, 0.5], [1.8, 2.2]],
+            plain_boards: 0.9,
+            board_m: [[1.8, 3.2], [1.1, 1.3]],
+            leaf_looks: vec![WHITE, Look::Plain("grey_lacquer", [156, 162, 168])],
+            door_m: [1.0, 2.1],
+            shut: 0.35,
+            window_m: [0.6, 2.4],
+            ..common(
+                vec![TableBase::Panels, TableBase::Panels, TableBase::Legs],
+                vec![(SeatBase::Sled, true), (SeatBase::Sled, false), (SeatBase::Star, true)],
+                vec![false],
+                vec![ShelfFront::Doors, ShelfFront::HalfDoors],
+                vec![LeafModel::Flush],
+                vec![[3, 2], [2, 2]],
+            )
+        },
+        _ => Models {
+            table_m: [[1.4, 1.6], [0.6, 0.7], [0.7, 0.73]],
+            seat_m: [[0.4, 0.45], [0.42, 0.46], [0.95, 1.12]],
+            couch_m: [[0.55, 0.64], [0.74, 0.84], [0.85, 0.98]],
+            shelf_m: [[1.2, 1.8], [0.3, 0.38], [1.0, 1.35]],
+            plain_boards: 0.4,
+            board_m: [[0.9, 1.6], [0.8, 1.0]],
+            leaf_looks: vec![WALNUT],
+            door_m: [0.85, 2.0],
+            shut: 0.2,
+            window_m: [1.0, 2.2],
+            ..common(
+                vec![TableBase::Trestles, TableBase::Trestles, TableBase::Pedestal],
+                vec![(SeatBase::Legs, false), (SeatBase::Legs, true), (SeatBase::Block, true)],
+                vec![true, false],
+                vec![ShelfFront::Open, ShelfFront::HalfDoors],
+                vec![LeafModel::Glazed],
+                vec![[1, 1]],
+            )
+        },
+    }
+}
+
+fn style(building: usize) -> Style {
+    let plain = Style::default();
+    match building {
+        0 => Style {
+            floors: vec![
+                FloorFinish::CarpetTiles([112.0, 120.0, 132.0]),
+                FloorFinish::CarpetTiles([128.0, 112.0, 98.0]),
+            ],
+            ceilings: vec![CeilingFinish::Tiles],
+            woods: vec![OAK, Look::Plain("beech", [216, 180, 140])],
+            fabrics: vec![BLUE_FABRIC, GREY_FABRIC],
+            boards: vec![Pattern::Whiteboard, Pattern::Whiteboard, Pattern::Plan],
+            ..plain
+        },
+        1 => Style {
+            walls: vec![[214.0, 218.0, 220.0], [204.0, 206.0, 204.0], [226.0, 226.0, 224.0]],
+            accents: vec![[120.0, 128.0, 136.0], [170.0, 60.0, 52.0]],
+            floors: vec![FloorFinish::Terrazzo],
+            ceilings: vec![CeilingFinish::Plaster],
+            woods: vec![WHITE, Look::Plain("grey_board", [182, 184, 186])],
+            fabrics: vec![RUST_FABRIC, Look::Plain("black_leather", [58, 54, 52])],
+            boards: vec![Pattern::Whiteboard, Pattern::Cork],
+            ..plain
+        },
+        _ => Style {
+            walls: vec![[238.0, 228.0, 204.0], [232.0, 218.0, 196.0]],
+            accents: vec![[206.0, 132.0, 96.0], [132.0, 150.0, 104.0]],
+            floors: vec![FloorFinish::PlanksAlongX(Wood::OAK), FloorFinish::PlanksAlongY(Wood::WALNUT)],
+            ceilings: vec![CeilingFinish::Boards, CeilingFinish::Plaster],
+            woods: vec![WALNUT],
+            fabrics: vec![Look::Plain("green_felt", [96, 122, 84]), GREY_FABRIC],
+            boards: vec![Pattern::Plan, Pattern::Cork],
+            ..plain
+        },
+    }
+}
