@@ -3,8 +3,8 @@
 use crate::error::{Error, Result};
 use crate::event::{Event, Level, Task};
 use std::fmt;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Ends calls early, from any thread or a signal handler's thread. Clones are the same switch.
 ///
@@ -75,6 +75,8 @@ pub struct Context {
     /// Is told what happens; nobody if `None`.
     pub observer: Option<Arc<dyn Observer>>,
     warnings: Arc<AtomicU64>,
+    /// Where warnings are written down, if they are.
+    notes: Option<Arc<Mutex<Vec<String>>>>,
 }
 
 impl fmt::Debug for Context {
@@ -125,7 +127,21 @@ impl Context {
     /// Tells of something that should be looked at, and counts it.
     pub fn warn(&self, text: impl fmt::Display) {
         self.warnings.fetch_add(1, Ordering::Relaxed);
+        if let Some(notes) = &self.notes {
+            notes.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_string());
+        }
         self.message(Level::Warning, text);
+    }
+
+    /// The same, which writes its warnings down as well.
+    pub(crate) fn noting(&self) -> Self {
+        Self { notes: Some(Arc::default()), ..self.clone() }
+    }
+
+    /// The warnings that were written down since they were taken last.
+    pub(crate) fn take_notes(&self) -> Vec<String> {
+        let notes = self.notes.as_ref().map(|notes| notes.lock().unwrap_or_else(PoisonError::into_inner));
+        notes.map(|mut notes| std::mem::take(&mut *notes)).unwrap_or_default()
     }
 
     /// Tells of what was done.

@@ -5,10 +5,11 @@
 //!   call is made again, and ends with the same bytes. [`plan`], [`Shard`] and [`merge`] share one among many
 //!   machines.
 //! - [`verify`] reads a data set back, every pixel of it, and returns a [`VerifyReport`]; [`statistics`]
-//!   counts it; [`info`] tells what a scene holds before it is exported.
+//!   counts it; [`compare`] tells what differs between two, as a [`Comparison`]; [`info`] what a scene holds
+//!   before it is exported.
 //! - [`pack`] makes packages for trainers of it, [`profile`] what loaders of point clouds want; [`xyz`] makes
 //!   its world coordinates again; [`DataSet`] reads it for other crates, and [`NewFolder`] is what they make
-//!   of it, whole or not at all. [`render`], [`render_poses`] and [`sample`] need a mesh alone.
+//!   of it, whole or not at all. [`render`], [`render_poses`], [`sample`] and [`place_cameras`] need a mesh alone.
 //!
 //! Every call is handed a [`Context`]: a [`Cancel`] that ends it early, from any thread, and an [`Observer`]
 //! that is told [what happens](Event). Nothing here prints, reads the command line, handles signals or exits;
@@ -41,6 +42,7 @@
 // What a file holds must not make it panic; loops index by what was checked.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
+mod compare;
 mod context;
 mod error;
 mod event;
@@ -60,6 +62,13 @@ mod useful;
 mod verify;
 mod xyz;
 
+pub use compare::comparison::{
+    AreaChanges, ChangedPatch, ClassPair, ClassPixels, ComparedSet, Comparison, FaceChange, FileKindChanges,
+    Geometry, ImageChange, InputChange, InstanceChange, LabelChanges, LabelCounts, LocationName,
+    ModalityChanges, PixelChanges, PoseChange, PoseChanges, SettingChange, Side, UnreadFile, ViewChanges,
+    ViewName,
+};
+pub use compare::{CompareOptions, compare};
 pub use context::{Cancel, Context, Observer, Progress};
 pub use error::{Error, Result};
 pub use event::{Event, Level, Stage, Task, UnitKind};
@@ -73,7 +82,9 @@ pub use options::{ExportOptions, PadLabels, canonical_uuid};
 pub use pack::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions, pack,
 };
+pub use place::{PlaceOptions, place_cameras};
 pub use profile::loader::Profile;
+pub use profile::room::{TreeInstance, TreeRoom};
 pub use profile::{ProfileOptions, profile};
 pub use reader::DataSet;
 pub use render::{PosesOptions, RenderOptions, RenderedPoses, render, render_poses};
@@ -81,7 +92,8 @@ pub use sample::{SampleOptions, sample};
 pub use shard::assignment::Shard;
 pub use shard::make_plan::plan;
 pub use shard::merge::merge;
-pub use store::new_folder::{FolderKind, NewFolder, beside};
+pub use store::new_file::NewFile;
+pub use store::new_folder::{FolderKind, NewFolder, beside, check_apart};
 pub use tables::statistics::{
     AreaStatistics, LabelStatistics, LabelTally, RoomTypeStatistics, Statistics, statistics,
 };

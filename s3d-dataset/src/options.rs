@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// What decides the bytes of a data set besides its input. The defaults are the paper's. The manifest stores
-/// them, with the seed and the distance of placed locations elsewhere in it.
+/// What decides the bytes of a data set besides its input. The defaults are the paper's where it names a
+/// number. The manifest stores them, with the seed and the distance of placed locations elsewhere in it.
 ///
 /// ```
 /// use s3d_dataset::ExportOptions;

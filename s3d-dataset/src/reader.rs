@@ -3,16 +3,20 @@
 use crate::context::Context;
 use crate::error::Result;
 use crate::options::ExportOptions;
+use crate::profile::room::{TreeInstance, TreeRoom, rooms_of};
 use crate::tables::dataset::Dataset;
+use memchr::memchr_iter;
 use s3d_geom::Camera;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    DatasetImage, Domain, Frame, Layout, PhotographRecord, PoseFile, ViewRecord, read_labels, read_pose,
-    read_views,
+    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, PhotographRecord, PoseFile,
+    ViewRecord, read_face_votes, read_instances, read_labels, read_pose, read_views,
 };
+use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_label::{LabelTable, Taxonomy};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 /// A complete data set, to be read. Whatever is read of it is held against its list of files: sizes before a
@@ -29,7 +33,7 @@ use std::path::Path;
 /// }
 /// # Ok::<(), s3d_dataset::Error>(())
 /// ```
-pub struct DataSet(Dataset);
+pub struct DataSet(pub(crate) Dataset);
 
 impl DataSet {
     /// Opens the data set in a folder: its manifest, its list of files and its conventions, which must agree.
@@ -38,6 +42,20 @@ impl DataSet {
     /// [`Error::File`](crate::Error::File) with the one that does not, or if the export did not finish.
     pub fn open(folder: &Path) -> Result<Self> {
         Dataset::open(&Layout::new(folder)).map(Self)
+    }
+
+    /// The same, of an export that did not finish, too: what is there of it so far. [`DataSet::missing_yet`]
+    /// tells what is not.
+    ///
+    /// # Errors
+    /// As [`DataSet::open`].
+    pub fn open_as_far_as_it_is(folder: &Path, ctx: &Context) -> Result<Self> {
+        Dataset::open_as_far_as_it_is(ctx, &Layout::new(folder)).map(Self)
+    }
+
+    /// What an export that did not finish lacks, a sentence each; `None` if it is complete.
+    pub fn missing_yet(&self) -> Option<&[String]> {
+        self.0.unfinished.as_ref().map(|unfinished| &*unfinished.missing)
     }
 
     /// Where its files lie.
@@ -91,17 +109,116 @@ impl DataSet {
         Ok(Some(table.map_err(|e| FileError::format(&path, e.to_string()))?))
     }
 
+    /// The coloured mesh of an area with its textures: the one that its images show. Faces are in the order
+    /// of the file. `None` if it is not there yet.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File) if it, a material or a texture is missing or damaged, or it has
+    /// not as many faces as the manifest tells of.
+    pub fn mesh(&self, area: u32) -> Result<Option<MeshFile>> {
+        let (path, folder) = (self.layout().rgb_obj(area), self.layout().mesh_dir(area));
+        let (materials, textures) = (path.with_extension("mtl"), folder.join("rgb_textures"));
+        if !self.names(&path) {
+            return Ok(None);
+        }
+        for other in self.0.files.below(&folder) {
+            if other == materials || other.starts_with(&textures) {
+                self.0.files.checked(&other)?;
+            }
+        }
+        let file = read_mesh(self.0.files.checked(&path)?, UpAxis::Y)?;
+        self.fits(area, &path, file.mesh.faces().len())?;
+        Ok(Some(file))
+    }
+
+    /// How the points of the annotations voted for each face of [`DataSet::mesh`]; `None` if the area has no
+    /// labels.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn face_votes(&self, area: u32) -> Result<Option<FaceVoteColumns>> {
+        let path = self.layout().votes_npz(area);
+        if !self.names(&path) {
+            return Ok(None);
+        }
+        let votes = read_face_votes(self.0.files.checked(&path)?)?;
+        self.fits(area, &path, votes.label.len())?;
+        Ok(Some(votes))
+    }
+
+    /// Refuses a file that tells of another number of faces than the manifest.
+    fn fits(&self, area: u32, path: &Path, faces: usize) -> Result<()> {
+        match self.0.manifest.area(area) {
+            Some(entry) if entry.faces != faces => {
+                let message = format!("{faces} faces, and the manifest tells of {}", entry.faces);
+                Err(FileError::format(path, message).into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The annotated rooms of an area, by type and number: those of its S3DIS tree; none if the data set has
+    /// no labels.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File) if the tree is damaged.
+    pub fn tree_rooms(&self, area: u32) -> Result<Vec<TreeRoom>> {
+        match self.taxonomy() {
+            Some(taxonomy) => rooms_of(self.layout(), taxonomy, area),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// How many points an instance of [`DataSet::tree_rooms`] has.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File) if its file is missing or damaged;
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    pub fn point_count(&self, instance: &TreeInstance, ctx: &Context) -> Result<u64> {
+        let path = &instance.path;
+        let mut file = self.0.files.open(path)?;
+        let (mut block, mut lines) = (vec![0; 1 << 18], 0);
+        loop {
+            ctx.check()?;
+            // Its end is an error if these are not the lines that were written, each a point.
+            let n = file.read(&mut block).map_err(|e| match e.kind() {
+                ErrorKind::InvalidData => FileError::format(path, e.to_string()),
+                _ => FileError::io(path, "read", e),
+            })?;
+            if n == 0 {
+                return Ok(lines);
+            }
+            lines += memchr_iter(b'\n', block.get(..n).unwrap_or_default()).count() as u64;
+        }
+    }
+
+    /// The instances of an area, with their boxes; none if it has no labels.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn instances(&self, area: u32) -> Result<Vec<InstanceEntry>> {
+        let path = self.layout().instances_json(area);
+        if !self.names(&path) {
+            return Ok(Vec::new());
+        }
+        Ok(read_instances(self.0.files.checked(&path)?)?)
+    }
+
     /// The images of an area, by scan location and room, views by number and the panorama last.
     pub fn images(&self, area: u32) -> Vec<DatasetImage> {
         self.0.files.images(self.layout(), area)
     }
 
-    /// Every candidate view of an area, kept or dropped.
+    /// Every candidate view of an area, kept or dropped; none if they are not listed yet.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File).
     pub fn views(&self, area: u32) -> Result<Vec<ViewRecord>> {
-        Ok(read_views(self.0.files.checked(&self.layout().views_json(area))?)?)
+        let path = self.layout().views_json(area);
+        if self.0.unfinished.is_some() && !self.names(&path) {
+            return Ok(Vec::new());
+        }
+        Ok(read_views(self.0.files.checked(&path)?)?)
     }
 
     /// The photographs of an area that became views.
@@ -152,12 +269,13 @@ impl DataSet {
         Ok(self.0.files.read_bytes(path)?)
     }
 
-    /// The files that are gone or of another size than was written, with what is wrong with each, by path
-    /// below the data set's folder. No file is opened.
+    /// The files that are gone or of another size than was written: paths below the data set's folder, and
+    /// what is wrong with each, without its path. No file is opened.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled); [`Error::Temporary`](crate::Error::Temporary).
     pub fn missing(&self, ctx: &Context) -> Result<BTreeMap<String, String>> {
-        self.0.files.faults(ctx, |_| true)
+        let faults = self.0.files.faults(ctx, |_| true)?;
+        Ok(faults.into_iter().map(|(path, e)| (path, e.message())).collect())
     }
 }

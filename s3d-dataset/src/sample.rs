@@ -2,8 +2,7 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::store::staging::Staging;
-use crate::store::{parent_of, refuse_existing};
+use crate::store::new_file::NewFile;
 use crate::useful::{PLY_POINT_BYTES, check_points, check_space};
 use glam::DVec3;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
@@ -50,10 +49,7 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
             output.display()
         )));
     }
-    let (parent, name) = (parent_of(output), Path::new(output.file_name().unwrap_or_default()));
-    if !Staging::is_left(&parent, name) {
-        refuse_existing(output, options.overwrite)?;
-    }
+    NewFile::check_free(output, options.overwrite)?;
     let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
     let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
     ctx.warn_each(&file.warnings);
@@ -63,8 +59,7 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     };
     check_points(points)?;
     // What a killed process left takes no space after this.
-    let staging = Staging::begin(ctx, &parent, name)?;
-    refuse_existing(output, options.overwrite || staging.was_placing())?;
+    let file_of_points = NewFile::begin(ctx, output, options.overwrite)?;
     check_space(points * PLY_POINT_BYTES, output)?;
     if file.offset_m != DVec3::ZERO {
         ctx.info(format_args!(
@@ -75,7 +70,7 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     }
     let started = Instant::now();
     let sampler = SurfaceSampler::new(&file.mesh, options.density, options.seed);
-    let mut ply = PlyPointWriter::create_moved(&staging.path().join(name), sampler.len(), file.offset_m)?;
+    let mut ply = PlyPointWriter::create_moved(file_of_points.path(), sampler.len(), file.offset_m)?;
     let progress = ctx.progress("sampling", "points", sampler.len());
     let mut cloud = PointCloud::default();
     let mut at = 0;
@@ -88,7 +83,7 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
         at = end;
     }
     ply.finish()?;
-    staging.place_files(&parent)?;
+    file_of_points.finish()?;
     drop(progress);
     ctx.info(format_args!(
         "{}: {} points on {:.1} m² in {:.1} s",

@@ -6,6 +6,8 @@ use common::{memory_scene, options, scene_of};
 use s3d_dataset::{Condition, Context, Error, Event, Export, ExportOptions, InfoOptions, Level, MemoryScene};
 use s3d_geom::glam::{Vec3, dvec3, vec3};
 use s3d_geom::{Pose, TriMesh};
+use s3d_synth::{Building, ScanOptions};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 /// Refused by this condition, with these words; `info` names it too, and with the condition allowed there is
@@ -45,6 +47,39 @@ fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Co
     assert!(export(&[condition], &context).unwrap().is_some(), "an export that is insisted on");
     assert!(warnings.lock().unwrap().iter().any(|w| w.contains(words)), "{:?}", warnings.lock().unwrap());
     assert!(manifest().contains("complete") && !manifest().contains("allow"));
+    // Who looks at the data set later is told the same.
+    let noted = noted(&out);
+    for warning in &*warnings.lock().unwrap() {
+        assert!(noted.contains(warning), "{warning}: {noted:?}");
+    }
+}
+
+/// What the manifest says that the export of its first area warned of.
+fn noted(out: &Path) -> Vec<String> {
+    let manifest = std::fs::read(out.join("manifest.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
+    let warnings = manifest["areas"][0]["warnings"].as_array().cloned().unwrap_or_default();
+    warnings.iter().map(|w| w.as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn warnings_that_are_kept_do_not_tell_where_the_scene_lay() {
+    let dir = tempfile::tempdir().unwrap();
+    let export = |name: &str| {
+        let folder = dir.path().join(name);
+        let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
+        let scene =
+            Building::demo().build().unwrap().write_scan(&folder.join("scan"), &scan, || true).unwrap();
+        let gone = folder.join("scan/rgb_textures/cork_13.png");
+        std::fs::remove_file(&gone).unwrap();
+        let out = folder.join("out");
+        let options = ExportOptions { views: 2, size: 32, pano_width: 64, ..options(0) };
+        Export::new([scene]).options(options).run(&out, &Context::default()).unwrap().unwrap();
+        noted(&out)
+    };
+    let first = export("a");
+    assert!(first.iter().any(|w| w.contains("cork_13.png") && !w.contains("/a/")), "{first:?}");
+    assert_eq!(first, export("quite another name"));
 }
 
 #[test]

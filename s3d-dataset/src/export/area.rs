@@ -24,8 +24,8 @@ use crate::tables::listing;
 use crate::tables::manifest::{AreaEntry, XyzLoss};
 use crate::tables::records;
 use crate::tables::summary::Unlabelled;
-use crate::useful::{judge, label_findings, outlook_findings};
-use s3d_geom::{Density, NearestFaces};
+use crate::useful::{Finding, judge, label_findings, mesh_findings, outlook_findings, size_findings};
+use s3d_geom::{Density, NearestFaces, TriMesh};
 use s3d_io::camera::ScanLocation;
 use s3d_io::dataset::{Domain, FileRecord, InstanceRecord, InstanceWriter, Layout};
 use s3d_io::fs::create_dir;
@@ -139,8 +139,8 @@ pub(crate) fn label_area(
     nearest: NearestFaces<'_>,
     common: Common<'_>,
 ) -> Result<AreaPlan> {
-    let ctx = common.account.ctx;
     let Common { table, layout, options, journal, account, is_ours, .. } = common;
+    let ctx = &account.ctx.noting();
     let number = area.number;
     let PreparedMesh { file, scene } = prepared;
 
@@ -197,6 +197,10 @@ pub(crate) fn label_area(
     for (outlook, location) in outlooks.iter().zip(&locations) {
         ctx.warn_each(outlook.warnings(location));
     }
+    // Others were told when the area was opened, which every call does.
+    let mut warnings: Vec<String> = area.doubts(file).cloned().collect();
+    warnings.extend(mesh_doubts(area, &file.mesh, options)?.iter().map(Finding::text));
+    warnings.extend(ctx.take_notes());
     let plan = AreaPlan {
         area: number,
         annotated,
@@ -207,6 +211,7 @@ pub(crate) fn label_area(
         mesh_box: file.mesh.aabb(),
         mesh_area_m2: file.mesh.total_area(),
         faces_left_out: file.mesh.report().zero_area_faces + file.repeated_faces,
+        warnings: warnings.iter().map(|w| area.with_short_names(w, &file.companions)).collect(),
     };
     let write = || -> Result<()> {
         plan.write(&common.cache_of(number))?;
@@ -229,6 +234,14 @@ pub(crate) fn label_area(
     know_labels(area, &plan, &common);
     labelling.end();
     Ok(plan)
+}
+
+/// What looks wrong about an area's mesh alone.
+pub(crate) fn mesh_doubts(area: &AreaInput, mesh: &TriMesh, options: &ExportOptions) -> Result<Vec<Finding>> {
+    let makes_rgb = area.pictures.is_none() && options.modalities.contains(&Domain::Rgb);
+    let mut findings = mesh_findings(mesh, makes_rgb);
+    findings.extend(size_findings(mesh, options.points_per_m2)?);
+    Ok(findings)
 }
 
 /// What was odd in the annotations, a sentence each.
@@ -355,6 +368,7 @@ fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> Are
         see: area.cameras.share(),
         surface_seen: plan.surface_seen,
         offset_m: area.frame.offset(),
+        warnings: plan.warnings.clone(),
         inputs: Vec::new(),
     }
 }

@@ -80,6 +80,7 @@ pub(crate) fn finish(
     finished: &Finished,
     disk: Option<SyncAhead>,
 ) -> Result<Totals> {
+    let ctx = &ctx.noting();
     if let Some(unit) = missing_units(request, finished).first() {
         return Err(Error::Input(format!("{}: {unit:?} is missing", layout.root().display())));
     }
@@ -95,7 +96,7 @@ pub(crate) fn finish(
             finished.photographs(area).map(|done| &done.record).collect();
         if !labels.photographs.is_empty() {
             write_json(&layout.frames_json(area), &photographs)?;
-            doubts(area, &photographs).iter().for_each(|doubt| ctx.warn(doubt));
+            ctx.warn_each(doubts(area, &photographs));
         }
         let of_photographs = finished.photographs(area).map(|done| done.tally);
         let of_locations = finished.locations(area).map(|done| done.tally);
@@ -120,8 +121,10 @@ pub(crate) fn finish(
         if let Some(of) = unlabelled {
             *all_unlabelled.get_or_insert_default() += of;
         }
+        let warnings = labels.entry.warnings.iter().cloned().chain(ctx.take_notes()).collect();
         entries.push(AreaEntry {
             unlabelled,
+            warnings,
             points: finished.assets(area).map_or(0, |assets| assets.points),
             panoramas: tally.panoramas.images,
             views: tally.views.images,

@@ -3,7 +3,7 @@
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::event::Stage;
-use crate::export::area::{self, Common, PreparedMesh};
+use crate::export::area::{self, Common, PreparedMesh, mesh_doubts};
 use crate::export::finish::{Totals, finish, missing_units};
 use crate::export::input::cameras::Cameras;
 use crate::export::input::memory::SceneSource;
@@ -21,7 +21,7 @@ use crate::tables::account::Account;
 use crate::tables::assets;
 use crate::tables::manifest::Manifest;
 use crate::tables::summary::Summary;
-use crate::useful::{Estimate, judge, mesh_findings, size_findings, space_findings};
+use crate::useful::{Estimate, judge, space_findings};
 use s3d_geom::NearestFaces;
 use s3d_io::dataset::{Domain, Layout};
 use s3d_io::fs::SyncAhead;
@@ -139,15 +139,12 @@ impl<'a> Job<'a> {
         // single area stays in memory; several are read again where they are needed.
         let mut single: Option<Arc<MeshFile>> = None;
         let mut companions = Vec::new();
-        let makes_rgb = options.modalities.contains(&Domain::Rgb);
         let mut estimate = Estimate::default();
         for area in &inputs.areas {
             ctx.check()?;
             let file = area.read_mesh()?;
             area.tell_mesh(ctx, &file);
-            let mut findings = mesh_findings(&file.mesh, area.pictures.is_none() && makes_rgb);
-            findings.extend(size_findings(&file.mesh, options.points_per_m2)?);
-            judge(ctx, &findings, &options.allow)?;
+            judge(ctx, &mesh_doubts(area, &file.mesh, options)?, &options.allow)?;
             estimate = estimate.add(area.estimate(&file.mesh, options));
             companions.push(file.companions.clone());
             single = (inputs.areas.len() == 1).then_some(file);

@@ -140,8 +140,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let inputs = Inputs::open(&[scene.into()], placing, lenient)?;
     let area = &inputs.areas[0];
     let file = area.read_mesh()?;
-    let mut doubts: Vec<String> =
-        area.warnings.iter().chain(&area.photographs.warnings).chain(&file.warnings).cloned().collect();
+    let mut doubts: Vec<String> = area.doubts(&file).cloned().collect();
     let mesh = &file.mesh;
     let nearest = NearestFaces::new(mesh);
     let annotated = match area.is_labelled {

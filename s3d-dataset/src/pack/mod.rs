@@ -11,9 +11,9 @@ mod webdataset;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::store::new_file::NewFile;
 use crate::store::new_folder::{beside, check_apart};
-use crate::store::staging::Staging;
-use crate::store::{parent_of, refuse_existing};
+use crate::store::parent_of;
 use destination::{About, Destination};
 pub use options::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions,
@@ -44,15 +44,11 @@ pub fn pack(dataset: &Path, kind: PackageKind, options: &PackOptions, ctx: &Cont
     };
     if kind == PackageKind::Parquet {
         check_apart(&place, dataset)?;
-        let (parent, name) = (parent_of(&place), Path::new(place.file_name().unwrap_or_default()));
-        if !Staging::is_left(&parent, name) {
-            refuse_existing(&place, options.overwrite)?;
-        }
-        create_dir(&parent)?;
-        let staging = Staging::begin(ctx, &parent, name)?;
-        refuse_existing(&place, options.overwrite || staging.was_placing())?;
-        parquet::pack(ctx, &source, &staging.path().join(name))?;
-        staging.place_files(&parent)?;
+        NewFile::check_free(&place, options.overwrite)?;
+        create_dir(&parent_of(&place))?;
+        let table = NewFile::begin(ctx, &place, options.overwrite)?;
+        parquet::pack(ctx, &source, table.path())?;
+        table.finish()?;
         source.frame_notes().iter().for_each(|note| ctx.info(note));
     } else {
         let destination = Destination::begin(ctx, &place, dataset, options.overwrite)?;

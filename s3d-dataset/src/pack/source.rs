@@ -44,7 +44,7 @@ impl Source {
             let of_area = data.photographs(area)?.into_iter();
             photographs.extend(of_area.map(|record| ((area, record.camera_uuid.clone()), record)));
         }
-        let Dataset { layout, manifest, files, taxonomy } = data;
+        let Dataset { layout, manifest, files, taxonomy, .. } = data;
         let there = &manifest.area_numbers;
         if let Some(area) = areas.iter().find(|a| !there.contains(a)) {
             let there: Vec<String> = there.iter().map(u32::to_string).collect();

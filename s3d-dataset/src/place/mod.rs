@@ -3,9 +3,12 @@
 
 pub(crate) mod free_space;
 
+use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::export::input::cameras::SHARE;
 use crate::export::labels::annotate::SurveyedRoom;
 use crate::export::location::{LOW_COVERAGE, Outlook};
+use crate::options::ExportOptions;
 use glam::{DVec3, Vec3, dvec3};
 use s3d_geom::{Density, NearestFaces, PointCloud, Pose, SurfaceSampler, TriMesh};
 use s3d_io::camera::{ScanLocation, uuid_from_name};
@@ -39,6 +42,37 @@ pub(crate) struct Placement {
     /// No two of a room are nearer to each other, metres.
     pub(crate) distance_m: f64,
     pub(crate) seed: u64,
+}
+
+/// How [`place_cameras`] chooses places.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaceOptions {
+    /// Of the surface that can be seen from anywhere, the share that the locations see together, above 0 to
+    /// 1. `None`: 0.95, if `apart_m` is not given either.
+    pub see: Option<f64>,
+    /// Instead: no two locations that see each other are nearer than this, metres, and every free place is
+    /// nearer than that to one.
+    pub apart_m: Option<f64>,
+    /// Everything random comes from it.
+    pub seed: u64,
+}
+
+/// Places scan locations on a mesh without labels, as an export of the mesh alone does, in its area 1: 1.5 m
+/// above surfaces that face up, inside, where a tripod could stand. All look along +Y; the most useful comes
+/// first. The same for the same mesh, options and seed, for any number of threads.
+///
+/// # Errors [`Error::Usage`] for numbers out of range, or both given; [`Error::Input`] if there is no such
+/// place, or hardly any surface is seen, with what was found and what may be wrong; [`Error::Cancelled`].
+pub fn place_cameras(scene: &Scene<'_>, options: &PlaceOptions, ctx: &Context) -> Result<Vec<ScanLocation>> {
+    let PlaceOptions { see, apart_m: place_cameras, seed } = *options;
+    ExportOptions { see, place_cameras, ..ExportOptions::default() }.canonical()?;
+    let wanted =
+        free_space::FreeSpaceOptions { share: see.unwrap_or(SHARE), distance_m: place_cameras, seed };
+    let nearest = NearestFaces::new(scene.mesh());
+    let placed = free_space::place_in_free_space(ctx, 1, scene, &nearest, wanted)?;
+    ctx.warn_each(&placed.warnings);
+    ctx.info(format_args!("{} scan locations placed: {}", placed.locations.len(), placed.seen));
+    Ok(placed.locations)
 }
 
 /// What [`place_locations`] reads.

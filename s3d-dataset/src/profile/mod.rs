@@ -8,7 +8,7 @@ pub(crate) mod loader;
 mod open3d_ml;
 mod pickle;
 mod pointcept;
-mod room;
+pub(crate) mod room;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -108,7 +108,7 @@ pub(crate) fn write(source: &Source<'_>, staged: &Layout, areas: &[u32], profile
     }
     let mut rooms = Vec::new();
     for area in areas {
-        rooms.extend(rooms_of(source, *area)?);
+        rooms.extend(rooms_of(source.layout, source.taxonomy, *area)?);
     }
     for profile in profiles {
         let dir = staged.profile_dir(profile.name());

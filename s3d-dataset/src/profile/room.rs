@@ -4,30 +4,36 @@ use super::Source;
 use crate::error::Result;
 use s3d_geom::PointCloud;
 use s3d_io::cloud::{AnnotationTree, OnFault, PointReader, TreeOptions};
-use s3d_label::Class;
+use s3d_io::dataset::Layout;
+use s3d_label::{Class, Taxonomy};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Points that are read at a time.
 const CHUNK: usize = 1 << 16;
 
-/// A room of the tree.
-pub(super) struct TreeRoom {
-    pub(super) area: u32,
+/// A room of the S3DIS tree of a data set, as its [profiles](crate::Profile) hand it to loaders: they put the
+/// points of one instance after those of another, each in the order of its file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TreeRoom {
+    /// The number of its area.
+    pub area: u32,
     /// Such as `office_3`.
-    pub(super) name: String,
+    pub name: String,
     /// Its instances, in the order of their file names as strings: `chair_10` before `chair_2`, as
     /// `sorted(glob(…))` gives them.
-    pub(super) instances: Vec<TreeInstance>,
+    pub instances: Vec<TreeInstance>,
 }
 
-/// An instance of a room.
-pub(super) struct TreeInstance {
+/// An instance of a room of the S3DIS tree.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TreeInstance {
     /// Which class of S3DIS it counts as: loaders of S3DIS know no others.
-    pub(super) class: Class,
+    pub class: Class,
     /// The name of its file for them, `chair_1.txt`.
-    pub(super) name: String,
-    pub(super) path: PathBuf,
+    pub name: String,
+    /// The file of its points in the data set.
+    pub path: PathBuf,
 }
 
 impl TreeRoom {
@@ -43,13 +49,13 @@ impl TreeRoom {
 }
 
 /// The rooms of an area that hold points, by type and number.
-pub(super) fn rooms_of(source: &Source<'_>, area: u32) -> Result<Vec<TreeRoom>> {
-    let dir = source.layout.s3dis_area_dir(area);
+pub(crate) fn rooms_of(layout: &Layout, taxonomy: &Taxonomy, area: u32) -> Result<Vec<TreeRoom>> {
+    let dir = layout.s3dis_area_dir(area);
     let is_empty = std::fs::read_dir(&dir).is_ok_and(|mut e| !e.any(|e| e.is_ok_and(|e| e.path().is_dir())));
     if is_empty {
         return Ok(Vec::new());
     }
-    let options = TreeOptions { taxonomy: source.taxonomy.clone(), ..TreeOptions::default() };
+    let options = TreeOptions { taxonomy: taxonomy.clone(), ..TreeOptions::default() };
     let tree = AnnotationTree::open_with(&dir, &options)?;
     let rooms = tree.rooms.into_iter().map(|room| {
         // Classes that count as one share its numbers.
@@ -57,7 +63,7 @@ pub(super) fn rooms_of(source: &Source<'_>, area: u32) -> Result<Vec<TreeRoom>> 
         let named = room.instances.into_iter().map(|i| {
             let class = i.class.s3dis();
             let number = last.entry(class).and_modify(|number| *number += 1).or_insert(1);
-            let number = if source.taxonomy.is_s3dis() { i.number } else { *number };
+            let number = if taxonomy.is_s3dis() { i.number } else { *number };
             TreeInstance { class, name: format!("{class}_{number}.txt"), path: i.path }
         });
         let mut instances: Vec<TreeInstance> = named.collect();

@@ -126,8 +126,11 @@ pub fn beside(dataset: &Path, ending: &str) -> Result<PathBuf> {
     Ok(named.with_file_name(name))
 }
 
-/// Refuses a place in the data set, or one that holds it.
-pub(crate) fn check_apart(place: &Path, root: &Path) -> Result<()> {
+/// Refuses a place in the data set in `root`, or one that holds it.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn check_apart(place: &Path, root: &Path) -> Result<()> {
     let (Ok(place_at), Ok(root_at)) = (resolved(place), resolved(root)) else { return Ok(()) };
     if place_at.starts_with(&root_at) || root_at.starts_with(&place_at) {
         return Err(Error::Usage(format!(

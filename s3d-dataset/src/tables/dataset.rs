@@ -13,7 +13,7 @@ use s3d_io::fs::checksum_of_file;
 use s3d_label::Taxonomy;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 /// A complete data set.
 pub(crate) struct Dataset {
@@ -22,6 +22,16 @@ pub(crate) struct Dataset {
     pub(crate) files: Listed,
     /// Which classes and types of rooms its labels have.
     pub(crate) taxonomy: Taxonomy,
+    /// If its export did not finish.
+    pub(crate) unfinished: Option<Unfinished>,
+}
+
+/// What an export that did not finish has, and what it lacks.
+pub(crate) struct Unfinished {
+    /// The photographs that are views already, by area.
+    pub(crate) photographs: BTreeMap<u32, Vec<PhotographRecord>>,
+    /// What is not there yet, a sentence each.
+    pub(crate) missing: Vec<String>,
 }
 
 impl Dataset {
@@ -39,7 +49,7 @@ impl Dataset {
             return Err(FileError::format(&path, message).into());
         }
         let taxonomy = manifest.read_taxonomy(layout, |path| files.checked(path).map(drop))?;
-        Ok(Self { layout: layout.clone(), manifest, files, taxonomy })
+        Ok(Self { layout: layout.clone(), manifest, files, taxonomy, unfinished: None })
     }
 
     /// The taxonomy of its labels, if it has some.
@@ -49,6 +59,9 @@ impl Dataset {
 
     /// The photographs of an area.
     pub(crate) fn photographs(&self, area: u32) -> Result<Vec<PhotographRecord>> {
+        if let Some(unfinished) = &self.unfinished {
+            return Ok(unfinished.photographs.get(&area).cloned().unwrap_or_default());
+        }
         if self.manifest.area(area).is_none_or(|area| area.frames == 0) {
             return Ok(Vec::new());
         }
@@ -120,13 +133,14 @@ impl Listed {
     }
 
     /// How the list calls a file or folder.
-    fn name(&self, path: &Path) -> String {
+    pub(crate) fn name(&self, path: &Path) -> String {
         let below = path.strip_prefix(&self.root).unwrap_or(path);
         let names: Vec<_> = below.iter().map(|name| name.to_string_lossy()).collect();
         names.join("/")
     }
 
-    fn record(&self, path: &Path) -> Result<&FileRecord, FileError> {
+    /// What is told of a file.
+    pub(crate) fn record(&self, path: &Path) -> Result<&FileRecord, FileError> {
         let record = self.records.get(&self.name(path));
         record.ok_or_else(|| FileError::format(path, "files.csv does not name it"))
     }
@@ -187,7 +201,7 @@ impl Listed {
         &self,
         ctx: &Context,
         needed: impl Fn(&Path) -> bool,
-    ) -> Result<BTreeMap<String, String>> {
+    ) -> Result<BTreeMap<String, FileError>> {
         let path = |record: &&FileRecord| needed(&record.path_in(&self.root));
         let records: Vec<&FileRecord> = self.records().filter(path).collect();
         let faults = Mutex::new(BTreeMap::new());
@@ -196,22 +210,19 @@ impl Listed {
             &records,
             || (),
             |(), record| {
-                match record.check_size(&self.root) {
-                    Ok(()) => {}
-                    Err(e) => match Error::from(e) {
-                        e @ Error::Temporary(_) => return Err(e),
-                        e => drop(
-                            faults
-                                .lock()
-                                .unwrap_or_else(std::sync::PoisonError::into_inner)
-                                .insert(record.path.clone(), e.to_string()),
-                        ),
-                    },
+                if let Err(e) = record.check_size(&self.root) {
+                    match Error::from(e) {
+                        Error::File(e) => {
+                            let mut faults = faults.lock().unwrap_or_else(PoisonError::into_inner);
+                            faults.insert(record.path.clone(), e);
+                        }
+                        e => return Err(e),
+                    }
                 }
                 Ok(())
             },
         )?;
-        Ok(faults.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner))
+        Ok(faults.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Refuses a data set in which a file that is `needed` is gone, or is of another size.

@@ -123,6 +123,9 @@ pub(crate) struct AreaEntry {
     /// What was subtracted from the scan's coordinates, metres; not there if nothing was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) offset_m: Option<[f64; 3]>,
+    /// What the export warned of, a sentence each; not there if it did not.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) warnings: Vec<String>,
     /// What it was made from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) inputs: Vec<InputRecord>,
@@ -294,6 +297,19 @@ impl Manifest {
         match manifest.contradiction() {
             Some(message) => fault(message),
             None => Ok(manifest),
+        }
+    }
+
+    /// The manifest of an export that did not finish; `None` if that is not what the folder holds.
+    ///
+    /// # Errors
+    /// As [`Manifest::read`].
+    pub(crate) fn read_running(layout: &Layout) -> Result<Option<Self>, FileError> {
+        let path = layout.manifest();
+        let head: Head = read_manifest(&path)?;
+        match head.generator == GENERATOR && head.status == RUNNING {
+            true => read_manifest(&path).map(Some),
+            false => Ok(None),
         }
     }
 

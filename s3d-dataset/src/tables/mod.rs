@@ -8,3 +8,4 @@ pub(crate) mod manifest;
 pub(crate) mod records;
 pub(crate) mod statistics;
 pub(crate) mod summary;
+pub(crate) mod unfinished;

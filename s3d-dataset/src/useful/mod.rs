@@ -105,6 +105,11 @@ impl Finding {
         Self { condition, stops, text }
     }
 
+    /// What it says.
+    pub(crate) fn text(&self) -> String {
+        self.text.clone()
+    }
+
     /// What `info` says of it.
     pub(crate) fn sentence(&self) -> String {
         let Self { condition, stops, text } = self;

@@ -10,7 +10,7 @@
 //! candidate views are scored again too, and the points are read in all their forms.
 
 mod files;
-mod images;
+pub(crate) mod images;
 mod instances;
 mod labels;
 mod mesh;

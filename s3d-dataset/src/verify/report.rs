@@ -1,8 +1,8 @@
 //! What was checked and what is wrong: faults by topic and kind, few lines of each.
 
 use crate::error::passes;
+use s3d_io::Error as FileError;
 use s3d_io::dataset::{FileRecord, Layout};
-use s3d_io::{Error as FileError, Place};
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -205,11 +205,7 @@ impl Report {
             FileError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "missing".to_owned()
             }
-            FileError::Io { source, action, .. } => format!("cannot {action}: {source}"),
-            FileError::Format { message, place: Place::Line(line), .. } => format!("line {line}: {message}"),
-            FileError::Format { message, .. } | FileError::Unsupported { message, .. } => message.clone(),
-            FileError::Mesh { source, .. } => source.to_string(),
-            other => other.to_string(),
+            other => other.message(),
         };
         self.fault(topic, kind, error.path(), message);
     }

@@ -87,7 +87,13 @@ impl From<MemoryScene> for SceneSource {
     fn from(scene: MemoryScene) -> Self {
         let MemoryScene { area, mesh, annotations, locations } = scene;
         let mesh = Arc::new(MeshFile::in_memory(MESH, mesh));
-        Self::Memory(Arc::new(SharedScene { area, mesh, annotations, locations }))
+        SharedScene::new(area, mesh, annotations, locations).into()
+    }
+}
+
+impl From<SharedScene> for SceneSource {
+    fn from(scene: SharedScene) -> Self {
+        Self::Memory(Arc::new(scene))
     }
 }
 
@@ -101,6 +107,16 @@ pub struct SharedScene {
 }
 
 impl SharedScene {
+    /// A [`MemoryScene`] whose mesh its caller shares.
+    pub fn new(
+        area: u32,
+        mesh: Arc<MeshFile>,
+        annotations: Option<Annotations>,
+        locations: Vec<ScanLocation>,
+    ) -> Self {
+        Self { area, mesh, annotations, locations }
+    }
+
     /// What messages call it.
     pub(crate) fn name(&self) -> PathBuf {
         format!("area {} in memory", self.area).into()

@@ -492,13 +492,31 @@ impl AreaInput {
         }
     }
 
+    /// What was odd in mesh, annotations and photographs, a sentence each.
+    pub(crate) fn doubts<'a>(&'a self, file: &'a MeshFile) -> impl Iterator<Item = &'a String> {
+        self.warnings.iter().chain(&self.photographs.warnings).chain(&file.warnings)
+    }
+
+    /// A sentence about this area with its files named as the manifest names them, which is the same wherever
+    /// the scene lies.
+    pub(crate) fn with_short_names(&self, sentence: &str, companions: &[PathBuf]) -> String {
+        let mut paths: Vec<&PathBuf> = self.sources.iter().chain(&self.files).chain(companions).collect();
+        paths.push(&self.path);
+        // A name without folders is short already, and might be a word of the sentence.
+        paths.retain(|path| path.components().count() > 1);
+        // What lies in a folder before the folder.
+        paths.sort_by_key(|path| std::cmp::Reverse(path.as_os_str().len()));
+        paths.iter().fold(sentence.to_owned(), |text, path| {
+            text.replace(&*path.to_string_lossy(), &requested::name_of(&self.path, path))
+        })
+    }
+
     /// Logs what the area's mesh is, and what was odd in mesh and annotations.
     pub(crate) fn tell_mesh(&self, ctx: &Context, file: &MeshFile) {
         self.frame.tell(ctx);
         self.notes.iter().for_each(|note| ctx.info(note));
         self.photographs.notes.iter().for_each(|note| ctx.info(note));
-        let doubts = self.warnings.iter().chain(&self.photographs.warnings).chain(&file.warnings);
-        doubts.for_each(|w| ctx.warn(w));
+        ctx.warn_each(self.doubts(file));
         ctx.info(format_args!(
             "{}: {} faces, {} vertices, {} textures, {:.1} m²",
             self.source.describe(),

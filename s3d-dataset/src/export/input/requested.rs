@@ -121,7 +121,7 @@ fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<BTreeMap<&'a Pa
 }
 
 /// What an input is called: its path from the folder of what the user named, or else its last part.
-fn name_of(scene: &Path, path: &Path) -> String {
+pub(super) fn name_of(scene: &Path, path: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     match path.strip_prefix(folder) {
         Ok(below) if below.is_relative() && below.components().next().is_some() => slashed(below),

@@ -45,6 +45,8 @@ pub(crate) struct AreaPlan {
     pub(crate) mesh_area_m2: f64,
     /// Faces of its file that the mesh has not.
     pub(crate) faces_left_out: usize,
+    /// What should be looked at, a sentence each.
+    pub(crate) warnings: Vec<String>,
 }
 
 /// The annotated instances of a room, without their points.
@@ -289,6 +291,7 @@ mod tests {
                 mesh_box: boxes.1,
                 mesh_area_m2: number,
                 faces_left_out: 5,
+                warnings: vec!["one \"thing\"\n".into(), String::new()],
             }
         }
     }

@@ -1,7 +1,7 @@
 //! One image after another: its files against each other, and against the mesh.
 
 pub(crate) mod diagnosis;
-mod pixels;
+pub(crate) mod pixels;
 pub(crate) mod rays;
 mod shade;
 

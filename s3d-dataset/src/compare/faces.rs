@@ -1,0 +1,134 @@
+//! The labels of faces, where both data sets have the same mesh.
+
+use super::comparison::{AreaChanges, ChangedPatch, FaceChange, Geometry, LabelCounts, LabelPairs, Side};
+use super::names::{NULL, Names};
+use super::sides::Sides;
+use crate::context::Context;
+use crate::error::Result;
+use s3d_geom::glam::DVec3;
+use s3d_geom::{TriMesh, face_patches};
+use s3d_io::Error as FileError;
+use s3d_io::mesh::{UpAxis, read_mesh};
+
+/// So many patches of an area are told.
+const MAX_PATCHES: usize = 300;
+
+/// A mesh with the number of each face's label.
+struct Labelled {
+    mesh: TriMesh,
+    label_of_face: Vec<u32>,
+}
+
+/// Compares the meshes of all areas; faces with other labels come to `pairs`.
+pub(crate) fn compare(
+    sides: &Sides,
+    names: Option<&Names>,
+    pairs: &mut LabelPairs,
+    ctx: &Context,
+) -> Result<Vec<AreaChanges>> {
+    let areas = sides.areas();
+    let progress = ctx.progress("comparing", "meshes", areas.len() as u64);
+    let mut all = Vec::new();
+    for area in areas {
+        ctx.check()?;
+        let faces = |side| sides.of(side).0.manifest.area(area).map(|entry| entry.faces as u64);
+        let mut changes = AreaChanges {
+            area,
+            faces_a: faces(Side::A),
+            faces_b: faces(Side::B),
+            geometry: Geometry::OneSided,
+            faces_changed: 0,
+            m2_changed: 0.0,
+            faces: Vec::new(),
+            patches: Vec::new(),
+        };
+        if changes.faces_a.is_some() && changes.faces_b.is_some() {
+            changes.geometry = of_area(sides, names, area, &mut changes, pairs)?;
+        }
+        all.push(changes);
+        progress.add(1);
+    }
+    Ok(all)
+}
+
+fn of_area(
+    sides: &Sides,
+    names: Option<&Names>,
+    area: u32,
+    changes: &mut AreaChanges,
+    pairs: &mut LabelPairs,
+) -> Result<Geometry> {
+    let [a, b] = [Side::A, Side::B].map(|side| sides.of(side).layout().semantic_obj(area));
+    let is_labelled = sides.both().iter().all(|(_, data)| data.taxonomy().is_some());
+    if !is_labelled {
+        let [a, b] = [Side::A, Side::B].map(|side| sides.of(side).layout().rgb_obj(area));
+        return Ok(if sides.are_same(&a, &b) { Geometry::Same } else { Geometry::Unlabelled });
+    }
+    // Materials are labels, and named in the mesh itself.
+    if sides.are_same(&a, &b) {
+        return Ok(Geometry::Same);
+    }
+    let Some(names) = names else { return Ok(Geometry::Unread) };
+    let read = |side| sides.keep(side, labelled_mesh(sides, side, names, area));
+    let (a, b) = rayon::join(|| read(Side::A), || read(Side::B));
+    let (Some(a), Some(b)) = (a?, b?) else { return Ok(Geometry::Unread) };
+    let faces = a.mesh.faces().len();
+    let is_same = |face: u32| a.mesh.triangle(face) == b.mesh.triangle(face);
+    if faces != b.mesh.faces().len() || !(0..faces as u32).all(is_same) {
+        return Ok(Geometry::Other);
+    }
+    for (face, labels) in (0..).zip(a.label_of_face.iter().copied().zip(b.label_of_face.iter().copied())) {
+        if labels.0 != labels.1 {
+            let m2 = a.mesh.area(face);
+            *pairs.entry(labels).or_default() += LabelCounts { faces: 1, m2, pixels: 0 };
+            changes.faces_changed += 1;
+            changes.m2_changed += m2;
+            let (a, b) = (names.index(Side::A, labels.0), names.index(Side::B, labels.1));
+            changes.faces.push(FaceChange { face, a, b });
+        }
+    }
+    changes.patches = patches(&a.mesh, names, &changes.faces);
+    Ok(Geometry::Same)
+}
+
+/// The largest patches of changed faces, those of another class first.
+fn patches(mesh: &TriMesh, names: &Names, changes: &[FaceChange]) -> Vec<ChangedPatch> {
+    let faces: Vec<(u32, (u32, u32))> = changes.iter().map(|of| (of.face, (of.a, of.b))).collect();
+    let center = |face: u32| mesh.triangle(face).map(|corner| corner.as_dvec3()).iter().sum::<DVec3>() / 3.0;
+    let patch = |places: Vec<usize>| {
+        let of_patch: Vec<FaceChange> =
+            places.into_iter().filter_map(|place| changes.get(place)).copied().collect();
+        let m2: f64 = of_patch.iter().map(|of| mesh.area(of.face)).sum();
+        let middle = of_patch.iter().map(|of| mesh.area(of.face) * center(of.face)).sum::<DVec3>() / m2;
+        let away = |of: &&FaceChange| center(of.face).distance_squared(middle);
+        let nearest = of_patch.iter().min_by(|x, y| away(x).total_cmp(&away(y)))?;
+        let (FaceChange { face, a, b }, faces) = (*nearest, of_patch.len() as u64);
+        Some(ChangedPatch { a, b, faces, m2, center: center(face).to_array() })
+    };
+    let mut patches: Vec<ChangedPatch> = face_patches(mesh, &faces).into_iter().filter_map(patch).collect();
+    patches.sort_by(|x, y| {
+        let same_class = |of: &ChangedPatch| names.have_same_class(of.a, of.b);
+        same_class(x).cmp(&same_class(y)).then(y.m2.total_cmp(&x.m2))
+    });
+    patches.truncate(MAX_PATCHES);
+    patches
+}
+
+/// Reads `semantic.obj`.
+fn labelled_mesh(sides: &Sides, side: Side, names: &Names, area: u32) -> Result<Labelled> {
+    let data = &sides.of(side).0;
+    let path = data.layout.semantic_obj(area);
+    data.files.checked(&path.with_extension("mtl"))?;
+    let mesh = read_mesh(data.files.checked(&path)?, UpAxis::Y)?.mesh;
+    let number = |name: &str| {
+        names.number(side, name).ok_or_else(|| {
+            let message = format!("the material {name:?} is no label of semantic_labels.json");
+            FileError::format(&path, message)
+        })
+    };
+    let numbers: Vec<u32> =
+        mesh.materials().iter().map(|m| number(&m.name)).collect::<Result<_, FileError>>()?;
+    let of = |face| mesh.material_of(face).map_or(NULL, |material| numbers[material as usize]);
+    let label_of_face = (0..mesh.faces().len() as u32).map(of).collect();
+    Ok(Labelled { mesh, label_of_face })
+}

@@ -1,0 +1,311 @@
+//! The images that are in both data sets, one pair after another.
+
+use super::comparison::{ClassPixels, ImageChange, LabelPairs, ModalityChanges, PoseChanges, Side};
+use super::names::Names;
+use super::pixels::{Meaning, Sums, compare};
+use super::poses::Moved;
+use super::sides::Sides;
+use super::views::{FoundImage, ImageKey, Views};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::export::work::map_in_order;
+use crate::verify::images::pixels::Pixels;
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{Domain, PoseFile};
+use std::path::PathBuf;
+
+/// What differs between the images.
+pub(crate) struct Images {
+    pub(crate) modalities: Vec<ModalityChanges>,
+    pub(crate) changed: Vec<ImageChange>,
+    pub(crate) poses: PoseChanges,
+    /// Images without poses on both sides, whose pixels were compared all the same.
+    pub(crate) without_poses: u64,
+}
+
+/// What became of the files of a modality, in both an image.
+#[derive(Clone, Copy)]
+enum Found {
+    Same,
+    Compared(Sums),
+    OtherPose,
+    OtherForm,
+    Unread,
+    OnlyA,
+    OnlyB,
+}
+
+/// What became of an image.
+struct Outcome {
+    found: Vec<(Domain, Found)>,
+    pose: PoseFound,
+    pairs: LabelPairs,
+}
+
+/// What became of its pose.
+#[derive(Clone, Copy)]
+enum PoseFound {
+    /// Not in both, or could not be read.
+    None,
+    /// Not to be told: of a view at other angles.
+    Redrawn,
+    Same,
+    Moved(Moved),
+}
+
+/// Whether both see the same.
+#[derive(Clone, Copy, PartialEq)]
+enum SameCamera {
+    Yes,
+    No,
+    Unread,
+}
+
+/// Compares all images; pixels with other labels come to `pairs`.
+pub(crate) fn compare_all(
+    sides: &Sides,
+    views: &Views,
+    names: Option<&Names>,
+    pairs: &mut LabelPairs,
+    ctx: &Context,
+) -> Result<Images> {
+    let jobs: Vec<(&ImageKey, &[Option<FoundImage>; 2])> = views.images.iter().collect();
+    let progress = ctx.progress("comparing", "images", jobs.len() as u64);
+    let work = Work { sides, views, names };
+    let outcomes = map_in_order(
+        ctx,
+        &jobs,
+        || (),
+        |(), (key, pair)| {
+            let outcome = work.image(key, pair);
+            progress.add(1);
+            outcome
+        },
+    )?;
+    drop(progress);
+    let mut images = Images {
+        modalities: Domain::ALL
+            .map(|domain| ModalityChanges { modality: domain.folder(), ..ModalityChanges::default() })
+            .to_vec(),
+        changed: Vec::new(),
+        poses: PoseChanges::default(),
+        without_poses: 0,
+    };
+    let mut sums = [Sums::default(); Domain::ALL.len()];
+    for ((key, pair), outcome) in jobs.iter().zip(outcomes) {
+        let classes = names.map(|names| names.classes_of_image(&outcome.pairs)).unwrap_or_default();
+        for (labels, counts) in outcome.pairs {
+            *pairs.entry(labels).or_default() += counts;
+        }
+        images.add_pose(pair, outcome.pose);
+        for (domain, found) in outcome.found {
+            let classes = if domain == Domain::Semantic { &classes[..] } else { &[] };
+            images.add((key, pair), domain, (found, classes), &mut sums);
+        }
+    }
+    for (modality, sums) in images.modalities.iter_mut().zip(&sums) {
+        modality.pixels = sums.changes();
+    }
+    images.modalities.retain(|of| of.modality != Domain::Pose.folder() && *of != empty(of.modality));
+    images.poses.sort();
+    images.sort();
+    Ok(images)
+}
+
+fn empty(modality: &'static str) -> ModalityChanges {
+    ModalityChanges { modality, pixels: Sums::default().changes(), ..ModalityChanges::default() }
+}
+
+impl Images {
+    fn add_pose(&mut self, pair: &[Option<FoundImage>; 2], pose: PoseFound) {
+        let [Some(a), Some(b)] = pair else { return };
+        match pose {
+            PoseFound::None => {
+                let has = |of: &FoundImage| of.image.has(Domain::Pose);
+                self.without_poses += u64::from(!has(a) || !has(b));
+            }
+            PoseFound::Redrawn => {}
+            PoseFound::Same => self.poses.same += 1,
+            PoseFound::Moved(moved) => {
+                let path = |of: &FoundImage| of.image.relative_path(Domain::Pose);
+                self.poses.add((path(a), path(b)), moved, a.size == b.size);
+            }
+        }
+    }
+
+    fn add(
+        &mut self,
+        (key, pair): (&ImageKey, &[Option<FoundImage>; 2]),
+        domain: Domain,
+        (found, classes): (Found, &[ClassPixels]),
+        sums: &mut [Sums],
+    ) {
+        let place = Domain::ALL.iter().position(|d| *d == domain).unwrap_or_default();
+        let modality = &mut self.modalities[place];
+        match found {
+            Found::Same => modality.same += 1,
+            Found::OtherPose => modality.other_pose += 1,
+            Found::OtherForm => modality.other_form += 1,
+            Found::Unread => modality.unread += 1,
+            Found::OnlyA => modality.only_a += 1,
+            Found::OnlyB => modality.only_b += 1,
+            Found::Compared(of_image) if of_image.changed == 0 => modality.same_pixels += 1,
+            Found::Compared(of_image) => {
+                modality.changed += 1;
+                sums[place].add(&of_image);
+                if let [Some(a), Some(b)] = pair {
+                    self.changed.push(ImageChange {
+                        modality: domain.folder(),
+                        area: key.area,
+                        a: a.image.relative_path(domain),
+                        b: b.image.relative_path(domain),
+                        pixels: of_image.changes(),
+                        classes: classes.to_vec(),
+                    });
+                }
+            }
+        }
+    }
+
+    /// By modality, in their order; of one those with the largest share of pixels first.
+    fn sort(&mut self) {
+        let order = |of: &ImageChange| Domain::ALL.iter().position(|d| d.folder() == of.modality);
+        let share = |of: &ImageChange| of.pixels.pixels_changed as f64 / of.pixels.pixels as f64;
+        self.changed.sort_by(|a, b| order(a).cmp(&order(b)).then(share(b).total_cmp(&share(a))));
+    }
+}
+
+/// What all images are compared with.
+struct Work<'a> {
+    sides: &'a Sides,
+    views: &'a Views,
+    names: Option<&'a Names>,
+}
+
+impl Work<'_> {
+    fn image(&self, key: &ImageKey, pair: &[Option<FoundImage>; 2]) -> Result<Outcome> {
+        let mut outcome = Outcome { found: Vec::new(), pose: PoseFound::None, pairs: LabelPairs::new() };
+        let has = |of: &Option<FoundImage>, domain| of.as_ref().is_some_and(|of| of.image.has(domain));
+        let mut camera = None;
+        for domain in Domain::ALL {
+            let found = match (has(&pair[0], domain), has(&pair[1], domain), pair) {
+                (true, true, [Some(a), Some(b)]) => {
+                    let camera = match camera {
+                        Some(camera) => camera,
+                        None => {
+                            let (pose, found) = self.camera(key, a, b)?;
+                            outcome.pose = pose;
+                            *camera.insert(found)
+                        }
+                    };
+                    if domain == Domain::Pose {
+                        continue;
+                    }
+                    self.domain(domain, camera, a, b, &mut outcome.pairs)?
+                }
+                (true, ..) => Found::OnlyA,
+                (_, true, _) => Found::OnlyB,
+                _ => continue,
+            };
+            outcome.found.push((domain, found));
+        }
+        Ok(outcome)
+    }
+
+    /// Whether both cameras see the same, and how they differ.
+    fn camera(&self, key: &ImageKey, a: &FoundImage, b: &FoundImage) -> Result<(PoseFound, SameCamera)> {
+        if self.views.redrawn.contains(key) {
+            return Ok((PoseFound::Redrawn, SameCamera::No));
+        }
+        if !a.image.has(Domain::Pose) || !b.image.has(Domain::Pose) {
+            // Views are drawn alike, and panoramas stand where their location is.
+            return Ok((PoseFound::None, SameCamera::Yes));
+        }
+        let path_a = a.image.path(self.sides.a.layout(), Domain::Pose);
+        let path_b = b.image.path(self.sides.b.layout(), Domain::Pose);
+        if self.sides.are_same(&path_a, &path_b) {
+            return Ok((PoseFound::Same, SameCamera::Yes));
+        }
+        let read = |side: Side, of: &FoundImage| -> Result<Option<PoseFile>> {
+            self.sides.keep(side, self.sides.of(side).pose(&of.image))
+        };
+        let (Some(pose_a), Some(pose_b)) = (read(Side::A, a)?, read(Side::B, b)?) else {
+            return Ok((PoseFound::None, SameCamera::Unread));
+        };
+        let moved = Moved::between(&pose_a, &pose_b);
+        let camera = if moved.is_same_camera() { SameCamera::Yes } else { SameCamera::No };
+        Ok((PoseFound::Moved(moved), camera))
+    }
+
+    fn domain(
+        &self,
+        domain: Domain,
+        camera: SameCamera,
+        a: &FoundImage,
+        b: &FoundImage,
+        pairs: &mut LabelPairs,
+    ) -> Result<Found> {
+        let path = |side: Side, of: &FoundImage| of.image.path(self.sides.of(side).layout(), domain);
+        let (path_a, path_b) = (path(Side::A, a), path(Side::B, b));
+        let has_other_labels = domain.is_semantic() && !self.means_same(domain);
+        if self.sides.are_same(&path_a, &path_b) && !has_other_labels {
+            return Ok(Found::Same);
+        }
+        if a.size != b.size || !self.has_same_form(domain) {
+            return Ok(Found::OtherForm);
+        }
+        match camera {
+            SameCamera::Yes => {}
+            SameCamera::No => return Ok(Found::OtherPose),
+            SameCamera::Unread => return Ok(Found::Unread),
+        }
+        let read = |side: Side, path: &PathBuf| {
+            let files = &self.sides.of(side).0.files;
+            let read = files.checked(path).and_then(|path| Pixels::read(domain, path));
+            self.sides.keep(side, read.map_err(Error::from))
+        };
+        let (Some(pixels_a), Some(pixels_b)) = (read(Side::A, &path_a)?, read(Side::B, &path_b)?) else {
+            return Ok(Found::Unread);
+        };
+        if domain == Domain::Semantic && self.names.is_none() {
+            // The table that could not be read is told of.
+            return Ok(Found::Unread);
+        }
+        let meaning = Meaning {
+            depth_units: self.sides.a.options().depth_units,
+            names: self.names,
+            taxonomies: [&self.sides.a, &self.sides.b].map(|data| &data.0.taxonomy),
+        };
+        match compare((&pixels_a, &pixels_b), domain, &meaning, pairs) {
+            Ok(Some(sums)) => Ok(Found::Compared(sums)),
+            Ok(None) => Ok(Found::OtherForm),
+            Err((side, message)) => {
+                let path = if side == Side::A { &path_a } else { &path_b };
+                self.sides.keep::<()>(side, Err(FileError::format(path, message).into()))?;
+                Ok(Found::Unread)
+            }
+        }
+    }
+
+    /// Whether equal numbers of a modality of labels mean the same in both.
+    fn means_same(&self, domain: Domain) -> bool {
+        match domain {
+            Domain::SemanticClass => {
+                let [a, b] = [&self.sides.a, &self.sides.b].map(|data| data.0.taxonomy.classes());
+                a.iter().map(|class| class.name()).eq(b.iter().map(|class| class.name()))
+            }
+            Domain::Semantic => self.names.is_none_or(Names::have_same_indices),
+            _ => true,
+        }
+    }
+
+    /// Whether numbers of a modality have the same units and axes in both.
+    fn has_same_form(&self, domain: Domain) -> bool {
+        let [a, b] = [&self.sides.a, &self.sides.b].map(|data| data.options());
+        match domain {
+            Domain::Depth => a.depth_units == b.depth_units,
+            Domain::Normal => a.normal_axes == b.normal_axes,
+            _ => true,
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! What differs between two data sets: by their lists of files first, then by what they hold.
+//!
+//! Areas are matched by number, scan locations by uuid, views by their number among the candidates of their
+//! location, labels and classes by name. Files to which both lists give the same bytes are not read, but for
+//! images of labels whose indices mean others. What cannot be read is told, and the rest is compared.
+
+pub(crate) mod comparison;
+mod faces;
+mod files;
+mod images;
+mod lines;
+mod names;
+mod pixels;
+mod poses;
+mod sides;
+mod text;
+mod views;
+
+use crate::context::Context;
+use crate::error::Result;
+use comparison::{Comparison, Geometry, LabelPairs};
+use images::Images;
+use names::Names;
+use s3d_io::dataset::Domain;
+use sides::{Sides, about};
+use std::path::Path;
+
+/// How two data sets are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CompareOptions {
+    /// Besides, read every file of both and hold it against its checksum. Otherwise all sizes are, and the
+    /// checksums of what is read.
+    pub full: bool,
+}
+
+/// Compares two data sets, in the folders `a` and `b`. Neither is altered.
+///
+/// # Errors
+/// [`Error::Usage`](crate::Error::Usage) if one is not there;
+/// [`Error::File`](crate::Error::File) if it is not complete, or its manifest, list of files or conventions
+/// are damaged; [`Error::Cancelled`](crate::Error::Cancelled). Other files that are missing or damaged are
+/// no error: [`Comparison::unread`] has them.
+pub fn compare(a: &Path, b: &Path, options: &CompareOptions, ctx: &Context) -> Result<Comparison> {
+    let sides = Sides::open(a, b)?;
+    files::check(&sides, options.full, ctx)?;
+    let (settings, inputs) = files::made(&sides)?;
+    let files = files::changes(&sides);
+    let names = Names::read(&sides)?;
+    let mut pairs = LabelPairs::new();
+    let areas = faces::compare(&sides, names.as_ref(), &mut pairs, ctx)?;
+    let views = views::compare(&sides)?;
+    let images = images::compare_all(&sides, &views, names.as_ref(), &mut pairs, ctx)?;
+    let mut notes = notes(&sides, &images);
+    notes.extend(
+        areas
+            .iter()
+            .filter(|of| of.geometry == Geometry::Other)
+            .map(|of| format!("area {}: the meshes differ; labels were compared by pixels alone", of.area)),
+    );
+    let same = files.iter().all(|kind| kind.changed + kind.only_a + kind.only_b == 0);
+    let (about_a, about_b) = (about(a, &sides.a), about(b, &sides.b));
+    let unread = sides.into_unread();
+    Ok(Comparison {
+        equal: same && unread.is_empty(),
+        full: options.full,
+        a: about_a,
+        b: about_b,
+        settings,
+        inputs,
+        files,
+        areas,
+        labels: names.map(|names| names.changes(&pairs)),
+        views: views.changes,
+        modalities: images.modalities,
+        images: images.changed,
+        poses: images.poses,
+        notes,
+        unread,
+    })
+}
+
+/// What was not compared, or otherwise than by itself.
+fn notes(sides: &Sides, images: &Images) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (side, other) in [(&sides.a, &sides.b), (&sides.b, &sides.a)] {
+        let name = |data: &_| if std::ptr::eq(data, &sides.a) { "A" } else { "B" };
+        let alone: Vec<String> =
+            side.areas().iter().filter(|area| !other.areas().contains(area)).map(u32::to_string).collect();
+        if !alone.is_empty() {
+            notes.push(format!("only {} has area {}", name(side), alone.join(", ")));
+        }
+        if side.taxonomy().is_some() && other.taxonomy().is_none() {
+            notes.push(format!("only {} has labels", name(side)));
+        }
+    }
+    if let (Some(a), Some(b)) = (sides.a.taxonomy(), sides.b.taxonomy())
+        && a.definition() != b.definition()
+    {
+        let (a, b) = (a.name(), b.name());
+        notes.push(format!("classes are those of {a} in A and of {b} in B; they were compared by name"));
+    }
+    let forms = [sides.a.options().conventions(), sides.b.options().conventions()];
+    let has = |domain| images.modalities.iter().any(|of| of.modality == domain && of.other_form > 0);
+    if has(Domain::Depth.folder()) && forms[0].depth_units != forms[1].depth_units {
+        let [a, b] = forms.map(|form| form.depth_units);
+        notes.push(format!("depth is in units of {a} in A and {b} in B; its pixels were not compared"));
+    }
+    if has(Domain::Normal.folder()) && forms[0].normal_axes != forms[1].normal_axes {
+        let [a, b] = forms.map(|form| form.normal_axes.name());
+        notes.push(format!("normals have the axes {a} in A and {b} in B; their pixels were not compared"));
+    }
+    if images.without_poses > 0 {
+        let images = images.without_poses;
+        notes.push(format!(
+            "{images} images have no poses in both; those of the same name among their location's images \
+             were taken to see the same"
+        ));
+    }
+    notes
+}

@@ -1,0 +1,276 @@
+//! How the pixels of two images of a modality differ.
+
+use super::comparison::{LabelCounts, LabelPairs, PixelChanges, Side};
+use super::names::{MISSING, Names};
+use crate::export::modality::NO_CLASS;
+use crate::verify::images::pixels::Pixels;
+use s3d_geom::Raster;
+use s3d_io::dataset::{DepthUnits, Domain};
+use s3d_label::Taxonomy;
+use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
+
+/// What the numbers of both mean.
+pub(crate) struct Meaning<'a> {
+    pub(crate) depth_units: DepthUnits,
+    pub(crate) names: Option<&'a Names>,
+    pub(crate) taxonomies: [&'a Taxonomy; 2],
+}
+
+/// Sums over the pixels of one or more images.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sums {
+    pub(crate) pixels: u64,
+    pub(crate) changed: u64,
+    /// Of colours: the sum of squares, and how many numbers there are.
+    squares: u64,
+    samples: u64,
+    /// Of what has a distance: over pixels that see something in both.
+    total: f64,
+    seen: u64,
+    largest: f64,
+}
+
+impl Sums {
+    /// These and those of another image.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.pixels += other.pixels;
+        self.changed += other.changed;
+        self.squares += other.squares;
+        self.samples += other.samples;
+        self.total += other.total;
+        self.seen += other.seen;
+        self.largest = self.largest.max(other.largest);
+    }
+
+    pub(crate) fn changes(&self) -> PixelChanges {
+        let mean_square = self.squares as f64 / self.samples as f64;
+        let psnr = || 10.0 * libm::log10(255.0 * 255.0 / mean_square);
+        PixelChanges {
+            pixels: self.pixels,
+            pixels_changed: self.changed,
+            psnr_db: (self.squares > 0).then(psnr),
+            mean: (self.seen > 0).then(|| self.total / self.seen as f64),
+            largest: (self.seen > 0).then_some(self.largest),
+        }
+    }
+
+    /// Compares pixel by pixel: whether they are the same, and how far apart if both see something.
+    fn of<T: Copy>(
+        a: &Raster<T>,
+        b: &Raster<T>,
+        is_same: impl Fn(T, T) -> bool,
+        distance: impl Fn(T, T) -> Option<f64>,
+    ) -> Self {
+        let mut sums = Self { pixels: a.len() as u64, ..Self::default() };
+        for (&a, &b) in a.pixels().iter().zip(b.pixels()) {
+            let is_same = is_same(a, b);
+            sums.changed += u64::from(!is_same);
+            if let Some(distance) = distance(a, b).filter(|distance| distance.is_finite()) {
+                sums.seen += 1;
+                if !is_same {
+                    sums.total += distance;
+                    sums.largest = sums.largest.max(distance);
+                }
+            }
+        }
+        sums
+    }
+}
+
+/// Compares two images of a modality; labels that differ come to `pairs`. An error is what is wrong with the
+/// image of a side; `None`, if they have other sizes.
+pub(crate) fn compare(
+    (a, b): (&Pixels, &Pixels),
+    domain: Domain,
+    meaning: &Meaning<'_>,
+    pairs: &mut LabelPairs,
+) -> Result<Option<Sums>, (Side, String)> {
+    if a.size() != b.size() {
+        return Ok(None);
+    }
+    Ok(Some(match (a, b) {
+        (Pixels::Color(a), Pixels::Color(b)) => match domain {
+            Domain::Semantic => labels(a, b, meaning, pairs)?,
+            Domain::Normal => Sums::of(a, b, |a, b| a == b, normal_angle),
+            Domain::Rgb => colors(a, b),
+            // Their colours tell instances apart, and nothing else.
+            Domain::SemanticPretty => Sums::of(a, b, |a, b| a == b, |_, _| None),
+            // These have no colours.
+            Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => return Ok(None),
+        },
+        (Pixels::Depth(a), Pixels::Depth(b)) => {
+            let metres = |a: u16, b: u16| f64::from(a.abs_diff(b)) / meaning.depth_units.per_m();
+            let seen = |a: u16, b: u16| (a != MISSING_DEPTH && b != MISSING_DEPTH).then(|| metres(a, b));
+            Sums::of(a, b, |a, b| a == b, seen)
+        }
+        (Pixels::Class(a, _), Pixels::Class(b, _)) => classes(a, b, meaning)?,
+        (Pixels::Xyz(a), Pixels::Xyz(b)) => {
+            let is_same = |a: [f32; 3], b: [f32; 3]| a.map(f32::to_bits) == b.map(f32::to_bits);
+            Sums::of(a, b, is_same, distance)
+        }
+        // A modality has one kind of pixels.
+        _ => return Ok(None),
+    }))
+}
+
+fn colors(a: &Raster<[u8; 3]>, b: &Raster<[u8; 3]>) -> Sums {
+    let mut sums = Sums::of(a, b, |a, b| a == b, |_, _| None);
+    let square = |(a, b): (&u8, &u8)| u64::from(a.abs_diff(*b)).pow(2);
+    let (a, b) = (a.pixels().as_flattened(), b.pixels().as_flattened());
+    sums.squares = a.iter().zip(b).map(square).sum();
+    sums.samples = a.len() as u64;
+    sums
+}
+
+/// The angle between two normals, degrees.
+fn normal_angle(a: [u8; 3], b: [u8; 3]) -> Option<f64> {
+    if a == MISSING_NORMAL || b == MISSING_NORMAL {
+        return None;
+    }
+    if a == b {
+        return Some(0.0);
+    }
+    let of = |n: [u8; 3]| glam::DVec3::from_array(n.map(|c| f64::from(c) - 127.5));
+    let (a, b) = (of(a), of(b));
+    Some(libm::atan2(a.cross(b).length(), a.dot(b)).to_degrees())
+}
+
+fn distance(a: [f32; 3], b: [f32; 3]) -> Option<f64> {
+    let of = |p: [f32; 3]| glam::DVec3::from_array(p.map(f64::from));
+    (a != [0.0; 3] && b != [0.0; 3]).then(|| of(a).distance(of(b)))
+}
+
+/// Images of labels: by name.
+fn labels(
+    a: &Raster<[u8; 3]>,
+    b: &Raster<[u8; 3]>,
+    meaning: &Meaning<'_>,
+    pairs: &mut LabelPairs,
+) -> Result<Sums, (Side, String)> {
+    let Some(names) = meaning.names else { return Err((Side::A, "the labels could not be read".to_owned())) };
+    let number = |side, pixel: [u8; 3]| {
+        if pixel == MISSING_INDEX {
+            return Ok(MISSING);
+        }
+        let index = u32::from_be_bytes([0, pixel[0], pixel[1], pixel[2]]);
+        names.at(side, index).ok_or_else(|| {
+            let count = names.count(side);
+            (side, format!("a pixel has label {index}, and the data set has {count} labels"))
+        })
+    };
+    let mut sums = Sums { pixels: a.len() as u64, ..Sums::default() };
+    let both: Vec<([u8; 3], [u8; 3])> = a.pixels().iter().copied().zip(b.pixels().iter().copied()).collect();
+    for run in both.chunk_by(|one, next| one == next) {
+        let Some(&(a, b)) = run.first() else { continue };
+        let labels = (number(Side::A, a)?, number(Side::B, b)?);
+        if labels.0 != labels.1 {
+            let pixels = run.len() as u64;
+            sums.changed += pixels;
+            *pairs.entry(labels).or_default() += LabelCounts { pixels, ..LabelCounts::default() };
+        }
+    }
+    Ok(sums)
+}
+
+/// Images of classes: by name.
+fn classes(a: &Raster<u8>, b: &Raster<u8>, meaning: &Meaning<'_>) -> Result<Sums, (Side, String)> {
+    let names = |side, taxonomy: &Taxonomy, image: &Raster<u8>| {
+        let all: Vec<&str> = taxonomy.classes().iter().map(|class| class.name()).collect();
+        let is_known = |place: u8| place == NO_CLASS || usize::from(place) < all.len();
+        match image.pixels().iter().find(|place| !is_known(**place)) {
+            None => Ok(all),
+            Some(place) => {
+                Err((side, format!("a pixel has class {place}, and the taxonomy has {}", all.len())))
+            }
+        }
+    };
+    let names_a = names(Side::A, meaning.taxonomies[0], a)?;
+    let names_b = names(Side::B, meaning.taxonomies[1], b)?;
+    let is_same = |a: u8, b: u8| names_a.get(usize::from(a)) == names_b.get(usize::from(b));
+    Ok(Sums::of(a, b, is_same, |_, _| None))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_label::LabelTable;
+
+    fn sums(a: Pixels, b: Pixels, domain: Domain) -> PixelChanges {
+        let taxonomy = Taxonomy::s3dis();
+        let meaning =
+            Meaning { depth_units: DepthUnits::Per512, names: None, taxonomies: [&taxonomy, &taxonomy] };
+        compare((&a, &b), domain, &meaning, &mut LabelPairs::new()).unwrap().unwrap().changes()
+    }
+
+    fn color(pixels: &[[u8; 3]]) -> Pixels {
+        Pixels::Color(Raster::from_vec(pixels.len() as u32, 1, pixels.to_vec()))
+    }
+
+    #[test]
+    fn colours_have_a_ratio_of_signal_to_noise() {
+        let same = sums(color(&[[1, 2, 3]; 2]), color(&[[1, 2, 3]; 2]), Domain::Rgb);
+        assert_eq!((same.pixels, same.pixels_changed, same.psnr_db), (2, 0, None));
+        let other = sums(color(&[[1, 2, 3]; 2]), color(&[[1, 2, 3], [1, 8, 3]]), Domain::Rgb);
+        // 36 / 6 numbers: a mean of 6.
+        let expected = 10.0 * (255.0f64 * 255.0 / 6.0).log10();
+        assert_eq!((other.pixels_changed, other.mean), (1, None));
+        assert!((other.psnr_db.unwrap() - expected).abs() < 1e-9, "{other:?}");
+    }
+
+    #[test]
+    fn normals_differ_by_angles_and_depth_by_metres() {
+        let (x, z, none) = ([255, 127, 127], [127, 127, 255], MISSING_NORMAL);
+        let found = sums(color(&[x, x, x, none]), color(&[x, z, none, none]), Domain::Normal);
+        assert_eq!((found.pixels, found.pixels_changed), (4, 2));
+        let (mean, largest) = (found.mean.unwrap(), found.largest.unwrap());
+        assert!((largest - 90.0).abs() < 0.7 && (mean - largest / 2.0).abs() < 1e-12, "{found:?}");
+
+        let depth = |values: &[u16]| Pixels::Depth(Raster::from_vec(values.len() as u32, 1, values.to_vec()));
+        let found = sums(depth(&[512, 512, 9, 65_535]), depth(&[512, 256, 65_535, 65_535]), Domain::Depth);
+        assert_eq!((found.pixels_changed, found.mean, found.largest), (2, Some(0.25), Some(0.5)));
+
+        let xyz =
+            |points: &[[f32; 3]]| Pixels::Xyz(Raster::from_vec(points.len() as u32, 1, points.to_vec()));
+        let (a, b) = ([[1.0, 1.0, 1.0], [0.0; 3]], [[1.0, 4.0, 5.0], [2.0; 3]]);
+        let found = sums(xyz(&a), xyz(&b), Domain::GlobalXyz);
+        assert_eq!((found.pixels_changed, found.mean, found.largest), (2, Some(5.0), Some(5.0)));
+    }
+
+    #[test]
+    fn classes_are_compared_by_name_and_must_be_known() {
+        let (s3dis, nyu40) = (Taxonomy::s3dis(), Taxonomy::built_in("nyu40").unwrap());
+        let place = |of: &Taxonomy, name: &str| of.class(name).unwrap().index() as u8;
+        let image = |pixels: &[u8]| Pixels::Class(Raster::from_vec(3, 1, pixels.to_vec()), Vec::new());
+        let a = image(&[place(&s3dis, "chair"), NO_CLASS, place(&s3dis, "beam")]);
+        let b = [place(&nyu40, "chair"), NO_CLASS, place(&nyu40, "wall")];
+        assert_ne!(place(&s3dis, "chair"), place(&nyu40, "chair"));
+        let meaning = Meaning { depth_units: DepthUnits::Per512, names: None, taxonomies: [&s3dis, &nyu40] };
+        let of = |b: &Pixels| compare((&a, b), Domain::SemanticClass, &meaning, &mut LabelPairs::new());
+        assert_eq!(of(&image(&b)).unwrap().unwrap().changed, 1);
+        let e = of(&image(&[b[0], 77, b[2]])).unwrap_err();
+        assert_eq!(e, (Side::B, "a pixel has class 77, and the taxonomy has 40".to_owned()));
+    }
+
+    #[test]
+    fn sizes_must_be_equal_and_labels_known() {
+        let table = LabelTable::from_labels(["chair_1_office_1_1".parse().unwrap()]).unwrap();
+        let taxonomy = Taxonomy::s3dis();
+        let names = Names::of_tables(Some(&table), Some(&table));
+        let meaning = Meaning {
+            depth_units: DepthUnits::Per512,
+            names: Some(&names),
+            taxonomies: [&taxonomy, &taxonomy],
+        };
+        let mut pairs = LabelPairs::new();
+        let mut of = |a: &Pixels, b: &Pixels| compare((a, b), Domain::Semantic, &meaning, &mut pairs);
+        let chair = [0, 0, 1];
+        assert_eq!(of(&color(&[chair]), &color(&[chair; 2])), Ok(None));
+        let e = of(&color(&[chair]), &color(&[[0, 1, 0]])).unwrap_err();
+        assert_eq!(e, (Side::B, "a pixel has label 256, and the data set has 2 labels".to_owned()));
+        let a = color(&[chair, chair, [0; 3], MISSING_INDEX]);
+        let b = color(&[chair, MISSING_INDEX, chair, MISSING_INDEX]);
+        assert_eq!(of(&a, &b).unwrap().unwrap().changed, 2);
+        let found: Vec<_> = pairs.iter().map(|(labels, counts)| (*labels, counts.pixels)).collect();
+        assert_eq!(found, [((0, 1), 1), ((1, MISSING), 1)]);
+    }
+}

@@ -1,0 +1,244 @@
+//! The text of a comparison.
+
+use super::comparison::{
+    ClassPair, ComparedSet, Comparison, FileKindChanges, Geometry, ImageChange, InstanceChange, LabelChanges,
+    LabelCounts, ModalityChanges, Side,
+};
+use super::lines::{Lines, grouped, percent, significant};
+use serde_json::Value;
+use std::fmt;
+
+/// Rows of a table that may be long.
+const MAX_ROWS: usize = 10;
+
+/// Files that could not be compared.
+const MAX_UNREAD: usize = 20;
+
+/// Digits of checksums.
+const MAX_DIGITS: usize = 12;
+
+impl fmt::Display for Comparison {
+    /// Lines for a person: tables with the largest differences first, of which the first rows are there. What
+    /// is equal has no lines. Characters of names that would steer a terminal are replaced.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let text = &mut Lines::default();
+        about(text, "A", &self.a);
+        about(text, "B", &self.b);
+        self.made(text);
+        self.files(text);
+        if let Some(labels) = &self.labels {
+            self.labels(text, labels);
+        }
+        self.views(text);
+        self.images(text);
+        self.poses(text);
+        self.notes.iter().for_each(|note| text.add(format!("note: {note}")));
+        self.end(text);
+        f.write_str(text.text())
+    }
+}
+
+impl FileKindChanges {
+    fn is_changed(&self) -> bool {
+        self.changed + self.only_a + self.only_b > 0
+    }
+}
+
+impl ModalityChanges {
+    fn is_changed(&self) -> bool {
+        let pixels = self.same_pixels + self.changed + self.other_pose + self.other_form;
+        pixels + self.unread + self.only_a + self.only_b > 0
+    }
+}
+
+impl Comparison {
+    fn made(&self, text: &mut Lines) {
+        let settings = self.settings.iter().map(|of| [of.name.clone(), words(&of.a), words(&of.b)]);
+        let mut rows: Vec<[String; 3]> = settings.collect();
+        for of in self.inputs.iter().take(MAX_ROWS) {
+            let sum = |sum: &Option<String>| {
+                sum.as_ref().map_or("none".to_owned(), |sum| sum.chars().take(MAX_DIGITS).collect())
+            };
+            rows.push([format!("area {}: {}", of.area, of.path), sum(&of.a), sum(&of.b)]);
+        }
+        text.table(["made with", "A", "B"], &rows, 3);
+        text.more(self.inputs.len().saturating_sub(MAX_ROWS));
+    }
+
+    fn files(&self, text: &mut Lines) {
+        let row = |of: &FileKindChanges| {
+            let [same, changed, a, b] = [of.same, of.changed, of.only_a, of.only_b].map(grouped);
+            [of.kind.clone(), same, changed, a, b]
+        };
+        let rows: Vec<_> = self.files.iter().filter(|of| of.is_changed()).map(row).collect();
+        text.table(["files", "same", "changed", "only A", "only B"], &rows, 1);
+    }
+
+    fn labels(&self, text: &mut Lines, labels: &LabelChanges) {
+        let LabelChanges { a, b, added, gone, changed, class_changed, matrix, instances } = labels;
+        if added.is_empty() && gone.is_empty() && matrix.is_empty() {
+            return;
+        }
+        text.add(format!("labels: {} in A, {} in B", grouped(*a), grouped(*b)));
+        names(text, "only A", gone);
+        names(text, "only B", added);
+        if matrix.is_empty() {
+            return;
+        }
+        let total = |what: &str, of: &LabelCounts| {
+            let [faces, m2, pixels] = cells(of);
+            // Faces that nobody could compare are not none.
+            let by_face = self.areas.iter().any(|of| of.geometry == Geometry::Same);
+            let surface = if by_face { format!("{faces} faces of {m2} m², ") } else { String::new() };
+            format!("  {what}: {surface}{pixels} pixels")
+        };
+        text.add(total("another label", changed));
+        text.add(total("another class", class_changed));
+        let row = |pair: &ClassPair| {
+            let [faces, m2, pixels] = cells(&pair.counts);
+            let class_b = if pair.a == pair.b { format!("another {}", pair.b) } else { pair.b.to_owned() };
+            [pair.a.to_owned(), class_b, faces, m2, pixels]
+        };
+        let rows: Vec<_> = matrix.iter().take(MAX_ROWS).map(row).collect();
+        text.table(["class in A", "class in B", "faces", "m²", "pixels"], &rows, 2);
+        text.more(matrix.len().saturating_sub(MAX_ROWS));
+        let row = |of: &InstanceChange| {
+            let ([_, lost_m2, lost], [_, gained_m2, gained]) = (cells(&of.lost), cells(&of.gained));
+            [of.name.clone(), lost_m2, lost, gained_m2, gained]
+        };
+        // Those that bear another number alone stand behind those of another class.
+        let is_of_another = |of: &&InstanceChange| of.class_changed != LabelCounts::default();
+        let of_another = instances.iter().filter(is_of_another).count();
+        let told = if of_another == 0 { instances.len() } else { of_another };
+        let rows: Vec<_> = instances.iter().take(told.min(MAX_ROWS)).map(row).collect();
+        text.table(["instance", "lost m²", "pixels", "gained m²", "pixels"], &rows, 1);
+        text.more(told.saturating_sub(MAX_ROWS));
+    }
+
+    fn views(&self, text: &mut Lines) {
+        let of = &self.views;
+        let rows = [
+            ("views", of.lost.len(), of.gained.len()),
+            ("scan locations", of.locations_lost.len(), of.locations_gained.len()),
+            ("photographs", of.photographs_lost.len(), of.photographs_gained.len()),
+        ];
+        let changed = rows.into_iter().filter(|(_, lost, gained)| lost + gained > 0);
+        let row = |(what, lost, gained): (&str, usize, usize)| {
+            [what.to_owned(), grouped(lost as u64), grouped(gained as u64)]
+        };
+        let rows: Vec<_> = changed.map(row).collect();
+        text.table(["there", "only A", "only B"], &rows, 1);
+        if !of.redrawn.is_empty() {
+            let count = grouped(of.redrawn.len() as u64);
+            text.add(format!("views in both that look elsewhere: {count}"));
+        }
+    }
+
+    fn images(&self, text: &mut Lines) {
+        let row = |of: &ModalityChanges| {
+            let counts = [of.same, of.same_pixels, of.changed, of.other_pose];
+            let [same, same_pixels, changed, other_pose] = counts.map(grouped);
+            let [other_form, unread, a, b] = [of.other_form, of.unread, of.only_a, of.only_b].map(grouped);
+            let modality = of.modality.to_owned();
+            [modality, same, same_pixels, changed, other_pose, other_form, unread, a, b]
+        };
+        let rows: Vec<_> = self.modalities.iter().filter(|of| of.is_changed()).map(row).collect();
+        let titles = ["images", "same", "same pixels", "changed", "other pose", "other form", "unread"];
+        let [images, same, same_pixels, changed, other_pose, other_form, unread] = titles;
+        let titles = [images, same, same_pixels, changed, other_pose, other_form, unread, "only A", "only B"];
+        text.table(titles, &rows, 1);
+        let row = |of: &ModalityChanges| {
+            let unit = if of.modality == "normal" { "°" } else { " m" };
+            let number = |value: Option<f64>, unit: &str| {
+                value.map_or_else(String::new, |value| significant(value) + unit)
+            };
+            let pixels = &of.pixels;
+            [
+                of.modality.to_owned(),
+                percent(pixels.pixels_changed, pixels.pixels),
+                number(pixels.psnr_db, " dB"),
+                number(pixels.mean, unit),
+                number(pixels.largest, unit),
+            ]
+        };
+        let rows: Vec<_> = self.modalities.iter().filter(|of| of.changed > 0).map(row).collect();
+        text.table(["images that changed", "pixels", "PSNR", "mean", "largest"], &rows, 1);
+        let row = |of: &ImageChange| {
+            let share = percent(of.pixels.pixels_changed, of.pixels.pixels);
+            [of.modality.to_owned(), share, of.a.clone()]
+        };
+        let first = self.images.chunk_by(|a, b| a.modality == b.modality).filter_map(|of| of.first());
+        text.table(["most changed", "pixels", "image"], &first.map(row).collect::<Vec<_>>(), 3);
+    }
+
+    fn poses(&self, text: &mut Lines) {
+        let of = &self.poses;
+        if of.moved.is_empty() {
+            return;
+        }
+        let row = |moved: &super::comparison::PoseChange| {
+            let k = moved.k_px.map_or_else(|| "other size".to_owned(), significant);
+            [moved.a.clone(), significant(moved.m), significant(moved.degrees), k]
+        };
+        let mut rows: Vec<_> = of.moved.iter().take(3).map(row).collect();
+        let largest = [of.largest_m, of.largest_degrees, of.largest_k_px].map(significant);
+        let [m, degrees, k] = largest;
+        rows.push(["largest".to_owned(), m, degrees, k]);
+        let title = format!("poses that moved: {}", grouped(of.moved.len() as u64));
+        text.table([title.as_str(), "m", "degrees", "K, pixels"], &rows, 1);
+    }
+
+    fn end(&self, text: &mut Lines) {
+        if !self.unread.is_empty() {
+            text.add("could not be compared");
+            for of in self.unread.iter().take(MAX_UNREAD) {
+                let side = if of.side == Side::A { "A" } else { "B" };
+                text.add(format!("  {side}: {}: {}", of.path, of.message));
+            }
+            text.more(self.unread.len().saturating_sub(MAX_UNREAD));
+        }
+        let files = grouped(self.a.files);
+        let is_changed = self.files.iter().any(FileKindChanges::is_changed);
+        text.add(match (self.equal, is_changed) {
+            (true, _) if self.full => format!("equal: {files} files, all read"),
+            (true, _) => {
+                format!("equal: {files} files, by their sizes and by the checksums that both lists tell")
+            }
+            (_, true) => "different".to_owned(),
+            (_, false) => {
+                "not comparable: what both lists tell is equal, and not all of it is there".to_owned()
+            }
+        });
+    }
+}
+
+fn about(text: &mut Lines, name: &str, of: &ComparedSet) {
+    let taxonomy = of.taxonomy.as_ref().map_or("no labels".to_owned(), |name| format!("classes of {name}"));
+    let (files, megabytes) = (grouped(of.files), significant(of.bytes as f64 / 1e6));
+    let ComparedSet { folder, version, .. } = of;
+    text.add(format!("{name}: {folder} (s3d {version}, {taxonomy}, {files} files, {megabytes} MB)"));
+}
+
+/// Names in a line, the first of them.
+fn names(text: &mut Lines, what: &str, all: &[String]) {
+    let first: Vec<&str> = all.iter().take(5).map(String::as_str).collect();
+    if !first.is_empty() {
+        let rest = if all.len() > first.len() { ", …" } else { "" };
+        text.add(format!("  {what}: {}: {}{rest}", grouped(all.len() as u64), first.join(", ")));
+    }
+}
+
+/// Faces, m² and pixels.
+fn cells(of: &LabelCounts) -> [String; 3] {
+    [grouped(of.faces), significant(of.m2), grouped(of.pixels)]
+}
+
+fn words(value: &Value) -> String {
+    match value {
+        Value::Null => "not set".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Array(items) if items.is_empty() => "none".to_owned(),
+        Value::Array(items) => items.iter().map(words).collect::<Vec<_>>().join(","),
+        other => other.to_string(),
+    }
+}

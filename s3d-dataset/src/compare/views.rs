@@ -1,0 +1,179 @@
+//! Which views, photographs and scan locations each data set has, and which images of both are the same one.
+
+use super::comparison::{LocationName, Side, ViewChanges, ViewName};
+use super::sides::Sides;
+use crate::error::Result;
+use s3d_io::dataset::{DatasetImage, Frame, PhotographRecord, ViewRecord};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What makes an image the same in both, in the order in which images are compared.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct ImageKey {
+    pub(crate) area: u32,
+    pub(crate) uuid: String,
+    pub(crate) kind: ImageKind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum ImageKind {
+    /// The view of so many among its location's candidates.
+    Candidate(u32),
+    /// A view of which only the number in its name is known.
+    Frame(u32),
+    Photograph,
+    Panorama,
+}
+
+/// An image, and what it would be of.
+#[derive(Clone, Debug)]
+pub(crate) struct FoundImage {
+    pub(crate) image: DatasetImage,
+    /// Width and height that the manifest tells of.
+    pub(crate) size: [u32; 2],
+}
+
+/// Images by what they are; those of A and of B.
+pub(crate) type ImagePairs = BTreeMap<ImageKey, [Option<FoundImage>; 2]>;
+
+/// The views of both.
+pub(crate) struct Views {
+    pub(crate) changes: ViewChanges,
+    pub(crate) images: ImagePairs,
+    /// Those that both keep at other angles.
+    pub(crate) redrawn: BTreeSet<ImageKey>,
+}
+
+/// What is listed of an area.
+struct Listed {
+    views: Option<Vec<ViewRecord>>,
+    photographs: BTreeMap<String, PhotographRecord>,
+}
+
+fn listed(sides: &Sides, side: Side, area: u32) -> Result<Listed> {
+    let data = sides.of(side);
+    if !data.areas().contains(&area) {
+        return Ok(Listed { views: Some(Vec::new()), photographs: BTreeMap::new() });
+    }
+    let views = sides.keep(side, data.views(area))?;
+    let photographs = sides.keep(side, data.photographs(area))?.unwrap_or_default();
+    let photographs = photographs.into_iter().map(|record| (record.camera_uuid.clone(), record)).collect();
+    Ok(Listed { views, photographs })
+}
+
+/// Reads what both list, and pairs their images.
+pub(crate) fn compare(sides: &Sides) -> Result<Views> {
+    let mut views =
+        Views { changes: ViewChanges::default(), images: BTreeMap::new(), redrawn: BTreeSet::new() };
+    for area in sides.areas() {
+        let (a, b) = (listed(sides, Side::A, area)?, listed(sides, Side::B, area)?);
+        let both = [(Side::A, &a), (Side::B, &b)];
+        let mut numbers: [BTreeMap<(&str, u32), u32>; 2] = Default::default();
+        if let (Some(views_a), Some(views_b)) = (&a.views, &b.views) {
+            views.drawn(area, views_a, views_b);
+            numbers = [views_a, views_b].map(|all| candidates(all));
+        }
+        for (place, (side, listed)) in both.into_iter().enumerate() {
+            let data = sides.of(side);
+            for image in data.images(area) {
+                let photograph = listed.photographs.get(&image.uuid);
+                let candidate = |frame| numbers[place].get(&(image.uuid.as_str(), frame)).copied();
+                let kind = match (image.frame, photograph) {
+                    (Frame::Panorama, _) => ImageKind::Panorama,
+                    (Frame::View(_), Some(_)) => ImageKind::Photograph,
+                    (Frame::View(frame), None) => {
+                        candidate(frame).map_or(ImageKind::Frame(frame), ImageKind::Candidate)
+                    }
+                };
+                let options = data.options();
+                let size = match (kind, photograph) {
+                    (ImageKind::Panorama, _) => [options.pano_width, options.pano_width / 2],
+                    (_, Some(record)) => [record.width, record.height],
+                    (_, None) => [options.size; 2],
+                };
+                let key = ImageKey { area, uuid: image.uuid.clone(), kind };
+                views.images.entry(key).or_default()[place] = Some(FoundImage { image, size });
+            }
+        }
+        let [locations_a, locations_b] = both.map(|(side, listed)| locations(sides, side, listed, area));
+        let named = |uuids: &BTreeSet<String>, others: &BTreeSet<String>| -> Vec<LocationName> {
+            uuids.difference(others).map(|uuid| LocationName { area, uuid: uuid.clone() }).collect()
+        };
+        let [photos_a, photos_b] = [&a, &b].map(|of| of.photographs.keys().cloned().collect());
+        let changes = &mut views.changes;
+        changes.locations_lost.extend(named(&locations_a, &locations_b));
+        changes.locations_gained.extend(named(&locations_b, &locations_a));
+        changes.photographs_lost.extend(named(&photos_a, &photos_b));
+        changes.photographs_gained.extend(named(&photos_b, &photos_a));
+    }
+    Ok(views)
+}
+
+/// The candidates of kept views, by location and the number in their files' names.
+fn candidates(views: &[ViewRecord]) -> BTreeMap<(&str, u32), u32> {
+    let kept = views.iter().filter_map(|v| Some(((v.camera_uuid.as_str(), v.frame_num?), v.candidate)));
+    kept.collect()
+}
+
+/// The scan locations of an area: those that candidates or panoramas are of.
+fn locations(sides: &Sides, side: Side, listed: &Listed, area: u32) -> BTreeSet<String> {
+    let of_views = listed.views.iter().flatten().map(|view| view.camera_uuid.clone());
+    let images = sides.of(side).images(area).into_iter();
+    let of_images = images.map(|image| image.uuid).filter(|uuid| !listed.photographs.contains_key(uuid));
+    of_views.chain(of_images).collect()
+}
+
+impl Views {
+    /// Compares the kept views of an area.
+    fn drawn(&mut self, area: u32, a: &[ViewRecord], b: &[ViewRecord]) {
+        type Kept<'v> = BTreeMap<(&'v str, u32), &'v ViewRecord>;
+        let kept = |views: &'_ [ViewRecord]| views.iter().filter(|v| v.frame_num.is_some()).count() as u64;
+        fn by_name(views: &[ViewRecord]) -> Kept<'_> {
+            let kept = views.iter().filter(|view| view.frame_num.is_some());
+            kept.map(|view| ((view.camera_uuid.as_str(), view.candidate), view)).collect()
+        }
+        let changes = &mut self.changes;
+        changes.kept_a += kept(a);
+        changes.kept_b += kept(b);
+        let (a, b) = (by_name(a), by_name(b));
+        let name = |(uuid, candidate): (&str, u32)| ViewName { area, uuid: uuid.to_owned(), candidate };
+        changes.lost.extend(a.keys().filter(|key| !b.contains_key(*key)).map(|key| name(*key)));
+        changes.gained.extend(b.keys().filter(|key| !a.contains_key(*key)).map(|key| name(*key)));
+        let angles = |view: &ViewRecord| [view.yaw_rad, view.pitch_rad, view.fov_rad];
+        for (key, view) in a {
+            if b.get(&key).is_some_and(|other| angles(view) != angles(other)) {
+                changes.redrawn.push(name(key));
+                let (uuid, kind) = (key.0.to_owned(), ImageKind::Candidate(key.1));
+                self.redrawn.insert(ImageKey { area, uuid, kind });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_are_named_by_location_and_candidate() {
+        let view = |candidate, yaw_rad, frame_num| ViewRecord {
+            camera_uuid: "a".into(),
+            candidate,
+            yaw_rad,
+            pitch_rad: 0.0,
+            fov_rad: 1.0,
+            entropy: 0.0,
+            frame_num,
+        };
+        let a = [view(0, 0.0, Some(0)), view(1, 0.5, Some(1)), view(2, 1.0, None), view(3, 1.5, Some(2))];
+        let b = [view(0, 0.0, None), view(1, 0.5, Some(0)), view(2, 1.0, Some(1)), view(3, 1.6, Some(2))];
+        let mut views =
+            Views { changes: ViewChanges::default(), images: BTreeMap::new(), redrawn: BTreeSet::new() };
+        views.drawn(7, &a, &b);
+        let ViewChanges { kept_a, kept_b, lost, gained, redrawn, .. } = views.changes;
+        let name = |candidate| ViewName { area: 7, uuid: "a".into(), candidate };
+        assert_eq!((kept_a, kept_b), (3, 3));
+        assert_eq!((lost, gained, redrawn), (vec![name(0)], vec![name(2)], vec![name(3)]));
+        assert_eq!(candidates(&b)[&("a", 0)], 1);
+        assert_eq!(views.redrawn.len(), 1);
+    }
+}

@@ -1,0 +1,79 @@
+//! A data set whose export did not finish, as far as it is.
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::export::finish::missing_units;
+use crate::store::journal::{Finished, Unit};
+use crate::store::output::read_request;
+use crate::store::request::Request;
+use crate::tables::dataset::{Dataset, Listed, Unfinished};
+use crate::tables::listing;
+use crate::tables::manifest::{AreaEntry, Manifest};
+use crate::tables::summary::UnitTally;
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Layout;
+use std::path::PathBuf;
+
+impl Dataset {
+    /// As [`Dataset::open`], of an export that did not finish, too: of that the files of finished units, as
+    /// its journals tell of them. Tables over all units are not there.
+    pub(crate) fn open_as_far_as_it_is(ctx: &Context, layout: &Layout) -> Result<Self> {
+        let Some(mut manifest) = Manifest::read_running(layout)? else { return Self::open(layout) };
+        let Some(request) = read_request(layout)? else {
+            let message = "the export did not finish, and what it was to be is not known";
+            return Err(FileError::format(&layout.manifest(), message).into());
+        };
+        let finished = Finished::read(ctx, layout)?;
+        let first: Vec<PathBuf> = listing::walk(&layout.assets_dir())?;
+        let first = listing::records(ctx, layout, &[first, vec![layout.conventions()]].concat())?;
+        let of_units = finished.iter().flat_map(|done| done.files().iter().cloned());
+        let files = Listed::of(layout.root(), of_units.chain(first));
+        manifest.areas = request.numbers().into_iter().filter_map(|area| entry(&finished, area)).collect();
+        let photographs = |area| finished.photographs(area).map(|done| done.record.clone()).collect();
+        let photographs = request.numbers().into_iter().map(|area| (area, photographs(area))).collect();
+        let taxonomy = manifest.read_taxonomy(layout, |_| Ok(()))?;
+        let unfinished = Unfinished { photographs, missing: sentences(&request, &finished) };
+        let unfinished = Some(unfinished);
+        Ok(Self { layout: layout.clone(), manifest, files, taxonomy, unfinished })
+    }
+}
+
+/// What the manifest would tell of an area that is labelled.
+fn entry(finished: &Finished, area: u32) -> Option<AreaEntry> {
+    let of_photographs = finished.photographs(area).map(|done| done.tally);
+    let of_locations = finished.locations(area).map(|done| done.tally);
+    let tally: UnitTally = of_locations.chain(of_photographs).sum();
+    Some(AreaEntry {
+        points: finished.assets(area).map_or(0, |assets| assets.points),
+        panoramas: tally.panoramas.images,
+        views: tally.views.images,
+        frames: finished.photographs(area).count() as u64,
+        ..(*finished.labels(area)?.entry).clone()
+    })
+}
+
+fn sentences(request: &Request, finished: &Finished) -> Vec<String> {
+    let missing = missing_units(request, finished);
+    let mut sentences = Vec::new();
+    for area in request.numbers() {
+        let count =
+            |is: fn(&Unit) -> bool| missing.iter().filter(|unit| unit.area() == area && is(unit)).count();
+        if count(|unit| matches!(unit, Unit::Labels(_))) > 0 {
+            sentences.push(format!("area {area} has neither labels nor images yet"));
+            continue;
+        }
+        for (n, what) in [
+            (count(|unit| matches!(unit, Unit::Location(..))), "scan locations have no images yet"),
+            (count(|unit| matches!(unit, Unit::Photograph(..))), "photographs are no views yet"),
+        ] {
+            if n > 0 {
+                sentences.push(format!("area {area}: {n} {what}"));
+            }
+        }
+        if count(|unit| matches!(unit, Unit::Assets(_))) > 0 {
+            sentences.push(format!("area {area} has neither meshes nor points yet"));
+        }
+    }
+    sentences.push("lists of views, statistics and folds are made at the end".to_owned());
+    sentences
+}
