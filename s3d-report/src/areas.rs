@@ -4,10 +4,12 @@ use crate::faults::Faults;
 use crate::index::{AreaVotes, ClassEntry, LabelEntry, RoomEntry, rounded};
 use s3d_dataset::{DataSet, Result};
 use s3d_io::Error as FileError;
+use s3d_io::dataset::InstanceEntry;
 use s3d_label::{LabelId, LabelTable, pretty_color};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A room of `rooms.json`.
@@ -41,10 +43,17 @@ pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomEntry
     for &area in data.areas() {
         let path = data.layout().rooms_json(area);
         let found: Vec<Room> = json(data, &path, faults)?.unwrap_or_default();
+        let instances = faults.keep(data.layout().root(), data.instances(area))?.unwrap_or_default();
+        let mut heights: BTreeMap<String, [f32; 2]> = BTreeMap::new();
+        for InstanceEntry { room, bbox: [_, _, low, _, _, high], .. } in instances {
+            let range = heights.entry(room).or_insert([low, high]);
+            *range = [range[0].min(low), range[1].max(high)];
+        }
         rooms.extend(found.into_iter().map(|Room { room: name, floor_m2, outline }| {
             let rings = outline.into_iter().flat_map(|p| std::iter::once(p.outer).chain(p.holes));
             let millimetres = |ring: Vec<[f64; 2]>| ring.iter().map(|p| p.map(|c| rounded(c, 3))).collect();
-            RoomEntry { area, name, floor_m2, outline: rings.map(millimetres).collect() }
+            let heights = heights.get(&name).map(|range| range.map(|z| rounded(z.into(), 3)));
+            RoomEntry { area, name, floor_m2, heights, outline: rings.map(millimetres).collect() }
         }));
     }
     Ok(rooms)

@@ -2,15 +2,20 @@
 
 use crate::areas;
 use crate::faults::Faults;
-use crate::index::{DataSetEntry, FORM, Index, LocationEntry, ViewEntry, degrees, rounded};
-use crate::pixels::{Picture, Shares, Widths, nothing_left, show};
-use crate::script::write_script;
+use crate::index::{
+    DataSetEntry, FORM, Index, LocationEntry, MeshEntry, Surface, ViewEntry, degrees, folder_name, rounded,
+};
+use crate::mesh;
+use crate::pixels::{Images, Picture, Shares, Widths, nothing_left};
+use crate::script::Scripts;
 use crate::selection::{Place, places};
 use crate::write::ReportOptions;
-use s3d_dataset::{Context, DataSet, Result, map_in_order};
+use s3d_dataset::{Context, DataSet, Progress, Result, map_in_order};
+use s3d_geom::TriMesh;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, PhotographRecord, ViewRecord};
 use s3d_label::LabelTable;
+use s3d_render::{Caster, Scene};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,6 +25,9 @@ const VIEWS_PER_FILE: usize = 12;
 
 /// Small images in a file, for the grid.
 const THUMBS_PER_FILE: usize = 48;
+
+/// Meshes of as many faces or more are in no picture: a pixel has 24 bits.
+const FACES_OF_PICTURES: usize = 0xff_ffff;
 
 /// What a data set holds, before its images are read.
 pub(crate) struct Content<'a> {
@@ -31,8 +39,19 @@ pub(crate) struct Content<'a> {
     /// Panoramas with their locations.
     panoramas: Vec<(usize, DatasetImage)>,
     views: Vec<DatasetImage>,
+    /// The numbers of their pictures. An area begins with a new file.
+    pictures: Vec<usize>,
     /// All that `views.json` lists, by area.
     candidates: Vec<(u32, ViewRecord)>,
+}
+
+/// Where a report shows an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Shown {
+    /// As the panorama of a location.
+    Panorama(usize),
+    /// As the picture of so many.
+    Picture(usize),
 }
 
 /// Where the camera of an image is.
@@ -40,6 +59,8 @@ struct Located {
     position: [f64; 3],
     azimuth_rad: f64,
     angles_deg: [f64; 3],
+    forward: [f64; 3],
+    up: [f64; 3],
     original: ([f64; 3], f64),
 }
 
@@ -49,12 +70,16 @@ pub(crate) struct ReadImage {
     pub(crate) seen: Option<Shares>,
 }
 
-/// What became of all images.
-pub(crate) struct ReadImages {
+/// What became of all images and meshes.
+#[derive(Default)]
+pub(crate) struct Written {
     pub(crate) bytes: u64,
     /// By place in `Content::panoramas` and `Content::views`.
     pub(crate) panoramas: Vec<ReadImage>,
     pub(crate) views: Vec<ReadImage>,
+    meshes: Vec<MeshEntry>,
+    /// What of a class's surface an area has.
+    surfaces: Vec<(usize, Surface)>,
 }
 
 /// A pinhole camera, for the page to compute rays by.
@@ -89,6 +114,7 @@ impl<'a> Content<'a> {
             locations: Vec::new(),
             panoramas: Vec::new(),
             views: Vec::new(),
+            pictures: Vec::new(),
             candidates: Vec::new(),
         };
         let mut rooms: BTreeMap<(u32, String), Option<String>> = BTreeMap::new();
@@ -112,7 +138,15 @@ impl<'a> Content<'a> {
         content.locations = rooms.into_iter().map(|((area, uuid), room)| (area, uuid, room)).collect();
         for image in images {
             match image.frame {
-                Frame::View(_) => content.views.push(image),
+                Frame::View(_) => {
+                    let next = match (content.views.last(), content.pictures.last()) {
+                        (Some(view), Some(last)) if view.area == image.area => last + 1,
+                        (_, Some(last)) => (last + 1).next_multiple_of(THUMBS_PER_FILE),
+                        (_, None) => 0,
+                    };
+                    content.pictures.push(next);
+                    content.views.push(image);
+                }
                 Frame::Panorama => {
                     if let Some(i) = content.location_of(image.area, &image.uuid) {
                         content.panoramas.push((i, image));
@@ -127,34 +161,72 @@ impl<'a> Content<'a> {
         self.locations.binary_search_by(|(a, u, _)| (*a, u.as_str()).cmp(&(area, uuid))).ok()
     }
 
-    pub(crate) fn write_pictures(
+    /// Where its images are shown, by area, scan location, room and frame.
+    pub(crate) fn shown(&self) -> BTreeMap<(u32, String, String, Frame), Shown> {
+        let panoramas = self.panoramas.iter().map(|(i, image)| (image, Shown::Panorama(*i)));
+        let views = self.views.iter().zip(&self.pictures).map(|(image, i)| (image, Shown::Picture(*i)));
+        let key = |image: &DatasetImage| (image.area, image.uuid.clone(), image.room.clone(), image.frame);
+        panoramas.chain(views).map(|(image, shown)| (key(image), shown)).collect()
+    }
+
+    /// Writes the meshes and pictures, area by area.
+    pub(crate) fn write_files(
         &self,
         ctx: &Context,
         options: &ReportOptions,
-        folder: &Path,
+        scripts: &Scripts,
         faults: &mut Faults,
-    ) -> Result<ReadImages> {
-        let mut jobs: Vec<Job<'_>> =
-            self.panoramas.iter().map(|(i, image)| Job::Panorama(*i, image)).collect();
-        let chunks = self.views.chunks(THUMBS_PER_FILE).enumerate();
-        jobs.extend(chunks.map(|(i, images)| Job::Views(i, images)));
+    ) -> Result<Written> {
         let progress = ctx.progress("reporting", "images", (self.panoramas.len() + self.views.len()) as u64);
-        let pano_width = options.pano_width;
-        let of_panorama = Widths { lossless: pano_width, rgb: pano_width, thumb: None };
-        let (small, large) = (options.thumbs, 2 * options.thumbs);
-        let of_view = Widths { lossless: small, rgb: large, thumb: Some(small) };
+        let mut written = Written::default();
+        for &area in self.data.areas() {
+            let read = faults.keep(self.data.layout().root(), self.data.mesh(area))?.flatten();
+            let mesh = read.as_ref().map(|file| &file.mesh);
+            if let Some(mesh) = mesh {
+                let of = (self.data, self.table.as_ref());
+                let (entry, surfaces, bytes) =
+                    mesh::write(ctx, of, (area, mesh), options.mesh_faces, scripts, faults)?;
+                written.meshes.push(entry);
+                written.surfaces.extend(surfaces);
+                written.bytes += bytes;
+            }
+            self.write_pictures(ctx, options, (area, mesh), (scripts, &progress), (faults, &mut written))?;
+        }
+        Ok(written)
+    }
+
+    /// Writes the pictures of an area.
+    fn write_pictures(
+        &self,
+        ctx: &Context,
+        options: &ReportOptions,
+        (area, mesh): (u32, Option<&TriMesh>),
+        (scripts, progress): (&Scripts, &Progress<'_>),
+        (faults, written): (&mut Faults, &mut Written),
+    ) -> Result<()> {
+        let panoramas = self.panoramas.iter().filter(|(_, image)| image.area == area);
+        let mut jobs: Vec<Job<'_>> = panoramas.map(|(i, image)| Job::Panorama(*i, image)).collect();
+        let first = self.views.partition_point(|view| view.area < area);
+        let of_area = self.views.get(first..).unwrap_or_default();
+        let of_area = of_area.get(..of_area.partition_point(|view| view.area == area)).unwrap_or_default();
+        let first = self.pictures.get(first).map_or(0, |picture| picture / THUMBS_PER_FILE);
+        let chunks = of_area.chunks(THUMBS_PER_FILE).enumerate();
+        jobs.extend(chunks.map(|(i, images)| Job::Views(first + i, images)));
+        let (of_panorama, of_view) = (options.of_panoramas(), options.of_views());
+        let scene = mesh.filter(|mesh| mesh.faces().len() < FACES_OF_PICTURES).map(Scene::new);
         let results = map_in_order(
             ctx,
             &jobs,
-            || (),
-            |(), job| {
+            || scene.as_ref().map(Caster::new),
+            |caster, job| {
                 let mut faults = Faults::default();
                 let (mut made, mut bytes) = (Vec::new(), 0);
                 match job {
                     Job::Panorama(i, image) => {
-                        let (one, picture, _) = self.make(image, of_panorama, &mut faults)?;
-                        if let Some(ViewPicture { picture, .. }) = picture {
-                            bytes += write_script(folder, &format!("pano_{i}"), &picture)?;
+                        let (one, picture, _) =
+                            self.make(image, of_panorama, caster.as_mut(), &mut faults)?;
+                        if let Some(picture) = picture {
+                            bytes += scripts.write(&format!("pano_{i}"), &picture.picture)?;
                         }
                         made.push(one);
                         progress.add(1);
@@ -165,51 +237,52 @@ impl<'a> Content<'a> {
                             let mut pictures = Vec::with_capacity(some.len());
                             for image in some {
                                 ctx.check()?;
-                                let (one, picture, thumb) = self.make(image, of_view, &mut faults)?;
+                                let (one, picture, thumb) =
+                                    self.make(image, of_view, caster.as_mut(), &mut faults)?;
                                 made.push(one);
                                 pictures.push(picture);
                                 thumbs.push(thumb);
                                 progress.add(1);
                             }
                             let file = chunk * (THUMBS_PER_FILE / VIEWS_PER_FILE) + k;
-                            bytes += write_script(folder, &format!("views_{file}"), &pictures)?;
+                            bytes += scripts.write(&format!("views_{file}"), &pictures)?;
                         }
-                        bytes += write_script(folder, &format!("thumbs_{chunk}"), &thumbs)?;
+                        bytes += scripts.write(&format!("thumbs_{chunk}"), &thumbs)?;
                     }
                 }
                 Ok((made, bytes, faults.into_vec()))
             },
         )?;
-        drop(progress);
-        let mut all = ReadImages { bytes: 0, panoramas: Vec::new(), views: Vec::new() };
         for (job, (made, bytes, found)) in jobs.iter().zip(results) {
-            all.bytes += bytes;
+            written.bytes += bytes;
             faults.extend(found);
             match job {
-                Job::Panorama(..) => all.panoramas.extend(made),
-                Job::Views(..) => all.views.extend(made),
+                Job::Panorama(..) => written.panoramas.extend(made),
+                Job::Views(..) => written.views.extend(made),
             }
         }
-        Ok(all)
+        Ok(())
     }
 
-    /// An image as the page shows it, its small image, and what is known of it.
+    /// An image as the page shows it, its small image, and what is known of it. What its pixels see is cast
+    /// again.
     fn make(
         &self,
         image: &DatasetImage,
         widths: Widths,
+        caster: Option<&mut Caster<'_, '_>>,
         faults: &mut Faults,
     ) -> Result<(ReadImage, Option<ViewPicture>, Option<String>)> {
         let root = self.data.layout().root();
-        let shown = show(self.data, image, self.table.as_ref(), widths, faults)?;
-        if shown.is_none() {
+        let images = Images::read(self.data, image, self.table.as_ref(), faults)?;
+        if images.is_none() {
             nothing_left(self.data, image, faults);
         }
         let mut pose = None;
         if image.has(Domain::Pose) {
             pose = faults.keep(root, self.data.pose(image))?;
         }
-        let size = shown.as_ref().map(|shown| shown.picture.of);
+        let size = images.as_ref().map(|images| images.size);
         let mut camera = None;
         if let (Some(pose), Some(size)) = (&pose, size) {
             camera = faults.keep(root, self.data.camera(image, pose, size))?;
@@ -220,30 +293,41 @@ impl<'a> Content<'a> {
             // The full horizontal angle; of a photograph whose centre is off, that of its focal length.
             let half_width = size.map_or(pose.camera_k_matrix[0][2], |[w, _]| f64::from(w) / 2.0);
             let fov = 2.0 * (half_width / pose.camera_k_matrix[0][0]).atan();
+            // Rows of the matrix are the camera's axes: right, down, forward.
+            let [_, down, forward] = this.rt_matrix().map(|[x, y, z, _]| [x, y, z].map(|c| rounded(c, 6)));
             Located {
                 position: this.location.to_array(),
                 azimuth_rad: this.azimuth_rad(),
                 angles_deg: [yaw, pitch, fov].map(degrees),
+                forward,
+                up: down.map(|c| 0.0 - c),
                 original: (original.location.to_array(), original.azimuth_rad()),
             }
         });
-        let (mut picture, mut thumb, mut seen) = (None, None, None);
-        if let Some(shown) = shown {
-            let pinhole = camera.filter(|_| image.frame != Frame::Panorama).map(|camera| {
-                let [[fx, _, cx], [_, fy, cy], _] = camera.k_matrix();
-                Pinhole { k: [fx, fy, cx, cy], rt: camera.pose.rt_matrix() }
-            });
-            picture = Some(ViewPicture { picture: shown.picture, camera: pinhole });
-            (thumb, seen) = (shown.thumb, Some(shown.seen));
-        }
-        Ok((ReadImage { located, seen }, picture, thumb))
+        let Some(images) = images else { return Ok((ReadImage { located, seen: None }, None, None)) };
+        let hits = camera.as_ref().zip(caster).map(|(camera, caster)| caster.cast(camera));
+        let (picture, thumb) = images
+            .picture(widths, hits.as_ref().map(|hits| &hits.face))
+            .map_err(|e| FileError::format(&image.path(self.data.layout(), Domain::Rgb), e.to_string()))?;
+        let pinhole = camera.filter(|_| image.frame != Frame::Panorama).map(|camera| {
+            let [[fx, _, cx], [_, fy, cy], _] = camera.k_matrix();
+            Pinhole { k: [fx, fy, cx, cy], rt: camera.pose.rt_matrix() }
+        });
+        let read = ReadImage { located, seen: Some(images.seen) };
+        Ok((read, Some(ViewPicture { picture, camera: pinhole }), thumb))
     }
 
-    pub(crate) fn index(&self, out: &Path, made: &ReadImages, mut faults: Faults) -> Result<Index> {
+    pub(crate) fn index(&self, out: &Path, made: &Written, mut faults: Faults) -> Result<Index> {
         let data = self.data;
         let classes = areas::classes(data);
         let mut pixels_by_class = vec![0; classes.len()];
         let mut pixels_unlabelled = 0;
+        let mut surface_by_class = vec![Surface::default(); classes.len()];
+        for (class, Surface { faces, m2 }) in &made.surfaces {
+            if let Some(sum) = surface_by_class.get_mut(*class) {
+                *sum = Surface { faces: sum.faces + faces, m2: sum.m2 + m2 };
+            }
+        }
         for seen in made.panoramas.iter().chain(&made.views).filter_map(|made| made.seen.as_ref()) {
             pixels_unlabelled += seen.pixels_unlabelled;
             for (class, pixels) in &seen.pixels_by_class {
@@ -255,9 +339,9 @@ impl<'a> Content<'a> {
         let (files, bytes) = data.size();
         let manifest = data.layout().manifest();
         let options = serde_json::to_value(data.options());
-        let canonical = std::fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
         let data_set = DataSetEntry {
-            name: canonical.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            name: folder_name(out),
+            missing_yet: data.missing_yet().map(<[String]>::to_vec),
             version: data.version().to_owned(),
             seed: data.seed(),
             files,
@@ -280,17 +364,21 @@ impl<'a> Content<'a> {
             rooms,
             locations,
             views,
+            meshes: made.meshes.clone(),
+            against: None,
             views_per_file: VIEWS_PER_FILE,
             thumbs_per_file: THUMBS_PER_FILE,
             statistics,
             votes,
             pixels_by_class,
+            surface_by_class,
             pixels_unlabelled,
             faults: faults.into_vec(),
+            verified: None,
         })
     }
 
-    fn locations(&self, made: &ReadImages) -> Vec<LocationEntry> {
+    fn locations(&self, made: &Written) -> Vec<LocationEntry> {
         let entry = |(area, uuid, room): &(u32, String, Option<String>)| LocationEntry {
             area: *area,
             uuid: uuid.clone(),
@@ -317,7 +405,7 @@ impl<'a> Content<'a> {
     }
 
     /// Kept views and photographs in the order of their files, then the candidates that were dropped.
-    fn view_entries(&self, made: &ReadImages) -> Vec<ViewEntry> {
+    fn view_entries(&self, made: &Written) -> Vec<ViewEntry> {
         let options = self.data.options();
         let listed: Vec<(u32, &ViewRecord)> =
             self.candidates.iter().map(|(area, view)| (*area, view)).collect();
@@ -340,22 +428,25 @@ impl<'a> Content<'a> {
             ..entry
         };
         let mut entries = Vec::with_capacity(self.views.len() + dropped.len());
-        for (i, (image, made)) in self.views.iter().zip(&made.views).enumerate() {
+        for ((image, made), picture) in self.views.iter().zip(&made.views).zip(&self.pictures) {
             let photograph = self.photographs.get(&(image.area, image.uuid.clone()));
             let Frame::View(frame) = image.frame else { continue };
             let angles = made.located.as_ref().map(|located| located.angles_deg);
             let is_photograph = photograph.is_some();
+            let of_photograph = made.located.as_ref().filter(|_| is_photograph);
             let entry = ViewEntry {
                 area: image.area,
                 location: self.location_of(image.area, &image.uuid),
                 room: image.room.clone(),
                 photograph: photograph.map(|p| p.name.clone()),
                 frame: Some(frame),
-                picture: Some(i).filter(|_| made.seen.is_some()),
+                picture: Some(*picture).filter(|_| made.seen.is_some()),
                 yaw_deg: angles.filter(|_| !is_photograph).map(|[yaw, ..]| yaw),
                 pitch_deg: angles.filter(|_| !is_photograph).map(|[_, pitch, _]| pitch),
                 fov_deg: angles.map(|[.., fov]| fov),
-                position: made.located.as_ref().filter(|_| is_photograph).map(|located| located.position),
+                position: of_photograph.map(|located| located.position),
+                forward: of_photograph.map(|located| located.forward),
+                up: of_photograph.map(|located| located.up),
                 seen: made.seen.clone(),
                 ..ViewEntry::default()
             };

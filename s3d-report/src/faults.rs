@@ -25,10 +25,7 @@ impl Faults {
         match read {
             Ok(value) => Ok(Some(value)),
             Err(Error::File(e)) => {
-                let path = name(root, e.path());
-                let (whole, file) = (e.to_string(), e.path().display().to_string());
-                let message = whole.strip_prefix(&file).unwrap_or(&whole);
-                self.add(path, message.trim_start_matches([':', ',', ' ']));
+                self.add(name(root, e.path()), &e.message());
                 Ok(None)
             }
             Err(e) => Err(e),

@@ -3,24 +3,18 @@
 
 use crate::faults::{Faults, name};
 use crate::index::rounded;
+use crate::packed::{jpeg_url, png_url};
 use crate::reduce::{mean, nearest, pack, reduced_size};
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
-use image::ExtendedColorType;
-use image::codecs::jpeg::JpegEncoder;
 use s3d_dataset::{DataSet, Result};
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
-use s3d_io::image::{Compression, Content, decode_gray16, decode_rgb8, encode_rgb8};
+use s3d_io::image::{Content, decode_gray16, decode_rgb8};
 use s3d_label::{LabelId, LabelTable};
 use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// Of JPEG files, 1 to 100.
-const QUALITY: u8 = 85;
 
 /// The colour of a pixel that sees nothing; in a photograph also of one beside it.
 const MISSING_COLOR: [u8; 3] = [0; 3];
@@ -36,10 +30,11 @@ pub(crate) struct Picture {
     pub(crate) normal: Option<String>,
     pub(crate) depth: Option<String>,
     pub(crate) label: Option<String>,
+    pub(crate) face: Option<String>,
 }
 
 /// What the pixels of an image show, as shares of all of them.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Shares {
     /// Those that see the mesh.
     pub(crate) coverage: Option<f64>,
@@ -64,71 +59,67 @@ pub(crate) struct Widths {
     pub(crate) thumb: Option<u32>,
 }
 
-/// An image of the data set as it is shown.
-pub(crate) struct Shown {
-    pub(crate) picture: Picture,
-    pub(crate) thumb: Option<String>,
+/// The decoded images, those that are there and whole, and what they show.
+pub(crate) struct Images {
+    pub(crate) size: [u32; 2],
     pub(crate) seen: Shares,
-}
-
-/// The decoded images, those that are there and whole.
-struct Decoded {
-    size: [u32; 2],
     rgb: Option<Raster<[u8; 3]>>,
     normal: Option<Raster<[u8; 3]>>,
     label: Option<Raster<[u8; 3]>>,
     depth: Option<Raster<u16>>,
 }
 
-/// Reads an image and reduces it. Files that are wrong are told to `faults`; `None` if none is left.
-pub(crate) fn show(
-    data: &DataSet,
-    image: &DatasetImage,
-    table: Option<&LabelTable>,
-    widths: Widths,
-    faults: &mut Faults,
-) -> Result<Option<Shown>> {
-    let Some(mut images) = decode(data, image, faults)? else { return Ok(None) };
-    let root = data.layout().root();
-    let path = image.path(data.layout(), Domain::Semantic);
-    let counted = match (&images.label, table) {
-        (Some(label), Some(table)) => {
-            let all = faults.keep(root, count(label, table, &path))?;
-            if all.is_none() {
+impl Images {
+    /// Reads an image. Files that are wrong are told to `faults`; `None` if none is left.
+    pub(crate) fn read(
+        data: &DataSet,
+        image: &DatasetImage,
+        table: Option<&LabelTable>,
+        faults: &mut Faults,
+    ) -> Result<Option<Self>> {
+        let Some(mut images) = decode(data, image, faults)? else { return Ok(None) };
+        let path = image.path(data.layout(), Domain::Semantic);
+        let mut counted = None;
+        if let (Some(label), Some(table)) = (&images.label, table) {
+            counted = faults.keep(data.layout().root(), count(label, table, &path))?;
+            if counted.is_none() {
                 images.label = None;
             }
-            all
         }
-        _ => None,
-    };
-    let seen = images.seen(counted);
-    let size = reduced_size(images.size, widths.lossless);
-    let rgb_size = reduced_size(images.size, widths.rgb);
-    let jpeg = |pixels: &Raster<[u8; 3]>, size, missing| {
-        let small = mean(pixels, size, missing);
-        let rgb = image.path(data.layout(), Domain::Rgb);
-        encode_jpeg(&small).map_err(|e| FileError::format(&rgb, e.to_string()))
-    };
-    let rgb = images.rgb.as_ref();
-    let thumb = match (rgb, widths.thumb) {
-        (Some(rgb), Some(width)) => Some(jpeg(rgb, reduced_size(images.size, width), MISSING_COLOR)?),
-        _ => None,
-    };
-    let picture = Picture {
-        of: images.size,
-        size,
-        rgb: rgb.map(|rgb| jpeg(rgb, rgb_size, MISSING_COLOR)).transpose()?,
-        normal: images.normal.as_ref().map(|normal| jpeg(normal, size, MISSING_NORMAL)).transpose()?,
-        depth: images.depth.as_ref().map(|depth| {
-            let packed = nearest(depth, size).map(|v| pack(u32::from(v)));
-            png(&packed, Content::Photo)
-        }),
-        label: images.label.as_ref().map(|label| png(&nearest(label, size), Content::Labels)),
-    };
-    Ok(Some(Shown { picture, thumb, seen }))
+        images.seen = images.shares(counted);
+        Ok(Some(images))
+    }
+
+    /// The images as they are shown, and a small one for a grid. `face` is what each pixel sees.
+    pub(crate) fn picture(
+        &self,
+        widths: Widths,
+        face: Option<&Raster<u32>>,
+    ) -> image::ImageResult<(Picture, Option<String>)> {
+        let reduced = |width| reduced_size(self.size, width);
+        let size = reduced(widths.lossless);
+        let small = |image: &Option<Raster<[u8; 3]>>, width, missing| {
+            image.as_ref().map(|image| mean(image, reduced(width), Some(missing)))
+        };
+        let rgb = small(&self.rgb, widths.rgb, MISSING_COLOR);
+        // Of the smaller image: means of means.
+        let thumb = widths.thumb.and_then(|width| small(&rgb, width, MISSING_COLOR));
+        let jpeg = |image: Option<Raster<[u8; 3]>>| image.as_ref().map(jpeg_url).transpose();
+        let depth = |depth| png_url(&nearest(depth, size).map(|v| pack(u32::from(v))), Content::Photo);
+        let picture = Picture {
+            of: self.size,
+            size,
+            rgb: jpeg(rgb)?,
+            normal: jpeg(small(&self.normal, widths.lossless, MISSING_NORMAL))?,
+            depth: self.depth.as_ref().map(depth),
+            label: self.label.as_ref().map(|label| png_url(&nearest(label, size), Content::Labels)),
+            face: face.map(|face| png_url(&nearest(face, size).map(pack), Content::Labels)),
+        };
+        Ok((picture, jpeg(thumb)?))
+    }
 }
 
-fn decode(data: &DataSet, image: &DatasetImage, faults: &mut Faults) -> Result<Option<Decoded>> {
+fn decode(data: &DataSet, image: &DatasetImage, faults: &mut Faults) -> Result<Option<Images>> {
     let root = data.layout().root();
     let mut size = None;
     let mut fits = |[w, h]: [u32; 2], path: &Path| -> Result<()> {
@@ -159,7 +150,8 @@ fn decode(data: &DataSet, image: &DatasetImage, faults: &mut Faults) -> Result<O
         depth = faults.keep(root, read)?;
     }
     let all_gone = rgb.is_none() && normal.is_none() && label.is_none() && depth.is_none();
-    Ok(size.filter(|_| !all_gone).map(|size| Decoded { size, rgb, normal, label, depth }))
+    let seen = Shares::default();
+    Ok(size.filter(|_| !all_gone).map(|size| Images { size, seen, rgb, normal, label, depth }))
 }
 
 /// What the pixels of an image of labels show.
@@ -198,8 +190,8 @@ fn count(label: &Raster<[u8; 3]>, table: &LabelTable, path: &Path) -> Result<Cou
     Ok(counted)
 }
 
-impl Decoded {
-    fn seen(&self, counted: Option<Counted>) -> Shares {
+impl Images {
+    fn shares(&self, counted: Option<Counted>) -> Shares {
         let pixels = (u64::from(self.size[0]) * u64::from(self.size[1])) as f64;
         let share = |count: u64| rounded(count as f64 / pixels, 4);
         // Depth misses what is beyond its range; labels do not.
@@ -223,23 +215,6 @@ impl Decoded {
     }
 }
 
-fn png(image: &Raster<[u8; 3]>, content: Content) -> String {
-    let bytes = encode_rgb8(image, content, Compression::Balanced);
-    format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes))
-}
-
-fn encode_jpeg(image: &Raster<[u8; 3]>) -> image::ImageResult<String> {
-    let mut bytes = Vec::new();
-    let pixels = image.pixels().as_flattened();
-    JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode(
-        pixels,
-        image.width(),
-        image.height(),
-        ExtendedColorType::Rgb8,
-    )?;
-    Ok(format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(bytes)))
-}
-
 /// A fault of an image of which nothing is left to be shown.
 pub(crate) fn nothing_left(data: &DataSet, image: &DatasetImage, faults: &mut Faults) {
     if let Some(domain) = image.domains.first() {
@@ -259,8 +234,9 @@ mod tests {
         let [n, a, b, w] = [[0; 3], [0, 0, 1], [0, 0, 2], [0, 0, 3]];
         let label = Raster::from_vec(4, 2, vec![MISSING_INDEX, n, a, a, b, w, w, a]);
         let counted = count(&label, &table, Path::new("a.png")).unwrap();
-        let images = Decoded { size: [4, 2], rgb: None, normal: None, label: None, depth: None };
-        let seen = images.seen(Some(counted));
+        let seen = Shares::default();
+        let images = Images { size: [4, 2], seen, rgb: None, normal: None, label: None, depth: None };
+        let seen = images.shares(Some(counted));
         assert_eq!((seen.coverage, seen.unlabelled, seen.instances), (Some(0.875), Some(0.125), Some(3)));
         assert_eq!(seen.classes, [(2, 0.25), (8, 0.5)]);
         let label = Raster::from_vec(2, 1, vec![a, [0, 1, 0]]);

@@ -23,38 +23,39 @@ pub(crate) fn nearest<T: Copy>(image: &Raster<T>, [w, h]: [u32; 2]) -> Raster<T>
     Raster::from_vec(w, h, pixels)
 }
 
-/// The mean of the pixels that a pixel covers, of those that are not `missing`; `missing` where there are
-/// none.
-pub(crate) fn mean(image: &Raster<[u8; 3]>, [w, h]: [u32; 2], missing: [u8; 3]) -> Raster<[u8; 3]> {
+/// The mean of the pixels that lie in a pixel, of those that are not `missing`; `missing` where there are
+/// none. No image is enlarged.
+pub(crate) fn mean(image: &Raster<[u8; 3]>, [w, h]: [u32; 2], missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
     if [w, h] == [image.width(), image.height()] {
         return image.clone();
     }
-    let (columns, rows) = (ranges(image.width(), w), ranges(image.height(), h));
+    let edge = |i: u32, from: u32, to: u32| (u64::from(i) * u64::from(from) / u64::from(to)) as u32;
+    let widths: Vec<usize> =
+        (0..w).map(|i| (edge(i + 1, image.width(), w) - edge(i, image.width(), w)) as usize).collect();
     let mut pixels = Vec::with_capacity(w as usize * h as usize);
-    for &(top, bottom) in &rows {
-        for &(left, right) in &columns {
-            let (mut sum, mut count) = ([0u32; 3], 0u32);
-            for y in top..bottom {
-                let line = image.row(y).get(left as usize..right as usize).unwrap_or_default();
-                for pixel in line.iter().filter(|pixel| **pixel != missing) {
-                    sum.iter_mut().zip(pixel).for_each(|(sum, v)| *sum += u32::from(*v));
-                    count += 1;
+    // Sums of the three channels, and how many pixels.
+    let mut sums = vec![[0u32; 4]; w as usize];
+    for j in 0..h {
+        sums.fill([0; 4]);
+        for y in edge(j, image.height(), h)..edge(j + 1, image.height(), h) {
+            let mut rest = image.row(y);
+            for (sum, width) in sums.iter_mut().zip(&widths) {
+                let (these, others) = rest.split_at(*width);
+                rest = others;
+                for pixel in these {
+                    let counts = u32::from(Some(*pixel) != missing);
+                    let [r, g, b] = pixel.map(|v| u32::from(v) * counts);
+                    let [sr, sg, sb, n] = *sum;
+                    *sum = [sr + r, sg + g, sb + b, n + counts];
                 }
             }
-            pixels.push(match count {
-                0 => missing,
-                n => sum.map(|sum| ((sum + n / 2) / n) as u8),
-            });
         }
+        pixels.extend(sums.iter().map(|[r, g, b, n]| match n {
+            0 => missing.unwrap_or_default(),
+            n => [r, g, b].map(|sum| ((sum + n / 2) / n) as u8),
+        }));
     }
     Raster::from_vec(w, h, pixels)
-}
-
-/// Which pixels of an axis of `from` each of `to` covers, from the first to before the second.
-fn ranges(from: u32, to: u32) -> Vec<(u32, u32)> {
-    let edge = |i: u32| u64::from(i) * u64::from(from);
-    let range = |i| ((edge(i) / u64::from(to)) as u32, edge(i + 1).div_ceil(u64::from(to)) as u32);
-    (0..to).map(range).collect()
 }
 
 /// A number of up to 24 bits as a pixel, the highest bits in red.
@@ -90,11 +91,11 @@ mod tests {
     fn missing_pixels_have_no_share_in_a_mean() {
         let [a, b, n] = [[10, 20, 30], [21, 40, 60], [0; 3]];
         let image = Raster::from_vec(4, 2, vec![a, b, n, n, n, a, n, n]);
-        assert_eq!(mean(&image, [2, 1], n).into_vec(), [[14, 27, 40], n]);
-        // Pixels on an edge count for both sides.
-        let image = Raster::from_vec(3, 1, vec![a, b, a]);
-        assert_eq!(mean(&image, [2, 1], n).into_vec(), [[16, 30, 45], [16, 30, 45]]);
-        assert_eq!(mean(&image, [3, 1], n).into_vec(), image.into_vec());
+        assert_eq!(mean(&image, [2, 1], Some(n)).into_vec(), [[14, 27, 40], n]);
+        // Each pixel lies in one.
+        let image = Raster::from_vec(3, 1, vec![a, b, b]);
+        assert_eq!(mean(&image, [2, 1], None).into_vec(), [a, b]);
+        assert_eq!(mean(&image, [3, 1], Some(n)).into_vec(), image.into_vec());
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::{data_set, files, numbers, pair, url_bytes, value};
-use s3d_dataset::{Context, DataSet, Error};
+use common::{data_set, export, files, numbers, pair, url_bytes, value};
+use s3d_dataset::{Cancel, Context, DataSet, Error, Event, UnitKind};
 use s3d_geom::Raster;
 use s3d_geom::glam::{DMat3, DVec3, dvec3};
 use s3d_io::dataset::{DatasetImage, Domain, Frame};
@@ -13,8 +13,16 @@ use serde_json::Value;
 use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-const SMALL: ReportOptions = ReportOptions { pano_width: 64, thumbs: 24, overwrite: false };
+const SMALL: ReportOptions = ReportOptions {
+    pano_width: 64,
+    thumbs: 24,
+    mesh_faces: 1000,
+    verify: false,
+    single: false,
+    overwrite: false,
+};
 
 fn made(out: &Path, to: &Path, options: &ReportOptions) -> Report {
     report(out, to, options, &Context::default()).unwrap()
@@ -154,7 +162,12 @@ fn pictures_are_the_data_sets_own() {
     let by_class =
         index["pixels_by_class"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).sum::<u64>();
     assert_eq!(by_class + index["pixels_unlabelled"].as_u64().unwrap(), pixels);
-    assert_eq!(index["rooms"].as_array().unwrap().len(), 4);
+    let rooms = index["rooms"].as_array().unwrap();
+    assert_eq!(rooms.len(), 4);
+    for heights in rooms.iter().map(|room| &room["heights"]) {
+        let [low, high] = [0, 1].map(|i| heights[i].as_f64().unwrap());
+        assert!(low.abs() < 0.1 && (2.0..4.0).contains(&high), "{heights}");
+    }
     assert_eq!(index["votes"][0]["area"], 1);
     assert!(index["areas"][0]["inputs"].is_null());
 }
@@ -221,6 +234,13 @@ fn what_is_missing_or_damaged_is_told_and_the_rest_is_shown() {
     assert!(
         made.faults.iter().all(|fault| !fault.message.is_empty() && !fault.message.contains("data set/"))
     );
+    let missing = DataSet::open(&out).unwrap().missing(&context).unwrap();
+    // What is only seen when it is read has its size.
+    assert_eq!(missing.len(), 2);
+    for fault in made.faults.iter().filter(|fault| missing.contains_key(&fault.path)) {
+        assert!(missing[&fault.path] == fault.message && !fault.message.contains(&fault.path), "{fault:?}");
+        assert!(!fault.message.starts_with([':', ' ']), "{fault:?}");
+    }
     let index = value(&to, "index");
     assert_eq!(index["faults"].as_array().unwrap().len(), 3);
     assert!(index["rooms"].as_array().unwrap().is_empty());
@@ -248,4 +268,99 @@ fn without_labels_there_is_all_that_needs_none() {
     assert!(index["data_set"]["taxonomy"].is_null());
     let picture = value(&to, "pano_0");
     assert!(picture["label"].is_null() && picture["depth"].is_string());
+}
+
+#[test]
+fn an_export_that_did_not_finish_is_shown_as_far_as_it_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let (export, out) = (export(dir.path(), true), dir.path().join("data set"));
+    // Ended when two scan locations have their images.
+    let cancel = Cancel::default();
+    let (theirs, done) = (cancel.clone(), AtomicU32::new(0));
+    let context = Context::default().cancelled_by(cancel).observed_by(move |event: &Event<'_>| {
+        let is_location = matches!(event, Event::UnitFinished { unit: UnitKind::Location, .. });
+        if is_location && done.fetch_add(1, Ordering::Relaxed) == 1 {
+            theirs.cancel();
+        }
+    });
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert!(matches!(one.install(|| export.run(&out, &context)), Err(Error::Cancelled)));
+    let to = dir.path().join("report");
+    let context = Context::default();
+    let made = report(&out, &to, &SMALL, &context).unwrap();
+    assert_eq!((made.faults.len(), made.panoramas), (0, 2), "{:?}", made.faults);
+    assert!(context.warnings() > 0);
+    let index = value(&to, "index");
+    let missing = index["data_set"]["missing_yet"].as_array().unwrap();
+    assert!(missing.iter().any(|m| m == "area 1: 4 scan locations have no images yet"), "{missing:?}");
+    assert!(index["rooms"].as_array().unwrap().len() == 4 && index["views"].as_array().unwrap().len() > 2);
+    assert!(value(&to, "pano_0")["rgb"].is_string());
+
+    // Once it has gone on, nothing is missing.
+    export.run(&out, &Context::default()).unwrap().unwrap();
+    assert_eq!(
+        report(&out, &to, &ReportOptions { overwrite: true, ..SMALL }, &context).unwrap().panoramas,
+        6
+    );
+    assert!(value(&to, "index")["data_set"]["missing_yet"].is_null());
+    let nothing = dir.path().join("nothing");
+    let e = report(&nothing, &dir.path().join("none"), &SMALL, &context).unwrap_err().to_string();
+    assert!(e.contains("manifest.json"), "{e}");
+}
+
+#[test]
+fn one_file_has_all_of_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), false);
+    let (folder, file) = (dir.path().join("report"), dir.path().join("report.html"));
+    made(&out, &folder, &SMALL);
+    let single = ReportOptions { single: true, ..SMALL };
+    let report_of_one = made(&out, &file, &single);
+    let page = fs::read_to_string(&file).unwrap();
+    assert_eq!((&report_of_one.page, report_of_one.bytes), (&file, page.len() as u64));
+    // The same values, before the program that reads them.
+    let (before, program) = page.split_once("</head>").unwrap();
+    assert!(program.contains("s3dReport"));
+    let mut found = 0;
+    for element in before.split("<script type=\"application/json\" data-key=\"").skip(1) {
+        let (key, rest) = element.split_once("\">").unwrap();
+        let text = rest.split("</script>").next().unwrap();
+        assert_eq!(serde_json::from_str::<Value>(text).unwrap(), value(&folder, key), "{key}");
+        found += 1;
+    }
+    assert_eq!(found, fs::read_dir(folder.join("data")).unwrap().count());
+
+    let again = report(&out, &file, &single, &Context::default()).unwrap_err().to_string();
+    assert!(again.contains("--overwrite"), "{again}");
+    made(&out, &file, &ReportOptions { overwrite: true, ..single.clone() });
+    assert_eq!(fs::read_to_string(&file).unwrap(), page);
+    let letter = dir.path().join("letter.html");
+    fs::write(&letter, "<!doctype html>Dear all").unwrap();
+    for place in [letter.clone(), out.join("report.html"), folder.clone()] {
+        let options = ReportOptions { overwrite: true, ..single.clone() };
+        let e = report(&out, &place, &options, &Context::default()).unwrap_err();
+        assert!(matches!(e, Error::Usage(_)), "{e}");
+    }
+    assert_eq!(fs::read_to_string(&letter).unwrap(), "<!doctype html>Dear all");
+}
+
+#[test]
+fn what_verify_finds_is_told_if_it_is_asked() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), false);
+    let verified = |to: &str| {
+        let to = dir.path().join(to);
+        made(&out, &to, &ReportOptions { verify: true, ..SMALL });
+        value(&to, "index")["verified"].clone()
+    };
+    let good = verified("good");
+    assert!(good["checks"].as_u64().unwrap() > 1000 && good["faults"].as_array().unwrap().is_empty());
+
+    let data = DataSet::open(&out).unwrap();
+    let image = data.images(1).into_iter().find(|image| image.frame == Frame::View(0)).unwrap();
+    let path = image.relative_path(Domain::Normal);
+    fs::write(out.join(&path), b"no image").unwrap();
+    let found = verified("bad");
+    let faults = found["faults"].as_array().unwrap();
+    assert!(faults.iter().any(|group| group["first"][0][0] == *path && group["count"] == 1), "{found}");
 }

@@ -6,19 +6,18 @@ import { readFile, writeFile } from "node:fs/promises";
 const here = (name) => new URL(name, import.meta.url);
 const target = ["chrome111", "firefox113", "safari16.4"];
 
-// The legend of depth has the colours of the pictures.
-const colors = await build({
-  entryPoints: [here("src/colors.ts").pathname],
-  bundle: true,
-  format: "esm",
-  write: false,
-});
-const { depthRamp } = await import(`data:text/javascript,${encodeURIComponent(colors.outputFiles[0].text)}`);
-const ramp = depthRamp(9);
-const stops = Array.from({ length: 9 }, (_, i) => `rgb(${ramp.subarray(4 * i, 4 * i + 3).join(" ")})`);
-
-const style = (await readFile(here("style.css"), "utf8")).replace("RAMP", stops.join(", "));
+const style = await readFile(here("style.css"), "utf8");
 const css = await transform(style, { loader: "css", minify: true, target });
+
+// The page shows the terms of all that is bundled.
+const json = async (path) => JSON.parse(await readFile(here(path), "utf8"));
+const licences = [];
+for (const name of Object.keys((await json("package.json")).dependencies)) {
+  const { version } = await json(`node_modules/${name}/package.json`);
+  const text = (await readFile(here(`node_modules/${name}/LICENSE`), "utf8")).trim();
+  licences.push({ name, version, text });
+}
+
 const js = await build({
   entryPoints: [here("src/main.ts").pathname],
   bundle: true,
@@ -27,6 +26,7 @@ const js = await build({
   write: false,
   legalComments: "inline",
   charset: "ascii",
+  define: { LICENCES: JSON.stringify(licences) },
   target,
 });
 const page = (await readFile(here("page.html"), "utf8"))

@@ -1,5 +1,8 @@
 //! Data sets that are made for tests, and reports that are read back.
 
+// Not every test file uses all of it.
+#![allow(dead_code)]
+
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use s3d_dataset::{Context, Export, ExportOptions};
@@ -13,6 +16,13 @@ use std::path::{Path, PathBuf};
 
 /// An export that takes little time, of the built-in scene.
 pub(crate) fn data_set(folder: &Path, labelled: bool) -> PathBuf {
+    let out = folder.join("data set");
+    export(folder, labelled).run(&out, &Context::default()).unwrap().unwrap();
+    out
+}
+
+/// That export, not yet made.
+pub(crate) fn export(folder: &Path, labelled: bool) -> Export {
     let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
     let scene = Building::demo().build().unwrap().write_scan(&folder.join("scan"), &scan, || true).unwrap();
     if !labelled {
@@ -21,11 +31,9 @@ pub(crate) fn data_set(folder: &Path, labelled: bool) -> PathBuf {
         let after = rest.split_once("\n[").map_or(String::new(), |(_, after)| format!("[{after}"));
         fs::write(&scene, format!("{before}{after}")).unwrap();
     }
-    let out = folder.join("data set");
     let options =
         ExportOptions { views: 6, size: 80, pano_width: 160, points_per_m2: 5.0, ..ExportOptions::default() };
-    Export::new([scene]).options(options).run(&out, &Context::default()).unwrap().unwrap();
-    out
+    Export::new([scene]).options(options)
 }
 
 /// The value of a file `data/KEY.js`.

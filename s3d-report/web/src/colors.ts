@@ -6,6 +6,15 @@ import type { Index, Rgb } from "./data.js";
 export const MISSING: Rgb = [0, 0, 0];
 /** Surface without a label, in pictures of classes and instances. */
 export const NULL_LABEL: Rgb = [128, 128, 128];
+/**
+ * What has a label of another class in another data set, and what is another instance of the class
+ * there.
+ */
+export const OTHER_CLASS: Rgb = [255, 0, 255];
+export const OTHER_INSTANCE: Rgb = [255, 190, 40];
+
+/** A colour in the words of shaders. */
+export const shader = (color: Rgb): string => `vec3(${color.map((c) => (c / 255).toFixed(6)).join(", ")})`;
 
 /** A colour of OKLCH (B. Ottosson, 2020), cut to what a screen shows. */
 function oklch(lightness: number, chroma: number, hueDeg: number): Rgb {
@@ -36,17 +45,39 @@ export function depthRamp(n: number): Uint8Array {
   return ramp;
 }
 
+/** From a tie to votes that agree in `n` colours: light yellow, orange, violet, nearly black. */
+export function marginRamp(n: number): Uint8Array {
+  const ramp = new Uint8Array(4 * n);
+  for (let i = 0; i < n; i++) {
+    const t = i / (n - 1);
+    const [r, g, b] = oklch(0.94 - 0.7 * t, 0.17 - 0.3 * Math.abs(t - 0.4) ** 1.5, 105 - 190 * t);
+    ramp.set([r, g, b, 255], 4 * i);
+  }
+  return ramp;
+}
+
+/** A ramp as a background, from left to right. */
+export function gradient(ramp: (n: number) => Uint8Array): string {
+  const colors = ramp(9);
+  const stops = Array.from({ length: 9 }, (_, i) => `rgb(${colors.subarray(4 * i, 4 * i + 3).join(" ")})`);
+  return `linear-gradient(to right, ${stops.join(", ")})`;
+}
+
 /** Columns of the tables of colours by label. */
 export const TABLE_WIDTH = 256;
 
-/** A table of colours by label, rows of `TABLE_WIDTH`. */
+/**
+ * A table of colours by label, rows of `TABLE_WIDTH`. The opacity is a number of the class, 0 without
+ * one: its lower byte in the table by class, the upper one in that by instance.
+ */
 export function labelTable(index: Index, by: "class" | "instance"): { pixels: Uint8Array; rows: number } {
   const rows = Math.max(1, Math.ceil(index.labels.length / TABLE_WIDTH));
   const pixels = new Uint8Array(4 * TABLE_WIDTH * rows);
   index.labels.forEach((label, i) => {
     const of_class = label.class === null ? undefined : index.classes[label.class]?.color;
     const color = (by === "class" ? of_class : label.class === null ? undefined : label.color) ?? NULL_LABEL;
-    pixels.set([...color, 255], 4 * i);
+    const number = label.class === null ? 0 : label.class + 1;
+    pixels.set([...color, by === "class" ? number & 255 : number >> 8], 4 * i);
   });
   return { pixels, rows };
 }

@@ -39,7 +39,10 @@ export interface View {
   fov_deg: number | null;
   entropy: number | null;
   place: Place | null;
+  /** Of photographs; like `forward` and `up`, the directions of its camera in the world. */
   position: Rgb | null;
+  forward?: Rgb | null;
+  up?: Rgb | null;
   seen: Seen | null;
 }
 
@@ -47,6 +50,7 @@ export interface Room {
   area: number;
   name: string;
   floor_m2: number;
+  heights: [number, number] | null;
   outline: [number, number][][];
 }
 
@@ -71,6 +75,7 @@ export interface Area {
   unlabelled?: { without_votes: Surface; without_label: Surface };
   surface_seen?: unknown;
   offset_m?: Rgb;
+  warnings?: string[];
 }
 
 export interface Statistics {
@@ -86,19 +91,65 @@ export interface Statistics {
   }[];
 }
 
+export interface VotesOf {
+  name: string;
+  points: number;
+  faces_voted: number;
+  votes_per_voted_face: number;
+  faces_contested: number;
+  faces_won_with_less_than_three_quarters: number;
+  faces_won_with_less_than_half: number;
+}
+
 export interface Votes {
   faces: number;
   faces_without_votes: number;
   m2_without_votes: number;
-  total: { faces_contested: number; faces_won_with_less_than_three_quarters: number };
+  total: Omit<VotesOf, "name">;
+  rooms: VotesOf[];
+  classes: VotesOf[];
   disputing_classes: { classes: [string, string]; faces: number; m2: number }[];
   disputed_patches: { labels: [string, string]; faces: number; m2: number; center: Rgb }[];
+}
+
+export interface VoteSpread {
+  /** Faces by all of their votes: 0, 1, 2, 3 to 4, 5 to 8, and so on. */
+  votes: Surface[];
+  /** Faces with votes, by margin in ten parts. */
+  margin: Surface[];
+}
+
+export interface Mesh {
+  area: number;
+  /** Of the data set's mesh. */
+  faces: number;
+  /** In the report's files. */
+  shown: number;
+  /** The edge of the cubes whose vertices became one; null if none did. */
+  cell_m: number | null;
+  min: Rgb;
+  max: Rgb;
+  files: number;
+  texture_files: number;
+  has_votes: boolean;
+  has_boxes: boolean;
+  /** Null without votes. */
+  spread: VoteSpread | null;
+  materials: { color: Rgb; texture: number | null }[];
+}
+
+export interface Verified {
+  files: number;
+  checks: number;
+  notes: string[];
+  faults: { topic: string; kind: string; count: number; first: [string, string][] }[];
 }
 
 export interface Index {
   form: number;
   data_set: {
     name: string;
+    missing_yet: string[] | null;
     version: string;
     seed: number;
     files: number;
@@ -117,9 +168,15 @@ export interface Index {
   thumbs_per_file: number;
   statistics: Statistics | null;
   votes: { area: number; votes: Votes }[];
+  meshes: Mesh[];
+  /** The name of the data set that the report was made against. */
+  against?: string | null;
   pixels_by_class: number[];
+  /** Faces and m² of each class, filled ones too. */
+  surface_by_class: Surface[];
   pixels_unlabelled: number;
   faults: { path: string; message: string }[];
+  verified: Verified | null;
 }
 
 export interface Pinhole {
@@ -136,25 +193,44 @@ export interface Picture {
   normal: string | null;
   depth: string | null;
   label: string | null;
+  /** Faces of `rgb.obj`, from 0. */
+  face: string | null;
   camera?: Pinhole | null;
 }
 
 declare global {
   interface Window {
-    s3dReport: (key: string, text: string) => void;
+    s3dReport: (key: string, text: string, packed?: boolean) => void;
   }
 }
 
 /** The form of files that this page reads. */
-export const FORM = 1;
+export const FORM = 2;
 
 /** So many files of a kind are kept; those that were not looked at for longest go. */
-const KEPT: Record<string, number> = { index: 1, pano: 4, views: 6, thumbs: 40 };
+const KEPT: Record<string, number> = {
+  index: 1,
+  pano: 4,
+  other: 4,
+  views: 6,
+  thumbs: 40,
+  mesh: 0,
+  textures: 0,
+  compare: 0,
+};
 
 const files = new Map<string, Promise<unknown>>();
-const arriving = new Map<string, (text: string) => void>();
+const arriving = new Map<string, (text: string, packed: boolean) => void>();
 
-window.s3dReport = (key, text) => arriving.get(key)?.(text);
+window.s3dReport = (key, text, packed = false) => arriving.get(key)?.(text, packed);
+
+/** What is packed: Base64 of a zlib stream. */
+export function unpacked(text: string): Response {
+  const characters = atob(text);
+  const bytes = new Uint8Array(characters.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = characters.charCodeAt(i);
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate")));
+}
 
 /** The value that the file `data/KEY.js` hands over. */
 export function load<T>(key: string): Promise<T> {
@@ -170,6 +246,8 @@ export function load<T>(key: string): Promise<T> {
 }
 
 function run(key: string): Promise<unknown> {
+  const inPage = document.querySelector(`script[data-key="${key}"]`);
+  if (inPage) return Promise.resolve(inPage.textContent).then(JSON.parse);
   return new Promise((resolve, reject) => {
     const script = document.createElement("script");
     const path = `data/${key}.js`;
@@ -177,13 +255,14 @@ function run(key: string): Promise<unknown> {
       arriving.delete(key);
       script.remove();
     };
-    arriving.set(key, (text) => {
+    const value = async (text: string, packed: boolean): Promise<unknown> => {
       try {
-        resolve(JSON.parse(text));
+        return JSON.parse(packed ? await unpacked(text).text() : text);
       } catch (e) {
-        reject(new Error(`${path} is damaged: ${String(e)}`));
+        throw new Error(`${path} is damaged: ${String(e)}`);
       }
-    });
+    };
+    arriving.set(key, (text, packed) => resolve(value(text, packed)));
     script.onload = () => {
       end();
       reject(new Error(`${path} is damaged: make the report again`));

@@ -43,17 +43,56 @@ export function s<K extends keyof SVGElementTagNameMap>(
   return element;
 }
 
+/** Lists that are longer are searched by typing. */
+const LONG = 100;
+let lists = 0;
+
 /** A list to choose from: value and text of each entry. */
 export function choice(
   label: string,
   entries: [string, string][],
   value: string,
   chosen: (value: string) => void,
-): HTMLSelectElement {
+): HTMLElement {
+  if (entries.length > LONG) return search(label, entries, value, chosen);
   const list = h("select", { "aria-label": label, change: () => chosen(list.value) });
   for (const [entry, text] of entries) list.append(h("option", { value: entry }, text));
   list.value = value;
   return list;
+}
+
+function search(
+  label: string,
+  entries: [string, string][],
+  value: string,
+  chosen: (value: string) => void,
+): HTMLElement {
+  const values = new Map(entries.map(([entry, text]) => [text, entry]));
+  const options = h("datalist", { id: `list-${++lists}` });
+  for (const [, text] of entries) options.append(h("option", { value: text }));
+  let now = entries.find(([entry]) => entry === value)?.[1] ?? "";
+  const field = h("input", {
+    type: "text",
+    "aria-label": label,
+    list: options.id,
+    value: now,
+    class: "search",
+  });
+  // The browser offers what fits to the text, so there is none while one chooses.
+  field.addEventListener("focus", () => {
+    field.placeholder = now;
+    field.value = "";
+  });
+  field.addEventListener("blur", () => {
+    field.value = now;
+  });
+  field.addEventListener("input", () => {
+    const entry = values.get(field.value);
+    if (entry === undefined) return;
+    now = field.value;
+    chosen(entry);
+  });
+  return h("span", {}, field, options);
 }
 
 /** A column of which the first cell is a `.number` is one of numbers. */

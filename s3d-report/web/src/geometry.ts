@@ -69,6 +69,40 @@ export function screenAt(
   return [width / 2 + (f * x) / depth, height / 2 - (f * up) / depth];
 }
 
+/**
+ * A world point on the screen of a panorama, as x·w, y·w and w: straight lines stay straight, and w is
+ * not positive for what is behind.
+ */
+export function panoramaScreen(
+  location: Location,
+  gaze: Gaze,
+  width: number,
+  height: number,
+  point: Vec3,
+): Vec3 {
+  const here = location.position ?? [0, 0, 0];
+  const [dx, dy, dz] = [point[0] - here[0], point[1] - here[1], point[2] - here[2]];
+  const azimuth = (location.azimuth_rad ?? 0) - gaze.lon;
+  const [level, right] = [
+    dx * Math.cos(azimuth) + dy * Math.sin(azimuth),
+    dx * Math.sin(azimuth) - dy * Math.cos(azimuth),
+  ];
+  const [cos, sin] = [Math.cos(gaze.lat), Math.sin(gaze.lat)];
+  const [forward, up] = [level * cos + dz * sin, dz * cos - level * sin];
+  const f = focal(gaze, width, height);
+  return [(width / 2) * forward + f * right, (height / 2) * forward - f * up, forward];
+}
+
+/** A world point in the image of a view, in shares of its size, likewise. */
+export function viewScreen(picture: Picture, point: Vec3): Vec3 | null {
+  if (!picture.camera) return null;
+  const { k, rt } = picture.camera;
+  const [x, y, z] = [0, 1, 2].map((row) =>
+    point.reduce((sum, c, column) => sum + c * (rt[row]?.[column] ?? 0), rt[row]?.[3] ?? 0),
+  ) as Vec3;
+  return [(k[0] * x + k[2] * z) / picture.of[0], (k[1] * y + k[3] * z) / picture.of[1], z];
+}
+
 /** Longitude and latitude of a world direction in the panorama of a location. */
 export function directionIn(location: Location, direction: Vec3): [number, number] {
   const [x, y, z] = direction;

@@ -1,11 +1,34 @@
-// A picture on a WebGL2 canvas: two of its modalities, left and right of a line, on a sphere or flat.
+// A picture on a WebGL2 canvas: two of its modalities, left and right of a line, on a sphere or flat;
+// or another picture of the same camera right of the line.
 
-import { MISSING, TABLE_WIDTH, depthRamp, labelTable } from "./colors.js";
+import {
+  MISSING,
+  NULL_LABEL,
+  OTHER_CLASS,
+  OTHER_INSTANCE,
+  TABLE_WIDTH,
+  depthRamp,
+  labelTable,
+  marginRamp,
+  shader,
+} from "./colors.js";
 import type { Index, Picture } from "./data.js";
 import { type Gaze, focal } from "./geometry.js";
 
-export const MODALITIES = ["rgb", "depth", "normal", "class", "instance", "unlabelled"] as const;
+export const MODALITIES = [
+  "rgb",
+  "depth",
+  "normal",
+  "class",
+  "instance",
+  "unlabelled",
+  "contested",
+  "changed",
+] as const;
 export type Modality = (typeof MODALITIES)[number];
+
+/** Columns of the table of margins by face. */
+const MARGINS_WIDTH = 4096;
 
 const VERTICES = `#version 300 es
 void main() {
@@ -15,13 +38,15 @@ void main() {
 
 const PIXELS = `#version 300 es
 precision highp float;
-uniform sampler2D rgb, normal, depth, label, classes, instances, ramp;
+uniform sampler2D rgb, normal, depth, label, face, classes, instances, ramp, margins, margin_ramp;
+uniform sampler2D rgb_b, normal_b, depth_b, label_b;
 uniform vec2 size;
 uniform float line, focal, nearest, farthest;
 uniform int left, right;
-uniform bool sphere, colored;
+uniform bool sphere, colored, two, colored_b;
 uniform vec2 gaze, origin, extent;
-uniform vec3 missing;
+uniform vec3 missing, no_votes;
+uniform float faces;
 out vec4 color;
 const float PI = 3.14159265358979;
 
@@ -30,26 +55,47 @@ float number(vec4 pixel) {
   return bytes.r * 65536.0 + bytes.g * 256.0 + bytes.b;
 }
 
-vec3 named(sampler2D table, float index) {
+vec4 named(sampler2D table, float index) {
   ivec2 place = ivec2(int(index) % ${TABLE_WIDTH}, int(index) / ${TABLE_WIDTH});
-  return texelFetch(table, place, 0).rgb;
+  return texelFetch(table, place, 0);
 }
 
-vec3 show(int modality, vec2 uv) {
-  vec3 seen = texture(rgb, uv).rgb;
+vec2 class_of(float index) {
+  return index == 855309.0 ? vec2(-1.0) : vec2(named(classes, index).a, named(instances, index).a);
+}
+
+vec3 show(int modality, vec2 uv, bool b) {
+  vec3 seen = b ? texture(rgb_b, uv).rgb : texture(rgb, uv).rgb;
+  bool is_colored = b ? colored_b : colored;
   if (modality == 0) return seen;
-  if (modality == 2) return texture(normal, uv).rgb;
+  if (modality == 2) return b ? texture(normal_b, uv).rgb : texture(normal, uv).rgb;
   if (modality == 1) {
-    float units = number(texture(depth, uv));
+    float units = number(b ? texture(depth_b, uv) : texture(depth, uv));
     float place = clamp((units - nearest) / (farthest - nearest), 0.0, 1.0);
     return units == 65535.0 ? missing : texture(ramp, vec2(place, 0.5)).rgb;
   }
-  float index = number(texture(label, uv));
+  float light = is_colored ? dot(seen, vec3(0.2126, 0.7152, 0.0722)) : 0.6;
+  if (modality == 6) {
+    float of_face = number(texture(face, uv));
+    if (of_face == 16777215.0 || faces == 0.0) return missing;
+    int place = int(of_face);
+    ivec2 at = ivec2(place % ${MARGINS_WIDTH}, place / ${MARGINS_WIDTH});
+    float margin = of_face < faces ? floor(texelFetch(margins, at, 0).r * 255.0 + 0.5) : 255.0;
+    vec3 shade = margin == 255.0 ? no_votes : texture(margin_ramp, vec2((margin + 0.5) / 255.0, 0.5)).rgb;
+    return mix(shade, vec3(light), 0.2);
+  }
+  float index = number(b ? texture(label_b, uv) : texture(label, uv));
+  if (modality == 7) {
+    float other = number(b ? texture(label, uv) : texture(label_b, uv));
+    bool is_class = class_of(index) != class_of(other);
+    vec3 other_color = is_class ? ${shader(OTHER_CLASS)} : ${shader(OTHER_INSTANCE)};
+    if (index != other) return is_colored ? mix(other_color, seen, 0.25) : other_color;
+    return 0.5 * mix(vec3(light), is_colored ? seen : vec3(light), 0.5);
+  }
   if (index == 855309.0) return missing;
-  float light = colored ? dot(seen, vec3(0.2126, 0.7152, 0.0722)) : 0.6;
   if (modality == 5) return index == 0.0 ? vec3(1.0, 0.0, 1.0) : vec3(0.12 + 0.7 * light);
-  vec3 flat_color = modality == 3 ? named(classes, index) : named(instances, index);
-  return colored ? mix(flat_color, seen, 0.3) : flat_color;
+  vec3 flat_color = (modality == 3 ? named(classes, index) : named(instances, index)).rgb;
+  return is_colored ? mix(flat_color, seen, 0.3) : flat_color;
 }
 
 void main() {
@@ -68,7 +114,7 @@ void main() {
       return;
     }
   }
-  color = vec4(show(at.x < line ? left : right, uv), 1.0);
+  color = vec4(show(at.x < line ? left : right, uv, two && at.x >= line), 1.0);
 }`;
 
 /** Numbers of a picture's pixels, as far as it has them. */
@@ -79,10 +125,22 @@ export interface Numbers {
   depth: Uint16Array | null;
   /** Indices of labels; `NO_LABEL` where nothing was seen. */
   label: Uint32Array | null;
+  /** Faces of the mesh; `NO_FACE` where nothing was seen. */
+  face: Uint32Array | null;
 }
 
 export const NO_DEPTH = 65_535;
 export const NO_LABEL = 0x0d0d0d;
+export const NO_FACE = 0xffffff;
+
+/** A picture of the same camera, to be shown right of the line. */
+export interface Other {
+  picture: Picture;
+  /** The places of its labels in the index that the renderer was made with. */
+  labels: Uint32Array;
+  /** What its depths are multiplied by. */
+  depth: number;
+}
 
 export interface Scene {
   left: Modality;
@@ -132,7 +190,9 @@ export class Renderer {
   private readonly program: WebGLProgram;
   private readonly textures = new Map<string, WebGLTexture>();
   private picture: Picture | null = null;
+  private other: Picture | null = null;
   private ends: [number, number] = [0, 1];
+  private faces = 0;
 
   constructor(
     readonly canvas: HTMLCanvasElement,
@@ -151,6 +211,8 @@ export class Renderer {
       this.upload(by === "class" ? "classes" : "instances", pixels, TABLE_WIDTH, rows, gl.NEAREST);
     }
     this.upload("ramp", depthRamp(256), 256, 1, gl.LINEAR);
+    this.upload("margin_ramp", marginRamp(255), 255, 1, gl.NEAREST);
+    this.upload("margins", new Uint8Array([255, 255, 255, 255]), 1, 1, gl.NEAREST);
     this.forget();
   }
 
@@ -193,20 +255,21 @@ export class Renderer {
     }
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, filter);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, filter);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, name === "ramp" ? gl.CLAMP_TO_EDGE : gl.REPEAT);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, name.endsWith("ramp") ? gl.CLAMP_TO_EDGE : gl.REPEAT);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
   }
 
   private forget(): void {
     const nothing = new Uint8Array([0x0d, 0x0d, 0x0d, 255]);
-    for (const name of ["rgb", "normal", "depth", "label"]) this.upload(name, nothing, 1, 1, this.gl.NEAREST);
+    for (const name of ["rgb", "normal", "depth", "label", "face"])
+      this.upload(name, nothing, 1, 1, this.gl.NEAREST);
     this.picture = null;
   }
 
   /** Takes a picture, and returns the numbers of its pixels. */
   async take(picture: Picture): Promise<Numbers> {
-    const [rgb, normal, depth, label] = await Promise.all(
-      [picture.rgb, picture.normal, picture.depth, picture.label].map((url) =>
+    const [rgb, normal, depth, label, face] = await Promise.all(
+      [picture.rgb, picture.normal, picture.depth, picture.label, picture.face].map((url) =>
         url === null ? null : image(url),
       ),
     );
@@ -217,6 +280,7 @@ export class Renderer {
       normal: [normal, LINEAR],
       depth: [depth, NEAREST],
       label: [label, NEAREST],
+      face: [face, NEAREST],
     } as const;
     for (const [name, [element, filter]] of Object.entries(all)) {
       if (element) this.upload(name, element, 0, 0, filter);
@@ -225,13 +289,65 @@ export class Renderer {
     const depths = depth ? numbers(depth) : null;
     const labels = label ? numbers(label) : null;
     this.ends = depths ? endsOf(depths.values) : [0, 1];
-    const { width, height } = depths ?? labels ?? { width: 0, height: 0 };
+    const faces = face ? numbers(face) : null;
+    const { width, height } = depths ?? labels ?? faces ?? { width: 0, height: 0 };
     return {
       width,
       height,
       depth: depths ? Uint16Array.from(depths.values) : null,
       label: labels?.values ?? null,
+      face: faces?.values ?? null,
     };
+  }
+
+  /** Takes the picture that is shown right of the line, and returns the numbers of its pixels. */
+  async takeOther({ picture, labels, depth: factor }: Other): Promise<Numbers> {
+    const { LINEAR, NEAREST } = this.gl;
+    const [rgb, normal, depth, label] = await Promise.all(
+      [picture.rgb, picture.normal, picture.depth, picture.label].map((url) =>
+        url === null ? null : image(url),
+      ),
+    );
+    const nothing = new Uint8Array([0x0d, 0x0d, 0x0d, 255]);
+    for (const name of ["rgb_b", "normal_b", "depth_b", "label_b"]) this.upload(name, nothing, 1, 1, NEAREST);
+    if (rgb) this.upload("rgb_b", rgb, 0, 0, LINEAR);
+    if (normal) this.upload("normal_b", normal, 0, 0, LINEAR);
+    const put = (
+      name: string,
+      from: HTMLImageElement | null | undefined,
+      of: (value: number) => number,
+    ): ReturnType<typeof numbers> | null => {
+      if (!from) return null;
+      const read = numbers(from);
+      read.values = read.values.map(of);
+      this.upload(name, pixelsOf(read.values), read.width, read.height, NEAREST);
+      return read;
+    };
+    const scaled = (units: number): number =>
+      units === NO_DEPTH ? units : Math.min(NO_DEPTH - 1, Math.round(units * factor));
+    const depths = put("depth_b", depth, scaled);
+    const known = put("label_b", label, (index) => (index === NO_LABEL ? index : (labels[index] ?? 0)));
+    this.other = picture;
+    const { width, height } = depths ?? known ?? { width: 0, height: 0 };
+    return {
+      width,
+      height,
+      depth: depths ? Uint16Array.from(depths.values) : null,
+      label: known?.values ?? null,
+      face: null,
+    };
+  }
+
+  /** Takes the margins of the mesh's faces. */
+  takeMargins(margin: Uint8Array): void {
+    const { gl } = this;
+    const rows = Math.max(1, Math.ceil(margin.length / MARGINS_WIDTH));
+    const table = new Uint8Array(MARGINS_WIDTH * rows);
+    table.set(margin);
+    const texture = this.textures.get("margins");
+    gl.bindTexture(gl.TEXTURE_2D, texture ?? null);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R8, MARGINS_WIDTH, rows, 0, gl.RED, gl.UNSIGNED_BYTE, table);
+    this.faces = margin.length;
   }
 
   /** The ends of the ramp of depths, units. */
@@ -258,9 +374,19 @@ export class Renderer {
     gl.uniform1i(at("right"), MODALITIES.indexOf(scene.right));
     gl.uniform1i(at("sphere"), scene.gaze ? 1 : 0);
     gl.uniform1i(at("colored"), picture.rgb ? 1 : 0);
+    gl.uniform1i(at("two"), this.other ? 1 : 0);
+    gl.uniform1i(at("colored_b"), this.other?.rgb ? 1 : 0);
+    gl.uniform1f(at("faces"), this.faces);
     gl.uniform1f(at("nearest"), this.ends[0]);
     gl.uniform1f(at("farthest"), this.ends[1]);
-    gl.uniform3f(at("missing"), MISSING[0] / 255, MISSING[1] / 255, MISSING[2] / 255);
+    gl.uniform3fv(
+      at("missing"),
+      MISSING.map((c) => c / 255),
+    );
+    gl.uniform3fv(
+      at("no_votes"),
+      NULL_LABEL.map((c) => c / 255),
+    );
     if (scene.gaze) {
       gl.uniform1f(at("focal"), focal(scene.gaze, width, height));
       gl.uniform2f(at("gaze"), scene.gaze.lon, scene.gaze.lat);
@@ -276,6 +402,13 @@ export class Renderer {
   close(): void {
     this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
+}
+
+/** Numbers of 24 bits as pixels. */
+function pixelsOf(values: Uint32Array): Uint8Array {
+  const pixels = new Uint8Array(4 * values.length);
+  values.forEach((value, i) => pixels.set([value >> 16, (value >> 8) & 255, value & 255, 255], 4 * i));
+  return pixels;
 }
 
 /** The depths that 1 and 98 of 100 pixels do not reach. */

@@ -1,31 +1,30 @@
 // The page as a whole: its tabs, and which of them is open.
 
+import { comparePage } from "./compare/page.js";
 import { FORM, type Index, load } from "./data.js";
 import { append, h } from "./dom.js";
 import { faultCount, notesPage } from "./pages/notes.js";
 import { numbersPage } from "./pages/numbers.js";
 import { panoPage } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
-import { link, parseRoute } from "./route.js";
+import { type Page, link, parseRoute } from "./route.js";
+import { spacePage } from "./space/page.js";
 import { viewPage } from "./pages/view.js";
 import { viewsPage } from "./pages/views.js";
-
-interface Page {
-  element: HTMLElement;
-  close: () => void;
-}
 
 const still = (element: HTMLElement): Page => ({ element, close: () => {} });
 
 function tabs(index: Index): [string, string][] {
   const all: [string, string, boolean][] = [
     ["pano", "Panoramas", index.locations.some((l) => l.pano)],
+    ["space", "3D", index.meshes.length > 0],
     ["views", "Views", index.views.length > 0],
     [
       "plan",
       "Plan",
       index.rooms.length > 0 || index.locations.length > 0 || index.views.some((v) => v.position),
     ],
+    ["compare", "Compared", index.against != null],
     ["numbers", "Numbers", true],
     ["notes", "Notes", true],
   ];
@@ -37,12 +36,16 @@ async function open(index: Index): Promise<Page> {
   switch (route.page || tabs(index)[0]?.[0]) {
     case "pano":
       return panoPage(index, route);
+    case "space":
+      return spacePage(index, route);
     case "views":
       return viewsPage(index, route);
     case "view":
       return viewPage(index, route);
     case "plan":
-      return still(planPage(index));
+      return still(await planPage(index));
+    case "compare":
+      return comparePage(index, route);
     case "numbers":
       return still(numbersPage(index));
     case "notes":
@@ -64,7 +67,8 @@ async function start(): Promise<void> {
     );
   // Photographs are numbered by their names.
   const numbered = new Intl.Collator("en", { numeric: true });
-  index.views.sort((a, b) => numbered.compare(a.photograph ?? "", b.photograph ?? ""));
+  if (index.views.some((view) => view.photograph !== null))
+    index.views.sort((a, b) => numbered.compare(a.photograph ?? "", b.photograph ?? ""));
   document.title = `${index.data_set.name} · s3d report`;
   const header = h("header", {}, h("a", { class: "title", href: link("") }, index.data_set.name));
   const nav = h("nav", { "aria-label": "Parts of the report" });
@@ -94,6 +98,9 @@ async function start(): Promise<void> {
     now = page;
     place.replaceChildren(page.element);
     window.scrollTo(0, 0);
+    page.start?.setAttribute("tabindex", "-1");
+    page.start?.focus();
+    page.start?.scrollIntoView();
     const current = parseRoute(window.location.hash).page || tabs(index)[0]?.[0];
     for (const tab of nav.querySelectorAll("a")) {
       const is = tab.dataset["page"] === (current === "view" ? "views" : current);
@@ -101,6 +108,7 @@ async function start(): Promise<void> {
       else tab.removeAttribute("aria-current");
     }
     document.body.dataset["ready"] = String(mine);
+    performance.mark("shown");
   };
   window.addEventListener("hashchange", () => void show());
   await show();

@@ -6,6 +6,14 @@ export interface Route {
   query: URLSearchParams;
 }
 
+/** What a route opens. */
+export interface Page {
+  element: HTMLElement;
+  close: () => void;
+  /** What of it comes into sight first, and has the focus. */
+  start?: HTMLElement;
+}
+
 export function parseRoute(hash: string): Route {
   const text = hash.replace(/^#\/?/, "");
   const at = text.indexOf("?");
@@ -51,4 +59,15 @@ export function numberOf(
   const text = query.get(name);
   const value = text === null || text.trim() === "" ? Number.NaN : Number(text);
   return Number.isFinite(value) ? Math.min(max, Math.max(min, value)) : otherwise;
+}
+
+/** A place in 3D, from where it is looked at, and in which colours. */
+export function spaceLink(
+  area: number,
+  at: number[],
+  from: number[] | null = null,
+  show: string | null = null,
+): string {
+  const words = (point: number[]): string => point.map((c) => c.toFixed(3)).join(",");
+  return link("space", [area], { at: words(at), ...(from && { from: words(from) }), ...(show && { show }) });
 }

@@ -1,10 +1,23 @@
 // A picture to look at: two modalities with a line between them that moves, and what is under the pointer.
 
-import { css } from "./colors.js";
 import type { Index, Picture, Rgb } from "./data.js";
-import { append, choice, h, roomName } from "./dom.js";
+import { append, choice, h } from "./dom.js";
+import { type FaceVotes, loadFaceVotes } from "./faces.js";
 import { type Gaze, clampGaze, focal, panoramaAt } from "./geometry.js";
-import { MODALITIES, type Modality, NO_DEPTH, NO_LABEL, type Numbers, Renderer, placeOf } from "./gl.js";
+import {
+  MODALITIES,
+  type Modality,
+  NO_DEPTH,
+  NO_FACE,
+  NO_LABEL,
+  type Numbers,
+  type Other,
+  Renderer,
+  placeOf,
+} from "./gl.js";
+import { Marks, type Projected } from "./marks.js";
+import { type Spot, legendOf, tell } from "./readout.js";
+import { spaceLink } from "./route.js";
 
 const NAMES: Record<Modality, string> = {
   rgb: "Colour",
@@ -13,7 +26,14 @@ const NAMES: Record<Modality, string> = {
   class: "Class",
   instance: "Instance",
   unlabelled: "Unlabelled",
+  contested: "Contested",
+  changed: "Changed",
 };
+
+/** The pointer rests if it has not moved for so long, ms. */
+const REST = 250;
+/** A press that moves no farther is a click, CSS pixels. */
+const STILL = 5;
 
 /** How a picture is looked at: what the address keeps of it. */
 export interface Look {
@@ -23,14 +43,27 @@ export interface Look {
   gaze: Gaze | null;
 }
 
+/** Another picture, B, beside A. */
+export interface OtherSide extends Other {
+  /** What both can be shown in. */
+  modalities: Modality[];
+  /** What is told of the labels of a pixel in both. */
+  tell: (a: number | null, b: number | null) => HTMLElement[];
+}
+
 export interface ViewerOptions {
   /** What the picture shows, for screen readers. */
   title: string;
+  area: number;
   /** The room, where there is no label to tell it. */
   room: string;
   /** The world point of a pixel at a depth, and its distance from the camera. */
   point: (i: number, j: number, depth: number) => Rgb | null;
   position: Rgb | null;
+  /** Where a world point is on a canvas of this size, as x·w, y·w and w. */
+  screen: (point: Rgb, gaze: Gaze | null, width: number, height: number) => Projected | null;
+  /** Right of the line another picture of the same camera is shown, in the same modality. */
+  other?: OtherSide;
   /** Called when the look has changed. */
   changed: (look: Look) => void;
   /** Called after each drawing, with the size of the canvas in CSS pixels. */
@@ -38,7 +71,8 @@ export interface ViewerOptions {
 }
 
 /** Which modalities a picture can be shown in. */
-export function modalitiesOf(picture: Picture): Modality[] {
+export function modalitiesOf(index: Index, area: number, picture: Picture): Modality[] {
+  const voted = index.meshes.some((mesh) => mesh.area === area && mesh.has_votes);
   const has: Record<Modality, boolean> = {
     rgb: picture.rgb !== null,
     depth: picture.depth !== null,
@@ -46,13 +80,14 @@ export function modalitiesOf(picture: Picture): Modality[] {
     class: picture.label !== null,
     instance: picture.label !== null,
     unlabelled: picture.label !== null,
+    contested: picture.face !== null && voted,
+    changed: false,
   };
   return MODALITIES.filter((modality) => has[modality]);
 }
 
 /** The look that an address asks for, as far as the picture can be shown so. */
-export function lookFrom(query: URLSearchParams, picture: Picture, gaze: Gaze | null): Look {
-  const there = modalitiesOf(picture);
+export function lookFrom(query: URLSearchParams, there: Modality[], gaze: Gaze | null): Look {
   const of = (name: string, otherwise: Modality[]): Modality => {
     const word = query.get(name) as Modality;
     return there.includes(word) ? word : (otherwise.find((m) => there.includes(m)) ?? there[0] ?? "rgb");
@@ -88,7 +123,18 @@ export class Viewer {
   private readonly bar = h("div", { class: "viewer-bar" });
   private readonly renderer: Renderer;
   private readonly resized = new ResizeObserver(() => this.resize());
-  private numbers: Numbers = { width: 0, height: 0, depth: null, label: null };
+  private readonly marks = new Marks();
+  private readonly measuring: HTMLButtonElement;
+  private readonly escape = (event: KeyboardEvent): void => {
+    if (event.key === "Escape") this.endMarks();
+  };
+  private readonly modalities: Modality[];
+  private numbers: Numbers = { width: 0, height: 0, depth: null, label: null, face: null };
+  private others: Numbers | null = null;
+  private votes: FaceVotes | null = null;
+  /** Why there are no votes to show. */
+  private trouble = "";
+  private rest = 0;
   private pending = false;
   private closed = false;
 
@@ -104,7 +150,7 @@ export class Viewer {
         class: "split",
         role: "slider",
         tabindex: 0,
-        "aria-label": "Line between the two modalities",
+        "aria-label": options.other ? "Line between A and B" : "Line between the two modalities",
         "aria-valuemin": 0,
         "aria-valuemax": 100,
         keydown: (event: KeyboardEvent) => this.splitKey(event),
@@ -114,20 +160,31 @@ export class Viewer {
     );
     const frame = h("div", { class: "frame" }, this.canvas, this.overlay, this.line);
     this.element = h("section", { class: "viewer" }, this.bar, frame, this.readout, this.legend);
+    this.measuring = h("button", { type: "button", "aria-pressed": "false" }, "Measure");
+    this.measuring.addEventListener("click", () => {
+      const on = this.measuring.getAttribute("aria-pressed") !== "true";
+      this.measuring.setAttribute("aria-pressed", String(on));
+      if (!on) this.marks.endMeasure();
+      this.draw();
+    });
+    append(this.overlay, this.marks.elements);
     this.canvas.setAttribute("aria-label", options.title);
     this.canvas.setAttribute("role", "img");
+    this.modalities = options.other?.modalities ?? modalitiesOf(index, options.area, picture);
     this.renderer = new Renderer(this.canvas, index);
   }
 
   static async open(index: Index, picture: Picture, look: Look, options: ViewerOptions): Promise<Viewer> {
     const viewer = new Viewer(index, picture, look, options);
     viewer.numbers = await viewer.renderer.take(picture);
+    if (options.other) viewer.others = await viewer.renderer.takeOther(options.other);
     viewer.fillBar();
     const hint = look.gaze
       ? "Drag to look around, scroll to zoom, point at something to know what it is."
       : "Point at something to know what it is.";
     viewer.readout.append(h("span", { class: "quiet" }, hint));
     viewer.listen();
+    document.addEventListener("keydown", viewer.escape);
     viewer.resized.observe(viewer.canvas);
     viewer.changed();
     return viewer;
@@ -135,6 +192,8 @@ export class Viewer {
 
   close(): void {
     this.closed = true;
+    window.clearTimeout(this.rest);
+    document.removeEventListener("keydown", this.escape);
     this.resized.disconnect();
     this.renderer.close();
   }
@@ -151,36 +210,82 @@ export class Viewer {
     return value === undefined || value === NO_DEPTH ? null : value;
   }
 
+  /** The labels of both pictures, if they are of one size. */
+  get labels(): { width: number; height: number; a: Uint32Array | null; b: Uint32Array | null } {
+    const { width, height, label: a } = this.numbers;
+    const fits = this.others?.width === width && this.others.height === height;
+    return { width, height, a, b: fits ? (this.others?.label ?? null) : null };
+  }
+
   lookAt(gaze: Gaze): void {
     this.look.gaze = clampGaze(gaze);
     this.changed();
   }
 
   private fillBar(): void {
-    const there = modalitiesOf(this.picture).map((m): [string, string] => [m, NAMES[m]]);
-    const pick = (side: "left" | "right"): HTMLSelectElement =>
-      choice(side === "left" ? "Left of the line" : "Right of the line", there, this.look[side], (value) => {
-        this.look[side] = value as Modality;
+    const there = this.modalities.map((m): [string, string] => [m, NAMES[m]]);
+    const pick = (label: string, ...sides: ("left" | "right")[]): HTMLElement =>
+      choice(label, there, this.look[sides[0] ?? "left"], (value) => {
+        for (const side of sides) this.look[side] = value as Modality;
         this.changed();
       });
-    append(this.bar, [
-      pick("left"),
+    const two = [
+      pick("Left of the line", "left"),
       h("span", { class: "versus", "aria-hidden": "true" }, "|"),
-      pick("right"),
-    ]);
+      pick("Right of the line", "right"),
+    ];
+    const one = [pick("What of both is shown", "left", "right")];
+    append(this.bar, [...(this.others ? one : two), this.numbers.depth && this.measuring]);
+  }
+
+  /** The votes of the area's faces, once; whoever looks at the picture meanwhile sees none. */
+  private async loadVotes(): Promise<void> {
+    if (this.votes) return;
+    try {
+      const votes = await loadFaceVotes(this.options.area);
+      if (this.closed || this.votes) return;
+      this.votes = votes;
+      this.renderer.takeMargins(votes.margin);
+    } catch (e) {
+      this.trouble = e instanceof Error ? e.message : String(e);
+    }
+    if (this.closed) return;
+    this.fillLegend();
+    this.draw();
+  }
+
+  private endMarks(): void {
+    this.marks.endMeasure();
+    this.marks.pinAt(null, "");
+    this.measuring.setAttribute("aria-pressed", "false");
+    this.draw();
+  }
+
+  /** A click at a point of the canvas: an end of the line, or the place to see in 3D. */
+  private mark(x: number, y: number): void {
+    const { area, position } = this.options;
+    const point = this.spotAt(x, y, this.canvas.getBoundingClientRect())?.spot.point;
+    if (!point) return;
+    if (this.measuring.getAttribute("aria-pressed") === "true") this.marks.measure(point);
+    else if (this.index.meshes.some((mesh) => mesh.area === area))
+      this.marks.pinAt(point, spaceLink(area, point, position, this.others ? "changed" : null));
+    this.draw();
   }
 
   private listen(): void {
     const { canvas } = this;
     let from: { x: number; y: number } | null = null;
+    let press: { x: number; y: number } | null = null;
     const fingers = new Map<number, PointerEvent>();
     canvas.addEventListener("pointerdown", (event) => {
       fingers.set(event.pointerId, event);
       canvas.setPointerCapture(event.pointerId);
       from = { x: event.clientX, y: event.clientY };
+      press = fingers.size === 1 && event.button === 0 ? from : null;
       this.read(event);
     });
     canvas.addEventListener("pointermove", (event) => {
+      if (press && Math.hypot(event.clientX - press.x, event.clientY - press.y) > STILL) press = null;
       const gaze = this.look.gaze;
       if (gaze && fingers.size === 2 && fingers.has(event.pointerId)) {
         const [a, b] = [...fingers.values()] as [PointerEvent, PointerEvent];
@@ -201,6 +306,11 @@ export class Viewer {
     for (const end of ["pointerup", "pointercancel"] as const) {
       canvas.addEventListener(end, (event) => {
         fingers.delete(event.pointerId);
+        if (press && end === "pointerup") {
+          const box = canvas.getBoundingClientRect();
+          this.mark(press.x - box.left, press.y - box.top);
+        }
+        press = null;
         from = null;
         canvas.classList.remove("dragged");
       });
@@ -223,7 +333,9 @@ export class Viewer {
 
   private key(event: KeyboardEvent): void {
     const gaze = this.look.gaze;
-    if (!gaze || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === "Enter") this.mark(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
+    if (!gaze) return;
     const step = gaze.fov / 12;
     const moves: Record<string, Partial<Gaze>> = {
       ArrowLeft: { lon: gaze.lon - step },
@@ -282,11 +394,10 @@ export class Viewer {
     const percent = Math.round(100 * this.look.split);
     this.line.style.left = `${100 * this.look.split}%`;
     this.line.setAttribute("aria-valuenow", String(percent));
-    this.line.setAttribute(
-      "aria-valuetext",
-      `${NAMES[this.look.left]} on ${percent} %, ${NAMES[this.look.right]} on the rest`,
-    );
+    const names = this.others ? ["A", "B"] : [NAMES[this.look.left], NAMES[this.look.right]];
+    this.line.setAttribute("aria-valuetext", `${names[0]} on ${percent} %, ${names[1]} on the rest`);
     this.fillLegend();
+    if (this.look.left === "contested" || this.look.right === "contested") void this.loadVotes();
     // Until it is on the page, the address is not its own.
     if (this.element.isConnected) this.options.changed(this.look);
     this.draw();
@@ -314,30 +425,18 @@ export class Viewer {
   private paint(): void {
     if (this.closed) return;
     this.renderer.draw(this.look);
-    this.options.drawn?.(this.canvas.clientWidth, this.canvas.clientHeight);
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    this.marks.draw((point) => this.options.screen(point, this.look.gaze, width, height), width, height);
+    this.options.drawn?.(width, height);
   }
 
-  /** Explains the colours of depth and of what has no label. */
   private fillLegend(): void {
-    this.legend.replaceChildren();
     const shown = [this.look.left, this.look.right];
-    if (shown.includes("depth")) {
-      const [near, far] = this.renderer.range.map(
-        (units) => `${(units / this.index.data_set.depth_units_per_m).toFixed(1)} m`,
-      );
-      append(this.legend, [h("span", {}, near), h("span", { class: "ramp" }), h("span", {}, far)]);
-    }
-    if (shown.includes("unlabelled")) {
-      append(this.legend, [h("span", { class: "key magenta" }), h("span", {}, "no label")]);
-    }
-    if (shown.includes("class")) {
-      for (const [i, { name, color }] of this.index.classes.entries()) {
-        if (!this.index.pixels_by_class[i]) continue;
-        const key = h("span", { class: "key" });
-        key.style.background = css(color);
-        append(this.legend, [h("span", { class: "entry" }, key, name)]);
-      }
-    }
+    const units = this.index.data_set.depth_units_per_m;
+    const [near, far] = this.renderer.range;
+    const trouble = this.trouble !== "" && h("span", { role: "alert" }, this.trouble);
+    this.legend.replaceChildren(...legendOf(this.index, shown, [near / units, far / units]));
+    append(this.legend, [shown.includes("contested") && trouble]);
   }
 
   private read(event: PointerEvent): void {
@@ -350,8 +449,12 @@ export class Viewer {
     this.readAt(box.width / 2, box.height / 2, box);
   }
 
-  /** Tells what a point of the canvas shows, whose size is that of `box`: not of whole pixels. */
-  private readAt(x: number, y: number, box: DOMRect): void {
+  /** What a point of the canvas shows, whose size is that of `box`: not of whole pixels. */
+  private spotAt(
+    x: number,
+    y: number,
+    box: DOMRect,
+  ): { pixel: string; spot: Spot; other: number | null } | null {
     const [w, h_] = [box.width, box.height];
     let [u, v] = [0, 0];
     if (this.look.gaze) {
@@ -360,44 +463,51 @@ export class Viewer {
       const [left, top, width, height] = placeOf(this.picture.of, w, h_);
       [u, v] = [(x - left) / width, (y - top) / height];
     }
-    const { width, height, depth, label } = this.numbers;
-    this.readout.replaceChildren();
-    delete this.readout.dataset["pixel"];
-    if (width === 0 || u < 0 || u >= 1 || v < 0 || v >= 1) return;
+    const { width, height, depth, label, face } = this.numbers;
+    if (width === 0 || u < 0 || u >= 1 || v < 0 || v >= 1) return null;
     const [i, j] = [Math.floor(u * width), Math.min(height - 1, Math.floor(v * height))];
-    const entry = (name: string, value: string): HTMLElement =>
-      h("span", { class: "entry", "data-is": name }, h("span", { class: "name" }, name), value);
-    const units = depth?.[j * width + i] ?? NO_DEPTH;
-    const of_label = label?.[j * width + i] ?? NO_LABEL;
-    let room = this.options.room;
-    if (label && of_label !== NO_LABEL) {
-      const found = this.index.labels[of_label];
-      const of_class =
-        found?.class === null || found === undefined ? undefined : this.index.classes[found.class];
-      if (found && of_class) {
-        const key = h("span", { class: "key" });
-        key.style.background = css(of_class.color);
-        const parts = found.name.split("_");
-        room = parts.slice(2, 4).join("_");
-        append(this.readout, [
-          h("span", { class: "entry", "data-is": "class" }, key, of_class.name),
-          entry("instance", found.name),
-        ]);
-      } else {
-        append(this.readout, [entry("class", "no label")]);
-      }
-    }
-    append(this.readout, [entry("room", roomName(room))]);
-    this.readout.dataset["pixel"] = `${i},${j}`;
-    if (units === NO_DEPTH) {
-      append(this.readout, [entry("distance", depth ? "nothing seen" : "not stored")]);
-      return;
-    }
-    const metres = units / this.index.data_set.depth_units_per_m;
-    const point = this.options.point(i, j, metres);
+    const known = (values: ArrayLike<number> | null, nothing: number): number | null => {
+      const value = values?.[j * width + i] ?? nothing;
+      return value === nothing ? null : value;
+    };
+    const units = known(depth, NO_DEPTH);
+    const metres = units === null ? null : units / this.index.data_set.depth_units_per_m;
+    const point = metres === null ? null : this.options.point(i, j, metres);
     const from = this.options.position;
     const away = point && from ? Math.hypot(...point.map((c, axis) => c - (from[axis] ?? 0))) : metres;
-    append(this.readout, [entry("distance", `${away.toFixed(3)} m`)]);
-    if (point) append(this.readout, [entry("X Y Z", point.map((c) => c.toFixed(3)).join("  "))]);
+    const spot = { label: known(label, NO_LABEL), face: known(face, NO_FACE), distance: away, point };
+    let other: number | null = null;
+    if (this.others?.label) {
+      const { width: across, height: down, label: labels } = this.others;
+      const row = Math.min(down - 1, Math.floor(v * down));
+      const value = labels[row * across + Math.floor(u * across)] ?? NO_LABEL;
+      other = value === NO_LABEL ? null : value;
+    }
+    return { pixel: `${i},${j}`, spot, other };
+  }
+
+  /** Tells what a point of the canvas shows. */
+  private readAt(x: number, y: number, box: DOMRect): void {
+    window.clearTimeout(this.rest);
+    this.readout.replaceChildren();
+    delete this.readout.dataset["pixel"];
+    const found = this.spotAt(x, y, box);
+    if (!found) return;
+    const { room } = this.options;
+    const { spot } = found;
+    const told = tell(this.index, spot, { room, hasDepth: this.numbers.depth !== null }, this.votes);
+    const { other } = this.options;
+    const ofOne = (entry: HTMLElement): boolean => !["class", "instance"].includes(entry.dataset["is"] ?? "");
+    append(this.readout, other ? [...other.tell(spot.label, found.other), ...told.filter(ofOne)] : told);
+    this.readout.dataset["pixel"] = found.pixel;
+    const voted = this.modalities.includes("contested");
+    if (this.votes || this.trouble !== "" || !voted || !spot.label || spot.face === null) return;
+    const gaze = this.look.gaze;
+    this.rest = window.setTimeout(async () => {
+      await this.loadVotes();
+      // What is told is still of this point, unless something else was read or turned meanwhile.
+      if (this.votes && this.readout.dataset["pixel"] === found.pixel && this.look.gaze === gaze)
+        this.readAt(x, y, box);
+    }, REST);
   }
 }

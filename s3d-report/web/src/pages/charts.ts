@@ -1,17 +1,24 @@
 // Bars and histograms, drawn as SVG.
 
-import { append, h, s } from "../dom.js";
+import type { Surface } from "../data.js";
+import { count, h, metres2, percent, s } from "../dom.js";
 
-/** Values in bins of the same width; a last value at the upper end belongs to the last bin. */
+/**
+ * Values in bins of the same width; the last has those at the upper end and beyond, the first those
+ * below.
+ */
 export function bins(values: number[], from: number, to: number, count: number): number[] {
   const found = new Array<number>(count).fill(0);
   for (const value of values) {
-    if (value < from || value > to) continue;
-    const bin = Math.min(count - 1, Math.floor(((value - from) / (to - from)) * count));
+    const place = Math.floor(((value - from) / (to - from)) * count + 1e-9);
+    const bin = Math.min(count - 1, Math.max(0, place));
     found[bin] = (found[bin] ?? 0) + 1;
   }
   return found;
 }
+
+/** The size of a chart, and how high its axis is. */
+const [w, height, floor] = [320, 130, 110];
 
 export interface Histogram {
   title: string;
@@ -23,6 +30,24 @@ export interface Histogram {
   dropped: number[];
   /** The density that values were drawn from, if there is one; its scale does not matter. */
   density?: (value: number) => number;
+  /** Where a bar leads; a bound is null at the ends, which have what is beyond them, too. */
+  href: (kept: boolean, min: number | null, max: number | null) => string;
+}
+
+/** Arrow keys move the focus from bar to bar; the tab key goes on to what follows. */
+function roving(bars: SVGElement[]): void {
+  bars.forEach((bar, i) => {
+    bar.setAttribute("tabindex", i === 0 ? "0" : "-1");
+    bar.addEventListener("keydown", (event) => {
+      const by = { ArrowRight: 1, ArrowLeft: -1, Home: -i, End: bars.length - 1 - i }[event.key];
+      const to = by === undefined ? undefined : bars[i + by];
+      if (!to) return;
+      event.preventDefault();
+      bar.setAttribute("tabindex", "-1");
+      to.setAttribute("tabindex", "0");
+      to.focus();
+    });
+  });
 }
 
 /** Kept values with dropped ones on top of them, and the curve that they were drawn from. */
@@ -35,8 +60,8 @@ export function histogram({
   kept,
   dropped,
   density,
+  href,
 }: Histogram): HTMLElement {
-  const [w, height, floor] = [320, 130, 110];
   const [low, high] = [bins(kept, from, to, n), bins(dropped, from, to, n)];
   const sums = low.map((count, i) => count + (high[i] ?? 0));
   const all = sums.reduce((a, b) => a + b, 0);
@@ -47,63 +72,104 @@ export function histogram({
   const most = Math.max(1, ...sums, ...expected);
   const y = (count: number): number => floor - (count / most) * (floor - 8);
   const words = `${title}: ${kept.length} kept, ${dropped.length} dropped`;
-  const svg = s("svg", { class: "chart", viewBox: `0 0 ${w} ${height}`, role: "img", "aria-label": words });
+  const svg = s("svg", { class: "chart", viewBox: `0 0 ${w} ${height}`, role: "group", "aria-label": words });
   const step = w / n;
   low.forEach((count, i) => {
-    const [start, end] = [i, i + 1].map((k) => (from + (k / n) * (to - from)).toFixed(1));
-    const text = `${start} to ${end} ${unit}: ${count} kept, ${high[i] ?? 0} dropped`;
-    const [x, wide] = [i * step + 0.5, step - 1];
-    const sum = count + (high[i] ?? 0);
-    append(svg, [
-      s(
-        "rect",
-        { class: "bar", x, y: y(count), width: wide, height: floor - y(count) },
-        s("title", {}, text),
-      ),
-      s(
-        "rect",
-        { class: "bar dropped", x, y: y(sum), width: wide, height: y(count) - y(sum) },
-        s("title", {}, text),
-      ),
-    ]);
+    const [start, end] = [i, i + 1].map((k) => Number((from + (k / n) * (to - from)).toFixed(4)));
+    const x = i * step + 0.5;
+    const parts: [boolean, number, number][] = [
+      [true, 0, count],
+      [false, count, high[i] ?? 0],
+    ];
+    for (const [kept, below, many] of parts) {
+      if (many === 0) continue;
+      const text = `${start} to ${end} ${unit}: ${many} ${kept ? "kept" : "dropped"}`;
+      const size = { x, y: y(below + many), width: step - 1, height: y(below) - y(below + many) };
+      const bar = s("rect", { class: kept ? "bar" : "bar dropped", ...size }, s("title", {}, text));
+      const to_grid = href(kept, i === 0 ? null : (start ?? null), i === n - 1 ? null : (end ?? null));
+      svg.append(s("a", { href: to_grid, "aria-label": text }, bar));
+    }
   });
+  roving([...svg.querySelectorAll<SVGAElement>("a")]);
   if (weight > 0) {
     const points = expected.map((count, i) => `${((i + 0.5) * step).toFixed(1)},${y(count).toFixed(1)}`);
     svg.append(s("polyline", { class: "curve", points: points.join(" ") }));
   }
-  svg.append(s("line", { class: "axis", x1: 0, x2: w, y1: floor, y2: floor }));
-  for (const [value, x, anchor] of [
-    [from, 0, "start"],
-    [(from + to) / 2, w / 2, "middle"],
-    [to, w, "end"],
-  ] as const) {
-    svg.append(
-      s("text", { x, y: height - 5, "text-anchor": anchor }, `${Number(value.toFixed(1))} ${unit}`.trim()),
-    );
-  }
+  svg.append(
+    ...axis([from, (from + to) / 2, to].map((value) => `${Number(value.toFixed(1))} ${unit}`.trim())),
+  );
   return h("figure", {}, h("figcaption", {}, title), svg);
 }
 
-/** A bar a row, with its name, its share of the longest, and words. */
-export function bars(
-  rows: { name: string; value: number; words: string; color: string; href?: string }[],
-): HTMLElement {
-  const most = Math.max(1e-9, ...rows.map((row) => row.value));
-  const list = h("div", { class: "bars", role: "list" });
-  for (const { name, value, words, color, href } of rows) {
-    const bar = h("span", { class: "bar" });
-    bar.style.width = `${(100 * value) / most}%`;
-    bar.style.background = color;
-    const label = href ? h("a", { href }, name) : h("span", {}, name);
-    list.append(
-      h(
-        "div",
-        { class: "bar-row", role: "listitem" },
-        label,
-        h("span", { class: "track" }, bar),
-        h("span", { class: "quiet" }, words),
-      ),
-    );
+/** The axis, and words at its start, its middle and its end. */
+function axis(words: string[]): SVGElement[] {
+  const at = (text: string, i: number): SVGElement => {
+    const anchor = ["start", "middle", "end"][i];
+    return s("text", { x: (i * w) / 2, y: height - 5, "text-anchor": anchor }, text);
+  };
+  return [s("line", { class: "axis", x1: 0, x2: w, y1: floor, y2: floor }), ...words.map(at)];
+}
+
+export interface Spread {
+  title: string;
+  bins: Surface[];
+  /** What the faces of a bin have in common. */
+  nameOf: (bin: number) => string;
+  /** Below the bars one by one, or at the start, the middle and the end of the axis. */
+  ticks: { of: "bars" | "axis"; words: string[] };
+}
+
+/** Shares of faces, and beside each that of their surface. What a bar has is told while it is pointed at. */
+export function spread({ title, bins, nameOf, ticks }: Spread): HTMLElement {
+  const sum = (of: (bin: Surface) => number): number => bins.reduce((all, bin) => all + of(bin), 0);
+  const [faces, m2] = [
+    Math.max(
+      1,
+      sum((bin) => bin.faces),
+    ),
+    sum((bin) => bin.m2) || 1,
+  ];
+  const shares = bins.map((bin) => [bin.faces / faces, bin.m2 / m2] as const);
+  const most = Math.max(...shares.flat(), 1e-9);
+  const step = w / bins.length;
+  const svg = s("svg", { class: "chart", viewBox: `0 0 ${w} ${height}`, role: "group", "aria-label": title });
+  const told = h("p", { class: "told", "aria-hidden": "true" });
+  const bars = bins.map((bin, i) => {
+    const words =
+      `${nameOf(i)}: ${count(bin.faces)} faces (${percent(bin.faces / faces)}), ` +
+      `${metres2(bin.m2)} (${percent(bin.m2 / m2)})`;
+    const tell = (text: string) => (): void => void (told.textContent = text);
+    const listeners = Object.fromEntries([
+      ...["pointerenter", "focus"].map((event) => [event, tell(words)]),
+      ...["pointerleave", "blur"].map((event) => [event, tell("")]),
+    ]);
+    const column = (share: number, k: number): SVGElement => {
+      const tall = (share / most) * (floor - 8);
+      const size = { x: (i + 0.12 + 0.4 * k) * step, y: floor - tall, width: 0.36 * step, height: tall };
+      return s("rect", { class: k === 0 ? "bar" : "bar surface", ...size });
+    };
+    // All of the column is pointed at, also where its bars are low.
+    const target = s("rect", { class: "target", x: i * step, y: 0, width: step, height: floor });
+    const parts = [target, ...(shares[i] ?? []).map(column)];
+    return s("g", { class: "column", role: "img", "aria-label": words, ...listeners }, ...parts);
+  });
+  svg.append(...bars, ...axis(ticks.of === "axis" ? ticks.words : []));
+  if (ticks.of === "bars") {
+    // As many as there is room for.
+    const every = Math.ceil(bins.length / 12);
+    ticks.words.forEach((text, i) => {
+      const place = { x: (i + 0.5) * step, y: height - 5, "text-anchor": "middle" };
+      if (i % every === 0) svg.append(s("text", place, text));
+    });
   }
-  return list;
+  roving(bars);
+  return h("figure", {}, h("figcaption", {}, title), told, svg);
+}
+
+/** A bar for a cell of a table: a share of the longest. */
+export function bar(share: number, color: string): HTMLElement {
+  const inner = h("span", { class: "bar" });
+  inner.style.width = `${Math.max(0, 100 * share)}%`;
+  inner.style.background = color;
+  return h("span", { class: "track", "aria-hidden": "true" }, inner);
 }

@@ -2,15 +2,56 @@
 
 import type { Index } from "../data.js";
 import { append, count, h, metres2, percent, several, table } from "../dom.js";
-import { link } from "../route.js";
+import { disputeInPanorama } from "../places.js";
+import { link, spaceLink } from "../route.js";
 
-/** The terms of the page; whoever bundles code of others adds theirs here. */
-const LICENCE =
-  "This page is part of s3d, which is under the MIT licence or the Apache licence 2.0, as you choose. " +
-  "It contains no code of others.";
+/** What the page has of others: put in by bundle.mjs. */
+declare const LICENCES: { name: string; version: string; text: string }[];
 
-/** How many notes the tab counts: what is wrong with files. */
-export const faultCount = (index: Index): number => index.faults.length;
+const warningsOf = (index: Index): string[] => index.areas.flatMap((area) => area.warnings ?? []);
+
+/** How many notes the tab counts: what is wrong with files, and what the export warned of. */
+export const faultCount = (index: Index): number =>
+  index.faults.length +
+  warningsOf(index).length +
+  (index.data_set.missing_yet?.length ?? 0) +
+  (index.verified?.faults ?? []).reduce((sum, group) => sum + group.count, 0);
+
+/** Where a page shows what a warning is about: the location that it names, or what has no label. */
+function placeOfWarning(index: Index, warning: string): [string, string] | null {
+  const location = index.locations.find((l) => l.pano && warning.includes(l.uuid));
+  if (location) return [link("pano", [location.area, location.uuid]), "its panorama"];
+  if (index.classes.length > 0 && /without a label|no label|unlabelled/.test(warning))
+    return [link("views", [], { sort: "unlabelled" }), "views that show most of it"];
+  return null;
+}
+
+function warnings(index: Index): HTMLElement | null {
+  const items = index.areas.flatMap((area) =>
+    (area.warnings ?? []).map((warning) => {
+      const place = placeOfWarning(index, warning);
+      const of = index.areas.length > 1 ? `Area ${area.area}: ` : "";
+      const item = h("li", {}, `${of}${warning}`);
+      append(item, place ? [" (", h("a", { href: place[0] }, place[1]), ")"] : []);
+      return item;
+    }),
+  );
+  return items.length === 0
+    ? null
+    : h("section", {}, h("h2", {}, "Warnings of the export"), h("ul", {}, ...items));
+}
+
+function missing(index: Index): HTMLElement | null {
+  const sentences = index.data_set.missing_yet;
+  if (sentences === null) return null;
+  return h(
+    "section",
+    {},
+    h("h2", {}, "Not finished"),
+    h("p", {}, "The export had not finished when this report was made:"),
+    h("ul", {}, ...sentences.map((sentence) => h("li", {}, sentence))),
+  );
+}
 
 function faults(index: Index): HTMLElement {
   const section = h("section", {}, h("h2", {}, "Files"));
@@ -18,10 +59,38 @@ function faults(index: Index): HTMLElement {
     append(section, [h("p", {}, "Every file that this report reads is as it was written.")]);
     return section;
   }
-  const rows = index.faults.map(({ path, message }) => [h("code", {}, path), message]);
+  const rows = index.faults.map(({ path, message }) => [fileName(index, path), message]);
   append(section, [
     h("p", {}, `${several(index.faults.length, "file")} missing or damaged:`),
     table(["File", "What is wrong"], rows),
+  ]);
+  return section;
+}
+
+/** The name of a file, which leads to the picture that it is of. */
+function fileName(index: Index, path: string): HTMLElement {
+  const name = h("code", {}, path);
+  const [, uuid, frame] = /\/camera_([0-9A-Za-z-]+)_.*_frame_(\d+|equirectangular)_/.exec(path) ?? [];
+  const area = Number(/^area_(\d+)\//.exec(path)?.[1]);
+  const at = index.locations.findIndex((l) => l.area === area && l.uuid === uuid);
+  const view = index.views.find((v) => v.location === at && String(v.frame) === frame);
+  if (view && view.picture !== null) return h("a", { href: link("view", [view.picture]) }, name);
+  return index.locations[at]?.pano ? h("a", { href: link("pano", [area, uuid ?? ""]) }, name) : name;
+}
+
+function verified(index: Index): HTMLElement | null {
+  if (index.verified === null) return null;
+  const { files, checks, notes: left, faults: found } = index.verified;
+  const all = found.reduce((sum, group) => sum + group.count, 0);
+  const words = `${several(files, "file")} and ${several(checks, "check")}: ${several(all, "fault")}.`;
+  const section = h("section", {}, h("h2", {}, "Verified"), h("p", {}, words));
+  const rows = found.flatMap(({ topic, count: n, first }) => {
+    const named = first.map(([path, message]) => [topic, fileName(index, path), message]);
+    return n > first.length ? [...named, [topic, "", `${count(n - first.length)} more like this`]] : named;
+  });
+  append(section, [
+    rows.length > 0 && table(["", "File", "What is wrong"], rows),
+    left.length > 0 && h("ul", {}, ...left.map((note) => h("li", {}, note))),
   ]);
   return section;
 }
@@ -50,6 +119,12 @@ function surface(index: Index): HTMLElement | null {
           {},
           `${of}${count(bare.faces)} faces have no label (${metres2(bare.m2)}${pixels}): `,
           h("a", { href: to }, "views that show most of it"),
+          ...(index.meshes.some((mesh) => mesh.area === area.area)
+            ? [
+                ", ",
+                h("a", { href: link("space", [area.area], { show: "unlabelled" }) }, "where they are in 3D"),
+              ]
+            : []),
         ),
       );
     }
@@ -62,23 +137,6 @@ function surface(index: Index): HTMLElement | null {
       items.push(h("li", {}, `${of}coordinates are those of the scan less ${area.offset_m.join(", ")} m.`));
   }
   return items.length === 0 ? null : h("section", {}, h("h2", {}, "Surface"), h("ul", {}, ...items));
-}
-
-/** The panorama nearest to a point, turned to it. */
-function placeOf(index: Index, area: number, point: [number, number, number]): string | null {
-  let best: { distance: number; href: string } | null = null;
-  for (const l of index.locations) {
-    if (l.area !== area || !l.pano || !l.position || l.azimuth_rad === null) continue;
-    const [x, y, z] = point.map((c, axis) => c - (l.position?.[axis] ?? 0)) as [number, number, number];
-    const distance = Math.hypot(x, y, z);
-    if (best && best.distance <= distance) continue;
-    const degrees = (radians: number): string => ((radians * 180) / Math.PI).toFixed(1);
-    const lon = l.azimuth_rad - Math.atan2(y, x);
-    const wrapped = lon - 2 * Math.PI * Math.round(lon / (2 * Math.PI));
-    const gaze = { lon: degrees(wrapped), lat: degrees(Math.atan2(z, Math.hypot(x, y))), fov: "45" };
-    best = { distance, href: link("pano", [l.area, l.uuid], gaze) };
-  }
-  return best?.href ?? null;
 }
 
 function disputes(index: Index): HTMLElement | null {
@@ -97,28 +155,35 @@ function disputes(index: Index): HTMLElement | null {
       ),
     ]);
     found = true;
-    const classes = votes.disputing_classes.slice(0, 12);
-    if (classes.length > 0) {
-      const rows = classes.map((d) => [
-        d.classes.join(" and "),
-        h("span", { class: "number" }, count(d.faces)),
-        h("span", { class: "number" }, `${d.m2.toFixed(3)} m²`),
-      ]);
-      append(section, [table(["Classes", "Faces", "Surface"], rows)]);
-    }
     const patches = votes.disputed_patches.slice(0, 12).map((p) => {
-      const href = placeOf(index, area, p.center);
+      const near = disputeInPanorama(index, area, p.center);
       const name = p.labels.join(" or ");
+      const solid = index.meshes.some((mesh) => mesh.area === area) && spaceLink(area, p.center);
       return [
-        href ? h("a", { href }, name) : name,
+        name,
         h("span", { class: "number" }, count(p.faces)),
         h("span", { class: "number" }, `${p.m2.toFixed(3)} m²`),
+        solid && h("a", { href: solid }, "3D"),
+        near && h("a", { href: near }, "Panorama"),
       ];
     });
     if (patches.length > 0)
-      append(section, [h("h3", {}, "Largest patches"), table(["Labels", "Faces", "Surface"], patches)]);
+      append(section, [
+        h("h3", {}, "Largest patches"),
+        table(["Labels", "Faces", "Surface", "", ""], patches),
+      ]);
   }
   return found ? section : null;
+}
+
+function licences(): HTMLElement {
+  const others = LICENCES.map(({ name, version }) => `${name} ${version}`).join(" and ");
+  const words =
+    "This page is part of s3d, which is under the MIT licence or the Apache licence 2.0, as you choose. " +
+    `It contains ${others}, under these terms:`;
+  const details = h("details", {}, h("summary", {}, "Licences"), h("p", {}, words));
+  for (const { name, text } of LICENCES) append(details, [h("h3", {}, name), h("pre", {}, text)]);
+  return details;
 }
 
 function about(index: Index): HTMLElement {
@@ -139,12 +204,20 @@ function about(index: Index): HTMLElement {
         `${count(d.files)} files, ${(d.bytes / 1e6).toFixed(1)} MB; ${taxonomy}.`,
     ),
     h("details", {}, h("summary", {}, "Options of the export"), table(["Option", "Value"], options)),
-    h("details", {}, h("summary", {}, "Licences"), h("p", {}, LICENCE)),
+    licences(),
   );
 }
 
 export function notesPage(index: Index): HTMLElement {
   const page = h("main", { class: "page" }, h("h1", {}, "Notes"));
-  append(page, [faults(index), surface(index), disputes(index), about(index)]);
+  append(page, [
+    missing(index),
+    faults(index),
+    verified(index),
+    warnings(index),
+    surface(index),
+    disputes(index),
+    about(index),
+  ]);
   return page;
 }

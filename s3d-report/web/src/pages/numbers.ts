@@ -1,10 +1,12 @@
 // The paper's tables, classes by pixels, and what the views are like.
 
-import { bars, histogram } from "./charts.js";
+import { bar, histogram } from "./charts.js";
 import { css } from "../colors.js";
 import type { Index, View } from "../data.js";
 import { append, count, h, metres2, percent, roomName, table } from "../dom.js";
 import { link } from "../route.js";
+import { votesSection } from "./disputes.js";
+import { yawOf } from "./views.js";
 
 /** Rows of a table with a column an area and, of several, their sum. */
 function byArea(
@@ -84,27 +86,44 @@ function tables(index: Index): HTMLElement {
   return section;
 }
 
+/** Each class by what shows it: pixels, faces, m², instances. */
 function classes(index: Index): HTMLElement | null {
   const labelled = index.pixels_by_class.reduce((a, b) => a + b, 0);
   const all = labelled + index.pixels_unlabelled;
   if (labelled === 0) return null;
+  const sum = (values: (number | undefined)[]): number => values.reduce<number>((a, b) => a + (b ?? 0), 0);
+  const surface = index.surface_by_class;
   const rows = index.classes.map(({ name, color }, i) => {
-    const value = index.pixels_by_class[i] ?? 0;
-    const href = link("views", [], { class: String(i), sort: "share" });
-    return { name, value, words: percent(value / all), color: css(color), href };
+    return {
+      name,
+      color: css(color),
+      pixels: index.pixels_by_class[i] ?? 0,
+      ...(surface[i] ?? { faces: 0, m2: 0 }),
+      instances: sum((index.statistics?.areas ?? []).map((a) => a.instances_per_class?.[name])),
+      href: link("views", [], { class: String(i), sort: "share" }),
+    };
   });
-  rows.sort((a, b) => b.value - a.value);
+  rows.sort((a, b) => b.pixels - a.pixels);
+  const shown = rows.filter((row) => row.pixels + row.faces + row.instances > 0);
+  const most = Math.max(...shown.map((row) => row.pixels));
   const words =
     `${count(all)} pixels of panoramas and views see the mesh; ` +
     `${percent(index.pixels_unlabelled / all)} of them have no label. ` +
-    "A class leads to the views that show most of it.";
-  return h(
-    "section",
-    {},
-    h("h2", {}, "Classes by pixels"),
-    h("p", { class: "quiet" }, words),
-    bars(rows.filter((row) => row.value > 0)),
-  );
+    `A class leads to the views that show most of it.`;
+  const number = (text: string): HTMLElement => h("span", { class: "number" }, text);
+  const cells = shown.map((row) => [
+    h("a", { href: row.href }, row.name),
+    bar(row.pixels / most, row.color),
+    number(percent(row.pixels / all)),
+    number(count(row.pixels)),
+    number(count(row.faces)),
+    number(metres2(row.m2)),
+    number(count(row.instances)),
+  ]);
+  const head = ["Class", "", "Share", "Pixels", "Faces", "Surface", "Instances"];
+  const list = table(head, cells);
+  list.classList.add("classes");
+  return h("section", {}, h("h2", {}, "Classes"), h("p", { class: "quiet" }, words), list);
 }
 
 function distributions(index: Index): HTMLElement | null {
@@ -115,9 +134,20 @@ function distributions(index: Index): HTMLElement | null {
     return { kept: values(true), dropped: values(false) };
   };
   if (views.length === 0) return null;
-  const wrapped = (yaw: number): number => yaw - 360 * Math.round(yaw / 360);
   const entropy = split((v) => v.entropy);
-  const highest = Math.max(0.1, ...[...entropy.kept, ...entropy.dropped].slice(0, 100_000));
+  const highest = [...entropy.kept, ...entropy.dropped].reduce((a, b) => Math.max(a, b), 0.1);
+  const photographs = index.views.some((v) => v.photograph !== null);
+  // The next number below a bound, as the index rounds them: a bar ends where the next one begins.
+  const below = (key: string, bound: number): string =>
+    key === "entropy" ? (bound - 1e-4).toFixed(4) : (bound - 0.01).toFixed(2);
+  const href =
+    (key: string) =>
+    (kept: boolean, min: number | null, max: number | null): string =>
+      link("views", [], {
+        ...(kept ? photographs && { show: "kept" } : { show: "dropped" }),
+        ...(min !== null && { [`${key}_min`]: String(min) }),
+        ...(max !== null && { [`${key}_max`]: below(key, max) }),
+      });
   const bell = (value: number, deviation: number): number => Math.exp(-0.5 * (value / deviation) ** 2);
   const charts = [
     histogram({
@@ -126,8 +156,9 @@ function distributions(index: Index): HTMLElement | null {
       from: -180,
       to: 180,
       bins: 36,
-      ...split((v) => (v.yaw_deg === null ? null : wrapped(v.yaw_deg))),
+      ...split(yawOf),
       density: () => 1,
+      href: href("yaw"),
     }),
     histogram({
       title: "Pitch",
@@ -137,6 +168,7 @@ function distributions(index: Index): HTMLElement | null {
       bins: 40,
       ...split((v) => v.pitch_deg),
       density: (v) => bell(v, 15),
+      href: href("pitch"),
     }),
     histogram({
       title: "Angle of view",
@@ -146,6 +178,7 @@ function distributions(index: Index): HTMLElement | null {
       bins: 26,
       ...split((v) => v.fov_deg),
       density: (v) => bell(75 - v, 30),
+      href: href("fov"),
     }),
     histogram({
       title: "Entropy",
@@ -154,10 +187,12 @@ function distributions(index: Index): HTMLElement | null {
       to: Math.ceil(10 * highest) / 10,
       bins: 40,
       ...entropy,
+      href: href("entropy"),
     }),
   ];
   const words =
-    "Kept views, dropped candidates on top of them in grey, and the curve that candidates are drawn from.";
+    "Kept views, dropped candidates on top of them in grey, and the curve that candidates are drawn from. " +
+    "A bar leads to its views; arrow keys go from bar to bar.";
   return h(
     "section",
     {},
@@ -169,6 +204,6 @@ function distributions(index: Index): HTMLElement | null {
 
 export function numbersPage(index: Index): HTMLElement {
   const page = h("main", { class: "page" }, h("h1", {}, "Numbers"));
-  append(page, [classes(index), distributions(index), tables(index)]);
+  append(page, [classes(index), distributions(index), votesSection(index), tables(index)]);
   return page;
 }

@@ -2,10 +2,11 @@
 
 import { type Index, type Location, type Picture, load } from "../data.js";
 import { append, choice, h, percent, roomName } from "../dom.js";
-import { type Gaze, directionIn, panoramaPoint, screenAt } from "../geometry.js";
-import { plan } from "./plan.js";
+import { type Gaze, directionIn, panoramaPoint, panoramaScreen, screenAt } from "../geometry.js";
+import { storeysOf } from "../storeys.js";
+import { plan } from "./floor.js";
 import { type Route, link, numberOf, replaceRoute } from "../route.js";
-import { Viewer, lookFrom, queryOf } from "../viewer.js";
+import { Viewer, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
 
 const RADIANS = Math.PI / 180;
 
@@ -102,15 +103,27 @@ export async function panoPage(
     lat: numberOf(route.query, "lat", -90, 90, -4) * RADIANS,
     fov: numberOf(route.query, "fov", 8, 120, 90) * RADIANS,
   };
-  const map = location.position ? plan(index, location.area, { small: true, current: at }) : null;
+  const storeys = storeysOf(index, location.area);
+  const storey = location.position && storeys.ofHeight(location.position[2]);
+  const map =
+    storey === null
+      ? null
+      : plan(index, location.area, {
+          small: true,
+          current: at,
+          hasRoom: (room) => storeys.ofRoom(room) === storey,
+          hasHeight: (z) => storeys.ofHeight(z) === storey,
+        });
   const marks: { button: HTMLElement; lon: number; lat: number }[] = [];
-  const look = lookFrom(route.query, picture, gaze);
+  const look = lookFrom(route.query, modalitiesOf(index, location.area, picture), gaze);
   let viewer: Viewer | null = null;
   const opened = await Viewer.open(index, picture, look, {
     title: `Panorama of ${roomName(location.room)}; arrow keys turn, plus and minus zoom`,
+    area: location.area,
     room: location.room,
     point: (i, j, distance) => panoramaPoint(location, picture, i, j, distance),
     position: location.position,
+    screen: (point, now, width, height) => panoramaScreen(location, now ?? gaze, width, height, point),
     changed: (now) => {
       replaceRoute("pano", [location.area, location.uuid], queryOf(now));
       if (now.gaze) map?.look((location.azimuth_rad ?? 0) - now.gaze.lon, now.gaze.fov);

@@ -2,9 +2,10 @@
 
 import { type Index, type View, loadPicture } from "../data.js";
 import { append, h, percent, roomName } from "../dom.js";
-import { viewPoint } from "../geometry.js";
+import { viewPoint, viewScreen } from "../geometry.js";
+import { placeOf } from "../gl.js";
 import { type Route, link, replaceRoute } from "../route.js";
-import { Viewer, lookFrom, queryOf } from "../viewer.js";
+import { Viewer, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
 
 /** Why a view is in the data set, or is not: a sentence. */
 export function reasonOf(view: View): string {
@@ -104,11 +105,18 @@ export async function viewPage(
     return { element, close: () => {} };
   }
   const location = view.location === null ? undefined : index.locations[view.location];
-  const viewer = await Viewer.open(index, picture, lookFrom(route.query, picture, null), {
+  const look = lookFrom(route.query, modalitiesOf(index, view.area, picture), null);
+  const viewer = await Viewer.open(index, picture, look, {
     title: nameOf(index, view),
+    area: view.area,
     room: view.room,
     point: (i, j, depth) => viewPoint(picture, i, j, depth),
     position: view.position ?? location?.position ?? null,
+    screen: (point, _, width, height) => {
+      const at = viewScreen(picture, point);
+      const [left, top, w, h_] = placeOf(picture.of, width, height);
+      return at && [at[0] * w + left * at[2], at[1] * h_ + top * at[2], at[2]];
+    },
     changed: (now) => replaceRoute("view", [at], queryOf(now)),
   });
   viewer.element.classList.add("flat");

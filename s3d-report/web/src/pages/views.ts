@@ -19,10 +19,16 @@ const PROPERTIES: Property[] = [
   { key: "coverage", name: "Coverage %", of: (v) => hundred(v.seen?.coverage), step: 1 },
   { key: "unlabelled", name: "Unlabelled %", of: (v) => hundred(v.seen?.unlabelled), step: 1 },
   { key: "instances", name: "Instances", of: (v) => v.seen?.instances ?? null, step: 1 },
-  { key: "yaw", name: "Yaw °", of: (v) => v.yaw_deg, step: 5 },
+  { key: "yaw", name: "Yaw °", of: (v) => yawOf(v), step: 5 },
   { key: "pitch", name: "Pitch °", of: (v) => v.pitch_deg, step: 5 },
   { key: "fov", name: "Angle of view °", of: (v) => v.fov_deg, step: 5 },
 ];
+
+/** Of half a turn at most, to the left. */
+export function yawOf(view: View): number | null {
+  const yaw = view.yaw_deg;
+  return yaw === null ? null : yaw - 360 * Math.round(yaw / 360);
+}
 
 const hundred = (share: number | null | undefined): number | null => (share == null ? null : 100 * share);
 
@@ -94,8 +100,9 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       });
     });
     const by = there.find((p) => p.key === query["sort"]);
-    const sign = query["order"] === "up" ? 1 : -1;
-    const value = query["sort"] === "share" ? shareOf : by?.of;
+    const named = query["sort"] === "room";
+    const sign = named || query["order"] === "up" ? 1 : -1;
+    const value = query["sort"] === "share" ? shareOf : named ? roomPlace(index) : by?.of;
     if (value) {
       // Those without a number come last, either way.
       const number = (view: View): number => value(view) ?? -sign * Infinity;
@@ -126,6 +133,18 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
   };
 }
 
+/** The place of a view's room among all, by area and name. */
+function roomPlace(index: Index): (view: View) => number {
+  const rooms = roomsOf(index);
+  const places = new Map(rooms.map((room, i) => [room, i]));
+  return (view) => places.get(`${view.area}/${view.room}`) ?? rooms.length;
+}
+
+const roomsOf = (index: Index): string[] =>
+  [...new Set(index.views.map((v) => `${v.area}/${v.room}`))].sort(
+    new Intl.Collator("en", { numeric: true }).compare,
+  );
+
 const bound = (text: string | undefined): number | null => {
   const value = text === undefined || text.trim() === "" ? Number.NaN : Number(text);
   return Number.isFinite(value) ? value : null;
@@ -137,7 +156,7 @@ function controls(
   query: Record<string, string>,
   set: (name: string) => (value: string) => void,
 ): HTMLElement {
-  const rooms = [...new Set(index.views.map((v) => `${v.area}/${v.room}`))].sort();
+  const rooms = roomsOf(index);
   const areas = index.areas.length > 1;
   const roomWords = (key: string): string => {
     const [area, room] = key.split("/");
@@ -156,18 +175,20 @@ function controls(
     ["", "In order"],
     ...there.map((p): [string, string] => [p.key, p.name]),
   ];
+  if (rooms.length > 1) sorts.push(["room", "Room"]);
   if (present.length > 0) sorts.push(["share", "Share of the class"]);
   const orders: [string, string][] = [
     ["", "highest first"],
     ["up", "lowest first"],
   ];
   const order = choice("Order", orders, query["order"] ?? "", set("order"));
-  order.hidden = !query["sort"];
+  const ordered = (by: string): boolean => by !== "" && by !== "room";
+  order.hidden = !ordered(query["sort"] ?? "");
   const bar = h("div", { class: "controls" });
   append(bar, [
     kinds.length > 1 && choice("Which views", kinds, query["show"] ?? "pictures", set("show")),
     choice("Sort by", sorts, query["sort"] ?? "", (by) => {
-      order.hidden = by === "";
+      order.hidden = !ordered(by);
       set("sort")(by);
     }),
     order,
@@ -185,7 +206,7 @@ function controls(
           ["", "All locations"],
           ...index.locations.map((l, i): [string, string] => [
             String(i),
-            `${roomName(l.room)} · ${l.uuid.slice(0, 8)}`,
+            `${roomWords(`${l.area}/${l.room}`)} · ${l.uuid.slice(0, 8)}`,
           ]),
         ],
         query["location"] ?? "",

@@ -1,0 +1,195 @@
+//! Another data set beside the one that is shown: what differs, and its pictures where they do.
+
+use crate::areas;
+use crate::content::{Content, Shown};
+use crate::faults::{Fault, Faults};
+use crate::index::{ClassEntry, LabelEntry, folder_name};
+use crate::packed::packed;
+use crate::pixels::Images;
+use crate::script::Scripts;
+use crate::write::ReportOptions;
+use s3d_dataset::{
+    ChangedPatch, ClassPixels, CompareOptions, Comparison, Context, DataSet, ImageChange, PixelChanges,
+    Result, compare, map_in_order,
+};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::{DatasetImage, Domain, ImageName};
+use s3d_label::LabelTable;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The modalities that pictures have.
+const SHOWN: [Domain; 4] = [Domain::Rgb, Domain::Depth, Domain::Normal, Domain::Semantic];
+
+/// `data/compare.js`.
+#[derive(Serialize)]
+struct Compared<'a> {
+    /// Without its images: they are in `pictures`.
+    comparison: &'a Comparison,
+    /// The other's: `labels` and `classes` as in the index.
+    classes: Vec<ClassEntry>,
+    labels: Vec<LabelEntry>,
+    depth_units_per_m: f64,
+    /// The files `changed_A.js`: areas with faces of other labels.
+    changed_faces: Vec<u32>,
+    /// Images that differ; the Kth is that of `other_K.js`.
+    pictures: Vec<PictureEntry>,
+    /// What is wrong in the other's files of these.
+    faults: Vec<Fault>,
+}
+
+/// An image that differs.
+#[derive(Serialize)]
+struct PictureEntry {
+    /// The picture of a view in this report, or the location of a panorama.
+    picture: Option<usize>,
+    pano: Option<usize>,
+    /// Whether anything is left of the other's.
+    is_there: bool,
+    /// By modality.
+    pixels: BTreeMap<&'static str, PixelChanges>,
+    /// Places in the comparison's matrix of classes, and pixels.
+    classes: Vec<(usize, u64)>,
+}
+
+/// `data/changed_A.js`: faces with other labels, packed, and the largest patches of them.
+#[derive(Serialize)]
+struct ChangedFaces<'a> {
+    faces: usize,
+    face: String,
+    a: String,
+    b: String,
+    patches: &'a [ChangedPatch],
+}
+
+/// Two images that differ.
+struct Pair {
+    shown: Shown,
+    other: DatasetImage,
+    pixels: BTreeMap<&'static str, PixelChanges>,
+    classes: Vec<ClassPixels>,
+}
+
+/// Compares the data set that is shown with another, and writes what the page needs. Returns the bytes.
+pub(crate) fn write(
+    ctx: &Context,
+    (out, content): (&Path, &Content<'_>),
+    against: &Path,
+    options: &ReportOptions,
+    scripts: &Scripts,
+) -> Result<u64> {
+    let mut comparison = compare(out, against, &CompareOptions::default(), ctx)?;
+    // The report names no folders of the machine.
+    comparison.a.folder = folder_name(out);
+    comparison.b.folder = folder_name(against);
+    let other = DataSet::open(against)?;
+    let mut faults = Faults::default();
+    let table = faults.keep(other.layout().root(), other.labels())?.flatten();
+    let pairs = pairs(&other, content, &std::mem::take(&mut comparison.images));
+    let progress = ctx.progress("comparing", "pictures", pairs.len() as u64);
+    let jobs: Vec<(usize, &Pair)> = pairs.iter().enumerate().collect();
+    let made = map_in_order(
+        ctx,
+        &jobs,
+        || (),
+        |(), (number, pair)| {
+            let mut faults = Faults::default();
+            let bytes =
+                write_picture(&other, table.as_ref(), (*number, pair), options, scripts, &mut faults)?;
+            progress.add(1);
+            Ok((bytes, faults.into_vec()))
+        },
+    )?;
+    drop(progress);
+    let matrix = comparison.labels.iter().flat_map(|labels| &labels.matrix);
+    let place_of: BTreeMap<_, usize> = matrix.map(|pair| (pair.a, pair.b)).zip(0..).collect();
+    let mut bytes = 0;
+    let mut pictures = Vec::with_capacity(pairs.len());
+    for (pair, (written, found)) in pairs.into_iter().zip(made) {
+        faults.extend(found);
+        bytes += written.unwrap_or(0);
+        let (picture, pano) = match pair.shown {
+            Shown::Picture(number) => (Some(number), None),
+            Shown::Panorama(location) => (None, Some(location)),
+        };
+        let place = |of: &ClassPixels| Some((*place_of.get(&(of.a, of.b))?, of.pixels));
+        let classes = pair.classes.iter().filter_map(place).collect();
+        let is_there = written.is_some();
+        pictures.push(PictureEntry { picture, pano, is_there, pixels: pair.pixels, classes });
+    }
+    let mut changed_faces = Vec::new();
+    for area in comparison.areas.iter().filter(|area| !area.faces.is_empty()) {
+        let number =
+            |of: fn(&s3d_dataset::FaceChange) -> u32| packed(area.faces.iter().map(of), u32::to_le_bytes);
+        let faces = ChangedFaces {
+            faces: area.faces.len(),
+            face: number(|change| change.face),
+            a: number(|change| change.a),
+            b: number(|change| change.b),
+            patches: &area.patches,
+        };
+        bytes += scripts.write(&format!("changed_{}", area.area), &faces)?;
+        changed_faces.push(area.area);
+    }
+    let compared = Compared {
+        comparison: &comparison,
+        classes: areas::classes(&other),
+        labels: table.as_ref().map(areas::labels).unwrap_or_default(),
+        depth_units_per_m: other.options().depth_units.per_m(),
+        changed_faces,
+        pictures,
+        faults: faults.into_vec(),
+    };
+    Ok(bytes + scripts.write_list("compare", &compared)?)
+}
+
+/// The images that differ in what is shown, in the order of the pictures.
+fn pairs(other: &DataSet, content: &Content<'_>, changes: &[ImageChange]) -> Vec<Pair> {
+    let named = |area: u32, path: &str| {
+        let name = path.rsplit('/').next().and_then(ImageName::parse)?;
+        Some((area, name.uuid, name.room, name.frame))
+    };
+    let of_other = |area: &u32| other.images(*area).into_iter();
+    let images = other.areas().iter().flat_map(of_other);
+    let images: BTreeMap<_, DatasetImage> = images
+        .map(|image| ((image.area, image.uuid.clone(), image.room.clone(), image.frame), image))
+        .collect();
+    let shown = content.shown();
+    let mut pairs: BTreeMap<Shown, Pair> = BTreeMap::new();
+    for change in changes {
+        let place = named(change.area, &change.a).and_then(|key| shown.get(&key));
+        let image = named(change.area, &change.b).and_then(|key| images.get(&key));
+        let (Some(place), Some(image)) = (place, image) else { continue };
+        let pair = pairs.entry(*place).or_insert_with(|| Pair {
+            shown: *place,
+            other: image.clone(),
+            pixels: BTreeMap::new(),
+            classes: Vec::new(),
+        });
+        pair.pixels.insert(change.modality, change.pixels);
+        pair.classes.extend_from_slice(&change.classes);
+    }
+    // Of the others nothing is shown.
+    let is_shown = |pair: &Pair| SHOWN.iter().any(|domain| pair.pixels.contains_key(domain.folder()));
+    pairs.into_values().filter(is_shown).collect()
+}
+
+/// Writes the other's picture; `None` if nothing is left of it.
+fn write_picture(
+    data: &DataSet,
+    table: Option<&LabelTable>,
+    (number, pair): (usize, &Pair),
+    options: &ReportOptions,
+    scripts: &Scripts,
+    faults: &mut Faults,
+) -> Result<Option<u64>> {
+    let Some(images) = Images::read(data, &pair.other, table, faults)? else { return Ok(None) };
+    let widths = match pair.shown {
+        Shown::Picture(_) => options.of_views(),
+        Shown::Panorama(_) => options.of_panoramas(),
+    };
+    let path = pair.other.path(data.layout(), Domain::Rgb);
+    let (picture, _) = images.picture(widths, None).map_err(|e| FileError::format(&path, e.to_string()))?;
+    Ok(Some(scripts.write(&format!("other_{number}"), &picture)?))
+}

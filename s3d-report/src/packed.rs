@@ -1,0 +1,45 @@
+//! Images and long rows of numbers as text.
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
+use s3d_geom::Raster;
+use s3d_io::image::{Content, encode_rgb8};
+use std::io::Write;
+
+/// Of JPEG files, 1 to 100.
+const QUALITY: u8 = 85;
+
+/// Numbers as their bytes in a zlib stream in Base64.
+pub(crate) fn packed<T, const N: usize>(
+    numbers: impl IntoIterator<Item = T>,
+    bytes: fn(T) -> [u8; N],
+) -> String {
+    let bytes: Vec<u8> = numbers.into_iter().flat_map(bytes).collect();
+    let mut stream = ZlibEncoder::new(Vec::new(), Compression::default());
+    // Nothing fails in memory.
+    let stream = stream.write_all(&bytes).and_then(|()| stream.finish()).unwrap_or_default();
+    BASE64_STANDARD.encode(stream)
+}
+
+/// An image without loss as a `data:` URL.
+pub(crate) fn png_url(image: &Raster<[u8; 3]>, content: Content) -> String {
+    let bytes = encode_rgb8(image, content, s3d_io::image::Compression::Balanced);
+    format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes))
+}
+
+/// An image in good quality as a `data:` URL.
+pub(crate) fn jpeg_url(image: &Raster<[u8; 3]>) -> image::ImageResult<String> {
+    let mut bytes = Vec::new();
+    let pixels = image.pixels().as_flattened();
+    JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode(
+        pixels,
+        image.width(),
+        image.height(),
+        ExtendedColorType::Rgb8,
+    )?;
+    Ok(format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(bytes)))
+}

@@ -1,0 +1,276 @@
+// Another data set beside the one shown: what a report that was made against it holds of it (docs/report.md,
+// docs/compare.md). A is the one shown, B the other.
+
+import { type Index, type Picture, type Rgb, load, loadPicture } from "../data.js";
+import { unpack } from "../faces.js";
+
+export interface Counts {
+  faces: number;
+  m2: number;
+  pixels: number;
+}
+
+export interface Pixels {
+  pixels: number;
+  pixels_changed: number;
+  psnr_db: number | null;
+  mean: number | null;
+  largest: number | null;
+}
+
+interface DataSet {
+  folder: string;
+  version: string;
+  seed: number;
+  files: number;
+  bytes: number;
+  areas: number[];
+  taxonomy: string | null;
+}
+
+export interface ViewName {
+  area: number;
+  uuid: string;
+  candidate?: number;
+}
+
+export interface ModalityChanges extends Pixels {
+  modality: string;
+  same: number;
+  same_pixels: number;
+  changed: number;
+  other_pose: number;
+  other_form: number;
+  unread: number;
+  only_a: number;
+  only_b: number;
+}
+
+export interface InstanceChange {
+  name: string;
+  lost: Counts;
+  gained: Counts;
+  class_changed: Counts;
+}
+
+export interface Comparison {
+  equal: boolean;
+  full: boolean;
+  a: DataSet;
+  b: DataSet;
+  settings: { name: string; a: unknown; b: unknown }[];
+  inputs: { area: number; path: string; a: string | null; b: string | null }[];
+  files: { kind: string; same: number; changed: number; only_a: number; only_b: number; first: string[] }[];
+  areas: {
+    area: number;
+    faces_a: number | null;
+    faces_b: number | null;
+    geometry: "same" | "other" | "unread" | "one_sided" | "unlabelled";
+    faces_changed: number;
+    m2_changed: number;
+  }[];
+  labels: {
+    a: number;
+    b: number;
+    added: string[];
+    gone: string[];
+    changed: Counts;
+    class_changed: Counts;
+    matrix: ({ a: string; b: string } & Counts)[];
+    instances: InstanceChange[];
+  } | null;
+  views: Record<
+    | "lost"
+    | "gained"
+    | "redrawn"
+    | "locations_lost"
+    | "locations_gained"
+    | "photographs_lost"
+    | "photographs_gained",
+    ViewName[]
+  > & { kept_a: number; kept_b: number };
+  modalities: ModalityChanges[];
+  poses: {
+    same: number;
+    same_camera: number;
+    moved: { a: string; b: string; m: number; degrees: number; k_px: number | null }[];
+    largest_m: number;
+    largest_degrees: number;
+    largest_k_px: number;
+  };
+  notes: string[];
+  unread: { side: "a" | "b"; path: string; message: string }[];
+}
+
+export interface ChangedPicture {
+  picture: number | null;
+  pano: number | null;
+  is_there: boolean;
+  pixels: Record<string, Pixels>;
+  /** Places in the comparison's matrix of classes, and how many pixels changed so. */
+  classes: [number, number][];
+}
+
+interface Compared {
+  comparison: Comparison;
+  classes: Index["classes"];
+  labels: Index["labels"];
+  depth_units_per_m: number;
+  changed_faces: number[];
+  pictures: ChangedPicture[];
+  faults: { path: string; message: string }[];
+}
+
+/** What differs between A and B, with labels and classes that count for both. */
+export interface Against extends Compared {
+  /** The index of A, with B's labels and classes behind its own. */
+  both: Index;
+  /** The place in `both.labels` of each of B's labels. */
+  labelOfB: Uint32Array;
+  /** What B's depths are multiplied by to be A's. */
+  depthOfB: number;
+}
+
+/** A's and B's labels are the same if they have the same name; so are classes. */
+function merged(index: Index, compared: Compared): Against {
+  const { classes, labels } = { classes: [...index.classes], labels: [...index.labels] };
+  const placeOf = <T extends { name: string }>(all: T[], of: T[], made: (entry: T) => T): number[] => {
+    const places = new Map(all.map(({ name }, i) => [name, i]));
+    return of.map((entry) => places.get(entry.name) ?? all.push(made(entry)) - 1);
+  };
+  const classOfB = placeOf(classes, compared.classes, (c) => c);
+  const labelOfB = placeOf(labels, compared.labels, (label) => ({
+    ...label,
+    class: label.class === null ? null : (classOfB[label.class] ?? null),
+  }));
+  const pixels = classes.map((_, i) => (labels.some((label) => label.class === i) ? 1 : 0));
+  const units = index.data_set.depth_units_per_m;
+  return {
+    ...compared,
+    both: { ...index, classes, labels, pixels_by_class: pixels },
+    labelOfB: Uint32Array.from(labelOfB),
+    depthOfB: units / (compared.depth_units_per_m || units),
+  };
+}
+
+let made: Promise<Against> | null = null;
+
+/** What differs; null if the report was not made against another data set. */
+export function loadAgainst(index: Index): Promise<Against> | null {
+  if (index.against === null || index.against === undefined) return null;
+  made ??= load<Compared>("compare").then((compared) => merged(index, compared));
+  made.catch(() => (made = null));
+  return made;
+}
+
+/** A's picture and B's of an image that differs; null for one of which nothing is left. */
+export async function loadPair(
+  index: Index,
+  { picture, pano, is_there }: ChangedPicture,
+  number: number,
+): Promise<{ a: Picture | null; b: Picture | null }> {
+  const ofA =
+    pano !== null ? load<Picture | null>(`pano_${pano}`) : loadPicture(index, picture ?? Number.NaN);
+  const [a, b] = await Promise.all([ofA, is_there ? load<Picture | null>(`other_${number}`) : null]);
+  return { a, b };
+}
+
+/** How a face or pixel changed: to another instance of the class, or to another class. */
+export const INSTANCE = 1;
+export const CLASS = 2;
+
+/** What changed from one label to another: places in `both.labels`. */
+export function kindOf({ both }: Against, a: number, b: number): 0 | typeof INSTANCE | typeof CLASS {
+  if (a === b) return 0;
+  return both.labels[a]?.class === both.labels[b]?.class ? INSTANCE : CLASS;
+}
+
+/** Changed faces that hang together: places in `both.labels`, and the centre of a face in their middle. */
+export interface Patch extends Omit<Counts, "pixels"> {
+  a: number;
+  b: number;
+  center: Rgb;
+}
+
+/** What is known of the faces with other labels. */
+export interface FaceChanges {
+  /** The largest, those of another class first. */
+  patches: Patch[];
+  /** How a face changed; 0 if it did not. */
+  kind: (face: number) => number;
+  /** Its labels in A and B, if it changed. */
+  labelsOf: (face: number) => [number, number] | null;
+  /** By both labels: those of another class first, then those with more faces. */
+  groups: Group[];
+}
+
+/** Faces that had one label, and have another: places in `both.labels`. */
+export interface Group {
+  a: number;
+  b: number;
+  kind: typeof INSTANCE | typeof CLASS;
+  faces: number[];
+}
+
+/** The faces of an area with other labels; null where there are none, or meshes differ. */
+export async function loadChanges(against: Against, area: number): Promise<FaceChanges | null> {
+  if (!against.changed_faces.includes(area)) return null;
+  const key = `changed_${area}`;
+  const packed = await load<Record<"face" | "a" | "b", string> & { faces: number; patches: Patch[] }>(key);
+  const texts = [packed.face, packed.a, packed.b].map(String);
+  const rows = await Promise.all(texts.map(unpack)).catch(() => []);
+  const fits = rows.every((row) => row.byteLength === 4 * packed.faces);
+  const [face, a, b] = fits ? rows.map((row) => new Uint32Array(row)) : [];
+  if (!face || !a || !b || !Array.isArray(packed.patches))
+    throw new Error(`data/${key}.js is damaged: make the report again`);
+  const placeOf = new Map<number, number>();
+  const groups = new Map<number, Group>();
+  face.forEach((number, place) => {
+    placeOf.set(number, place);
+    const [x, y] = [a[place] ?? 0, (b[place] = against.labelOfB[b[place] ?? 0] ?? 0)];
+    const pair = x * against.both.labels.length + y;
+    const group = groups.get(pair) ?? { a: x, b: y, kind: kindOf(against, x, y) || INSTANCE, faces: [] };
+    group.faces.push(number);
+    groups.set(pair, group);
+  });
+  const labelsOf = (number: number): [number, number] | null => {
+    const place = placeOf.get(number);
+    return place === undefined ? null : [a[place] ?? 0, b[place] ?? 0];
+  };
+  return {
+    patches: packed.patches.map((patch) => ({ ...patch, b: against.labelOfB[patch.b] ?? 0 })),
+    labelsOf,
+    kind: (number) => {
+      const labels = labelsOf(number);
+      return labels ? kindOf(against, ...labels) : 0;
+    },
+    groups: [...groups.values()].sort((x, y) => y.kind - x.kind || y.faces.length - x.faces.length),
+  };
+}
+
+/** Whether a label is meant by the name of its class or instance; the comparison calls no label `<UNK>`. */
+function isNamed({ both }: Against, label: number, name: string | null): boolean {
+  if (name === null) return true;
+  const { class: of, name: its } = both.labels[label] ?? { class: null, name: "" };
+  return of === null ? name === "<UNK>" : its === name || both.classes[of]?.name === name;
+}
+
+/** The first group that was `was` in A and is `is` in B; null of both stands for any. */
+export const groupOf = (
+  against: Against,
+  { groups }: FaceChanges,
+  was: string | null,
+  is: string | null,
+): Group | undefined => groups.find(({ a, b }) => isNamed(against, a, was) && isNamed(against, b, is));
+
+/** The name of a label, as the comparison has it of a class or an instance. */
+export function nameOf({ both }: Against, label: number, of: "class" | "instance"): string {
+  const found = both.labels[label];
+  const its = found?.class === null || !found ? undefined : both.classes[found.class];
+  if (!its || !found) return "no label";
+  return of === "class" ? its.name : found.name;
+}
+
+/** `<UNK>` and `<nothing>` of the comparison, as people say it. */
+export const classWords = (name: string): string =>
+  name === "<UNK>" ? "no label" : name === "<nothing>" ? "nothing seen" : name;

@@ -1,0 +1,38 @@
+// Where on the plan labels changed: in the middles of the patches of changed faces.
+
+import type { Index, Rgb } from "../data.js";
+import { count } from "../dom.js";
+import { spaceLink } from "../route.js";
+import { CLASS, kindOf, loadAgainst, loadChanges, nameOf } from "./data.js";
+import { surface } from "./matrix.js";
+
+/** A change of labels at a place of an area. */
+export interface ChangeMark {
+  at: Rgb;
+  /** Whether the class is another, too. */
+  isClass: boolean;
+  words: string;
+  href: string | null;
+}
+
+/** By area; of an area without changed faces, none. */
+export async function changeMarks(index: Index): Promise<Map<number, ChangeMark[]>> {
+  const marks = new Map<number, ChangeMark[]>();
+  const against = await loadAgainst(index);
+  for (const area of against?.changed_faces ?? []) {
+    const changes = against && (await loadChanges(against, area));
+    if (!changes) continue;
+    const hasMesh = index.meshes.some((mesh) => mesh.area === area);
+    const mark = ({ a, b, faces, m2, center }: (typeof changes.patches)[number]): ChangeMark => {
+      const [was, is] = [a, b].map((label) => nameOf(against, label, "instance"));
+      return {
+        at: center,
+        isClass: kindOf(against, a, b) === CLASS,
+        words: `${was} is ${is}: ${count(faces)} faces, ${surface(m2)}`,
+        href: hasMesh ? spaceLink(area, center, null, "changed") : null,
+      };
+    };
+    marks.set(area, changes.patches.map(mark));
+  }
+  return marks;
+}

@@ -1,0 +1,77 @@
+// In which order changed images are listed, and which of them show one change of labels.
+
+import { type Route, link } from "../route.js";
+import { type Against, type ChangedPicture, type Pixels, classWords } from "./data.js";
+
+/** A change of labels, by its classes in A and in B: what of all the list of images is about. */
+export interface Change {
+  was: string;
+  is: string;
+}
+
+export const changeOf = ({ query }: Route): Change | null => {
+  const [was, is] = [query.get("was"), query.get("is")];
+  return was === null || is === null ? null : { was, is };
+};
+
+export const changeWords = ({ was, is }: Change): string =>
+  was === is ? `${classWords(was)}, another instance` : `${classWords(was)} is ${classWords(is)}`;
+
+/** The images that show a change. */
+export const imagesOf = (change: Change): string => link("compare", [], { ...change });
+
+const share = (pixels: Pixels | undefined): number =>
+  pixels ? pixels.pixels_changed / Math.max(1, pixels.pixels) : 0;
+
+/** In which modality an image is said to differ, and how. Colours of labels follow from labels. */
+export function mostChanged({ pixels }: ChangedPicture): [string, Pixels] | null {
+  const told = Object.entries(pixels).filter(([modality]) => modality !== "semantic_pretty");
+  const of = told.length > 0 ? told : Object.entries(pixels);
+  const labels = of.find(([modality]) => modality === "semantic");
+  return labels ?? of.sort((a, b) => share(b[1]) - share(a[1]))[0] ?? null;
+}
+
+/** Images that differ in colours of labels alone come last. */
+function shareOf(changed: ChangedPicture): number {
+  const most = mostChanged(changed);
+  if (!most) return -2;
+  return most[0] === "semantic_pretty" ? share(most[1]) - 1.5 : share(most[1]);
+}
+
+/** How many pixels of each picture show a change; one that shows none is left out. */
+function pixelsOf({ comparison, pictures }: Against, { was, is }: Change): Map<number, number> {
+  const place = comparison.labels?.matrix.findIndex(({ a, b }) => a === was && b === is) ?? -1;
+  const found = pictures.map(({ classes }, k): [number, number] => {
+    return [k, classes.find(([of]) => of === place)?.[1] ?? 0];
+  });
+  return new Map(found.filter(([, pixels]) => pixels > 0));
+}
+
+/** How many pictures show each change, by its place in the comparison's matrix. */
+export function imagesByChange({ pictures }: Against): Map<number, number> {
+  const images = new Map<number, number>();
+  for (const { classes } of pictures)
+    for (const [place] of classes) images.set(place, (images.get(place) ?? 0) + 1);
+  return images;
+}
+
+export interface Order {
+  /** Places in `pictures`. */
+  numbers: number[];
+  /** How many pixels of one show the change that is asked for; null if none is. */
+  pixels: Map<number, number> | null;
+}
+
+/**
+ * The pictures that show a change, those with most pixels of it first; without one all, by the share of
+ * their pixels that differ: of labels, or else of what they have.
+ */
+export function orderOf(against: Against, change: Change | null): Order {
+  const pixels = change && pixelsOf(against, change);
+  const numbers = [...(pixels?.keys() ?? against.pictures.keys())];
+  const size = (k: number): number => {
+    const picture = against.pictures[k];
+    return pixels?.get(k) ?? (picture ? shareOf(picture) : -2);
+  };
+  return { numbers: numbers.sort((a, b) => size(b) - size(a)), pixels };
+}

@@ -1,0 +1,266 @@
+// What differs between two data sets, in tables.
+
+import type { Index } from "../data.js";
+import { count, h, percent, several, table } from "../dom.js";
+import { inPanorama, nameOf as nameOfView } from "../pages/view.js";
+import { link } from "../route.js";
+import type { Against, Comparison, InstanceChange, ModalityChanges, ViewName } from "./data.js";
+import { changedLink, countsWords, matrix, number, surface } from "./matrix.js";
+import { MODALITY_NAMES } from "./picture.js";
+
+/** So many entries of a list are shown. */
+const MOST = 50;
+
+type Cells = (string | Node | null)[];
+
+/** A table of the first rows, and how many there are more. */
+function some(head: string[], rows: Cells[], most = MOST): (HTMLElement | null)[] {
+  if (rows.length === 0) return [];
+  const more = rows.length - most;
+  return [
+    table(head, rows.slice(0, most)),
+    more > 0 ? h("p", { class: "quiet" }, `${count(more)} more are in the JSON of s3d compare.`) : null,
+  ];
+}
+
+function section(title: string, ...children: (Node | null)[]): HTMLElement | null {
+  const there = children.filter((child) => child !== null);
+  return there.length === 0 ? null : h("section", {}, h("h2", {}, title), ...there);
+}
+
+const value = (of: unknown): string =>
+  of === null || of === undefined ? "–" : typeof of === "string" ? of : JSON.stringify(of);
+
+/** How A and B were made: what both are, and the settings and inputs that differ. */
+export function madeWith({ a, b, labels, settings, inputs }: Comparison): HTMLElement {
+  const rows: [string, string, string][] = [
+    ["Data set", a.folder, b.folder],
+    ["Made by", `s3d ${a.version}`, `s3d ${b.version}`],
+    ["Files", count(a.files), count(b.files)],
+    ["Size", `${(a.bytes / 1e6).toFixed(1)} MB`, `${(b.bytes / 1e6).toFixed(1)} MB`],
+    ["Areas", a.areas.join(", "), b.areas.join(", ")],
+    ["Classes", a.taxonomy ?? "without labels", b.taxonomy ?? "without labels"],
+  ];
+  if (labels) rows.push(["Labels", count(labels.a), count(labels.b)]);
+  if (!settings.some(({ name }) => name === "seed")) rows.push(["Seed", String(a.seed), String(b.seed)]);
+  for (const { name, a: ofA, b: ofB } of settings) rows.push([name, value(ofA), value(ofB)]);
+  for (const { area, path, a: ofA, b: ofB } of inputs)
+    rows.push([`Input of area ${area}: ${path}`, value(ofA?.slice(0, 12)), value(ofB?.slice(0, 12))]);
+  const element = table(
+    ["", "A", "B"],
+    rows.map((row) => (row[1] === row[2] ? row : row.map((cell) => h("strong", {}, cell)))),
+  );
+  element.classList.add("sides");
+  return element;
+}
+
+export function labelsSection(against: Against): HTMLElement | null {
+  const { labels, areas } = against.comparison;
+  if (!labels) return null;
+  const meshes = areas
+    .filter(({ geometry }) => geometry === "other" || geometry === "unread" || geometry === "one_sided")
+    .map(({ area, geometry }) => {
+      const words = {
+        other: "its meshes differ, so labels are compared by pixels alone",
+        unread: "a mesh could not be read, so labels are compared by pixels alone",
+        one_sided: "only one of both has it",
+      }[geometry as "other"];
+      return h("p", {}, `Area ${area}: ${words}.`);
+    });
+  const { changed, class_changed: other } = labels;
+  const none = changed.faces + changed.pixels === 0;
+  const words = none
+    ? "No face and no pixel has another label."
+    : `Another class: ${countsWords(other)}. ` +
+      `Another label, instances of the same class too: ${countsWords(changed)}.`;
+  const solid = against.changed_faces.flatMap((area) => {
+    if (!against.both.meshes.some((mesh) => mesh.area === area)) return [];
+    const words =
+      against.both.meshes.length > 1 ? `What changed of area ${area} in 3D` : "What changed, in 3D";
+    return [h("a", { href: link("space", [area], { show: "changed" }) }, words)];
+  });
+  const places = solid.length > 0 ? h("p", { class: "places" }, ...solid) : null;
+  return section("Labels", h("p", {}, words), ...meshes, matrix(against), places);
+}
+
+/** The area of an instance is the last number of its name. */
+const areaOf = (name: string): string => name.split("_").at(-1) ?? "";
+
+function instanceLink(against: Against, { name, lost, gained }: InstanceChange): string | null {
+  const most = lost.m2 >= gained.m2 ? "was" : "is";
+  const href = changedLink(against, most === "was" ? lost : gained, { [most]: name });
+  const area = areaOf(name);
+  const there = against.changed_faces.some((number) => String(number) === area);
+  return href && there ? href.replace("#/space?", `#/space/${area}?`) : href;
+}
+
+export function instancesSection(against: Against): HTMLElement | null {
+  const labels = against.comparison.labels;
+  if (!labels) return null;
+  const rows = labels.instances.map((instance): Cells => {
+    const href = instanceLink(against, instance);
+    return [
+      href ? h("a", { href, title: "Show in 3D" }, instance.name) : instance.name,
+      number(surface(instance.lost.m2)),
+      number(count(instance.lost.pixels)),
+      number(surface(instance.gained.m2)),
+      number(count(instance.gained.pixels)),
+      number(surface(instance.class_changed.m2)),
+    ];
+  });
+  const head = ["Instance", "Lost", "Pixels", "Gained", "Pixels", "Another class"];
+  const names = (words: string, all: string[]): HTMLElement | null =>
+    all.length === 0
+      ? null
+      : h(
+          "details",
+          {},
+          h("summary", {}, `${several(all.length, "label")} ${words}`),
+          h("p", {}, all.join(", ")),
+        );
+  return section(
+    "Instances",
+    ...some(head, rows),
+    names("only in A", labels.gone),
+    names("only in B", labels.added),
+  );
+}
+
+/** Where a candidate view or scan location of A is seen, and its name. */
+function placeOf(index: Index, { area, uuid, candidate }: ViewName): { name: string; href: string | null } {
+  const at = index.locations.findIndex((l) => l.area === area && l.uuid === uuid);
+  const location = index.locations[at];
+  const view =
+    candidate === undefined
+      ? undefined
+      : index.views.find((v) => v.location === at && at >= 0 && v.candidate === candidate);
+  if (view) {
+    const href = view.picture === null ? inPanorama(index, view) : link("view", [view.picture]);
+    return { name: nameOfView(index, view), href };
+  }
+  const name = candidate === undefined ? uuid : `${uuid.slice(0, 8)} · candidate ${candidate}`;
+  const pano = location?.pano && candidate === undefined ? link("pano", [area, uuid]) : null;
+  return { name: index.areas.length > 1 ? `area ${area} · ${name}` : name, href: pano };
+}
+
+export function viewsSection(index: Index, { views }: Comparison): HTMLElement | null {
+  const kinds: [string, ViewName[]][] = [
+    ["Kept in A alone", views.lost],
+    ["Kept in B alone", views.gained],
+    ["In both, at other angles", views.redrawn],
+    ["Scan locations in A alone", views.locations_lost],
+    ["Scan locations in B alone", views.locations_gained],
+    ["Photographs in A alone", views.photographs_lost],
+    ["Photographs in B alone", views.photographs_gained],
+  ];
+  const lists = kinds.flatMap(([title, names]) => {
+    if (names.length === 0) return [];
+    const items = names.slice(0, MOST).map((name) => {
+      const { name: words, href } = placeOf(index, name);
+      return h("li", {}, href ? h("a", { href }, words) : words);
+    });
+    const more = names.length - items.length;
+    if (more > 0) items.push(h("li", { class: "quiet" }, `${count(more)} more`));
+    return [h("details", {}, h("summary", {}, `${title}: ${count(names.length)}`), h("ul", {}, ...items))];
+  });
+  if (lists.length === 0) return null;
+  const kept = `A keeps ${several(views.kept_a, "view")}, B ${count(views.kept_b)}.`;
+  return section("Views", h("p", {}, kept), ...lists);
+}
+
+const COLUMNS: [keyof ModalityChanges, string][] = [
+  ["same", "Same"],
+  ["same_pixels", "Same pixels"],
+  ["changed", "Changed"],
+  ["other_pose", "Other pose"],
+  ["other_form", "Other form"],
+  ["unread", "Unread"],
+  ["only_a", "Only A"],
+  ["only_b", "Only B"],
+];
+
+export function modalitiesSection({ modalities }: Comparison): HTMLElement | null {
+  const shown = COLUMNS.filter(([key]) => modalities.some((m) => Number(m[key]) > 0));
+  const differ = modalities.some((m) => m.changed > 0);
+  const rows = modalities.map((m): Cells => {
+    const unit = m.modality === "normal" ? "°" : " m";
+    const size = [
+      m.psnr_db !== null && `PSNR ${m.psnr_db.toFixed(1)} dB`,
+      m.mean !== null && `mean ${m.mean.toPrecision(2)}${unit}`,
+      m.largest !== null && `largest ${m.largest.toPrecision(2)}${unit}`,
+    ].filter(Boolean);
+    return [
+      MODALITY_NAMES[m.modality] ?? m.modality,
+      ...shown.map(([key]) => number(count(Number(m[key])))),
+      ...(differ ? [number(m.changed > 0 ? percent(m.pixels_changed / Math.max(1, m.pixels)) : "")] : []),
+      ...(differ ? [size.join(", ")] : []),
+    ];
+  });
+  if (rows.length === 0) return null;
+  const head = ["Images", ...shown.map(([, name]) => name), ...(differ ? ["Pixels that differ", ""] : [])];
+  const hint = differ ? h("p", { class: "quiet" }, "Pixels are those of the images that changed.") : null;
+  return section("Images by modality", table(head, rows), hint);
+}
+
+/** The place in the report that a file of A is an image of. */
+function placeOfFile(index: Index, path: string): string | null {
+  const [, area, uuid, frame] = /^area_(\d+)\/.*camera_([^_]+)_.*_frame_([^_]+)_domain_/.exec(path) ?? [];
+  const at = index.locations.findIndex((l) => String(l.area) === area && l.uuid === uuid);
+  if (at < 0) return null;
+  if (frame === "equirectangular") return placeOf(index, { area: Number(area), uuid: uuid ?? "" }).href;
+  const view = index.views.find((v) => v.location === at && String(v.frame) === frame);
+  return view && view.picture !== null ? link("view", [view.picture]) : null;
+}
+
+export function posesSection(index: Index, { poses }: Comparison): HTMLElement | null {
+  const rows = poses.moved.map(({ a, m, degrees, k_px }): Cells => {
+    const href = placeOfFile(index, a);
+    const name = a.split("/").at(-1) ?? a;
+    return [
+      href ? h("a", { href }, name) : name,
+      number(`${m.toPrecision(3)} m`),
+      number(`${degrees.toPrecision(3)}°`),
+      number(k_px === null ? "other size" : `${k_px.toPrecision(3)} px`),
+    ];
+  });
+  return section("Poses that differ", ...some(["File in A", "Place", "Direction", "Lens"], rows, 20));
+}
+
+export function filesSection({ files }: Comparison): HTMLElement | null {
+  const differ = files.filter((kind) => kind.changed + kind.only_a + kind.only_b > 0);
+  if (differ.length === 0) return null;
+  const rows = differ.map((kind): Cells => {
+    const list = h("ul", {}, ...kind.first.map((path) => h("li", {}, h("code", {}, path))));
+    return [
+      h("details", {}, h("summary", {}, kind.kind), list),
+      number(count(kind.same)),
+      number(count(kind.changed)),
+      number(count(kind.only_a)),
+      number(count(kind.only_b)),
+    ];
+  });
+  const same = files.length - differ.length;
+  const words =
+    same === 0 ? null : h("p", { class: "quiet" }, `${several(same, "other kind")} of files are the same.`);
+  const element = section("Files", table(["Kind", "Same", "Changed", "Only A", "Only B"], rows), words);
+  element?.classList.add("files");
+  return element;
+}
+
+export function faultsSection({ comparison, faults }: Against): HTMLElement | null {
+  const rows = [
+    ...comparison.unread.map(({ side, path, message }): Cells => [
+      side.toUpperCase(),
+      h("code", {}, path),
+      message,
+    ]),
+    ...faults.map(({ path, message }): Cells => ["B", h("code", {}, path), message]),
+  ];
+  const notes = comparison.notes.map((note) => h("li", {}, note));
+  const element = section(
+    "Not compared",
+    notes.length > 0 ? h("ul", {}, ...notes) : null,
+    ...some(["", "File", "What is wrong"], rows),
+  );
+  return element;
+}

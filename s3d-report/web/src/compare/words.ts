@@ -1,0 +1,25 @@
+// What a place is in A and in B, in words.
+
+import { entry, key } from "../readout.js";
+import { type Against, nameOf } from "./data.js";
+
+/** What is under the pointer in A and in B. */
+export function tellBoth(against: Against, a: number | null, b: number | null): HTMLElement[] {
+  const sides = [
+    ["A", a],
+    ["B", b],
+  ] as const;
+  return sides.map(([side, label]) => {
+    const words =
+      label === null
+        ? "nothing seen"
+        : [nameOf(against, label, "class"), nameOf(against, label, "instance")]
+            .filter((word, i, all) => all.indexOf(word) === i)
+            .join(" · ");
+    const element = entry(side, words);
+    const of = against.both.labels[label ?? -1]?.class;
+    const color = of === null || of === undefined ? undefined : against.both.classes[of]?.color;
+    if (color) element.querySelector(".name")?.after(key(color));
+    return element;
+  });
+}

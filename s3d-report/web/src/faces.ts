@@ -1,0 +1,60 @@
+// What the faces of a mesh voted: `faces_A.js`.
+
+import { load, unpacked } from "./data.js";
+
+/** The margin of a face without votes. */
+export const NO_VOTES = 255;
+/** The margin of a face that nobody disputes. */
+export const SURE = 254;
+
+export interface FaceVotes {
+  /** Places of labels. */
+  label: Uint32Array;
+  /** Likewise; 0 if nobody voted otherwise. */
+  runnerUp: Uint32Array;
+  /** 254 times the lead of the first over the second, as a share of all votes. */
+  margin: Uint8Array;
+}
+
+interface Packed {
+  faces: number;
+  label: string;
+  runner_up: string;
+  margin: string;
+}
+
+/** The bytes of a packed row of numbers: Base64 of a zlib stream. */
+export const unpack = (text: string): Promise<ArrayBuffer> => unpacked(text).arrayBuffer();
+
+async function read(area: number): Promise<FaceVotes> {
+  const packed = await load<Packed>(`faces_${area}`);
+  const damaged = new Error(`data/faces_${area}.js is damaged: make the report again`);
+  try {
+    const [label, runnerUp, margin] = await Promise.all(
+      [packed.label, packed.runner_up, packed.margin].map(unpack),
+    );
+    if (!label || !runnerUp || !margin || margin.byteLength !== packed.faces) throw damaged;
+    if (label.byteLength !== 4 * packed.faces || runnerUp.byteLength !== label.byteLength) throw damaged;
+    return {
+      label: new Uint32Array(label),
+      runnerUp: new Uint32Array(runnerUp),
+      margin: new Uint8Array(margin),
+    };
+  } catch {
+    throw damaged;
+  }
+}
+
+let last: { area: number; votes: Promise<FaceVotes> } | null = null;
+
+/** The votes of an area's faces. Those of one area are kept. */
+export function loadFaceVotes(area: number): Promise<FaceVotes> {
+  if (last?.area === area) return last.votes;
+  const votes = read(area);
+  const mine = { area, votes };
+  last = mine;
+  votes.catch(() => {
+    if (last === mine) last = null;
+  });
+  return votes;
+}

@@ -1,0 +1,39 @@
+// Where a point of the world is seen: in the panorama nearest to it, and in 3D.
+
+import type { Index, Rgb } from "./data.js";
+import { directionIn } from "./geometry.js";
+import { link, spaceLink } from "./route.js";
+
+const DEGREES = 180 / Math.PI;
+
+/** The panorama nearest to a point, turned to it; `look` says more of how. */
+export function panoramaOf(
+  index: Index,
+  area: number,
+  point: Rgb,
+  look: Record<string, string> = {},
+): string | null {
+  let best: { distance: number; href: string } | null = null;
+  for (const l of index.locations) {
+    if (l.area !== area || !l.pano || !l.position || l.azimuth_rad === null) continue;
+    const ray = point.map((c, axis) => c - (l.position?.[axis] ?? 0)) as Rgb;
+    const distance = Math.hypot(...ray);
+    if (best && best.distance <= distance) continue;
+    const [lon, lat] = directionIn(l, ray);
+    const gaze = { lon: (lon * DEGREES).toFixed(1), lat: (lat * DEGREES).toFixed(1), fov: "45" };
+    best = { distance, href: link("pano", [l.area, l.uuid], { ...gaze, ...look }) };
+  }
+  return best?.href ?? null;
+}
+
+/** A patch that labels dispute, in the panorama nearest to it. */
+export function disputeInPanorama(index: Index, area: number, center: Rgb): string | null {
+  const hasVotes = index.meshes.some((m) => m.area === area && m.has_votes);
+  return panoramaOf(index, area, center, hasVotes ? { left: "rgb", right: "contested" } : {});
+}
+
+/** Where such a patch is looked at: in a panorama, or else in 3D. */
+export function patchLink(index: Index, area: number, center: Rgb): string | null {
+  const hasMesh = index.meshes.some((m) => m.area === area);
+  return disputeInPanorama(index, area, center) ?? (hasMesh ? spaceLink(area, center) : null);
+}

@@ -1,0 +1,84 @@
+// What lies over the canvas: names of rooms, and scan locations to enter.
+
+import { Vector3 } from "three";
+import type { Index, Mesh, Rgb } from "../data.js";
+import { h, roomName } from "../dom.js";
+import { link } from "../route.js";
+import type { Eye } from "./eye.js";
+import type { Box } from "./files.js";
+import { floorOf, middleOf } from "./lines.js";
+import type { Look } from "./look.js";
+import type { Surface } from "./surface.js";
+
+/** So many locations are marked at once: those nearest to what is looked at. */
+const MOST = 200;
+/** What hides a location is nearer than it by so much, metres. */
+const SLACK = 0.05;
+
+interface Label {
+  element: HTMLElement;
+  at: Rgb;
+}
+
+const away = (a: Rgb, b: Rgb): number => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+
+export class Labels {
+  private readonly locations: Label[] = [];
+  private rooms: Label[] = [];
+
+  constructor(
+    private readonly index: Index,
+    private readonly mesh: Mesh,
+    private readonly overlay: HTMLElement,
+  ) {
+    for (const location of index.locations) {
+      if (location.area !== mesh.area || !location.position) continue;
+      const name = `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`;
+      const words = h("span", { class: "walk-name" }, name);
+      const element = location.pano
+        ? h("a", { href: link("pano", [location.area, location.uuid]), "aria-label": `Enter ${name}` }, words)
+        : h("span", {}, words);
+      element.classList.add("walk", "small");
+      element.hidden = true;
+      this.locations.push({ element, at: location.position });
+      overlay.append(element);
+    }
+  }
+
+  /** Names the rooms; boxes tell where their floors are. */
+  nameRooms(boxes: Box[]): void {
+    const rooms = this.index.rooms.filter((room) => room.area === this.mesh.area);
+    this.rooms = rooms.map((room) => {
+      const element = h("span", { class: "room-name" }, roomName(room.name));
+      return { element, at: middleOf(room, floorOf(this.index, this.mesh, boxes, room)) };
+    });
+    this.overlay.prepend(...this.rooms.map(({ element }) => element));
+  }
+
+  /** Puts all in its places on a canvas of this size. What the section cuts away is not shown. */
+  place(eye: Eye, surface: Surface, look: Look, width: number, height: number): void {
+    const section = look.section ?? Infinity;
+    const { at: target, from } = eye.stand;
+    const hidden = (at: Rgb): boolean => {
+      const camera = eye.camera.position;
+      const hit = surface.pick(camera, new Vector3(...at).sub(camera).normalize(), section);
+      return hit !== null && hit.distance < away(at, from) - SLACK;
+    };
+    const put = ({ element, at }: Label, wanted: boolean, hides: boolean): void => {
+      const [x, y, w] = eye.screen(at, width, height);
+      const inside = w > 0 && x > 0 && x < width * w && y > 0 && y < height * w;
+      const shown = wanted && inside && at[2] < section && !(hides && hidden(at));
+      element.hidden = !shown;
+      if (shown) element.style.transform = `translate(${x / w}px, ${y / w}px)`;
+    };
+    let near = this.locations;
+    if (near.length > MOST) {
+      near = [...near].sort((a, b) => away(a.at, target) - away(b.at, target)).slice(0, MOST);
+      for (const { element } of this.locations) element.hidden = true;
+    }
+    for (const label of near) put(label, look.marks.has("locations"), true);
+    // From inside, names of other rooms would stand in the walls.
+    const above = from[2] > Math.min(section, this.mesh.max[2]);
+    for (const label of this.rooms) put(label, look.marks.has("rooms") && above, false);
+  }
+}

@@ -1,0 +1,143 @@
+// Lines in the mesh: outlines of rooms, boxes of instances, and what views see.
+
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  type Object3D,
+} from "three";
+import { LineMaterial } from "three/addons/lines/LineMaterial.js";
+import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
+import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
+import type { Index, Mesh, Rgb, Room, View } from "../data.js";
+import type { Box } from "./files.js";
+
+/** How far above a floor an outline lies, and how long a frustum is, metres. */
+const ABOVE_FLOOR = 0.03;
+const REACH = 0.45;
+
+const ROOM: Rgb = [31, 95, 191];
+const KEPT: Rgb = [210, 80, 30];
+const DROPPED: Rgb = [118, 118, 124];
+
+const share = (color: Rgb): [number, number, number] => color.map((c) => c / 255) as Rgb;
+
+/** Lines of a width in CSS pixels; `colors` has one for each segment. */
+function wide(points: number[], colors: Rgb[], width: number): LineSegments2 {
+  const geometry = new LineSegmentsGeometry();
+  geometry.setPositions(points);
+  geometry.setColors(colors.flatMap((color) => [...share(color), ...share(color)]));
+  const lines = new LineSegments2(geometry, new LineMaterial({ vertexColors: true, linewidth: width }));
+  lines.frustumCulled = false;
+  return lines;
+}
+
+/** The floor of a room: the top of its boxes of the class floor, else the lowest of its instances. */
+export function floorOf(index: Index, mesh: Mesh, boxes: Box[], room: Room): number {
+  let floor: number | null = null;
+  for (const { label, box } of boxes) {
+    const { name, class: place } = index.labels[label] ?? { name: "", class: null };
+    const is = place !== null && index.classes[place]?.name === "floor";
+    if (is && name.split("_").slice(2, 4).join("_") === room.name)
+      floor = Math.max(floor ?? -Infinity, box[5] ?? 0);
+  }
+  return floor ?? room.heights?.[0] ?? mesh.min[2];
+}
+
+/** Where the name of a room stands: the middle of its largest ring's box. */
+export function middleOf(room: Room, floor: number): Rgb {
+  let best: [number, Rgb] = [-1, [0, 0, floor]];
+  for (const ring of room.outline) {
+    const [xs, ys] = [ring.map(([x]) => x), ring.map(([, y]) => y)];
+    const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    const size = (x1 - x0) * (y1 - y0);
+    if (size > best[0]) best = [size, [(x0 + x1) / 2, (y0 + y1) / 2, floor]];
+  }
+  return best[1];
+}
+
+export function roomLines(rooms: { room: Room; floor: number }[]): Object3D {
+  const points: number[] = [];
+  for (const { room, floor } of rooms)
+    for (const ring of room.outline)
+      ring.forEach(([x, y], i) => {
+        const [toX, toY] = ring[(i + 1) % ring.length] ?? [x, y];
+        points.push(x, y, floor + ABOVE_FLOOR, toX, toY, floor + ABOVE_FLOOR);
+      });
+  return wide(points, Array<Rgb>(points.length / 6).fill(ROOM), 2.5);
+}
+
+/** Pairs of a cube's corners; bit k of a corner is its end of axis k. */
+const EDGES = [0, 1, 2].flatMap((axis) =>
+  [0, 1, 2, 3, 4, 5, 6, 7].filter((c) => !(c & (1 << axis))).map((c) => [c, c | (1 << axis)] as const),
+);
+
+/** The boxes of the instances of a class, or of all. */
+export function boxLines(index: Index, boxes: Box[], of_class: number | null): Object3D {
+  const points: number[] = [];
+  const colors: Rgb[] = [];
+  for (const { label, box } of boxes) {
+    const place = index.labels[label]?.class ?? null;
+    if (place === null || (of_class !== null && place !== of_class)) continue;
+    const corner = (c: number): number[] =>
+      [0, 1, 2].map((axis) => box[axis + (c & (1 << axis) ? 3 : 0)] ?? 0);
+    for (const [a, b] of EDGES) {
+      points.push(...corner(a), ...corner(b));
+      colors.push(index.classes[place]?.color ?? DROPPED);
+    }
+  }
+  return wide(points, colors, 2);
+}
+
+type Axes = { at: Rgb; forward: Rgb; up: Rgb };
+
+/** Where the camera of a view is, and how it is turned. */
+function axesOf(index: Index, view: View): Axes | null {
+  const { position, forward, up, yaw_deg: yaw, pitch_deg: pitch } = view;
+  if (position && forward && up) return { at: position, forward, up };
+  const location = view.location === null ? undefined : index.locations[view.location];
+  if (!location?.position || location.azimuth_rad === null || yaw === null || pitch === null) return null;
+  const azimuth = location.azimuth_rad + (yaw * Math.PI) / 180;
+  const [c, s] = [Math.cos(azimuth), Math.sin(azimuth)];
+  const [level, rise] = [Math.cos((pitch * Math.PI) / 180), Math.sin((pitch * Math.PI) / 180)];
+  return { at: location.position, forward: [c * level, s * level, rise], up: [-c * rise, -s * rise, level] };
+}
+
+/**
+ * What kept views, or dropped ones, see. Views are square; the shape of a photograph is not in the index, so
+ * that its frustum is drawn as high as it is wide.
+ */
+export function frustums(index: Index, area: number, kept: boolean): Object3D {
+  const points: number[] = [];
+  for (const view of index.views) {
+    if (view.area !== area || (view.frame !== null || view.photograph !== null) !== kept) continue;
+    const axes = axesOf(index, view);
+    if (!axes || view.fov_deg === null) continue;
+    const { at, forward: f, up: u } = axes;
+    const right: Rgb = [f[1] * u[2] - f[2] * u[1], f[2] * u[0] - f[0] * u[2], f[0] * u[1] - f[1] * u[0]];
+    const half = REACH * Math.tan((view.fov_deg * Math.PI) / 360);
+    const corner = (x: number, y: number): number[] =>
+      at.map((c, k) => c + REACH * (f[k] ?? 0) + half * (x * (right[k] ?? 0) + y * (u[k] ?? 0)));
+    const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
+    corners.forEach((here, i) => points.push(...at, ...here, ...here, ...(corners[(i + 1) % 4] ?? here)));
+  }
+  // There can be 100,000 of them: lines of one pixel.
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(new Float32Array(points), 3));
+  const material = new LineBasicMaterial();
+  material.color.setRGB(...share(kept ? KEPT : DROPPED));
+  const lines = new LineSegments(geometry, material);
+  lines.frustumCulled = false;
+  return lines;
+}
+
+/** Gives the graphics card back what lines hold. */
+export function drop(group: Group): void {
+  for (const child of [...group.children] as (LineSegments | LineSegments2)[]) {
+    child.geometry.dispose();
+    for (const material of [child.material].flat()) material.dispose();
+    group.remove(child);
+  }
+}

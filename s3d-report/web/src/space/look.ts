@@ -1,0 +1,78 @@
+// How a mesh is looked at, and what the address keeps of it.
+
+import type { Index, Mesh, Rgb } from "../data.js";
+import { SHOWS, type Show } from "./paint.js";
+import type { Stand } from "./eye.js";
+
+export const MARKS = ["rooms", "locations", "kept", "dropped"] as const;
+export type Mark = (typeof MARKS)[number];
+
+export interface Look {
+  show: Show;
+  marks: Set<Mark>;
+  /** Whose boxes are shown: a class, all, or nobody's. */
+  boxes: number | "all" | null;
+  /** What is above is cut away; null asks for just below the ceilings. */
+  section: number | null;
+  at: Rgb | null;
+  from: Rgb | null;
+  /** Whether the address is that of a place, which is to be marked. */
+  place: boolean;
+  /** The class or instance in A and in B of changed faces to look at; null if no such are meant. */
+  find: { was: string | null; is: string | null } | null;
+}
+
+/** In what colours the faces of a mesh can be shown. */
+export const showsOf = (mesh: Mesh, changed: boolean): Show[] =>
+  SHOWS.filter((show) => (show === "changed" ? changed : show === "texture" || mesh.has_votes));
+
+/** What there is to be drawn in a mesh. */
+export function marksOf(index: Index, mesh: Mesh): Mark[] {
+  const views = index.views.filter((view) => view.area === mesh.area && view.fov_deg !== null);
+  const kept = views.filter((view) => view.frame !== null || view.photograph !== null).length;
+  const has: Record<Mark, boolean> = {
+    rooms: index.rooms.some((room) => room.area === mesh.area),
+    locations: index.locations.some((location) => location.area === mesh.area && location.position),
+    kept: kept > 0,
+    dropped: kept < views.length,
+  };
+  return MARKS.filter((mark) => has[mark]);
+}
+
+function point(text: string | null): Rgb | null {
+  const numbers = (text ?? "").split(",").map((word) => (word.trim() === "" ? Number.NaN : Number(word)));
+  return numbers.length === 3 && numbers.every((c) => Math.abs(c) < 1e7) ? (numbers as Rgb) : null;
+}
+
+export function lookFrom(index: Index, mesh: Mesh, query: URLSearchParams, changed: boolean): Look {
+  const show = query.get("show") as Show;
+  const there = marksOf(index, mesh);
+  const named = query.get("marks")?.split(",") ?? ["rooms", "locations"];
+  const boxes = query.get("boxes");
+  const section = query.get("section");
+  const height = section === null || section.trim() === "" ? Number.NaN : Number(section);
+  const of_class = boxes !== null && /^\d+$/.test(boxes) && index.classes[Number(boxes)] !== undefined;
+  return {
+    show: showsOf(mesh, changed).includes(show) ? show : "texture",
+    marks: new Set(there.filter((mark) => named.includes(mark))),
+    boxes: boxes === "all" ? "all" : of_class ? Number(boxes) : null,
+    section: section === "none" ? Infinity : Number.isFinite(height) ? height : null,
+    at: point(query.get("at")),
+    from: point(query.get("from")),
+    place: !query.has("show") || !query.has("marks"),
+    find: query.has("was") || query.has("is") ? { was: query.get("was"), is: query.get("is") } : null,
+  };
+}
+
+export function queryOf(look: Look, { at, from }: Stand): Record<string, string> {
+  const words = (place: Rgb): string => place.map((c) => c.toFixed(3)).join(",");
+  const { section } = look;
+  return {
+    at: words(at),
+    from: words(from),
+    show: look.show,
+    ...(section !== null && { section: Number.isFinite(section) ? section.toFixed(2) : "none" }),
+    marks: [...look.marks].join(","),
+    ...(look.boxes !== null && { boxes: String(look.boxes) }),
+  };
+}

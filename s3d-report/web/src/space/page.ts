@@ -1,0 +1,243 @@
+// The page of a mesh in 3D: what can be chosen, and the list of what is contested.
+
+import type { Index, Mesh } from "../data.js";
+import { append, choice, count, h, several } from "../dom.js";
+import type { Modality } from "../gl.js";
+import { legendOf } from "../readout.js";
+import { type Against, groupOf, loadAgainst, loadChanges, nameOf } from "../compare/data.js";
+import { type Page, type Route, link, replaceRoute } from "../route.js";
+import { type Look, type Mark, lookFrom, marksOf, queryOf, showsOf } from "./look.js";
+import type { Show } from "./paint.js";
+import { SpaceView } from "./view.js";
+
+/** Browsers take no more than so many changes of the address a minute, ms between two. */
+const PAUSE = 250;
+
+const SHOW_NAMES: Record<Show, string> = {
+  texture: "Texture",
+  class: "Class",
+  instance: "Instance",
+  margin: "Vote margin",
+  unlabelled: "Unlabelled",
+  changed: "Changed",
+};
+
+const LEGENDS: Record<Show, Modality[]> = {
+  texture: [],
+  class: ["class"],
+  instance: [],
+  margin: ["contested"],
+  unlabelled: ["unlabelled"],
+  changed: ["changed"],
+};
+
+const MARK_NAMES: Record<Mark, string> = {
+  rooms: "Rooms",
+  locations: "Scan locations",
+  kept: "Kept views",
+  dropped: "Dropped views",
+};
+
+function sentence(words: string): Page {
+  const element = h("main", { class: "page" }, h("h1", {}, "3D"), h("p", { role: "alert" }, words));
+  return { element, close: () => {} };
+}
+
+export async function spacePage(index: Index, route: Route): Promise<Page> {
+  let trouble = "";
+  const against = await (loadAgainst(index) ?? Promise.resolve(null)).catch((e: unknown) => {
+    trouble = e instanceof Error ? e.message : String(e);
+    return null;
+  });
+  const area = route.path[0] ?? (against ? await areaOfChange(against, route.query) : undefined);
+  const mesh = area === undefined ? index.meshes[0] : index.meshes.find((m) => String(m.area) === area);
+  if (!mesh)
+    return sentence(
+      index.areas.some((a) => String(a.area) === area || area === undefined)
+        ? "The mesh of this area could not be read when the report was made; see Notes."
+        : "There is no such area in this report.",
+    );
+  try {
+    const changed = against?.changed_faces.includes(mesh.area) ?? false;
+    const page = pageOf(index, mesh, lookFrom(index, mesh, route.query, changed), against);
+    if (trouble !== "") page.element.prepend(h("p", { role: "alert" }, trouble));
+    return page;
+  } catch (e) {
+    return sentence(e instanceof Error ? e.message : String(e));
+  }
+}
+
+/** The first area in which the faces changed that an address is about. */
+async function areaOfChange(against: Against, query: URLSearchParams): Promise<string | undefined> {
+  if (!query.has("was") && !query.has("is")) return undefined;
+  for (const area of against.changed_faces) {
+    // A file that cannot be read is told of when its area is shown.
+    const changes = await loadChanges(against, area).catch(() => null);
+    if (changes && groupOf(against, changes, query.get("was"), query.get("is"))) return String(area);
+  }
+  return undefined;
+}
+
+function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): Page {
+  const status = h("p", { class: "quiet progress", role: "status" });
+  const faults = h("div", {});
+  const legend = h("div", { class: "legend" });
+  let timer = 0;
+  const view = new SpaceView(index, mesh, look, {
+    against,
+    changed: () => {
+      slide();
+      legend.replaceChildren(...legendOf(index, LEGENDS[look.show], [0, 0]));
+      window.clearTimeout(timer);
+      timer = window.setTimeout(() => {
+        if (element.isConnected) replaceRoute("space", [mesh.area], queryOf(look, view.stand));
+      }, PAUSE);
+    },
+    progress: (words) => {
+      status.textContent = words;
+      status.hidden = words === "";
+    },
+    fault: (words) => faults.append(h("p", { role: "alert" }, words)),
+  });
+  const { slider, slide } = section(mesh, look, () => view.refresh());
+  const areas = index.meshes.map((m): [string, string] => [link("space", [m.area]), `Area ${m.area}`]);
+  const place = choice("Area", areas, link("space", [mesh.area]), (to) => (window.location.hash = to));
+  const tools = h("div", { class: "tools" }, h("h1", { class: "hidden" }, `Area ${mesh.area} in 3D`));
+  append(tools, [areas.length > 1 && place, slider, ...switches(index, view)]);
+  const changed = against?.changed_faces.includes(mesh.area) ?? false;
+  const colors = showsOf(mesh, changed).map((show): [string, string] => [show, SHOW_NAMES[show]]);
+  const bar = h("div", { class: "viewer-bar" });
+  const show = choice("Colours", colors, look.show, (to) => {
+    look.show = to as Show;
+    view.refresh();
+  });
+  append(bar, [colors.length > 1 && show, measureButton(view)]);
+  const hint =
+    "Drag to turn, scroll to zoom, double-click to go closer, point at something to know what it is.";
+  view.readout.append(h("span", { class: "quiet" }, hint));
+  const frame = h("div", { class: "frame" }, view.canvas, view.overlay, status);
+  const viewer = h("section", { class: "viewer space" }, bar, frame, view.readout, legend, simplified(mesh));
+  const element = h("main", { class: "look in-space" }, tools, faults, viewer);
+  const fill = async (): Promise<void> => {
+    await view.load();
+    element.dataset["loaded"] = "mesh";
+    append(tools, [boxChoice(index, view), patchList(index, view), against && changeList(against, view)]);
+    await view.loadTextures();
+    element.dataset["loaded"] = "all";
+  };
+  void fill();
+  return {
+    element,
+    close: () => {
+      window.clearTimeout(timer);
+      view.close();
+    },
+  };
+}
+
+/** A slider for the height above which all is cut away. */
+function section(mesh: Mesh, look: Look, moved: () => void): { slider: HTMLElement; slide: () => void } {
+  const [low, high] = [Math.floor(100 * mesh.min[2]) / 100, Math.ceil(100 * mesh.max[2]) / 100];
+  const value = h("output", { class: "section-height" });
+  const range = h("input", { type: "range", min: low, max: high, step: 0.01, value: high });
+  range.setAttribute("aria-label", "Cut away what is above, metres");
+  range.addEventListener("input", () => {
+    const height = Number(range.value);
+    look.section = height >= high ? Infinity : height;
+    moved();
+  });
+  const slide = (): void => {
+    const height = look.section ?? Infinity;
+    range.value = String(Math.min(high, height));
+    const words = Number.isFinite(height) ? `${height.toFixed(2)} m` : "nothing";
+    value.textContent = words;
+    range.setAttribute("aria-valuetext", words);
+  };
+  slide();
+  return { slider: h("label", { class: "tool" }, "Cut above", range, value), slide };
+}
+
+function switches(index: Index, view: SpaceView): HTMLElement[] {
+  return marksOf(index, view.mesh).map((mark) => {
+    const box = h("input", { type: "checkbox", checked: view.look.marks.has(mark) });
+    box.addEventListener("change", () => {
+      if (box.checked) view.look.marks.add(mark);
+      else view.look.marks.delete(mark);
+      view.refresh(true);
+    });
+    return h("label", { class: "tool" }, box, MARK_NAMES[mark]);
+  });
+}
+
+function measureButton(view: SpaceView): HTMLButtonElement {
+  const button = h("button", { type: "button", "aria-pressed": "false" }, "Measure");
+  const turn = (on: boolean): void => {
+    button.setAttribute("aria-pressed", String(on));
+    view.measure(on);
+  };
+  button.addEventListener("click", () => turn(button.getAttribute("aria-pressed") !== "true"));
+  for (const element of [button, view.canvas])
+    element.addEventListener("keydown", (event) => {
+      if ((event as KeyboardEvent).key === "Escape") turn(false);
+    });
+  return button;
+}
+
+function boxChoice(index: Index, view: SpaceView): HTMLElement | null {
+  const found = new Set(view.boxes.map(({ label }) => index.labels[label]?.class ?? null));
+  const classes = index.classes
+    .map(({ name }, i): [string, string] => [String(i), `Boxes: ${name}`])
+    .filter(([i]) => found.has(Number(i)));
+  if (classes.length === 0) return null;
+  const entries: [string, string][] = [["", "No boxes"], ["all", "Boxes: all instances"], ...classes];
+  const { look } = view;
+  return choice("Boxes of instances", entries, look.boxes === null ? "" : String(look.boxes), (value) => {
+    look.boxes = value === "" ? null : value === "all" ? "all" : Number(value);
+    view.refresh(true);
+  });
+}
+
+/** The patches that most surface is contested of; each leads to its place. */
+function patchList(index: Index, view: SpaceView): HTMLElement | null {
+  const patches = index.votes.find(({ area }) => area === view.mesh.area)?.votes.disputed_patches ?? [];
+  if (patches.length === 0) return null;
+  const entries = patches.map(({ labels, faces, m2 }, i): [string, string] => [
+    String(i),
+    `${labels.join(" or ")} · ${several(faces, "face")} · ${m2.toFixed(4)} m²`,
+  ]);
+  const list = choice("Contested patches", [["", "Contested patches…"], ...entries], "", (value) => {
+    const patch = patches[Number(value)];
+    if (value !== "" && patch) view.visit(patch.center, Math.sqrt(patch.m2), true);
+  });
+  list.classList.add("patches");
+  return list;
+}
+
+/** So many changes are listed. */
+const CHANGES = 50;
+
+/** What changed, those of another class first; each leads to its place. */
+function changeList(against: Against, view: SpaceView): HTMLElement | null {
+  const groups = view.changes?.groups.slice(0, CHANGES) ?? [];
+  if (groups.length === 0) return null;
+  const name = (label: number): string => nameOf(against, label, "instance");
+  const entries = groups.map(({ a, b, faces }, i): [string, string] => [
+    String(i),
+    `${name(a)} is ${name(b)} · ${several(faces.length, "face")}`,
+  ]);
+  const list = choice("Changed labels", [["", "Changed labels…"], ...entries], "", (value) => {
+    const group = groups[Number(value)];
+    if (value !== "" && group) view.visitFaces(group.faces, true);
+  });
+  list.classList.add("patches");
+  return list;
+}
+
+function simplified(mesh: Mesh): HTMLElement {
+  const words =
+    mesh.cell_m === null
+      ? `All ${count(mesh.faces)} faces of the mesh.`
+      : `Simplified: ${count(mesh.shown)} of ${count(mesh.faces)} faces. The vertices in each cube of ` +
+        `${(100 * mesh.cell_m).toFixed(1)} cm were made one, and what collapsed was left out.`;
+  return h("p", { class: "quiet" }, words);
+}

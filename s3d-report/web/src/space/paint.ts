@@ -1,0 +1,183 @@
+// The colours of the faces: one shader, which takes them from textures or by a number of each face.
+
+import {
+  DataTexture,
+  FrontSide,
+  GLSL3,
+  LinearFilter,
+  LinearMipmapLinearFilter,
+  NearestFilter,
+  RGBAFormat,
+  RawShaderMaterial,
+  RepeatWrapping,
+  Texture,
+  Vector2,
+  Vector3,
+} from "three";
+import {
+  NULL_LABEL,
+  OTHER_CLASS,
+  OTHER_INSTANCE,
+  TABLE_WIDTH,
+  labelTable,
+  marginRamp,
+  shader,
+} from "../colors.js";
+import type { Index, Mesh } from "../data.js";
+import type { Part } from "./files.js";
+
+export const SHOWS = ["texture", "class", "instance", "margin", "unlabelled", "changed"] as const;
+export type Show = (typeof SHOWS)[number];
+
+// The fourth number of a position is the light of its face; `told` has 24 bits of its label, 8 of its margin;
+// `changed` is 1 of another instance, 2 of another class, else 0.
+const VERTICES = `
+precision highp float;
+precision highp int;
+in vec4 position;
+in vec2 uv;
+in vec3 tint;
+in float changed;
+in uint told;
+uniform mat4 modelMatrix, modelViewMatrix, projectionMatrix;
+uniform vec2 uvOrigin, uvStep;
+out vec2 at;
+out vec3 tinted;
+out float height;
+flat out float light;
+flat out float differs;
+flat out uint of;
+void main() {
+  vec4 place = vec4(position.xyz, 1.0);
+  height = (modelMatrix * place).z;
+  light = position.w / 65535.0;
+  at = uvOrigin + uvStep * uv;
+  tinted = tint;
+  of = told;
+  differs = changed;
+  gl_Position = projectionMatrix * modelViewMatrix * place;
+}`;
+
+const PIXELS = `
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+uniform sampler2D image, classes, instances, ramp;
+uniform vec3 plain;
+uniform bool textured, colored;
+uniform int show;
+uniform float section;
+in vec2 at;
+in vec3 tinted;
+in float height;
+flat in float light;
+flat in float differs;
+flat in uint of;
+out vec4 color;
+
+vec3 named(sampler2D table, uint index) {
+  return texelFetch(table, ivec2(int(index % ${TABLE_WIDTH}u), int(index / ${TABLE_WIDTH}u)), 0).rgb;
+}
+
+void main() {
+  vec3 image_color = texture(image, at).rgb;
+  if (height > section) discard;
+  vec3 seen = textured ? image_color : (colored ? tinted : plain) * light;
+  uint label = of & 0xffffffu, margin = of >> 24;
+  vec3 none = ${shader(NULL_LABEL)};
+  if (show == 0) color.rgb = seen;
+  else if (show == 1) color.rgb = named(classes, label) * light;
+  else if (show == 2) color.rgb = named(instances, label) * light;
+  else if (show == 3) {
+    vec3 led = texelFetch(ramp, ivec2(int(margin), 0), 0).rgb;
+    // A little of the colours, so that shapes can be made out.
+    color.rgb = mix(margin == 255u ? none : led, vec3(dot(seen, vec3(0.2126, 0.7152, 0.0722))), 0.25);
+  } else if (show == 5) {
+    vec3 other = differs > 1.5 ? ${shader(OTHER_CLASS)} : ${shader(OTHER_INSTANCE)};
+    if (differs > 0.5) color.rgb = other * light;
+    else color.rgb = mix(vec3(dot(seen, vec3(0.2126, 0.7152, 0.0722))), vec3(0.55), 0.45);
+  } else color.rgb = label == 0u ? vec3(1.0, 0.0, 1.0) : vec3(0.82 * light);
+  color.a = 1.0;
+}`;
+
+function table(pixels: Uint8Array, width: number, rows: number): DataTexture {
+  const texture = new DataTexture(pixels, width, rows, RGBAFormat);
+  texture.minFilter = texture.magFilter = NearestFilter;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** The materials of a mesh. What is changed here is changed in all of them. */
+export class Paint {
+  private readonly show = { value: 0 };
+  private readonly section = { value: 0 };
+  private readonly tables: Record<string, { value: Texture }>;
+  private readonly blank = table(new Uint8Array([255, 255, 255, 255]), 1, 1);
+  private readonly images = new Map<number, Texture>();
+  private readonly made: { material: RawShaderMaterial; texture: number | null }[] = [];
+
+  constructor(
+    index: Index,
+    private readonly mesh: Mesh,
+  ) {
+    const [classes, instances] = [labelTable(index, "class"), labelTable(index, "instance")];
+    this.tables = {
+      classes: { value: table(classes.pixels, TABLE_WIDTH, classes.rows) },
+      instances: { value: table(instances.pixels, TABLE_WIDTH, instances.rows) },
+      // Margins are whole numbers up to 254.
+      ramp: { value: table(marginRamp(255), 255, 1) },
+    };
+  }
+
+  set(show: Show, section: number): void {
+    this.show.value = SHOWS.indexOf(show);
+    this.section.value = section;
+  }
+
+  /** The material of the faces of a part that have one. */
+  of(part: Part, place: number): RawShaderMaterial {
+    const { color, texture } = this.mesh.materials[place] ?? { color: NULL_LABEL, texture: null };
+    const image = part.uv && texture !== null ? this.images.get(texture) : undefined;
+    const material = new RawShaderMaterial({
+      glslVersion: GLSL3,
+      vertexShader: VERTICES,
+      fragmentShader: PIXELS,
+      side: FrontSide,
+      uniforms: {
+        ...this.tables,
+        show: this.show,
+        section: this.section,
+        image: { value: image ?? this.blank },
+        textured: { value: image !== undefined },
+        colored: { value: part.color !== null },
+        plain: { value: new Vector3(...color).divideScalar(255) },
+        uvOrigin: { value: new Vector2(...part.uvOrigin) },
+        uvStep: { value: new Vector2(...part.uvStep) },
+      },
+    });
+    this.made.push({ material, texture: part.uv && texture });
+    return material;
+  }
+
+  /** Takes the image of a texture, for the materials that are there and those to come. */
+  take(texture: number, image: HTMLImageElement, anisotropy: number): void {
+    const made = new Texture(image);
+    made.wrapS = made.wrapT = RepeatWrapping;
+    made.minFilter = LinearMipmapLinearFilter;
+    made.magFilter = LinearFilter;
+    made.anisotropy = anisotropy;
+    made.needsUpdate = true;
+    this.images.set(texture, made);
+    for (const { material, texture: its } of this.made) {
+      if (its !== texture) continue;
+      (material.uniforms["image"] as { value: Texture }).value = made;
+      (material.uniforms["textured"] as { value: boolean }).value = true;
+    }
+  }
+
+  close(): void {
+    for (const { material } of this.made) material.dispose();
+    for (const texture of [...this.images.values(), this.blank]) texture.dispose();
+    for (const { value } of Object.values(this.tables)) value.dispose();
+  }
+}

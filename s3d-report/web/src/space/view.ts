@@ -1,0 +1,363 @@
+// A mesh on a canvas: drawn when something has changed, and asked what is under the pointer.
+
+import { ColorManagement, Group, LinearSRGBColorSpace, Plane, Scene, Vector3, WebGLRenderer } from "three";
+import type { Index, Mesh, Rgb } from "../data.js";
+import { type Against, type FaceChanges, groupOf, loadChanges } from "../compare/data.js";
+import { tellBoth } from "../compare/words.js";
+import { append, h } from "../dom.js";
+import { type FaceVotes, loadFaceVotes } from "../faces.js";
+import { Marks } from "../marks.js";
+import { tell } from "../readout.js";
+import { Eye, type Stand } from "./eye.js";
+import { type Box, loadBoxes, loadPart, loadTextures } from "./files.js";
+import { Labels } from "./labels.js";
+import { boxLines, drop, floorOf, frustums, roomLines } from "./lines.js";
+import type { Look, Mark } from "./look.js";
+import { Paint } from "./paint.js";
+import { type Hit, Surface } from "./surface.js";
+
+/** A press that moves no farther is a click, CSS pixels. */
+const STILL = 5;
+/** A place so little below the section is cut away with what is above, metres. */
+const SLACK = 0.05;
+/** Higher than everything, metres. */
+const SKY = 1e6;
+
+export interface ViewOptions {
+  /** The data set that this one is compared with. */
+  against: Against | null;
+  /** Called when one looks otherwise, or from elsewhere. */
+  changed: () => void;
+  /** Called as files come in, and with what is wrong with one. */
+  progress: (words: string) => void;
+  fault: (words: string) => void;
+}
+
+/** An extension that TypeScript does not know. */
+interface ProvokingVertex {
+  readonly FIRST_VERTEX_CONVENTION_WEBGL: number;
+  provokingVertexWEBGL(convention: number): void;
+}
+
+export class SpaceView {
+  readonly canvas = h("canvas", { tabindex: 0, role: "img" });
+  readonly overlay = h("div", { class: "overlay" });
+  readonly readout = h("output", { class: "readout", "aria-live": "polite" });
+  readonly eye: Eye;
+  boxes: Box[] = [];
+  changes: FaceChanges | null = null;
+  private readonly renderer: WebGLRenderer;
+  private readonly paint: Paint;
+  private readonly surface: Surface;
+  private readonly scene = new Scene();
+  private readonly lines = new Group();
+  private readonly cut = new Plane(new Vector3(0, 0, -1), SKY);
+  private readonly marks = new Marks();
+  private readonly labels: Labels;
+  private readonly resized = new ResizeObserver(() => this.resize());
+  private votes: FaceVotes | null = null;
+  private measuring = false;
+  private loaded = false;
+  private pending = false;
+  private closed = false;
+
+  constructor(
+    private readonly index: Index,
+    readonly mesh: Mesh,
+    readonly look: Look,
+    private readonly options: ViewOptions,
+  ) {
+    const gl = this.canvas.getContext("webgl2", { antialias: true, alpha: true });
+    if (!gl) throw new Error("This browser has no WebGL 2, which the 3D view needs.");
+    // Colours are shown as they are in the files.
+    ColorManagement.enabled = false;
+    this.renderer = new WebGLRenderer({ canvas: this.canvas, context: gl });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.renderer.setClearColor(0, 0);
+    this.renderer.clippingPlanes = [this.cut];
+    // All corners of a face are alike, and where the first one is asked no work is made of it.
+    const corners = gl.getExtension("WEBGL_provoking_vertex") as ProvokingVertex | null;
+    corners?.provokingVertexWEBGL(corners.FIRST_VERTEX_CONVENTION_WEBGL);
+    this.paint = new Paint(index, mesh);
+    this.surface = new Surface(this.paint);
+    this.scene.add(this.surface.group, this.lines);
+    this.eye = new Eye(this.canvas, mesh, () => this.changed());
+    this.canvas.setAttribute("aria-label", `Area ${mesh.area} in 3D; arrow keys turn, plus and minus zoom`);
+    this.labels = new Labels(index, mesh, this.overlay);
+    // The pin of a place has a link to it in 3D, where one is here.
+    append(
+      this.overlay,
+      this.marks.elements.filter((element) => !(element instanceof HTMLAnchorElement)),
+    );
+    this.listen();
+    this.resized.observe(this.canvas);
+  }
+
+  /** Fetches the mesh, and shows what there is of it. */
+  async load(): Promise<void> {
+    const { mesh, options } = this;
+    if (mesh.has_votes) {
+      options.progress("Loading what the faces voted.");
+      this.votes = await this.tried(loadFaceVotes(mesh.area));
+    }
+    if (mesh.has_boxes) this.boxes = (await this.tried(loadBoxes(mesh.area))) ?? [];
+    if (options.against) this.changes = await this.tried(loadChanges(options.against, mesh.area));
+    for (let part = 0; part < mesh.files && !this.closed; part++) {
+      options.progress(`Loading the mesh: file ${part + 1} of ${mesh.files}.`);
+      const read = await this.tried(loadPart(mesh, part));
+      if (read && !this.closed) this.surface.add(read, this.votes, this.changes);
+    }
+    options.progress("");
+    if (this.closed) return;
+    this.loaded = true;
+    this.labels.nameRooms(this.boxes);
+    this.fillLines();
+    this.start();
+  }
+
+  /** Fetches the textures, and shows each file of them when it is there. */
+  async loadTextures(): Promise<void> {
+    const { mesh, options } = this;
+    const anisotropy = Math.min(4, this.renderer.capabilities.getMaxAnisotropy());
+    for (let file = 0; file < mesh.texture_files && !this.closed; file++) {
+      options.progress(`Loading textures: file ${file + 1} of ${mesh.texture_files}.`);
+      const images = await this.tried(loadTextures(mesh, file));
+      if (this.closed) return;
+      images?.forEach((image, i) => this.paint.take(16 * file + i, image, anisotropy));
+      this.draw();
+    }
+    options.progress("");
+  }
+
+  /** What a file holds; if it cannot be had, that is told, and the rest goes on. */
+  private async tried<T>(file: Promise<T>): Promise<T | null> {
+    try {
+      return await file;
+    } catch (e) {
+      if (!this.closed) this.options.fault(e instanceof Error ? e.message : String(e));
+      return null;
+    }
+  }
+
+  /** Shows all as the look has it now; `lines` if other lines are wanted. */
+  refresh(lines = false): void {
+    if (lines) this.fillLines();
+    this.changed();
+  }
+
+  /** Takes up or lays down the measuring line. */
+  measure(on: boolean): void {
+    this.measuring = on;
+    if (!on) this.marks.endMeasure();
+    this.draw();
+  }
+
+  /** Goes to where a place is seen; what hides it by the section is shown again. */
+  visit(at: Rgb, size: number, flying: boolean): void {
+    if (at[2] > (this.look.section ?? Infinity) - SLACK) this.look.section = Infinity;
+    this.marks.pinAt(at, "");
+    const to = { at, from: this.vantage(at, size) };
+    if (flying) this.eye.fly(to);
+    else this.eye.set(to);
+    this.changed();
+  }
+
+  /** Goes to the middle of faces; nowhere, if none of them is shown. */
+  visitFaces(faces: number[], flying: boolean): boolean {
+    const place = this.surface.placeOf(new Set(faces));
+    if (place) this.visit(place.at, Math.sqrt(place.m2), flying);
+    return place !== null;
+  }
+
+  /** Goes to the changed faces that the address is about. */
+  private findChange(): boolean {
+    const { changes, look, options } = this;
+    if (!look.find || !changes || !options.against) return false;
+    const group = groupOf(options.against, changes, look.find.was, look.find.is);
+    return group !== undefined && this.visitFaces(group.faces, false);
+  }
+
+  close(): void {
+    this.closed = true;
+    this.resized.disconnect();
+    this.eye.close();
+    drop(this.lines);
+    this.surface.close();
+    this.paint.close();
+    const context = this.renderer.getContext();
+    this.renderer.dispose();
+    context.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+
+  /**
+   * The section if nobody has chosen one: just below the ceilings, unless one stands below or looks
+   * above.
+   */
+  private firstSection(): number {
+    const height = this.surface.ceiling();
+    const { at, from } = this.look;
+    if (height === null || (from && from[2] < height) || (at && at[2] > height - SLACK)) return Infinity;
+    return Number(height.toFixed(2));
+  }
+
+  private start(): void {
+    this.resize();
+    const { at, from, place } = this.look;
+    this.look.section ??= this.firstSection();
+    if (at && from) this.eye.set({ at, from });
+    else if (at) this.visit(at, 0.5, false);
+    else if (!this.findChange()) this.eye.set(this.eye.overview(this.surface.sample(this.look.section)));
+    if (at && place) this.marks.pinAt(at, "");
+  }
+
+  /** From where nothing hides a place, as near as possible to the direction one looks from. */
+  private vantage(at: Rgb, size: number): Rgb {
+    const { from, at: was } = this.eye.stand;
+    const ahead = Math.atan2(from[1] - was[1], from[0] - was[0]);
+    const away = Math.max(1, 3 * size);
+    const section = this.look.section ?? Infinity;
+    const near = 0.02 + size / 4 + (this.mesh.cell_m ?? 0);
+    let best: { off: number; from: Rgb } | null = null;
+    for (const degrees of [30, 55, 8, -25]) {
+      for (let k = 0; k < 16; k++) {
+        const azimuth = ahead + (k % 2 === 0 ? k / 2 : -(k + 1) / 2) * (Math.PI / 8);
+        const rise = (degrees * Math.PI) / 180;
+        const level = Math.cos(rise);
+        const back = new Vector3(level * Math.cos(azimuth), level * Math.sin(azimuth), Math.sin(rise));
+        const eye = new Vector3(...at).addScaledVector(back, away);
+        const hit = this.surface.pick(eye, back.negate(), section);
+        const off = hit ? Math.hypot(...hit.point.map((c, axis) => c - (at[axis] ?? 0))) : Infinity;
+        const found = { off, from: [eye.x, eye.y, eye.z] as Rgb };
+        if (off < near) return found.from;
+        if (!best || off < best.off) best = found;
+      }
+    }
+    return best?.from ?? from;
+  }
+
+  private listen(): void {
+    const { canvas } = this;
+    let down: { x: number; y: number } | null = null;
+    canvas.addEventListener("pointerdown", (event) => {
+      down = event.isPrimary && event.button === 0 ? { x: event.clientX, y: event.clientY } : null;
+      this.read(event);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons === 0) this.read(event);
+    });
+    canvas.addEventListener("pointerup", (event) => {
+      const still = down && Math.hypot(event.clientX - down.x, event.clientY - down.y) < STILL;
+      down = null;
+      if (still) this.click(this.read(event));
+    });
+    // Before the zoom: what is under the pointer is what one goes to.
+    const aim = (event: WheelEvent): void => {
+      const hit = this.read(event);
+      if (hit) this.eye.reach(this.eye.depth(hit.point));
+    };
+    canvas.addEventListener("wheel", aim, { capture: true, passive: true });
+    canvas.addEventListener("webglcontextrestored", () => this.draw());
+    canvas.addEventListener("dblclick", (event) => {
+      const hit = this.read(event);
+      if (!hit || this.measuring) return;
+      const { from } = this.eye.stand;
+      const back = from.map((c, axis) => c + 0.5 * ((hit.point[axis] ?? 0) - c)) as Rgb;
+      this.eye.fly({ at: hit.point, from: back });
+    });
+    canvas.addEventListener("keydown", (event) => {
+      if (event.key === "Enter") this.click(this.readAt(0.5, 0.5));
+    });
+    canvas.addEventListener("keyup", () => this.readAt(0.5, 0.5));
+    canvas.addEventListener("focus", () => {
+      if (canvas.matches(":focus-visible")) this.readAt(0.5, 0.5);
+    });
+  }
+
+  private click(hit: Hit | null): void {
+    if (!hit || !this.measuring) return;
+    this.marks.measure(hit.point);
+    this.draw();
+  }
+
+  private read(event: PointerEvent | MouseEvent): Hit | null {
+    const box = this.canvas.getBoundingClientRect();
+    return this.readAt((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+  }
+
+  /** Tells what a point of the canvas shows, in shares of its size. */
+  private readAt(u: number, v: number): Hit | null {
+    if (!this.loaded) return null;
+    const hit = this.surface.pick(
+      this.eye.camera.position,
+      this.eye.ray(u, v),
+      this.look.section ?? Infinity,
+    );
+    this.readout.replaceChildren();
+    if (!hit) return null;
+    const label = this.votes?.label[hit.face] ?? null;
+    const spot = { label, face: hit.face, distance: hit.distance, point: hit.point };
+    const told = tell(this.index, spot, { room: "", hasDepth: true }, this.votes);
+    const labels = this.changes?.labelsOf(hit.face);
+    const hidden = labels ? ["class", "instance"] : [];
+    // Only a label tells the room.
+    if (!label) hidden.push("room");
+    append(this.readout, labels && this.options.against ? tellBoth(this.options.against, ...labels) : []);
+    append(
+      this.readout,
+      told.filter((entry) => !hidden.includes(entry.dataset["is"] ?? "")),
+    );
+    return hit;
+  }
+
+  private fillLines(): void {
+    if (!this.loaded) return;
+    const { index, mesh, look, boxes } = this;
+    drop(this.lines);
+    if (look.marks.has("rooms")) {
+      const rooms = index.rooms.filter((room) => room.area === mesh.area);
+      this.lines.add(roomLines(rooms.map((room) => ({ room, floor: floorOf(index, mesh, boxes, room) }))));
+    }
+    if (look.boxes !== null) this.lines.add(boxLines(index, boxes, look.boxes === "all" ? null : look.boxes));
+    for (const mark of ["kept", "dropped"] as const satisfies Mark[])
+      if (look.marks.has(mark)) this.lines.add(frustums(index, mesh.area, mark === "kept"));
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
+    this.renderer.setSize(width, height, false);
+    this.eye.resize(width, height);
+    this.paintNow();
+  }
+
+  private changed(): void {
+    if (this.loaded && this.canvas.isConnected) this.options.changed();
+    this.draw();
+  }
+
+  private draw(): void {
+    if (this.pending) return;
+    this.pending = true;
+    requestAnimationFrame(() => {
+      this.pending = false;
+      this.paintNow();
+    });
+  }
+
+  private paintNow(): void {
+    if (this.closed || !this.loaded) return;
+    const { show, section } = this.look;
+    this.paint.set(show, section ?? Infinity);
+    this.cut.constant = Math.min(SKY, section ?? SKY);
+    this.surface.useMaterials(show === "texture" || show === "margin" || show === "changed");
+    this.renderer.render(this.scene, this.eye.camera);
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    this.labels.place(this.eye, this.surface, this.look, width, height);
+    this.marks.draw((point) => this.eye.screen(point, width, height), width, height);
+  }
+
+  get stand(): Stand {
+    return this.eye.stand;
+  }
+}

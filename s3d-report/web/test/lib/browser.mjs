@@ -1,0 +1,129 @@
+// A browser without a window, and a page in it that tells of everything that must not happen.
+
+import { existsSync } from "node:fs";
+import { chromium, firefox } from "playwright-core";
+import { pathToFileURL } from "node:url";
+
+const QUIET = [
+  "--no-sandbox",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+  "--use-gl=angle",
+  "--use-angle=swiftshader",
+  "--enable-unsafe-swiftshader",
+];
+
+const PATIENCE_MS = 60_000;
+
+const CHROMIUM = ["/usr/bin/chromium", "/usr/bin/chromium-browser"];
+const FIREFOX = ["/usr/bin/firefox-esr", "/usr/bin/firefox"];
+
+/** Without a graphics card, too. */
+const DRAWN = { "webgl.force-enabled": true };
+
+/**
+ * Firefox as it is installed, by WebDriver BiDi, or else Chromium. Firefox has WebGL with a display
+ * alone.
+ */
+export const isFirefox = process.env["S3D_BROWSER"] === "firefox";
+
+export function launch() {
+  const [name, named, places] = isFirefox
+    ? ["Firefox", process.env["S3D_FIREFOX"], FIREFOX]
+    : ["Chromium", process.env["S3D_CHROMIUM"], CHROMIUM];
+  const executablePath = named ?? places.find((path) => existsSync(path));
+  if (!executablePath)
+    throw new Error(`no ${name}: install Debian's package, or name one by S3D_${name.toUpperCase()}`);
+  return isFirefox
+    ? firefox.launch({ executablePath, channel: "moz-firefox", headless: false, firefoxUserPrefs: DRAWN })
+    : chromium.launch({ executablePath, args: QUIET });
+}
+
+/**
+ * Opens a report, a folder or one file, from the disk. `faults` fills with errors, and with requests
+ * that leave the folder.
+ */
+export async function open(browser, folder, hash, { width = 1440, height = 900, touch = false } = {}) {
+  const context = await browser.newContext({ viewport: { width, height }, hasTouch: touch });
+  const page = await context.newPage();
+  page.setDefaultTimeout(PATIENCE_MS);
+  const faults = [];
+  const isFile = folder.endsWith(".html");
+  const root = pathToFileURL(isFile ? folder : `${folder}/`).href;
+  page.on("console", (message) => {
+    if (["error", "warning"].includes(message.type())) faults.push(message.text());
+  });
+  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on("request", (request) => {
+    const url = request.url();
+    if (!url.startsWith(root) && !url.startsWith("data:")) faults.push(`request of ${url.slice(0, 200)}`);
+  });
+  page.on("dialog", (dialog) => {
+    faults.push(`dialog: ${dialog.message()}`);
+    dialog.dismiss();
+  });
+  await page.goto(`${root}${isFile ? "" : "index.html"}${hash}`);
+  await ready(page);
+  return { page, faults, close: () => context.close() };
+}
+
+/** Waits until the page shows what the address asks for. */
+export async function ready(page) {
+  await page.waitForSelector("body[data-ready]");
+  await page.waitForTimeout(100);
+}
+
+/** Changes the part behind `#`, and waits for the page of it. */
+export async function go(page, hash) {
+  const before = await page.getAttribute("body", "data-ready");
+  await page.evaluate((to) => {
+    window.location.hash = to;
+  }, hash);
+  await page.waitForFunction((was) => document.body.dataset.ready !== was, before);
+  await page.waitForTimeout(100);
+}
+
+/** What the line under a picture tells, by name. */
+export async function readout(page) {
+  return page.evaluate(() => {
+    const line = document.querySelector(".readout");
+    const told = { pixel: line.dataset.pixel ?? null };
+    for (const entry of line.querySelectorAll("[data-is]")) {
+      const name = entry.querySelector(".name")?.textContent ?? "";
+      told[entry.dataset.is] = entry.textContent.slice(name.length);
+    }
+    return told;
+  });
+}
+
+/** Waits until what was asked for is drawn. */
+export async function drawn(page) {
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+}
+
+/** Taps with a finger; where the browser's driver has none, clicks. */
+export async function tap(page, x, y) {
+  if (!isFirefox) return page.touchscreen.tap(x, y);
+  // It may be there already, and is told of only if it moves.
+  await page.mouse.move(x + 3, y);
+  return page.mouse.click(x, y);
+}
+
+/** Draws a finger from one x to another at the height y; the pointer, likewise. */
+export async function drag(page, from, to, y) {
+  const steps = [0.2, 0.6, 1].map((t) => from + t * (to - from));
+  if (isFirefox) {
+    await page.mouse.move(from, y);
+    await page.mouse.down();
+    for (const x of steps) await page.mouse.move(x, y);
+    return page.mouse.up();
+  }
+  const touches = await page.context().newCDPSession(page);
+  const touch = (type, touchPoints) => touches.send("Input.dispatchTouchEvent", { type, touchPoints });
+  await touch("touchStart", [{ x: from, y }]);
+  for (const x of steps) await touch("touchMove", [{ x, y }]);
+  await touch("touchEnd", []);
+}
