@@ -1,0 +1,306 @@
+//! Reads detections: lists of boxes, or mmdetection3d's files, one a room.
+
+use super::Bbox;
+use super::truth::{Classes, Room};
+use crate::folder::entries;
+use crate::task::Task;
+use s3d_dataset::s3d_io::Error as FileError;
+use s3d_dataset::s3d_io::fs::read_json;
+use s3d_dataset::s3d_label::Class;
+use s3d_dataset::{Error, Result};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// The detections of all rooms: score, class and box, world metres, in the order of the file.
+pub(super) struct Predictions {
+    /// As many as rooms.
+    pub(super) of_rooms: Vec<Vec<(f64, Class, Bbox)>>,
+    pub(super) notes: Vec<String>,
+}
+
+/// What a file of detections is: an array or an object.
+enum Content {
+    List(Vec<BoxEntry>),
+    Sample(Sample),
+}
+
+/// A box of a list.
+#[derive(Deserialize)]
+struct BoxEntry {
+    area: u32,
+    room: String,
+    class: String,
+    score: f64,
+    min: Option<[f64; 3]>,
+    max: Option<[f64; 3]>,
+    center: Option<[f64; 3]>,
+    size: Option<[f64; 3]>,
+}
+
+/// What mmdetection3d's inferencers write of a room.
+#[derive(Deserialize)]
+struct Sample {
+    labels_3d: Vec<usize>,
+    scores_3d: Vec<f64>,
+    /// Middle of the lower face, size, and perhaps an angle.
+    bboxes_3d: Vec<Vec<f64>>,
+    box_type_3d: Option<String>,
+}
+
+const FORMS: &str = "detections are a JSON file with a list of boxes, a folder of such files, or a folder \
+                     with mmdetection3d's Area_N_ROOM.json of every room";
+
+impl Predictions {
+    pub(super) fn read(task: &Task<'_>, classes: &Classes, rooms: &[Room]) -> Result<Self> {
+        let places = rooms.iter().enumerate().map(|(i, room)| ((room.area, room.name.as_str()), i)).collect();
+        let mut reader = Reader {
+            task,
+            classes,
+            rooms,
+            places,
+            of_rooms: vec![Vec::new(); rooms.len()],
+            other_areas: 0,
+            other_classes: 0,
+            samples: BTreeMap::new(),
+        };
+        let (files, others) = files(task.predictions)?;
+        let mut list = None;
+        for path in &files {
+            task.ctx.check()?;
+            match read_content(path)? {
+                Content::List(entries) => {
+                    list = Some(path);
+                    entries
+                        .into_iter()
+                        .enumerate()
+                        .try_for_each(|(i, entry)| reader.entry(path, i, entry))?;
+                }
+                Content::Sample(sample) => reader.sample(path, sample)?,
+            }
+        }
+        reader.finish(list, &others)
+    }
+}
+
+/// The JSON files of predictions, and the names of what else lies there.
+fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>)> {
+    if path.is_file() {
+        return Ok((vec![path.to_owned()], Vec::new()));
+    }
+    let list = |dir: &Path| -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+        Ok(entries(dir)?.into_iter().partition(|p| p.extension().is_some_and(|e| e == "json") && p.is_file()))
+    };
+    let (mut found, mut others) = list(path)?;
+    // Inferencers write into this folder of the one that they are told.
+    let below = path.join("preds");
+    if found.is_empty() && below.is_dir() {
+        let (more, beside) = list(&below)?;
+        others.retain(|other| *other != below);
+        (found, others) = (more, [others, beside].concat());
+    }
+    let names = others.iter().map(|p| p.strip_prefix(path).unwrap_or(p).display().to_string()).collect();
+    let pickle = others.iter().find(|p| p.extension().is_some_and(|e| e == "pkl" || e == "pickle"));
+    match (found.is_empty(), pickle) {
+        (false, _) => Ok((found, names)),
+        (true, Some(pickle)) => Err(FileError::format(
+            pickle,
+            format!("pickles are not read: docs/evaluation.md has the lines that make JSON of them; {FORMS}"),
+        )
+        .into()),
+        (true, None) => Err(FileError::format(path, format!("has no JSON file: {FORMS}")).into()),
+    }
+}
+
+fn read_content(path: &Path) -> Result<Content> {
+    read_json(path).map_err(|error| match error {
+        FileError::Format { path, place, message } => {
+            FileError::Format { path, place, message: format!("{message}; {FORMS}") }.into()
+        }
+        error => error.into(),
+    })
+}
+
+impl<'de> Deserialize<'de> for Content {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ContentVisitor)
+    }
+}
+
+struct ContentVisitor;
+
+impl<'de> Visitor<'de> for ContentVisitor {
+    type Value = Content;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a list of boxes or the boxes of a room")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Content, A::Error> {
+        let mut entries = Vec::new();
+        let of_box = |count: usize, e| A::Error::custom(format_args!("box {}: {e}", count + 1));
+        while let Some(entry) = seq.next_element().map_err(|e| of_box(entries.len(), e))? {
+            entries.push(entry);
+        }
+        Ok(Content::List(entries))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Content, A::Error> {
+        Sample::deserialize(MapAccessDeserializer::new(map)).map(Content::Sample)
+    }
+}
+
+/// What is wrong with a box of a file, counted from 0.
+fn fault(path: &Path, index: usize, message: &str) -> Error {
+    FileError::format(path, format!("box {}: {message}", index + 1)).into()
+}
+
+struct Reader<'a> {
+    task: &'a Task<'a>,
+    classes: &'a Classes,
+    rooms: &'a [Room],
+    places: BTreeMap<(u32, &'a str), usize>,
+    of_rooms: Vec<Vec<(f64, Class, Bbox)>>,
+    /// Boxes of areas that are not tested, and of classes that are not detected.
+    other_areas: u64,
+    other_classes: u64,
+    /// Rooms that have a file.
+    samples: BTreeMap<usize, PathBuf>,
+}
+
+impl Reader<'_> {
+    /// The room of these names; `None` if its area is not tested.
+    fn place(&self, area: u32, room: &str) -> Result<Option<usize>, String> {
+        if let Some(place) = self.places.get(&(area, room)) {
+            return Ok(Some(*place));
+        }
+        let tested = self.task.folds.iter().any(|fold| fold.areas.contains(&area));
+        match (tested, self.task.data.areas().contains(&area)) {
+            (false, true) => Ok(None),
+            (false, false) => Err(format!("the data set has no area {area}")),
+            (true, _) => Err(format!("the data set has no room {room:?} with annotations in area {area}")),
+        }
+    }
+
+    fn entry(&mut self, path: &Path, index: usize, entry: BoxEntry) -> Result<()> {
+        let wrong = |message: &str| fault(path, index, message);
+        let Some(place) = self.place(entry.area, &entry.room).map_err(|e| wrong(&e))? else {
+            self.other_areas += 1;
+            return Ok(());
+        };
+        let class = self.classes.named(&entry.class).map_err(|e| wrong(&e))?;
+        let (min, max) = match (entry.min, entry.max, entry.center, entry.size) {
+            (Some(min), Some(max), None, None) => (min, max),
+            (None, None, Some(center), Some(size)) => {
+                let end = |sign: f64| std::array::from_fn(|k| center[k] + sign * size[k] / 2.0);
+                (end(-1.0), end(1.0))
+            }
+            _ => return Err(wrong("a box has min and max, or center and size, each x y z in metres")),
+        };
+        if (0..3).any(|k| min[k] > max[k]) {
+            return Err(wrong(&format!("it ends before it begins: {min:?} to {max:?}")));
+        }
+        self.add(place, entry.score, class, [min[0], min[1], min[2], max[0], max[1], max[2]]);
+        Ok(())
+    }
+
+    fn add(&mut self, place: usize, score: f64, class: Class, bbox: Bbox) {
+        if self.classes.list.contains(&class) {
+            self.of_rooms[place].push((score, class, bbox));
+        } else {
+            self.other_classes += 1;
+        }
+    }
+
+    /// Boxes of a room, which are in its own frame: its least coordinates are 0.
+    fn sample(&mut self, path: &Path, sample: Sample) -> Result<()> {
+        let file = |message: String| Error::from(FileError::format(path, message));
+        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+        let name = stem.strip_prefix("Area_").and_then(|rest| rest.split_once('_'));
+        let Some((area, room)) = name.and_then(|(area, room)| Some((area.parse().ok()?, room))) else {
+            return Err(file("a room's file is called Area_N_ROOM.json, as Area_5_office_1.json".to_owned()));
+        };
+        if let Some(kind) = sample.box_type_3d.filter(|kind| kind != "Depth") {
+            return Err(file(format!(
+                "box_type_3d is {kind:?}: only boxes of type \"Depth\" have z upwards"
+            )));
+        }
+        let counts = [sample.labels_3d.len(), sample.scores_3d.len(), sample.bboxes_3d.len()];
+        if counts != [counts[0]; 3] {
+            return Err(file(format!("has {counts:?} labels_3d, scores_3d, bboxes_3d: as many of each")));
+        }
+        let Some(place) = self.place(area, room).map_err(file)? else {
+            self.other_areas += counts[0] as u64;
+            return Ok(());
+        };
+        self.samples.insert(place, path.to_owned());
+        let corner = self.rooms[place].corner;
+        let rows = sample.labels_3d.into_iter().zip(sample.scores_3d).zip(sample.bboxes_3d);
+        for (i, ((label, score), row)) in rows.enumerate() {
+            let Some(class) = self.classes.list.get(label).copied() else {
+                return Err(fault(
+                    path,
+                    i,
+                    &format!(
+                        "label {label}, but there are {} classes: labels count {}; name the classes of the \
+                         training, in its order",
+                        self.classes.list.len(),
+                        self.classes.names()
+                    ),
+                ));
+            };
+            let (x, y, z, size) = match row[..] {
+                [x, y, z, dx, dy, dz] | [x, y, z, dx, dy, dz, 0.0] => (x, y, z, [dx, dy, dz]),
+                [_, _, _, _, _, _, _] => {
+                    return Err(fault(path, i, "it is turned: only boxes along the axes are evaluated"));
+                }
+                _ => return Err(fault(path, i, &format!("has {} numbers instead of 7", row.len()))),
+            };
+            if size.iter().any(|v| *v < 0.0) {
+                return Err(fault(path, i, &format!("its size is negative: {size:?}")));
+            }
+            let min = [x - size[0] / 2.0 + corner[0], y - size[1] / 2.0 + corner[1], z + corner[2]];
+            let [a, b, c] = min;
+            self.add(place, score, class, [a, b, c, a + size[0], b + size[1], c + size[2]]);
+        }
+        Ok(())
+    }
+
+    fn finish(self, list: Option<&PathBuf>, others: &[String]) -> Result<Predictions> {
+        if let Some(sample) = self.samples.values().next() {
+            if let Some(list) = list {
+                let message =
+                    "is a list of boxes, and other files are mmdetection3d's: leave those of one kind";
+                return Err(FileError::format(list, message).into());
+            }
+            let missing: Vec<String> = (self.rooms.iter().enumerate())
+                .filter(|(i, _)| !self.samples.contains_key(i))
+                .map(|(_, room)| format!("Area_{}_{}.json", room.area, room.name))
+                .collect();
+            if let Some(first) = missing.first() {
+                let message = format!(
+                    "missing, as are {} of {} rooms: a room in which nothing was found has a file with \
+                     empty lists",
+                    missing.len(),
+                    self.rooms.len()
+                );
+                return Err(FileError::format(&sample.with_file_name(first), message).into());
+            }
+        }
+        let mut notes = Vec::new();
+        if self.other_areas > 0 {
+            notes.push(format!("{} detections are of areas that are not tested.", self.other_areas));
+        }
+        if self.other_classes > 0 {
+            notes.push(format!("{} detections are of classes that are not evaluated.", self.other_classes));
+        }
+        if !others.is_empty() {
+            let names = others.iter().take(5).map(String::as_str).collect::<Vec<_>>().join(", ");
+            notes.push(format!("{} other files were passed over, as {names}.", others.len()));
+        }
+        Ok(Predictions { of_rooms: self.of_rooms, notes })
+    }
+}

@@ -1,0 +1,181 @@
+//! The protocol: rooms in parallel, then classes over rooms.
+
+use super::precision::{ClassScore, mean};
+use super::predictions::Predictions;
+use super::room::{Verdict, verdicts};
+use super::truth::{Classes, rooms};
+use super::{Bbox, Found, Rule};
+use crate::tables::{Rows, tables};
+use crate::task::Task;
+use crate::{Evaluation, Fold};
+use s3d_dataset::s3d_label::Class;
+use s3d_dataset::{Result, map_in_order};
+
+/// The thresholds of the IoU, and what their columns are called.
+const THRESHOLDS: [f64; 2] = [0.25, 0.5];
+const COLUMNS: [&str; 4] = ["AP@0.25", "AR@0.25", "AP@0.50", "AR@0.50"];
+
+const MMDETECTION3D: [&str; 5] = [
+    "Detections of all rooms are pooled by class and sorted by score, the highest first; of equal ones the \
+     first room by area, type and number, and in a room the first of the predictions. Each is held against \
+     the box of its class in its room with which its IoU is largest: it is true if that IoU is more than \
+     the threshold, 0.25 or 0.50, and no detection before it was true by this box.",
+    "AP is the area under precision over recall, each precision the largest at that recall or more. AR is \
+     the recall of all detections.",
+    "A class of the truth without detections has AP 0; one that is in neither is left out of means; of one \
+     that is detected alone AP, AR and their means are not defined.",
+    "Widths in x and y of less than 0.1 mm are 0.1 mm for the volume that two boxes share but not for the \
+     volume of each, and IoU is divided by 1e-8 m³ at least: a box that is flat in z is never found.",
+    "As in mmdetection3d fe25f7a (mmdet3d/evaluation/functional/indoor_eval.py), but in 64 bits throughout.",
+];
+
+const OPEN3D_ML: [&str; 4] = [
+    "A detection is true if its IoU with a box of its class in its room is the threshold, 0.25 or 0.50, or \
+     more, and it is the one with the largest IoU for that or another box, whatever its score; of equal \
+     ones the first of the predictions. One whose IoU with a box is not defined, both being flat, counts as \
+     neither.",
+    "AP: precision is taken at the scores of true detections, 41 at most, the nearest to even steps of \
+     recall, and made the largest at that recall or more. It is the mean of every fourth of 41, or of all \
+     if there are fewer: a low recall does not lower it. AR is not defined.",
+    "A class without true detections has AP 0, be it in the truth or not, and counts in means.",
+    "As in Open3D-ML 5e81f52 (ml3d/metrics/mAP.py, boxes in 3D), but in 64 bits throughout, and a share of \
+     1 instead of 100.",
+];
+
+/// A class in a room: boxes of the truth, and scores with what they count as at each threshold.
+struct OfClass {
+    truth: u64,
+    judged: Vec<(f64, Vec<Verdict>)>,
+}
+
+/// The boxes of rooms against detections.
+pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
+    let rule = if task.variant == "open3d-ml" { Rule::Open3dMl } else { Rule::Mmdetection3d };
+    let classes = Classes::new(task)?;
+    let rooms = rooms(task, &classes)?;
+    let Predictions { of_rooms, mut notes } = Predictions::read(task, &classes, &rooms)?;
+    let progress = task.ctx.progress("evaluate", "rooms", rooms.len() as u64);
+    let jobs: Vec<_> = rooms.iter().zip(&of_rooms).collect();
+    let judged = map_in_order(
+        task.ctx,
+        &jobs,
+        || (),
+        |(), (room, found)| {
+            let of_class = |class: &Class| {
+                let truth: Vec<Bbox> =
+                    room.boxes.iter().filter(|(c, _)| c == class).map(|(_, bbox)| *bbox).collect();
+                let found: Vec<Found> =
+                    found.iter().filter(|(_, c, _)| c == class).map(|(s, _, bbox)| (*s, *bbox)).collect();
+                let verdicts = verdicts(&truth, &found, &THRESHOLDS, rule);
+                let judged = found.iter().map(|(score, _)| *score).zip(verdicts).collect();
+                OfClass { truth: truth.len() as u64, judged }
+            };
+            let of_classes: Vec<OfClass> = classes.list.iter().map(of_class).collect();
+            progress.add(1);
+            Ok((room.fold, of_classes))
+        },
+    )?;
+    drop(progress);
+    let columns: Vec<&str> = match rule {
+        Rule::Mmdetection3d => COLUMNS.to_vec(),
+        Rule::Open3dMl => vec![COLUMNS[0], COLUMNS[2]],
+    };
+    let tables = tables(task, &columns, &judged, |rooms| rows(rooms, &classes.list, rule));
+    let of_rule = if rule == Rule::Mmdetection3d { &MMDETECTION3D[..] } else { &OPEN3D_ML };
+    let truth = format!(
+        "Truth: the boxes along the world axes of each instance's annotated points (instances.json), of \
+         {}.{}",
+        classes.names(),
+        if task.options.classes.is_none() {
+            " A class of another taxonomy is the one that it counts as."
+        } else {
+            ""
+        }
+    );
+    let mut definition: Vec<&str> = vec![&truth];
+    definition.extend(of_rule);
+    let boxes = rooms.iter().flat_map(|room| &room.boxes);
+    let flat = boxes.clone().filter(|(_, b)| (0..3).any(|k| b[k + 3] <= b[k])).count();
+    if flat > 0 {
+        notes.push(format!("{flat} boxes of the truth are flat: see the definition for what that means."));
+    }
+    notes.extend(invented(task.folds, &judged, &classes.list).filter(|_| rule == Rule::Mmdetection3d));
+    let detections = of_rooms.iter().map(|found| found.len() as u64).sum();
+    let counted =
+        [("rooms", rooms.len() as u64), ("boxes", boxes.count() as u64), ("detections", detections)];
+    let mut evaluation = task.evaluation(&definition, counted, tables);
+    evaluation.notes = notes;
+    Ok(evaluation)
+}
+
+/// Which classes are detected in a fold whose truth has none of them.
+fn invented(folds: &[Fold], rooms: &[(usize, Vec<OfClass>)], classes: &[Class]) -> Option<String> {
+    let in_fold = |(i, fold): (usize, &Fold)| {
+        let of_fold = rooms.iter().filter(move |(at, _)| *at == i).map(|(_, of)| of);
+        let is_invented = |class: &usize| {
+            let of_class = of_fold.clone().map(|of| &of[*class]);
+            of_class.clone().all(|of| of.truth == 0) && of_class.clone().any(|of| !of.judged.is_empty())
+        };
+        let names = (0..classes.len()).filter(is_invented).map(|class| classes[class].name());
+        names.map(|name| format!("{name} in {}", fold.name)).collect::<Vec<_>>()
+    };
+    let names: Vec<String> = folds.iter().enumerate().flat_map(in_fold).collect();
+    let told = "Detected where the truth has none, so that means are not defined there";
+    (!names.is_empty()).then(|| format!("{told}: {}.", names.join(", ")))
+}
+
+/// The rows of classes, then means: of those that a building is made of, of those that can be moved, and of
+/// all.
+fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
+    let of_class = |class: usize, threshold: usize| {
+        let of_rooms = rooms.iter().map(|room| &room[class]);
+        let truth = of_rooms.clone().map(|of| of.truth).sum();
+        let mut judged: Vec<(f64, Verdict)> =
+            of_rooms.flat_map(|of| of.judged.iter().map(|(s, verdicts)| (*s, verdicts[threshold]))).collect();
+        ClassScore::new(truth, &mut judged, rule)
+    };
+    let scores: Vec<[ClassScore; 2]> =
+        (0..classes.len()).map(|class| [0, 1].map(|threshold| of_class(class, threshold))).collect();
+    let columns = |pairs: [(f64, f64); 2]| match rule {
+        Rule::Mmdetection3d => pairs.into_iter().flat_map(|(ap, recall)| [ap, recall]).collect(),
+        Rule::Open3dMl => pairs.into_iter().map(|(ap, _)| ap).collect::<Vec<f64>>(),
+    };
+    let of_row = |of: &[ClassScore; 2]| columns(of.map(|score| (score.ap, score.recall)));
+    let mut rows: Rows =
+        classes.iter().zip(&scores).map(|(class, of)| (class.name().to_owned(), of_row(of))).collect();
+    let mean_of = |wanted: &dyn Fn(Class) -> bool| {
+        let chosen = |threshold: usize| -> Vec<ClassScore> {
+            classes.iter().zip(&scores).filter(|(c, _)| wanted(**c)).map(|(_, of)| of[threshold]).collect()
+        };
+        columns([0, 1].map(|threshold| mean(&chosen(threshold), rule)))
+    };
+    let (structural, movable) = (|c: Class| c.s3dis() <= Class::DOOR, |c: Class| c.s3dis() > Class::DOOR);
+    if classes.iter().any(|c| structural(*c)) && classes.iter().any(|c| movable(*c)) {
+        rows.push(("mean of structural".to_owned(), mean_of(&structural)));
+        rows.push(("mean of movable".to_owned(), mean_of(&movable)));
+    }
+    rows.push(("mean".to_owned(), mean_of(&|_| true)));
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_detected_in_vain_is_told() {
+        let folds = [5, 2].map(|area| Fold { name: format!("area {area}"), areas: vec![area] });
+        let of = |truth, found: bool| OfClass {
+            truth,
+            judged: vec![(0.5, vec![Verdict::False; 2]); found.into()],
+        };
+        let rooms = vec![
+            (0, vec![of(1, true), of(0, true)]),
+            (0, vec![of(0, true), of(0, false)]),
+            (1, vec![of(0, false), of(1, true)]),
+        ];
+        let told = invented(&folds, &rooms, &[Class::BEAM, Class::SOFA]).unwrap();
+        assert!(told.ends_with("not defined there: sofa in area 5."), "{told}");
+        assert!(invented(&folds, &rooms[2..], &[Class::BEAM, Class::SOFA]).is_none());
+    }
+}

@@ -1,0 +1,164 @@
+//! What an evaluation says.
+
+use crate::Protocol;
+use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Scores with the definition that they follow. Serializes as what `--json` writes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// The protocol's name.
+    #[serde(serialize_with = "name")]
+    pub protocol: Protocol,
+    /// The version of its definition.
+    pub version: u32,
+    /// Which of its variants.
+    pub variant: &'static str,
+    /// The definition, a sentence each.
+    pub definition: Vec<String>,
+    /// How many rooms, images, points … were counted, by noun.
+    pub counted: BTreeMap<&'static str, u64>,
+    /// The scores.
+    pub tables: Vec<Table>,
+    /// What should be known beside the scores, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Scores of classes, or of all.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Table {
+    /// What it is of: `areas 2, 4`.
+    pub title: String,
+    /// What its columns are called: `IoU`, `accuracy`.
+    pub columns: Vec<String>,
+    /// Its rows, each as long as `columns`.
+    pub rows: Vec<Row>,
+}
+
+/// A row of a table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// A class, or `mean`, `overall` …
+    pub name: String,
+    /// One a column.
+    pub scores: Vec<Score>,
+}
+
+/// A number of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Score {
+    /// In the protocol's unit; NaN where it is not defined, which is `null` in JSON.
+    pub value: f64,
+    /// The 95 % interval of the bootstrap, if it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval: Option<[f64; 2]>,
+}
+
+impl From<f64> for Score {
+    fn from(value: f64) -> Self {
+        Self { value, interval: None }
+    }
+}
+
+fn name<S: Serializer>(protocol: &Protocol, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(protocol.name())
+}
+
+impl Table {
+    /// A row of scores without intervals.
+    pub(crate) fn push(&mut self, name: impl Into<String>, values: impl IntoIterator<Item = f64>) {
+        let scores = values.into_iter().map(Score::from).collect();
+        self.rows.push(Row { name: name.into(), scores });
+    }
+
+    /// All scores, row by row.
+    pub fn scores(&self) -> impl Iterator<Item = f64> {
+        self.rows.iter().flat_map(|row| row.scores.iter().map(|score| score.value))
+    }
+
+    /// Gives its scores their intervals, row by row.
+    pub(crate) fn set_intervals(&mut self, intervals: impl IntoIterator<Item = [f64; 2]>) {
+        let scores = self.rows.iter_mut().flat_map(|row| &mut row.scores);
+        scores.zip(intervals).for_each(|(score, interval)| score.interval = Some(interval));
+    }
+}
+
+impl Evaluation {
+    /// The score of a row and column of a table, by their names.
+    pub fn score(&self, table: &str, row: &str, column: &str) -> Option<f64> {
+        let table = self.tables.iter().find(|t| t.title == table)?;
+        let at = table.columns.iter().position(|c| c == column)?;
+        let row = table.rows.iter().find(|r| r.name == row)?;
+        row.scores.get(at).map(|score| score.value)
+    }
+
+    /// The same as text: the definition, the tables and the notes.
+    pub fn to_markdown(&self) -> String {
+        let mut text = format!("# {}, version {}, as {}\n\n", self.protocol, self.version, self.variant);
+        for sentence in &self.definition {
+            let _ = writeln!(text, "- {sentence}");
+        }
+        let counted: Vec<String> =
+            self.counted.iter().map(|(noun, count)| format!("{noun} {count}")).collect();
+        let _ = writeln!(text, "\nCounted: {}.", counted.join(", "));
+        for table in &self.tables {
+            let _ = write!(text, "\n## {}\n\n| |", table.title);
+            table.columns.iter().for_each(|column| {
+                let _ = write!(text, " {column} |");
+            });
+            let _ = writeln!(text, "\n|---|{}", "---:|".repeat(table.columns.len()));
+            for row in &table.rows {
+                let _ = write!(text, "| {} |", row.name);
+                row.scores.iter().for_each(|score| {
+                    let _ = write!(text, " {} |", shown(score));
+                });
+                text.push('\n');
+            }
+        }
+        for note in &self.notes {
+            let _ = writeln!(text, "\n{note}");
+        }
+        text
+    }
+}
+
+/// A score as it is read: four digits after the point, and nothing where it is not defined.
+fn shown(score: &Score) -> String {
+    match (score.value.is_nan(), score.interval) {
+        (true, _) => "–".to_owned(),
+        (false, None) => format!("{:.4}", score.value),
+        (false, Some([low, high])) => format!("{:.4} [{low:.4}, {high:.4}]", score.value),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scores_are_shown_and_stored() {
+        let mut table =
+            Table { title: "all".into(), columns: vec!["IoU".into(), "accuracy".into()], rows: Vec::new() };
+        table.push("chair", [0.5, f64::NAN]);
+        table.set_intervals([[0.25, 0.75], [f64::NAN; 2]]);
+        let evaluation = Evaluation {
+            protocol: Protocol::Sem3d,
+            version: 1,
+            variant: "pointcept",
+            definition: vec!["Counts are summed over rooms.".into()],
+            counted: BTreeMap::from([("rooms", 3), ("points", 40)]),
+            tables: vec![table],
+            notes: Vec::new(),
+        };
+        let text = evaluation.to_markdown();
+        assert!(text.contains("| chair | 0.5000 [0.2500, 0.7500] | – |"), "{text}");
+        assert!(text.contains("Counted: points 40, rooms 3."), "{text}");
+        let json = serde_json::to_value(&evaluation).unwrap();
+        assert_eq!(json["protocol"], "sem3d");
+        assert_eq!(json["tables"][0]["rows"][0]["scores"][0]["interval"][1], 0.75);
+        assert!(json["tables"][0]["rows"][0]["scores"][1]["value"].is_null());
+        assert_eq!(evaluation.score("all", "chair", "IoU"), Some(0.5));
+        assert_eq!(evaluation.score("all", "table", "IoU"), None);
+    }
+}

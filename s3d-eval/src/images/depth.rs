@@ -1,0 +1,146 @@
+//! Protocol `depth`.
+
+use crate::Evaluation;
+use crate::images::depth_metrics::{DEPTH_COLUMNS, DepthScores, hohonet_depth, unifuse_depth};
+use crate::images::predictions::{Matched, Predicted, Wanted, find};
+use crate::images::read::{self, Places};
+use crate::images::resample::{opencv_nearest, pillow_nearest};
+use crate::options::ImageKind;
+use crate::tables::tables;
+use crate::task::Task;
+use s3d_dataset::{Error, Result, map_in_order};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Domain;
+use s3d_io::image::read_gray16;
+
+const HOHONET: [&str; 5] = [
+    "Panoramas are evaluated at 1024 × 512 pixels, of which each takes the pixel of the panorama that its \
+     middle lies in, as scikit-image and Pillow do; a prediction of the panorama's own size is sampled at \
+     the same pixels.",
+    "Evaluated are pixels whose true distance is there and above 0; truth and prediction are both brought \
+     between 0.01 m and 10 m first.",
+    "Scores are those of a panorama; the table has their mean over panoramas.",
+    "δ is the larger of prediction ÷ truth and truth ÷ prediction; logarithms are decimal.",
+    "As HoHoNet's test_depth.py (commit 2bbc0866), which has no SqRel and computes in 32 bits: here in 64.",
+];
+
+const UNIFUSE: [&str; 6] = [
+    "Panoramas are evaluated at 1024 × 512 pixels, of which each takes the pixel of the panorama that its \
+     start lies in, as OpenCV does; a prediction of the panorama's own size is sampled at the same pixels.",
+    "Evaluated are pixels whose true distance is above 0 and at most 10 m; truth and prediction are at least \
+     0.1 m.",
+    "A fault of that script, kept: where a prediction is beyond 10 m the truth is set to 10 m, and the \
+     prediction stays as it is.",
+    "Scores are those of a panorama; the table has their mean over panoramas.",
+    "δ is the larger of prediction ÷ truth and truth ÷ prediction; logarithms are decimal.",
+    "As UniFuse's metrics.py (commit 5da3a4e6).",
+];
+
+const MEDIAN_SCALE: &str = "Predictions are scaled, panorama by panorama, so that the median of those that \
+     are evaluated is the truth's; of two middle values the lower is the median.";
+
+pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
+    let median_scale = task.options.median_scale;
+    let is_unifuse = task.variant == "unifuse";
+    if median_scale && !is_unifuse {
+        let message = format!("depth as {} has no scale to the median: depth as unifuse has", task.variant);
+        return Err(Error::Usage(message));
+    }
+    if task.options.images == Some(ImageKind::Views) {
+        return Err(Error::Usage("depth is of panoramas, not of views".to_owned()));
+    }
+    let wanted = Wanted {
+        domain: Domain::Depth,
+        besides: &[],
+        kind: Some(ImageKind::Panoramas),
+        endings: &["png", "npy", "npz"],
+        known: &[],
+    };
+    let Matched { images, mut notes, .. } = find(task, &wanted)?;
+    let progress = task.ctx.progress("evaluating", "panoramas", images.len() as u64);
+    let units = map_in_order(
+        task.ctx,
+        &images,
+        || (),
+        |(), predicted| {
+            let nearest = if is_unifuse { opencv_nearest } else { pillow_nearest };
+            let farthest = if is_unifuse { 10.0 } else { f64::INFINITY };
+            let (truth, prediction) = both(task, predicted, nearest, farthest)?;
+            progress.add(1);
+            let scores = if is_unifuse {
+                unifuse_depth(&truth, &prediction, median_scale)
+            } else {
+                hohonet_depth(&truth, &prediction)
+            };
+            Ok((predicted.fold, scores))
+        },
+    )?;
+    drop(progress);
+
+    let empty = units.iter().filter(|(_, scores)| scores.pixels == 0).count();
+    if empty > 0 {
+        notes.push(format!(
+            "Left out for want of a pixel to evaluate: {empty} panoramas, which make all scores NaN in the \
+             script."
+        ));
+    }
+    let replaced: u64 = units.iter().map(|(_, scores)| scores.replaced).sum();
+    if replaced > 0 {
+        notes.push(format!(
+            "{replaced} pixels were predicted beyond 10 m and held against 10 m instead of their truth."
+        ));
+    }
+    let tables = tables(task, &DEPTH_COLUMNS, &units, |units| vec![("mean".to_owned(), mean(units))]);
+    let pixels = units.iter().map(|(_, scores)| scores.pixels).sum();
+    let counted = [("panoramas", images.len() as u64), ("pixels", pixels)];
+    let mut definition = if is_unifuse { UNIFUSE.to_vec() } else { HOHONET.to_vec() };
+    if median_scale {
+        definition.insert(3, MEDIAN_SCALE);
+    }
+    Ok(Evaluation { notes, ..task.evaluation(&definition, counted, tables) })
+}
+
+/// The mean of scores over the images that have some.
+fn mean(units: &[&DepthScores]) -> Vec<f64> {
+    let there = units.iter().filter(|scores| scores.pixels > 0);
+    let mut sums = [0.0; DEPTH_COLUMNS.len()];
+    there.clone().for_each(|scores| sums.iter_mut().zip(scores.values).for_each(|(sum, v)| *sum += v));
+    let count = there.count() as f64;
+    sums.map(|sum| sum / count).to_vec()
+}
+
+/// Truth (0 where it is missing) and prediction in metres, at the pixels of the evaluation; where the truth
+/// is above 0 and at most `farthest` there is a prediction.
+fn both(
+    task: &Task<'_>,
+    predicted: &Predicted,
+    nearest: fn(u32, u32) -> Vec<u32>,
+    farthest: f64,
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    let units = task.data.options().depth_units;
+    let image = read::gray16(task.data, &predicted.image, Domain::Depth)?;
+    let places = Places::new([image.width(), image.height()], nearest);
+    let metres = |value: u16, missing: f64| units.metres(value).unwrap_or(missing);
+    let truth: Vec<f64> = places.sample(image.pixels()).into_iter().map(|value| metres(value, 0.0)).collect();
+    let file = &predicted.file;
+    let (size, prediction) = if read::is_png(file) {
+        let image = read_gray16(file)?;
+        let size = [image.width(), image.height()];
+        read::check_size(file, size, &places.sizes())?;
+        let values = places.sample_prediction(size, image.into_vec());
+        (size, values.into_iter().map(|value| metres(value, f64::NAN)).collect())
+    } else {
+        let (size, values) = read::floats(file, &places.sizes(), 1)?;
+        (size, places.sample_prediction(size, values))
+    };
+    let wrong =
+        |(truth, prediction): (&f64, &f64)| *truth > 0.0 && *truth <= farthest && !prediction.is_finite();
+    if let Some(at) = truth.iter().zip(&prediction).position(wrong) {
+        let [x, y] = places.place(size, at);
+        let found =
+            if read::is_png(file) { "65535 (missing)".to_owned() } else { prediction[at].to_string() };
+        let message = format!("has {found} in column {x}, row {y}, which is evaluated: predict every pixel");
+        return Err(FileError::format(file, message).into());
+    }
+    Ok((truth, prediction))
+}

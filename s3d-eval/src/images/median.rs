@@ -1,0 +1,132 @@
+//! Exact medians of more angles than fit into memory, in two passes.
+
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+use std::sync::{Mutex, PoisonError};
+
+/// Steps of the first pass.
+const STEPS: usize = 1 << 16;
+
+fn step(angle: f64) -> usize {
+    ((angle * (STEPS as f64 / 180.0)) as usize).min(STEPS - 1)
+}
+
+/// The first pass: how many angles are in each step, of each fold.
+pub(super) struct Medians(Vec<Mutex<Vec<u64>>>);
+
+impl Medians {
+    pub(super) fn new(folds: usize) -> Self {
+        Self((0..folds).map(|_| Mutex::new(vec![0; STEPS])).collect())
+    }
+
+    /// Counts angles of an image of a fold, 0 to 180°.
+    pub(super) fn count(&self, fold: usize, angles: &[f64]) {
+        let mut counts = self.0[fold].lock().unwrap_or_else(PoisonError::into_inner);
+        angles.iter().for_each(|angle| counts[step(*angle)] += 1);
+    }
+
+    /// The second pass, which must be shown the same angles.
+    pub(super) fn search(self) -> Search {
+        let folds: Vec<Vec<u64>> =
+            self.0.into_iter().map(|m| m.into_inner().unwrap_or_else(PoisonError::into_inner)).collect();
+        let all = (0..STEPS).map(|at| folds.iter().map(|counts| counts[at]).sum()).collect();
+        Search(folds.into_iter().chain([all]).map(|counts| Group::of(&counts)).collect())
+    }
+}
+
+/// The second pass: the angles of the steps that hold the middle ones, of each fold and of all.
+pub(super) struct Search(Vec<Group>);
+
+struct Group {
+    steps: RangeInclusive<usize>,
+    /// The places of the two middle angles among those of the steps; `None` without angles.
+    middle: Option<[u64; 2]>,
+    /// How many times an angle is there, by its bits, whose order is that of angles from 0 on.
+    angles: Mutex<BTreeMap<u64, u64>>,
+}
+
+impl Group {
+    fn of(counts: &[u64]) -> Self {
+        let total: u64 = counts.iter().sum();
+        let Some(last) = total.checked_sub(1) else {
+            return Self { steps: 0..=0, middle: None, angles: Mutex::default() };
+        };
+        let middle = [last / 2, total / 2];
+        let mut before = 0;
+        let mut first: Option<(usize, u64)> = None;
+        for (at, count) in counts.iter().enumerate() {
+            if first.is_none() && before + count > middle[0] {
+                first = Some((at, before));
+            }
+            if let Some((start, below)) = first.filter(|_| before + count > middle[1]) {
+                let middle = Some(middle.map(|place| place - below));
+                return Self { steps: start..=at, middle, angles: Mutex::default() };
+            }
+            before += count;
+        }
+        Self { steps: 0..=0, middle: None, angles: Mutex::default() }
+    }
+}
+
+impl Search {
+    /// Looks at the angles of an image of a fold.
+    pub(super) fn look(&self, fold: usize, angles: &[f64]) {
+        for group in [fold, self.0.len() - 1].into_iter().filter_map(|at| self.0.get(at)) {
+            let inside = angles.iter().filter(|angle| group.steps.contains(&step(**angle)));
+            let mut inside: Vec<u64> = inside.map(|angle| angle.to_bits()).collect();
+            inside.sort_unstable();
+            let mut counts = group.angles.lock().unwrap_or_else(PoisonError::into_inner);
+            for same in inside.chunk_by(|a, b| a == b) {
+                *counts.entry(same[0]).or_default() += same.len() as u64;
+            }
+        }
+    }
+
+    /// The median of each fold, and of all; of two middle angles their mean, NaN without angles.
+    pub(super) fn found(self) -> Vec<f64> {
+        let median = |group: Group| {
+            let counts = group.angles.into_inner().unwrap_or_else(PoisonError::into_inner);
+            let at = |place: u64| {
+                let ends = counts.iter().scan(0, |end, (bits, count)| {
+                    *end += count;
+                    Some((*end, *bits))
+                });
+                ends.into_iter()
+                    .find(|(end, _)| *end > place)
+                    .map_or(f64::NAN, |(_, bits)| f64::from_bits(bits))
+            };
+            group.middle.map_or(f64::NAN, |[low, high]| (at(low) + at(high)) / 2.0)
+        };
+        self.0.into_iter().map(median).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::images::median_of_angles;
+
+    #[test]
+    fn medians_are_those_of_sorted_angles() {
+        let folds: [&[&[f64]]; 4] =
+            [&[&[3.0, 0.5], &[90.0, 90.0, 180.0]], &[&[10.0, 10.5]], &[], &[&[0.0], &[], &[0.0, 170.0, 0.0]]];
+        let medians = Medians::new(folds.len());
+        let each = |f: &dyn Fn(usize, &[f64])| {
+            folds
+                .iter()
+                .enumerate()
+                .for_each(|(fold, images)| images.iter().for_each(|image| f(fold, image)));
+        };
+        each(&|fold, angles| medians.count(fold, angles));
+        let search = medians.search();
+        each(&|fold, angles| search.look(fold, angles));
+        let found = search.found();
+        let mut expected: Vec<f64> =
+            folds.iter().map(|images| median_of_angles(&mut images.concat()).unwrap_or(f64::NAN)).collect();
+        expected.push(median_of_angles(&mut folds.concat().concat()).unwrap());
+        assert_eq!(expected[..2], [90.0, 10.25]);
+        for (ours, sorted) in found.iter().zip(&expected) {
+            assert!(ours == sorted || ours.is_nan() && sorted.is_nan(), "{found:?} {expected:?}");
+        }
+    }
+}

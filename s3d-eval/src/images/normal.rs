@@ -1,0 +1,207 @@
+//! Protocol `normal`.
+
+use crate::Evaluation;
+use crate::images::median::Medians;
+use crate::images::normal_metrics::{AngleSums, DSINE_LIMITS, dsine_angle, omnidata_angle, omnidata_scores};
+use crate::images::predictions::{Matched, Predicted, Wanted, find};
+use crate::images::read;
+use crate::options::ImageKind;
+use crate::tables::{mean_of_defined, tables};
+use crate::task::Task;
+use s3d_dataset::{Result, map_in_order};
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Domain;
+use s3d_io::image::read_rgb8;
+
+const DSINE: [&str; 3] = [
+    "Images are evaluated at their own size, at pixels that show something; the angle between truth and \
+     prediction is that of their unit vectors, 90° to a prediction of no length.",
+    "Pixels of all images are pooled: mean, median (of two middle values their mean) and root mean square of \
+     their angles in degrees, and the percentage of angles below (<) 5, 7.5, 11.25, 22.5 and 30°.",
+    "As DSINE's utils.py (commit ef0c2afa), which computes in 32 bits: here in 64.",
+];
+
+const OMNIDATA: [&str; 3] = [
+    "Images are evaluated at their own size, at pixels that show something.",
+    "Scores are those of an image: mean and median (of two middle values their mean) of its angles in \
+     degrees, and the share (0 to 1) of angles of at most (≤) 11.25, 22.5 and 30°; the table has their \
+     mean over images.",
+    "As Omnidata's evaluation_metrics.py (commit f69ff3ae).",
+];
+
+pub(crate) fn normal(task: &Task<'_>) -> Result<Evaluation> {
+    let wanted = Wanted {
+        domain: Domain::Normal,
+        besides: &[],
+        kind: task.options.images,
+        endings: &["png", "npy", "npz"],
+        known: &[],
+    };
+    let matched = find(task, &wanted)?;
+    let (of_axes, noun) = match matched.kind {
+        ImageKind::Views => {
+            ("Views: normals are in the camera's axes, as the data set stores them.", "views")
+        }
+        ImageKind::Panoramas => {
+            ("Panoramas: normals are in the world's axes, as the data set stores them.", "panoramas")
+        }
+    };
+    let (mut definition, pixels, tables) = match task.variant {
+        "omnidata" => omnidata(task, &matched)?,
+        _ => dsine(task, &matched)?,
+    };
+    definition.push(of_axes);
+    let counted = [(noun, matched.images.len() as u64), ("pixels", pixels)];
+    Ok(Evaluation { notes: matched.notes, ..task.evaluation(&definition, counted, tables) })
+}
+
+type Parts = (Vec<&'static str>, u64, Vec<crate::Table>);
+
+fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
+    let progress = task.ctx.progress("evaluating", "images", matched.images.len() as u64);
+    let units = map_in_order(
+        task.ctx,
+        &matched.images,
+        || (),
+        |(), predicted| {
+            let angles = angles(task, predicted, omnidata_angle)?;
+            progress.add(1);
+            Ok((predicted.fold, (angles.len() as u64, omnidata_scores(angles))))
+        },
+    )?;
+    let score = |units: &[&(u64, Option<[f64; 5]>)]| {
+        let there = units.iter().filter_map(|unit| unit.1);
+        let mut sums = [0.0; 5];
+        there.clone().for_each(|scores| sums.iter_mut().zip(scores).for_each(|(sum, v)| *sum += v));
+        let count = there.count() as f64;
+        vec![("mean".to_owned(), sums.map(|sum| sum / count).to_vec())]
+    };
+    let columns = ["mean (°)", "median (°)", "≤ 11.25°", "≤ 22.5°", "≤ 30°"];
+    let made = tables(task, &columns, &units, score);
+    Ok((OMNIDATA.to_vec(), units.iter().map(|unit| unit.1.0).sum(), made))
+}
+
+/// What is kept of an image: sums, and with intervals how many of its angles are in each of many steps.
+type Unit = (AngleSums, Vec<u32>);
+
+/// Steps of the histograms of images, of which medians of the bootstrap are taken.
+const STEPS: usize = 900;
+
+fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
+    let images = &matched.images;
+    let with_intervals = task.options.bootstrap.is_some();
+    let medians = Medians::new(task.folds.len());
+    let progress = task.ctx.progress("evaluating", "images", 2 * images.len() as u64);
+    let units = map_in_order(
+        task.ctx,
+        images,
+        || (),
+        |(), predicted| {
+            let angles = angles(task, predicted, dsine_angle)?;
+            medians.count(predicted.fold, &angles);
+            let mut steps = vec![0; if with_intervals { STEPS } else { 0 }];
+            if with_intervals {
+                angles.iter().for_each(|angle| steps[((angle * 5.0) as usize).min(STEPS - 1)] += 1);
+            }
+            progress.add(1);
+            Ok((predicted.fold, (AngleSums::of(&angles), steps)))
+        },
+    )?;
+    // The angles do not fit into memory: those around the medians are looked at once more.
+    let search = medians.search();
+    map_in_order(
+        task.ctx,
+        images,
+        || (),
+        |(), predicted| {
+            search.look(predicted.fold, &angles(task, predicted, dsine_angle)?);
+            progress.add(1);
+            Ok(())
+        },
+    )?;
+    drop(progress);
+    let medians = search.found();
+
+    let score = |units: &[&Unit]| {
+        let (mut sums, mut steps) = (AngleSums::default(), vec![0u64; STEPS]);
+        for (of_image, counts) in units {
+            sums.add(of_image);
+            steps.iter_mut().zip(counts).for_each(|(sum, n)| *sum += u64::from(*n));
+        }
+        let ([mean, rmse], below) = sums.mean_rmse_below();
+        let scores = [mean, median_of_steps(&steps), rmse].into_iter().chain(below);
+        vec![("all pixels".to_owned(), scores.collect())]
+    };
+    let below = DSINE_LIMITS.map(|limit| format!("< {limit}° (%)"));
+    let columns = ["mean (°)", "median (°)", "RMSE (°)"].into_iter().chain(below.iter().map(String::as_str));
+    let mut made = tables(task, &columns.collect::<Vec<_>>(), &units, score);
+    // Those of steps are for intervals.
+    for (table, median) in made.iter_mut().zip(of_tables(&medians)) {
+        table.rows[0].scores[1].value = median;
+    }
+    let mut definition = DSINE.to_vec();
+    if with_intervals {
+        definition.push("Intervals of medians are of angles in steps of 0.2°.");
+    }
+    Ok((definition, units.iter().map(|unit| unit.1.0.pixels).sum(), made))
+}
+
+/// Medians in the order of tables, of those of the folds and that of all: one fold has no other table.
+fn of_tables(medians: &[f64]) -> Vec<f64> {
+    let [folds @ .., _] = medians else { return Vec::new() };
+    let mean = mean_of_defined(folds.iter().copied());
+    medians.iter().copied().chain([mean]).collect()
+}
+
+/// Where half of the angles are below, evenly within a step.
+fn median_of_steps(steps: &[u64]) -> f64 {
+    let half = steps.iter().sum::<u64>() as f64 / 2.0;
+    let mut below = 0.0;
+    for (step, &count) in steps.iter().enumerate().filter(|(_, count)| **count > 0) {
+        if below + count as f64 >= half {
+            return (step as f64 + (half - below) / count as f64) * 180.0 / steps.len() as f64;
+        }
+        below += count as f64;
+    }
+    f64::NAN
+}
+
+/// The angles of an image, degrees, where its truth shows something.
+fn angles(task: &Task<'_>, predicted: &Predicted, angle: fn([f64; 3], [f64; 3]) -> f64) -> Result<Vec<f64>> {
+    /// Nothing is seen.
+    const MISSING: [u8; 3] = [128; 3];
+    let decoded = |pixel: [u8; 3]| pixel.map(|channel| (f64::from(channel) - 127.5) / 127.5);
+    let image = read::rgb8(task.data, &predicted.image, Domain::Normal)?;
+    let (size, file) = ([image.width(), image.height()], &predicted.file);
+    let wrong = |at: usize, what: String| {
+        let (x, y) = (at % size[0] as usize, at / size[0] as usize);
+        let message = format!("has {what} in column {x}, row {y}, which is evaluated");
+        Err(FileError::format(file, message).into())
+    };
+    let truth = image.pixels().iter().enumerate().filter(|(_, pixel)| **pixel != MISSING);
+    let mut found = Vec::with_capacity(image.len());
+    if read::is_png(file) {
+        let prediction = read_rgb8(file)?;
+        read::check_size(file, [prediction.width(), prediction.height()], &[size])?;
+        for (at, truth) in truth {
+            let pixel = prediction.pixels()[at];
+            if pixel == MISSING {
+                return wrong(at, "128, 128, 128 (missing)".to_owned());
+            }
+            found.push(angle(decoded(*truth), decoded(pixel)));
+        }
+        return Ok(found);
+    }
+    let (_, values) = read::floats(file, &[size], 3)?;
+    let vectors = values.as_chunks::<3>().0;
+    for (at, truth) in truth {
+        let vector = vectors[at];
+        // Lengths that networks give are about 1; colours from 0 to 255 are none.
+        let square: f64 = vector.iter().map(|c| c * c).sum();
+        if square.is_nan() || square > 4.0 {
+            return wrong(at, format!("{vector:?}, no unit vector,"));
+        }
+        found.push(angle(decoded(*truth), vector));
+    }
+    Ok(found)
+}

@@ -1,0 +1,119 @@
+//! Coverage, precision and recall of instances of points.
+//!
+//! Source: ASIS d71c3d6, `models/ASIS/eval_iou_accuracy.py`.
+
+use super::matching::{PredictedInstance, TrueInstance};
+
+/// The IoU from which on a prediction is right.
+const LEAST_IOU: f64 = 0.5;
+
+/// How the instances of a room are covered, class by class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoomCoverage(Vec<ClassCoverage>);
+
+/// Those of a class.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct ClassCoverage {
+    /// Over true instances: the sum of the largest IoU, and of this times points.
+    covered: f64,
+    covered_points: f64,
+    truth: u64,
+    points: u64,
+    right: u64,
+    predicted: u64,
+}
+
+impl RoomCoverage {
+    /// Those of a room; scores and void points of predictions do not matter. Instances of a class that is not
+    /// below `classes` are left out.
+    pub fn new(truth: &[TrueInstance], predicted: &[PredictedInstance], classes: usize) -> Self {
+        let mut coverage = vec![ClassCoverage::default(); classes];
+        let mut best = vec![0.0f64; truth.len()];
+        for instance in predicted {
+            let Some(class) = coverage.get_mut(instance.class) else { continue };
+            class.predicted += 1;
+            let mut largest = 0.0f64;
+            for (at, _, iou) in instance.of_its_class(truth) {
+                largest = largest.max(iou);
+                if let Some(best) = best.get_mut(at) {
+                    *best = best.max(iou);
+                }
+            }
+            class.right += u64::from(largest >= LEAST_IOU);
+        }
+        for (instance, best) in truth.iter().zip(best) {
+            let Some(class) = coverage.get_mut(instance.class) else { continue };
+            class.truth += 1;
+            class.points += instance.points;
+            class.covered += best;
+            class.covered_points += best * instance.points as f64;
+        }
+        Self(coverage)
+    }
+}
+
+/// Scores of a class, or their means, 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoverageScores {
+    /// Right predictions over all; NaN without predictions.
+    pub precision: f64,
+    /// Right predictions over true instances; NaN without these.
+    pub recall: f64,
+    /// The mean over rooms of the mean largest IoU of their true instances; NaN without these.
+    pub coverage: f64,
+    /// The same, each instance weighted by its points.
+    pub weighted_coverage: f64,
+}
+
+/// The scores of classes over rooms, of as many classes each.
+pub fn coverage(rooms: &[&RoomCoverage]) -> Vec<CoverageScores> {
+    let classes = rooms.iter().map(|room| room.0.len()).max().unwrap_or(0);
+    let of_class = |class: usize| {
+        let rooms: Vec<&ClassCoverage> = rooms.iter().filter_map(|room| room.0.get(class)).collect();
+        let sum = |count: fn(&ClassCoverage) -> u64| rooms.iter().map(|room| count(room)).sum::<u64>() as f64;
+        let mean = |score: fn(&ClassCoverage) -> f64| {
+            let scores: Vec<f64> =
+                rooms.iter().filter(|room| room.truth > 0).map(|room| score(room)).collect();
+            scores.iter().sum::<f64>() / scores.len() as f64
+        };
+        let right = sum(|room| room.right);
+        CoverageScores {
+            precision: right / sum(|room| room.predicted),
+            recall: right / sum(|room| room.truth),
+            coverage: mean(|room| room.covered / room.truth as f64),
+            weighted_coverage: mean(|room| room.covered_points / room.points as f64),
+        }
+    };
+    (0..classes).map(of_class).collect()
+}
+
+impl CoverageScores {
+    /// Precision, recall, coverage, weighted coverage.
+    pub fn to_array(self) -> [f64; 4] {
+        [self.precision, self.recall, self.coverage, self.weighted_coverage]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_iou_at_the_threshold_is_right() {
+        let truth = [TrueInstance { class: 0, points: 200 }, TrueInstance { class: 0, points: 50 }];
+        let of = |points, common| PredictedInstance {
+            class: 0,
+            score: 0.0,
+            points,
+            void: 0,
+            overlaps: vec![(0, common)],
+        };
+        let room = RoomCoverage::new(&truth, &[of(250, 150), of(30, 10)], 2);
+        let scores = coverage(&[&room]);
+        let expected = [0.5, 0.5, 0.25, 0.5 * 200.0 / 250.0];
+        assert_eq!(scores[0].to_array(), expected);
+        assert!(scores[1].to_array().iter().all(|score| score.is_nan()));
+        assert_eq!(coverage(&[&RoomCoverage::new(&truth, &[of(251, 150)], 1)])[0].precision, 0.0);
+        assert!(coverage(&[]).is_empty());
+    }
+}

@@ -1,0 +1,174 @@
+//! The protocols: room by room, on all threads.
+
+use super::CLASSES;
+use super::coverage::{CoverageScores, RoomCoverage, coverage};
+use super::find::find;
+use super::instances::{scored, segments};
+use super::labels::for_each_run;
+use super::precision::{InstanceMatches, instance_ap};
+use super::semantic::{AbsentClass, SemanticCounts, nan_mean};
+use super::truth::{Points, Room};
+use crate::tables::{Rows, tables};
+use crate::task::Task;
+use crate::{Evaluation, Table};
+use s3d_dataset::s3d_label::Class;
+use s3d_dataset::{Result, map_in_order};
+use std::path::Path;
+
+const TRUTH: &str = "The points of a room are those of its files \
+                     s3dis/Area_k/ROOM/Annotations/CLASS_N.txt, the files in the order of their names as \
+                     strings, as `s3d profile` gives them to trainers.";
+const OF_CLASSES: &str =
+    "Classes are the 13 of S3DIS; a class of another taxonomy is the one that it counts as.";
+
+/// What rooms gave, and what should be told besides.
+struct Counted<T> {
+    rooms: Vec<(usize, T)>,
+    points: u64,
+    notes: Vec<String>,
+}
+
+/// Does `work` on the prediction of each room.
+fn count<T: Send + Sync>(
+    task: &Task<'_>,
+    endings: &[&str],
+    work: impl Fn(&Path, &Room, &Points) -> Result<T> + Sync,
+) -> Result<Counted<T>> {
+    let rooms = Room::all(task)?;
+    let (paths, notes) = find(task, &rooms, endings)?;
+    let progress = task.ctx.progress("evaluate", "rooms", rooms.len() as u64);
+    let jobs: Vec<_> = rooms.iter().zip(&paths).collect();
+    let results = map_in_order(
+        task.ctx,
+        &jobs,
+        || (),
+        |(), (room, path)| {
+            let points = room.points(task)?;
+            let result = work(path, room, &points)?;
+            progress.add(1);
+            Ok((room.fold, points.count(), result))
+        },
+    )?;
+    let points = results.iter().map(|(_, points, _)| points).sum();
+    let rooms = results.into_iter().map(|(fold, _, result)| (fold, result)).collect();
+    Ok(Counted { rooms, points, notes })
+}
+
+impl<T> Counted<T> {
+    fn evaluation(self, task: &Task<'_>, definition: &[&str], tables: Vec<Table>) -> Evaluation {
+        let definition = [definition, &[TRUTH, OF_CLASSES]].concat();
+        let counted = [("rooms", self.rooms.len() as u64), ("points", self.points)];
+        let mut evaluation = task.evaluation(&definition, counted, tables);
+        evaluation.notes = self.notes;
+        evaluation
+    }
+}
+
+/// The rows of classes, then others.
+fn rows<const N: usize>(
+    classes: impl IntoIterator<Item = [f64; N]>,
+    others: impl IntoIterator<Item = (&'static str, [f64; N])>,
+) -> Rows {
+    let classes = Class::S3DIS.into_iter().map(Class::name).zip(classes);
+    classes.chain(others).map(|(name, scores)| (name.to_owned(), scores.to_vec())).collect()
+}
+
+/// Semantic segmentation of points.
+pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
+    let counted = count(task, &["npy", "npz"], |path, room, points| {
+        let mut counts = SemanticCounts::new(CLASSES);
+        for_each_run(path, room, points, task.ctx, |instance, labels| {
+            counts.add_run(instance.class, labels)
+        })?;
+        Ok(counts)
+    })?;
+    let (absent, of_absent) = match task.variant {
+        "nanmean" => (
+            AbsentClass::LeftOut,
+            "A class that neither side has is left out of mIoU, one that the truth has not of mAcc, as in \
+             mmdetection3d fe25f7a (seg_eval.py) and Open3D-ML 5e81f52 (semseg_metric.py).",
+        ),
+        _ => (
+            AbsentClass::Zero,
+            "1e-10 is added to every denominator, so that a class that neither side has counts as 0 in \
+             mIoU and mAcc, as in Pointcept d74c646 (engines/test.py, tools/test_s3dis_6fold.py).",
+        ),
+    };
+    let tables = tables(task, &["IoU", "accuracy"], &counted.rooms, |rooms| {
+        let scores = SemanticCounts::sum(CLASSES, rooms.iter().copied()).scores(absent);
+        let classes = scores.iou.iter().zip(&scores.accuracy).map(|(iou, accuracy)| [*iou, *accuracy]);
+        let mean = [scores.mean_iou, scores.mean_accuracy];
+        rows(classes, [("mean", mean), ("overall", [f64::NAN, scores.overall_accuracy])])
+    });
+    let definition = [
+        "Points are counted by class and summed over rooms: those of the truth, those predicted, those both.",
+        "IoU = both / (truth + predicted - both); accuracy = both / truth; overall accuracy = right points \
+         / all.",
+        "mIoU and mAcc (the row mean) are means over classes.",
+        of_absent,
+        "A point predicted as -1 is wrong, and of no class.",
+    ];
+    Ok(counted.evaluation(task, &definition, tables))
+}
+
+/// Average precision of instances of points.
+pub(crate) fn inst_ap(task: &Task<'_>) -> Result<Evaluation> {
+    let counted = count(task, &["npz"], |path, room, points| {
+        let (truth, predicted) = scored(path, room, points, task.ctx)?;
+        Ok(InstanceMatches::new(&truth, &predicted, CLASSES))
+    })?;
+    let tables = tables(task, &["AP", "AP50", "AP25"], &counted.rooms, |rooms| {
+        let mut ap = instance_ap(rooms);
+        // No room was drawn of a fold.
+        ap.by_class.resize(CLASSES, [f64::NAN; 3]);
+        rows(ap.by_class, [("mean", ap.mean)])
+    });
+    let definition = [
+        "Instances of fewer than 100 points do not count, on both sides.",
+        "In their order, true instances take the first prediction of their class that is free and whose \
+         IoU is greater than the threshold; each further one is wrong, the one with the lower score.",
+        "A prediction without a true instance of greater IoU is wrong, unless the share of its points that \
+         are void or of true instances of its class that are too small is greater than the threshold. \
+         S3DIS's points are never void.",
+        "Predictions of all rooms are sorted by score, equal scores together; the area below precision \
+         over recall is that of trapezes, from precision 1 at recall 0.",
+        "AP is the mean over IoU .50 to .90 in steps of .05 (nine thresholds: .95 is not among them); AP50 \
+         and AP25 are those of .50 and .25.",
+        "A class without a true instance that counts is not defined and left out of the mean; one without \
+         predictions is 0.",
+        "Source: Pointcept d74c646, engines/hooks/evaluator.py (InsSegEvaluator), after ScanNet's script.",
+    ];
+    Ok(counted.evaluation(task, &definition, tables))
+}
+
+/// Coverage of instances of points.
+pub(crate) fn inst_cov(task: &Task<'_>) -> Result<Evaluation> {
+    let counted = count(task, &["npz"], |path, room, points| {
+        let (truth, predicted) = segments(path, room, points, task.ctx)?;
+        Ok(RoomCoverage::new(&truth, &predicted, CLASSES))
+    })?;
+    let columns = ["precision", "recall", "coverage", "weighted coverage"];
+    let tables = tables(task, &columns, &counted.rooms, |rooms| {
+        let mut classes: Vec<_> = coverage(rooms).into_iter().map(CoverageScores::to_array).collect();
+        // No room was drawn of a fold.
+        classes.resize(CLASSES, [f64::NAN; 4]);
+        let mean =
+            std::array::from_fn(|i| classes.iter().map(|class| class[i]).sum::<f64>() / CLASSES as f64);
+        let defined = std::array::from_fn(|i| nan_mean(classes.iter().map(|class| class[i])));
+        rows(classes, [("mean", mean), ("mean where defined", defined)])
+    });
+    let definition = [
+        "The class of a predicted instance is that of most of its points, the lowest number of equals; \
+         points of instance -1 are in none.",
+        "A prediction is right if its largest IoU with a true instance of its class is 0.5 or more; \
+         several may be right by the same one. Precision = right / predicted, recall = right / true, over \
+         all rooms.",
+        "The coverage of a room is the mean over its true instances of the largest IoU with a prediction \
+         of their class, weighted by points for weighted coverage; of these the mean over rooms with such \
+         instances is taken.",
+        "mPrec, mRec, mCov and mWCov (the row mean) are means over the 13 classes, not defined if one of \
+         them is not; the row below leaves these out.",
+        "Source: ASIS d71c3d6, models/ASIS/eval_iou_accuracy.py, on all points of a room, each once.",
+    ];
+    Ok(counted.evaluation(task, &definition, tables))
+}

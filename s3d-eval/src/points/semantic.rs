@@ -1,0 +1,136 @@
+//! Semantic segmentation: counts of points by class, and what follows from them.
+
+/// Points by class: how many the truth has, how many are predicted, and how many are both.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SemanticCounts {
+    /// Points that are of the class.
+    pub truth: Vec<u64>,
+    /// Points that are predicted to be.
+    pub predicted: Vec<u64>,
+    /// Points that are, and are predicted to be.
+    pub intersection: Vec<u64>,
+}
+
+/// What a class counts that neither the truth nor the predictions have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AbsentClass {
+    /// IoU and accuracy 0, in the mean too, since 1e-10 is added to every denominator. Source: Pointcept
+    /// d74c646, `pointcept/engines/test.py`.
+    Zero,
+    /// IoU and accuracy NaN, left out of the mean; the accuracy of a class that the truth has not is NaN as
+    /// well. Sources: mmdetection3d fe25f7a, `mmdet3d/evaluation/functional/seg_eval.py`; Open3D-ML 5e81f52,
+    /// `ml3d/torch/modules/metrics/semseg_metric.py`, which has no overall accuracy.
+    LeftOut,
+}
+
+/// Scores of a semantic segmentation, 0 to 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SemanticScores {
+    /// By class: points that are both over points that are either.
+    pub iou: Vec<f64>,
+    /// By class: points that are both over points of the truth.
+    pub accuracy: Vec<f64>,
+    /// mIoU.
+    pub mean_iou: f64,
+    /// mAcc.
+    pub mean_accuracy: f64,
+    /// OA: right points over all that are not void.
+    pub overall_accuracy: f64,
+}
+
+impl SemanticCounts {
+    /// No points, of so many classes.
+    pub fn new(classes: usize) -> Self {
+        let none = vec![0; classes];
+        Self { truth: none.clone(), predicted: none.clone(), intersection: none }
+    }
+
+    /// Counts points, each its true and its predicted class, from 0. A true class that is none, such as -1,
+    /// makes the point void: it does not count. A predicted one that is none makes it wrong.
+    pub fn add(&mut self, points: impl IntoIterator<Item = (i64, i64)>) {
+        for (truth, predicted) in points {
+            if let Some(class) = usize::try_from(truth).ok().filter(|class| *class < self.truth.len()) {
+                self.add_run(class, &[predicted]);
+            }
+        }
+    }
+
+    /// Counts points of one true class.
+    pub(super) fn add_run(&mut self, class: usize, predicted: &[i64]) {
+        let before = self.predicted.get(class).copied().unwrap_or(0);
+        for label in predicted {
+            if let Some(count) = usize::try_from(*label).ok().and_then(|label| self.predicted.get_mut(label))
+            {
+                *count += 1;
+            }
+        }
+        let right = self.predicted.get(class).copied().unwrap_or(0) - before;
+        if let (Some(truth), Some(both)) = (self.truth.get_mut(class), self.intersection.get_mut(class)) {
+            *truth += predicted.len() as u64;
+            *both += right;
+        }
+    }
+
+    /// The sum of counts of as many classes each.
+    pub fn sum<'a>(classes: usize, counts: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut sum = Self::new(classes);
+        let add = |sum: &mut [u64], counts: &[u64]| {
+            sum.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        };
+        for counts in counts {
+            add(&mut sum.truth, &counts.truth);
+            add(&mut sum.predicted, &counts.predicted);
+            add(&mut sum.intersection, &counts.intersection);
+        }
+        sum
+    }
+
+    /// The scores of these counts.
+    pub fn scores(&self, absent: AbsentClass) -> SemanticScores {
+        let share = |part: u64, whole: u64| match absent {
+            AbsentClass::Zero => part as f64 / (whole as f64 + 1e-10),
+            AbsentClass::LeftOut => part as f64 / whole as f64,
+        };
+        let both = || self.intersection.iter().copied();
+        let sides = self.truth.iter().zip(&self.predicted);
+        let iou: Vec<f64> = both().zip(sides).map(|(both, (t, p))| share(both, t + p - both)).collect();
+        let accuracy: Vec<f64> = both().zip(&self.truth).map(|(both, truth)| share(both, *truth)).collect();
+        SemanticScores {
+            mean_iou: nan_mean(iou.iter().copied()),
+            mean_accuracy: nan_mean(accuracy.iter().copied()),
+            overall_accuracy: share(both().sum(), self.truth.iter().sum()),
+            iou,
+            accuracy,
+        }
+    }
+}
+
+/// The mean of what is not NaN; NaN of none.
+pub(super) fn nan_mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0u32);
+    for value in values.into_iter().filter(|value| !value.is_nan()) {
+        sum += value;
+        count += 1;
+    }
+    sum / f64::from(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_class_that_is_nowhere_counts_as_is_said() {
+        let mut counts = SemanticCounts::new(3);
+        counts.add([(0, 0), (0, 1), (1, 1), (-1, 0), (7, 1), (1, -1)]);
+        assert_eq!((&counts.truth[..], &counts.predicted[..]), (&[2, 2, 0][..], &[1, 2, 0][..]));
+        assert_eq!(counts.intersection, [1, 1, 0]);
+        let zero = counts.scores(AbsentClass::Zero);
+        assert!((zero.mean_iou - (0.5 + 1.0 / 3.0) / 3.0).abs() < 1e-9 && zero.iou[2] == 0.0, "{zero:?}");
+        let left_out = counts.scores(AbsentClass::LeftOut);
+        assert_eq!(left_out.mean_iou, (0.5 + 1.0 / 3.0) / 2.0);
+        assert!(left_out.iou[2].is_nan() && left_out.overall_accuracy == 0.5);
+        assert!(SemanticCounts::new(3).scores(AbsentClass::LeftOut).mean_iou.is_nan());
+        assert_eq!(SemanticCounts::new(3).scores(AbsentClass::Zero).overall_accuracy, 0.0);
+    }
+}

@@ -1,0 +1,99 @@
+//! The points that predictions are held against: those of the S3DIS tree, in the order of its profiles.
+
+use super::CLASSES;
+use super::matching::TrueInstance;
+use crate::task::Task;
+use s3d_dataset::{Error, Result, TreeRoom};
+
+/// A room that is tested.
+pub(super) struct Room {
+    /// The fold that it is in.
+    pub(super) fold: usize,
+    pub(super) tree: TreeRoom,
+}
+
+/// The instances of a room, in the order of its points: one after another.
+pub(super) struct Points(Vec<TrueInstance>);
+
+impl Room {
+    /// The rooms of all folds, fold by fold.
+    pub(super) fn all(task: &Task<'_>) -> Result<Vec<Self>> {
+        let root = task.data.layout().root().display();
+        if task.data.taxonomy().is_none() {
+            let message = format!("{root}: {} needs labels, and the data set has none", task.protocol);
+            return Err(Error::Input(message));
+        }
+        let mut rooms = Vec::new();
+        for (fold, areas) in task.folds.iter().enumerate() {
+            for area in &areas.areas {
+                rooms.extend(task.data.tree_rooms(*area)?.into_iter().map(|tree| Self { fold, tree }));
+            }
+        }
+        if rooms.is_empty() {
+            return Err(Error::Input(format!("{root}: no annotated room in the areas that are tested")));
+        }
+        Ok(rooms)
+    }
+
+    /// `Area_5/office_1`.
+    pub(super) fn name(&self) -> String {
+        format!("Area_{}/{}", self.tree.area, self.tree.name)
+    }
+
+    /// Counts its points.
+    pub(super) fn points(&self, task: &Task<'_>) -> Result<Points> {
+        let count = |instance| task.data.point_count(instance, task.ctx);
+        let instances = self
+            .tree
+            .instances
+            .iter()
+            .map(|instance| Ok(TrueInstance { class: instance.class.index(), points: count(instance)? }));
+        Ok(Points(instances.collect::<Result<_>>()?))
+    }
+}
+
+impl Points {
+    /// How many there are.
+    pub(super) fn count(&self) -> u64 {
+        self.0.iter().map(|instance| instance.points).sum()
+    }
+
+    /// The instances, if predictions may be for so many points: all of the room; or all, with the only point
+    /// of an instance twice, as the profile for Pointcept has it. `None` for another number.
+    pub(super) fn of_rows(&self, rows: u64) -> Option<Vec<TrueInstance>> {
+        if rows == self.count() {
+            return Some(self.0.clone());
+        }
+        let twice = self.0.iter().map(|instance| match instance.points {
+            1 => TrueInstance { points: 2, ..*instance },
+            _ => *instance,
+        });
+        let twice = Self(twice.collect());
+        (rows == twice.count()).then_some(twice.0)
+    }
+}
+
+/// What predictions of a room should look like.
+pub(super) fn rows_expected(room: &Room, points: &Points) -> String {
+    format!(
+        "{} has {} points, in the order of `s3d profile`: predictions are for all of them (those on voxels \
+         are carried to the points in each), and of {CLASSES} classes",
+        room.name(),
+        points.count()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_only_point_of_an_instance_may_stand_twice() {
+        let of = |points: &[u64]| points.iter().map(|&points| TrueInstance { class: 2, points }).collect();
+        let points = Points(of(&[5, 1, 0, 1]));
+        assert_eq!(points.of_rows(7), Some(of(&[5, 1, 0, 1])));
+        assert_eq!(points.of_rows(9), Some(of(&[5, 2, 0, 2])));
+        assert_eq!(points.of_rows(8), None);
+        assert_eq!(Points(of(&[5])).of_rows(6), None);
+    }
+}

@@ -1,0 +1,102 @@
+//! The protocols by name.
+
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error as ThisError;
+
+/// A definition by which predictions are held against a data set. `docs/evaluation.md` describes each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Protocol {
+    /// Average precision of 3D boxes, as mmdetection3d's indoor evaluation.
+    Det,
+    /// Semantic segmentation of points, as Pointcept.
+    Sem3d,
+    /// Average precision of instances of points, as ScanNet's script in Pointcept's form.
+    InstAp,
+    /// Coverage, precision and recall of instances of points, as ASIS.
+    InstCov,
+    /// Semantic segmentation of panoramas, as HoHoNet.
+    SemPano,
+    /// Depth of panoramas, as HoHoNet or UniFuse.
+    Depth,
+    /// Surface normals of images, as DSINE or Omnidata.
+    Normal,
+    /// Panoptic quality of images, as panopticapi.
+    Panoptic,
+}
+
+/// A protocol as it is called, its version, and its variants, of which the first is the default.
+type Entry = (Protocol, &'static str, u32, &'static [&'static str]);
+
+const PROTOCOLS: [Entry; 8] = [
+    (Protocol::Det, "det", 1, &["mmdetection3d", "open3d-ml"]),
+    (Protocol::Sem3d, "sem3d", 1, &["pointcept", "nanmean"]),
+    (Protocol::InstAp, "inst-ap", 1, &["pointcept"]),
+    (Protocol::InstCov, "inst-cov", 1, &["asis"]),
+    (Protocol::SemPano, "sem-pano", 1, &["hohonet"]),
+    (Protocol::Depth, "depth", 1, &["hohonet", "unifuse"]),
+    (Protocol::Normal, "normal", 1, &["dsine", "omnidata"]),
+    (Protocol::Panoptic, "panoptic", 1, &["panopticapi"]),
+];
+
+impl Protocol {
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        PROTOCOLS.into_iter().map(|(protocol, ..)| protocol)
+    }
+
+    fn entry(self) -> Entry {
+        // Every protocol has its line, in the order of the enum.
+        PROTOCOLS[self as usize]
+    }
+
+    /// What it is called: `sem3d`.
+    pub fn name(self) -> &'static str {
+        self.entry().1
+    }
+
+    /// Changes with every change of its definition.
+    pub fn version(self) -> u32 {
+        self.entry().2
+    }
+
+    /// The names of its variants, the default first.
+    pub fn variants(self) -> &'static [&'static str] {
+        self.entry().3
+    }
+}
+
+impl fmt::Display for Protocol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A word that names no protocol.
+#[derive(Clone, Debug, PartialEq, Eq, ThisError)]
+#[error("no protocol is called {0:?}: det, sem3d, inst-ap, inst-cov, sem-pano, depth, normal, panoptic are")]
+pub struct UnknownProtocol(String);
+
+impl FromStr for Protocol {
+    type Err = UnknownProtocol;
+
+    fn from_str(word: &str) -> Result<Self, UnknownProtocol> {
+        Self::all().find(|p| p.name() == word).ok_or_else(|| UnknownProtocol(word.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lead_to_protocols() {
+        for protocol in Protocol::all() {
+            assert_eq!(protocol.to_string().parse(), Ok(protocol));
+            assert!(!protocol.variants().is_empty());
+        }
+        let message = "sem2d".parse::<Protocol>().unwrap_err().to_string();
+        assert!(Protocol::all().all(|p| message.contains(p.name())), "{message}");
+    }
+}

@@ -1,0 +1,246 @@
+//! Detections as files, held against a data set.
+
+mod scene;
+
+use s3d_dataset::DataSet;
+use s3d_eval::{Context, EvalOptions, Evaluation, Folds, Protocol, Result, evaluate};
+use scene::data_set;
+use serde_json::{Value, json};
+use std::fs;
+use std::path::Path;
+
+const FIVE: [&str; 5] = ["table", "chair", "sofa", "bookcase", "board"];
+
+fn det(predictions: &Path, change: impl Fn(&mut EvalOptions)) -> Result<Evaluation> {
+    let mut options = EvalOptions::default();
+    change(&mut options);
+    evaluate(Protocol::Det, data_set(), predictions, &options, &Context::default())
+}
+
+fn five(options: &mut EvalOptions) {
+    options.classes = Some(FIVE.map(str::to_owned).to_vec());
+}
+
+fn message(predictions: &Path, change: impl Fn(&mut EvalOptions)) -> String {
+    det(predictions, change).unwrap_err().to_string()
+}
+
+/// The data set's own boxes, as a list.
+fn own_boxes() -> Vec<Value> {
+    let data = DataSet::open(data_set()).unwrap();
+    let mut list = Vec::new();
+    for area in data.areas() {
+        for i in data.instances(*area).unwrap() {
+            let b = i.bbox.map(f64::from);
+            let mut entry = json!({"area": area, "room": i.room, "class": i.class, "score": 0.5});
+            // Both forms of a box.
+            if list.len() % 2 == 0 {
+                (entry["min"], entry["max"]) = (json!(b[..3]), json!(b[3..]));
+            } else {
+                entry["center"] = json!([0, 1, 2].map(|k| (b[k] + b[k + 3]) / 2.0));
+                entry["size"] = json!([0, 1, 2].map(|k| b[k + 3] - b[k]));
+            }
+            list.push(entry);
+        }
+    }
+    list
+}
+
+/// The data set's own boxes of five classes as mmdetection3d writes them, by room.
+fn own_samples(folder: &Path) {
+    let data = DataSet::open(data_set()).unwrap();
+    for area in data.areas() {
+        let instances = data.instances(*area).unwrap();
+        for room in instances.iter().map(|i| &i.room) {
+            let of_room = instances.iter().filter(|i| i.room == *room);
+            let corner = [0, 1, 2].map(|k| of_room.clone().map(|i| i.bbox[k]).fold(f32::INFINITY, f32::min));
+            let (mut labels, mut boxes) = (Vec::new(), Vec::new());
+            for (label, b) in of_room.filter_map(|i| Some((FIVE.iter().position(|c| *c == i.class)?, i.bbox)))
+            {
+                let [x, y] = [0, 1].map(|k| (b[k] + b[k + 3]) / 2.0 - corner[k]);
+                labels.push(label);
+                boxes.push([x, y, b[2] - corner[2], b[3] - b[0], b[4] - b[1], b[5] - b[2], 0.0]);
+            }
+            let scores = vec![0.5; labels.len()];
+            let sample =
+                json!({"labels_3d": labels, "scores_3d": scores, "bboxes_3d": boxes, "box_type_3d": "Depth"});
+            fs::write(folder.join(format!("Area_{area}_{room}.json")), sample.to_string()).unwrap();
+        }
+    }
+}
+
+fn write(folder: &Path, name: &str, value: &Value) {
+    fs::write(folder.join(name), value.to_string()).unwrap();
+}
+
+/// That all classes of the truth have the score 1, and which of them there are.
+fn assert_perfect(evaluation: &Evaluation, mean: bool) -> usize {
+    let text = evaluation.to_markdown();
+    for table in &evaluation.tables {
+        for row in table.rows.iter().filter(|row| mean || !row.name.starts_with("mean")) {
+            assert!(row.scores.iter().all(|s| s.value == 1.0 || s.value.is_nan()), "{text}");
+        }
+    }
+    let rows = &evaluation.tables[0].rows;
+    assert!(rows.last().is_some_and(|row| row.name == "mean" && row.scores[0].value > 0.0), "{text}");
+    rows.iter().filter(|row| row.scores[0].value == 1.0).count()
+}
+
+#[test]
+fn a_data_set_against_itself_is_perfect() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("boxes.json");
+    fs::write(&path, json!(own_boxes()).to_string()).unwrap();
+    let evaluation = det(&path, |_| ()).unwrap();
+    assert!(assert_perfect(&evaluation, true) >= 10);
+    let clutter = own_boxes().iter().filter(|b| b["class"] == "clutter").count() as u64;
+    let boxes = own_boxes().len() as u64 - clutter;
+    assert_eq!((evaluation.counted["boxes"], evaluation.counted["detections"]), (boxes, boxes));
+    assert_eq!(evaluation.notes, [format!("{clutter} detections are of classes that are not evaluated.")]);
+
+    let open3d = |o: &mut EvalOptions| o.variant = Some("open3d-ml".into());
+    let evaluation = det(&path, open3d).unwrap();
+    assert_eq!(evaluation.tables[0].columns, ["AP@0.25", "AP@0.50"]);
+    let there = det(&path, |_| ()).unwrap().tables[0]
+        .rows
+        .iter()
+        .take(12)
+        .map(|r| r.scores[0].value)
+        .collect::<Vec<_>>();
+    for (row, is_there) in evaluation.tables[0].rows.iter().zip(there.iter().map(|v| !v.is_nan())) {
+        assert!(row.scores.iter().all(|s| s.value == f64::from(u8::from(is_there))), "{row:?}");
+    }
+
+    // A folder of lists is the same.
+    let lists = tempfile::tempdir().unwrap();
+    let all = own_boxes();
+    write(lists.path(), "a.json", &json!(all[..10]));
+    write(lists.path(), "b.json", &json!(all[10..]));
+    fs::write(lists.path().join("log.txt"), "").unwrap();
+    let evaluation = det(lists.path(), |_| ()).unwrap();
+    assert!(assert_perfect(&evaluation, true) >= 10);
+    assert!(evaluation.notes.iter().any(|n| n.contains("log.txt")), "{:?}", evaluation.notes);
+}
+
+#[test]
+fn mmdetection3d_files_of_the_data_set_are_perfect() {
+    let folder = tempfile::tempdir().unwrap();
+    let below = folder.path().join("preds");
+    fs::create_dir(&below).unwrap();
+    own_samples(&below);
+    for predictions in [&below, folder.path()] {
+        let evaluation = det(predictions, five).unwrap();
+        assert!(assert_perfect(&evaluation, true) >= 4);
+        assert_eq!(evaluation.tables[0].rows.len(), 6);
+    }
+    // The labels are of five classes.
+    let e = message(&below, |o| o.classes = Some(vec!["sofa".into()]));
+    assert!(e.contains(": label ") && e.contains("labels count sofa"), "{e}");
+    assert!(message(&below, |o| o.classes = Some(vec!["stool".into()])).contains("--classes: \"stool\""));
+}
+
+#[test]
+fn folds_and_intervals() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("boxes.json");
+    // Area 2 is found, area 5 is not; one box is nowhere.
+    let mut boxes = own_boxes();
+    boxes.retain(|b| b["area"] == 2);
+    let mut nowhere = boxes[0].clone();
+    (nowhere["class"], nowhere["score"]) = (json!("chair"), json!(0.25));
+    nowhere["min"] = json!([90, 90, 90]);
+    nowhere["max"] = json!([91, 91, 91]);
+    boxes.push(nowhere);
+    fs::write(&path, json!(boxes).to_string()).unwrap();
+    let run = |o: &mut EvalOptions| {
+        o.folds = Folds::Paper;
+        o.bootstrap = Some(50);
+    };
+    let evaluation = det(&path, run).unwrap();
+    let titles: Vec<&str> = evaluation.tables.iter().map(|t| t.title.as_str()).collect();
+    assert_eq!(titles, ["area 5", "area 2", "all folds, pooled", "mean over folds"]);
+    let score = |table: &str| evaluation.score(table, "wall", "AR@0.50").unwrap();
+    assert_eq!((score("area 5"), score("area 2"), score("mean over folds")), (0.0, 1.0, 0.5));
+    let walls = |area: Option<u32>| {
+        own_boxes().iter().filter(|b| b["class"] == "wall" && area.is_none_or(|a| b["area"] == a)).count()
+            as f64
+    };
+    assert_eq!(score("all folds, pooled"), walls(Some(2)) / walls(None));
+    for table in &evaluation.tables {
+        for row in table.rows.iter().filter(|row| !row.scores[0].value.is_nan()) {
+            let [low, high] = row.scores[0].interval.unwrap();
+            assert!(low <= row.scores[0].value && row.scores[0].value <= high, "{} {row:?}", table.title);
+        }
+    }
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let again = one.install(|| det(&path, run).unwrap());
+    assert_eq!(again.to_markdown(), evaluation.to_markdown());
+    // Of one area, boxes of others are told.
+    let evaluation = det(&path, |o| o.folds = Folds::Areas(vec![5])).unwrap();
+    assert_eq!(evaluation.counted["detections"], 0);
+    assert!(evaluation.notes[0].contains("areas that are not tested"), "{:?}", evaluation.notes);
+}
+
+#[test]
+fn wrong_lists_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("boxes.json");
+    let good = own_boxes().remove(0);
+    let with = |key: &str, value: Value| {
+        let mut entry = good.clone();
+        entry[key] = value;
+        fs::write(&path, json!([good, entry]).to_string()).unwrap();
+        let e = message(&path, |_| ());
+        assert!(e.contains("boxes.json") && e.contains(": box 2: "), "{e}");
+        e
+    };
+    assert!(with("area", json!(9)).contains("no area 9"));
+    assert!(with("room", json!("office_99")).contains("no room \"office_99\""));
+    assert!(with("class", json!("chiar")).contains("\"chiar\" is no class"));
+    assert!(with("score", json!("high")).contains("invalid type"));
+    assert!(with("size", json!([1, 1, 1])).contains("min and max, or center and size"));
+    assert!(with("max", json!([-1e3, 0, 0])).contains("ends before it begins"));
+    assert!(with("max", json!([1, 2])).contains("invalid length"));
+    fs::write(&path, "[{\"score\": NaN}]").unwrap();
+    assert!(message(&path, |_| ()).contains("boxes.json, line 1"));
+    fs::write(&path, "{}").unwrap();
+    let e = message(&path, |_| ());
+    assert!(e.contains("missing field `labels_3d`") && e.contains("detections are a JSON file with"), "{e}");
+    fs::remove_file(&path).unwrap();
+    assert!(message(folder.path(), |_| ()).contains("has no JSON file"));
+    fs::write(folder.path().join("results.pkl"), "").unwrap();
+    assert!(message(folder.path(), |_| ()).contains("results.pkl: pickles are not read"));
+    assert!(message(&folder.path().join("gone"), |_| ()).contains("gone"));
+}
+
+#[test]
+fn wrong_files_of_mmdetection3d_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    own_samples(folder.path());
+    let mut files: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path()).collect();
+    files.sort();
+    let (path, text) = (&files[0], fs::read_to_string(&files[0]).unwrap());
+    let name = path.file_name().unwrap().to_str().unwrap();
+    let damaged = |value: Value| {
+        fs::write(path, value.to_string()).unwrap();
+        let e = message(folder.path(), five);
+        fs::write(path, &text).unwrap();
+        assert!(e.contains(name), "{e}");
+        e
+    };
+    let sample = |row: Value| json!({"labels_3d": [0], "scores_3d": [1.0], "bboxes_3d": [row]});
+    assert!(damaged(sample(json!([1, 2, 0, 1, 1, 1, 0.5]))).contains("box 1: it is turned"));
+    assert!(damaged(sample(json!([1, 2, 0, 1, 1]))).contains("5 numbers instead of 7"));
+    assert!(damaged(sample(json!([1, 2, 0, 1, -1, 1]))).contains("its size is negative"));
+    let mut value = sample(json!([1, 2, 0, 1, 1, 1]));
+    value["box_type_3d"] = json!("LiDAR");
+    assert!(damaged(value.clone()).contains("box_type_3d is \"LiDAR\""));
+    value["scores_3d"] = json!([]);
+    value["box_type_3d"] = json!("Depth");
+    assert!(damaged(value).contains("[1, 0, 1] labels_3d, scores_3d, bboxes_3d"));
+    assert!(damaged(json!([])).contains("is a list of boxes"));
+    fs::remove_file(path).unwrap();
+    assert!(message(folder.path(), five).contains(&format!("{name}: missing, as are 1 of")));
+    fs::write(folder.path().join("office_1.json"), sample(json!([1, 2, 0, 1, 1, 1])).to_string()).unwrap();
+    assert!(message(folder.path(), five).contains("office_1.json: a room's file is called Area_N_ROOM.json"));
+}

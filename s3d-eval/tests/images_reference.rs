@@ -1,0 +1,278 @@
+//! The metrics of images against the reference programs: `reference/images/README.md`.
+
+use s3d_eval::images::{
+    AngleSums, Lanczos, PANORAMA, PanoramaClasses, dsine_angle, hohonet_depth, median_of_angles,
+    omnidata_angle, omnidata_scores, opencv_nearest, pillow_nearest, unifuse_depth,
+};
+use s3d_geom::Raster;
+use serde_json::Value;
+
+fn expected() -> Value {
+    serde_json::from_str(include_str!("reference/images/expected.json")).unwrap()
+}
+
+/// As `mix` of reference/images/inputs.py.
+fn mix(seed: u64, i: u64) -> u64 {
+    const MASK: u64 = 0xFFFF_FFFF;
+    let mut x = (i.wrapping_mul(0x9E37_79B1).wrapping_add(seed * 0x85EB_CA77)) & MASK;
+    x ^= x >> 15;
+    x = (x * 0x2C1B_3C6D) & MASK;
+    x ^= x >> 12;
+    x = (x * 0x297A_2D39) & MASK;
+    x ^ (x >> 15)
+}
+
+fn checksum(values: impl IntoIterator<Item = u64>) -> u64 {
+    let weighted =
+        values.into_iter().zip(0u64..).map(|(v, i)| v.wrapping_mul((i * 0x9E37_79B1) & 0xFFFF_FFFF));
+    weighted.fold(0, u64::wrapping_add)
+}
+
+fn raster<T>(width: u32, height: u32, pixel: impl Fn(u64, u64, u64) -> T) -> Raster<T> {
+    let [w, h] = [width, height].map(u64::from);
+    Raster::from_vec(width, height, (0..w * h).map(|i| pixel(i % w, i / w, i)).collect())
+}
+
+fn rgb(width: u32, height: u32, seed: u64) -> Raster<[u8; 3]> {
+    raster(width, height, |x, y, i| {
+        let noise = [0, 1, 2].map(|c| mix(seed + 100 + c, i));
+        match mix(seed, (y / 24) * 997 + x / 24) % 4 {
+            0 => [0; 3],
+            1 => noise.map(|n| (n % 3) as u8),
+            2 => [255; 3],
+            _ => noise.map(|n| (n % 256) as u8),
+        }
+    })
+}
+
+/// HoHoNet's numbers of the classes that there are labels of: all but beam and column.
+const CLASSES: [u8; 11] = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12];
+
+fn semantic(name: &str, width: u32, height: u32, seed: u64) -> Raster<[u8; 3]> {
+    raster(width, height, |x, y, _| {
+        let index = mix(seed + 7, (y / 5) * 991 + x / 7) % 13;
+        if name == "void" || index == 12 { [13; 3] } else { [0, 0, index as u8] }
+    })
+}
+
+const PANORAMAS: [(&str, u32, u32, u64); 6] = [
+    ("a", 2048, 1024, 1),
+    ("b", 1024, 512, 2),
+    ("c", 1000, 500, 3),
+    ("d", 4096, 2048, 4),
+    ("f", 1360, 680, 6),
+    ("void", 1024, 512, 5),
+];
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+/// Equal to 1e-12, relative; below 1e-12 both are nothing.
+#[track_caller]
+fn same(ours: &[f64], theirs: &[f64], what: &str) {
+    near(ours, theirs, 1e-12, what);
+}
+
+#[track_caller]
+fn near(ours: &[f64], theirs: &[f64], tolerance: f64, what: &str) {
+    assert_eq!(ours.len(), theirs.len(), "{what}");
+    for (a, b) in ours.iter().zip(theirs) {
+        assert!((a - b).abs() <= tolerance * b.abs() + 1e-12, "{what}: {ours:?}, the reference {theirs:?}");
+    }
+}
+
+#[test]
+fn places_are_those_of_the_libraries() {
+    let expected = &expected()["resampling"];
+    for (library, places) in [
+        ("pillow", pillow_nearest as fn(u32, u32) -> Vec<u32>),
+        ("skimage", pillow_nearest),
+        ("opencv", opencv_nearest),
+    ] {
+        for (axis, sum) in expected[library].as_object().unwrap() {
+            let (from, to) = axis.split_once(' ').unwrap();
+            let places = places(from.parse().unwrap(), to.parse().unwrap());
+            assert_eq!(
+                checksum(places.into_iter().map(u64::from)),
+                sum.as_u64().unwrap(),
+                "{library}, {axis}"
+            );
+        }
+    }
+}
+
+#[test]
+fn lanczos_is_pillows() {
+    for (name, width, height, seed) in PANORAMAS.into_iter().filter(|(_, width, ..)| *width <= 2048) {
+        let image = rgb(width, height, seed);
+        let lanczos = Lanczos::new([width, height], PANORAMA);
+        for channel in 0..3 {
+            let ours = lanczos.channel(&image, channel);
+            let theirs = expected()["resampling"]["lanczos"][name][channel].as_u64().unwrap();
+            assert_eq!(checksum(ours.iter().map(|v| u64::from(*v))), theirs, "{name}, {channel}");
+            for at in (0..ours.len()).step_by(7919) {
+                assert_eq!(
+                    lanczos.pixel(&image, channel, at % 1024, at / 1024),
+                    ours[at],
+                    "{name}, pixel {at}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn classes_of_panoramas_are_hohonets() {
+    for (fold, names) in [("1_valid", &["a", "b", "void"][..]), ("2_valid", &["c", "d"]), ("3_valid", &["f"])]
+    {
+        let mut all = s3d_eval::images::Confusion::new(13);
+        for (name, width, height, seed) in PANORAMAS.into_iter().filter(|(name, ..)| names.contains(name)) {
+            let class = |index: u16| CLASSES.get(usize::from(index).checked_sub(1)?).copied();
+            let truth =
+                PanoramaClasses::new(&rgb(width, height, seed), &semantic(name, width, height, seed), class);
+            let prediction: Vec<u8> = (0..1024 * 512).map(|i| (mix(seed + 50, i) % 13) as u8).collect();
+            all.add(&truth.compare(&prediction, 13).unwrap());
+            assert_eq!(truth.classes.iter().all(Option::is_none), name == "void");
+        }
+        let expected = &expected()["sem-pano"][fold];
+        let scores = all.scores();
+        let of_there = |values: &[f64]| CLASSES.map(|class| values[usize::from(class)]);
+        same(&of_there(&scores.iou), &numbers(&expected["iou"]), fold);
+        same(&of_there(&scores.accuracy), &numbers(&expected["accuracy"]), fold);
+        same(&[scores.mean_iou, scores.mean_accuracy], &numbers(&expected["mean"]), fold);
+        assert!(scores.iou[0].is_nan() && scores.accuracy[6].is_nan(), "no pixel is beam or column");
+        let matrix: u64 = expected["cm"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|row| numbers(row).iter().sum::<f64>() as u64)
+            .sum();
+        assert!(matrix < all.pixels(), "what was taken for beam or column counts nowhere");
+    }
+}
+
+fn depth(width: u32, height: u32, seed: u64) -> Vec<u16> {
+    let value = |i: u64| match mix(seed + 1, i) % 16 {
+        0 => u16::MAX,
+        1 => 0,
+        _ => (mix(seed, i) % 7000) as u16,
+    };
+    (0..u64::from(width) * u64::from(height)).map(value).collect()
+}
+
+fn predicted_depth(truth: &[u16], seed: u64) -> Vec<f64> {
+    let predicted = |(truth, i): (&u16, u64)| {
+        let (h, metres) = (mix(seed + 2, i), f64::from(*truth) / 512.0);
+        match h / 1024 % 16 {
+            0 => metres * 1.25,
+            1 => 0.0,
+            2 => 12.5,
+            _ => metres * (0.7 + (h % 1024) as f64 / 1024.0 * 0.6),
+        }
+    };
+    truth.iter().zip(0..).map(predicted).collect()
+}
+
+fn metres(units: &[u16]) -> Vec<f64> {
+    units.iter().map(|&v| if v == u16::MAX { 0.0 } else { f64::from(v) / 512.0 }).collect()
+}
+
+/// The scripts average what is within in 32 bits.
+#[track_caller]
+fn same_depth(ours: &[f64], theirs: &Value, what: &str) {
+    let theirs = numbers(theirs);
+    let (errors, within) = ours.split_at(ours.len() - 3);
+    let (their_errors, their_within) = theirs.split_at(theirs.len() - 3);
+    same(errors, their_errors, what);
+    near(within, their_within, 1e-7, what);
+}
+
+#[test]
+fn depth_is_that_of_both_scripts() {
+    let expected = &expected()["depth"];
+    let cases = [
+        ("mixed", depth(4096, 1, 11)),
+        ("one", vec![2048]),
+        ("beyond", vec![6000; 64]),
+        ("even", depth(1000, 1, 12)),
+        ("odd", depth(999, 1, 13)),
+    ];
+    for (seed, (name, units)) in (0..).zip(cases) {
+        let (truth, prediction) = (metres(&units), predicted_depth(&units, seed));
+        let without_sq_rel = |scores: [f64; 9]| [&scores[..2], &scores[3..]].concat();
+        let ours = without_sq_rel(hohonet_depth(&truth, &prediction).values);
+        same_depth(&ours, &expected[name]["hohonet"], name);
+        // As the script is called: in 32 bits.
+        near(&ours, &numbers(&expected[name]["hohonet in 32 bits"]), 1e-6, name);
+        let ours = unifuse_depth(&truth, &prediction, false);
+        assert_eq!(ours.pixels == 0, name == "beyond");
+        if ours.pixels > 0 {
+            same_depth(&ours.values, &expected[name]["unifuse"], name);
+            let scaled = unifuse_depth(&truth, &prediction, true);
+            same_depth(&scaled.values, &expected[name]["unifuse, median"], name);
+            assert!(name == "one" || ours.replaced > 0);
+        }
+    }
+}
+
+#[test]
+fn depth_of_files_is_that_of_both_scripts() {
+    let whole = depth(4096, 2048, 21);
+    let sampled = |places: fn(u32, u32) -> Vec<u32>| {
+        let (columns, rows) = (places(4096, 1024), places(2048, 512));
+        let at = |row: u32, column: u32| whole[row as usize * 4096 + column as usize];
+        rows.iter().flat_map(|&row| columns.iter().map(move |&c| at(row, c))).collect::<Vec<u16>>()
+    };
+    let prediction = predicted_depth(&depth(1024, 512, 22), 23);
+    let scores = hohonet_depth(&metres(&sampled(pillow_nearest)), &prediction).values;
+    let expected = &expected()["depth"]["file"];
+    same_depth(&[&scores[..2], &scores[3..]].concat(), &expected["hohonet"], "hohonet");
+    let scores = unifuse_depth(&metres(&sampled(opencv_nearest)), &prediction, false);
+    same_depth(&scores.values, &expected["unifuse"], "unifuse");
+}
+
+/// True and predicted vectors that are evaluated.
+fn normals(n: u64, seed: u64) -> Vec<[[f64; 3]; 2]> {
+    let vector = |seed: u64, i: u64| [0, 1, 2].map(|c| (mix(seed + c, i) % 2001) as f64 / 1000.0 - 1.0);
+    (0..n)
+        .filter(|&i| mix(seed + 20, i) % 16 != 3)
+        .map(|i| {
+            let (truth, shift) = (vector(seed, i), vector(seed + 10, i));
+            let prediction = match mix(seed + 20, i) % 16 {
+                0 => truth,
+                1 => truth.map(|c| -c),
+                2 => [0.0; 3],
+                _ => [0, 1, 2].map(|c| truth[c] + 0.4 * shift[c]),
+            };
+            [truth, prediction]
+        })
+        .collect()
+}
+
+#[test]
+fn angles_are_those_of_both_scripts() {
+    let expected = &expected()["normal"];
+    let images = [(4000, 31), (1, 40), (2501, 33)].map(|(n, seed)| normals(n, seed));
+    let angles = |image: &[[[f64; 3]; 2]], angle: fn([f64; 3], [f64; 3]) -> f64| -> Vec<f64> {
+        image.iter().map(|&[truth, prediction]| angle(truth, prediction)).collect()
+    };
+    let mut sums = AngleSums::default();
+    images.iter().for_each(|image| sums.add(&AngleSums::of(&angles(image, dsine_angle))));
+    let mut all: Vec<f64> = images.iter().flat_map(|image| angles(image, dsine_angle)).collect();
+    let ([mean, rmse], below) = sums.mean_rmse_below();
+    let ours = [&[mean, median_of_angles(&mut all).unwrap(), rmse][..], &below].concat();
+    let theirs = numbers(&expected["dsine"]);
+    // Of equal and opposite vectors the last bit of the cosine decides: 0° or a millionth, which differs by
+    // the instructions that PyTorch is built with.
+    near(&[ours[0], ours[2]], &[theirs[0], theirs[2]], 1e-9, "dsine");
+    same(&[&ours[1..2], &ours[3..]].concat(), &[&theirs[1..2], &theirs[3..]].concat(), "dsine");
+    // As the script is called: in 32 bits, in which equal vectors are up to 0.03° apart.
+    near(&ours, &numbers(&expected["dsine in 32 bits"]), 1e-4, "dsine in 32 bits");
+
+    for (image, theirs) in images.iter().zip(expected["omnidata"].as_array().unwrap()) {
+        let ours = omnidata_scores(angles(image, omnidata_angle)).unwrap();
+        same(&ours, &numbers(theirs), "omnidata");
+    }
+    assert_eq!((omnidata_scores(Vec::new()), median_of_angles(&mut [])), (None, None));
+}

@@ -1,0 +1,116 @@
+"""The inputs of the comparison with the reference programs; tests/images_reference.rs makes the same numbers."""
+import numpy as np
+
+MASK = np.uint64(0xFFFFFFFF)
+
+# HoHoNet's classes, in its order.
+CLASSES = ["beam", "board", "bookcase", "ceiling", "chair", "clutter", "column", "door", "floor", "sofa", "table",
+           "wall", "window"]
+# Labels of eleven of them: no pixel is truly beam or column.
+LABELS = ["<UNK>_0_<UNK>_0_0"] + [c + "_1_office_1_1" for c in CLASSES if c not in ("beam", "column")]
+
+# Name, width, height, seed; all of the last one is void.
+PANORAMAS = [("a", 2048, 1024, 1), ("b", 1024, 512, 2), ("c", 1000, 500, 3), ("d", 4096, 2048, 4),
+             ("f", 1360, 680, 6), ("void", 1024, 512, 5)]
+# The areas that hold them, and the fold of HoHoNet that tests these.
+FOLDS = {"1_valid": {"area_5a": ["a"], "area_5b": ["b", "void"]}, "2_valid": {"area_2": ["c"], "area_4": ["d"]},
+         "3_valid": {"area_1": ["f"], "area_3": [], "area_6": []}}
+AXES = [(4096, 1024), (2048, 512), (1000, 1024), (1360, 1024), (1234, 1024), (777, 512), (160, 1024), (2047, 1024)]
+
+
+def mix(seed, i):
+    """Numbers of 32 bits that look random, of a seed and counters."""
+    x = (np.asarray(i, np.uint64) * np.uint64(0x9E3779B1) + np.uint64(seed * 0x85EBCA77)) & MASK
+    x ^= x >> np.uint64(15)
+    x = (x * np.uint64(0x2C1B3C6D)) & MASK
+    x ^= x >> np.uint64(12)
+    x = (x * np.uint64(0x297A2D39)) & MASK
+    return x ^ (x >> np.uint64(15))
+
+
+def checksum(values):
+    values = np.asarray(values, np.uint64).ravel()
+    i = np.arange(values.size, dtype=np.uint64)
+    with np.errstate(over="ignore"):
+        return int(np.sum(values * ((i * np.uint64(0x9E3779B1)) & MASK), dtype=np.uint64))
+
+
+def grid(width, height):
+    y, x = np.mgrid[0:height, 0:width].astype(np.uint64)
+    return x, y, y * np.uint64(width) + x
+
+
+def rgb(width, height, seed):
+    """Blocks that are black, nearly black, white or noise."""
+    x, y, i = grid(width, height)
+    kind = mix(seed, (y // np.uint64(24)) * np.uint64(997) + x // np.uint64(24)) % np.uint64(4)
+    noise = np.stack([mix(seed + 100 + c, i) for c in range(3)], -1)
+    out = np.zeros((height, width, 3), np.uint64)
+    out[kind == 1] = (noise % np.uint64(3))[kind == 1]
+    out[kind == 2] = 255
+    out[kind == 3] = (noise % np.uint64(256))[kind == 3]
+    return out.astype(np.uint8)
+
+
+def semantic(name, width, height, seed):
+    """Indices of labels in blocks, among them 0 and what is missing."""
+    x, y, _ = grid(width, height)
+    index = mix(seed + 7, (y // np.uint64(5)) * np.uint64(991) + x // np.uint64(7)) % np.uint64(len(LABELS) + 1)
+    out = np.stack([index * np.uint64(0), index // np.uint64(256), index % np.uint64(256)], -1)
+    out[index == len(LABELS)] = 13
+    if name == "void":
+        out[:] = 13
+    return out.astype(np.uint8)
+
+
+def classes(seed):
+    """A predicted class a pixel, 1024 x 512."""
+    return (mix(seed + 50, np.arange(1024 * 512)) % np.uint64(len(CLASSES))).reshape(512, 1024)
+
+
+def depth(width, height, seed):
+    """Truth of 512ths of a metre: missing, 0, near and beyond 10 m."""
+    i = grid(width, height)[2]
+    value = mix(seed, i) % np.uint64(7000)
+    kind = mix(seed + 1, i) % np.uint64(16)
+    value[kind == 0] = 65535
+    value[kind == 1] = 0
+    return value.astype(np.uint16)
+
+
+def predicted_depth(truth, seed):
+    """Metres: about the truth, at a ratio of 1.25, nothing, or beyond 10 m."""
+    truth = np.asarray(truth, np.uint16)
+    h = mix(seed + 2, np.arange(truth.size)).reshape(truth.shape)
+    metres = truth.astype(np.float64) / 512.0
+    out = metres * (0.7 + (h % np.uint64(1024)).astype(np.float64) / 1024.0 * 0.6)
+    kind = h // np.uint64(1024) % np.uint64(16)
+    out[kind == 0] = metres[kind == 0] * 1.25
+    out[kind == 1] = 0.0
+    out[kind == 2] = 12.5
+    return out
+
+
+# Name, and the truth as an image of one row.
+DEPTHS = [("mixed", depth(4096, 1, 11)), ("one", np.array([[2048]], np.uint16)),
+          ("beyond", np.full((1, 64), 6000, np.uint16)), ("even", depth(1000, 1, 12)), ("odd", depth(999, 1, 13))]
+
+
+def vectors(n, seed):
+    h = np.stack([mix(seed + c, np.arange(n)) for c in range(3)], -1)
+    return (h % np.uint64(2001)).astype(np.float64) / 1000.0 - 1.0
+
+
+def normals(n, seed):
+    """True and predicted vectors, and which are evaluated: some are equal, opposite or of no length."""
+    truth = vectors(n, seed)
+    prediction = truth + 0.4 * vectors(n, seed + 10)
+    kind = mix(seed + 20, np.arange(n)) % np.uint64(16)
+    prediction[kind == 0] = truth[kind == 0]
+    prediction[kind == 1] = -truth[kind == 1]
+    prediction[kind == 2] = 0.0
+    return truth, prediction, kind != 3
+
+
+# Number of vectors and seed of each image.
+NORMALS = [(4000, 31), (1, 40), (2501, 33)]

@@ -1,0 +1,34 @@
+//! A data set of two areas, made once for all tests of a file.
+
+use s3d_dataset::{Context, Export, ExportOptions};
+use s3d_synth::{Building, ScanOptions};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+static OUT: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_CRATE_NAME"));
+    let _ = fs::remove_dir_all(&folder);
+    let building = Building::demo().build().unwrap();
+    let scenes = [2, 5].map(|area: u32| {
+        let scan = ScanOptions { points_per_m2: 60.0, area, seed: area.into(), ..ScanOptions::default() };
+        let to = folder.join(format!("scan {area}"));
+        let scene = building.write_scan(&to, &scan, || true).unwrap();
+        // Scan locations of two areas have different names.
+        let (path, digit) = (to.join("cameras.csv"), area.to_string());
+        let rows = fs::read_to_string(&path).unwrap();
+        let renamed = |row: &str| digit.clone() + &row[1..];
+        fs::write(&path, rows.lines().map(renamed).collect::<Vec<_>>().join("\n")).unwrap();
+        scene
+    });
+    let options =
+        ExportOptions { views: 2, size: 48, pano_width: 96, points_per_m2: 5.0, ..ExportOptions::default() };
+    let out = folder.join("data set");
+    Export::new(scenes).options(options).run(&out, &Context::default()).unwrap().unwrap();
+    out
+});
+
+/// The folder of a labelled data set with areas 2 and 5.
+pub(crate) fn data_set() -> &'static Path {
+    &OUT
+}
