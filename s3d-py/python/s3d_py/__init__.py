@@ -1,0 +1,103 @@
+"""Scans rendered, sampled and labelled; 2D-3D-Semantic data sets made and read.
+
+```python
+import s3d_py as s3d
+```
+
+World frame everywhere: metres, Z up, right-handed. Cameras are OpenCV's: `K` is a 3 × 3 matrix of intrinsics
+in pixels (the centre of the first pixel is at 0.5, 0.5), `T_world_cam` the 4 × 4 pose camera → world with x
+right, y down, z forward.
+"""
+
+from __future__ import annotations
+
+from ._camera import Location, PoseLike, intrinsics, look_at
+from ._dataset import (
+    Candidate,
+    DataSet,
+    FaceVotes,
+    Instance,
+    Label,
+    Room,
+    TorchDataset,
+    View,
+    Views,
+    open,
+)
+from ._errors import (
+    CancelledError,
+    Error,
+    FileAccessError,
+    FileError,
+    FormatError,
+    InputError,
+    MeshError,
+    MissingFileError,
+    TemporaryError,
+    UnsupportedError,
+    UsageError,
+)
+from ._export import Area, ExportOptions, Labels, SceneLike, export
+from ._mesh import Mesh, MeshLike, as_mesh, read_mesh
+from ._native import __version__
+from ._points import PointCloud, PointsLike, Votes, fill, sample, vote
+from ._progress import Progress, Task
+from ._results import Comparison, Evaluation, FaultGroup, Statistics, VerifyReport, compare, evaluate, verify
+from ._scene import Images, Rays, Scene
+
+__all__ = [
+    "Area",
+    "CancelledError",
+    "Candidate",
+    "Comparison",
+    "DataSet",
+    "Error",
+    "Evaluation",
+    "ExportOptions",
+    "FaceVotes",
+    "FaultGroup",
+    "FileAccessError",
+    "FileError",
+    "FormatError",
+    "Images",
+    "InputError",
+    "Instance",
+    "Label",
+    "Labels",
+    "Location",
+    "Mesh",
+    "MeshError",
+    "MeshLike",
+    "MissingFileError",
+    "PointCloud",
+    "PointsLike",
+    "PoseLike",
+    "Progress",
+    "Rays",
+    "Room",
+    "Scene",
+    "SceneLike",
+    "Statistics",
+    "Task",
+    "TemporaryError",
+    "TorchDataset",
+    "UnsupportedError",
+    "UsageError",
+    "VerifyReport",
+    "View",
+    "Views",
+    "Votes",
+    "__version__",
+    "as_mesh",
+    "compare",
+    "evaluate",
+    "export",
+    "fill",
+    "intrinsics",
+    "look_at",
+    "open",
+    "read_mesh",
+    "sample",
+    "verify",
+    "vote",
+]

@@ -1,0 +1,747 @@
+"""Data sets: read image by image, checked, compared, scored, and made into what trainers read."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._camera import Matrix
+from ._errors import UsageError
+from ._mesh import Mesh
+from ._progress import Progress, sink
+from ._results import (
+    Arguments,
+    Comparison,
+    Evaluation,
+    PathLike,
+    Statistics,
+    VerifyReport,
+    compare,
+    evaluate,
+    root_of,
+    verify,
+)
+from ._scene import Scene, picture
+
+ARRAYS = ("rgb", "depth", "normal", "xyz", "labels", "classes", "instances", "pretty")
+"""What a view shows; `View` says what each is."""
+
+_FILE_OF = {
+    "labels": "semantic",
+    "classes": "semantic",
+    "instances": "semantic",
+    "pretty": "semantic_pretty",
+    "xyz": "global_xyz",
+}
+
+
+@dataclass(frozen=True)
+class Label:
+    """An entry of the table of labels: an instance."""
+
+    index: int
+    """What pixels of `View.labels` are."""
+    name: str
+    """Class, number, room, area: "chair_3_office_5_1"."""
+    class_name: str | None
+    """Its class; None for the entry that stands for no label."""
+    instance: int
+    """Its number among those of its class in the room's area, from 1."""
+    room: str
+    """Type and number: "office_5"."""
+    area: int
+
+
+@dataclass(frozen=True)
+class Room:
+    """A room of an area."""
+
+    area: int
+    name: str
+    """Type and number: "office_5"."""
+
+    @property
+    def type(self) -> str:
+        """Its type: "office"."""
+        return self.name.rpartition("_")[0]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """What the points of one instance of an area fill."""
+
+    label: str
+    """Its name in the table of labels."""
+    index: int
+    """Its index there."""
+    class_name: str
+    room: str
+    points: int
+    """How many annotated points it has."""
+    bounds: list[float]
+    """xmin, ymin, zmin, xmax, ymax, zmax: world metres."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A view that was drawn at a scan location, kept or dropped by the selection."""
+
+    location: str
+    """The scan location's name."""
+    number: int
+    yaw: float
+    """Radians to the left of the location's original camera."""
+    pitch: float
+    """Radians above its horizon."""
+    fov: float
+    """Horizontal angle of view, radians."""
+    entropy: float
+    """Of the classes of its pixels, nats: what it was scored by."""
+    frame: int | None
+    """The number of the view that it became; None if it was dropped."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FaceVotes:
+    """How the annotated points voted for the label of each of F faces of `DataSet.mesh`."""
+
+    label: npt.NDArray[np.uint32]
+    """(F,), index into the table of labels: of most votes, or what the face was filled with; 0 for none."""
+    votes: npt.NDArray[np.uint32]
+    """(F,), its votes."""
+    runner_up: npt.NDArray[np.uint32]
+    """(F,), the label of the second most votes; 0 if all were for one."""
+    runner_up_votes: npt.NDArray[np.uint32]
+    """(F,), its votes."""
+    total: npt.NDArray[np.uint32]
+    """(F,), all votes."""
+    max_distance: npt.NDArray[np.float32]
+    """(F,), metres from the farthest voter to the face; 0 without votes."""
+
+    def __repr__(self) -> str:
+        return f"FaceVotes({int((self.label > 0).sum()):,} of {len(self.label):,} faces labelled)"
+
+
+class View:
+    """An image of a data set, perspective or a panorama: its modalities are registered pixel to pixel. A file
+    is read when it is asked for the first time, held against its checksum, and kept as long as the view.
+    Arrays are the view's own: to change one, copy it.
+
+    Getters raise `UsageError` for a modality that has no file, and `FileError` for one that is damaged.
+    """
+
+    def __init__(self, dataset: DataSet, index: int) -> None:
+        self._dataset, self.index = dataset, index
+        self.area, self.location, self.room, self.frame, self.files = dataset._images[index]
+        self._arrays: dict[str, npt.NDArray[Any]] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return View, (self._dataset, self.index)
+
+    index: int
+    """Its place in the data set: `dataset[view.index]` is the same image."""
+    area: int
+    location: str
+    """The scan location's name, 32 hexadecimal digits."""
+    room: str
+    """Type and number: "office_5"."""
+    frame: int | None
+    """The number of the view at its location; None for a panorama."""
+    files: Sequence[str]
+    """The modalities that have a file, by the names of their folders."""
+
+    @property
+    def is_panorama(self) -> bool:
+        return self.frame is None
+
+    @property
+    def name(self) -> str:
+        """What its files' names begin with: unique in its area."""
+        frame = "equirectangular" if self.frame is None else self.frame
+        return f"camera_{self.location}_{self.room}_frame_{frame}"
+
+    @cached_property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self._dataset._native.size(self.index)
+
+    @cached_property
+    def _camera(self) -> tuple[Matrix, Matrix]:
+        K, T = self._dataset._native.camera(self.index)
+        return np.array(K), np.array(T)
+
+    @property
+    def K(self) -> Matrix | None:
+        """Intrinsics, 3 × 3, pixels; the centre of the first pixel is at (0.5, 0.5). None for a panorama."""
+        return None if self.is_panorama else self._camera[0]
+
+    @property
+    def T_world_cam(self) -> Matrix:
+        """Camera → world, 4 × 4, OpenCV's axes (x right, y down, z forward), metres. A panorama's middle
+        column looks along z, projected to the horizon; its rows are level whatever its tilt.
+        """
+        return self._camera[1]
+
+    @cached_property
+    def pose(self) -> dict[str, Any]:
+        """What its pose file holds, under the published keys."""
+        return json.loads(self._dataset._native.file(self.index, "pose"))  # type: ignore[no-any-return]
+
+    @property
+    def rgb(self) -> npt.NDArray[np.uint8]:
+        """(H, W, 3), sRGB."""
+        return self["rgb"]
+
+    @property
+    def depth(self) -> npt.NDArray[np.float32]:
+        """(H, W), metres: along z in a view, along the ray in a panorama. NaN where nothing is seen, or it is
+        beyond what the file can hold.
+        """
+        return self["depth"]
+
+    @property
+    def normal(self) -> npt.NDArray[np.float32]:
+        """(H, W, 3), unit vectors, right to 0.5°: in a view in the camera's axes, x right, y down, z forward,
+        whatever axes the file has; in a panorama (X, −Z, Y) of the world. NaN where nothing is seen.
+        """
+        return self["normal"]
+
+    @property
+    def xyz(self) -> npt.NDArray[np.float32]:
+        """(H, W, 3), world metres as stored (half precision: centimetres). NaN where nothing is seen. Those
+        of `points` come from depth.
+        """
+        return self["xyz"]
+
+    @property
+    def labels(self) -> npt.NDArray[np.int32]:
+        """(H, W), index into `DataSet.labels`: 0 without a label, −1 where nothing is seen."""
+        return self["labels"]
+
+    @property
+    def classes(self) -> npt.NDArray[np.int16]:
+        """(H, W), place in `DataSet.classes`: −1 without a label and where nothing is seen."""
+        return self["classes"]
+
+    @property
+    def instances(self) -> npt.NDArray[np.int32]:
+        """(H, W), index into `DataSet.labels` of the instance: −1 without a label and where nothing is
+        seen.
+        """
+        return self["instances"]
+
+    @property
+    def pretty(self) -> npt.NDArray[np.uint8]:
+        """(H, W, 3), a colour an instance, for looking at."""
+        return self["pretty"]
+
+    def points(self) -> npt.NDArray[np.float32]:
+        """(H, W, 3), world metres, from depth and pose. NaN where depth is missing."""
+        return self._dataset._native.points(self.index)
+
+    @cached_property
+    def shares(self) -> dict[str, float]:
+        """The share of its pixels that each class has, of those that are there."""
+        found = self._dataset._class_shares([self.index])[0]
+        return {name: share for name, share in zip(self._dataset.classes or (), found) if share > 0}
+
+    def path(self, modality: str) -> Path:
+        """Where the file of a modality lies: a word of `files` or of `ARRAYS`."""
+        return self._dataset._native.path(self.index, _FILE_OF.get(modality, modality))
+
+    def load(self, *modalities: str) -> View:
+        """Reads these modalities at the same time, on a thread each; all that there are if none is named."""
+        wanted = modalities or tuple(name for name in ARRAYS if _FILE_OF.get(name, name) in self.files)
+        with ThreadPoolExecutor(max(len(wanted), 1)) as pool:
+            for _ in pool.map(self.__getitem__, wanted):
+                pass
+        return self
+
+    def __getitem__(self, modality: str) -> npt.NDArray[Any]:
+        """`view["depth"]` is `view.depth`."""
+        array = self._arrays.get(modality)
+        if array is None:
+            array = self._read(modality)
+            array.flags.writeable = False
+            self._arrays[modality] = array
+        return array
+
+    def _read(self, modality: str) -> npt.NDArray[Any]:
+        file, native = _FILE_OF.get(modality, modality), self._dataset._native
+        if modality not in ARRAYS:
+            raise UsageError(f"{modality!r}: must be one of {', '.join(ARRAYS)}")
+        if file not in self.files:
+            raise UsageError(f"{self.name} has no {file}: it has {', '.join(self.files)}")
+        if modality == "rgb" or modality == "pretty":
+            return native.rgb(self.index, modality == "pretty")
+        if modality == "depth":
+            return native.depth(self.index)
+        if modality == "normal":
+            return native.normal(self.index)
+        if modality == "xyz":
+            return native.xyz(self.index)
+        if modality == "classes":
+            return native.class_(self.index)
+        if modality == "labels":
+            return native.label(self.index)
+        labels = self.labels
+        return np.where(labels > 0, labels, np.int32(-1))
+
+    def __repr__(self) -> str:
+        what = "panorama" if self.is_panorama else f"view {self.frame}"
+        return (
+            f"View({what} of {self.location[:8]}… in {self.room}, area {self.area}: {', '.join(self.files)})"
+        )
+
+    def _repr_png_(self) -> bytes:
+        """The first of its images, for notebooks."""
+        if "rgb" in self.files:
+            return _native.encode_png(np.ascontiguousarray(self.rgb))
+        for name in ("pretty", "normal", "depth"):
+            if _FILE_OF.get(name, name) in self.files:
+                shown = self[name] if name == "pretty" else picture(name, self[name])
+                return _native.encode_png(np.ascontiguousarray(shown))
+        raise UsageError(f"{self.name} has no image to show")
+
+
+class Views(Sequence[View]):
+    """Images of a data set, in its order. Every access makes a new `View`, so that a loop over all of them
+    keeps one in memory.
+    """
+
+    def __init__(self, dataset: DataSet, indices: Sequence[int]) -> None:
+        self.dataset, self.indices = dataset, list(indices)
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    @overload
+    def __getitem__(self, index: int) -> View: ...
+    @overload
+    def __getitem__(self, index: slice) -> Views: ...
+    def __getitem__(self, index: int | slice) -> View | Views:
+        if isinstance(index, slice):
+            return Views(self.dataset, self.indices[index])
+        return View(self.dataset, self.indices[index])
+
+    def __iter__(self) -> Iterator[View]:
+        return (View(self.dataset, index) for index in self.indices)
+
+    def torch(
+        self, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None = None
+    ) -> TorchDataset:
+        """These images as a data set for torch: see `DataSet.torch`."""
+        return TorchDataset(self, modalities, transform)
+
+    def __repr__(self) -> str:
+        panoramas = sum(self.dataset._images[index][3] is None for index in self.indices)
+        return f"Views({len(self) - panoramas} views, {panoramas} panoramas)"
+
+
+class TorchDataset:
+    """A map-style data set: what `torch.utils.data.DataLoader` takes, with any number of workers."""
+
+    def __init__(
+        self, views: Views, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None
+    ) -> None:
+        others = [word for word in modalities if word not in (*ARRAYS, "K", "T_world_cam", "points")]
+        if others or not modalities:
+            raise UsageError(
+                f"modalities={list(modalities)}: some of {', '.join(ARRAYS)}, points, K, T_world_cam"
+            )
+        self.views, self.modalities, self.transform = views, tuple(modalities), transform
+
+    def __len__(self) -> int:
+        return len(self.views)
+
+    def __getitem__(self, index: int) -> Any:
+        torch: Any = importlib.import_module("torch")
+        view = self.views[index]
+        sample: dict[str, Any] = {"index": view.index}
+        for word in self.modalities:
+            if word in ("K", "T_world_cam"):
+                matrix = view.K if word == "K" else view.T_world_cam
+                if matrix is None:
+                    raise UsageError(f"{view.name} is a panorama, which has no K")
+                sample[word] = torch.from_numpy(matrix.copy())
+                continue
+            array = view.points() if word == "points" else view[word]
+            if array.ndim == 3:
+                array = array.transpose(2, 0, 1)
+            wide = word in ("labels", "classes", "instances")
+            sample[word] = torch.from_numpy(array.astype(np.int64) if wide else array.copy())
+        return sample if self.transform is None else self.transform(sample)
+
+
+class DataSet(Sequence[View]):
+    """A complete data set: all its images, by area, location and number. Whatever is read is held against its
+    list of files. It may be shared by threads, and pickled: what is unpickled opens the same folder.
+    """
+
+    def __init__(self, folder: PathLike) -> None:
+        """Raises `FileError` if there is no data set, its export did not finish, or its tables are damaged."""
+        self._native = _native.DataSet.open(Path(folder))
+        self._images = self._native.images
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return DataSet, (self.root,)
+
+    @property
+    def root(self) -> Path:
+        """Its folder."""
+        return self._native.root
+
+    @property
+    def version(self) -> str:
+        """The version of s3d that made it."""
+        return self._native.version
+
+    @property
+    def seed(self) -> int:
+        """The seed that it was made with."""
+        return self._native.seed
+
+    @cached_property
+    def options(self) -> dict[str, Any]:
+        """The options that it was made with."""
+        return json.loads(self._native.options)  # type: ignore[no-any-return]
+
+    @property
+    def areas(self) -> list[int]:
+        """The numbers of its areas."""
+        return self._native.areas
+
+    @cached_property
+    def classes(self) -> list[str] | None:
+        """The names of its classes; None without labels."""
+        found = self._native.classes
+        return None if found is None else [name for name, _ in found]
+
+    @cached_property
+    def class_colors(self) -> npt.NDArray[np.uint8] | None:
+        """(classes, 3), the palette of its classes, sRGB; None without labels."""
+        found = self._native.classes
+        return None if found is None else np.array([list(color) for _, color in found], np.uint8)
+
+    @cached_property
+    def labels(self) -> list[Label]:
+        """The table of labels, by index: pixels of `View.labels` are places in it. Empty without labels."""
+        names = self.classes or []
+        return [
+            Label(index, name, names[of_class] if of_class >= 0 else None, instance, room, area)
+            for index, (name, of_class, instance, room, area) in enumerate(self._native.labels)
+        ]
+
+    @cached_property
+    def class_of_label(self) -> npt.NDArray[np.int16]:
+        """(labels,), of each index into `labels` the place of its class in `classes`; −1 for none."""
+        return self._native.class_of_label
+
+    @cached_property
+    def rooms(self) -> list[Room]:
+        """Its rooms: those of the labels, or without labels those that images are of."""
+        found = self._native.rooms() or sorted({(image[0], image[2]) for image in self._images})
+        return [Room(area, name) for area, name in found]
+
+    @property
+    def locations(self) -> list[str]:
+        """The names of its scan locations, in the order of its images."""
+        return list(dict.fromkeys(image[1] for image in self._images))
+
+    def __len__(self) -> int:
+        return len(self._images)
+
+    @overload
+    def __getitem__(self, index: int | str) -> View: ...
+    @overload
+    def __getitem__(self, index: slice) -> Views: ...
+    def __getitem__(self, index: int | str | slice) -> View | Views:
+        """An image by its place, or by what its files' names begin with (`View.name`); some by a slice."""
+        if isinstance(index, str):
+            found = self._by_name.get(index)
+            if found is None:
+                raise KeyError(f"no image is called {index!r}")
+            return View(self, found)
+        everything = range(len(self._images))
+        if isinstance(index, slice):
+            return Views(self, everything[index])
+        return View(self, everything[index])
+
+    def __iter__(self) -> Iterator[View]:
+        return iter(Views(self, range(len(self))))
+
+    @cached_property
+    def _by_name(self) -> dict[str, int]:
+        return {view.name: view.index for view in self}
+
+    def views(
+        self,
+        *,
+        area: int | None = None,
+        room: str | None = None,
+        location: str | None = None,
+        min_share: Mapping[str, float] | None = None,
+        progress: Progress = None,
+    ) -> Views:
+        """Its perspective views: those of an area, a room ("office_5"), a scan location (its name or the
+        beginning of it), and those of which each class of `min_share` has at least its share of the pixels.
+        For that the images of labels are read once; shares are kept.
+        """
+        return self._select(False, area, room, location, min_share, progress)
+
+    def panoramas(
+        self,
+        *,
+        area: int | None = None,
+        room: str | None = None,
+        location: str | None = None,
+        min_share: Mapping[str, float] | None = None,
+        progress: Progress = None,
+    ) -> Views:
+        """Its panoramas, selected likewise."""
+        return self._select(True, area, room, location, min_share, progress)
+
+    def _select(
+        self,
+        panoramas: bool,
+        area: int | None,
+        room: str | None,
+        location: str | None,
+        min_share: Mapping[str, float] | None,
+        progress: Progress,
+    ) -> Views:
+        for what, value, all_of in (
+            ("area", area, self.areas),
+            ("room", room, [name.name for name in self.rooms]),
+        ):
+            if value is not None and value not in all_of:
+                raise UsageError(
+                    f"{what}={value!r}: the data set has {', '.join(map(str, dict.fromkeys(all_of)))}"
+                )
+        if location is not None and not any(name.startswith(location) for name in self.locations):
+            raise UsageError(f"location={location!r}: the data set has no such scan location")
+        indices = [
+            index
+            for index, (of_area, of_location, of_room, frame, _) in enumerate(self._images)
+            if (frame is None) == panoramas
+            and area in (None, of_area)
+            and room in (None, of_room)
+            and (location is None or of_location.startswith(location))
+        ]
+        if min_share:
+            if self.classes is None:
+                raise UsageError("min_share: the data set has no labels")
+            unknown = [name for name in min_share if name not in self.classes]
+            if unknown:
+                raise UsageError(
+                    f"min_share: no class is called {unknown[0]!r}; there are {', '.join(self.classes)}"
+                )
+            wanted = [(self.classes.index(name), share) for name, share in min_share.items()]
+            shares = self._class_shares(indices, progress)
+            indices = [
+                index
+                for index, found in zip(indices, shares)
+                if all(found[place] >= share for place, share in wanted)
+            ]
+        return Views(self, indices)
+
+    @cached_property
+    def _known_shares(self) -> dict[int, list[float]]:
+        return {}
+
+    def _class_shares(self, indices: Sequence[int], progress: Progress = None) -> list[list[float]]:
+        known = self._known_shares
+        missing = [index for index in indices if index not in known]
+        if missing:
+            known.update(zip(missing, self._native.class_shares(missing, None, sink(progress))))
+        return [known[index] for index in indices]
+
+    def torch(
+        self, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None = None
+    ) -> TorchDataset:
+        """Its perspective views as a map-style data set for torch, which is imported with the first sample:
+        for others, `dataset.views(room=…).torch(…)`, `dataset.panoramas().torch(…)`.
+
+        A sample is a dict of tensors: each of `modalities` — words of `ARRAYS` as (C, H, W) or (H, W),
+        indices as int64 (−1 for none: `ignore_index=-1`), "points", "K", "T_world_cam" — and "index".
+        `transform` makes of it what the loader returns. It pickles, so that any number of workers read at the
+        same time.
+        """
+        return self.views().torch(modalities, transform)
+
+    def mesh(self, area: int | None = None, *, progress: Progress = None) -> Mesh:
+        """The coloured mesh of an area, in the frame of its images; faces in the order of the file."""
+        return Mesh._of(self._native.mesh(self._area(area), sink(progress)))
+
+    def scene(self, area: int | None = None) -> Scene:
+        """The same, to be rendered."""
+        return Scene(self.mesh(area))
+
+    def votes(self, area: int | None = None) -> FaceVotes | None:
+        """How points voted for each face of `mesh(area)`; None without labels."""
+        found = self._native.votes(self._area(area))
+        return None if found is None else FaceVotes(*found)
+
+    def instances(self, area: int | None = None) -> list[Instance]:
+        """The instances of an area with their boxes; of all areas if none is named. Empty without labels."""
+        areas = self.areas if area is None else [area]
+        return [Instance(*entry) for number in areas for entry in self._native.instances(number)]
+
+    def candidates(self, area: int | None = None) -> list[Candidate]:
+        """Every view that was drawn in an area, kept or dropped; of all areas if none is named."""
+        areas = self.areas if area is None else [area]
+        return [Candidate(*entry) for number in areas for entry in self._native.candidates(number)]
+
+    def _area(self, area: int | None) -> int:
+        if area is not None:
+            return area
+        if len(self.areas) != 1:
+            raise UsageError(f"area: name one of {', '.join(map(str, self.areas))}")
+        return self.areas[0]
+
+    def verify(
+        self, *, full: bool = False, threads: int | None = None, progress: Progress = None
+    ) -> VerifyReport:
+        """Reads every file back, and renders every image again: see `s3d_py.verify`."""
+        return verify(self, full=full, threads=threads, progress=progress)
+
+    def evaluate(self, protocol: str, pred: PathLike, **options: Any) -> Evaluation:
+        """Scores predictions against it: see `s3d_py.evaluate`."""
+        return evaluate(protocol, self, pred, **options)
+
+    def compare(
+        self, other: DataSet | PathLike, *, full: bool = False, progress: Progress = None
+    ) -> Comparison:
+        """What differs between it and another data set: see `s3d_py.compare`."""
+        return compare(self, other, full=full, progress=progress)
+
+    def statistics(self) -> Statistics:
+        """The paper's tables, counted from its files."""
+        data, markdown = _native.statistics(self.root)
+        return Statistics(json.loads(data), markdown)
+
+    def report(
+        self,
+        to: PathLike | None = None,
+        *,
+        against: DataSet | PathLike | None = None,
+        single: bool = False,
+        verify: bool = False,
+        overwrite: bool = False,
+        pano_width: int = 2048,
+        thumbs: int = 256,
+        mesh_faces: int = 300_000,
+        threads: int | None = None,
+        progress: Progress = None,
+    ) -> Path:
+        """Writes a page that shows it, to be opened from the disk, and returns the page's path.
+
+        - `to`: the report's folder, or its file if it is `single`; beside the data set by default.
+        - `against`: another data set, shown beside it where both differ.
+        - `pano_width`, `thumbs`: width of panoramas and of views in the report, pixels.
+        - `mesh_faces`: a mesh of more faces is simplified.
+        - `verify`: verify it as well, and show what was found.
+        """
+        how = Arguments(
+            pano_width=pano_width,
+            thumbs=thumbs,
+            mesh_faces=mesh_faces,
+            verify=verify,
+            single=single,
+            overwrite=overwrite,
+        )
+        return _native.report(
+            self.root, _path(to), None if against is None else root_of(against), how, threads, sink(progress)
+        )
+
+    def pack(
+        self,
+        kind: str,
+        to: PathLike | None = None,
+        *,
+        overwrite: bool = False,
+        areas: Sequence[int] = (),
+        images: str | None = None,
+        modalities: Sequence[str] | None = None,
+        max_size: int | None = None,
+        max_count: int | None = None,
+        prefix: str | None = None,
+        shuffle: int | None = None,
+        points: int | None = None,
+        binary: bool = False,
+        copy_images: bool = False,
+        depth: str | None = None,
+        stuff: Sequence[str] | None = None,
+        compression: str | None = None,
+        threads: int | None = None,
+        progress: Progress = None,
+    ) -> Path:
+        """Makes a package of it, and returns its path: `kind` is "webdataset", "colmap", "nerfstudio", "coco"
+        or "parquet", `to` its folder (of Parquet its file), beside the data set by default. The other
+        arguments are the options of `s3d pack`, which `s3d pack --help` explains; an empty `stuff` stands for
+        none.
+        """
+        how = Arguments(
+            output=_path(to),
+            overwrite=overwrite,
+            areas=list(areas),
+            images=images,
+            modalities=None if modalities is None else list(modalities),
+            max_size=max_size,
+            max_count=max_count,
+            prefix=prefix,
+            shuffle=shuffle,
+            points=points,
+            binary=binary,
+            copy_images=copy_images,
+            depth=depth,
+            stuff=None if stuff is None else list(stuff),
+            compression=compression,
+        )
+        return _native.pack(self.root, kind, how, threads, sink(progress))
+
+    def profile(self, *loaders: str, overwrite: bool = False, progress: Progress = None) -> Path:
+        """Writes what loaders of point clouds want, "pointcept", "open3d-ml", "mmdet3d" or "pointnet", into
+        `profiles/` of the data set, and returns that folder.
+        """
+        _native.profile(self.root, list(loaders), overwrite, sink(progress))
+        return self.root / "profiles"
+
+    def write_xyz(
+        self,
+        kind: str = "half",
+        *,
+        overwrite: bool = False,
+        threads: int | None = None,
+        progress: Progress = None,
+    ) -> DataSet:
+        """Makes the images of world coordinates again, from depth and pose, in "half" or "float" precision,
+        and returns the data set with them.
+        """
+        _native.write_xyz(self.root, kind, overwrite, threads, sink(progress))
+        return DataSet(self.root)
+
+    def __repr__(self) -> str:
+        panoramas = sum(image[3] is None for image in self._images)
+        what = f"{len(self) - panoramas} views, {panoramas} panoramas, {len(self.rooms)} rooms"
+        labels = "no labels" if self.classes is None else f"{len(self.classes)} classes"
+        return f"DataSet({str(self.root)!r}: areas {self.areas}, {what}, {labels})"
+
+
+def _path(path: PathLike | None) -> Path | None:
+    return None if path is None else Path(path)
+
+
+def open(folder: PathLike) -> DataSet:  # noqa: A001
+    """Opens the data set in a folder, to be read."""
+    return DataSet(folder)

@@ -1,0 +1,321 @@
+"""What cameras and rays see of a mesh."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._camera import Location, Matrix, PoseLike, matrix, pose_of
+from ._errors import UsageError
+from ._mesh import Mesh, MeshLike, as_mesh
+from ._progress import Progress, sink
+
+MODALITIES = ("rgb", "depth", "normal", "xyz", "face")
+"""What a view can be asked for; `Images` says what each is."""
+
+
+class Images:
+    """The images of one view or panorama, H × W, all of the same hit a pixel. Those that were not asked for
+    are not there.
+    """
+
+    K: Matrix | None
+    """Intrinsics, 3 × 3, pixels; None for a panorama."""
+    T_world_cam: Matrix
+    """Camera → world, 4 × 4, OpenCV's axes."""
+
+    def __init__(self, arrays: dict[str, npt.NDArray[Any]], K: Matrix | None, T_world_cam: Matrix) -> None:
+        self._arrays = arrays
+        self.K, self.T_world_cam = K, T_world_cam
+
+    def __getitem__(self, modality: str) -> npt.NDArray[Any]:
+        if modality not in self._arrays:
+            raise AttributeError(f"{modality!r} was not asked for: modalities={list(self._arrays)}")
+        return self._arrays[modality]
+
+    @property
+    def modalities(self) -> tuple[str, ...]:
+        """The names of the images that are there."""
+        return tuple(self._arrays)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        height, width = next(iter(self._arrays.values())).shape[:2]
+        return width, height
+
+    @property
+    def rgb(self) -> npt.NDArray[np.uint8]:
+        """(H, W, 3), sRGB. Pure black only where nothing is seen."""
+        return self["rgb"]
+
+    @property
+    def depth(self) -> npt.NDArray[np.float32]:
+        """(H, W), metres: along the optical axis (z) in a view, along the ray in a panorama. NaN where
+        nothing is seen.
+        """
+        return self["depth"]
+
+    @property
+    def normal(self) -> npt.NDArray[np.float32]:
+        """(H, W, 3), unit vectors towards the camera's side: in a view in the camera's axes, x right, y down,
+        z forward, so that a wall that faces the camera is (0, 0, −1) and `n @ T_world_cam[:3, :3].T` is in
+        the world; in a panorama (X, −Z, Y) of the world. NaN where nothing is seen.
+        """
+        return self["normal"]
+
+    @property
+    def xyz(self) -> npt.NDArray[np.float32]:
+        """(H, W, 3), world metres. NaN where nothing is seen."""
+        return self["xyz"]
+
+    @property
+    def face(self) -> npt.NDArray[np.int32]:
+        """(H, W), index of the mesh's face. −1 where nothing is seen."""
+        return self["face"]
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        kind = "panorama" if self.K is None else "view"
+        return f"Images({kind}, {width} × {height}: {', '.join(self._arrays)})"
+
+    def _repr_png_(self) -> bytes:
+        """The first image as a picture, for notebooks."""
+        name, array = next(iter(self._arrays.items()))
+        return _native.encode_png(picture(name, array))
+
+
+def picture(name: str, array: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
+    """Colours, (H, W, 3), that show a modality."""
+    if name == "rgb":
+        return array
+    if name == "face":
+        mixed = array.astype(np.uint32) * np.uint32(2654435761)
+        colors = np.stack([mixed >> 24, mixed >> 16 & 255, mixed >> 8 & 255], -1)
+        return np.where(array[..., None] < 0, 0, colors).astype(np.uint8)
+    if name == "normal":
+        shown = 0.5 + 0.5 * array * [1.0, 1.0, -1.0]
+    else:
+        low, high = (
+            (np.nanmin(array, (0, 1)), np.nanmax(array, (0, 1))) if np.isfinite(array).any() else (0.0, 1.0)
+        )
+        shown = (array - low) / np.maximum(high - low, 1e-9)
+    colors = np.nan_to_num(255.0 * shown).astype(np.uint8)
+    return np.ascontiguousarray(
+        np.broadcast_to(colors[..., None] if colors.ndim == 2 else colors, (*array.shape[:2], 3))
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rays:
+    """What N rays hit first."""
+
+    t: npt.NDArray[np.float64]
+    """(N,), how far along: the multiple of the direction, metres if that has length 1. NaN where nothing is
+    hit.
+    """
+    face: npt.NDArray[np.int32]
+    """(N,), index of the mesh's face. −1 where nothing is hit."""
+    origins: npt.NDArray[np.float64]
+    directions: npt.NDArray[np.float64]
+
+    @property
+    def xyz(self) -> npt.NDArray[np.float64]:
+        """(N, 3), world metres. NaN where nothing is hit."""
+        return self.origins + self.t[:, None] * self.directions
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"Rays({len(self):,}, of which {int((self.face >= 0).sum()):,} hit)"
+
+
+class Scene:
+    """A mesh with a tree over its faces: built once, shared by any number of threads. The mesh is not copied.
+
+    Visibility is exact: no pinholes, no leaks at shared edges, the same bits for any number of threads, and
+    the same as in the files of `s3d render` and `s3d export`. One image is made on the calling thread,
+    without Python's lock.
+    """
+
+    def __init__(self, mesh: MeshLike) -> None:
+        """`mesh` is what `as_mesh` takes."""
+        self.mesh: Mesh = as_mesh(mesh)
+        self._native = _native.Scene(self.mesh._native)
+
+    def __repr__(self) -> str:
+        return f"Scene({self.mesh!r})"
+
+    def render(
+        self,
+        K: npt.ArrayLike,
+        T_world_cam: PoseLike,
+        size: tuple[int, int],
+        *,
+        modalities: Sequence[str] = ("rgb", "depth", "normal"),
+        rgb_samples: int = 1,
+        smooth_normals: bool = False,
+    ) -> Images:
+        """What a pinhole camera sees.
+
+        - `K`: 3 × 3, pixels, without skew; the centre of the first pixel is at (0.5, 0.5).
+        - `T_world_cam`: camera → world, 4 × 4, OpenCV's axes (x right, y down, z forward), metres.
+        - `size`: (width, height), pixels.
+        - `modalities`: some of "rgb", "depth", "normal", "xyz", "face".
+        - `rgb_samples`: from 1 to 64; how many places of a pixel tell its colour where surfaces end or turn.
+        - `smooth_normals`: those interpolated from the mesh's own, where it has some.
+
+        Raises `UsageError` for a matrix that is no camera, with what is wrong with it.
+        """
+        return self._images(
+            matrix("K", K, (3, 3)), T_world_cam, size, modalities, rgb_samples, smooth_normals
+        )
+
+    def panorama(
+        self,
+        pose: PoseLike,
+        width: int = 2048,
+        *,
+        modalities: Sequence[str] = ("rgb", "depth", "normal"),
+        rgb_samples: int = 1,
+        smooth_normals: bool = False,
+    ) -> Images:
+        """All around a place: equirectangular, `width` × `width` / 2 pixels. The middle column looks along
+        the pose's forward axis, projected to the horizon; rows go from +90° down to −90° in the world,
+        whatever the pose's tilt. `pose` is a `Location`, a matrix 4 × 4, or a place (3,) from which the
+        middle looks along +Y. `depth` is along the ray.
+        """
+        return self._images(None, pose, (width, width // 2), modalities, rgb_samples, smooth_normals)
+
+    def render_many(
+        self,
+        poses: Iterable[PoseLike],
+        K: npt.ArrayLike,
+        size: tuple[int, int],
+        *,
+        modalities: Sequence[str] = ("rgb", "depth", "normal"),
+        rgb_samples: int = 1,
+        smooth_normals: bool = False,
+        threads: int | None = None,
+    ) -> Iterator[Images]:
+        """A generator of `render` for each pose, in order, made on `threads` threads (one a core if None). No
+        more than three images a thread are there at a time: `poses` may be endless.
+        """
+        intrinsics = matrix("K", K, (3, 3))
+        count = os.cpu_count() or 1 if threads is None else threads
+        if count < 1:
+            raise UsageError(f"threads={threads}: must be at least 1")
+
+        def generate() -> Iterator[Images]:
+            waiting: deque[Future[Images]] = deque()
+            with ThreadPoolExecutor(count) as pool:
+                try:
+                    for pose in poses:
+                        waiting.append(
+                            pool.submit(
+                                self._images, intrinsics, pose, size, modalities, rgb_samples, smooth_normals
+                            )
+                        )
+                        if len(waiting) > 2 * count:
+                            yield waiting.popleft().result()
+                    while waiting:
+                        yield waiting.popleft().result()
+                finally:
+                    for image in waiting:
+                        image.cancel()
+
+        return generate()
+
+    def render_stored(
+        self,
+        K: npt.ArrayLike | None,
+        T_world_cam: PoseLike,
+        size: tuple[int, int],
+        *,
+        modalities: Sequence[str] = ("rgb", "depth", "normal"),
+        rgb_samples: int = 1,
+        smooth_normals: bool = False,
+    ) -> dict[str, npt.NDArray[Any]]:
+        """As `render` (as `panorama` if `K` is None), but with pixels as the files of a data set store them:
+        `depth` uint16, 512 a metre, 65,535 where nothing is seen or beyond 128 m; `normal` uint8, 127.5 +
+        127.5 n in the paper's axes (right, down, towards the camera), 128 where nothing is seen; `xyz`
+        float16, 0 where nothing is seen; `rgb` and `face` as ever.
+        """
+        intrinsics = None if K is None else matrix("K", K, (3, 3))
+        return self._arrays(
+            intrinsics, pose_of(T_world_cam), size, modalities, rgb_samples, smooth_normals, True
+        )
+
+    def cast(self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, threads: int | None = None) -> Rays:
+        """What rays hit first, from either side of the faces; exact, as in images.
+
+        `origins`: (N, 3), or (3,) for all; `directions`: (N, 3), of any length; both in the world, metres.
+        Nothing at t ≤ 0 is hit. Rays of an endless or zero direction hit nothing. On `threads` threads, one a
+        core if None.
+        """
+        ways = np.ascontiguousarray(np.atleast_2d(np.asarray(directions, np.float64)))
+        starts = np.ascontiguousarray(np.atleast_2d(np.asarray(origins, np.float64)))
+        t, face = self._native.cast(starts, ways, threads)
+        return Rays(t, face, starts, ways)
+
+    def place_cameras(
+        self,
+        *,
+        see: float | None = None,
+        apart: float | None = None,
+        seed: int = 0,
+        threads: int | None = None,
+        progress: Progress = None,
+    ) -> list[Location]:
+        """Scan locations where a tripod could stand: 1.5 m above surfaces that face up, inside, clear of
+        things.
+
+        As few as see the share `see` (0.95 if nothing is given) of the surface that can be seen from
+        anywhere, the most useful first; or, with `apart`, a pattern of which no two that see each other are
+        nearer than that, metres. They are those of `s3d export` on the same mesh and seed.
+
+        Raises `InputError` if there is no such place, with what was found: the mesh may be upside down, or in
+        other units.
+        """
+        placed = self._native.place_cameras(see, apart, seed, threads, sink(progress))
+        return [Location(uuid, np.array(pose)) for uuid, pose in placed]
+
+    def _images(
+        self,
+        K: Matrix | None,
+        pose: PoseLike,
+        size: tuple[int, int],
+        modalities: Sequence[str],
+        rgb_samples: int,
+        smooth_normals: bool,
+    ) -> Images:
+        T = pose_of(pose)
+        return Images(self._arrays(K, T, size, modalities, rgb_samples, smooth_normals, False), K, T)
+
+    def _arrays(
+        self,
+        K: Matrix | None,
+        T: Matrix,
+        size: tuple[int, int],
+        modalities: Sequence[str],
+        rgb_samples: int,
+        smooth_normals: bool,
+        stored: bool,
+    ) -> dict[str, npt.NDArray[Any]]:
+        words = list(dict.fromkeys(modalities))
+        if not words:
+            raise UsageError(f"modalities: name some of {', '.join(MODALITIES)}")
+        width, height = size
+        request = (words, smooth_normals, rgb_samples, stored)
+        k = None if K is None else K.tolist()
+        made = self._native.render(k, T.tolist(), (int(width), int(height)), request)
+        return {word: made[word] for word in words}

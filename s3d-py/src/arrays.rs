@@ -1,0 +1,91 @@
+//! Arrays of NumPy from values and back.
+
+use crate::error::{fault, usage};
+use crate::mesh::Mesh;
+use numpy::ndarray::ArrayView2;
+use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use s3d_geom::glam::{DMat3, DVec3, Vec3};
+use s3d_geom::{Raster, TriMesh};
+
+/// A read-only array of rows that a mesh has, without a copy.
+pub(crate) fn view<'py, T: Element, const N: usize>(
+    mesh: &Bound<'py, Mesh>,
+    rows: impl for<'m> FnOnce(&'m TriMesh) -> &'m [[T; N]],
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let rows = rows(mesh.get().mesh());
+    let shaped = ArrayView2::from_shape((rows.len(), N), rows.as_flattened());
+    let shaped = shaped.map_err(|e| fault(e.to_string()))?;
+    // SAFETY: the rows are the mesh's, whose class is frozen: they are neither written nor moved as long as
+    // there is the object, which the array keeps.
+    #[allow(unsafe_code)]
+    let array = unsafe { PyArray2::borrow_from_array(&shaped, mesh.clone().into_any()) };
+    array.readwrite().make_nonwriteable();
+    Ok(array)
+}
+
+/// The array n × N of rows, which it takes over.
+pub(crate) fn rows<T: Element, const N: usize>(
+    py: Python<'_>,
+    rows: Vec<[T; N]>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let count = rows.len();
+    PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
+}
+
+/// The array height × width of an image, which it takes over.
+pub(crate) fn image<T: Element + Copy>(py: Python<'_>, image: Raster<T>) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let size = [image.height() as usize, image.width() as usize];
+    PyArray1::from_vec(py, image.into_vec()).reshape(size)
+}
+
+/// The array height × width × N of an image, which it takes over.
+pub(crate) fn image_of_rows<T: Element, const N: usize>(
+    py: Python<'_>,
+    image: Raster<[T; N]>,
+) -> PyResult<Bound<'_, PyArray3<T>>>
+where
+    [T; N]: Copy,
+{
+    let size = [image.height() as usize, image.width() as usize, N];
+    PyArray1::from_vec(py, image.into_vec().into_flattened()).reshape(size)
+}
+
+/// The rows of an array n × N, which `what` is.
+pub(crate) fn from_rows<T: Element + Copy, const N: usize>(
+    what: &str,
+    array: &PyReadonlyArray2<'_, T>,
+) -> PyResult<Vec<[T; N]>> {
+    let shape = array.shape();
+    let (rows, rest) = match array.as_slice() {
+        Ok(numbers) if shape[1] == N => numbers.as_chunks(),
+        _ => {
+            return Err(usage(format!(
+                "{what}: an array n × {N} in C order, not {} × {}",
+                shape[0], shape[1]
+            )));
+        }
+    };
+    debug_assert!(rest.is_empty());
+    Ok(rows.to_vec())
+}
+
+/// Points or directions as vectors.
+pub(crate) fn points(what: &str, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<Vec3>> {
+    Ok(bytemuck::cast_vec(from_rows::<f32, 3>(what, array)?))
+}
+
+/// The same in 64 bits.
+pub(crate) fn points_f64(what: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<DVec3>> {
+    Ok(bytemuck::cast_vec(from_rows::<f64, 3>(what, array)?))
+}
+
+/// Camera → world in OpenCV's axes, 4 × 4, row by row.
+pub(crate) fn world_from_opencv(pose: &s3d_geom::Pose) -> [[f64; 4]; 4] {
+    let rotation: DMat3 = pose.opencv_from_world();
+    // The rows of world → camera are the columns of camera → world.
+    let [right, down, forward] = [0, 1, 2].map(|k| rotation.row(k));
+    let at = pose.location;
+    let row = |k: usize| [right[k], down[k], forward[k], at[k]];
+    [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
+}

@@ -1,0 +1,233 @@
+//! Calls on whole data sets. What they found goes to Python as JSON and text.
+
+use crate::error::{fault, usage};
+use crate::mesh::parsed;
+use crate::work::watched;
+use pyo3::prelude::*;
+use s3d_dataset::{
+    CompareOptions, PackOptions, Profile, ProfileOptions, SpecificOptions, VerifyOptions, XyzOptions,
+};
+use s3d_eval::{EvalOptions, Folds, Protocol};
+use s3d_report::ReportOptions;
+use std::path::PathBuf;
+
+/// JSON and text.
+type Answer = (String, String);
+
+/// Topic, kind, count, and the first of them: file and message.
+type Fault = (&'static str, &'static str, u64, Vec<(String, String)>);
+
+/// Faults, notes, files, checks, what could not be read, and all of it as text.
+type Verified = (Vec<Fault>, Vec<String>, u64, u64, Option<String>, String);
+
+fn json(value: &impl serde::Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|e| fault(e.to_string()))
+}
+
+#[pyfunction]
+pub(crate) fn verify(
+    py: Python<'_>,
+    root: PathBuf,
+    full: bool,
+    threads: Option<usize>,
+    sink: Py<PyAny>,
+) -> PyResult<Verified> {
+    let report = watched(py, threads, &sink, |ctx| s3d_dataset::verify(&root, &VerifyOptions { full }, ctx))?;
+    let text = report.to_string();
+    let faults = report.faults.into_iter().map(|f| (f.topic, f.kind, f.count, f.first)).collect();
+    Ok((faults, report.notes, report.files, report.checks, report.unread, text))
+}
+
+/// Which areas: `folds` is a word, or `areas` are tested together.
+#[derive(FromPyObject)]
+pub(crate) struct Evaluated {
+    variant: Option<String>,
+    folds: String,
+    areas: Vec<u32>,
+    bootstrap: Option<u32>,
+    seed: u64,
+    median_scale: bool,
+    images: Option<String>,
+    classes: Option<Vec<String>>,
+}
+
+#[pyfunction]
+pub(crate) fn evaluate(
+    py: Python<'_>,
+    protocol: &str,
+    truth: PathBuf,
+    predictions: PathBuf,
+    how: Evaluated,
+    threads: Option<usize>,
+    sink: Py<PyAny>,
+) -> PyResult<Answer> {
+    let protocol: Protocol = protocol.parse().map_err(|e: s3d_eval::UnknownProtocol| usage(e.to_string()))?;
+    let mut options = EvalOptions::default();
+    options.variant = how.variant;
+    options.folds = match &*how.folds {
+        _ if !how.areas.is_empty() => Folds::Areas(how.areas),
+        "all" => Folds::All,
+        "each" => Folds::EachArea,
+        "paper" => Folds::Paper,
+        other => return Err(usage(format!("folds={other:?}: must be one of all, each, paper"))),
+    };
+    options.bootstrap = how.bootstrap;
+    options.seed = how.seed;
+    options.median_scale = how.median_scale;
+    options.images =
+        how.images.map(|word| word.parse().map_err(|e| crate::error::exception(&e))).transpose()?;
+    options.classes = how.classes;
+    let evaluation =
+        watched(py, threads, &sink, |ctx| s3d_eval::evaluate(protocol, &truth, &predictions, &options, ctx))?;
+    Ok((json(&evaluation)?, evaluation.to_markdown()))
+}
+
+#[pyfunction]
+pub(crate) fn compare(
+    py: Python<'_>,
+    a: PathBuf,
+    b: PathBuf,
+    full: bool,
+    threads: Option<usize>,
+    sink: Py<PyAny>,
+) -> PyResult<(bool, String, String)> {
+    let options = CompareOptions { full };
+    let comparison = watched(py, threads, &sink, |ctx| s3d_dataset::compare(&a, &b, &options, ctx))?;
+    Ok((comparison.is_equal(), json(&comparison)?, comparison.to_string()))
+}
+
+#[pyfunction]
+pub(crate) fn statistics(py: Python<'_>, root: PathBuf) -> PyResult<Answer> {
+    let made = py.detach(|| s3d_dataset::statistics(&root)).map_err(|e| crate::error::exception(&e))?;
+    Ok((json(&made)?, made.to_markdown()))
+}
+
+/// How a report is made.
+#[derive(FromPyObject)]
+pub(crate) struct Reported {
+    pano_width: u32,
+    thumbs: u32,
+    mesh_faces: u32,
+    verify: bool,
+    single: bool,
+    overwrite: bool,
+}
+
+/// Makes the report, and returns where it is.
+#[pyfunction]
+pub(crate) fn report(
+    py: Python<'_>,
+    root: PathBuf,
+    to: Option<PathBuf>,
+    against: Option<PathBuf>,
+    how: Reported,
+    threads: Option<usize>,
+    sink: Py<PyAny>,
+) -> PyResult<PathBuf> {
+    let Reported { pano_width, thumbs, mesh_faces, verify, single, overwrite } = how;
+    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
+    watched(py, threads, &sink, |ctx| {
+        let ending = if single { "_report.html" } else { "_report" };
+        let to = to.map_or_else(|| s3d_dataset::beside(&root, ending), Ok)?;
+        match against {
+            Some(other) => s3d_report::report_against(&root, &other, &to, &options, ctx)?,
+            None => s3d_report::report(&root, &to, &options, ctx)?,
+        };
+        Ok(if single { to } else { to.join("index.html") })
+    })
+}
+
+/// What a package is made of; each as on the command line.
+#[derive(FromPyObject)]
+pub(crate) struct Packed {
+    output: Option<PathBuf>,
+    overwrite: bool,
+    areas: Vec<u32>,
+    images: Option<String>,
+    modalities: Option<Vec<String>>,
+    max_size: Option<u32>,
+    max_count: Option<u32>,
+    prefix: Option<String>,
+    shuffle: Option<u64>,
+    points: Option<u32>,
+    binary: bool,
+    copy_images: bool,
+    depth: Option<String>,
+    stuff: Option<Vec<String>>,
+    compression: Option<String>,
+}
+
+/// The value of a word that may be missing.
+fn word<T: std::str::FromStr<Err: ToString>>(word: Option<String>) -> PyResult<Option<T>> {
+    word.map(|word| word.parse().map_err(|e: T::Err| usage(e.to_string()))).transpose()
+}
+
+/// Makes the package, and returns where it is.
+#[pyfunction]
+pub(crate) fn pack(
+    py: Python<'_>,
+    root: PathBuf,
+    kind: &str,
+    how: Packed,
+    threads: Option<usize>,
+    sink: Py<PyAny>,
+) -> PyResult<PathBuf> {
+    let kind = parsed("kind", kind, "webdataset, colmap, nerfstudio, coco, parquet")?;
+    let stuff = how.stuff.map(|classes| match &*classes {
+        [] => "none".to_owned(),
+        classes => classes.join(","),
+    });
+    let modalities = how.modalities.map(|words| {
+        words.into_iter().map(|modality| crate::dataset::domain(&modality)).collect::<PyResult<Vec<_>>>()
+    });
+    let options = PackOptions {
+        output: how.output,
+        overwrite: how.overwrite,
+        areas: how.areas,
+        images: word(how.images)?,
+        specific: SpecificOptions {
+            modalities: modalities.transpose()?,
+            max_size: how.max_size,
+            max_count: how.max_count,
+            prefix: word(how.prefix)?,
+            shuffle: how.shuffle,
+            points: how.points,
+            binary: how.binary,
+            copy_images: how.copy_images,
+            depth: word(how.depth)?,
+            stuff: word(stuff)?,
+            compression: word(how.compression)?,
+        },
+    };
+    watched(py, threads, &sink, |ctx| s3d_dataset::pack(&root, kind, &options, ctx))
+}
+
+#[pyfunction]
+pub(crate) fn profile(
+    py: Python<'_>,
+    root: PathBuf,
+    loaders: Vec<String>,
+    overwrite: bool,
+    sink: Py<PyAny>,
+) -> PyResult<()> {
+    let choices = "pointcept, open3d-ml, mmdet3d, pointnet";
+    let loaders = loaders.iter().map(|name| parsed::<Profile>("loader", name, choices));
+    let loaders = loaders.collect::<PyResult<Vec<_>>>()?;
+    let options = ProfileOptions { overwrite };
+    watched(py, None, &sink, |ctx| s3d_dataset::profile(root, &loaders, &options, ctx))
+}
+
+/// Makes the images of world coordinates again, and returns how many.
+#[pyfunction]
+pub(crate) fn write_xyz(
+    py: Python<'_>,
+    root: PathBuf,
+    kind: &str,
+    overwrite: bool,
+    threads: Option<usize>,
+    sink: Py<PyAny>,
+) -> PyResult<usize> {
+    let xyz = parsed("kind", kind, "half, float")?;
+    let options = XyzOptions { xyz, overwrite, ..XyzOptions::default() };
+    watched(py, threads, &sink, |ctx| s3d_dataset::xyz(root, &options, ctx))
+}

@@ -1,0 +1,44 @@
+//! The compiled part of the Python package `s3d_py`: what `python/s3d_py` is made of. Nothing here is public
+//! in Python; what is, and what it means, stands there.
+
+// What is handed over or read must not make it panic.
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::string_slice)]
+
+mod arrays;
+mod calls;
+mod command_line;
+mod dataset;
+mod error;
+mod export;
+mod mesh;
+mod points;
+mod scene;
+mod work;
+
+/// `s3d_py._native`.
+#[pyo3::pymodule(name = "_native", gil_used = false)]
+mod native {
+    use super::work;
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use super::calls::{compare, evaluate, pack, profile, report, statistics, verify, write_xyz};
+    #[pymodule_export]
+    use super::command_line::run_command_line;
+    #[pymodule_export]
+    use super::dataset::DataSet;
+    #[pymodule_export]
+    use super::export::{export, uuid_of_name};
+    #[pymodule_export]
+    use super::mesh::Mesh;
+    #[pymodule_export]
+    use super::points::{fill, sample, vote};
+    #[pymodule_export]
+    use super::scene::{Scene, encode_png, look_at};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        work::hide_caught_panics();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

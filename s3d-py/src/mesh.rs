@@ -1,0 +1,231 @@
+//! `_native.Mesh`: a mesh that scenes, arrays and exports share.
+
+use crate::arrays;
+use crate::error::{exception, usage};
+use crate::work::{detached, watched};
+use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use s3d_geom::glam::Vec2;
+use s3d_geom::{Material, MeshParts, NO_INDEX, Raster, Texture, TriMesh, Wrap};
+use s3d_io::Error as FileError;
+use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis, read_mesh_with};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What a mesh of arrays is called in messages.
+const IN_MEMORY: &str = "mesh in memory";
+
+/// A mesh as it was read or given. Nothing of it ever changes.
+#[pyclass(frozen)]
+pub(crate) struct Mesh {
+    pub(crate) file: Arc<MeshFile>,
+}
+
+/// A word that means something, or an error that says which do.
+pub(crate) fn parsed<T: std::str::FromStr>(what: &str, word: &str, choices: &str) -> PyResult<T> {
+    word.parse().map_err(|_| usage(format!("{what}={word:?}: must be one of {choices}")))
+}
+
+type Rows<'py, T> = Bound<'py, PyArray2<T>>;
+
+#[pymethods]
+impl Mesh {
+    /// Reads a mesh's file.
+    #[staticmethod]
+    fn read(
+        py: Python<'_>,
+        path: PathBuf,
+        up: &str,
+        units: Option<&str>,
+        near: bool,
+        sink: Py<PyAny>,
+    ) -> PyResult<Self> {
+        let up: UpAxis = parsed("up", up, "y, z")?;
+        let units = units.map(|word| parsed::<LengthUnit>("units", word, "m, cm, mm, ft, in")).transpose()?;
+        let origin = if near { MeshOrigin::Near } else { MeshOrigin::OfFile };
+        let options = MeshOptions { origin, units, ..MeshOptions::default() };
+        let file = watched(py, None, &sink, |ctx| {
+            let file = read_mesh_with(&path, up, &options)?;
+            file.warnings.iter().for_each(|warning| ctx.warn(warning));
+            Ok(file)
+        })?;
+        Ok(Self { file: Arc::new(file) })
+    }
+
+    /// A mesh of arrays.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)]
+    fn from_arrays(
+        py: Python<'_>,
+        vertices: PyReadonlyArray2<'_, f32>,
+        faces: PyReadonlyArray2<'_, u32>,
+        vertex_colors: Option<PyReadonlyArray2<'_, u8>>,
+        uv: Option<PyReadonlyArray2<'_, f32>>,
+        face_uv: Option<PyReadonlyArray2<'_, u32>>,
+        textures: Vec<PyReadonlyArray3<'_, u8>>,
+        texture_of_face: Option<PyReadonlyArray1<'_, u32>>,
+        vertex_normals: Option<PyReadonlyArray2<'_, f32>>,
+    ) -> PyResult<Self> {
+        let faces = arrays::from_rows::<u32, 3>("faces", &faces)?;
+        let normals = vertex_normals.map(|n| arrays::points("vertex_normals", &n)).transpose()?;
+        let uvs = uv.map(|uv| arrays::from_rows::<f32, 2>("uv", &uv)).transpose()?;
+        let textures = textures.iter().enumerate().map(texture).collect::<PyResult<Vec<_>>>()?;
+        let face_materials = match texture_of_face {
+            Some(of_face) => of_face.to_vec().map_err(|e| usage(format!("texture_of_face: {e}")))?,
+            None if textures.is_empty() => Vec::new(),
+            None => vec![0; faces.len()],
+        };
+        let parts = MeshParts {
+            positions: arrays::points("vertices", &vertices)?,
+            colors: vertex_colors
+                .map(|c| arrays::from_rows("vertex_colors", &c))
+                .transpose()?
+                .unwrap_or_default(),
+            uvs: bytemuck::cast_vec::<[f32; 2], Vec2>(uvs.unwrap_or_default()),
+            face_uvs: face_uv.map(|f| arrays::from_rows("face_uv", &f)).transpose()?.unwrap_or_default(),
+            face_normals: if normals.is_some() { faces.clone() } else { Vec::new() },
+            normals: normals.unwrap_or_default(),
+            materials: (0..textures.len() as u32).map(material).collect(),
+            face_materials,
+            textures,
+            faces,
+            ..MeshParts::default()
+        };
+        let made = detached(py, None, || TriMesh::new(parts).map(TriMesh::without_repeated_faces))?;
+        let (mesh, repeated) =
+            made.map_err(|source| exception(&FileError::Mesh { path: IN_MEMORY.into(), source }.into()))?;
+        let mut file = MeshFile::in_memory(IN_MEMORY, mesh);
+        file.repeated_faces = repeated;
+        Ok(Self { file: Arc::new(file) })
+    }
+
+    #[getter]
+    fn vertices<'py>(slf: &Bound<'py, Self>) -> PyResult<Rows<'py, f32>> {
+        arrays::view(slf, |mesh| bytemuck::cast_slice::<_, [f32; 3]>(mesh.positions()))
+    }
+
+    #[getter]
+    fn faces<'py>(slf: &Bound<'py, Self>) -> PyResult<Rows<'py, u32>> {
+        arrays::view(slf, TriMesh::faces)
+    }
+
+    #[getter]
+    fn vertex_colors<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Rows<'py, u8>>> {
+        let is_there = !slf.get().mesh().parts().colors.is_empty();
+        is_there.then(|| arrays::view(slf, |mesh| &mesh.parts().colors)).transpose()
+    }
+
+    #[getter]
+    fn uv<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Rows<'py, f32>>> {
+        let is_there = !slf.get().mesh().parts().uvs.is_empty();
+        let uvs = || arrays::view(slf, |mesh| bytemuck::cast_slice::<_, [f32; 2]>(&mesh.parts().uvs));
+        is_there.then(uvs).transpose()
+    }
+
+    #[getter]
+    fn face_uv<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Rows<'py, u32>>> {
+        let is_there = !slf.get().mesh().parts().face_uvs.is_empty();
+        is_there.then(|| arrays::view(slf, |mesh| &mesh.parts().face_uvs)).transpose()
+    }
+
+    /// Of each face its texture, u32's maximum for none.
+    #[getter]
+    fn texture_of_face<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        let materials = self.mesh().materials();
+        let texture = |face: u32| {
+            let material = self.mesh().material_of(face).and_then(|m| materials.get(m as usize));
+            material.and_then(|m| m.texture).unwrap_or(NO_INDEX)
+        };
+        PyArray1::from_iter(py, (0..self.mesh().faces().len() as u32).map(texture))
+    }
+
+    /// The names and pixels of the textures.
+    #[getter]
+    fn textures<'py>(slf: &Bound<'py, Self>) -> PyResult<Vec<(String, Bound<'py, PyArray3<u8>>)>> {
+        let show = |(number, texture): (usize, &Texture)| {
+            let rows = arrays::view(slf, |mesh| {
+                mesh.textures().get(number).map_or(&[], |texture| texture.image.pixels())
+            })?;
+            let size = [texture.image.height() as usize, texture.image.width() as usize, 3];
+            Ok((texture.name.clone(), rows.reshape(size)?))
+        };
+        slf.get().mesh().textures().iter().enumerate().map(show).collect()
+    }
+
+    /// The unit normals of faces, by their winding.
+    fn face_normals<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py, f32>> {
+        let normals = (0..self.mesh().faces().len() as u32).map(|face| self.mesh().normal(face).to_array());
+        arrays::rows(py, normals.collect())
+    }
+
+    /// The areas of faces, m².
+    fn face_areas<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, (0..self.mesh().faces().len() as u32).map(|face| self.mesh().area(face)))
+    }
+
+    #[getter]
+    fn area(&self) -> f64 {
+        self.mesh().total_area()
+    }
+
+    #[getter]
+    fn bounds(&self) -> [[f32; 3]; 2] {
+        let bounds = self.mesh().aabb();
+        [bounds.min.to_array(), bounds.max.to_array()]
+    }
+
+    #[getter]
+    fn offset(&self) -> [f64; 3] {
+        self.file.offset_m.to_array()
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.file.warnings.clone()
+    }
+
+    #[getter]
+    fn repeated_faces(&self) -> usize {
+        self.file.repeated_faces
+    }
+
+    #[getter]
+    fn has_labels(&self) -> bool {
+        self.file.labels.is_some()
+    }
+
+    #[getter]
+    fn path(&self) -> Option<PathBuf> {
+        let path = self.file.sources.first().map(|source| source.path.clone());
+        path.filter(|path| path.as_os_str() != IN_MEMORY)
+    }
+}
+
+impl Mesh {
+    pub(crate) fn mesh(&self) -> &TriMesh {
+        &self.file.mesh
+    }
+}
+
+fn texture((number, array): (usize, &PyReadonlyArray3<'_, u8>)) -> PyResult<Texture> {
+    let image = raster(&format!("textures[{number}]"), array)?;
+    Ok(Texture { name: format!("texture_{number}.png"), image, wrap: [Wrap::Repeat; 2] })
+}
+
+/// The image of an array height × width × 3, which `what` is.
+pub(crate) fn raster(what: &str, array: &PyReadonlyArray3<'_, u8>) -> PyResult<Raster<[u8; 3]>> {
+    let shape = array.shape();
+    let sides = (u32::try_from(shape[0]), u32::try_from(shape[1]));
+    match (array.as_slice(), sides) {
+        (Ok(pixels), (Ok(height @ 1..), Ok(width @ 1..))) if shape[2] == 3 => {
+            Ok(Raster::from_vec(width, height, pixels.as_chunks().0.to_vec()))
+        }
+        _ => Err(usage(format!("{what}: an array height × width × 3 of uint8 in C order, not {shape:?}"))),
+    }
+}
+
+fn material(number: u32) -> Material {
+    let name = format!("material_{number}");
+    Material { name, color: s3d_geom::DEFAULT_COLOR, texture: Some(number) }
+}

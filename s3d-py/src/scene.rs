@@ -1,0 +1,238 @@
+//! `_native.Scene`: what cameras and rays see of a mesh.
+
+use crate::arrays;
+use crate::error::usage;
+use crate::mesh::Mesh;
+use crate::work::{detached, watched};
+use numpy::{PyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use rayon::prelude::*;
+use s3d_dataset::{PlaceOptions, place_cameras};
+use s3d_geom::{Camera, NormalAxes, Pose, Raster};
+use s3d_io::image::{Compression, Content, encode_rgb8};
+use s3d_io::mesh::MeshFile;
+use s3d_render::{
+    Hits, MipMaps, NO_FACE, Normals, TextureFilter, cast, cast_ray, depth_image, normal_image,
+    normal_vectors, rgb_image, sample_edges, xyz_image, xyz_image_half,
+};
+use self_cell::self_cell;
+use std::sync::Arc;
+
+type Tree<'m> = s3d_render::Scene<'m>;
+type Column<'py, T> = Bound<'py, PyArray1<T>>;
+
+self_cell!(
+    struct MeshAndTree {
+        owner: Arc<MeshFile>,
+        #[covariant]
+        dependent: Tree,
+    }
+);
+
+/// A mesh with the tree over its faces, which any number of threads share.
+#[pyclass(frozen)]
+pub(crate) struct Scene {
+    cell: MeshAndTree,
+    mip_maps: MipMaps,
+}
+
+/// What a view is asked for: modalities, smooth normals, samples of the colour of a pixel, and whether pixels
+/// are those that the files of a data set store, instead of numbers in metres.
+#[derive(FromPyObject)]
+struct Request(Vec<String>, bool, u32, bool);
+
+/// An image of a view.
+enum Modality {
+    Rgb(Raster<[u8; 3]>),
+    Depth(Raster<f32>),
+    StoredDepth(Raster<u16>),
+    Normal(Raster<[f32; 3]>),
+    StoredNormal(Raster<[u8; 3]>),
+    Xyz(Raster<[f32; 3]>),
+    StoredXyz(Raster<[half::f16; 3]>),
+    Face(Raster<i32>),
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    fn new(py: Python<'_>, mesh: &Bound<'_, Mesh>) -> PyResult<Self> {
+        let file = Arc::clone(&mesh.get().file);
+        detached(py, None, || {
+            let mip_maps = MipMaps::new(&file.mesh);
+            Self { cell: MeshAndTree::new(file, |file| Tree::new(&file.mesh)), mip_maps }
+        })
+    }
+
+    /// The images that a camera sees, by name: of a pinhole if there is a K, else of a panorama.
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        k: Option<[[f64; 3]; 3]>,
+        world_from_camera: [[f64; 4]; 4],
+        size: [u32; 2],
+        request: Request,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let camera = camera(k, world_from_camera, size)?;
+        let Request(modalities, _, rgb_samples, stored) = &request;
+        if let Some(word) = modalities.iter().find(|word| !MODALITIES.contains(&word.as_str())) {
+            return Err(usage(format!("modalities: {word:?} is none of {}", MODALITIES.join(", "))));
+        }
+        if !(1..=64).contains(rgb_samples) {
+            return Err(usage(format!("rgb_samples={rgb_samples}: must be from 1 to 64")));
+        }
+        let images = py.detach(|| {
+            let mut hits = cast(self.tree(), &camera);
+            // Depth and faces are the hits themselves, and so the last to be made.
+            let mut words: Vec<&str> = modalities.iter().map(String::as_str).collect();
+            words.sort_by_key(|word| (*word == "depth" && !*stored) || *word == "face");
+            let made = words.iter().map(|word| (*word, self.draw(word, &mut hits, &camera, &request)));
+            made.collect::<Vec<_>>()
+        });
+        let dict = PyDict::new(py);
+        for (word, image) in images {
+            dict.set_item(word, array(py, image)?)?;
+        }
+        Ok(dict)
+    }
+
+    /// What rays hit: t, the multiple of the direction, NaN for nothing; and the face, −1 for nothing.
+    fn cast<'py>(
+        &self,
+        py: Python<'py>,
+        origins: PyReadonlyArray2<'_, f64>,
+        directions: PyReadonlyArray2<'_, f64>,
+        threads: Option<usize>,
+    ) -> PyResult<(Column<'py, f64>, Column<'py, i32>)> {
+        let origins = arrays::points_f64("origins", &origins)?;
+        let directions = arrays::points_f64("directions", &directions)?;
+        if origins.len() != 1 && origins.len() != directions.len() {
+            let (n, m) = (origins.len(), directions.len());
+            return Err(usage(format!("{n} origins for {m} directions: one for all, or one for each")));
+        }
+        let Some(&first) = origins.first() else { return Err(usage("origins: there are none")) };
+        let hits: (Vec<f64>, Vec<i32>) = detached(py, threads, || {
+            let ray = |(k, direction): (usize, &_)| {
+                let origin =
+                    if origins.len() == 1 { first } else { origins.get(k).copied().unwrap_or(first) };
+                cast_ray(self.tree(), origin, *direction)
+                    .map_or((f64::NAN, -1), |hit| (hit.t, hit.face as i32))
+            };
+            directions.par_iter().enumerate().with_min_len(1024).map(ray).unzip()
+        })?;
+        Ok((PyArray1::from_vec(py, hits.0), PyArray1::from_vec(py, hits.1)))
+    }
+
+    /// Scan locations: uuid and camera → world of each.
+    fn place_cameras(
+        &self,
+        py: Python<'_>,
+        see: Option<f64>,
+        apart: Option<f64>,
+        seed: u64,
+        threads: Option<usize>,
+        sink: Py<PyAny>,
+    ) -> PyResult<Vec<(String, [[f64; 4]; 4])>> {
+        let options = PlaceOptions { see, apart_m: apart, seed };
+        let placed = watched(py, threads, &sink, |ctx| place_cameras(self.tree(), &options, ctx))?;
+        Ok(placed.into_iter().map(|place| (place.uuid, arrays::world_from_opencv(&place.pose))).collect())
+    }
+}
+
+const MODALITIES: [&str; 5] = ["rgb", "depth", "normal", "xyz", "face"];
+
+impl Scene {
+    fn tree(&self) -> &Tree<'_> {
+        self.cell.borrow_dependent()
+    }
+
+    fn draw(&self, word: &str, hits: &mut Hits, camera: &Camera, request: &Request) -> Modality {
+        let scene = self.tree();
+        let Request(_, smooth, rgb_samples, stored) = request;
+        let normals = if *smooth { Normals::Smooth } else { Normals::Flat };
+        match (word, *stored) {
+            ("rgb", _) => {
+                let mut rgb = rgb_image(scene, &self.mip_maps, hits, camera);
+                let filter = TextureFilter::default();
+                sample_edges(scene, &self.mip_maps, hits, camera, &filter, *rgb_samples, &mut rgb);
+                Modality::Rgb(rgb)
+            }
+            ("depth", true) => Modality::StoredDepth(depth_image(hits)),
+            ("depth", false) => {
+                let nothing = Raster::from_vec(0, 0, Vec::new());
+                let mut depth = std::mem::replace(&mut hits.depth, nothing);
+                for depth in depth.pixels_mut().iter_mut().filter(|depth| depth.is_infinite()) {
+                    *depth = f32::NAN;
+                }
+                Modality::Depth(depth)
+            }
+            ("normal", true) => Modality::StoredNormal(normal_image(scene, hits, camera, normals)),
+            ("normal", false) => {
+                Modality::Normal(normal_vectors(scene, hits, camera, normals, NormalAxes::OpenCv))
+            }
+            ("xyz", true) => Modality::StoredXyz(xyz_image_half(hits, camera)),
+            ("xyz", false) => {
+                let mut xyz = xyz_image(hits, camera);
+                for (xyz, face) in xyz.pixels_mut().iter_mut().zip(hits.face.pixels()) {
+                    if *face == NO_FACE {
+                        *xyz = [f32::NAN; 3];
+                    }
+                }
+                Modality::Xyz(xyz)
+            }
+            // Those that were asked for are known.
+            _ => Modality::Face(hits.face.map(|face| face as i32)),
+        }
+    }
+}
+
+fn array<'py>(py: Python<'py>, modality: Modality) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match modality {
+        Modality::Rgb(image) | Modality::StoredNormal(image) => arrays::image_of_rows(py, image)?.into_any(),
+        Modality::Depth(image) => arrays::image(py, image)?.into_any(),
+        Modality::StoredDepth(image) => arrays::image(py, image)?.into_any(),
+        Modality::Normal(image) | Modality::Xyz(image) => arrays::image_of_rows(py, image)?.into_any(),
+        Modality::StoredXyz(image) => arrays::image_of_rows(py, image)?.into_any(),
+        Modality::Face(image) => arrays::image(py, image)?.into_any(),
+    })
+}
+
+/// A pinhole camera, or a panorama if there is no K.
+pub(crate) fn camera(k: Option<[[f64; 3]; 3]>, pose: [[f64; 4]; 4], size: [u32; 2]) -> PyResult<Camera> {
+    /// The most pixels of a side of an image.
+    const MOST: u32 = 32_768;
+    let [width, height] = size;
+    if !(1..=MOST).contains(&width) || !(1..=MOST).contains(&height) {
+        return Err(usage(format!("size=({width}, {height}): width and height must be from 1 to {MOST}")));
+    }
+    let pose = Pose::from_opencv(pose).map_err(|e| usage(format!("T_world_cam: {e}")))?;
+    let Some(k) = k else {
+        if width != 2 * height {
+            return Err(usage(format!("width={width}: a panorama is half as high as wide, so even")));
+        }
+        return Ok(Camera::equirectangular(pose, width));
+    };
+    let camera =
+        Camera::from_k_rt(k, pose.rt_matrix(), width, height).map_err(|e| usage(format!("K: {e}")))?;
+    // The pose itself, not what the way there and back makes of it.
+    Ok(Camera { pose, ..camera })
+}
+
+/// The file PNG of an image of colours, height × width × 3.
+#[pyfunction]
+pub(crate) fn encode_png<'py>(
+    py: Python<'py>,
+    image: numpy::PyReadonlyArray3<'_, u8>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let texture = crate::mesh::raster("image", &image)?;
+    let png = py.detach(|| encode_rgb8(&texture, Content::Photo, Compression::Fast));
+    Ok(PyBytes::new(py, &png))
+}
+
+/// Camera → world of a camera at a place that looks at another.
+#[pyfunction]
+pub(crate) fn look_at(eye: [f64; 3], target: [f64; 3], up: [f64; 3]) -> PyResult<[[f64; 4]; 4]> {
+    let pose = Pose::look_at(eye.into(), target.into(), up.into());
+    Ok(arrays::world_from_opencv(&pose.map_err(|e| usage(e.to_string()))?))
+}

@@ -1,0 +1,62 @@
+"""What every call has in common: versions, errors, the command."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import signal
+import subprocess
+import sys
+import sysconfig
+import time
+from pathlib import Path
+
+import pytest
+
+import s3d_py as s3d
+
+COMMAND = os.path.join(sysconfig.get_path("scripts"), "s3d")
+
+
+def test_the_package_has_the_version_of_its_compiled_part() -> None:
+    assert s3d.__version__ == importlib.metadata.version("s3d-py")
+    assert all(hasattr(s3d, name) for name in s3d.__all__)
+
+
+def test_errors_are_a_hierarchy() -> None:
+    for kind, bases in {
+        s3d.UsageError: (s3d.Error, ValueError),
+        s3d.InputError: (s3d.Error, ValueError),
+        s3d.MeshError: (s3d.FormatError, s3d.FileError, ValueError),
+        s3d.MissingFileError: (s3d.FileAccessError, FileNotFoundError, s3d.FileError),
+        s3d.TemporaryError: (s3d.Error,),
+        s3d.CancelledError: (s3d.Error,),
+    }.items():
+        assert issubclass(kind, bases)
+
+
+def test_the_command_is_that_of_the_binary(tmp_path: Path) -> None:
+    def run(*words: str, module: bool = False) -> subprocess.CompletedProcess[str]:
+        program = [sys.executable, "-m", "s3d_py"] if module else [COMMAND]
+        return subprocess.run([*program, *words], capture_output=True, text=True, cwd=tmp_path)
+
+    assert run("--version").stdout == f"s3d {s3d.__version__}\n"
+    assert run("--version", module=True).stdout == f"s3d {s3d.__version__}\n"
+    wrong = run("export")
+    assert wrong.returncode == 2 and "Usage: s3d export" in wrong.stderr
+    missing = run("info", "gone.glb")
+    assert missing.returncode == 1 and "gone.glb" in missing.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_ctrl_c_ends_the_command_as_it_does_the_binary(tmp_path: Path) -> None:
+    words = [COMMAND, "demo", "-o", "demo"]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+    while not (tmp_path / "demo" / "area_1").is_dir():
+        assert process.poll() is None, process.stderr and process.stderr.read()
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    told = process.communicate(timeout=60)[1]
+    assert process.returncode == 75, told
+    # The command that goes on is the one that was called, not Python's.
+    assert "stopped by SIGINT; go on with: s3d demo -o demo" in told and "Traceback" not in told

@@ -1,0 +1,123 @@
+"""Points sampled from a mesh, and voting for its faces."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from multiprocessing.queues import SimpleQueue
+
+import numpy as np
+import pytest
+
+import s3d_py as s3d
+
+
+def test_samples_lie_evenly_on_the_surface(room: s3d.Mesh) -> None:
+    cloud = s3d.sample(room, 500, seed=3)
+    assert (
+        len(cloud) == 30_000 == len(cloud.rgb) == len(cloud.face)
+        and repr(cloud) == "PointCloud(30,000 points)"
+    )
+    counts = np.bincount(cloud.face, minlength=14)
+    assert np.abs(counts - 500 * room.face_areas).max() <= 2
+    # In the planes of their faces, in their colours.
+    corner = room.vertices[room.faces[cloud.face, 0]]
+    assert np.abs(((cloud.xyz - corner) * room.face_normals[cloud.face]).sum(-1)).max() < 1e-6
+    assert room.vertex_colors is not None
+    assert np.array_equal(cloud.rgb, room.vertex_colors[room.faces[cloud.face, 0]])
+    for threads in (1, 3):
+        again = s3d.sample(room, 500, seed=3, threads=threads)
+        assert np.array_equal(again.xyz, cloud.xyz)
+    assert not np.array_equal(s3d.sample(room, 500, seed=4).xyz, cloud.xyz)
+    assert len(s3d.sample(room, points=7)) == 7 and len(s3d.sample(room, points=0)) == 0
+    for wrong in (-1.0, np.inf, np.nan):
+        with pytest.raises(s3d.UsageError, match="points_per_m2"):
+            s3d.sample(room, wrong)
+    with pytest.raises(s3d.UsageError, match="points=-1"):
+        s3d.sample(room, points=-1)
+
+
+def test_points_vote_for_the_nearest_face(room: s3d.Mesh) -> None:
+    cloud = s3d.sample(room, 200, seed=1)
+    labels = cloud.face.astype(np.int64) // 2
+    labels[::20] = 6  # one in twenty is wrong
+    votes = s3d.vote(room, cloud, labels)
+    assert np.array_equal(votes.label, np.arange(14) // 2)
+    assert votes.total.sum() == len(cloud) and (votes.votes + votes.runner_up_votes == votes.total).all()
+    assert np.array_equal(votes.margin, votes.votes - votes.runner_up_votes)
+    assert votes.runner_up[:12].tolist() == [6] * 12 and votes.runner_up[12:].tolist() == [-1] * 2
+    assert votes.share == pytest.approx(votes.votes / votes.total) and votes.share[:12].max() < 0.96
+    assert votes.max_distance.max() < 1e-6 and (votes.mean_distance <= votes.max_distance).all()
+    assert repr(votes) == "Votes(14 of 14 faces labelled, 7 labels)"
+
+
+def test_faces_without_votes_have_none_and_can_be_filled(room: s3d.Mesh) -> None:
+    votes = s3d.vote(room, [[0.5, 1.4, 0.01], [3.5, 1.0, 2.4]], [3, 0])
+    labelled = np.flatnonzero(votes.label >= 0)
+    assert len(labelled) == 2 and sorted(votes.label[labelled].tolist()) == [0, 3]
+    empty = votes.label < 0
+    assert (
+        (votes.total[empty] == 0).all()
+        and np.isnan(votes.mean_distance[empty]).all()
+        and np.isnan(votes.share[empty]).all()
+    )
+    # The other half of the floor and of the ceiling; not around the edges to the walls.
+    filled = votes.filled(within=10)
+    assert (filled[:2] == 3).all() and (filled[2:4] == 0).all() and (filled[4:] == -1).all()
+    assert np.array_equal(votes.filled(within=0), votes.label)
+    with pytest.raises(s3d.UsageError, match="within=NaN"):
+        votes.filled(within=float("nan"))
+    with pytest.raises(s3d.UsageError, match="3 labels for 14 faces"):
+        s3d.fill(room, [1, 2, 3], 1.0)
+
+
+def test_columns_of_other_packages_are_taken(room: s3d.Mesh) -> None:
+    points = np.array([[0.5, 1.4, 0.01], [3.5, 1.0, 2.4]])
+    expected = s3d.vote(room, points, [3, 0]).label
+
+    class Las(dict[str, object]):
+        """What laspy's points have."""
+
+        xyz = points
+
+    assert np.array_equal(
+        s3d.vote(room, Las(classification=np.array([3, 0], np.uint8)), "classification").label, expected
+    )
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(points, columns=["x", "y", "z"])
+    frame["class"] = [3, 0]
+    assert np.array_equal(s3d.vote(room, frame, "class").label, expected)
+
+
+def test_wrong_points_are_told(room: s3d.Mesh) -> None:
+    point = [[1.0, 1.0, 1.0]]
+    for labels, words in (
+        ([-1], "labels[0] is -1"),
+        ([900_000], "labels[0] is 900000"),
+        ([1.5], "whole numbers"),
+        ([1, 2], "2 labels for 1 points"),
+        ([[1]], "shape (N,)"),
+    ):
+        with pytest.raises(s3d.UsageError) as caught:
+            s3d.vote(room, point, labels)
+        assert words in str(caught.value)
+    with pytest.raises(s3d.InputError, match="point 0"):
+        s3d.vote(room, [[np.nan, 0, 0]], [1])
+    with pytest.raises(s3d.UsageError, match="xyz: an array"):
+        s3d.vote(room, [[1.0, 2.0]], [1])
+
+
+def _count(mesh: s3d.Mesh, queue: SimpleQueue[int]) -> None:
+    queue.put(len(s3d.sample(mesh, points=50_000)))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own(room: s3d.Mesh) -> None:
+    assert len(s3d.sample(room, points=50_000)) == 50_000
+    context = multiprocessing.get_context("fork")
+    queue: SimpleQueue[int] = context.SimpleQueue()
+    child = context.Process(target=_count, args=(room, queue))
+    child.start()
+    child.join(60)
+    assert child.exitcode == 0 and queue.get() == 50_000

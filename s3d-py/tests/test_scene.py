@@ -1,0 +1,295 @@
+"""What cameras and rays see."""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import json
+import os
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import s3d_py as s3d
+
+from common import AHEAD, K
+
+ALL = ("rgb", "depth", "normal", "xyz", "face")
+
+
+@pytest.fixture(scope="module")
+def scene(room: s3d.Mesh) -> s3d.Scene:
+    return s3d.Scene(room)
+
+
+def open_box() -> s3d.Mesh:
+    """A wall at x = 2 that a camera at the origin sees half of."""
+    return s3d.Mesh([[2, -9, 0], [2, 9, 0], [2, 9, 9], [2, -9, 9]], [[0, 2, 1], [0, 3, 2]])
+
+
+def test_a_wall_ahead_is_where_it_stands(scene: s3d.Scene) -> None:
+    images = scene.render(K, AHEAD, (64, 48), modalities=ALL)
+    assert images.size == (64, 48) and images.modalities == ALL
+    assert images.rgb[24, 32].tolist() == [170] * 3
+    assert images.depth.dtype == np.float32 and images.depth[24, 32] == 2.0
+    assert np.array_equal(images.normal[24, 32], [0, 0, -1])
+    # The pixel's centre is half a pixel right of the middle and half below: right is −Y, 2 m away.
+    assert images.xyz[24, 32] == pytest.approx([4.0, 1.5 - 1 / 32, 1.2 - 1 / 32], abs=1e-6)
+    assert set(images.face[24, [0, 32]].tolist()) <= set(range(4, 12))
+    # In the world, and where depth says.
+    rays = np.linalg.inv(K) @ [32.5, 24.5, 1.0]
+    assert AHEAD[:3, :3] @ (rays * images.depth[24, 32]) + AHEAD[:3, 3] == pytest.approx(
+        images.xyz[24, 32], abs=1e-6
+    )
+    assert "view, 64 × 48: rgb, depth, normal, xyz, face" in repr(images)
+    with pytest.raises(AttributeError, match="'xyz' was not asked for"):
+        scene.render(K, AHEAD, (64, 48)).xyz  # noqa: B018
+
+
+def test_nothing_has_documented_values() -> None:
+    scene = s3d.Scene(open_box())
+    images = scene.render(K, s3d.look_at((0, 0, 0), (1, 0, 0)), (64, 48), modalities=ALL)
+    seen = images.face >= 0
+    assert seen[:24].all() and not seen[24:].any()
+    assert np.isnan(images.depth[~seen]).all() and np.isfinite(images.depth[seen]).all()
+    assert np.isnan(images.normal[~seen]).all() and np.isnan(images.xyz[~seen]).all()
+    assert (
+        (images.rgb[~seen] == 0).all() and (images.rgb[seen] > 0).all() and (images.face[~seen] == -1).all()
+    )
+    stored = scene.render_stored(K, s3d.look_at((0, 0, 0), (1, 0, 0)), (64, 48), modalities=ALL)
+    assert {name: array.dtype.name for name, array in stored.items()} == {
+        "rgb": "uint8",
+        "depth": "uint16",
+        "normal": "uint8",
+        "xyz": "float16",
+        "face": "int32",
+    }
+    assert (stored["depth"][~seen] == 65535).all() and (stored["normal"][~seen] == 128).all()
+    assert (stored["xyz"][~seen] == 0).all() and (stored["depth"][seen] == 1024).all()
+
+
+def test_a_panorama_looks_all_around(scene: s3d.Scene) -> None:
+    for pose in ((2.0, 1.5, 1.2), s3d.Location("", s3d.look_at((2, 1.5, 1.2), (2, 3, 1.2)))):
+        images = scene.panorama(pose, 64, modalities=ALL)
+        assert images.K is None and images.size == (64, 32)
+        # Ahead is +Y, to the right of it +X; distances, not depths.
+        assert images.depth[16, 32] == pytest.approx(1.5, abs=0.01) and images.depth[16, 48] == pytest.approx(
+            2, abs=0.02
+        )
+        assert images.depth[0, 0] == pytest.approx(1.3, abs=0.01) and images.depth[31, 0] == pytest.approx(
+            1.2, abs=0.01
+        )
+        distance = np.linalg.norm(images.xyz - [2, 1.5, 1.2], axis=-1)
+        assert distance == pytest.approx(images.depth, abs=1e-5)
+        # (X, −Z, Y): the wall ahead has the normal −Y, the floor +Z.
+        assert np.array_equal(images.normal[16, 32], [0, 0, -1]) and np.array_equal(
+            images.normal[31, 0], [0, -1, 0]
+        )
+
+
+def test_normals_are_unit_vectors_towards_the_camera(scene: s3d.Scene) -> None:
+    pose = s3d.look_at((1.7, 0.4, 1.9), (3.1, 2.2, 0.3))
+    images = scene.render(K, pose, (64, 48), modalities=ALL)
+    world = images.normal @ pose[:3, :3].T.astype(np.float32)
+    towards = pose[:3, 3] - images.xyz
+    assert np.linalg.norm(images.normal, axis=-1) == pytest.approx(1.0, abs=1e-6)
+    assert ((world * towards).sum(-1) > 0).all()
+    assert np.abs(np.abs((world * scene.mesh.face_normals[images.face]).sum(-1)) - 1).max() < 1e-6
+
+
+def test_rays_hit_what_images_show(scene: s3d.Scene) -> None:
+    images = scene.render(K, AHEAD, (64, 48), modalities=ALL)
+    j, i = np.mgrid[:48, :64]
+    pixels = np.stack([i + 0.5, j + 0.5, np.ones_like(i)], -1) @ np.linalg.inv(K).T
+    rays = scene.cast(AHEAD[:3, 3], (pixels @ AHEAD[:3, :3].T).reshape(-1, 3))
+    assert len(rays) == 64 * 48 and rays.t.reshape(48, 64) == pytest.approx(images.depth, rel=1e-6)
+    assert (rays.face.reshape(48, 64) == images.face).mean() > 0.99
+    assert rays.xyz.reshape(48, 64, 3) == pytest.approx(images.xyz, abs=1e-5)
+
+    two = scene.cast([[2, 1.5, 1.2], [2, 1.5, 99]], [[0, 0, -2], [0, 0, 1]], threads=1)
+    assert two.t[0] == 0.6 and two.face[0] in (0, 1)
+    assert np.isnan(two.t[1]) and two.face[1] == -1 and np.isnan(two.xyz[1]).all()
+    with pytest.raises(s3d.UsageError, match="2 origins for 3 directions"):
+        scene.cast(np.zeros((2, 3)), np.ones((3, 3)))
+    with pytest.raises(s3d.UsageError, match="directions: an array n × 3"):
+        scene.cast([0, 0, 0], [[1, 2]])
+
+
+def test_many_views_are_those_of_single_calls_in_order(scene: s3d.Scene) -> None:
+    poses = [s3d.look_at((2, 1.5, 1.2), (2 + np.cos(a), 1.5 + np.sin(a), 1.0)) for a in np.linspace(0, 6, 23)]
+    for threads in (1, 2, 5):
+        many = list(scene.render_many(poses, K, (64, 48), modalities=ALL, threads=threads))
+        assert len(many) == len(poses)
+        for pose, images in zip(poses, many):
+            alone = scene.render(K, pose, (64, 48), modalities=ALL)
+            assert np.array_equal(images.T_world_cam, pose)
+            assert all(np.array_equal(images[name], alone[name], equal_nan=name != "rgb") for name in ALL)
+    # It may be left early, and be endless.
+    first = list(itertools.islice(scene.render_many(itertools.repeat(AHEAD), K, (64, 48)), 3))
+    assert len(first) == 3
+    with pytest.raises(s3d.UsageError, match="T_world_cam"):
+        list(scene.render_many([AHEAD, np.eye(3)], K, (64, 48)))
+
+
+def test_threads_share_a_scene(scene: s3d.Scene) -> None:
+    expected = scene.render(K, AHEAD, (64, 48), modalities=ALL)
+    start = threading.Barrier(8)
+
+    def work(_: int) -> bool:
+        start.wait()
+        for _ in range(25):
+            images = scene.render(K, AHEAD, (64, 48), modalities=ALL)
+            if not all(np.array_equal(images[name], expected[name]) for name in ALL):
+                return False
+        return True
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(work, range(8)))
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="memory is read from /proc")
+def test_memory_stays_flat_over_ten_thousand_renders(scene: s3d.Scene) -> None:
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    def render(times: int) -> None:
+        for _ in range(times):
+            scene.render(K, AHEAD, (64, 48), modalities=ALL)
+
+    render(500)
+    before = resident()
+    render(10_000)
+    # A leak of one byte a pixel would be 31 MB.
+    assert resident() - before < 4 << 20
+
+
+@pytest.mark.parametrize(
+    "k, pose, size, words",
+    [
+        (np.eye(4), AHEAD, (64, 48), "K: a matrix 3 × 3"),
+        ([[50, 1, 32], [0, 50, 24], [0, 0, 1]], AHEAD, (64, 48), "skew"),
+        ([[0, 0, 32], [0, 50, 24], [0, 0, 1]], AHEAD, (64, 48), "K: focal lengths"),
+        (K, AHEAD.T, (64, 48), "transposed"),
+        (K, AHEAD * 2, (64, 48), "T_world_cam"),
+        (K, AHEAD + [[0, 0, 0, np.inf], *[[0] * 4] * 3], (64, 48), "not finite"),
+        (K, np.diag([1.0, 1, -1, 1]), (64, 48), "mirrors"),
+        (K, AHEAD, (0, 48), "size=(0, 48)"),
+        (K, AHEAD, (64, 100_000), "size=(64, 100000)"),
+    ],
+)
+def test_what_is_no_camera_is_told(
+    scene: s3d.Scene, k: Any, pose: Any, size: tuple[int, int], words: str
+) -> None:
+    with pytest.raises(s3d.UsageError) as caught:
+        scene.render(k, pose, size)
+    assert words in str(caught.value)
+
+
+def test_other_wrong_calls_are_told(scene: s3d.Scene) -> None:
+    with pytest.raises(s3d.UsageError, match='"smell" is none of rgb, depth'):
+        scene.render(K, AHEAD, (64, 48), modalities=["rgb", "smell"])
+    with pytest.raises(s3d.UsageError, match="name some of"):
+        scene.render(K, AHEAD, (64, 48), modalities=[])
+    with pytest.raises(s3d.UsageError, match="rgb_samples=0"):
+        scene.render(K, AHEAD, (64, 48), rgb_samples=0)
+    with pytest.raises(s3d.UsageError, match="a panorama is half as high"):
+        scene.panorama((1, 1, 1), 63)
+    with pytest.raises(s3d.UsageError, match="fov=180"):
+        s3d.intrinsics((64, 48), 180)
+    with pytest.raises(s3d.UsageError, match="target is where the camera is"):
+        s3d.look_at((1, 1, 1), (1, 1, 1))
+
+
+def test_pictures_for_notebooks(scene: s3d.Scene) -> None:
+    for name in ALL:
+        png = scene.render(K, AHEAD, (64, 48), modalities=[name])._repr_png_()
+        assert png[:8] == b"\x89PNG\r\n\x1a\n" and png[16:24] == (64).to_bytes(4, "big") + (48).to_bytes(
+            4, "big"
+        )
+
+
+def test_images_are_those_of_the_command_to_the_bit(demo: Path, tmp_path: Path) -> None:
+    mesh = demo / "scan" / "rgb.obj"
+    scene = s3d.Scene(s3d.read_mesh(mesh))
+    places = scene.place_cameras(see=0.6)
+    size, k = (160, 120), np.array([[120.5, 0, 79.25], [0, 119.75, 61.5], [0, 0, 1]])
+    turn = [(0.3, 0.8, -0.2), (-1, 0.1, 0.05)]
+    poses = [s3d.look_at(p.xyz, p.xyz + np.array(d)) for p in places[:3] for d in turn]
+    opengl = [(T * [1, -1, -1, 1]).tolist() for T in poses]
+    cameras = tmp_path / "transforms.json"
+    cameras.write_text(
+        json.dumps(
+            {
+                "w": size[0],
+                "h": size[1],
+                "fl_x": k[0, 0],
+                "fl_y": k[1, 1],
+                "cx": k[0, 2],
+                "cy": k[1, 2],
+                "frames": [{"file_path": f"{n:03}.png", "transform_matrix": T} for n, T in enumerate(opengl)],
+            }
+        )
+    )
+    out = tmp_path / "views"
+    command = [
+        sys.executable,
+        "-m",
+        "s3d_py",
+        "render",
+        str(mesh),
+        "--poses",
+        str(cameras),
+        "-o",
+        str(out),
+        "--rgb-samples",
+        "4",
+        "--quiet",
+    ]
+    subprocess.run(command, check=True)
+    # The reader that comes with a data set, of numpy alone.
+    spec = importlib.util.spec_from_file_location("utils", demo / "assets" / "utils.py")
+    assert spec and spec.loader
+    utils = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(utils)
+    for number, pose in enumerate(poses):
+        stored = scene.render_stored(k, pose, size, modalities=ALL, rgb_samples=4)
+        exact = scene.render(k, pose, size, modalities=ALL, rgb_samples=4)
+        read = {name: out / name / f"{number:03}.png" for name in ("rgb", "depth", "normal", "faces")}
+        for name in ("rgb", "depth", "normal"):
+            assert np.array_equal(utils.read_png(read[name]), stored[name]), (number, name)
+        index = utils.read_png(read["faces"]).astype(np.int64) @ [65536, 256, 1]
+        assert np.array_equal(np.where(index == 0xFFFFFF, -1, index), stored["face"])
+        xyz = utils.read_xyz(out / "global_xyz" / f"{number:03}.exr")
+        assert np.array_equal(np.nan_to_num(xyz), stored["xyz"].astype(xyz.dtype))
+        # Numbers in metres are what was rounded.
+        seen = exact.face >= 0
+        assert seen.mean() > 0.9 and np.array_equal(exact.rgb, stored["rgb"])
+        depth = np.floor(exact.depth[seen].astype(np.float64) * 512 + 0.5)
+        assert np.array_equal(depth, stored["depth"][seen])
+        assert np.array_equal(exact.xyz[seen].astype(np.float16), stored["xyz"][seen])
+        normal = 127.5 + 127.5 * exact.normal[seen].astype(np.float64) * [1, 1, -1]
+        assert np.abs(normal - stored["normal"][seen]).max() <= 0.5 + 1e-4
+
+
+def test_locations_are_placed_alike_for_any_number_of_threads(demo: Path) -> None:
+    scene = s3d.Scene(demo / "scan" / "rgb.obj")
+    done: list[s3d.Task] = []
+    one = scene.place_cameras(see=0.8, threads=1, progress=done.append)
+    two = scene.place_cameras(see=0.8, threads=3)
+    assert 1 < len(one) < 40 and [p.uuid for p in one] == [p.uuid for p in two]
+    assert all(np.array_equal(p.T_world_cam, q.T_world_cam) for p, q in zip(one, two))
+    assert all(len(p.uuid) == 32 and 1.0 < p.xyz[2] < 2.0 for p in one)
+    apart = scene.place_cameras(apart=2.0)
+    assert {p.uuid for p in apart} != {p.uuid for p in one}
+    with pytest.raises(s3d.UsageError, match="see"):
+        scene.place_cameras(see=1.5)
+    with pytest.raises(s3d.UsageError, match="see"):
+        scene.place_cameras(see=0.5, apart=2.0)
+    with pytest.raises(s3d.InputError):
+        s3d.Scene(open_box()).place_cameras()
