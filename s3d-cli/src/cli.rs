@@ -1,7 +1,9 @@
 //! The command line as a whole.
 
+use crate::commands::scores::{detect, eval};
+use crate::commands::shards::{merge, plan};
 use crate::commands::{
-    demo, export, info, merge, pack, plan, profile, render, report, sample, stats, verify, xyz,
+    compare, demo, export, info, pack, profile, render, report, sample, stats, verify, xyz,
 };
 use crate::console::LogFormat;
 use crate::failure::Outcome;
@@ -48,13 +50,17 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Write the built-in scene as input files and export it: a data set to look at.
+    /// Write the built-in scene, or generated areas to train on, as input files and export them.
     #[command(
         after_help = concat!(
             "Example:\n",
             "  s3d demo -o s3d-demo\n",
             "The scene's own files are in OUT/scan; export them again, larger, with\n",
-            "  s3d export s3d-demo/scan/scene.toml -o dataset",
+            "  s3d export s3d-demo/scan/scene.toml -o dataset\n",
+            "Six generated areas, as a detector of objects needs them, without images:\n",
+            "  s3d demo --areas 6 --seed 1 --no-images -o areas\n",
+            "What is learnt and measured on generated areas tests programs; it is not comparable with results on \
+             the six licensed areas of 2D-3D-S.",
         )
     )]
     Demo(demo::DemoArgs),
@@ -166,6 +172,40 @@ pub(crate) enum Command {
         )
     )]
     Verify(verify::VerifyArgs),
+    /// Tell what differs between two data sets: options, files, labels, views, pixels, poses.
+    #[command(
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d compare dataset other\n",
+            "  s3d compare dataset other --json - | jq .labels.matrix\n",
+            "Exit code 0 if both hold the same data, 1 if they differ or could not be compared, 2 for a \
+             wrong call.\n",
+            "The same data are the same files with the same bytes. The manifests tell how they were made:\n",
+            "what differs there is listed, and decides nothing.",
+        )
+    )]
+    Compare(compare::CompareArgs),
+    /// Hold predictions against a data set, by the definition that others report by.
+    #[command(
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d eval sem3d --truth dataset --pred predictions --areas 5\n",
+            "  s3d eval det --truth dataset --pred boxes.json --folds paper --json result.json\n",
+            "docs/evaluation.md describes each protocol and the files of its predictions.",
+        )
+    )]
+    Eval(eval::EvalArgs),
+    /// Train, run or measure the paper's baseline detector: boxes of twelve classes in the points of an area.
+    #[command(
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d detect table dataset --seeds 5\n",
+            "  s3d detect train dataset --areas 1,2,3,4,6 -o model.json\n",
+            "  s3d detect run dataset model.json --areas 5 -o found.json\n",
+            "docs/detector.md tells how it works, and what its numbers mean.",
+        )
+    )]
+    Detect(detect::DetectArgs),
 }
 
 impl Command {
@@ -179,7 +219,10 @@ impl Command {
             | Self::Pack(_)
             | Self::Xyz(_)
             | Self::Profile(_)
-            | Self::Report(_) => true,
+            | Self::Report(_)
+            | Self::Compare(_)
+            | Self::Eval(_)
+            | Self::Detect(_) => true,
             Self::Render(args) => args.poses.is_some(),
             Self::Info(_) | Self::Stats(_) | Self::Verify(_) => false,
         }
@@ -200,6 +243,9 @@ impl Command {
             Self::Report(args) => report::run(args),
             Self::Stats(args) => stats::run(&args),
             Self::Verify(args) => verify::run(args),
+            Self::Compare(args) => compare::run(args),
+            Self::Eval(args) => eval::run(args),
+            Self::Detect(args) => detect::run(args),
         }
     }
 }
@@ -264,6 +310,8 @@ mod tests {
             &["s3d", "export", "a.toml", "--profile", "sea"],
             &["s3d", "xyz", "out", "--type", "none"],
             &["s3d", "profile", "out"],
+            &["s3d", "compare", "out"],
+            &["s3d", "compare", "out", "other", "--overwrite"],
             &["s3d", "report", "out", "--pano-width", "15"],
             &["s3d", "report", "out", "--thumbs", "4096"],
             &["s3d", "export", "a.toml", "--compression", "9"],

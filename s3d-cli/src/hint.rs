@@ -1,17 +1,23 @@
 //! The command that goes on where this one ends, to be copied into a shell.
 
-use std::env;
-use std::ffi::OsString;
+use std::sync::OnceLock;
+
+/// The command line as it was called.
+static WORDS: OnceLock<Vec<String>> = OnceLock::new();
+
+/// What [`resume_hint`] tells.
+pub(crate) fn remember(words: Vec<String>) {
+    let _ = WORDS.set(words);
+}
 
 /// "go on with: s3d export scan/scene.toml -o 'data set'": the command line as it was called, quoted for a
 /// shell. Every failure that may pass ends with it.
 pub(crate) fn resume_hint() -> String {
-    format!("go on with: {}", command_line(env::args_os()))
+    format!("go on with: {}", command_line(WORDS.get().into_iter().flatten()))
 }
 
-fn command_line(args: impl Iterator<Item = OsString>) -> String {
-    let words: Vec<String> = args.map(|arg| quoted(&arg.to_string_lossy())).collect();
-    words.join(" ")
+fn command_line(words: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    words.into_iter().map(|word| quoted(word.as_ref())).collect::<Vec<_>>().join(" ")
 }
 
 /// A word as a shell takes it: as it is if nothing in it means something there, else in quotes.
@@ -32,8 +38,7 @@ mod tests {
 
     #[test]
     fn words_are_quoted_where_a_shell_needs_it() {
-        let line =
-            |words: &[&str]| command_line(words.iter().map(OsString::from).collect::<Vec<_>>().into_iter());
+        let line = |words: &[&str]| command_line(words);
         assert_eq!(line(&["s3d", "export", "a/b.toml", "-o", "Büro-1_x"]), "s3d export a/b.toml -o Büro-1_x");
         assert_eq!(line(&["s3d", "my scan", "", "$x", "it's", "*"]), r"s3d 'my scan' '' '$x' 'it'\''s' '*'");
     }
@@ -41,7 +46,7 @@ mod tests {
     #[test]
     fn a_shell_reads_back_the_same_words() {
         let words = ["a b", "$HOME", "it's", "`x`", "\"", "\\", "*", "a\nb", "~", "#", "-n", "ü;&|<>"];
-        let line = command_line(words.iter().map(OsString::from));
+        let line = command_line(words);
         let out = std::process::Command::new("sh")
             .arg("-c")
             .arg(format!("printf '%s\\0' {line}"))

@@ -252,7 +252,7 @@ fn other_commands_stop_too() {
     let dir = tempfile::tempdir().unwrap();
     let _scene = write_scan(dir.path(), 1);
     let (mesh, cloud) = (dir.path().join("room.obj"), dir.path().join("cloud.ply"));
-    let mut run = Run::start(&["sample", text(&mesh), "-o", text(&cloud), "--points", "400000000"]);
+    let mut run = Run::start(&["sample", text(&mesh), "-o", text(&cloud), "--points", "100000000"]);
     run.wait_for("progress", |e| kind(e) == "progress");
     assert_stopped(run, "TERM", SOON);
     assert!(!cloud.exists());

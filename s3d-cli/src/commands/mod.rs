@@ -1,15 +1,16 @@
 //! One file a subcommand: its words, and the call that they mean.
 
+pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod export;
 pub(crate) mod info;
-pub(crate) mod merge;
 pub(crate) mod pack;
-pub(crate) mod plan;
 pub(crate) mod profile;
 pub(crate) mod render;
 pub(crate) mod report;
 pub(crate) mod sample;
+pub(crate) mod scores;
+pub(crate) mod shards;
 pub(crate) mod stats;
 pub(crate) mod verify;
 pub(crate) mod xyz;
@@ -33,7 +34,7 @@ fn on_threads<T: Send>(threads: Threads, call: impl FnOnce(&Context) -> Result<T
 }
 
 /// Writes the answer of a command to standard output.
-fn print(text: &str) -> Outcome<()> {
+pub(crate) fn print(text: &str) -> Outcome<()> {
     match stdout().write_all(text.as_bytes()) {
         // Whoever reads may stop early: `s3d stats OUT | head`.
         Err(e) if e.kind() != ErrorKind::BrokenPipe => {

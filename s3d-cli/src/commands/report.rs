@@ -12,8 +12,11 @@ pub(crate) struct ReportArgs {
     /// The data set's folder. Nothing in it is altered.
     #[arg(value_name = "OUT")]
     pub(crate) dataset: PathBuf,
-    /// The report's folder [default: beside OUT: OUT_report]
-    #[arg(short, long, value_name = "DIR")]
+    /// Another data set, to be shown beside it where both differ. Nothing in it is altered.
+    #[arg(long, value_name = "B")]
+    pub(crate) against: Option<PathBuf>,
+    /// The report's folder, or its file with --single [default: beside OUT: OUT_report]
+    #[arg(short, long, value_name = "PATH")]
     pub(crate) output: Option<PathBuf>,
     /// Width of panoramas in the report, pixels; the data set's own if that is less.
     #[arg(long, value_name = "PIXELS", default_value_t = 2048,
@@ -23,7 +26,17 @@ pub(crate) struct ReportArgs {
     #[arg(long, value_name = "PIXELS", default_value_t = 256,
         value_parser = value_parser!(u32).range(16..=2048))]
     pub(crate) thumbs: u32,
-    /// Replace an earlier report in DIR.
+    /// Faces of an area's mesh in the report; a larger mesh is simplified.
+    #[arg(long, value_name = "FACES", default_value_t = 300_000,
+        value_parser = value_parser!(u32).range(1000..=10_000_000))]
+    pub(crate) mesh_faces: u32,
+    /// Verify the data set as well, every pixel of it, and show what was found.
+    #[arg(long)]
+    pub(crate) verify: bool,
+    /// Write one file, to be sent or published, instead of a folder; for small data sets.
+    #[arg(long)]
+    pub(crate) single: bool,
+    /// Replace an earlier report.
     #[arg(long)]
     pub(crate) overwrite: bool,
     #[command(flatten)]
@@ -31,10 +44,28 @@ pub(crate) struct ReportArgs {
 }
 
 pub(crate) fn run(args: ReportArgs) -> Outcome<()> {
-    let ReportArgs { dataset, output, pano_width, thumbs, overwrite, threads } = args;
-    let options = ReportOptions { pano_width, thumbs, overwrite };
+    let ReportArgs {
+        dataset,
+        against,
+        output,
+        pano_width,
+        thumbs,
+        mesh_faces,
+        verify,
+        single,
+        overwrite,
+        threads,
+    } = args;
+    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
     on_threads(threads, |context| {
-        let to = output.map_or_else(|| s3d_dataset::beside(&dataset, "_report"), Ok)?;
-        s3d_report::report(&dataset, &to, &options, context).map(drop)
+        let to = output.map_or_else(
+            || s3d_dataset::beside(&dataset, if single { "_report.html" } else { "_report" }),
+            Ok,
+        )?;
+        match against {
+            Some(other) => s3d_report::report_against(&dataset, &other, &to, &options, context),
+            None => s3d_report::report(&dataset, &to, &options, context),
+        }
+        .map(drop)
     })
 }

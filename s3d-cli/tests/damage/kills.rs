@@ -16,7 +16,7 @@ use tempfile::TempDir;
 
 /// The commands, as they are called in a folder with `scan` (the input), `out` (an export) and `shard_1`,
 /// `shard_2` (its shards). Whoever adds a command that writes adds a line.
-const COMMANDS: [&str; 24] = [
+const COMMANDS: [&str; 30] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -41,6 +41,12 @@ const COMMANDS: [&str; 24] = [
     "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o views --overwrite",
     "profile out --to mmdet3d",
     "report out --pano-width 32 --thumbs 16",
+    "report out --single -o new.html --pano-width 32 --thumbs 16",
+    "report out --against out --pano-width 32 --thumbs 16",
+    "compare out out --json new.json",
+    "eval det --truth out --pred boxes.json --json new.json",
+    "compare out out --full --json old.ply --overwrite",
+    "detect train out -o new.json --most-spaces 1",
 ];
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;
@@ -83,6 +89,7 @@ impl Template {
         let photographs =
             "area = 1\n[mesh]\npath = \"room.obj\"\n[frames]\npath = \"../views/transforms.json\"\n";
         fs::write(at("scan/photographs.toml"), photographs).unwrap();
+        fs::write(at("boxes.json"), "[]").unwrap();
         let files = files(&at(""));
         Self { dir, files }
     }
@@ -106,7 +113,7 @@ fn run(folder: &Path, command: &str, delay: Option<Duration>) -> ExitStatus {
         .args(words)
         .current_dir(folder)
         .stdout(Stdio::null())
-        .stderr(Stdio::null())
+        .stderr(fs::File::create(folder.with_extension("log")).unwrap())
         .spawn()
         .unwrap();
     let Some(delay) = delay else { return child.wait().unwrap() };
@@ -188,7 +195,12 @@ fn killed_commands_are_made_whole_by_the_same_call() {
                 if status.code() == Some(2) && made(&folder, command) == whole {
                     break;
                 }
-                assert_eq!(status.code(), None, "{command}: the same call failed after {kills} kills");
+                let said = fs::read_to_string(folder.with_extension("log")).unwrap();
+                assert_eq!(
+                    status.code(),
+                    None,
+                    "{command}: the same call failed after {kills} kills: {said}"
+                );
                 assert_nothing_by_halves(&folder, &template.files, &whole, command);
                 kills += 1;
             }

@@ -54,7 +54,7 @@ fn copy() -> (TempDir, PathBuf) {
 }
 
 /// Everything that reads an export. What it writes goes to the folder that holds the export, or into it.
-const READERS: [&[&str]; 12] = [
+const READERS: [&[&str]; 13] = [
     &["verify", "OUT"],
     &["stats", "OUT"],
     &["xyz", "OUT", "--overwrite", "--type", "float"],
@@ -67,6 +67,7 @@ const READERS: [&[&str]; 12] = [
     &["pack", "OUT", "--to", "nerfstudio", "--copy-images"],
     &["pack", "OUT", "--to", "coco"],
     &["pack", "OUT", "--to", "parquet"],
+    &["compare", "OUT", "OUT", "--full"],
 ];
 
 /// Runs a command, with so much memory as it may need and no more, until it ends, which must be soon.
@@ -201,7 +202,7 @@ fn what_is_wrong_in_a_manifest_is_told_by_all_alike() {
         let message = told.split_once(": ").unwrap().1;
         let message =
             if message.starts_with("line ") { message.split_once(": ").unwrap().1 } else { message };
-        refuse(&out, readers(&["stats", "xyz", "profile", "pack"]), &["manifest.json", message]);
+        refuse(&out, readers(&["stats", "xyz", "profile", "pack", "compare"]), &["manifest.json", message]);
     }
 }
 
@@ -250,7 +251,7 @@ fn a_file_that_is_gone_cut_or_altered_is_refused_by_whoever_reads_it() {
         let (_dir, out) = copy();
         flip(&out.join(name));
         assert!(verified(&out).contains(&format!("  {name}: ")), "{name}");
-        refuse(&out, readers(commands), &[name]);
+        refuse(&out, readers(commands).chain(readers(&["compare"])), &[name]);
     }
     let cut = [
         ("area_1/3d/pointcloud.ply".to_owned(), &["stats", "colmap", "nerfstudio"][..]),
@@ -266,7 +267,7 @@ fn a_file_that_is_gone_cut_or_altered_is_refused_by_whoever_reads_it() {
                 fs::write(out.join(name), &bytes[..bytes.len() - 1]).unwrap();
             }
             assert!(verified(&out).contains(&format!("  {name}: ")), "{name}");
-            refuse(&out, readers(commands), &[name]);
+            refuse(&out, readers(commands).chain(readers(&["compare"])), &[name]);
         }
     }
     // As input of another export.

@@ -482,8 +482,8 @@ def test_schemas_hold(request, name):
     assert set(manifest["options"]) == set(options) - {"fill", "rgb_samples"}
     area = schema["manifest"]["properties"]["areas"]["items"]["properties"]
     # An area whose scan lies near the origin has no offset, one whose locations are listed does not place them, and here are
-    # no photographs.
-    rare = {"offset_m", "see", "surface_seen", "frames"}
+    # no photographs; nothing is warned of.
+    rare = {"offset_m", "see", "surface_seen", "frames", "warnings"}
     assert all(set(entry) == set(area) - rare for entry in manifest["areas"])
     poses = sorted(out.glob("area_1/*/pose/*.json"))
     assert len(poses) > 5

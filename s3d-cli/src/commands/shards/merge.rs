@@ -1,7 +1,7 @@
 //! `s3d merge`: shards to one data set.
 
-use super::on_threads;
 use crate::args::Threads;
+use crate::commands::on_threads;
 use crate::failure::Outcome;
 use clap::Args;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! `s3d plan`: labels and scores, for the shards of an export.
 
-use super::on_threads;
 use crate::args::{Allow, Placing, Scenes, Threads};
+use crate::commands::on_threads;
 use crate::failure::Outcome;
 use crate::values::{parsed, positive};
 use clap::{Args, value_parser};

@@ -1,0 +1,50 @@
+//! What a command found out: text on standard output, and JSON where it is asked for.
+
+use crate::commands::print;
+use crate::failure::Outcome;
+use clap::Args;
+use s3d_dataset::{Context, NewFile, Result};
+use s3d_io::Error as FileError;
+use s3d_io::fs::write_json;
+use serde::Serialize;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Where the answer goes as JSON.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct JsonArgs {
+    /// Write all of it as JSON, besides the text; to standard output instead of the text with `-`.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Replace FILE if it is there.
+    #[arg(long, requires = "json")]
+    overwrite: bool,
+}
+
+impl JsonArgs {
+    fn file(&self) -> Option<&Path> {
+        self.json.as_deref().filter(|file| *file != Path::new("-"))
+    }
+
+    /// Refuses a file that is there, before the answer is looked for.
+    pub(crate) fn check_free(&self) -> Result<()> {
+        self.file().map_or(Ok(()), |file| NewFile::check_free(file, self.overwrite))
+    }
+
+    /// Writes the file, if there is one.
+    pub(crate) fn write(&self, answer: &impl Serialize, context: &Context) -> Result<()> {
+        let Some(path) = self.file() else { return Ok(()) };
+        let file = NewFile::begin(context, path, self.overwrite)?;
+        write_json(file.path(), answer)?;
+        file.finish()
+    }
+
+    /// Writes to standard output: `text`, or JSON.
+    pub(crate) fn print(&self, answer: &impl Serialize, text: impl FnOnce() -> String) -> Outcome<()> {
+        if self.json.is_none() || self.file().is_some() {
+            return print(&text());
+        }
+        let failed = |e| FileError::io("standard output".as_ref(), "write", io::Error::from(e));
+        print(&(serde_json::to_string_pretty(answer).map_err(failed)? + "\n"))
+    }
+}

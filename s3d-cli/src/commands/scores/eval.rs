@@ -1,0 +1,86 @@
+//! `s3d eval`: predictions held against a data set.
+
+use crate::answer::JsonArgs;
+use crate::args::Threads;
+use crate::commands::on_threads;
+use crate::failure::Outcome;
+use crate::values::parsed;
+use clap::{Args, ValueEnum, value_parser};
+use s3d_eval::{EvalOptions, Folds, ImageKind, Protocol};
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(crate) struct EvalArgs {
+    /// By which definition (docs/evaluation.md).
+    #[arg(value_parser = parsed::<Protocol>,
+        value_name = "det|sem3d|inst-ap|inst-cov|sem-pano|depth|normal|panoptic")]
+    pub(crate) protocol: Protocol,
+    /// The data set's folder. Nothing in it is altered.
+    #[arg(long, value_name = "OUT")]
+    pub(crate) truth: PathBuf,
+    /// The predictions: a folder, or a file.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) pred: PathBuf,
+    /// A variant of the protocol, by the name of whoever counts so [default: the first that
+    /// docs/evaluation.md names]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) variant: Option<String>,
+    /// Which areas are tested, and which of them together: all of them, each by itself (six-fold), or the
+    /// paper's three folds.
+    #[arg(long, value_enum, default_value_t, value_name = "all|each|paper", hide_possible_values = true)]
+    pub(crate) folds: FoldsArg,
+    /// Test these areas only, together: 5 for what most results on S3DIS are of.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', conflicts_with = "folds")]
+    pub(crate) areas: Vec<u32>,
+    /// det: the classes to detect [default: the paper's 12]
+    #[arg(long, value_name = "CLASS,…", value_delimiter = ',')]
+    pub(crate) classes: Vec<String>,
+    /// depth: scale predictions to the median of the truth first, image by image.
+    #[arg(long)]
+    pub(crate) median_scale: bool,
+    /// normal: which images are tested [default: those that the predictions are named after]
+    #[arg(long, value_parser = parsed::<ImageKind>, value_name = "views|panoramas")]
+    pub(crate) images: Option<ImageKind>,
+    /// Tell 95 % intervals of the scores, by drawing rooms (images, where there are no rooms) N times.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(10..=100_000))]
+    pub(crate) bootstrap: Option<u32>,
+    /// Everything random comes from it.
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(crate) enum FoldsArg {
+    #[default]
+    All,
+    Each,
+    Paper,
+}
+
+pub(crate) fn run(args: EvalArgs) -> Outcome<()> {
+    let json = args.json;
+    let mut options = EvalOptions::default();
+    options.variant = args.variant;
+    options.folds = match args.folds {
+        _ if !args.areas.is_empty() => Folds::Areas(args.areas),
+        FoldsArg::All => Folds::All,
+        FoldsArg::Each => Folds::EachArea,
+        FoldsArg::Paper => Folds::Paper,
+    };
+    options.bootstrap = args.bootstrap;
+    options.seed = args.seed;
+    options.images = args.images;
+    options.median_scale = args.median_scale;
+    options.classes = (!args.classes.is_empty()).then_some(args.classes);
+    let evaluation = on_threads(args.threads, |context| {
+        json.check_free()?;
+        let evaluation = s3d_eval::evaluate(args.protocol, &args.truth, &args.pred, &options, context)?;
+        json.write(&evaluation, context)?;
+        Ok(evaluation)
+    })?;
+    json.print(&evaluation, || evaluation.to_markdown())
+}

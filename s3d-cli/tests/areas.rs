@@ -1,0 +1,64 @@
+//! `s3d demo --areas`: a data set of generated areas that is whole, is gone on with, and is not written over.
+
+mod common;
+
+use common::{s3d_fails, s3d_ok, text};
+use s3d_io::dataset::{Layout, read_splits};
+use std::fs;
+
+const SMALL: [&str; 8] = ["--views", "1", "--size", "16", "--pano-width", "32", "--points-per-m2", "20"];
+
+#[test]
+fn two_generated_areas_are_a_data_set_that_verify_passes() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("areas");
+    let demo = [&["demo", "--areas", "2", "--seed", "3", "-o", text(&out)][..], &SMALL].concat();
+    s3d_ok(&demo);
+    s3d_ok(&["verify", text(&out)]);
+    let layout = Layout::new(&out);
+    for area in [1, 2] {
+        assert!(layout.s3dis_area_dir(area).join("office_1/Annotations/table_1.txt").exists());
+        assert!(out.join(format!("scan/area_{area}/scene.toml")).exists());
+        assert!(fs::read_dir(layout.area_dir(area).join("pano/rgb")).unwrap().count() > 60);
+    }
+    // The published folds: areas 1 and 2 are of two buildings, so each is tested with the other's training.
+    let splits = read_splits(&layout.splits()).unwrap();
+    assert!(splits.len() >= 2 && splits.iter().all(|split| split.train_areas != split.test_areas));
+}
+
+#[test]
+fn a_demo_of_areas_goes_on_and_writes_over_nothing_else() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("areas");
+    let few = ["demo", "--areas", "1", "--points-per-m2", "10", "--no-images", "-o", text(&out)];
+    s3d_ok(&few);
+    let layout = Layout::new(&out);
+    assert!(layout.instances_json(1).exists() && layout.rooms_json(1).exists());
+    assert!(!layout.area_dir(1).join("pano").exists());
+    let list = fs::read(out.join("files.csv")).unwrap();
+
+    // Killed after the scan was written, and while the next one was.
+    for entry in fs::read_dir(&out).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true if path.ends_with("scan") => {}
+            true => fs::remove_dir_all(path).unwrap(),
+            false => fs::remove_file(path).unwrap(),
+        }
+    }
+    fs::create_dir(out.join(".s3d-scan.part")).unwrap();
+    s3d_ok(&few);
+    assert_eq!(fs::read(out.join("files.csv")).unwrap(), list);
+    assert!(!out.join(".s3d-scan.part").exists());
+
+    // A scan that somebody changed, and one that is not ours.
+    let other = dir.path().join("other");
+    fs::create_dir_all(other.join("scan")).unwrap();
+    fs::rename(out.join("scan/area_1"), other.join("scan/area_1")).unwrap();
+    fs::write(other.join("scan/area_1/cameras.csv"), "mine").unwrap();
+    let demo = ["demo", "--areas", "1", "--no-images", "-o", text(&other), "--points-per-m2", "10"];
+    s3d_fails(&demo, 2, &["differs from the generated area 1", "--overwrite"]);
+    fs::write(other.join("scan/area_1/scene.toml"), "area = 1").unwrap();
+    s3d_fails(&demo, 2, &["is not the generated area 1", "another folder"]);
+    s3d_fails(&["demo", "--areas", "7"], 2, &["--areas"]);
+}
