@@ -5,7 +5,8 @@ use crate::mesh::parsed;
 use crate::work::watched;
 use pyo3::prelude::*;
 use s3d_dataset::{
-    CompareOptions, PackOptions, Profile, ProfileOptions, SpecificOptions, VerifyOptions, XyzOptions,
+    CompareOptions, InfoOptions, PackOptions, Profile, ProfileOptions, SceneSource, SpecificOptions,
+    VerifyOptions, XyzOptions,
 };
 use s3d_eval::{EvalOptions, Folds, Protocol};
 use s3d_report::ReportOptions;
@@ -20,8 +21,30 @@ type Fault = (&'static str, &'static str, u64, Vec<(String, String)>);
 /// Faults, notes, files, checks, what could not be read, and all of it as text.
 type Verified = (Vec<Fault>, Vec<String>, u64, u64, Option<String>, String);
 
-fn json(value: &impl serde::Serialize) -> PyResult<String> {
+/// What Python reads as JSON.
+pub(crate) fn json(value: &impl serde::Serialize) -> PyResult<String> {
     serde_json::to_string(value).map_err(|e| fault(e.to_string()))
+}
+
+/// What a scene, a mesh, or a data set holds, as text.
+#[pyfunction]
+pub(crate) fn info(
+    py: Python<'_>,
+    path: PathBuf,
+    see: Option<f64>,
+    place_cameras: Option<f64>,
+    lenient: bool,
+    threads: Option<usize>,
+    sink: Py<PyAny>,
+) -> PyResult<String> {
+    watched(py, threads, &sink, |ctx| {
+        if s3d_dataset::is_data_set(&path) {
+            return Ok(s3d_dataset::data_set_info(&path, ctx)?.to_string());
+        }
+        let options = InfoOptions { place_cameras, see, seed: 0, lenient };
+        let scene = SceneSource::list([path], None, None).remove(0);
+        Ok(s3d_dataset::info(scene, &options, ctx)?.to_string())
+    })
 }
 
 #[pyfunction]

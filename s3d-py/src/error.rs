@@ -50,7 +50,9 @@ type About = (String, Option<(&'static str, Option<i64>)>);
 /// A class of `s3d_py._errors` with its message, and what file it is about.
 fn raise(class: &str, message: &str, about: Option<About>) -> PyErr {
     let made = Python::attach(|py| {
-        let class = py.import("s3d_py._errors")?.getattr(class)?;
+        let errors = py.import("s3d_py._errors")?;
+        let class = errors.getattr(class)?;
+        let message = errors.call_method1("in_python", (message,))?;
         let fields = PyDict::new(py);
         if let Some((path, detail)) = about {
             fields.set_item("path", path)?;

@@ -4,10 +4,12 @@
 // What is handed over or read must not make it panic.
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::string_slice)]
 
+mod annotations;
 mod arrays;
 mod calls;
 mod command_line;
 mod dataset;
+mod detect;
 mod error;
 mod export;
 mod mesh;
@@ -22,11 +24,15 @@ mod native {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use super::calls::{compare, evaluate, pack, profile, report, statistics, verify, write_xyz};
+    use super::annotations::{read_points, write_points};
+    #[pymodule_export]
+    use super::calls::{compare, evaluate, info, pack, profile, report, statistics, verify, write_xyz};
     #[pymodule_export]
     use super::command_line::run_command_line;
     #[pymodule_export]
     use super::dataset::DataSet;
+    #[pymodule_export]
+    use super::detect::Detector;
     #[pymodule_export]
     use super::export::{export, uuid_of_name};
     #[pymodule_export]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
+import inspect
 import os
 import signal
 import subprocess
@@ -21,6 +23,32 @@ COMMAND = os.path.join(sysconfig.get_path("scripts"), "s3d")
 def test_the_package_has_the_version_of_its_compiled_part() -> None:
     assert s3d.__version__ == importlib.metadata.version("s3d-py")
     assert all(hasattr(s3d, name) for name in s3d.__all__)
+
+
+def test_everything_public_is_explained() -> None:
+    for name in s3d.__all__:
+        thing = getattr(s3d, name)
+        if not (inspect.isclass(thing) or inspect.isfunction(thing)):
+            continue
+        assert thing.__doc__, name
+        for member, value in vars(thing).items() if inspect.isclass(thing) else ():
+            if not member.startswith("_") and (inspect.isfunction(value) or hasattr(value, "__get__")):
+                assert inspect.getdoc(value), f"{name}.{member}"
+
+
+def test_messages_name_arguments_not_options(demo: Path, tmp_path: Path) -> None:
+    with pytest.raises(s3d.UsageError, match="overwrite=True"):
+        s3d.export(demo / "scan" / "scene.toml", demo, size=64)
+    (tmp_path / "page").mkdir()
+    (tmp_path / "page" / "letter.txt").write_text("mine")
+    with pytest.raises(s3d.UsageError) as raised:
+        s3d.open(demo).report(tmp_path / "page")
+    assert "--" not in str(raised.value)
+    in_python = importlib.import_module("s3d_py._errors").in_python
+    assert in_python("stops here without --allow far-points") == 'stops here without allow=["far-points"]'
+    assert in_python("--pano-width 4096 there, 64 now") == "pano_width 4096 there, 64 now"
+    whole = "go on with: s3d export scan.toml -o out --views 3"
+    assert in_python(whole) == whole
 
 
 def test_errors_are_a_hierarchy() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 from multiprocessing.queues import SimpleQueue
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -121,3 +122,77 @@ def test_a_forked_process_has_threads_of_its_own(room: s3d.Mesh) -> None:
     child.start()
     child.join(60)
     assert child.exitcode == 0 and queue.get() == 50_000
+
+
+def test_annotated_points_are_those_of_the_files(demo: Path) -> None:
+    folder = demo / "scan" / "Area_1"
+    points = s3d.read_points(folder)
+    files = sorted(folder.glob("*/Annotations/*.txt"))
+    assert len(points.names) == len(files) and len(points) == len(points.rgb) == len(points.label)
+    for path in files[:: len(files) // 7]:
+        class_name, number = path.stem.rsplit("_", 1)
+        name = f"{class_name}_{number}_{path.parents[1].name}"
+        rows = np.loadtxt(path)
+        of_instance = points.label == points.names.index(name)
+        assert np.allclose(points.xyz[of_instance], rows[:, :3], atol=1e-6)
+        assert np.array_equal(points.rgb[of_instance], rows[:, 3:6])
+    # A data set has them by room as well.
+    exported = s3d.read_points(demo / "s3dis" / "Area_1")
+    labels = [label for label in s3d.open(demo).labels if label.class_name]
+    # Numbered in each room here, in the area there.
+    parts = [name.split("_") for name in exported.names]
+    assert sorted((words[0], "_".join(words[2:])) for words in parts) == sorted(
+        (str(label.class_name), label.room) for label in labels
+    )
+    with pytest.raises(s3d.MissingFileError):
+        s3d.read_points(demo / "nothing.ply")
+    with pytest.raises(s3d.UsageError, match="smell"):
+        s3d.read_points(folder, taxonomy="smell")
+    assert "instances" in repr(points)
+
+
+def test_tables_of_points_tell_their_columns(tmp_path: Path) -> None:
+    table = np.array([[0, 0, 0, 8, 1], [1, 0, 0, 8, 2], [0, 1, 0, 1, 1]], np.float32)
+    np.save(tmp_path / "points.npy", table)
+
+    def read(classes: dict[str, str | None], offset: float = 0.0) -> s3d.AnnotatedPoints:
+        return s3d.read_points(
+            tmp_path / "points.npy",
+            columns=["x", "y", "z", "class", "instance"],
+            classes=classes,
+            room="office_3",
+            offset=(offset, 0, 0),
+        )
+
+    points = read({"8": "chair", "1": "floor"}, offset=1)
+    assert sorted(points.names) == ["chair_1_office_3", "chair_2_office_3", "floor_1_office_3"]
+    assert points.xyz[:, 0].min() == -1 and (points.rgb == 0).all()
+    assert read({"8": "table", "1": None}).names == ["table_1_office_3", "table_2_office_3"]
+    with pytest.raises(s3d.UsageError, match="smell"):
+        read({"8": "smell"})
+    with pytest.raises(s3d.FormatError, match="points.npy"):
+        read({"8": "chair"})
+
+
+def test_points_are_saved_as_ply(room: s3d.Mesh, tmp_path: Path) -> None:
+    cloud = s3d.sample(room, 20, seed=1)
+    cloud.save(tmp_path / "cloud.ply")
+    content = (tmp_path / "cloud.ply").read_bytes()
+    header, _, body = content.partition(b"end_header\n")
+    assert f"element vertex {len(cloud)}".encode() in header
+    rows = np.frombuffer(body, [("xyz", "<f4", 3), ("rgb", "u1", 3)])
+    assert np.array_equal(rows["xyz"], cloud.xyz) and np.array_equal(rows["rgb"], cloud.rgb)
+    s3d.save_points(tmp_path / "cloud.ply", [[0, 0, 1]], [[1.0, 0.0, 0.5]])
+    assert (tmp_path / "cloud.ply").read_bytes().endswith(bytes([255, 0, 128]))
+    with pytest.raises(s3d.UsageError, match="colours"):
+        s3d.save_points(tmp_path / "cloud.ply", cloud.xyz, cloud.rgb[1:])
+
+
+def test_points_of_laspy_vote(room: s3d.Mesh) -> None:
+    laspy = pytest.importorskip("laspy", reason="laspy is not installed")
+    cloud = s3d.sample(room, 50, seed=2)
+    las = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
+    las.header.scales = [0.001] * 3
+    las.x, las.y, las.z = cloud.xyz.T
+    las.classification = (cloud.face // 2).astype(np.uint8)
+    assert np.array_equal(s3d.vote(room, las, "classification").label, np.arange(14) // 2)

@@ -24,6 +24,7 @@ from ._dataset import (
     Views,
     open,
 )
+from ._detector import Detector, FoundBox, save_boxes
 from ._errors import (
     CancelledError,
     Error,
@@ -40,17 +41,39 @@ from ._errors import (
 from ._export import Area, ExportOptions, Labels, SceneLike, export
 from ._mesh import Mesh, MeshLike, as_mesh, read_mesh
 from ._native import __version__
-from ._points import PointCloud, PointsLike, Votes, fill, sample, vote
+from ._points import (
+    AnnotatedPoints,
+    PointCloud,
+    PointsLike,
+    Votes,
+    fill,
+    read_points,
+    sample,
+    save_points,
+    vote,
+)
 from ._progress import Progress, Task
-from ._results import Comparison, Evaluation, FaultGroup, Statistics, VerifyReport, compare, evaluate, verify
+from ._results import (
+    Comparison,
+    Evaluation,
+    FaultGroup,
+    Statistics,
+    VerifyReport,
+    compare,
+    evaluate,
+    info,
+    verify,
+)
 from ._scene import Images, Rays, Scene
 
 __all__ = [
+    "AnnotatedPoints",
     "Area",
     "CancelledError",
     "Candidate",
     "Comparison",
     "DataSet",
+    "Detector",
     "Error",
     "Evaluation",
     "ExportOptions",
@@ -59,6 +82,7 @@ __all__ = [
     "FileAccessError",
     "FileError",
     "FormatError",
+    "FoundBox",
     "Images",
     "InputError",
     "Instance",
@@ -93,11 +117,15 @@ __all__ = [
     "evaluate",
     "export",
     "fill",
+    "info",
     "intrinsics",
     "look_at",
     "open",
     "read_mesh",
+    "read_points",
     "sample",
+    "save_boxes",
+    "save_points",
     "verify",
     "vote",
 ]

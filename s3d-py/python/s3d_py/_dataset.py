@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, overload
 
 import numpy as np
@@ -20,7 +21,6 @@ from ._errors import UsageError
 from ._mesh import Mesh
 from ._progress import Progress, sink
 from ._results import (
-    Arguments,
     Comparison,
     Evaluation,
     PathLike,
@@ -162,6 +162,7 @@ class View:
 
     @property
     def is_panorama(self) -> bool:
+        """Whether it looks all around; else it is a perspective view."""
         return self.frame is None
 
     @property
@@ -652,7 +653,7 @@ class DataSet(Sequence[View]):
         - `mesh_faces`: a mesh of more faces is simplified.
         - `verify`: verify it as well, and show what was found.
         """
-        how = Arguments(
+        how = SimpleNamespace(
             pano_width=pano_width,
             thumbs=thumbs,
             mesh_faces=mesh_faces,
@@ -691,7 +692,7 @@ class DataSet(Sequence[View]):
         arguments are the options of `s3d pack`, which `s3d pack --help` explains; an empty `stuff` stands for
         none.
         """
-        how = Arguments(
+        how = SimpleNamespace(
             output=_path(to),
             overwrite=overwrite,
             areas=list(areas),

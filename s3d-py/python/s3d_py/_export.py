@@ -99,7 +99,7 @@ class ExportOptions(TypedDict, total=False):
     """What is written for loaders besides: pointcept, open3d-ml, mmdet3d, pointnet."""
 
 
-SceneLike = Union[str, "PathLike[str]", Area, MeshLike]
+SceneLike = Union[str, PathLike[str], Area, MeshLike]
 """What is exported: the path of a scene file (scene.toml), of a published area's folder, or of a mesh; an
 `Area`; a mesh.
 """

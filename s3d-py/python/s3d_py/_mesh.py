@@ -182,7 +182,7 @@ class Mesh:
         return f"Mesh({name}{len(self.faces):,} faces, {self.area:.1f} m², {size} m{looks}{labels})"
 
 
-MeshLike = Union[Mesh, str, "PathLike[str]", Any]
+MeshLike = Union[Mesh, str, PathLike[str], Any]
 """A `Mesh`; the path of a file; a mesh of trimesh or Open3D."""
 
 
@@ -277,14 +277,14 @@ def indices(what: str, values: npt.ArrayLike, columns: int) -> npt.NDArray[np.ui
     return rows(what, array, columns, np.uint32)
 
 
-def colors_of(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+def colors_of(values: npt.ArrayLike, what: str = "vertex_colors") -> npt.NDArray[np.uint8]:
     """Colours of uint8, or of floats from 0 to 1, without their opacity."""
     array = np.asarray(values)
     if array.dtype.kind == "f":
         array = np.rint(np.clip(array, 0.0, 1.0) * 255.0)
     if array.ndim == 2 and array.shape[1] == 4:
         array = array[:, :3]
-    return rows("vertex_colors", array, 3, np.uint8)
+    return rows(what, array, 3, np.uint8)
 
 
 def _corner_uv(

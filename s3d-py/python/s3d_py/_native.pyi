@@ -23,6 +23,14 @@ _Matrix = list[list[float]]
 
 _Columns = tuple[_U32, _U32, _U32, _U32, _U32, _F32]
 
+def info(
+    path: Path,
+    see: float | None,
+    place_cameras: float | None,
+    lenient: bool,
+    threads: int | None,
+    sink: Sink,
+) -> str: ...
 def verify(
     root: Path, full: bool, threads: int | None, sink: Sink
 ) -> tuple[list[tuple[str, str, int, list[tuple[str, str]]]], list[str], int, int, str | None, str]: ...
@@ -57,6 +65,30 @@ def vote(
     mesh: Mesh, xyz: _F32, labels: _I64, threads: int | None, sink: Sink
 ) -> tuple[_I32, _U32, _I32, _U32, _U32, _F32, _F32]: ...
 def fill(mesh: Mesh, labels: _I64, within: float) -> _I32: ...
+
+def read_points(paths: Sequence[str], how: object, sink: Sink) -> tuple[_F32, _U8, _I32, list[str]]: ...
+def write_points(path: str, xyz: _F32, rgb: _U8) -> None: ...
+
+@final
+class Detector:
+    @staticmethod
+    def train(
+        root: Path,
+        areas: Sequence[int],
+        spaces: str,
+        most_spaces: int,
+        seed: int,
+        threads: int | None,
+        sink: Sink,
+    ) -> Detector: ...
+    @staticmethod
+    def load(path: Path) -> Detector: ...
+    def save(self, path: Path) -> None: ...
+    @property
+    def areas(self) -> list[int]: ...
+    @property
+    def seed(self) -> int: ...
+    def run(self, root: Path, areas: Sequence[int], threads: int | None, sink: Sink) -> str: ...
 
 @final
 class Mesh:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike, fspath
+from types import SimpleNamespace
 from typing import Any, Union
 
 import numpy as np
@@ -10,7 +13,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._errors import UsageError
-from ._mesh import Mesh, MeshLike, as_mesh, rows
+from ._mesh import Mesh, MeshLike, as_mesh, colors_of, rows
 from ._progress import Progress, sink
 
 
@@ -28,8 +31,36 @@ class PointCloud:
     def __len__(self) -> int:
         return len(self.xyz)
 
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes a binary PLY file of positions and colours, whole or not at all; one that is there is
+        replaced.
+        """
+        save_points(path, self.xyz, self.rgb)
+
     def __repr__(self) -> str:
         return f"PointCloud({len(self):,} points)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AnnotatedPoints:
+    """N annotated points of an area, instance by instance."""
+
+    xyz: npt.NDArray[np.float32]
+    """(N, 3), world metres."""
+    rgb: npt.NDArray[np.uint8]
+    """(N, 3), sRGB; black where the files have no colours."""
+    label: npt.NDArray[np.int32]
+    """(N,), of each point the place in `names`."""
+    names: list[str]
+    """The instances, as `export` takes them: class, number among those of the room, room, its number:
+    "chair_1_office_2".
+    """
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    def __repr__(self) -> str:
+        return f"AnnotatedPoints({len(self):,} points of {len(self.names):,} instances)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,10 +108,59 @@ class Votes:
         return f"Votes({labelled:,} of {len(self.label):,} faces labelled, {labels} labels)"
 
 
-PointsLike = Union[npt.ArrayLike, PointCloud, Any]
-"""Positions (N, 3), world metres; a `PointCloud`; points of laspy; a data frame of pandas with columns x, y,
-z.
+PointsLike = Union[npt.ArrayLike, PointCloud, AnnotatedPoints, Any]
+"""Positions (N, 3), world metres; a `PointCloud` or `AnnotatedPoints`; points of laspy; a data frame of
+pandas with columns x, y, z.
 """
+
+
+def read_points(
+    paths: str | PathLike[str] | Sequence[str | PathLike[str]],
+    *,
+    taxonomy: str = "s3dis",
+    classes: Mapping[str, str | None] | None = None,
+    class_column: str | None = None,
+    instance_column: str | None = None,
+    room_column: str | None = None,
+    columns: Sequence[str] = (),
+    room: str | None = None,
+    offset: Sequence[float] = (0.0, 0.0, 0.0),
+    lenient: bool = False,
+    progress: Progress = None,
+) -> AnnotatedPoints:
+    """Reads the annotated points of an area: the folder of an S3DIS area, `pointcloud.mat`, a scan of
+    ScanNet, PLY, NPY, NPZ, LAS, LAZ or E57; several files together.
+
+    - `taxonomy`: "s3dis", "nyu40", "scannet20", "scannet200" or "matterport40".
+    - `classes`: which class a name or number of the files means; None leaves its points out.
+    - `class_column`, `instance_column`, `room_column`: where they are, if not where the format has them;
+      `columns` names those of a plain NPY array.
+    - `room`: that of points whose file names none: "office_1".
+    - `offset`: metres, subtracted in 64 bits from points far from the origin, as `Mesh.offset` was.
+    - `lenient`: skip and count what is not as it should be; unknown classes are clutter.
+
+    Raises `FileError` with file and line, `UsageError` for a class or room that is none.
+    """
+    how = SimpleNamespace(
+        taxonomy=taxonomy,
+        classes=dict(classes or {}),
+        class_column=class_column,
+        instance_column=instance_column,
+        room_column=room_column,
+        columns=list(columns),
+        room=room,
+        offset=[float(metres) for metres in offset],
+        lenient=lenient,
+    )
+    files = [paths] if isinstance(paths, (str, PathLike)) else list(paths)
+    return AnnotatedPoints(*_native.read_points([fspath(path) for path in files], how, sink(progress)))
+
+
+def save_points(path: str | PathLike[str], xyz: npt.ArrayLike, rgb: npt.ArrayLike) -> None:
+    """Writes N points as a binary PLY file, whole or not at all; one that is there is replaced. `xyz` is
+    (N, 3), metres; `rgb` (N, 3), sRGB, uint8, or floats from 0 to 1.
+    """
+    _native.write_points(fspath(path), rows("xyz", xyz, 3, np.float32), colors_of(rgb, "rgb"))
 
 
 def sample(

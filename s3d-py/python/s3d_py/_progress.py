@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Union
 
+from ._errors import in_python
+
 log = logging.getLogger("s3d_py")
 
 LINE_EVERY_S = 5.0
@@ -43,7 +45,8 @@ class Sink:
     """Is told by the compiled part what happens."""
 
     def message(self, level: str, text: str) -> None:
-        log.log({"warning": logging.WARNING, "info": logging.INFO}.get(level, logging.DEBUG), "%s", text)
+        number = {"warning": logging.WARNING, "info": logging.INFO}.get(level, logging.DEBUG)
+        log.log(number, "%s", in_python(text))
 
     def started(self, id: int, what: str, unit: str, total: int) -> None: ...
 

@@ -8,13 +8,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Union
 
 from . import _native
 from ._errors import UsageError
 from ._progress import Progress, sink
 
-PathLike = Union[str, "os.PathLike[str]"]
+PathLike = Union[str, os.PathLike[str]]
 
 
 @dataclass(frozen=True)
@@ -135,16 +136,25 @@ class Statistics(_Answer):
         return self.text
 
 
-class Arguments:
-    """What is handed over together, by name."""
-
-    def __init__(self, **values: Any) -> None:
-        self.__dict__.update(values)
-
-
 def root_of(dataset: Any) -> Path:
     """The folder of a `DataSet`, or a path itself."""
     return Path(dataset if isinstance(dataset, (str, os.PathLike)) else dataset.root)
+
+
+def info(
+    scene: PathLike,
+    *,
+    see: float | None = None,
+    place_cameras: float | None = None,
+    lenient: bool = False,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> str:
+    """What a scene file, a mesh, or the folder of an area or a data set holds, how large a data set of it
+    would be, and what looks wrong: what `s3d info` prints. `see` and `place_cameras` place scan locations, as
+    `export` would.
+    """
+    return _native.info(Path(scene), see, place_cameras, lenient, threads, sink(progress))
 
 
 def verify(
@@ -188,7 +198,7 @@ def evaluate(
 
     Raises `FileError` for a prediction that is missing, double, or of the wrong size.
     """
-    how = Arguments(
+    how = SimpleNamespace(
         variant=variant,
         folds=folds,
         areas=list(areas),

@@ -1,0 +1,79 @@
+# %% [markdown]
+# # From labelled points to labelled faces
+#
+# Each annotated point votes for the face that is nearest to it; a face has the label of most votes. How sure that is, and
+# what happens where points are sparse, can be looked at.
+
+# %%
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import s3d_py as s3d
+
+if not Path("s3d-demo").exists():
+    small = ["--views", "24", "--size", "320", "--pano-width", "1024"]
+    subprocess.run([sys.executable, "-m", "s3d_py", "demo", "-o", "s3d-demo", *small], check=True)
+mesh = s3d.read_mesh("s3d-demo/scan/rgb.obj", up="y")
+points = s3d.read_points("s3d-demo/scan/Area_1")
+print(mesh, points, sep="\n")
+
+# %% [markdown]
+# ## The vote
+
+# %%
+votes = s3d.vote(mesh, points, points.label)
+area = mesh.face_areas
+labelled = votes.label >= 0
+print(votes)
+print(f"{area[labelled].sum() / area.sum():.1%} of the surface has a label")
+disputed = labelled & (votes.share < 0.75)
+print(f"{disputed.sum()} faces, {area[disputed].sum():.2f} m², are won by less than three quarters of their votes")
+
+# %% [markdown]
+# Between which labels?
+
+# %%
+pairs = np.stack([votes.label, votes.runner_up])[:, disputed & (votes.runner_up >= 0)]
+(first, second), count = np.unique(np.sort(pairs, 0), axis=1, return_counts=True)
+for place in np.argsort(-count)[:5]:
+    print(f"{count[place]:5} faces: {points.names[first[place]]} or {points.names[second[place]]}")
+
+# %% [markdown]
+# ## Seen in an image
+#
+# Columns of faces become images by the image of faces: here bright where the vote was sure, black where nobody voted.
+
+# %%
+scene = s3d.Scene(mesh)
+place = scene.place_cameras(see=0.5)[0]
+image = scene.panorama(place, width=1024, modalities=["face"])
+of_face = np.where(labelled, np.nan_to_num(votes.share), 0.0)
+shown = np.where(image.face >= 0, of_face[image.face], 0.0)
+print(f"a pixel's face was won by {shown[shown > 0].mean():.1%} of its votes on average")
+
+# %% [markdown]
+# ## Fewer points
+#
+# One point in 200 of the scan leaves faces without a vote. `filled` gives them the label of the surface beside them, not
+# around an edge and no farther than it is told.
+
+# %%
+thin = np.random.default_rng(0).random(len(points)) < 1 / 200
+sparse = s3d.vote(mesh, points.xyz[thin], points.label[thin])
+
+
+def told(label: np.ndarray) -> tuple[float, float]:
+    """Of the surface that all points label: the share that has a label, and the share of it that has the same."""
+    both = labelled & (label >= 0)
+    return area[both].sum() / area[labelled].sum(), area[both & (label == votes.label)].sum() / area[both].sum()
+
+
+for within in (0.0, 0.1, 0.3, 1.0):
+    label = sparse.filled(within) if within else sparse.label
+    covered, right = told(label)
+    print(f"filled within {within} m: {covered:.1%} of the surface labelled, {right:.1%} of it right")
+before, after = told(sparse.label), told(sparse.filled(0.3))
+assert after[0] > before[0] and after[1] > 0.9
