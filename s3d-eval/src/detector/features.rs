@@ -26,8 +26,8 @@ const BEYOND_M: [f32; 2] = [0.02, 0.3];
 const OCCUPANCY: Range<usize> = 0..2 * CELLS;
 const NORMAL: Range<usize> = OCCUPANCY.end..OCCUPANCY.end + 3 * CELLS;
 const CURVATURE: Range<usize> = NORMAL.end..NORMAL.end + CELLS;
-/// By cell: colour, and how much of it is the box's own; of the box: shares of the palette in it, around it and
-/// in its layers; contrasts.
+/// By cell: colour, and how much of it is the box's own; of the box: shares of the palette in it, around it
+/// and in its layers; contrasts.
 const CELL_COLOR: Range<usize> = CURVATURE.end..CURVATURE.end + 3 * CELLS;
 const OWN: Range<usize> = CELL_COLOR.end..CELL_COLOR.end + CELLS;
 const SHARES: Range<usize> = OWN.end..OWN.end + (2 + LAYERS) * ENTRIES;

@@ -1,10 +1,10 @@
 //! A palette: the few colours that descriptions tell apart, how much of each there is in a box and around it,
 //! and how well the two differ.
 //!
-//! Palettes stand for the paper's colour, whose form is not public. A colour is shared by the entries next to
-//! it (Swain and Ballard's histograms, 1991, with soft borders), lightness is told against the space's mean, so
-//! that light counts little, and what the box has more of than its surroundings is told for every surfel
-//! (their back-projection, with the surroundings in the place of the image).
+//! Palettes stand for the paper's colour, whose form is not public. A colour is shared by the entries next
+//! to it (Swain and Ballard's histograms, 1991, with soft borders), lightness is told against the space's
+//! mean, so that light counts little, and what the box has more of than its surroundings is told for every
+//! surfel (their back-projection, with the surroundings in the place of the image).
 
 use glam::Vec3;
 use s3d_geom::Aabb;

@@ -50,8 +50,8 @@ const AROUND_M: f32 = 0.2;
 /// What is nearer to a plane than this, in metres, is of it.
 const OF_PLANE_M: f32 = 0.01;
 
-/// The box of a window's surfels. Axes that are [`Fit::Densest`] or [`Fit::Front`] come first, and the surfels
-/// outside of their interval do not count for the others. `None` if the window holds no surfel, or no plane.
+/// The box of a window's surfels. Axes that are [`Fit::Densest`] or [`Fit::Front`] come first, and the
+/// surfels outside of their interval do not count for the others. `None` if the window holds no surfel, or no plane.
 pub fn fit(index: &Index, window: &Aabb, size: Vec3, fits: [Fit; 3]) -> Option<Aabb> {
     let grown = Aabb { min: window.min - BEYOND_M, max: window.max + BEYOND_M };
     let mut surfels: Vec<&Surfel> = index.within(&grown).collect();
@@ -198,8 +198,8 @@ fn front(index: &Index, surfels: &[&Surfel], grown: &Aabb, axis: usize, layer: f
 }
 
 /// For each axis what brings windows nearest to the boxes that they are for, by mean overlap on that axis:
-/// axes that are best fitted by [`Fit::Densest`] or [`Fit::Front`] are found first. `examples` have an index, a window and a
-/// box each.
+/// axes that are best fitted by [`Fit::Densest`] or [`Fit::Front`] are found first. `examples` have an index,
+/// a window and a box each.
 pub fn learn(examples: &[(&Index, Aabb, Aabb)], size: Vec3) -> [Fit; 3] {
     let mut fits = [Fit::Share(1.0); 3];
     for _ in 0..2 {
