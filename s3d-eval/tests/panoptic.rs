@@ -80,7 +80,10 @@ fn what_is_stuff_can_be_said() {
     let stuff: ClassList = "floor,door".parse().unwrap();
     let (_folder, package) = packed(|o| o.specific.stuff = Some(stuff.clone()));
     let told = panoptic(&package, |_| ()).unwrap_err().to_string();
-    assert!(told.contains("isthing"), "{told}");
+    assert!(
+        told.contains("ceiling is a thing, and by the taxonomy of the data set stuff, unless --stuff"),
+        "{told}"
+    );
     let evaluation = panoptic(&package, |o| o.stuff = Some(stuff.clone())).unwrap();
     assert_perfect(&evaluation);
     let definition = evaluation.definition.join(" ");
