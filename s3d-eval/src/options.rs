@@ -1,7 +1,7 @@
 //! How an evaluation is done.
 
 use crate::{Folds, Protocol};
-use s3d_dataset::{Error, Result};
+use s3d_dataset::{ClassList, Error, Result};
 use s3d_io::dataset::Frame;
 use std::fmt;
 use std::str::FromStr;
@@ -26,6 +26,9 @@ pub struct EvalOptions {
     pub images: Option<ImageKind>,
     /// `det`: the classes to detect, by name; `None`: the paper's 12.
     pub classes: Option<Vec<String>>,
+    /// `panoptic`: the classes of which all of an image is one segment; `None`: those that the taxonomy calls
+    /// stuff.
+    pub stuff: Option<ClassList>,
 }
 
 /// A kind of images.

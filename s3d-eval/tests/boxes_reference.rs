@@ -1,11 +1,18 @@
 //! Average precision of boxes, held against mmdetection3d's and Open3D-ML's own numbers: see
 //! `reference/boxes/README.md`.
 
+mod scene;
+
 use s3d_dataset::s3d_label::Class;
 use s3d_eval::boxes::{ClassScore, Detection, GroundTruth, Rule, average_precision, mean};
+use s3d_eval::{Context, EvalOptions, Folds, Protocol, evaluate};
+use s3d_io::dataset::{InstanceEntry, Layout};
+use s3d_io::fs::{Checksum, checksum_of_file, write_json};
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 #[derive(Deserialize)]
 struct Case {
@@ -89,4 +96,81 @@ fn open3d_ml_gives_the_same() {
             }
         }
     }
+}
+
+/// What `s3d detect` found in rooms of a generated area.
+#[derive(Deserialize)]
+struct Detected {
+    classes: Vec<String>,
+    rooms: Vec<String>,
+    /// Room, class, box in metres.
+    truth: Vec<(usize, usize, [f32; 6])>,
+    /// Room, class, score, box.
+    detections: Vec<(usize, usize, f64, [f32; 6])>,
+}
+
+/// A data set whose area 5 has these instances alone.
+fn with_instances(detected: &Detected) -> &'static Path {
+    let root = scene::data_set();
+    let entries = detected.truth.iter().enumerate().map(|(i, &(room, class, bbox))| InstanceEntry {
+        label: format!("{}_{i}_{}_5", detected.classes[class], detected.rooms[room]),
+        label_index: 0,
+        class: detected.classes[class].clone(),
+        room: detected.rooms[room].clone(),
+        points: 2,
+        bbox,
+        voxel_occupancy: vec![0; 216],
+        points_per_voxel: vec![0; 216],
+    });
+    let path = Layout::new(root).instances_json(5);
+    let (list, manifest) = (root.join("files.csv"), root.join("manifest.json"));
+    let sums = || [&path, &list].map(|file| checksum_of_file(file).unwrap());
+    let before = sums();
+    write_json(&path, &entries.collect::<Vec<_>>()).unwrap();
+    let replace = |file: &Path, of: usize| {
+        let ((bytes, sum), (old_bytes, old_sum)) = (sums()[of], before[of]);
+        let text = fs::read_to_string(file).unwrap();
+        let line = |bytes: u64, sum: Checksum| format!("{bytes},{sum}");
+        let changed = text.replace(&line(old_bytes, old_sum), &line(bytes, sum));
+        fs::write(file, changed.replace(&old_sum.to_string(), &sum.to_string())).unwrap();
+    };
+    replace(&list, 0);
+    replace(&manifest, 1);
+    root
+}
+
+#[test]
+fn mmdetection3d_gives_the_same_for_what_our_detector_finds() {
+    let detected: Detected = serde_json::from_str(include_str!("reference/boxes/detector.json")).unwrap();
+    let theirs: Value =
+        serde_json::from_str(include_str!("reference/boxes/detector_reference.json")).unwrap();
+    let list = detected.detections.iter().map(|(room, class, score, b)| {
+        let (room, class) = (&detected.rooms[*room], &detected.classes[*class]);
+        json!({"area": 5, "room": room, "class": class, "score": score, "min": b[..3], "max": b[3..]})
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let found = folder.path().join("found.json");
+    write_json(&found, &list.collect::<Vec<_>>()).unwrap();
+    let mut options = EvalOptions::default();
+    options.folds = Folds::Areas(vec![5]);
+    let root = with_instances(&detected);
+    let ours = evaluate(Protocol::Det, root, &found, &options, &Context::default()).unwrap();
+    assert_eq!(ours.counted["boxes"], detected.truth.len() as u64);
+    assert_eq!(ours.counted["detections"], detected.detections.len() as u64);
+    let mut told = 0;
+    for class in detected.classes.iter().map(String::as_str).chain(["mean"]) {
+        for suffix in ["0.25", "0.50"] {
+            let [ap, recall] = match class {
+                "mean" => [format!("mAP_{suffix}"), format!("mAR_{suffix}")],
+                _ => [format!("{class}_AP_{suffix}"), format!("{class}_rec_{suffix}")],
+            };
+            for (column, key, error) in [("AP", ap, 2.4e-7), ("AR", recall, 1e-12)] {
+                let ours = ours.score("area 5", class, &format!("{column}@{suffix}")).unwrap();
+                assert!(same(ours, &theirs[&key], error), "{key}: {ours}, {}", theirs[&key]);
+                told += usize::from(ours > 0.0 && ours < 1.0);
+            }
+        }
+    }
+    // Numbers that say something.
+    assert!(told > 30, "{told}");
 }

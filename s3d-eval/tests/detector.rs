@@ -106,7 +106,7 @@ fn models_are_saved_loaded_and_checked() {
         assert!(told.contains("model.json") && told.contains(why), "{told}");
     };
     refused("s3d detector", "other", "is no model");
-    refused("\"version\":1", "\"version\":9", "version 9");
+    refused("\"version\":2", "\"version\":9", "version 9");
     refused("\"bottom_m\":[", "\"bottom_m\":[1e9,", "invalid length");
     refused("\"class\":0", "\"class\":77", "class 77");
     refused("\"weights\":[", "\"weights\":[0.5,", "finite weights");

@@ -75,6 +75,23 @@ fn a_data_set_against_itself_is_perfect() {
     assert!(evaluation.notes[0].contains("areas that are not tested"), "{:?}", evaluation.notes);
 }
 
+#[test]
+fn what_is_stuff_can_be_said() {
+    let stuff: ClassList = "floor,door".parse().unwrap();
+    let (_folder, package) = packed(|o| o.specific.stuff = Some(stuff.clone()));
+    let told = panoptic(&package, |_| ()).unwrap_err().to_string();
+    assert!(
+        told.contains("ceiling is a thing, and by the taxonomy of the data set stuff, unless --stuff"),
+        "{told}"
+    );
+    let evaluation = panoptic(&package, |o| o.stuff = Some(stuff.clone())).unwrap();
+    assert_perfect(&evaluation);
+    let definition = evaluation.definition.join(" ");
+    assert!(definition.contains("but of floor, door all of an image is one"), "{definition}");
+    let told = panoptic(&package, |o| o.stuff = Some("grass".parse().unwrap())).unwrap_err().to_string();
+    assert!(told.contains("--stuff: \"grass\" is no class"), "{told}");
+}
+
 /// Where a view lies outside of its photograph there is nothing to be found.
 #[test]
 fn outside_of_photographs_is_void() {

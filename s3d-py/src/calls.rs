@@ -5,8 +5,8 @@ use crate::mesh::parsed;
 use crate::work::watched;
 use pyo3::prelude::*;
 use s3d_dataset::{
-    CompareOptions, InfoOptions, PackOptions, Profile, ProfileOptions, SceneSource, SpecificOptions,
-    VerifyOptions, XyzOptions,
+    ClassList, CompareOptions, InfoOptions, PackOptions, Profile, ProfileOptions, SceneSource,
+    SpecificOptions, VerifyOptions, XyzOptions,
 };
 use s3d_eval::{EvalOptions, Folds, Protocol};
 use s3d_report::ReportOptions;
@@ -72,6 +72,7 @@ pub(crate) struct Evaluated {
     median_scale: bool,
     images: Option<String>,
     classes: Option<Vec<String>>,
+    stuff: Option<Vec<String>>,
 }
 
 #[pyfunction]
@@ -100,6 +101,7 @@ pub(crate) fn evaluate(
     options.images =
         how.images.map(|word| word.parse().map_err(|e| crate::error::exception(&e))).transpose()?;
     options.classes = how.classes;
+    options.stuff = how.stuff.map(ClassList);
     let evaluation =
         watched(py, threads, &sink, |ctx| s3d_eval::evaluate(protocol, &truth, &predictions, &options, ctx))?;
     Ok((json(&evaluation)?, evaluation.to_markdown()))

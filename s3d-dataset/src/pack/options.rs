@@ -198,7 +198,7 @@ impl ClassList {
     ///
     /// # Errors
     /// [`Error::Usage`] for a name that is none of a class.
-    pub(crate) fn classes(&self, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
+    pub fn classes(&self, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
         let class = |name: &String| taxonomy.class(name).map_err(|e| Error::Usage(format!("--stuff: {e}")));
         let mut classes = self.0.iter().map(class).collect::<Result<Vec<_>>>()?;
         classes.sort_unstable();

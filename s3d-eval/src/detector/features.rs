@@ -3,10 +3,13 @@
 //!
 //! The paper names what a description is made of; the forms here are ours. Cells hold: whether there are
 //! surfels and how many; the mean of each part of normals, without sign; mean curvature; mean colour, less
-//! the space's: walls and woods of another building have other colours. Cells reach beyond the box by a
-//! quarter of its size, so that two in six along an axis are outside. Position and size are told by bins,
-//! which a linear machine can weigh each: a number counts in the two bins next to it.
+//! the space's: walls and woods of another building have other colours; and how much of that colour is the
+//! box's own, and not its surroundings'. Cells reach beyond the box by a quarter of its size, so that two in
+//! six along an axis are outside. Colour has besides what is told of a box by its [palette](super::palette).
+//! Position and size are told by bins, which a linear machine can weigh each: a number counts in the two bins
+//! next to it.
 
+use crate::detector::palette::{ENTRIES, LAYERS, Palette, own_of, share};
 use crate::detector::surfel::index::Index;
 use glam::Vec3;
 use s3d_geom::Aabb;
@@ -23,13 +26,20 @@ const BEYOND_M: [f32; 2] = [0.02, 0.3];
 const OCCUPANCY: Range<usize> = 0..2 * CELLS;
 const NORMAL: Range<usize> = OCCUPANCY.end..OCCUPANCY.end + 3 * CELLS;
 const CURVATURE: Range<usize> = NORMAL.end..NORMAL.end + CELLS;
-const COLOR: Range<usize> = CURVATURE.end..CURVATURE.end + 3 * CELLS;
+/// By cell: colour, and how much of it is the box's own; of the box: shares of the palette in it, around it
+/// and in its layers; contrasts.
+const CELL_COLOR: Range<usize> = CURVATURE.end..CURVATURE.end + 3 * CELLS;
+const OWN: Range<usize> = CELL_COLOR.end..CELL_COLOR.end + CELLS;
+const SHARES: Range<usize> = OWN.end..OWN.end + (2 + LAYERS) * ENTRIES;
+const CONTRAST: Range<usize> = SHARES.end..SHARES.end + 7 * CONTRAST_BINS;
+const COLOR: Range<usize> = CELL_COLOR.start..CONTRAST.end;
 
 /// Bins of position in the unit cube, of heights in metres, of lengths, and of shares of the space's length.
 const POSITION_BINS: usize = 11;
 const HEIGHT_BINS: usize = 13;
 const SIZE_BINS: usize = 16;
 const SHARE_BINS: usize = 9;
+const CONTRAST_BINS: usize = 6;
 const POSITION: Range<usize> = COLOR.end..COLOR.end + 5 * POSITION_BINS + 2 * HEIGHT_BINS;
 const SIZE: Range<usize> = POSITION.end..POSITION.end + 3 * (SIZE_BINS + SHARE_BINS);
 
@@ -42,6 +52,8 @@ const HEIGHTS_M: [f32; 2] = [0.0, 3.6];
 const LENGTHS_M: [f32; 2] = [0.01, 12.0];
 /// Colours are differences to the space's mean, and weigh so much.
 const COLOR_WEIGHT: f32 = 2.0;
+/// What shares of a palette are multiplied by.
+const SHARE_WEIGHT: f32 = 3.0;
 /// Bins weigh as much as some ten cells.
 const BIN_WEIGHT: f32 = 3.0;
 
@@ -91,6 +103,7 @@ struct Cell {
     normal: Vec3,
     curvature: f32,
     color: Vec3,
+    own: f32,
 }
 
 /// Describes a box of a space of this extent; all in the space's frame.
@@ -100,13 +113,16 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
     let grown = Aabb { min: b.min - beyond, max: b.max + beyond };
     let scale = SIDE as f32 / grown.size();
     let mut cells = [Cell::default(); CELLS];
-    for s in index.within(&grown) {
+    let palette = Palette::new(b, index.shades_within(&grown).map(|(s, shade)| (s.position, shade)));
+    let own = palette.own();
+    for (s, shade) in index.shades_within(&grown) {
         let at = ((s.position - grown.min) * scale).as_uvec3().min(glam::UVec3::splat(SIDE as u32 - 1));
         let cell = &mut cells[(at.x as usize * SIDE + at.y as usize) * SIDE + at.z as usize];
         cell.count += 1.0;
         cell.normal += s.normal.abs();
         cell.curvature += s.curvature;
         cell.color += s.color;
+        cell.own += own_of(shade, &own);
     }
     let occupied = cells.iter().filter(|c| c.count > 0.0).count() as f32;
     let mean = cells.iter().map(|c| c.count).sum::<f32>() / occupied.max(1.0);
@@ -117,7 +133,17 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
         let color = COLOR_WEIGHT * (cell.color / cell.count - index.mean_color());
         out[NORMAL.start + 3 * i..][..3].copy_from_slice(&normal.to_array());
         out[CURVATURE.start + i] = 3.0 * cell.curvature / cell.count;
-        out[COLOR.start + 3 * i..][..3].copy_from_slice(&color.to_array());
+        out[CELL_COLOR.start + 3 * i..][..3].copy_from_slice(&color.to_array());
+        out[OWN.start + i] = cell.own / cell.count;
+    }
+    let shares = palette.inside_and_around().into_iter().chain(palette.layers.map(|layer| share(&layer)));
+    for (out, share) in out[SHARES].iter_mut().zip(shares.flatten()) {
+        *out = SHARE_WEIGHT * share;
+    }
+    for (bins, contrast) in out[CONTRAST].chunks_exact_mut(CONTRAST_BINS).zip(palette.contrasts()) {
+        if let Some(contrast) = contrast {
+            put(Some(bins), contrast);
+        }
     }
     let unit = |p: Vec3| p / extent.max(Vec3::splat(0.1));
     let (center, low, high, size) = (unit(b.center()), unit(b.min), unit(b.max), b.size());
@@ -181,14 +207,20 @@ mod tests {
         assert_eq!(row.len(), FEATURES);
         // The box is grown to 1.5 m; the surfel is in the middle of it: cell (3, 3, 3).
         let cell = (3 * 6 + 3) * 6 + 3;
-        let local: Vec<usize> = (0..COLOR.end).filter(|&i| row[i] != 0.0).collect();
-        let colors = [0, 1, 2].map(|k| COLOR.start + 3 * cell + k);
+        let local: Vec<usize> = (0..CELL_COLOR.end).filter(|&i| row[i] != 0.0).collect();
+        let colors = [0, 1, 2].map(|k| CELL_COLOR.start + 3 * cell + k);
         let mut expected = vec![2 * cell, 2 * cell + 1, NORMAL.start + 3 * cell + 1, CURVATURE.start + cell];
         // Its green is the mean's.
         expected.extend([colors[0], colors[2]]);
         assert_eq!(local, expected);
         assert_eq!((row[2 * cell], row[2 * cell + 1], row[NORMAL.start + 3 * cell + 1]), (1.0, 0.5, 1.0));
         assert!((row[CURVATURE.start + cell] - 0.3).abs() < 1e-6 && (row[colors[2]] - 0.2).abs() < 1e-6);
+        // All of the colour is the box's own; it is in its middle third, and there is nothing to differ from.
+        assert!(row[OWN.start + cell] > 0.9 && row[OWN].iter().filter(|v| **v != 0.0).count() == 1);
+        let shares: Vec<f32> = row[SHARES].chunks(ENTRIES).map(|of| of.iter().sum()).collect();
+        let expected = [SHARE_WEIGHT, 0.0, 0.0, SHARE_WEIGHT, 0.0];
+        assert!(shares.iter().zip(expected).all(|(s, e)| (s - e).abs() < 1e-5), "{shares:?}");
+        assert!(row[CONTRAST].iter().all(|v| *v == 0.0));
         // Every number is told by bins that sum to the weight of one.
         let global: f32 = row[POSITION.start..].iter().sum();
         assert!((global - BIN_WEIGHT * (5 + 2 + 3 + 3) as f32).abs() < 1e-4, "{global}");
@@ -200,7 +232,7 @@ mod tests {
     #[test]
     fn variants_leave_out_what_the_paper_leaves_out() {
         let left = |v: Variant| FEATURES - v.without().iter().map(Range::len).sum::<usize>();
-        assert_eq!(Variant::ALL.map(left), [FEATURES, 1944, FEATURES - 6 * CELLS, FEATURES - 3 * CELLS]);
-        assert_eq!(SIZE.end, 1944 + 55 + 26 + 75);
+        assert_eq!(Variant::ALL.map(left), [FEATURES, 2312, FEATURES - 6 * CELLS, FEATURES - 1016]);
+        assert_eq!(SIZE.end, 2312 + 55 + 26 + 75);
     }
 }

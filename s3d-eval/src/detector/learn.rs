@@ -5,13 +5,14 @@ use crate::detector::boxes::{iou, suppress};
 use crate::detector::context::{Context as Field, Node};
 use crate::detector::features::{FEATURES, Variant, describe};
 use crate::detector::proposals::{NEGATIVE_IOU, POSITIVE_IOU, Prepared, Proposal};
-use crate::detector::svm::sparse::SparseRows;
+use crate::detector::svm::sparse::{SparseRow, SparseRows};
 use crate::detector::svm::{Linear, SvmOptions, train};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use s3d_dataset::{Context, Result};
+use s3d_geom::Aabb;
 use serde::{Deserialize, Serialize};
 
 /// What an error of a machine costs; of positive examples this times how many negative ones there are for
@@ -55,6 +56,8 @@ struct Source<'a> {
     spaces: &'a [Prepared<'a>],
     /// By space: proposals, and how much each overlaps an element of its class.
     proposals: &'a [Vec<(Proposal, f64)>],
+    /// Their descriptions: as many variants and rounds look at them, they are made once.
+    described: Vec<SparseRows>,
     /// The true boxes of all classes: rows, classes, spaces.
     truth: SparseRows,
     class_of_truth: Vec<usize>,
@@ -67,8 +70,11 @@ pub fn overlap(prepared: &Prepared<'_>, p: &Proposal) -> f64 {
     prepared.truth(p.class).map(|b| iou(b, &p.bbox)).fold(0.0, f64::max)
 }
 
-fn row_of(prepared: &Prepared<'_>, p: &Proposal) -> Vec<f32> {
-    describe(&prepared.space.index, prepared.space.frame.extent, &p.bbox)
+/// The descriptions of boxes of a space, a row each.
+fn describe_all<'b>(prepared: &Prepared<'_>, boxes: impl Iterator<Item = &'b Aabb>) -> SparseRows {
+    let mut rows = SparseRows::new(FEATURES);
+    boxes.for_each(|b| rows.push(&describe(&prepared.space.index, prepared.space.frame.extent, b)));
+    rows
 }
 
 /// Learns the machines of `variants` from spaces and their proposals. Classes learn on a thread each.
@@ -82,22 +88,20 @@ pub fn learn(
     seed: u64,
     ctx: &Context,
 ) -> Result<Vec<Machines>> {
-    let described: Vec<SparseRows> = spaces
-        .par_iter()
-        .map(|s| {
-            let mut rows = SparseRows::new(FEATURES);
-            let boxes = s.space.elements.iter();
-            boxes.for_each(|e| rows.push(&describe(&s.space.index, s.space.frame.extent, &e.bbox)));
-            rows
-        })
-        .collect();
+    let of_space = |(s, proposals): (&Prepared<'_>, &Vec<(Proposal, f64)>)| {
+        let truth = describe_all(s, s.space.elements.iter().map(|e| &e.bbox));
+        (truth, describe_all(s, proposals.iter().map(|(p, _)| &p.bbox)))
+    };
+    let (truths, described): (Vec<SparseRows>, Vec<SparseRows>) =
+        spaces.par_iter().zip(proposals).map(of_space).unzip();
     let mut truth = SparseRows::new(FEATURES);
-    described.iter().for_each(|rows| truth.append(rows));
+    truths.iter().for_each(|rows| truth.append(rows));
     let elements =
         || spaces.iter().enumerate().flat_map(|(i, s)| s.space.elements.iter().map(move |e| (i, e)));
     let source = Source {
         spaces,
         proposals,
+        described,
         truth,
         class_of_truth: elements().map(|(_, e)| e.class).collect(),
         space_of_truth: elements().map(|(i, _)| i).collect(),
@@ -136,16 +140,19 @@ impl Source<'_> {
         let mut pool = Pool { rows: SparseRows::new(FEATURES), positive: Vec::new(), space: Vec::new() };
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed.wrapping_mul(31).wrapping_add(class as u64));
         for (space, proposals) in self.proposals.iter().enumerate() {
-            let of_class = || proposals.iter().filter(|(p, _)| p.class == class);
-            let mut some: Vec<&(Proposal, f64)> = of_class().filter(|(_, o)| *o < NEGATIVE_IOU).collect();
+            let of_class = |i: &usize| proposals[*i].0.class == class;
+            let those = |which: &dyn Fn(f64) -> bool| -> Vec<usize> {
+                (0..proposals.len()).filter(of_class).filter(|i| which(proposals[*i].1)).collect()
+            };
+            let mut some = those(&|overlap| overlap < NEGATIVE_IOU);
             some.shuffle(&mut rng);
             some.truncate(FIRST_NEGATIVES);
-            let positive = of_class().filter(|(_, o)| *o >= POSITIVE_IOU).take(POSITIVES);
-            for (p, overlap) in positive.chain(some) {
-                pool.rows.push(&row_of(&self.spaces[space], p));
-                pool.positive.push(*overlap >= POSITIVE_IOU);
-                pool.space.push(space);
-            }
+            let mut all = those(&|overlap| overlap >= POSITIVE_IOU);
+            all.truncate(POSITIVES);
+            all.append(&mut some);
+            pool.rows.append(&self.described[space].select(all.iter().copied(), &[]));
+            pool.positive.extend(all.iter().map(|i| proposals[*i].1 >= POSITIVE_IOU));
+            pool.space.resize(pool.positive.len(), space);
         }
         pool
     }
@@ -187,11 +194,9 @@ impl Source<'_> {
                 let mut found = Vec::new();
                 for (class, machine) in machines.iter().enumerate() {
                     let Some(machine) = machine else { continue };
-                    let negatives =
-                        self.proposals[space].iter().filter(|(p, o)| p.class == class && *o < NEGATIVE_IOU);
-                    let mut rows = SparseRows::new(FEATURES);
-                    negatives.for_each(|(p, _)| rows.push(&row_of(&self.spaces[space], p)));
+                    let (proposals, rows) = (&self.proposals[space], &self.described[space]);
                     let mut scores: Vec<(f64, usize)> = (0..rows.len())
+                        .filter(|i| proposals[*i].0.class == class && proposals[*i].1 < NEGATIVE_IOU)
                         .map(|i| (machine.score(rows.row(i)), i))
                         .filter(|(score, _)| *score > MARGIN)
                         .collect();
@@ -217,7 +222,8 @@ impl Source<'_> {
     fn nodes(&self, space: usize, machines: &[Option<Linear>]) -> (Vec<Node>, Vec<bool>) {
         let prepared = &self.spaces[space];
         let proposals: Vec<Proposal> = self.proposals[space].iter().map(|(p, _)| *p).collect();
-        let scores = score(prepared, &proposals, &[machines]).swap_remove(0);
+        let score = |(i, p): (usize, &Proposal)| score_of(machines, p, self.described[space].row(i));
+        let scores: Vec<f64> = proposals.iter().enumerate().map(score).collect();
         let nodes = elements(&proposals, &scores);
         let mut taken = vec![false; prepared.space.elements.len()];
         let answers = nodes.iter().map(|n| {
@@ -246,16 +252,15 @@ pub fn score(
     proposals: &[Proposal],
     machines: &[&[Option<Linear>]],
 ) -> Vec<Vec<f64>> {
-    let mut scores = vec![Vec::with_capacity(proposals.len()); machines.len()];
-    for p in proposals {
-        let mut row = SparseRows::new(FEATURES);
-        row.push(&row_of(prepared, p));
-        for (scores, machines) in scores.iter_mut().zip(machines) {
-            let machine = machines[p.class].as_ref();
-            scores.push(machine.map_or(f64::NEG_INFINITY, |m| m.score(row.row(0))));
-        }
-    }
-    scores
+    let rows = describe_all(prepared, proposals.iter().map(|p| &p.bbox));
+    let of = |machines: &&[Option<Linear>]| {
+        proposals.iter().enumerate().map(|(i, p)| score_of(machines, p, rows.row(i))).collect()
+    };
+    machines.iter().map(of).collect()
+}
+
+fn score_of(machines: &[Option<Linear>], p: &Proposal, row: SparseRow<'_>) -> f64 {
+    machines[p.class].as_ref().map_or(f64::NEG_INFINITY, |machine| machine.score(row))
 }
 
 /// What stays of scored proposals after non-maximum suppression: class by class, the highest score first.

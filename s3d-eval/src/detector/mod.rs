@@ -27,6 +27,7 @@ pub mod context;
 pub mod features;
 pub mod learn;
 pub mod model;
+pub mod palette;
 pub mod proposals;
 pub mod space;
 pub mod spaces;

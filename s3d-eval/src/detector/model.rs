@@ -23,7 +23,7 @@ use std::path::Path;
 /// What the file says it is.
 const FORMAT: &str = "s3d detector";
 /// The form of the file, and of the descriptions that its weights are for.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// How a detector is trained.
 #[derive(Clone, Debug, PartialEq)]

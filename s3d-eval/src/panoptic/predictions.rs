@@ -150,7 +150,7 @@ fn check_categories(categories: &[Category], taxonomy: &Taxonomy, stuff: &[Class
             let [here, there] =
                 if stuff.contains(class) { ["a thing", "stuff"] } else { ["stuff", "a thing"] };
             return Err(format!(
-                "{name} is {here}, and by the taxonomy of the data set {there}, which counts"
+                "{name} is {here}, and by the taxonomy of the data set {there}, unless --stuff says otherwise"
             ));
         }
     }

@@ -60,10 +60,13 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     let classes = taxonomy.classes();
     let tables = tables(task, &COLUMNS, &counts, |images| rows(images, classes, &truth.stuff));
     let names = |of: &[Class]| of.iter().map(|class| class.name()).collect::<Vec<_>>().join(", ");
+    let but = match &*names(&truth.stuff) {
+        "" => String::new(),
+        stuff => format!(", but of {stuff} all of an image is one"),
+    };
     let source = format!(
-        "Truth: the labels of semantic images; each instance is a segment, but of {} all of an image is \
-         one. Void is what has no label, or lies outside of the photograph.",
-        names(&truth.stuff)
+        "Truth: the labels of semantic images; each instance is a segment{but}. Void is what has no label, or \
+         lies outside of the photograph."
     );
     let mut definition: Vec<&str> = vec![&source];
     definition.extend(DEFINITION);
@@ -128,7 +131,10 @@ impl<'a> Truth<'a> {
             return Err(Error::Input(message));
         };
         let taxonomy = table.taxonomy();
-        let stuff = taxonomy.classes().iter().copied().filter(|class| taxonomy.is_stuff(*class)).collect();
+        let stuff = match &task.options.stuff {
+            Some(list) => list.classes(taxonomy)?,
+            None => taxonomy.classes().iter().copied().filter(|class| taxonomy.is_stuff(*class)).collect(),
+        };
         let mut masked = BTreeSet::new();
         for area in task.folds.iter().flat_map(|fold| &fold.areas) {
             let photographs = task.data.photographs(*area)?.into_iter();

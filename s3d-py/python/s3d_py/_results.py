@@ -183,6 +183,7 @@ def evaluate(
     median_scale: bool = False,
     images: str | None = None,
     classes: Sequence[str] | None = None,
+    stuff: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Evaluation:
@@ -194,7 +195,8 @@ def evaluate(
     - `variant`: whose definition; the first of the protocol by default.
     - `folds`: "all" areas together, "each" for itself, or the three of the "paper"; or `areas`, together.
     - `bootstrap`: so many draws for 95 % intervals, by `seed`.
-    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` (det): see the protocols.
+    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` (det), `stuff` (panoptic): see the
+      protocols.
 
     Raises `FileError` for a prediction that is missing, double, or of the wrong size.
     """
@@ -207,6 +209,7 @@ def evaluate(
         median_scale=median_scale,
         images=images,
         classes=None if classes is None else list(classes),
+        stuff=None if stuff is None else list(stuff),
     )
     data, text = _native.evaluate(protocol, root_of(truth), Path(pred), how, threads, sink(progress))
     return Evaluation(json.loads(data), text)

@@ -3,6 +3,11 @@
 //! Areas 1, 3 and 6 are of one building, 2 and 4 of another, 5 of a third, as in 2D-3D-S. How many rooms of
 //! each type an area has, and how many beams, columns and windows, is counted from the names in the published
 //! table of labels; area 5 has 60 of its 68 rooms. What is in a room follows `outfit`. All else is made up.
+//!
+//! Each building has materials of its own, of the kinds that offices have: doors of veneer or painted, light
+//! table tops, dark chairs, sofas in warm colours, bookcases of painted steel or dark wood, boards white,
+//! green, black or of cork, all before walls that are almost white. So colours tell classes apart, though
+//! hardly one is the same in two buildings.
 
 use super::models::Models;
 use super::{BuildingOptions, FloorPlan, RoomOptions, Style, between, rng};
@@ -195,8 +200,15 @@ fn models(building: usize) -> Models {
         shelf_m: [[0.8, 1.0], [0.28, 0.34], [1.9, 2.15]],
         plain_boards: 0.1,
         board_m: [[1.2, 2.4], [1.0, 1.2]],
+        table_looks: vec![WHITE, Look::Plain("maple", [226, 202, 164])],
+        seat_looks: vec![Look::Plain("black_mesh", [46, 48, 52]), Look::Plain("navy_fabric", [44, 58, 92])],
+        couch_looks: vec![RUST_FABRIC, Look::Plain("burgundy_fabric", [136, 44, 52])],
+        shelf_looks: vec![
+            Look::Plain("blue_steel", [92, 112, 138]),
+            Look::Plain("graphite_steel", [88, 92, 98]),
+        ],
         leaves,
-        leaf_looks: vec![OAK],
+        leaf_looks: vec![OAK, Look::Plain("beech_veneer", [206, 160, 112])],
         door_m: [0.9, 2.05],
         shut: 0.3,
         panes,
@@ -221,7 +233,23 @@ fn models(building: usize) -> Models {
             shelf_m: [[1.0, 1.4], [0.4, 0.5], [1.8, 2.2]],
             plain_boards: 0.9,
             board_m: [[1.8, 3.2], [1.1, 1.3]],
-            leaf_looks: vec![WHITE, Look::Plain("grey_lacquer", [156, 162, 168])],
+            table_looks: vec![WHITE, Look::Plain("grey_laminate", [204, 206, 206])],
+            seat_looks: vec![
+                Look::Plain("charcoal_fabric", [66, 68, 72]),
+                Look::Plain("black_leather", [48, 45, 44]),
+            ],
+            couch_looks: vec![
+                Look::Plain("red_leather", [172, 52, 44]),
+                Look::Plain("cognac_leather", [168, 98, 52]),
+            ],
+            shelf_looks: vec![
+                Look::Plain("teal_steel", [76, 116, 122]),
+                Look::Plain("anthracite_steel", [74, 80, 88]),
+            ],
+            leaf_looks: vec![
+                Look::Plain("cherry_veneer", [158, 92, 58]),
+                Look::Plain("blue_lacquer", [64, 104, 140]),
+            ],
             door_m: [1.0, 2.1],
             shut: 0.35,
             window_m: [0.6, 2.4],
@@ -241,7 +269,20 @@ fn models(building: usize) -> Models {
             shelf_m: [[1.2, 1.8], [0.3, 0.38], [1.0, 1.35]],
             plain_boards: 0.4,
             board_m: [[0.9, 1.6], [0.8, 1.0]],
-            leaf_looks: vec![WALNUT],
+            table_looks: vec![
+                Look::Plain("birch", [232, 214, 180]),
+                Look::Plain("ivory_laminate", [240, 232, 214]),
+            ],
+            seat_looks: vec![
+                Look::Plain("forest_felt", [52, 74, 58]),
+                Look::Plain("black_fabric", [52, 50, 54]),
+            ],
+            couch_looks: vec![
+                Look::Plain("mustard_fabric", [206, 158, 54]),
+                Look::Plain("terracotta_fabric", [196, 104, 72]),
+            ],
+            shelf_looks: vec![Look::Plain("slate_blue_board", [82, 98, 124]), WALNUT],
+            leaf_looks: vec![WALNUT, Look::Plain("chestnut_veneer", [128, 82, 54])],
             door_m: [0.85, 2.0],
             shut: 0.2,
             window_m: [1.0, 2.2],
@@ -266,29 +307,24 @@ fn style(building: usize) -> Style {
                 FloorFinish::CarpetTiles([128.0, 112.0, 98.0]),
             ],
             ceilings: vec![CeilingFinish::Tiles],
-            woods: vec![OAK, Look::Plain("beech", [216, 180, 140])],
-            fabrics: vec![BLUE_FABRIC, GREY_FABRIC],
-            boards: vec![Pattern::Whiteboard, Pattern::Whiteboard, Pattern::Plan],
+            accents: vec![[158.0, 182.0, 172.0], [196.0, 176.0, 120.0]],
+            boards: vec![Pattern::Whiteboard, Pattern::Plan, Pattern::GreenBoard],
             ..plain
         },
         1 => Style {
             walls: vec![[214.0, 218.0, 220.0], [204.0, 206.0, 204.0], [226.0, 226.0, 224.0]],
-            accents: vec![[120.0, 128.0, 136.0], [170.0, 60.0, 52.0]],
+            accents: vec![[150.0, 158.0, 164.0], [172.0, 184.0, 170.0]],
             floors: vec![FloorFinish::Terrazzo],
             ceilings: vec![CeilingFinish::Plaster],
-            woods: vec![WHITE, Look::Plain("grey_board", [182, 184, 186])],
-            fabrics: vec![RUST_FABRIC, Look::Plain("black_leather", [58, 54, 52])],
-            boards: vec![Pattern::Whiteboard, Pattern::Cork],
+            boards: vec![Pattern::Whiteboard, Pattern::BlackBoard],
             ..plain
         },
         _ => Style {
             walls: vec![[238.0, 228.0, 204.0], [232.0, 218.0, 196.0]],
-            accents: vec![[206.0, 132.0, 96.0], [132.0, 150.0, 104.0]],
+            accents: vec![[150.0, 170.0, 180.0], [160.0, 174.0, 136.0]],
             floors: vec![FloorFinish::PlanksAlongX(Wood::OAK), FloorFinish::PlanksAlongY(Wood::WALNUT)],
             ceilings: vec![CeilingFinish::Boards, CeilingFinish::Plaster],
-            woods: vec![WALNUT],
-            fabrics: vec![Look::Plain("green_felt", [96, 122, 84]), GREY_FABRIC],
-            boards: vec![Pattern::Plan, Pattern::Cork],
+            boards: vec![Pattern::Plan, Pattern::GreenBoard, Pattern::Cork],
             ..plain
         },
     }

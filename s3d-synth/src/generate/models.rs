@@ -31,6 +31,14 @@ pub struct Models {
     pub plain_boards: f64,
     /// Width of boards, and height of the board itself.
     pub board_m: [[f32; 2]; 2],
+    /// What tables are made of.
+    pub table_looks: Vec<Look>,
+    /// What chairs are covered with.
+    pub seat_looks: Vec<Look>,
+    /// What sofas are covered with.
+    pub couch_looks: Vec<Look>,
+    /// What bookcases are made of.
+    pub shelf_looks: Vec<Look>,
     /// How door leaves are made.
     pub leaves: Vec<LeafModel>,
     /// What door leaves are made of.
@@ -58,6 +66,10 @@ impl Models {
             ("models of chairs", self.seats.is_empty()),
             ("models of sofas", self.couches.is_empty()),
             ("models of bookcases", self.shelves.is_empty()),
+            ("materials of tables", self.table_looks.is_empty()),
+            ("materials of chairs", self.seat_looks.is_empty()),
+            ("materials of sofas", self.couch_looks.is_empty()),
+            ("materials of bookcases", self.shelf_looks.is_empty()),
             ("models of door leaves", self.leaves.is_empty()),
             ("materials of door leaves", self.leaf_looks.is_empty()),
             ("divisions of windows", self.panes.is_empty()),

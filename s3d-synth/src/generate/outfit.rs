@@ -240,7 +240,9 @@ impl Outfitter<'_> {
     /// A piece where there is space for it, or nothing.
     fn place(&self, piece: Piece, space: &mut Space, rng: &mut ChaCha8Rng) -> Vec<Item> {
         let (models, style) = (self.models, self.style);
-        let (wood, fabric) = (pick(rng, &style.woods), pick(rng, &style.fabrics));
+        let woods = if matches!(piece, Shelves) { &models.shelf_looks } else { &models.table_looks };
+        let fabrics = if matches!(piece, Couch) { &models.couch_looks } else { &models.seat_looks };
+        let (wood, fabric) = (pick(rng, woods), pick(rng, fabrics));
         match piece {
             Desk => {
                 let size = sized(&models.table_m, rng);

@@ -170,6 +170,28 @@ pub(crate) fn plan() -> Raster<[u8; 3]> {
     c.finish()
 }
 
+/// A board of this colour with chalk on it: the name, a line below it, and a triangle with its height.
+pub(crate) fn chalkboard(ground: Color) -> Raster<[u8; 3]> {
+    const CHALK: Color = [232.0, 232.0, 222.0];
+    let wiped = |x: f32, y: f32| 26.0 * (fractal(x / 110.0, y / 50.0, 64, 47) - 0.4);
+    let mut c = Canvas::new(400, 220, |x, y| tint(ground, wiped(x, y)));
+    for (letter, x) in [(S, 36.0), (THREE, 92.0), (D, 146.0)] {
+        c.line(letter, [x, 30.0], 70.0, 6.0, CHALK);
+    }
+    c.line(&[[34.0, 112.0], [196.0, 106.0]], [0.0; 2], 1.0, 4.0, CHALK);
+    let corners = [[240.0, 180.0], [372.0, 180.0], [300.0, 60.0], [240.0, 180.0]];
+    c.line(&corners, [0.0; 2], 1.0, 4.0, [240.0, 216.0, 120.0]);
+    c.line(&[corners[2], [300.0, 180.0]], [0.0; 2], 1.0, 3.0, CHALK);
+    for (row, length) in [140.0, 110.0].into_iter().enumerate() {
+        let y = 140.0 + 28.0 * row as f32;
+        let wave: Vec<[f32; 2]> = (0..(length / 6.0) as u32)
+            .map(|i| [40.0 + 6.0 * i as f32, y - 7.0 + 14.0 * hash(i, row as u32, 48)])
+            .collect();
+        c.line(&wave, [0.0; 2], 1.0, 3.0, CHALK);
+    }
+    c.finish()
+}
+
 /// A cork board with sheets of paper and notes.
 pub(crate) fn cork() -> Raster<[u8; 3]> {
     let mut c = Canvas::new(420, 270, |x, y| {
@@ -315,6 +337,8 @@ mod tests {
     fn pictures_tell_left_from_right_and_top_from_bottom() {
         for picture in
             [whiteboard(), plan(), cork(), poster(), landscape(), sky(), editor(), chart(), keyboard()]
+                .into_iter()
+                .chain([chalkboard([44.0, 88.0, 68.0])])
         {
             let (w, h) = (picture.width(), picture.height());
             let differs = |other: &dyn Fn(u32, u32) -> (u32, u32)| {

@@ -46,6 +46,10 @@ pub enum Pattern {
     Chart,
     /// The keys of a keyboard.
     Keyboard,
+    /// A green board with chalk on it.
+    GreenBoard,
+    /// A black board with chalk on it.
+    BlackBoard,
 }
 
 impl Pattern {
@@ -71,6 +75,8 @@ impl Pattern {
             Pattern::Editor => "editor",
             Pattern::Chart => "chart",
             Pattern::Keyboard => "keyboard",
+            Pattern::GreenBoard => "green_board",
+            Pattern::BlackBoard => "black_board",
         }
     }
 
@@ -109,6 +115,8 @@ impl Pattern {
             Pattern::Editor => pictures::editor(),
             Pattern::Chart => pictures::chart(),
             Pattern::Keyboard => pictures::keyboard(),
+            Pattern::GreenBoard => pictures::chalkboard([44.0, 88.0, 68.0]),
+            Pattern::BlackBoard => pictures::chalkboard([46.0, 48.0, 52.0]),
         }
     }
 }

@@ -6,6 +6,7 @@ use crate::commands::on_threads;
 use crate::failure::Outcome;
 use crate::values::parsed;
 use clap::{Args, ValueEnum, value_parser};
+use s3d_dataset::ClassList;
 use s3d_eval::{EvalOptions, Folds, ImageKind, Protocol};
 use std::path::PathBuf;
 
@@ -35,6 +36,10 @@ pub(crate) struct EvalArgs {
     /// det: the classes to detect [default: the paper's 12]
     #[arg(long, value_name = "CLASS,…", value_delimiter = ',')]
     pub(crate) classes: Vec<String>,
+    /// panoptic: classes of which all of an image is one segment, or none [default: those that the taxonomy
+    /// calls stuff: ceiling,floor,wall]
+    #[arg(long, value_name = "CLASS,…|none", value_parser = parsed::<ClassList>)]
+    pub(crate) stuff: Option<ClassList>,
     /// depth: scale predictions to the median of the truth first, image by image.
     #[arg(long)]
     pub(crate) median_scale: bool,
@@ -76,6 +81,7 @@ pub(crate) fn run(args: EvalArgs) -> Outcome<()> {
     options.images = args.images;
     options.median_scale = args.median_scale;
     options.classes = (!args.classes.is_empty()).then_some(args.classes);
+    options.stuff = args.stuff;
     let evaluation = on_threads(args.threads, |context| {
         json.check_free()?;
         let evaluation = s3d_eval::evaluate(args.protocol, &args.truth, &args.pred, &options, context)?;

@@ -17,16 +17,23 @@ pub enum Fit {
     Share(f32),
     /// As long as things of its size are, where it holds most surfels: walls, floors, what is thin.
     Densest,
+    /// The longest run without a gap: what has a distance to its neighbours.
+    Run,
+    /// What lies before the plane around the window, off it by at most so many metres: boards on walls.
+    Front(f32),
 }
 
 /// What is tried.
-pub const FITS: [Fit; 7] = [
+pub const FITS: [Fit; 10] = [
     Fit::Share(1.0),
     Fit::Share(0.98),
     Fit::Share(0.95),
     Fit::Share(0.9),
     Fit::Share(0.8),
     Fit::Densest,
+    Fit::Run,
+    Fit::Front(0.06),
+    Fit::Front(0.13),
     Fit::Window,
 ];
 
@@ -36,9 +43,15 @@ const BEYOND_M: f32 = 0.05;
 const BIN_M: f32 = 0.01;
 /// Surfels on a thin thing lie so near to its middle, in metres.
 const THIN_M: f32 = 0.025;
+/// A run goes on over gaps up to this, in bins: less than the width of a surfel's cell.
+const GAP_BINS: usize = 4;
+/// A plane before which something may lie is looked for so far around the window, in metres.
+const AROUND_M: f32 = 0.2;
+/// What is nearer to a plane than this, in metres, is of it.
+const OF_PLANE_M: f32 = 0.01;
 
-/// The box of a window's surfels. Axes that are [`Fit::Densest`] come first, and the surfels outside of their
-/// interval do not count for the others. `None` if the window holds no surfel.
+/// The box of a window's surfels. Axes that are [`Fit::Densest`] or [`Fit::Front`] come first, and the
+/// surfels outside of their interval do not count for the others. `None` if the window holds no surfel, or no plane.
 pub fn fit(index: &Index, window: &Aabb, size: Vec3, fits: [Fit; 3]) -> Option<Aabb> {
     let grown = Aabb { min: window.min - BEYOND_M, max: window.max + BEYOND_M };
     let mut surfels: Vec<&Surfel> = index.within(&grown).collect();
@@ -52,10 +65,19 @@ pub fn fit(index: &Index, window: &Aabb, size: Vec3, fits: [Fit; 3]) -> Option<A
         }
     }
     for (axis, how) in fits.into_iter().enumerate() {
-        if let Fit::Share(share) = how {
-            let [low, high] = shortest(&surfels, &grown, axis, share)?;
+        if let Fit::Front(layer) = how {
+            let [low, high] = front(index, &surfels, &grown, axis, layer)?;
             (out.min[axis], out.max[axis]) = (low, high);
+            surfels.retain(|s| s.position[axis] >= low && s.position[axis] <= high);
         }
+    }
+    for (axis, how) in fits.into_iter().enumerate() {
+        let [low, high] = match how {
+            Fit::Share(share) => shortest(&surfels, &grown, axis, share)?,
+            Fit::Run => run(&surfels, &grown, axis)?,
+            Fit::Window | Fit::Densest | Fit::Front(_) => continue,
+        };
+        (out.min[axis], out.max[axis]) = (low, high);
     }
     if surfels.is_empty() { None } else { Some(out) }
 }
@@ -125,9 +147,59 @@ fn shortest(surfels: &[&Surfel], grown: &Aabb, axis: usize, share: f32) -> Optio
     if ends.is_empty() { None } else { Some([ends.min[axis], ends.max[axis]]) }
 }
 
+/// The longest run of bins that surfels reach into, to the ends of what these stand for. Of equal ones the
+/// first.
+fn run(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Option<[f32; 2]> {
+    let bin = |x: f32| ((x - grown.min[axis]) / BIN_M).max(0.0) as usize;
+    let mut covered = vec![false; bin(grown.max[axis]) + 1];
+    for s in surfels {
+        let last = bin(s.extent.max[axis]).min(covered.len() - 1);
+        covered[bin(s.extent.min[axis]).min(last)..=last].fill(true);
+    }
+    let mut best: Option<[usize; 2]> = None;
+    let mut now: Option<[usize; 2]> = None;
+    for at in (0..covered.len()).filter(|&i| covered[i]) {
+        let start = now.filter(|[_, end]| at - end <= GAP_BINS + 1).map_or(at, |[start, _]| start);
+        now = Some([start, at]);
+        if best.is_none_or(|[a, b]| at - start > b - a) {
+            best = now;
+        }
+    }
+    let [start, end] = best?;
+    let (low, high) = (grown.min[axis] + start as f32 * BIN_M, grown.min[axis] + (end + 1) as f32 * BIN_M);
+    let within = surfels.iter().filter(|s| s.position[axis] >= low && s.position[axis] <= high);
+    let ends = within.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
+    if ends.is_empty() { None } else { Some([ends.min[axis], ends.max[axis]]) }
+}
+
+/// The interval from a plane's near side to the end of what lies before it, at most `layer` off it. The plane
+/// is the densest of the surfels around the window, and before it is where most of the window's surfels lie.
+fn front(index: &Index, surfels: &[&Surfel], grown: &Aabb, axis: usize, layer: f32) -> Option<[f32; 2]> {
+    let mut wide = Aabb { min: grown.min - AROUND_M, max: grown.max + AROUND_M };
+    (wide.min[axis], wide.max[axis]) = (grown.min[axis], grown.max[axis]);
+    let around: Vec<&Surfel> = index.within(&wide).filter(|s| !grown.contains(s.position)).collect();
+    let [low, high] = densest(&around, &wide, axis, OF_PLANE_M)?;
+    let plane = 0.5 * (low + high);
+    let off = |s: &&&Surfel| {
+        let off = s.position[axis] - plane;
+        (OF_PLANE_M..=layer).contains(&off.abs()).then_some(off)
+    };
+    let above = surfels.iter().filter_map(|s| off(&s)).fold(0i64, |sum, off| sum + off.signum() as i64);
+    let before = surfels.iter().filter(|s| off(s).is_some_and(|o| (o > 0.0) == (above > 0)));
+    let ends = before.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
+    if above == 0 || ends.is_empty() {
+        return None;
+    }
+    Some(if above > 0 {
+        [plane + OF_PLANE_M, ends.max[axis].min(plane + layer)]
+    } else {
+        [ends.min[axis].max(plane - layer), plane - OF_PLANE_M]
+    })
+}
+
 /// For each axis what brings windows nearest to the boxes that they are for, by mean overlap on that axis:
-/// axes that are best fitted by [`Fit::Densest`] are found first. `examples` have an index, a window and a
-/// box each.
+/// axes that are best fitted by [`Fit::Densest`] or [`Fit::Front`] are found first. `examples` have an index,
+/// a window and a box each.
 pub fn learn(examples: &[(&Index, Aabb, Aabb)], size: Vec3) -> [Fit; 3] {
     let mut fits = [Fit::Share(1.0); 3];
     for _ in 0..2 {
@@ -193,6 +265,29 @@ mod tests {
         assert_eq!(fits[1], Fit::Densest);
         let found = fit(&index, &window, size, fits).unwrap();
         assert!(crate::detector::boxes::iou(&found, &truth) > 0.9, "{found:?}");
+        // With a board of 2.5 cm, 1 cm off the wall, whose edges are not seen: its back is told by the wall.
+        let mut surfels = index.surfels().to_vec();
+        let is_hidden = |p: Vec3| p.y > 0.99 && (1.0..3.0).contains(&p.x) && (1.0..2.0).contains(&p.z);
+        let hidden: Vec<Surfel> = surfels.iter().filter(|s| is_hidden(s.position)).copied().collect();
+        surfels.retain(|s| !is_hidden(s.position));
+        surfels.extend(hidden.iter().map(|s| {
+            let position = s.position.with_y(0.965);
+            let half = vec3(0.02, 0.001, 0.02);
+            Surfel { position, extent: Aabb { min: position - half, max: position + half }, ..*s }
+        }));
+        let truth = Aabb { min: vec3(1.005, 0.964, 1.005), max: vec3(2.995, 0.99, 1.995) };
+        let window = Aabb { min: vec3(0.9, 0.9, 1.0), max: vec3(2.9, 1.1, 2.0) };
+        let index = Index::new(surfels);
+        let fits = learn(&[(&index, window, truth)], truth.size());
+        assert!(matches!(fits[1], Fit::Front(_)), "{fits:?}");
+        let found = fit(&index, &window, truth.size(), fits).unwrap();
+        assert!(crate::detector::boxes::iou(&found, &truth) > 0.85, "{found:?} {fits:?}");
+        // A run ends where there is a gap.
+        let line =
+            |x: f32| index.surfels().iter().find(|s| s.position.z == 0.0 && (s.position.x - x).abs() < 0.03);
+        let some: Vec<&Surfel> = [0.1, 0.15, 0.2, 0.4, 0.45].into_iter().filter_map(line).collect();
+        let found = run(&some, &Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 0).unwrap();
+        assert!((found[1] - found[0] - 0.14).abs() < 0.02 && found[1] < 0.3, "{found:?}");
         let nowhere = Aabb { min: vec3(8.0, 8.0, 8.0), max: vec3(9.0, 9.0, 9.0) };
         assert_eq!(fit(&index, &nowhere, size, fits), None);
         assert_eq!(fit(&index, &nowhere, size, [Fit::Window; 3]), None);

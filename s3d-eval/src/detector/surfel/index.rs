@@ -1,5 +1,6 @@
 //! Finds the surfels of a space in a box.
 
+use crate::detector::palette::Shade;
 use crate::detector::surfel::Surfel;
 use glam::{DVec3, IVec3, Vec3, ivec3};
 use s3d_geom::Aabb;
@@ -11,6 +12,7 @@ const CELLS_A_M: f32 = 10.0;
 #[derive(Clone, Debug)]
 pub struct Index {
     surfels: Vec<Surfel>,
+    shades: Vec<Shade>,
     cells: IVec3,
     /// Where each row of cells along x begins.
     rows: Vec<u32>,
@@ -37,7 +39,8 @@ impl Index {
         }
         let sum = surfels.iter().map(|s| s.color.as_dvec3()).sum::<DVec3>();
         let mean_color = (sum / surfels.len().max(1) as f64).as_vec3();
-        Self { surfels, cells, rows, mean_color }
+        let shades = surfels.iter().map(|s| Shade::new(s.color, mean_color)).collect();
+        Self { surfels, shades, cells, rows, mean_color }
     }
 
     /// Their mean colour; black without any.
@@ -52,17 +55,26 @@ impl Index {
 
     /// Those whose positions are in a box, in their order.
     pub fn within<'a>(&'a self, b: &'a Aabb) -> impl Iterator<Item = &'a Surfel> + 'a {
+        self.places_within(b).map(|i| &self.surfels[i])
+    }
+
+    /// As [`within`](Self::within), with the shades of their colours.
+    pub fn shades_within<'a>(&'a self, b: &'a Aabb) -> impl Iterator<Item = (&'a Surfel, &'a Shade)> + 'a {
+        self.places_within(b).map(|i| (&self.surfels[i], &self.shades[i]))
+    }
+
+    fn places_within<'a>(&'a self, b: &'a Aabb) -> impl Iterator<Item = usize> + 'a {
         let low = (b.min * CELLS_A_M).floor().as_ivec3().max(IVec3::ZERO);
         let high = (b.max * CELLS_A_M).floor().as_ivec3().min(self.cells - 1);
         let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| ivec3(0, y, z)));
         rows.flat_map(move |c| {
             let row = (c.z * self.cells.y + c.y) as usize;
-            let surfels = &self.surfels[self.rows[row] as usize..self.rows[row + 1] as usize];
+            let (from, to) = (self.rows[row] as usize, self.rows[row + 1] as usize);
             let x = |s: &Surfel| (s.position.x * CELLS_A_M).floor() as i32;
-            let start = surfels.partition_point(|s| x(s) < low.x);
-            surfels[start..].iter().take_while(move |s| x(s) <= high.x)
+            let start = from + self.surfels[from..to].partition_point(|s| x(s) < low.x);
+            (start..to).take_while(move |&i| x(&self.surfels[i]) <= high.x)
         })
-        .filter(|s| b.contains(s.position))
+        .filter(|&i| b.contains(self.surfels[i].position))
     }
 }
 

@@ -84,7 +84,10 @@ pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Contex
             fold.number, fold.train, fold.test
         ));
         let model = Model::train(&spaces, options, ctx)?;
-        table.rows_of_fold(test(&model, &testing, ctx)?);
+        let rows = test(&model, &testing, ctx)?;
+        let told = rows.iter().filter_map(|row| Some(format!("{} {:.1}", row.name, row.overall()?)));
+        ctx.info(format_args!("fold {}: AP in %: {}", fold.number, told.collect::<Vec<_>>().join(", ")));
+        table.rows_of_fold(rows);
     }
     Ok(table)
 }

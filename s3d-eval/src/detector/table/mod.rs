@@ -17,6 +17,13 @@ pub struct Row {
     pub ap: Precisions,
 }
 
+impl Row {
+    /// The mean of the classes that are there at IoU .5, in per cent.
+    pub fn overall(&self) -> Option<f64> {
+        mean(self.ap[0].iter().flatten().map(|ap| 100.0 * ap))
+    }
+}
+
 /// Average precision by threshold (IoU .5, then .25), then by class, 0 to 1; `None` for classes that are not
 /// there.
 pub type Precisions = [Vec<Option<f64>>; 2];
