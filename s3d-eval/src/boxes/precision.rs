@@ -69,8 +69,9 @@ fn area(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
         largest = largest.max(*precision);
         *precision = largest;
     }
-    // Recall grows by as much with each hit.
-    precisions.iter().filter(|(hit, _)| *hit).map(|(_, precision)| precision).sum::<f64>() / truth as f64
+    // Recall grows by as much with each hit. The sum of none is −0.
+    let of_hits = precisions.iter().filter(|(hit, _)| *hit).map(|(_, precision)| precision);
+    (0.0 + of_hits.sum::<f64>()) / truth as f64
 }
 
 /// Open3D-ML's mean of sampled precision.
@@ -138,6 +139,8 @@ mod tests {
         let score = ClassScore::new(4, &mut judged("tftt"), Rule::Mmdetection3d);
         assert!((score.ap - (1.0 + 0.75 + 0.75) / 4.0).abs() < 1e-15);
         assert_eq!((score.recall, score.hits), (0.75, 3));
+        let nothing = ClassScore::new(4, &mut judged("ff"), Rule::Mmdetection3d).ap;
+        assert!(nothing == 0.0 && nothing.is_sign_positive());
     }
 
     #[test]
