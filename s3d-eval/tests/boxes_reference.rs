@@ -7,7 +7,7 @@ use s3d_dataset::s3d_label::Class;
 use s3d_eval::boxes::{ClassScore, Detection, GroundTruth, Rule, average_precision, mean};
 use s3d_eval::{Context, EvalOptions, Folds, Protocol, evaluate};
 use s3d_io::dataset::{InstanceEntry, Layout};
-use s3d_io::fs::{Checksum, checksum_of_file, write_json};
+use s3d_io::fs::{checksum_of_file, read_json, write_json};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -124,18 +124,17 @@ fn with_instances(detected: &Detected) -> &'static Path {
     });
     let path = Layout::new(root).instances_json(5);
     let (list, manifest) = (root.join("files.csv"), root.join("manifest.json"));
-    let sums = || [&path, &list].map(|file| checksum_of_file(file).unwrap());
-    let before = sums();
+    let (bytes, sum) = checksum_of_file(&path).unwrap();
     write_json(&path, &entries.collect::<Vec<_>>()).unwrap();
-    let replace = |file: &Path, of: usize| {
-        let ((bytes, sum), (old_bytes, old_sum)) = (sums()[of], before[of]);
-        let text = fs::read_to_string(file).unwrap();
-        let line = |bytes: u64, sum: Checksum| format!("{bytes},{sum}");
-        let changed = text.replace(&line(old_bytes, old_sum), &line(bytes, sum));
-        fs::write(file, changed.replace(&old_sum.to_string(), &sum.to_string())).unwrap();
-    };
-    replace(&list, 0);
-    replace(&manifest, 1);
+    // The list of files and the manifest tell of the new one.
+    let (new_bytes, new_sum) = checksum_of_file(&path).unwrap();
+    let text = fs::read_to_string(&list).unwrap();
+    fs::write(&list, text.replace(&format!("{bytes},{sum}"), &format!("{new_bytes},{new_sum}"))).unwrap();
+    let mut value: Value = read_json(&manifest).unwrap();
+    let files = &mut value["files"];
+    files["bytes"] = (files["bytes"].as_u64().unwrap() + new_bytes - bytes).into();
+    files["xxh3_128"] = checksum_of_file(&list).unwrap().1.to_string().into();
+    write_json(&manifest, &value).unwrap();
     root
 }
 
