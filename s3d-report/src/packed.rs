@@ -32,8 +32,8 @@ pub(crate) fn png_url(image: &Raster<[u8; 3]>, content: Content) -> String {
 
 /// An image in good quality as a `data:` URL, its colours as fine as its light.
 ///
-/// Not the `image` crate's encoder, which takes three times as long. Not the instructions for AVX2 of this one:
-/// they save a fifth, and round otherwise, so that bytes would depend on the processor.
+/// Not the `image` crate's encoder, which takes twice as long. Not the instructions for AVX2 of this
+/// one: they save a fifth, and round otherwise, so that bytes would depend on the processor.
 pub(crate) fn jpeg_url(image: &Raster<[u8; 3]>) -> Result<String, EncodingError> {
     let side = |pixels: u32| {
         let longer = |_| EncodingError::Write(format!("{pixels} pixels are more than JPEG has"));

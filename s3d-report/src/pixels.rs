@@ -109,8 +109,8 @@ impl Images {
         Ok(Some(Self { size, seen, widths, rgb, normal, label, depth }))
     }
 
-    /// The images as they are shown, and a small one for a grid. `face` tells what each pixel of an image of this
-    /// size sees.
+    /// The images as they are shown, and a small one for a grid. `face` tells what each pixel of an image of
+    /// this size sees.
     pub(crate) fn picture(
         &self,
         face: impl FnOnce([u32; 2]) -> Option<Raster<u32>>,

@@ -59,8 +59,8 @@ const LINES: u32 = 256;
 /// Below so many pixels their mean is a multiplication.
 const FEW: u32 = 4096;
 
-/// Means of an image that comes line by line: of the pixels that lie in a pixel, of those that are not `missing`;
-/// `missing` where there are none.
+/// Means of an image that comes line by line: of the pixels that lie in a pixel, of those that are not
+/// `missing`; `missing` where there are none.
 ///
 /// Lines are added up first, columns then, so that most of it is done 16 bytes at a time.
 pub(crate) struct Mean {

@@ -1,7 +1,7 @@
 //! Filters taken off again. Source: the PNG specification, section 9.
 //!
-//! In a line by Paeth each pixel waits for the one before. Lines that follow one another go together instead, each
-//! a pixel behind the line above it: 16 bytes at a time, without a branch, about ten times as fast.
+//! In a line by Paeth each pixel waits for the one before. Lines that follow one another go together instead,
+//! each a pixel behind the line above it: 16 bytes at a time, without a branch, about ten times as fast.
 
 use super::expected;
 use crate::Error;
@@ -9,9 +9,10 @@ use crate::Error;
 /// Bytes that go together.
 const LANES: usize = 16;
 
-/// Takes the filters off some lines of an image, in place: as [`filter`](super::filter) makes them, for each line the
-/// filter's number, which stays, and then `line` bytes of `pixel` bytes a pixel. `above` is the line before the
-/// first, without filter and number; at the top of an image there is none. All five filters of PNG are known.
+/// Takes the filters off some lines of an image, in place: as [`filter`](super::filter) makes them, for each
+/// line the filter's number, which stays, and then `line` bytes of `pixel` bytes a pixel. `above` is the line
+/// before the first, without filter and number; at the top of an image there is none. All five filters of PNG
+/// are known.
 ///
 /// ```
 /// use s3d_deflate::png::{Filter, filter, unfilter};
@@ -205,14 +206,14 @@ mod tests {
     proptest! {
         #[test]
         fn the_fast_form_is_the_plain_one(
-            (pixel, width, lines) in (1usize..5, 1usize..30, 1usize..24).prop_flat_map(|(pixel, width, lines)| {
+            (pixel, width, lines) in (1usize..5, 1usize..30, 1usize..24).prop_flat_map(|(pixel, width, n)| {
                 // Paeth more often than others, and neighbours that are alike.
                 let line = (prop_oneof![3 => Just(4u8), 1 => 0u8..5], prop_oneof![Just(3u8), Just(255u8)])
                     .prop_flat_map(move |(number, most)| {
                         proptest::collection::vec(0..=most, pixel * width)
                             .prop_map(move |bytes| [vec![number], bytes].concat())
                     });
-                let lines = proptest::collection::vec(line, lines).prop_map(|lines| lines.concat());
+                let lines = proptest::collection::vec(line, n).prop_map(|lines| lines.concat());
                 (Just(pixel), Just(width), lines)
             }),
             cut in 0usize..24,
