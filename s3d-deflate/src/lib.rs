@@ -96,6 +96,12 @@ pub enum Error {
         /// How many of them make a line.
         line: usize,
     },
+    /// A line of a PNG image begins with a number that no filter has.
+    #[error("a filter of number {number}, not 0 to 4")]
+    UnknownFilter {
+        /// The number.
+        number: u8,
+    },
 }
 
 #[cfg(doctest)]

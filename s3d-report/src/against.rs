@@ -14,6 +14,7 @@ use s3d_dataset::{
 };
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, ImageName};
+use s3d_io::image::PngReader;
 use s3d_label::LabelTable;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -89,18 +90,13 @@ pub(crate) fn write(
     let pairs = pairs(&other, content, &std::mem::take(&mut comparison.images));
     let progress = ctx.progress("comparing", "pictures", pairs.len() as u64);
     let jobs: Vec<(usize, &Pair)> = pairs.iter().enumerate().collect();
-    let made = map_in_order(
-        ctx,
-        &jobs,
-        || (),
-        |(), (number, pair)| {
-            let mut faults = Faults::default();
-            let bytes =
-                write_picture(&other, table.as_ref(), (*number, pair), options, scripts, &mut faults)?;
-            progress.add(1);
-            Ok((bytes, faults.into_vec()))
-        },
-    )?;
+    let made = map_in_order(ctx, &jobs, PngReader::default, |reader, (number, pair)| {
+        let mut faults = Faults::default();
+        let bytes =
+            write_picture(&other, table.as_ref(), (*number, pair), options, scripts, (reader, &mut faults))?;
+        progress.add(1);
+        Ok((bytes, faults.into_vec()))
+    })?;
     drop(progress);
     let matrix = comparison.labels.iter().flat_map(|labels| &labels.matrix);
     let place_of: BTreeMap<_, usize> = matrix.map(|pair| (pair.a, pair.b)).zip(0..).collect();
@@ -182,14 +178,15 @@ fn write_picture(
     (number, pair): (usize, &Pair),
     options: &ReportOptions,
     scripts: &Scripts,
-    faults: &mut Faults,
+    (reader, faults): (&mut PngReader, &mut Faults),
 ) -> Result<Option<u64>> {
-    let Some(images) = Images::read(data, &pair.other, table, faults)? else { return Ok(None) };
     let widths = match pair.shown {
         Shown::Picture(_) => options.of_views(),
         Shown::Panorama(_) => options.of_panoramas(),
     };
+    let read = Images::read(data, &pair.other, table, widths, (reader, faults))?;
+    let Some(images) = read else { return Ok(None) };
     let path = pair.other.path(data.layout(), Domain::Rgb);
-    let (picture, _) = images.picture(widths, None).map_err(|e| FileError::format(&path, e.to_string()))?;
+    let (picture, _) = images.picture(|_| None).map_err(|e| FileError::format(&path, e.to_string()))?;
     Ok(Some(scripts.write(&format!("other_{number}"), &picture)?))
 }

@@ -7,13 +7,15 @@ use crate::index::{
 };
 use crate::mesh;
 use crate::pixels::{Images, Picture, Shares, Widths, nothing_left};
+use crate::reduce::nearest;
 use crate::script::Scripts;
 use crate::selection::{Place, places};
 use crate::write::ReportOptions;
 use s3d_dataset::{Context, DataSet, Progress, Result, map_in_order};
-use s3d_geom::TriMesh;
+use s3d_geom::{Camera, Raster, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, PhotographRecord, ViewRecord};
+use s3d_io::image::PngReader;
 use s3d_label::LabelTable;
 use s3d_render::{Caster, Scene};
 use serde::Serialize;
@@ -102,6 +104,22 @@ struct ViewPicture {
 enum Job<'a> {
     Panorama(usize, &'a DatasetImage),
     Views(usize, &'a [DatasetImage]),
+}
+
+/// What a thread makes pictures with.
+struct Tools<'s, 'm> {
+    reader: PngReader,
+    caster: Option<Caster<'s, 'm>>,
+}
+
+/// The face that each pixel of an image of this size sees, which shows the nearest pixels of the camera's.
+fn faces(caster: &mut Caster<'_, '_>, camera: &Camera, [w, h]: [u32; 2]) -> Raster<u32> {
+    let stride = camera.width / w.max(1);
+    if [w * stride, h * stride] == [camera.width, camera.height] {
+        // Every pixel that is shown, and no other.
+        return caster.cast_strided(camera, stride).face;
+    }
+    nearest(&caster.cast(camera).face, [w, h])
 }
 
 impl<'a> Content<'a> {
@@ -217,14 +235,13 @@ impl<'a> Content<'a> {
         let results = map_in_order(
             ctx,
             &jobs,
-            || scene.as_ref().map(Caster::new),
-            |caster, job| {
+            || Tools { reader: PngReader::default(), caster: scene.as_ref().map(Caster::new) },
+            |tools, job| {
                 let mut faults = Faults::default();
                 let (mut made, mut bytes) = (Vec::new(), 0);
                 match job {
                     Job::Panorama(i, image) => {
-                        let (one, picture, _) =
-                            self.make(image, of_panorama, caster.as_mut(), &mut faults)?;
+                        let (one, picture, _) = self.make(image, of_panorama, tools, &mut faults)?;
                         if let Some(picture) = picture {
                             bytes += scripts.write(&format!("pano_{i}"), &picture.picture)?;
                         }
@@ -237,8 +254,7 @@ impl<'a> Content<'a> {
                             let mut pictures = Vec::with_capacity(some.len());
                             for image in some {
                                 ctx.check()?;
-                                let (one, picture, thumb) =
-                                    self.make(image, of_view, caster.as_mut(), &mut faults)?;
+                                let (one, picture, thumb) = self.make(image, of_view, tools, &mut faults)?;
                                 made.push(one);
                                 pictures.push(picture);
                                 thumbs.push(thumb);
@@ -270,11 +286,11 @@ impl<'a> Content<'a> {
         &self,
         image: &DatasetImage,
         widths: Widths,
-        caster: Option<&mut Caster<'_, '_>>,
+        Tools { reader, caster }: &mut Tools<'_, '_>,
         faults: &mut Faults,
     ) -> Result<(ReadImage, Option<ViewPicture>, Option<String>)> {
         let root = self.data.layout().root();
-        let images = Images::read(self.data, image, self.table.as_ref(), faults)?;
+        let images = Images::read(self.data, image, self.table.as_ref(), widths, (reader, faults))?;
         if images.is_none() {
             nothing_left(self.data, image, faults);
         }
@@ -305,9 +321,9 @@ impl<'a> Content<'a> {
             }
         });
         let Some(images) = images else { return Ok((ReadImage { located, seen: None }, None, None)) };
-        let hits = camera.as_ref().zip(caster).map(|(camera, caster)| caster.cast(camera));
+        let faces = |size| Some(faces(caster.as_mut()?, camera.as_ref()?, size));
         let (picture, thumb) = images
-            .picture(widths, hits.as_ref().map(|hits| &hits.face))
+            .picture(faces)
             .map_err(|e| FileError::format(&image.path(self.data.layout(), Domain::Rgb), e.to_string()))?;
         let pinhole = camera.filter(|_| image.frame != Frame::Panorama).map(|camera| {
             let [[fx, _, cx], [_, fy, cy], _] = camera.k_matrix();

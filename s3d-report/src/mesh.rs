@@ -315,8 +315,9 @@ fn write_textures(ctx: &Context, area: u32, mesh: &TriMesh, scripts: &Scripts) -
                 let size = [texture.image.width(), texture.image.height()];
                 let width = ((f64::from(size[0]) * scale).ceil() as u32).clamp(1, TEXTURE_WIDTH);
                 let small = mean(&texture.image, reduced_size(size, width), None);
-                let failed =
-                    |e: image::ImageError| FileError::format(Path::new(&texture.name), e.to_string());
+                let failed = |e: jpeg_encoder::EncodingError| {
+                    FileError::format(Path::new(&texture.name), e.to_string())
+                };
                 urls.push(jpeg_url(&small).map_err(failed)?);
             }
             scripts.write(&format!("textures_{area}_{k}"), &urls)

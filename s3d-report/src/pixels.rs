@@ -4,17 +4,18 @@
 use crate::faults::{Faults, name};
 use crate::index::rounded;
 use crate::packed::{jpeg_url, png_url};
-use crate::reduce::{mean, nearest, pack, reduced_size};
+use crate::reduce::{Mean, Nearest, mean, pack, reduced_size};
+use jpeg_encoder::EncodingError;
 use s3d_dataset::{DataSet, Result};
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
-use s3d_io::image::{Content, decode_gray16, decode_rgb8};
+use s3d_io::image::{Content, PngLines, PngReader};
 use s3d_label::{LabelId, LabelTable};
 use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The colour of a pixel that sees nothing; in a photograph also of one beside it.
 const MISSING_COLOR: [u8; 3] = [0; 3];
@@ -59,10 +60,11 @@ pub(crate) struct Widths {
     pub(crate) thumb: Option<u32>,
 }
 
-/// The decoded images, those that are there and whole, and what they show.
+/// The images of a picture, those that are there and whole, reduced, and what they show.
 pub(crate) struct Images {
     pub(crate) size: [u32; 2],
     pub(crate) seen: Shares,
+    widths: Widths,
     rgb: Option<Raster<[u8; 3]>>,
     normal: Option<Raster<[u8; 3]>>,
     label: Option<Raster<[u8; 3]>>,
@@ -75,83 +77,207 @@ impl Images {
         data: &DataSet,
         image: &DatasetImage,
         table: Option<&LabelTable>,
-        faults: &mut Faults,
+        widths: Widths,
+        (reader, faults): (&mut PngReader, &mut Faults),
     ) -> Result<Option<Self>> {
-        let Some(mut images) = decode(data, image, faults)? else { return Ok(None) };
-        let path = image.path(data.layout(), Domain::Semantic);
-        let mut counted = None;
-        if let (Some(label), Some(table)) = (&images.label, table) {
-            counted = faults.keep(data.layout().root(), count(label, table, &path))?;
-            if counted.is_none() {
-                images.label = None;
+        let mut files = Files { data, image, size: None, reader, faults };
+        let mut no_color = None;
+        let rgb = files.colors(Domain::Rgb, widths.rgb, MISSING_COLOR)?.map(|(rgb, missing)| {
+            no_color = Some(missing);
+            rgb
+        });
+        let normal = files.colors(Domain::Normal, widths.lossless, MISSING_NORMAL)?.map(|(normal, _)| normal);
+        let (mut label, mut counted) = (None, None);
+        if let Some((image, counts, path)) = files.labels(widths.lossless, table)? {
+            label = Some(image);
+            if let (Some(table), Some(counts)) = (table, counts) {
+                let root = data.layout().root();
+                counted = files.faults.keep(root, counts.by_class(table, &path))?;
+                label = label.filter(|_| counted.is_some());
             }
         }
-        images.seen = images.shares(counted);
-        Ok(Some(images))
+        let mut no_depth = None;
+        let depth = files.depth(widths.lossless)?.map(|(depth, missing)| {
+            no_depth = Some(missing);
+            depth
+        });
+        let all_gone = rgb.is_none() && normal.is_none() && label.is_none() && depth.is_none();
+        let Some(size) = files.size.filter(|_| !all_gone) else { return Ok(None) };
+        // Depth misses what is beyond its range; labels do not.
+        let missing = counted.as_ref().map(|counted| counted.missing).or(no_depth).or(no_color);
+        let seen = shares(size, counted, missing);
+        Ok(Some(Self { size, seen, widths, rgb, normal, label, depth }))
     }
 
-    /// The images as they are shown, and a small one for a grid. `face` is what each pixel sees.
+    /// The images as they are shown, and a small one for a grid. `face` tells what each pixel of an image of
+    /// this size sees.
     pub(crate) fn picture(
         &self,
-        widths: Widths,
-        face: Option<&Raster<u32>>,
-    ) -> image::ImageResult<(Picture, Option<String>)> {
-        let reduced = |width| reduced_size(self.size, width);
-        let size = reduced(widths.lossless);
-        let small = |image: &Option<Raster<[u8; 3]>>, width, missing| {
-            image.as_ref().map(|image| mean(image, reduced(width), Some(missing)))
-        };
-        let rgb = small(&self.rgb, widths.rgb, MISSING_COLOR);
+        face: impl FnOnce([u32; 2]) -> Option<Raster<u32>>,
+    ) -> Result<(Picture, Option<String>), EncodingError> {
+        let size = reduced_size(self.size, self.widths.lossless);
         // Of the smaller image: means of means.
-        let thumb = widths.thumb.and_then(|width| small(&rgb, width, MISSING_COLOR));
-        let jpeg = |image: Option<Raster<[u8; 3]>>| image.as_ref().map(jpeg_url).transpose();
-        let depth = |depth| png_url(&nearest(depth, size).map(|v| pack(u32::from(v))), Content::Photo);
+        let small = |width, rgb: &Raster<_>| mean(rgb, reduced_size(self.size, width), Some(MISSING_COLOR));
+        let thumb = self.widths.thumb.zip(self.rgb.as_ref()).map(|(width, rgb)| small(width, rgb));
+        let jpeg = |image: Option<&Raster<[u8; 3]>>| image.map(jpeg_url).transpose();
+        let depth = |depth: &Raster<u16>| png_url(&depth.map(|v| pack(u32::from(v))), Content::Photo);
         let picture = Picture {
             of: self.size,
             size,
-            rgb: jpeg(rgb)?,
-            normal: jpeg(small(&self.normal, widths.lossless, MISSING_NORMAL))?,
+            rgb: jpeg(self.rgb.as_ref())?,
+            normal: jpeg(self.normal.as_ref())?,
             depth: self.depth.as_ref().map(depth),
-            label: self.label.as_ref().map(|label| png_url(&nearest(label, size), Content::Labels)),
-            face: face.map(|face| png_url(&nearest(face, size).map(pack), Content::Labels)),
+            label: self.label.as_ref().map(|label| png_url(label, Content::Labels)),
+            face: face(size).map(|face| png_url(&face.map(pack), Content::Labels)),
         };
-        Ok((picture, jpeg(thumb)?))
+        Ok((picture, jpeg(thumb.as_ref())?))
     }
 }
 
-fn decode(data: &DataSet, image: &DatasetImage, faults: &mut Faults) -> Result<Option<Images>> {
-    let root = data.layout().root();
-    let mut size = None;
-    let mut fits = |[w, h]: [u32; 2], path: &Path| -> Result<()> {
-        let [sw, sh] = *size.get_or_insert([w, h]);
-        if [w, h] == [sw, sh] {
-            return Ok(());
-        }
-        let message = format!("{w} × {h} pixels, and other modalities of this image have {sw} × {sh}");
-        Err(FileError::format(path, message).into())
-    };
-    let mut rgb8 = |domain, faults: &mut Faults| {
-        if !image.has(domain) {
+/// The files of an image, of which each is read once, line by line.
+struct Files<'a> {
+    data: &'a DataSet,
+    image: &'a DatasetImage,
+    /// That of the first that could be read, which all others must have.
+    size: Option<[u32; 2]>,
+    reader: &'a mut PngReader,
+    faults: &'a mut Faults,
+}
+
+impl Files<'_> {
+    /// Takes the lines of a modality; `None` if there are none, or something is wrong, which is told.
+    fn take<const N: usize, T>(
+        &mut self,
+        domain: Domain,
+        open: impl for<'r> FnOnce(&'r mut PngReader, &[u8], &Path) -> Result<PngLines<'r, N>, FileError>,
+        lines: impl FnOnce([u32; 2], PngLines<'_, N>) -> T,
+    ) -> Result<Option<(T, PathBuf)>> {
+        if !self.image.has(domain) {
             return Ok(None);
         }
-        let path = image.path(data.layout(), domain);
-        let read = data.read(&path).and_then(|bytes| Ok(decode_rgb8(&bytes, &path)?));
-        let read = read.and_then(|raster| fits([raster.width(), raster.height()], &path).map(|()| raster));
-        faults.keep(root, read)
-    };
-    let rgb = rgb8(Domain::Rgb, faults)?;
-    let normal = rgb8(Domain::Normal, faults)?;
-    let label = rgb8(Domain::Semantic, faults)?;
-    let mut depth = None;
-    if image.has(Domain::Depth) {
-        let path = image.path(data.layout(), Domain::Depth);
-        let read = data.read(&path).and_then(|bytes| Ok(decode_gray16(&bytes, &path)?));
-        let read = read.and_then(|raster| fits([raster.width(), raster.height()], &path).map(|()| raster));
-        depth = faults.keep(root, read)?;
+        let layout = self.data.layout();
+        let path = self.image.path(layout, domain);
+        let read = self.data.read(&path).and_then(|bytes| {
+            let read = open(self.reader, &bytes, &path)?;
+            let [w, h] = [read.width(), read.height()];
+            let [sw, sh] = *self.size.get_or_insert([w, h]);
+            if [w, h] != [sw, sh] {
+                let message =
+                    format!("{w} × {h} pixels, and other modalities of this image have {sw} × {sh}");
+                return Err(FileError::format(&path, message).into());
+            }
+            Ok(lines([w, h], read))
+        });
+        Ok(self.faults.keep(layout.root(), read)?.map(|taken| (taken, path)))
     }
-    let all_gone = rgb.is_none() && normal.is_none() && label.is_none() && depth.is_none();
-    let seen = Shares::default();
-    Ok(size.filter(|_| !all_gone).map(|size| Images { size, seen, rgb, normal, label, depth }))
+
+    /// Means of colours, and how many pixels of the file are missing.
+    fn colors(
+        &mut self,
+        domain: Domain,
+        width: u32,
+        missing: [u8; 3],
+    ) -> Result<Option<(Raster<[u8; 3]>, u64)>> {
+        let taken = self.take(domain, PngReader::rgb8, |size, lines| {
+            let mut mean = Mean::new(size, reduced_size(size, width), Some(missing));
+            lines.for_each(|line| mean.line(line));
+            (mean.missing(), mean.finish())
+        })?;
+        Ok(taken.map(|((missing, image), _)| (image, missing)))
+    }
+
+    /// Labels, what was counted of them, and their file.
+    fn labels(
+        &mut self,
+        width: u32,
+        table: Option<&LabelTable>,
+    ) -> Result<Option<(Raster<[u8; 3]>, Option<LabelCounts>, PathBuf)>> {
+        let taken = self.take(Domain::Semantic, PngReader::rgb8, |size, lines| {
+            let mut nearest = Nearest::new(size, reduced_size(size, width));
+            let mut counts = table.map(|table| LabelCounts::new(table.len()));
+            lines.for_each(|line| {
+                nearest.line(line, |pixel| pixel);
+                counts.iter_mut().for_each(|counts| counts.add(line));
+            });
+            (nearest.finish(), counts)
+        })?;
+        Ok(taken.map(|((image, counts), path)| (image, counts, path)))
+    }
+
+    /// Depth, and how many pixels of the file are missing.
+    fn depth(&mut self, width: u32) -> Result<Option<(Raster<u16>, u64)>> {
+        let taken = self.take(Domain::Depth, PngReader::gray16, |size, lines| {
+            let mut nearest = Nearest::new(size, reduced_size(size, width));
+            let mut missing = 0;
+            lines.for_each(|line| {
+                nearest.line(line, u16::from_be_bytes);
+                let here = line.iter().map(|sample| u32::from(u16::from_be_bytes(*sample) == MISSING_DEPTH));
+                missing += u64::from(here.sum::<u32>());
+            });
+            (nearest.finish(), missing)
+        })?;
+        Ok(taken.map(|(taken, _)| taken))
+    }
+}
+
+/// Pixels by label.
+struct LabelCounts {
+    missing: u64,
+    by_label: Vec<u64>,
+    /// The least label that is none of the data set's.
+    unknown: Option<u32>,
+}
+
+/// Pixels that are compared at once to find where a run of equal ones ends.
+const RUN: usize = 16;
+
+impl LabelCounts {
+    fn new(labels: usize) -> Self {
+        Self { missing: 0, by_label: vec![0; labels], unknown: None }
+    }
+
+    fn add(&mut self, mut line: &[[u8; 3]]) {
+        while let Some((&[r, g, b], others)) = line.split_first() {
+            let mut rest = others;
+            while let Some((these, others)) = rest.split_first_chunk::<RUN>()
+                && *these == [[r, g, b]; RUN]
+            {
+                rest = others;
+            }
+            while let Some((next, others)) = rest.split_first()
+                && *next == [r, g, b]
+            {
+                rest = others;
+            }
+            let pixels = (line.len() - rest.len()) as u64;
+            line = rest;
+            let label = u32::from_be_bytes([0, r, g, b]);
+            match self.by_label.get_mut(label as usize) {
+                _ if [r, g, b] == MISSING_INDEX => self.missing += pixels,
+                Some(count) => *count += pixels,
+                None => self.unknown = Some(self.unknown.map_or(label, |least| least.min(label))),
+            }
+        }
+    }
+
+    fn by_class(&self, table: &LabelTable, path: &Path) -> Result<Counted> {
+        if let Some(label) = self.unknown {
+            let message = format!("a pixel has label {label}, and the data set has {} labels", table.len());
+            return Err(FileError::format(path, message).into());
+        }
+        let missing = self.missing;
+        let mut counted = Counted { missing, unlabelled: 0, instances: 0, by_class: BTreeMap::new() };
+        for (label, pixels) in (0..).zip(&self.by_label).filter(|(_, pixels)| **pixels > 0) {
+            match table.class_of(LabelId(label)) {
+                Some(class) => {
+                    *counted.by_class.entry(class.index()).or_default() += pixels;
+                    counted.instances += 1;
+                }
+                None => counted.unlabelled += pixels,
+            }
+        }
+        Ok(counted)
+    }
 }
 
 /// What the pixels of an image of labels show.
@@ -162,56 +288,17 @@ struct Counted {
     by_class: BTreeMap<usize, u64>,
 }
 
-fn count(label: &Raster<[u8; 3]>, table: &LabelTable, path: &Path) -> Result<Counted> {
-    let mut by_label: BTreeMap<u32, u64> = BTreeMap::new();
-    let mut missing = 0;
-    for run in label.pixels().chunk_by(|a, b| a == b) {
-        match run.first() {
-            Some(&[r, g, b]) if [r, g, b] != MISSING_INDEX => {
-                *by_label.entry(u32::from_be_bytes([0, r, g, b])).or_default() += run.len() as u64;
-            }
-            _ => missing += run.len() as u64,
-        }
-    }
-    let mut counted = Counted { missing, unlabelled: 0, instances: 0, by_class: BTreeMap::new() };
-    for (index, pixels) in by_label {
-        if index as usize >= table.len() {
-            let message = format!("a pixel has label {index}, and the data set has {} labels", table.len());
-            return Err(FileError::format(path, message).into());
-        }
-        match table.class_of(LabelId(index)) {
-            Some(class) => {
-                *counted.by_class.entry(class.index()).or_default() += pixels;
-                counted.instances += 1;
-            }
-            None => counted.unlabelled += pixels,
-        }
-    }
-    Ok(counted)
-}
-
-impl Images {
-    fn shares(&self, counted: Option<Counted>) -> Shares {
-        let pixels = (u64::from(self.size[0]) * u64::from(self.size[1])) as f64;
-        let share = |count: u64| rounded(count as f64 / pixels, 4);
-        // Depth misses what is beyond its range; labels do not.
-        let missing = match (&counted, &self.depth, &self.rgb) {
-            (Some(counted), ..) => Some(counted.missing),
-            (_, Some(depth), _) => {
-                Some(depth.pixels().iter().filter(|v| **v == MISSING_DEPTH).count() as u64)
-            }
-            (.., Some(rgb)) => Some(rgb.pixels().iter().filter(|v| **v == MISSING_COLOR).count() as u64),
-            _ => None,
-        };
-        let classes = counted.iter().flat_map(|c| &c.by_class).map(|(class, n)| (*class, share(*n)));
-        Shares {
-            coverage: missing.map(|missing| rounded(1.0 - missing as f64 / pixels, 4)),
-            unlabelled: counted.as_ref().map(|c| share(c.unlabelled)),
-            instances: counted.as_ref().map(|c| c.instances),
-            classes: classes.collect(),
-            pixels_unlabelled: counted.as_ref().map_or(0, |c| c.unlabelled),
-            pixels_by_class: counted.map(|c| c.by_class).unwrap_or_default(),
-        }
+fn shares([width, height]: [u32; 2], counted: Option<Counted>, missing: Option<u64>) -> Shares {
+    let pixels = (u64::from(width) * u64::from(height)) as f64;
+    let share = |count: u64| rounded(count as f64 / pixels, 4);
+    let classes = counted.iter().flat_map(|c| &c.by_class).map(|(class, n)| (*class, share(*n)));
+    Shares {
+        coverage: missing.map(|missing| rounded(1.0 - missing as f64 / pixels, 4)),
+        unlabelled: counted.as_ref().map(|c| share(c.unlabelled)),
+        instances: counted.as_ref().map(|c| c.instances),
+        classes: classes.collect(),
+        pixels_unlabelled: counted.as_ref().map_or(0, |c| c.unlabelled),
+        pixels_by_class: counted.map(|c| c.by_class).unwrap_or_default(),
     }
 }
 
@@ -232,15 +319,24 @@ mod tests {
         let names = ["<UNK>_0_<UNK>_0_0", "chair_1_office_1_1", "chair_2_office_1_1", "wall_1_office_1_1"];
         let table = LabelTable::from_names(&names.map(String::from)).unwrap();
         let [n, a, b, w] = [[0; 3], [0, 0, 1], [0, 0, 2], [0, 0, 3]];
-        let label = Raster::from_vec(4, 2, vec![MISSING_INDEX, n, a, a, b, w, w, a]);
-        let counted = count(&label, &table, Path::new("a.png")).unwrap();
-        let seen = Shares::default();
-        let images = Images { size: [4, 2], seen, rgb: None, normal: None, label: None, depth: None };
-        let seen = images.shares(Some(counted));
+        let counted = |lines: &[&[[u8; 3]]]| {
+            let mut counts = LabelCounts::new(table.len());
+            lines.iter().for_each(|line| counts.add(line));
+            counts.by_class(&table, Path::new("a.png"))
+        };
+        let counts = counted(&[&[MISSING_INDEX, n, a, a], &[b, w, w, a]]).unwrap();
+        let missing = Some(counts.missing);
+        let seen = shares([4, 2], Some(counts), missing);
         assert_eq!((seen.coverage, seen.unlabelled, seen.instances), (Some(0.875), Some(0.125), Some(3)));
         assert_eq!(seen.classes, [(2, 0.25), (8, 0.5)]);
-        let label = Raster::from_vec(2, 1, vec![a, [0, 1, 0]]);
-        let e = count(&label, &table, Path::new("a.png")).err().unwrap().to_string();
+        let e = counted(&[&[a, [0, 1, 0], [0, 2, 0]]]).err().unwrap().to_string();
         assert!(e.contains("a.png: a pixel has label 256"), "{e}");
+        // Long runs.
+        for (before, long) in [(0, 1), (1, 15), (3, 16), (2, 17), (7, 64), (0, 100)] {
+            let line = [vec![a; before], vec![w; long], vec![b; 5]].concat();
+            let counts = counted(&[&line]).unwrap();
+            assert_eq!(counts.by_class[&8], (before + 5) as u64, "{before}, {long}");
+            assert_eq!(counts.by_class[&2], long as u64, "{before}, {long}");
+        }
     }
 }

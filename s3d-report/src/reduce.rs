@@ -15,47 +15,201 @@ pub(crate) fn source_pixel(i: u32, from: u32, to: u32) -> u32 {
     ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))) as u32
 }
 
+/// The nearest pixels of an image that comes line by line.
+pub(crate) struct Nearest<T> {
+    size: [u32; 2],
+    columns: Vec<usize>,
+    /// The line that comes next, and the height of the image.
+    y: u32,
+    height: u32,
+    pixels: Vec<T>,
+}
+
+impl<T: Copy> Nearest<T> {
+    /// Of an image of `from` pixels, which is not enlarged.
+    pub(crate) fn new([width, height]: [u32; 2], size: [u32; 2]) -> Self {
+        let columns = (0..size[0]).map(|i| source_pixel(i, width, size[0]) as usize).collect();
+        Self { size, columns, y: 0, height, pixels: Vec::with_capacity(size[0] as usize * size[1] as usize) }
+    }
+
+    /// Takes the next line, pixels that `value` makes out of what is given.
+    pub(crate) fn line<P: Copy>(&mut self, line: &[P], value: impl Fn(P) -> T) {
+        let next = (self.pixels.len() / self.columns.len().max(1)) as u32;
+        if next < self.size[1] && self.y == source_pixel(next, self.height, self.size[1]) {
+            self.pixels.extend(self.columns.iter().filter_map(|x| line.get(*x)).map(|pixel| value(*pixel)));
+        }
+        self.y += 1;
+    }
+
+    pub(crate) fn finish(self) -> Raster<T> {
+        Raster::from_vec(self.size[0], self.size[1], self.pixels)
+    }
+}
+
 /// The nearest pixels.
-pub(crate) fn nearest<T: Copy>(image: &Raster<T>, [w, h]: [u32; 2]) -> Raster<T> {
-    let columns: Vec<u32> = (0..w).map(|i| source_pixel(i, image.width(), w)).collect();
-    let rows = (0..h).map(|j| source_pixel(j, image.height(), h));
-    let pixels = rows.flat_map(|y| columns.iter().map(move |x| image.at(*x, y))).collect();
-    Raster::from_vec(w, h, pixels)
+pub(crate) fn nearest<T: Copy>(image: &Raster<T>, size: [u32; 2]) -> Raster<T> {
+    let mut nearest = Nearest::new([image.width(), image.height()], size);
+    image.rows().for_each(|line| nearest.line(line, |pixel| pixel));
+    nearest.finish()
+}
+
+/// Lines whose sums fit into 16 bits.
+const LINES: u32 = 256;
+
+/// Below so many pixels their mean is a multiplication.
+const FEW: u32 = 4096;
+
+/// Means of an image that comes line by line: of the pixels that lie in a pixel, of those that are not
+/// `missing`; `missing` where there are none.
+///
+/// Lines are added up first, columns then, so that most of it is done 16 bytes at a time.
+pub(crate) struct Mean {
+    from: [u32; 2],
+    size: [u32; 2],
+    missing: Option<[u8; 3]>,
+    /// How many columns lie in each.
+    widths: Vec<u32>,
+    /// Lines that were taken, and those of them that `columns` are the sums of.
+    y: u32,
+    lines: u32,
+    /// Sums of the three channels, and where some are missing, of how many lines.
+    columns: Vec<[u16; 3]>,
+    counts: Vec<u16>,
+    some_missing: bool,
+    /// Sums of the pixels that come next, and of how many.
+    sums: Vec<[u32; 4]>,
+    /// 2³² over a number of pixels, rounded up.
+    inverse: Vec<u64>,
+    pixels: Vec<[u8; 3]>,
+    all_missing: u64,
+}
+
+/// Where a pixel of an axis begins.
+fn edge(i: u32, from: u32, to: u32) -> u32 {
+    (u64::from(i) * u64::from(from) / u64::from(to.max(1))) as u32
+}
+
+impl Mean {
+    /// Of an image of `from` pixels, which is not enlarged.
+    pub(crate) fn new(from: [u32; 2], size: [u32; 2], missing: Option<[u8; 3]>) -> Self {
+        let [[width, height], [w, h]] = [from, size];
+        let most = u64::from(width.div_ceil(w.max(1))) * u64::from(height.div_ceil(h.max(1)));
+        let inverse = (0..=most.min(u64::from(FEW - 1))).map(|n| (1 << 32) / n.max(1) + 1).collect();
+        Self {
+            from,
+            size,
+            missing,
+            widths: (0..w).map(|i| edge(i + 1, width, w) - edge(i, width, w)).collect(),
+            y: 0,
+            lines: 0,
+            columns: vec![[0; 3]; width as usize],
+            counts: vec![0; width as usize],
+            some_missing: false,
+            sums: vec![[0; 4]; w as usize],
+            inverse,
+            pixels: Vec::with_capacity(w as usize * h as usize),
+            all_missing: 0,
+        }
+    }
+
+    /// Takes the next line.
+    pub(crate) fn line(&mut self, line: &[[u8; 3]]) {
+        self.y += 1;
+        let missing = self.missing.filter(|missing| may_have(line, *missing));
+        if self.size == self.from {
+            self.pixels.extend_from_slice(line);
+            let is_missing = |pixel: &&[u8; 3]| Some(**pixel) == missing;
+            self.all_missing += missing.map_or(0, |_| line.iter().filter(is_missing).count() as u64);
+            return;
+        }
+        if missing.is_some() && !self.some_missing {
+            self.some_missing = true;
+            self.counts.fill(self.lines as u16);
+        }
+        self.lines += 1;
+        match missing {
+            Some(missing) => {
+                for ((sum, count), pixel) in self.columns.iter_mut().zip(&mut self.counts).zip(line) {
+                    if *pixel != missing {
+                        sum.iter_mut().zip(pixel).for_each(|(sum, v)| *sum += u16::from(*v));
+                        *count += 1;
+                    } else {
+                        self.all_missing += 1;
+                    }
+                }
+            }
+            None => {
+                let sums = self.columns.as_flattened_mut().iter_mut();
+                sums.zip(line.as_flattened()).for_each(|(sum, v)| *sum += u16::from(*v));
+                if self.some_missing {
+                    self.counts.iter_mut().for_each(|count| *count += 1);
+                }
+            }
+        }
+        let next = (self.pixels.len() / self.size[0].max(1) as usize) as u32 + 1;
+        let is_last = self.y == edge(next, self.from[1], self.size[1]);
+        if is_last || self.lines == LINES {
+            self.add_columns();
+        }
+        if is_last {
+            let mean = |[r, g, b, n]: [u32; 4]| match (n, self.inverse.get(n as usize)) {
+                (0, _) => self.missing.unwrap_or_default(),
+                // Exact: the product of sum and number is below 2³².
+                (n, Some(inverse)) => [r, g, b].map(|sum| ((u64::from(sum + n / 2) * inverse) >> 32) as u8),
+                (n, None) => [r, g, b].map(|sum| ((sum + n / 2) / n) as u8),
+            };
+            self.pixels.extend(self.sums.iter().map(|sums| mean(*sums)));
+            self.sums.fill([0; 4]);
+        }
+    }
+
+    /// Adds up what lies in each pixel.
+    fn add_columns(&mut self) {
+        let (mut columns, mut counts) = (self.columns.as_slice(), self.counts.as_slice());
+        for (sum, width) in self.sums.iter_mut().zip(&self.widths) {
+            let (these, others) = columns.split_at(*width as usize);
+            columns = others;
+            let [mut r, mut g, mut b, mut n] = *sum;
+            for [dr, dg, db] in these {
+                (r, g, b) = (r + u32::from(*dr), g + u32::from(*dg), b + u32::from(*db));
+            }
+            if self.some_missing {
+                let (these, others) = counts.split_at(*width as usize);
+                counts = others;
+                n += these.iter().map(|count| u32::from(*count)).sum::<u32>();
+            } else {
+                n += self.lines * width;
+            }
+            *sum = [r, g, b, n];
+        }
+        self.columns.fill([0; 3]);
+        (self.lines, self.some_missing) = (0, false);
+    }
+
+    /// How many pixels were missing.
+    pub(crate) fn missing(&self) -> u64 {
+        self.all_missing
+    }
+
+    pub(crate) fn finish(self) -> Raster<[u8; 3]> {
+        Raster::from_vec(self.size[0], self.size[1], self.pixels)
+    }
+}
+
+/// Whether the bytes of a pixel stand somewhere in a line, be it across pixels: asked without a branch.
+fn may_have(line: &[[u8; 3]], [r, g, b]: [u8; 3]) -> bool {
+    let bytes = line.as_flattened();
+    let (second, third) = (bytes.get(1..).unwrap_or_default(), bytes.get(2..).unwrap_or_default());
+    let is_there = |((x, y), z): ((&u8, &u8), &u8)| u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
+    bytes.iter().zip(second).zip(third).map(is_there).fold(0, |any, here| any | here) != 0
 }
 
 /// The mean of the pixels that lie in a pixel, of those that are not `missing`; `missing` where there are
 /// none. No image is enlarged.
-pub(crate) fn mean(image: &Raster<[u8; 3]>, [w, h]: [u32; 2], missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
-    if [w, h] == [image.width(), image.height()] {
-        return image.clone();
-    }
-    let edge = |i: u32, from: u32, to: u32| (u64::from(i) * u64::from(from) / u64::from(to)) as u32;
-    let widths: Vec<usize> =
-        (0..w).map(|i| (edge(i + 1, image.width(), w) - edge(i, image.width(), w)) as usize).collect();
-    let mut pixels = Vec::with_capacity(w as usize * h as usize);
-    // Sums of the three channels, and how many pixels.
-    let mut sums = vec![[0u32; 4]; w as usize];
-    for j in 0..h {
-        sums.fill([0; 4]);
-        for y in edge(j, image.height(), h)..edge(j + 1, image.height(), h) {
-            let mut rest = image.row(y);
-            for (sum, width) in sums.iter_mut().zip(&widths) {
-                let (these, others) = rest.split_at(*width);
-                rest = others;
-                for pixel in these {
-                    let counts = u32::from(Some(*pixel) != missing);
-                    let [r, g, b] = pixel.map(|v| u32::from(v) * counts);
-                    let [sr, sg, sb, n] = *sum;
-                    *sum = [sr + r, sg + g, sb + b, n + counts];
-                }
-            }
-        }
-        pixels.extend(sums.iter().map(|[r, g, b, n]| match n {
-            0 => missing.unwrap_or_default(),
-            n => [r, g, b].map(|sum| ((sum + n / 2) / n) as u8),
-        }));
-    }
-    Raster::from_vec(w, h, pixels)
+pub(crate) fn mean(image: &Raster<[u8; 3]>, size: [u32; 2], missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
+    let mut mean = Mean::new([image.width(), image.height()], size, missing);
+    image.rows().for_each(|line| mean.line(line));
+    mean.finish()
 }
 
 /// A number of up to 24 bits as a pixel, the highest bits in red.
@@ -96,6 +250,54 @@ mod tests {
         let image = Raster::from_vec(3, 1, vec![a, b, b]);
         assert_eq!(mean(&image, [2, 1], None).into_vec(), [a, b]);
         assert_eq!(mean(&image, [3, 1], Some(n)).into_vec(), image.into_vec());
+    }
+
+    /// Pixel by pixel.
+    fn plain_mean(image: &Raster<[u8; 3]>, [w, h]: [u32; 2], missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
+        let (width, height) = (image.width(), image.height());
+        let pixel = |i, j| {
+            let (columns, rows) =
+                (edge(i, width, w)..edge(i + 1, width, w), edge(j, height, h)..edge(j + 1, height, h));
+            let inside = rows.flat_map(|y| columns.clone().map(move |x| image.at(x, y)));
+            let seen: Vec<[u8; 3]> = inside.filter(|pixel| Some(*pixel) != missing).collect();
+            let n = seen.len() as u32;
+            let sum = |c: usize| seen.iter().map(|pixel| u32::from(pixel[c])).sum::<u32>();
+            if n == 0 { missing.unwrap() } else { [0, 1, 2].map(|c| ((sum(c) + n / 2) / n) as u8) }
+        };
+        Raster::from_vec(w, h, (0..h).flat_map(|j| (0..w).map(move |i| pixel(i, j))).collect())
+    }
+
+    #[test]
+    fn means_are_those_pixel_by_pixel() {
+        let mut state = 1u32;
+        let mut byte = move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        };
+        for ([w, h], size) in [
+            ([40, 30], [20, 15]),
+            ([40, 30], [17, 13]),
+            ([9, 4], [1, 1]),
+            // More than 256 lines, and more than 4,096 pixels, in one.
+            ([7, 1100], [3, 2]),
+            ([300, 260], [2, 3]),
+            ([12, 5], [12, 5]),
+        ] {
+            for few in [256, 2, 1] {
+                let pixels = (0..w * h).map(|_| [byte(), byte(), byte()].map(|v| (u32::from(v) % few) as u8));
+                let mut image = Raster::from_vec(w, h, pixels.collect());
+                // A part of it is missing.
+                image.pixels_mut().iter_mut().step_by(5).for_each(|pixel| *pixel = [255; 3]);
+                for missing in [None, Some([0; 3]), Some([255; 3]), Some([1, 0, 1])] {
+                    let mut lines = Mean::new([w, h], size, missing);
+                    image.rows().for_each(|line| lines.line(line));
+                    let count = image.pixels().iter().filter(|pixel| Some(**pixel) == missing).count();
+                    assert_eq!(lines.missing(), count as u64, "{w} × {h}, {few}, {missing:?}");
+                    let expected = plain_mean(&image, size, missing);
+                    assert_eq!(lines.finish(), expected, "{w} × {h}, {few}, {missing:?}");
+                }
+            }
+        }
     }
 
     #[test]

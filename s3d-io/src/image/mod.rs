@@ -41,8 +41,8 @@ pub use self::exr::{
 };
 #[cfg(feature = "png")]
 pub use self::png::{
-    Content, decode_gray16, decode_rgb8, encode_gray8, encode_gray16, encode_palette8, encode_rgb8,
-    read_gray16, read_numbers8, read_palette8, read_rgb8, write_gray16, write_rgb8,
+    Content, PngLines, PngReader, decode_gray16, decode_rgb8, encode_gray8, encode_gray16, encode_palette8,
+    encode_rgb8, read_gray16, read_numbers8, read_palette8, read_rgb8, write_gray16, write_rgb8,
 };
 pub use compression::{Compression, UnknownCompression};
 pub use s3d_label::pretty_color;

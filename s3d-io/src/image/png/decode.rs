@@ -1,26 +1,35 @@
 //! PNG files of one kind, and no other: their samples may be numbers, which must not be converted.
 
+use super::lines::PngReader;
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
 use png::{BitDepth, ColorType};
 use s3d_geom::Raster;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 /// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
-const MAX_PIXELS: u64 = 1 << 30;
+pub(super) const MAX_PIXELS: u64 = 1 << 30;
 
 /// What deflate can make of a byte at most.
-const MAX_DEFLATE: u64 = 1032;
+pub(super) const MAX_DEFLATE: u64 = 1032;
+
+/// Larger files are not held in memory.
+const MAX_WHOLE: u64 = 1 << 28;
 
 /// Reads an 8-bit RGB PNG file, and nothing else: its channels may be numbers, which must not be converted.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no PNG file, damaged, or of another kind.
 pub fn read_rgb8(path: &Path) -> Result<Raster<[u8; 3]>> {
-    let (file, size) = open(path)?;
-    rgb8(file, size, path)
+    match open_whole(path)? {
+        Opened::Whole(bytes) => decode_rgb8(&bytes, path),
+        Opened::Large(file, size) => {
+            let (width, height, bytes, _) = decode(file, size, path, ColorType::Rgb, BitDepth::Eight)?;
+            Ok(Raster::from_vec(width, height, bytes.as_chunks().0.to_vec()))
+        }
+    }
 }
 
 /// As [`read_rgb8`], from the file's bytes; errors call it `name`.
@@ -28,12 +37,12 @@ pub fn read_rgb8(path: &Path) -> Result<Raster<[u8; 3]>> {
 /// # Errors
 /// As [`read_rgb8`].
 pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
-    rgb8(Cursor::new(bytes), bytes.len() as u64, name)
-}
-
-fn rgb8(file: impl BufRead + Seek, size: u64, path: &Path) -> Result<Raster<[u8; 3]>> {
-    let (width, height, bytes, _) = decode(file, size, path, ColorType::Rgb, BitDepth::Eight)?;
-    Ok(Raster::from_vec(width, height, bytes.as_chunks().0.to_vec()))
+    let mut reader = PngReader::default();
+    let lines = reader.rgb8(bytes, name)?;
+    let (width, height) = (lines.width(), lines.height());
+    let mut pixels = Vec::with_capacity(width as usize * height as usize);
+    lines.for_each(|line| pixels.extend_from_slice(line));
+    Ok(Raster::from_vec(width, height, pixels))
 }
 
 /// Reads an 8-bit PNG file with a palette, and nothing else: the places in the palette, and its colours.
@@ -62,8 +71,15 @@ pub fn read_palette8(path: &Path) -> Result<(Raster<u8>, Vec<[u8; 3]>)> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no PNG file, damaged, or of another kind.
 pub fn read_gray16(path: &Path) -> Result<Raster<u16>> {
-    let (file, size) = open(path)?;
-    gray16(file, size, path)
+    match open_whole(path)? {
+        Opened::Whole(bytes) => decode_gray16(&bytes, path),
+        Opened::Large(file, size) => {
+            let (width, height, bytes, _) =
+                decode(file, size, path, ColorType::Grayscale, BitDepth::Sixteen)?;
+            let values = bytes.as_chunks().0.iter().map(|&pair| u16::from_be_bytes(pair)).collect();
+            Ok(Raster::from_vec(width, height, values))
+        }
+    }
 }
 
 /// As [`read_gray16`], from the file's bytes; errors call it `name`.
@@ -81,12 +97,11 @@ pub fn read_gray16(path: &Path) -> Result<Raster<u16>> {
 /// # Errors
 /// As [`read_gray16`].
 pub fn decode_gray16(bytes: &[u8], name: &Path) -> Result<Raster<u16>> {
-    gray16(Cursor::new(bytes), bytes.len() as u64, name)
-}
-
-fn gray16(file: impl BufRead + Seek, size: u64, path: &Path) -> Result<Raster<u16>> {
-    let (width, height, bytes, _) = decode(file, size, path, ColorType::Grayscale, BitDepth::Sixteen)?;
-    let values = bytes.as_chunks().0.iter().map(|&pair| u16::from_be_bytes(pair)).collect();
+    let mut reader = PngReader::default();
+    let lines = reader.gray16(bytes, name)?;
+    let (width, height) = (lines.width(), lines.height());
+    let mut values = Vec::with_capacity(width as usize * height as usize);
+    lines.for_each(|line| values.extend(line.iter().map(|pair| u16::from_be_bytes(*pair))));
     Ok(Raster::from_vec(width, height, values))
 }
 
@@ -95,6 +110,25 @@ fn open(path: &Path) -> Result<(BufReader<File>, u64)> {
     let file = open_file(path)?;
     let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
     Ok((BufReader::new(file), size))
+}
+
+/// A file that was opened.
+enum Opened {
+    /// All of it.
+    Whole(Vec<u8>),
+    /// One that is read piece by piece, and how many bytes it has.
+    Large(BufReader<File>, u64),
+}
+
+/// Opens a file, and reads it if it is not large.
+fn open_whole(path: &Path) -> Result<Opened> {
+    let (mut file, size) = open(path)?;
+    if size > MAX_WHOLE {
+        return Ok(Opened::Large(file, size));
+    }
+    let mut bytes = Vec::with_capacity(size as usize);
+    file.read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+    Ok(Opened::Whole(bytes))
 }
 
 /// Reads the numbers of an 8-bit gray PNG file, or the places of one with a palette, of up to 8 bits, and
@@ -140,7 +174,7 @@ pub fn read_numbers8(path: &Path) -> Result<Raster<u8>> {
 }
 
 /// Width, height, samples and palette of a file of `size` bytes.
-fn decode(
+pub(super) fn decode(
     file: impl BufRead + Seek,
     size: u64,
     path: &Path,

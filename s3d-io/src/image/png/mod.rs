@@ -2,6 +2,7 @@
 
 mod decode;
 mod encode;
+mod lines;
 #[cfg(test)]
 mod tests;
 
@@ -9,3 +10,4 @@ pub use self::decode::{decode_gray16, decode_rgb8, read_gray16, read_numbers8, r
 pub use self::encode::{
     Content, encode_gray8, encode_gray16, encode_palette8, encode_rgb8, write_gray16, write_rgb8,
 };
+pub use self::lines::{PngLines, PngReader};

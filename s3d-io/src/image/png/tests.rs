@@ -1,10 +1,15 @@
-use super::{Content, encode_gray8, encode_gray16, encode_rgb8, read_gray16, read_numbers8, read_rgb8};
+use super::decode::decode;
+use super::{
+    Content, PngReader, decode_rgb8, encode_gray8, encode_gray16, encode_rgb8, read_gray16, read_numbers8,
+    read_rgb8,
+};
 use crate::error::Error;
 use crate::fs::atomic::write_bytes;
 use crate::image::compression::Compression;
 use png::{BitDepth, ColorType};
 use proptest::prelude::*;
 use s3d_geom::Raster;
+use std::io::Cursor;
 use std::path::Path;
 
 #[test]
@@ -232,4 +237,100 @@ fn broken_files_are_format_errors() {
     assert!(in_file(&huge, read_rgb8).is_err());
     let missing = read_rgb8(Path::new("/nowhere/image.png")).unwrap_err();
     assert!(matches!(missing, Error::Io { action: "read", .. }));
+}
+
+/// An image in the `png` crate's words: what our reader of whole files is held to.
+fn plain(bytes: &[u8]) -> Result<Raster<[u8; 3]>, String> {
+    let size = bytes.len() as u64;
+    let decoded = decode(Cursor::new(bytes), size, Path::new("a.png"), ColorType::Rgb, BitDepth::Eight);
+    let (width, height, bytes, _) = decoded.map_err(|e| e.to_string())?;
+    Ok(Raster::from_vec(width, height, bytes.as_chunks().0.to_vec()))
+}
+
+#[test]
+fn cut_and_damaged_files_are_read_as_the_png_crate_does() {
+    let mut byte = noise();
+    let image = Raster::from_vec(13, 11, (0..143).map(|i| [i as u8, byte() % 4, 7]).collect());
+    let ours = |bytes: &[u8]| decode_rgb8(bytes, Path::new("a.png")).map_err(|e| e.to_string());
+    for content in CONTENTS {
+        let whole = encode_rgb8(&image, content, Compression::Balanced);
+        assert_eq!(ours(&whole).as_ref(), Ok(&image));
+        for cut in 0..whole.len() {
+            assert_eq!(ours(&whole[..cut]), plain(&whole[..cut]), "{content:?}, the first {cut} bytes");
+        }
+        for at in 0..whole.len() {
+            for flip in [1, 0x80, 0xff] {
+                let mut damaged = whole.clone();
+                damaged[at] ^= flip;
+                assert_eq!(ours(&damaged), plain(&damaged), "{content:?}, byte {at} and {flip}");
+            }
+        }
+    }
+}
+
+/// A file of these chunks, with right checksums.
+fn file_of(chunks: &[([u8; 4], &[u8])]) -> Vec<u8> {
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    for (name, content) in chunks {
+        let checked = [name, *content].concat();
+        file.extend((content.len() as u32).to_be_bytes());
+        file.extend(&checked);
+        file.extend(crc32fast::hash(&checked).to_be_bytes());
+    }
+    file
+}
+
+#[test]
+fn files_of_other_programs_are_read() {
+    let (w, h) = (21, 40);
+    let mut byte = noise();
+    let image = Raster::from_vec(w, h, (0..w * h).map(|i| [(i / 3) as u8, byte() % 9, 250]).collect());
+    let header = [&w.to_be_bytes()[..], &h.to_be_bytes(), &[8, 2, 0, 0, 0]].concat();
+    // All filters, by the png crate; its stream in pieces, with chunks between, and with something behind.
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, w, h);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_filter(png::Filter::Adaptive);
+    encoder.write_header().unwrap().write_image_data(image.pixels().as_flattened()).unwrap();
+    assert_eq!(decode_rgb8(&file, Path::new("a.png")).unwrap(), image);
+    let at = file.windows(4).position(|name| name == b"IDAT").unwrap();
+    let len = u32::from_be_bytes(file[at - 4..at].try_into().unwrap()) as usize;
+    let stream = &file[at + 4..at + 4 + len];
+    let (first, second) = stream.split_at(len / 3);
+    let [ihdr, idat, iend] = [*b"IHDR", *b"IDAT", *b"IEND"];
+    let behind = [stream, &[1, 2, 3]].concat();
+    for chunks in [
+        vec![(ihdr, &header[..]), (idat, first), (idat, second), (iend, &[])],
+        vec![(ihdr, &header), (*b"tEXt", b"k\0v"), (idat, stream), (iend, &[])],
+        vec![(ihdr, &header), (idat, &[]), (idat, first), (idat, &[]), (idat, second), (iend, &[])],
+        vec![(ihdr, &header), (idat, stream), (*b"tIME", &[7, 234, 1, 1, 1, 1, 1]), (iend, &[])],
+        vec![(ihdr, &header), (idat, &behind), (iend, &[])],
+        vec![(ihdr, &header), (idat, first), (iend, &[])],
+    ] {
+        let file = file_of(&chunks);
+        let ours = decode_rgb8(&file, Path::new("a.png")).map_err(|e| e.to_string());
+        assert_eq!(ours, plain(&file), "{}", chunks.len());
+    }
+}
+
+#[test]
+fn a_reader_forgets_what_it_read_before() {
+    let mut reader = PngReader::default();
+    let name = Path::new("a.png");
+    let large = encode_rgb8(&Raster::filled(50, 50, [9; 3]), Content::Labels, Compression::Balanced);
+    let gray = Raster::from_vec(3, 9, (0..27).map(|i| 1000 * i).collect());
+    let small = encode_gray16(&gray, Compression::Balanced);
+    for _ in 0..2 {
+        let mut lines = 0;
+        reader.rgb8(&large, name).unwrap().for_each(|line| {
+            assert_eq!(line, [[9; 3]; 50]);
+            lines += 1;
+        });
+        assert_eq!(lines, 50);
+        let mut found = Vec::new();
+        let add = |line: &[[u8; 2]]| found.extend(line.iter().map(|v| u16::from_be_bytes(*v)));
+        reader.gray16(&small, name).unwrap().for_each(add);
+        assert_eq!(found, gray.pixels());
+        assert!(reader.rgb8(&small, name).is_err());
+    }
 }

@@ -3,6 +3,10 @@
 //! Why not the `png` crate's adaptive filter: it makes normals 42 % larger and nothing smaller, takes twice
 //! the time, and filtered bytes cannot be had from that crate (README, "Filters").
 
+mod unfilter;
+
+pub use unfilter::unfilter;
+
 use crate::Error;
 use crate::simd::{Compare, Kernel, dispatch};
 

@@ -1,0 +1,183 @@
+//! PNG files in memory, line by line: what this workspace writes, in about half of the `png` crate's time.
+//! Whatever is unusual or damaged is left to that crate, which decides whether it can be read.
+//!
+//! The time goes to what a stream of unknown length has to do: one call inflates a whole image here, and
+//! lines lose their filters together (`s3d_deflate::png::unfilter`).
+
+use super::decode::{MAX_DEFLATE, MAX_PIXELS, decode};
+use crate::error::Result;
+use fdeflate::Decompressor;
+use png::{BitDepth, ColorType};
+use s3d_deflate::png::unfilter;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Lines that lose their filters at a time: they stay in a first-level cache until they are used.
+const BAND: usize = 8;
+
+/// What every PNG file begins with.
+const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// Reads PNG images one after the other, in memory that it keeps.
+///
+/// ```
+/// use s3d_geom::Raster;
+/// use s3d_io::image::{Compression, PngReader, encode_gray16};
+///
+/// let depth = Raster::from_vec(2, 2, vec![1, 2, 3, 0x0405u16]);
+/// let bytes = encode_gray16(&depth, Compression::Balanced);
+/// let mut reader = PngReader::default();
+/// let lines = reader.gray16(&bytes, "depth.png".as_ref())?;
+/// assert_eq!((lines.width(), lines.height()), (2, 2));
+/// let mut found = Vec::new();
+/// lines.for_each(|line| found.extend(line.iter().map(|sample| u16::from_be_bytes(*sample))));
+/// assert_eq!(found, depth.into_vec());
+/// # Ok::<(), s3d_io::Error>(())
+/// ```
+#[derive(Default)]
+pub struct PngReader {
+    stream: Vec<u8>,
+    lines: Vec<u8>,
+}
+
+/// The lines of a whole image, pixels of `N` bytes.
+pub struct PngLines<'a, const N: usize> {
+    width: u32,
+    height: u32,
+    /// Filtered, after the filter's number, or as they are.
+    lines: &'a mut [u8],
+    is_filtered: bool,
+}
+
+impl PngReader {
+    /// The lines of an 8-bit RGB image, from its file's bytes, and of nothing else; errors call it `name`.
+    ///
+    /// # Errors
+    /// [`Error::Format`](crate::Error::Format) if it is no PNG file, damaged, or of another kind.
+    pub fn rgb8(&mut self, bytes: &[u8], name: &Path) -> Result<PngLines<'_, 3>> {
+        self.lines(bytes, name, ColorType::Rgb, BitDepth::Eight)
+    }
+
+    /// As [`Self::rgb8`], of a 16-bit gray image: the samples are big-endian.
+    ///
+    /// # Errors
+    /// As [`Self::rgb8`].
+    pub fn gray16(&mut self, bytes: &[u8], name: &Path) -> Result<PngLines<'_, 2>> {
+        self.lines(bytes, name, ColorType::Grayscale, BitDepth::Sixteen)
+    }
+
+    fn lines<const N: usize>(
+        &mut self,
+        bytes: &[u8],
+        name: &Path,
+        color: ColorType,
+        depth: BitDepth,
+    ) -> Result<PngLines<'_, N>> {
+        if let Some((width, height, len)) = self.inflate::<N>(bytes, [depth as u8, color as u8]) {
+            let lines = self.lines.get_mut(..len).unwrap_or_default();
+            return Ok(PngLines { width, height, lines, is_filtered: true });
+        }
+        let size = bytes.len() as u64;
+        let (width, height, samples, _) = decode(Cursor::new(bytes), size, name, color, depth)?;
+        self.lines = samples;
+        Ok(PngLines { width, height, lines: &mut self.lines, is_filtered: false })
+    }
+
+    /// Width and height of an image of this kind, and how many of `self.lines` are its filtered lines; `None`
+    /// if anything about the file is other than usual.
+    fn inflate<const N: usize>(&mut self, bytes: &[u8], kind: [u8; 2]) -> Option<(u32, u32, usize)> {
+        let mut chunks = Chunks(bytes.strip_prefix(SIGNATURE)?);
+        let (name, header) = chunks.next()?;
+        let (size, rest) = header.split_first_chunk::<8>()?;
+        let [a, b, c, d, size @ ..] = *size;
+        let (width, height) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes(size));
+        // Compression and filters have one method each, and no interlacing.
+        let is_usual = name == *b"IHDR" && rest.strip_prefix(&kind)? == [0; 3];
+        let pixels = u64::from(width) * u64::from(height);
+        let needed = pixels * N as u64 + u64::from(height);
+        if !is_usual || pixels == 0 || pixels > MAX_PIXELS || needed > MAX_DEFLATE * bytes.len() as u64 {
+            return None;
+        }
+        // Mostly there is one chunk, which needs no copy.
+        self.stream.clear();
+        let (mut name, mut stream) = chunks.next()?;
+        let first = stream;
+        let mut count = 0;
+        while name == *b"IDAT" {
+            if count == 1 {
+                self.stream.extend_from_slice(first);
+            }
+            if count > 0 {
+                self.stream.extend_from_slice(stream);
+            }
+            count += 1;
+            (name, stream) = chunks.next()?;
+        }
+        if name != *b"IEND" || !stream.is_empty() {
+            return None;
+        }
+        let stream = if count == 1 { first } else { &self.stream };
+        let len = usize::try_from(needed).ok()?;
+        if self.lines.len() < len {
+            // What was there is of no use: nothing to copy.
+            self.lines = Vec::new();
+            self.lines = vec![0; len];
+        }
+        let lines = self.lines.get_mut(..len)?;
+        let mut decompressor = Decompressor::new();
+        // As the png crate does: chunks have checksums of their own.
+        decompressor.ignore_adler32();
+        let (_, made) = decompressor.read(stream, lines, 0, true).ok()?;
+        let line = N * width as usize;
+        let is_known = |line: &[u8]| line.first().is_some_and(|filter| *filter <= 4);
+        let is_whole = decompressor.is_done() && made == len && lines.chunks(line + 1).all(is_known);
+        is_whole.then_some((width, height, len))
+    }
+}
+
+impl<const N: usize> PngLines<'_, N> {
+    /// Width of the image.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height of the image.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Hands over line by line, the top line first.
+    pub fn for_each(self, mut each: impl FnMut(&[[u8; N]])) {
+        let line = N * self.width as usize;
+        if !self.is_filtered {
+            self.lines.chunks_exact(line.max(1)).for_each(|line| each(line.as_chunks().0));
+            return;
+        }
+        let mut above: Option<&[u8]> = None;
+        for band in self.lines.chunks_mut(BAND * (line + 1)) {
+            // Lines and their filters were looked at before.
+            let is_done = unfilter(band, above, line, N);
+            debug_assert!(is_done.is_ok(), "{is_done:?}");
+            let band = &*band;
+            let lines = band.chunks_exact(line + 1).filter_map(|line| line.get(1..));
+            lines.clone().for_each(|line| each(line.as_chunks().0));
+            above = lines.last();
+        }
+    }
+}
+
+/// The chunks of a file: names and contents of those that are whole.
+struct Chunks<'a>(&'a [u8]);
+
+impl<'a> Iterator for Chunks<'a> {
+    type Item = ([u8; 4], &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (len, rest) = self.0.split_first_chunk()?;
+        let (checked, rest) = rest.split_at_checked(4 + u32::from_be_bytes(*len) as usize)?;
+        let (sum, rest) = rest.split_first_chunk()?;
+        let (name, content) = checked.split_first_chunk()?;
+        self.0 = rest;
+        (crc32fast::hash(checked) == u32::from_be_bytes(*sum)).then_some((*name, content))
+    }
+}
