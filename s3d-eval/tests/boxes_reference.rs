@@ -125,7 +125,7 @@ fn with_instances(detected: &Detected) -> &'static Path {
     let path = Layout::new(root).instances_json(5);
     let (list, manifest) = (root.join("files.csv"), root.join("manifest.json"));
     let (bytes, sum) = checksum_of_file(&path).unwrap();
-    write_json(&path, &entries.collect::<Vec<_>>()).unwrap();
+    write_json(&path, &json!({"instances": entries.collect::<Vec<_>>()})).unwrap();
     // The list of files and the manifest tell of the new one.
     let (new_bytes, new_sum) = checksum_of_file(&path).unwrap();
     let text = fs::read_to_string(&list).unwrap();
