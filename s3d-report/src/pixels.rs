@@ -88,7 +88,7 @@ impl Images {
         });
         let normal = files.colors(Domain::Normal, widths.lossless, MISSING_NORMAL)?.map(|(normal, _)| normal);
         let (mut label, mut counted) = (None, None);
-        if let Some((image, counts, path)) = files.labels(widths.lossless, table)? {
+        if let Some(Labels { image, counts, path }) = files.labels(widths.lossless, table)? {
             label = Some(image);
             if let (Some(table), Some(counts)) = (table, counts) {
                 let root = data.layout().root();
@@ -186,12 +186,7 @@ impl Files<'_> {
         Ok(taken.map(|((missing, image), _)| (image, missing)))
     }
 
-    /// Labels, what was counted of them, and their file.
-    fn labels(
-        &mut self,
-        width: u32,
-        table: Option<&LabelTable>,
-    ) -> Result<Option<(Raster<[u8; 3]>, Option<LabelCounts>, PathBuf)>> {
+    fn labels(&mut self, width: u32, table: Option<&LabelTable>) -> Result<Option<Labels>> {
         let taken = self.take(Domain::Semantic, PngReader::rgb8, |size, lines| {
             let mut nearest = Nearest::new(size, reduced_size(size, width));
             let mut counts = table.map(|table| LabelCounts::new(table.len()));
@@ -201,7 +196,7 @@ impl Files<'_> {
             });
             (nearest.finish(), counts)
         })?;
-        Ok(taken.map(|((image, counts), path)| (image, counts, path)))
+        Ok(taken.map(|((image, counts), path)| Labels { image, counts, path }))
     }
 
     /// Depth, and how many pixels of the file are missing.
@@ -218,6 +213,13 @@ impl Files<'_> {
         })?;
         Ok(taken.map(|(taken, _)| taken))
     }
+}
+
+/// Labels, what was counted of them, and their file.
+struct Labels {
+    image: Raster<[u8; 3]>,
+    counts: Option<LabelCounts>,
+    path: PathBuf,
 }
 
 /// Pixels by label.

@@ -134,7 +134,7 @@ fn wave<const P: usize, const L: usize, const R: usize>(lines: &mut [u8], above:
     if width >= R {
         let steps = width - first;
         let mut lag = R;
-        let rows = rows.each_mut().map(|row| {
+        let mut rows = rows.each_mut().map(|row| {
             lag -= 1;
             &mut row[lag..][..steps]
         });
@@ -143,12 +143,12 @@ fn wave<const P: usize, const L: usize, const R: usize>(lines: &mut [u8], above:
         let mut here = wave;
         for x in 0..steps {
             let mut filtered = 0;
-            for r in 0..R {
-                filtered |= u128::from(load(&rows[r][x])) << (8 * L * r);
+            for (r, row) in rows.iter().enumerate() {
+                filtered |= u128::from(load(&row[x])) << (8 * L * r);
             }
             let samples = here.step::<L>(load(&above[x]), filtered);
-            for r in 0..R {
-                store(&mut rows[r][x], (samples >> (8 * L * r)) as u32);
+            for (r, row) in rows.iter_mut().enumerate() {
+                store(&mut row[x], (samples >> (8 * L * r)) as u32);
             }
         }
         wave = here;

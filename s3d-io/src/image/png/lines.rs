@@ -159,9 +159,9 @@ impl<const N: usize> PngLines<'_, N> {
             let is_done = unfilter(band, above, line, N);
             debug_assert!(is_done.is_ok(), "{is_done:?}");
             let band = &*band;
-            let lines = band.chunks_exact(line + 1).filter_map(|line| line.get(1..));
+            let mut lines = band.chunks_exact(line + 1).filter_map(|line| line.get(1..));
             lines.clone().for_each(|line| each(line.as_chunks().0));
-            above = lines.last();
+            above = lines.next_back();
         }
     }
 }
