@@ -90,6 +90,11 @@ impl Lens {
         self.center_px
     }
 
+    /// OpenCV's k₁ k₂ p₁ p₂ k₃.
+    pub fn distortion(&self) -> [f64; 5] {
+        self.distortion
+    }
+
     /// Where a direction in OpenCV's axes, of any length, comes to in the picture's plane. `None` behind the
     /// camera, and so far out that the polynomial folds back.
     #[inline]

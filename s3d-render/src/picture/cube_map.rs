@@ -108,6 +108,33 @@ pub struct CubeMap {
 /// A pixel of a cube map before it is made: a colour of 0 to 255 a channel, or nothing.
 pub(crate) type Texel = Option<[f32; 3]>;
 
+/// The most rows of a [`Band`].
+pub(crate) const BAND: u32 = 32;
+
+/// Some rows of a face with its border, while a cube map is made.
+pub(crate) struct Band<'a> {
+    pub(crate) face: usize,
+    pub(crate) first_row: u32,
+    /// Of a row, in pixels.
+    pub(crate) width: usize,
+    /// Row after row.
+    pub(crate) colors: &'a mut [[u8; 3]],
+    /// 255 where a picture shows the pixel, else 0.
+    pub(crate) seen: &'a mut [u8],
+}
+
+impl Band<'_> {
+    /// The colours of each row, and what is seen of it.
+    pub(crate) fn rows(&mut self) -> impl Iterator<Item = (&mut [[u8; 3]], &mut [u8])> {
+        self.colors.chunks_mut(self.width).zip(self.seen.chunks_mut(self.width))
+    }
+}
+
+/// The width of a face of `size` pixels with its border.
+pub(crate) fn stored_width(size: u32) -> u32 {
+    size + 2 * (size / BORDERS)
+}
+
 impl CubeMap {
     /// The size of a face that [`CubeMap`]s can have and that is at least `wanted`: a multiple of 32 up to
     /// 8,192.
@@ -124,25 +151,35 @@ impl CubeMap {
         size: u32,
         texel: impl Fn(usize, u32, u32, DVec3) -> Texel + Sync,
     ) -> Self {
+        Self::build_bands(pose, size, |mut band| {
+            let (face, first_row) = (band.face, band.first_row);
+            for (y, (row, seen)) in (first_row..).zip(band.rows()) {
+                for (x, (pixel, seen)) in (0..).zip(row.iter_mut().zip(seen)) {
+                    if let Some(color) = texel(face, x, y, direction_of(face, size, x, y)) {
+                        *pixel = color.map(|c| (c + 0.5) as u8);
+                        *seen = 255;
+                    }
+                }
+            }
+        })
+    }
+
+    /// A cube map around `pose` (E(original)) with faces of `size` pixels, made in bands of [`BAND`] rows by
+    /// `paint`, which finds them black and unseen. On all threads of the current pool.
+    pub(crate) fn build_bands(pose: Pose, size: u32, paint: impl Fn(Band<'_>) + Sync) -> Self {
         let size = Self::fitting_size(f64::from(size));
-        let (border, width) = (size / BORDERS, size + 2 * (size / BORDERS));
+        let (border, width) = (size / BORDERS, stored_width(size));
         let mut faces = Vec::with_capacity(6);
         let mut masks = Vec::with_capacity(6);
         for face in 0..6 {
             let mut colors = Raster::filled(width, width, [0u8; 3]);
             let mut mask = Raster::filled(width, width, 0u8);
-            let rows = colors.pixels_mut().par_chunks_mut(width as usize);
-            rows.zip(mask.pixels_mut().par_chunks_mut(width as usize)).enumerate().for_each(
-                |(y, (row, seen))| {
-                    for (x, (pixel, seen)) in row.iter_mut().zip(seen).enumerate() {
-                        let (x, y) = (x as u32, y as u32);
-                        if let Some(color) = texel(face, x, y, direction_of(face, size, x, y)) {
-                            *pixel = color.map(|c| (c + 0.5) as u8);
-                            *seen = 255;
-                        }
-                    }
-                },
-            );
+            let band = width as usize * BAND as usize;
+            let bands = colors.pixels_mut().par_chunks_mut(band).zip(mask.pixels_mut().par_chunks_mut(band));
+            bands.enumerate().for_each(|(k, (colors, seen))| {
+                let first_row = k as u32 * BAND;
+                paint(Band { face, first_row, width: width as usize, colors, seen });
+            });
             faces.push(colors);
             masks.push(mask);
         }
@@ -163,7 +200,7 @@ impl CubeMap {
     /// Every pixel of a map with faces of `size`: its face, its column and row there, and its direction in
     /// the cube's frame.
     pub(crate) fn directions(size: u32) -> impl Iterator<Item = (usize, u32, u32, DVec3)> {
-        let width = size + 2 * (size / BORDERS);
+        let width = stored_width(size);
         let at = move |face: usize, k: u32| (face, k % width, k / width);
         let all = (0..6).flat_map(move |face| (0..width * width).map(move |k| at(face, k)));
         all.map(move |(face, x, y)| (face, x, y, direction_of(face, size, x, y)))
@@ -273,22 +310,32 @@ impl CubeMap {
     }
 }
 
+/// Where the middle of column or row `i` of a face with its border is on the face's plane: −1 to 1 within the
+/// face.
+pub(crate) fn place_of(size: u32, i: u32) -> f64 {
+    (f64::from(i) + 0.5 - f64::from(size / BORDERS)) / (0.5 * f64::from(size)) - 1.0
+}
+
+/// A face's right, down and forward in the cube's frame.
+pub(crate) fn axes_of(face: usize) -> [DVec3; 3] {
+    let FaceAxes { right, down, forward } = AXES[face];
+    [right, down, forward].map(axis)
+}
+
 /// The direction, in the cube's frame and with a depth of 1 on the face, of the centre of a pixel of a face
 /// with its border.
 fn direction_of(face: usize, size: u32, x: u32, y: u32) -> DVec3 {
-    let half = 0.5 * f64::from(size);
-    let at = |i: u32| (f64::from(i) + 0.5 - f64::from(size / BORDERS)) / half - 1.0;
-    let FaceAxes { right, down, forward } = AXES[face];
-    axis(right) * at(x) + axis(down) * at(y) + axis(forward)
+    let [right, down, forward] = axes_of(face);
+    right * place_of(size, x) + down * place_of(size, y) + forward
 }
 
 /// The cameras that see the faces with their borders, pixel for pixel, from `pose`.
 pub(crate) fn face_cameras(pose: &Pose, size: u32) -> [s3d_geom::Camera; 6] {
-    let width = size + 2 * (size / BORDERS);
+    let width = stored_width(size);
     let fov = 2.0 * libm::atan(f64::from(width) / f64::from(size));
     let world_from_frame = pose.opencv_from_world().transpose();
-    AXES.map(|FaceAxes { right, down, forward }| {
-        let [right, down, forward] = [right, down, forward].map(|a| world_from_frame * axis(a));
+    std::array::from_fn(|face| {
+        let [right, down, forward] = axes_of(face).map(|axis| world_from_frame * axis);
         let world_from_camera = DMat3::from_cols(right, -down, -forward);
         s3d_geom::Camera::perspective(Pose { location: pose.location, world_from_camera }, fov, width, width)
     })

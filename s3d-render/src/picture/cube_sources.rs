@@ -1,6 +1,7 @@
 //! Cube maps from sky boxes and from equirectangular photographs.
 
 use crate::picture::cube_map::{CubeMap, face_of, place_on};
+use crate::shade::filter::MipLevels;
 use crate::shade::mip_maps::{MipMap, TextureFilter, halved};
 use glam::{DVec2, dvec2};
 use s3d_geom::{Pose, Raster, Texture, Wrap};
@@ -160,6 +161,11 @@ impl SourceMipMap {
     pub(crate) fn new(image: Raster<[u8; 3]>, wrap: [Wrap; 2]) -> Self {
         let reductions = std::iter::successors(halved(&image), halved).collect();
         Self { full: Texture { name: String::new(), image, wrap }, reductions }
+    }
+
+    /// For the fast filter.
+    pub(crate) fn levels(&self) -> MipLevels<'_> {
+        MipLevels::new(&self.full, &self.reductions)
     }
 
     /// The colour around a place in pixels (y down), over the footprint with the sides `x` and `y` in pixels.

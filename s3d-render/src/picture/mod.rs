@@ -5,4 +5,5 @@ pub(crate) mod cube_sources;
 pub(crate) mod fill;
 pub(crate) mod picture_color;
 pub(crate) mod stitch;
+pub(crate) mod stitch_lanes;
 pub(crate) mod undistort;

@@ -10,17 +10,18 @@
 //! the centre: off by their distance from it over the distance of what is seen, 2 cm at 2 m being ten pixels
 //! of 1,000 a radian.
 
-use crate::hits::{Hits, NO_FACE};
 use crate::picture::cube_map::{CubeMap, face_cameras};
 use crate::picture::cube_sources::SourceMipMap;
+use crate::picture::stitch_lanes::{BlendKernel, DepthLimits, LaneCapture};
 use crate::raster::visibility::cast;
 use crate::scene::Scene;
+use crate::simd::dispatch;
 use glam::{DMat3, DVec2, DVec3, dvec2};
 use rayon::prelude::*;
 use s3d_geom::{Camera, Lens, Pose, Raster, Wrap};
 
 /// How far behind the nearest surface a point may be and still be seen: a part of its depth, and metres.
-const BEHIND: (f64, f64) = (0.01, 0.02);
+const BEHIND: (f32, f32) = (0.01, 0.02);
 
 /// Pixels across the images that tell what hides what.
 const DEPTH_WIDTH: u32 = 640;
@@ -86,33 +87,26 @@ pub fn stitch(
         vec![[1.0; 3]; views.len()]
     };
     let rays = SceneDepths::new(pose, size, scene);
-    CubeMap::build(*pose, size, |face, x, y, d| {
-        let ray = CubeRay { direction: world_from_frame * d, depth: rays.depth(face, x, y), size };
-        let (mut sum, mut total) = ([0.0f32; 3], 0.0f32);
-        for (view, gain) in views.iter().zip(&gains) {
-            if let Some((color, weight)) = view.sees(&ray) {
-                (0..3).for_each(|k| sum[k] += weight * gain[k] * color[k]);
-                total += weight;
-            }
-        }
-        (total > 0.0).then(|| sum.map(|c| (c / total).min(255.0)))
+    let captures: Vec<LaneCapture<'_>> =
+        views.iter().zip(gains).map(|(view, gain)| view.in_lanes(world_from_frame, gain)).collect();
+    CubeMap::build_bands(*pose, size, |band| {
+        let depths = rays.0.as_ref().map(|faces| &faces[band.face]);
+        dispatch(BlendKernel { captures: &captures, size, depths, band });
     })
 }
 
-/// The depths of the scene behind each pixel of the cube.
-struct SceneDepths(Option<Vec<Hits>>);
+/// The depths of the scene behind each pixel of the cube, infinite where there is nothing.
+struct SceneDepths(Option<Vec<Raster<f32>>>);
 
 impl SceneDepths {
     fn new(pose: &Pose, size: u32, scene: Option<&Scene<'_>>) -> Self {
-        Self(
-            scene
-                .map(|scene| face_cameras(pose, size).par_iter().map(|camera| cast(scene, camera)).collect()),
-        )
+        let depths = |scene| face_cameras(pose, size).par_iter().map(|c| cast(scene, c).depth).collect();
+        Self(scene.map(depths))
     }
 
     fn depth(&self, face: usize, x: u32, y: u32) -> Option<f64> {
-        let hits = &self.0.as_ref()?[face];
-        (hits.face.at(x, y) != NO_FACE).then(|| f64::from(hits.depth.at(x, y)))
+        let depth = self.0.as_ref()?[face].at(x, y);
+        depth.is_finite().then(|| f64::from(depth))
     }
 }
 
@@ -135,10 +129,10 @@ struct PreparedCapture {
     /// From the camera to the cube's centre, world.
     center: DVec3,
     forward: DVec3,
-    /// The cosine of the angle from its axis beyond which it sees nothing.
-    min_cosine: f64,
-    /// What it sees of the scene.
-    surface: Option<(Camera, Hits)>,
+    /// The tangent of the angle from its axis beyond which it sees nothing.
+    reach: f64,
+    /// How deep it sees into the scene.
+    limits: Option<DepthLimits>,
 }
 
 impl PreparedCapture {
@@ -150,10 +144,10 @@ impl PreparedCapture {
             "a picture has its lens's size"
         );
         let reach = lens.reach();
-        let surface = scene.map(|scene| {
+        let limits = scene.map(|scene| {
             let camera = Camera::perspective(own, 2.0 * libm::atan(1.01 * reach), DEPTH_WIDTH, DEPTH_WIDTH);
-            let hits = cast(scene, &camera);
-            (camera, hits)
+            let limits = depth_limits(&cast(scene, &camera).depth);
+            DepthLimits { limits, focal: camera.focal_px().x as f32 }
         });
         Self {
             picture: SourceMipMap::new(image, [Wrap::Clamp; 2]),
@@ -161,19 +155,31 @@ impl PreparedCapture {
             camera_from_world: own.opencv_from_world(),
             center: pose.location - own.location,
             forward: own.forward(),
-            min_cosine: 1.0 / (1.0 + reach * reach).sqrt() - 1e-9,
-            surface,
+            reach,
+            limits,
+        }
+    }
+
+    fn in_lanes(&self, world_from_frame: DMat3, gain: [f32; 3]) -> LaneCapture<'_> {
+        LaneCapture {
+            levels: self.picture.levels(),
+            lens: &self.lens,
+            turn: self.camera_from_world * world_from_frame,
+            center: self.camera_from_world * self.center,
+            reach: self.reach,
+            limits: self.limits.as_ref(),
+            gain,
         }
     }
 
     /// The colour that the capture has of what a ray sees, and its weight.
     fn sees(&self, ray: &CubeRay) -> Option<([f32; 3], f32)> {
-        let direction = match (&self.surface, ray.depth) {
+        let direction = match (&self.limits, ray.depth) {
             (Some(_), Some(depth)) => self.center + ray.direction * depth,
             _ => ray.direction,
         };
-        let (cosine, length_2) = (self.forward.dot(direction), direction.length_squared());
-        if cosine <= 0.0 || cosine * cosine < self.min_cosine * self.min_cosine * length_2 {
+        let (depth, length_2) = (self.forward.dot(direction), direction.length_squared());
+        if depth <= 0.0 || length_2 > (1.0 + self.reach * self.reach) * depth * depth {
             return None;
         }
         let v = self.camera_from_world * direction;
@@ -198,18 +204,27 @@ impl PreparedCapture {
 
     /// Whether something is in front of the point at `v`, in the camera's axes.
     fn is_hidden(&self, v: DVec3) -> bool {
-        let Some((camera, hits)) = &self.surface else { return false };
-        let focal = camera.focal_px().x;
-        let middle = 0.5 * f64::from(camera.width);
-        let at = dvec2(v.x, v.y) * (focal / v.z) + middle - 0.5;
-        let (x, y) = (at.x.floor(), at.y.floor());
-        let last = f64::from(camera.width - 2);
-        let (x, y) = (x.clamp(0.0, last) as u32, y.clamp(0.0, last) as u32);
-        // The farthest around: at an edge both sides may be seen.
-        let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
-        let far = around.map(|(x, y)| hits.depth.at(x, y)).into_iter().fold(0.0, f32::max);
-        v.z > f64::from(far) * (1.0 + BEHIND.0) + BEHIND.1
+        let Some(DepthLimits { limits, focal }) = &self.limits else { return false };
+        let middle = 0.5 * f64::from(limits.width());
+        let at = dvec2(v.x, v.y) * (f64::from(*focal) / v.z) + middle;
+        let last = f64::from(limits.width() - 1);
+        let (x, y) = (at.x.clamp(0.0, last) as u32, at.y.clamp(0.0, last) as u32);
+        v.z > f64::from(limits.at(x, y))
     }
+}
+
+/// By the upper left one of four neighbouring pixels of a depth image: how deep a point between them may be
+/// and be seen. That is what is behind the farthest: at an edge both sides may be seen.
+fn depth_limits(depths: &Raster<f32>) -> Raster<f32> {
+    let (columns, rows) = (depths.width() - 1, depths.height() - 1);
+    let mut limits = Vec::with_capacity(columns as usize * rows as usize);
+    for y in 0..rows {
+        for (upper, lower) in depths.row(y).windows(2).zip(depths.row(y + 1).windows(2)) {
+            let far = upper[0].max(upper[1]).max(lower[0].max(lower[1]));
+            limits.push(far * (1.0 + BEHIND.0) + BEHIND.1);
+        }
+    }
+    Raster::from_vec(columns, rows, limits)
 }
 
 /// A factor a capture and channel that brings colours of what several see together: the least sum, over the

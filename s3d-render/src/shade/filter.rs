@@ -165,9 +165,22 @@ impl<'a> MipLevels<'a> {
         l: L,
         footprints: &Footprints,
         i: usize,
-        (these, maybe): (u32, u32),
+        these_and_maybe: (u32, u32),
         most: u32,
     ) -> [u32; LANES] {
+        l.pixels(self.sums(l, footprints, i, these_and_maybe, most))
+    }
+
+    /// As [`MipLevels::colors`], not rounded.
+    #[inline(always)]
+    pub(crate) fn sums<L: ShadeLanes>(
+        &self,
+        l: L,
+        footprints: &Footprints,
+        i: usize,
+        (these, maybe): (u32, u32),
+        most: u32,
+    ) -> L::ColorSum {
         let pair = |of: &[Vec<f32>; 2]| [eight(l, &of[0], i), eight(l, &of[1], i)];
         let [x, y] = pair(&footprints.at);
         if maybe == 0 {
@@ -200,12 +213,7 @@ impl<'a> MipLevels<'a> {
             if wide != 0 {
                 let part = l.div(one, count);
                 let step = l.mul(stretch, part);
-                let (level, fraction) = l.log2(width);
-                // Beyond the last level there is the last.
-                let last = (self.levels.len() - 1) as f32;
-                let past = l.sub(level, l.splat(last));
-                let fraction = l.select_by_sign(past, fraction, zero);
-                let level = l.min(level, l.splat(last));
+                let (level, fraction) = self.level_of(l, width);
                 let share = l.mul(l.splat(-32768.0), part);
                 let next_weight = l.mul(share, fraction);
                 let taps = Taps {
@@ -216,17 +224,52 @@ impl<'a> MipLevels<'a> {
                     step_x: l.select(wide, l.mul(axis_x, step), zero),
                     step_y: l.select(wide, l.mul(axis_y, step), zero),
                 };
-                return l.pixels(self.filtered(l, x, y, &taps, these));
+                return self.filtered(l, x, y, &taps, these);
             }
         }
         self.magnified(l, x, y, these)
     }
 
+    /// The colours, not rounded, over round footprints around those of the places that are among `these`:
+    /// one trilinear sample each.
     #[inline(always)]
-    fn magnified<L: ShadeLanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> [u32; LANES] {
+    pub(crate) fn round_sums<L: ShadeLanes>(
+        &self,
+        l: L,
+        (x, y): (L::F, L::F),
+        width: L::F,
+        these: u32,
+    ) -> L::ColorSum {
+        let (zero, one, all) = (l.splat(0.0), l.splat(1.0), l.splat(-32768.0));
+        if l.greater(width, one) & these == 0 {
+            return self.magnified(l, x, y, these);
+        }
+        let (level, fraction) = self.level_of(l, l.max(width, one));
+        let next_weight = l.mul(all, fraction);
+        let weight = l.sub(all, next_weight);
+        self.filtered(
+            l,
+            x,
+            y,
+            &Taps { level, weight, next_weight, count: one, step_x: zero, step_y: zero },
+            these,
+        )
+    }
+
+    /// The level in which samples of a width of at least 1 are taken, and how much of the next one.
+    #[inline(always)]
+    fn level_of<L: ShadeLanes>(&self, l: L, width: L::F) -> (L::F, L::F) {
+        let (level, fraction) = l.log2(width);
+        // Beyond the last level there is the last.
+        let last = l.splat((self.levels.len() - 1) as f32);
+        (l.min(level, last), l.select_by_sign(l.sub(level, last), fraction, l.splat(0.0)))
+    }
+
+    #[inline(always)]
+    fn magnified<L: ShadeLanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> L::ColorSum {
         let (level, half, zero) = (&self.levels[0], l.splat(0.5), l.splat(0.0));
         let walk = TapWalk::at(l, (l.sub(x, half), l.sub(y, half)), (zero, zero));
-        l.pixels(self.add(l, l.zero_sum(), level, &walk, zero, l.full_weights(), these))
+        self.add(l, l.zero_sum(), level, &walk, zero, l.full_weights(), these)
     }
 
     #[inline(always)]

@@ -90,6 +90,9 @@ pub(crate) fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
     if w <= 1 && h <= 1 {
         return None;
     }
+    if w.is_multiple_of(2) && h.is_multiple_of(2) {
+        return Some(even_halved(image));
+    }
     let (columns, rows) = (shares(w), shares(h));
     let pixels = rows.par_iter().flat_map_iter(|row| {
         columns.iter().map(move |column| {
@@ -108,6 +111,25 @@ pub(crate) fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
         })
     });
     Some(Raster::from_vec(columns.len() as u32, rows.len() as u32, pixels.collect()))
+}
+
+/// [`halved`] of an even width and height: means of four.
+fn even_halved(image: &Raster<[u8; 3]>) -> Raster<[u8; 3]> {
+    let (w, h) = (image.width() as usize, image.height() as usize);
+    let mut half = Raster::filled(w as u32 / 2, h as u32 / 2, [0u8; 3]);
+    let rows = half.pixels_mut().par_chunks_mut(w / 2).zip(image.pixels().par_chunks(2 * w));
+    rows.for_each(|(to, from)| {
+        let (upper, lower) = from.split_at(w);
+        let upper = upper.as_chunks::<2>().0;
+        let lower = lower.as_chunks::<2>().0;
+        for ((pixel, [a, b]), [c, d]) in to.iter_mut().zip(upper).zip(lower) {
+            for k in 0..3 {
+                let sum = u16::from(a[k]) + u16::from(b[k]) + u16::from(c[k]) + u16::from(d[k]);
+                pixel[k] = ((sum + 2) >> 2) as u8;
+            }
+        }
+    });
+    half
 }
 
 /// The pixels along an axis whose mean is one pixel of half as many: up to three, with weights that add up to

@@ -158,6 +158,10 @@ impl<W: Width> ShadeLanes for Eight<W> {
         self.0.add(sum, quads, corners)
     }
     #[inline(always)]
+    fn channels(self, sum: Self::ColorSum) -> [__m256; 3] {
+        self.0.channels(sum)
+    }
+    #[inline(always)]
     fn pixels(self, sum: Self::ColorSum) -> [u32; LANES] {
         // SAFETY: `self` holds the proof of AVX2; the array has eight values.
         unsafe {
@@ -298,6 +302,11 @@ mod tests {
             sum = lanes.add_weighted(sum, quads, corners);
             plain = Plain.add_weighted(plain, plain_quads, plain_corners);
             prop_assert_eq!(lanes.pixels(sum), Plain.pixels(plain));
+            for (channel, plain) in lanes.channels(sum).into_iter().zip(Plain.channels(plain)) {
+                let mut got = [0.0; LANES];
+                lanes.store(channel, &mut got);
+                prop_assert_eq!(got, plain);
+            }
         }
         let one = lanes.add_weighted(lanes.zero_sum(), quads, all.0);
         let plain = Plain.add_weighted(Plain.zero_sum(), plain_quads, all.1);

@@ -85,6 +85,8 @@ pub(crate) trait ShadeLanes: Copy {
     fn zero_sum(self) -> Self::ColorSum;
     /// `sum` and weighted colours. Nothing is rounded.
     fn add_weighted(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum;
+    /// Of 0 to 255 a channel, not rounded.
+    fn channels(self, sum: Self::ColorSum) -> [Self::F; 3];
     /// Rounded to bytes, R G B in the lowest three of each value; never black.
     fn pixels(self, sum: Self::ColorSum) -> [u32; LANES];
     /// The lowest three bytes of each value, one after another.
@@ -342,6 +344,10 @@ impl ShadeLanes for Plain {
             }
             sum
         })
+    }
+    #[inline(always)]
+    fn channels(self, sum: Self::ColorSum) -> [Eight; 3] {
+        std::array::from_fn(|c| each(|k| sum[k][c] as f32 * (-1.0 / 32768.0)))
     }
     #[inline(always)]
     fn pixels(self, sum: Self::ColorSum) -> [u32; LANES] {

@@ -30,6 +30,8 @@ pub(crate) trait Width: Copy {
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
     fn none(self) -> Self::ColorSum;
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum;
+    /// See [`crate::simd::shade_lanes::ShadeLanes::channels`].
+    fn channels(self, sum: Self::ColorSum) -> [__m256; 3];
     /// R, G, B and 0, rounded to bytes.
     fn bytes(self, sum: Self::ColorSum) -> __m256i;
     /// See [`crate::simd::shade_lanes::ShadeLanes::changes`].
@@ -131,6 +133,21 @@ impl Width for Avx2 {
         }
     }
     #[inline(always)]
+    fn channels(self, [a, b, c, d]: Self::ColorSum) -> [__m256; 3] {
+        // SAFETY: `self` is the proof of AVX2.
+        unsafe {
+            // R R G G, and B B.
+            let (ab, cd) = (_mm256_unpacklo_epi32(a, b), _mm256_unpacklo_epi32(c, d));
+            let blue = _mm256_unpacklo_epi64(_mm256_unpackhi_epi32(a, b), _mm256_unpackhi_epi32(c, d));
+            let mut channels = [_mm256_setzero_ps(); 3];
+            let sums = [_mm256_unpacklo_epi64(ab, cd), _mm256_unpackhi_epi64(ab, cd), blue];
+            for (channel, sum) in channels.iter_mut().zip(sums) {
+                *channel = _mm256_mul_ps(_mm256_cvtepi32_ps(sum), _mm256_set1_ps(-1.0 / 32768.0));
+            }
+            channels
+        }
+    }
+    #[inline(always)]
     fn bytes(self, sum: Self::ColorSum) -> __m256i {
         // SAFETY: `self` is the proof of AVX2.
         unsafe {
@@ -219,6 +236,19 @@ impl Width for Avx512 {
             }
             sum
         }
+    }
+    #[inline(always)]
+    fn channels(self, [low, high]: Self::ColorSum) -> [__m256; 3] {
+        // SAFETY: `self` is the proof of AVX-512.
+        let pairs = unsafe {
+            [
+                _mm256_set_m128i(_mm512_extracti32x4_epi32::<0>(high), _mm512_extracti32x4_epi32::<0>(low)),
+                _mm256_set_m128i(_mm512_extracti32x4_epi32::<1>(high), _mm512_extracti32x4_epi32::<1>(low)),
+                _mm256_set_m128i(_mm512_extracti32x4_epi32::<2>(high), _mm512_extracti32x4_epi32::<2>(low)),
+                _mm256_set_m128i(_mm512_extracti32x4_epi32::<3>(high), _mm512_extracti32x4_epi32::<3>(low)),
+            ]
+        };
+        self.avx2().channels(pairs)
     }
     #[inline(always)]
     fn bytes(self, sum: Self::ColorSum) -> __m256i {
