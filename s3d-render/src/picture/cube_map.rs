@@ -241,6 +241,15 @@ impl CubeMap {
         Raster::from_vec(self.size, self.size, rows.copied().collect())
     }
 
+    /// The pixels of all faces with their borders, and how much of each a picture shows: 0 or 255.
+    #[cfg(test)]
+    pub(crate) fn texels(&self) -> impl Iterator<Item = ([u8; 3], u8)> {
+        self.faces.iter().enumerate().flat_map(move |(face, texture)| {
+            let seen = move |k| self.seen.as_ref().map_or(255, |seen| seen[face].pixels()[k]);
+            texture.image.pixels().iter().enumerate().map(move |(k, color)| (*color, seen(k)))
+        })
+    }
+
     /// World → the cube's frame.
     pub(crate) fn frame_from_world(&self) -> DMat3 {
         self.pose.opencv_from_world()
@@ -324,7 +333,7 @@ pub(crate) fn axes_of(face: usize) -> [DVec3; 3] {
 
 /// The direction, in the cube's frame and with a depth of 1 on the face, of the centre of a pixel of a face
 /// with its border.
-fn direction_of(face: usize, size: u32, x: u32, y: u32) -> DVec3 {
+pub(crate) fn direction_of(face: usize, size: u32, x: u32, y: u32) -> DVec3 {
     let [right, down, forward] = axes_of(face);
     right * place_of(size, x) + down * place_of(size, y) + forward
 }

@@ -1,14 +1,10 @@
-//! Cube maps from sky boxes and from equirectangular photographs.
+//! Cube maps from sky boxes, and pictures that cube maps are made from.
 
-use crate::picture::cube_map::{CubeMap, face_of, place_on};
+use crate::picture::cube_map::{CubeMap, direction_of, face_of, place_on};
 use crate::shade::filter::MipLevels;
 use crate::shade::mip_maps::{MipMap, TextureFilter, halved};
 use glam::{DVec2, dvec2};
 use s3d_geom::{Pose, Raster, Texture, Wrap};
-
-/// Near its poles a pixel sees many columns of a photograph and few rows: as many samples as keep the rows
-/// apart.
-const AT_POLES: TextureFilter = TextureFilter { max_taps: 256 };
 
 /// Which way the upper and the lower picture of a sky box are turned: with which side picture the lower edge
 /// of the one and the upper edge of the other meet.
@@ -63,51 +59,30 @@ impl CubeMap {
         let [_, right, back, left, front, _] = pictures;
         let pictures = [&turned[0], right, back, left, front, &turned[1]];
         let size = Self::fitting_size(f64::from(size.unwrap_or(n)));
-        let mip_maps: Vec<SourceMipMap> =
-            pictures.iter().map(|p| SourceMipMap::new((*p).clone(), [Wrap::Clamp; 2])).collect();
+        let source = if size < n { SourceMipMap::new } else { SourceMipMap::without_reductions };
+        let mip_maps = pictures.map(|p| source(p.clone(), [Wrap::Clamp; 2]));
         let (width, step) = (f64::from(n), f64::from(n) / f64::from(size));
-        Self::build(*pose, size, |_, _, _, d| {
+        let color = |d| {
             let face = face_of(d);
             let at = (place_on(face, d) + 1.0) * (0.5 * width);
-            Some(mip_maps[face].sample(at, dvec2(step, 0.0), dvec2(0.0, step), &TextureFilter::default()))
-        })
-    }
-
-    /// From an equirectangular photograph, whose columns are longitudes growing to the right and whose rows
-    /// are latitudes from +90° at the top to −90°, upright in the world (+Z up). Its centre column looks
-    /// along the forward axis of `pose` projected to the horizon, turned by `yaw_rad` to the left:
-    /// formats.md's panoramas have 0. With faces of `size` pixels, or of as many as keep what the photograph
-    /// shows.
-    ///
-    /// # Panics
-    /// If the photograph has no pixel.
-    pub fn from_equirectangular(
-        photo: &Raster<[u8; 3]>,
-        yaw_rad: f64,
-        pose: &Pose,
-        size: Option<u32>,
-    ) -> Self {
-        use std::f64::consts::{PI, TAU};
-        let (w, h) = (f64::from(photo.width()), f64::from(photo.height()));
-        assert!(!photo.is_empty(), "a photograph has pixels");
-        let size = Self::fitting_size(size.map_or(w * (1.25 / PI), f64::from));
-        let mip_map = SourceMipMap::new(photo.clone(), [Wrap::Repeat, Wrap::Clamp]);
-        let world_from_frame = pose.opencv_from_world().transpose();
-        let azimuth = pose.azimuth_rad() + yaw_rad;
-        let angle = 2.0 / f64::from(size);
-        Self::build(*pose, size, |_, _, _, d| {
-            // A pixel at the depth 1 and the distance r is seen under the angle 2/size · 1/r, across even
-            // 1/r².
-            let distance = d.length();
-            let v = world_from_frame * d;
-            let flat = libm::hypot(v.x, v.y);
-            let turn = (azimuth - libm::atan2(v.y, v.x)) / TAU + 0.5;
-            let latitude = libm::atan2(v.z, flat);
-            let place = dvec2((turn - turn.floor()) * w, (0.5 - latitude / PI) * h);
-            // A circle of latitude shortens towards the pole, where a pixel sees many columns.
-            let around = (angle / flat).min(TAU) / TAU * w;
-            let along = angle / distance / PI * h;
-            Some(mip_map.sample(place, dvec2(around, 0.0), dvec2(0.0, along), &AT_POLES))
+            mip_maps[face].sample(at, dvec2(step, 0.0), dvec2(0.0, step), &TextureFilter::default())
+        };
+        Self::build_bands(*pose, size, |mut band| {
+            let (face, first_row) = (band.face, band.first_row);
+            let border = (band.width - size as usize) / 2;
+            for (y, (row, seen)) in (first_row as usize..).zip(band.rows()) {
+                seen.fill(255);
+                // What a picture of this size shows is taken as it is.
+                let inside = border..border + n as usize;
+                let taken = if size == n && inside.contains(&y) { inside } else { 0..0 };
+                if !taken.is_empty() {
+                    row[taken.clone()].copy_from_slice(pictures[face].row((y - border) as u32));
+                }
+                for (x, pixel) in row.iter_mut().enumerate().filter(|(x, _)| !taken.contains(x)) {
+                    let color = color(direction_of(face, size, x as u32, y as u32));
+                    *pixel = color.map(|c| (c + 0.5) as u8);
+                }
+            }
         })
     }
 }
@@ -118,16 +93,17 @@ fn agreeing_turn(pictures: &[&Raster<[u8; 3]>; 6], face: usize) -> u32 {
     let n = pictures[0].width();
     let difference = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| u64::from(a[k].abs_diff(b[k]))).sum::<u64>();
     let cost = |quarters: u32| -> u64 {
-        let cap = turned(pictures[face], if face == 0 { quarters } else { (4 - quarters) % 4 });
+        let quarters = if face == 0 { quarters } else { (4 - quarters) % 4 };
+        let cap = |x, y| turned_at(pictures[face], quarters, x, y);
         (0..n)
             .map(|i| {
                 let last = n - 1;
                 // Along the edge with the front from left to right, then right, back and left, each as its
                 // own picture goes.
                 let (edge, row) = if face == 0 {
-                    ([cap.at(i, last), cap.at(last, last - i), cap.at(last - i, 0), cap.at(0, i)], 0)
+                    ([cap(i, last), cap(last, last - i), cap(last - i, 0), cap(0, i)], 0)
                 } else {
-                    ([cap.at(i, 0), cap.at(last, i), cap.at(last - i, last), cap.at(0, last - i)], last)
+                    ([cap(i, 0), cap(last, i), cap(last - i, last), cap(0, last - i)], last)
                 };
                 let sides = [4, 1, 2, 3].map(|side| pictures[side].at(i, row));
                 edge.into_iter().zip(sides).map(|(a, b)| difference(a, b)).sum::<u64>()
@@ -140,15 +116,17 @@ fn agreeing_turn(pictures: &[&Raster<[u8; 3]>; 6], face: usize) -> u32 {
 /// The picture turned so that what was its lower edge becomes its right one, `quarters` times.
 fn turned(picture: &Raster<[u8; 3]>, quarters: u32) -> Raster<[u8; 3]> {
     let n = picture.width();
-    let pixels = (0..n * n).map(|k| {
-        let (mut x, mut y) = (k % n, k / n);
-        for _ in 0..quarters {
-            // What is at (x, y) now was at (n − 1 − y, x): (right, middle) was (middle, bottom).
-            (x, y) = (n - 1 - y, x);
-        }
-        picture.at(x, y)
-    });
-    Raster::from_vec(n, n, pixels.collect())
+    let rows = (0..n).flat_map(|y| (0..n).map(move |x| turned_at(picture, quarters, x, y)));
+    Raster::from_vec(n, n, rows.collect())
+}
+
+/// What [`turned`] has at (x, y).
+fn turned_at(picture: &Raster<[u8; 3]>, quarters: u32, mut x: u32, mut y: u32) -> [u8; 3] {
+    for _ in 0..quarters {
+        // What is at (x, y) now was at (n − 1 − y, x): (right, middle) was (middle, bottom).
+        (x, y) = (picture.width() - 1 - y, x);
+    }
+    picture.at(x, y)
 }
 
 /// A source picture at every size, sampled at pixels of its full one.
@@ -160,7 +138,12 @@ pub(crate) struct SourceMipMap {
 impl SourceMipMap {
     pub(crate) fn new(image: Raster<[u8; 3]>, wrap: [Wrap; 2]) -> Self {
         let reductions = std::iter::successors(halved(&image), halved).collect();
-        Self { full: Texture { name: String::new(), image, wrap }, reductions }
+        Self { reductions, ..Self::without_reductions(image, wrap) }
+    }
+
+    /// For footprints of at most a pixel.
+    fn without_reductions(image: Raster<[u8; 3]>, wrap: [Wrap; 2]) -> Self {
+        Self { full: Texture { name: String::new(), image, wrap }, reductions: Vec::new() }
     }
 
     /// For the fast filter.

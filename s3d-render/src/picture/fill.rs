@@ -5,16 +5,26 @@ use s3d_geom::Raster;
 /// Gives every pixel of `image` whose `seen` is 0 a colour from those around it: the nearer, the more.
 /// Neighbours of holes can then be filtered without a rim. An image of which nothing is seen stays as it is.
 pub(crate) fn fill_unseen(image: &mut Raster<[u8; 3]>, seen: &Raster<u8>) {
-    let colors = image.pixels().iter().zip(seen.pixels());
-    let full: Vec<[f32; 4]> = colors
-        .map(
-            |(c, &s)| if s > 0 { [f32::from(c[0]), f32::from(c[1]), f32::from(c[2]), 1.0] } else { [0.0; 4] },
-        )
-        .collect();
-    let filled = filled(Raster::from_vec(image.width(), image.height(), full));
-    for ((pixel, color), &seen) in image.pixels_mut().iter_mut().zip(filled.pixels()).zip(seen.pixels()) {
-        if seen == 0 && color[3] > 0.0 {
-            *pixel = std::array::from_fn(|k| (color[k] + 0.5) as u8);
+    if seen.pixels().iter().all(|&s| s > 0) {
+        return;
+    }
+    let (w, h) = (image.width(), image.height());
+    let half = filled(half_of(w, h, |at| match seen.pixels()[at] {
+        0 => [0.0; 4],
+        _ => {
+            let [r, g, b] = image.pixels()[at].map(f32::from);
+            [r, g, b, 1.0]
+        }
+    }));
+    for y in 0..h {
+        for x in 0..w {
+            let at = y as usize * w as usize + x as usize;
+            if seen.pixels()[at] == 0 {
+                let color = between(&half, x, y);
+                if color[3] > 0.0 {
+                    image.pixels_mut()[at] = std::array::from_fn(|k| (color[k] + 0.5) as u8);
+                }
+            }
         }
     }
 }
@@ -25,40 +35,48 @@ fn filled(mut image: Raster<[f32; 4]>) -> Raster<[f32; 4]> {
     if (w <= 1 && h <= 1) || image.pixels().iter().all(|c| c[3] > 0.0) {
         return image;
     }
-    let (half_w, half_h) = (w.div_ceil(2), h.div_ceil(2));
-    let mut half = Raster::filled(half_w, half_h, [0.0f32; 4]);
-    for (y, row) in image.rows().enumerate() {
-        for (x, color) in row.iter().enumerate() {
-            let sum = &mut half.pixels_mut()[(y / 2) * half_w as usize + x / 2];
-            (0..4).for_each(|k| sum[k] += color[k]);
-        }
-    }
-    for color in half.pixels_mut() {
-        if color[3] > 0.0 {
-            *color = color.map(|c| c / color[3]);
-        }
-    }
-    let half = filled(half);
+    let half = filled(half_of(w, h, |at| image.pixels()[at]));
     for y in 0..h {
         for x in 0..w {
             let at = y as usize * w as usize + x as usize;
-            if image.pixels()[at][3] > 0.0 {
-                continue;
+            if image.pixels()[at][3] == 0.0 {
+                image.pixels_mut()[at] = between(&half, x, y);
             }
-            // Three quarters of the pixel that covers it, a quarter of the next one on its side, in either
-            // direction.
-            let next =
-                |i: u32, n: u32| if i % 2 == 1 { (i / 2 + 1).min(n - 1) } else { (i / 2).saturating_sub(1) };
-            let (x0, x1, y0, y1) = (x / 2, next(x, half_w), y / 2, next(y, half_h));
-            let corners = [half.at(x0, y0), half.at(x1, y0), half.at(x0, y1), half.at(x1, y1)];
-            let mut color = [0.0; 4];
-            for (corner, weight) in corners.into_iter().zip([0.5625, 0.1875, 0.1875, 0.0625]) {
-                (0..4).for_each(|k| color[k] += weight * corner[k]);
-            }
-            image.pixels_mut()[at] = color;
         }
     }
     image
+}
+
+/// An image of w × h at half the size: means of what has a weight.
+fn half_of(w: u32, h: u32, color: impl Fn(usize) -> [f32; 4]) -> Raster<[f32; 4]> {
+    let (half_w, half_h) = (w.div_ceil(2), h.div_ceil(2));
+    let mut half = Vec::with_capacity(half_w as usize * half_h as usize);
+    for y in 0..half_h {
+        for x in 0..half_w {
+            let mut sum = [0.0f32; 4];
+            for y in 2 * y..h.min(2 * y + 2) {
+                for x in 2 * x..w.min(2 * x + 2) {
+                    let color = color(y as usize * w as usize + x as usize);
+                    (0..4).for_each(|k| sum[k] += color[k]);
+                }
+            }
+            half.push(if sum[3] > 0.0 { sum.map(|c| c / sum[3]) } else { sum });
+        }
+    }
+    Raster::from_vec(half_w, half_h, half)
+}
+
+/// What an image at half the size has at pixel (x, y) of the full one: three quarters of the pixel that
+/// covers it, a quarter of the next one on its side, in either direction.
+fn between(half: &Raster<[f32; 4]>, x: u32, y: u32) -> [f32; 4] {
+    let next = |i: u32, n: u32| if i % 2 == 1 { (i / 2 + 1).min(n - 1) } else { (i / 2).saturating_sub(1) };
+    let (x0, x1, y0, y1) = (x / 2, next(x, half.width()), y / 2, next(y, half.height()));
+    let corners = [half.at(x0, y0), half.at(x1, y0), half.at(x0, y1), half.at(x1, y1)];
+    let mut color = [0.0; 4];
+    for (corner, weight) in corners.into_iter().zip([0.5625, 0.1875, 0.1875, 0.0625]) {
+        (0..4).for_each(|k| color[k] += weight * corner[k]);
+    }
+    color
 }
 
 #[cfg(test)]

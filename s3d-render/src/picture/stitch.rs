@@ -15,7 +15,8 @@ use crate::picture::cube_sources::SourceMipMap;
 use crate::picture::stitch_lanes::{BlendKernel, DepthLimits, LaneCapture};
 use crate::raster::visibility::cast;
 use crate::scene::Scene;
-use crate::simd::dispatch;
+use crate::simd::dispatch_on;
+use crate::simd::level::{Level, level};
 use glam::{DMat3, DVec2, DVec3, dvec2};
 use rayon::prelude::*;
 use s3d_geom::{Camera, Lens, Pose, Raster, Wrap};
@@ -74,25 +75,71 @@ pub fn stitch(
     scene: Option<&Scene<'_>>,
     options: &StitchOptions,
 ) -> CubeMap {
-    assert!(!captures.is_empty(), "a cube map needs captures");
-    let sharpest = captures.iter().map(|c| c.lens.focal_px().max_element()).fold(0.0, f64::max);
-    let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
-    let world_from_frame = pose.opencv_from_world().transpose();
-    let views: Vec<PreparedCapture> =
-        captures.into_par_iter().map(|c| PreparedCapture::new(c, pose, scene)).collect();
-    let gains = if options.gains && views.len() > 1 {
-        let rays = SceneDepths::new(pose, GAIN_SIZE, scene);
-        gains(&views, GAIN_SIZE, &rays, world_from_frame)
+    let stitch = Stitch::new(captures, pose, scene, options);
+    let lanes = stitch.lanes();
+    if lanes.iter().all(|capture| capture.levels.is_usable()) {
+        stitch.in_lanes(&lanes, level())
     } else {
-        vec![[1.0; 3]; views.len()]
-    };
-    let rays = SceneDepths::new(pose, size, scene);
-    let captures: Vec<LaneCapture<'_>> =
-        views.iter().zip(gains).map(|(view, gain)| view.in_lanes(world_from_frame, gain)).collect();
-    CubeMap::build_bands(*pose, size, |band| {
-        let depths = rays.0.as_ref().map(|faces| &faces[band.face]);
-        dispatch(BlendKernel { captures: &captures, size, depths, band });
-    })
+        stitch.pixel_by_pixel()
+    }
+}
+
+/// All that the pixels of the cube are made from.
+struct Stitch {
+    pose: Pose,
+    size: u32,
+    world_from_frame: DMat3,
+    views: Vec<PreparedCapture>,
+    gains: Vec<[f32; 3]>,
+    depths: SceneDepths,
+}
+
+impl Stitch {
+    fn new(captures: Vec<Capture>, pose: &Pose, scene: Option<&Scene<'_>>, options: &StitchOptions) -> Self {
+        assert!(!captures.is_empty(), "a cube map needs captures");
+        let sharpest = captures.iter().map(|c| c.lens.focal_px().max_element()).fold(0.0, f64::max);
+        let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
+        let world_from_frame = pose.opencv_from_world().transpose();
+        let views: Vec<PreparedCapture> =
+            captures.into_par_iter().map(|c| PreparedCapture::new(c, pose, scene)).collect();
+        let gains = if options.gains && views.len() > 1 {
+            let depths = SceneDepths::new(pose, GAIN_SIZE, scene);
+            gains(&views, GAIN_SIZE, &depths, world_from_frame)
+        } else {
+            vec![[1.0; 3]; views.len()]
+        };
+        let depths = SceneDepths::new(pose, size, scene);
+        Self { pose: *pose, size, world_from_frame, views, gains, depths }
+    }
+
+    fn lanes(&self) -> Vec<LaneCapture<'_>> {
+        let each = self.views.iter().zip(&self.gains);
+        each.map(|(view, gain)| view.in_lanes(self.world_from_frame, *gain)).collect()
+    }
+
+    fn in_lanes(&self, captures: &[LaneCapture<'_>], level: Level) -> CubeMap {
+        CubeMap::build_bands(self.pose, self.size, |band| {
+            let depths = self.depths.0.as_ref().map(|faces| &faces[band.face]);
+            dispatch_on(level, BlendKernel { captures, size: self.size, depths, band });
+        })
+    }
+
+    /// The same in `f64`, one pixel after another: for pictures so large that the lanes' numbers would not
+    /// do, and what tests hold the lanes against.
+    fn pixel_by_pixel(&self) -> CubeMap {
+        CubeMap::build(self.pose, self.size, |face, x, y, d| {
+            let depth = self.depths.depth(face, x, y);
+            let ray = CubeRay { direction: self.world_from_frame * d, depth, size: self.size };
+            let (mut sum, mut total) = ([0.0f32; 3], 0.0f32);
+            for (view, gain) in self.views.iter().zip(&self.gains) {
+                if let Some((color, weight)) = view.sees(&ray) {
+                    (0..3).for_each(|k| sum[k] += weight * gain[k] * color[k]);
+                    total += weight;
+                }
+            }
+            (total > 0.0).then(|| sum.map(|c| (c / total).min(255.0)))
+        })
+    }
 }
 
 /// The depths of the scene behind each pixel of the cube, infinite where there is nothing.
@@ -304,6 +351,7 @@ mod tests {
     use crate::picture::picture_color::{Unseen, picture_image};
     use crate::shade::color::rgb_image;
     use crate::shade::mip_maps::{MipMaps, TextureFilter};
+    use crate::simd::level::all_levels;
     use glam::{DQuat, dvec3};
     use proptest::prelude::*;
 
@@ -399,6 +447,58 @@ mod tests {
                 prop_assert!((solved - x).abs() < 1e-9);
             }
         }
+    }
+
+    /// Noise, each picture darker or brighter than the others and beside the centre.
+    fn noisy_captures() -> Vec<Capture> {
+        let all = captures(|_, _| [0.0; 3]).into_iter().enumerate();
+        all.map(|(n, mut capture)| {
+            for (k, pixel) in capture.image.pixels_mut().iter_mut().enumerate() {
+                let mut h = ((n * 7919 + k) as u32).wrapping_mul(0x9E37_79B1);
+                h ^= h >> 15;
+                let [r, g, b, _] = h.wrapping_mul(0x85EB_CA77).to_le_bytes();
+                *pixel = [r, g / 2 + 10 * n as u8 % 50, b];
+            }
+            let beside = dvec3(0.04, 0.01 * (n % 5) as f64, -0.03);
+            Capture { pose: Pose { location: pose().location + beside, ..capture.pose }, ..capture }
+        })
+        .collect()
+    }
+
+    /// With the scene and without; sharper than the captures, about as sharp, and coarser.
+    fn in_many_ways(mut check: impl FnMut(&Stitch)) {
+        let mesh = s3d_synth::scenes::furnished_room(5);
+        let scene = Scene::new(&mesh);
+        for (scene, size) in [(None, None), (Some(&scene), None), (Some(&scene), Some(320)), (None, Some(96))]
+        {
+            check(&Stitch::new(noisy_captures(), &pose(), scene, &StitchOptions { size, gains: true }));
+        }
+    }
+
+    #[test]
+    fn eight_pixels_at_a_time_give_what_single_ones_do() {
+        in_many_ways(|stitch| {
+            let (cube, plain) = (stitch.in_lanes(&stitch.lanes(), level()), stitch.pixel_by_pixel());
+            let (mut pixels, mut far, mut differ) = (0, 0, 0);
+            for ((color, seen), (plain, plain_seen)) in cube.texels().zip(plain.texels()) {
+                let off = (0..3).map(|k| color[k].abs_diff(plain[k])).max().unwrap_or(0);
+                pixels += 1;
+                differ += usize::from(seen != plain_seen);
+                far += usize::from(seen == plain_seen && seen == 255 && off > 1);
+            }
+            // Where a capture ends and where one surface hides another rounding decides.
+            assert!(differ * 20_000 <= pixels && far * 2_000 <= pixels, "{differ}, {far} of {pixels}");
+        });
+    }
+
+    #[test]
+    fn every_level_of_instructions_gives_the_same_bytes() {
+        in_many_ways(|stitch| {
+            let lanes = stitch.lanes();
+            let cubes = all_levels().into_iter().map(|level| stitch.in_lanes(&lanes, level));
+            let texels: Vec<Vec<_>> = cubes.map(|cube| cube.texels().collect()).collect();
+            assert!(texels.iter().all(|t| *t == texels[0]));
+        });
     }
 
     /// Cameras beside the centre, and a thing in the room: with the mesh each pixel is where the mesh has it.

@@ -3,11 +3,12 @@
 //! In tiles of [`TILE`] columns: which captures may see a tile follows from the angle between the middle of
 //! the tile and the axis of the capture. Each pixel of the tile is then projected into each of these captures
 //! in `f32`, where a place in a picture of 1,280 pixels is off by less than a 1000th of a pixel; the weighted
-//! colours are added in the order of the captures. `stitch::blended_pixel` is the same in `f64`.
+//! colours are added in the order of the captures. `Stitch::pixel_by_pixel`
+//! is the same in `f64`.
 
 use crate::picture::cube_map::{BAND, Band, axes_of, place_of};
 use crate::shade::filter::MipLevels;
-use crate::simd::shade_lanes::{LANES, ShadeLanes, eight, put};
+use crate::simd::shade_lanes::{LANES, ShadeLanes, eight, packed, put};
 use crate::simd::{Kernel, Simd};
 use glam::{DMat3, DVec3};
 use s3d_geom::{Lens, Raster};
@@ -159,7 +160,7 @@ impl BlendKernel<'_> {
             }
         }
         let (mut colors, mut seen) = ([[0; 3]; TILE], [0; TILE]);
-        let (half, most) = (l.splat(0.5), l.splat(255.0));
+        let most = l.splat(255.0);
         for i in (0..tile.columns).step_by(LANES) {
             let weight = eight(l, &sums.weights, i);
             let shown = l.greater(weight, l.splat(0.0));
@@ -167,14 +168,12 @@ impl BlendKernel<'_> {
                 continue;
             }
             let inverse = l.div(l.splat(1.0), l.max(weight, l.splat(f32::MIN_POSITIVE)));
-            let mut bytes = [[0; LANES]; 3];
+            let mut color = [inverse; 3];
             for k in 0..3 {
-                let color = l.min(l.mul(eight(l, &sums.colors[k], i), inverse), most);
-                l.store_int(l.add(color, half), &mut bytes[k]);
+                color[k] = l.min(l.mul(eight(l, &sums.colors[k], i), inverse), most);
             }
-            let mut packed = [0; LANES];
+            let packed = packed(l, color);
             for k in 0..LANES {
-                packed[k] = (bytes[0][k] | bytes[1][k] << 8 | bytes[2][k] << 16) as u32;
                 seen[i + k] = if shown >> k & 1 == 1 { 255 } else { 0 };
             }
             if let Some(to) = colors[i..].as_flattened_mut().first_chunk_mut() {

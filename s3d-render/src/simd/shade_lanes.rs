@@ -419,6 +419,20 @@ pub(crate) fn eight<L: ShadeLanes>(lanes: L, of: &[f32], at: usize) -> L::F {
     }
 }
 
+/// Colours of 0 to 255 a channel as R G B in the lowest three bytes of each value, rounded half up.
+#[inline(always)]
+pub(crate) fn packed<L: ShadeLanes>(lanes: L, color: [L::F; 3]) -> [u32; LANES] {
+    let mut packed = [0; LANES];
+    for (channel, shift) in color.into_iter().zip([0, 8, 16]) {
+        let mut bytes = [0; LANES];
+        lanes.store_int(lanes.add(channel, lanes.splat(0.5)), &mut bytes);
+        for (packed, byte) in packed.iter_mut().zip(bytes) {
+            *packed |= (byte as u32) << shift;
+        }
+    }
+    packed
+}
+
 /// Stores eight values from the `at`th on, if there are as many.
 #[inline(always)]
 pub(crate) fn put<L: ShadeLanes>(lanes: L, to: &mut [f32], at: usize, values: L::F) {
