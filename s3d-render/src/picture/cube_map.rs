@@ -101,8 +101,8 @@ pub struct CubeMap {
     /// With their borders.
     faces: Vec<Texture>,
     reductions: Vec<Vec<Raster<[u8; 3]>>>,
-    /// By face, with its border: 255 what a picture shows, 0 what none does. `None` if all is shown.
-    seen: Option<Vec<Raster<u8>>>,
+    /// By face, with its border: 255 what a picture shows, 0 what none does. `None` if all of a face is shown.
+    seen: Vec<Option<Raster<u8>>>,
 }
 
 /// A pixel of a cube map before it is made: a colour of 0 to 255 a channel, or nothing.
@@ -170,7 +170,7 @@ impl CubeMap {
         let size = Self::fitting_size(f64::from(size));
         let (border, width) = (size / BORDERS, stored_width(size));
         let mut faces = Vec::with_capacity(6);
-        let mut masks = Vec::with_capacity(6);
+        let mut seen = Vec::with_capacity(6);
         for face in 0..6 {
             let mut colors = Raster::filled(width, width, [0u8; 3]);
             let mut mask = Raster::filled(width, width, 0u8);
@@ -181,13 +181,13 @@ impl CubeMap {
                 paint(Band { face, first_row, width: width as usize, colors, seen });
             });
             faces.push(colors);
-            masks.push(mask);
+            seen.push(mask.pixels().iter().any(|&m| m != 255).then_some(mask));
         }
-        let all_seen = masks.iter().all(|mask| mask.pixels().iter().all(|&m| m == 255));
-        let seen = (!all_seen).then_some(masks);
-        if let Some(seen) = &seen {
-            faces.par_iter_mut().zip(seen).for_each(|(face, seen)| fill_unseen(face, seen));
-        }
+        faces.par_iter_mut().zip(&seen).for_each(|(face, seen)| {
+            if let Some(seen) = seen {
+                fill_unseen(face, seen);
+            }
+        });
         let reductions =
             faces.iter().map(|face| std::iter::successors(halved(face), halved).collect()).collect();
         let faces = faces
@@ -225,9 +225,9 @@ impl CubeMap {
 
     /// The share of the pixels that pictures show, borders included: 1 if there is no hole.
     pub fn coverage(&self) -> f64 {
-        let Some(seen) = &self.seen else { return 1.0 };
-        let all = seen.iter().map(Raster::len).sum::<usize>();
-        seen.iter().flat_map(Raster::pixels).filter(|&&m| m > 0).count() as f64 / all as f64
+        let all = self.faces.iter().map(|face| face.image.len()).sum::<usize>();
+        let holes = self.seen.iter().flatten().flat_map(Raster::pixels).filter(|&&m| m == 0).count();
+        (all - holes) as f64 / all as f64
     }
 
     /// A face without its border, as a sky box has it.
@@ -245,7 +245,7 @@ impl CubeMap {
     #[cfg(test)]
     pub(crate) fn texels(&self) -> impl Iterator<Item = ([u8; 3], u8)> {
         self.faces.iter().enumerate().flat_map(move |(face, texture)| {
-            let seen = move |k| self.seen.as_ref().map_or(255, |seen| seen[face].pixels()[k]);
+            let seen = move |k| self.seen[face].as_ref().map_or(255, |seen: &Raster<u8>| seen.pixels()[k]);
             texture.image.pixels().iter().enumerate().map(move |(k, color)| (*color, seen(k)))
         })
     }
@@ -269,14 +269,18 @@ impl CubeMap {
 
     /// Whether there are holes.
     pub(crate) fn has_holes(&self) -> bool {
-        self.seen.is_some()
+        self.seen.iter().any(Option::is_some)
+    }
+
+    /// Whether there are holes in a face or its border.
+    pub(crate) fn has_holes_in(&self, face: usize) -> bool {
+        self.seen[face].is_some()
     }
 
     /// How much of what is at a place of a stored face, in pixels, a picture shows: 0 to 255, bilinear.
     #[inline]
     pub(crate) fn seen_at(&self, face: usize, x: f32, y: f32) -> u8 {
-        let Some(seen) = &self.seen else { return 255 };
-        let mask = &seen[face];
+        let Some(mask) = &self.seen[face] else { return 255 };
         let last = mask.width() as i32 - 1;
         // Never below −½ nor NaN beyond what a cast brings to 0.
         let (x, y) = (x - 0.5, y - 0.5);

@@ -5,9 +5,6 @@ use s3d_geom::Raster;
 /// Gives every pixel of `image` whose `seen` is 0 a colour from those around it: the nearer, the more.
 /// Neighbours of holes can then be filtered without a rim. An image of which nothing is seen stays as it is.
 pub(crate) fn fill_unseen(image: &mut Raster<[u8; 3]>, seen: &Raster<u8>) {
-    if seen.pixels().iter().all(|&s| s > 0) {
-        return;
-    }
     let (w, h) = (image.width(), image.height());
     let half = filled(half_of(w, h, |at| match seen.pixels()[at] {
         0 => [0.0; 4],

@@ -10,7 +10,7 @@ use crate::picture::cube_map::{AXES, CubeMap, FaceAxes};
 use crate::scene::Scene;
 use crate::shade::anchor::Interpolated;
 use crate::shade::channels::{assert_size, fit};
-use crate::shade::color::rgb_image_into;
+use crate::shade::color::rgb_of_faces_into;
 use crate::shade::filter::{Footprints, MipLevels};
 use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
@@ -71,8 +71,13 @@ pub fn picture_image_into(
     if shown.pixels().iter().all(|&s| s == 255) {
         return;
     }
+    // The mesh where it shows.
+    let mut face = hits.face.clone();
+    for (face, _) in face.pixels_mut().iter_mut().zip(shown.pixels()).filter(|(_, shown)| **shown == 255) {
+        *face = NO_FACE;
+    }
     let mut mesh = Raster::filled(0, 0, [0; 3]);
-    rgb_image_into(scene, mip_maps, hits, camera, filter, &mut mesh);
+    rgb_of_faces_into(scene, mip_maps, &face, camera, filter, &mut mesh);
     for ((pixel, &mesh), &shown) in out.pixels_mut().iter_mut().zip(mesh.pixels()).zip(shown.pixels()) {
         if shown < 255 {
             *pixel = mixed(*pixel, mesh, shown);
@@ -216,6 +221,7 @@ impl PictureKernel<'_> {
             wants_shown: shown.is_some(),
         };
         for (j, faces) in hits.face.rows().enumerate() {
+            painter.shown.fill(255);
             painter.row::<PANORAMA>(grid, j, faces);
             let from = j * width;
             let to = &mut out.pixels_mut()[from..from + width];
@@ -236,7 +242,11 @@ impl PictureKernel<'_> {
 #[inline(always)]
 fn on_face<L: ShadeLanes>(l: L, face: usize, v: &[L::F; 3]) -> [L::F; 3] {
     let FaceAxes { right, down, forward } = AXES[face];
-    [right, down, forward].map(|(axis, sign)| if sign < 0 { l.sub(l.splat(0.0), v[axis]) } else { v[axis] })
+    let mut out = *v;
+    for (to, (axis, sign)) in out.iter_mut().zip([right, down, forward]) {
+        *to = if sign < 0 { l.sub(l.splat(0.0), v[axis]) } else { v[axis] };
+    }
+    out
 }
 
 struct PicturePainter<'a, L> {
@@ -289,8 +299,10 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
     fn group(&mut self, i: usize, some: usize, direction: &[L::F; 3], along: &[L::F; 3], down: &[L::F; 3]) {
         let l = self.lanes;
         let zero = l.splat(0.0);
-        let size = direction.map(|c| l.max(c, l.sub(zero, c)));
-        let [x, y, z] = size;
+        let [mut x, mut y, mut z] = *direction;
+        for c in [&mut x, &mut y, &mut z] {
+            *c = l.max(*c, l.sub(zero, *c));
+        }
         // As `face_of` has it: of equal ones the earlier.
         let is_x = !(l.greater(y, x) | l.greater(z, x)) & 0xFF;
         let is_y = !is_x & !l.greater(z, y) & 0xFF;
@@ -311,7 +323,8 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
             } else {
                 ([1, 5, 4][axis], whole & !negative)
             };
-            self.face(face, i, some, these, &[direction, along, down].map(|v| on_face(l, face, v)));
+            let on_face = [on_face(l, face, direction), on_face(l, face, along), on_face(l, face, down)];
+            self.face(face, i, some, these, &on_face);
             left &= !these;
         }
     }
@@ -327,9 +340,13 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
         let (offset, scale) = (l.splat(self.place.0 as f32), l.splat(self.place.1 as f32));
         let per_step = l.mul(inverse, scale);
         // (u / m)' = (u' − u / m · m') / m
-        let slope = |v: [L::F; 3]| [0, 1].map(|k| l.mul(l.sub(v[k], l.mul(place[k], v[2])), per_step));
-        let values = place.map(|p| l.mul(l.add(p, offset), scale));
-        let seen = Interpolated { values, x: slope(along), y: slope(below), doubtful: 0 };
+        let (mut values, mut x, mut y) = (place, place, place);
+        for k in 0..2 {
+            values[k] = l.mul(l.add(place[k], offset), scale);
+            x[k] = l.mul(l.sub(along[k], l.mul(place[k], along[2])), per_step);
+            y[k] = l.mul(l.sub(below[k], l.mul(place[k], below[2])), per_step);
+        }
+        let seen = Interpolated { values, x, y, doubtful: 0 };
         let levels = &self.levels[face];
         self.footprints.store(l, 0, &seen, false);
         let colors = levels.colors(l, &self.footprints, 0, (these, these), self.max_taps);
@@ -344,7 +361,7 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
                 }
             }
         }
-        if self.wants_shown {
+        if self.wants_shown && self.cube.has_holes_in(face) {
             let [mut x, mut y] = [[0.0; LANES]; 2];
             l.store(values[0], &mut x);
             l.store(values[1], &mut y);

@@ -66,14 +66,26 @@ pub fn rgb_image_into(
     out: &mut Raster<[u8; 3]>,
 ) {
     assert_size(hits, camera);
-    fit(out, &hits.face, [0; 3]);
-    dispatch(RgbKernel { scene, mip_maps, hits, camera, filter, out });
+    rgb_of_faces_into(scene, mip_maps, &hits.face, camera, filter, out);
+}
+
+/// As [`rgb_image_into`], of the faces of hits.
+pub(crate) fn rgb_of_faces_into(
+    scene: &Scene<'_>,
+    mip_maps: &MipMaps,
+    faces: &Raster<u32>,
+    camera: &Camera,
+    filter: &TextureFilter,
+    out: &mut Raster<[u8; 3]>,
+) {
+    fit(out, faces, [0; 3]);
+    dispatch(RgbKernel { scene, mip_maps, faces, camera, filter, out });
 }
 
 struct RgbKernel<'a> {
     scene: &'a Scene<'a>,
     mip_maps: &'a MipMaps,
-    hits: &'a Hits,
+    faces: &'a Raster<u32>,
     camera: &'a Camera,
     filter: &'a TextureFilter,
     out: &'a mut Raster<[u8; 3]>,
@@ -85,12 +97,12 @@ impl Kernel for RgbKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let lanes = simd.shade();
-        let Self { scene, mip_maps, hits, camera, filter, out } = self;
+        let Self { scene, mip_maps, faces, camera, filter, out } = self;
         let grid = RayGrid::new(camera);
         let mut painter = RgbPainter::new(lanes, scene, mip_maps, camera, filter);
-        let width = hits.face.width() as usize;
+        let width = faces.width() as usize;
         let (mut spans, band) = (Spans::new(width), (band_rows(width) * width).max(1));
-        let parts = hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band));
+        let parts = faces.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band));
         for (k, (faces, out)) in parts.enumerate() {
             if spans.find(lanes, Some(scene.mesh()), faces) {
                 painter.forget();
@@ -431,7 +443,7 @@ mod tests {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 let (scene, mip_maps, filter) = (&scene, &mip_maps, &filter);
                 let kernel =
-                    RgbKernel { scene, mip_maps, hits: &hits, camera: &camera, filter, out: &mut out };
+                    RgbKernel { scene, mip_maps, faces: &hits.face, camera: &camera, filter, out: &mut out };
                 dispatch_on(level, kernel);
                 out
             });
