@@ -77,7 +77,7 @@ pub fn stitch(
 ) -> CubeMap {
     let stitch = Stitch::new(captures, pose, scene, options);
     let lanes = stitch.lanes();
-    if lanes.iter().all(|capture| capture.levels.is_usable()) {
+    if lanes.iter().all(LaneCapture::is_usable) {
         stitch.in_lanes(&lanes, level())
     } else {
         stitch.pixel_by_pixel()
@@ -124,8 +124,8 @@ impl Stitch {
         })
     }
 
-    /// The same in `f64`, one pixel after another: for pictures so large that the lanes' numbers would not
-    /// do, and what tests hold the lanes against.
+    /// The same in `f64`, one pixel after another: for pictures that do not suit the lanes, and what
+    /// tests hold them against.
     fn pixel_by_pixel(&self) -> CubeMap {
         CubeMap::build(self.pose, self.size, |face, x, y, d| {
             let depth = self.depths.depth(face, x, y);

@@ -40,6 +40,13 @@ pub(crate) struct LaneCapture<'a> {
 }
 
 impl LaneCapture<'_> {
+    /// Whether places in its picture fit the numbers here, and one sample covers what a pixel of the cube
+    /// sees of it: its pixels are nearly square.
+    pub(crate) fn is_usable(&self) -> bool {
+        let focal = self.lens.focal_px();
+        self.levels.is_usable() && focal.max_element() < 1.5 * focal.min_element()
+    }
+
     /// Whether it may see something of a tile with the middle `direction`, of length 1 in the cube's frame,
     /// whose pixels are up to `angle` from it and whose points are at least 1 / `inverse_depth` away.
     fn may_see(&self, direction: DVec3, angle: f64, inverse_depth: f64) -> bool {
