@@ -170,8 +170,8 @@ impl Places<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::Portable;
     use proptest::prelude::*;
+    use s3d_simd::Scalar;
 
     /// The plain way: every distance, byte by byte.
     fn reference(data: &[u8], at: usize, line: usize, shortest: usize) -> Option<(usize, usize)> {
@@ -195,7 +195,7 @@ mod tests {
             matcher.begin();
             let (mut at, mut steps) = (0, steps.iter().cycle());
             while at < data.len() {
-                matcher.reach(Portable, data, at);
+                matcher.reach(Scalar, data, at);
                 let found = matcher
                     .places()
                     .longest::<SHORTEST>(at)
@@ -233,8 +233,8 @@ mod tests {
         check::<3>(&data, 1000, &[258]);
         let mut matcher = FixedDistanceMatcher::new(1000);
         matcher.begin();
-        matcher.reach(Portable, &data, 0);
-        matcher.reach(Portable, &data, TILE - 100);
+        matcher.reach(Scalar, &data, 0);
+        matcher.reach(Scalar, &data, TILE - 100);
         assert_eq!(
             matcher.places().longest::<3>(TILE - 100),
             Some(FixedMatch { length: LONGEST_MATCH, index: 0 })

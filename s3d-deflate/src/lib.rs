@@ -305,7 +305,7 @@ mod tests {
             };
             match search.candidates {
                 Candidates::FixedDistances | Candidates::LongFixedDistances => {
-                    parser.at_fixed_distances(simd::Portable, &data, &mut bits);
+                    parser.at_fixed_distances(s3d_simd::Scalar, &data, &mut bits);
                 }
                 _ => parser.by_hash(&data, &mut bits),
             }

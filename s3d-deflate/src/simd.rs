@@ -1,12 +1,14 @@
-//! Wide registers, and the one place where they are chosen.
+//! Loops over bytes in wide registers.
 //!
 //! AVX-512 against the portable form makes a view's files in about a third of the time
-//! (`docs/performance.md`, "Encoding"). Every form gives the same bytes: tests hold each to the portable one.
+//! (`docs/performance/encoding.md`). Every form gives the same bytes: tests hold each to the portable one.
+
+use s3d_simd::{Scalar, dispatch, level};
 
 /// Bytes in a register, and places that one comparison asks.
 pub(crate) const WIDTH: usize = 32;
 
-/// Compares bytes. A value of a type that implements it shows that the processor has what it needs.
+/// Compares bytes. Levels of instructions do, with their own.
 pub(crate) trait Compare: Copy {
     /// Which bytes of `window` are `byte`: a bit for each, the first lowest.
     fn equal(self, window: &[u8; WIDTH], byte: u8) -> u32;
@@ -18,11 +20,7 @@ pub(crate) trait Compare: Copy {
     }
 }
 
-/// For any processor.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Portable;
-
-impl Compare for Portable {
+impl Compare for Scalar {
     #[inline(always)]
     fn equal(self, window: &[u8; WIDTH], byte: u8) -> u32 {
         const LOW: u64 = 0x7f7f_7f7f_7f7f_7f7f;
@@ -47,45 +45,19 @@ pub(crate) trait Kernel {
     fn run<C: Compare>(self, compare: C) -> Self::Output;
 }
 
-/// Runs `kernel` in the widest registers that the processor has and the kernel gains from.
+/// Runs `kernel` in the widest registers that are in use and that it gains from.
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if K::GAINS_FROM_AVX512
-            && let Some(avx512) = x86_64::Avx512::detect()
-        {
-            // SAFETY: an `Avx512` is made only where the processor has every feature that `run_avx512` is
-            // compiled for.
-            #[allow(unsafe_code)]
-            return unsafe { x86_64::run_avx512(kernel, avx512) };
-        }
-        if let Some(avx2) = x86_64::Avx2::detect() {
-            // SAFETY: an `Avx2` is made only where the processor has every feature that `run_avx2` is
-            // compiled for.
-            #[allow(unsafe_code)]
-            return unsafe { x86_64::run_avx2(kernel, avx2) };
-        }
-    }
-    kernel.run(Portable)
+    let level = if K::GAINS_FROM_AVX512 { level() } else { level().without_avx512() };
+    dispatch!(level, simd => kernel.run(simd))
 }
 
 #[cfg(target_arch = "x86_64")]
 mod x86_64 {
-    use super::{Compare, Kernel, WIDTH};
-    use std::arch::is_x86_feature_detected as has;
+    use super::{Compare, WIDTH};
+    use s3d_simd::{Avx2, Avx512};
     use std::arch::x86_64::{
         _mm256_cmpeq_epi8, _mm256_cmpeq_epi8_mask, _mm256_loadu_si256, _mm256_movemask_epi8, _mm256_set1_epi8,
     };
-
-    /// The processor has AVX2, and counts zeros and shifts in one instruction.
-    #[derive(Clone, Copy, Debug)]
-    pub(super) struct Avx2(());
-
-    impl Avx2 {
-        pub(super) fn detect() -> Option<Self> {
-            (has!("avx2") && has!("bmi1") && has!("bmi2") && has!("lzcnt")).then_some(Self(()))
-        }
-    }
 
     impl Compare for Avx2 {
         #[inline(always)]
@@ -97,17 +69,6 @@ mod x86_64 {
                 let window = _mm256_loadu_si256(window.as_ptr().cast());
                 _mm256_movemask_epi8(_mm256_cmpeq_epi8(window, _mm256_set1_epi8(byte as i8))) as u32
             }
-        }
-    }
-
-    /// The processor has AVX-512's comparisons that answer with bits, for registers of 32 bytes, and all of
-    /// [`Avx2`].
-    #[derive(Clone, Copy, Debug)]
-    pub(super) struct Avx512(());
-
-    impl Avx512 {
-        pub(super) fn detect() -> Option<Self> {
-            (Avx2::detect().is_some() && has!("avx512bw") && has!("avx512vl")).then_some(Self(()))
         }
     }
 
@@ -123,46 +84,33 @@ mod x86_64 {
             }
         }
     }
-
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
-    pub(super) fn run_avx2<K: Kernel>(kernel: K, avx2: Avx2) -> K::Output {
-        kernel.run(avx2)
-    }
-
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,avx512bw,avx512vl")]
-    pub(super) fn run_avx512<K: Kernel>(kernel: K, avx512: Avx512) -> K::Output {
-        kernel.run(avx512)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use s3d_simd::Level;
 
     proptest! {
         #[test]
         fn equal_bytes_are_found_in_a_window(window in proptest::array::uniform32(0u8..4), low in 0u8..4) {
             for (window, byte) in [(window, low), (window.map(|b| b.wrapping_sub(2)), low.wrapping_sub(2))] {
                 let expected = (0..WIDTH).fold(0, |bits, i| bits | u32::from(window[i] == byte) << i);
-                prop_assert_eq!(Portable.equal(&window, byte), expected);
+                prop_assert_eq!(Scalar.equal(&window, byte), expected);
             }
         }
 
-        #[cfg(target_arch = "x86_64")]
         #[test]
         fn all_processors_compare_alike(
             upper in proptest::array::uniform32(0u8..4),
             lower in proptest::array::uniform32(0u8..4),
             byte in 0u8..4,
         ) {
-            let expected = Portable.equal_in_two(&upper, &lower, byte);
-            prop_assert_eq!(expected >> WIDTH, u64::from(Portable.equal(&upper, byte)));
-            if let Some(avx2) = x86_64::Avx2::detect() {
-                prop_assert_eq!(avx2.equal_in_two(&upper, &lower, byte), expected);
-            }
-            if let Some(avx512) = x86_64::Avx512::detect() {
-                prop_assert_eq!(avx512.equal_in_two(&upper, &lower, byte), expected);
+            let expected = Scalar.equal_in_two(&upper, &lower, byte);
+            prop_assert_eq!(expected >> WIDTH, u64::from(Scalar.equal(&upper, byte)));
+            for level in Level::all() {
+                prop_assert_eq!(dispatch!(level, simd => simd.equal_in_two(&upper, &lower, byte)), expected);
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Wider registers where the processor has them.
 
+use s3d_simd::{dispatch, level};
+
 /// Work whose loops the compiler may vectorise. `run` and what it calls in its loops are `#[inline(always)]`,
 /// so that they are compiled once for any processor of the target and once for one with AVX2.
 pub(crate) trait Work {
@@ -7,22 +9,10 @@ pub(crate) trait Work {
     fn run(self) -> Self::Output;
 }
 
-/// Runs `work`, compiled for AVX2 if the processor has it. The answer is the same, as no rounding depends on
-/// the width: products and sums are not fused.
+/// Runs `work`, compiled for AVX2 where that is in use. The answer is the same, as no rounding depends on the
+/// width: products and sums are not fused.
 pub(crate) fn run<W: Work>(work: W) -> W::Output {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2, which was just asked.
-        #[allow(unsafe_code)]
-        return unsafe { run_avx2(work) };
-    }
-    work.run()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_avx2<W: Work>(work: W) -> W::Output {
-    work.run()
+    dispatch!(level().without_avx512(), _simd => work.run())
 }
 
 /// The larger, `b` if one is NaN: a single instruction, unlike [`f32::max`].

@@ -88,6 +88,7 @@ pub use picture::stitch::{Capture, StitchOptions, stitch};
 pub use picture::undistort::undistort;
 pub use raster::visibility::{Caster, cast, cast_ray_by_ray, cast_strided};
 pub use ray::caster::{Hit, Sight, cast_ray, cast_ray_brute_force};
+pub use s3d_simd::SimdLevel;
 pub use scene::Scene;
 pub use shade::channels::{
     MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, Normals, byte_per_face_image, byte_per_face_image_into,
@@ -99,7 +100,6 @@ pub use shade::mip_maps::{MipMaps, TextureFilter};
 pub use shade::pixel_color::{rgb_image_pixel_by_pixel, rgb_of_ray};
 pub use shade::points::{xyz_image, xyz_image_half, xyz_image_half_into, xyz_image_into};
 pub use shade::view::{FaceImages, Modalities, Shading, ViewImages, view_images_into};
-pub use simd::level::SimdLevel;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -9,11 +9,11 @@ use crate::picture::cube_sources::SourceMipMap;
 use crate::shade::anchor::Interpolated;
 use crate::shade::filter::{Footprints, MipLevels};
 use crate::shade::mip_maps::TextureFilter;
-use crate::simd::level::{Level, level};
 use crate::simd::shade_lanes::{LANES, ShadeLanes, eight, packed};
 use crate::simd::{Kernel, Simd, dispatch_on};
 use glam::{DMat3, DVec3, dvec2};
 use s3d_geom::{Pose, Raster, Wrap};
+use s3d_simd::{Level, level};
 use std::f64::consts::{PI, TAU};
 
 /// Near its poles a pixel sees many columns of a photograph and few rows: as many samples as keep the rows
@@ -203,7 +203,6 @@ fn atan2<L: ShadeLanes>(l: L, y: L::F, x: L::F) -> L::F {
 mod tests {
     use super::*;
     use crate::picture::cube_map::tests::pose;
-    use crate::simd::level::all_levels;
     use crate::simd::shade_lanes::Plain;
     use proptest::prelude::*;
 
@@ -238,7 +237,7 @@ mod tests {
     fn every_level_of_instructions_gives_the_same_bytes() {
         for photo in photographs() {
             let levels = photo.mip_map.levels();
-            let cubes = all_levels().into_iter().map(|level| photo.in_lanes(&levels, level));
+            let cubes = Level::all().into_iter().map(|level| photo.in_lanes(&levels, level));
             let texels: Vec<Vec<_>> = cubes.map(|cube| cube.texels().collect()).collect();
             assert!(texels.iter().all(|t| *t == texels[0]));
         }

@@ -380,9 +380,9 @@ mod tests {
     use crate::raster::visibility::cast;
     use crate::shade::color::rgb_image;
     use crate::simd::dispatch_on;
-    use crate::simd::level::all_levels;
     use glam::dvec3;
     use s3d_geom::{Pose, TriMesh};
+    use s3d_simd::Level;
     use s3d_synth::scenes::furnished_room;
 
     fn pose() -> Pose {
@@ -487,7 +487,7 @@ mod tests {
         let (cube, filter) = (noise(true), TextureFilter::default());
         for camera in cameras() {
             let hits = cast(&scene, &camera);
-            let images = all_levels().into_iter().map(|level| {
+            let images = Level::all().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 let mut shown = Raster::filled(camera.width, camera.height, 0);
                 let (cube, hits, filter) = (&cube, &hits, &filter);

@@ -16,10 +16,10 @@ use crate::picture::stitch_lanes::{BlendKernel, DepthLimits, LaneCapture};
 use crate::raster::visibility::cast;
 use crate::scene::Scene;
 use crate::simd::dispatch_on;
-use crate::simd::level::{Level, level};
 use glam::{DMat3, DVec2, DVec3, dvec2};
 use rayon::prelude::*;
 use s3d_geom::{Camera, Lens, Pose, Raster, Wrap};
+use s3d_simd::{Level, level};
 
 /// How far behind the nearest surface a point may be and still be seen: a part of its depth, and metres.
 const BEHIND: (f32, f32) = (0.01, 0.02);
@@ -351,7 +351,6 @@ mod tests {
     use crate::picture::picture_color::{Unseen, picture_image};
     use crate::shade::color::rgb_image;
     use crate::shade::mip_maps::{MipMaps, TextureFilter};
-    use crate::simd::level::all_levels;
     use glam::{DQuat, dvec3};
     use proptest::prelude::*;
 
@@ -495,7 +494,7 @@ mod tests {
     fn every_level_of_instructions_gives_the_same_bytes() {
         in_many_ways(|stitch| {
             let lanes = stitch.lanes();
-            let cubes = all_levels().into_iter().map(|level| stitch.in_lanes(&lanes, level));
+            let cubes = Level::all().into_iter().map(|level| stitch.in_lanes(&lanes, level));
             let texels: Vec<Vec<_>> = cubes.map(|cube| cube.texels().collect()).collect();
             assert!(texels.iter().all(|t| *t == texels[0]));
         });

@@ -7,8 +7,8 @@ use crate::raster::window::{Scratch, VisibilityKernel, Window};
 use crate::ray::caster::RayCaster;
 use crate::scene::Scene;
 use crate::simd::dispatch_on;
-use crate::simd::level::{Level, level};
 use s3d_geom::{Camera, Projection, Raster};
+use s3d_simd::{Level, level};
 use std::f64::consts::TAU;
 
 /// Casts image after image of a scene, and keeps its memory between them: what a thread that renders should
@@ -181,7 +181,6 @@ fn strided(size: u32, stride: u32) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::level::all_levels;
     use glam::{DVec3, dvec2};
     use s3d_geom::Pose;
     use s3d_synth::scenes::scan_like;
@@ -200,7 +199,7 @@ mod tests {
         for camera in &views {
             let (width, height) = ((camera.width / 2) as usize, camera.height as usize - 5);
             let window = Window { camera, stride: 1, column: 60, row: 3, width, height };
-            let images: Vec<_> = all_levels()
+            let images: Vec<_> = Level::all()
                 .into_iter()
                 .map(|level| {
                     let (mut faces, mut depths) = (vec![7; width * height], vec![7.0; width * height]);

@@ -421,8 +421,8 @@ fn put_some(colors: &[u32; LANES], these: u32, to: &mut [[u8; 3]]) {
 mod tests {
     use super::*;
     use crate::simd::dispatch_on;
-    use crate::simd::level::all_levels;
     use s3d_geom::Pose;
+    use s3d_simd::Level;
     use s3d_synth::scenes::scan_like;
 
     #[test]
@@ -439,7 +439,7 @@ mod tests {
         ] {
             let hits = crate::raster::visibility::cast(&scene, &camera);
             let filter = TextureFilter::default();
-            let images = all_levels().into_iter().map(|level| {
+            let images = Level::all().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 let (scene, mip_maps, filter) = (&scene, &mip_maps, &filter);
                 let kernel =

@@ -1,7 +1,7 @@
 //! Wide registers: one choice of instructions for all kernels.
 //!
 //! A kernel is written once, over [`Simd`], and compiled for every level of instructions; [`dispatch`] runs
-//! it with the level that [`level::level`] has chosen. A level gives it registers for sixteen pixels of the
+//! it with the level that s3d-simd has chosen. A level gives it registers for sixteen pixels of the
 //! visibility pass ([`RasterLanes`]) or for eight pixels to be shaded ([`ShadeLanes`]). All give the same
 //! bits: every operation is on integers or rounds once, as IEEE 754 says it must; products and sums are never
 //! fused.
@@ -14,7 +14,6 @@
 //! no stores of some lanes alone; and it asks for Ice Lake where AVX-512 is to be used. Measured by
 //! `docs/performance/simd_library`.
 
-pub(crate) mod level;
 pub(crate) mod raster_lanes;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod raster_x86;
@@ -24,10 +23,10 @@ pub(crate) mod shade_lanes;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod shade_width;
 
-#[cfg(target_arch = "x86_64")]
-use level::{Avx2, Avx512};
-use level::{Level, Scalar};
 use raster_lanes::{Portable, RasterLanes};
+#[cfg(target_arch = "x86_64")]
+use s3d_simd::{Avx2, Avx512};
+use s3d_simd::{Level, Scalar, level};
 use shade_lanes::{Plain, ShadeLanes};
 
 /// A level of instructions, as the proof that the processor has them.
@@ -94,37 +93,10 @@ pub(crate) trait Kernel {
 /// Runs a kernel with the instructions in use.
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    dispatch_on(level::level(), kernel)
+    dispatch_on(level(), kernel)
 }
 
 /// Runs a kernel with the instructions of a level.
-#[allow(unsafe_code)]
 pub(crate) fn dispatch_on<K: Kernel>(level: Level, kernel: K) -> K::Output {
-    match level {
-        Level::Scalar(simd) => kernel.run(simd),
-        #[cfg(target_arch = "x86_64")]
-        Level::Avx2(simd) => {
-            // SAFETY: `simd` is the proof that the processor has the features that the function enables.
-            unsafe { with_avx2(kernel, simd) }
-        }
-        #[cfg(target_arch = "x86_64")]
-        Level::Avx512(simd) => {
-            // SAFETY: as above.
-            unsafe { with_avx512(kernel, simd) }
-        }
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt")]
-fn with_avx2<K: Kernel>(kernel: K, simd: Avx2) -> K::Output {
-    kernel.run(simd)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(
-    enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vnni"
-)]
-fn with_avx512<K: Kernel>(kernel: K, simd: Avx512) -> K::Output {
-    kernel.run(simd)
+    s3d_simd::dispatch!(level, simd => kernel.run(simd))
 }

@@ -8,8 +8,8 @@
 )]
 #![allow(unsafe_code)]
 
-use crate::simd::level::{Avx2, Avx512};
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes, RowGroup, SHORT, along};
+use s3d_simd::{Avx2, Avx512};
 use std::arch::x86_64::*;
 
 /// One register of 512 bits.

@@ -262,9 +262,9 @@ fn lanes_of(these: u32) -> __m256i {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::level::{Avx2, Avx512};
     use crate::simd::shade_lanes::Plain;
     use proptest::prelude::*;
+    use s3d_simd::{Avx2, Avx512};
 
     fn eight() -> impl Strategy<Value = [f32; LANES]> {
         let number = prop_oneof![

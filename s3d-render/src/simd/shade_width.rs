@@ -8,8 +8,8 @@
 //! references that are as large, or loads from places of an image that were compared with its end.
 #![allow(unsafe_code)]
 
-use crate::simd::level::{Avx2, Avx512};
 use crate::simd::shade_lanes::{EightRays, LANES};
+use s3d_simd::{Avx2, Avx512};
 use std::arch::x86_64::*;
 
 /// The widest registers that hold texels, as the proof that the processor has them.

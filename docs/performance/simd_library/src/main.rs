@@ -13,21 +13,19 @@
 
 #[path = "../../../../s3d-render/src/raster/chunk.rs"]
 mod chunk;
-#[path = "../../../../s3d-render/src/simd/level.rs"]
-mod level;
 #[path = "../../../../s3d-render/src/simd/raster_lanes.rs"]
 mod raster_lanes;
 #[path = "../../../../s3d-render/src/simd/raster_x86.rs"]
 mod raster_x86;
 
 mod simd {
-    pub(crate) use crate::{level, raster_lanes};
+    pub(crate) use crate::raster_lanes;
 }
 
 use chunk::{Chunk, ChunkGrid, EDGE_ERROR, Linear, MAX_ROWS, draw};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16, u32x16};
-use level::{Avx2, Avx512};
+use s3d_simd::{Avx2, Avx512};
 use raster_lanes::{LANES, Portable, RasterLanes};
 use raster_x86::{Wide256, Wide512};
 

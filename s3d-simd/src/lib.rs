@@ -1,0 +1,257 @@
+//! Which vector instructions a program uses, decided in one place.
+//!
+//! [`level`] is the highest that the processor has, and at most what the environment variable `S3D_SIMD`
+//! names. [`dispatch!`] runs work with it: the work is compiled once for each level, and given a value
+//! ([`Scalar`], [`Avx2`], [`Avx512`]) that exists only where the processor has what it stands for. What the
+//! work calls in its loops is `#[inline(always)]`, or it is compiled for any processor, and called.
+//!
+//! Own code, since libraries that offer this (`fearless_simd`, `pulp`) bring registers of their own, which
+//! cost time in the kernels that count: see `docs/performance.md`.
+
+use std::fmt;
+use std::sync::OnceLock;
+
+/// The environment variable that holds kernels to a level: see [`SimdLevel`].
+const VARIABLE: &str = "S3D_SIMD";
+
+/// Vector instructions. All levels give the same bytes.
+///
+/// The highest that the processor has is used. The environment variable `S3D_SIMD`, read when the first
+/// kernel runs, holds the program to a lower one: `scalar` or `avx2`. A level that the processor lacks, and
+/// any other value, changes nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum SimdLevel {
+    /// What every processor of the target has.
+    Scalar,
+    /// x86-64-v3: AVX2 and what comes with it.
+    Avx2,
+    /// x86-64-v4 and AVX512-VNNI.
+    Avx512,
+}
+
+impl SimdLevel {
+    const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
+
+    /// The level in use.
+    ///
+    /// ```
+    /// assert!(["scalar", "avx2", "avx512"].contains(&s3d_simd::SimdLevel::used().name()));
+    /// ```
+    pub fn used() -> Self {
+        level().name()
+    }
+
+    /// As `S3D_SIMD` takes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+}
+
+impl fmt::Display for SimdLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The instructions that every processor of the target has.
+#[derive(Clone, Copy, Debug)]
+pub struct Scalar;
+
+/// Proof that the processor has AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug)]
+pub struct Avx2(());
+
+/// Proof that the processor has what [`Avx2`] stands for, and AVX-512 F, BW, DQ, VL and VNNI.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512(());
+
+#[cfg(target_arch = "x86_64")]
+impl Avx2 {
+    /// The proof, if the processor has it all.
+    pub fn detect() -> Option<Self> {
+        use std::arch::is_x86_feature_detected as has;
+        let all = has!("avx2")
+            && has!("fma")
+            && has!("f16c")
+            && has!("bmi1")
+            && has!("bmi2")
+            && has!("lzcnt")
+            && has!("popcnt");
+        all.then_some(Self(()))
+    }
+
+    /// Runs `work`, a closure that is `#[inline(always)]`, compiled for these instructions.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub fn vectorize<R>(self, work: impl FnOnce() -> R) -> R {
+        #[target_feature(enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt")]
+        fn compiled<R>(work: impl FnOnce() -> R) -> R {
+            work()
+        }
+        // SAFETY: `self` proves that the processor has the features that the function enables: `detect`.
+        unsafe { compiled(work) }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Avx512 {
+    /// The proof, if the processor has it all.
+    pub fn detect() -> Option<Self> {
+        use std::arch::is_x86_feature_detected as has;
+        let all = Avx2::detect().is_some()
+            && has!("avx512f")
+            && has!("avx512bw")
+            && has!("avx512dq")
+            && has!("avx512vl")
+            && has!("avx512vnni");
+        all.then_some(Self(()))
+    }
+
+    /// Whoever has these has those.
+    #[inline(always)]
+    pub fn avx2(self) -> Avx2 {
+        Avx2(())
+    }
+
+    /// Runs `work`, a closure that is `#[inline(always)]`, compiled for these instructions.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub fn vectorize<R>(self, work: impl FnOnce() -> R) -> R {
+        #[target_feature(
+            enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vnni"
+        )]
+        fn compiled<R>(work: impl FnOnce() -> R) -> R {
+            work()
+        }
+        // SAFETY: `self` proves that the processor has the features that the function enables: `detect`.
+        unsafe { compiled(work) }
+    }
+}
+
+/// A level and the proof that the processor has it.
+#[derive(Clone, Copy, Debug)]
+pub enum Level {
+    /// The plain form, which defines results.
+    Scalar(Scalar),
+    /// See [`Avx2`].
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// See [`Avx512`].
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+}
+
+impl Level {
+    /// Its name.
+    pub fn name(self) -> SimdLevel {
+        match self {
+            Self::Scalar(_) => SimdLevel::Scalar,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => SimdLevel::Avx2,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => SimdLevel::Avx512,
+        }
+    }
+
+    /// The highest that the processor has and that is not above `most`.
+    fn best(most: SimdLevel) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if let (true, Some(proof)) = (most >= SimdLevel::Avx512, Avx512::detect()) {
+                return Self::Avx512(proof);
+            }
+            if let (true, Some(proof)) = (most >= SimdLevel::Avx2, Avx2::detect()) {
+                return Self::Avx2(proof);
+            }
+        }
+        let _ = most;
+        Self::Scalar(Scalar)
+    }
+
+    /// This one, or AVX2 where that is lower: for what gains nothing from wider registers.
+    #[inline]
+    pub fn without_avx512(self) -> Self {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(proof) => Self::Avx2(proof.avx2()),
+            other => other,
+        }
+    }
+
+    /// All levels that the processor has, whatever the environment says: tests hold each to the first, the
+    /// plain one.
+    pub fn all() -> Vec<Self> {
+        let mut levels: Vec<Self> = SimdLevel::ALL.into_iter().map(Self::best).collect();
+        levels.dedup_by_key(|level| level.name());
+        levels
+    }
+}
+
+/// The level that a value of [`VARIABLE`] allows at most.
+fn allowed(value: Option<&str>) -> SimdLevel {
+    let named = |level: &SimdLevel| value == Some(level.name());
+    SimdLevel::ALL.into_iter().find(named).unwrap_or(SimdLevel::Avx512)
+}
+
+/// The level in use.
+#[inline]
+pub fn level() -> Level {
+    static LEVEL: OnceLock<Level> = OnceLock::new();
+    *LEVEL.get_or_init(|| Level::best(allowed(std::env::var(VARIABLE).ok().as_deref())))
+}
+
+/// `dispatch!(level, simd => work)` is `work`, an expression, compiled for each [`Level`] and run for one.
+/// In it `simd` is the level's proof. Every function that `work` calls in its loops must be
+/// `#[inline(always)]`.
+#[macro_export]
+macro_rules! dispatch {
+    ($level:expr, $simd:ident => $work:expr) => {
+        match $level {
+            $crate::Level::Scalar($simd) => $work,
+            #[cfg(target_arch = "x86_64")]
+            $crate::Level::Avx2($simd) => $simd.vectorize(
+                #[inline(always)]
+                || $work,
+            ),
+            #[cfg(target_arch = "x86_64")]
+            $crate::Level::Avx512($simd) => $simd.vectorize(
+                #[inline(always)]
+                || $work,
+            ),
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_variable_holds_the_level_down_and_never_up() {
+        let best = Level::best(SimdLevel::Avx512).name();
+        for level in SimdLevel::ALL {
+            assert_eq!(allowed(Some(level.name())), level);
+            assert_eq!(Level::best(level).name(), level.min(best));
+        }
+        for other in [None, Some(""), Some("AVX2"), Some("neon")] {
+            assert_eq!(Level::best(allowed(other)).name(), best);
+        }
+    }
+
+    #[test]
+    fn all_levels_run_and_the_plain_one_is_first() {
+        let sums = Level::all().into_iter().map(|level| {
+            assert!(level.without_avx512().name() <= SimdLevel::Avx2.min(level.name()));
+            dispatch!(level, _simd => [1u32, 2, 3].iter().sum::<u32>())
+        });
+        assert!(sums.eq(Level::all().iter().map(|_| 6)));
+        assert_eq!(Level::all()[0].name(), SimdLevel::Scalar);
+    }
+}
