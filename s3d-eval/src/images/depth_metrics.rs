@@ -84,10 +84,11 @@ fn scores(pairs: impl Iterator<Item = [f64; 2]>) -> DepthScores {
     for [truth, prediction] in pairs {
         let error = (truth - prediction).abs();
         let square = error * error;
-        let of_logs = (libm::log10(truth) - libm::log10(prediction)).abs();
-        let terms = [error, error / truth, square / truth, square, of_logs * of_logs, of_logs];
+        // The larger of both quotients, as division rounds monotonically, or NaN.
+        let ratio = if truth > prediction { truth / prediction } else { prediction / truth };
+        let (relative, of_logs) = (error / truth, libm::log10(ratio));
+        let terms = [error, relative, square / truth, square, of_logs * of_logs, of_logs];
         sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-        let ratio = (prediction / truth).max(truth / prediction);
         let below = [1.25, 1.5625, 1.953125].map(|most| u64::from(ratio < most));
         within.iter_mut().zip(below).for_each(|(count, is)| *count += is);
         pixels += 1;

@@ -1,6 +1,8 @@
 //! Exact medians of more angles than fit into memory, in two passes.
 
+use crate::images::normal_metrics::degrees;
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::{Mutex, PoisonError};
 
@@ -25,7 +27,7 @@ impl Medians {
         angles.iter().for_each(|angle| counts[step(*angle)] += 1);
     }
 
-    /// The second pass, which must be shown the same angles.
+    /// The second pass, which must be shown the cosines of the same angles.
     pub(super) fn search(self) -> Search {
         let folds: Vec<Vec<u64>> =
             self.0.into_iter().map(|m| m.into_inner().unwrap_or_else(PoisonError::into_inner)).collect();
@@ -39,6 +41,8 @@ pub(super) struct Search(Vec<Group>);
 
 struct Group {
     steps: RangeInclusive<usize>,
+    /// What the cosines of their angles lie between, and perhaps others': few need an arc cosine.
+    cosines: RangeInclusive<f64>,
     /// The places of the two middle angles among those of the steps; `None` without angles.
     middle: Option<[u64; 2]>,
     /// How many times an angle is there, by its bits, whose order is that of angles from 0 on.
@@ -48,9 +52,7 @@ struct Group {
 impl Group {
     fn of(counts: &[u64]) -> Self {
         let total: u64 = counts.iter().sum();
-        let Some(last) = total.checked_sub(1) else {
-            return Self { steps: 0..=0, middle: None, angles: Mutex::default() };
-        };
+        let Some(last) = total.checked_sub(1) else { return Self::new(0..=0, None) };
         let middle = [last / 2, total / 2];
         let mut before = 0;
         let mut first: Option<(usize, u64)> = None;
@@ -60,20 +62,29 @@ impl Group {
             }
             if let Some((start, below)) = first.filter(|_| before + count > middle[1]) {
                 let middle = Some(middle.map(|place| place - below));
-                return Self { steps: start..=at, middle, angles: Mutex::default() };
+                return Self::new(start..=at, middle);
             }
             before += count;
         }
-        Self { steps: 0..=0, middle: None, angles: Mutex::default() }
+        Self::new(0..=0, None)
+    }
+
+    fn new(steps: RangeInclusive<usize>, middle: Option<[u64; 2]>) -> Self {
+        let cosine = |step: usize| libm::cos(step as f64 * (PI / STEPS as f64));
+        // Rounding brings cosines beyond 1 too.
+        let cosines = cosine(steps.end() + 1) - 1e-12..=cosine(*steps.start()) + 1e-12;
+        Self { steps, cosines, middle, angles: Mutex::default() }
     }
 }
 
 impl Search {
-    /// Looks at the angles of an image of a fold.
-    pub(super) fn look(&self, fold: usize, angles: &[f64]) {
+    /// Looks at the angles of an image of a fold, by their cosines.
+    pub(super) fn look(&self, fold: usize, cosines: &[f64]) {
         for group in [fold, self.0.len() - 1].into_iter().filter_map(|at| self.0.get(at)) {
-            let inside = angles.iter().filter(|angle| group.steps.contains(&step(**angle)));
-            let mut inside: Vec<u64> = inside.map(|angle| angle.to_bits()).collect();
+            let near = cosines.iter().filter(|cosine| group.cosines.contains(cosine));
+            let inside =
+                near.map(|cosine| degrees(*cosine)).filter(|angle| group.steps.contains(&step(*angle)));
+            let mut inside: Vec<u64> = inside.map(f64::to_bits).collect();
             inside.sort_unstable();
             let mut counts = group.angles.lock().unwrap_or_else(PoisonError::into_inner);
             for same in inside.chunk_by(|a, b| a == b) {
@@ -108,23 +119,27 @@ mod tests {
 
     #[test]
     fn medians_are_those_of_sorted_angles() {
-        let folds: [&[&[f64]]; 4] =
-            [&[&[3.0, 0.5], &[90.0, 90.0, 180.0]], &[&[10.0, 10.5]], &[], &[&[0.0], &[], &[0.0, 170.0, 0.0]]];
-        let medians = Medians::new(folds.len());
+        let cosines: [&[&[f64]]; 4] = [
+            &[&[0.9, 1.0 + f64::EPSILON], &[0.0, 0.0, -1.0]],
+            &[&[0.5, 0.25]],
+            &[],
+            &[&[1.0], &[], &[1.0, -0.3, 1.0]],
+        ];
+        let angles = |cosines: &[f64]| -> Vec<f64> { cosines.iter().copied().map(degrees).collect() };
+        let medians = Medians::new(cosines.len());
         let each = |f: &dyn Fn(usize, &[f64])| {
-            folds
-                .iter()
-                .enumerate()
-                .for_each(|(fold, images)| images.iter().for_each(|image| f(fold, image)));
+            for (fold, images) in cosines.iter().enumerate() {
+                images.iter().for_each(|image| f(fold, image));
+            }
         };
-        each(&|fold, angles| medians.count(fold, angles));
+        each(&|fold, image| medians.count(fold, &angles(image)));
         let search = medians.search();
-        each(&|fold, angles| search.look(fold, angles));
+        each(&|fold, image| search.look(fold, image));
         let found = search.found();
-        let mut expected: Vec<f64> =
-            folds.iter().map(|images| median_of_angles(&mut images.concat()).unwrap_or(f64::NAN)).collect();
-        expected.push(median_of_angles(&mut folds.concat().concat()).unwrap());
-        assert_eq!(expected[..2], [90.0, 10.25]);
+        let sorted = |cosines: &[f64]| median_of_angles(&mut angles(cosines)).unwrap_or(f64::NAN);
+        let mut expected: Vec<f64> = cosines.iter().map(|images| sorted(&images.concat())).collect();
+        expected.push(sorted(&cosines.concat().concat()));
+        assert_eq!((expected[0], expected[3]), (90.0, 0.0));
         for (ours, sorted) in found.iter().zip(&expected) {
             assert!(ours == sorted || ours.is_nan() && sorted.is_nan(), "{found:?} {expected:?}");
         }

@@ -2,7 +2,9 @@
 
 use crate::Evaluation;
 use crate::images::median::Medians;
-use crate::images::normal_metrics::{AngleSums, DSINE_LIMITS, dsine_angle, omnidata_angle, omnidata_scores};
+use crate::images::normal_metrics::{
+    AngleSums, DSINE_LIMITS, degrees, dsine_cosine, omnidata_cosine, omnidata_scores,
+};
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
 use crate::images::read;
 use crate::options::ImageKind;
@@ -59,16 +61,12 @@ type Parts = (Vec<&'static str>, u64, Vec<crate::Table>);
 
 fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     let progress = task.ctx.progress("evaluating", "images", matched.images.len() as u64);
-    let units = map_in_order(
-        task.ctx,
-        &matched.images,
-        || (),
-        |(), predicted| {
-            let angles = angles(task, predicted, omnidata_angle)?;
-            progress.add(1);
-            Ok((predicted.fold, (angles.len() as u64, omnidata_scores(angles))))
-        },
-    )?;
+    let units = map_in_order(task.ctx, &matched.images, Vec::new, |angles, predicted| {
+        cosines(task, predicted, omnidata_cosine, angles)?;
+        angles.iter_mut().for_each(|angle| *angle = degrees(*angle));
+        progress.add(1);
+        Ok((predicted.fold, (angles.len() as u64, omnidata_scores(angles))))
+    })?;
     let score = |units: &[&(u64, Option<[f64; 5]>)]| {
         let there = units.iter().filter_map(|unit| unit.1);
         let mut sums = [0.0; 5];
@@ -92,33 +90,25 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     let with_intervals = task.options.bootstrap.is_some();
     let medians = Medians::new(task.folds.len());
     let progress = task.ctx.progress("evaluating", "images", 2 * images.len() as u64);
-    let units = map_in_order(
-        task.ctx,
-        images,
-        || (),
-        |(), predicted| {
-            let angles = angles(task, predicted, dsine_angle)?;
-            medians.count(predicted.fold, &angles);
-            let mut steps = vec![0; if with_intervals { STEPS } else { 0 }];
-            if with_intervals {
-                angles.iter().for_each(|angle| steps[((angle * 5.0) as usize).min(STEPS - 1)] += 1);
-            }
-            progress.add(1);
-            Ok((predicted.fold, (AngleSums::of(&angles), steps)))
-        },
-    )?;
+    let units = map_in_order(task.ctx, images, Vec::new, |angles, predicted| {
+        cosines(task, predicted, dsine_cosine, angles)?;
+        angles.iter_mut().for_each(|angle| *angle = degrees(*angle));
+        medians.count(predicted.fold, angles);
+        let mut steps = vec![0; if with_intervals { STEPS } else { 0 }];
+        if with_intervals {
+            angles.iter().for_each(|angle| steps[((angle * 5.0) as usize).min(STEPS - 1)] += 1);
+        }
+        progress.add(1);
+        Ok((predicted.fold, (AngleSums::of(angles), steps)))
+    })?;
     // The angles do not fit into memory: those around the medians are looked at once more.
     let search = medians.search();
-    map_in_order(
-        task.ctx,
-        images,
-        || (),
-        |(), predicted| {
-            search.look(predicted.fold, &angles(task, predicted, dsine_angle)?);
-            progress.add(1);
-            Ok(())
-        },
-    )?;
+    map_in_order(task.ctx, images, Vec::new, |found, predicted| {
+        cosines(task, predicted, dsine_cosine, found)?;
+        search.look(predicted.fold, found);
+        progress.add(1);
+        Ok(())
+    })?;
     drop(progress);
     let medians = search.found();
 
@@ -166,11 +156,17 @@ fn median_of_steps(steps: &[u64]) -> f64 {
     f64::NAN
 }
 
-/// The angles of an image, degrees, where its truth shows something.
-fn angles(task: &Task<'_>, predicted: &Predicted, angle: fn([f64; 3], [f64; 3]) -> f64) -> Result<Vec<f64>> {
+/// Puts the cosines of an image's angles, where its truth shows something, in place of what `found` holds.
+fn cosines(
+    task: &Task<'_>,
+    predicted: &Predicted,
+    cosine: impl Fn([f64; 3], [f64; 3]) -> f64,
+    found: &mut Vec<f64>,
+) -> Result<()> {
     /// Nothing is seen.
     const MISSING: [u8; 3] = [128; 3];
-    let decoded = |pixel: [u8; 3]| pixel.map(|channel| (f64::from(channel) - 127.5) / 127.5);
+    let channels: [f64; 256] = std::array::from_fn(|channel| (channel as f64 - 127.5) / 127.5);
+    let decoded = |pixel: [u8; 3]| pixel.map(|channel| channels[usize::from(channel)]);
     let image = read::rgb8(task.data, &predicted.image, Domain::Normal)?;
     let (size, file) = ([image.width(), image.height()], &predicted.file);
     let wrong = |at: usize, what: String| {
@@ -179,7 +175,8 @@ fn angles(task: &Task<'_>, predicted: &Predicted, angle: fn([f64; 3], [f64; 3]) 
         Err(FileError::format(file, message).into())
     };
     let truth = image.pixels().iter().enumerate().filter(|(_, pixel)| **pixel != MISSING);
-    let mut found = Vec::with_capacity(image.len());
+    found.clear();
+    found.reserve(image.len());
     if read::is_png(file) {
         let prediction = read_rgb8(file)?;
         read::check_size(file, [prediction.width(), prediction.height()], &[size])?;
@@ -188,9 +185,9 @@ fn angles(task: &Task<'_>, predicted: &Predicted, angle: fn([f64; 3], [f64; 3]) 
             if pixel == MISSING {
                 return wrong(at, "128, 128, 128 (missing)".to_owned());
             }
-            found.push(angle(decoded(*truth), decoded(pixel)));
+            found.push(cosine(decoded(*truth), decoded(pixel)));
         }
-        return Ok(found);
+        return Ok(());
     }
     let (_, values) = read::floats(file, &[size], 3)?;
     let vectors = values.as_chunks::<3>().0;
@@ -201,7 +198,7 @@ fn angles(task: &Task<'_>, predicted: &Predicted, angle: fn([f64; 3], [f64; 3]) 
         if square.is_nan() || square > 4.0 {
             return wrong(at, format!("{vector:?}, no unit vector,"));
         }
-        found.push(angle(decoded(*truth), vector));
+        found.push(cosine(decoded(*truth), vector));
     }
-    Ok(found)
+    Ok(())
 }

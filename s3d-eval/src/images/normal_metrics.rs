@@ -7,25 +7,36 @@ use std::f64::consts::PI;
 /// PyTorch's `cosine_similarity` since 1.13; the script computes in 32 bits, in which angles below 0.03°
 /// are told apart from 0° by chance.
 pub fn dsine_angle(truth: [f64; 3], prediction: [f64; 3]) -> f64 {
+    degrees(dsine_cosine(truth, prediction))
+}
+
+/// The cosine of [`dsine_angle`].
+pub(crate) fn dsine_cosine(truth: [f64; 3], prediction: [f64; 3]) -> f64 {
     let unit = |v: [f64; 3]| {
         let length = dot(v, v).sqrt().max(1e-8);
         v.map(|c| c / length)
     };
-    degrees(dot(unit(prediction), unit(truth)))
+    dot(unit(prediction), unit(truth))
 }
 
 /// The same as Omnidata: the product is divided by that of the lengths, at least 1e-8. Source: Omnidata,
 /// `paper_code/evaluation_metrics.py`, `get_metrics`, which computes in 64 bits.
 pub fn omnidata_angle(truth: [f64; 3], prediction: [f64; 3]) -> f64 {
+    degrees(omnidata_cosine(truth, prediction))
+}
+
+/// The cosine of [`omnidata_angle`].
+pub(crate) fn omnidata_cosine(truth: [f64; 3], prediction: [f64; 3]) -> f64 {
     let lengths = dot(prediction, prediction).sqrt() * dot(truth, truth).sqrt();
-    degrees(dot(prediction, truth) / lengths.max(1e-8))
+    dot(prediction, truth) / lengths.max(1e-8)
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn degrees(cosine: f64) -> f64 {
+/// The angle of a cosine, which rounding may have brought beyond 1.
+pub(crate) fn degrees(cosine: f64) -> f64 {
     libm::acos(cosine.clamp(-1.0, 1.0)) * 180.0 / PI
 }
 
@@ -75,13 +86,13 @@ impl AngleSums {
 
 /// Omnidata's scores of the angles of one image, degrees: their mean and median, and the shares (0 to 1) of
 /// those that are at most 11.25°, 22.5° and 30°; `None` without an angle. Source: Omnidata,
-/// `paper_code/evaluation_metrics.py`, `get_metrics`.
-pub fn omnidata_scores(mut angles: Vec<f64>) -> Option<[f64; 5]> {
+/// `paper_code/evaluation_metrics.py`, `get_metrics`. The order of angles is lost.
+pub fn omnidata_scores(angles: &mut [f64]) -> Option<[f64; 5]> {
     let n = angles.len() as f64;
     let mean = angles.iter().sum::<f64>() / n;
     let [a, b, c] =
         [11.25, 22.5, 30.0].map(|limit| angles.iter().filter(|angle| **angle <= limit).count() as f64 / n);
-    Some([mean, median_of_angles(&mut angles)?, a, b, c])
+    Some([mean, median_of_angles(angles)?, a, b, c])
 }
 
 /// The middle one of angles, or the mean of both; `None` of nothing. Their order is lost.
