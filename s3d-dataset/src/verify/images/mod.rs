@@ -16,6 +16,7 @@ use crate::verify::photographs::{Photographs, check_share};
 use crate::verify::pose::{self, CheckedPose};
 use crate::verify::report::{Report, Topic};
 use crate::verify::views::Views;
+use glam::DVec3;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{Conventions, DatasetImage, Domain, Frame, Layout, PhotographRecord, XyzType};
 use s3d_render::{Caster, Hits, MISSING_INDEX, MipMaps, NO_FACE, Scene, ViewImages};
@@ -255,7 +256,7 @@ impl ImageFiles<'_> {
         // Too far for a depth is no fault.
         let wrong = |(m, e): (&bool, &bool)| if domain == Domain::Depth { *e && !*m } else { m != e };
         let mut pairs = missing.iter().zip(expected);
-        let first = pairs.clone().position(wrong);
+        let first = if missing == *expected { None } else { pairs.clone().position(wrong) };
         let count = if first.is_some() { pairs.by_ref().filter(|p| wrong(*p)).count() } else { 0 };
         self.check.report.check(first.is_none(), NOTHING, path, || {
             let (at, width) = (first.unwrap_or_default() as u32, pixels.size().0);
@@ -345,31 +346,26 @@ impl ImageFiles<'_> {
         // What depth is rounded to, and what is too far for it.
         let (half_depth, far) = (0.5 / units.per_m(), 65_534.0 / units.per_m());
         let is_half = self.check.manifest.conventions().xyz == XyzType::Half;
+        // A half float has 11 significant bits; a 32-bit one 24.
+        let (relative, absolute) = if is_half { (4.9e-4, 3e-8) } else { (6e-8, 0.0) };
+        let of_depth = if from_depth { 0.0 } else { half_depth };
+        let always = 1e-6 * (1.0 + origin.abs()) + absolute;
+        let is_wrong = |point: [f32; 3], depth: u16, ray: DVec3| {
+            let p = DVec3::from_array(point.map(f64::from));
+            let Some(metres) = units.metres(depth) else {
+                // Beyond what depth can say there may be a point.
+                return point != [0.0; 3] && (from_depth || (p - origin).length() < far * 0.999);
+            };
+            let off = (p - (origin + ray * metres)).abs();
+            let most = of_depth * ray.abs() + relative * p.abs() + always;
+            // Written so that what is no number is wrong.
+            !off.cmple(most).all()
+        };
         let mut first = None;
         let mut count = 0u64;
         for y in 0..points.height() {
             for (x, (point, depth)) in (0..).zip(points.row(y).iter().zip(depth.row(y))) {
-                let missing = *point == [0.0; 3];
-                let p = glam::DVec3::from_array(point.map(f64::from));
-                let ray = rays.at(x, y);
-                let wrong = match units.metres(*depth) {
-                    // Beyond what depth can say there may be a point.
-                    None => !missing && (from_depth || (p - origin).length() < far * 0.999),
-                    Some(metres) => {
-                        let expected = origin + ray * metres;
-                        let off = (p - expected).abs();
-                        let step = |k: usize| {
-                            let c = p[k].abs();
-                            // A half float has 11 significant bits; a 32-bit one 24.
-                            let rounding = if is_half { c * 4.9e-4 + 3e-8 } else { c * 6e-8 };
-                            let of_depth = if from_depth { 0.0 } else { half_depth * ray[k].abs() };
-                            of_depth + rounding + 1e-6 * (1.0 + origin[k].abs())
-                        };
-                        // Written so that what is no number is wrong.
-                        !(off.x <= step(0) && off.y <= step(1) && off.z <= step(2))
-                    }
-                };
-                if wrong {
+                if is_wrong(*point, *depth, rays.at(x, y)) {
                     count += 1;
                     first.get_or_insert((x, y));
                 }

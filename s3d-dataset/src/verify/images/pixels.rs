@@ -68,12 +68,30 @@ impl Pixels {
             Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => [0; 3],
         };
         match self {
-            Self::Color(r) => r.pixels().iter().map(|p| *p == color).collect(),
+            Self::Color(r) => equal_to(r.pixels(), color),
             Self::Depth(r) => r.pixels().iter().map(|p| *p == MISSING_DEPTH).collect(),
             Self::Class(r, _) => r.pixels().iter().map(|p| *p == NO_CLASS).collect(),
             Self::Xyz(r) => r.pixels().iter().map(|p| *p == [0.0; 3]).collect(),
         }
     }
+}
+
+/// Whether each pixel is `color`. Few are, so that a part where no three bytes are those is done at once.
+fn equal_to(pixels: &[[u8; 3]], color @ [r, g, b]: [u8; 3]) -> Vec<bool> {
+    const PART: usize = 1024;
+    let mut equal = vec![false; pixels.len()];
+    for (part, equal) in pixels.chunks(PART).zip(equal.chunks_mut(PART)) {
+        let bytes = part.as_flattened();
+        let next = bytes[1..].iter().zip(&bytes[2..]);
+        let somewhere = bytes
+            .iter()
+            .zip(next)
+            .fold(0, |any, (x, (y, z))| any | u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b));
+        if somewhere != 0 {
+            equal.iter_mut().zip(part).for_each(|(equal, pixel)| *equal = *pixel == color);
+        }
+    }
+    equal
 }
 
 /// How the pixels of a file differ from what they should be.
@@ -90,6 +108,18 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
+    /// Compares colours of images of one size, byte by byte as long as they are equal.
+    pub(crate) fn of_colors(
+        found: &Raster<[u8; 3]>,
+        expected: &Raster<[u8; 3]>,
+        text: impl Fn([u8; 3]) -> String,
+    ) -> Option<Self> {
+        if found.pixels().as_flattened() == expected.pixels().as_flattened() {
+            return None;
+        }
+        Self::of(found, expected, |a, b| a == b, &text, &text)
+    }
+
     /// Compares images of one size; `None` if they are equal.
     pub(crate) fn of<T: Copy + PartialEq, U: Copy>(
         found: &Raster<T>,
@@ -136,6 +166,23 @@ impl Difference {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pixels_of_a_color_are_found_at_any_place() {
+        let missing = MISSING_INDEX;
+        for width in [1, 2, 1023, 1024, 2500] {
+            // Bytes of the colour across pixels are none of it.
+            let mut pixels = vec![[missing[0], missing[1], 0], [missing[2]; 3]];
+            pixels.resize(width, [1, 2, 3]);
+            for at in [None, Some(0), Some(width / 2), Some(width - 1)] {
+                let mut pixels = pixels.clone();
+                at.into_iter().for_each(|at| pixels[at] = missing);
+                let plain: Vec<bool> = pixels.iter().map(|pixel| *pixel == missing).collect();
+                let image = Pixels::Color(Raster::from_vec(width as u32, 1, pixels));
+                assert_eq!(image.missing(Domain::Semantic), plain);
+            }
+        }
+    }
 
     #[test]
     fn differences_are_counted() {
