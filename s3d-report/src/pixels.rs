@@ -4,7 +4,7 @@
 use crate::faults::{Faults, name};
 use crate::index::rounded;
 use crate::packed::{jpeg_url, png_url};
-use crate::reduce::{Mean, Nearest, mean, pack, reduced_size};
+use crate::reduce::{Mean, Nearest, mean, pack, shown_size};
 use jpeg_encoder::EncodingError;
 use s3d_dataset::{DataSet, Result};
 use s3d_geom::Raster;
@@ -115,9 +115,9 @@ impl Images {
         &self,
         face: impl FnOnce([u32; 2]) -> Option<Raster<u32>>,
     ) -> Result<(Picture, Option<String>), EncodingError> {
-        let size = reduced_size(self.size, self.widths.lossless);
+        let size = shown_size(self.size, self.widths.lossless);
         // Of the smaller image: means of means.
-        let small = |width, rgb: &Raster<_>| mean(rgb, reduced_size(self.size, width), Some(MISSING_COLOR));
+        let small = |width, rgb: &Raster<_>| mean(rgb, shown_size(self.size, width), Some(MISSING_COLOR));
         let thumb = self.widths.thumb.zip(self.rgb.as_ref()).map(|(width, rgb)| small(width, rgb));
         let jpeg = |image: Option<&Raster<[u8; 3]>>| image.map(jpeg_url).transpose();
         let depth = |depth: &Raster<u16>| png_url(&depth.map(|v| pack(u32::from(v))), Content::Photo);
@@ -179,7 +179,7 @@ impl Files<'_> {
         missing: [u8; 3],
     ) -> Result<Option<(Raster<[u8; 3]>, u64)>> {
         let taken = self.take(domain, PngReader::rgb8, |size, lines| {
-            let mut mean = Mean::new(size, reduced_size(size, width), Some(missing));
+            let mut mean = Mean::new(size, shown_size(size, width), Some(missing));
             lines.for_each(|line| mean.line(line));
             (mean.missing(), mean.finish())
         })?;
@@ -188,7 +188,7 @@ impl Files<'_> {
 
     fn labels(&mut self, width: u32, table: Option<&LabelTable>) -> Result<Option<Labels>> {
         let taken = self.take(Domain::Semantic, PngReader::rgb8, |size, lines| {
-            let mut nearest = Nearest::new(size, reduced_size(size, width));
+            let mut nearest = Nearest::new(size, shown_size(size, width));
             let mut counts = table.map(|table| LabelCounts::new(table.len()));
             lines.for_each(|line| {
                 nearest.line(line, |pixel| pixel);
@@ -202,7 +202,7 @@ impl Files<'_> {
     /// Depth, and how many pixels of the file are missing.
     fn depth(&mut self, width: u32) -> Result<Option<(Raster<u16>, u64)>> {
         let taken = self.take(Domain::Depth, PngReader::gray16, |size, lines| {
-            let mut nearest = Nearest::new(size, reduced_size(size, width));
+            let mut nearest = Nearest::new(size, shown_size(size, width));
             let mut missing = 0;
             lines.for_each(|line| {
                 nearest.line(line, u16::from_be_bytes);

@@ -9,6 +9,17 @@ pub(crate) fn reduced_size([w, h]: [u32; 2], width: u32) -> [u32; 2] {
     [width, u32::try_from(height).unwrap_or(u32::MAX).max(1)]
 }
 
+/// The size at which the page shows an image: about `width` pixels across. If every second, third or n-th pixel
+/// makes at most an eighth more or less than that, it is those: their faces can be cast alone, and means are of
+/// whole pixels.
+pub(crate) fn shown_size(size: [u32; 2], width: u32) -> [u32; 2] {
+    let width = width.max(1);
+    let stride = ((size[0] + width / 2) / width).max(1);
+    let even = size[0] / stride;
+    let is_even = size.iter().all(|side| side % stride == 0);
+    reduced_size(size, if is_even && 8 * even.abs_diff(width) <= width { even } else { width })
+}
+
 /// The pixel of an axis of `from` pixels that pixel `i` of `to` shows: the one in which its centre lies.
 /// `docs/report.md` states it, since the page computes rays by it.
 pub(crate) fn source_pixel(i: u32, from: u32, to: u32) -> u32 {
@@ -221,6 +232,16 @@ pub(crate) fn pack(value: u32) -> [u8; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shown_sizes_are_even_parts_where_one_is_near() {
+        assert_eq!(shown_size([1080, 1080], 256), [270, 270]);
+        assert_eq!(shown_size([1080, 1080], 512), [540, 540]);
+        assert_eq!(shown_size([4096, 2048], 2048), [2048, 1024]);
+        assert_eq!(shown_size([640, 480], 256), [256, 192], "320 are too many");
+        assert_eq!(shown_size([4000, 1], 256), [256, 1], "a line is not divided");
+        assert_eq!(shown_size([100, 100], 256), [100, 100]);
+    }
 
     #[test]
     fn sizes_keep_the_shape_and_do_not_grow() {
