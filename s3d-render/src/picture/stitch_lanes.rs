@@ -176,8 +176,8 @@ impl BlendKernel<'_> {
             }
             let inverse = l.div(l.splat(1.0), l.max(weight, l.splat(f32::MIN_POSITIVE)));
             let mut color = [inverse; 3];
-            for k in 0..3 {
-                color[k] = l.min(l.mul(eight(l, &sums.colors[k], i), inverse), most);
+            for (color, sums) in color.iter_mut().zip(&sums.colors) {
+                *color = l.min(l.mul(eight(l, sums, i), inverse), most);
             }
             let packed = packed(l, color);
             for k in 0..LANES {
@@ -255,10 +255,10 @@ impl BlendKernel<'_> {
             let color = l.channels(capture.levels.round_sums(l, (at[0], at[1]), width, these));
             let weights = l.add(eight(l, &sums.weights, i), weight);
             put(l, &mut sums.weights, i, weights);
-            for k in 0..3 {
-                let add = l.mul(l.mul(weight, l.splat(capture.gain[k])), color[k]);
-                let colors = l.add(eight(l, &sums.colors[k], i), add);
-                put(l, &mut sums.colors[k], i, colors);
+            for ((sums, gain), color) in sums.colors.iter_mut().zip(capture.gain).zip(color) {
+                let add = l.mul(l.mul(weight, l.splat(gain)), color);
+                let colors = l.add(eight(l, sums, i), add);
+                put(l, sums, i, colors);
             }
         }
     }
