@@ -26,6 +26,12 @@ use crate::simd::{Compare, Kernel, dispatch};
 /// assert!(stream.len() < 19_200 / 50, "{}", stream.len());
 /// // A block that does not shrink is stored as it is: B, G and R of a line, one after the other.
 /// assert_eq!(block.stored().take(4).collect::<Vec<u8>>(), 0f32.to_le_bytes());
+/// // Of what a reader has inflated, the pixels come back.
+/// let differences = block.differences().to_vec();
+/// block.differences_mut(differences.len()).copy_from_slice(&differences);
+/// let mut read = vec![[0.0; 3]; 1600];
+/// block.get(&mut read, 100, f32::from_le_bytes)?;
+/// assert_eq!(read, pixels);
 /// # Ok::<(), s3d_deflate::Error>(())
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -52,19 +58,41 @@ impl ZipBlock {
         width: usize,
         to_le_bytes: impl Fn(T) -> [u8; N],
     ) -> Result<(), Error> {
-        if width == 0 || pixels.is_empty() || !pixels.len().is_multiple_of(width) {
-            return Err(Error::PartialLine { len: pixels.len(), line: width });
-        }
-        if N == 0 || !N.is_multiple_of(2) {
-            return Err(Error::Setting { setting: "bytes of a sample", value: N, min: 2, max: 4 });
-        }
-        let bytes = 3 * N * pixels.len();
+        let bytes = bytes_of::<N>(pixels.len(), width)?;
         self.line.resize(3 * N * width, 0);
         self.separated.resize(bytes, 0);
         self.differences.resize(bytes, 0);
         let Self { line, separated, differences } = self;
         dispatch(Prepare { pixels, width, to_le_bytes, line, separated, differences });
         Ok(())
+    }
+
+    /// The pixels of the block whose differences are in [`Self::differences_mut`]: the reverse of [`Self::set`].
+    ///
+    /// # Errors
+    /// As [`Self::set`]; [`Error::PartialLine`] also if there are more or fewer differences than bytes of
+    /// samples.
+    pub fn get<T: Copy, const N: usize>(
+        &mut self,
+        pixels: &mut [[T; 3]],
+        width: usize,
+        from_le_bytes: impl Fn([u8; N]) -> T,
+    ) -> Result<(), Error> {
+        let bytes = bytes_of::<N>(pixels.len(), width)?;
+        if bytes != self.differences.len() {
+            return Err(Error::PartialLine { len: self.differences.len(), line: bytes });
+        }
+        self.line.resize(3 * N * width, 0);
+        self.separated.resize(bytes, 0);
+        let Self { line, separated, differences } = self;
+        dispatch(Restore { pixels, width, from_le_bytes, line, separated, differences });
+        Ok(())
+    }
+
+    /// Room for the differences of a block whose samples have so many bytes.
+    pub fn differences_mut(&mut self, bytes: usize) -> &mut [u8] {
+        self.differences.resize(bytes, 0);
+        &mut self.differences
     }
 
     /// What is to be compressed. Even bytes of samples are before its middle and odd ones after it.
@@ -78,6 +106,17 @@ impl ZipBlock {
         let (even, odd) = self.separated.split_at(self.separated.len() / 2);
         even.iter().zip(odd).flat_map(|(even, odd)| [*even, *odd])
     }
+}
+
+/// How many bytes the samples of rows of `width` pixels have.
+fn bytes_of<const N: usize>(pixels: usize, width: usize) -> Result<usize, Error> {
+    if width == 0 || pixels == 0 || !pixels.is_multiple_of(width) {
+        return Err(Error::PartialLine { len: pixels, line: width });
+    }
+    if N == 0 || !N.is_multiple_of(2) {
+        return Err(Error::Setting { setting: "bytes of a sample", value: N, min: 2, max: 4 });
+    }
+    Ok(3 * N * pixels)
 }
 
 /// Takes the samples' bytes apart, and their differences.
@@ -122,9 +161,103 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Kernel for Prepare<'_, T, F> 
     }
 }
 
+/// Adds differences up, and puts the samples' bytes together.
+struct Restore<'a, T, F, const N: usize> {
+    pixels: &'a mut [[T; 3]],
+    width: usize,
+    from_le_bytes: F,
+    line: &'a mut [u8],
+    separated: &'a mut [u8],
+    differences: &'a [u8],
+}
+
+impl<T: Copy, const N: usize, F: Fn([u8; N]) -> T> Kernel for Restore<'_, T, F, N> {
+    type Output = ();
+    const GAINS_FROM_AVX512: bool = false;
+
+    #[inline(always)]
+    fn run<C: Compare>(self, _: C) {
+        let Self { pixels, width, from_le_bytes, line, separated, differences } = self;
+        add_up(differences, separated);
+        let half = 3 * N / 2 * width;
+        let (even, odd) = separated.split_at(separated.len() / 2);
+        let lines = even.chunks_exact(half).zip(odd.chunks_exact(half));
+        for (row, (even, odd)) in pixels.chunks_exact_mut(width).zip(lines) {
+            for ((even, odd), pair) in even.iter().zip(odd).zip(line.as_chunks_mut::<2>().0) {
+                *pair = [*even, *odd];
+            }
+            let (blue, rest) = line.as_chunks::<N>().0.split_at(width);
+            let (green, red) = rest.split_at(width);
+            for (((pixel, b), g), r) in row.iter_mut().zip(blue).zip(green).zip(red) {
+                *pixel = [from_le_bytes(*r), from_le_bytes(*g), from_le_bytes(*b)];
+            }
+        }
+    }
+}
+
+/// Sums of differences, 128 standing for none: of 16 in four steps, each of which adds to every sum the one that
+/// stands 1, 2, 4, 8 places before.
+#[inline(always)]
+fn add_up(differences: &[u8], sums: &mut [u8]) {
+    let mut last = 128u8;
+    let (chunks, rest) = differences.as_chunks::<16>();
+    let (out, out_rest) = sums.as_chunks_mut::<16>();
+    for (chunk, out) in chunks.iter().zip(out) {
+        let mut sums = *chunk;
+        for sum in &mut sums {
+            *sum = sum.wrapping_sub(128);
+        }
+        for places in [1, 2, 4, 8] {
+            let mut before = [0; 16];
+            before[places..].copy_from_slice(&sums[..16 - places]);
+            for (sum, before) in sums.iter_mut().zip(before) {
+                *sum = sum.wrapping_add(before);
+            }
+        }
+        for sum in &mut sums {
+            *sum = sum.wrapping_add(last);
+        }
+        last = sums[15];
+        *out = sums;
+    }
+    for (difference, out) in rest.iter().zip(out_rest) {
+        last = last.wrapping_add(*difference).wrapping_sub(128);
+        *out = last;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn pixels_come_back(
+            (width, lines) in (1usize..40, 1usize..17),
+            seed in proptest::collection::vec(any::<[u16; 3]>(), 1..50),
+        ) {
+            let pixels: Vec<[u16; 3]> = seed.iter().copied().cycle().take(width * lines).collect();
+            let mut block = ZipBlock::default();
+            block.set(&pixels, width, u16::to_le_bytes).unwrap();
+            let differences = block.differences().to_vec();
+            let mut reader = ZipBlock::default();
+            reader.differences_mut(differences.len()).copy_from_slice(&differences);
+            let mut read = vec![[0; 3]; pixels.len()];
+            reader.get(&mut read, width, u16::from_le_bytes).unwrap();
+            prop_assert_eq!(read, pixels);
+            // One by one.
+            let mut sum = 128u8;
+            let plain: Vec<u8> = differences
+                .iter()
+                .map(|d| {
+                    sum = sum.wrapping_add(*d).wrapping_sub(128);
+                    sum
+                })
+                .collect();
+            prop_assert_eq!(reader.separated, plain);
+        }
+    }
 
     #[test]
     fn bytes_are_apart_by_channel_and_place() {
@@ -158,5 +291,9 @@ mod tests {
         assert!(block.set(&[[0u16; 3]; 4], 0, u16::to_le_bytes).is_err());
         assert!(block.set::<u16, 2>(&[], 2, u16::to_le_bytes).is_err());
         assert!(block.set(&[[0u8; 3]; 4], 2, u8::to_le_bytes).is_err());
+        block.differences_mut(23);
+        let error = block.get(&mut [[0u16; 3]; 4], 2, u16::from_le_bytes).unwrap_err();
+        assert_eq!(error, Error::PartialLine { len: 23, line: 24 });
+        assert!(block.get(&mut [[0u16; 3]; 4], 3, u16::from_le_bytes).is_err());
     }
 }

@@ -5,9 +5,7 @@
 
 use super::expected;
 use crate::Error;
-
-/// Bytes that go together.
-const LANES: usize = 16;
+use crate::simd::{Compare, Kernel, dispatch};
 
 /// Takes the filters off some lines of an image, in place: as [`filter`](super::filter) makes them, for each
 /// line the filter's number, which stays, and then `line` bytes of `pixel` bytes a pixel. `above` is the line
@@ -47,8 +45,7 @@ pub fn unfilter(lines: &mut [u8], above: Option<&[u8]>, line: usize, pixel: usiz
         }
     };
     let together = match pixel {
-        2 => 8,
-        3 => 4,
+        2 | 3 => 8,
         _ => usize::MAX,
     };
     let mut rest = lines;
@@ -57,8 +54,8 @@ pub fn unfilter(lines: &mut [u8], above: Option<&[u8]>, line: usize, pixel: usiz
         let is_wave = rest.len() >= many && rest[..many].iter().step_by(line + 1).all(|number| *number == 4);
         let (these, others) = rest.split_at_mut(if is_wave { many } else { line + 1 });
         match (is_wave, pixel) {
-            (true, 2) => wave::<2, 2, 8>(these, above),
-            (true, _) => wave::<3, 4, 4>(these, above),
+            (true, 2) => dispatch(Lines::<2, 2, 8, 16> { lines: these, above }),
+            (true, _) => dispatch(Lines::<3, 4, 8, 32> { lines: these, above }),
             (false, _) => single(these, above, pixel),
         }
         above = &these[these.len() - line..];
@@ -86,39 +83,47 @@ fn single(line: &mut [u8], above: &[u8], pixel: usize) {
 
 /// The neighbours of the pixels that are next in lines that go together.
 #[derive(Clone, Copy)]
-struct Wave {
-    left: [u8; LANES],
-    corner: [u8; LANES],
+struct Wave<const B: usize> {
+    left: [u8; B],
+    corner: [u8; B],
 }
 
-impl Wave {
+impl<const B: usize> Wave<B> {
     /// The next pixel of each line, `L` lanes each; `above` is what lies above the first line's.
     #[inline(always)]
-    fn step<const L: usize>(&mut self, above: u32, filtered: u128) -> u128 {
+    fn step<const L: usize>(&mut self, above: u32, filtered: [u8; B]) -> [u8; B] {
         // What a line's pixel was a step ago is now above the next line's.
-        let mut up = [0; LANES];
-        up[L..].copy_from_slice(&self.left[..LANES - L]);
+        let mut up = [0; B];
+        up[L..].copy_from_slice(&self.left[..B - L]);
         up[..L].copy_from_slice(&above.to_le_bytes()[..L]);
-        let filtered = filtered.to_le_bytes();
-        let mut next = [0; LANES];
-        for i in 0..LANES {
+        let mut next = [0; B];
+        for i in 0..B {
             let (left, above, corner) = (self.left[i], up[i], self.corner[i]);
-            let distance = |a: u8, b: u8| a.max(b).wrapping_sub(a.min(b));
-            let (from_left, from_above) = (distance(above, corner), distance(left, corner));
-            // Where both lie on one side of the corner, it is at least as far as each of them.
-            let is_far = (above >= corner) == (left >= corner);
-            let from_corner = if is_far { u8::MAX } else { distance(from_left, from_above) };
-            let least = from_left.min(from_above).min(from_corner);
-            let nearer = if from_above == least { above } else { corner };
-            next[i] = (if from_left == least { left } else { nearer }).wrapping_add(filtered[i]);
+            next[i] = expected(left, above, corner).wrapping_add(filtered[i]);
         }
         *self = Self { left: next, corner: up };
-        u128::from_le_bytes(next)
+        next
     }
 }
 
-/// `R` lines by Paeth, of pixels of `P` bytes in `L` lanes.
-fn wave<const P: usize, const L: usize, const R: usize>(lines: &mut [u8], above: &[u8]) {
+/// `R` lines by Paeth, of pixels of `P` bytes in `L` of `B` lanes.
+struct Lines<'a, const P: usize, const L: usize, const R: usize, const B: usize> {
+    lines: &'a mut [u8],
+    above: &'a [u8],
+}
+
+impl<const P: usize, const L: usize, const R: usize, const B: usize> Kernel for Lines<'_, P, L, R, B> {
+    type Output = ();
+    const GAINS_FROM_AVX512: bool = false;
+
+    #[inline(always)]
+    fn run<C: Compare>(self, _: C) {
+        wave::<P, L, R, B>(self.lines, self.above);
+    }
+}
+
+#[inline(always)]
+fn wave<const P: usize, const L: usize, const R: usize, const B: usize>(lines: &mut [u8], above: &[u8]) {
     let above = above.as_chunks::<P>().0;
     let width = above.len();
     let mut rest = lines;
@@ -127,10 +132,10 @@ fn wave<const P: usize, const L: usize, const R: usize>(lines: &mut [u8], above:
         rest = others;
         line[1..].as_chunks_mut().0
     });
-    let mut wave = Wave { left: [0; LANES], corner: [0; LANES] };
+    let mut wave = Wave { left: [0; B], corner: [0; B] };
     // At first and in the end not every line has a pixel. Before its first, a line has zeros.
     let first = (R - 1).min(width);
-    (0..first).for_each(|at| edge::<P, L, R>(&mut wave, &mut rows, above, at));
+    (0..first).for_each(|at| edge::<P, L, R, B>(&mut wave, &mut rows, above, at));
     if width >= R {
         let steps = width - first;
         let mut lag = R;
@@ -142,36 +147,38 @@ fn wave<const P: usize, const L: usize, const R: usize>(lines: &mut [u8], above:
         // A copy, which stays in registers.
         let mut here = wave;
         for x in 0..steps {
-            let mut filtered = 0;
+            let mut filtered = [0; B];
             for (r, row) in rows.iter().enumerate() {
-                filtered |= u128::from(load(&row[x])) << (8 * L * r);
+                filtered[L * r..][..L].copy_from_slice(&load(&row[x]).to_le_bytes()[..L]);
             }
             let samples = here.step::<L>(load(&above[x]), filtered);
             for (r, row) in rows.iter_mut().enumerate() {
-                store(&mut row[x], (samples >> (8 * L * r)) as u32);
+                row[x].copy_from_slice(&samples[L * r..][..P]);
             }
         }
         wave = here;
     }
-    (first.max(width)..width + R - 1).for_each(|at| edge::<P, L, R>(&mut wave, &mut rows, above, at));
+    (first.max(width)..width + R - 1).for_each(|at| edge::<P, L, R, B>(&mut wave, &mut rows, above, at));
 }
 
 /// A step in which the line `r` has its pixel `at - r`, if there is one.
-fn edge<const P: usize, const L: usize, const R: usize>(
-    wave: &mut Wave,
+#[inline(always)]
+fn edge<const P: usize, const L: usize, const R: usize, const B: usize>(
+    wave: &mut Wave<B>,
     rows: &mut [&mut [[u8; P]]; R],
     above: &[[u8; P]],
     at: usize,
 ) {
     let pixel = |r: usize| at.checked_sub(r);
-    let mut filtered = 0;
+    let mut filtered = [0; B];
     for (r, row) in rows.iter().enumerate() {
-        filtered |= u128::from(pixel(r).and_then(|x| row.get(x)).map_or(0, load)) << (8 * L * r);
+        let pixel = pixel(r).and_then(|x| row.get(x)).map_or(0, load);
+        filtered[L * r..][..L].copy_from_slice(&pixel.to_le_bytes()[..L]);
     }
     let samples = wave.step::<L>(above.get(at).map_or(0, load), filtered);
     for (r, row) in rows.iter_mut().enumerate() {
         if let Some(here) = pixel(r).and_then(|x| row.get_mut(x)) {
-            store(here, (samples >> (8 * L * r)) as u32);
+            here.copy_from_slice(&samples[L * r..][..P]);
         }
     }
 }
@@ -181,11 +188,6 @@ fn edge<const P: usize, const L: usize, const R: usize>(
 fn load<const P: usize>(pixel: &[u8; P]) -> u32 {
     let low = u32::from(u16::from_le_bytes([pixel[0], pixel[1]]));
     if P == 3 { low | u32::from(pixel[2]) << 16 } else { low }
-}
-
-#[inline(always)]
-fn store<const P: usize>(pixel: &mut [u8; P], value: u32) {
-    pixel.copy_from_slice(&value.to_le_bytes()[..P]);
 }
 
 #[cfg(test)]
