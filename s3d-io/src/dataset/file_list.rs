@@ -76,6 +76,14 @@ impl FileRecord {
         self.check_found(&path, found)
     }
 
+    /// As [`FileRecord::check`], with the bytes that were read of the file.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if it is another.
+    pub fn check_bytes(&self, root: &Path, bytes: &[u8]) -> Result<()> {
+        self.check_found(&self.path_in(root), (bytes.len() as u64, Checksum::of(bytes)))
+    }
+
     /// What is wrong with the file in the data set in `root`, by [`FileRecord::check`].
     pub fn fault(&self, root: &Path) -> Option<String> {
         self.check(root).err().map(|e| e.to_string())
@@ -89,7 +97,7 @@ impl FileRecord {
         self.check_size(root)?;
         let path = self.path_in(root);
         let bytes = read_file(&path)?;
-        self.check_found(&path, (bytes.len() as u64, Checksum::of(&bytes)))?;
+        self.check_bytes(root, &bytes)?;
         Ok(bytes)
     }
 

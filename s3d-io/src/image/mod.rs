@@ -37,12 +37,13 @@ pub(crate) mod texture;
 
 #[cfg(feature = "exr")]
 pub use self::exr::{
-    decode_xyz, encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half,
+    decode_xyz, decode_xyz_half, encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half,
 };
 #[cfg(feature = "png")]
 pub use self::png::{
-    Content, PngLines, PngReader, decode_gray16, decode_rgb8, encode_gray8, encode_gray16, encode_palette8,
-    encode_rgb8, read_gray16, read_numbers8, read_palette8, read_rgb8, write_gray16, write_rgb8,
+    Content, PngLines, PngReader, decode_gray16, decode_palette8, decode_rgb8, encode_gray8, encode_gray16,
+    encode_palette8, encode_rgb8, read_gray16, read_numbers8, read_palette8, read_rgb8, write_gray16,
+    write_rgb8,
 };
 pub use compression::{Compression, UnknownCompression};
 pub use s3d_label::pretty_color;

@@ -2,11 +2,11 @@
 
 use super::lines::PngReader;
 use crate::error::{Error, Result};
-use crate::fs::open::open_file;
+use crate::fs::open::{open_file, read_file};
 use png::{BitDepth, ColorType};
 use s3d_geom::Raster;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 /// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
@@ -37,12 +37,7 @@ pub fn read_rgb8(path: &Path) -> Result<Raster<[u8; 3]>> {
 /// # Errors
 /// As [`read_rgb8`].
 pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
-    let mut reader = PngReader::default();
-    let lines = reader.rgb8(bytes, name)?;
-    let (width, height) = (lines.width(), lines.height());
-    let mut pixels = Vec::with_capacity(width as usize * height as usize);
-    lines.for_each(|line| pixels.extend_from_slice(line));
-    Ok(Raster::from_vec(width, height, pixels))
+    Ok(PngReader::default().rgb8(bytes, name)?.into_raster())
 }
 
 /// Reads an 8-bit PNG file with a palette, and nothing else: the places in the palette, and its colours.
@@ -61,9 +56,17 @@ pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
 /// # Errors
 /// As [`read_rgb8`].
 pub fn read_palette8(path: &Path) -> Result<(Raster<u8>, Vec<[u8; 3]>)> {
-    let (file, size) = open(path)?;
-    let (width, height, bytes, palette) = decode(file, size, path, ColorType::Indexed, BitDepth::Eight)?;
-    Ok((Raster::from_vec(width, height, bytes), palette.as_chunks().0.to_vec()))
+    decode_palette8(&read_file(path)?, path)
+}
+
+/// As [`read_palette8`], from the file's bytes; errors call it `name`.
+///
+/// # Errors
+/// As [`read_palette8`].
+pub fn decode_palette8(bytes: &[u8], name: &Path) -> Result<(Raster<u8>, Vec<[u8; 3]>)> {
+    let (file, size) = (Cursor::new(bytes), bytes.len() as u64);
+    let (width, height, places, palette) = decode(file, size, name, ColorType::Indexed, BitDepth::Eight)?;
+    Ok((Raster::from_vec(width, height, places), palette.as_chunks().0.to_vec()))
 }
 
 /// Reads a 16-bit gray PNG file, and nothing else: its values are numbers, which must not be converted.
@@ -97,12 +100,7 @@ pub fn read_gray16(path: &Path) -> Result<Raster<u16>> {
 /// # Errors
 /// As [`read_gray16`].
 pub fn decode_gray16(bytes: &[u8], name: &Path) -> Result<Raster<u16>> {
-    let mut reader = PngReader::default();
-    let lines = reader.gray16(bytes, name)?;
-    let (width, height) = (lines.width(), lines.height());
-    let mut values = Vec::with_capacity(width as usize * height as usize);
-    lines.for_each(|line| values.extend(line.iter().map(|pair| u16::from_be_bytes(*pair))));
-    Ok(Raster::from_vec(width, height, values))
+    Ok(PngReader::default().gray16(bytes, name)?.into_raster())
 }
 
 /// A file, and how many bytes it has.

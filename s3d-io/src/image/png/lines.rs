@@ -8,7 +8,8 @@ use super::decode::{MAX_DEFLATE, MAX_PIXELS, decode};
 use crate::error::Result;
 use fdeflate::Decompressor;
 use png::{BitDepth, ColorType};
-use s3d_deflate::png::unfilter;
+use s3d_deflate::png::{is_filtered, unfilter};
+use s3d_geom::Raster;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -29,9 +30,8 @@ const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// let mut reader = PngReader::default();
 /// let lines = reader.gray16(&bytes, "depth.png".as_ref())?;
 /// assert_eq!((lines.width(), lines.height()), (2, 2));
-/// let mut found = Vec::new();
-/// lines.for_each(|line| found.extend(line.iter().map(|sample| u16::from_be_bytes(*sample))));
-/// assert_eq!(found, depth.into_vec());
+/// assert!(lines.are_of(&depth));
+/// assert_eq!(lines.into_raster(), depth);
 /// # Ok::<(), s3d_io::Error>(())
 /// ```
 #[derive(Default)]
@@ -163,6 +163,57 @@ impl<const N: usize> PngLines<'_, N> {
             lines.clone().for_each(|line| each(line.as_chunks().0));
             above = lines.next_back();
         }
+    }
+}
+
+impl PngLines<'_, 3> {
+    /// The whole image.
+    pub fn into_raster(self) -> Raster<[u8; 3]> {
+        let (width, height) = (self.width, self.height);
+        let mut pixels = Vec::with_capacity(width as usize * height as usize);
+        self.for_each(|line| pixels.extend_from_slice(line));
+        Raster::from_vec(width, height, pixels)
+    }
+
+    /// Whether it is surely this image, without taking filters off, which takes a few times as long. It may be
+    /// `false` of files that others wrote.
+    pub fn are_of(&self, image: &Raster<[u8; 3]>) -> bool {
+        let fits = (self.width, self.height) == (image.width(), image.height());
+        let top = vec![[0; 3]; image.width() as usize];
+        let mut above = top.as_slice();
+        let mut lines = self.lines.chunks_exact(3 * self.width as usize + 1).zip(image.rows());
+        self.is_filtered
+            && fits
+            && lines.all(|(filtered, line)| {
+                let above = std::mem::replace(&mut above, line);
+                is_filtered(filtered, line.as_flattened(), above.as_flattened(), 3)
+            })
+    }
+}
+
+impl PngLines<'_, 2> {
+    /// The whole image.
+    pub fn into_raster(self) -> Raster<u16> {
+        let (width, height) = (self.width, self.height);
+        let mut samples = Vec::with_capacity(width as usize * height as usize);
+        self.for_each(|line| samples.extend(line.iter().map(|sample| u16::from_be_bytes(*sample))));
+        Raster::from_vec(width, height, samples)
+    }
+
+    /// As [`PngLines::<3>::are_of`].
+    pub fn are_of(&self, image: &Raster<u16>) -> bool {
+        let fits = (self.width, self.height) == (image.width(), image.height());
+        let (mut line, mut above) =
+            (vec![0; 2 * image.width() as usize], vec![0; 2 * image.width() as usize]);
+        let mut lines = self.lines.chunks_exact(line.len() + 1).zip(image.rows());
+        self.is_filtered
+            && fits
+            && lines.all(|(filtered, samples)| {
+                std::mem::swap(&mut line, &mut above);
+                let bytes = line.as_chunks_mut().0.iter_mut();
+                bytes.zip(samples).for_each(|(bytes, sample)| *bytes = sample.to_be_bytes());
+                is_filtered(filtered, &line, &above, 2)
+            })
     }
 }
 

@@ -6,7 +6,9 @@ mod lines;
 #[cfg(test)]
 mod tests;
 
-pub use self::decode::{decode_gray16, decode_rgb8, read_gray16, read_numbers8, read_palette8, read_rgb8};
+pub use self::decode::{
+    decode_gray16, decode_palette8, decode_rgb8, read_gray16, read_numbers8, read_palette8, read_rgb8,
+};
 pub use self::encode::{
     Content, encode_gray8, encode_gray16, encode_palette8, encode_rgb8, write_gray16, write_rgb8,
 };
