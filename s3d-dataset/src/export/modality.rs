@@ -2,6 +2,7 @@
 //! walk over the hits (`together`), the others one after another. `file` makes a file of each.
 
 use crate::export::input::pictures::PictureColors;
+use half::f16;
 use rayon::prelude::*;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, XyzType};
@@ -121,6 +122,16 @@ impl Default for ImageBuffers {
     }
 }
 
+/// An image that was drawn.
+#[derive(Clone, Copy)]
+pub(crate) enum Drawn<'a> {
+    Color(&'a Raster<[u8; 3]>),
+    Depth(&'a Raster<u16>),
+    Class(&'a Raster<u8>),
+    Xyz(&'a Raster<[f32; 3]>),
+    XyzHalf(&'a Raster<[f16; 3]>),
+}
+
 impl Channels<'_> {
     /// What `each` makes of the files of some images of a view, from the view's hits, in the order of
     /// `images`. Threads of the current rayon pool that have nothing else to do take part. Nothing but time
@@ -137,18 +148,7 @@ impl Channels<'_> {
         each: impl Fn(Image, Vec<u8>) -> Result<T, E> + Sync,
     ) -> Result<Vec<T>, E> {
         let large = hits.face.len() > ImageBuffers::MAX_PIXELS;
-        buffers.made = if large { Modalities::default() } else { self.together(images) };
-        if buffers.made != Modalities::default() {
-            let shading = Shading {
-                scene: self.scene,
-                mip_maps: self.textures,
-                filter: TextureFilter::default(),
-                normal_axes: self.conventions.normal_axes,
-                index_of_face: self.label_of_face,
-                color_of_face: self.pretty_of_face,
-            };
-            view_images_into(&shading, hits, camera, buffers.made, &mut buffers.images);
-        }
+        self.draw_together(images, hits, camera, buffers);
         let (mut done, mut unlabelled) = (Vec::new(), 0);
         for &image in images {
             self.draw(image, hits, camera, buffers);
@@ -168,6 +168,30 @@ impl Channels<'_> {
         Ok(done)
     }
 
+    /// Draws those of the images that can be in one walk over the hits, unless they are large. [`Self::draw`]
+    /// draws the others.
+    pub(crate) fn draw_together(
+        &self,
+        images: &[Image],
+        hits: &Hits,
+        camera: &Camera,
+        buffers: &mut ImageBuffers,
+    ) {
+        let large = hits.face.len() > ImageBuffers::MAX_PIXELS;
+        buffers.made = if large { Modalities::default() } else { self.together(images) };
+        if buffers.made != Modalities::default() {
+            let shading = Shading {
+                scene: self.scene,
+                mip_maps: self.textures,
+                filter: TextureFilter::default(),
+                normal_axes: self.conventions.normal_axes,
+                index_of_face: self.label_of_face,
+                color_of_face: self.pretty_of_face,
+            };
+            view_images_into(&shading, hits, camera, buffers.made, &mut buffers.images);
+        }
+    }
+
     /// The images that are made in one walk over the hits.
     fn together(&self, images: &[Image]) -> Modalities {
         let wants = |image| images.contains(&image);
@@ -182,7 +206,7 @@ impl Channels<'_> {
     }
 
     /// Draws an image, unless it is made already.
-    fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
+    pub(crate) fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
         let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, made, .. } =
             buffers;
@@ -231,28 +255,42 @@ impl Channels<'_> {
         sample_edges(self.scene, self.textures, hits, camera, &filter, self.rgb_samples, rgb);
     }
 
-    /// The file of an image that is drawn.
-    fn file(&self, image: Image, buffers: &ImageBuffers) -> Vec<u8> {
-        let compression = self.compression;
+    /// An image that is drawn.
+    pub(crate) fn drawn<'a>(&self, image: Image, buffers: &'a ImageBuffers) -> Drawn<'a> {
         let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, .. } = buffers;
         match image {
-            Image::Rgb => encode_rgb8(rgb, Content::Photo, compression),
-            Image::Depth => encode_gray16(depth, compression),
-            Image::Normal => encode_rgb8(&faces.normal, Content::Normals, compression),
-            Image::Semantic => encode_rgb8(&faces.index, Content::Labels, compression),
-            Image::SemanticPretty => encode_rgb8(&faces.color, Content::Labels, compression),
-            Image::SemanticClass => encode_palette8(class, self.palette, compression),
-            Image::GlobalXyz if self.conventions.xyz == XyzType::Float => {
-                encode_xyz_float(xyz_float, compression)
-            }
-            Image::GlobalXyz => encode_xyz_half(xyz, compression),
+            Image::Rgb => Drawn::Color(rgb),
+            Image::Depth => Drawn::Depth(depth),
+            Image::Normal => Drawn::Color(&faces.normal),
+            Image::Semantic => Drawn::Color(&faces.index),
+            Image::SemanticPretty => Drawn::Color(&faces.color),
+            Image::SemanticClass => Drawn::Class(class),
+            Image::GlobalXyz if self.conventions.xyz == XyzType::Float => Drawn::Xyz(xyz_float),
+            Image::GlobalXyz => Drawn::XyzHalf(xyz),
+        }
+    }
+
+    /// Its file.
+    fn file(&self, image: Image, buffers: &ImageBuffers) -> Vec<u8> {
+        let compression = self.compression;
+        let content = match image {
+            Image::Normal => Content::Normals,
+            Image::Semantic | Image::SemanticPretty => Content::Labels,
+            _ => Content::Photo,
+        };
+        match self.drawn(image, buffers) {
+            Drawn::Color(colors) => encode_rgb8(colors, content, compression),
+            Drawn::Depth(depth) => encode_gray16(depth, compression),
+            Drawn::Class(class) => encode_palette8(class, self.palette, compression),
+            Drawn::Xyz(points) => encode_xyz_float(points, compression),
+            Drawn::XyzHalf(points) => encode_xyz_half(points, compression),
         }
     }
 }
 
 /// How many pixels of a label image are those of the null label. Four pixels at a time are four times
 /// as fast as one: that would be 3 % of a large panorama's time.
-fn null_pixels(pixels: &[[u8; 3]]) -> u64 {
+pub(crate) fn null_pixels(pixels: &[[u8; 3]]) -> u64 {
     let (fours, rest) = pixels.as_chunks::<4>();
     let mut count = rest.iter().filter(|pixel| **pixel == [0; 3]).count() as u64;
     for four in fours {

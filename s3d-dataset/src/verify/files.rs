@@ -56,11 +56,20 @@ impl Files {
 
     /// Checks the size and checksum of a file that is there.
     pub(crate) fn check(&self, path: &Path, report: &Report) {
+        self.check_by(path, report, |record| record.check(report.root()));
+    }
+
+    /// The same with the bytes that were read of it.
+    pub(crate) fn check_bytes(&self, path: &Path, bytes: &[u8], report: &Report) {
+        self.check_by(path, report, |record| record.check_bytes(report.root(), bytes));
+    }
+
+    fn check_by(&self, path: &Path, report: &Report, check: impl Fn(&FileRecord) -> Checked) {
         report.looked_at(1);
         let entry = self.listed.as_ref().and_then(|l| l.get(&report.relative(path)));
         if let Some((record, looked_at)) = entry {
             looked_at.store(true, Ordering::Relaxed);
-            check_record(record, report);
+            tell(check(record), report);
         }
     }
 
@@ -99,7 +108,7 @@ impl Files {
             || (),
             |(), record| {
                 report.looked_at(1);
-                check_record(record, report);
+                tell(record.check(report.root()), report);
                 progress.add(1);
                 Ok(())
             },
@@ -107,9 +116,12 @@ impl Files {
     }
 }
 
-fn check_record(record: &FileRecord, report: &Report) {
+/// Whether a file has the size and checksum that are listed.
+type Checked = std::result::Result<(), FileError>;
+
+fn tell(checked: Checked, report: &Report) {
     report.checked(2);
-    if let Err(e) = record.check(report.root()) {
+    if let Err(e) = checked {
         report.wrong(BYTES, &e);
     }
 }

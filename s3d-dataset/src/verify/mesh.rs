@@ -24,6 +24,8 @@ pub(crate) struct LabelledMesh {
     pub(crate) file: MeshFile,
     /// Its index in the label table, or [`NOT_IN_TABLE`].
     pub(crate) label_of_face: Vec<u32>,
+    /// Whether none is that.
+    pub(crate) all_in_table: bool,
     /// Whether each face has votes, and not its label by filling.
     pub(crate) is_voted: Vec<bool>,
 }
@@ -74,7 +76,8 @@ pub(crate) fn read_and_check(
         );
     }
     if !manifest.is_labelled() {
-        return Some(LabelledMesh { file, label_of_face: vec![0; faces], is_voted: vec![false; faces] });
+        let (label_of_face, is_voted) = (vec![0; faces], vec![false; faces]);
+        return Some(LabelledMesh { file, label_of_face, all_in_table: true, is_voted });
     }
     let (label_of_face, other) = names?;
     let same = report.check(faces == other.faces().len(), MESH, &semantic, || {
@@ -93,10 +96,11 @@ pub(crate) fn read_and_check(
         )
     });
     drop(other);
-    let mut labelled = LabelledMesh { file, label_of_face, is_voted: Vec::new() };
+    let all_in_table = !label_of_face.contains(&NOT_IN_TABLE);
+    let mut labelled = LabelledMesh { file, label_of_face, all_in_table, is_voted: Vec::new() };
     labelled.is_voted = check_votes(layout, area, &labelled, (labels, manifest.options.fill), report);
     if let Some(told) = manifest.area(area).and_then(|entry| entry.unlabelled) {
-        let LabelledMesh { file, label_of_face, is_voted } = &labelled;
+        let LabelledMesh { file, label_of_face, is_voted, .. } = &labelled;
         let surface = |is_without: &dyn Fn(usize) -> bool| {
             let faces = (0..label_of_face.len()).filter(|face| is_without(*face));
             faces.fold((0, 0.0), |(n, m2), face| (n + 1, m2 + file.mesh.area(face as u32)))

@@ -24,6 +24,7 @@ mod views;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::export::modality::{Channels, NO_CLASS};
 use crate::export::work::for_each_in_order;
 use crate::tables::manifest::Manifest;
 use files::Files;
@@ -35,7 +36,7 @@ pub use report::{FaultGroup, VerifyReport};
 use report::{Report, Topic};
 use s3d_geom::Camera;
 use s3d_io::dataset::{DatasetImage, Domain, Layout, dataset_images};
-use s3d_io::image::pretty_color;
+use s3d_io::image::{Compression, pretty_color};
 use s3d_render::{MipMaps, Scene};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -133,6 +134,8 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     let textures = MipMaps::new(&mesh.file.mesh);
     let pretty = |label: &u32| if *label == NOT_IN_TABLE { [0; 3] } else { pretty_color(*label) };
     let pretty_of_face: Vec<[u8; 3]> = mesh.label_of_face.iter().map(pretty).collect();
+    let class = |label: &u32| labels.classes.get(*label as usize).copied().unwrap_or(NO_CLASS);
+    let class_of_face: Vec<u8> = mesh.label_of_face.iter().map(class).collect();
     let source = manifest.area(area).map_or("texture", |a| a.rgb.as_str());
     let domains = manifest.domains();
     if source != "texture" && domains.contains(&Domain::Rgb) {
@@ -157,9 +160,20 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
         manifest,
         labels,
         mesh,
-        scene: &scene,
-        textures: &textures,
-        pretty_of_face: &pretty_of_face,
+        channels: Channels {
+            scene: &scene,
+            textures: &textures,
+            pictures: None,
+            normals: manifest.options.normals,
+            rgb_samples: manifest.options.rgb_samples,
+            label_of_face: &mesh.label_of_face,
+            pretty_of_face: &pretty_of_face,
+            class_of_face: &class_of_face,
+            palette: &[],
+            // Nothing is written.
+            compression: Compression::default(),
+            conventions: manifest.conventions(),
+        },
         rgb_from_mesh: source == "texture",
         report,
     };

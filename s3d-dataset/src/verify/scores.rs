@@ -47,7 +47,7 @@ pub(crate) fn check(
     let kinds = Kinds::of(&table, &labels, &reference.mesh.file.mesh);
     let path = reference.layout.views_json(area);
     let locations: Vec<&ScanLocation> = located.iter().collect();
-    score_area(ctx, &locations, reference.scene, &kinds, scoring, |uuid, scores| {
+    score_area(ctx, &locations, reference.channels.scene, &kinds, scoring, |uuid, scores| {
         let checks = reference.report.of(ENTROPIES, &path);
         for (record, score) in views.of_location(area, uuid).zip(scores) {
             checks.check(record.entropy == score, || {

@@ -149,7 +149,7 @@ fn predict<'a>(
 ) -> (Seen<'a>, [f64; 3]) {
     let (camera, px, py) = ray.place(&mismatches.camera, x, y);
     let direction = camera.direction(px, py);
-    let hit = cast_ray(reference.scene, camera.pose.location, direction);
+    let hit = cast_ray(reference.channels.scene, camera.pose.location, direction);
     let value = shade.value(&camera, direction, hit);
     (Seen { reference, camera, direction, hit }, value)
 }
@@ -282,7 +282,7 @@ fn changes(domain: Domain, panorama: bool, all: &mut Vec<Suspect>) {
     match domain {
         Domain::Depth => {
             of("it is in the other unit of depth", |seen, [d, ..]| {
-                let units = match seen.reference.conventions().depth_units {
+                let units = match seen.reference.channels.conventions.depth_units {
                     DepthUnits::Per512 => DepthUnits::Millimetres,
                     DepthUnits::Millimetres => DepthUnits::Per512,
                 };
@@ -328,7 +328,7 @@ fn changes(domain: Domain, panorama: bool, all: &mut Vec<Suspect>) {
 }
 
 fn world_normal(seen: &Seen<'_>) -> Option<[f64; 3]> {
-    let n = seen.reference.scene.mesh().normal(seen.hit?.face).as_dvec3();
+    let n = seen.reference.channels.scene.mesh().normal(seen.hit?.face).as_dvec3();
     let n = if n.dot(seen.direction) > 0.0 { -n } else { n };
     Some((n * 127.5 + 128.0).to_array().map(f64::floor))
 }

@@ -5,11 +5,11 @@ pub(crate) mod pixels;
 pub(crate) mod rays;
 mod shade;
 
-use crate::export::modality::{NO_CLASS, palette};
+use crate::export::modality::{Channels, Drawn, Image, ImageBuffers, NO_CLASS, null_pixels, palette};
 use crate::tables::manifest::Manifest;
 use crate::verify::files::Files;
-use crate::verify::images::pixels::{Difference, Pixels};
-use crate::verify::images::rays::difference;
+use crate::verify::images::pixels::{Difference, Opened, Pixels};
+use crate::verify::images::rays::{difference, points_of_depth};
 use crate::verify::labels::Labels;
 use crate::verify::mesh::LabelledMesh;
 use crate::verify::photographs::{Photographs, check_share};
@@ -18,8 +18,10 @@ use crate::verify::report::{Report, Topic};
 use crate::verify::views::Views;
 use glam::DVec3;
 use s3d_geom::{Camera, Raster};
-use s3d_io::dataset::{Conventions, DatasetImage, Domain, Frame, Layout, PhotographRecord, XyzType};
-use s3d_render::{Caster, Hits, MISSING_INDEX, MipMaps, NO_FACE, Scene, ViewImages};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, PhotographRecord, XyzType};
+use s3d_io::fs::read_file;
+use s3d_io::image::PngReader;
+use s3d_render::{Caster, Hits, MISSING_INDEX, NO_FACE};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -42,19 +44,10 @@ pub(crate) struct Reference<'a> {
     pub(crate) manifest: &'a Manifest,
     pub(crate) labels: &'a Labels,
     pub(crate) mesh: &'a LabelledMesh,
-    pub(crate) scene: &'a Scene<'a>,
-    pub(crate) textures: &'a MipMaps,
-    pub(crate) pretty_of_face: &'a [[u8; 3]],
+    pub(crate) channels: Channels<'a>,
     /// Whether RGB comes from the mesh.
     pub(crate) rgb_from_mesh: bool,
     pub(crate) report: &'a Report,
-}
-
-impl Reference<'_> {
-    /// In which forms numbers are written.
-    pub(crate) fn conventions(&self) -> Conventions {
-        self.manifest.conventions()
-    }
 }
 
 /// What every image of an area is checked with.
@@ -97,19 +90,19 @@ pub(crate) struct Mismatch {
 
 /// What a thread keeps from image to image.
 pub(crate) struct Scratch<'s> {
-    pub(super) caster: Option<Caster<'s, 's>>,
-    pub(super) hits: Hits,
-    pub(super) images: ViewImages,
-    pub(super) xyz: Raster<[f32; 3]>,
+    caster: Option<Caster<'s, 's>>,
+    hits: Hits,
+    buffers: ImageBuffers,
+    reader: PngReader,
 }
 
 impl<'s> Scratch<'s> {
     pub(crate) fn new(reference: Option<&'s Reference<'s>>) -> Self {
         Self {
-            caster: reference.map(|s| Caster::new(s.scene)),
+            caster: reference.map(|s| Caster::new(s.channels.scene)),
             hits: Hits::default(),
-            images: ViewImages::default(),
-            xyz: Raster::filled(0, 0, [0.0; 3]),
+            buffers: ImageBuffers::default(),
+            reader: PngReader::default(),
         }
     }
 }
@@ -131,7 +124,7 @@ impl ImageCheck<'_> {
             report.check(image.has(domain), MISSING, &path, || {
                 format!("missing: {} is there", image.relative_path(image.domains[0]))
             });
-            if image.has(domain) {
+            if image.has(domain) && domain == Domain::Pose {
                 self.files.check(&path, report);
             }
         }
@@ -162,29 +155,58 @@ impl ImageCheck<'_> {
             }
             _ => false,
         };
+        if let (Some(pose), Some(reference), true) = (&pose, self.reference, cast) {
+            let drawn = self.domains.iter().filter(|domain| image.has(**domain));
+            let drawn = drawn.filter(|domain| self.is_of_mesh(reference, **domain, photograph));
+            let drawn: Vec<Image> = drawn.filter_map(|domain| Image::of(*domain)).collect();
+            let channels = &reference.channels;
+            channels.draw_together(&drawn, &memory.hits, &pose.camera, &mut memory.buffers);
+        }
+        let mut reader = std::mem::take(&mut memory.reader);
         let mut files = ImageFiles {
             check: self,
             index,
             photograph,
             pose: pose.as_ref(),
             cast,
+            as_mesh: Vec::new(),
             seen: None,
             depth: None,
             semantic: None,
         };
         for &domain in self.domains.iter().filter(|d| **d != Domain::Pose && image.has(**d)) {
             let path = image.path(self.layout, domain);
-            let Some(pixels) = report.read(Topic::Images, &path, |path| Pixels::read(domain, path)) else {
-                continue;
-            };
-            let fits = report.check(pixels.size() == size, SIZES, &path, || {
-                let (w, h) = pixels.size();
+            let Some(opened) = self.open(domain, &path, &mut reader) else { continue };
+            let fits = report.check(opened.size() == size, SIZES, &path, || {
+                let (w, h) = opened.size();
                 format!("{w} × {h} pixels, and the manifest tells of {} × {}", size.0, size.1)
             });
             if fits {
-                files.domain(domain, pixels, &path, memory);
+                files.domain(domain, opened, &path, memory);
             }
         }
+        memory.reader = reader;
+    }
+
+    /// Whether the mesh shows what a file of a domain should hold.
+    fn is_of_mesh(&self, reference: &Reference<'_>, domain: Domain, of: Option<&PhotographRecord>) -> bool {
+        match domain {
+            Domain::Rgb => reference.rgb_from_mesh && of.is_none(),
+            Domain::GlobalXyz => !self.manifest.is_xyz_from_depth(),
+            _ => true,
+        }
+    }
+
+    /// Reads a file once: its checksum and its pixels.
+    fn open<'r>(&self, domain: Domain, path: &Path, reader: &'r mut PngReader) -> Option<Opened<'r>> {
+        let report = self.report;
+        let bytes = report.check_size(path).and_then(|()| read_file(path));
+        match &bytes {
+            Ok(bytes) => self.files.check_bytes(path, bytes, report),
+            // It tells more of why.
+            Err(_) => self.files.check(path, report),
+        }
+        report.ok(Topic::Images, bytes.and_then(|bytes| Opened::new(domain, &bytes, path, reader)))
     }
 }
 
@@ -197,34 +219,80 @@ struct ImageFiles<'a> {
     pose: Option<&'a CheckedPose>,
     /// Whether the memory holds the image's hits.
     cast: bool,
-    /// Where nothing is seen, by the first domain that says so exactly.
-    seen: Option<(Domain, Vec<bool>)>,
+    /// The domains whose files were found to be what the mesh shows before their pixels were read.
+    as_mesh: Vec<Domain>,
+    /// Where nothing is seen, by the first domain that says so exactly; of one of those the hits tell.
+    seen: Option<(Domain, Option<Vec<bool>>)>,
+    /// Depth and labels, unless they are among those.
     depth: Option<Raster<u16>>,
     semantic: Option<Raster<[u8; 3]>>,
 }
 
 impl ImageFiles<'_> {
-    fn domain(&mut self, domain: Domain, pixels: Pixels, path: &Path, memory: &mut Scratch<'_>) {
+    fn domain(&mut self, domain: Domain, opened: Opened<'_>, path: &Path, memory: &mut Scratch<'_>) {
         // What a photograph shows need not be in the mesh, and the other way round.
-        match self.photograph.filter(|_| domain == Domain::Rgb) {
-            Some(record) => self.photograph(record, &pixels, path, memory),
-            None => {
-                self.against_mesh(domain, &pixels, memory);
-                self.nothing(domain, &pixels, path);
-            }
+        if let Some(record) = self.photograph.filter(|_| domain == Domain::Rgb) {
+            return self.photograph(record, &opened.into_pixels(), path, memory);
         }
+        let Some(pixels) = self.unlike_mesh(domain, opened, memory) else {
+            // What holds of the mesh's images need not be looked for in the files.
+            match (domain, &self.seen) {
+                (Domain::GlobalXyz, _) => self.check.report.checked(1),
+                (Domain::Depth, None) => {}
+                (_, None) => self.seen = Some((domain, None)),
+                (_, Some(_)) => self.check.report.checked(1),
+            }
+            match domain {
+                Domain::Semantic => {
+                    self.check.report.checked(1);
+                    self.unlabelled(self.semantic(memory), memory);
+                }
+                Domain::SemanticPretty => self.check.report.checked(1),
+                _ => {}
+            }
+            return;
+        };
+        self.nothing(domain, &pixels, path, &memory.hits);
         match (domain, pixels) {
             (Domain::Depth, Pixels::Depth(depth)) => self.depth = Some(depth),
             (Domain::Semantic, Pixels::Color(indices)) => {
                 self.indices(&indices, path);
-                self.unlabelled(&indices, memory);
+                self.unlabelled(Some(&indices), memory);
                 self.semantic = Some(indices);
             }
-            (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path),
-            (Domain::SemanticClass, Pixels::Class(places, palette)) => self.classes(&places, &palette, path),
-            (Domain::GlobalXyz, Pixels::Xyz(points)) => self.coordinates(&points, path),
+            (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path, memory),
+            (Domain::SemanticClass, Pixels::Class(places, palette)) => {
+                self.classes(&places, &palette, path, memory);
+            }
+            (Domain::GlobalXyz, pixels) => {
+                if let Pixels::Xyz(points) = pixels.in_floats() {
+                    self.coordinates(&points, path, memory);
+                }
+            }
             _ => {}
         }
+    }
+
+    /// The depths of the file, read or drawn.
+    fn depth<'m>(&'m self, memory: &'m Scratch<'_>) -> Option<&'m Raster<u16>> {
+        match self.drawn(Domain::Depth, memory) {
+            Some(Drawn::Depth(depth)) => Some(depth),
+            _ => self.depth.as_ref(),
+        }
+    }
+
+    /// The label indices of the file, likewise.
+    fn semantic<'m>(&'m self, memory: &'m Scratch<'_>) -> Option<&'m Raster<[u8; 3]>> {
+        match self.drawn(Domain::Semantic, memory) {
+            Some(Drawn::Color(indices)) => Some(indices),
+            _ => self.semantic.as_ref(),
+        }
+    }
+
+    /// What was drawn of a domain, if its file is that.
+    fn drawn<'m>(&self, domain: Domain, memory: &'m Scratch<'_>) -> Option<Drawn<'m>> {
+        let image = Image::of(domain).filter(|_| self.as_mesh.contains(&domain))?;
+        Some(self.check.reference?.channels.drawn(image, &memory.buffers))
     }
 
     /// A photograph's colours against what is told of it.
@@ -242,21 +310,22 @@ impl ImageFiles<'_> {
     /// Modalities agree on where nothing is seen. Depth also is missing where it is too large, and
     /// coordinates that are made from depth are missing with it: those two are compared in
     /// [`Self::coordinates`]. Images of classes do not tell nothing from no class.
-    fn nothing(&mut self, domain: Domain, pixels: &Pixels, path: &Path) {
+    fn nothing(&mut self, domain: Domain, pixels: &Pixels, path: &Path, hits: &Hits) {
         if matches!(domain, Domain::GlobalXyz | Domain::SemanticClass) {
             return;
         }
-        let missing = pixels.missing(domain);
         let Some((other, expected)) = &self.seen else {
             if domain != Domain::Depth {
-                self.seen = Some((domain, missing));
+                self.seen = Some((domain, Some(pixels.missing(domain))));
             }
             return;
         };
+        let of_hits = || hits.face.pixels().iter().map(|face| *face == NO_FACE).collect();
+        let (missing, expected) = (pixels.missing(domain), expected.clone().unwrap_or_else(of_hits));
         // Too far for a depth is no fault.
         let wrong = |(m, e): (&bool, &bool)| if domain == Domain::Depth { *e && !*m } else { m != e };
-        let mut pairs = missing.iter().zip(expected);
-        let first = if missing == *expected { None } else { pairs.clone().position(wrong) };
+        let mut pairs = missing.iter().zip(&expected);
+        let first = if missing == expected { None } else { pairs.clone().position(wrong) };
         let count = if first.is_some() { pairs.by_ref().filter(|p| wrong(*p)).count() } else { 0 };
         self.check.report.check(first.is_none(), NOTHING, path, || {
             let (at, width) = (first.unwrap_or_default() as u32, pixels.size().0);
@@ -270,15 +339,15 @@ impl ImageFiles<'_> {
     }
 
     /// Counts what has no votes, and no label.
-    fn unlabelled(&self, indices: &Raster<[u8; 3]>, memory: &Scratch<'_>) {
-        let Some(reference) = self.check.reference.filter(|_| self.cast) else { return };
+    fn unlabelled(&self, indices: Option<&Raster<[u8; 3]>>, memory: &Scratch<'_>) {
+        let reference = self.check.reference.filter(|_| self.cast);
+        let (Some(reference), Some(indices)) = (reference, indices) else { return };
         let UnlabelledPixels { images, without_votes, without_label } = self.check.unlabelled;
         let is_voted = &reference.mesh.is_voted;
         let unvoted = |face: &&u32| **face != NO_FACE && !is_voted[**face as usize];
         let faces = memory.hits.face.pixels().iter().filter(unvoted).count();
         without_votes.fetch_add(faces as u64, Ordering::Relaxed);
-        let null = indices.pixels().iter().filter(|index| **index == [0; 3]).count();
-        without_label.fetch_add(null as u64, Ordering::Relaxed);
+        without_label.fetch_add(null_pixels(indices.pixels()), Ordering::Relaxed);
         images.fetch_add(1, Ordering::Relaxed);
     }
 
@@ -303,8 +372,8 @@ impl ImageFiles<'_> {
     }
 
     /// Colours are those of the indices.
-    fn pretty(&self, colors: &Raster<[u8; 3]>, path: &Path) {
-        let (Some(labels), Some(indices)) = (self.check.labels, &self.semantic) else { return };
+    fn pretty(&self, colors: &Raster<[u8; 3]>, path: &Path, memory: &Scratch<'_>) {
+        let (Some(labels), Some(indices)) = (self.check.labels, self.semantic(memory)) else { return };
         let expected = |[r, g, b]: [u8; 3]| {
             labels.pretty.get(u32::from_be_bytes([0, r, g, b]) as usize).copied().unwrap_or([0; 3])
         };
@@ -318,12 +387,12 @@ impl ImageFiles<'_> {
     }
 
     /// Classes are those of the indices, and their colours those of the taxonomy.
-    fn classes(&self, places: &Raster<u8>, colors: &[[u8; 3]], path: &Path) {
+    fn classes(&self, places: &Raster<u8>, colors: &[[u8; 3]], path: &Path, memory: &Scratch<'_>) {
         let Some(labels) = self.check.labels else { return };
         self.check.report.check(colors == palette(&labels.taxonomy), CLASSES, path, || {
             format!("its palette has not the colours of {}", labels.taxonomy.name())
         });
-        let Some(indices) = &self.semantic else { return };
+        let Some(indices) = self.semantic(memory) else { return };
         let expected = |[r, g, b]: [u8; 3]| {
             labels.classes.get(u32::from_be_bytes([0, r, g, b]) as usize).copied().unwrap_or(NO_CLASS)
         };
@@ -337,8 +406,8 @@ impl ImageFiles<'_> {
     }
 
     /// Coordinates are what depth and pose give, as far as both are rounded.
-    fn coordinates(&self, points: &Raster<[f32; 3]>, path: &Path) {
-        let (Some(pose), Some(depth)) = (self.pose, &self.depth) else { return };
+    fn coordinates(&self, points: &Raster<[f32; 3]>, path: &Path, memory: &Scratch<'_>) {
+        let (Some(pose), Some(depth)) = (self.pose, self.depth(memory)) else { return };
         let units = self.check.manifest.conventions().depth_units;
         let (camera, rays) = (&pose.camera, pose.camera.rays());
         let origin = camera.pose.location;
@@ -385,21 +454,50 @@ impl ImageFiles<'_> {
         });
     }
 
-    /// Holds a file against what the mesh shows.
-    fn against_mesh(&self, domain: Domain, pixels: &Pixels, memory: &mut Scratch<'_>) {
-        let (Some(pose), Some(reference), true) = (self.pose, self.check.reference, self.cast) else {
-            return;
+    /// Holds a file against what the mesh shows. `None` if it is that, and all that its pixels could be asked is
+    /// known; otherwise they are read.
+    fn unlike_mesh(
+        &mut self,
+        domain: Domain,
+        opened: Opened<'_>,
+        memory: &mut Scratch<'_>,
+    ) -> Option<Pixels> {
+        let (Some(pose), Some(reference), Some(image), true) =
+            (self.pose, self.check.reference, Image::of(domain), self.cast)
+        else {
+            return Some(opened.into_pixels());
         };
-        if domain == Domain::Rgb && !reference.rgb_from_mesh {
-            return;
-        }
-        let difference = difference(reference, domain, pixels, pose, &self.depth, memory);
+        let of_depth;
+        let expected = if self.check.is_of_mesh(reference, domain, self.photograph) {
+            let Scratch { hits, buffers, .. } = memory;
+            reference.channels.draw(image, hits, &pose.camera, buffers);
+            reference.channels.drawn(image, buffers)
+        } else if let (Domain::GlobalXyz, Some(depth)) = (domain, self.depth(memory)) {
+            of_depth = points_of_depth(reference, pose, depth);
+            of_depth.as_drawn()
+        } else {
+            return Some(opened.into_pixels());
+        };
         self.check.report.checked(1);
-        let Some(difference) = difference else { return };
-        if !pose.is_consistent && (difference.count as f64) < SLACK * difference.of as f64 {
-            return;
+        let is_known = !matches!(self.seen, Some((_, Some(_))))
+            && match domain {
+                Domain::Semantic => reference.mesh.all_in_table,
+                Domain::SemanticPretty => self.semantic.is_none(),
+                Domain::GlobalXyz => self.depth.is_none(),
+                Domain::SemanticClass => false,
+                _ => true,
+            };
+        if is_known && opened.are_of(expected) {
+            self.as_mesh.push(domain);
+            return None;
         }
-        let mismatches = Mismatch { image: self.index, domain, difference, camera: pose.camera };
-        self.check.mismatches.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(mismatches);
+        let pixels = opened.into_pixels();
+        if let Some(difference) = difference(reference, image, &pixels, expected)
+            && (pose.is_consistent || difference.count as f64 >= SLACK * difference.of as f64)
+        {
+            let mismatch = Mismatch { image: self.index, domain, difference, camera: pose.camera };
+            self.check.mismatches.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(mismatch);
+        }
+        Some(pixels)
     }
 }

@@ -1,10 +1,13 @@
 //! The files of one image: what each should hold, and where it does not.
 
-use crate::export::modality::NO_CLASS;
+use crate::export::modality::{Drawn, NO_CLASS};
+use half::f16;
+use half::slice::HalfFloatSliceExt;
 use s3d_geom::Raster;
 use s3d_io::Result;
 use s3d_io::dataset::Domain;
-use s3d_io::image::{read_gray16, read_palette8, read_rgb8, read_xyz};
+use s3d_io::fs::read_file;
+use s3d_io::image::{PngLines, PngReader, decode_palette8, decode_xyz, decode_xyz_half};
 use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
 use std::path::Path;
 
@@ -16,26 +19,98 @@ pub(crate) enum Pixels {
     /// Places in a palette, and the palette.
     Class(Raster<u8>, Vec<[u8; 3]>),
     Xyz(Raster<[f32; 3]>),
+    /// The same of a file that holds half floats.
+    XyzHalf(Raster<[f16; 3]>),
 }
 
-impl Pixels {
-    /// Reads the file of a domain.
+/// A file that was inflated: PNG's filters are still on its pixels.
+pub(crate) enum Opened<'r> {
+    Color(PngLines<'r, 3>),
+    Depth(PngLines<'r, 2>),
+    Pixels(Pixels),
+}
+
+impl<'r> Opened<'r> {
+    /// The file of a domain, from its bytes.
     ///
     /// # Panics
     /// For poses, which have no pixels.
-    pub(crate) fn read(domain: Domain, path: &Path) -> Result<Self> {
+    pub(crate) fn new(domain: Domain, bytes: &[u8], path: &Path, reader: &'r mut PngReader) -> Result<Self> {
         Ok(match domain {
             Domain::Rgb | Domain::Normal | Domain::Semantic | Domain::SemanticPretty => {
-                Self::Color(read_rgb8(path)?)
+                Self::Color(reader.rgb8(bytes, path)?)
             }
-            Domain::Depth => Self::Depth(read_gray16(path)?),
+            Domain::Depth => Self::Depth(reader.gray16(bytes, path)?),
             Domain::SemanticClass => {
-                let (places, palette) = read_palette8(path)?;
-                Self::Class(places, palette)
+                let (places, palette) = decode_palette8(bytes, path)?;
+                Self::Pixels(Pixels::Class(places, palette))
             }
-            Domain::GlobalXyz => Self::Xyz(read_xyz(path)?),
+            Domain::GlobalXyz => Self::Pixels(match decode_xyz_half(bytes) {
+                Some(points) => Pixels::XyzHalf(points),
+                None => Pixels::Xyz(decode_xyz(bytes, path)?),
+            }),
             Domain::Pose => unreachable!("a pose has no pixels"),
         })
+    }
+
+    /// Width and height.
+    pub(crate) fn size(&self) -> (u32, u32) {
+        match self {
+            Self::Color(lines) => (lines.width(), lines.height()),
+            Self::Depth(lines) => (lines.width(), lines.height()),
+            Self::Pixels(pixels) => pixels.size(),
+        }
+    }
+
+    /// Whether its pixels are surely these, bit by bit: asked in the quickest way.
+    pub(crate) fn are_of(&self, drawn: Drawn<'_>) -> bool {
+        match (self, drawn) {
+            (Self::Color(lines), Drawn::Color(image)) => lines.are_of(image),
+            (Self::Depth(lines), Drawn::Depth(image)) => lines.are_of(image),
+            (Self::Pixels(Pixels::XyzHalf(points)), Drawn::XyzHalf(image)) => {
+                let [a, b] = [points, image].map(|points| points.pixels().as_flattened().reinterpret_cast());
+                (points.width(), points.height()) == (image.width(), image.height()) && a == b
+            }
+            _ => false,
+        }
+    }
+
+    pub(crate) fn into_pixels(self) -> Pixels {
+        match self {
+            Self::Color(lines) => Pixels::Color(lines.into_raster()),
+            Self::Depth(lines) => Pixels::Depth(lines.into_raster()),
+            Self::Pixels(pixels) => pixels,
+        }
+    }
+}
+
+impl Pixels {
+    /// Reads a file; coordinates in 32-bit floats, whatever it holds.
+    ///
+    /// # Panics
+    /// As [`Opened::new`].
+    pub(crate) fn read(domain: Domain, path: &Path) -> Result<Self> {
+        let (bytes, mut reader) = (read_file(path)?, PngReader::default());
+        Ok(Opened::new(domain, &bytes, path, &mut reader)?.into_pixels().in_floats())
+    }
+
+    /// As if they were drawn.
+    pub(crate) fn as_drawn(&self) -> Drawn<'_> {
+        match self {
+            Self::Color(image) => Drawn::Color(image),
+            Self::Depth(image) => Drawn::Depth(image),
+            Self::Class(image, _) => Drawn::Class(image),
+            Self::Xyz(image) => Drawn::Xyz(image),
+            Self::XyzHalf(image) => Drawn::XyzHalf(image),
+        }
+    }
+
+    /// Coordinates in 32-bit floats.
+    pub(crate) fn in_floats(self) -> Self {
+        match self {
+            Self::XyzHalf(points) => Self::Xyz(points.map(|p| p.map(f16::to_f32))),
+            other => other,
+        }
     }
 
     /// Width and height.
@@ -45,6 +120,7 @@ impl Pixels {
             Self::Depth(r) => (r.width(), r.height()),
             Self::Class(r, _) => (r.width(), r.height()),
             Self::Xyz(r) => (r.width(), r.height()),
+            Self::XyzHalf(r) => (r.width(), r.height()),
         }
     }
 
@@ -55,6 +131,7 @@ impl Pixels {
             Self::Depth(r) => [f64::from(r.at(x, y)), 0.0, 0.0],
             Self::Class(r, _) => [f64::from(r.at(x, y)), 0.0, 0.0],
             Self::Xyz(r) => r.at(x, y).map(f64::from),
+            Self::XyzHalf(r) => r.at(x, y).map(f64::from),
         }
     }
 
@@ -72,6 +149,7 @@ impl Pixels {
             Self::Depth(r) => r.pixels().iter().map(|p| *p == MISSING_DEPTH).collect(),
             Self::Class(r, _) => r.pixels().iter().map(|p| *p == NO_CLASS).collect(),
             Self::Xyz(r) => r.pixels().iter().map(|p| *p == [0.0; 3]).collect(),
+            Self::XyzHalf(r) => r.pixels().iter().map(|p| *p == [f16::ZERO; 3]).collect(),
         }
     }
 }
@@ -108,18 +186,6 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
-    /// Compares colours of images of one size, byte by byte as long as they are equal.
-    pub(crate) fn of_colors(
-        found: &Raster<[u8; 3]>,
-        expected: &Raster<[u8; 3]>,
-        text: impl Fn([u8; 3]) -> String,
-    ) -> Option<Self> {
-        if found.pixels().as_flattened() == expected.pixels().as_flattened() {
-            return None;
-        }
-        Self::of(found, expected, |a, b| a == b, &text, &text)
-    }
-
     /// Compares images of one size; `None` if they are equal.
     pub(crate) fn of<T: Copy + PartialEq, U: Copy>(
         found: &Raster<T>,

@@ -21,7 +21,7 @@ impl<'a> Shade<'a> {
     /// What the file has where the ray along `direction` ends at `hit`.
     pub(crate) fn value(&self, camera: &Camera, direction: DVec3, hit: Option<Hit>) -> [f64; 3] {
         let reference = self.reference;
-        let conventions = reference.conventions();
+        let conventions = reference.channels.conventions;
         let Some(hit) = hit else {
             return match self.domain {
                 Domain::Depth => [f64::from(MISSING_DEPTH), 0.0, 0.0],
@@ -36,7 +36,7 @@ impl<'a> Shade<'a> {
                 [(hit.t * conventions.depth_units.per_m() + 0.5).floor().min(65_535.0), 0.0, 0.0]
             }
             Domain::Normal => {
-                let n = reference.scene.mesh().normal(hit.face).as_dvec3();
+                let n = reference.channels.scene.mesh().normal(hit.face).as_dvec3();
                 let n = if n.dot(direction) > 0.0 { -n } else { n };
                 let n: DVec3 = camera.normal_axes_from_world(conventions.normal_axes) * n;
                 (n * 127.5 + (128.0 + 1e-6)).to_array().map(f64::floor)
@@ -45,7 +45,7 @@ impl<'a> Shade<'a> {
                 let [_, r, g, b] = reference.mesh.label_of_face[hit.face as usize].to_be_bytes();
                 [r, g, b].map(f64::from)
             }
-            Domain::SemanticPretty => reference.pretty_of_face[hit.face as usize].map(f64::from),
+            Domain::SemanticPretty => reference.channels.pretty_of_face[hit.face as usize].map(f64::from),
             Domain::SemanticClass => {
                 let label = reference.mesh.label_of_face[hit.face as usize] as usize;
                 let place = reference.labels.classes.get(label).copied().unwrap_or(NO_CLASS);
@@ -54,8 +54,15 @@ impl<'a> Shade<'a> {
             Domain::GlobalXyz => (camera.pose.location + direction * hit.t).to_array(),
             Domain::Rgb => {
                 let filter = TextureFilter::default();
-                rgb_of_ray(reference.scene, reference.textures, camera, direction, hit.face, &filter)
-                    .map(f64::from)
+                rgb_of_ray(
+                    reference.channels.scene,
+                    reference.channels.textures,
+                    camera,
+                    direction,
+                    hit.face,
+                    &filter,
+                )
+                .map(f64::from)
             }
             Domain::Pose => [0.0; 3],
         }
