@@ -97,8 +97,8 @@ impl Images {
             }
         }
         let mut no_depth = None;
-        let depth = files.depth(widths.lossless)?.map(|(depth, missing)| {
-            no_depth = Some(missing);
+        let depth = files.depth(widths.lossless, counted.is_none())?.map(|(depth, missing)| {
+            no_depth = missing;
             depth
         });
         let all_gone = rgb.is_none() && normal.is_none() && label.is_none() && depth.is_none();
@@ -199,15 +199,15 @@ impl Files<'_> {
         Ok(taken.map(|((image, counts), path)| Labels { image, counts, path }))
     }
 
-    /// Depth, and how many pixels of the file are missing.
-    fn depth(&mut self, width: u32) -> Result<Option<(Raster<u16>, u64)>> {
+    /// Depth, and if `counts`, how many pixels of the file are missing.
+    fn depth(&mut self, width: u32, counts: bool) -> Result<Option<(Raster<u16>, Option<u64>)>> {
         let taken = self.take(Domain::Depth, PngReader::gray16, |size, lines| {
             let mut nearest = Nearest::new(size, shown_size(size, width));
-            let mut missing = 0;
+            let mut missing = counts.then_some(0);
             lines.for_each(|line| {
                 nearest.line(line, u16::from_be_bytes);
-                let here = line.iter().map(|sample| u32::from(u16::from_be_bytes(*sample) == MISSING_DEPTH));
-                missing += u64::from(here.sum::<u32>());
+                let is_missing = |sample: &&[u8; 2]| u16::from_be_bytes(**sample) == MISSING_DEPTH;
+                missing.iter_mut().for_each(|n| *n += line.iter().filter(is_missing).count() as u64);
             });
             (nearest.finish(), missing)
         })?;

@@ -64,8 +64,8 @@ pub(crate) fn nearest<T: Copy>(image: &Raster<T>, size: [u32; 2]) -> Raster<T> {
     nearest.finish()
 }
 
-/// Lines whose sums fit into 16 bits.
-const LINES: u32 = 256;
+/// Lines whose sums fit into 16 bits, and their number into 8.
+const LINES: u32 = 255;
 
 /// Below so many pixels their mean is a multiplication.
 const FEW: u32 = 4096;
@@ -83,9 +83,11 @@ pub(crate) struct Mean {
     /// Lines that were taken, and those of them that `columns` are the sums of.
     y: u32,
     lines: u32,
-    /// Sums of the three channels, and where some are missing, of how many lines.
+    /// Sums of the three channels of all lines.
     columns: Vec<[u16; 3]>,
-    counts: Vec<u16>,
+    /// By byte of a line, in how many of them the bytes of a missing pixel begin there, be it across pixels; and
+    /// whether there is one.
+    missing_at: Vec<u8>,
     some_missing: bool,
     /// Sums of the pixels that come next, and of how many.
     sums: Vec<[u32; 4]>,
@@ -98,6 +100,15 @@ pub(crate) struct Mean {
 /// Where a pixel of an axis begins.
 fn edge(i: u32, from: u32, to: u32) -> u32 {
     (u64::from(i) * u64::from(from) / u64::from(to.max(1))) as u32
+}
+
+/// Adds columns, sums of so many lines, to the sums of their pixel and their number.
+#[inline(always)]
+fn add([r, g, b, n]: &mut [u32; 4], columns: &[[u16; 3]], lines: u32) {
+    for [dr, dg, db] in columns {
+        (*r, *g, *b) = (*r + u32::from(*dr), *g + u32::from(*dg), *b + u32::from(*db));
+    }
+    *n += lines * columns.len() as u32;
 }
 
 impl Mean {
@@ -114,7 +125,7 @@ impl Mean {
             y: 0,
             lines: 0,
             columns: vec![[0; 3]; width as usize],
-            counts: vec![0; width as usize],
+            missing_at: vec![0; 3 * width as usize],
             some_missing: false,
             sums: vec![[0; 4]; w as usize],
             inverse,
@@ -126,36 +137,25 @@ impl Mean {
     /// Takes the next line.
     pub(crate) fn line(&mut self, line: &[[u8; 3]]) {
         self.y += 1;
-        let missing = self.missing.filter(|missing| may_have(line, *missing));
         if self.size == self.from {
             self.pixels.extend_from_slice(line);
-            let is_missing = |pixel: &&[u8; 3]| Some(**pixel) == missing;
-            self.all_missing += missing.map_or(0, |_| line.iter().filter(is_missing).count() as u64);
+            let is_missing = |pixel: &&[u8; 3]| Some(**pixel) == self.missing;
+            self.all_missing += line.iter().filter(is_missing).count() as u64;
             return;
         }
-        if missing.is_some() && !self.some_missing {
-            self.some_missing = true;
-            self.counts.fill(self.lines as u16);
-        }
         self.lines += 1;
-        match missing {
-            Some(missing) => {
-                for ((sum, count), pixel) in self.columns.iter_mut().zip(&mut self.counts).zip(line) {
-                    if *pixel != missing {
-                        sum.iter_mut().zip(pixel).for_each(|(sum, v)| *sum += u16::from(*v));
-                        *count += 1;
-                    } else {
-                        self.all_missing += 1;
-                    }
-                }
+        let bytes = line.as_flattened();
+        let sums = self.columns.as_flattened_mut().iter_mut();
+        sums.zip(bytes).for_each(|(sum, v)| *sum += u16::from(*v));
+        if let ([_, second @ ..], Some([r, g, b])) = (bytes, self.missing) {
+            let third = second.get(1..).unwrap_or_default();
+            let mut any = 0;
+            for (((count, x), y), z) in self.missing_at.iter_mut().zip(bytes).zip(second).zip(third) {
+                let is_missing = u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
+                *count += is_missing;
+                any |= is_missing;
             }
-            None => {
-                let sums = self.columns.as_flattened_mut().iter_mut();
-                sums.zip(line.as_flattened()).for_each(|(sum, v)| *sum += u16::from(*v));
-                if self.some_missing {
-                    self.counts.iter_mut().for_each(|count| *count += 1);
-                }
-            }
+            self.some_missing |= any != 0;
         }
         let next = (self.pixels.len() / self.size[0].max(1) as usize) as u32 + 1;
         let is_last = self.y == edge(next, self.from[1], self.size[1]);
@@ -176,25 +176,42 @@ impl Mean {
 
     /// Adds up what lies in each pixel.
     fn add_columns(&mut self) {
-        let (mut columns, mut counts) = (self.columns.as_slice(), self.counts.as_slice());
-        for (sum, width) in self.sums.iter_mut().zip(&self.widths) {
-            let (these, others) = columns.split_at(*width as usize);
-            columns = others;
-            let [mut r, mut g, mut b, mut n] = *sum;
-            for [dr, dg, db] in these {
-                (r, g, b) = (r + u32::from(*dr), g + u32::from(*dg), b + u32::from(*db));
+        let even = self.from[0] / self.size[0].max(1);
+        match if even * self.size[0] == self.from[0] { even } else { 0 } {
+            // Additions of which the compiler knows how many they are.
+            2 => self.add_even_columns::<2>(),
+            4 => self.add_even_columns::<4>(),
+            _ => self.add_any_columns(),
+        }
+        if let (true, Some(missing)) = (self.some_missing, self.missing) {
+            let mut missing_at = self.missing_at.as_chunks::<3>().0;
+            for ([r, g, b, n], width) in self.sums.iter_mut().zip(&self.widths) {
+                let (these, others) = missing_at.split_at(*width as usize);
+                missing_at = others;
+                let gone: u32 = these.iter().map(|[count, ..]| u32::from(*count)).sum();
+                let [dr, dg, db] = missing.map(|channel| gone * u32::from(channel));
+                (*r, *g, *b, *n) = (*r - dr, *g - dg, *b - db, *n - gone);
+                self.all_missing += u64::from(gone);
             }
-            if self.some_missing {
-                let (these, others) = counts.split_at(*width as usize);
-                counts = others;
-                n += these.iter().map(|count| u32::from(*count)).sum::<u32>();
-            } else {
-                n += self.lines * width;
-            }
-            *sum = [r, g, b, n];
+            self.missing_at.fill(0);
         }
         self.columns.fill([0; 3]);
         (self.lines, self.some_missing) = (0, false);
+    }
+
+    fn add_even_columns<const N: usize>(&mut self) {
+        for (sum, columns) in self.sums.iter_mut().zip(self.columns.as_chunks::<N>().0) {
+            add(sum, columns, self.lines);
+        }
+    }
+
+    fn add_any_columns(&mut self) {
+        let mut columns = self.columns.as_slice();
+        for (sum, width) in self.sums.iter_mut().zip(&self.widths) {
+            let (these, others) = columns.split_at(*width as usize);
+            columns = others;
+            add(sum, these, self.lines);
+        }
     }
 
     /// How many pixels were missing.
@@ -205,14 +222,6 @@ impl Mean {
     pub(crate) fn finish(self) -> Raster<[u8; 3]> {
         Raster::from_vec(self.size[0], self.size[1], self.pixels)
     }
-}
-
-/// Whether the bytes of a pixel stand somewhere in a line, be it across pixels: asked without a branch.
-fn may_have(line: &[[u8; 3]], [r, g, b]: [u8; 3]) -> bool {
-    let bytes = line.as_flattened();
-    let (second, third) = (bytes.get(1..).unwrap_or_default(), bytes.get(2..).unwrap_or_default());
-    let is_there = |((x, y), z): ((&u8, &u8), &u8)| u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
-    bytes.iter().zip(second).zip(third).map(is_there).fold(0, |any, here| any | here) != 0
 }
 
 /// The mean of the pixels that lie in a pixel, of those that are not `missing`; `missing` where there are
