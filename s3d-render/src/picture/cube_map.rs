@@ -101,8 +101,39 @@ pub struct CubeMap {
     /// With their borders.
     faces: Vec<Texture>,
     reductions: Vec<Vec<Raster<[u8; 3]>>>,
-    /// By face, with its border: 255 what a picture shows, 0 what none does. `None` if all of a face is shown.
-    seen: Vec<Option<Raster<u8>>>,
+    /// By face, with its border. `None` if all of a face is shown.
+    seen: Vec<Option<Seen>>,
+}
+
+/// What pictures show of a face.
+#[derive(Clone, Debug)]
+struct Seen {
+    /// 255 what a picture shows, 0 what none does.
+    mask: Raster<u8>,
+    /// By block of [`BLOCK`] pixels squared, whether all of it and of the pixels around it is shown: of most of a
+    /// face nothing else need be asked.
+    whole: Raster<bool>,
+}
+
+/// Width of a block of [`Seen`].
+const BLOCK: u32 = 16;
+
+impl Seen {
+    fn new(mask: Raster<u8>) -> Self {
+        let blocks = mask.width().div_ceil(BLOCK);
+        let around = |block: u32| {
+            (block * BLOCK).saturating_sub(1) as usize..((block + 1) * BLOCK + 1).min(mask.width()) as usize
+        };
+        let mut whole = Vec::with_capacity((blocks * blocks) as usize);
+        for rows in (0..blocks).map(around) {
+            for columns in (0..blocks).map(around) {
+                let is_shown = |y| mask.row(y as u32)[columns.clone()].iter().all(|&seen| seen == 255);
+                whole.push(rows.clone().all(is_shown));
+            }
+        }
+        let whole = Raster::from_vec(blocks, blocks, whole);
+        Self { mask, whole }
+    }
 }
 
 /// A pixel of a cube map before it is made: a colour of 0 to 255 a channel, or nothing.
@@ -181,11 +212,11 @@ impl CubeMap {
                 paint(Band { face, first_row, width: width as usize, colors, seen });
             });
             faces.push(colors);
-            seen.push(mask.pixels().iter().any(|&m| m != 255).then_some(mask));
+            seen.push(mask.pixels().iter().any(|&m| m != 255).then(|| Seen::new(mask)));
         }
         faces.par_iter_mut().zip(&seen).for_each(|(face, seen)| {
             if let Some(seen) = seen {
-                fill_unseen(face, seen);
+                fill_unseen(face, &seen.mask);
             }
         });
         let reductions =
@@ -219,14 +250,15 @@ impl CubeMap {
     /// The number of bytes that it takes.
     pub fn bytes(&self) -> usize {
         let colors = self.faces.iter().map(|f| &f.image).chain(self.reductions.iter().flatten());
-        let seen = self.seen.iter().flatten().map(Raster::len).sum::<usize>();
+        let seen = self.seen.iter().flatten().map(|seen| seen.mask.len() + seen.whole.len()).sum::<usize>();
         3 * colors.map(Raster::len).sum::<usize>() + seen
     }
 
     /// The share of the pixels that pictures show, borders included: 1 if there is no hole.
     pub fn coverage(&self) -> f64 {
         let all = self.faces.iter().map(|face| face.image.len()).sum::<usize>();
-        let holes = self.seen.iter().flatten().flat_map(Raster::pixels).filter(|&&m| m == 0).count();
+        let masks = self.seen.iter().flatten().flat_map(|seen| seen.mask.pixels());
+        let holes = masks.filter(|&&m| m == 0).count();
         (all - holes) as f64 / all as f64
     }
 
@@ -245,7 +277,7 @@ impl CubeMap {
     #[cfg(test)]
     pub(crate) fn texels(&self) -> impl Iterator<Item = ([u8; 3], u8)> {
         self.faces.iter().enumerate().flat_map(move |(face, texture)| {
-            let seen = move |k| self.seen[face].as_ref().map_or(255, |seen: &Raster<u8>| seen.pixels()[k]);
+            let seen = move |k| self.seen[face].as_ref().map_or(255, |seen| seen.mask.pixels()[k]);
             texture.image.pixels().iter().enumerate().map(move |(k, color)| (*color, seen(k)))
         })
     }
@@ -280,7 +312,12 @@ impl CubeMap {
     /// How much of what is at a place of a stored face, in pixels, a picture shows: 0 to 255, bilinear.
     #[inline]
     pub(crate) fn seen_at(&self, face: usize, x: f32, y: f32) -> u8 {
-        let Some(mask) = &self.seen[face] else { return 255 };
+        let Some(Seen { mask, whole }) = &self.seen[face] else { return 255 };
+        // In the middle of a block, or beside it.
+        let block = |place: f32| (place as u32 / BLOCK).min(whole.width() - 1);
+        if whole.at(block(x), block(y)) {
+            return 255;
+        }
         let last = mask.width() as i32 - 1;
         // Never below −½ nor NaN beyond what a cast brings to 0.
         let (x, y) = (x - 0.5, y - 0.5);
@@ -402,6 +439,32 @@ pub(crate) mod tests {
             let (color, _) = cube.sample(d, x, y, &TextureFilter::default());
             prop_assert!(close(color, color_of(d), 2.0), "{color:?} {:?}", color_of(d));
         }
+    }
+
+    #[test]
+    fn whole_blocks_change_nothing_that_is_seen() {
+        // Few holes, one of them at a corner.
+        let hole = |x: u32, y: u32| (x / 3, y / 5) == (30, 7) || (x, y) == (0, 0) || (x, y) == (48, 63);
+        let cube = CubeMap::build(pose(), 96, |face, x, y, _| (face != 2 || !hole(x, y)).then_some([9.0; 3]));
+        let plain = |x: f64, y: f64| {
+            let at = |x: f64, y: f64| {
+                let [x, y] = [x, y].map(|v| v.clamp(0.0, 101.0) as u32);
+                if hole(x, y) { 0.0 } else { 255.0 }
+            };
+            let (x, y) = (x - 0.5, y - 0.5);
+            let (fx, fy) = (x - x.floor(), y - y.floor());
+            let row = |y| at(x.floor(), y) * (1.0 - fx) + at(x.floor() + 1.0, y) * fx;
+            row(y.floor()) * (1.0 - fy) + row(y.floor() + 1.0) * fy
+        };
+        let mut part = 0;
+        for k in 0..400 * 400 {
+            let (x, y) = (f64::from(k % 400) * 0.255, f64::from(k / 400) * 0.255);
+            let (seen, expected) = (cube.seen_at(2, x as f32, y as f32), plain(x, y));
+            assert!((f64::from(seen) - expected).abs() <= 3.0, "({x}, {y}): {seen}, {expected}");
+            part += u32::from(seen < 255);
+            assert_eq!(cube.seen_at(1, x as f32, y as f32), 255);
+        }
+        assert!((300..3000).contains(&part), "{part}");
     }
 
     #[test]

@@ -129,7 +129,7 @@ impl Stitch {
     fn pixel_by_pixel(&self) -> CubeMap {
         CubeMap::build(self.pose, self.size, |face, x, y, d| {
             let depth = self.depths.depth(face, x, y);
-            let ray = CubeRay { direction: self.world_from_frame * d, depth, size: self.size };
+            let ray = CubeRay { direction: self.world_from_frame * d, depth, size: self.size, whole: false };
             let (mut sum, mut total) = ([0.0f32; 3], 0.0f32);
             for (view, gain) in self.views.iter().zip(&self.gains) {
                 if let Some((color, weight)) = view.sees(&ray) {
@@ -165,6 +165,8 @@ struct CubeRay {
     depth: Option<f64>,
     /// Of the cube's faces.
     size: u32,
+    /// Whether a capture counts only if all of the pixel is within its picture.
+    whole: bool,
 }
 
 /// A capture, prepared.
@@ -231,20 +233,21 @@ impl PreparedCapture {
         }
         let v = self.camera_from_world * direction;
         let pixel = self.lens.project(v)?;
-        let (w, h) = (f64::from(self.lens.width()), f64::from(self.lens.height()));
-        if !(pixel.x > 0.5 && pixel.y > 0.5 && pixel.x < w - 0.5 && pixel.y < h - 0.5) {
+        // A pixel of the cube is 2/size wide at the depth 1; distortion hardly changes how much of the
+        // picture that is.
+        let step = ray.direction.length() * 2.0 / f64::from(ray.size) / ray.direction.length_squared();
+        let along = self.lens.focal_px() * (step * length_2.sqrt() / v.z);
+        let size = dvec2(f64::from(self.lens.width()), f64::from(self.lens.height()));
+        let border = if ray.whole { 0.5 * along.max(DVec2::ONE) } else { DVec2::splat(0.5) };
+        if !(pixel.cmpgt(border) & pixel.cmplt(size - border)).all() {
             return None;
         }
         if ray.depth.is_some() && self.is_hidden(v) {
             return None;
         }
         // 1 in the middle of the picture and 0 at its border, along either axis.
-        let inner = |at: f64, size: f64| 1.0 - (2.0 * at / size - 1.0) * (2.0 * at / size - 1.0);
-        let weight = inner(pixel.x, w) * inner(pixel.y, h);
-        // A pixel of the cube is 2/size wide at the depth 1; distortion hardly changes how much of the
-        // picture that is.
-        let step = ray.direction.length() * 2.0 / f64::from(ray.size) / ray.direction.length_squared();
-        let along = self.lens.focal_px() * (step * length_2.sqrt() / v.z);
+        let inner = 1.0 - (2.0 * pixel / size - 1.0) * (2.0 * pixel / size - 1.0);
+        let weight = inner.x * inner.y;
         let color = self.picture.sample(pixel, DVec2::X * along.x, DVec2::Y * along.y, &Default::default());
         Some((color, (weight * weight) as f32))
     }
@@ -282,7 +285,8 @@ fn gains(views: &[PreparedCapture], size: u32, rays: &SceneDepths, world_from_fr
     // By pair: pixels and the sums of the colours of the first.
     let mut sums = vec![(0.0f64, [0.0f64; 3]); n * n];
     let colors = CubeMap::directions(size).map(|(face, x, y, d)| {
-        let ray = CubeRay { direction: world_from_frame * d, depth: rays.depth(face, x, y), size };
+        let ray =
+            CubeRay { direction: world_from_frame * d, depth: rays.depth(face, x, y), size, whole: true };
         views.iter().map(|v| v.sees(&ray).map(|(c, _)| c)).collect::<Vec<_>>()
     });
     for seen in colors {
