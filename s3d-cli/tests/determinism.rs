@@ -4,6 +4,7 @@ mod common;
 
 use common::{copyroom, files, s3d_ok, text, write_scan};
 use std::path::Path;
+use std::process::Command;
 
 const SMALL: [&str; 8] = ["--size", "64", "--pano-width", "128", "--views", "12", "--points-per-m2", "300"];
 
@@ -51,6 +52,25 @@ fn threads_change_no_byte_of_other_forms() {
         ["pointnet/stanford_indoor3d/Area_1_office_1.npy", "open3d-ml/original_pkl/Area_1_office_1.pkl"]
     {
         assert!(outs[0].join("profiles").join(file).is_file(), "{file}");
+    }
+}
+
+/// What runs are widths of registers: a processor that has none of them runs the same three times.
+#[test]
+fn instructions_change_no_byte() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = write_scan(&dir.path().join("scan"), 1);
+    let export = |level: Option<&str>| {
+        let out = dir.path().join(level.unwrap_or("any"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_s3d"));
+        command.env_remove("S3D_SIMD").envs(level.map(|level| ("S3D_SIMD", level)));
+        let output = command.arg("export").arg(&scene).arg("-o").arg(&out).args(SMALL).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        out
+    };
+    let any = export(None);
+    for level in ["scalar", "avx2"] {
+        assert_same(&any, &export(Some(level)));
     }
 }
 
