@@ -1,5 +1,6 @@
-//! How many coloured points a second come from a textured mesh of 32 thousand faces, and from a scan of 300
-//! thousand with three textures, on one thread and on all? The aim is 15 million a second and core.
+//! How many coloured points a second come from a textured mesh of 32 thousand faces, and from scans of 300
+//! thousand, with three textures and with a dozen large ones, on one thread and on all? The aim is 15 million
+//! a second and core.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{Vec3, vec2, vec3};
@@ -7,9 +8,8 @@ use s3d_geom::{Density, Material, MeshParts, PointCloud, Raster, SurfaceSampler,
 use s3d_synth::scenes::scan_like;
 use std::hint::black_box;
 
-/// A bumpy 12.8 m square of 2 × 128² faces under a 2048 × 2048 texture that repeats four times.
-fn textured_ground() -> TriMesh {
-    let n = 128u32;
+/// A bumpy square of 2 × `n`² faces, 10 cm a cell, whose texture coordinates are in cells.
+fn ground(n: u32) -> MeshParts {
     let vertices = || (0..=n).flat_map(|i| (0..=n).map(move |j| (i as f32, j as f32)));
     let at = |i: u32, j: u32| i * (n + 1) + j;
     let faces: Vec<[u32; 3]> = (0..n)
@@ -18,24 +18,69 @@ fn textured_ground() -> TriMesh {
             [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
         })
         .collect();
-    let pixels = (0..2048u32 * 2048).map(|i| [i as u8, (i >> 8) as u8, (i >> 16) as u8]).collect();
-    TriMesh::new(MeshParts {
+    MeshParts {
         positions: vertices()
             .map(|(x, y)| vec3(x * 0.1, y * 0.1, ((x * 7.0 + y * 3.0) % 5.0) * 0.01))
             .collect(),
-        uvs: vertices().map(|(x, y)| vec2(x, y) / 32.0).collect(),
+        uvs: vertices().map(|(x, y)| vec2(x, y)).collect(),
         face_uvs: faces.clone(),
         face_materials: vec![0; faces.len()],
         faces,
-        materials: vec![Material { name: "ground".into(), color: [0; 3], texture: Some(0) }],
-        textures: vec![Texture {
-            name: "ground".into(),
-            image: Raster::from_vec(2048, 2048, pixels),
-            wrap: Default::default(),
-        }],
         ..MeshParts::default()
-    })
-    .expect("a valid mesh")
+    }
+}
+
+/// Gives `parts` textures of `side`², each with a material.
+fn add_textures(parts: &mut MeshParts, count: u32, side: u32) {
+    for texture in 0..count {
+        let pixels = (0..side * side).map(|i| [i as u8, (i >> 8) as u8, (i >> 16) as u8 ^ texture as u8]);
+        let image = Raster::from_vec(side, side, pixels.collect());
+        let name = format!("ground {texture}");
+        parts.materials.push(Material { name: name.clone(), color: [0; 3], texture: Some(texture) });
+        parts.textures.push(Texture { name, image, wrap: Default::default() });
+    }
+}
+
+/// 2 × 128² faces under a 2048 × 2048 texture that repeats four times.
+fn textured_ground() -> TriMesh {
+    let mut parts = ground(128);
+    parts.uvs.iter_mut().for_each(|uv| *uv /= 32.0);
+    add_textures(&mut parts, 1, 2048);
+    TriMesh::new(parts).expect("a valid mesh")
+}
+
+/// 301,088 faces under twelve textures of 4096 × 4096 (604 MB), as a scanner's software lays them out: patches of
+/// 4 × 4 cells, each anywhere in any of the textures.
+fn ground_of_patches() -> TriMesh {
+    const CELLS: u32 = 388;
+    const PATCH: u32 = 4;
+    /// Patches along a texture's side: all textures are full.
+    const PATCHES: u32 = 28;
+    let mut parts = ground(CELLS);
+    add_textures(&mut parts, 12, 4096);
+    parts.face_uvs.clear();
+    parts.uvs.clear();
+    let vertices = (0..=PATCH).flat_map(|i| (0..=PATCH).map(move |j| vec2(i as f32, j as f32)));
+    let vertices: Vec<_> = vertices.collect();
+    let patches = (CELLS / PATCH) * (CELLS / PATCH);
+    // A number without a divisor in common with that of the places: every patch has one of its own.
+    let place = |patch: u32| patch * 5477 % (12 * PATCHES * PATCHES);
+    for patch in 0..patches {
+        let place = place(patch) % (PATCHES * PATCHES);
+        let corner = vec2((place % PATCHES) as f32, (place / PATCHES) as f32);
+        parts.uvs.extend(vertices.iter().map(|uv| (corner + *uv / PATCH as f32) / PATCHES as f32));
+    }
+    for cell in 0..CELLS * CELLS {
+        let (i, j) = (cell / CELLS, cell % CELLS);
+        let patch = (i / PATCH) * (CELLS / PATCH) + j / PATCH;
+        let at = |i: u32, j: u32| patch * (PATCH + 1) * (PATCH + 1) + i * (PATCH + 1) + j;
+        let (k, l) = (i % PATCH, j % PATCH);
+        parts.face_uvs.push([at(k, l), at(k + 1, l), at(k + 1, l + 1)]);
+        parts.face_uvs.push([at(k, l), at(k + 1, l + 1), at(k, l + 1)]);
+        let texture = place(patch) / (PATCHES * PATCHES);
+        parts.face_materials[2 * cell as usize..][..2].fill(texture);
+    }
+    TriMesh::new(parts).expect("a valid mesh")
 }
 
 fn sample(c: &mut Criterion) {
@@ -45,11 +90,17 @@ fn sample(c: &mut Criterion) {
     parts.face_uvs.clear();
     let vertex_colors = TriMesh::new(parts).expect("a valid mesh");
     let scan = scan_like(300_000, 1);
+    let patches = ground_of_patches();
     let points = 1 << 21;
 
     let mut group = c.benchmark_group("surface");
     group.throughput(Throughput::Elements(points)).sample_size(20);
-    for (what, mesh) in [("texture", &textured), ("vertex colours", &vertex_colors), ("scan", &scan)] {
+    for (what, mesh) in [
+        ("texture", &textured),
+        ("vertex colours", &vertex_colors),
+        ("scan", &scan),
+        ("dozen textures", &patches),
+    ] {
         let sampler = SurfaceSampler::new(mesh, Density::Total(points), 1);
         for threads in [1, 0] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");

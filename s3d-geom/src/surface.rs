@@ -2,8 +2,9 @@
 //!
 //! The published clouds are made like this: densely and uniformly from the textured mesh.
 
+use crate::mesh::texture::Quad;
 use crate::wide::{self, Work};
-use crate::{FaceColor, PointCloud, TriMesh};
+use crate::{FaceColor, PointCloud, Texture, TriMesh};
 use glam::{DVec3, Vec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -28,6 +29,9 @@ const WORDS: u128 = 3;
 
 /// Points that one task draws.
 const CHUNK: usize = 4096;
+
+/// Points that are placed before the first one's colour is looked up: its pixels come from memory meanwhile.
+const BLOCK: usize = 256;
 
 /// Points spread evenly over the surface of a mesh, to be drawn piece by piece.
 ///
@@ -179,20 +183,35 @@ impl Work for Draw<'_> {
         rng.set_word_pos(u128::from(first) * WORDS);
         let mut position = usize::MAX;
         let mut patch = None;
-        for (k, ((point, color), face)) in positions.iter_mut().zip(colors).zip(faces).enumerate() {
-            let place = place(&mut rng, first + k as u64);
-            if position == usize::MAX {
-                position = sampler.ends.partition_point(|&end| end <= place);
+        let mut awaited = Vec::with_capacity(BLOCK);
+        let mut i = first;
+        let blocks = positions.chunks_mut(BLOCK).zip(colors.chunks_mut(BLOCK)).zip(faces.chunks_mut(BLOCK));
+        for ((positions, colors), faces) in blocks {
+            for (k, ((point, color), face)) in positions.iter_mut().zip(&mut *colors).zip(faces).enumerate() {
+                let place = place(&mut rng, i);
+                i += 1;
+                if position == usize::MAX {
+                    position = sampler.ends.partition_point(|&end| end <= place);
+                }
+                while sampler.ends[position] <= place {
+                    position += 1;
+                    patch = None;
+                }
+                let patch = patch.get_or_insert_with(|| Patch::new(sampler.mesh, sampler.faces[position]));
+                let weights = barycentric(unit(&mut rng), unit(&mut rng));
+                *point = patch.point(weights);
+                *face = sampler.faces[position];
+                match patch.color(weights) {
+                    PointColor::Texels(quad, pixels) => {
+                        quad.prefetch(pixels);
+                        awaited.push((k, quad, pixels));
+                    }
+                    PointColor::Known(known) => *color = known,
+                }
             }
-            while sampler.ends[position] <= place {
-                position += 1;
-                patch = None;
+            for (k, quad, pixels) in awaited.drain(..) {
+                colors[k] = quad.color(pixels).map(|c| (c + 0.5) as u8);
             }
-            let patch = patch.get_or_insert_with(|| Patch::new(sampler.mesh, sampler.faces[position]));
-            let weights = barycentric(unit(&mut rng), unit(&mut rng));
-            *point = patch.point(weights);
-            *color = patch.color(weights);
-            *face = sampler.faces[position];
         }
     }
 }
@@ -236,18 +255,27 @@ impl<'m> Patch<'m> {
     }
 
     #[inline(always)]
-    fn color(&self, [wa, wb, wc]: [f64; 3]) -> [u8; 3] {
-        match self.color {
-            FaceColor::Texture(_, texture, uvs) => {
+    fn color(&self, [wa, wb, wc]: [f64; 3]) -> PointColor<'m> {
+        PointColor::Known(match self.color {
+            FaceColor::Texture(_, Texture { image, .. }, _) if image.is_empty() => [0; 3],
+            FaceColor::Texture(_, Texture { image, wrap, .. }, uvs) => {
                 let [a, b, c] = uvs.map(|uv| uv.as_dvec2());
-                texture.sample((a * wa + b * wb + c * wc).as_vec2()).map(|c| (c + 0.5) as u8)
+                let uv = (a * wa + b * wb + c * wc).as_vec2();
+                return PointColor::Texels(Quad::new(image, *wrap, uv), image.pixels());
             }
             FaceColor::Corners([a, b, c]) => std::array::from_fn(|k| {
                 (f64::from(a[k]) * wa + f64::from(b[k]) * wb + f64::from(c[k]) * wc + 0.5) as u8
             }),
             FaceColor::Flat(color) => color,
-        }
+        })
     }
+}
+
+/// The colour of a point.
+enum PointColor<'m> {
+    /// Between four pixels of a texture, which may have to come from memory.
+    Texels(Quad, &'m [[u8; 3]]),
+    Known([u8; 3]),
 }
 
 #[cfg(test)]
@@ -504,7 +532,7 @@ mod tests {
         let patch = Patch::new(&mesh, 0);
         assert!(matches!(patch.color, FaceColor::Texture(_, _, [_, Vec2::X, _])));
         // The texture's middle, where it is exactly ½.
-        assert_eq!(patch.color([0.5, 0.0, 0.5]), [1; 3]);
+        assert!(matches!(patch.color([0.5, 0.0, 0.5]), PointColor::Known([1, 1, 1])));
         assert_eq!(mesh.textures()[0].sample(vec2(0.5, 0.5)), [0.5; 3]);
     }
 

@@ -2,7 +2,7 @@
 
 mod merge;
 mod repeated;
-mod texture;
+pub(crate) mod texture;
 
 pub use texture::{Texture, Wrap, sample_bilinear};
 

@@ -93,27 +93,63 @@ impl Texture {
 /// as in [`Texture`]. An image without pixels is black.
 #[inline(always)]
 pub fn sample_bilinear(image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: Vec2) -> [f32; 3] {
-    let (w, h) = (image.width(), image.height());
-    if w == 0 || h == 0 {
+    if image.width() == 0 || image.height() == 0 {
         return [0.0; 3];
     }
-    // f64 keeps the fraction of a pixel when a coordinate repeats many times; `as i64` saturates and takes
-    // NaN to 0.
-    let x = f64::from(uv.x) * f64::from(w) - 0.5;
-    let y = (1.0 - f64::from(uv.y)) * f64::from(h) - 0.5;
-    let (x, y) = (if x.is_finite() { x } else { 0.0 }, if y.is_finite() { y } else { 0.0 });
-    let (xf, yf) = (x.floor(), y.floor());
-    let (fx, fy) = ((x - xf) as f32, (y - yf) as f32);
-    let (xi, yi) = (xf.clamp(-1e15, 1e15) as i64, yf.clamp(-1e15, 1e15) as i64);
-    let (x0, x1) = wrap[0].pair(xi, w);
-    // v grows upwards and rows downwards: mirroring and repeating are the same seen from either side.
-    let (y0, y1) = wrap[1].pair(yi, h);
-    let (a, b, c, d) = (image.at(x0, y0), image.at(x1, y0), image.at(x0, y1), image.at(x1, y1));
-    std::array::from_fn(|k| {
-        let top = f32::from(a[k]) + (f32::from(b[k]) - f32::from(a[k])) * fx;
-        let bottom = f32::from(c[k]) + (f32::from(d[k]) - f32::from(c[k])) * fx;
-        top + (bottom - top) * fy
-    })
+    Quad::new(image, wrap, uv).color(image.pixels())
+}
+
+/// The four pixels around a place of an image, and where the place is between them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quad {
+    /// Indices of the pixels: upper left, upper right, lower left, lower right.
+    at: [usize; 4],
+    /// To the right and downwards, from 0 to 1.
+    fraction: [f32; 2],
+}
+
+impl Quad {
+    /// Around `uv` of an image that has pixels; conventions as in [`Texture`].
+    #[inline(always)]
+    pub(crate) fn new(image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: Vec2) -> Self {
+        let (w, h) = (image.width(), image.height());
+        // f64 keeps the fraction of a pixel when a coordinate repeats many times; `as i64` saturates and takes
+        // NaN to 0.
+        let x = f64::from(uv.x) * f64::from(w) - 0.5;
+        let y = (1.0 - f64::from(uv.y)) * f64::from(h) - 0.5;
+        let (x, y) = (if x.is_finite() { x } else { 0.0 }, if y.is_finite() { y } else { 0.0 });
+        let (xf, yf) = (x.floor(), y.floor());
+        let fraction = [(x - xf) as f32, (y - yf) as f32];
+        let (xi, yi) = (xf.clamp(-1e15, 1e15) as i64, yf.clamp(-1e15, 1e15) as i64);
+        let (x0, x1) = wrap[0].pair(xi, w);
+        // v grows upwards and rows downwards: mirroring and repeating are the same seen from either side.
+        let (y0, y1) = wrap[1].pair(yi, h);
+        let index = |x: u32, y: u32| y as usize * w as usize + x as usize;
+        Self { at: [index(x0, y0), index(x1, y0), index(x0, y1), index(x1, y1)], fraction }
+    }
+
+    /// The interpolated colour, 0 to 255 a channel. `pixels` are those of the image that it was made for.
+    #[inline(always)]
+    pub(crate) fn color(&self, pixels: &[[u8; 3]]) -> [f32; 3] {
+        let [fx, fy] = self.fraction;
+        let [a, b, c, d] = self.at.map(|at| pixels[at]);
+        std::array::from_fn(|k| {
+            let top = f32::from(a[k]) + (f32::from(b[k]) - f32::from(a[k])) * fx;
+            let bottom = f32::from(c[k]) + (f32::from(d[k]) - f32::from(c[k])) * fx;
+            top + (bottom - top) * fy
+        })
+    }
+
+    /// Asks for both rows of pixels: see [`s3d_simd::prefetch`].
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, pixels: &[[u8; 3]]) {
+        for at in [[self.at[0], self.at[1]], [self.at[2], self.at[3]]] {
+            if let [Some([first, ..]), Some([.., last])] = at.map(|at| pixels.get(at)) {
+                s3d_simd::prefetch(first);
+                s3d_simd::prefetch(last);
+            }
+        }
+    }
 }
 
 #[cfg(test)]

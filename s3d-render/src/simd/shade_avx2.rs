@@ -199,8 +199,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn prefetch<T>(self, thing: &T) {
-        // SAFETY: `self` holds the proof of AVX2, which comes with SSE; what is fetched is not looked at.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(thing).cast()) }
+        s3d_simd::prefetch(thing);
     }
     #[inline(always)]
     fn equal(self, values: &[u32; LANES], value: u32) -> u32 {
