@@ -202,15 +202,15 @@ impl Work for Draw<'_> {
                 *point = patch.point(weights);
                 *face = sampler.faces[position];
                 match patch.color(weights) {
-                    PointColor::Texels(quad, pixels) => {
-                        quad.prefetch(pixels);
-                        awaited.push((k, quad, pixels));
-                    }
                     PointColor::Known(known) => *color = known,
+                    texels => {
+                        texels.prefetch();
+                        awaited.push((k, texels));
+                    }
                 }
             }
-            for (k, quad, pixels) in awaited.drain(..) {
-                colors[k] = quad.color(pixels).map(|c| (c + 0.5) as u8);
+            for (k, texels) in awaited.drain(..) {
+                colors[k] = texels.rounded();
             }
         }
     }
@@ -276,6 +276,30 @@ enum PointColor<'m> {
     /// Between four pixels of a texture, which may have to come from memory.
     Texels(Quad, &'m [[u8; 3]]),
     Known([u8; 3]),
+}
+
+impl PointColor<'_> {
+    /// Asks for the pixels.
+    #[inline(always)]
+    fn prefetch(&self) {
+        if let Self::Texels(quad, pixels) = self {
+            let rows = [[quad.at[0], quad.at[1]], [quad.at[2], quad.at[3]]];
+            for row in rows {
+                if let [Some([first, ..]), Some([.., last])] = row.map(|at| pixels.get(at)) {
+                    s3d_simd::prefetch(first);
+                    s3d_simd::prefetch(last);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn rounded(&self) -> [u8; 3] {
+        match self {
+            Self::Texels(quad, pixels) => quad.color(pixels).map(|c| (c + 0.5) as u8),
+            Self::Known(color) => *color,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -532,7 +556,7 @@ mod tests {
         let patch = Patch::new(&mesh, 0);
         assert!(matches!(patch.color, FaceColor::Texture(_, _, [_, Vec2::X, _])));
         // The texture's middle, where it is exactly ½.
-        assert!(matches!(patch.color([0.5, 0.0, 0.5]), PointColor::Known([1, 1, 1])));
+        assert_eq!(patch.color([0.5, 0.0, 0.5]).rounded(), [1; 3]);
         assert_eq!(mesh.textures()[0].sample(vec2(0.5, 0.5)), [0.5; 3]);
     }
 

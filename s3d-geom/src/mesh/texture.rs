@@ -103,7 +103,7 @@ pub fn sample_bilinear(image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: Vec2) -> [f
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Quad {
     /// Indices of the pixels: upper left, upper right, lower left, lower right.
-    at: [usize; 4],
+    pub(crate) at: [usize; 4],
     /// To the right and downwards, from 0 to 1.
     fraction: [f32; 2],
 }
@@ -138,17 +138,6 @@ impl Quad {
             let bottom = f32::from(c[k]) + (f32::from(d[k]) - f32::from(c[k])) * fx;
             top + (bottom - top) * fy
         })
-    }
-
-    /// Asks for both rows of pixels: see [`s3d_simd::prefetch`].
-    #[inline(always)]
-    pub(crate) fn prefetch(&self, pixels: &[[u8; 3]]) {
-        for at in [[self.at[0], self.at[1]], [self.at[2], self.at[3]]] {
-            if let [Some([first, ..]), Some([.., last])] = at.map(|at| pixels.get(at)) {
-                s3d_simd::prefetch(first);
-                s3d_simd::prefetch(last);
-            }
-        }
     }
 }
 
