@@ -227,8 +227,8 @@ mod tests {
                 let mut lines = filter(&bytes, line, pixel, filters).unwrap();
                 let top = vec![0; line];
                 let all = |lines: &[u8]| {
-                    let aboves = std::iter::once(top.as_slice()).chain(rows.iter().copied());
-                    let known = lines.chunks(line + 1).zip(&rows).zip(aboves);
+                    let upper = std::iter::once(top.as_slice()).chain(rows.iter().copied());
+                    let known = lines.chunks(line + 1).zip(&rows).zip(upper);
                     known.map(|((f, row), above)| is_filtered(f, row, above, pixel)).collect::<Vec<_>>()
                 };
                 prop_assert_eq!(all(&lines), [true; 4]);
