@@ -1,7 +1,7 @@
 //! How long does the RGB image of a view take from pictures, and how long does it take to make a location's
 //! cube map?
 //!
-//! Nine views of 1080² and a panorama of 4096 × 2048 from a cube map of 2,144² pixels a face, with and
+//! Nine views of 1080² and a panorama of 4096 × 2048 from a cube map of 2,176² pixels a face, with and
 //! without holes; that cube map from 18 captures of 1280 × 1024 pixels, from a sky box of 1,024² and from a
 //! panorama of 4096 × 2048.
 
