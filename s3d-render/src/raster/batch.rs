@@ -21,7 +21,7 @@ const SHORT: f64 = 1e-3;
 const MARGIN: f64 = 1e-4;
 
 /// Faces that are set up together.
-const GROUP: usize = 8;
+pub(crate) const GROUP: usize = 8;
 
 /// How a face is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,39 @@ pub(crate) enum DrawKind {
     InSpace,
 }
 
-type Values<T> = [T; MAX_FACES];
+pub(crate) type Values<T> = [T; MAX_FACES];
+
+/// The faces of a cluster by kind.
+pub(crate) struct FacesByKind {
+    lists: [Values<u8>; KINDS],
+    counts: [usize; KINDS],
+}
+
+const KINDS: usize = 7;
+
+impl FacesByKind {
+    pub(crate) fn new() -> Self {
+        Self { lists: [[0; MAX_FACES]; KINDS], counts: [0; KINDS] }
+    }
+
+    /// Sorts faces, given by what kind each is.
+    #[inline(always)]
+    pub(crate) fn sort(&mut self, kinds: &[u32]) {
+        self.counts = [0; KINDS];
+        for (i, &kind) in kinds.iter().enumerate() {
+            let (list, count) = (&mut self.lists[kind as usize], &mut self.counts[kind as usize]);
+            list[*count % MAX_FACES] = i as u8;
+            *count += 1;
+        }
+    }
+
+    /// The places of the faces of a kind.
+    #[inline(always)]
+    pub(crate) fn faces(&self, kind: DrawKind) -> impl Iterator<Item = usize> {
+        let list = &self.lists[kind as usize][..self.counts[kind as usize]];
+        list.iter().map(|&i| usize::from(i) % MAX_FACES)
+    }
+}
 
 /// What is known of each face of a cluster.
 pub(crate) struct FaceBatch {
@@ -64,12 +96,8 @@ pub(crate) struct FaceBatch {
     /// No value of 1/t in a face's chunk, or its two, is farther off.
     error: Values<f32>,
     kind: Values<u32>,
-    /// Faces by kind, and how many there are.
-    lists: [Values<u8>; KINDS],
-    counts: [usize; KINDS],
+    by_kind: FacesByKind,
 }
-
-const KINDS: usize = 7;
 
 impl FaceBatch {
     pub(crate) fn new() -> Self {
@@ -87,8 +115,7 @@ impl FaceBatch {
             chunk_at: [[0.0; MAX_FACES]; 4],
             error: [0.0; MAX_FACES],
             kind: [0; MAX_FACES],
-            lists: [[0; MAX_FACES]; KINDS],
-            counts: [0; KINDS],
+            by_kind: FacesByKind::new(),
         }
     }
 
@@ -107,12 +134,7 @@ impl FaceBatch {
         for first in (0..faces.len()).step_by(GROUP) {
             self.set_up_group(first, width - 1.0, height - 1.0);
         }
-        self.counts = [0; KINDS];
-        for (i, &kind) in self.kind[..faces.len()].iter().enumerate() {
-            let (list, count) = (&mut self.lists[kind as usize], &mut self.counts[kind as usize]);
-            list[*count % MAX_FACES] = i as u8;
-            *count += 1;
-        }
+        self.by_kind.sort(&self.kind[..faces.len()]);
     }
 
     #[inline(always)]
@@ -218,8 +240,7 @@ impl FaceBatch {
     /// The places in the cluster of the faces of a kind.
     #[inline(always)]
     pub(crate) fn faces(&self, kind: DrawKind) -> impl Iterator<Item = usize> {
-        let list = &self.lists[kind as usize][..self.counts[kind as usize]];
-        list.iter().map(|&i| usize::from(i) % MAX_FACES)
+        self.by_kind.faces(kind)
     }
 
     /// 1/t as a function of the pixel, as [`DrawnFace`](crate::simd::raster_lanes::DrawnFace) has it.
@@ -285,12 +306,12 @@ impl FaceBatch {
 }
 
 #[inline(always)]
-fn group(values: &Values<f64>, first: usize) -> [f64; GROUP] {
+pub(crate) fn group<T: Copy>(values: &Values<T>, first: usize) -> [T; GROUP] {
     values[first..first + GROUP].try_into().unwrap()
 }
 
 #[inline(always)]
-fn put<T: Copy>(values: &mut Values<T>, first: usize, group: &[T; GROUP]) {
+pub(crate) fn put<T: Copy>(values: &mut Values<T>, first: usize, group: &[T; GROUP]) {
     values[first..first + GROUP].copy_from_slice(group);
 }
 

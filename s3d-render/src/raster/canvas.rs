@@ -249,6 +249,24 @@ impl Canvas {
         }
     }
 
+    /// Draws a chunk, `narrow` or not, with care unless 1/t is `trusted` all over it.
+    #[inline(always)]
+    pub(crate) fn draw_part<L: RasterLanes, const PANORAMA: bool>(
+        &mut self,
+        l: L,
+        grid: &ChunkGrid<'_>,
+        chunk: &Chunk,
+        narrow: bool,
+        trusted: bool,
+    ) {
+        match (narrow, trusted) {
+            (true, true) => self.draw::<L::Half, PANORAMA, false>(l.half(), grid, chunk),
+            (true, false) => self.draw::<L::Half, PANORAMA, true>(l.half(), grid, chunk),
+            (false, true) => self.draw::<L, PANORAMA, false>(l, grid, chunk),
+            (false, false) => self.draw::<L, PANORAMA, true>(l, grid, chunk),
+        }
+    }
+
     /// Notes pixels of a chunk, by row, that may see its face.
     #[cold]
     #[inline(never)]

@@ -57,8 +57,8 @@ pub(crate) struct PinholePlanes {
 }
 
 /// A perspective view's window.
-pub(crate) struct Pinhole<'m> {
-    mesh: &'m TriMesh,
+pub(crate) struct Pinhole<'a> {
+    mesh: &'a TriMesh,
     origin: DVec3,
     /// ρ, δ and φ.
     across: DVec3,
@@ -70,7 +70,7 @@ pub(crate) struct Pinhole<'m> {
     first: DVec3,
     step_x: DVec3,
     step_y: DVec3,
-    pixels: Pixels,
+    pixels: Pixels<'a>,
     width: usize,
     height: usize,
     columns: Vec<[f64; LANES]>,
@@ -103,12 +103,12 @@ fn guard(focal: DVec2, center: DVec2) -> f64 {
     (farthest / focal.recip().element_sum()).min(GUARD)
 }
 
-impl<'m> Pinhole<'m> {
+impl<'a> Pinhole<'a> {
     /// The window of `window` of a view with the axes `right`, `down` and `forward`.
-    pub(crate) fn new(mesh: &'m TriMesh, window: &Window<'_>) -> Self {
+    pub(crate) fn new(mesh: &'a TriMesh, window: &Window<'a>) -> Self {
         let camera = window.camera;
         let pixels = Pixels::new(window);
-        let Rays::Perspective { x_step, y_step, origin } = pixels.rays else {
+        let Rays::Perspective { x_step, y_step, origin } = *pixels.rays else {
             unreachable!("a perspective camera has perspective rays")
         };
         let (pose, stride) = (&camera.pose, f64::from(window.stride));
@@ -343,12 +343,7 @@ impl PinholeTiles<'_> {
                 canvas.touch_tile(tile_column, tile_row);
                 let trusted = error < TRUSTED * low;
                 (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
-                match (narrow, trusted) {
-                    (true, true) => canvas.draw::<L::Half, false, false>(l.half(), &grid(rows), &chunk),
-                    (true, false) => canvas.draw::<L::Half, false, true>(l.half(), &grid(rows), &chunk),
-                    (false, true) => canvas.draw::<L, false, false>(l, &grid(rows), &chunk),
-                    (false, false) => canvas.draw::<L, false, true>(l, &grid(rows), &chunk),
-                }
+                canvas.draw_part::<L, false>(l, &grid(rows), &chunk, narrow, trusted);
             }
         }
     }

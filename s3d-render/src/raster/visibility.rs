@@ -96,10 +96,11 @@ impl<'s, 'm> Caster<'s, 'm> {
         // As many windows as it takes, of one height but for the last.
         let windows = (rows * max_columns).div_ceil(WINDOW);
         let max_rows = rows.div_ceil(windows).min(MAX_SIDE);
+        let rays = &camera.rays();
         for row in (0..rows).step_by(max_rows) {
             for column in (0..columns).step_by(max_columns) {
                 let (width, height) = (max_columns.min(columns - column), max_rows.min(rows - row));
-                let window = Window { camera, stride, column, row, width, height };
+                let window = Window { camera, rays, stride, column, row, width, height };
                 let first = row * columns + column;
                 let out = (&mut hits.face.pixels_mut()[first..], &mut hits.depth.pixels_mut()[first..]);
                 cast_window(level(), self.scene, &window, &mut self.scratch, out, columns);
@@ -198,7 +199,8 @@ mod tests {
         ];
         for camera in &views {
             let (width, height) = ((camera.width / 2) as usize, camera.height as usize - 5);
-            let window = Window { camera, stride: 1, column: 60, row: 3, width, height };
+            let window =
+                Window { camera, rays: &camera.rays(), stride: 1, column: 60, row: 3, width, height };
             let images: Vec<_> = Level::all()
                 .into_iter()
                 .map(|level| {

@@ -17,6 +17,8 @@ use std::collections::BinaryHeap;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window<'a> {
     pub(crate) camera: &'a Camera,
+    /// The camera's rays.
+    pub(crate) rays: &'a Rays,
     pub(crate) stride: u32,
     /// The window's first column and row among the samples, and its size.
     pub(crate) column: usize,
@@ -26,18 +28,18 @@ pub(crate) struct Window<'a> {
 }
 
 /// Which pixels of the image the samples of a window are.
-pub(crate) struct Pixels {
-    pub(crate) rays: Rays,
+pub(crate) struct Pixels<'a> {
+    pub(crate) rays: &'a Rays,
     stride: u32,
     column: u32,
     row: u32,
 }
 
-impl Pixels {
-    pub(crate) fn new(window: &Window<'_>) -> Self {
+impl<'a> Pixels<'a> {
+    pub(crate) fn new(window: &Window<'a>) -> Self {
         let first = |sample: usize| window.stride / 2 + window.stride * sample as u32;
         let (column, row) = (first(window.column), first(window.row));
-        Self { rays: window.camera.rays(), stride: window.stride, column, row }
+        Self { rays: window.rays, stride: window.stride, column, row }
     }
 
     /// The direction of a sample's ray, as single rays have it.

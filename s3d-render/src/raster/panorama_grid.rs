@@ -1,0 +1,255 @@
+//! The columns and rows of a panorama's window, and the functions of a face on them.
+//!
+//! The direction in column i and row j is (cos θ cos φ, sin θ cos φ, sin φ), with the azimuth θ falling by
+//! the same step from column to column. Divided by cos φ > 0, a plane's value is x cos θ + y sin θ + z tan φ.
+//! From an anchor in column a the columns go by the angle kδ, and with h = x cos θₐ + y sin θₐ and h′ = x sin
+//! θₐ − y cos θₐ
+//!
+//! > x cos θ + y sin θ = h + h·(cos kδ − 1) + h′·sin kδ.
+//!
+//! So the functions u = cos kδ − 1 and v = sin kδ of a chunk's columns are the same for all, and those of its
+//! rows are differences of tangents. Near a plane's zero all terms are as small as the chunk, so the error of
+//! `f32` is as in a perspective view: a few parts in 10⁵ of a pixel.
+
+#![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
+
+use crate::raster::chunk::{Chunk, ChunkGrid, INVERSE_T_ROUNDING, Linear, MAX_ROWS};
+use crate::raster::window::{Window, groups};
+use crate::simd::raster_lanes::LANES;
+use glam::DVec3;
+use s3d_geom::Rays;
+use std::f64::consts::TAU;
+
+/// By how much [`turn_of`] may be off, in radians, and then some.
+pub(crate) const ANGLE_ERROR: f32 = 3e-5;
+
+/// Rounding in a chunk, as a part of the sizes of an edge function's terms.
+const EDGE_ROUNDING: f64 = 1e-6;
+
+/// Columns and rows of a window, by angle.
+pub(crate) struct PanoramaGrid {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Radians from column to column, and from row to row.
+    pub(crate) step: f64,
+    /// Sine and cosine of the azimuth of the window's middle, and the column there.
+    pub(crate) middle_sin_cos: (f32, f32),
+    pub(crate) middle_column: f64,
+    /// Latitude of row 0.
+    top: f64,
+    /// cos θ and sin θ of the columns.
+    pub(crate) cos: Vec<[f64; LANES]>,
+    pub(crate) sin: Vec<[f64; LANES]>,
+    /// cos φ, sin φ and tan φ of the rows.
+    pub(crate) row_cos: Vec<f64>,
+    pub(crate) row_sin: Vec<f64>,
+    tan: Vec<f64>,
+    scale: Vec<f32>,
+    u: [f32; LANES],
+    v: [f32; LANES],
+}
+
+/// Where a chunk's anchor is: its column's azimuth and its row's latitude.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Anchor {
+    pub(crate) cos: f64,
+    pub(crate) sin: f64,
+    pub(crate) tan: f64,
+}
+
+/// How far the functions of a chunk's columns and rows go from its anchor, and cos φ at both ends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reach {
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+    pub(crate) tan: f32,
+    pub(crate) cos: [f32; 2],
+}
+
+/// Three edges' planes, inwards, and 1/t = `inverse_t` · d.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PanoramaPlanes {
+    pub(crate) edges: [DVec3; 3],
+    pub(crate) inverse_t: DVec3,
+    /// By how much the edges' values are off, for a direction of length 1.
+    pub(crate) edge_off: f64,
+}
+
+/// The pixels that a face may cover.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PanoramaBounds {
+    pub(crate) left: usize,
+    pub(crate) right: usize,
+    pub(crate) top: usize,
+    pub(crate) bottom: usize,
+}
+
+impl PanoramaGrid {
+    /// The columns and rows of `window`.
+    pub(crate) fn new(window: &Window<'_>) -> Self {
+        let Rays::Equirectangular { columns, rows } = window.rays else {
+            unreachable!("a panorama has a panorama's rays")
+        };
+        let pixel = |sample: usize| (window.stride / 2 + window.stride * sample as u32) as usize;
+        let columns: Vec<_> = (0..window.width).map(|i| columns[pixel(window.column + i)]).collect();
+        let rows: Vec<_> = (0..window.height).map(|j| rows[pixel(window.row + j)]).collect();
+        let step = TAU / f64::from(window.camera.width) * f64::from(window.stride);
+        let middle_column = 0.5 * (window.width - 1) as f64;
+        let middle = libm::atan2(columns[0].y, columns[0].x) - step * middle_column;
+        let angle = |k: usize| libm::sincos(k as f64 * step);
+        Self {
+            width: window.width,
+            height: window.height,
+            step,
+            middle_sin_cos: (libm::sin(middle) as f32, libm::cos(middle) as f32),
+            middle_column,
+            top: libm::atan2(rows[0].y, rows[0].x),
+            cos: groups(&columns.iter().map(|c| c.x).collect::<Vec<_>>()),
+            sin: groups(&columns.iter().map(|c| c.y).collect::<Vec<_>>()),
+            row_cos: rows.iter().map(|r| r.x).collect(),
+            row_sin: rows.iter().map(|r| r.y).collect(),
+            tan: rows.iter().map(|r| r.y / r.x).collect(),
+            scale: rows.iter().map(|r| r.x as f32).collect(),
+            u: std::array::from_fn(|k| (angle(k).1 - 1.0) as f32),
+            v: std::array::from_fn(|k| angle(k).0 as f32),
+        }
+    }
+
+    /// Rows between two latitudes.
+    #[inline(always)]
+    pub(crate) fn rows_between(&self, low: f32, high: f32) -> (f32, f32) {
+        let (top, per_rad) = (self.top as f32, 1.0 / self.step as f32);
+        ((top - high) * per_rad, (top - low) * per_rad)
+    }
+
+    #[inline(always)]
+    pub(crate) fn anchor(&self, column: usize, row: usize) -> Anchor {
+        let (cos, sin) = (self.cos.as_flattened()[column], self.sin.as_flattened()[column]);
+        Anchor { cos, sin, tan: self.tan[row] }
+    }
+
+    /// Of a chunk from a row on.
+    #[inline(always)]
+    pub(crate) fn reach(&self, row: usize, rows: usize) -> Reach {
+        let last = row + rows - 1;
+        Reach {
+            u: self.u[LANES - 1],
+            v: self.v[LANES - 1],
+            tan: (self.tan[last] - self.tan[row]) as f32,
+            cos: [self.scale[row], self.scale[last]],
+        }
+    }
+
+    /// Columns and rows of a chunk from a row on.
+    #[inline(always)]
+    pub(crate) fn chunk_grid<'a>(
+        &'a self,
+        row: usize,
+        rows: usize,
+        tangents: &'a mut [f32; MAX_ROWS],
+    ) -> ChunkGrid<'a> {
+        let tan = self.tan[row];
+        for (to, from) in tangents.iter_mut().zip(&self.tan[row..row + rows]) {
+            *to = (from - tan) as f32;
+        }
+        let scale = &self.scale[row..row + rows];
+        ChunkGrid { u: &self.u, v: &self.v, rows: tangents, count: rows, scale }
+    }
+
+    /// Part of a face, from a column and a row on. Nothing is known yet of the error of 1/t.
+    #[inline(always)]
+    pub(crate) fn chunk(
+        &self,
+        planes: &PanoramaPlanes,
+        (column, row): (usize, usize),
+        reach: &Reach,
+        slot: u32,
+    ) -> Chunk {
+        let anchor = self.anchor(column, row);
+        let [e0, e1, e2] = &planes.edges;
+        let edges = [anchor.linear(e0), anchor.linear(e1), anchor.linear(e2)];
+        let edge_error = anchor.edge_error(&edges, reach, planes.edge_off);
+        let inverse_t = anchor.linear(&planes.inverse_t);
+        Chunk { column, row, edges, edge_error, inverse_t, slot, ..Chunk::default() }
+    }
+}
+
+impl Anchor {
+    /// The function n · d / cos φ.
+    #[inline(always)]
+    pub(crate) fn linear(&self, n: &DVec3) -> Linear {
+        let h = n.x * self.cos + n.y * self.sin;
+        let turned = n.x * self.sin - n.y * self.cos;
+        Linear { at: (h + n.z * self.tan) as f32, across: h as f32, bend: turned as f32, down: n.z as f32 }
+    }
+
+    /// By how much edge functions may be off in a chunk whose planes are off by `edge_off`.
+    #[inline(always)]
+    pub(crate) fn edge_error(&self, edges: &[Linear; 3], reach: &Reach, edge_off: f64) -> f32 {
+        let (reach_u, reach_v) = (f64::from(-reach.u), f64::from(reach.v));
+        let reach_t = f64::from(-reach.tan);
+        // A direction is as long as 1 / cos φ where its planes are evaluated: 1 + |tan φ| at most.
+        let away = 1.0 + self.tan.abs() + reach_t.abs();
+        let terms = |e: &Linear| {
+            f64::from(e.across.abs()) * reach_u
+                + f64::from(e.bend.abs()) * reach_v
+                + f64::from(e.down.abs()) * reach_t
+        };
+        let size = max64(terms(&edges[0]), max64(terms(&edges[1]), terms(&edges[2])));
+        (EDGE_ROUNDING * size + edge_off * away + 1e-12) as f32
+    }
+}
+
+impl Reach {
+    /// Bounds of a function on a chunk, before it is multiplied by cos φ, and the sizes of its terms.
+    #[inline(always)]
+    pub(crate) fn range(&self, f: &Linear) -> (f32, f32, f32) {
+        let down = f.down * self.tan;
+        let (u, v) = (f.across * self.u, f.bend * self.v);
+        let along = u + v;
+        // Between its ends the function along a row bulges by the square of the angle over 8.
+        let bulge = (f.across.abs() + f.bend.abs()) * (self.v * self.v - 2.0 * self.u) * 0.125;
+        let low = f.at + min(along, 0.0) + min(down, 0.0) - bulge;
+        let high = f.at + max(along, 0.0) + max(down, 0.0) + bulge;
+        (low, high, f.at.abs() + u.abs() + v.abs() + down.abs())
+    }
+
+    /// The least 1/t of a chunk, as far as is known, and by how much any may be off.
+    #[inline(always)]
+    pub(crate) fn trust(&self, inverse_t: &Linear) -> (f32, f32) {
+        let (low, _, size) = self.range(inverse_t);
+        // cos φ is least at one of the ends; between them it may be greater than there.
+        let (min_cos, max_cos) = (min(self.cos[0], self.cos[1]), max(self.cos[0], self.cos[1]));
+        let max_cos = min(1.0, max_cos * 1.5);
+        let low = if low > 0.0 { low * min_cos } else { low };
+        (low, INVERSE_T_ROUNDING * size * max_cos)
+    }
+}
+
+#[inline(always)]
+pub(crate) fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+pub(crate) fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+pub(crate) fn max64(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The angle of (x, y), from the x axis, to 1.2e-5.
+#[inline(always)]
+pub(crate) fn turn_of(y: f32, x: f32) -> f32 {
+    let (wide, high) = (x.abs(), y.abs());
+    let (small, large) = if wide < high { (wide, high) } else { (high, wide) };
+    let t = small / if large > 0.0 { large } else { 1.0 };
+    let s = t * t;
+    let angle = t * (0.999_866 + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1))));
+    let angle = if wide < high { std::f32::consts::FRAC_PI_2 - angle } else { angle };
+    let angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
+    if y < 0.0 { -angle } else { angle }
+}
