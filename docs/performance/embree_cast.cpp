@@ -174,30 +174,35 @@ void time_all(RTCDevice device, const Dump& d, int rounds) {
     std::vector<Direction> directions(pano.face.size());
     for (unsigned j = 0; j < d.pano_height; j++)
         for (unsigned i = 0; i < d.pano_width; i++) directions[(size_t)j * d.pano_width + i] = direction(d, i, j);
-    std::vector<double> views, panos;
+    // By width of the packets: 8 and 16.
+    std::vector<double> views[2], panos[2];
     const int PANORAMAS = 3;
-    for (int k = 0; k < rounds; k++) {
+    auto cast = [&](int wide, Image& image, auto along) {
+        if (wide) cast_packets<16, RTCRayHit16>(scene, d.origin, image, along, rtcIntersect16);
+        else cast_packets<8, RTCRayHit8>(scene, d.origin, image, along, rtcIntersect8);
+    };
+    for (int k = 0; k < rounds; k++)
+    for (int wide = 0; wide < 2; wide++) {
         double start = user_seconds();
         for (const View& v : d.cameras) {
             ViewInF32 f;
             for (int n = 0; n < 3; n++)
                 f.corner[n] = (float)v.corner[n], f.x_step[n] = (float)v.x_step[n], f.y_step[n] = (float)v.y_step[n];
-            cast_packets<16, RTCRayHit16>(scene, d.origin, view, [&](unsigned i, unsigned j) {
+            cast(wide, view, [&](unsigned i, unsigned j) {
                 float x = i + 0.5f, y = j + 0.5f;
                 return Direction{f.corner[0] + f.x_step[0] * x + f.y_step[0] * y,
                                  f.corner[1] + f.x_step[1] * x + f.y_step[1] * y,
                                  f.corner[2] + f.x_step[2] * x + f.y_step[2] * y};
-            }, rtcIntersect16);
+            });
         }
-        views.push_back(1e-6 * d.views * view.face.size() / (user_seconds() - start));
+        views[wide].push_back(1e-6 * d.views * view.face.size() / (user_seconds() - start));
         start = user_seconds();
         for (int n = 0; n < PANORAMAS; n++)
-            cast_packets<8, RTCRayHit8>(scene, d.origin, pano, [&](unsigned i, unsigned j) {
-                return directions[(size_t)j * d.pano_width + i];
-            }, rtcIntersect8);
-        panos.push_back(1e-6 * PANORAMAS * pano.face.size() / (user_seconds() - start));
+            cast(wide, pano, [&](unsigned i, unsigned j) { return directions[(size_t)j * d.pano_width + i]; });
+        panos[wide].push_back(1e-6 * PANORAMAS * pano.face.size() / (user_seconds() - start));
     }
-    printf("views: %.2f Mray/s a core\npanorama: %.2f Mray/s a core\n", median(views), median(panos));
+    auto better = [](std::vector<double>* rates) { return std::max(median(rates[0]), median(rates[1])); };
+    printf("views: %.2f Mray/s a core\npanorama: %.2f Mray/s a core\n", better(views), better(panos));
     rtcReleaseScene(scene);
 }
 

@@ -294,9 +294,9 @@ impl PanoramaBatch {
             }
         }
         for k in 0..4 {
-            for axis in 0..3 {
-                put(&mut self.planes[k][axis], first, &planes[k][axis]);
-            }
+            put(&mut self.planes[k][0], first, &planes[k][0]);
+            put(&mut self.planes[k][1], first, &planes[k][1]);
+            put(&mut self.planes[k][2], first, &planes[k][2]);
             put(&mut self.at[k], first, &ats[k]);
             put(&mut self.across[k], first, &acrosses[k]);
             put(&mut self.bend[k], first, &bends[k]);
