@@ -90,9 +90,14 @@ impl<'s, 'm> Caster<'s, 'm> {
             *hits = cast_ray_by_ray(self.scene, camera, stride);
             return;
         }
-        // A panorama is cast in sectors: what is opposite to a sector's middle is far from it.
-        let sectors = if camera.is_panorama() { 4 } else { 1 };
-        let max_columns = columns.div_ceil(sectors).min(MAX_SIDE);
+        // A panorama's windows are about square, so that few clusters lie in several; and what is opposite to
+        // the middle of one is far from it. Views are no faster by squares than by strips.
+        let across = if camera.is_panorama() {
+            columns.div_ceil(WINDOW.isqrt()).max(4)
+        } else {
+            columns.div_ceil(MAX_SIDE)
+        };
+        let max_columns = columns.div_ceil(across);
         // As many windows as it takes, of one height but for the last.
         let windows = (rows * max_columns).div_ceil(WINDOW);
         let max_rows = rows.div_ceil(windows).min(MAX_SIDE);
