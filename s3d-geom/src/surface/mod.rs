@@ -2,10 +2,12 @@
 //!
 //! The published clouds are made like this: densely and uniformly from the textured mesh.
 
-use crate::mesh::texture::Quad;
+mod patch;
+
 use crate::wide::{self, Work};
-use crate::{FaceColor, PointCloud, Texture, TriMesh};
-use glam::{DVec3, Vec3};
+use crate::{PointCloud, TriMesh};
+use glam::Vec3;
+use patch::{Patch, PointColor};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -236,76 +238,10 @@ fn barycentric(u: f64, v: f64) -> [f64; 3] {
     [1.0 - u - v, u, v]
 }
 
-/// A face, ready to be sampled.
-struct Patch<'m> {
-    corners: [DVec3; 3],
-    color: FaceColor<'m>,
-}
-
-impl<'m> Patch<'m> {
-    fn new(mesh: &'m TriMesh, face: u32) -> Self {
-        Self { corners: mesh.triangle(face).map(|p| p.as_dvec3()), color: mesh.color_of(face) }
-    }
-
-    /// In `f64`, so that a point is off its face by the rounding of its coordinates only.
-    #[inline(always)]
-    fn point(&self, [wa, wb, wc]: [f64; 3]) -> Vec3 {
-        let [a, b, c] = self.corners;
-        (a * wa + b * wb + c * wc).as_vec3()
-    }
-
-    #[inline(always)]
-    fn color(&self, [wa, wb, wc]: [f64; 3]) -> PointColor<'m> {
-        PointColor::Known(match self.color {
-            FaceColor::Texture(_, Texture { image, .. }, _) if image.is_empty() => [0; 3],
-            FaceColor::Texture(_, Texture { image, wrap, .. }, uvs) => {
-                let [a, b, c] = uvs.map(|uv| uv.as_dvec2());
-                let uv = (a * wa + b * wb + c * wc).as_vec2();
-                return PointColor::Texels(Quad::new(image, *wrap, uv), image.pixels());
-            }
-            FaceColor::Corners([a, b, c]) => std::array::from_fn(|k| {
-                (f64::from(a[k]) * wa + f64::from(b[k]) * wb + f64::from(c[k]) * wc + 0.5) as u8
-            }),
-            FaceColor::Flat(color) => color,
-        })
-    }
-}
-
-/// The colour of a point.
-enum PointColor<'m> {
-    /// Between four pixels of a texture, which may have to come from memory.
-    Texels(Quad, &'m [[u8; 3]]),
-    Known([u8; 3]),
-}
-
-impl PointColor<'_> {
-    /// Asks for the pixels.
-    #[inline(always)]
-    fn prefetch(&self) {
-        if let Self::Texels(quad, pixels) = self {
-            let rows = [[quad.at[0], quad.at[1]], [quad.at[2], quad.at[3]]];
-            for row in rows {
-                if let [Some([first, ..]), Some([.., last])] = row.map(|at| pixels.get(at)) {
-                    s3d_simd::prefetch(first);
-                    s3d_simd::prefetch(last);
-                }
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn rounded(&self) -> [u8; 3] {
-        match self {
-            Self::Texels(quad, pixels) => quad.color(pixels).map(|c| (c + 0.5) as u8),
-            Self::Known(color) => *color,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Aabb, Material, MeshParts, Raster, Texture, Wrap};
+    use crate::{Aabb, FaceColor, Material, MeshParts, Raster, Texture, Wrap};
     use glam::{Vec2, vec2, vec3};
     use proptest::prelude::*;
 
