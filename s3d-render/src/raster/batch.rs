@@ -12,6 +12,7 @@
 use crate::raster::chunk::{Chunk, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TRUSTED};
 use crate::raster::clusters::MAX_FACES;
 use crate::raster::pinhole::{PinholeBounds, PinholeCorners, PinholePlanes};
+use crate::raster::{high, low, max, min};
 use crate::simd::raster_lanes::LANES;
 
 /// An edge that is shorter, in pixels, has no direction to speak of: see the module `pinhole`.
@@ -313,26 +314,6 @@ pub(crate) fn group<T: Copy>(values: &Values<T>, first: usize) -> [T; GROUP] {
 #[inline(always)]
 pub(crate) fn put<T: Copy>(values: &mut Values<T>, first: usize, group: &[T; GROUP]) {
     values[first..first + GROUP].copy_from_slice(group);
-}
-
-#[inline(always)]
-fn min(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn max(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-fn low(v: [f64; 3]) -> f64 {
-    min(min(v[0], v[1]), v[2])
-}
-
-#[inline(always)]
-fn high(v: [f64; 3]) -> f64 {
-    max(max(v[0], v[1]), v[2])
 }
 
 #[cfg(test)]

@@ -5,15 +5,16 @@ use crate::raster::batch::{DrawKind, FacesByKind, GROUP, Values, group, put};
 use crate::raster::chunk::{Chunk, Linear, MAX_ROWS, TRUSTED};
 use crate::raster::clusters::{MAX_CORNERS, MAX_FACES};
 use crate::raster::panorama_grid::{
-    ANGLE_ERROR, Anchor, PanoramaBounds, PanoramaGrid, PanoramaPlanes, Reach, max, max64, min,
+    ANGLE_ERROR, Anchor, PanoramaBounds, PanoramaGrid, PanoramaPlanes, Reach,
 };
+use crate::raster::{high, low, max, min};
 use crate::simd::raster_lanes::LANES;
 use glam::{DVec3, dvec3};
 
 /// Faces that bounds over a greater azimuth, in radians, are bounded by their latitude alone.
 const WIDE: f32 = 0.3;
 
-/// A plane through an edge that is farther off, as a part of 1e-15, says nothing.
+/// Where rounding may put an edge's plane off by more than so many times 1e-15, single rays decide.
 const FIRM: f64 = 1e6;
 
 /// The corners of a cluster.
@@ -148,7 +149,7 @@ impl PanoramaBatch {
         self.by_kind.sort(&self.kind[..count]);
     }
 
-    /// Bounds faces.
+    /// Bounds the faces of a group, and says which may show something.
     #[inline(always)]
     fn bound_group(&mut self, first: usize, grid: &PanoramaGrid) {
         let turns = [group(&self.turn[0], first), group(&self.turn[1], first), group(&self.turn[2], first)];
@@ -246,10 +247,11 @@ impl PanoramaBatch {
             // Edge k is opposite to corner k, from corner k + 1 to k + 2.
             let across = [cross(b, c), cross(c, a), cross(a, b)];
             let shorter = [1.0 / size_of(across[0]), 1.0 / size_of(across[1]), 1.0 / size_of(across[2])];
-            let off = max64(
+            let off = high([
                 size_of(b) * size_of(c) * shorter[0],
-                max64(size_of(c) * size_of(a) * shorter[1], size_of(a) * size_of(b) * shorter[2]),
-            );
+                size_of(c) * size_of(a) * shorter[1],
+                size_of(a) * size_of(b) * shorter[2],
+            ]);
             let edges = [
                 across[0] * (sign * shorter[0]),
                 across[1] * (sign * shorter[1]),
@@ -378,16 +380,6 @@ impl PanoramaBatch {
 }
 
 #[inline(always)]
-fn low(v: [f32; 3]) -> f32 {
-    min(min(v[0], v[1]), v[2])
-}
-
-#[inline(always)]
-fn high(v: [f32; 3]) -> f32 {
-    max(max(v[0], v[1]), v[2])
-}
-
-#[inline(always)]
 fn cross(a: DVec3, b: DVec3) -> DVec3 {
     dvec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 }
@@ -397,7 +389,7 @@ fn dot(a: DVec3, b: DVec3) -> f64 {
     a.x * b.x + a.y * b.y + a.z * b.z
 }
 
-/// The sum of what the coordinates are, without sign.
+/// The sum of the absolute values of the coordinates.
 #[inline(always)]
 fn size_of(v: DVec3) -> f64 {
     v.x.abs() + v.y.abs() + v.z.abs()

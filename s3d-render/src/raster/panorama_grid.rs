@@ -1,20 +1,21 @@
 //! The columns and rows of a panorama's window, and the functions of a face on them.
 //!
-//! The direction in column i and row j is (cos θ cos φ, sin θ cos φ, sin φ), with the azimuth θ falling by
-//! the same step from column to column. Divided by cos φ > 0, a plane's value is x cos θ + y sin θ + z tan φ.
-//! From an anchor in column a the columns go by the angle kδ, and with h = x cos θₐ + y sin θₐ and h′ = x sin
-//! θₐ − y cos θₐ
+//! The direction in column i and row j is (cos θ cos φ, sin θ cos φ, sin φ), with the azimuth θ falling
+//! by the same step from column to column. Divided by cos φ > 0, a plane's value is x cos θ + y sin θ +
+//! z tan φ. From an anchor in column a the columns go by the angle kδ, and with h = x cos θₐ + y sin θₐ and
+//! h′ = x sin θₐ − y cos θₐ
 //!
 //! > x cos θ + y sin θ = h + h·(cos kδ − 1) + h′·sin kδ.
 //!
-//! So the functions u = cos kδ − 1 and v = sin kδ of a chunk's columns are the same for all, and those of its
-//! rows are differences of tangents. Near a plane's zero all terms are as small as the chunk, so the error of
-//! `f32` is as in a perspective view: a few parts in 10⁵ of a pixel.
+//! So the functions u = cos kδ − 1 and v = sin kδ of a chunk's columns are the same for all, and those of
+//! its rows are differences of tangents. Near a plane's zero all terms are as small as the chunk, so the
+//! error of `f32` is as in a perspective view: a few parts in 10⁵ of a pixel.
 
 #![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
 
 use crate::raster::chunk::{Chunk, ChunkGrid, INVERSE_T_ROUNDING, Linear, MAX_ROWS};
 use crate::raster::window::{Window, groups};
+use crate::raster::{high, max, min};
 use crate::simd::raster_lanes::LANES;
 use glam::DVec3;
 use s3d_geom::Rays;
@@ -44,12 +45,14 @@ pub(crate) struct PanoramaGrid {
     pub(crate) row_cos: Vec<f64>,
     pub(crate) row_sin: Vec<f64>,
     tan: Vec<f64>,
+    /// cos φ of the rows.
     scale: Vec<f32>,
+    /// Of a chunk's columns.
     u: [f32; LANES],
     v: [f32; LANES],
 }
 
-/// Where a chunk's anchor is: its column's azimuth and its row's latitude.
+/// Where a chunk's anchor is: cos θ and sin θ of its column, tan φ of its row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Anchor {
     pub(crate) cos: f64,
@@ -128,7 +131,7 @@ impl PanoramaGrid {
         Anchor { cos, sin, tan: self.tan[row] }
     }
 
-    /// Of a chunk from a row on.
+    /// The reach of a chunk of some rows, from a row on.
     #[inline(always)]
     pub(crate) fn reach(&self, row: usize, rows: usize) -> Reach {
         let last = row + rows - 1;
@@ -195,7 +198,7 @@ impl Anchor {
                 + f64::from(e.bend.abs()) * reach_v
                 + f64::from(e.down.abs()) * reach_t
         };
-        let size = max64(terms(&edges[0]), max64(terms(&edges[1]), terms(&edges[2])));
+        let size = high([terms(&edges[0]), terms(&edges[1]), terms(&edges[2])]);
         (EDGE_ROUNDING * size + edge_off * away + 1e-12) as f32
     }
 }
@@ -224,21 +227,6 @@ impl Reach {
         let low = if low > 0.0 { low * min_cos } else { low };
         (low, INVERSE_T_ROUNDING * size * max_cos)
     }
-}
-
-#[inline(always)]
-pub(crate) fn min(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-pub(crate) fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-pub(crate) fn max64(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 /// The angle of (x, y), from the x axis, to 1.2e-5.
