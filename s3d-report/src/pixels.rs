@@ -233,6 +233,13 @@ struct LabelCounts {
 /// Pixels that are compared at once to find where a run of equal ones ends.
 const RUN: usize = 16;
 
+/// Whether all of them are equal, as words of 64 bits: a comparison of the array is a call of `memcmp`.
+fn are(pixels: &[[u8; 3]; RUN], expected: &[[u8; 3]; RUN]) -> bool {
+    let (words, expected) = (pixels.as_flattened().as_chunks().0, expected.as_flattened().as_chunks().0);
+    let differ = |(a, b): (&[u8; 8], &[u8; 8])| u64::from_ne_bytes(*a) ^ u64::from_ne_bytes(*b);
+    words.iter().zip(expected).map(differ).fold(0, |all, bits| all | bits) == 0
+}
+
 impl LabelCounts {
     fn new(labels: usize) -> Self {
         Self { missing: 0, by_label: vec![0; labels], unknown: None }
@@ -241,8 +248,9 @@ impl LabelCounts {
     fn add(&mut self, mut line: &[[u8; 3]]) {
         while let Some((&[r, g, b], others)) = line.split_first() {
             let mut rest = others;
-            while let Some((these, others)) = rest.split_first_chunk::<RUN>()
-                && *these == [[r, g, b]; RUN]
+            let run = [[r, g, b]; RUN];
+            while let Some((these, others)) = rest.split_first_chunk()
+                && are(these, &run)
             {
                 rest = others;
             }

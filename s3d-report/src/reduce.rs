@@ -1,6 +1,8 @@
 //! Smaller images: means of colours, and nearest pixels of what is no colour.
 
 use s3d_geom::Raster;
+use s3d_simd::dispatch;
+use std::ops::Add;
 
 /// The size of an image that is reduced to `width` pixels across, and never enlarged.
 pub(crate) fn reduced_size([w, h]: [u32; 2], width: u32) -> [u32; 2] {
@@ -83,16 +85,21 @@ pub(crate) struct Mean {
     /// Lines that were taken, and those of them that `columns` are the sums of.
     y: u32,
     lines: u32,
-    /// Sums of the three channels of all lines.
-    columns: Vec<[u16; 3]>,
+    /// Sums of all lines, by channel of a column.
+    columns: Vec<u16>,
     /// By byte of a line, in how many of them the bytes of a missing pixel begin there, be it across pixels; and
     /// whether there is one.
     missing_at: Vec<u8>,
     some_missing: bool,
     /// Sums of the pixels that come next, and of how many.
     sums: Vec<[u32; 4]>,
-    /// 2³² over a number of pixels, rounded up.
-    inverse: Vec<u64>,
+    divisor: Divisor,
+    /// Where a pixel is the mean of 2ⁿ × 2ⁿ, and their sum fits into 16 bits: n.
+    halvings: Option<u32>,
+    /// What is made of `columns` and `missing_at` then.
+    halved: Vec<u16>,
+    halved_missing: Vec<u8>,
+    means: Vec<u8>,
     pixels: Vec<[u8; 3]>,
     all_missing: u64,
 }
@@ -102,13 +109,72 @@ fn edge(i: u32, from: u32, to: u32) -> u32 {
     (u64::from(i) * u64::from(from) / u64::from(to.max(1))) as u32
 }
 
-/// Adds columns, sums of so many lines, to the sums of their pixel and their number.
+/// Adds a line to sums of lines.
 #[inline(always)]
-fn add([r, g, b, n]: &mut [u32; 4], columns: &[[u16; 3]], lines: u32) {
-    for [dr, dg, db] in columns {
-        (*r, *g, *b) = (*r + u32::from(*dr), *g + u32::from(*dg), *b + u32::from(*db));
+fn add_line(sums: &mut [u16], line: &[u8]) {
+    for (sum, v) in sums.iter_mut().zip(line) {
+        *sum += u16::from(*v);
     }
-    *n += lines * columns.len() as u32;
+}
+
+/// Whether three bytes of a line that follow each other are those of `pixel`, be it across pixels.
+#[inline(always)]
+fn is_in(line: &[u8], [r, g, b]: [u8; 3]) -> bool {
+    let (second, third) = (line.get(1..).unwrap_or_default(), line.get(2..).unwrap_or_default());
+    let mut any = 0;
+    for ((x, y), z) in line.iter().zip(second).zip(third) {
+        any |= u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
+    }
+    any != 0
+}
+
+/// Adds one to the counts of the bytes at which [`is_in`] finds them.
+#[inline(always)]
+fn count_at(counts: &mut [u8], line: &[u8], [r, g, b]: [u8; 3]) {
+    let (second, third) = (line.get(1..).unwrap_or_default(), line.get(2..).unwrap_or_default());
+    for (((count, x), y), z) in counts.iter_mut().zip(line).zip(second).zip(third) {
+        *count += u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
+    }
+}
+
+/// Adds each number to the one `step` places before it.
+#[inline(always)]
+fn add_next<T: Copy + Add<Output = T>>(sums: &[T], step: usize, to: &mut [T]) {
+    for ((to, a), b) in to.iter_mut().zip(sums).zip(sums.get(step..).unwrap_or_default()) {
+        *to = *a + *b;
+    }
+}
+
+/// Sums over their number, a power of two, rounded.
+#[inline(always)]
+fn divide(sums: &[u16], shift: u32, to: &mut [u8]) {
+    for (to, sum) in to.iter_mut().zip(sums) {
+        *to = ((sum + (1 << shift >> 1)) >> shift) as u8;
+    }
+}
+
+/// Divides by numbers of pixels, few of them by a multiplication.
+struct Divisor {
+    /// 2³² over a number, rounded up.
+    inverse: Vec<u64>,
+}
+
+impl Divisor {
+    /// By at most so many.
+    fn new(most: u64) -> Self {
+        Self { inverse: (0..=most.min(u64::from(FEW - 1))).map(|n| (1 << 32) / n.max(1) + 1).collect() }
+    }
+
+    /// The mean of so many pixels, from the sums of their channels.
+    #[inline]
+    fn mean(&self, [r, g, b, n]: [u32; 4]) -> Option<[u8; 3]> {
+        match (n, self.inverse.get(n as usize)) {
+            (0, _) => None,
+            // Exact: the product of sum and number is below 2³².
+            (n, Some(inverse)) => Some([r, g, b].map(|sum| ((u64::from(sum + n / 2) * inverse) >> 32) as u8)),
+            (n, None) => Some([r, g, b].map(|sum| ((sum + n / 2) / n) as u8)),
+        }
+    }
 }
 
 impl Mean {
@@ -116,7 +182,7 @@ impl Mean {
     pub(crate) fn new(from: [u32; 2], size: [u32; 2], missing: Option<[u8; 3]>) -> Self {
         let [[width, height], [w, h]] = [from, size];
         let most = u64::from(width.div_ceil(w.max(1))) * u64::from(height.div_ceil(h.max(1)));
-        let inverse = (0..=most.min(u64::from(FEW - 1))).map(|n| (1 << 32) / n.max(1) + 1).collect();
+        let even = |side: u32| (width == side * w && height == side * h).then_some(side.trailing_zeros());
         Self {
             from,
             size,
@@ -124,11 +190,15 @@ impl Mean {
             widths: (0..w).map(|i| edge(i + 1, width, w) - edge(i, width, w)).collect(),
             y: 0,
             lines: 0,
-            columns: vec![[0; 3]; width as usize],
+            columns: vec![0; 3 * width as usize],
             missing_at: vec![0; 3 * width as usize],
             some_missing: false,
             sums: vec![[0; 4]; w as usize],
-            inverse,
+            divisor: Divisor::new(most),
+            halvings: [2, 4, 8].into_iter().find_map(even),
+            halved: vec![0; 3 * width as usize],
+            halved_missing: vec![0; 3 * width as usize],
+            means: vec![0; 3 * width as usize],
             pixels: Vec::with_capacity(w as usize * h as usize),
             all_missing: 0,
         }
@@ -145,43 +215,73 @@ impl Mean {
         }
         self.lines += 1;
         let bytes = line.as_flattened();
-        let sums = self.columns.as_flattened_mut().iter_mut();
-        sums.zip(bytes).for_each(|(sum, v)| *sum += u16::from(*v));
-        if let ([_, second @ ..], Some([r, g, b])) = (bytes, self.missing) {
-            let third = second.get(1..).unwrap_or_default();
-            let mut any = 0;
-            for (((count, x), y), z) in self.missing_at.iter_mut().zip(bytes).zip(second).zip(third) {
-                let is_missing = u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
-                *count += is_missing;
-                any |= is_missing;
-            }
-            self.some_missing |= any != 0;
+        let level = s3d_simd::level().without_avx512();
+        dispatch!(level, _simd => add_line(&mut self.columns, bytes));
+        if let Some(missing) = self.missing
+            && dispatch!(level, _simd => is_in(bytes, missing))
+        {
+            self.some_missing = true;
+            dispatch!(level, _simd => count_at(&mut self.missing_at, bytes, missing));
         }
         let next = (self.pixels.len() / self.size[0].max(1) as usize) as u32 + 1;
         let is_last = self.y == edge(next, self.from[1], self.size[1]);
+        if let (true, Some(halvings)) = (is_last, self.halvings) {
+            return self.halve_columns(halvings);
+        }
         if is_last || self.lines == LINES {
             self.add_columns();
         }
         if is_last {
-            let mean = |[r, g, b, n]: [u32; 4]| match (n, self.inverse.get(n as usize)) {
-                (0, _) => self.missing.unwrap_or_default(),
-                // Exact: the product of sum and number is below 2³².
-                (n, Some(inverse)) => [r, g, b].map(|sum| ((u64::from(sum + n / 2) * inverse) >> 32) as u8),
-                (n, None) => [r, g, b].map(|sum| ((sum + n / 2) / n) as u8),
-            };
-            self.pixels.extend(self.sums.iter().map(|sums| mean(*sums)));
+            let mean = |sums: &[u32; 4]| self.divisor.mean(*sums).or(self.missing).unwrap_or_default();
+            self.pixels.extend(self.sums.iter().map(mean));
             self.sums.fill([0; 4]);
         }
     }
 
+    /// Makes a line of pixels that are means of 2ⁿ × 2ⁿ.
+    fn halve_columns(&mut self, halvings: u32) {
+        let level = s3d_simd::level().without_avx512();
+        for n in 0..halvings {
+            dispatch!(level, _simd => add_next(&self.columns, 3 << n, &mut self.halved));
+            std::mem::swap(&mut self.columns, &mut self.halved);
+        }
+        dispatch!(level, _simd => divide(&self.columns, 2 * halvings, &mut self.means));
+        let begin = self.pixels.len();
+        self.pixels.extend(self.means.as_chunks::<3>().0.iter().step_by(1 << halvings));
+        if let (true, Some(missing)) = (self.some_missing, self.missing) {
+            for n in 0..halvings {
+                dispatch!(level, _simd => add_next(&self.missing_at, 3 << n, &mut self.halved_missing));
+                std::mem::swap(&mut self.missing_at, &mut self.halved_missing);
+            }
+            let sums = self.columns.as_chunks::<3>().0.iter().zip(self.missing_at.as_chunks::<3>().0);
+            let made = self.pixels.get_mut(begin..).unwrap_or_default();
+            for (pixel, (sums, [gone, ..])) in made.iter_mut().zip(sums.step_by(1 << halvings)) {
+                if *gone > 0 {
+                    let (gone, all) = (u32::from(*gone), 1 << (2 * halvings));
+                    let [r, g, b] = sums.map(u32::from);
+                    let [dr, dg, db] = missing.map(|channel| gone * u32::from(channel));
+                    let seen = self.divisor.mean([r - dr, g - dg, b - db, all - gone]);
+                    *pixel = seen.unwrap_or(missing);
+                    self.all_missing += u64::from(gone);
+                }
+            }
+            self.missing_at.fill(0);
+            self.some_missing = false;
+        }
+        self.columns.fill(0);
+        self.lines = 0;
+    }
+
     /// Adds up what lies in each pixel.
     fn add_columns(&mut self) {
-        let even = self.from[0] / self.size[0].max(1);
-        match if even * self.size[0] == self.from[0] { even } else { 0 } {
-            // Additions of which the compiler knows how many they are.
-            2 => self.add_even_columns::<2>(),
-            4 => self.add_even_columns::<4>(),
-            _ => self.add_any_columns(),
+        let mut columns = self.columns.as_chunks::<3>().0;
+        for ([r, g, b, n], width) in self.sums.iter_mut().zip(&self.widths) {
+            let (these, others) = columns.split_at(*width as usize);
+            columns = others;
+            for [dr, dg, db] in these {
+                (*r, *g, *b) = (*r + u32::from(*dr), *g + u32::from(*dg), *b + u32::from(*db));
+            }
+            *n += self.lines * width;
         }
         if let (true, Some(missing)) = (self.some_missing, self.missing) {
             let mut missing_at = self.missing_at.as_chunks::<3>().0;
@@ -195,23 +295,8 @@ impl Mean {
             }
             self.missing_at.fill(0);
         }
-        self.columns.fill([0; 3]);
+        self.columns.fill(0);
         (self.lines, self.some_missing) = (0, false);
-    }
-
-    fn add_even_columns<const N: usize>(&mut self) {
-        for (sum, columns) in self.sums.iter_mut().zip(self.columns.as_chunks::<N>().0) {
-            add(sum, columns, self.lines);
-        }
-    }
-
-    fn add_any_columns(&mut self) {
-        let mut columns = self.columns.as_slice();
-        for (sum, width) in self.sums.iter_mut().zip(&self.widths) {
-            let (these, others) = columns.split_at(*width as usize);
-            columns = others;
-            add(sum, these, self.lines);
-        }
     }
 
     /// How many pixels were missing.
@@ -307,6 +392,9 @@ mod tests {
         for ([w, h], size) in [
             ([40, 30], [20, 15]),
             ([40, 30], [17, 13]),
+            ([40, 20], [10, 5]),
+            ([48, 32], [6, 4]),
+            ([48, 32], [3, 2]),
             ([9, 4], [1, 1]),
             // More than 256 lines, and more than 4,096 pixels, in one.
             ([7, 1100], [3, 2]),
