@@ -1,5 +1,6 @@
-//! Deflate (RFC 1951) in zlib's wrapping (RFC 1950), written for what filters leave of images, and the
-//! filters of PNG and of OpenEXR's ZIP. Any reader of PNG, OpenEXR or zlib reads what it makes.
+//! Deflate (RFC 1951) in zlib's wrapping (RFC 1950), both ways, written for what filters leave of images, and
+//! the filters of PNG and of OpenEXR's ZIP. Any reader of PNG, OpenEXR or zlib reads what it makes, and
+//! [`Inflater`] reads what anybody makes.
 //!
 //! General libraries walk chains of places one after the other, and on filtered images the processor
 //! mispredicts at each. Here
@@ -43,7 +44,8 @@
 #![expect(
     clippy::indexing_slicing,
     clippy::expect_used,
-    reason = "an encoder, on the way of every byte of an image: places are those that its own search found"
+    reason = "on the way of every byte of an image: places are those that the encoder's own search found, and the \
+              decoder compares those that a stream names before it goes there"
 )]
 
 mod alphabet;
@@ -54,12 +56,14 @@ pub mod exr;
 mod fixed_distance;
 mod hash_matcher;
 mod huffman;
+mod inflate;
 mod parse;
 pub mod png;
 mod search;
 mod simd;
 mod tokens;
 
+pub use inflate::Inflater;
 pub use search::{Candidates, Search};
 
 use bit_writer::BitWriter;
@@ -102,6 +106,18 @@ pub enum Error {
         /// The number.
         number: u8,
     },
+    /// A zlib stream cannot be read.
+    #[error("a damaged zlib stream: {about}")]
+    Stream {
+        /// What is wrong with it.
+        about: std::borrow::Cow<'static, str>,
+    },
+}
+
+impl Error {
+    fn damaged(about: impl Into<std::borrow::Cow<'static, str>>) -> Self {
+        Self::Stream { about: about.into() }
+    }
 }
 
 #[cfg(doctest)]

@@ -26,7 +26,7 @@ pub(crate) fn packed<T, const N: usize>(
 
 /// An image without loss as a `data:` URL.
 pub(crate) fn png_url(image: &Raster<[u8; 3]>, content: Content) -> String {
-    let bytes = encode_rgb8(image, content, s3d_io::image::Compression::Balanced);
+    let bytes = encode_rgb8(image, content, s3d_io::image::Compression::Fast);
     format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes))
 }
 

@@ -15,10 +15,9 @@ use exr::compression::Compression as Method;
 use exr::meta::BlockDescription;
 use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType};
 use exr::meta::header::{Header, LayerAttributes};
-use fdeflate::Decompressor;
 use half::f16;
 use s3d_deflate::exr::ZipBlock;
-use s3d_deflate::{Deflater, Search};
+use s3d_deflate::{Deflater, Inflater, Search};
 use s3d_geom::Raster;
 use std::io::Cursor;
 use std::path::Path;
@@ -264,7 +263,7 @@ fn decode_blocks(bytes: &[u8]) -> Option<Raster<[f16; 3]>> {
     let (width, height) = (header.layer_size.x(), header.layer_size.y());
     let mut image = Raster::filled(u32::try_from(width).ok()?, u32::try_from(height).ok()?, [f16::ZERO; 3]);
     let mut chunks = reader.all_chunks(false).ok()?;
-    let mut block = ZipBlock::default();
+    let (mut block, mut inflater) = (ZipBlock::default(), Inflater::default());
     for (index, pixels) in image.pixels_mut().chunks_mut(width * BLOCK_LINES as usize).enumerate() {
         let CompressedBlock::ScanLine(lines) = chunks.next()?.ok()?.compressed_block else { return None };
         if lines.y_coordinate != i32::try_from(index).ok()?.checked_mul(BLOCK_LINES as i32)? {
@@ -283,11 +282,7 @@ fn decode_blocks(bytes: &[u8]) -> Option<Raster<[f16; 3]>> {
             continue;
         }
         let differences = block.differences_mut(len);
-        let mut decompressor = Decompressor::new();
-        let (_, made) = decompressor.read(bytes, differences, 0, true).ok()?;
-        if !decompressor.is_done() || made != differences.len() {
-            return None;
-        }
+        inflater.zlib(bytes, differences).ok()?;
         block.get(pixels, width, f16::from_le_bytes).ok()?;
     }
     chunks.next().is_none().then_some(image)

@@ -1,13 +1,13 @@
 //! PNG files in memory, line by line: what this workspace writes, in about half of the `png` crate's time.
 //! Whatever is unusual or damaged is left to that crate, which decides whether it can be read.
 //!
-//! The time goes to what a stream of unknown length has to do: one call inflates a whole image here, and
-//! lines lose their filters together (`s3d_deflate::png::unfilter`).
+//! The time goes to what a stream of unknown length has to do: one call inflates a whole image here
+//! ([`Inflater`]), and lines lose their filters together (`s3d_deflate::png::unfilter`).
 
 use super::decode::{MAX_DEFLATE, MAX_PIXELS, decode};
 use crate::error::Result;
-use fdeflate::Decompressor;
 use png::{BitDepth, ColorType};
+use s3d_deflate::Inflater;
 use s3d_deflate::png::{is_filtered, unfilter};
 use s3d_geom::Raster;
 use std::io::Cursor;
@@ -38,6 +38,7 @@ const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 pub struct PngReader {
     stream: Vec<u8>,
     lines: Vec<u8>,
+    inflater: Inflater,
 }
 
 /// The lines of a whole image, pixels of `N` bytes.
@@ -124,13 +125,11 @@ impl PngReader {
             self.lines = vec![0; len];
         }
         let lines = self.lines.get_mut(..len)?;
-        let mut decompressor = Decompressor::new();
         // As the png crate does: chunks have checksums of their own.
-        decompressor.ignore_adler32();
-        let (_, made) = decompressor.read(stream, lines, 0, true).ok()?;
+        self.inflater.zlib_without_checksum(stream, lines).ok()?;
         let line = N * width as usize;
         let is_known = |line: &[u8]| line.first().is_some_and(|filter| *filter <= 4);
-        let is_whole = decompressor.is_done() && made == len && lines.chunks(line + 1).all(is_known);
+        let is_whole = lines.chunks(line + 1).all(is_known);
         is_whole.then_some((width, height, len))
     }
 }

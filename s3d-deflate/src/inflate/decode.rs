@@ -1,0 +1,411 @@
+//! From the bits of a stream to bytes.
+
+use super::table::{
+    Alphabet, DISTANCE_BITS, DISTANCE_SIZE, Entry, LENGTHS_BITS, LENGTHS_SIZE, LITLEN_BITS, LITLEN_SIZE,
+    Table,
+};
+use crate::Error;
+use crate::alphabet::LONGEST_MATCH;
+
+/// Bytes of the stream that a round of the fast loop may look at: two words.
+const INPUT: usize = 16;
+/// Bytes that it may write, some of which are overwritten later: literals, and a match with what its last
+/// pattern writes beyond it.
+const OUTPUT: usize = 8 + LONGEST_MATCH + PATTERN;
+/// Bytes that are written at once.
+const PATTERN: usize = 32;
+
+/// The order in which the lengths of the codes of code lengths are stored (3.2.7).
+const ORDER: [usize; 19] = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
+
+type Litlen = Table<LITLEN_SIZE>;
+type Distance = Table<DISTANCE_SIZE>;
+
+/// A stream, and how far it is read.
+pub(super) struct Decoder<'a> {
+    stream: &'a [u8],
+    /// The byte that is read next.
+    at: usize,
+    /// The next bits, lowest first: `count` of them, and above them, if anything, those that follow.
+    bits: u64,
+    count: u32,
+    out: &'a mut [u8],
+    /// The byte that is written next.
+    to: usize,
+}
+
+impl<'a> Decoder<'a> {
+    /// Behind the head (RFC 1950, 2.2).
+    pub(super) fn new(stream: &'a [u8], out: &'a mut [u8]) -> Result<Self, Error> {
+        let Some(([method, flags], _)) = stream.split_first_chunk() else { return Err(ends_early()) };
+        if method & 0x0f != 8 || method >> 4 > 7 || !u16::from_be_bytes([*method, *flags]).is_multiple_of(31)
+        {
+            return Err(Error::damaged("it does not begin like one"));
+        }
+        if flags & 0x20 != 0 {
+            return Err(Error::damaged("it wants a dictionary"));
+        }
+        Ok(Self { stream, at: 2, bits: 0, count: 0, out, to: 0 })
+    }
+
+    /// Whether the block that begins is the last one, and of which kind it is.
+    pub(super) fn block(&mut self) -> Result<(bool, u64), Error> {
+        let bits = self.take(3)?;
+        Ok((bits & 1 != 0, bits >> 1))
+    }
+
+    /// Fills `bits` as far as the stream goes.
+    #[inline(always)]
+    fn fill(&mut self) {
+        if let Some(word) = self.stream.get(self.at..).and_then(|rest| rest.first_chunk()) {
+            self.bits |= u64::from_le_bytes(*word) << self.count;
+            self.at += (63 - self.count) as usize / 8;
+            self.count |= 56;
+            return;
+        }
+        while let (true, Some(byte)) = (self.count < 56, self.stream.get(self.at)) {
+            self.bits |= u64::from(*byte) << self.count;
+            (self.at, self.count) = (self.at + 1, self.count + 8);
+        }
+    }
+
+    fn take(&mut self, count: u32) -> Result<u64, Error> {
+        self.fill();
+        let bits = self.bits & !(u64::MAX << count);
+        self.drop(count)?;
+        Ok(bits)
+    }
+
+    fn drop(&mut self, count: u32) -> Result<(), Error> {
+        self.count = self.count.checked_sub(count).ok_or_else(ends_early)?;
+        self.bits >>= count;
+        Ok(())
+    }
+
+    /// A block that is not compressed (3.2.4).
+    pub(super) fn stored(&mut self) -> Result<(), Error> {
+        self.align();
+        let (len, check) = (self.take(16)?, self.take(16)?);
+        if len != check ^ 0xffff {
+            return Err(Error::damaged("a length that is not what it says it is"));
+        }
+        self.align();
+        let len = len as usize;
+        let bytes = self.stream.get(self.at..self.at + len).ok_or_else(ends_early)?;
+        let Some(out) = self.out.get_mut(self.to..self.to + len) else { return Err(self.too_long()) };
+        out.copy_from_slice(bytes);
+        (self.at, self.to) = (self.at + len, self.to + len);
+        Ok(())
+    }
+
+    /// Goes to where the next byte begins.
+    fn align(&mut self) {
+        self.at -= (self.count / 8) as usize;
+        (self.bits, self.count) = (0, 0);
+    }
+
+    /// The codes of a block (3.2.7).
+    pub(super) fn code_lengths(&mut self, litlen: &mut Litlen, distance: &mut Distance) -> Result<(), Error> {
+        let literals = self.take(5)? as usize + 257;
+        let distances = self.take(5)? as usize + 1;
+        let codes = self.take(4)? as usize + 4;
+        if literals > 286 || distances > 30 {
+            return Err(Error::damaged("more symbols than there are"));
+        }
+        let mut of_lengths = [0; 19];
+        for symbol in &ORDER[..codes] {
+            of_lengths[*symbol] = self.take(3)? as u8;
+        }
+        let mut table = Table::<LENGTHS_SIZE>::new(Alphabet::Lengths);
+        table.build(&of_lengths)?;
+        let mut lengths = [0; 286 + 30];
+        let all = literals + distances;
+        let mut next = 0;
+        while next < all {
+            self.fill();
+            let entry = table.first(self.bits, LENGTHS_BITS);
+            self.drop(entry.bits())?;
+            let [symbol, _] = entry.bytes();
+            let (length, repeats) = match symbol {
+                16 => {
+                    let Some(last) = next.checked_sub(1) else {
+                        return Err(Error::damaged("a repetition of nothing"));
+                    };
+                    (lengths[last], 3 + self.take(2)? as usize)
+                }
+                17 => (0, 3 + self.take(3)? as usize),
+                18 => (0, 11 + self.take(7)? as usize),
+                length => (length, 1),
+            };
+            if repeats > all - next {
+                return Err(Error::damaged("lengths of more codes than there are"));
+            }
+            lengths[next..next + repeats].fill(length);
+            next += repeats;
+        }
+        if lengths[256] == 0 {
+            return Err(Error::damaged("a block without an end"));
+        }
+        litlen.build(&lengths[..literals])?;
+        distance.build(&lengths[literals..all])
+    }
+
+    /// The content of a block of these codes.
+    #[inline(always)]
+    pub(super) fn compressed(&mut self, litlen: &Litlen, distance: &Distance) -> Result<(), Error> {
+        loop {
+            if self.at + INPUT <= self.stream.len() && self.to + OUTPUT <= self.out.len() {
+                if self.fast(litlen, distance)? {
+                    return Ok(());
+                }
+            } else if self.one(litlen, distance)? {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Decodes as long as the ends are far off. Whether the block ends.
+    #[inline(always)]
+    fn fast(&mut self, litlen: &Litlen, distance: &Distance) -> Result<bool, Error> {
+        let stream = self.stream;
+        let out = &mut *self.out;
+        let (mut at, mut bits, mut count, mut to) = (self.at, self.bits, self.count, self.to);
+        let (input_end, output_end) = (stream.len() - INPUT, out.len() - OUTPUT);
+        let mut ends = Ok(false);
+        fill(stream, &mut at, &mut bits, &mut count);
+        let mut entry = litlen.first(bits, LITLEN_BITS);
+        // A round begins with 56 bits, and with what the first of them say.
+        while at <= input_end && to <= output_end {
+            // Three of up to eleven bits, and a code with extra bits of up to twenty.
+            for _ in 0..3 {
+                if !entry.is_literal() {
+                    break;
+                }
+                let literals = entry;
+                bits >>= literals.bits();
+                count -= literals.bits();
+                entry = litlen.first(bits, LITLEN_BITS);
+                out[to..to + 2].copy_from_slice(&literals.bytes());
+                to += literals.literals();
+            }
+            if entry.is_literal() {
+                fill(stream, &mut at, &mut bits, &mut count);
+                continue;
+            }
+            if entry.is_special() {
+                bits >>= entry.bits();
+                count -= entry.bits();
+                if entry.is_second_table() {
+                    entry = litlen.second(entry, bits);
+                    if entry.is_literal() {
+                        bits >>= entry.bits();
+                        count -= entry.bits();
+                        out[to] = entry.bytes()[0];
+                        to += 1;
+                        fill(stream, &mut at, &mut bits, &mut count);
+                        entry = litlen.first(bits, LITLEN_BITS);
+                        continue;
+                    }
+                    if entry.is_special() {
+                        bits >>= entry.bits();
+                        count -= entry.bits();
+                    }
+                }
+                if entry.is_special() {
+                    ends = if entry.is_end() { Ok(true) } else { Err(Error::damaged(NO_CODE)) };
+                    break;
+                }
+            }
+            let length = entry.value(bits);
+            bits >>= entry.bits();
+            count -= entry.bits();
+            fill(stream, &mut at, &mut bits, &mut count);
+            let mut place = distance.first(bits, DISTANCE_BITS);
+            if place.is_special() {
+                if place.is_second_table() {
+                    bits >>= place.bits();
+                    count -= place.bits();
+                    place = distance.second(place, bits);
+                }
+                if place.is_special() {
+                    ends = Err(Error::damaged(NO_CODE));
+                    break;
+                }
+            }
+            let back = place.value(bits);
+            bits >>= place.bits();
+            count -= place.bits();
+            if back > to {
+                ends = Err(Error::damaged(TOO_FAR));
+                break;
+            }
+            // The next entry is on its way while bytes are copied.
+            fill(stream, &mut at, &mut bits, &mut count);
+            entry = litlen.first(bits, LITLEN_BITS);
+            copy(out, to, back, length);
+            to += length;
+        }
+        (self.at, self.bits, self.count, self.to) = (at, bits, count, to);
+        ends
+    }
+
+    /// Decodes one symbol, or two literals, be the ends as near as they may. Whether it is the end of the
+    /// block.
+    fn one(&mut self, litlen: &Litlen, distance: &Distance) -> Result<bool, Error> {
+        self.fill();
+        let mut entry = litlen.first(self.bits, LITLEN_BITS);
+        if entry.is_second_table() {
+            self.drop(entry.bits())?;
+            entry = litlen.second(entry, self.bits);
+        }
+        if entry.is_literal() {
+            self.drop(entry.bits())?;
+            let literals = entry.literals();
+            let Some(out) = self.out.get_mut(self.to..self.to + literals) else {
+                return Err(self.too_long());
+            };
+            out.copy_from_slice(&entry.bytes()[..literals]);
+            self.to += literals;
+            return Ok(false);
+        }
+        if entry.is_special() {
+            self.drop(entry.bits())?;
+            return if entry.is_end() { Ok(true) } else { Err(Error::damaged(NO_CODE)) };
+        }
+        let length = self.value(entry)?;
+        self.fill();
+        let mut entry = distance.first(self.bits, DISTANCE_BITS);
+        if entry.is_second_table() {
+            self.drop(entry.bits())?;
+            entry = distance.second(entry, self.bits);
+        }
+        if entry.is_special() {
+            return Err(Error::damaged(NO_CODE));
+        }
+        let back = self.value(entry)?;
+        if back > self.to {
+            return Err(Error::damaged(TOO_FAR));
+        }
+        if length > self.out.len() - self.to {
+            return Err(self.too_long());
+        }
+        for place in self.to..self.to + length {
+            self.out[place] = self.out[place - back];
+        }
+        self.to += length;
+        Ok(false)
+    }
+
+    fn value(&mut self, entry: Entry) -> Result<usize, Error> {
+        let value = entry.value(self.bits);
+        self.drop(entry.bits())?;
+        Ok(value)
+    }
+
+    /// The checksum behind the last block (RFC 1950, 2.2).
+    pub(super) fn finish(mut self) -> Result<u32, Error> {
+        self.align();
+        if self.to < self.out.len() {
+            return Err(Error::damaged(format!("it has {} bytes in it, not {}", self.to, self.out.len())));
+        }
+        let sum = self.stream.get(self.at..).and_then(|rest| rest.first_chunk());
+        sum.map(|sum| u32::from_be_bytes(*sum)).ok_or_else(ends_early)
+    }
+
+    fn too_long(&self) -> Error {
+        Error::damaged(format!("it has more than {} bytes in it", self.out.len()))
+    }
+}
+
+const NO_CODE: &str = "bits that are no code";
+const TOO_FAR: &str = "a match before the first byte";
+
+fn ends_early() -> Error {
+    Error::damaged("it ends early")
+}
+
+/// At least 56 bits, where the stream has a word more.
+#[inline(always)]
+fn fill(stream: &[u8], at: &mut usize, bits: &mut u64, count: &mut u32) {
+    *bits |= word(stream, *at) << *count;
+    *at += (63 - *count) as usize / 8;
+    *count |= 56;
+}
+
+#[inline(always)]
+fn word(bytes: &[u8], at: usize) -> u64 {
+    let mut word = [0; 8];
+    word.copy_from_slice(&bytes[at..at + 8]);
+    u64::from_le_bytes(word)
+}
+
+#[inline(always)]
+fn put(out: &mut [u8], at: usize, word: u64) {
+    out[at..at + 8].copy_from_slice(&word.to_le_bytes());
+}
+
+/// How bytes that repeat are made a pattern.
+#[derive(Clone, Copy)]
+struct Repeat {
+    /// The bits of the bytes that repeat.
+    mask: u64,
+    /// A factor that repeats them over a word.
+    times: u64,
+    /// Bits of a word after which the next one begins.
+    shift: u32,
+    /// Bytes of a pattern that are whole repetitions.
+    step: usize,
+}
+
+/// By distance below 8.
+const REPEAT: [Repeat; 8] = {
+    let mut table = [Repeat { mask: 0, times: 0, shift: 0, step: PATTERN }; 8];
+    let mut back = 1;
+    while back < 8 {
+        let mut shift = 0;
+        while shift < 64 {
+            table[back].times |= 1 << shift;
+            shift += 8 * back;
+        }
+        table[back].mask = !(u64::MAX << (8 * back));
+        table[back].shift = 8 * (8 % back) as u32;
+        table[back].step = PATTERN - PATTERN % back;
+        back += 1;
+    }
+    table
+};
+
+/// A match: `length` bytes that are those `back` before. Up to [`PATTERN`] bytes behind it are overwritten.
+#[inline(always)]
+fn copy(out: &mut [u8], to: usize, back: usize, length: usize) {
+    let from = to - back;
+    if back >= PATTERN {
+        let mut done = 0;
+        while done < length {
+            let mut bytes = [0; PATTERN];
+            bytes.copy_from_slice(&out[from + done..from + done + PATTERN]);
+            out[to + done..to + done + PATTERN].copy_from_slice(&bytes);
+            done += PATTERN;
+        }
+    } else if back >= 8 {
+        let mut done = 0;
+        while done < length {
+            put(out, to + done, word(out, from + done));
+            put(out, to + done + 8, word(out, from + done + 8));
+            done += 16;
+        }
+    } else {
+        let Repeat { mask, times, shift, step } = REPEAT[back];
+        let mut pattern = [0; PATTERN];
+        let mut last = (word(out, from) & mask).wrapping_mul(times);
+        for word in pattern.as_chunks_mut().0 {
+            *word = last.to_le_bytes();
+            last = (last >> shift & mask).wrapping_mul(times);
+        }
+        let mut done = 0;
+        while done < length {
+            out[to + done..to + done + PATTERN].copy_from_slice(&pattern);
+            done += step;
+        }
+    }
+}
