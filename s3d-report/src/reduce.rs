@@ -246,20 +246,23 @@ impl Mean {
             std::mem::swap(&mut self.columns, &mut self.halved);
         }
         dispatch!(level, _simd => divide(&self.columns, 2 * halvings, &mut self.means));
-        let begin = self.pixels.len();
-        self.pixels.extend(self.means.as_chunks::<3>().0.iter().step_by(1 << halvings));
+        let (begin, step) = (self.pixels.len(), 3 << halvings);
+        let first = |bytes: &[u8]| bytes.first_chunk().copied().unwrap_or_default();
+        self.pixels.extend(self.means.chunks_exact(step).map(first));
         if let (true, Some(missing)) = (self.some_missing, self.missing) {
             for n in 0..halvings {
                 dispatch!(level, _simd => add_next(&self.missing_at, 3 << n, &mut self.halved_missing));
                 std::mem::swap(&mut self.missing_at, &mut self.halved_missing);
             }
-            let sums = self.columns.as_chunks::<3>().0.iter().zip(self.missing_at.as_chunks::<3>().0);
+            let sums = self.columns.chunks_exact(step).zip(self.missing_at.chunks_exact(step));
             let made = self.pixels.get_mut(begin..).unwrap_or_default();
-            for (pixel, (sums, [gone, ..])) in made.iter_mut().zip(sums.step_by(1 << halvings)) {
-                if *gone > 0 {
+            for (pixel, (sums, gone)) in made.iter_mut().zip(sums) {
+                if let ([r, g, b, ..], [gone, ..]) = (sums, gone)
+                    && *gone > 0
+                {
                     let (gone, all) = (u32::from(*gone), 1 << (2 * halvings));
-                    let [r, g, b] = sums.map(u32::from);
                     let [dr, dg, db] = missing.map(|channel| gone * u32::from(channel));
+                    let [r, g, b] = [*r, *g, *b].map(u32::from);
                     let seen = self.divisor.mean([r - dr, g - dg, b - db, all - gone]);
                     *pixel = seen.unwrap_or(missing);
                     self.all_missing += u64::from(gone);
