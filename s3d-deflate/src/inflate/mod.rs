@@ -134,7 +134,7 @@ mod tests {
         (decompressor.is_done() && made == len).then_some(out)
     }
 
-    fn by_flate2(data: &[u8], level: u32) -> Vec<u8> {
+    fn by_zlib_rs(data: &[u8], level: u32) -> Vec<u8> {
         use std::io::Write;
         let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::new(level));
         encoder.write_all(data).unwrap();
@@ -171,7 +171,7 @@ mod tests {
         #[test]
         fn what_was_compressed_comes_back(data in data()) {
             for level in [0, 1, 4, 9] {
-                prop_assert_eq!(inflate(&by_flate2(&data, level), data.len()), Ok(data.clone()));
+                prop_assert_eq!(inflate(&by_zlib_rs(&data, level), data.len()), Ok(data.clone()));
             }
             for candidates in [Candidates::Hash16, Candidates::FixedDistances] {
                 prop_assert_eq!(inflate(&by_us(&data, candidates), data.len()), Ok(data.clone()));
@@ -190,7 +190,7 @@ mod tests {
             cuts in any::<bool>(),
             more in -3isize..4,
         ) {
-            let mut stream = by_flate2(&data, level);
+            let mut stream = by_zlib_rs(&data, level);
             // Near the beginning are the codes.
             let near = stream.len().min(if cuts { 60 } else { usize::MAX });
             changes.iter().for_each(|(at, to)| stream[at.index(near)] = *to);
@@ -211,7 +211,7 @@ mod tests {
         let data: Vec<u8> = (0..2000u32).map(|i| (i * i / 97) as u8).collect();
         let (mut both, mut other) = (0, 0);
         for level in [0, 1, 9] {
-            let stream = by_flate2(&data, level);
+            let stream = by_zlib_rs(&data, level);
             for at in 0..stream.len() {
                 for bit in 0..8 {
                     let mut stream = stream.clone();
@@ -234,7 +234,7 @@ mod tests {
     fn streams_that_end_early_are_refused() {
         let data: Vec<u8> = (0..3000u32).map(|i| (i * i / 97) as u8).collect();
         for level in [0, 1, 9] {
-            let stream = by_flate2(&data, level);
+            let stream = by_zlib_rs(&data, level);
             for len in 0..stream.len() {
                 assert!(inflate(&stream[..len], data.len()).is_err(), "{len} of {}", stream.len());
             }
@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn checksums_are_looked_at_where_they_are_wanted() {
-        let mut stream = by_flate2(b"abcabcabc", 6);
+        let mut stream = by_zlib_rs(b"abcabcabc", 6);
         let (mut inflater, mut out) = (Inflater::default(), [0; 9]);
         inflater.zlib(&stream, &mut out).unwrap();
         assert_eq!(&out, b"abcabcabc");
@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn heads_are_looked_at() {
-        let stream = by_flate2(b"abc", 6);
+        let stream = by_zlib_rs(b"abc", 6);
         let message = |head: [u8; 2]| inflate(&[&head, &stream[2..]].concat(), 3).unwrap_err().to_string();
         for head in [[0x79, 0x01], [0x78, 0x02], [0x88, 0x1c]] {
             assert_eq!(message(head), "a damaged zlib stream: it does not begin like one");
