@@ -12,13 +12,17 @@ use crate::raster::clusters::{Cluster, Node, PACKET};
 use crate::raster::panorama_batch::{PanoramaBatch, PanoramaCorners};
 use crate::raster::panorama_grid::{ANGLE_ERROR, PanoramaBounds, PanoramaGrid, PanoramaPlanes, turn_of};
 use crate::raster::window::{Pixels, ProjectionRaster, Window};
-use crate::raster::{max, min};
+use crate::raster::{high, low, max, min};
 use crate::ray::cone::{Cone, Plane};
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
 use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
 use s3d_geom::TriMesh;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
+
+/// Faces over a greater azimuth, in radians, may be around a pole, or across the place opposite to the window's
+/// middle: less than half a turn.
+const WIDEST: f32 = 3.0;
 
 /// A panorama's window.
 pub(crate) struct Panorama<'a> {
@@ -71,26 +75,40 @@ impl<'a> Panorama<'a> {
     }
 
     /// Draws a face that goes around a good part of the sky, or across the place opposite to the window's
-    /// middle.
+    /// middle. `turns` are the azimuths of its corners.
     #[inline(never)]
-    fn draw_wide(&self, canvas: &mut Canvas, face: u32) {
+    fn draw_wide(&self, canvas: &mut Canvas, face: u32, turns: [f32; 3]) {
         let corners = self.mesh.triangle(face).map(|p| p.as_dvec3() - self.origin);
         let latitude = corners.map(|p| libm::atan2(p.z, p.truncate().length()));
-        let (low, high) =
+        let (low_latitude, high_latitude) =
             (latitude[0].min(latitude[1]).min(latitude[2]), latitude[0].max(latitude[1]).max(latitude[2]));
-        // Arcs bend towards the poles: from the equator's side corners bound them.
-        let high = if high > 0.0 { 0.5 * PI } else { high };
-        let low = if low < 0.0 { -0.5 * PI } else { low };
-        let (top, bottom) = self.grid.rows_between(low as f32 - ANGLE_ERROR, high as f32 + ANGLE_ERROR);
-        let (top, bottom) = ((top - 1.0).max(0.0), (bottom + 1.0).min(self.grid.height as f32 - 1.0));
-        if top <= bottom {
-            self.draw_in_space(canvas, face, (top as usize, bottom as usize));
+        let (grid, wide) = (&self.grid, high(turns) - low(turns));
+        let (columns, bend) = if wide < WIDEST {
+            // It is between its corners: a face around a pole, or across the opposite place, is wider.
+            (
+                grid.columns_between(low(turns), high(turns)),
+                libm::cos(0.5 * f64::from(wide + 4.0 * ANGLE_ERROR)),
+            )
+        } else {
+            ((0.0, (grid.width - 1) as f32), 0.0)
+        };
+        // Arcs bend towards the poles. Along one, the latitude's tangent is a cosine of the azimuth, and the
+        // nearer end is at most half of the width away from where that is greatest.
+        let towards_pole = |latitude: f64| libm::atan2(libm::sin(latitude), libm::cos(latitude) * bend);
+        let high = if high_latitude > 0.0 { towards_pole(high_latitude) } else { high_latitude };
+        let low = if low_latitude < 0.0 { towards_pole(low_latitude) } else { low_latitude };
+        let rows = grid.rows_between(low as f32 - ANGLE_ERROR, high as f32 + ANGLE_ERROR);
+        let (top, bottom) = ((rows.0 - 1.0).max(0.0), (rows.1 + 1.0).min(grid.height as f32 - 1.0));
+        let (left, right) = (columns.0.max(0.0), columns.1.min(grid.width as f32 - 1.0));
+        if top <= bottom && left <= right {
+            let [left, right, top, bottom] = [left, right, top, bottom].map(|pixel| pixel as usize);
+            self.draw_in_space(canvas, face, PanoramaBounds { left, right, top, bottom });
         }
     }
 
-    /// Draws a face on all of some rows.
+    /// Draws a face from its planes in space, on the pixels of some bounds.
     #[inline(never)]
-    fn draw_in_space(&self, canvas: &mut Canvas, face: u32, (top, bottom): (usize, usize)) {
+    fn draw_in_space(&self, canvas: &mut Canvas, face: u32, bounds: PanoramaBounds) {
         let Some(cone) = Cone::new(self.mesh, face, self.origin) else { return };
         let [a, b, c] = cone.corners;
         let mut edges = [DVec3::ZERO; 3];
@@ -109,7 +127,6 @@ impl<'a> Panorama<'a> {
         let inverse_t = if known { normal / offset } else { DVec3::ZERO };
         let slot = canvas.enter(DrawnFace::new(inverse_t.to_array(), face, !known));
         let planes = PanoramaPlanes { edges, inverse_t, edge_off };
-        let bounds = PanoramaBounds { left: 0, right: self.grid.width - 1, top, bottom };
         dispatch(PanoramaTiles {
             grid: &self.grid,
             canvas,
@@ -275,10 +292,9 @@ impl ProjectionRaster for Panorama<'_> {
         }
         for j in batch.faces(DrawKind::InSpace) {
             let (face, bounds) = (cluster.ids[batch.place_in_cluster(j)], batch.bounds(j));
-            if batch.is_wide(j) {
-                self.draw_wide(canvas, face);
-            } else {
-                self.draw_in_space(canvas, face, (bounds.top, bounds.bottom));
+            match batch.wide_turns(j) {
+                Some(turns) => self.draw_wide(canvas, face, turns),
+                None => self.draw_in_space(canvas, face, bounds),
             }
         }
     }

@@ -158,8 +158,6 @@ impl PanoramaBatch {
             group(&self.latitude[1], first),
             group(&self.latitude[2], first),
         ];
-        let (middle, per_rad) = (grid.middle_column as f32, 1.0 / grid.step as f32);
-        let pad = 0.01 + ANGLE_ERROR * per_rad;
         let (last_column, last_row) = (grid.width as f32 - 1.0, grid.height as f32 - 1.0);
         // Arrays of their own, so that all faces of the group go together.
         let (mut lefts, mut rights) = ([0.0; GROUP], [0.0; GROUP]);
@@ -173,8 +171,8 @@ impl PanoramaBatch {
             // An arc bends towards the pole, by no more than the square of its width over 16.
             let bend = wide * wide * (1.0 / 15.0) + ANGLE_ERROR;
             let rows = grid.rows_between(low(latitude) - bend, high(latitude) + bend);
-            let left = max((middle + first * per_rad - pad).ceil(), 0.0);
-            let right = min((middle + last * per_rad + pad).floor(), last_column);
+            let columns = grid.columns_between(first, last);
+            let (left, right) = (max(columns.0, 0.0), min(columns.1, last_column));
             let top = max((rows.0 - 0.01).ceil(), 0.0);
             let bottom = min((rows.1 + 0.01).floor(), last_row);
             let seen = if left <= right { Shown::InBounds as u32 } else { Shown::Nothing as u32 };
@@ -363,9 +361,10 @@ impl PanoramaBatch {
         self.bounds_in_cluster(self.place_in_cluster(j))
     }
 
-    /// Whether the bounds of a face mean nothing, since it is too wide.
-    pub(crate) fn is_wide(&self, j: usize) -> bool {
-        self.wide[j] != 0
+    /// The azimuths of the corners of a face whose bounds mean nothing, since it is too wide.
+    pub(crate) fn wide_turns(&self, j: usize) -> Option<[f32; 3]> {
+        let i = self.place_in_cluster(j);
+        (self.wide[j] != 0).then(|| [self.turn[0][i], self.turn[1][i], self.turn[2][i]])
     }
 
     #[inline(always)]

@@ -125,6 +125,14 @@ impl PanoramaGrid {
         ((top - high) * per_rad, (top - low) * per_rad)
     }
 
+    /// Columns between two azimuths from the window's middle, to the right, and what [`turn_of`] may be off.
+    #[inline(always)]
+    pub(crate) fn columns_between(&self, first: f32, last: f32) -> (f32, f32) {
+        let (middle, per_rad) = (self.middle_column as f32, 1.0 / self.step as f32);
+        let pad = 0.01 + ANGLE_ERROR * per_rad;
+        ((middle + first * per_rad - pad).ceil(), (middle + last * per_rad + pad).floor())
+    }
+
     #[inline(always)]
     pub(crate) fn anchor(&self, column: usize, row: usize) -> Anchor {
         let (cos, sin) = (self.cos.as_flattened()[column], self.sin.as_flattened()[column]);
