@@ -96,7 +96,7 @@ pub(crate) struct Mean {
     divisor: Divisor,
     /// Where a pixel is the mean of 2ⁿ × 2ⁿ, and their sum fits into 16 bits: n.
     halvings: Option<u32>,
-    /// What is made of `columns` and `missing_at` then.
+    /// What is made of `columns` and `missing_at` then. Behind the last whole pixel they hold what is of no use.
     halved: Vec<u16>,
     halved_missing: Vec<u8>,
     means: Vec<u8>,

@@ -57,11 +57,8 @@ impl<'a> Decoder<'a> {
     /// Fills `bits` as far as the stream goes.
     #[inline(always)]
     fn fill(&mut self) {
-        if let Some(word) = self.stream.get(self.at..).and_then(|rest| rest.first_chunk()) {
-            self.bits |= u64::from_le_bytes(*word) << self.count;
-            self.at += (63 - self.count) as usize / 8;
-            self.count |= 56;
-            return;
+        if self.at + 8 <= self.stream.len() {
+            return fill(self.stream, &mut self.at, &mut self.bits, &mut self.count);
         }
         while let (true, Some(byte)) = (self.count < 56, self.stream.get(self.at)) {
             self.bits |= u64::from(*byte) << self.count;
@@ -72,11 +69,11 @@ impl<'a> Decoder<'a> {
     fn take(&mut self, count: u32) -> Result<u64, Error> {
         self.fill();
         let bits = self.bits & !(u64::MAX << count);
-        self.drop(count)?;
+        self.consume(count)?;
         Ok(bits)
     }
 
-    fn drop(&mut self, count: u32) -> Result<(), Error> {
+    fn consume(&mut self, count: u32) -> Result<(), Error> {
         self.count = self.count.checked_sub(count).ok_or_else(ends_early)?;
         self.bits >>= count;
         Ok(())
@@ -105,11 +102,15 @@ impl<'a> Decoder<'a> {
     }
 
     /// The codes of a block (3.2.7).
-    pub(super) fn code_lengths(&mut self, litlen: &mut Litlen, distance: &mut Distance) -> Result<(), Error> {
-        let literals = self.take(5)? as usize + 257;
-        let distances = self.take(5)? as usize + 1;
+    pub(super) fn code_lengths(
+        &mut self,
+        litlen: &mut Litlen,
+        distances: &mut Distance,
+    ) -> Result<(), Error> {
+        let litlen_count = self.take(5)? as usize + 257;
+        let distance_count = self.take(5)? as usize + 1;
         let codes = self.take(4)? as usize + 4;
-        if literals > 286 || distances > 30 {
+        if litlen_count > 286 || distance_count > 30 {
             return Err(Error::damaged("more symbols than there are"));
         }
         let mut of_lengths = [0; 19];
@@ -119,12 +120,12 @@ impl<'a> Decoder<'a> {
         let mut table = Table::<LENGTHS_SIZE>::new(Alphabet::Lengths);
         table.build(&of_lengths)?;
         let mut lengths = [0; 286 + 30];
-        let all = literals + distances;
+        let all = litlen_count + distance_count;
         let mut next = 0;
         while next < all {
             self.fill();
             let entry = table.first(self.bits, LENGTHS_BITS);
-            self.drop(entry.bits())?;
+            self.consume(entry.bits())?;
             let [symbol, _] = entry.bytes();
             let (length, repeats) = match symbol {
                 16 => {
@@ -146,19 +147,19 @@ impl<'a> Decoder<'a> {
         if lengths[256] == 0 {
             return Err(Error::damaged("a block without an end"));
         }
-        litlen.build(&lengths[..literals])?;
-        distance.build(&lengths[literals..all])
+        litlen.build(&lengths[..litlen_count])?;
+        distances.build(&lengths[litlen_count..all])
     }
 
     /// The content of a block of these codes.
     #[inline(always)]
-    pub(super) fn compressed(&mut self, litlen: &Litlen, distance: &Distance) -> Result<(), Error> {
+    pub(super) fn compressed(&mut self, litlen: &Litlen, distances: &Distance) -> Result<(), Error> {
         loop {
             if self.at + INPUT <= self.stream.len() && self.to + OUTPUT <= self.out.len() {
-                if self.fast(litlen, distance)? {
+                if self.fast(litlen, distances)? {
                     return Ok(());
                 }
-            } else if self.one(litlen, distance)? {
+            } else if self.one(litlen, distances)? {
                 return Ok(());
             }
         }
@@ -166,7 +167,7 @@ impl<'a> Decoder<'a> {
 
     /// Decodes as long as the ends are far off. Whether the block ends.
     #[inline(always)]
-    fn fast(&mut self, litlen: &Litlen, distance: &Distance) -> Result<bool, Error> {
+    fn fast(&mut self, litlen: &Litlen, distances: &Distance) -> Result<bool, Error> {
         let stream = self.stream;
         let out = &mut *self.out;
         let (mut at, mut bits, mut count, mut to) = (self.at, self.bits, self.count, self.to);
@@ -220,29 +221,29 @@ impl<'a> Decoder<'a> {
             bits >>= entry.bits();
             count -= entry.bits();
             fill(stream, &mut at, &mut bits, &mut count);
-            let mut place = distance.first(bits, DISTANCE_BITS);
+            let mut place = distances.first(bits, DISTANCE_BITS);
             if place.is_special() {
                 if place.is_second_table() {
                     bits >>= place.bits();
                     count -= place.bits();
-                    place = distance.second(place, bits);
+                    place = distances.second(place, bits);
                 }
                 if place.is_special() {
                     ends = Err(Error::damaged(NO_CODE));
                     break;
                 }
             }
-            let back = place.value(bits);
+            let distance = place.value(bits);
             bits >>= place.bits();
             count -= place.bits();
-            if back > to {
+            if distance > to {
                 ends = Err(Error::damaged(TOO_FAR));
                 break;
             }
             // The next entry is on its way while bytes are copied.
             fill(stream, &mut at, &mut bits, &mut count);
             entry = litlen.first(bits, LITLEN_BITS);
-            copy(out, to, back, length);
+            copy(out, to, distance, length);
             to += length;
         }
         (self.at, self.bits, self.count, self.to) = (at, bits, count, to);
@@ -251,15 +252,10 @@ impl<'a> Decoder<'a> {
 
     /// Decodes one symbol, or two literals, be the ends as near as they may. Whether it is the end of the
     /// block.
-    fn one(&mut self, litlen: &Litlen, distance: &Distance) -> Result<bool, Error> {
-        self.fill();
-        let mut entry = litlen.first(self.bits, LITLEN_BITS);
-        if entry.is_second_table() {
-            self.drop(entry.bits())?;
-            entry = litlen.second(entry, self.bits);
-        }
+    fn one(&mut self, litlen: &Litlen, distances: &Distance) -> Result<bool, Error> {
+        let entry = self.entry(litlen, LITLEN_BITS)?;
         if entry.is_literal() {
-            self.drop(entry.bits())?;
+            self.consume(entry.bits())?;
             let literals = entry.literals();
             let Some(out) = self.out.get_mut(self.to..self.to + literals) else {
                 return Err(self.too_long());
@@ -269,36 +265,42 @@ impl<'a> Decoder<'a> {
             return Ok(false);
         }
         if entry.is_special() {
-            self.drop(entry.bits())?;
+            self.consume(entry.bits())?;
             return if entry.is_end() { Ok(true) } else { Err(Error::damaged(NO_CODE)) };
         }
         let length = self.value(entry)?;
-        self.fill();
-        let mut entry = distance.first(self.bits, DISTANCE_BITS);
-        if entry.is_second_table() {
-            self.drop(entry.bits())?;
-            entry = distance.second(entry, self.bits);
-        }
+        let entry = self.entry(distances, DISTANCE_BITS)?;
         if entry.is_special() {
             return Err(Error::damaged(NO_CODE));
         }
-        let back = self.value(entry)?;
-        if back > self.to {
+        let distance = self.value(entry)?;
+        if distance > self.to {
             return Err(Error::damaged(TOO_FAR));
         }
         if length > self.out.len() - self.to {
             return Err(self.too_long());
         }
         for place in self.to..self.to + length {
-            self.out[place] = self.out[place - back];
+            self.out[place] = self.out[place - distance];
         }
         self.to += length;
         Ok(false)
     }
 
+    /// What the next bits say, which are not consumed but for the index into a first table.
+    fn entry<const N: usize>(&mut self, table: &Table<N>, index_bits: u32) -> Result<Entry, Error> {
+        self.fill();
+        let entry = table.first(self.bits, index_bits);
+        if !entry.is_second_table() {
+            return Ok(entry);
+        }
+        self.consume(entry.bits())?;
+        Ok(table.second(entry, self.bits))
+    }
+
     fn value(&mut self, entry: Entry) -> Result<usize, Error> {
         let value = entry.value(self.bits);
-        self.drop(entry.bits())?;
+        self.consume(entry.bits())?;
         Ok(value)
     }
 
@@ -350,7 +352,7 @@ struct Repeat {
     /// The bits of the bytes that repeat.
     mask: u64,
     /// A factor that repeats them over a word.
-    times: u64,
+    factor: u64,
     /// Bits of a word after which the next one begins.
     shift: u32,
     /// Bytes of a pattern that are whole repetitions.
@@ -359,27 +361,27 @@ struct Repeat {
 
 /// By distance below 8.
 const REPEAT: [Repeat; 8] = {
-    let mut table = [Repeat { mask: 0, times: 0, shift: 0, step: PATTERN }; 8];
-    let mut back = 1;
-    while back < 8 {
+    let mut table = [Repeat { mask: 0, factor: 0, shift: 0, step: PATTERN }; 8];
+    let mut distance = 1;
+    while distance < 8 {
         let mut shift = 0;
         while shift < 64 {
-            table[back].times |= 1 << shift;
-            shift += 8 * back;
+            table[distance].factor |= 1 << shift;
+            shift += 8 * distance;
         }
-        table[back].mask = !(u64::MAX << (8 * back));
-        table[back].shift = 8 * (8 % back) as u32;
-        table[back].step = PATTERN - PATTERN % back;
-        back += 1;
+        table[distance].mask = !(u64::MAX << (8 * distance));
+        table[distance].shift = 8 * (8 % distance) as u32;
+        table[distance].step = PATTERN - PATTERN % distance;
+        distance += 1;
     }
     table
 };
 
-/// A match: `length` bytes that are those `back` before. Up to [`PATTERN`] bytes behind it are overwritten.
+/// A match: `length` bytes that are those `distance` before. Up to [`PATTERN`] bytes behind it are overwritten.
 #[inline(always)]
-fn copy(out: &mut [u8], to: usize, back: usize, length: usize) {
-    let from = to - back;
-    if back >= PATTERN {
+fn copy(out: &mut [u8], to: usize, distance: usize, length: usize) {
+    let from = to - distance;
+    if distance >= PATTERN {
         let mut done = 0;
         while done < length {
             let mut bytes = [0; PATTERN];
@@ -387,7 +389,7 @@ fn copy(out: &mut [u8], to: usize, back: usize, length: usize) {
             out[to + done..to + done + PATTERN].copy_from_slice(&bytes);
             done += PATTERN;
         }
-    } else if back >= 8 {
+    } else if distance >= 8 {
         let mut done = 0;
         while done < length {
             put(out, to + done, word(out, from + done));
@@ -395,12 +397,12 @@ fn copy(out: &mut [u8], to: usize, back: usize, length: usize) {
             done += 16;
         }
     } else {
-        let Repeat { mask, times, shift, step } = REPEAT[back];
+        let Repeat { mask, factor, shift, step } = REPEAT[distance];
         let mut pattern = [0; PATTERN];
-        let mut last = (word(out, from) & mask).wrapping_mul(times);
+        let mut last = (word(out, from) & mask).wrapping_mul(factor);
         for word in pattern.as_chunks_mut().0 {
             *word = last.to_le_bytes();
-            last = (last >> shift & mask).wrapping_mul(times);
+            last = (last >> shift & mask).wrapping_mul(factor);
         }
         let mut done = 0;
         while done < length {

@@ -20,8 +20,8 @@ use glam::DVec3;
 use s3d_geom::TriMesh;
 use std::f64::consts::TAU;
 
-/// Faces over a greater azimuth, in radians, may be around a pole, or across the place opposite to the window's
-/// middle: less than half a turn.
+/// Only faces over a greater azimuth, in radians, may hold a pole, or cross the azimuth opposite to the window's
+/// middle: their corners are half a turn apart at least.
 const WIDEST: f32 = 3.0;
 
 /// A panorama's window.
@@ -80,7 +80,7 @@ impl<'a> Panorama<'a> {
     fn draw_wide(&self, canvas: &mut Canvas, face: u32, turns: [f32; 3]) {
         let corners = self.mesh.triangle(face).map(|p| p.as_dvec3() - self.origin);
         let latitude = corners.map(|p| libm::atan2(p.z, p.truncate().length()));
-        let (low_latitude, high_latitude) =
+        let (south, north) =
             (latitude[0].min(latitude[1]).min(latitude[2]), latitude[0].max(latitude[1]).max(latitude[2]));
         let (grid, wide) = (&self.grid, high(turns) - low(turns));
         let (columns, bend) = if wide < WIDEST {
@@ -95,9 +95,9 @@ impl<'a> Panorama<'a> {
         // Arcs bend towards the poles. Along one, the latitude's tangent is a cosine of the azimuth, and the
         // nearer end is at most half of the width away from where that is greatest.
         let towards_pole = |latitude: f64| libm::atan2(libm::sin(latitude), libm::cos(latitude) * bend);
-        let high = if high_latitude > 0.0 { towards_pole(high_latitude) } else { high_latitude };
-        let low = if low_latitude < 0.0 { towards_pole(low_latitude) } else { low_latitude };
-        let rows = grid.rows_between(low as f32 - ANGLE_ERROR, high as f32 + ANGLE_ERROR);
+        let north = if north > 0.0 { towards_pole(north) } else { north };
+        let south = if south < 0.0 { towards_pole(south) } else { south };
+        let rows = grid.rows_between(south as f32 - ANGLE_ERROR, north as f32 + ANGLE_ERROR);
         let (top, bottom) = ((rows.0 - 1.0).max(0.0), (rows.1 + 1.0).min(grid.height as f32 - 1.0));
         let (left, right) = (columns.0.max(0.0), columns.1.min(grid.width as f32 - 1.0));
         if top <= bottom && left <= right {
