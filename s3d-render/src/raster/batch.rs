@@ -10,9 +10,9 @@
 )]
 
 use crate::raster::chunk::{Chunk, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TRUSTED};
-use crate::raster::clusters::MAX_FACES;
 use crate::raster::pinhole::{PinholeBounds, PinholeCorners, PinholePlanes};
 use crate::raster::{high, low, max, min};
+use crate::scene::clusters::MAX_FACES;
 use crate::simd::raster_lanes::LANES;
 
 /// An edge that is shorter, in pixels, has no direction to speak of: see the module `pinhole`.

@@ -4,7 +4,6 @@
 pub(crate) mod batch;
 pub(crate) mod canvas;
 pub(crate) mod chunk;
-pub(crate) mod clusters;
 pub(crate) mod panorama;
 pub(crate) mod panorama_batch;
 pub(crate) mod panorama_grid;

@@ -8,12 +8,13 @@
 use crate::raster::batch::DrawKind;
 use crate::raster::canvas::{Canvas, Cover, TILE, half_of_tile, part_of_tile};
 use crate::raster::chunk::{Linear, MAX_ROWS, TRUSTED};
-use crate::raster::clusters::{Cluster, Node, PACKET};
 use crate::raster::panorama_batch::{PanoramaBatch, PanoramaCorners};
 use crate::raster::panorama_grid::{ANGLE_ERROR, PanoramaBounds, PanoramaGrid, PanoramaPlanes, turn_of};
 use crate::raster::window::{Pixels, ProjectionRaster, Window};
 use crate::raster::{high, low, max, min};
 use crate::ray::cone::{Cone, Plane};
+use crate::scene::clusters::{Cluster, PACKET};
+use crate::scene::tree::Node;
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
 use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;

@@ -3,11 +3,11 @@
 
 use crate::raster::batch::{DrawKind, FacesByKind, GROUP, Values, group, put};
 use crate::raster::chunk::{Chunk, Linear, MAX_ROWS, TRUSTED};
-use crate::raster::clusters::{MAX_CORNERS, MAX_FACES};
 use crate::raster::panorama_grid::{
     ANGLE_ERROR, Anchor, PanoramaBounds, PanoramaGrid, PanoramaPlanes, Reach,
 };
 use crate::raster::{high, low, max, min};
+use crate::scene::clusters::{MAX_CORNERS, MAX_FACES};
 use crate::simd::raster_lanes::LANES;
 use glam::{DVec3, dvec3};
 

@@ -12,9 +12,10 @@
 use crate::raster::batch::{DrawKind, FaceBatch};
 use crate::raster::canvas::{Canvas, Cover, TILE, half_of_tile, part_of_tile};
 use crate::raster::chunk::{Chunk, ChunkGrid, EDGE_ERROR, INVERSE_T_ROUNDING, Linear, MAX_ROWS, TRUSTED};
-use crate::raster::clusters::{Cluster, MAX_CORNERS, Node, PACKET};
 use crate::raster::window::{Pixels, ProjectionRaster, Window, groups};
 use crate::ray::cone::Cone;
+use crate::scene::clusters::{Cluster, MAX_CORNERS, PACKET};
+use crate::scene::tree::Node;
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
 use crate::simd::{Kernel, Simd, dispatch};
 use glam::{DVec2, DVec3, dvec2};

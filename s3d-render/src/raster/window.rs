@@ -1,10 +1,11 @@
 //! The visibility pass over a window of an image, whatever the projection.
 
 use crate::raster::canvas::{Canvas, Cover};
-use crate::raster::clusters::{Cluster, Clusters, Content, Node};
 use crate::ray::caster::Nearest;
 use crate::ray::cone::Cone;
 use crate::scene::Scene;
+use crate::scene::clusters::{Cluster, Clusters};
+use crate::scene::tree::{Content, Node};
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
 use crate::simd::{Kernel, Simd};
 use glam::DVec3;
@@ -172,7 +173,7 @@ fn draw_all<L: RasterLanes, T: ProjectionRaster>(
                     queue.extend(raster.cover(&nodes[node as usize]).map(|cover| QueuedNode { node, cover }));
                 }
             }
-            Content::Cluster(index) => {
+            Content::Leaf { first: index, .. } => {
                 raster.draw(l, canvas, &clusters.cluster(index));
                 canvas.touch(&cover);
             }

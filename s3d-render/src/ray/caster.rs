@@ -2,6 +2,7 @@
 
 use crate::ray::cone::Cone;
 use crate::scene::Scene;
+use crate::scene::tree::Content;
 use glam::DVec3;
 use s3d_geom::TriMesh;
 
@@ -147,7 +148,7 @@ impl<'s, 'm> RayCaster<'s, 'm> {
         if !is_ray(self.origin, direction) {
             return None;
         }
-        let (mesh, bvh) = (self.scene.mesh(), self.scene.bvh());
+        let (mesh, tree) = (self.scene.mesh(), self.scene.tree());
         let inverse = inverse(direction);
         self.nearest.t_min = None;
         self.nearest.candidates.clear();
@@ -157,15 +158,15 @@ impl<'s, 'm> RayCaster<'s, 'm> {
             if self.nearest.t_min.is_some_and(|t| t_enter > t * (1.0 + SLACK)) {
                 continue;
             }
-            let node = &bvh.nodes[node as usize];
-            let first = node.first_index;
-            if node.is_leaf() {
-                for slot in first..first + node.prim_count {
-                    let face = bvh.primitive_indices[slot as usize];
-                    self.nearest.meet(mesh, face, self.origin, direction);
+            let first = match tree.nodes[node as usize].content {
+                Content::Children(first) => first,
+                Content::Leaf { first, count } => {
+                    for &face in &tree.faces[first as usize..first as usize + count as usize] {
+                        self.nearest.meet(mesh, face, self.origin, direction);
+                    }
+                    continue;
                 }
-                continue;
-            }
+            };
             match (self.enter(first, inverse), self.enter(first + 1, inverse)) {
                 (Some(left), Some(right)) if left <= right => {
                     self.stack.push((right, first + 1));
@@ -186,20 +187,21 @@ impl<'s, 'm> RayCaster<'s, 'm> {
         if !is_ray(self.origin, direction) || end.is_nan() || end <= 0.0 {
             return None;
         }
-        let bvh = self.scene.bvh();
+        let tree = self.scene.tree();
         let inverse = inverse(direction);
         self.stack.clear();
         self.stack.extend(self.enter(0, inverse).map(|t| (t, 0)));
         while let Some((_, node)) = self.stack.pop() {
-            let node = &bvh.nodes[node as usize];
-            let first = node.first_index;
-            if node.is_leaf() {
-                let faces = &bvh.primitive_indices[first as usize..(first + node.prim_count) as usize];
-                if let Some(&face) = faces.iter().find(|&&face| self.is_hit(face, direction, end)) {
-                    return Some(face);
+            let first = match tree.nodes[node as usize].content {
+                Content::Children(first) => first,
+                Content::Leaf { first, count } => {
+                    let faces = &tree.faces[first as usize..first as usize + count as usize];
+                    if let Some(&face) = faces.iter().find(|&&face| self.is_hit(face, direction, end)) {
+                        return Some(face);
+                    }
+                    continue;
                 }
-                continue;
-            }
+            };
             let [left, right] = [first, first + 1].map(|node| {
                 self.enter(node, inverse).filter(|t| *t <= end * (1.0 + SLACK)).map(|t| (t, node))
             });
@@ -218,9 +220,9 @@ impl<'s, 'm> RayCaster<'s, 'm> {
 
     /// Where the ray enters the box of a node, at 0 if it starts inside.
     fn enter(&self, node: u32, inverse: DVec3) -> Option<f64> {
-        let aabb = self.scene.bvh().nodes[node as usize].aabb();
-        let a = (aabb.min.as_dvec3() - self.origin - self.padding) * inverse;
-        let b = (aabb.max.as_dvec3() - self.origin + self.padding) * inverse;
+        let node = &self.scene.tree().nodes[node as usize];
+        let a = (node.min().as_dvec3() - self.origin - self.padding) * inverse;
+        let b = (node.max().as_dvec3() - self.origin + self.padding) * inverse;
         let (enter, leave) = (a.min(b).max_element().max(0.0), a.max(b).min_element());
         // The slabs themselves are rounded to a few parts in 1e16.
         (enter <= leave * (1.0 + 1e-14)).then_some(enter * (1.0 - 1e-14))

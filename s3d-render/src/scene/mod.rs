@@ -1,10 +1,14 @@
 //! A mesh and the tree over its faces.
 
-use crate::raster::clusters::Clusters;
+mod blocks;
+pub(crate) mod clusters;
+pub(crate) mod tree;
+
+use clusters::Clusters;
 use glam::DVec3;
-use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
+use rayon::prelude::*;
 use s3d_geom::TriMesh;
-use std::time::Duration;
+use tree::{FaceTree, Top};
 
 /// A mesh with a bounding volume hierarchy over its faces: built once, shared by any number of threads that
 /// render it.
@@ -23,34 +27,30 @@ use std::time::Duration;
 /// ```
 pub struct Scene<'m> {
     mesh: &'m TriMesh,
-    /// Boxes are exact unions of `f32` corners; every test against them allows for its own rounding.
-    bvh: Bvh2,
+    tree: FaceTree,
     clusters: Clusters,
     /// The largest absolute coordinate of a corner.
     extent: f64,
 }
 
-struct FaceBox(Aabb);
-
-impl Boundable for FaceBox {
-    fn aabb(&self) -> Aabb {
-        self.0
-    }
-}
-
 impl<'m> Scene<'m> {
-    /// Builds the tree over the faces of `mesh`.
+    /// Builds the tree over the faces of `mesh`: that of each block of faces by itself, by the threads that
+    /// rayon has, and one above them. What is seen does not depend on it.
     pub fn new(mesh: &'m TriMesh) -> Self {
-        let boxes: Vec<FaceBox> = (0..mesh.faces().len() as u32)
-            .map(|face| FaceBox(Aabb::from_points(&mesh.triangle(face).map(Into::into))))
+        let blocks: Vec<(FaceTree, Clusters)> = blocks::blocks(mesh)
+            .into_par_iter()
+            .map(|faces| {
+                let tree = FaceTree::new(mesh, &faces);
+                let clusters = Clusters::new(mesh, &tree);
+                (tree, clusters)
+            })
             .collect();
-        // Small leaves: a face costs more than a box here.
-        let params = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::fast_build() };
-        let bvh = build_bvh2(&boxes, params, &mut Duration::default());
+        let top = Top::new(blocks.iter().map(|(tree, _)| tree.nodes[0]));
+        let (trees, clusters): (Vec<_>, Vec<_>) = blocks.into_iter().unzip();
+        let (tree, clusters) = rayon::join(|| FaceTree::join(&top, trees), || Clusters::join(&top, clusters));
         let b = mesh.aabb();
         let extent = f64::from(b.min.abs().max(b.max.abs()).max_element());
-        let clusters = Clusters::new(mesh, &bvh);
-        Self { mesh, bvh, clusters, extent }
+        Self { mesh, tree, clusters, extent }
     }
 
     /// The mesh.
@@ -58,8 +58,8 @@ impl<'m> Scene<'m> {
         self.mesh
     }
 
-    pub(crate) fn bvh(&self) -> &Bvh2 {
-        &self.bvh
+    pub(crate) fn tree(&self) -> &FaceTree {
+        &self.tree
     }
 
     pub(crate) fn clusters(&self) -> &Clusters {
@@ -76,7 +76,7 @@ impl std::fmt::Debug for Scene<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Scene")
             .field("faces", &self.mesh.faces().len())
-            .field("nodes", &self.bvh.nodes.len())
+            .field("nodes", &self.tree.nodes.len())
             .finish_non_exhaustive()
     }
 }
@@ -91,7 +91,7 @@ mod tests {
         let mesh = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
         let scene = Scene::new(&mesh);
         std::thread::scope(|s| {
-            s.spawn(|| assert_eq!(scene.bvh().primitive_indices, [0]));
+            s.spawn(|| assert_eq!(scene.tree().faces, [0]));
         });
         assert_eq!(scene.magnitude(DVec3::new(0.0, -3.0, 1.0)), 4.0);
     }

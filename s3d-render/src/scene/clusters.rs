@@ -3,7 +3,7 @@
 //! The visibility pass prepares a group at a time: its corners are projected once however many of its faces
 //! meet in them, and its box says at once whether any of it can be seen.
 
-use obvhs::bvh2::Bvh2;
+use crate::scene::tree::{Content, FaceTree, Node, Top};
 use s3d_geom::TriMesh;
 
 /// No group has more faces; so a corner's place in its group fits a byte.
@@ -15,21 +15,6 @@ pub(crate) const PACKET: usize = 8;
 /// No group has more corners, padding included.
 pub(crate) const MAX_CORNERS: usize = 3 * MAX_FACES;
 
-/// A node of the tree: a box, and what is in it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Node {
-    pub(crate) min: [f32; 3],
-    pub(crate) max: [f32; 3],
-    pub(crate) content: Content,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Content {
-    /// The first of two nodes that follow each other.
-    Children(u32),
-    Cluster(u32),
-}
-
 /// Where a group's faces and corners are in the lists of all groups.
 #[derive(Clone, Copy, Debug)]
 struct ClusterStart {
@@ -40,7 +25,7 @@ struct ClusterStart {
 /// All groups of a mesh.
 #[derive(Debug)]
 pub(crate) struct Clusters {
-    /// The root is the first.
+    /// The root is the first; the entry of a leaf is a group.
     nodes: Vec<Node>,
     /// One more than there are groups: each ends where the next begins.
     starts: Vec<ClusterStart>,
@@ -62,36 +47,55 @@ pub(crate) struct Cluster<'a> {
 
 impl Clusters {
     /// Cuts the tree where a branch has few enough faces.
-    pub(crate) fn new(mesh: &TriMesh, bvh: &Bvh2) -> Self {
-        let counts = face_counts(bvh);
-        let n = mesh.faces().len();
+    pub(crate) fn new(mesh: &TriMesh, tree: &FaceTree) -> Self {
+        let counts = face_counts(&tree.nodes);
+        let n = tree.faces.len();
         let mut clusters = Self {
-            nodes: Vec::new(),
+            nodes: vec![tree.nodes[0]],
             starts: Vec::new(),
             corners: Vec::new(),
             faces: Vec::with_capacity(n),
             ids: Vec::with_capacity(n),
         };
         let mut gather = Gather::new(mesh);
-        let node = |index: u32| {
-            let aabb = bvh.nodes[index as usize].aabb();
-            Node { min: aabb.min.to_array(), max: aabb.max.to_array(), content: Content::Cluster(0) }
-        };
-        clusters.nodes.push(node(0));
         let mut stack = vec![(0, 0)];
         while let Some((from, to)) = stack.pop() {
-            let branch = &bvh.nodes[from as usize];
-            clusters.nodes[to].content = if counts[from as usize] <= MAX_FACES as u32 || branch.is_leaf() {
-                Content::Cluster(clusters.add(bvh, from, &mut gather))
-            } else {
-                let first = clusters.nodes.len();
-                clusters.nodes.extend([node(branch.first_index), node(branch.first_index + 1)]);
-                stack.extend([(branch.first_index + 1, first + 1), (branch.first_index, first)]);
-                Content::Children(first as u32)
+            clusters.nodes[to].content = match tree.nodes[from as usize].content {
+                Content::Children(first) if counts[from as usize] > MAX_FACES as u32 => {
+                    let child = clusters.nodes.len();
+                    clusters.nodes.extend_from_slice(&tree.nodes[first as usize..first as usize + 2]);
+                    stack.extend([(first + 1, child + 1), (first, child)]);
+                    Content::Children(child as u32)
+                }
+                _ => Content::Leaf { first: clusters.add(tree, from, &mut gather), count: 1 },
             };
         }
         clusters.end();
         clusters
+    }
+
+    /// Those of several blocks as one.
+    pub(crate) fn join(top: &Top, parts: Vec<Self>) -> Self {
+        let nodes: Vec<_> = parts.iter().map(|part| (&part.nodes[..], part.starts.len() - 1)).collect();
+        let mut joined = Self {
+            nodes: top.join(&nodes),
+            starts: Vec::with_capacity(parts.iter().map(|part| part.starts.len()).sum()),
+            corners: Vec::with_capacity(parts.iter().map(|part| part.corners.len()).sum()),
+            faces: Vec::with_capacity(parts.iter().map(|part| part.faces.len()).sum()),
+            ids: Vec::with_capacity(parts.iter().map(|part| part.ids.len()).sum()),
+        };
+        for part in &parts {
+            let (faces, packets) = (joined.faces.len() as u32, joined.corners.len() as u32);
+            joined.starts.extend(part.starts[..part.starts.len() - 1].iter().map(|start| ClusterStart {
+                first_face: start.first_face + faces,
+                first_packet: start.first_packet + packets,
+            }));
+            joined.corners.extend_from_slice(&part.corners);
+            joined.faces.extend_from_slice(&part.faces);
+            joined.ids.extend_from_slice(&part.ids);
+        }
+        joined.end();
+        joined
     }
 
     fn end(&mut self) {
@@ -102,26 +106,23 @@ impl Clusters {
     }
 
     /// Adds the faces below a node of the tree as a group.
-    fn add(&mut self, bvh: &Bvh2, branch: u32, gather: &mut Gather<'_>) -> u32 {
+    fn add(&mut self, tree: &FaceTree, branch: u32, gather: &mut Gather<'_>) -> u32 {
         self.end();
-        let index = self.starts.len() as u32 - 1;
-        gather.begin(index);
+        gather.begin();
         let mut stack = vec![branch];
         while let Some(index) = stack.pop() {
-            let node = &bvh.nodes[index as usize];
-            let first = node.first_index;
-            if !node.is_leaf() {
-                stack.extend([first + 1, first]);
-                continue;
-            }
-            for place in first..first + node.prim_count {
-                let face = bvh.primitive_indices[place as usize];
-                self.ids.push(face);
-                self.faces.push(gather.face(face));
+            match tree.nodes[index as usize].content {
+                Content::Children(first) => stack.extend([first + 1, first]),
+                Content::Leaf { first, count } => {
+                    for &face in &tree.faces[first as usize..first as usize + count as usize] {
+                        self.ids.push(face);
+                        self.faces.push(gather.face(face));
+                    }
+                }
             }
         }
         gather.finish(&mut self.corners);
-        index
+        self.starts.len() as u32 - 1
     }
 
     pub(crate) fn nodes(&self) -> &[Node] {
@@ -141,22 +142,22 @@ impl Clusters {
 }
 
 /// The number of faces below each node.
-fn face_counts(bvh: &Bvh2) -> Vec<u32> {
+fn face_counts(nodes: &[Node]) -> Vec<u32> {
+    // Each node after the one above it.
     let mut order = vec![0u32];
     let mut next = 0;
     while let Some(&index) = order.get(next) {
-        let node = &bvh.nodes[index as usize];
-        if !node.is_leaf() {
-            order.extend([node.first_index, node.first_index + 1]);
+        if let Content::Children(first) = nodes[index as usize].content {
+            order.extend([first, first + 1]);
         }
         next += 1;
     }
-    let mut counts = vec![0; bvh.nodes.len()];
+    let mut counts = vec![0; nodes.len()];
     for &index in order.iter().rev() {
-        let node = &bvh.nodes[index as usize];
-        let first = node.first_index as usize;
-        counts[index as usize] =
-            if node.is_leaf() { node.prim_count } else { counts[first] + counts[first + 1] };
+        counts[index as usize] = match nodes[index as usize].content {
+            Content::Children(first) => counts[first as usize] + counts[first as usize + 1],
+            Content::Leaf { count, .. } => count.into(),
+        };
     }
     counts
 }
@@ -164,33 +165,53 @@ fn face_counts(bvh: &Bvh2) -> Vec<u32> {
 /// Collects the corners of one group after another.
 struct Gather<'m> {
     mesh: &'m TriMesh,
-    /// By vertex of the mesh: the last group that has it, and its place there.
-    known: Vec<(u32, u8)>,
+    /// The corners of the group by a hash of their vertex; the next free slot where that is taken.
+    slots: [Slot; 1 << SLOT_BITS],
     group: u32,
     positions: Vec<[f32; 3]>,
 }
 
+/// Enough for twice as many corners as a group has.
+const SLOT_BITS: u32 = 9;
+
+#[derive(Clone, Copy)]
+struct Slot {
+    /// Groups count from 1; of another group than the present one, a slot is free.
+    group: u32,
+    vertex: u32,
+    place: u8,
+}
+
 impl<'m> Gather<'m> {
     fn new(mesh: &'m TriMesh) -> Self {
-        let known = vec![(u32::MAX, 0); mesh.positions().len()];
-        Self { mesh, known, group: 0, positions: Vec::new() }
+        let free = Slot { group: 0, vertex: 0, place: 0 };
+        Self { mesh, slots: [free; 1 << SLOT_BITS], group: 0, positions: Vec::new() }
     }
 
-    fn begin(&mut self, group: u32) {
-        self.group = group;
+    fn begin(&mut self) {
+        self.group += 1;
         self.positions.clear();
     }
 
     fn face(&mut self, face: u32) -> [u8; 4] {
-        let [a, b, c] = self.mesh.faces()[face as usize].map(|vertex| {
-            let known = &mut self.known[vertex as usize];
-            if known.0 != self.group {
-                *known = (self.group, self.positions.len() as u8);
-                self.positions.push(self.mesh.positions()[vertex as usize].to_array());
-            }
-            known.1
-        });
+        let [a, b, c] = self.mesh.faces()[face as usize].map(|vertex| self.place(vertex));
         [a, b, c, 0]
+    }
+
+    /// The place of a vertex among the group's corners.
+    fn place(&mut self, vertex: u32) -> u8 {
+        // Fibonacci hashing: 2^32 by the golden ratio.
+        let mut k = (vertex.wrapping_mul(0x9E37_79B9) >> (32 - SLOT_BITS)) as usize;
+        while self.slots[k].group == self.group {
+            if self.slots[k].vertex == vertex {
+                return self.slots[k].place;
+            }
+            k = (k + 1) % self.slots.len();
+        }
+        let place = self.positions.len() as u8;
+        self.slots[k] = Slot { group: self.group, vertex, place };
+        self.positions.push(self.mesh.positions()[vertex as usize].to_array());
+        place
     }
 
     fn finish(&mut self, packets: &mut Vec<[[f32; PACKET]; 3]>) {
@@ -208,13 +229,14 @@ mod tests {
 
     #[test]
     fn every_face_is_in_one_group_inside_its_box() {
-        let mesh = s3d_synth::scenes::scan_like(5000, 3);
+        // In several blocks.
+        let mesh = s3d_synth::scenes::scan_like(40_000, 3);
         let scene = Scene::new(&mesh);
         let clusters = scene.clusters();
         let mut met = vec![false; mesh.faces().len()];
         let mut groups = 0;
         for node in clusters.nodes() {
-            let Content::Cluster(index) = node.content else { continue };
+            let Content::Leaf { first: index, .. } = node.content else { continue };
             groups += 1;
             let cluster = clusters.cluster(index);
             assert!(cluster.faces.len() <= MAX_FACES && cluster.faces.len() == cluster.ids.len());
@@ -229,6 +251,6 @@ mod tests {
             }
         }
         assert!(met.iter().all(|&m| m));
-        assert!(groups < 5000 / 20, "groups of {} faces", 5000 / groups);
+        assert!(groups < 40_000 / 20, "groups of {} faces", 40_000 / groups);
     }
 }
