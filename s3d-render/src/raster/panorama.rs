@@ -164,29 +164,34 @@ impl PanoramaTiles<'_> {
         let Self { grid, canvas, planes, bounds, slot, poor } = self;
         let mut tangents = [0.0; MAX_ROWS];
         for tile_row in bounds.top / TILE..=bounds.bottom / TILE {
-            let (row, rows) = part_of_tile(tile_row, bounds.top, bounds.bottom);
-            let (reach, lines) = (grid.reach(row, rows), grid.chunk_grid(row, rows, &mut tangents));
-            for tile_column in bounds.left / TILE..=bounds.right / TILE {
-                let (column, narrow) = half_of_tile(tile_column, bounds.left, bounds.right);
-                let mut chunk = grid.chunk(planes, (column, row), &reach, slot);
-                if chunk.edges.iter().any(|e| reach.range(e).1 < -2.0 * chunk.edge_error - 1e-6) {
-                    continue;
+            let (first, count) = part_of_tile(tile_row, bounds.top, bounds.bottom);
+            let mut row = first;
+            while row < first + count {
+                let rows = grid.steady_rows(row, first + count - row);
+                let (reach, lines) = (grid.reach(row, rows), grid.chunk_grid(row, rows, &mut tangents));
+                for tile_column in bounds.left / TILE..=bounds.right / TILE {
+                    let (column, narrow) = half_of_tile(tile_column, bounds.left, bounds.right);
+                    let mut chunk = grid.chunk(planes, (column, row), &reach, slot);
+                    if chunk.edges.iter().any(|e| reach.range(e).1 < -2.0 * chunk.edge_error - 1e-6) {
+                        continue;
+                    }
+                    if poor {
+                        chunk.inverse_t = Linear { at: f32::MAX, ..Linear::default() };
+                        (chunk.inverse_t_error, chunk.trusted) = (f32::INFINITY, f32::INFINITY);
+                        canvas.draw::<L, true, true>(l, &lines, &chunk);
+                        continue;
+                    }
+                    let high = reach.range(&chunk.inverse_t).1;
+                    let (low, error) = reach.trust(&chunk.inverse_t);
+                    if high + error <= 0.0 || canvas.tile_hides(tile_column, tile_row, high + error) {
+                        continue;
+                    }
+                    canvas.touch_tile(tile_column, tile_row);
+                    let trusted = error < TRUSTED * low;
+                    (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
+                    canvas.draw_part::<L, true>(l, &lines, &chunk, narrow, trusted);
                 }
-                if poor {
-                    chunk.inverse_t = Linear { at: f32::MAX, ..Linear::default() };
-                    (chunk.inverse_t_error, chunk.trusted) = (f32::INFINITY, f32::INFINITY);
-                    canvas.draw::<L, true, true>(l, &lines, &chunk);
-                    continue;
-                }
-                let high = reach.range(&chunk.inverse_t).1;
-                let (low, error) = reach.trust(&chunk.inverse_t);
-                if high + error <= 0.0 || canvas.tile_hides(tile_column, tile_row, high + error) {
-                    continue;
-                }
-                canvas.touch_tile(tile_column, tile_row);
-                let trusted = error < TRUSTED * low;
-                (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
-                canvas.draw_part::<L, true>(l, &lines, &chunk, narrow, trusted);
+                row += rows;
             }
         }
     }

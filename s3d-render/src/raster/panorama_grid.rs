@@ -27,6 +27,9 @@ pub(crate) const ANGLE_ERROR: f32 = 3e-5;
 /// Rounding in a chunk, as a part of the sizes of an edge function's terms.
 const EDGE_ROUNDING: f64 = 1e-6;
 
+/// Up to this tangent of the latitude rows are steady: they are more than 7° away from the poles.
+const STEEP_TAN: f64 = 8.0;
+
 /// Columns and rows of a window, by angle.
 pub(crate) struct PanoramaGrid {
     pub(crate) width: usize,
@@ -139,6 +142,22 @@ impl PanoramaGrid {
         Anchor { cos, sin, tan: self.tan[row] }
     }
 
+    /// How many rows, from a row on and `most` at most, make a chunk on which 1/t can be trusted. Next to a
+    /// pole tan φ doubles from row to row, and its rounding in one row is too much for the next.
+    #[inline(always)]
+    pub(crate) fn steady_rows(&self, row: usize, most: usize) -> usize {
+        let tan = |row: usize| self.tan[row].abs();
+        let first = tan(row);
+        if max(first, tan(row + most - 1)) <= STEEP_TAN {
+            return most;
+        }
+        let steady = |&rows: &usize| {
+            let last = tan(row + rows);
+            max(first, last) <= 3.0 * min(first, last)
+        };
+        1 + (1..most).take_while(steady).count()
+    }
+
     /// The reach of a chunk of some rows, from a row on.
     #[inline(always)]
     pub(crate) fn reach(&self, row: usize, rows: usize) -> Reach {
@@ -248,4 +267,30 @@ pub(crate) fn turn_of(y: f32, x: f32) -> f32 {
     let angle = if wide < high { std::f32::consts::FRAC_PI_2 - angle } else { angle };
     let angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
     if y < 0.0 { -angle } else { angle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::{Camera, Pose};
+
+    #[test]
+    fn rows_are_drawn_together_but_next_to_a_pole() {
+        let camera = Camera::equirectangular(Pose::level(DVec3::ZERO, 0.0), 1024);
+        let rays = &camera.rays();
+        let window = Window { camera: &camera, rays, stride: 1, column: 0, row: 0, width: 1024, height: 512 };
+        let grid = PanoramaGrid::new(&window);
+        let grid = &grid;
+        let chunks = |mut row: usize, end: usize| {
+            std::iter::from_fn(move || {
+                let rows = (row < end).then(|| grid.steady_rows(row, end - row))?;
+                row += rows;
+                Some(rows)
+            })
+        };
+        // Tangents fall as 1, 1/3, 1/5, …, and a little faster; they rise again at the other pole.
+        assert_eq!(Vec::from_iter(chunks(0, 16)), [1, 3, 9, 3]);
+        assert_eq!(Vec::from_iter(chunks(496, 512)), [11, 3, 1, 1]);
+        assert_eq!(Vec::from_iter(chunks(248, 264)), [16]);
+    }
 }
