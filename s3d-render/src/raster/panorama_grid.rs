@@ -143,7 +143,7 @@ impl PanoramaGrid {
     }
 
     /// How many rows, from a row on and `most` at most, make a chunk on which 1/t can be trusted. Next to a
-    /// pole tan φ doubles from row to row, and its rounding in one row is too much for the next.
+    /// pole tan φ changes by up to three times from row to row: its rounding in one is too much for a later.
     #[inline(always)]
     pub(crate) fn steady_rows(&self, row: usize, most: usize) -> usize {
         let tan = |row: usize| self.tan[row].abs();
