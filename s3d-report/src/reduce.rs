@@ -11,9 +11,9 @@ pub(crate) fn reduced_size([w, h]: [u32; 2], width: u32) -> [u32; 2] {
     [width, u32::try_from(height).unwrap_or(u32::MAX).max(1)]
 }
 
-/// The size at which the page shows an image: about `width` pixels across. If every second, third or n-th pixel
-/// makes at most an eighth more or less than that, it is those: their faces can be cast alone, and means are of
-/// whole pixels.
+/// The size at which the page shows an image: about `width` pixels across. If every second, third or n-th
+/// pixel makes at most an eighth more or less than that, it is those: their faces can be cast alone, and
+/// means are of whole pixels.
 pub(crate) fn shown_size(size: [u32; 2], width: u32) -> [u32; 2] {
     let width = width.max(1);
     let stride = ((size[0] + width / 2) / width).max(1);
@@ -87,8 +87,8 @@ pub(crate) struct Mean {
     lines: u32,
     /// Sums of all lines, by channel of a column.
     columns: Vec<u16>,
-    /// By byte of a line, in how many of them the bytes of a missing pixel begin there, be it across pixels; and
-    /// whether there is one.
+    /// By byte of a line, in how many of them the bytes of a missing pixel begin there, be it across pixels;
+    /// and whether there is one.
     missing_at: Vec<u8>,
     some_missing: bool,
     /// Sums of the pixels that come next, and of how many.
@@ -96,7 +96,8 @@ pub(crate) struct Mean {
     divisor: Divisor,
     /// Where a pixel is the mean of 2ⁿ × 2ⁿ, and their sum fits into 16 bits: n.
     halvings: Option<u32>,
-    /// What is made of `columns` and `missing_at` then. Behind the last whole pixel they hold what is of no use.
+    /// What is made of `columns` and `missing_at` then. Behind the last whole pixel they hold what is of no
+    /// use.
     halved: Vec<u16>,
     halved_missing: Vec<u8>,
     means: Vec<u8>,

@@ -1,7 +1,8 @@
 //! Where a camera stands and how it is turned, in the convention of the published data set.
 //!
 //! Camera axes here are Blender's: x right, y up, looking along −z. Angles are Blender's XYZ Euler angles,
-//! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "What is written" (settled on genuine pose files).
+//! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "What is written" (settled on genuine pose
+//! files).
 
 use crate::CameraError;
 use glam::{DMat3, DQuat, DVec3, dvec3};
@@ -14,8 +15,8 @@ pub fn rotation_from_euler(angles_rad: DVec3) -> DMat3 {
         * DMat3::from_rotation_x(angles_rad.x)
 }
 
-/// Three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in [−π/2, π/2].
-/// Where the two outer axes coincide (y = ±π/2) z is 0.
+/// Three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in
+/// [−π/2, π/2]. Where the two outer axes coincide (y = ±π/2) z is 0.
 pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
     let m = |row: usize, col: usize| rotation.col(col)[row];
     let cos_y = libm::hypot(m(0, 0), m(1, 0));
@@ -52,8 +53,8 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°), so that the
-    /// identity looks along +Y with +Z up.
+    /// The pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°), so that
+    /// the identity looks along +Y with +Z up.
     pub fn from_scanner(location: DVec3, world_from_scanner: DQuat) -> Self {
         let turn = DMat3::from_quat(world_from_scanner.normalize());
         Self { location, world_from_camera: turn * DMat3::from_rotation_x(FRAC_PI_2) }
@@ -89,8 +90,8 @@ impl Pose {
     }
 
     /// The pose of an OpenGL camera (x right, y up, z backwards; Blender's and nerfstudio's too), from camera
-    /// → world, 4 × 4, row by row. Axes that are off by less than a thousandth, as rounded files have them,
-    /// are made perpendicular; the viewing direction is kept.
+    /// → world, 4 × 4, row by row. Axes that are off by less than a thousandth, as rounded files have
+    /// them, are made perpendicular; the viewing direction is kept.
     ///
     /// # Errors
     /// [`CameraError::NotFinite`]; [`CameraError::Transposed`], [`CameraError::LastRow`],
@@ -173,7 +174,8 @@ impl Pose {
     /// roll can.
     pub fn yaw_pitch_to(&self, view: &Pose) -> (f64, f64) {
         let turn = self.world_from_camera.transpose() * view.world_from_camera;
-        // Ry(yaw)·Rx(pitch) has the columns (cos y, 0, −sin y), … and the middle row (0, cos p, −sin p).
+        // Ry(yaw)·Rx(pitch) has the columns (cos y, 0, −sin y), …; its middle row is
+        // (0, cos p, −sin p).
         (libm::atan2(-turn.x_axis.z, turn.x_axis.x), libm::atan2(-turn.z_axis.y, turn.y_axis.y))
     }
 
@@ -198,13 +200,14 @@ impl Pose {
         -self.world_from_camera.z_axis
     }
 
-    /// World → camera in OpenCV's axes (x right, y down, z forward), without the translation: D·E(final)ᵀ.
+    /// World → camera in OpenCV's axes (x right, y down, z forward), without the translation:
+    /// D·E(final)ᵀ.
     pub fn opencv_from_world(&self) -> DMat3 {
         DMat3::from_cols(self.right(), -self.up(), self.forward()).transpose()
     }
 
-    /// `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C], world → camera, 3 ×
-    /// 4.
+    /// `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C], world →
+    /// camera, 3 × 4.
     pub fn rt_matrix(&self) -> [[f64; 4]; 3] {
         let r = self.opencv_from_world();
         let t = -(r * self.location);

@@ -21,8 +21,8 @@ use glam::DVec3;
 use s3d_geom::TriMesh;
 use std::f64::consts::TAU;
 
-/// Only faces over a greater azimuth, in radians, may hold a pole, or cross the azimuth opposite to the window's
-/// middle: their corners are half a turn apart at least.
+/// Only faces over a greater azimuth, in radians, may hold a pole, or cross the azimuth opposite to the
+/// window's middle: their corners are half a turn apart at least.
 const WIDEST: f32 = 3.0;
 
 /// A panorama's window.

@@ -46,7 +46,8 @@ impl Node {
     }
 }
 
-/// A tree over faces. Its boxes are exact unions of `f32` corners.
+/// A tree over faces. Its boxes are exact unions of `f32` corners; every test against them allows for its own
+/// rounding.
 #[derive(Debug)]
 pub(crate) struct FaceTree {
     /// The root is the first.
@@ -74,6 +75,7 @@ impl FaceTree {
         }
     }
 
+    /// Those of all blocks as one.
     pub(crate) fn join(top: &Top, parts: Vec<Self>) -> Self {
         let nodes: Vec<_> = parts.iter().map(|part| (&part.nodes[..], part.faces.len())).collect();
         Self { nodes: top.join(&nodes), faces: parts.iter().flat_map(|part| &part.faces).copied().collect() }
