@@ -59,27 +59,12 @@ impl Costs {
         u32::from(self.lengths[length - 3]) + u32::from(self.distances[distance.ilog2() as usize & 15])
     }
 
-    /// Whether a match at `at`, of `SHORTEST` bytes at least, costs less than its bytes as literals. Only the
-    /// first `PRICED` of them are asked.
+    /// Whether a match at `at` costs less than its bytes as literals. Only the first three of them are asked.
     #[inline(always)]
-    pub(crate) fn pays<const PRICED: usize, const SHORTEST: usize>(
-        &self,
-        data: &[u8],
-        at: usize,
-        found: FixedMatch,
-    ) -> bool {
+    pub(crate) fn pays(&self, data: &[u8], at: usize, found: FixedMatch) -> bool {
+        const PRICED: usize = 3;
         let cost = u32::from(self.lengths[found.length - 3]) + u32::from(self.fixed_distances[found.index]);
         let here: &[u8; PRICED] = data[at..].first_chunk().unwrap_or(&[0; PRICED]);
-        let literals = here.map(|byte| self.literal(byte));
-        if SHORTEST >= PRICED {
-            return literals.iter().sum::<u32>() * found.length as u32 / PRICED as u32 > cost;
-        }
-        // In an array, so that the length needs no branch.
-        let (mut sums, mut sum) = ([0; PRICED], 0);
-        for (at, literal) in sums.iter_mut().zip(literals) {
-            sum += literal;
-            *at = sum;
-        }
-        sums[found.length.min(PRICED) - 1] * found.length.max(PRICED) as u32 / PRICED as u32 > cost
+        here.map(|byte| self.literal(byte)).iter().sum::<u32>() * found.length as u32 / PRICED as u32 > cost
     }
 }

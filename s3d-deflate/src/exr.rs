@@ -20,7 +20,7 @@ use crate::simd::{Compare, Kernel, dispatch};
 /// let mut block = ZipBlock::default();
 /// block.set(&pixels, 100, f32::to_le_bytes)?;
 /// // Even and odd bytes are apart, so a line comes back after half its bytes.
-/// let mut deflater = Deflater::new(Search::smooth(100 * 3 * 4 / 2))?;
+/// let mut deflater = Deflater::new(Search::floats(100 * 3 * 4 / 2, 4))?;
 /// let mut stream = Vec::new();
 /// deflater.zlib(block.differences(), Some(block.differences().len() / 2), &mut stream);
 /// assert!(stream.len() < 19_200 / 50, "{}", stream.len());

@@ -1,35 +1,145 @@
-//! Matches at fixed distances: the 32 smallest, and 32 around a line.
+//! Matches at fixed distances: the 32 smallest and 32 around a line, or half as many of each.
 //!
 //! What filters leave of a smooth image repeats there and hardly anywhere else: steps that come at nearly
 //! equal intervals along a line, and again nearly below in the next. So there are no hashes and no chains;
-//! every byte is compared with those at all 64 distances, which takes two comparisons of registers. The
+//! every byte is compared with those at all distances, which takes one or two comparisons of registers. The
 //! answers are the bits of a mask, and a match lasts as long as the masks of the places that follow have a
-//! bit in common. Depth, normals and coordinates of a view take 20 ms so, 49 ms with libdeflate at the same
-//! or larger sizes (bench `compressors`).
+//! bit in common; what is longer than most is compared directly, so that masks inside it are not needed.
+//! Depth, normals and coordinates of a view take 15 ms so, 52 ms with libdeflate at the same or larger sizes
+//! (bench `compressors`).
 
 use crate::WINDOW;
 use crate::alphabet::LONGEST_MATCH;
-use crate::simd::{Compare, WIDTH};
+use crate::hash_matcher::common;
+use crate::simd::{Compare, ROW, WIDTH, joined};
 use std::array::from_fn;
 use std::hint::select_unpredictable;
+use std::ops::{BitAnd, BitOr, Not};
 
 /// How many fixed distances there are.
 pub(crate) const FIXED: usize = 2 * WIDTH;
-/// Places of which the masks are there at a time: as much as the fastest memory takes.
-const TILE: usize = 2048;
+/// Places of which masks are made at a time; after a match that went beyond those that there are, not so many.
+const TILE: usize = 512;
+const SHORT_TILE: usize = 128;
+/// Masks that there is room for: as much as the fastest memory takes.
+const ROOM: usize = 2048;
+/// Bytes of a match, at least, of which the masks are asked, before it is compared directly.
+const ASKED: usize = 64;
 /// Masks that a match's end may ask for.
-const AHEAD: usize = LONGEST_MATCH + 4;
+const AHEAD: usize = ASKED + 8;
+
+/// Which distances agree at a place, of the `N` smallest and `N` around a line: the highest bit for the
+/// distance 1, the `N`th for `N`; the lower `N` for those from a line less `N` / 2 − 1 to a line and `N` / 2.
+pub(crate) trait Mask<const N: usize>:
+    Copy + Default + PartialEq + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self>
+{
+    /// All of them, and the smallest.
+    const ALL: Self;
+    const NEAR: Self;
+    /// That of a place with this `byte`, from the bytes before it and those around it in the line above.
+    fn agreeing<C: Compare>(compare: C, near: &[u8; N], above: &[u8; N], byte: u8) -> Self;
+    /// Those of the places from `place` on, around which in the line above bytes begin at `above`.
+    fn agreeing_in_row<C: Compare>(
+        compare: C,
+        data: &[u8],
+        place: usize,
+        above: usize,
+        masks: &mut [Self; ROW],
+    );
+    /// That of the distance that has so many before it.
+    fn bit(number: usize) -> Self;
+    /// The first distance's number; there is one.
+    fn first(self) -> usize;
+    /// Which of [`fixed_distances`] that is.
+    fn fixed(number: usize) -> usize;
+}
+
+impl Mask<WIDTH> for u64 {
+    const ALL: Self = Self::MAX;
+    const NEAR: Self = Self::MAX << WIDTH;
+
+    #[inline(always)]
+    fn agreeing<C: Compare>(compare: C, near: &[u8; WIDTH], above: &[u8; WIDTH], byte: u8) -> Self {
+        u64::from(compare.equal(near, byte)) << WIDTH | u64::from(compare.equal(above, byte))
+    }
+
+    #[inline(always)]
+    fn agreeing_in_row<C: Compare>(
+        compare: C,
+        data: &[u8],
+        place: usize,
+        above: usize,
+        masks: &mut [Self; ROW],
+    ) {
+        let (near, above) = (bytes(data, place - WIDTH), bytes(data, above));
+        compare.equal_in_two(near, above, bytes(data, place), masks);
+    }
+
+    #[inline(always)]
+    fn bit(number: usize) -> Self {
+        1 << 63 >> number
+    }
+
+    #[inline(always)]
+    fn first(self) -> usize {
+        self.leading_zeros() as usize % FIXED
+    }
+
+    #[inline(always)]
+    fn fixed(number: usize) -> usize {
+        number
+    }
+}
+
+const HALF: usize = WIDTH / 2;
+
+impl Mask<HALF> for u32 {
+    const ALL: Self = Self::MAX;
+    const NEAR: Self = Self::MAX << HALF;
+
+    #[inline(always)]
+    fn agreeing<C: Compare>(compare: C, near: &[u8; HALF], above: &[u8; HALF], byte: u8) -> Self {
+        compare.equal(&joined(near, above), byte)
+    }
+
+    #[inline(always)]
+    fn agreeing_in_row<C: Compare>(
+        compare: C,
+        data: &[u8],
+        place: usize,
+        above: usize,
+        masks: &mut [Self; ROW],
+    ) {
+        let (near, above) = (bytes(data, place - HALF), bytes(data, above));
+        compare.equal_in_halves(near, above, bytes(data, place), masks);
+    }
+
+    #[inline(always)]
+    fn bit(number: usize) -> Self {
+        1 << 31 >> number
+    }
+
+    #[inline(always)]
+    fn first(self) -> usize {
+        self.leading_zeros() as usize % WIDTH
+    }
+
+    #[inline(always)]
+    fn fixed(number: usize) -> usize {
+        // Those around the line are in the middle of the others'.
+        number + (number & HALF) / 2 * 3
+    }
+}
 
 /// Which distances agree at the places of a piece of the data.
-pub(crate) struct FixedDistanceMatcher {
-    /// The highest bit for the distance 1, the 32nd for 32; the lower 32 for those from a line less 15 to a
-    /// line and 16.
-    masks: Vec<u64>,
+pub(crate) struct FixedDistanceMatcher<M> {
+    masks: Vec<M>,
     /// The first place of `masks`.
     start: usize,
     /// Behind the last place that was compared.
     end: usize,
     line: usize,
+    distances: [usize; FIXED],
 }
 
 /// A match.
@@ -46,22 +156,54 @@ pub(crate) fn fixed_distances(line: usize) -> [usize; FIXED] {
     from_fn(|i| if i < WIDTH { i + 1 } else { (line + i + 1).saturating_sub(WIDTH + WIDTH / 2) })
 }
 
-impl FixedDistanceMatcher {
+/// So many bytes of `data`.
+#[inline(always)]
+fn bytes<const N: usize>(data: &[u8], from: usize) -> &[u8; N] {
+    data[from..].first_chunk().expect("they are there")
+}
+
+/// Whether all distances around a line are possible.
+fn has_line(line: usize) -> bool {
+    (WIDTH..=WINDOW - WIDTH / 2).contains(&line)
+}
+
+/// The mask of a place: the first bytes have less before them, and the first line none above it.
+#[inline(always)]
+fn agreeing<C: Compare, M: Mask<N>, const N: usize>(compare: C, data: &[u8], place: usize, line: usize) -> M {
+    let byte = data[place];
+    let Some(near) = place.checked_sub(N) else {
+        let agree = (0..place).filter(|number| data[place - 1 - number] == byte);
+        return agree.fold(M::default(), |mask, number| mask | M::bit(number));
+    };
+    let near = bytes(data, near);
+    match place.checked_sub(line + N / 2).filter(|_| has_line(line)) {
+        Some(above) => M::agreeing(compare, near, bytes(data, above), byte),
+        None => M::agreeing(compare, near, near, byte) & M::NEAR,
+    }
+}
+
+impl<M> FixedDistanceMatcher<M> {
     /// For lines of `line` bytes.
     pub(crate) fn new(line: usize) -> Self {
-        Self { masks: Vec::new(), start: 0, end: 0, line }
+        Self { masks: Vec::new(), start: 0, end: 0, line, distances: fixed_distances(line) }
     }
 
-    /// Begins with other data.
-    pub(crate) fn begin(&mut self) {
-        self.masks.resize(TILE + AHEAD, 0);
-        (self.start, self.end) = (0, 0);
+    /// Begins at `start` of other data.
+    pub(crate) fn begin<const N: usize>(&mut self, start: usize)
+    where
+        M: Mask<N>,
+    {
+        self.masks.resize(ROOM + AHEAD, M::default());
+        (self.start, self.end) = (start, start);
     }
 
     /// Sees to it that the masks of `at`, which does not go back, and of those ahead are there, and returns
     /// up to which place they are.
     #[inline(always)]
-    pub(crate) fn reach<C: Compare>(&mut self, compare: C, data: &[u8], at: usize) -> usize {
+    pub(crate) fn reach<C: Compare, const N: usize>(&mut self, compare: C, data: &[u8], at: usize) -> usize
+    where
+        M: Mask<N>,
+    {
         if at + AHEAD > self.end && self.end < data.len() {
             self.advance(compare, data, at);
         }
@@ -69,101 +211,143 @@ impl FixedDistanceMatcher {
     }
 
     #[inline(always)]
-    fn advance<C: Compare>(&mut self, compare: C, data: &[u8], at: usize) {
-        let known = self.end.saturating_sub(at);
-        self.masks.copy_within(at - self.start..at - self.start + known, 0);
-        (self.start, self.end) = (at, data.len().min(at + TILE));
-        let from = at + known;
-        let (masks, behind) = self.masks[known..].split_at_mut(self.end - from);
-        // Nothing is there behind the end.
-        behind.fill(0);
-
-        // The first bytes have less before them, and the first line none above it.
-        let lines = if self.line < WIDTH || self.line + WIDTH / 2 > WINDOW {
-            self.end
-        } else {
-            (self.line + WIDTH / 2).clamp(from, self.end)
-        };
-        let (first, masks) = masks.split_at_mut(lines - from);
-        let whole = WIDTH.clamp(from, lines);
-        let (fewer, first) = first.split_at_mut(whole - from);
-        for (place, mask) in (from..whole).zip(fewer) {
-            *mask =
-                (1..=place).fold(0, |mask, d| mask | u64::from(data[place] == data[place - d]) << (64 - d));
+    fn advance<C: Compare, const N: usize>(&mut self, compare: C, data: &[u8], at: usize)
+    where
+        M: Mask<N>,
+    {
+        let mut tile = TILE;
+        if at > self.end {
+            // Nobody asks for the places between.
+            self.start += at - self.end;
+            self.end = at;
+            tile = SHORT_TILE;
         }
-        let near = |place: usize| data[place.max(WIDTH) - WIDTH..].array_windows();
-        for ((mask, near), &byte) in first.iter_mut().zip(near(whole)).zip(&data[whole..]) {
-            *mask = u64::from(compare.equal(near, byte)) << WIDTH;
+        if self.end + tile > self.start + ROOM {
+            self.masks.copy_within(at - self.start..self.end - self.start, 0);
+            self.start = at;
         }
-        if lines == self.end {
-            return;
+        let from = self.end;
+        self.end = data.len().min(from + tile);
+        let (masks, behind) = self.masks[from - self.start..].split_at_mut(self.end - from);
+        if self.end == data.len() {
+            // Nothing is there behind the end.
+            behind[..AHEAD].fill(M::default());
         }
-        let above = data[lines - self.line - WIDTH / 2..].array_windows();
-        for (((mask, near), above), &byte) in masks.iter_mut().zip(near(lines)).zip(above).zip(&data[lines..])
-        {
-            *mask = compare.equal_in_two(near, above, byte);
+        let above = self.line + N / 2;
+        let rows = if has_line(self.line) && from >= above { masks.len() / ROW * ROW } else { 0 };
+        let (rows, others) = masks.split_at_mut(rows);
+        for (row, place) in rows.as_chunks_mut().0.iter_mut().zip((from..).step_by(ROW)) {
+            M::agreeing_in_row(compare, data, place, place - above, row);
+        }
+        for (mask, place) in others.iter_mut().zip(from + rows.len()..) {
+            *mask = agreeing(compare, data, place, self.line);
         }
     }
 
     /// The places that have been [`reach`](Self::reach)ed.
     #[inline(always)]
-    pub(crate) fn places(&self) -> Places<'_> {
-        Places { masks: &self.masks, start: self.start }
+    pub(crate) fn places(&self) -> Places<'_, M> {
+        Places { masks: &self.masks, start: self.start, line: self.line, distances: &self.distances }
     }
 }
 
 /// The masks of some places.
 #[derive(Clone, Copy)]
-pub(crate) struct Places<'a> {
-    masks: &'a [u64],
+pub(crate) struct Places<'a, M> {
+    masks: &'a [M],
     /// The first of them.
     start: usize,
+    line: usize,
+    distances: &'a [usize; FIXED],
 }
 
-impl Places<'_> {
+impl<M> Places<'_, M> {
     /// The first place from `at` to `until` at which there is a match of three bytes; `until` if there is
     /// none.
     #[inline(always)]
-    pub(crate) fn next(self, at: usize, until: usize) -> usize {
+    pub(crate) fn next<const N: usize>(self, at: usize, until: usize) -> usize
+    where
+        M: Mask<N>,
+    {
         let masks = &self.masks[at - self.start..until + 2 - self.start];
-        at + masks.array_windows().take_while(|[a, b, c]| a & b & c == 0).count()
+        at + masks.array_windows().take_while(|&&[a, b, c]| a & b & c == M::default()).count()
     }
 
     /// The longest match at `at`, which has been [`reach`](FixedDistanceMatcher::reach)ed: the nearest of
     /// several.
     #[inline(always)]
-    pub(crate) fn longest<const SHORTEST: usize>(self, at: usize) -> Option<FixedMatch> {
-        const {
-            assert!(
-                SHORTEST >= 3 && (LONGEST_MATCH - SHORTEST) % 4 >= 2,
-                "only a third byte more may be too many"
-            )
-        };
-        let masks: &[u64; AHEAD] = self.masks[at - self.start..].first_chunk().expect("they were reached");
-        let mut agree = masks[..SHORTEST].iter().fold(u64::MAX, |agree, mask| agree & mask);
-        if agree == 0 {
+    pub(crate) fn longest<C: Compare, const N: usize, const SHORTEST: usize>(
+        self,
+        compare: C,
+        data: &[u8],
+        at: usize,
+    ) -> Option<FixedMatch>
+    where
+        M: Mask<N>,
+    {
+        const { assert!(SHORTEST >= 3 && SHORTEST <= ASKED) };
+        let none = M::default();
+        let masks: &[M; AHEAD] = self.masks[at - self.start..].first_chunk().expect("they were reached");
+        let mut agree = masks[..SHORTEST].iter().fold(M::ALL, |agree, &mask| agree & mask);
+        if agree == none {
             return None;
         }
         let mut length = SHORTEST;
         let [mut first, mut second, mut third, mut fourth] = from_fn(|i| masks[length + i]);
         loop {
             let next = agree & (first & second & (third & fourth));
-            if next == 0 || length + 4 > LONGEST_MATCH {
+            if next == none {
                 break;
             }
             (agree, length) = (next, length + 4);
+            if length >= ASKED {
+                return Some(self.extended(compare, data, at, agree, length));
+            }
             [first, second, third, fourth] = from_fn(|i| masks[length + i]);
         }
         // Up to three more, without a branch.
         let one = agree & first;
         let two = one & second;
-        let three = if length + 3 <= LONGEST_MATCH { two & third } else { 0 };
-        length += usize::from(one != 0) + usize::from(two != 0) + usize::from(three != 0);
-        let agree = select_unpredictable(one != 0, one, agree);
-        let agree = select_unpredictable(two != 0, two, agree);
-        let agree = select_unpredictable(three != 0, three, agree);
-        // One bit at least is left.
-        Some(FixedMatch { length, index: (agree.leading_zeros() as usize) & (FIXED - 1) })
+        let three = two & third;
+        length += usize::from(one != none) + usize::from(two != none) + usize::from(three != none);
+        let agree = select_unpredictable(one != none, one, agree);
+        let agree = select_unpredictable(two != none, two, agree);
+        let agree = select_unpredictable(three != none, three, agree);
+        Some(FixedMatch { length, index: M::fixed(agree.first()) })
+    }
+
+    /// The longest match at `at` of those distances that `agree` in the first `length` bytes.
+    #[inline(always)]
+    fn extended<C: Compare, const N: usize>(
+        self,
+        compare: C,
+        data: &[u8],
+        at: usize,
+        mut agree: M,
+        length: usize,
+    ) -> FixedMatch
+    where
+        M: Mask<N>,
+    {
+        let (here, end) = (at + length, data.len().min(at + LONGEST_MATCH));
+        let mut best = FixedMatch { length: 0, index: 0 };
+        loop {
+            let number = agree.first();
+            let index = M::fixed(number);
+            let longer = length + common(data, here, here - self.distances[index], end - here);
+            if longer > best.length {
+                best = FixedMatch { length: longer, index };
+            }
+            if at + best.length == end {
+                return best;
+            }
+            // What is longer agrees in the next byte too.
+            let next = agreeing::<_, M, N>(compare, data, at + best.length, self.line);
+            agree = agree & next & !M::bit(number);
+            if agree == M::default() {
+                return best;
+            }
+        }
     }
 }
 
@@ -174,11 +358,11 @@ mod tests {
     use s3d_simd::Scalar;
 
     /// The plain way: every distance, byte by byte.
-    fn reference(data: &[u8], at: usize, line: usize, shortest: usize) -> Option<(usize, usize)> {
-        let reaches = (WIDTH..=WINDOW - WIDTH / 2).contains(&line) && at >= line + WIDTH / 2;
-        let above = (line.saturating_sub(WIDTH / 2 - 1)..=line + WIDTH / 2).filter(|_| reaches);
+    fn reference(data: &[u8], at: usize, line: usize, n: usize, shortest: usize) -> Option<(usize, usize)> {
+        let reaches = (WIDTH..=WINDOW - WIDTH / 2).contains(&line) && at >= line + n / 2;
+        let above = (line.saturating_sub(n / 2 - 1)..=line + n / 2).filter(|_| reaches);
         let mut best = None;
-        for distance in (1..=WIDTH.min(at)).chain(above) {
+        for distance in (1..=n.min(at)).chain(above) {
             let here = data[at..].iter().take(LONGEST_MATCH);
             let length = here.zip(&data[at - distance..]).take_while(|(a, b)| a == b).count();
             if length >= shortest && best.is_none_or(|(most, _)| length > most) {
@@ -188,19 +372,19 @@ mod tests {
         best
     }
 
-    fn check<const SHORTEST: usize>(data: &[u8], line: usize, steps: &[usize]) {
-        let mut matcher = FixedDistanceMatcher::new(line);
-        // A second time, with what the first left.
-        for _ in 0..2 {
-            matcher.begin();
-            let (mut at, mut steps) = (0, steps.iter().cycle());
+    fn check<M: Mask<N>, const N: usize, const SHORTEST: usize>(data: &[u8], line: usize, steps: &[usize]) {
+        let mut matcher = FixedDistanceMatcher::<M>::new(line);
+        // A second time, with what the first left, and not from the beginning.
+        for start in [0, data.len() / 2] {
+            matcher.begin(start);
+            let (mut at, mut steps) = (start, steps.iter().cycle());
             while at < data.len() {
                 matcher.reach(Scalar, data, at);
                 let found = matcher
                     .places()
-                    .longest::<SHORTEST>(at)
+                    .longest::<_, N, SHORTEST>(Scalar, data, at)
                     .map(|f| (f.length, fixed_distances(line)[f.index]));
-                assert_eq!(found, reference(data, at, line, SHORTEST), "at {at}");
+                assert_eq!(found, reference(data, at, line, N, SHORTEST), "at {at}");
                 at += steps.next().unwrap();
             }
         }
@@ -222,22 +406,17 @@ mod tests {
                 }
                 data.push(byte);
             }
-            check::<3>(&data, line, &steps);
-            check::<11>(&data, line, &steps);
+            check::<u64, WIDTH, 3>(&data, line, &steps);
+            check::<u64, WIDTH, 15>(&data, line, &steps);
+            check::<u32, HALF, 3>(&data, line, &steps);
+            check::<u32, HALF, 15>(&data, line, &steps);
         }
     }
 
     #[test]
     fn the_longest_match_reaches_over_pieces_of_the_data() {
         let data = vec![5; 3 * TILE];
-        check::<3>(&data, 1000, &[258]);
-        let mut matcher = FixedDistanceMatcher::new(1000);
-        matcher.begin();
-        matcher.reach(Scalar, &data, 0);
-        matcher.reach(Scalar, &data, TILE - 100);
-        assert_eq!(
-            matcher.places().longest::<3>(TILE - 100),
-            Some(FixedMatch { length: LONGEST_MATCH, index: 0 })
-        );
+        check::<u64, WIDTH, 3>(&data, 1000, &[258]);
+        check::<u32, HALF, 15>(&data, 1000, &[258]);
     }
 }

@@ -5,7 +5,7 @@ use crate::alphabet::LONGEST_MATCH;
 use crate::bit_writer::BitWriter;
 use crate::block::write_block;
 use crate::costs::Costs;
-use crate::fixed_distance::FixedDistanceMatcher;
+use crate::fixed_distance::{FixedDistanceMatcher, Mask};
 use crate::hash_matcher::HashMatcher;
 use crate::search::{Candidates, Search};
 use crate::simd::{Compare, Kernel, dispatch};
@@ -13,20 +13,21 @@ use crate::tokens::{BLOCK, Tokens};
 
 /// Places passed over at most.
 const LONGEST_STEP: usize = 32;
-/// Bytes whose cost as literals is asked for; where there are short matches, longer ones pay anyway.
-const COUNTED: usize = 8;
-/// Bytes, at least, of matches where only long ones are looked for: more than are counted.
-const LONG: usize = 11;
-/// Steps to the next place where only long ones are looked for: if there was none, and if it cost too much.
-/// What begins between two places is found at the second.
-const LONG_STEPS: (usize, usize) = (2, 4);
+/// Matches of more bytes than that pay, whatever their bytes cost as literals.
+const PAYING: usize = 5;
+/// Bytes, at least, of matches where only long ones are looked for.
+const LONG: usize = 15;
+/// Bytes to the next place where only long ones are looked for. What begins between two places is found at the
+/// second.
+const LONG_STEP: usize = 4;
 /// Bytes at the end in which nothing is looked for.
 const TAIL: usize = LONGEST_MATCH + 8;
 
 /// One pass over data.
 pub(crate) struct Parser<'a> {
     pub(crate) hash_matcher: &'a mut HashMatcher,
-    pub(crate) fixed_distance_matcher: &'a mut FixedDistanceMatcher,
+    pub(crate) all_distances: &'a mut FixedDistanceMatcher<u64>,
+    pub(crate) half_of_distances: &'a mut FixedDistanceMatcher<u32>,
     pub(crate) tokens: &'a mut Tokens,
     pub(crate) costs: &'a mut Costs,
     pub(crate) search: Search,
@@ -37,20 +38,30 @@ pub(crate) struct Parser<'a> {
 impl Parser<'_> {
     /// Writes `data` as blocks, in the widest registers that pay.
     pub(crate) fn run(self, data: &[u8], out: &mut BitWriter<'_>) {
-        match self.search.candidates {
-            Candidates::FixedDistances | Candidates::LongFixedDistances => {
-                dispatch(AtFixedDistances { parser: self, data, out });
-            }
-            _ => dispatch(ByHash { parser: self, data, out }),
+        if self.search.candidates.are_of_a_hash() {
+            dispatch(ByHash { parser: self, data, out });
+        } else {
+            dispatch(AtFixedDistances { parser: self, data, out });
         }
     }
 
     /// Matches at the fixed distances alone.
     #[inline(always)]
     pub(crate) fn at_fixed_distances<C: Compare>(self, compare: C, data: &[u8], out: &mut BitWriter<'_>) {
-        match self.search.candidates {
-            Candidates::LongFixedDistances => self.parse_fixed::<C, LONG>(compare, data, out),
-            _ => self.parse_fixed::<C, 3>(compare, data, out),
+        let Self { all_distances: all, half_of_distances: half, tokens, costs, search, boundary, .. } = self;
+        let mut at = 0;
+        for (until, is_last) in [(boundary.min(data.len()), false), (data.len(), true)] {
+            // A stream without data has a block, too.
+            if at == until && !(is_last && data.is_empty()) {
+                continue;
+            }
+            let mut part = FixedPart { data, at, until, tokens, costs, out };
+            at = match search.candidates {
+                Candidates::HalfOfFixedDistances => part.parse::<_, _, _, 3>(compare, half),
+                Candidates::LongFixedDistances => part.parse::<_, _, _, LONG>(compare, all),
+                Candidates::SplitFixedDistances if is_last => part.parse::<_, _, _, LONG>(compare, half),
+                _ => part.parse::<_, _, _, 3>(compare, all),
+            };
         }
     }
 
@@ -68,70 +79,6 @@ impl Parser<'_> {
             Candidates::Hash2 => self.parse_by_hash::<1, 2, 1, 3, 3>(data, [around[0]], out),
             Candidates::Hash4 => self.parse_by_hash::<1, 4, 5, 1, 2>(data, around, out),
             _ => self.parse_by_hash::<4, 16, 5, 1, 1>(data, around, out),
-        }
-    }
-
-    /// Matches of `SHORTEST` bytes and more; `SHORTEST` is 3 or [`LONG`].
-    #[inline(always)]
-    fn parse_fixed<C: Compare, const SHORTEST: usize>(
-        self,
-        compare: C,
-        data: &[u8],
-        out: &mut BitWriter<'_>,
-    ) {
-        let Self { fixed_distance_matcher, tokens, costs, boundary, .. } = self;
-        let steps = if SHORTEST > COUNTED { LONG_STEPS } else { (1, 1) };
-        fixed_distance_matcher.begin();
-        tokens.clear();
-        // The block's first byte, the first that is in no token, and the place where the block is full if no
-        // match comes before.
-        let (mut at, mut block, mut pending, mut full) = (0, 0, 0, BLOCK);
-        loop {
-            at = at.min(data.len());
-            if at >= full || block < boundary && at >= boundary || at >= data.len() {
-                let last = at >= data.len();
-                tokens.literals(data, pending, at);
-                write_block(data, block..at, tokens, last, costs, out);
-                if last {
-                    return;
-                }
-                tokens.clear();
-                (block, pending, full) = (at, at, at + BLOCK);
-            }
-            // Where there is something else to do than to look for matches: the block may be full, or masks
-            // are missing.
-            let mut pause = fixed_distance_matcher.reach(compare, data, at).min(full);
-            if block < boundary {
-                pause = pause.min(boundary);
-            }
-            let places = fixed_distance_matcher.places();
-            while at < pause {
-                let Some(mut found) = places.longest::<SHORTEST>(at) else {
-                    at = if SHORTEST == 3 { places.next(at + 1, pause) } else { at + steps.0 };
-                    continue;
-                };
-                if (SHORTEST > COUNTED || found.length <= COUNTED)
-                    && !costs.pays::<COUNTED, SHORTEST>(data, at, found)
-                {
-                    at += steps.1;
-                    continue;
-                }
-                if steps != (1, 1) {
-                    let distance = tokens.fixed_distances[found.index];
-                    while at > pending.max(distance)
-                        && found.length < LONGEST_MATCH
-                        && data[at - 1] == data[at - 1 - distance]
-                    {
-                        at -= 1;
-                        found.length += 1;
-                    }
-                }
-                tokens.literals(data, pending, at);
-                tokens.fixed_match(found.index, found.length);
-                at += found.length;
-                pending = at;
-                full += found.length - 1;
-            }
         }
     }
 
@@ -223,6 +170,77 @@ impl Parser<'_> {
         }
         tokens.literals(data, pending, data.len());
         write_block(data, block..data.len(), tokens, true, costs, out);
+    }
+}
+
+/// A part of the data, to be searched at fixed distances.
+struct FixedPart<'a, 'b> {
+    data: &'a [u8],
+    /// Its first byte, and where the next part begins.
+    at: usize,
+    until: usize,
+    tokens: &'a mut Tokens,
+    costs: &'a mut Costs,
+    out: &'a mut BitWriter<'b>,
+}
+
+impl FixedPart<'_, '_> {
+    /// Writes it as blocks, with matches of `SHORTEST` bytes and more, which is 3 or [`LONG`], and returns where
+    /// it ended: the last match may go on behind it.
+    #[inline(always)]
+    fn parse<C: Compare, M: Mask<N>, const N: usize, const SHORTEST: usize>(
+        &mut self,
+        compare: C,
+        matcher: &mut FixedDistanceMatcher<M>,
+    ) -> usize {
+        let Self { data, mut at, until, ref mut tokens, ref mut costs, ref mut out } = *self;
+        matcher.begin(at);
+        tokens.clear();
+        // The block's first byte, the first that is in no token, and the place where the block is full if no
+        // match comes before.
+        let (mut block, mut pending, mut full) = (at, at, at + BLOCK);
+        loop {
+            at = at.min(data.len());
+            if at >= full.min(until) {
+                let last = at == data.len();
+                tokens.literals(data, pending, at);
+                write_block(data, block..at, tokens, last, costs, out);
+                if at >= until {
+                    return at;
+                }
+                tokens.clear();
+                (block, pending, full) = (at, at, at + BLOCK);
+            }
+            // Where there is something else to do than to look for matches: the block may be full, or masks
+            // are missing.
+            let pause = matcher.reach(compare, data, at).min(full).min(until);
+            let places = matcher.places();
+            while at < pause {
+                let Some(mut found) = places.longest::<C, N, SHORTEST>(compare, data, at) else {
+                    at = if SHORTEST == 3 { places.next(at + 1, pause) } else { at + LONG_STEP };
+                    continue;
+                };
+                if SHORTEST <= PAYING && found.length <= PAYING && !costs.pays(data, at, found) {
+                    at += 1;
+                    continue;
+                }
+                if SHORTEST > PAYING {
+                    let distance = tokens.fixed_distances[found.index];
+                    while at > pending.max(distance)
+                        && found.length < LONGEST_MATCH
+                        && data[at - 1] == data[at - 1 - distance]
+                    {
+                        at -= 1;
+                        found.length += 1;
+                    }
+                }
+                tokens.literals(data, pending, at);
+                tokens.fixed_match(found.index, found.length);
+                at += found.length;
+                pending = at;
+                full += found.length - 1;
+            }
+        }
     }
 }
 

@@ -51,8 +51,21 @@ pub enum Candidates {
     /// Those 1 to 32 bytes back and those a line less 15 to a line and 16 back, at every byte: for smooth
     /// surfaces. Of the other settings, only `line` matters.
     FixedDistances,
-    /// The same, but only matches of 11 bytes and more, at every second byte: where literals cost little.
+    /// Those 1 to 16 bytes back and those a line less 7 to a line and 8 back, at every byte: likewise, in less
+    /// time, in larger files.
+    HalfOfFixedDistances,
+    /// As `FixedDistances`, but only matches of 15 bytes and more, at every fourth byte: where literals cost
+    /// little.
     LongFixedDistances,
+    /// As `FixedDistances` before the data's boundary; after it only matches of 15 bytes and more, at every
+    /// fourth byte, of `HalfOfFixedDistances`: where numbers have their noisy bytes apart, before the others.
+    SplitFixedDistances,
+}
+
+impl Candidates {
+    pub(crate) const fn are_of_a_hash(self) -> bool {
+        matches!(self, Self::Hash1 | Self::Hash2 | Self::Hash4 | Self::Hash16)
+    }
 }
 
 impl Search {
@@ -80,10 +93,17 @@ impl Search {
         Self { candidates: Candidates::Hash4, hash_bytes: 4, lazy: 258, nice: 258, ..Self::patches(line) }
     }
 
-    /// For what changes little along a line and from line to line: normals without a filter, OpenEXR's
-    /// blocks.
+    /// For what changes little along a line and from line to line: normals without a filter.
     pub const fn smooth(line: usize) -> Self {
-        Self { candidates: Candidates::FixedDistances, ..Self::photo(line) }
+        Self { candidates: Candidates::HalfOfFixedDistances, ..Self::photo(line) }
+    }
+
+    /// For OpenEXR's blocks of floats of so many bytes, of which even bytes come before odd ones.
+    pub const fn floats(line: usize, bytes: usize) -> Self {
+        // Half floats have their exponents in the odd bytes.
+        let candidates =
+            if bytes == 2 { Candidates::SplitFixedDistances } else { Candidates::FixedDistances };
+        Self { candidates, ..Self::photo(line) }
     }
 
     /// For 16-bit samples of smooth surfaces after Paeth's filter, such as depth, of which small numbers are

@@ -9,7 +9,7 @@ use crate::bit_writer::{BitWriter, Bits};
 use crate::fixed_distance::FIXED;
 
 /// Symbols in a block; only steps over several bytes make it a few more.
-pub(crate) const BLOCK: usize = 16_000;
+pub(crate) const BLOCK: usize = 64_000;
 /// Tokens in a block at most: a match takes four.
 const ROOM: usize = 4 * (BLOCK + 4 * LONGEST_MATCH);
 
@@ -227,12 +227,14 @@ impl Tokens {
 
 /// Adds how often each byte occurs.
 pub(crate) fn count_bytes(data: &[u8], counts: &mut [u32]) {
-    // Four tables: equal bytes in a row would wait for each other.
-    let mut tables = [[0u32; 256]; 4];
-    let (fours, rest) = data.as_chunks::<4>();
-    for four in fours {
-        for (table, &byte) in tables.iter_mut().zip(four) {
-            table[usize::from(byte)] += 1;
+    // Eight tables: equal bytes near each other would wait for each other.
+    let mut tables = [[0u32; 256]; 8];
+    let (eights, rest) = data.as_chunks::<8>();
+    for eight in eights {
+        let mut word = u64::from_le_bytes(*eight);
+        for table in &mut tables {
+            table[(word & 0xff) as usize] += 1;
+            word >>= 8;
         }
     }
     rest.iter().for_each(|&byte| tables[0][usize::from(byte)] += 1);

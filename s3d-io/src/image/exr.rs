@@ -122,7 +122,7 @@ impl BlockCompressor {
         // Even and odd bytes are apart, so a line comes back after half its bytes.
         let line = 3 * sample * width / 2;
         let search = match compression {
-            Compression::Fast | Compression::Balanced => Search::smooth(line),
+            Compression::Fast | Compression::Balanced => Search::floats(line, sample),
             Compression::Small => Search::thorough(line, sample / 2),
         };
         let deflater = Deflater::new(search).expect("searches are in range");
