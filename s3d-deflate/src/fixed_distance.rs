@@ -18,7 +18,7 @@ use std::ops::{BitAnd, BitOr, Not};
 
 /// How many fixed distances there are.
 pub(crate) const FIXED: usize = 2 * WIDTH;
-/// Places of which masks are made at a time; after a match that went beyond those that there are, not so many.
+/// Places of which masks are made at a time; after a match that went beyond those that there are, fewer.
 const TILE: usize = 512;
 const SHORT_TILE: usize = 128;
 /// Masks that there is room for: as much as the fastest memory takes.

@@ -17,8 +17,8 @@ const LONGEST_STEP: usize = 32;
 const PAYING: usize = 5;
 /// Bytes, at least, of matches where only long ones are looked for.
 const LONG: usize = 15;
-/// Bytes to the next place where only long ones are looked for. What begins between two places is found at the
-/// second.
+/// Bytes to the next place where only long ones are looked for. What begins between two places is found at
+/// the second.
 const LONG_STEP: usize = 4;
 /// Bytes at the end in which nothing is looked for.
 const TAIL: usize = LONGEST_MATCH + 8;
@@ -185,8 +185,8 @@ struct FixedPart<'a, 'b> {
 }
 
 impl FixedPart<'_, '_> {
-    /// Writes it as blocks, with matches of `SHORTEST` bytes and more, which is 3 or [`LONG`], and returns where
-    /// it ended: the last match may go on behind it.
+    /// Writes it as blocks, with matches of `SHORTEST` bytes and more, which is 3 or [`LONG`], and returns
+    /// where it ended: the last match may go on behind it.
     #[inline(always)]
     fn parse<C: Compare, M: Mask<N>, const N: usize, const SHORTEST: usize>(
         &mut self,

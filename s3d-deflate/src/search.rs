@@ -51,8 +51,8 @@ pub enum Candidates {
     /// Those 1 to 32 bytes back and those a line less 15 to a line and 16 back, at every byte: for smooth
     /// surfaces. Of the other settings, only `line` matters.
     FixedDistances,
-    /// Those 1 to 16 bytes back and those a line less 7 to a line and 8 back, at every byte: likewise, in less
-    /// time, in larger files.
+    /// Those 1 to 16 bytes back and those a line less 7 to a line and 8 back, at every byte: likewise, in
+    /// less time, in larger files.
     HalfOfFixedDistances,
     /// As `FixedDistances`, but only matches of 15 bytes and more, at every fourth byte: where literals cost
     /// little.

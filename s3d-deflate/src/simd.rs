@@ -98,7 +98,9 @@ mod x86_64 {
 
     /// Expands `$body` for each byte of a row, whose number is the constant `$j`.
     macro_rules! for_each_of_row {
-        ($j:ident => $body:expr) => { for_each_of_row!(@ $j [0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15] => $body) };
+        ($j:ident => $body:expr) => {
+            for_each_of_row!(@ $j [0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15] => $body)
+        };
         (@ $j:ident [$($n:literal)*] => $body:expr) => { $({ const $j: usize = $n; $body; })* };
     }
 
