@@ -3,7 +3,7 @@
 //! Wide registers against the portable form make a view's files in a third of the time
 //! (`docs/performance/encoding.md`). Every form gives the same bytes: tests hold each to the portable one.
 
-use s3d_simd::{Scalar, dispatch, level};
+use s3d_simd::{Level, Scalar, level};
 
 /// Bytes in a register, and places that one comparison asks.
 pub(crate) const WIDTH: usize = 32;
@@ -83,14 +83,30 @@ pub(crate) trait Kernel {
 
 /// Runs `kernel` in the widest registers that are in use and that it gains from.
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    let level = if K::GAINS_FROM_AVX512 { level() } else { level().without_avx512() };
-    dispatch!(level, simd => kernel.run(simd))
+    dispatch_on(if K::GAINS_FROM_AVX512 { level() } else { level().without_avx512() }, kernel)
+}
+
+fn dispatch_on<K: Kernel>(level: Level, kernel: K) -> K::Output {
+    match level {
+        Level::Scalar(scalar) => kernel.run(scalar),
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2(avx2) => avx2.vectorize(
+            #[inline(always)]
+            || kernel.run(avx2),
+        ),
+        // Comparisons into its mask registers are no faster; what surrounds them is.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512(avx512) => avx512.vectorize(
+            #[inline(always)]
+            || kernel.run(avx512.avx2()),
+        ),
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod x86_64 {
     use super::{Compare, ROW, WIDTH};
-    use s3d_simd::{Avx2, Avx512};
+    use s3d_simd::Avx2;
     use std::arch::x86_64::{
         __m256i, _mm_loadu_si128, _mm256_alignr_epi8, _mm256_cmpeq_epi8, _mm256_loadu_si256,
         _mm256_movemask_epi8, _mm256_set_m128i, _mm256_set1_epi8,
@@ -189,43 +205,34 @@ mod x86_64 {
             });
         }
     }
-
-    // Comparisons into mask registers are no faster; what surrounds them is.
-    impl Compare for Avx512 {
-        #[inline(always)]
-        fn equal(self, window: &[u8; WIDTH], byte: u8) -> u32 {
-            self.avx2().equal(window, byte)
-        }
-
-        #[inline(always)]
-        fn equal_in_two(
-            self,
-            upper: &[u8; WIDTH + ROW],
-            lower: &[u8; WIDTH + ROW],
-            bytes: &[u8; ROW],
-            equal: &mut [u64; ROW],
-        ) {
-            self.avx2().equal_in_two(upper, lower, bytes, equal);
-        }
-
-        #[inline(always)]
-        fn equal_in_halves(
-            self,
-            upper: &[u8; WIDTH],
-            lower: &[u8; WIDTH],
-            bytes: &[u8; ROW],
-            equal: &mut [u32; ROW],
-        ) {
-            self.avx2().equal_in_halves(upper, lower, bytes, equal);
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use s3d_simd::Level;
+
+    /// Both comparisons of a row.
+    #[derive(Clone, Copy)]
+    struct Windows<'a> {
+        upper: &'a [u8; WIDTH + ROW],
+        lower: &'a [u8; WIDTH + ROW],
+        upper_half: &'a [u8; WIDTH],
+        lower_half: &'a [u8; WIDTH],
+        bytes: &'a [u8; ROW],
+    }
+
+    impl Kernel for Windows<'_> {
+        type Output = ([u64; ROW], [u32; ROW]);
+        const GAINS_FROM_AVX512: bool = true;
+
+        fn run<C: Compare>(self, compare: C) -> Self::Output {
+            let (mut in_two, mut in_halves) = ([0; ROW], [0; ROW]);
+            compare.equal_in_two(self.upper, self.lower, self.bytes, &mut in_two);
+            compare.equal_in_halves(self.upper_half, self.lower_half, self.bytes, &mut in_halves);
+            (in_two, in_halves)
+        }
+    }
 
     proptest! {
         #[test]
@@ -252,14 +259,9 @@ mod tests {
             let expected_in_halves = std::array::from_fn(|at| {
                 (in_window(upper, at, half) << half | in_window(lower, at, half)) as u32
             });
+            let windows = Windows { upper, lower, upper_half, lower_half, bytes };
             for level in Level::all() {
-                let (mut in_two, mut in_halves) = ([0; ROW], [0; ROW]);
-                dispatch!(level, simd => {
-                    simd.equal_in_two(upper, lower, bytes, &mut in_two);
-                    simd.equal_in_halves(upper_half, lower_half, bytes, &mut in_halves);
-                });
-                prop_assert_eq!(in_two, expected);
-                prop_assert_eq!(in_halves, expected_in_halves);
+                prop_assert_eq!(dispatch_on(level, windows), (expected, expected_in_halves));
             }
         }
     }

@@ -32,7 +32,8 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
     let plans: &[(Filter, Search)] = match (content, compression) {
         (Content::Photo, Compression::Fast) => &[(Filter::Paeth, Search { nice: 16, patience: 3, ..photo })],
         (Content::Photo, Compression::Balanced) => &[(Filter::Paeth, photo)],
-        (Content::Photo, Compression::Small) => &[(Filter::Paeth, small)],
+        // In noise, matches of few bytes do not pay.
+        (Content::Photo, Compression::Small) => &[(Filter::Paeth, small), (Filter::Paeth, photo)],
         (Content::Normals, Compression::Fast | Compression::Balanced) => {
             &[(Filter::None, Search::smooth(line))]
         }

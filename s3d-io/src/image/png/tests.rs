@@ -179,8 +179,7 @@ fn more_time_makes_smaller_files_about_as_small_as_libpngs() {
     for (image, content, percent) in images {
         let [fast, balanced, small] = sizes(&|c| encode_rgb8(image, content, c));
         let peer = peer(w, h, ColorType::Rgb, BitDepth::Eight, image.pixels().as_flattened());
-        // Where nearly all is noise, they are the same but for a thousandth.
-        let ordered = 102 * fast >= 100 * balanced && 1001 * balanced >= 1000 * small;
+        let ordered = 102 * fast >= 100 * balanced && balanced >= small;
         assert!(ordered, "{content:?}: {fast}, {balanced}, {small}");
         assert!(100 * balanced <= percent * peer, "{content:?}: {balanced}, the peer {peer}");
         assert!(100 * small <= 102 * peer, "{content:?}: {small}, the peer {peer}");
