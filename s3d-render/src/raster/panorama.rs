@@ -56,14 +56,11 @@ impl<'a> Panorama<'a> {
     fn project(&mut self, corners: &[[[f32; PACKET]; 3]]) {
         let o = self.origin;
         let (sin, cos) = self.grid.middle_sin_cos;
+        let projected = &mut *self.projected;
         for (k, [x, y, z]) in corners.iter().enumerate() {
-            let at = k * PACKET;
-            let p = &mut *self.projected;
-            let xs: &mut [f64; PACKET] = (&mut p.x[at..at + PACKET]).try_into().unwrap();
-            let ys: &mut [f64; PACKET] = (&mut p.y[at..at + PACKET]).try_into().unwrap();
-            let zs: &mut [f64; PACKET] = (&mut p.z[at..at + PACKET]).try_into().unwrap();
-            let turns: &mut [f32; PACKET] = (&mut p.turn[at..at + PACKET]).try_into().unwrap();
-            let latitudes: &mut [f32; PACKET] = (&mut p.latitude[at..at + PACKET]).try_into().unwrap();
+            // Arrays of their own, so that all corners of the packet go together.
+            let (mut xs, mut ys, mut zs) = ([0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
+            let (mut turns, mut latitudes) = ([0.0; PACKET], [0.0; PACKET]);
             for i in 0..PACKET {
                 let (x, y, z) = (f64::from(x[i]) - o.x, f64::from(y[i]) - o.y, f64::from(z[i]) - o.z);
                 (xs[i], ys[i], zs[i]) = (x, y, z);
@@ -72,6 +69,12 @@ impl<'a> Panorama<'a> {
                 turns[i] = turn_of(x * sin - y * cos, x * cos + y * sin);
                 latitudes[i] = turn_of(z, (x * x + y * y).sqrt());
             }
+            let packet = k * PACKET..(k + 1) * PACKET;
+            projected.x[packet.clone()].copy_from_slice(&xs);
+            projected.y[packet.clone()].copy_from_slice(&ys);
+            projected.z[packet.clone()].copy_from_slice(&zs);
+            projected.turn[packet.clone()].copy_from_slice(&turns);
+            projected.latitude[packet].copy_from_slice(&latitudes);
         }
     }
 
