@@ -9,7 +9,7 @@ use crate::raster::batch::DrawKind;
 use crate::raster::canvas::{Canvas, Cover, TILE, half_of_tile, part_of_tile};
 use crate::raster::chunk::{Linear, MAX_ROWS, TRUSTED};
 use crate::raster::panorama_batch::{PanoramaBatch, PanoramaCorners};
-use crate::raster::panorama_grid::{ANGLE_ERROR, PanoramaBounds, PanoramaGrid, PanoramaPlanes, turn_of};
+use crate::raster::panorama_grid::{ANGLE_ERROR, PanoramaBounds, PanoramaGrid, PanoramaPlanes, turn_of, turns_of};
 use crate::raster::window::{Pixels, ProjectionRaster, Window};
 use crate::raster::{high, low, max, min};
 use crate::ray::cone::{Cone, Plane};
@@ -17,7 +17,7 @@ use crate::scene::clusters::{Cluster, PACKET};
 use crate::scene::tree::Node;
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
 use crate::simd::{Kernel, Simd, dispatch};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use s3d_geom::TriMesh;
 use std::f64::consts::TAU;
 
@@ -211,30 +211,34 @@ impl ProjectionRaster for Panorama<'_> {
 
     #[inline(always)]
     fn cover(&self, node: &Node) -> Option<Cover> {
-        let o = self.origin.to_array();
-        let lo = [0, 1, 2].map(|k| (f64::from(node.min[k]) - o[k]) as f32);
-        let hi = [0, 1, 2].map(|k| (f64::from(node.max[k]) - o[k]) as f32);
+        let lo = (Vec3::from(node.min).as_dvec3() - self.origin).as_vec3();
+        let hi = (Vec3::from(node.max).as_dvec3() - self.origin).as_vec3();
         // What rounding may have moved.
-        let off = [0, 1, 2].map(|k| 1e-6 * max(lo[k].abs(), hi[k].abs()) + 1e-30);
-        let (lo, hi) = ([0, 1, 2].map(|k| lo[k] - off[k]), [0, 1, 2].map(|k| hi[k] + off[k]));
-        let near = [0, 1, 2].map(|k| max(max(lo[k], -hi[k]), 0.0));
-        let far = [0, 1, 2].map(|k| max(lo[k].abs(), hi[k].abs()));
-        let flat = (near[0] * near[0] + near[1] * near[1]).sqrt();
-        let flat_far = (far[0] * far[0] + far[1] * far[1]).sqrt();
-        let distance = (flat * flat + near[2] * near[2]).sqrt() * (1.0 - 1e-6);
-        let high = turn_of(hi[2], if hi[2] > 0.0 { flat } else { flat_far }) + ANGLE_ERROR;
-        let low = turn_of(lo[2], if lo[2] < 0.0 { flat } else { flat_far }) - ANGLE_ERROR;
-        let (top, bottom) = self.grid.rows_between(low, high);
+        let off = 1e-6 * lo.abs().max(hi.abs()) + 1e-30;
+        let (lo, hi) = (lo - off, hi + off);
+        let near = lo.max(-hi).max(Vec3::ZERO);
+        let far = lo.abs().max(hi.abs());
+        let flat = (near.x * near.x + near.y * near.y).sqrt();
+        let flat_far = (far.x * far.x + far.y * far.y).sqrt();
+        let distance = (flat * flat + near.z * near.z).sqrt() * (1.0 - 1e-6);
+        // All angles at once: both latitudes, the azimuth of the middle, and from there those of the corners,
+        // which are less than half a turn apart.
+        let (sin, cos) = self.grid.middle_sin_cos;
+        let (x, y) = (0.5 * (lo.x + hi.x), 0.5 * (lo.y + hi.y));
+        let from_middle = |cx: f32, cy: f32| (cx * y - cy * x, cx * x + cy * y);
+        let (a, b) = (from_middle(lo.x, lo.y), from_middle(hi.x, lo.y));
+        let (c, d) = (from_middle(lo.x, hi.y), from_middle(hi.x, hi.y));
+        let (low_flat, high_flat) =
+            (if lo.z < 0.0 { flat } else { flat_far }, if hi.z > 0.0 { flat } else { flat_far });
+        let ys = [lo.z, hi.z, x * sin - y * cos, a.0, b.0, c.0, d.0, 0.0];
+        let xs = [low_flat, high_flat, x * cos + y * sin, a.1, b.1, c.1, d.1, 1.0];
+        let [low, high, middle, corners @ .., _] = turns_of(&ys, &xs);
+        let (top, bottom) = self.grid.rows_between(low - ANGLE_ERROR, high + ANGLE_ERROR);
         let rows = (top - 0.01, bottom + 0.01);
         let (mut left, mut right) = (0.0, self.grid.width as f32 - 1.0);
         if flat > 0.0 {
-            let (sin, cos) = self.grid.middle_sin_cos;
-            // Against the direction of the box's middle corners are less than half a turn apart.
-            let (x, y) = (0.5 * (lo[0] + hi[0]), 0.5 * (lo[1] + hi[1]));
-            let middle = turn_of(x * sin - y * cos, x * cos + y * sin);
             let mut range = (0.0f32, 0.0f32);
-            for (cx, cy) in [(lo[0], lo[1]), (hi[0], lo[1]), (lo[0], hi[1]), (hi[0], hi[1])] {
-                let turn = turn_of(cx * y - cy * x, cx * x + cy * y);
+            for turn in corners {
                 range = (min(range.0, turn), max(range.1, turn));
             }
             let (middle_column, per_rad) = (self.grid.middle_column as f32, 1.0 / self.grid.step as f32);

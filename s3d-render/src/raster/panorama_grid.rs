@@ -13,6 +13,7 @@
 
 #![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
 
+use crate::raster::batch::GROUP;
 use crate::raster::chunk::{Chunk, ChunkGrid, INVERSE_T_ROUNDING, Linear, MAX_ROWS};
 use crate::raster::window::{Window, groups};
 use crate::raster::{high, max, min};
@@ -44,7 +45,7 @@ pub(crate) struct PanoramaGrid {
     /// cos θ and sin θ of the columns.
     pub(crate) cos: Vec<[f64; LANES]>,
     pub(crate) sin: Vec<[f64; LANES]>,
-    /// cos φ, sin φ and tan φ of the rows.
+    /// cos φ, sin φ and tan φ of the rows; then zeros, so that each row begins a whole group of tangents.
     pub(crate) row_cos: Vec<f64>,
     pub(crate) row_sin: Vec<f64>,
     tan: Vec<f64>,
@@ -114,7 +115,7 @@ impl PanoramaGrid {
             sin: groups(&columns.iter().map(|c| c.y).collect::<Vec<_>>()),
             row_cos: rows.iter().map(|r| r.x).collect(),
             row_sin: rows.iter().map(|r| r.y).collect(),
-            tan: rows.iter().map(|r| r.y / r.x).collect(),
+            tan: rows.iter().map(|r| r.y / r.x).chain([0.0; GROUP - 1]).collect(),
             scale: rows.iter().map(|r| r.x as f32).collect(),
             u: std::array::from_fn(|k| (angle(k).1 - 1.0) as f32),
             v: std::array::from_fn(|k| angle(k).0 as f32),
@@ -179,8 +180,10 @@ impl PanoramaGrid {
         tangents: &'a mut [f32; MAX_ROWS],
     ) -> ChunkGrid<'a> {
         let tan = self.tan[row];
-        for (to, from) in tangents.iter_mut().zip(&self.tan[row..row + rows]) {
-            *to = (from - tan) as f32;
+        let (to, _) = tangents.as_chunks_mut::<GROUP>();
+        let (from, _) = self.tan[row..].as_chunks::<GROUP>();
+        for (to, from) in to.iter_mut().zip(from).take(rows.div_ceil(GROUP)) {
+            *to = from.map(|from| (from - tan) as f32);
         }
         let scale = &self.scale[row..row + rows];
         ChunkGrid { u: &self.u, v: &self.v, rows: tangents, count: rows, scale }
@@ -267,6 +270,12 @@ pub(crate) fn turn_of(y: f32, x: f32) -> f32 {
     let angle = if wide < high { std::f32::consts::FRAC_PI_2 - angle } else { angle };
     let angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
     if y < 0.0 { -angle } else { angle }
+}
+
+/// [`turn_of`] of eight. Not inlined: where LLVM knows how the arrays are made, it takes one after another.
+#[inline(never)]
+pub(crate) fn turns_of(y: &[f32; 8], x: &[f32; 8]) -> [f32; 8] {
+    std::array::from_fn(|k| turn_of(y[k], x[k]))
 }
 
 #[cfg(test)]
