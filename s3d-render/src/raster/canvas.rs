@@ -358,15 +358,18 @@ impl Canvas {
         for row in 0..self.height {
             let start = row * self.pitch;
             let slots = &mut self.slots[start..start + width.next_multiple_of(LANES)];
+            let inverse_t = self.inverse_t[start..start + width].as_chunks_mut::<LANES>();
             let faces = &mut out.0[row * out_pitch..][..width];
             let depths = &mut out.1[row * out_pitch..][..width];
             let (level, rise) = line(row);
             let drawn = &self.drawn[..];
             let (faces, last_faces) = faces.as_chunks_mut::<LANES>();
             let (depths, last_depths) = depths.as_chunks_mut::<LANES>();
-            let mut groups = slots.as_chunks::<LANES>().0.iter().zip(u.iter().zip(v));
-            for ((faces, depths), (slots, (u, v))) in faces.iter_mut().zip(depths).zip(groups.by_ref()) {
+            let mut groups = slots.as_chunks_mut::<LANES>().0.iter_mut().zip(u.iter().zip(v));
+            let full = faces.iter_mut().zip(depths).zip(inverse_t.0);
+            for (((faces, depths), inverse_t), (slots, (u, v))) in full.zip(groups.by_ref()) {
                 l.resolve::<PANORAMA>(slots, &RowGroup { u, v, level, rise }, drawn, faces, depths);
+                (*slots, *inverse_t) = ([0; LANES], [0.0; LANES]);
             }
             // A last group that is not full.
             if let Some((slots, (u, v))) = groups.next() {
@@ -374,9 +377,9 @@ impl Canvas {
                 l.resolve::<PANORAMA>(slots, &RowGroup { u, v, level, rise }, drawn, &mut faces, &mut depths);
                 last_faces.copy_from_slice(&faces[..last_faces.len()]);
                 last_depths.copy_from_slice(&depths[..last_depths.len()]);
+                *slots = [0; LANES];
+                inverse_t.1.fill(0.0);
             }
-            slots.fill(0);
-            self.inverse_t[start..start + width].fill(0.0);
         }
         for &pixel in &self.poor {
             let (column, row) = (pixel as usize % self.pitch, pixel as usize / self.pitch);
