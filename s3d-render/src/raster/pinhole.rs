@@ -18,7 +18,7 @@ use crate::scene::clusters::{Cluster, MAX_CORNERS, PACKET};
 use crate::scene::tree::Node;
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes};
 use crate::simd::{Kernel, Simd, dispatch};
-use glam::{DVec2, DVec3, dvec2};
+use glam::{DVec2, DVec3, Vec3, dvec2};
 use s3d_geom::{Projection, Rays, TriMesh};
 
 /// Pixels from the window's first that a corner may be away.
@@ -361,33 +361,28 @@ impl ProjectionRaster for Pinhole<'_> {
 
     #[inline(always)]
     fn cover(&self, node: &Node) -> Option<Cover> {
-        let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
+        let (right, down, ahead) = (self.across.as_vec3(), self.down.as_vec3(), self.ahead.as_vec3());
+        let lo = (Vec3::from(node.min).as_dvec3() - self.origin).as_vec3();
+        let hi = (Vec3::from(node.max).as_dvec3() - self.origin).as_vec3();
         let mut xs = [0.0f32; 8];
         let mut ys = [0.0f32; 8];
         let mut zs = [0.0f32; 8];
-        let lo = [0, 1, 2].map(|k| (f64::from(node.min[k]) - o[k]) as f32);
-        let hi = [0, 1, 2].map(|k| (f64::from(node.max[k]) - o[k]) as f32);
-        let [r, d, f] = [r, d, f].map(|v| v.as_vec3().to_array());
         for k in 0..8 {
-            let x = if k & 1 == 0 { lo[0] } else { hi[0] };
-            let y = if k & 2 == 0 { lo[1] } else { hi[1] };
-            let z = if k & 4 == 0 { lo[2] } else { hi[2] };
-            xs[k] = r[0] * x + r[1] * y + r[2] * z;
-            ys[k] = d[0] * x + d[1] * y + d[2] * z;
-            zs[k] = f[0] * x + f[1] * y + f[2] * z;
+            let x = if k & 1 == 0 { lo.x } else { hi.x };
+            let y = if k & 2 == 0 { lo.y } else { hi.y };
+            let z = if k & 4 == 0 { lo.z } else { hi.z };
+            xs[k] = right.x * x + right.y * y + right.z * z;
+            ys[k] = down.x * x + down.y * y + down.z * z;
+            zs[k] = ahead.x * x + ahead.y * y + ahead.z * z;
         }
-        let size = |v: [f32; 3]| {
-            (0..3)
-                .map(|k| v[k].abs() * if lo[k].abs() > hi[k].abs() { lo[k].abs() } else { hi[k].abs() })
-                .sum::<f32>()
-        };
-        let off = 1e-6 * size(f);
+        let far = lo.abs().max(hi.abs());
+        let off = 1e-6 * ahead.abs().dot(far);
         let nearest = zs.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a }) - off;
         let farthest = zs.iter().fold(f32::NEG_INFINITY, |a, &b| if b > a { b } else { a }) + off;
         if farthest <= 0.0 {
             return None;
         }
-        let off = 1e-6 * (size(r) + size(d)) + off * (self.width + self.height) as f32;
+        let off = 1e-6 * (right.abs() + down.abs()).dot(far) + off * (self.width + self.height) as f32;
         let (width, height) = (self.width as f32, self.height as f32);
         if nearest <= 1e-4 * farthest {
             let outside = |v: &[f32; 8], size: f32| {

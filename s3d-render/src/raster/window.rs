@@ -170,10 +170,15 @@ fn draw_all<L: RasterLanes, T: ProjectionRaster>(
         match nodes[node as usize].content {
             Content::Children(first) => {
                 for node in [first, first + 1] {
-                    queue.extend(raster.cover(&nodes[node as usize]).map(|cover| QueuedNode { node, cover }));
+                    let Some(cover) = raster.cover(&nodes[node as usize]) else { continue };
+                    clusters.prefetch_below(node);
+                    queue.push(QueuedNode { node, cover });
                 }
             }
             Content::Leaf { first: index, .. } => {
+                if let Some(next) = queue.peek() {
+                    clusters.prefetch(next.node);
+                }
                 raster.draw(l, canvas, &clusters.cluster(index));
                 canvas.touch(&cover);
             }

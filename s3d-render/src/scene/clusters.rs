@@ -5,6 +5,7 @@
 
 use crate::scene::tree::{Content, FaceTree, Node, Top};
 use s3d_geom::TriMesh;
+use s3d_simd::prefetch;
 
 /// No group has more faces; so a corner's place in its group fits a byte.
 pub(crate) const MAX_FACES: usize = 64;
@@ -127,6 +128,34 @@ impl Clusters {
 
     pub(crate) fn nodes(&self) -> &[Node] {
         &self.nodes
+    }
+
+    /// Prefetches what a node says where to find: the nodes below, or where the cluster is.
+    #[inline(always)]
+    pub(crate) fn prefetch_below(&self, node: u32) {
+        match self.nodes[node as usize].content {
+            Content::Children(first) => {
+                prefetch(&self.nodes[first as usize]);
+                prefetch(&self.nodes[first as usize + 1]);
+            }
+            Content::Leaf { first: index, .. } => prefetch(&self.starts[index as usize]),
+        }
+    }
+
+    /// Prefetches the cluster of a node that has one.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, node: u32) {
+        if let Content::Leaf { first: index, .. } = self.nodes[node as usize].content {
+            let Cluster { corners, faces, ids } = self.cluster(index);
+            for packet in corners {
+                prefetch(&packet[0]);
+                prefetch(&packet[2]);
+            }
+            for line in (0..faces.len()).step_by(64 / size_of::<u32>()) {
+                prefetch(&faces[line]);
+                prefetch(&ids[line]);
+            }
+        }
     }
 
     #[inline(always)]
