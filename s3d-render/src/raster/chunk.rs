@@ -79,13 +79,10 @@ pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
     assert!(0 < rows && rows <= MAX_ROWS && (!PANORAMA || rows <= grid.scale.len()));
     let cells = pitch.saturating_mul(rows - 1).saturating_add(L::N);
     assert!(cells <= best.len() && cells <= slots.len());
-    let (u, v) = (l.load(grid.u), l.load(grid.v));
-    let along = |f: &Linear| {
-        let sum = l.add(l.mul(l.splat(f.across), u), l.splat(f.at));
-        if PANORAMA { l.add(l.mul(l.splat(f.bend), v), sum) } else { sum }
-    };
+    let uv = (l.load(grid.u), l.load(grid.v));
     let [e0, e1, e2] = chunk.edges;
-    let (a0, a1, a2, aq) = (along(&e0), along(&e1), along(&e2), along(&chunk.inverse_t));
+    let (a0, a1) = (along::<L, PANORAMA>(l, &e0, uv), along::<L, PANORAMA>(l, &e1, uv));
+    let (a2, aq) = (along::<L, PANORAMA>(l, &e2, uv), along::<L, PANORAMA>(l, &chunk.inverse_t, uv));
     // What each row adds: from here the processor spreads a number over a register without a step of its own.
     let mut down = [[0.0; MAX_ROWS]; 4];
     for (down, f) in down.iter_mut().zip([&e0, &e1, &e2, &chunk.inverse_t]) {
@@ -126,4 +123,11 @@ pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
         any |= doubts[k];
     }
     any != 0
+}
+
+/// A function in the first row. No closure: that might be compiled for any processor, and called.
+#[inline(always)]
+fn along<L: RasterLanes, const PANORAMA: bool>(l: L, f: &Linear, (u, v): (L::F, L::F)) -> L::F {
+    let sum = l.add(l.mul(l.splat(f.across), u), l.splat(f.at));
+    if PANORAMA { l.add(l.mul(l.splat(f.bend), v), sum) } else { sum }
 }

@@ -9,7 +9,9 @@ use crate::raster::batch::DrawKind;
 use crate::raster::canvas::{Canvas, Cover, TILE, half_of_tile, part_of_tile};
 use crate::raster::chunk::{Linear, MAX_ROWS, TRUSTED};
 use crate::raster::panorama_batch::{PanoramaBatch, PanoramaCorners};
-use crate::raster::panorama_grid::{ANGLE_ERROR, PanoramaBounds, PanoramaGrid, PanoramaPlanes, turn_of, turns_of};
+use crate::raster::panorama_grid::{
+    ANGLE_ERROR, PanoramaBounds, PanoramaGrid, PanoramaPlanes, turn_of, turns_of,
+};
 use crate::raster::window::{Pixels, ProjectionRaster, Window};
 use crate::raster::{high, low, max, min};
 use crate::ray::cone::{Cone, Plane};

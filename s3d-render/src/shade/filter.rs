@@ -181,12 +181,11 @@ impl<'a> MipLevels<'a> {
         (these, maybe): (u32, u32),
         most: u32,
     ) -> L::ColorSum {
-        let pair = |of: &[Vec<f32>; 2]| [eight(l, &of[0], i), eight(l, &of[1], i)];
-        let [x, y] = pair(&footprints.at);
+        let [x, y] = pair(l, &footprints.at, i);
         if maybe == 0 {
             return self.magnified(l, x, y, these);
         }
-        let ([xx, xy], [yx, yy]) = (pair(&footprints.x), pair(&footprints.y));
+        let ([xx, xy], [yx, yy]) = (pair(l, &footprints.x, i), pair(l, &footprints.y, i));
         let a = l.add(l.mul(xx, xx), l.mul(yx, yx));
         let c = l.add(l.mul(xy, xy), l.mul(yy, yy));
         let sum = l.add(a, c);
@@ -413,4 +412,10 @@ impl<'a> MipLevels<'a> {
 #[inline(always)]
 fn word(bytes: &[u8], at: usize) -> Option<u64> {
     bytes.get(at..)?.first_chunk().map(|b| u64::from_le_bytes(*b))
+}
+
+/// Eight of each of two. No closure: that might be compiled for any processor, and called.
+#[inline(always)]
+fn pair<L: ShadeLanes>(l: L, of: &[Vec<f32>; 2], i: usize) -> [L::F; 2] {
+    [eight(l, &of[0], i), eight(l, &of[1], i)]
 }

@@ -220,7 +220,13 @@ macro_rules! wide256 {
         #[inline(always)]
         fn $name(self, $($arg: $type),*) -> $out {
             // SAFETY: `self` is the proof that the processor has AVX2.
-            std::array::from_fn(|$k| unsafe { $body })
+            unsafe {
+                let mut out = [_mm256_setzero_ps(); R];
+                for $k in 0..R {
+                    out[$k] = $body;
+                }
+                out
+            }
         }
     )*};
 }
@@ -258,7 +264,13 @@ impl<const R: usize> RasterLanes for Wide256<R> {
     fn load(self, from: &[f32]) -> Self::F {
         let from = &from[..Self::N];
         // SAFETY: `self` is the proof of AVX2; the slice has eight values for each register.
-        std::array::from_fn(|k| unsafe { _mm256_loadu_ps(from.as_ptr().add(k * WIDTH)) })
+        unsafe {
+            let mut out = [_mm256_setzero_ps(); R];
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = _mm256_loadu_ps(from.as_ptr().add(k * WIDTH));
+            }
+            out
+        }
     }
 
     #[inline(always)]
@@ -272,8 +284,12 @@ impl<const R: usize> RasterLanes for Wide256<R> {
 
     #[inline(always)]
     fn bits(self, m: Self::M) -> u16 {
-        // SAFETY: `self` is the proof that the processor has AVX2.
-        (0..R).fold(0, |bits, k| bits | (unsafe { _mm256_movemask_ps(m[k]) } as u16) << (k * WIDTH))
+        let mut bits = 0;
+        for (k, m) in m.into_iter().enumerate() {
+            // SAFETY: `self` is the proof that the processor has AVX2.
+            bits |= (unsafe { _mm256_movemask_ps(m) } as u16) << (k * WIDTH);
+        }
+        bits
     }
 
     #[inline(always)]
