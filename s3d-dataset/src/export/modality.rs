@@ -297,8 +297,9 @@ pub(crate) fn null_pixels(pixels: &[[u8; 3]]) -> u64 {
         let bytes = four.as_flattened();
         let (Some(first), Some(last)) = (bytes.first_chunk(), bytes.last_chunk()) else { continue };
         let (first, last) = (u64::from_le_bytes(*first), u64::from_le_bytes(*last));
-        let pixels = [first << 40, first >> 24 << 40, last >> 16 << 40, last >> 40];
-        count += pixels.map(|pixel| u64::from(pixel == 0)).iter().sum::<u64>();
+        for pixel in [first << 40, first >> 24 << 40, last >> 16 << 40, last >> 40] {
+            count += u64::from(pixel == 0);
+        }
     }
     count
 }
