@@ -1,10 +1,5 @@
 //! Panoramas, for the visibility pass: [`PanoramaGrid`] says how.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "slices are cut to the length of the array: there is nothing left of the check"
-)]
-
 use crate::raster::batch::DrawKind;
 use crate::raster::canvas::{Canvas, Cover, TILE, half_of_tile, part_of_tile};
 use crate::raster::chunk::{Linear, MAX_ROWS, TRUSTED};
