@@ -125,7 +125,7 @@ pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
     any != 0
 }
 
-/// A function in the first row. No closure: that might be compiled for any processor, and called.
+/// A function in the first row of a chunk. No closure: see [`crate::simd`].
 #[inline(always)]
 fn along<L: RasterLanes, const PANORAMA: bool>(l: L, f: &Linear, (u, v): (L::F, L::F)) -> L::F {
     let sum = l.add(l.mul(l.splat(f.across), u), l.splat(f.at));

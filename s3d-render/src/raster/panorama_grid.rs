@@ -183,7 +183,9 @@ impl PanoramaGrid {
         let (to, _) = tangents.as_chunks_mut::<GROUP>();
         let (from, _) = self.tan[row..].as_chunks::<GROUP>();
         for (to, from) in to.iter_mut().zip(from).take(rows.div_ceil(GROUP)) {
-            *to = from.map(|from| (from - tan) as f32);
+            for k in 0..GROUP {
+                to[k] = (from[k] - tan) as f32;
+            }
         }
         let scale = &self.scale[row..row + rows];
         ChunkGrid { u: &self.u, v: &self.v, rows: tangents, count: rows, scale }
@@ -272,7 +274,7 @@ pub(crate) fn turn_of(y: f32, x: f32) -> f32 {
     if y < 0.0 { -angle } else { angle }
 }
 
-/// [`turn_of`] of eight. Not inlined: where LLVM knows how the arrays are made, it takes one after another.
+/// [`turn_of`] of eight. Not inlined: where LLVM sees how the arrays are made, it computes one after another.
 #[inline(never)]
 pub(crate) fn turns_of(y: &[f32; 8], x: &[f32; 8]) -> [f32; 8] {
     std::array::from_fn(|k| turn_of(y[k], x[k]))

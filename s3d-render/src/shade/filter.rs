@@ -414,7 +414,7 @@ fn word(bytes: &[u8], at: usize) -> Option<u64> {
     bytes.get(at..)?.first_chunk().map(|b| u64::from_le_bytes(*b))
 }
 
-/// Eight of each of two. No closure: that might be compiled for any processor, and called.
+/// Eight values from each of two lists. No closure: see [`crate::simd`].
 #[inline(always)]
 fn pair<L: ShadeLanes>(l: L, of: &[Vec<f32>; 2], i: usize) -> [L::F; 2] {
     [eight(l, &of[0], i), eight(l, &of[1], i)]
