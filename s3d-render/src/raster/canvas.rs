@@ -33,6 +33,9 @@
 //!
 //! Depth is computed at the end from the `f64` functions of the face that is seen, and rounded once: within
 //! one step of the last place of `f32` of what a single ray gives.
+//!
+//! [`EDGE_ERROR`]: crate::raster::chunk::EDGE_ERROR
+//! [`TRUSTED`]: crate::raster::chunk::TRUSTED
 
 #![expect(
     clippy::unwrap_used,

@@ -47,7 +47,7 @@ pub(crate) struct Chunk {
     pub(crate) inverse_t_error: f32,
     /// From this value on, `inverse_t` is known to [`TRUSTED`]. Likewise.
     pub(crate) trusted: f32,
-    /// The face, as it was entered by [`Canvas::enter`].
+    /// The face, as [`enter`](crate::raster::canvas::Canvas::enter) says.
     pub(crate) slot: u32,
 }
 
