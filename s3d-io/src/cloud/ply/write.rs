@@ -9,6 +9,7 @@ use crate::fs::open::open_file;
 use s3d_geom::glam::DVec3;
 use s3d_geom::{NO_INDEX, PointCloud};
 use std::io::{BufRead, BufReader, Read, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Bytes of one point: three floats, three bytes, two integers.
@@ -117,19 +118,9 @@ impl<W: Write> PlyPointWriter<W> {
             "{} faces for {n} points",
             cloud.faces.len()
         );
-        let colors = cloud.colors.iter().copied().chain(std::iter::repeat([0; 3]));
-        let faces = cloud.faces.iter().copied().chain(std::iter::repeat(NO_INDEX));
-        let mut points = cloud.positions.iter().zip(labels).zip(colors).zip(faces).peekable();
-        while points.peek().is_some() {
+        for first in (0..n).step_by(BATCH) {
             self.buffer.clear();
-            for (((position, label), color), face) in points.by_ref().take(BATCH) {
-                for coordinate in position.to_array() {
-                    self.buffer.extend_from_slice(&coordinate.to_le_bytes());
-                }
-                self.buffer.extend_from_slice(&color);
-                self.buffer.extend_from_slice(&label.to_le_bytes());
-                self.buffer.extend_from_slice(&face.to_le_bytes());
-            }
+            put_points(&mut self.buffer, cloud, labels, first..n.min(first + BATCH));
             self.file.write_all(&self.buffer).map_err(|e| Error::io(&self.name, "write", e))?;
         }
         self.written += n as u64;
@@ -146,6 +137,22 @@ impl<W: Write> PlyPointWriter<W> {
             return Err(Error::format(&self.name, message));
         }
         Ok(self.file)
+    }
+}
+
+/// Appends the bytes of some points of a cloud. Not generic, so that it is compiled here, once.
+fn put_points(buffer: &mut Vec<u8>, cloud: &PointCloud, labels: &[u32], which: Range<usize>) {
+    let points = cloud.positions.iter().zip(labels).enumerate();
+    for (i, (position, label)) in points.skip(which.start).take(which.len()) {
+        let face = cloud.faces.get(i).copied().unwrap_or(NO_INDEX);
+        let mut point = [0; POINT_BYTES];
+        point[0..4].copy_from_slice(&position.x.to_le_bytes());
+        point[4..8].copy_from_slice(&position.y.to_le_bytes());
+        point[8..12].copy_from_slice(&position.z.to_le_bytes());
+        point[12..15].copy_from_slice(&cloud.colors.get(i).copied().unwrap_or([0; 3]));
+        point[15..19].copy_from_slice(&label.to_le_bytes());
+        point[19..23].copy_from_slice(&face.to_le_bytes());
+        buffer.extend_from_slice(&point);
     }
 }
 
