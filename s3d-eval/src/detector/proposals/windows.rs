@@ -126,20 +126,12 @@ pub fn best_windows(
     }
     let scores = score_map(volumes, machine, cells, least, count);
     let [nx, ny, nz] = count.to_array().map(|n| n as usize);
-    let at = |x: usize, y: usize, z: usize| scores[(z * ny + y) * nx + x];
     let mut found: Vec<(Window, f32)> = Vec::new();
     for z in 0..nz {
         for y in 0..ny {
             for x in 0..nx {
-                let score = at(x, y, z);
-                let around = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
-                let beaten = around(z, nz).any(|k| {
-                    around(y, ny).any(|j| {
-                        around(x, nx)
-                            .any(|i| at(i, j, k) > score || (at(i, j, k) == score && (k, j, i) < (z, y, x)))
-                    })
-                });
-                if !beaten {
+                let score = scores[(z * ny + y) * nx + x];
+                if !is_beaten(&scores, [nx, ny, nz], [x, y, z]) {
                     found
                         .push((Window { corner: least + ivec3(x as i32, y as i32, z as i32), cells }, score));
                 }
@@ -149,6 +141,24 @@ pub fn best_windows(
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
     found.truncate(most);
     found
+}
+
+/// Whether a window at `place` has a neighbour that scores more, or as much and comes first.
+fn is_beaten(scores: &[f32], [nx, ny, nz]: [usize; 3], place: [usize; 3]) -> bool {
+    let [x, y, z] = place;
+    let score = scores[(z * ny + y) * nx + x];
+    let around = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
+    for k in around(z, nz) {
+        for j in around(y, ny) {
+            for i in around(x, nx) {
+                let other = scores[(k * ny + j) * nx + i];
+                if other > score || (other == score && (k, j, i) < (z, y, x)) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
 }
 
 /// The scores of windows from corner `least` on: x fastest.
