@@ -147,11 +147,13 @@ fn a_seed_with_instances_is_read() {
 fn coarser_levels_and_hidden_nodes_are_left_out() {
     let rest = format!(
         r#"{MESH}, "nodes": [
-        {{"mesh": 0, "extensions": {{"MSFT_lod": {{"ids": [1, 2]}}}}}}, {{"mesh": 0, "translation": [1, 0, 0]}},
+        {{"mesh": 0, "extensions": {{"MSFT_lod": {{"ids": [1, 2]}}}}}},
+        {{"mesh": 0, "translation": [1, 0, 0]}},
         {{"mesh": 0, "translation": [2, 0, 0]}},
         {{"mesh": 0, "translation": [3, 0, 0], "extensions": {{"KHR_node_visibility": {{"visible": false}}}},
         "children": [4]}}, {{"mesh": 0}},
-        {{"mesh": 0, "translation": [5, 0, 0], "extensions": {{"KHR_node_visibility": {{"visible": true}}}}}}]"#
+        {{"mesh": 0, "translation": [5, 0, 0],
+        "extensions": {{"KHR_node_visibility": {{"visible": true}}}}}}]"#
     );
     let file = read_bytes("a.gltf", gltf(&[triangle()], &rest).as_bytes()).unwrap();
     let at: Vec<f32> = (0..file.mesh.faces().len() as u32).map(|f| file.mesh.triangle(f)[0].x).collect();
@@ -167,7 +169,8 @@ fn coarser_levels_and_hidden_nodes_are_left_out() {
 fn extensions_that_have_geometry_are_refused_by_name_wherever_they_are() {
     let primitive = |e: &str| {
         format!(
-            r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "extensions": {{"{e}": {{}}}}}}]}}],
+            r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}},
+                "extensions": {{"{e}": {{}}}}}}]}}],
             "nodes": [{{"mesh": 0}}]"#
         )
     };
@@ -215,7 +218,8 @@ fn odd_but_valid_files_are_read() {
     let with = |more: &str| good.replacen("\"meshes\"", &format!("{more}, \"meshes\""), 1);
     for json in [
         with(
-            r#""animations": [{"channels": [{"sampler": 0, "target": {"path": "pointer"}}], "samplers": []}]"#,
+            r#""animations": [{"channels": [{"sampler": 0, "target": {"path": "pointer"}}],
+                "samplers": []}]"#,
         ),
         with(r#""animations": 5, "cameras": [{"type": "none"}], "skins": [{}], "extras": "a text""#),
         with(r#""scene": 1, "scenes": [{"name": "nothing"}, {"nodes": [0], "extras": 7}]"#),
