@@ -24,7 +24,7 @@ pub(crate) mod shade_lanes;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod shade_width;
 
-use raster_lanes::{Portable, RasterLanes};
+use raster_lanes::{Pair, Portable, RasterLanes};
 #[cfg(target_arch = "x86_64")]
 use s3d_simd::{Avx2, Avx512};
 use s3d_simd::{Level, Scalar, level};
@@ -42,12 +42,12 @@ pub(crate) trait Simd: Copy {
 }
 
 impl Simd for Scalar {
-    type Raster = Portable<{ raster_lanes::LANES }>;
+    type Raster = Pair<Portable>;
     type Shade = Plain;
 
     #[inline(always)]
     fn raster(self) -> Self::Raster {
-        Portable
+        Pair(Portable)
     }
     #[inline(always)]
     fn shade(self) -> Self::Shade {
@@ -57,12 +57,12 @@ impl Simd for Scalar {
 
 #[cfg(target_arch = "x86_64")]
 impl Simd for Avx2 {
-    type Raster = raster_x86::Wide256<2>;
+    type Raster = Pair<raster_x86::Wide256>;
     type Shade = shade_avx2::Eight<Self>;
 
     #[inline(always)]
     fn raster(self) -> Self::Raster {
-        raster_x86::Wide256(self)
+        Pair(raster_x86::Wide256(self))
     }
     #[inline(always)]
     fn shade(self) -> Self::Shade {

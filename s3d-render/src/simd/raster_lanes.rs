@@ -8,6 +8,8 @@
     reason = "slices are cut to the length of the array: there is nothing left of the check"
 )]
 
+use std::ops::BitOr;
+
 /// Pixels in a register (or in as many registers as it takes).
 pub(crate) const LANES: usize = 16;
 
@@ -110,25 +112,52 @@ pub(crate) fn along<const PANORAMA: bool>([a, b, c]: [f64; 3], line: &RowGroup<'
     if PANORAMA { [c * line.rise, a * line.level, b * line.level] } else { [a + c * line.rise, b, 0.0] }
 }
 
-/// Plain arrays of `N`, for any processor: the compiler uses the registers that every processor of the target
-/// has.
+/// Plain arrays of eight, for any processor: the compiler uses the registers that every processor of the
+/// target has.
 #[derive(Clone, Copy)]
-pub(crate) struct Portable<const N: usize>;
+pub(crate) struct Portable;
 
-impl<const N: usize> RasterLanes for Portable<N> {
-    const N: usize = N;
-    type F = [f32; N];
-    type M = [u32; N];
-    type Half = Portable<8>;
+/// Values in a [`Portable`].
+const WIDTH: usize = 8;
+
+/// An array of eight values: `value` for each `k` from 0 to 7. It is no loop, since kernels have hundreds of them:
+/// to unroll those took longer than all the rest of their compilation.
+macro_rules! eight {
+    ($k:ident => $value:expr) => {
+        eight!($k => $value; 0, 1, 2, 3, 4, 5, 6, 7)
+    };
+    ($k:ident => $value:expr; $($n:literal),*) => {
+        [$({
+            let $k: usize = $n;
+            $value
+        }),*]
+    };
+}
+
+/// Operations on arrays, which touch no memory: value `k` of the result.
+macro_rules! portable {
+    ($(fn $name:ident($($arg:ident: $type:ty),*) -> $out:ty = |$k:ident| $body:expr;)*) => {$(
+        #[inline(always)]
+        fn $name(self, $($arg: $type),*) -> $out {
+            eight!($k => $body)
+        }
+    )*};
+}
+
+impl RasterLanes for Portable {
+    const N: usize = WIDTH;
+    type F = [f32; WIDTH];
+    type M = [u32; WIDTH];
+    type Half = Self;
 
     #[inline(always)]
-    fn half(self) -> Self::Half {
-        Portable
+    fn half(self) -> Self {
+        self
     }
 
     #[inline(always)]
     fn splat(self, x: f32) -> Self::F {
-        [x; N]
+        [x; WIDTH]
     }
 
     #[inline(always)]
@@ -141,54 +170,113 @@ impl<const N: usize> RasterLanes for Portable<N> {
         *to.first_chunk_mut().expect(SHORT) = x;
     }
 
-    #[inline(always)]
-    fn add(self, a: Self::F, b: Self::F) -> Self::F {
-        std::array::from_fn(|k| a[k] + b[k])
-    }
-
-    #[inline(always)]
-    fn mul(self, a: Self::F, b: Self::F) -> Self::F {
-        std::array::from_fn(|k| a[k] * b[k])
-    }
-
-    #[inline(always)]
-    fn min(self, a: Self::F, b: Self::F) -> Self::F {
-        std::array::from_fn(|k| if a[k] < b[k] { a[k] } else { b[k] })
-    }
-
-    #[inline(always)]
-    fn greater(self, a: Self::F, b: Self::F) -> Self::M {
-        std::array::from_fn(|k| if a[k] > b[k] { u32::MAX } else { 0 })
-    }
-
-    #[inline(always)]
-    fn greater_by_ulps(self, a: Self::F, b: Self::F, ulps: i32) -> Self::M {
-        std::array::from_fn(|k| {
+    portable! {
+        fn add(a: Self::F, b: Self::F) -> Self::F = |k| a[k] + b[k];
+        fn mul(a: Self::F, b: Self::F) -> Self::F = |k| a[k] * b[k];
+        fn min(a: Self::F, b: Self::F) -> Self::F = |k| if a[k] < b[k] { a[k] } else { b[k] };
+        fn greater(a: Self::F, b: Self::F) -> Self::M = |k| if a[k] > b[k] { u32::MAX } else { 0 };
+        fn greater_by_ulps(a: Self::F, b: Self::F, ulps: i32) -> Self::M = |k| {
             let above = a[k].to_bits() as i32 > (b[k].to_bits() as i32).wrapping_add(ulps);
             if above { u32::MAX } else { 0 }
-        })
-    }
-
-    #[inline(always)]
-    fn and(self, a: Self::M, b: Self::M) -> Self::M {
-        std::array::from_fn(|k| a[k] & b[k])
+        };
+        fn and(a: Self::M, b: Self::M) -> Self::M = |k| a[k] & b[k];
     }
 
     #[inline(always)]
     fn bits(self, m: Self::M) -> u16 {
-        (0..N).fold(0, |bits, k| bits | ((m[k] & 1) as u16) << k)
+        eight!(k => ((m[k] & 1) as u16) << k).into_iter().fold(0, BitOr::bitor)
     }
 
     #[inline(always)]
     fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
-        let to: &mut [f32; N] = to.first_chunk_mut().expect(SHORT);
-        *to = std::array::from_fn(|k| if m[k] != 0 { x[k] } else { to[k] });
+        let to: &mut [f32; WIDTH] = to.first_chunk_mut().expect(SHORT);
+        *to = eight!(k => if m[k] != 0 { x[k] } else { to[k] });
     }
 
     #[inline(always)]
     fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32) {
-        let to: &mut [u32; N] = to.first_chunk_mut().expect(SHORT);
-        *to = std::array::from_fn(|k| if m[k] != 0 { x } else { to[k] });
+        let to: &mut [u32; WIDTH] = to.first_chunk_mut().expect(SHORT);
+        *to = eight!(k => if m[k] != 0 { x } else { to[k] });
+    }
+}
+
+/// Two registers side by side.
+#[derive(Clone, Copy)]
+pub(crate) struct Pair<L>(pub(crate) L);
+
+/// Operations on both registers of a pair.
+macro_rules! pair {
+    ($(fn $name:ident($($arg:ident: $type:ty),*; $($same:ident: $same_type:ty),*) -> $out:ty;)*) => {$(
+        #[inline(always)]
+        fn $name(self, $($arg: $type,)* $($same: $same_type,)*) -> $out {
+            (self.0.$name($($arg.0,)* $($same,)*), self.0.$name($($arg.1,)* $($same,)*))
+        }
+    )*};
+}
+
+impl<L: RasterLanes> RasterLanes for Pair<L> {
+    const N: usize = 2 * L::N;
+    type F = (L::F, L::F);
+    type M = (L::M, L::M);
+    type Half = L;
+
+    pair! {
+        fn add(a: Self::F, b: Self::F;) -> Self::F;
+        fn mul(a: Self::F, b: Self::F;) -> Self::F;
+        fn min(a: Self::F, b: Self::F;) -> Self::F;
+        fn greater(a: Self::F, b: Self::F;) -> Self::M;
+        fn greater_by_ulps(a: Self::F, b: Self::F; ulps: i32) -> Self::M;
+        fn and(a: Self::M, b: Self::M;) -> Self::M;
+    }
+
+    #[inline(always)]
+    fn half(self) -> L {
+        self.0
+    }
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> Self::F {
+        (self.0.splat(x), self.0.splat(x))
+    }
+
+    #[inline(always)]
+    fn load(self, from: &[f32]) -> Self::F {
+        (self.0.load(from), self.0.load(&from[L::N..]))
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f32], x: Self::F) {
+        self.0.store(to, x.0);
+        self.0.store(&mut to[L::N..], x.1);
+    }
+
+    #[inline(always)]
+    fn bits(self, m: Self::M) -> u16 {
+        self.0.bits(m.0) | self.0.bits(m.1) << L::N
+    }
+
+    #[inline(always)]
+    fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
+        self.0.store_masked_f32(to, m.0, x.0);
+        self.0.store_masked_f32(&mut to[L::N..], m.1, x.1);
+    }
+
+    #[inline(always)]
+    fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32) {
+        self.0.store_masked_u32(to, m.0, x);
+        self.0.store_masked_u32(&mut to[L::N..], m.1, x);
+    }
+
+    #[inline(always)]
+    fn resolve<const PANORAMA: bool>(
+        self,
+        slots: &[u32; LANES],
+        line: &RowGroup<'_>,
+        drawn: &[DrawnFace],
+        faces: &mut [u32; LANES],
+        depths: &mut [f32; LANES],
+    ) {
+        self.0.resolve::<PANORAMA>(slots, line, drawn, faces, depths);
     }
 }
 

@@ -16,12 +16,12 @@ use std::arch::{asm, x86_64::*};
 #[derive(Clone, Copy)]
 pub(crate) struct Wide512(pub(crate) Avx512);
 
-/// Operations on registers of 512 bits, which touch no memory.
-macro_rules! wide512 {
+/// Operations on registers, which touch no memory.
+macro_rules! registers {
     ($(fn $name:ident($($arg:ident: $type:ty),*) -> $out:ty = $body:expr;)*) => {$(
         #[inline(always)]
         fn $name(self, $($arg: $type),*) -> $out {
-            // SAFETY: `self` is the proof that the processor has AVX-512.
+            // SAFETY: `self` is the proof that the processor has these registers.
             unsafe { $body }
         }
     )*};
@@ -31,14 +31,14 @@ impl RasterLanes for Wide512 {
     const N: usize = LANES;
     type F = __m512;
     type M = __mmask16;
-    type Half = Wide256<1>;
+    type Half = Wide256;
 
     #[inline(always)]
     fn half(self) -> Self::Half {
         Wide256(self.0.avx2())
     }
 
-    wide512! {
+    registers! {
         fn splat(x: f32) -> Self::F = _mm512_set1_ps(x);
         fn add(a: Self::F, b: Self::F) -> Self::F = _mm512_add_ps(a, b);
         fn mul(a: Self::F, b: Self::F) -> Self::F = _mm512_mul_ps(a, b);
@@ -195,9 +195,9 @@ fn resolve_by_fours<const PANORAMA: bool>(
     }
 }
 
-/// `R` registers of 256 bits.
+/// One register of 256 bits.
 #[derive(Clone, Copy)]
-pub(crate) struct Wide256<const R: usize>(pub(crate) Avx2);
+pub(crate) struct Wide256(pub(crate) Avx2);
 
 /// Values in a register of 256 bits.
 const WIDTH: usize = 8;
@@ -214,106 +214,63 @@ fn opaque(mut x: __m256) -> __m256 {
     x
 }
 
-/// Operations on `R` registers of 256 bits, which touch no memory: register `k` of the result.
-macro_rules! wide256 {
-    ($(fn $name:ident($($arg:ident: $type:ty),*) -> $out:ty = |$k:ident| $body:expr;)*) => {$(
-        #[inline(always)]
-        fn $name(self, $($arg: $type),*) -> $out {
-            // SAFETY: `self` is the proof that the processor has AVX2.
-            unsafe {
-                let mut out = [_mm256_setzero_ps(); R];
-                for $k in 0..R {
-                    out[$k] = $body;
-                }
-                out
-            }
-        }
-    )*};
-}
-
-impl<const R: usize> RasterLanes for Wide256<R> {
-    const N: usize = R * WIDTH;
-    type F = [__m256; R];
-    type M = [__m256; R];
-    type Half = Wide256<1>;
+impl RasterLanes for Wide256 {
+    const N: usize = WIDTH;
+    type F = __m256;
+    type M = __m256;
+    type Half = Self;
 
     #[inline(always)]
-    fn half(self) -> Self::Half {
-        Wide256(self.0)
+    fn half(self) -> Self {
+        self
     }
 
-    #[inline(always)]
-    fn splat(self, x: f32) -> Self::F {
-        // SAFETY: `self` is the proof that the processor has AVX2.
-        unsafe { [_mm256_set1_ps(x); R] }
-    }
-
-    wide256! {
-        fn add(a: Self::F, b: Self::F) -> Self::F = |k| _mm256_add_ps(a[k], b[k]);
-        fn mul(a: Self::F, b: Self::F) -> Self::F = |k| _mm256_mul_ps(a[k], b[k]);
-        fn min(a: Self::F, b: Self::F) -> Self::F = |k| _mm256_min_ps(a[k], b[k]);
-        fn greater(a: Self::F, b: Self::F) -> Self::M = |k| _mm256_cmp_ps::<_CMP_GT_OQ>(a[k], b[k]);
-        fn greater_by_ulps(a: Self::F, b: Self::F, ulps: i32) -> Self::M = |k| {
-            let b = _mm256_add_epi32(_mm256_castps_si256(b[k]), _mm256_set1_epi32(ulps));
-            _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_castps_si256(a[k]), b))
+    registers! {
+        fn splat(x: f32) -> Self::F = _mm256_set1_ps(x);
+        fn add(a: Self::F, b: Self::F) -> Self::F = _mm256_add_ps(a, b);
+        fn mul(a: Self::F, b: Self::F) -> Self::F = _mm256_mul_ps(a, b);
+        fn min(a: Self::F, b: Self::F) -> Self::F = _mm256_min_ps(a, b);
+        fn greater(a: Self::F, b: Self::F) -> Self::M = _mm256_cmp_ps::<_CMP_GT_OQ>(a, b);
+        fn greater_by_ulps(a: Self::F, b: Self::F, ulps: i32) -> Self::M = {
+            let b = _mm256_add_epi32(_mm256_castps_si256(b), _mm256_set1_epi32(ulps));
+            _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_castps_si256(a), b))
         };
-        fn and(a: Self::M, b: Self::M) -> Self::M = |k| _mm256_and_ps(a[k], b[k]);
+        fn and(a: Self::M, b: Self::M) -> Self::M = _mm256_and_ps(a, b);
+        fn bits(m: Self::M) -> u16 = _mm256_movemask_ps(m) as u16;
     }
 
     #[inline(always)]
     fn load(self, from: &[f32]) -> Self::F {
-        let from = &from[..Self::N];
-        // SAFETY: `self` is the proof of AVX2; the slice has eight values for each register.
-        unsafe {
-            let mut out = [_mm256_setzero_ps(); R];
-            for (k, out) in out.iter_mut().enumerate() {
-                *out = _mm256_loadu_ps(from.as_ptr().add(k * WIDTH));
-            }
-            out
-        }
+        let from: &[f32; WIDTH] = from.first_chunk().expect(SHORT);
+        // SAFETY: `self` is the proof of AVX2; the array has eight values.
+        unsafe { _mm256_loadu_ps(from.as_ptr()) }
     }
 
     #[inline(always)]
     fn store(self, to: &mut [f32], x: Self::F) {
-        let to = &mut to[..Self::N];
-        for (k, x) in x.into_iter().enumerate() {
-            // SAFETY: as in `load`.
-            unsafe { _mm256_storeu_ps(to.as_mut_ptr().add(k * WIDTH), x) };
-        }
-    }
-
-    #[inline(always)]
-    fn bits(self, m: Self::M) -> u16 {
-        let mut bits = 0;
-        for (k, m) in m.into_iter().enumerate() {
-            // SAFETY: `self` is the proof that the processor has AVX2.
-            bits |= (unsafe { _mm256_movemask_ps(m) } as u16) << (k * WIDTH);
-        }
-        bits
+        let to: &mut [f32; WIDTH] = to.first_chunk_mut().expect(SHORT);
+        // SAFETY: as in `load`.
+        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), x) }
     }
 
     #[inline(always)]
     fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F) {
-        let to = &mut to[..Self::N];
-        for k in 0..R {
-            // SAFETY: as in `load`.
-            unsafe {
-                let to = to.as_mut_ptr().add(k * WIDTH);
-                _mm256_storeu_ps(to, opaque(_mm256_blendv_ps(_mm256_loadu_ps(to), x[k], m[k])));
-            }
+        let to: &mut [f32; WIDTH] = to.first_chunk_mut().expect(SHORT);
+        // SAFETY: as in `load`.
+        unsafe {
+            let to = to.as_mut_ptr();
+            _mm256_storeu_ps(to, opaque(_mm256_blendv_ps(_mm256_loadu_ps(to), x, m)));
         }
     }
 
     #[inline(always)]
     fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32) {
-        let to = &mut to[..Self::N];
-        for (k, m) in m.into_iter().enumerate() {
-            // SAFETY: as in `load`.
-            unsafe {
-                let to = to.as_mut_ptr().add(k * WIDTH).cast();
-                let x = _mm256_castsi256_ps(_mm256_set1_epi32(x as i32));
-                _mm256_storeu_ps(to, opaque(_mm256_blendv_ps(_mm256_loadu_ps(to), x, m)));
-            }
+        let to: &mut [u32; WIDTH] = to.first_chunk_mut().expect(SHORT);
+        // SAFETY: as in `load`.
+        unsafe {
+            let to = to.as_mut_ptr().cast();
+            let x = _mm256_castsi256_ps(_mm256_set1_epi32(x as i32));
+            _mm256_storeu_ps(to, opaque(_mm256_blendv_ps(_mm256_loadu_ps(to), x, m)));
         }
     }
 
