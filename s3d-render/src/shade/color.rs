@@ -17,12 +17,14 @@ use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::shade::patch::{FaceCache, Patch};
 use crate::shade::pixel_color::PixelByPixel;
 use crate::shade::prefetch::Prefetch;
-use crate::shade::spans::{Spans, band_rows};
+use crate::shade::spans::Spans;
 use crate::shade::texel_wrap::TexelWrap;
+use crate::shade::view::{Modalities, Shading, ViewImages, ViewKernel};
+use crate::simd::dispatch_on;
 use crate::simd::shade_lanes::{LANES, ShadeLanes};
-use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
-use s3d_geom::{Camera, FaceColor, Raster};
+use s3d_geom::{Camera, FaceColor, NormalAxes, Raster};
+use s3d_simd::{Level, level};
 use std::ops::Range;
 
 /// The colours that the pixels see: textures filtered over each pixel's footprint, corners' colours
@@ -78,42 +80,29 @@ pub(crate) fn rgb_of_faces_into(
     filter: &TextureFilter,
     out: &mut Raster<[u8; 3]>,
 ) {
+    rgb_by(level(), scene, mip_maps, faces, camera, filter, out);
+}
+
+/// As [`rgb_of_faces_into`], with the instructions of a level.
+fn rgb_by(
+    level: Level,
+    scene: &Scene<'_>,
+    mip_maps: &MipMaps,
+    faces: &Raster<u32>,
+    camera: &Camera,
+    filter: &TextureFilter,
+    out: &mut Raster<[u8; 3]>,
+) {
     fit(out, faces, [0; 3]);
-    dispatch(RgbKernel { scene, mip_maps, faces, camera, filter, out });
-}
-
-struct RgbKernel<'a> {
-    scene: &'a Scene<'a>,
-    mip_maps: &'a MipMaps,
-    faces: &'a Raster<u32>,
-    camera: &'a Camera,
-    filter: &'a TextureFilter,
-    out: &'a mut Raster<[u8; 3]>,
-}
-
-impl Kernel for RgbKernel<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let lanes = simd.shade();
-        let Self { scene, mip_maps, faces, camera, filter, out } = self;
-        let grid = RayGrid::new(camera);
-        let mut painter = RgbPainter::new(lanes, scene, mip_maps, camera, filter);
-        let width = faces.width() as usize;
-        let (mut spans, band) = (Spans::new(width), (band_rows(width) * width).max(1));
-        let parts = faces.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band));
-        for (k, (faces, out)) in parts.enumerate() {
-            if spans.find(lanes, Some(scene.mesh()), faces) {
-                painter.forget();
-            }
-            if grid.is_panorama() {
-                painter.band::<true>(&grid, &spans, k * band_rows(width), faces, out, &Prefetch::default());
-            } else {
-                painter.band::<false>(&grid, &spans, k * band_rows(width), faces, out, &Prefetch::default());
-            }
-        }
-    }
+    let &filter = filter;
+    let (normal_axes, index_of_face, color_of_face) = (NormalAxes::default(), &[][..], &[][..]);
+    let shading = Shading { scene, mip_maps, filter, normal_axes, index_of_face, color_of_face };
+    let mut images = ViewImages::default();
+    std::mem::swap(&mut images.rgb, out);
+    let wanted = Modalities { rgb: true, ..Modalities::default() };
+    let depths = &Raster::filled(0, 0, 0.0);
+    dispatch_on(level, ViewKernel { shading: &shading, faces, depths, camera, wanted, out: &mut images });
+    std::mem::swap(&mut images.rgb, out);
 }
 
 /// Where a face has its colour from.
@@ -246,18 +235,18 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
             let (group, count) = spans.new_group::<true>(self.lanes, Some(self.scene.mesh()), k);
             self.prepare::<PANORAMA>(grid, first_row, &group, count);
         }
-        let (mut j, mut from) = (0, 0);
-        for pieces in spans.pieces().windows(2) {
-            let (start, end) = (pieces[0].start as usize, pieces[1].start as usize);
-            if start == from + width {
-                self.fetch(&mut out[from..start], from, prefetch);
-                (j, from) = (j + 1, start);
+        let mut pieces = spans.pieces().windows(2).peekable();
+        for (j, row) in out.chunks_mut(width.max(1)).enumerate() {
+            let from = j * width;
+            while let Some(&[piece, next]) =
+                pieces.next_if(|pieces| (pieces[0].start as usize) < from + width)
+            {
+                let (start, end) = (piece.start as usize, next.start as usize);
+                let columns = start - from..end - from;
+                self.lay_out::<PANORAMA>(grid, faces[start], piece.number, first_row + j, columns, row);
             }
-            let row = &mut out[from..from + width];
-            let columns = start - from..end - from;
-            self.lay_out::<PANORAMA>(grid, faces[start], pieces[0].number, first_row + j, columns, row);
+            self.fetch(row, from, prefetch);
         }
-        self.fetch(&mut out[from..], from, prefetch);
     }
 
     /// Prepares the first `count` of some faces that the band from row `first_row` on is the first to show.
@@ -420,9 +409,7 @@ fn put_some(colors: &[u32; LANES], these: u32, to: &mut [[u8; 3]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::dispatch_on;
     use s3d_geom::Pose;
-    use s3d_simd::Level;
     use s3d_synth::scenes::scan_like;
 
     #[test]
@@ -441,10 +428,7 @@ mod tests {
             let filter = TextureFilter::default();
             let images = Level::all().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
-                let (scene, mip_maps, filter) = (&scene, &mip_maps, &filter);
-                let kernel =
-                    RgbKernel { scene, mip_maps, faces: &hits.face, camera: &camera, filter, out: &mut out };
-                dispatch_on(level, kernel);
+                rgb_by(level, &scene, &mip_maps, &hits.face, &camera, &filter, &mut out);
                 out
             });
             let images: Vec<_> = images.collect();

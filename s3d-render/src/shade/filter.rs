@@ -182,51 +182,65 @@ impl<'a> MipLevels<'a> {
         most: u32,
     ) -> L::ColorSum {
         let [x, y] = pair(l, &footprints.at, i);
-        if maybe == 0 {
-            return self.magnified(l, x, y, these);
+        let taps = if maybe == 0 { None } else { self.taps(l, footprints, i, maybe, most) };
+        match taps {
+            None => self.magnified(l, x, y, these),
+            Some(taps) => self.filtered(l, x, y, &taps, these),
         }
+    }
+
+    /// How those of eight footprints that are among `maybe` are sampled; `None` if none of them is wide.
+    #[inline(always)]
+    fn taps<L: ShadeLanes>(
+        &self,
+        l: L,
+        footprints: &Footprints,
+        i: usize,
+        maybe: u32,
+        most: u32,
+    ) -> Option<Taps<L::F>> {
         let ([xx, xy], [yx, yy]) = (pair(l, &footprints.x, i), pair(l, &footprints.y, i));
         let a = l.add(l.mul(xx, xx), l.mul(yx, yx));
         let c = l.add(l.mul(xy, xy), l.mul(yy, yy));
         let sum = l.add(a, c);
         let maybe = l.greater(sum, l.splat(1.0)) & l.greater(l.splat(f32::INFINITY), sum) & maybe;
-        if maybe != 0 {
-            // See `taps` and `axes` of texture.rs for what follows.
-            let (zero, half_of, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
-            let b = l.add(l.mul(xx, xy), l.mul(yx, yy));
-            let (mean, half) = (l.mul(half_of, sum), l.mul(half_of, l.sub(a, c)));
-            let root = l.sqrt(l.add(l.mul(half, half), l.mul(b, b)));
-            let long = l.sqrt(l.add(mean, root));
-            let axis_x = l.select_by_sign(half, b, l.add(root, half));
-            let axis_y = l.select_by_sign(half, l.sub(root, half), b);
-            // What makes the axis as long as that. A round footprint has no axis, and one sample.
-            let length_2 = l.add(l.mul(axis_x, axis_x), l.mul(axis_y, axis_y));
-            let stretch = l.sqrt(l.div(l.add(mean, root), l.max(length_2, l.splat(1e-30))));
-            let cross = l.sub(l.mul(xx, yy), l.mul(xy, yx));
-            let minor = l.div(l.max(cross, l.sub(zero, cross)), long);
-            let most = most.max(1) as f32;
-            let width = l.max(l.max(minor, l.mul(long, l.splat(1.0 / most))), one);
-            let count = l.min(l.max(l.add(l.div(long, width), half_of), one), l.splat(most));
-            let count = l.truncate(count);
-            let wide = maybe & (l.greater(width, one) | l.greater(count, one));
-            if wide != 0 {
-                let part = l.div(one, count);
-                let step = l.mul(stretch, part);
-                let (level, fraction) = self.level_of(l, width);
-                let share = l.mul(l.splat(-32768.0), part);
-                let next_weight = l.mul(share, fraction);
-                let taps = Taps {
-                    level: l.select(wide, level, zero),
-                    weight: l.select(wide, l.sub(share, next_weight), l.splat(-32768.0)),
-                    next_weight: l.select(wide, next_weight, zero),
-                    count: l.select(wide, count, one),
-                    step_x: l.select(wide, l.mul(axis_x, step), zero),
-                    step_y: l.select(wide, l.mul(axis_y, step), zero),
-                };
-                return self.filtered(l, x, y, &taps, these);
-            }
+        if maybe == 0 {
+            return None;
         }
-        self.magnified(l, x, y, these)
+        // See `taps` and `axes` of mip_maps.rs for what follows.
+        let (zero, half_of, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
+        let b = l.add(l.mul(xx, xy), l.mul(yx, yy));
+        let (mean, half) = (l.mul(half_of, sum), l.mul(half_of, l.sub(a, c)));
+        let root = l.sqrt(l.add(l.mul(half, half), l.mul(b, b)));
+        let long = l.sqrt(l.add(mean, root));
+        let axis_x = l.select_by_sign(half, b, l.add(root, half));
+        let axis_y = l.select_by_sign(half, l.sub(root, half), b);
+        // What makes the axis as long as that. A round footprint has no axis, and one sample.
+        let length_2 = l.add(l.mul(axis_x, axis_x), l.mul(axis_y, axis_y));
+        let stretch = l.sqrt(l.div(l.add(mean, root), l.max(length_2, l.splat(1e-30))));
+        let cross = l.sub(l.mul(xx, yy), l.mul(xy, yx));
+        let minor = l.div(l.max(cross, l.sub(zero, cross)), long);
+        let most = most.max(1) as f32;
+        let width = l.max(l.max(minor, l.mul(long, l.splat(1.0 / most))), one);
+        let count = l.min(l.max(l.add(l.div(long, width), half_of), one), l.splat(most));
+        let count = l.truncate(count);
+        let wide = maybe & (l.greater(width, one) | l.greater(count, one));
+        if wide == 0 {
+            return None;
+        }
+        let part = l.div(one, count);
+        let step = l.mul(stretch, part);
+        let (level, fraction) = self.level_of(l, width);
+        let share = l.mul(l.splat(-32768.0), part);
+        let next_weight = l.mul(share, fraction);
+        Some(Taps {
+            level: l.select(wide, level, zero),
+            weight: l.select(wide, l.sub(share, next_weight), l.splat(-32768.0)),
+            next_weight: l.select(wide, next_weight, zero),
+            count: l.select(wide, count, one),
+            step_x: l.select(wide, l.mul(axis_x, step), zero),
+            step_y: l.select(wide, l.mul(axis_y, step), zero),
+        })
     }
 
     /// The colours, not rounded, over round footprints around those of the places that are among `these`:

@@ -131,15 +131,18 @@ pub fn view_images_into(
     if wanted.xyz {
         fit(xyz, &hits.face, [f16::ZERO; 3]);
     }
-    dispatch(ViewKernel { shading, hits, camera, wanted, out });
+    dispatch(ViewKernel { shading, faces: &hits.face, depths: &hits.depth, camera, wanted, out });
 }
 
-struct ViewKernel<'a> {
-    shading: &'a Shading<'a>,
-    hits: &'a Hits,
-    camera: &'a Camera,
-    wanted: Modalities,
-    out: &'a mut ViewImages,
+/// The images that are wanted, which have the right size.
+pub(crate) struct ViewKernel<'a> {
+    pub(crate) shading: &'a Shading<'a>,
+    pub(crate) faces: &'a Raster<u32>,
+    /// For depth and xyz alone.
+    pub(crate) depths: &'a Raster<f32>,
+    pub(crate) camera: &'a Camera,
+    pub(crate) wanted: Modalities,
+    pub(crate) out: &'a mut ViewImages,
 }
 
 impl Kernel for ViewKernel<'_> {
@@ -160,7 +163,7 @@ impl Kernel for ViewKernel<'_> {
 impl ViewKernel<'_> {
     #[inline(always)]
     fn bands<const PANORAMA: bool>(self, lanes: impl ShadeLanes, grid: &RayGrid) {
-        let Self { shading, hits, camera, wanted, out } = self;
+        let Self { shading, faces: all_faces, depths: all_depths, camera, wanted, out } = self;
         let &Shading { scene, mip_maps, ref filter, normal_axes, index_of_face, color_of_face } = shading;
         let ViewImages { rgb, depth, faces: FaceImages { normal, index, color }, xyz } = out;
         let mut painter = RgbPainter::new(lanes, scene, mip_maps, camera, filter);
@@ -175,16 +178,17 @@ impl ViewKernel<'_> {
         let mut flat = FlatPainter::new([MISSING_NORMAL, MISSING_INDEX, [0; 3]], values);
         let directions = RayTable::new(camera);
 
-        let width = hits.face.width() as usize;
+        let width = all_faces.width() as usize;
         let (mut spans, rows) = (Spans::new(width), band_rows(width));
         let band = (rows * width).max(1);
-        for (k, faces) in hits.face.pixels().chunks(band).enumerate() {
+        for (k, faces) in all_faces.pixels().chunks(band).enumerate() {
             let pixels = k * band..k * band + faces.len();
-            let distances = &hits.depth.pixels()[pixels.clone()];
             if wanted.depth {
+                let distances = &all_depths.pixels()[pixels.clone()];
                 depths(lanes, distances, &mut depth.pixels_mut()[pixels.clone()]);
             }
             if wanted.xyz {
+                let distances = &all_depths.pixels()[pixels.clone()];
                 let out = &mut xyz.pixels_mut()[pixels.clone()];
                 directions.points::<PANORAMA, f16>(lanes, k * rows, distances, out);
             }
@@ -196,13 +200,13 @@ impl ViewKernel<'_> {
                 flat.forget();
             }
             if wanted.rgb {
-                let next = pixels.end..hits.face.len().min(pixels.end + band);
+                let next = pixels.end..all_faces.len().min(pixels.end + band);
                 let (done, rest) = rgb.pixels_mut().split_at_mut(next.start);
                 let part = |of: &Range<usize>, wanted| if wanted { of.clone() } else { 0..0 };
                 let painted = part(&pixels, wanted.faces);
                 let prefetch = Prefetch {
-                    faces: &hits.face.pixels()[next.clone()],
-                    distances: &hits.depth.pixels()[part(&next, wanted.depth || wanted.xyz)],
+                    faces: &all_faces.pixels()[next.clone()],
+                    distances: &all_depths.pixels()[part(&next, wanted.depth || wanted.xyz)],
                     depth: &depth.pixels()[part(&next, wanted.depth)],
                     xyz: &xyz.pixels()[part(&next, wanted.xyz)],
                     rgb: &rest[..next.len()],
