@@ -268,11 +268,21 @@ fn is_fallback(buffer: &json::Buffer) -> bool {
 fn root_of(text: &[u8]) -> std::result::Result<json::Root, serde_json::Error> {
     json::Root::from_slice(text).or_else(|first| {
         let document = serde_json::from_slice(text)?;
-        serde_json::from_value(needed(document)).map_err(|second| {
-            // The same fault, and its place with it.
-            if first.to_string().starts_with(&second.to_string()) { first } else { second }
+        // As text once more: that the crate reads already, while for a tree of values all its types would be
+        // compiled again.
+        json::Root::from_slice(needed(document).to_string().as_bytes()).map_err(|second| {
+            let (known, fault) = (without_place(&first), without_place(&second));
+            // The same fault, and its place with it. Another one's place is not one in the file.
+            if known == fault { first } else { serde::de::Error::custom(fault) }
         })
     })
+}
+
+/// What an error says, but not where.
+fn without_place(error: &serde_json::Error) -> String {
+    let (message, place) =
+        (error.to_string(), format!(" at line {} column {}", error.line(), error.column()));
+    message.strip_suffix(&place).unwrap_or(&message).to_owned()
 }
 
 /// The JSON of a `.glb` file, and where its binary chunk is.
