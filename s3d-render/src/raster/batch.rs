@@ -150,15 +150,29 @@ impl FaceBatch {
         let (mut ats, mut acrosses, mut downs) = ([[0.0; GROUP]; 4], [[0.0; GROUP]; 4], [[0.0; GROUP]; 4]);
         let mut chunk_ats = [[0.0; GROUP]; 4];
         let mut errors = [0.0; GROUP];
-        let mut kinds = [0; GROUP];
+        let mut kinds = [DrawKind::Nothing as u32; GROUP];
+        let mut any = 0;
         for i in 0..GROUP {
             let x = [xs[0][i], xs[1][i], xs[2][i]];
             let y = [ys[0][i], ys[1][i], ys[2][i]];
-            let q = [qs[0][i], qs[1][i], qs[2][i]];
             let left = max((low(x) - MARGIN).ceil(), 0.0);
             let right = min((high(x) + MARGIN).floor(), last_column);
             let top = max((low(y) - MARGIN).ceil(), 0.0);
             let bottom = min((high(y) + MARGIN).floor(), last_row);
+            let covers = (left <= right) & (top <= bottom);
+            let in_front = low([qs[0][i], qs[1][i], qs[2][i]]) > 0.0;
+            any |= u32::from(covers | !in_front);
+            (lefts[i], rights[i], tops[i], bottoms[i]) = (left, right, top, bottom);
+        }
+        // Where faces are smaller than pixels, every third group has nothing to draw.
+        if any == 0 {
+            return put(&mut self.kind, first, &kinds);
+        }
+        for i in 0..GROUP {
+            let x = [xs[0][i], xs[1][i], xs[2][i]];
+            let y = [ys[0][i], ys[1][i], ys[2][i]];
+            let q = [qs[0][i], qs[1][i], qs[2][i]];
+            let (left, right, top, bottom) = (lefts[i], rights[i], tops[i], bottoms[i]);
 
             // Edge k is opposite to corner k, from corner k + 1 to k + 2.
             let across = [y[1] - y[2], y[2] - y[0], y[0] - y[1]];
@@ -217,7 +231,6 @@ impl FaceBatch {
             let kind = if top <= bottom { kind } else { DrawKind::Nothing as u32 };
             kinds[i] = if low(q) > 0.0 { kind } else { DrawKind::InSpace as u32 };
 
-            (lefts[i], rights[i], tops[i], bottoms[i]) = (left, right, top, bottom);
             errors[i] = error;
             for k in 0..4 {
                 (ats[k][i], acrosses[k][i], downs[k][i]) = (at[k], across[k], down[k]);

@@ -26,7 +26,7 @@ use chunk::{Chunk, ChunkGrid, EDGE_ERROR, Linear, MAX_ROWS, draw};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16, u32x16};
 use s3d_simd::{Avx2, Avx512};
-use raster_lanes::{LANES, Portable, RasterLanes};
+use raster_lanes::{LANES, Pair, Portable, RasterLanes};
 use raster_x86::{Wide256, Wide512};
 
 /// The library's registers.
@@ -37,7 +37,7 @@ impl<S: Simd> RasterLanes for Library<S> {
     const N: usize = LANES;
     type F = f32x16<S>;
     type M = mask32x16<S>;
-    type Half = Portable<8>;
+    type Half = Portable;
 
     #[inline(always)]
     fn half(self) -> Self::Half {
@@ -156,7 +156,7 @@ impl Job {
 }
 
 #[target_feature(enable = "avx2,fma,f16c,bmi1,bmi2,lzcnt,popcnt")]
-fn ours_avx2(job: &mut Job, lanes: Wide256<2>) {
+fn ours_avx2(job: &mut Job, lanes: Pair<Wide256>) {
     job.run(lanes);
 }
 
@@ -191,7 +191,7 @@ fn main() {
                     0 => unsafe { ours_avx512(job, Wide512(avx512)) },
                     1 => dispatch!(best, simd => job.run(Library(simd))),
                     // SAFETY: likewise AVX2.
-                    2 => unsafe { ours_avx2(job, Wide256(avx2)) },
+                    2 => unsafe { ours_avx2(job, Pair(Wide256(avx2))) },
                     _ => dispatch!(lower, simd => job.run(Library(simd))),
                 }
             }
