@@ -17,6 +17,7 @@ use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
 use crate::simd::{Kernel, Simd, dispatch};
 use glam::DVec3;
 use s3d_geom::{Camera, Raster, Rays};
+use s3d_simd::level;
 
 /// What a pixel of the mesh shows that no picture shows.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +78,7 @@ pub fn picture_image_into(
         *face = NO_FACE;
     }
     let mut mesh = Raster::filled(0, 0, [0; 3]);
-    rgb_of_faces_into(scene, mip_maps, &face, camera, filter, &mut mesh);
+    rgb_of_faces_into(level(), scene, mip_maps, &face, camera, filter, &mut mesh);
     for ((pixel, &mesh), &shown) in out.pixels_mut().iter_mut().zip(mesh.pixels()).zip(shown.pixels()) {
         if shown < 255 {
             *pixel = mixed(*pixel, mesh, shown);

@@ -164,7 +164,7 @@ impl FaceBatch {
             any |= u32::from(covers | !in_front);
             (lefts[i], rights[i], tops[i], bottoms[i]) = (left, right, top, bottom);
         }
-        // Where faces are smaller than pixels, every third group has nothing to draw.
+        // Where faces are smaller than pixels, many groups have nothing to draw.
         if any == 0 {
             return put(&mut self.kind, first, &kinds);
         }

@@ -68,23 +68,11 @@ pub fn rgb_image_into(
     out: &mut Raster<[u8; 3]>,
 ) {
     assert_size(hits, camera);
-    rgb_of_faces_into(scene, mip_maps, &hits.face, camera, filter, out);
+    rgb_of_faces_into(level(), scene, mip_maps, &hits.face, camera, filter, out);
 }
 
-/// As [`rgb_image_into`], of the faces of hits.
+/// As [`rgb_image_into`], of the faces of hits, with the instructions of a level.
 pub(crate) fn rgb_of_faces_into(
-    scene: &Scene<'_>,
-    mip_maps: &MipMaps,
-    faces: &Raster<u32>,
-    camera: &Camera,
-    filter: &TextureFilter,
-    out: &mut Raster<[u8; 3]>,
-) {
-    rgb_by(level(), scene, mip_maps, faces, camera, filter, out);
-}
-
-/// As [`rgb_of_faces_into`], with the instructions of a level.
-fn rgb_by(
     level: Level,
     scene: &Scene<'_>,
     mip_maps: &MipMaps,
@@ -428,7 +416,7 @@ mod tests {
             let filter = TextureFilter::default();
             let images = Level::all().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
-                rgb_by(level, &scene, &mip_maps, &hits.face, &camera, &filter, &mut out);
+                rgb_of_faces_into(level, &scene, &mip_maps, &hits.face, &camera, &filter, &mut out);
                 out
             });
             let images: Vec<_> = images.collect();

@@ -134,11 +134,11 @@ pub fn view_images_into(
     dispatch(ViewKernel { shading, faces: &hits.face, depths: &hits.depth, camera, wanted, out });
 }
 
-/// The images that are wanted, which have the right size.
+/// Makes the images that are wanted; they have the size of `faces` already.
 pub(crate) struct ViewKernel<'a> {
     pub(crate) shading: &'a Shading<'a>,
     pub(crate) faces: &'a Raster<u32>,
-    /// For depth and xyz alone.
+    /// Looked at for depth and xyz alone; else it may be empty.
     pub(crate) depths: &'a Raster<f32>,
     pub(crate) camera: &'a Camera,
     pub(crate) wanted: Modalities,

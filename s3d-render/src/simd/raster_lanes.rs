@@ -120,8 +120,8 @@ pub(crate) struct Portable;
 /// Values in a [`Portable`].
 const WIDTH: usize = 8;
 
-/// An array of eight values: `value` for each `k` from 0 to 7. It is no loop, since kernels have hundreds of them:
-/// to unroll those took longer than all the rest of their compilation.
+/// An array of eight values: `value` for each `k` from 0 to 7. It is written out: a loop in each operation
+/// was most of what a kernel took to compile.
 macro_rules! eight {
     ($k:ident => $value:expr) => {
         eight!($k => $value; 0, 1, 2, 3, 4, 5, 6, 7)

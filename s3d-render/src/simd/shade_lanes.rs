@@ -163,8 +163,8 @@ pub(crate) fn part(a: i16, b: i16) -> i16 {
     ((i32::from(a) * i32::from(b) + 0x4000) >> 15) as i16
 }
 
-/// Ordinary Rust. Longer operations are inlined where the compiler likes to: always, they would make up a quarter
-/// of the time that the crate takes to compile.
+/// Ordinary Rust. Whether longer operations are inlined is left to the compiler: with all of them inlined, the
+/// crate takes 1.08 times as long to compile.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain;
 
@@ -301,7 +301,7 @@ impl ShadeLanes for Plain {
         }
         Some(quads)
     }
-    #[inline]
+    #[inline(always)]
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads {
         [*upper, *lower]
     }

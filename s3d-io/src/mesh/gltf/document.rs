@@ -268,11 +268,11 @@ fn is_fallback(buffer: &json::Buffer) -> bool {
 fn root_of(text: &[u8]) -> std::result::Result<json::Root, serde_json::Error> {
     json::Root::from_slice(text).or_else(|first| {
         let document = serde_json::from_slice(text)?;
-        // As text once more: that the crate reads already, while for a tree of values all its types would be
-        // compiled again.
+        // Written as text again, since gltf-json has compiled how its types are read from text: to read them
+        // from a `Value`, all of it would be compiled once more here.
         json::Root::from_slice(needed(document).to_string().as_bytes()).map_err(|second| {
             let (known, fault) = (without_place(&first), without_place(&second));
-            // The same fault, and its place with it. Another one's place is not one in the file.
+            // The first error has the place of the fault in the file, the second one in our text.
             if known == fault { first } else { serde::de::Error::custom(fault) }
         })
     })
