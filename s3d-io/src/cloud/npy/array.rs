@@ -2,11 +2,10 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::npy::header::{bad, kind_of, parse, read_text};
+use crate::cloud::npy::header::{Elements, bad, parse, read_text};
 use crate::cloud::table::records::{Kind, fill, rows_of_block};
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
-use npyz::{DType, Endianness, Order};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -70,18 +69,18 @@ impl<R: Read> NpyArray<R> {
             let message = "holds no numbers: save an array of integers, floats or Booleans";
             Error::unsupported(name, message)
         };
-        let DType::Plain(stored) = header.dtype() else { return Err(no_numbers()) };
-        let kind = kind_of(&stored).filter(|kind| !kind.is_text()).ok_or_else(no_numbers)?;
-        let shape = header.shape().to_vec();
+        let Elements::Plain(stored) = header.elements else { return Err(no_numbers()) };
+        let kind = stored.kind.filter(|kind| !kind.is_text()).ok_or_else(no_numbers)?;
+        let shape = header.shape;
         let count = shape.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
         Ok(Self {
             name: name.to_owned(),
             source,
-            is_column_major: header.order() == Order::Fortran && shape.len() > 1,
+            is_column_major: header.is_column_major && shape.len() > 1,
             count: count.ok_or_else(|| bad("its shape is too large").of(name))?,
             shape,
             kind,
-            big_endian: stored.endianness() == Endianness::Big,
+            big_endian: stored.big_endian,
             done: 0,
             block: Vec::new(),
         })
@@ -329,7 +328,8 @@ mod tests {
         assert!(integers(&bytes).unwrap().into_iter().eq(0..3_000_000));
         let message = integers(&bytes[..bytes.len() - 1]).unwrap_err().to_string();
         assert!(message.contains("a.npy") && message.contains("cut short"), "{message}");
-        for (kind, words) in [("<U3", "no numbers"), ("|O", "no numbers"), ("<c8", "no numbers")] {
+        for (kind, words) in [("<U3", "no numbers"), ("|O", "pickled Python objects"), ("<c8", "no numbers")]
+        {
             let message = integers(&npy(kind, "(1,)", "False", &[0; 16])).unwrap_err().to_string();
             assert!(message.contains(words), "{kind}: {message}");
         }

@@ -1,23 +1,16 @@
 //! The header of an NPY file: what numpy says of an array, written as a Python dictionary. Source: numpy's
 //! "NPY format", versions 1.0 to 3.0.
-//!
-//! npyz reads it; here it becomes the fields of a table. npyz takes the length of a header at its word,
-//! overflows the stack or runs for minutes on brackets in brackets, and refuses Python 2's `7L`: see [`tame`]
-//! and `headers_that_npyz_would_choke_on_are_refused`.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
+use crate::cloud::npy::literal::{self, Literal};
 use crate::cloud::table::records::{Field, Kind};
 use crate::error::{Error, Result};
-use crate::guarded::guarded;
-use npyz::{DType, Endianness, Order, TypeChar, TypeStr};
 use std::io::Read;
 use std::path::Path;
 
 /// The longest header that is read: numpy's own are aligned to 64 bytes and rarely longer than a few hundred.
 const LONGEST_HEADER: usize = 1 << 17;
-/// How deep lists may be in lists: numpy's are four deep, and two more for each structure in a field.
-const DEEPEST_LIST: u32 = 8;
 /// The most columns of a table.
 const MOST_COLUMNS: usize = 4096;
 
@@ -45,7 +38,7 @@ impl NpyHeader {
 
     fn parse(text: &str) -> std::result::Result<Self, Refused> {
         let header = parse(text)?;
-        let (rows, columns) = match *header.shape() {
+        let (rows, columns) = match *header.shape {
             [] => (1, None),
             [n] => (n, None),
             [n, k] => (n, Some(k)),
@@ -54,38 +47,36 @@ impl NpyHeader {
                 return Err(Refused::Unsupported(why));
             }
         };
-        if header.order() == Order::Fortran && columns.is_some_and(|k| k > 1) && rows > 1 {
+        if header.is_column_major && columns.is_some_and(|k| k > 1) && rows > 1 {
             let why = "is stored column by column: save numpy.ascontiguousarray(array)".to_owned();
             return Err(Refused::Unsupported(why));
         }
-        if header.uses_pickled_array() {
-            let why = "holds pickled Python objects: save an array of numbers or texts";
-            return Err(Refused::Unsupported(why.to_owned()));
-        }
         let (mut fields, mut at) = (Vec::new(), 0);
-        let kind = header.dtype();
-        let is_structured = matches!(kind, DType::Record(_));
-        match kind {
-            DType::Record(_) if columns.is_some_and(|k| k != 1) => {
+        let is_structured = matches!(header.elements, Elements::Structure(_));
+        match header.elements {
+            Elements::Structure(_) if columns.is_some_and(|k| k != 1) => {
                 return Err(Refused::Unsupported("is a structured array of two dimensions".to_owned()));
             }
-            DType::Record(record) => {
-                for npyz::Field { name, dtype } in record {
-                    let (n, kind) = elements(&name, &dtype)?;
-                    let names: Vec<String> = match n {
-                        None => vec![name],
-                        Some(n) => (0..n).map(|i| format!("{name}[{i}]")).collect(),
+            Elements::Structure(structure) => {
+                for (name, sides, stored) in structure {
+                    let count = sides.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
+                    let names: Vec<String> = match count {
+                        _ if sides.is_empty() => vec![name],
+                        Some(n) if n <= MOST_COLUMNS as u64 => {
+                            (0..n).map(|i| format!("{name}[{i}]")).collect()
+                        }
+                        _ => return Err(bad("a huge field")),
                     };
-                    push_fields(&mut fields, &mut at, names, kind)?;
+                    push_fields(&mut fields, &mut at, names, stored)?;
                 }
             }
-            kind => {
+            Elements::Plain(stored) => {
                 let names = match columns {
                     None => vec![String::new()],
                     Some(k) if k <= MOST_COLUMNS as u64 => (0..k).map(|i| format!("[{i}]")).collect(),
                     Some(k) => return Err(bad(&format!("{k} columns"))),
                 };
-                push_fields(&mut fields, &mut at, names, elements("", &kind)?.1)?;
+                push_fields(&mut fields, &mut at, names, stored)?;
             }
         }
         Ok(Self { rows, stride: at, fields, is_structured })
@@ -123,114 +114,141 @@ pub(super) fn read_text(path: &Path, source: &mut impl Read) -> Result<String> {
     Ok(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// What a header says, of a shape whose numbers can be counted.
-pub(super) fn parse(text: &str) -> std::result::Result<npyz::NpyHeader, Refused> {
-    let text = tame(text)?;
-    let mut bytes = b"\x93NUMPY\x03\x00".to_vec();
-    // It is longer than it was by at most twice: see `String::from_utf8_lossy`.
-    bytes.extend(u32::try_from(text.len()).unwrap_or(u32::MAX).to_le_bytes());
-    bytes.extend(text);
-    // npyz multiplies the numbers of the shape.
-    let header = guarded(|| npyz::NpyHeader::from_reader(&bytes[..]))
-        .ok_or_else(|| bad("its shape is too large"))?
-        // The parser draws an arrow below its place, on lines of their own.
-        .map_err(|e| bad(e.to_string().split(" -->").next().unwrap_or_default()))?;
-    let count = header.shape().iter().try_fold(1u64, |count, side| count.checked_mul(*side));
+/// What a header says.
+#[derive(Debug)]
+pub(super) struct Header {
+    /// Its product is a `u64`.
+    pub(super) shape: Vec<u64>,
+    /// Whether the first index runs fastest (`fortran_order`).
+    pub(super) is_column_major: bool,
+    pub(super) elements: Elements,
+}
+
+/// What an array holds.
+#[derive(Debug)]
+pub(super) enum Elements {
+    Plain(Stored),
+    /// Fields: name, sides if it is an array, and type.
+    Structure(Vec<(String, Vec<u64>, Stored)>),
+}
+
+/// How numbers or texts of a type are stored.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stored {
+    /// `None` for what holds no label: padding, dates, complex numbers, floats of more than 64 bits.
+    pub(super) kind: Option<Kind>,
+    /// Bytes of each.
+    size: usize,
+    pub(super) big_endian: bool,
+}
+
+/// What the text of a header says.
+pub(super) fn parse(text: &str) -> std::result::Result<Header, Refused> {
+    let Literal::Dictionary(entries) = literal::parse(text).map_err(Refused::Bad)? else {
+        return Err(bad("it is no dictionary"));
+    };
+    let value = |key: &str| {
+        let entry = entries.iter().rfind(|(k, _)| k == key);
+        entry.map(|(_, value)| value).ok_or_else(|| bad(&format!("missing key '{key}'")))
+    };
+    let shape = sides(value("shape")?)?;
+    let count = shape.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
     count.ok_or_else(|| bad("its shape is too large"))?;
-    Ok(header)
+    let Literal::Bool(is_column_major) = *value("fortran_order")? else {
+        return Err(bad("its fortran_order is neither True nor False"));
+    };
+    let elements = match value("descr")? {
+        Literal::Text(kind) => Elements::Plain(stored(kind)?),
+        Literal::List(fields) => {
+            Elements::Structure(fields.iter().map(field).collect::<std::result::Result<_, _>>()?)
+        }
+        _ => return Err(bad("its descr is no type")),
+    };
+    Ok(Header { shape, is_column_major, elements })
 }
 
-/// A header's text without the `L` of Python 2's numbers, if npyz reads it in little time and stack.
-fn tame(text: &str) -> std::result::Result<Vec<u8>, Refused> {
-    let mut bytes = text.as_bytes().to_vec();
-    let (mut quote, mut depth, mut dictionaries, mut before) = (None, 0u32, 0u32, 0u8);
-    let mut escaped = false;
-    for byte in &mut bytes {
-        match (*byte, quote) {
-            (_, Some(_)) if escaped => escaped = false,
-            (b'\\', Some(_)) => escaped = true,
-            (end, Some(start)) if end == start => quote = None,
-            (_, Some(_)) => {}
-            (start @ (b'\'' | b'"'), None) => quote = Some(start),
-            (b'L', None) if before.is_ascii_digit() => *byte = b' ',
-            (open @ (b'(' | b'[' | b'{'), None) => {
-                depth = depth.saturating_add(1);
-                dictionaries = dictionaries.saturating_add(u32::from(open == b'{'));
-            }
-            (b')' | b']' | b'}', None) => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-        if depth > DEEPEST_LIST || dictionaries > 1 {
-            return Err(bad("its lists are too deep"));
-        }
-        before = *byte;
-    }
-    Ok(bytes)
+/// The numbers of a tuple.
+fn sides(tuple: &Literal) -> std::result::Result<Vec<u64>, Refused> {
+    let number = |side: &Literal| if let Literal::Number(n) = side { Some(*n) } else { None };
+    let numbers = if let Literal::List(sides) = tuple { sides.iter().map(number).collect() } else { None };
+    numbers.ok_or_else(|| bad("a shape is no tuple of whole numbers"))
 }
 
-/// The type of a field's elements, and their number if there are several.
-fn elements<'a>(name: &str, mut kind: &'a DType) -> std::result::Result<(Option<u64>, &'a TypeStr), Refused> {
-    let mut n = None;
-    loop {
-        match kind {
-            DType::Plain(kind) => return Ok((n, kind)),
-            DType::Array(side, inner) => {
-                n = n.unwrap_or(1u64).checked_mul(*side).filter(|n| *n <= MOST_COLUMNS as u64);
-                if n.is_none() {
-                    return Err(bad("a huge field"));
-                }
-                kind = &**inner;
-            }
-            DType::Record(_) => {
-                return Err(Refused::Unsupported(format!("has a structure in the field {name:?}")));
-            }
+/// A field: its name, or title and name; its type; its sides if it is an array.
+fn field(field: &Literal) -> std::result::Result<(String, Vec<u64>, Stored), Refused> {
+    let no_field = || bad("a field is no tuple of name, type and shape");
+    let Literal::List(field) = field else { return Err(no_field()) };
+    let (name, kind, shape) = match &field[..] {
+        [name, kind] => (name, kind, Vec::new()),
+        [name, kind, shape] => (name, kind, sides(shape)?),
+        _ => return Err(no_field()),
+    };
+    let name = if let Literal::List(titled) = name { titled.last() } else { Some(name) };
+    match (name, kind) {
+        (Some(Literal::Text(name)), Literal::Text(kind)) => Ok((name.clone(), shape, stored(kind)?)),
+        (Some(Literal::Text(name)), Literal::List(_)) => {
+            Err(Refused::Unsupported(format!("has a structure in the field {name:?}")))
         }
+        _ => Err(no_field()),
     }
 }
 
-/// Adds fields of one type; those that are padding or of a type that holds no label are passed over.
+/// How the type of a string is stored: order of bytes, kind, and size in bytes or characters.
+fn stored(text: &str) -> std::result::Result<Stored, Refused> {
+    let unknown = || bad(&format!("the type string {text:?}"));
+    let mut chars = text.chars();
+    let (order, code) = (chars.next(), chars.next());
+    if code == Some('O') {
+        let why = "holds pickled Python objects: save an array of numbers or texts";
+        return Err(Refused::Unsupported(why.to_owned()));
+    }
+    // The unit of a date stands behind it.
+    let size = chars.as_str().split('[').next().and_then(|size| size.parse().ok());
+    let size: usize = size.filter(|size| *size <= 1 << 16).ok_or_else(unknown)?;
+    let big_endian = match order {
+        Some('>') => true,
+        Some('<' | '|') => false,
+        _ => return Err(unknown()),
+    };
+    let kind = match (code, size) {
+        (Some('i'), 1) => Kind::I8,
+        (Some('u' | 'b'), 1) => Kind::U8,
+        (Some('i'), 2) => Kind::I16,
+        (Some('u'), 2) => Kind::U16,
+        (Some('f'), 2) => Kind::F16,
+        (Some('i'), 4) => Kind::I32,
+        (Some('u'), 4) => Kind::U32,
+        (Some('f'), 4) => Kind::F32,
+        (Some('i'), 8) => Kind::I64,
+        (Some('u'), 8) => Kind::U64,
+        (Some('f'), 8) => Kind::F64,
+        (Some('S'), n) => Kind::Bytes(n),
+        (Some('U'), n) => Kind::Utf32(n),
+        (Some('V'), _) | (Some('m' | 'M'), 8) | (Some('f'), 12 | 16) | (Some('c'), 8 | 16 | 24 | 32) => {
+            return Ok(Stored { kind: None, size, big_endian });
+        }
+        _ => return Err(unknown()),
+    };
+    Ok(Stored { kind: Some(kind), size: kind.size(), big_endian })
+}
+
+/// Adds fields of one type; those of a type that holds no label are passed over.
 fn push_fields(
     fields: &mut Vec<Field>,
     at: &mut usize,
     names: Vec<String>,
-    kind: &TypeStr,
+    stored: Stored,
 ) -> std::result::Result<(), Refused> {
-    let big_endian = kind.endianness() == Endianness::Big;
-    let bytes = kind
-        .num_bytes()
-        .filter(|_| kind.size_field() <= 1 << 16)
-        .ok_or_else(|| bad(&format!("the type {kind}")))?;
-    let kind = kind_of(kind);
     for name in names {
-        if let Some(kind) = kind {
-            fields.push(Field { name, at: *at, kind, big_endian });
+        if let Some(kind) = stored.kind {
+            fields.push(Field { name, at: *at, kind, big_endian: stored.big_endian });
         }
-        *at = at.saturating_add(bytes);
+        *at = at.saturating_add(stored.size);
     }
     if fields.len() > MOST_COLUMNS || *at > 1 << 24 {
         return Err(bad("a huge row"));
     }
     Ok(())
-}
-
-/// How a type's values are stored; `None` if it holds no label.
-pub(super) fn kind_of(kind: &TypeStr) -> Option<Kind> {
-    Some(match (kind.type_char(), usize::try_from(kind.size_field()).ok()?) {
-        (TypeChar::Int, 1) => Kind::I8,
-        (TypeChar::Uint | TypeChar::Bool, 1) => Kind::U8,
-        (TypeChar::Int, 2) => Kind::I16,
-        (TypeChar::Uint, 2) => Kind::U16,
-        (TypeChar::Float, 2) => Kind::F16,
-        (TypeChar::Int, 4) => Kind::I32,
-        (TypeChar::Uint, 4) => Kind::U32,
-        (TypeChar::Float, 4) => Kind::F32,
-        (TypeChar::Int, 8) => Kind::I64,
-        (TypeChar::Uint, 8) => Kind::U64,
-        (TypeChar::Float, 8) => Kind::F64,
-        (TypeChar::ByteStr, n) => Kind::Bytes(n),
-        (TypeChar::UnicodeStr, n) => Kind::Utf32(n),
-        _ => return None,
-    })
 }
 
 /// Why a header is not read.
@@ -257,6 +275,11 @@ pub(super) fn bad(why: &str) -> Refused {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    const TYPES: &[&str] = &[
+        "|b1", "|i1", "|u1", "<i2", ">u2", "<f2", ">i4", "<u4", ">f4", "<i8", ">u8", "<f8", "<c8", ">c16",
+        "|S3", "<U4", ">U4", "|V3",
+    ];
 
     fn header(text: &str) -> std::result::Result<NpyHeader, Refused> {
         NpyHeader::parse(text)
@@ -315,7 +338,18 @@ mod tests {
     }
 
     #[test]
-    fn headers_that_npyz_would_choke_on_are_refused() {
+    fn titles_of_fields_and_units_of_dates() {
+        let h = header(
+            "{'descr': [(('metres', 'x'), '<f4'), ('t', '<M8[25s]'), ('y', '<f4', (1,))], \
+             'fortran_order': False, 'shape': (7,)}",
+        )
+        .unwrap();
+        let fields: Vec<_> = h.fields.iter().map(|f| (f.name.as_str(), f.at)).collect();
+        assert_eq!((&fields[..], h.stride), (&[("x", 0), ("y[0]", 12)][..], 16));
+    }
+
+    #[test]
+    fn headers_that_ask_too_much_are_refused() {
         for (text, words) in [
             (format!("{{'a': {}", "(".repeat(100_000)), "deep"),
             (format!("{{'a': {}", "{".repeat(40)), "deep"),
@@ -333,6 +367,44 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn structures_as_npyz_reads_them(
+            fields in prop::collection::vec(
+                ("[a-z_ ()\\\\'\"é]{1,6}", prop::sample::select(TYPES), prop::collection::vec(1u64..4, 0..3)),
+                1..6,
+            ),
+            rows in 0u64..9,
+        ) {
+            let numbers = |sides: &[u64]| sides.iter().map(|n| format!("{n}, ")).collect::<String>();
+            let mut descr = String::new();
+            for (name, kind, sides) in &fields {
+                let name = name.replace('\\', "\\\\").replace('\'', "\\'");
+                descr += &format!("('{name}', '{kind}'");
+                descr += &if sides.is_empty() { "), ".into() } else { format!(", ({})), ", numbers(sides)) };
+            }
+            let text = format!("{{'descr': [{descr}], 'fortran_order': False, 'shape': ({rows},), }}");
+            let mut bytes = b"\x93NUMPY\x03\x00".to_vec();
+            bytes.extend(u32::try_from(text.len()).unwrap().to_le_bytes());
+            bytes.extend(text.bytes());
+            let theirs = npyz::NpyHeader::from_reader(&bytes[..]).unwrap();
+            prop_assert_eq!(theirs.shape(), &[rows]);
+            let npyz::DType::Record(theirs) = theirs.dtype() else { panic!("{text}") };
+            let Elements::Structure(ours) = parse(&text).unwrap().elements else { panic!("{text}") };
+            prop_assert_eq!(ours.len(), theirs.len());
+            for ((name, sides, stored), theirs) in ours.iter().zip(theirs) {
+                prop_assert_eq!(name, &theirs.name);
+                let mut kind = &theirs.dtype;
+                for side in sides {
+                    let npyz::DType::Array(n, inner) = kind else { panic!("{text}") };
+                    prop_assert_eq!(side, n);
+                    kind = &**inner;
+                }
+                let npyz::DType::Plain(kind) = kind else { panic!("{text}") };
+                prop_assert_eq!(Some(stored.size), kind.num_bytes());
+                prop_assert_eq!(stored.big_endian, kind.endianness() == npyz::Endianness::Big);
+            }
+        }
+
         #[test]
         fn any_text_gives_a_header_or_an_error(text in "[{}()\\[\\]',:0-9a-zTF<> ]{0,60}") {
             let _ = header(&text);

@@ -2,6 +2,7 @@
 
 mod array;
 mod header;
+mod literal;
 pub(crate) mod read;
 pub(crate) mod write;
 
