@@ -2,7 +2,7 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::npy::header::{Elements, bad, parse, read_text};
+use crate::cloud::npy::header::{Elements, parse, read_text};
 use crate::cloud::table::records::{Kind, fill, rows_of_block};
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
@@ -72,12 +72,11 @@ impl<R: Read> NpyArray<R> {
         let Elements::Plain(stored) = header.elements else { return Err(no_numbers()) };
         let kind = stored.kind.filter(|kind| !kind.is_text()).ok_or_else(no_numbers)?;
         let shape = header.shape;
-        let count = shape.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
         Ok(Self {
             name: name.to_owned(),
             source,
             is_column_major: header.is_column_major && shape.len() > 1,
-            count: count.ok_or_else(|| bad("its shape is too large").of(name))?,
+            count: header.count,
             shape,
             kind,
             big_endian: stored.big_endian,

@@ -117,8 +117,9 @@ pub(super) fn read_text(path: &Path, source: &mut impl Read) -> Result<String> {
 /// What a header says.
 #[derive(Debug)]
 pub(super) struct Header {
-    /// Its product is a `u64`.
     pub(super) shape: Vec<u64>,
+    /// How many elements that are.
+    pub(super) count: u64,
     /// Whether the first index runs fastest (`fortran_order`).
     pub(super) is_column_major: bool,
     pub(super) elements: Elements,
@@ -153,7 +154,7 @@ pub(super) fn parse(text: &str) -> std::result::Result<Header, Refused> {
     };
     let shape = sides(value("shape")?)?;
     let count = shape.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
-    count.ok_or_else(|| bad("its shape is too large"))?;
+    let count = count.ok_or_else(|| bad("its shape is too large"))?;
     let Literal::Bool(is_column_major) = *value("fortran_order")? else {
         return Err(bad("its fortran_order is neither True nor False"));
     };
@@ -164,7 +165,7 @@ pub(super) fn parse(text: &str) -> std::result::Result<Header, Refused> {
         }
         _ => return Err(bad("its descr is no type")),
     };
-    Ok(Header { shape, is_column_major, elements })
+    Ok(Header { shape, count, is_column_major, elements })
 }
 
 /// The numbers of a tuple.
