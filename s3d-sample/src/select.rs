@@ -102,17 +102,18 @@ const WEIGHT_SIGMA: f64 = 0.5;
 /// Selects from one pool of views: whether each of `scores` stays.
 ///
 /// Of n views, the `discard`·n with the lowest scores go (rounded down) and the `keep`·n with the highest
-/// stay (rounded to the nearest, halves up). From the rest so many are drawn that [`Selection::share`]·n stay
-/// in all (rounded likewise): 72.5 % of any pool, to half a view. Of two equal scores the one with the
+/// stay (rounded to the nearest, halves up). From the rest so many are drawn that [`Selection::share`]·n
+/// stay in all (rounded likewise): 72.5 % of any pool, to half a view. Of two equal scores the one with the
 /// smaller index counts as the higher.
 ///
-/// The draw is without replacement. "Half-normal with mean 1 and deviation ½ on the entropy scaled to \[0,
-/// 1\]" is read as the lower half of that normal distribution: a view of score e has the weight
-/// exp(−(s − 1)² / (2·½²)), with s = e / (the pool's highest score), 1 at the top and e⁻² = 0.135 at s = 0.
-/// (If all scores are 0, all weights are equal.) By the method of Efraimidis and Spirakis (2006), view i gets
-/// the key ln(uᵢ) / weightᵢ, and the largest keys stay; uᵢ, in (0, 1], is from the i-th 64 bits of a ChaCha8
-/// stream keyed by `seed`. So the draw has one result, in whatever order keys are computed, but it knows a
-/// view by its index: see [`select_pooled`](crate::select_pooled) for views that are known by name.
+/// The draw is without replacement. "Half-normal with mean 1 and deviation ½ on the entropy scaled to
+/// \[0, 1\]" is read as the lower half of that normal distribution: a view of score e has the weight
+/// exp(−(s − 1)² / (2·½²)), with s = e / (the pool's highest score), 1 at the top and e⁻² = 0.135
+/// at s = 0. (If all scores are 0, all weights are equal.) By the method of Efraimidis and Spirakis (2006),
+/// view i gets the key ln(uᵢ) / weightᵢ, and the largest keys stay; uᵢ, in (0, 1], is from the i-th 64
+/// bits of a ChaCha8 stream keyed by `seed`. So the draw has one result, in whatever order keys are computed,
+/// but it knows a view by its index: see [`select_pooled`](crate::select_pooled) for views that are known by
+/// name.
 ///
 /// # Panics
 /// If a score is negative or not finite, or [`Selection::check`] fails.

@@ -23,10 +23,10 @@ impl Annotations {
     /// | path | annotations |
     /// |---|---|
     /// | a folder | the S3DIS tree of an area, as [`AnnotationTree`] takes it |
-    /// | `….mat` | the `pointcloud.mat` of a published area, as [`MatArea`](crate::cloud::MatArea) takes it |
-    /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh, by object |
+    /// | `….mat` | `pointcloud.mat` of a published area, see [`MatArea`](crate::cloud::MatArea) |
+    /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh |
     /// | `.ply` | vertices with properties for class and instance; ASCII or binary |
-    /// | `.npy` | a structured array, or a plain one of rows and columns, see [`AnnotationOptions::columns`] |
+    /// | `.npy` | a structured array, or rows and columns, see [`AnnotationOptions::columns`] |
     /// | `.npz` | one such array, or an array a column (`xyz`, `rgb`, `label`…), or a few |
     /// | `.las`, `.laz` | `classification`, and `point_source_id` as instance; extra dimensions by name |
     /// | `.e57` | several scans with their poses; attributes of extensions for classes and instances |
@@ -37,8 +37,8 @@ impl Annotations {
     ///
     /// - **class**: [`AnnotationOptions::classes`] tells what a number or a name means; names of the 13
     ///   classes mean themselves, and the usual words of ScanNet's annotators the nearest of the 13. The
-    ///   numbers of a plain NPY array are S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes are
-    ///   named. A class without a meaning stops with a list of them.
+    ///   numbers of a plain NPY array are S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes
+    ///   are named. A class without a meaning stops with a list of them.
     /// - **instance**: points of one room and class with one number are one. Two classes of the file that
     ///   mean the same are kept apart, since many files number per class. Points without a number, or with a
     ///   negative one, are one instance a class and room. Instances are numbered per class and room from 1 in

@@ -3,25 +3,25 @@
 //! # The special case
 //!
 //! All rays of an image start at one point. Put it at zero: a face (a, b, c) is hit along the direction d
-//! exactly if d lies inside the three planes through the origin and an edge, N₁ = b × c, N₂ = c × a, N₃ = a ×
-//! b (turned so that they look inwards), and 1/t = n · d / n · a, where n is the face's normal. So four dot
-//! products with d decide everything, and each is a simple function of the pixel: linear in a perspective
-//! view; in a row of a panorama, divided by the cosine of the latitude, x cos θ + y sin θ + z tan φ. Faces
-//! are drawn one after another, as a rasteriser does, the nearest first where that is known; what lies behind
-//! a tile of pixels that all see something nearer is not looked at.
+//! exactly if d lies inside the three planes through the origin and an edge, N₁ = b × c, N₂ = c × a,
+//! N₃ = a × b (turned so that they look inwards), and 1/t = n · d / n · a, where n is the face's normal.
+//! So four dot products with d decide everything, and each is a simple function of the pixel: linear in a
+//! perspective view; in a row of a panorama, divided by the cosine of the latitude,
+//! x cos θ + y sin θ + z tan φ. Faces are drawn one after another, as a rasteriser does, the nearest first
+//! where that is known; what lies behind a tile of pixels that all see something nearer is not looked at.
 //!
 //! # Why it is exact
 //!
 //! The four functions are set up in `f64`, moved to a pixel at the face (the *anchor* of a chunk of 16 × up
 //! to [`MAX_ROWS`] pixels), rounded to `f32` there, and evaluated with one multiplication and one addition a
 //! row. Take an edge function e(i, j) = c + a·i + b·j with |a| + |b| = 1, so that e is about a distance in
-//! pixels, and |i| ≤ 15, |j| ≤ 31. Near its zero |c| ≤ 46, so the roundings of a, b, c, two products and two
-//! sums are at most 2⁻²⁴·(46 + 46 + 46 + 92) < 1.4e-5; `f64` before it adds less than 1e-8 (`pinhole` and
-//! `panorama` say why). [`EDGE_ERROR`] is twice that. A pixel where the smallest of the three exceeds its
-//! error is *certainly* in the face; where it is below minus the error, certainly not.
+//! pixels, and |i| ≤ 15, |j| ≤ 31. Near its zero |c| ≤ 46, so the roundings of a, b, c, two products
+//! and two sums are at most 2⁻²⁴·(46 + 46 + 46 + 92) < 1.4e-5; `f64` before it adds less than 1e-8
+//! (`pinhole` and `panorama` say why). [`EDGE_ERROR`] is twice that. A pixel where the smallest of the three
+//! exceeds its error is *certainly* in the face; where it is below minus the error, certainly not.
 //!
-//! 1/t is off by at most 2⁻²²·(|c| + |a|·15 + |b|·31), which is held against what it is worth: where that is
-//! more than [`TRUSTED`] of the value, the pixel is not certain. Values that differ by more than
+//! 1/t is off by at most 2⁻²²·(|c| + |a|·15 + |b|·31), which is held against what it is worth: where
+//! that is more than [`TRUSTED`] of the value, the pixel is not certain. Values that differ by more than
 //! [`CLOSE_ULPS`] steps of the last place (2.5e-5 of themselves at least: two errors, and some) are in order.
 //!
 //! Whatever is not certain — a pixel too near an edge, two faces almost equally far — goes to a list of

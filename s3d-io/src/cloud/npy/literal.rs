@@ -1,8 +1,9 @@
-//! Python's literals, as far as headers of NPY files have them: texts, whole numbers, truth values, tuples, lists
-//! and dictionaries. Source: Python Language Reference, "Lexical analysis".
+//! Python's literals, as far as headers of NPY files have them: texts, whole numbers, truth values, tuples,
+//! lists and dictionaries. Source: Python Language Reference, "Lexical analysis".
 //!
-//! Own code: npyz, which reads headers too, and what it needs are 16 packages, a C compiler, and 4 % of the time of a
-//! first build; its parser overflows the stack on brackets in brackets. Tests hold the types that are read against it.
+//! Own code: npyz, which reads headers too, and what it needs are 16 packages, a C compiler, and 4 % of the
+//! time of a first build; its parser overflows the stack on brackets in brackets. Tests hold the types that
+//! are read against it.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
