@@ -95,14 +95,11 @@ impl Cover {
         (width, height): (usize, usize),
         inverse_t: f32,
     ) -> Option<Self> {
-        let (last_column, last_row) = ((width - 1) as f32, (height - 1) as f32);
-        if right < 0.0 || bottom < 0.0 || left > last_column || top > last_row {
-            return None;
-        }
-        let pixel = |v: f32, last: f32| v.clamp(0.0, last) as u16;
-        Some(Self {
-            columns: (pixel(left, last_column), pixel(right.ceil(), last_column)),
-            rows: (pixel(top, last_row), pixel(bottom.ceil(), last_row)),
+        let (left, right) = (left.ceil().max(0.0), right.floor().min((width - 1) as f32));
+        let (top, bottom) = (top.ceil().max(0.0), bottom.floor().min((height - 1) as f32));
+        (left <= right && top <= bottom).then_some(Self {
+            columns: (left as u16, right as u16),
+            rows: (top as u16, bottom as u16),
             inverse_t,
         })
     }
