@@ -43,7 +43,7 @@
 )]
 
 use crate::hits::NO_FACE;
-use crate::raster::chunk::{CLOSE_ULPS, Chunk, ChunkGrid, MAX_ROWS, draw};
+use crate::raster::chunk::{CLOSE_ULPS, Chunk, ChunkGrid, RowScratch, draw};
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes, RowGroup};
 
 /// What is behind a tile must be so by this factor: ten times [`CLOSE_ULPS`].
@@ -123,6 +123,7 @@ pub(crate) struct Canvas {
     tile_columns: usize,
     /// By slot; the first stands for no face.
     drawn: Vec<DrawnFace>,
+    rows: RowScratch,
     doubts: Vec<Doubt>,
     /// The pixels that see a face whose function is too poor: none but doubtful ones do.
     poor: Vec<u32>,
@@ -242,10 +243,8 @@ impl Canvas {
     ) {
         let at = chunk.row * self.pitch + chunk.column;
         let window = (&mut self.inverse_t[at..], &mut self.slots[at..], self.pitch);
-        let mut doubts = [0; MAX_ROWS];
-        let any = draw::<L, PANORAMA, CARE>(l, window, grid, chunk, &mut doubts);
-        if any {
-            self.doubt(&doubts, grid, chunk, PANORAMA, CARE);
+        if draw::<L, PANORAMA, CARE>(l, window, grid, chunk, &mut self.rows) {
+            self.doubt(grid, chunk, PANORAMA, CARE);
         }
     }
 
@@ -267,19 +266,12 @@ impl Canvas {
         }
     }
 
-    /// Notes pixels of a chunk, by row, that may see its face.
+    /// Notes the pixels of the chunk just drawn that may see its face.
     #[cold]
     #[inline(never)]
-    fn doubt(
-        &mut self,
-        doubts: &[u16; MAX_ROWS],
-        grid: &ChunkGrid<'_>,
-        chunk: &Chunk,
-        turn: bool,
-        care: bool,
-    ) {
+    fn doubt(&mut self, grid: &ChunkGrid<'_>, chunk: &Chunk, turn: bool, care: bool) {
         let f = &chunk.inverse_t;
-        for (k, (&lanes, &row)) in doubts.iter().zip(grid.rows).take(grid.count).enumerate() {
+        for (k, (&lanes, &row)) in self.rows.doubts.iter().zip(grid.rows).take(grid.count).enumerate() {
             let mut lanes = lanes;
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;

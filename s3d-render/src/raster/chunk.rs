@@ -63,6 +63,18 @@ pub(crate) struct ChunkGrid<'a> {
     pub(crate) scale: &'a [f32],
 }
 
+/// What the drawing of a chunk keeps by row. Its memory serves one chunk after another: to make it empty took
+/// as long as the drawing of two rows.
+#[derive(Default)]
+#[repr(align(64))]
+pub(crate) struct RowScratch {
+    /// What each row adds to the edge functions and to 1/t: from here the processor spreads a number over a
+    /// register without a step of its own.
+    down: [[f32; MAX_ROWS]; 4],
+    /// The doubtful pixels of the rows of the chunk that was drawn last; behind these, anything.
+    pub(crate) doubts: [u16; MAX_ROWS],
+}
+
 /// Draws a chunk: see [`Canvas::draw`](crate::raster::canvas::Canvas::draw). `best` and `slots` begin at its
 /// anchor, `pitch` is from row to row. Notes doubtful pixels by row, and says whether there are any: a call
 /// from row to row would take the registers.
@@ -73,7 +85,7 @@ pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
     (best, slots, pitch): (&mut [f32], &mut [u32], usize),
     grid: &ChunkGrid<'_>,
     chunk: &Chunk,
-    doubts: &mut [u16; MAX_ROWS],
+    RowScratch { down, doubts }: &mut RowScratch,
 ) -> bool {
     let rows = grid.count;
     assert!(0 < rows && rows <= MAX_ROWS && (!PANORAMA || rows <= grid.scale.len()));
@@ -83,15 +95,16 @@ pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
     let [e0, e1, e2] = chunk.edges;
     let (a0, a1) = (along::<L, PANORAMA>(l, &e0, uv), along::<L, PANORAMA>(l, &e1, uv));
     let (a2, aq) = (along::<L, PANORAMA>(l, &e2, uv), along::<L, PANORAMA>(l, &chunk.inverse_t, uv));
-    // What each row adds: from here the processor spreads a number over a register without a step of its own.
-    let mut down = [[0.0; MAX_ROWS]; 4];
-    for (down, f) in down.iter_mut().zip([&e0, &e1, &e2, &chunk.inverse_t]) {
-        let step = l.splat(f.down);
-        let mut k = 0;
-        while k < rows {
-            l.store(&mut down[k..], l.mul(step, l.load(&grid.rows[k..])));
-            k += L::N;
-        }
+    let (d0, d1) = (l.splat(e0.down), l.splat(e1.down));
+    let (d2, dq) = (l.splat(e2.down), l.splat(chunk.inverse_t.down));
+    let mut k = 0;
+    while k < rows {
+        let r = l.load(&grid.rows[k..]);
+        l.store(&mut down[0][k..], l.mul(d0, r));
+        l.store(&mut down[1][k..], l.mul(d1, r));
+        l.store(&mut down[2][k..], l.mul(d2, r));
+        l.store(&mut down[3][k..], l.mul(dq, r));
+        k += L::N;
     }
     let (error, minus_error) = (l.splat(chunk.edge_error), l.splat(-chunk.edge_error));
     let (trusted, off) = (l.splat(chunk.trusted), l.splat(chunk.inverse_t_error));
