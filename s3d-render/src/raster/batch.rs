@@ -84,10 +84,10 @@ pub(crate) struct FaceBatch {
     /// 1/z of the corners.
     q: [Values<f64>; 3],
     /// First and last column and row of pixels, cut off at the window.
-    left: Values<f64>,
-    right: Values<f64>,
-    top: Values<f64>,
-    bottom: Values<f64>,
+    left: Values<u32>,
+    right: Values<u32>,
+    top: Values<u32>,
+    bottom: Values<u32>,
     /// See [`PinholePlanes`].
     at: [Values<f64>; 4],
     across: [Values<f64>; 4],
@@ -106,10 +106,10 @@ impl FaceBatch {
             x: [[0.0; MAX_FACES]; 3],
             y: [[0.0; MAX_FACES]; 3],
             q: [[0.0; MAX_FACES]; 3],
-            left: [0.0; MAX_FACES],
-            right: [0.0; MAX_FACES],
-            top: [0.0; MAX_FACES],
-            bottom: [0.0; MAX_FACES],
+            left: [0; MAX_FACES],
+            right: [0; MAX_FACES],
+            top: [0; MAX_FACES],
+            bottom: [0; MAX_FACES],
             at: [[0.0; MAX_FACES]; 4],
             across: [[0.0; MAX_FACES]; 4],
             down: [[0.0; MAX_FACES]; 4],
@@ -237,10 +237,10 @@ impl FaceBatch {
                 chunk_ats[k][i] = chunk_at[k];
             }
         }
-        put(&mut self.left, first, &lefts);
-        put(&mut self.right, first, &rights);
-        put(&mut self.top, first, &tops);
-        put(&mut self.bottom, first, &bottoms);
+        put(&mut self.left, first, &pixels(&lefts));
+        put(&mut self.right, first, &pixels(&rights));
+        put(&mut self.top, first, &pixels(&tops));
+        put(&mut self.bottom, first, &pixels(&bottoms));
         put(&mut self.error, first, &errors);
         put(&mut self.kind, first, &kinds);
         for k in 0..4 {
@@ -280,7 +280,7 @@ impl FaceBatch {
             edge_error: EDGE_ERROR,
             inverse_t: f(3),
             inverse_t_error: self.error[i],
-            trusted: self.error[i] / TRUSTED,
+            trusted: 0.0,
             slot,
         };
         (chunk, self.bottom[i] as usize - row + 1)
@@ -289,7 +289,7 @@ impl FaceBatch {
     /// The second chunk of a face that has two, and how many columns of the face it holds.
     #[inline(always)]
     pub(crate) fn second_chunk(&self, i: usize, first: &Chunk) -> (Chunk, usize) {
-        let (left, top) = (self.left[i] + LANES as f64, self.top[i]);
+        let (left, top) = (f64::from(self.left[i]) + LANES as f64, f64::from(self.top[i]));
         let at = |k: usize| (self.at[k][i] + self.across[k][i] * left + self.down[k][i] * top) as f32;
         let mut chunk = *first;
         chunk.column += LANES;
@@ -317,6 +317,17 @@ impl FaceBatch {
             inverse_t: (low(q), high(q)),
         }
     }
+}
+
+/// Whole numbers from 0 on, of a group at once: `as` takes one after another.
+#[inline(always)]
+fn pixels(whole: &[f64; GROUP]) -> [u32; GROUP] {
+    let mut pixels = [0; GROUP];
+    for i in 0..GROUP {
+        // From 2^52 on a number of 64 bits ends in the whole number itself.
+        pixels[i] = (whole[i] + (1u64 << 52) as f64).to_bits() as u32;
+    }
+    pixels
 }
 
 #[inline(always)]

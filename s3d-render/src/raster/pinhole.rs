@@ -438,7 +438,8 @@ impl ProjectionRaster for Pinhole<'_> {
             }
         }
         for i in batch.faces(DrawKind::Careful) {
-            let (chunk, rows) = batch.chunk(i, enter(canvas, i));
+            let (mut chunk, rows) = batch.chunk(i, enter(canvas, i));
+            chunk.trusted = chunk.inverse_t_error / TRUSTED;
             canvas.draw::<L, false, true>(l, &grid(rows), &chunk);
         }
         for i in batch.faces(DrawKind::InSpace) {
