@@ -79,8 +79,6 @@ impl FacesByKind {
 
 /// What is known of each face of a cluster.
 pub(crate) struct FaceBatch {
-    x: [Values<f64>; 3],
-    y: [Values<f64>; 3],
     /// 1/z of the corners.
     q: [Values<f64>; 3],
     /// First and last column and row of pixels, cut off at the window.
@@ -103,8 +101,6 @@ pub(crate) struct FaceBatch {
 impl FaceBatch {
     pub(crate) fn new() -> Self {
         Self {
-            x: [[0.0; MAX_FACES]; 3],
-            y: [[0.0; MAX_FACES]; 3],
             q: [[0.0; MAX_FACES]; 3],
             left: [0; MAX_FACES],
             right: [0; MAX_FACES],
@@ -123,27 +119,31 @@ impl FaceBatch {
     /// Sets up faces, given by the places of their corners, in a window of a size.
     #[inline(always)]
     pub(crate) fn set_up(&mut self, faces: &[[u8; 4]], corners: &PinholeCorners, width: f64, height: f64) {
-        for (i, places) in faces.iter().enumerate() {
-            for (k, &place) in places[..3].iter().enumerate() {
-                let place = usize::from(place);
-                self.x[k][i] = corners.x[place];
-                self.y[k][i] = corners.y[place];
-                self.q[k][i] = corners.inverse_z[place];
-            }
-        }
-        // The last group is filled up with what was there: nobody looks at it.
         for first in (0..faces.len()).step_by(GROUP) {
-            self.set_up_group(first, width - 1.0, height - 1.0);
+            self.set_up_group(first, faces, corners, (width - 1.0, height - 1.0));
         }
         self.by_kind.sort(&self.kind[..faces.len()]);
     }
 
     #[inline(always)]
-    fn set_up_group(&mut self, first: usize, last_column: f64, last_row: f64) {
-        let three = |from: &[Values<f64>; 3]| {
-            [group(&from[0], first), group(&from[1], first), group(&from[2], first)]
-        };
-        let (xs, ys, qs) = (three(&self.x), three(&self.y), three(&self.q));
+    fn set_up_group(
+        &mut self,
+        first: usize,
+        faces: &[[u8; 4]],
+        corners: &PinholeCorners,
+        (last_column, last_row): (f64, f64),
+    ) {
+        let (mut xs, mut ys, mut qs) = ([[0.0; GROUP]; 3], [[0.0; GROUP]; 3], [[0.0; GROUP]; 3]);
+        for i in 0..GROUP {
+            // The last group is filled up with the last face: nobody looks at it.
+            let places = faces[(first + i).min(faces.len() - 1)];
+            for k in 0..3 {
+                let place = usize::from(places[k]);
+                xs[k][i] = corners.x[place];
+                ys[k][i] = corners.y[place];
+                qs[k][i] = corners.inverse_z[place];
+            }
+        }
         // Arrays of their own, so that all faces of the group go together.
         let (mut lefts, mut rights) = ([0.0; GROUP], [0.0; GROUP]);
         let (mut tops, mut bottoms) = ([0.0; GROUP], [0.0; GROUP]);
@@ -243,6 +243,9 @@ impl FaceBatch {
         put(&mut self.bottom, first, &pixels(&bottoms));
         put(&mut self.error, first, &errors);
         put(&mut self.kind, first, &kinds);
+        put(&mut self.q[0], first, &qs[0]);
+        put(&mut self.q[1], first, &qs[1]);
+        put(&mut self.q[2], first, &qs[2]);
         for k in 0..4 {
             put(&mut self.at[k], first, &ats[k]);
             put(&mut self.across[k], first, &acrosses[k]);
@@ -263,7 +266,7 @@ impl FaceBatch {
         [self.at[3][i], self.across[3][i], self.down[3][i]]
     }
 
-    /// A face in one chunk, or the first of its two, and its number of rows.
+    /// A face in one chunk, or the first of its two, and its number of rows. Where 1/t is trusted is not said.
     #[inline(always)]
     pub(crate) fn chunk(&self, i: usize, slot: u32) -> (Chunk, usize) {
         let f = |k: usize| Linear {

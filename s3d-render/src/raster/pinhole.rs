@@ -79,17 +79,22 @@ pub(crate) struct Pinhole<'a> {
     batch: Box<FaceBatch>,
 }
 
+/// As many as a byte can name, which spares checks of bounds.
+const PLACES: usize = 1 << u8::BITS;
+
+const _: () = assert!(MAX_CORNERS <= PLACES);
+
 /// The corners of a cluster.
 pub(crate) struct PinholeCorners {
-    pub(crate) x: [f64; MAX_CORNERS],
-    pub(crate) y: [f64; MAX_CORNERS],
+    pub(crate) x: [f64; PLACES],
+    pub(crate) y: [f64; PLACES],
     /// 1/z; 0 for a corner that is behind the camera or too far out.
-    pub(crate) inverse_z: [f64; MAX_CORNERS],
+    pub(crate) inverse_z: [f64; PLACES],
 }
 
 impl PinholeCorners {
     pub(crate) fn new() -> Self {
-        let none = [0.0; MAX_CORNERS];
+        let none = [0.0; PLACES];
         Self { x: none, y: none, inverse_z: none }
     }
 }
