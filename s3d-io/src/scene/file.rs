@@ -73,8 +73,7 @@ pub enum MeshColors {
     /// The mesh's own: its textures, the colours of its vertices or materials.
     #[default]
     File,
-    /// The annotated points, for a mesh without textures
-    /// ([`VertexColors`](s3d_geom::VertexColors)).
+    /// The annotated points, for a mesh without textures (`s3d_geom::VertexColors`).
     Points,
 }
 

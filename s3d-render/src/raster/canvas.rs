@@ -86,8 +86,8 @@ pub(crate) struct Cover {
 }
 
 impl Cover {
-    /// The part of a window of `width` × `height` pixels between the given columns and rows; `None` if there
-    /// is none.
+    /// The centres of pixels, at whole numbers, between columns and between rows of a window of
+    /// `width` × `height`; `None` if there are none.
     #[inline(always)]
     pub(crate) fn new(
         (left, right): (f32, f32),
@@ -377,6 +377,22 @@ impl Canvas {
             let (column, row) = (pixel as usize % self.pitch, pixel as usize / self.pitch);
             let at = row * out_pitch + column;
             out.1[at] = single(out.0[at], column, row) as f32;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cover_holds_the_centres_of_pixels_between_its_bounds() {
+        let pixels = |columns, rows| Cover::new(columns, rows, (10, 6), 1.0).map(|c| (c.columns, c.rows));
+        assert_eq!(pixels((0.2, 3.9), (1.0, 2.0)), Some(((1, 3), (1, 2))));
+        assert_eq!(pixels((-7.5, 99.0), (-0.3, f32::INFINITY)), Some(((0, 9), (0, 5))));
+        for between in [(0.2, 0.8), (-3.0, -0.1), (9.1, 20.0)] {
+            assert_eq!(pixels(between, (0.0, 5.0)), None);
+            assert_eq!(pixels((0.0, 9.0), (between.0 - 4.0, between.1 - 4.0)), None);
         }
     }
 }

