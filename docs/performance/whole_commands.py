@@ -58,6 +58,8 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--scratch", type=Path)
     args = parser.parse_args()
+    if args.scratch:
+        args.scratch.mkdir(parents=True, exist_ok=True)
     for scene in args.scenes:
         with tempfile.TemporaryDirectory(dir=args.scratch) as scratch:
             scratch = Path(scratch)
