@@ -22,7 +22,7 @@ mod simd {
     pub(crate) use crate::raster_lanes;
 }
 
-use chunk::{Chunk, ChunkGrid, EDGE_ERROR, Linear, MAX_ROWS, draw};
+use chunk::{Chunk, ChunkGrid, EDGE_ERROR, Linear, MAX_ROWS, RowScratch, draw};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16, u32x16};
 use s3d_simd::{Avx2, Avx512};
@@ -109,6 +109,7 @@ struct Job {
     slots: Vec<u32>,
     chunks: Vec<(Chunk, usize)>,
     count: [f32; MAX_ROWS],
+    scratch: RowScratch,
     doubtful: u64,
 }
 
@@ -137,6 +138,7 @@ impl Job {
             slots: vec![0; PITCH * ROWS],
             chunks: (0..CHUNKS).map(chunk).collect(),
             count: std::array::from_fn(|k| k as f32),
+            scratch: RowScratch::default(),
             doubtful: 0,
         }
     }
@@ -144,13 +146,13 @@ impl Job {
     #[inline(always)]
     fn run<L: RasterLanes>(&mut self, lanes: L) {
         self.best.fill(0.0);
-        let Self { best, slots, chunks, count, doubtful } = self;
+        let Self { best, slots, chunks, count, scratch, doubtful } = self;
         let Some(u) = count.first_chunk() else { return };
         for (chunk, rows) in chunks.iter() {
             let grid = ChunkGrid { u, v: u, rows: count, count: *rows, scale: &[] };
             let at = chunk.row * PITCH + chunk.column;
             let window = (&mut best[at..], &mut slots[at..], PITCH);
-            *doubtful += u64::from(draw::<L, false, false>(lanes, window, &grid, chunk, &mut [0; MAX_ROWS]));
+            *doubtful += u64::from(draw::<L, false, false>(lanes, window, &grid, chunk, scratch));
         }
     }
 }
