@@ -266,7 +266,8 @@ impl FaceBatch {
         [self.at[3][i], self.across[3][i], self.down[3][i]]
     }
 
-    /// A face in one chunk, or the first of its two, and its number of rows. Where 1/t is trusted is not said.
+    /// A face in one chunk, or the first of its two, and its number of rows. From where on 1/t is trusted is
+    /// left to those who draw with care.
     #[inline(always)]
     pub(crate) fn chunk(&self, i: usize, slot: u32) -> (Chunk, usize) {
         let f = |k: usize| Linear {
