@@ -7,10 +7,10 @@
 //! | module | the files |
 //! |---|---|
 //! | [`mesh`] | OBJ, glTF and PLY with textures and labels: [`mesh::read_mesh`]; the data set's OBJ files |
-//! | [`cloud`] | annotated points: [`cloud::Annotations`]; writers of PLY, the S3DIS tree, `pointcloud.mat`, NPY |
-//! | [`camera`] | scan locations of lists of cameras: [`camera::read_scan_locations`]; the scanner's pictures |
+//! | [`cloud`] | annotated points: [`cloud::Annotations`]; writers of PLY, S3DIS, `pointcloud.mat`, NPY |
+//! | [`camera`] | scan locations of camera lists: [`camera::read_scan_locations`]; the scanner's pictures |
 //! | [`image`] | images, PNG and OpenEXR: [`image::encode_rgb8`]; [`image::Compression`] |
-//! | [`dataset`] | names: [`dataset::Layout`], [`dataset::ImageName`]; poses, labels, instances, splits, lists |
+//! | [`dataset`] | names: [`dataset::Layout`], [`dataset::ImageName`]; poses, labels, instances, splits |
 //! | [`package`] | WebDataset, COLMAP, nerfstudio, COCO, Parquet, from the images of a data set |
 //! | [`scene`] | `scene.toml`: [`scene::read_scene`]; published areas as scenes |
 //! | [`fs`] | files written whole or not at all, brought to the disk, checked by their checksums; JSON |

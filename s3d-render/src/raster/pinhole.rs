@@ -1,11 +1,11 @@
 //! Perspective views, for the visibility pass.
 //!
-//! A corner p (relative to the camera) is in column x = (ρ·p)/(φ·p) and row y = (δ·p)/(φ·p) of the window,
-//! pixel centres at whole numbers, at the depth z = φ·p. For a corner that is no farther out than [`GUARD`]
-//! pixels x and y are good to 2⁻⁵³·8·GUARD < 2e-11 pixels, since |p|/z is then bounded by the angle of the
-//! guard band; so an edge function made from two corners at least 1e-3 apart is good to 1e-8 over a chunk.
-//! Faces that bounds farther out, behind the camera, or have shorter edges, get their planes in space
-//! instead. The others are set up by [`FaceBatch`], a cluster at a time.
+//! A corner p (relative to the camera) is in column x = (ρ·p)/(φ·p) and row y = (δ·p)/(φ·p) of the
+//! window, pixel centres at whole numbers, at the depth z = φ·p. For a corner that is no farther out than
+//! [`GUARD`] pixels x and y are good to 2⁻⁵³·8·GUARD < 2e-11 pixels, since |p|/z is then bounded by
+//! the angle of the guard band; so an edge function made from two corners at least 1e-3 apart is good to 1e-8
+//! over a chunk. Faces with a corner farther out or behind the camera, or with shorter edges, get their
+//! planes in space instead. The others are set up by [`FaceBatch`], a cluster at a time.
 
 #![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
 
@@ -103,7 +103,8 @@ impl PinholeCorners {
 /// `center`, so that x and y are as good as the module says: where pixels are far from square, or the window
 /// is far from the optical axis, less than [`GUARD`].
 fn guard(focal: DVec2, center: DVec2) -> f64 {
-    // x is off by 2⁻⁵³·(fx + |cx|)·|p|/z, and |p|/z < 1 + (guard + |cx|)/fx + (guard + |cy|)/fy; y likewise.
+    // x is off by 2⁻⁵³·(fx + |cx|)·|p|/z, and |p|/z < 1 + (guard + |cx|)/fx + (guard + |cy|)/fy;
+    // y likewise.
     let center = center.abs();
     let farthest = 8.0 * GUARD / (focal + center).max_element() - 1.0 - (center / focal).element_sum();
     (farthest / focal.recip().element_sum()).min(GUARD)

@@ -16,9 +16,9 @@
 //! Error: an anchor serves pixels that are at most [`REACH`] columns and rows away and whose w is within
 //! 1/[`DEEP`] to [`DEEP`]. n and w each go through fewer than 8 roundings of 2⁻²⁴ relative to the pixels
 //! between; with f what one pixel more adds to the attribute, here or at the anchor, the quotient is off by
-//! less than 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and below f / 8000 where w hardly varies, as
-//! it mostly does in 64 pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel in a
-//! texture of 4096.
+//! less than 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and below f / 8000 where w hardly
+//! varies, as it mostly does in 64 pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a
+//! pixel in a texture of 4096.
 
 use crate::shade::patch::Patch;
 use crate::shade::texel_wrap::TexelWrap;
@@ -57,9 +57,9 @@ impl Attributes {
 }
 
 impl Attributes {
-    /// What [`AnchorBatch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face is
-    /// along a ray, an attribute changes by (m − (a − a₀) ω / ω·e) · step / w where m = (α − a₀ω) / ω·e; and
-    /// z is greatest at a corner.
+    /// What [`AnchorBatch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face
+    /// is along a ray, an attribute changes by (m − (a − a₀) ω / ω·e) · step / w where
+    /// m = (α − a₀ω) / ω·e; and z is greatest at a corner.
     #[inline(always)]
     fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
         let scale = self.denominator.dot(e).recip();
