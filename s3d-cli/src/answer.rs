@@ -28,7 +28,8 @@ impl JsonArgs {
 
     /// Refuses a file that is there, before the answer is looked for.
     pub(crate) fn check_free(&self) -> Result<()> {
-        self.file().map_or(Ok(()), |file| NewFile::check_free(file, self.overwrite))
+        self.file()
+            .map_or(Ok(()), |file| NewFile::check_free(file, self.overwrite))
     }
 
     /// Writes the file, if there is one.

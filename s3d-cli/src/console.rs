@@ -65,7 +65,11 @@ pub(crate) fn start(verbose: bool, quiet: bool, format: LogFormat) {
         .with_ansi(terminal)
         .log_internal_errors(false)
         .with_writer(AboveBars);
-    if json { log.event_format(JsonLines).init() } else { log.init() }
+    if json {
+        log.event_format(JsonLines).init()
+    } else {
+        log.init()
+    }
 }
 
 /// Whether standard error is for a program.
@@ -321,7 +325,11 @@ impl Progress {
 
 /// Rates below 10 with one digit behind the point, others whole.
 fn round_rate(rate: f64) -> f64 {
-    if rate < 10.0 { (10.0 * rate).round() / 10.0 } else { rate.round() }
+    if rate < 10.0 {
+        (10.0 * rate).round() / 10.0
+    } else {
+        rate.round()
+    }
 }
 
 impl Drop for Progress {

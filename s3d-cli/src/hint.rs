@@ -17,7 +17,11 @@ pub(crate) fn resume_hint() -> String {
 }
 
 fn command_line(words: impl IntoIterator<Item = impl AsRef<str>>) -> String {
-    words.into_iter().map(|word| quoted(word.as_ref())).collect::<Vec<_>>().join(" ")
+    words
+        .into_iter()
+        .map(|word| quoted(word.as_ref()))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// A word as a shell takes it: as it is if nothing in it means something there, else in quotes.
@@ -52,7 +56,10 @@ mod tests {
             .arg(format!("printf '%s\\0' {line}"))
             .output()
             .unwrap();
-        let read: Vec<&str> = std::str::from_utf8(&out.stdout).unwrap().split_terminator('\0').collect();
+        let read: Vec<&str> = std::str::from_utf8(&out.stdout)
+            .unwrap()
+            .split_terminator('\0')
+            .collect();
         assert_eq!(read, words);
     }
 }

@@ -11,7 +11,9 @@ pub(crate) fn install() {
 
 fn tell(panic: &PanicHookInfo<'_>) {
     let message = panic.payload_as_str().unwrap_or("no message");
-    let place = panic.location().map_or_else(String::new, |l| format!(" at {}:{}", l.file(), l.line()));
+    let place = panic
+        .location()
+        .map_or_else(String::new, |l| format!(" at {}:{}", l.file(), l.line()));
     if s3d_io::panic_is_caught() {
         debug!("a decoder gave up: {message}{place}");
         return;

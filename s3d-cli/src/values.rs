@@ -31,12 +31,20 @@ pub(crate) fn finite(text: &str) -> Result<f64, String> {
 
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     let v = finite(text)?;
-    if v > 0.0 { Ok(v) } else { Err("must be above 0".to_owned()) }
+    if v > 0.0 {
+        Ok(v)
+    } else {
+        Err("must be above 0".to_owned())
+    }
 }
 
 pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
     let v = finite(text)?;
-    if v > 0.0 && v < 180.0 { Ok(v) } else { Err("must be between 0 and 180 degrees".to_owned()) }
+    if v > 0.0 && v < 180.0 {
+        Ok(v)
+    } else {
+        Err("must be between 0 and 180 degrees".to_owned())
+    }
 }
 
 pub(crate) fn uuid(text: &str) -> Result<String, String> {
@@ -63,5 +71,7 @@ pub(crate) fn intrinsics(text: &str) -> Result<[f64; 4], String> {
 
 pub(crate) fn point(text: &str) -> Result<DVec3, String> {
     let v = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
-    <[f64; 3]>::try_from(v).map(DVec3::from_array).map_err(|_| "must be three numbers: x,y,z".to_owned())
+    <[f64; 3]>::try_from(v)
+        .map(DVec3::from_array)
+        .map_err(|_| "must be three numbers: x,y,z".to_owned())
 }

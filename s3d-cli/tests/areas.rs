@@ -17,7 +17,12 @@ fn two_generated_areas_are_a_data_set_that_verify_passes() {
     s3d_ok(&["verify", text(&out)]);
     let layout = Layout::new(&out);
     for area in [1, 2] {
-        assert!(layout.s3dis_area_dir(area).join("office_1/Annotations/table_1.txt").exists());
+        assert!(
+            layout
+                .s3dis_area_dir(area)
+                .join("office_1/Annotations/table_1.txt")
+                .exists()
+        );
         assert!(out.join(format!("scan/area_{area}/scene.toml")).exists());
         assert!(fs::read_dir(layout.area_dir(area).join("pano/rgb")).unwrap().count() > 60);
     }

@@ -208,7 +208,9 @@ fn files_that_may_not_be_read_are_refused() {
         let out = scan.dir.path().join("home/out");
         fs::create_dir(scan.dir.path().join("home")).unwrap();
         let mut command = Command::new(&binary);
-        command.args(["export", text(&scan.scene), "-o", text(&out)]).args(SMALL);
+        command
+            .args(["export", text(&scan.scene), "-o", text(&out)])
+            .args(SMALL);
         if fs::File::open(scan.file(name)).is_ok() {
             chown(scan.dir.path().join("home"), Some(NOBODY), Some(NOBODY)).unwrap();
             command.uid(NOBODY).gid(NOBODY);
@@ -234,7 +236,12 @@ fn names_that_are_no_text_are_no_trouble() {
     let moved = scan.dir.path().join(OsStr::from_bytes(b"sc\xffan"));
     fs::rename(scan.file(""), &moved).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_s3d"));
-    command.arg("export").arg(moved.join("scene.toml")).arg("-o").arg(scan.out()).args(SMALL);
+    command
+        .arg("export")
+        .arg(moved.join("scene.toml"))
+        .arg("-o")
+        .arg(scan.out())
+        .args(SMALL);
     let (code, log) = wait(&mut command);
     assert_eq!(code, Some(0), "{log}");
 }

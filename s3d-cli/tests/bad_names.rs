@@ -52,8 +52,9 @@ fn exports_only_into_out(scan: &Scan) -> BTreeMap<PathBuf, (String, u64)> {
     let before = listing(scan.dir.path());
     scan.exported();
     let out = scan.out();
-    let (inside, outside): (BTreeMap<_, _>, BTreeMap<_, _>) =
-        listing(scan.dir.path()).into_iter().partition(|(path, _)| path.starts_with(&out));
+    let (inside, outside): (BTreeMap<_, _>, BTreeMap<_, _>) = listing(scan.dir.path())
+        .into_iter()
+        .partition(|(path, _)| path.starts_with(&out));
     assert_eq!(outside, before, "something outside of OUT changed");
     let mut in_lower_case = std::collections::BTreeSet::new();
     for path in inside.keys() {

@@ -63,8 +63,17 @@ fn instructions_change_no_byte() {
     let export = |level: Option<&str>| {
         let out = dir.path().join(level.unwrap_or("any"));
         let mut command = Command::new(env!("CARGO_BIN_EXE_s3d"));
-        command.env_remove("S3D_SIMD").envs(level.map(|level| ("S3D_SIMD", level)));
-        let output = command.arg("export").arg(&scene).arg("-o").arg(&out).args(SMALL).output().unwrap();
+        command
+            .env_remove("S3D_SIMD")
+            .envs(level.map(|level| ("S3D_SIMD", level)));
+        let output = command
+            .arg("export")
+            .arg(&scene)
+            .arg("-o")
+            .arg(&out)
+            .args(SMALL)
+            .output()
+            .unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         out
     };
@@ -106,7 +115,10 @@ fn another_seed_gives_other_views_and_only_keeps_the_selection() {
     export(&[text(&scene)], &seven, &["--seed", "7"]);
     export(&[text(&scene)], &only, &["--only", common::UUID_B]);
     let (zero, seven, only) = (files(&zero), files(&seven), files(&only));
-    assert!(zero.iter().any(|(path, bytes)| seven.get(path).is_some_and(|other| other != bytes)));
+    assert!(
+        zero.iter()
+            .any(|(path, bytes)| seven.get(path).is_some_and(|other| other != bytes))
+    );
     let images = |f: &std::collections::BTreeMap<std::path::PathBuf, Vec<u8>>| {
         f.iter()
             .filter(|(p, _)| text(p).contains(common::UUID_B))

@@ -140,7 +140,11 @@ fn bad_camera_tables_are_named_with_their_line() {
     ] {
         let scan = Scan::new();
         fs::write(scan.file("cameras.csv"), table).unwrap();
-        let place = if line == 0 { String::new() } else { format!("line {line}") };
+        let place = if line == 0 {
+            String::new()
+        } else {
+            format!("line {line}")
+        };
         scan.fails(&["cameras.csv", part, &place]);
     }
     let scan = Scan::new();
@@ -408,7 +412,11 @@ fn a_log_that_cannot_be_written_ends_nothing() {
         .status()
         .unwrap();
     assert!(status.success());
-    assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains("\"complete\""));
+    assert!(
+        fs::read_to_string(out.join("manifest.json"))
+            .unwrap()
+            .contains("\"complete\"")
+    );
 }
 
 /// A pipe or a device is not replaced by a file.
@@ -417,7 +425,13 @@ fn a_log_that_cannot_be_written_ends_nothing() {
 fn a_pipe_is_not_replaced() {
     let scan = Scan::new();
     let pipe = scan.dir.path().join("pipe.ply");
-    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    assert!(
+        std::process::Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
     s3d_fails(&["sample", text(&scan.file("room.obj")), "-o", text(&pipe), "--overwrite"], 1, &["pipe"]);
     assert!(!fs::metadata(&pipe).unwrap().is_file());
 }

@@ -25,7 +25,10 @@ fn a_data_set_against_its_own_package_is_perfect_in_text_and_json() {
     let result: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
     let rows = result["tables"][0]["rows"].as_array().unwrap();
     let pq = rows.iter().flat_map(|row| row["scores"].as_array().unwrap().first());
-    let defined: Vec<&Value> = pq.map(|score| &score["value"]).filter(|value| !value.is_null()).collect();
+    let defined: Vec<&Value> = pq
+        .map(|score| &score["value"])
+        .filter(|value| !value.is_null())
+        .collect();
     assert!(defined.len() > 4 && defined.iter().all(|value| **value == 1.0), "{answer}");
     // The same on standard output, and for any number of threads.
     let said = s3d(&[&call[..], &["--json", "-", "--threads", "1"]].concat());

@@ -18,7 +18,10 @@ fn points(scan: &Scan) -> Vec<([f64; 3], &'static str, u32)> {
     let instances =
         [("floor", 1), ("ceiling", 1), ("wall", 1), ("wall", 2), ("wall", 3), ("wall", 4), ("table", 1)];
     for (class, number) in instances {
-        for line in fs::read_to_string(scan.annotation(&format!("{class}_{number}.txt"))).unwrap().lines() {
+        for line in fs::read_to_string(scan.annotation(&format!("{class}_{number}.txt")))
+            .unwrap()
+            .lines()
+        {
             let mut words = line.split(' ').map(|w| w.parse().unwrap());
             all.push(([(); 3].map(|()| words.next().unwrap()), class, number));
         }
@@ -213,8 +216,10 @@ fn without_offset(path: &Path, bytes: &[u8]) -> Vec<u8> {
         Some("json") if path.iter().any(|part| part == "pose") => in_pose.as_bytes(),
         _ => return bytes.to_vec(),
     };
-    let at =
-        bytes.windows(stated.len()).position(|w| w == stated).unwrap_or_else(|| panic!("{}", path.display()));
+    let at = bytes
+        .windows(stated.len())
+        .position(|w| w == stated)
+        .unwrap_or_else(|| panic!("{}", path.display()));
     [&bytes[..at], &bytes[at + stated.len()..]].concat()
 }
 
@@ -349,7 +354,9 @@ fn what_follows_an_export_keeps_the_offset() {
             let plain = home.dir.path().join(kind);
             s3d_ok(&["pack", text(&home.out()), "--to", kind, "-o", text(&plain)]);
             let (mut here, mut there) = (files(&place), files(&plain));
-            [&mut here, &mut there].into_iter().for_each(|all| drop(all.remove(Path::new("pack.json"))));
+            [&mut here, &mut there]
+                .into_iter()
+                .for_each(|all| drop(all.remove(Path::new("pack.json"))));
             assert!(here == there, "{kind}");
         }
     }

@@ -67,7 +67,12 @@ impl Scene {
         // A disk in memory, where there is one: what is tested is what a killed process leaves there, and a
         // busy disk would be most of the wait.
         let memory = Path::new("/dev/shm");
-        let dir = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap();
+        let dir = if memory.is_dir() {
+            tempfile::tempdir_in(memory)
+        } else {
+            tempfile::tempdir()
+        }
+        .unwrap();
         let scenes = [1, 2].map(|area| write_scan(&dir.path().join(format!("scan_{area}")), area));
         let mut scene = Self { dir, scenes, whole: Files::new(), took: Duration::ZERO };
         let started = Instant::now();
@@ -141,7 +146,9 @@ fn assert_no_half_files(out: &Path, whole: &Files) {
         if name.starts_with(".s3d") || name.ends_with(".part") || name == "manifest.json" {
             continue;
         }
-        let expected = whole.get(&path).unwrap_or_else(|| panic!("{name} is in no undisturbed export"));
+        let expected = whole
+            .get(&path)
+            .unwrap_or_else(|| panic!("{name} is in no undisturbed export"));
         assert!(*expected == bytes, "{name} is there by halves");
     }
 }
@@ -195,7 +202,11 @@ fn stopped_by_a_signal_it_goes_on_to_the_same_bytes() {
         // The first milliseconds are the system's, which knows of no way to end but its own.
         thread::sleep(scene.took.mul_f64(0.2) + random.delay(scene.took.mul_f64(0.6)));
         let pid = child.id().to_string();
-        let _ = Command::new("kill").args([signal, &pid]).stderr(Stdio::null()).status().unwrap();
+        let _ = Command::new("kill")
+            .args([signal, &pid])
+            .stderr(Stdio::null())
+            .status()
+            .unwrap();
         match child.wait().unwrap().code() {
             Some(0) => {}
             Some(75) => stops += 1,
@@ -366,7 +377,11 @@ fn a_killed_replacement_goes_on_or_gives_way_to_another() {
         let killed = scene.run_for(&out, &seven, random.delay(scene.took));
         if killed && out.join(".s3d").exists() {
             // What a process was writing in folders that hold files of others too.
-            for folder in ["", "assets", ".s3d"].map(|name| out.join(name)).iter().filter(|f| f.is_dir()) {
+            for folder in ["", "assets", ".s3d"]
+                .map(|name| out.join(name))
+                .iter()
+                .filter(|f| f.is_dir())
+            {
                 fs::write(folder.join(".s3d-Ab12Cd.part"), "half").unwrap();
             }
         }
@@ -457,7 +472,11 @@ fn a_full_disk_is_gone_on_with_when_there_is_space_again() {
     let size: usize = scene.whole.values().map(Vec::len).sum();
     let mount = |options: &str| {
         let args = ["-t", "tmpfs", "-o", options, "tmpfs", text(&disk)];
-        Command::new("mount").args(args).stderr(Stdio::null()).status().is_ok_and(|s| s.success())
+        Command::new("mount")
+            .args(args)
+            .stderr(Stdio::null())
+            .status()
+            .is_ok_and(|s| s.success())
     };
     if !mount(&format!("size={}", size / 3)) {
         eprintln!("skipped: no file system can be mounted here");

@@ -25,7 +25,11 @@ fn peak_of(args: &[&str]) -> Option<u64> {
         // A mark that only rises: what is seen last is the peak but for the last milliseconds.
         let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
         if let Some(line) = status.lines().find_map(|l| l.strip_prefix("VmHWM:")) {
-            let kb: u64 = line.trim().trim_end_matches(" kB").parse().expect("a number of kilobytes");
+            let kb: u64 = line
+                .trim()
+                .trim_end_matches(" kB")
+                .parse()
+                .expect("a number of kilobytes");
             peak = peak.max(Some(1024 * kb));
         }
         if let Some(status) = child.try_wait().expect("the process can be waited for") {
@@ -69,8 +73,11 @@ fn memory_does_not_grow_with_the_points_of_an_instance() {
             "--threads=2",
         ]));
         let written = files(&out.join("area_1/3d"));
-        let json =
-            written.iter().find(|(path, _)| path.ends_with("instances.json")).expect("the instances").1;
+        let json = written
+            .iter()
+            .find(|(path, _)| path.ends_with("instances.json"))
+            .expect("the instances")
+            .1;
         assert!(String::from_utf8_lossy(json).contains(&format!("\"points\":{points}")));
         fs::remove_dir_all(&out).unwrap();
         fs::remove_dir_all(&scan_dir).unwrap();

@@ -52,8 +52,10 @@ fn pack(dir: &Path, kind: &str, more: &[&str]) -> BTreeMap<PathBuf, Vec<u8>> {
 /// Images of an area's kind, as the data set has them.
 fn image_names(area: u32, kind: &str) -> Vec<String> {
     let folder = dataset().join(format!("area_{area}/{kind}/rgb"));
-    let mut names: Vec<String> =
-        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -67,7 +69,11 @@ fn the_same_bytes_for_any_number_of_threads_and_nothing_altered() {
     let before = files(dataset());
     for kind in KINDS {
         let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let more: &[&str] = if kind == "webdataset" { &["--max-count", "3", "--shuffle", "5"] } else { &[] };
+        let more: &[&str] = if kind == "webdataset" {
+            &["--max-count", "3", "--shuffle", "5"]
+        } else {
+            &[]
+        };
         let one = pack(a.path(), kind, &[more, &["--threads", "1"]].concat());
         let four = pack(b.path(), kind, &[more, &["--threads", "4"]].concat());
         // nerfstudio's paths lead from the package to the data set; both packages are as deep.
@@ -87,8 +93,10 @@ fn shards_hold_every_file_once() {
     let index = json(&package[Path::new("shards.json")]);
     let shards = index["shardlist"].as_array().unwrap();
     let samples: u64 = shards.iter().map(|s| s["nsamples"].as_u64().unwrap()).sum();
-    let images: usize =
-        [1, 2].iter().map(|a| image_names(*a, "data").len() + image_names(*a, "pano").len()).sum();
+    let images: usize = [1, 2]
+        .iter()
+        .map(|a| image_names(*a, "data").len() + image_names(*a, "pano").len())
+        .sum();
     assert_eq!(samples as usize, images);
     let all = files(dataset());
     let mut found = 0;
@@ -108,7 +116,10 @@ fn shards_hold_every_file_once() {
         }
         assert_eq!(meta, 2, "conventions and labels");
     }
-    let in_images = |p: &&PathBuf| p.components().any(|c| c.as_os_str() == "data" || c.as_os_str() == "pano");
+    let in_images = |p: &&PathBuf| {
+        p.components()
+            .any(|c| c.as_os_str() == "data" || c.as_os_str() == "pano")
+    };
     assert_eq!(found, all.keys().filter(in_images).count());
     assert!(package.contains_key(Path::new("area_1_panoramas-000000.tar")));
 
@@ -123,7 +134,10 @@ fn shards_hold_every_file_once() {
     assert_eq!(names[..2], ["pack.json", "shards.json"]);
     assert_eq!(names[2..], shards);
     for shard in shards {
-        let headers = package[Path::new(&shard)].chunks(512).filter(|b| b[257..262] == *b"ustar").count();
+        let headers = package[Path::new(&shard)]
+            .chunks(512)
+            .filter(|b| b[257..262] == *b"ustar")
+            .count();
         assert_eq!(headers, 2 + 2);
     }
 }
@@ -161,7 +175,11 @@ fn colmap_models_and_copies() {
     let dir = tempfile::tempdir().unwrap();
     let package = pack(dir.path(), "colmap", &["--binary", "--points", "0", "--areas", "1"]);
     assert_eq!(package[Path::new("area_1/sparse/0/points3D.bin")], [0; 8]);
-    assert!(package.keys().all(|p| p.extension().is_none_or(|e| e != "txt" && e != "png")));
+    assert!(
+        package
+            .keys()
+            .all(|p| p.extension().is_none_or(|e| e != "txt" && e != "png"))
+    );
 }
 
 #[test]

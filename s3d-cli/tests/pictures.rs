@@ -171,7 +171,11 @@ fn export(scan: &Path, rgb: &str) -> PathBuf {
     let path = scan.join(format!("{name}.toml"));
     fs::write(
         &path,
-        if rgb.starts_with("rgb") { format!("{rgb}\n{scene}") } else { format!("{scene}{rgb}\n") },
+        if rgb.starts_with("rgb") {
+            format!("{rgb}\n{scene}")
+        } else {
+            format!("{scene}{rgb}\n")
+        },
     )
     .unwrap();
     let out = scan.with_file_name(name);
@@ -209,10 +213,16 @@ fn pictures_of_the_scene_give_its_images() {
 
     let faces = studio.sky_box(&pose, 0.0, 768);
     let name = |k: usize| format!("{UUID}_skybox{k}_sami.png");
-    faces.iter().enumerate().for_each(|(k, face)| write(&scan.join("skybox").join(name(k)), face));
+    faces
+        .iter()
+        .enumerate()
+        .for_each(|(k, face)| write(&scan.join("skybox").join(name(k)), face));
     // Held as Matterport's viewers have it: up and down meet the right.
     let matterport = studio.sky_box(&pose, -FRAC_PI_2, 768);
-    matterport.iter().enumerate().for_each(|(k, face)| write(&scan.join("matterport").join(name(k)), face));
+    matterport
+        .iter()
+        .enumerate()
+        .for_each(|(k, face)| write(&scan.join("matterport").join(name(k)), face));
     let panorama = studio.take(&Camera::equirectangular(pose, 3072));
     write(&scan.join("panorama").join(format!("{UUID}.png")), &panorama);
     write_captures(&studio, UUID, &pose, &scan.join("captures"));
@@ -316,7 +326,12 @@ fn the_same_pictures_give_the_same_bytes() {
         files(&out)
     };
     let one = run("1");
-    assert!(one.keys().filter(|p| p.ends_with("rgb") || p.to_string_lossy().contains("/rgb/")).count() >= 6);
+    assert!(
+        one.keys()
+            .filter(|p| p.ends_with("rgb") || p.to_string_lossy().contains("/rgb/"))
+            .count()
+            >= 6
+    );
     assert!(one == run("3"), "threads change the images");
     // One capture less is a hole, and told.
     fs::remove_file(dir.path().join(format!("scan/captures/{UUID_A}_i0_3.png"))).unwrap();

@@ -49,7 +49,12 @@ fn difference(mesh: &TriMesh, cloud: &PointCloud) -> f64 {
         other => panic!("{other:?}"),
     };
     let off = |(p, c): (&_, &[u8; 3])| {
-        color(*p).iter().zip(c).map(|(a, b)| (a - f64::from(*b)).abs()).sum::<f64>() / 3.0
+        color(*p)
+            .iter()
+            .zip(c)
+            .map(|(a, b)| (a - f64::from(*b)).abs())
+            .sum::<f64>()
+            / 3.0
     };
     cloud.positions.iter().zip(&cloud.colors).map(off).sum::<f64>() / cloud.len() as f64
 }
@@ -85,7 +90,11 @@ fn a_mesh_without_texture_shows_the_colours_of_the_points() {
     let panoramas = out.join("area_1/pano/rgb");
     for entry in fs::read_dir(panoramas).unwrap() {
         let image = read_rgb8(&entry.unwrap().path()).unwrap();
-        let blue = image.pixels().iter().filter(|pixel| pixel[2].abs_diff(128) <= 1).count();
+        let blue = image
+            .pixels()
+            .iter()
+            .filter(|pixel| pixel[2].abs_diff(128) <= 1)
+            .count();
         assert!(blue as f64 > 0.99 * image.len() as f64, "{blue} of {}", image.len());
         let reds: std::collections::BTreeSet<u8> = image.pixels().iter().map(|pixel| pixel[0] / 16).collect();
         assert!(reds.len() >= 10, "{reds:?}");

@@ -102,7 +102,10 @@ fn every_form_gives_the_same_images() {
             serde_json::json!({"file_path": format!("images/{i}.png"), "transform_matrix": rows(-1.0)}),
         );
     }
-    let k = camera(poses[0]).k_matrix().map(|row| row.map(|v| v.to_string()).join(" ")).join("\n");
+    let k = camera(poses[0])
+        .k_matrix()
+        .map(|row| row.map(|v| v.to_string()).join(" "))
+        .join("\n");
     scan.write("scannet/intrinsic/intrinsic_color.txt", k);
     scan.write("scannet/pose/2.txt", "-inf -inf -inf -inf\n".repeat(4));
     let shared = serde_json::json!({
@@ -304,21 +307,25 @@ fn only_views_of_ours_are_replaced() {
 #[test]
 fn it_tells_how_far_it_is_and_ends_when_asked() {
     let scan = Scan::new();
-    let rows: String = (0..40).map(|i| format!("v{i},2,1.2,1.5,{},64,48,70\n", 9 * i)).collect();
+    let rows: String = (0..40)
+        .map(|i| format!("v{i},2,1.2,1.5,{},64,48,70\n", 9 * i))
+        .collect();
     scan.write("list.csv", format!("name,x,y,z,yaw,width,height,fov\n{rows}"));
     let (mesh, list, out) = (scan.file("room.obj"), scan.file("list.csv"), scan.out());
     let cancel = Cancel::default();
     let (theirs, told) = (cancel.clone(), Arc::new(Mutex::new((0, 0))));
     let seen = Arc::clone(&told);
-    let ctx = Context::default().cancelled_by(cancel.clone()).observed_by(move |event: &Event<'_>| {
-        if let Event::TaskAdvanced { task, done } = event {
-            let mut told = seen.lock().unwrap();
-            *told = (task.total, told.1.max(*done));
-            if *done == 7 {
-                theirs.cancel();
+    let ctx = Context::default()
+        .cancelled_by(cancel.clone())
+        .observed_by(move |event: &Event<'_>| {
+            if let Event::TaskAdvanced { task, done } = event {
+                let mut told = seen.lock().unwrap();
+                *told = (task.total, told.1.max(*done));
+                if *done == 7 {
+                    theirs.cancel();
+                }
             }
-        }
-    });
+        });
     let call = || render_poses(&mesh, &list, &out, &PosesOptions::default(), &ctx);
     assert!(matches!(call(), Err(Error::Cancelled)));
     let (total, done) = *told.lock().unwrap();

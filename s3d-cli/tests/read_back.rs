@@ -20,7 +20,9 @@ use std::path::Path;
 fn check_images(layout: &Layout, area: u32) -> usize {
     let table = LabelTable::from_names(&read_labels(&layout.labels_json()).unwrap()).unwrap();
     let colored = read_mesh(&layout.mesh_dir(area).join("rgb.obj"), UpAxis::Y).unwrap();
-    let semantic = read_mesh(&layout.mesh_dir(area).join("semantic.obj"), UpAxis::Y).unwrap().mesh;
+    let semantic = read_mesh(&layout.mesh_dir(area).join("semantic.obj"), UpAxis::Y)
+        .unwrap()
+        .mesh;
     assert!(colored.warnings.is_empty(), "{:?}", colored.warnings);
     let mesh = colored.mesh;
     assert_eq!(mesh.faces().len(), semantic.faces().len());
@@ -29,7 +31,11 @@ fn check_images(layout: &Layout, area: u32) -> usize {
     }
     let label_of = |face: u32| -> u32 {
         let name = &semantic.materials()[semantic.material_of(face).unwrap() as usize].name;
-        table.names().iter().position(|n| n == name).unwrap_or_else(|| panic!("{name} is no label")) as u32
+        table
+            .names()
+            .iter()
+            .position(|n| n == name)
+            .unwrap_or_else(|| panic!("{name} is no label")) as u32
     };
     let labels: Vec<u32> = (0..mesh.faces().len() as u32).map(label_of).collect();
     let scene = Scene::new(&mesh);
@@ -37,8 +43,10 @@ fn check_images(layout: &Layout, area: u32) -> usize {
     let mut images = 0;
     for kind in [Frame::Panorama, Frame::View(0)] {
         let poses = layout.image_dir(area, kind, Domain::Pose);
-        let mut names: Vec<_> =
-            fs::read_dir(&poses).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<_> = fs::read_dir(&poses)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         assert!(!names.is_empty(), "{kind:?}: no image");
         for name in names {
@@ -146,8 +154,9 @@ fn the_demo_is_a_whole_and_correct_data_set() {
     assert!(check_images(&layout, 1) > 10);
 
     let table = LabelTable::from_names(&read_labels(&layout.labels_json()).unwrap()).unwrap();
-    let classes: BTreeSet<Class> =
-        (0..table.len() as u32).filter_map(|i| table.class_of(LabelId(i))).collect();
+    let classes: BTreeSet<Class> = (0..table.len() as u32)
+        .filter_map(|i| table.class_of(LabelId(i)))
+        .collect();
     assert_eq!(classes.len(), 13, "the demo has all classes");
     for file in ["splits.json", "statistics.json", "statistics.md", "manifest.json", "area_1/views.json"] {
         assert!(out.join(file).is_file(), "{file}");
@@ -162,7 +171,11 @@ fn the_demo_is_a_whole_and_correct_data_set() {
     ] {
         assert!(out.join("area_1/3d").join(file).is_file(), "{file}");
     }
-    assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains("\"status\": \"complete\""));
+    assert!(
+        fs::read_to_string(out.join("manifest.json"))
+            .unwrap()
+            .contains("\"status\": \"complete\"")
+    );
     assert!(!out.join(".s3d-previous").exists());
     s3dis_tree_is_well_formed(&out.join("s3dis/Area_1"));
 
@@ -181,7 +194,11 @@ fn the_demo_is_a_whole_and_correct_data_set() {
 /// A room's file holds the points of its instances, six numbers a line.
 fn s3dis_tree_is_well_formed(area: &Path) {
     let mut rooms = 0;
-    for room in fs::read_dir(area).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()) {
+    for room in fs::read_dir(area)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .filter(|p| p.is_dir())
+    {
         let name = room.file_name().unwrap().to_str().unwrap();
         let all = fs::read_to_string(room.join(format!("{name}.txt"))).unwrap();
         let mut lines = 0;
@@ -248,7 +265,9 @@ fn assert_list_is_true(out: &Path) {
     there.remove(Path::new("manifest.json")).unwrap();
     let list = there.remove(Path::new("files.csv")).unwrap();
     for record in &listed {
-        let content = there.remove(Path::new(&record.path)).unwrap_or_else(|| panic!("no {}", record.path));
+        let content = there
+            .remove(Path::new(&record.path))
+            .unwrap_or_else(|| panic!("no {}", record.path));
         let found = (content.len() as u64, Checksum::of(&content));
         assert_eq!((record.bytes, record.xxh3_128), found, "{}", record.path);
     }
@@ -307,9 +326,13 @@ fn coordinates_and_profiles_that_failed_are_made_by_the_same_call() {
 
     let rooms = layout.s3dis_area_dir(1);
     let points = common::files(&rooms);
-    points.keys().for_each(|name| fs::write(rooms.join(name), "no points").unwrap());
+    points
+        .keys()
+        .for_each(|name| fs::write(rooms.join(name), "no points").unwrap());
     common::s3d_fails(&["profile", text(&out), "--to", "pointnet"], 1, &["Area_1"]);
-    points.iter().for_each(|(name, content)| fs::write(rooms.join(name), content).unwrap());
+    points
+        .iter()
+        .for_each(|(name, content)| fs::write(rooms.join(name), content).unwrap());
     s3d_ok(&["profile", text(&out), "--to", "pointnet"]);
     assert_list_is_true(&out);
 

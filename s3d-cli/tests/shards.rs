@@ -99,7 +99,12 @@ fn merging<'a>(shards: &[&'a Path], out: &'a Path) -> Vec<&'a str> {
 /// Starts `s3d` and lets it run.
 fn begin(args: &[&str]) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_s3d"));
-    command.args(args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the binary starts")
+    command
+        .args(args)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the binary starts")
 }
 
 #[test]
@@ -132,7 +137,11 @@ fn shards_that_share_an_out() {
     for child in &mut children {
         assert!(child.wait().unwrap().success());
     }
-    assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains("\"running\""));
+    assert!(
+        fs::read_to_string(out.join("manifest.json"))
+            .unwrap()
+            .contains("\"running\"")
+    );
     // While a shard is at work nobody merges.
     let lock = fs::File::open(out.join(".s3d/lock")).unwrap();
     lock.lock_shared().unwrap();
@@ -209,8 +218,10 @@ fn what_a_plan_is_not_for_is_refused() {
         ("label_of_face", "is damaged"),
     ] {
         let all = files(&plan);
-        let (name, whole) =
-            all.iter().find(|(name, bytes)| text(name).contains(part) && !bytes.is_empty()).unwrap();
+        let (name, whole) = all
+            .iter()
+            .find(|(name, bytes)| text(name).contains(part) && !bytes.is_empty())
+            .unwrap();
         fs::write(plan.join(name), &whole[..whole.len() / 2]).unwrap();
         let call = trial.export(&out, &["--shard", "1/1", "--plan", text(&plan)]);
         s3d_fails(&words(&call), 1, &[message]);
@@ -281,7 +292,10 @@ fn a_shard_that_is_missing_damaged_or_of_another_call_is_named() {
     s3d_fails(&merging(&[all[0], &trial.path("nowhere")], &out), 1, &["nowhere"]);
     assert!(!out.exists());
     // One byte of an image.
-    let image = files(all[2]).into_keys().find(|name| name.extension().is_some_and(|e| e == "png")).unwrap();
+    let image = files(all[2])
+        .into_keys()
+        .find(|name| name.extension().is_some_and(|e| e == "png"))
+        .unwrap();
     let path = all[2].join(image);
     let whole = fs::read(&path).unwrap();
     let mut damaged = whole.clone();
@@ -381,7 +395,10 @@ fn folders(dir: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut left = vec![dir.to_owned()];
     while let Some(folder) = left.pop() {
-        let below = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).filter(|path| path.is_dir());
+        let below = fs::read_dir(&folder)
+            .unwrap()
+            .map(|e| e.unwrap().path())
+            .filter(|path| path.is_dir());
         left.extend(below);
         found.push(folder.strip_prefix(dir).unwrap().to_owned());
     }
@@ -419,7 +436,9 @@ fn merged_too_early_again_or_by_another_version() {
     s3d_fails(&merging(&[&one, &two], &call), 2, &["version 0.0.1 of s3d", "merge with that version"]);
     // One with other options is no less of a shard, and nobody's to remove.
     for (path, text) in requests.iter().zip(&written) {
-        let other = text.replace(env!("CARGO_PKG_VERSION"), "0.0.1").replace("\"seed\": 0,", "");
+        let other = text
+            .replace(env!("CARGO_PKG_VERSION"), "0.0.1")
+            .replace("\"seed\": 0,", "");
         assert!(other.len() + 8 < text.len());
         fs::write(path, other).unwrap();
     }
@@ -429,7 +448,10 @@ fn merged_too_early_again_or_by_another_version() {
         s3d_fails(&words(&trial.export(&one, how)), 2, &["version 0.0.1 of s3d there", "--overwrite"]);
     }
     assert_eq!(files(&one), before);
-    requests.iter().zip(&written).for_each(|(path, text)| fs::write(path, text).unwrap());
+    requests
+        .iter()
+        .zip(&written)
+        .for_each(|(path, text)| fs::write(path, text).unwrap());
 
     // Into one of them, and twice by mistake.
     trial.merge(&[&one, &two], &one);

@@ -38,8 +38,11 @@ fn an_export_is_exported_again_as_published_areas_are() {
     for (path, bytes) in &a {
         // Poses go through Euler angles once more.
         if path.extension().is_some_and(|e| e == "json") {
-            let pose =
-                |bytes: &[u8]| serde_json::from_slice::<s3d_io::dataset::PoseFile>(bytes).unwrap().pose();
+            let pose = |bytes: &[u8]| {
+                serde_json::from_slice::<s3d_io::dataset::PoseFile>(bytes)
+                    .unwrap()
+                    .pose()
+            };
             let (a, b) = (pose(bytes), pose(&b[path]));
             assert!(a.location.abs_diff_eq(b.location, 1e-9), "{}", path.display());
             assert!(a.world_from_camera.abs_diff_eq(b.world_from_camera, 1e-9), "{}", path.display());
@@ -98,7 +101,12 @@ fn write_ply(scan: &Path, parts: usize) -> Vec<PathBuf> {
             quads.push((4 * quads.len(), material));
         }
     }
-    let class = |name: &str| ["floor", "ceiling", "wall", "table"].iter().position(|n| *n == name).unwrap();
+    let class = |name: &str| {
+        ["floor", "ceiling", "wall", "table"]
+            .iter()
+            .position(|n| *n == name)
+            .unwrap()
+    };
     quads
         .chunks(quads.len().div_ceil(parts))
         .enumerate()
@@ -134,7 +142,10 @@ fn labels_of_the_mesh_give_what_the_tree_gives() {
     let expected = dir.path().join("expected");
     export(&tree, &expected, &SIX);
     for parts in [1, 3] {
-        let names: Vec<String> = write_ply(&scan, parts).iter().map(|p| format!("{:?}", text(p))).collect();
+        let names: Vec<String> = write_ply(&scan, parts)
+            .iter()
+            .map(|p| format!("{:?}", text(p)))
+            .collect();
         let toml = scan.join(format!("ply_{parts}.toml"));
         let table = format!(
             "area = 3\n[mesh]\npaths = [{}]\n[annotations]\nmesh = true\nroom = \"office_1\"\n\
@@ -180,7 +191,9 @@ fn columns_of_a_cloud_are_not_looked_for_in_the_mesh() {
     let out = dir.path().join("out");
     export(&toml, &out, &["--views", "0", "--allow", "colour,labels"]);
     assert!(
-        fs::read_to_string(out.join("area_3/3d/semantic.obj")).unwrap().contains("usemtl floor_1_office_1_3")
+        fs::read_to_string(out.join("area_3/3d/semantic.obj"))
+            .unwrap()
+            .contains("usemtl floor_1_office_1_3")
     );
 }
 

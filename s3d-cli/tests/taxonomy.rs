@@ -108,7 +108,11 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
         (classes.len(), &classes[15]["name"], &classes[15]["id"]),
         (20, &"showerCurtain".into(), &28.into())
     );
-    assert!(fs::read_to_string(out.join("files.csv")).unwrap().contains("assets/taxonomy.json,"));
+    assert!(
+        fs::read_to_string(out.join("files.csv"))
+            .unwrap()
+            .contains("assets/taxonomy.json,")
+    );
     let statistics = json(&out.join("statistics.json"));
     let of_area = &statistics["areas"][0];
     assert_eq!(of_area["instances_per_class"].as_object().unwrap().len(), 20);
@@ -117,7 +121,9 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
         (&2.into(), &1.into())
     );
     let markdown = fs::read_to_string(out.join("statistics.md")).unwrap();
-    let (own, as_s3dis) = markdown.split_once("## Instances by what they count as in S3DIS").unwrap();
+    let (own, as_s3dis) = markdown
+        .split_once("## Instances by what they count as in S3DIS")
+        .unwrap();
     assert!(own.contains("| showerCurtain | 1 | 1 |") && !own.contains("clutter"));
     let (clutter, walls) = (&of_area["as_s3dis"]["instances_per_class"]["clutter"], "| wall | 2 | 2 |");
     assert!(clutter.as_u64() > Some(1) && as_s3dis.contains(walls) && !as_s3dis.contains("showerCurtain"));
@@ -129,10 +135,14 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
         (votes["classes"].as_array().unwrap().len(), &votes["classes"][0]["name"]),
         (20, &"wall".into())
     );
-    assert!(out.join("s3dis/Area_3/bedroom_1/Annotations/showerCurtain_1.txt").is_file());
+    assert!(
+        out.join("s3dis/Area_3/bedroom_1/Annotations/showerCurtain_1.txt")
+            .is_file()
+    );
     // Loaders of S3DIS know a bed and a curtain as clutter.
-    let mut profile: Vec<PathBuf> =
-        files(&out.join("profiles/pointcept/Area_3/bedroom_1/Annotations")).into_keys().collect();
+    let mut profile: Vec<PathBuf> = files(&out.join("profiles/pointcept/Area_3/bedroom_1/Annotations"))
+        .into_keys()
+        .collect();
     profile.sort();
     let of_s3dis =
         ["clutter_1.txt", "clutter_2.txt", "floor_1.txt", "sofa_1.txt", "wall_1.txt", "wall_2.txt"];
@@ -144,7 +154,11 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
     s3d_ok(&["pack", text(&out), "--to", "coco", "-o", text(&coco)]);
     let panoptic = json(&coco.join("panoptic.json"));
     let categories = panoptic["categories"].as_array().unwrap();
-    let stuff: Vec<&Value> = categories.iter().filter(|c| c["isthing"] == 0).map(|c| &c["name"]).collect();
+    let stuff: Vec<&Value> = categories
+        .iter()
+        .filter(|c| c["isthing"] == 0)
+        .map(|c| &c["name"])
+        .collect();
     assert_eq!((categories.len(), stuff), (20, vec![&"wall".into(), &"floor".into()] as Vec<&Value>));
     assert_eq!(
         (&categories[15]["id"], &categories[15]["color"]),
@@ -165,11 +179,16 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
     let instances = json(&coco.join("instances.json"));
     let found = instances["annotations"].as_array().unwrap();
     assert!(
-        found.iter().all(|a| [4, 6, 28].contains(&a["category_id"].as_u64().unwrap())) && found.len() > 5
+        found
+            .iter()
+            .all(|a| [4, 6, 28].contains(&a["category_id"].as_u64().unwrap()))
+            && found.len() > 5
     );
-    assert!(
-        found.iter().all(|a| a["segmentation"]["counts"].as_str().is_some_and(|counts| !counts.is_empty()))
-    );
+    assert!(found.iter().all(|a| {
+        a["segmentation"]["counts"]
+            .as_str()
+            .is_some_and(|counts| !counts.is_empty())
+    }));
     assert_eq!(instances["categories"].as_array().unwrap().len(), 18);
     s3d_fails(
         &["pack", text(&out), "--to", "coco", "-o", text(&dir.path().join("x")), "--stuff", "board"],
@@ -223,8 +242,11 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
     s3d_ok(&["merge", text(&parts[0]), text(&parts[1]), "-o", text(&merged)]);
     let (one, joined) = (files(&out), files(&merged));
     assert!(one.keys().eq(joined.keys()));
-    let differs: Vec<_> =
-        one.iter().filter(|(path, bytes)| joined[*path] != **bytes).map(|(path, _)| path).collect();
+    let differs: Vec<_> = one
+        .iter()
+        .filter(|(path, bytes)| joined[*path] != **bytes)
+        .map(|(path, _)| path)
+        .collect();
     assert!(differs.is_empty(), "{differs:?}");
 
     // A taxonomy that is not the one that was written is told.
@@ -259,8 +281,10 @@ fn images_of_classes_have_the_taxonomys_places_and_colours() {
     let tables = ["manifest.json", "files.csv"].map(PathBuf::from);
     let rest = with.keys().filter(|path| !is_new(path));
     assert!(rest.eq(without.keys()));
-    let same =
-        without.iter().filter(|(path, _)| !tables.contains(path)).all(|(path, bytes)| with[path] == *bytes);
+    let same = without
+        .iter()
+        .filter(|(path, _)| !tables.contains(path))
+        .all(|(path, bytes)| with[path] == *bytes);
     assert!(same);
 
     let names = names(&json(&out.join("assets/semantic_labels.json")))
@@ -269,8 +293,9 @@ fn images_of_classes_have_the_taxonomys_places_and_colours() {
         .collect::<Vec<_>>();
     let taxonomy = s3d_label::Taxonomy::built_in("scannet20").unwrap();
     let mut images = 0;
-    for (path, _) in
-        with.iter().filter(|(path, _)| path.to_string_lossy().ends_with("domain_semantic_class.png"))
+    for (path, _) in with
+        .iter()
+        .filter(|(path, _)| path.to_string_lossy().ends_with("domain_semantic_class.png"))
     {
         let (places, palette) = s3d_io::image::read_palette8(&out.join(path)).unwrap();
         assert_eq!(
@@ -292,8 +317,10 @@ fn images_of_classes_have_the_taxonomys_places_and_colours() {
     assert!(s3d_io::image::read_rgb8(&out.join("assets/class_legend.png")).is_ok());
     s3d_ok(&["verify", text(&out), "--full"]);
     // One place wrong in an image, another palette, and a legend that is gone.
-    let path =
-        with.keys().find(|path| path.to_string_lossy().ends_with("domain_semantic_class.png")).unwrap();
+    let path = with
+        .keys()
+        .find(|path| path.to_string_lossy().ends_with("domain_semantic_class.png"))
+        .unwrap();
     let (mut places, mut palette) = s3d_io::image::read_palette8(&out.join(path)).unwrap();
     let compression = s3d_io::image::Compression::Balanced;
     places.pixels_mut()[7] ^= 1;
@@ -326,8 +353,9 @@ fn a_taxonomy_of_ones_own_in_a_file_or_in_the_scene() {
                 counts_as = \"bed\"\n\
                 [[rooms]]\nname = \"suite\"\naliases = [\"bedroom\"]\n[aliases]\ncouch = \"\"\n";
     let scene = write_scannet(&scan, "taxonomy = \"mine.toml\"\n");
-    let toml =
-        fs::read_to_string(&scene).unwrap().replace("[cameras]", "unknown_as_clutter = true\n[cameras]");
+    let toml = fs::read_to_string(&scene)
+        .unwrap()
+        .replace("[cameras]", "unknown_as_clutter = true\n[cameras]");
     fs::write(&scene, &toml).unwrap();
     fs::write(scan.join("mine.toml"), mine).unwrap();
     let out = dir.path().join("out");
@@ -350,7 +378,9 @@ fn a_taxonomy_of_ones_own_in_a_file_or_in_the_scene() {
     args.extend(SMALL);
     s3d_fails(&args, 2, &["--overwrite"]);
     // The same in the scene itself.
-    let table: String = mine.replace("[[", "[[taxonomy.").replace("[aliases]", "[taxonomy.aliases]");
+    let table: String = mine
+        .replace("[[", "[[taxonomy.")
+        .replace("[aliases]", "[taxonomy.aliases]");
     let inline = toml
         .replace("taxonomy = \"mine.toml\"\n", "")
         .replace("[mesh]", &format!("[taxonomy]\n{table}[mesh]"));

@@ -29,8 +29,12 @@ fn manifest(out: &Path) -> serde_json::Value {
 fn uuids(out: &Path) -> Vec<String> {
     let views: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("area_1/views.json")).unwrap()).unwrap();
-    let mut uuids: Vec<String> =
-        views.as_array().unwrap().iter().map(|v| v["camera_uuid"].as_str().unwrap().to_owned()).collect();
+    let mut uuids: Vec<String> = views
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v["camera_uuid"].as_str().unwrap().to_owned())
+        .collect();
     uuids.dedup();
     uuids
 }
@@ -39,7 +43,8 @@ fn uuids(out: &Path) -> Vec<String> {
 fn images(out: &Path) -> BTreeMap<String, Vec<u8>> {
     let is_image = |path: &PathBuf| text(path).contains("_domain_") && !text(path).ends_with(".json");
     let all = files(out).into_iter().filter(|(path, _)| is_image(path));
-    all.map(|(path, bytes)| (text(&path).replace("office_1", "").replace("unknown_1", ""), bytes)).collect()
+    all.map(|(path, bytes)| (text(&path).replace("office_1", "").replace("unknown_1", ""), bytes))
+        .collect()
 }
 
 #[test]
@@ -61,7 +66,11 @@ fn all_but_the_labels_is_as_with_them() {
     }
     let manifest = manifest(&without);
     assert_eq!((&manifest["labels"], &manifest["labels_padded_to"]), (&0.into(), &0.into()));
-    assert!(fs::read_to_string(without.join("statistics.md")).unwrap().contains("There are no labels."));
+    assert!(
+        fs::read_to_string(without.join("statistics.md"))
+            .unwrap()
+            .contains("There are no labels.")
+    );
 
     assert!(s3d_ok(&["verify", text(&without), "--full"]).is_empty());
     let stats = String::from_utf8(s3d(&["stats", text(&without)]).stdout).unwrap();
@@ -78,8 +87,12 @@ fn views_are_selected_by_what_they_show_of_the_geometry() {
     assert!(log.contains("selected 4 of 6 candidate views"), "{log}");
     let views: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("area_1/views.json")).unwrap()).unwrap();
-    let entropies: Vec<f64> =
-        views.as_array().unwrap().iter().map(|v| v["entropy"].as_f64().unwrap()).collect();
+    let entropies: Vec<f64> = views
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v["entropy"].as_f64().unwrap())
+        .collect();
     assert!(entropies.iter().all(|e| (0.0..=26f64.ln()).contains(e)));
     assert!(entropies.iter().any(|e| *e > 0.5), "{entropies:?}");
     // What is scored again by verify has the same scores, and others are found.
@@ -179,8 +192,11 @@ fn a_mesh_alone_is_enough() {
     let text_of_mesh = fs::read_to_string(&mesh).unwrap();
     let (walls, table) = text_of_mesh.split_once("usemtl table").unwrap();
     scan.write("walls.obj", walls);
-    let own: Vec<String> =
-        table.replace("f 25/25 26/26 27/27 28/28", "f 1/1 2/2 3/3 4/4").lines().map(String::from).collect();
+    let own: Vec<String> = table
+        .replace("f 25/25 26/26 27/27 28/28", "f 1/1 2/2 3/3 4/4")
+        .lines()
+        .map(String::from)
+        .collect();
     scan.write("table.obj", format!("mtllib room.mtl\nusemtl table{}", own.join("\n")));
     let joined = scan.dir.path().join("joined");
     let (walls, table) = (scan.file("walls.obj"), scan.file("table.obj"));

@@ -63,7 +63,9 @@ fn copy(of: &Path) -> (TempDir, PathBuf) {
     for path in walk(of) {
         let to = out.join(path.strip_prefix(of).unwrap());
         create_dir(to.parent().unwrap()).unwrap();
-        fs::hard_link(&path, &to).or_else(|_| fs::copy(&path, &to).map(drop)).unwrap();
+        fs::hard_link(&path, &to)
+            .or_else(|_| fs::copy(&path, &to).map(drop))
+            .unwrap();
     }
     (dir, out)
 }
@@ -72,7 +74,11 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        if path.is_dir() { found.extend(walk(&path)) } else { found.push(path) }
+        if path.is_dir() {
+            found.extend(walk(&path))
+        } else {
+            found.push(path)
+        }
     }
     found.sort();
     found
@@ -103,7 +109,10 @@ fn images(out: &Path) -> Vec<DatasetImage> {
 fn views(out: &Path) -> Vec<DatasetImage> {
     let all = images(out);
     let of = |uuid: &str| -> Vec<DatasetImage> {
-        all.iter().filter(|i| i.uuid == uuid && i.frame != Frame::Panorama).cloned().collect()
+        all.iter()
+            .filter(|i| i.uuid == uuid && i.frame != Frame::Panorama)
+            .cloned()
+            .collect()
     };
     all.iter().map(|i| of(&i.uuid)).max_by_key(Vec::len).unwrap()
 }
@@ -189,7 +198,9 @@ fn a_flipped_bit_in_every_kind_of_file_is_found() {
         chunk.iter().for_each(|file| flip(&out, file));
         let (report, code) = verify(&out, &[]);
         assert_eq!(code, 1);
-        chunk.iter().for_each(|file| tells(&report, file, &["other content than was written"]));
+        chunk
+            .iter()
+            .for_each(|file| tells(&report, file, &["other content than was written"]));
     }
     // The list itself, and the manifest.
     let (_dir, out) = copy(demo());
@@ -304,7 +315,9 @@ fn what_tools_get_wrong_is_called_by_its_name() {
         .unwrap();
     // Channels in the other order; K transposed.
     let swapped = &views[1];
-    let normals = read_rgb8(&path(swapped, Domain::Normal)).unwrap().map(|[r, g, b]| [b, g, r]);
+    let normals = read_rgb8(&path(swapped, Domain::Normal))
+        .unwrap()
+        .map(|[r, g, b]| [b, g, r]);
     write_bytes(&path(swapped, Domain::Normal), &encode_rgb8(&normals, Content::Normals, Compression::Fast))
         .unwrap();
     let mut pose = read_pose(&path(swapped, Domain::Pose)).unwrap();

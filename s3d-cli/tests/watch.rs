@@ -83,7 +83,10 @@ impl Run {
     }
 
     fn signal(&self, name: &str) {
-        let kill = Command::new("kill").args(["-s", name, &self.child.id().to_string()]).status().unwrap();
+        let kill = Command::new("kill")
+            .args(["-s", name, &self.child.id().to_string()])
+            .status()
+            .unwrap();
         assert!(kill.success(), "{}", self.seen);
     }
 
@@ -104,10 +107,17 @@ impl Run {
 /// The command that the last error tells of.
 fn command_told(log: &str) -> String {
     let all = events(log);
-    let told =
-        all.iter().rev().find(|e| e["level"] == "error").unwrap_or_else(|| panic!("no error in {log}"));
+    let told = all
+        .iter()
+        .rev()
+        .find(|e| e["level"] == "error")
+        .unwrap_or_else(|| panic!("no error in {log}"));
     let message = told["message"].as_str().unwrap();
-    message.split_once("; go on with: ").unwrap_or_else(|| panic!("no command in {message}")).1.to_owned()
+    message
+        .split_once("; go on with: ")
+        .unwrap_or_else(|| panic!("no command in {message}"))
+        .1
+        .to_owned()
 }
 
 /// Runs a command line as a person does who copies it.
@@ -182,7 +192,9 @@ fn start_endless(dir: &Path) -> Run {
     let mut text_of_faces = String::new();
     for _ in 0..corners {
         let mut next = || {
-            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (random >> 40) as f64 / 1e6
         };
         let _ = writeln!(text_of_faces, "v {} 0 {}", next(), next());
@@ -215,7 +227,9 @@ fn a_second_signal_kills() {
         let mut run = start_endless(dir.path());
         run.signal(first);
         run.wait_for("acknowledgement", |e| {
-            e["message"].as_str().is_some_and(|m| m.contains("a second signal stops at once"))
+            e["message"]
+                .as_str()
+                .is_some_and(|m| m.contains("a second signal stops at once"))
         });
         run.signal(second);
         let (took, status, log) = run.end();
@@ -264,7 +278,11 @@ fn other_commands_stop_too() {
     run.wait_for("start", |e| kind(e) == "started");
     // The scene is made in one piece.
     shell(&assert_stopped(run, "INT", AT_LAST));
-    assert!(fs::read_to_string(demo.join("manifest.json")).unwrap().contains("\"complete\""));
+    assert!(
+        fs::read_to_string(demo.join("manifest.json"))
+            .unwrap()
+            .contains("\"complete\"")
+    );
     let names: Vec<_> = fs::read_dir(&demo).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert!(names.iter().any(|n| n == "scan"), "{names:?}");
     assert!(!names.iter().any(|n| n.to_string_lossy().starts_with('.')), "{names:?}");
@@ -330,13 +348,20 @@ fn every_line_is_an_event_and_counts_what_is_on_the_disk() {
     assert_eq!(all.last().unwrap()["exit_code"], 0);
     assert!(all.iter().any(|e| e["level"] == "debug") && !log.contains("\u{1b}"), "{log}");
 
-    let stages: Vec<&str> =
-        of_kind(&all, "stage_finished").iter().map(|e| e["stage"].as_str().unwrap()).collect();
+    let stages: Vec<&str> = of_kind(&all, "stage_finished")
+        .iter()
+        .map(|e| e["stage"].as_str().unwrap())
+        .collect();
     for stage in ["load", "label", "score", "render", "meshes", "points", "tables"] {
         assert!(stages.contains(&stage), "{stage} in {stages:?}");
     }
     let progress = of_kind(&all, "progress");
-    assert!(progress.iter().any(|e| e["what"] == "rendering" && e["done"] == e["total"]), "{progress:?}");
+    assert!(
+        progress
+            .iter()
+            .any(|e| e["what"] == "rendering" && e["done"] == e["total"]),
+        "{progress:?}"
+    );
 
     // The units of work.
     let layout = Layout::new(out.clone());
@@ -356,8 +381,10 @@ fn every_line_is_an_event_and_counts_what_is_on_the_disk() {
     assert_eq!(locations.into_values().collect::<Vec<_>>().len(), 4);
 
     for (name, file) in [("labels", "3d/instances.npz"), ("rest", "3d/pointcloud.mat")] {
-        let of_kind: Vec<_> =
-            units.iter().filter(|u| u["unit"] == name && u.get("location").is_none()).collect();
+        let of_kind: Vec<_> = units
+            .iter()
+            .filter(|u| u["unit"] == name && u.get("location").is_none())
+            .collect();
         let areas: Vec<u64> = of_kind.iter().map(|u| number(u, "area")).collect();
         assert_eq!(areas, [1, 5], "{name}");
         let largest = on_disk[&PathBuf::from(format!("area_1/{file}"))].len() as u64;
@@ -385,8 +412,11 @@ fn every_line_is_an_event_and_counts_what_is_on_the_disk() {
     assert_eq!(stage_seconds.len(), 7);
     for (stage, seconds) in stage_seconds {
         let told = of_kind(&all, "stage_finished");
-        let sum: f64 =
-            told.iter().filter(|e| e["stage"] == **stage).map(|e| e["seconds"].as_f64().unwrap()).sum();
+        let sum: f64 = told
+            .iter()
+            .filter(|e| e["stage"] == **stage)
+            .map(|e| e["seconds"].as_f64().unwrap())
+            .sum();
         assert!((seconds.as_f64().unwrap() - sum).abs() < 0.01, "{stage}: {seconds} and {sum}");
     }
 }
@@ -533,8 +563,11 @@ fn a_decoder_that_panics_is_an_error_of_the_file_and_no_more() {
         let log = String::from_utf8(run.stderr).unwrap();
         assert_eq!(run.status.code(), Some(1), "{log}");
         let all = events(&log);
-        let errors: Vec<&str> =
-            all.iter().filter(|e| e["level"] == "error").map(|e| e["message"].as_str().unwrap()).collect();
+        let errors: Vec<&str> = all
+            .iter()
+            .filter(|e| e["level"] == "error")
+            .map(|e| e["message"].as_str().unwrap())
+            .collect();
         assert!(
             errors.len() == 1 && errors[0].ends_with("broken.laz: its compressed points are damaged"),
             "{log}"

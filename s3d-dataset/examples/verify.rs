@@ -14,5 +14,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     println!("{} checks of {} files, {} faults", report.checks, report.files, report.fault_count());
-    if report.fault_count() > 0 { Err("the data set is damaged".into()) } else { Ok(()) }
+    if report.fault_count() > 0 {
+        Err("the data set is damaged".into())
+    } else {
+        Ok(())
+    }
 }

@@ -104,7 +104,11 @@ impl Context {
     /// # Errors
     /// [`Error::Cancelled`] if an end was asked for.
     pub fn check(&self) -> Result<()> {
-        if self.cancel.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+        if self.cancel.is_cancelled() {
+            Err(Error::Cancelled)
+        } else {
+            Ok(())
+        }
     }
 
     pub(crate) fn tell(&self, event: &Event<'_>) {
@@ -128,7 +132,10 @@ impl Context {
     pub fn warn(&self, text: impl fmt::Display) {
         self.warnings.fetch_add(1, Ordering::Relaxed);
         if let Some(notes) = &self.notes {
-            notes.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_string());
+            notes
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push(text.to_string());
         }
         self.message(Level::Warning, text);
     }
@@ -140,7 +147,10 @@ impl Context {
 
     /// The warnings that were written down since they were taken last.
     pub(crate) fn take_notes(&self) -> Vec<String> {
-        let notes = self.notes.as_ref().map(|notes| notes.lock().unwrap_or_else(PoisonError::into_inner));
+        let notes = self
+            .notes
+            .as_ref()
+            .map(|notes| notes.lock().unwrap_or_else(PoisonError::into_inner));
         notes.map(|mut notes| std::mem::take(&mut *notes)).unwrap_or_default()
     }
 

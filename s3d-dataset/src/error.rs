@@ -40,7 +40,11 @@ impl Error {
 impl From<s3d_io::Error> for Error {
     /// A file that is wrong, or a system that may do better the next time: [`Error::Temporary`].
     fn from(error: s3d_io::Error) -> Self {
-        if passes(&error) { Self::Temporary(error.to_string()) } else { Self::File(error) }
+        if passes(&error) {
+            Self::Temporary(error.to_string())
+        } else {
+            Self::File(error)
+        }
     }
 }
 

@@ -161,7 +161,11 @@ impl ExportOptions {
         options.modalities = Domain::ALL.into_iter().filter(asked).collect();
         options.profiles.sort();
         options.profiles.dedup();
-        options.only = self.only.iter().map(|text| canonical_uuid(text)).collect::<Result<_>>()?;
+        options.only = self
+            .only
+            .iter()
+            .map(|text| canonical_uuid(text))
+            .collect::<Result<_>>()?;
         options.only.sort();
         options.only.dedup();
         Ok(options)
@@ -247,7 +251,11 @@ impl Default for PadLabels {
 
 impl fmt::Display for PadLabels {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0 == 0 { f.write_str("off") } else { write!(f, "{}", self.0) }
+        if self.0 == 0 {
+            f.write_str("off")
+        } else {
+            write!(f, "{}", self.0)
+        }
     }
 }
 
@@ -301,7 +309,10 @@ mod by_names {
         deserializer: D,
     ) -> Result<Vec<T>, D::Error> {
         let words = Vec::<String>::deserialize(deserializer)?;
-        words.iter().map(|word| word.parse().map_err(D::Error::custom)).collect()
+        words
+            .iter()
+            .map(|word| word.parse().map_err(D::Error::custom))
+            .collect()
     }
 }
 

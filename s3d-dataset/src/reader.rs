@@ -80,7 +80,11 @@ impl DataSet {
 
     /// How many files it has, all but `manifest.json` and `files.csv`, and their bytes.
     pub fn size(&self) -> (u64, u64) {
-        self.0.manifest.files.as_ref().map_or((0, 0), |list| (list.count, list.bytes))
+        self.0
+            .manifest
+            .files
+            .as_ref()
+            .map_or((0, 0), |list| (list.count, list.bytes))
     }
 
     /// The numbers of its areas.

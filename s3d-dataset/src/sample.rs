@@ -43,7 +43,10 @@ impl Default for SampleOptions {
 /// [`Error::Usage`] if the file's name is not that of a PLY file, if it is there and not to be replaced, or
 /// the points are too many; [`Error::File`]; [`Error::Cancelled`].
 pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
-    if !output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ply")) {
+    if !output
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("ply"))
+    {
         return Err(Error::Usage(format!(
             "{}: a cloud is written as PLY: give it a name that ends with .ply",
             output.display()

@@ -131,7 +131,9 @@ fn make(ctx: &Context, data: &Dataset, works: &[Work], args: &XyzOptions, call: 
     let mut changed = changed.into_inner().unwrap_or_else(PoisonError::into_inner);
     let mut manifest = Manifest::read(layout)?;
     manifest.xyz_from_depth(args.xyz, conventions.depth_units);
-    manifest.conventions().write(&staged.conventions(), &manifest.request().world_offsets())?;
+    manifest
+        .conventions()
+        .write(&staged.conventions(), &manifest.request().world_offsets())?;
     changed.push(FileRecord::of_file(staged.root(), &staged.conventions())?);
     listing::write_changed(data, &mut manifest, changed, |_| false, staged)?;
     change.commit(call, &[])?;

@@ -13,8 +13,9 @@ use std::path::Path;
 
 /// Each face in four, `times` times; with it, the face that each was part of.
 fn subdivided(mesh: &TriMesh, times: u32) -> (TriMesh, Vec<usize>) {
-    let mut faces: Vec<(usize, [Vec3; 3])> =
-        (0..mesh.faces().len()).map(|face| (face, mesh.triangle(face as u32))).collect();
+    let mut faces: Vec<(usize, [Vec3; 3])> = (0..mesh.faces().len())
+        .map(|face| (face, mesh.triangle(face as u32)))
+        .collect();
     for _ in 0..times {
         let four = |(face, [a, b, c]): (usize, [Vec3; 3])| {
             let [d, e, f] = [a.midpoint(b), b.midpoint(c), c.midpoint(a)];
@@ -34,8 +35,10 @@ fn subdivided(mesh: &TriMesh, times: u32) -> (TriMesh, Vec<usize>) {
 fn labels_that_are_hidden_are_found_again() {
     let building = Building::two_storeys().build().unwrap();
     let (mesh, parents) = subdivided(&building.mesh, 2);
-    let truth: Vec<LabelId> =
-        parents.iter().map(|face| LabelId(building.instance_of_face[*face] + 1)).collect();
+    let truth: Vec<LabelId> = parents
+        .iter()
+        .map(|face| LabelId(building.instance_of_face[*face] + 1))
+        .collect();
     let middle = |face: usize| mesh.triangle(face as u32).iter().sum::<Vec3>() / 3.0;
     let middles: Vec<Vec3> = (0..truth.len()).map(middle).collect();
     let places: Vec<Vec3> = middles.iter().step_by(211).copied().collect();
@@ -47,7 +50,10 @@ fn labels_that_are_hidden_are_found_again() {
         .collect();
     let hidden = labels.iter().filter(|label| label.is_null()).count();
     let filled = fill_labels(&mesh, &mut labels, 0.1);
-    let right = filled.iter().filter(|f| labels[**f as usize] == truth[**f as usize]).count();
+    let right = filled
+        .iter()
+        .filter(|f| labels[**f as usize] == truth[**f as usize])
+        .count();
     let (back, precision) = (filled.len() as f64 / hidden as f64, right as f64 / filled.len() as f64);
     assert!(hidden > 5000 && back > 0.7 && precision > 0.99, "{hidden} {back} {precision}");
 }
@@ -57,7 +63,11 @@ fn scene_of_small_faces() -> MemoryScene {
     let mut scene = memory_scene();
     let (mesh, _) = subdivided(&scene.mesh, 5);
     let mut parts = mesh.into_parts();
-    parts.colors = parts.positions.iter().map(|p| [(p.x * 60.0) as u8, 200, (p.z * 90.0) as u8]).collect();
+    parts.colors = parts
+        .positions
+        .iter()
+        .map(|p| [(p.x * 60.0) as u8, 200, (p.z * 90.0) as u8])
+        .collect();
     scene.mesh = TriMesh::new(parts).unwrap();
     scene
 }
@@ -129,7 +139,10 @@ fn a_plan_keeps_what_was_filled() {
     assert_eq!(direct, manifest(export.clone().plan(Some(plan.clone())), "planned"));
     // A plan without filling is of another call.
     let other = ExportOptions { fill: None, ..common::options(3) };
-    let refused = export.options(other).plan(Some(plan)).run(dir.path().join("other"), &context);
+    let refused = export
+        .options(other)
+        .plan(Some(plan))
+        .run(dir.path().join("other"), &context);
     assert!(refused.unwrap_err().to_string().contains("is a plan of another call"));
 }
 
@@ -138,7 +151,9 @@ fn filling_needs_labels_and_a_distance() {
     let dir = tempfile::tempdir().unwrap();
     let refused = |scene: MemoryScene, fill: f64| {
         let options = ExportOptions { fill: Some(fill), ..options(3) };
-        let export = Export::new([scene]).options(options).run(dir.path().join("out"), &Context::default());
+        let export = Export::new([scene])
+            .options(options)
+            .run(dir.path().join("out"), &Context::default());
         let error = export.unwrap_err();
         assert!(matches!(error, Error::Usage(_)), "{error}");
         error.to_string()

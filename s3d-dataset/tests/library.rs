@@ -43,7 +43,11 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn assert_same(a: &Path, b: &Path) {
     let (a, b) = (files(a), files(b));
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
-    let differ: Vec<_> = a.iter().filter(|(name, bytes)| b[*name] != **bytes).map(|(name, _)| name).collect();
+    let differ: Vec<_> = a
+        .iter()
+        .filter(|(name, bytes)| b[*name] != **bytes)
+        .map(|(name, _)| name)
+        .collect();
     assert!(differ.is_empty(), "{differ:?}");
 }
 
@@ -59,24 +63,28 @@ fn an_export_that_is_cancelled_half_way_goes_on_to_the_same_bytes() {
     let cancel = Cancel::default();
     let (theirs, events) = (cancel.clone(), Arc::new(Mutex::new((0, false))));
     let seen = Arc::clone(&events);
-    let context = Context::default().cancelled_by(cancel.clone()).observed_by(move |event: &Event<'_>| {
-        let mut seen = seen.lock().unwrap();
-        match event {
-            Event::UnitFinished { unit: UnitKind::Location, .. } => {
-                seen.0 += 1;
-                // From another thread than the caller's.
-                theirs.cancel();
+    let context = Context::default()
+        .cancelled_by(cancel.clone())
+        .observed_by(move |event: &Event<'_>| {
+            let mut seen = seen.lock().unwrap();
+            match event {
+                Event::UnitFinished { unit: UnitKind::Location, .. } => {
+                    seen.0 += 1;
+                    // From another thread than the caller's.
+                    theirs.cancel();
+                }
+                Event::StageStarted { stage: Stage::Render, .. } => seen.1 = true,
+                _ => {}
             }
-            Event::StageStarted { stage: Stage::Render, .. } => seen.1 = true,
-            _ => {}
-        }
-    });
+        });
     assert!(matches!(export.run(&stopped, &context), Err(Error::Cancelled)));
     assert!(events.lock().unwrap().0 >= 1 && events.lock().unwrap().1);
     assert!(!stopped.join("manifest.json").exists() || stopped.join(".s3d/request.json").exists());
 
     // Another call is refused, the same one goes on.
-    let other = Export::new([&scene]).options(options(4)).run(&stopped, &Context::default());
+    let other = Export::new([&scene])
+        .options(options(4))
+        .run(&stopped, &Context::default());
     assert!(matches!(other, Err(Error::Usage(_))));
     assert!(cancel.is_cancelled());
     cancel.reset();
@@ -98,7 +106,9 @@ fn two_exports_at_the_same_time_do_not_meet() {
                 *counted.lock().unwrap() += 1;
             }
         });
-        let made = Export::new([&scene]).options(options(seed)).run(dir.path().join(name), &context);
+        let made = Export::new([&scene])
+            .options(options(seed))
+            .run(dir.path().join(name), &context);
         let made = made.unwrap().unwrap();
         assert_eq!((made.warnings, context.warnings()), (*warnings.lock().unwrap(), made.warnings));
     };
@@ -163,7 +173,9 @@ fn options_out_of_range_are_refused_before_anything_is_written() {
         ExportOptions { only: vec!["a camera".into()], ..options(0) },
     ];
     for options in wrong {
-        let refused = Export::new([memory_scene()]).options(options).run(&out, &Context::default());
+        let refused = Export::new([memory_scene()])
+            .options(options)
+            .run(&out, &Context::default());
         assert!(matches!(refused, Err(Error::Usage(_))), "{refused:?}");
     }
     assert!(!out.exists());
@@ -174,7 +186,9 @@ fn example(name: &str, args: &[&Path]) -> String {
     let mut folder = std::env::current_exe().unwrap();
     folder.pop();
     folder.pop();
-    let program = folder.join("examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    let program = folder
+        .join("examples")
+        .join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     if !program.exists() {
         let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
         let target = folder.parent().unwrap();

@@ -30,7 +30,10 @@ fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Co
 
     let info_options = InfoOptions { place_cameras: options.place_cameras, ..InfoOptions::default() };
     let info = s3d_dataset::info(scene(), &info_options, &Context::default()).unwrap();
-    let named = info.doubts.iter().any(|d| d.contains(words) && d.contains(&format!("--allow {condition}")));
+    let named = info
+        .doubts
+        .iter()
+        .any(|d| d.contains(words) && d.contains(&format!("--allow {condition}")));
     assert!(named || condition == Condition::Size, "{info}");
 
     let warnings = Arc::new(Mutex::new(Vec::new()));
@@ -68,13 +71,20 @@ fn warnings_that_are_kept_do_not_tell_where_the_scene_lay() {
     let export = |name: &str| {
         let folder = dir.path().join(name);
         let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
-        let scene =
-            Building::demo().build().unwrap().write_scan(&folder.join("scan"), &scan, || true).unwrap();
+        let scene = Building::demo()
+            .build()
+            .unwrap()
+            .write_scan(&folder.join("scan"), &scan, || true)
+            .unwrap();
         let gone = folder.join("scan/rgb_textures/cork_13.png");
         std::fs::remove_file(&gone).unwrap();
         let out = folder.join("out");
         let options = ExportOptions { views: 2, size: 32, pano_width: 64, ..options(0) };
-        Export::new([scene]).options(options).run(&out, &Context::default()).unwrap().unwrap();
+        Export::new([scene])
+            .options(options)
+            .run(&out, &Context::default())
+            .unwrap()
+            .unwrap();
         noted(&out)
     };
     let first = export("a");
@@ -143,8 +153,10 @@ fn a_location_outside() {
     };
     let both = ExportOptions { allow: vec![Condition::InsideOut], ..options(0) };
     let dir = tempfile::tempdir().unwrap();
-    let error =
-        Export::new([scene()]).options(both).run(dir.path().join("out"), &Context::default()).unwrap_err();
+    let error = Export::new([scene()])
+        .options(both)
+        .run(dir.path().join("out"), &Context::default())
+        .unwrap_err();
     assert!(
         error.to_string().contains("scan locations see the mesh in")
             && error.to_string().contains("--allow coverage")
@@ -174,10 +186,19 @@ fn a_mesh_without_colours() {
     };
     stops(scene, &options(0), Condition::Colour, "no texture and no colours");
     // Without RGB images it is none the worse.
-    let modalities = options(0).modalities.into_iter().filter(|d| d.to_string() != "rgb").collect();
+    let modalities = options(0)
+        .modalities
+        .into_iter()
+        .filter(|d| d.to_string() != "rgb")
+        .collect();
     let dir = tempfile::tempdir().unwrap();
     let export = Export::new([scene()]).options(ExportOptions { modalities, ..options(0) });
-    assert!(export.run(dir.path().join("out"), &Context::default()).unwrap().is_some());
+    assert!(
+        export
+            .run(dir.path().join("out"), &Context::default())
+            .unwrap()
+            .is_some()
+    );
 }
 
 #[test]
@@ -198,7 +219,10 @@ fn more_than_the_disk_holds() {
 fn a_data_set_is_told_of_as_a_whole_and_by_area() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
-    Export::new([memory_scene()]).options(options(5)).run(&out, &Context::default()).unwrap();
+    Export::new([memory_scene()])
+        .options(options(5))
+        .run(&out, &Context::default())
+        .unwrap();
     assert!(s3d_dataset::is_data_set(&out) && !s3d_dataset::is_data_set(dir.path()));
     let info = s3d_dataset::data_set_info(&out, &Context::default()).unwrap();
     assert_eq!((info.seed, info.panoramas, info.areas.len(), &*info.taxonomy), (5, 1, 1, "s3dis"));

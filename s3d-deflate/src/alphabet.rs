@@ -75,7 +75,11 @@ impl CodeLengths {
     /// Bits that the counted symbols take, without extra bits.
     pub(crate) fn bits(&self, counts: &Counts) -> u64 {
         let sum = |counts: &[u32], lengths: &[u8]| -> u64 {
-            counts.iter().zip(lengths).map(|(&n, &l)| u64::from(n) * u64::from(l)).sum()
+            counts
+                .iter()
+                .zip(lengths)
+                .map(|(&n, &l)| u64::from(n) * u64::from(l))
+                .sum()
         };
         sum(&counts.litlen, &self.litlen) + sum(&counts.distance, &self.distance)
     }

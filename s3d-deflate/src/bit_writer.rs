@@ -166,8 +166,9 @@ mod tests {
             let count = (3 * i as u32).min(28);
             Bits::new(0x5_a5a5_a5a5_u64.rotate_left(i as u32) & ((1 << count) - 1), count)
         });
-        let indices: Vec<[u16; 4]> =
-            (0..1000u32).map(|i| from_fn(|k| (i.wrapping_mul(2_654_435_761) >> (6 * k)) as u16)).collect();
+        let indices: Vec<[u16; 4]> = (0..1000u32)
+            .map(|i| from_fn(|k| (i.wrapping_mul(2_654_435_761) >> (6 * k)) as u16))
+            .collect();
         let (mut bytes, mut expected) = (vec![], vec![]);
         let mut out = BitWriter::new(&mut bytes);
         out.reserve(4000 * 28);

@@ -63,7 +63,10 @@ impl DynamicHeader {
         let (mut lengths, mut codes) = ([0; 19], [0; 19]);
         code_lengths(&counts, 7, &mut lengths);
         canonical_codes(&lengths, &mut codes);
-        let written = CODE_LENGTH_ORDER.iter().rposition(|&i| lengths[i] > 0).map_or(4, |i| 4.max(i + 1));
+        let written = CODE_LENGTH_ORDER
+            .iter()
+            .rposition(|&i| lengths[i] > 0)
+            .map_or(4, |i| 4.max(i + 1));
         let bits =
             (0..19).map(|i| u64::from(counts[i]) * (u64::from(lengths[i]) + u64::from(CODE_LENGTH_EXTRA[i])));
         let bits = 14 + 3 * written as u64 + bits.sum::<u64>();

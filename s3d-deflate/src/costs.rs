@@ -44,7 +44,9 @@ impl Costs {
             literals: from_fn(|byte| cost(lengths.litlen[byte])),
             lengths: LENGTH_SYMBOLS
                 .map(|(symbol, extra)| cost(lengths.litlen[257 + usize::from(symbol)]) + extra),
-            fixed_distances: tokens.fixed_distances.map(|distance| distances[distance.ilog2() as usize & 15]),
+            fixed_distances: tokens
+                .fixed_distances
+                .map(|distance| distances[distance.ilog2() as usize & 15]),
             distances,
         }
     }

@@ -267,8 +267,11 @@ mod tests {
         let expected: Vec<u8> = lines.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(stored, expected);
         // Even places first; then each from the one before, as a reader adds them up.
-        let apart: Vec<u8> =
-            [0, 1].iter().flat_map(|i| expected.iter().skip(*i).step_by(2)).copied().collect();
+        let apart: Vec<u8> = [0, 1]
+            .iter()
+            .flat_map(|i| expected.iter().skip(*i).step_by(2))
+            .copied()
+            .collect();
         let mut sum = block.differences()[0];
         let mut read = vec![sum];
         for difference in &block.differences()[1..] {

@@ -153,7 +153,13 @@ pub(crate) struct FixedMatch {
 
 /// The distances that are asked for: the 32 smallest, and 32 around a line.
 pub(crate) fn fixed_distances(line: usize) -> [usize; FIXED] {
-    from_fn(|i| if i < WIDTH { i + 1 } else { (line + i + 1).saturating_sub(WIDTH + WIDTH / 2) })
+    from_fn(|i| {
+        if i < WIDTH {
+            i + 1
+        } else {
+            (line + i + 1).saturating_sub(WIDTH + WIDTH / 2)
+        }
+    })
 }
 
 /// So many bytes of `data`.
@@ -207,7 +213,11 @@ impl<M> FixedDistanceMatcher<M> {
         if at + AHEAD > self.end && self.end < data.len() {
             self.advance(compare, data, at);
         }
-        if self.end < data.len() { self.end + 1 - AHEAD } else { self.end }
+        if self.end < data.len() {
+            self.end + 1 - AHEAD
+        } else {
+            self.end
+        }
     }
 
     #[inline(always)]
@@ -234,7 +244,11 @@ impl<M> FixedDistanceMatcher<M> {
             behind[..AHEAD].fill(M::default());
         }
         let above = self.line + N / 2;
-        let rows = if has_line(self.line) && from >= above { masks.len() / ROW * ROW } else { 0 };
+        let rows = if has_line(self.line) && from >= above {
+            masks.len() / ROW * ROW
+        } else {
+            0
+        };
         let (rows, others) = masks.split_at_mut(rows);
         for (row, place) in rows.as_chunks_mut().0.iter_mut().zip((from..).step_by(ROW)) {
             M::agreeing_in_row(compare, data, place, place - above, row);
@@ -270,7 +284,10 @@ impl<M> Places<'_, M> {
         M: Mask<N>,
     {
         let masks = &self.masks[at - self.start..until + 2 - self.start];
-        at + masks.array_windows().take_while(|&&[a, b, c]| a & b & c == M::default()).count()
+        at + masks
+            .array_windows()
+            .take_while(|&&[a, b, c]| a & b & c == M::default())
+            .count()
     }
 
     /// The longest match at `at`, which has been [`reach`](FixedDistanceMatcher::reach)ed: the nearest of

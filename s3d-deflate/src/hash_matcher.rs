@@ -71,7 +71,13 @@ impl HashMatcher {
         let hash = (word(data, at) << (64 - 8 * self.hash_bytes)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let row = &mut self.table.as_chunks_mut::<WORDS>().0[(hash >> (64 - HASH_BITS)) as usize];
         let before = *row;
-        let carried = |i: usize| if i == 0 { (at & 0xffff) as u64 } else { before[i - 1] >> 48 };
+        let carried = |i: usize| {
+            if i == 0 {
+                (at & 0xffff) as u64
+            } else {
+                before[i - 1] >> 48
+            }
+        };
         *row = from_fn(|i| before[i] << 16 | carried(i));
         before
     }
@@ -136,7 +142,9 @@ impl HashMatcher {
             if length >= self.nice {
                 return Match { length, distance: distance_found, gain: i32::MAX };
             }
-            let rest = data[at + 8..at + length.min(COUNTED)].iter().map(|&byte| costs.literal(byte));
+            let rest = data[at + 8..at + length.min(COUNTED)]
+                .iter()
+                .map(|&byte| costs.literal(byte));
             // What follows costs a bit at least.
             saved += rest.sum::<u32>() + length.saturating_sub(COUNTED) as u32;
         }

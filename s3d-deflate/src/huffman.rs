@@ -56,7 +56,10 @@ pub(crate) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
     let limit = usize::from(limit);
     let mut taken: u32 = (1..=limit).map(|d| leaves_at[d] << (limit - d)).sum();
     while taken > 1 << limit {
-        let d = (1..limit).rev().find(|&d| leaves_at[d] > 0).expect("there is a code to lengthen");
+        let d = (1..limit)
+            .rev()
+            .find(|&d| leaves_at[d] > 0)
+            .expect("there is a code to lengthen");
         leaves_at[d] -= 1;
         leaves_at[d + 1] += 1;
         taken -= 1 << (limit - d - 1);
@@ -64,8 +67,9 @@ pub(crate) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
     // And what was given back too much, the longest codes take again.
     while taken < 1 << limit {
         let free = (1 << limit) - taken;
-        let d =
-            (2..=limit).find(|&d| leaves_at[d] > 0 && 1 << (limit - d) <= free).expect("a code to shorten");
+        let d = (2..=limit)
+            .find(|&d| leaves_at[d] > 0 && 1 << (limit - d) <= free)
+            .expect("a code to shorten");
         leaves_at[d] -= 1;
         leaves_at[d - 1] += 1;
         taken += 1 << (limit - d);
@@ -94,7 +98,11 @@ pub(crate) fn canonical_codes(lengths: &[u8], codes: &mut [u16]) {
     }
     for (code, &length) in codes.iter_mut().zip(lengths) {
         let n = &mut next[usize::from(length)];
-        *code = if length == 0 { 0 } else { (*n as u16).reverse_bits() >> (16 - length) };
+        *code = if length == 0 {
+            0
+        } else {
+            (*n as u16).reverse_bits() >> (16 - length)
+        };
         *n += 1;
     }
 }

@@ -234,7 +234,9 @@ mod tests {
     fn inflated(stream: &[u8], len: usize) -> Vec<u8> {
         let mut out = Vec::with_capacity(len + 1);
         let mut reader = flate2::Decompress::new(true);
-        let status = reader.decompress_vec(stream, &mut out, flate2::FlushDecompress::Finish).unwrap();
+        let status = reader
+            .decompress_vec(stream, &mut out, flate2::FlushDecompress::Finish)
+            .unwrap();
         assert_eq!(status, flate2::Status::StreamEnd);
         assert_eq!(reader.total_in(), stream.len() as u64);
         out

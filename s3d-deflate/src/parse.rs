@@ -217,7 +217,11 @@ impl FixedPart<'_, '_> {
             let places = matcher.places();
             while at < pause {
                 let Some(mut found) = places.longest::<C, N, SHORTEST>(compare, data, at) else {
-                    at = if SHORTEST == 3 { places.next(at + 1, pause) } else { at + LONG_STEP };
+                    at = if SHORTEST == 3 {
+                        places.next(at + 1, pause)
+                    } else {
+                        at + LONG_STEP
+                    };
                     continue;
                 };
                 if SHORTEST <= PAYING && found.length <= PAYING && !costs.pays(data, at, found) {

@@ -101,8 +101,11 @@ impl Search {
     /// For OpenEXR's blocks of floats of so many bytes, of which even bytes come before odd ones.
     pub const fn floats(line: usize, bytes: usize) -> Self {
         // Half floats have their exponents in the odd bytes.
-        let candidates =
-            if bytes == 2 { Candidates::SplitFixedDistances } else { Candidates::FixedDistances };
+        let candidates = if bytes == 2 {
+            Candidates::SplitFixedDistances
+        } else {
+            Candidates::FixedDistances
+        };
         Self { candidates, ..Self::photo(line) }
     }
 

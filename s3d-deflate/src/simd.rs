@@ -83,7 +83,14 @@ pub(crate) trait Kernel {
 
 /// Runs `kernel` in the widest registers that are in use and that it gains from.
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    dispatch_on(if K::GAINS_FROM_AVX512 { level() } else { level().without_avx512() }, kernel)
+    dispatch_on(
+        if K::GAINS_FROM_AVX512 {
+            level()
+        } else {
+            level().without_avx512()
+        },
+        kernel,
+    )
 }
 
 fn dispatch_on<K: Kernel>(level: Level, kernel: K) -> K::Output {

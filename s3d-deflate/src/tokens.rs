@@ -90,7 +90,9 @@ impl Tokens {
         }
         // Sixteen at once, whether there are as many or not: mostly there are few, which are then
         // overwritten.
-        let few = data[from..].first_chunk::<FEW>().zip(self.tokens[self.len..].first_chunk_mut());
+        let few = data[from..]
+            .first_chunk::<FEW>()
+            .zip(self.tokens[self.len..].first_chunk_mut());
         let done = few.map_or(0, |(bytes, tokens)| {
             *tokens = bytes.map(u16::from);
             FEW
@@ -100,7 +102,10 @@ impl Tokens {
             let tokens = &mut self.tokens[..self.len];
             let rest = &data[from + done..to];
             let begin = tokens.len() - rest.len();
-            tokens[begin..].iter_mut().zip(rest).for_each(|(token, byte)| *token = u16::from(*byte));
+            tokens[begin..]
+                .iter_mut()
+                .zip(rest)
+                .for_each(|(token, byte)| *token = u16::from(*byte));
         }
     }
 
@@ -159,7 +164,10 @@ impl Tokens {
         }
         let mut counts = [0u32; SLOTS];
         for table in &tables {
-            counts.iter_mut().zip(table).for_each(|(n, more)| *n += u32::from(*more));
+            counts
+                .iter_mut()
+                .zip(table)
+                .for_each(|(n, more)| *n += u32::from(*more));
         }
 
         let mut sums = Counts { litlen: [0; 288], distance: [0; 32], extra: 0 };
@@ -183,7 +191,9 @@ impl Tokens {
             sums.extra += u64::from(n) * u64::from(extra);
         }
         for count in 1..=MOST_BITS {
-            let n = counts[usize::from(bits_token(0, count))..][..1 << count].iter().sum::<u32>();
+            let n = counts[usize::from(bits_token(0, count))..][..1 << count]
+                .iter()
+                .sum::<u32>();
             sums.extra += u64::from(n) * u64::from(count);
         }
         sums

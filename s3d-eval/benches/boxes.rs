@@ -37,7 +37,9 @@ fn boxes() -> (Vec<GroundTruth>, Vec<Detection>) {
 fn det(c: &mut Criterion) {
     let mut group = c.benchmark_group("det");
     let (truth, detections) = boxes();
-    group.sample_size(10).throughput(Throughput::Elements(detections.len() as u64));
+    group
+        .sample_size(10)
+        .throughput(Throughput::Elements(detections.len() as u64));
     for rule in [Rule::Mmdetection3d, Rule::Open3dMl] {
         group.bench_function(BenchmarkId::from_parameter(format!("{rule:?}")), |b| {
             b.iter(|| average_precision(black_box(&truth), &detections, &Class::S3DIS[..12], 0.5, rule));
@@ -62,7 +64,9 @@ fn panoptic(c: &mut Criterion) {
     };
     let segments: Vec<Segment> = (1..=128).map(|id| Segment { id, class: id as usize % 13 }).collect();
     let (truth, predicted) = (pixels(0), pixels(20));
-    group.sample_size(10).throughput(Throughput::Elements(u64::from(width * height)));
+    group
+        .sample_size(10)
+        .throughput(Throughput::Elements(u64::from(width * height)));
     group.bench_function("panorama", |b| {
         b.iter(|| {
             let mut counts = PanopticCounts::new(13);

@@ -15,16 +15,27 @@ fn images(criterion: &mut Criterion) {
     let dir = tempfile::tempdir().expect("a folder");
     let scan = ScanOptions { points_per_m2: 100.0, ..ScanOptions::default() };
     let building = Building::demo().build().expect("the built-in scene");
-    let scene = building.write_scan(&dir.path().join("scan"), &scan, || true).expect("a scan");
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let scene = building
+        .write_scan(&dir.path().join("scan"), &scan, || true)
+        .expect("a scan");
+    let one = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a thread");
     for pano_width in [1024, 4096] {
         let truth = dir.path().join(format!("{pano_width}"));
         let options =
             ExportOptions { views: 1, size: 64, pano_width, points_per_m2: 5.0, ..ExportOptions::default() };
-        Export::new([&scene]).options(options).run(&truth, &Context::default()).expect("an export");
+        Export::new([&scene])
+            .options(options)
+            .run(&truth, &Context::default())
+            .expect("an export");
         let data = DataSet::open(&truth).expect("a data set");
-        let panoramas: Vec<_> =
-            data.images(1).into_iter().filter(|image| image.frame == Frame::Panorama).collect();
+        let panoramas: Vec<_> = data
+            .images(1)
+            .into_iter()
+            .filter(|image| image.frame == Frame::Panorama)
+            .collect();
         for (protocol, variant, domain) in [
             (Protocol::SemPano, "hohonet", Domain::Semantic),
             (Protocol::Depth, "hohonet", Domain::Depth),
@@ -49,7 +60,9 @@ fn images(criterion: &mut Criterion) {
             options.variant = Some(variant.to_owned());
             options.images = Some(ImageKind::Panoramas);
             let mut group = criterion.benchmark_group(protocol.name());
-            group.sample_size(10).throughput(Throughput::Elements(panoramas.len() as u64));
+            group
+                .sample_size(10)
+                .throughput(Throughput::Elements(panoramas.len() as u64));
             group.bench_function(BenchmarkId::new(variant, pano_width), |bencher| {
                 let run = || evaluate(protocol, &truth, &predictions, &options, &Context::default());
                 bencher.iter(|| one.install(|| black_box(run().expect("scores"))));

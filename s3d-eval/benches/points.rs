@@ -17,7 +17,11 @@ use zip::write::SimpleFileOptions;
 /// The built-in scene, of some million points.
 fn data_set(dir: &Path) -> DataSet {
     let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
-    let scene = Building::demo().build().unwrap().write_scan(&dir.join("scan"), &scan, || true).unwrap();
+    let scene = Building::demo()
+        .build()
+        .unwrap()
+        .write_scan(&dir.join("scan"), &scan, || true)
+        .unwrap();
     let options = ExportOptions {
         views: 1,
         size: 32,
@@ -26,7 +30,11 @@ fn data_set(dir: &Path) -> DataSet {
         ..ExportOptions::default()
     };
     let out = dir.join("data set");
-    Export::new([scene]).options(options).run(&out, &Context::default()).unwrap().unwrap();
+    Export::new([scene])
+        .options(options)
+        .run(&out, &Context::default())
+        .unwrap()
+        .unwrap();
     DataSet::open(&out).unwrap()
 }
 
@@ -38,8 +46,9 @@ fn npy(kind: &str, shape: &[u64], bytes: &[u8]) -> Vec<u8> {
 
 fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) {
     let mut zip = ZipWriter::new(fs::File::create(path).unwrap());
-    let options =
-        SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored).large_file(true);
+    let options = SimpleFileOptions::default()
+        .compression_method(zip::CompressionMethod::Stored)
+        .large_file(true);
     for (name, bytes) in arrays {
         zip.start_file(format!("{name}.npy"), options).unwrap();
         zip.write_all(bytes).unwrap();

@@ -29,8 +29,11 @@ pub fn bootstrap<T: Sync>(
     let count = of_rounds.iter().map(Vec::len).min().unwrap_or(0);
     (0..count)
         .map(|at| {
-            let mut values: Vec<f64> =
-                of_rounds.iter().map(|scores| scores[at]).filter(|value| !value.is_nan()).collect();
+            let mut values: Vec<f64> = of_rounds
+                .iter()
+                .map(|scores| scores[at])
+                .filter(|value| !value.is_nan())
+                .collect();
             values.sort_unstable_by(f64::total_cmp);
             [0.025, 0.975].map(|share| quantile(&values, share))
         })

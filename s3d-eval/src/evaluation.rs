@@ -74,13 +74,17 @@ impl Table {
 
     /// All scores, row by row.
     pub fn scores(&self) -> impl Iterator<Item = f64> {
-        self.rows.iter().flat_map(|row| row.scores.iter().map(|score| score.value))
+        self.rows
+            .iter()
+            .flat_map(|row| row.scores.iter().map(|score| score.value))
     }
 
     /// Gives its scores their intervals, row by row.
     pub(crate) fn set_intervals(&mut self, intervals: impl IntoIterator<Item = [f64; 2]>) {
         let scores = self.rows.iter_mut().flat_map(|row| &mut row.scores);
-        scores.zip(intervals).for_each(|(score, interval)| score.interval = Some(interval));
+        scores
+            .zip(intervals)
+            .for_each(|(score, interval)| score.interval = Some(interval));
     }
 }
 
@@ -99,8 +103,11 @@ impl Evaluation {
         for sentence in &self.definition {
             let _ = writeln!(text, "- {sentence}");
         }
-        let counted: Vec<String> =
-            self.counted.iter().map(|(noun, count)| format!("{noun} {count}")).collect();
+        let counted: Vec<String> = self
+            .counted
+            .iter()
+            .map(|(noun, count)| format!("{noun} {count}"))
+            .collect();
         let _ = writeln!(text, "\nCounted: {}.", counted.join(", "));
         for table in &self.tables {
             let _ = write!(text, "\n## {}\n\n| |", table.title);

@@ -60,8 +60,11 @@ impl Folds {
                 PAPER.into_iter().map(of).collect()
             }
         };
-        let folds: Vec<Fold> =
-            sets.into_iter().filter(|areas| !areas.is_empty()).map(|areas| Fold::new(&areas)).collect();
+        let folds: Vec<Fold> = sets
+            .into_iter()
+            .filter(|areas| !areas.is_empty())
+            .map(|areas| Fold::new(&areas))
+            .collect();
         if folds.is_empty() {
             return Err(Error::Usage(format!(
                 "no fold has one of the data set's areas, {}",
@@ -88,7 +91,12 @@ mod tests {
     use super::*;
 
     fn areas(folds: &Folds, present: &[u32]) -> Vec<Vec<u32>> {
-        folds.of_areas(present).unwrap().into_iter().map(|fold| fold.areas).collect()
+        folds
+            .of_areas(present)
+            .unwrap()
+            .into_iter()
+            .map(|fold| fold.areas)
+            .collect()
     }
 
     #[test]

@@ -43,7 +43,11 @@ pub enum ImageKind {
 impl ImageKind {
     /// Which kind an image is of.
     pub fn of(frame: Frame) -> Self {
-        if frame == Frame::Panorama { Self::Panoramas } else { Self::Views }
+        if frame == Frame::Panorama {
+            Self::Panoramas
+        } else {
+            Self::Views
+        }
     }
 }
 
@@ -60,7 +64,9 @@ impl FromStr for ImageKind {
     type Err = Error;
 
     fn from_str(word: &str) -> Result<Self> {
-        let found = [Self::Views, Self::Panoramas].into_iter().find(|kind| kind.to_string() == word);
+        let found = [Self::Views, Self::Panoramas]
+            .into_iter()
+            .find(|kind| kind.to_string() == word);
         found.ok_or_else(|| Error::Usage(format!("{word:?} is no kind of images: views and panoramas are")))
     }
 }
@@ -98,6 +104,12 @@ mod tests {
     fn kinds_of_images_are_words() {
         assert_eq!("panoramas".parse::<ImageKind>().unwrap(), ImageKind::of(Frame::Panorama));
         assert_eq!("views".parse::<ImageKind>().unwrap(), ImageKind::of(Frame::View(3)));
-        assert!("both".parse::<ImageKind>().unwrap_err().to_string().contains("views and panoramas are"));
+        assert!(
+            "both"
+                .parse::<ImageKind>()
+                .unwrap_err()
+                .to_string()
+                .contains("views and panoramas are")
+        );
     }
 }

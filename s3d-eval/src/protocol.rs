@@ -82,7 +82,9 @@ impl FromStr for Protocol {
     type Err = UnknownProtocol;
 
     fn from_str(word: &str) -> Result<Self, UnknownProtocol> {
-        Self::all().find(|p| p.name() == word).ok_or_else(|| UnknownProtocol(word.to_owned()))
+        Self::all()
+            .find(|p| p.name() == word)
+            .ok_or_else(|| UnknownProtocol(word.to_owned()))
     }
 }
 

@@ -18,7 +18,10 @@ pub(crate) fn tables<T: Sync>(
     let mut tables = of_units(task, columns, &all, &score);
     if let Some(rounds) = task.options.bootstrap {
         let intervals = bootstrap(units, rounds, task.options.seed, |drawn| {
-            of_units(task, columns, drawn, &score).iter().flat_map(Table::scores).collect()
+            of_units(task, columns, drawn, &score)
+                .iter()
+                .flat_map(Table::scores)
+                .collect()
         });
         let mut intervals = intervals.into_iter();
         for table in &mut tables {
@@ -68,7 +71,8 @@ fn of_units<T>(
 
 /// The mean of those values that are not NaN; NaN of none.
 pub(crate) fn mean_of_defined(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) =
-        values.filter(|value| !value.is_nan()).fold((0.0, 0u32), |(sum, n), value| (sum + value, n + 1));
+    let (sum, count) = values
+        .filter(|value| !value.is_nan())
+        .fold((0.0, 0u32), |(sum, n), value| (sum + value, n + 1));
     sum / f64::from(count)
 }

@@ -82,7 +82,11 @@ fn assert_perfect(evaluation: &Evaluation, mean: bool) -> usize {
         }
     }
     let rows = &evaluation.tables[0].rows;
-    assert!(rows.last().is_some_and(|row| row.name == "mean" && row.scores[0].value > 0.0), "{text}");
+    assert!(
+        rows.last()
+            .is_some_and(|row| row.name == "mean" && row.scores[0].value > 0.0),
+        "{text}"
+    );
     rows.iter().filter(|row| row.scores[0].value == 1.0).count()
 }
 
@@ -162,8 +166,10 @@ fn folds_and_intervals() {
     let score = |table: &str| evaluation.score(table, "wall", "AR@0.50").unwrap();
     assert_eq!((score("area 5"), score("area 2"), score("mean over folds")), (0.0, 1.0, 0.5));
     let walls = |area: Option<u32>| {
-        own_boxes().iter().filter(|b| b["class"] == "wall" && area.is_none_or(|a| b["area"] == a)).count()
-            as f64
+        own_boxes()
+            .iter()
+            .filter(|b| b["class"] == "wall" && area.is_none_or(|a| b["area"] == a))
+            .count() as f64
     };
     assert_eq!(score("all folds, pooled"), walls(Some(2)) / walls(None));
     for table in &evaluation.tables {
@@ -217,7 +223,10 @@ fn wrong_lists_are_told() {
 fn wrong_files_of_mmdetection3d_are_told() {
     let folder = tempfile::tempdir().unwrap();
     own_samples(folder.path());
-    let mut files: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path()).collect();
+    let mut files: Vec<_> = fs::read_dir(folder.path())
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
     files.sort();
     let (path, text) = (&files[0], fs::read_to_string(&files[0]).unwrap());
     let name = path.file_name().unwrap().to_str().unwrap();

@@ -112,16 +112,20 @@ struct Detected {
 /// A data set whose area 5 has these instances alone.
 fn with_instances(detected: &Detected) -> &'static Path {
     let root = scene::data_set();
-    let entries = detected.truth.iter().enumerate().map(|(i, &(room, class, bbox))| InstanceEntry {
-        label: format!("{}_{i}_{}_5", detected.classes[class], detected.rooms[room]),
-        label_index: 0,
-        class: detected.classes[class].clone(),
-        room: detected.rooms[room].clone(),
-        points: 2,
-        bbox,
-        voxel_occupancy: vec![0; 216],
-        points_per_voxel: vec![0; 216],
-    });
+    let entries = detected
+        .truth
+        .iter()
+        .enumerate()
+        .map(|(i, &(room, class, bbox))| InstanceEntry {
+            label: format!("{}_{i}_{}_5", detected.classes[class], detected.rooms[room]),
+            label_index: 0,
+            class: detected.classes[class].clone(),
+            room: detected.rooms[room].clone(),
+            points: 2,
+            bbox,
+            voxel_occupancy: vec![0; 216],
+            points_per_voxel: vec![0; 216],
+        });
     let path = Layout::new(root).instances_json(5);
     let (list, manifest) = (root.join("files.csv"), root.join("manifest.json"));
     let (bytes, sum) = checksum_of_file(&path).unwrap();

@@ -21,11 +21,16 @@ static DATA: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
         let options = BuildingOptions { texture_scale: 0.05, ..BuildingOptions::drawn(2, u64::from(area)) };
         let scene = Building::generate(&options).unwrap().build().unwrap();
         let options = ScanOptions { area, points_per_m2: 400.0, ..ScanOptions::default() };
-        scene.write_scan(&folder.path().join(format!("scan_{area}")), &options, || true).unwrap()
+        scene
+            .write_scan(&folder.path().join(format!("scan_{area}")), &options, || true)
+            .unwrap()
     });
     let small = ExportOptions { views: 0, size: 8, pano_width: 16, ..ExportOptions::default() };
     let options = ExportOptions { points_per_m2: 800.0, modalities: Vec::new(), ..small };
-    Export::new(scenes).options(options).run(folder.path().join("data"), &Context::default()).unwrap();
+    Export::new(scenes)
+        .options(options)
+        .run(folder.path().join("data"), &Context::default())
+        .unwrap();
     folder
 });
 
@@ -38,7 +43,11 @@ fn areas() -> Vec<ParsedArea> {
 }
 
 fn on_threads<T: Send>(threads: usize, call: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(call)
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap()
+        .install(call)
 }
 
 fn train(areas: &[ParsedArea], seed: u64) -> Model {
@@ -119,12 +128,18 @@ fn models_are_saved_loaded_and_checked() {
 #[test]
 fn calls_that_make_no_sense_say_so() {
     let context = Context::default();
-    let told = read_areas(&data(), &[2], SpaceSource::Rooms, &context).unwrap_err().to_string();
+    let told = read_areas(&data(), &[2], SpaceSource::Rooms, &context)
+        .unwrap_err()
+        .to_string();
     assert!(told.contains("no area 2"), "{told}");
     let areas = areas();
-    let told = cross_validate(&areas[..1], &TrainOptions::default(), &context).unwrap_err().to_string();
+    let told = cross_validate(&areas[..1], &TrainOptions::default(), &context)
+        .unwrap_err()
+        .to_string();
     assert!(told.contains("make no fold"), "{told}");
-    let told = Model::train(&[], &TrainOptions::default(), &context).unwrap_err().to_string();
+    let told = Model::train(&[], &TrainOptions::default(), &context)
+        .unwrap_err()
+        .to_string();
     assert!(told.contains("no annotated element"), "{told}");
     context.cancel.cancel();
     assert!(matches!(read_areas(&data(), &[1], SpaceSource::Rooms, &context), Err(Error::Cancelled)));

@@ -16,7 +16,11 @@ fn data_set(folder: &Path) -> PathBuf {
     let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
     let scenes = [2, 5].map(|area| {
         let folder = folder.join(format!("scan{area}"));
-        let scene = Building::demo().build().unwrap().write_scan(&folder, &scan, || true).unwrap();
+        let scene = Building::demo()
+            .build()
+            .unwrap()
+            .write_scan(&folder, &scan, || true)
+            .unwrap();
         let text = fs::read_to_string(&scene).unwrap();
         assert!(text.contains("area = 1"));
         fs::write(&scene, text.replace("area = 1", &format!("area = {area}"))).unwrap();
@@ -30,7 +34,11 @@ fn data_set(folder: &Path) -> PathBuf {
     let options =
         ExportOptions { views: 2, size: 64, pano_width: 160, points_per_m2: 5.0, ..ExportOptions::default() };
     let out = folder.join("dataset");
-    Export::new(scenes).options(options).run(&out, &Context::default()).unwrap().unwrap();
+    Export::new(scenes)
+        .options(options)
+        .run(&out, &Context::default())
+        .unwrap()
+        .unwrap();
     out
 }
 
@@ -57,15 +65,19 @@ fn depth(data: &DataSet, image: &DatasetImage) -> Raster<u16> {
 fn classes(data: &DataSet, image: &DatasetImage) -> Raster<u8> {
     let path = image.path(data.layout(), Domain::Semantic);
     let table = data.labels().unwrap().unwrap();
-    decode_rgb8(&data.read(&path).unwrap(), &path).unwrap().map(|[r, g, b]| {
-        let class = table.class_of(LabelId(u32::from_be_bytes([0, r, g, b])));
-        class.map_or(255, |class| class.index() as u8)
-    })
+    decode_rgb8(&data.read(&path).unwrap(), &path)
+        .unwrap()
+        .map(|[r, g, b]| {
+            let class = table.class_of(LabelId(u32::from_be_bytes([0, r, g, b])));
+            class.map_or(255, |class| class.index() as u8)
+        })
 }
 
 fn write_floats(path: &Path, shape: &[u64], values: impl IntoIterator<Item = f64>) {
     let mut file = NpyWriter::create(path, "<f8", shape).unwrap();
-    values.into_iter().for_each(|value| file.put(&value.to_le_bytes()).unwrap());
+    values
+        .into_iter()
+        .for_each(|value| file.put(&value.to_le_bytes()).unwrap());
     file.finish().unwrap();
 }
 
@@ -171,7 +183,11 @@ fn known_differences_have_their_scores() {
         let normals = decode_rgb8(&data.read(&from).unwrap(), &from).unwrap();
         let turned = normals.pixels().iter().enumerate().flat_map(|(i, pixel)| {
             let [x, y, z] = pixel.map(|c| (f64::from(c) - 127.5) / 127.5);
-            if i % 2 == 0 { [x, y, z] } else { [y, -x, 0.0].map(|c| c / x.hypot(y)) }
+            if i % 2 == 0 {
+                [x, y, z]
+            } else {
+                [y, -x, 0.0].map(|c| c / x.hypot(y))
+            }
         });
         write_floats(path, &[64, 64, 3], turned.collect::<Vec<_>>());
     });
@@ -181,7 +197,12 @@ fn known_differences_have_their_scores() {
     let share = table.rows[0].scores[3].value;
     assert!((share - 50.0).abs() < 2.0, "{}", result.to_markdown());
     assert!((table.rows[0].scores[0].value - 0.9 * (100.0 - share)).abs() < 1e-3);
-    assert!(table.rows[0].scores.iter().all(|s| s.interval.is_some_and(|[low, high]| low <= high)));
+    assert!(
+        table.rows[0]
+            .scores
+            .iter()
+            .all(|s| s.interval.is_some_and(|[low, high]| low <= high))
+    );
     assert_eq!(one.install(|| run(Protocol::Normal, &truth, &out, &intervals)), result);
 
     // All is a wall, by numbers of one's own.
@@ -195,7 +216,11 @@ fn known_differences_have_their_scores() {
     let result = run(Protocol::SemPano, &truth, &out, &only);
     assert_eq!(result.score("area 5", "wall", "accuracy"), Some(1.0), "{}", result.to_markdown());
     assert_eq!(result.score("area 5", "floor", "IoU"), Some(0.0));
-    assert!(result.score("area 5", "sofa", "IoU").is_some_and(|iou| iou.is_nan() || iou == 0.0));
+    assert!(
+        result
+            .score("area 5", "sofa", "IoU")
+            .is_some_and(|iou| iou.is_nan() || iou == 0.0)
+    );
     let notes = result.notes.join(" ");
     assert!(notes.contains("notes.txt") && !notes.contains("classes.txt"), "{notes}");
     assert!(notes.contains("areas that are not tested"), "{notes}");
@@ -221,7 +246,9 @@ fn mistakes_are_told_with_their_file() {
     let refused = |protocol: Protocol, options: &EvalOptions, words: &[&str]| {
         let result = evaluate(protocol, &truth, &out, options, &Context::default());
         let message = result.unwrap_err().to_string();
-        words.iter().for_each(|word| assert!(message.contains(word), "{word}: {message}"));
+        words
+            .iter()
+            .for_each(|word| assert!(message.contains(word), "{word}: {message}"));
     };
     let usual = EvalOptions::default();
     let of_depth = |words: &[&str]| refused(Protocol::Depth, &usual, words);

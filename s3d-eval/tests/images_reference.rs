@@ -23,8 +23,10 @@ fn mix(seed: u64, i: u64) -> u64 {
 }
 
 fn checksum(values: impl IntoIterator<Item = u64>) -> u64 {
-    let weighted =
-        values.into_iter().zip(0u64..).map(|(v, i)| v.wrapping_mul((i * 0x9E37_79B1) & 0xFFFF_FFFF));
+    let weighted = values
+        .into_iter()
+        .zip(0u64..)
+        .map(|(v, i)| v.wrapping_mul((i * 0x9E37_79B1) & 0xFFFF_FFFF));
     weighted.fold(0, u64::wrapping_add)
 }
 
@@ -51,7 +53,11 @@ const CLASSES: [u8; 11] = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12];
 fn semantic(name: &str, width: u32, height: u32, seed: u64) -> Raster<[u8; 3]> {
     raster(width, height, |x, y, _| {
         let index = mix(seed + 7, (y / 5) * 991 + x / 7) % 13;
-        if name == "void" || index == 12 { [13; 3] } else { [0, 0, index as u8] }
+        if name == "void" || index == 12 {
+            [13; 3]
+        } else {
+            [0, 0, index as u8]
+        }
     })
 }
 
@@ -175,7 +181,10 @@ fn predicted_depth(truth: &[u16], seed: u64) -> Vec<f64> {
 }
 
 fn metres(units: &[u16]) -> Vec<f64> {
-    units.iter().map(|&v| if v == u16::MAX { 0.0 } else { f64::from(v) / 512.0 }).collect()
+    units
+        .iter()
+        .map(|&v| if v == u16::MAX { 0.0 } else { f64::from(v) / 512.0 })
+        .collect()
 }
 
 /// The scripts average what is within in 32 bits.
@@ -222,7 +231,9 @@ fn depth_of_files_is_that_of_both_scripts() {
     let sampled = |places: fn(u32, u32) -> Vec<u32>| {
         let (columns, rows) = (places(4096, 1024), places(2048, 512));
         let at = |row: u32, column: u32| whole[row as usize * 4096 + column as usize];
-        rows.iter().flat_map(|&row| columns.iter().map(move |&c| at(row, c))).collect::<Vec<u16>>()
+        rows.iter()
+            .flat_map(|&row| columns.iter().map(move |&c| at(row, c)))
+            .collect::<Vec<u16>>()
     };
     let prediction = predicted_depth(&depth(1024, 512, 22), 23);
     let scores = hohonet_depth(&metres(&sampled(pillow_nearest)), &prediction).values;
@@ -255,10 +266,15 @@ fn angles_are_those_of_both_scripts() {
     let expected = &expected()["normal"];
     let images = [(4000, 31), (1, 40), (2501, 33)].map(|(n, seed)| normals(n, seed));
     let angles = |image: &[[[f64; 3]; 2]], angle: fn([f64; 3], [f64; 3]) -> f64| -> Vec<f64> {
-        image.iter().map(|&[truth, prediction]| angle(truth, prediction)).collect()
+        image
+            .iter()
+            .map(|&[truth, prediction]| angle(truth, prediction))
+            .collect()
     };
     let mut sums = AngleSums::default();
-    images.iter().for_each(|image| sums.add(&AngleSums::of(&angles(image, dsine_angle))));
+    images
+        .iter()
+        .for_each(|image| sums.add(&AngleSums::of(&angles(image, dsine_angle))));
     let mut all: Vec<f64> = images.iter().flat_map(|image| angles(image, dsine_angle)).collect();
     let ([mean, rmse], below) = sums.mean_rmse_below();
     let ours = [&[mean, median_of_angles(&mut all).unwrap(), rmse][..], &below].concat();

@@ -88,7 +88,9 @@ fn what_is_stuff_can_be_said() {
     assert_perfect(&evaluation);
     let definition = evaluation.definition.join(" ");
     assert!(definition.contains("but of floor, door all of an image is one"), "{definition}");
-    let told = panoptic(&package, |o| o.stuff = Some("grass".parse().unwrap())).unwrap_err().to_string();
+    let told = panoptic(&package, |o| o.stuff = Some("grass".parse().unwrap()))
+        .unwrap_err()
+        .to_string();
     assert!(told.contains("--stuff: \"grass\" is no class"), "{told}");
 }
 
@@ -98,7 +100,11 @@ fn outside_of_photographs_is_void() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
-    let scene = Building::demo().build().unwrap().write_scan(&at("scan"), &scan, || true).unwrap();
+    let scene = Building::demo()
+        .build()
+        .unwrap()
+        .write_scan(&at("scan"), &scan, || true)
+        .unwrap();
     let with_frames = fs::read_to_string(&scene).unwrap() + "\n[frames]\npath = \"transforms.json\"\n";
     fs::write(&scene, with_frames).unwrap();
     // Pincushion distortion, so that the view reaches beyond the photograph; along x from a scan location.
@@ -113,7 +119,11 @@ fn outside_of_photographs_is_void() {
     let options =
         ExportOptions { views: 1, size: 32, pano_width: 64, points_per_m2: 5.0, ..ExportOptions::default() };
     let (out, package) = (at("out"), at("coco"));
-    Export::new([scene]).options(options).run(&out, &Context::default()).unwrap().unwrap();
+    Export::new([scene])
+        .options(options)
+        .run(&out, &Context::default())
+        .unwrap()
+        .unwrap();
     let photographs = DataSet::open(&out).unwrap().photographs(1).unwrap();
     assert!(photographs.len() == 1 && photographs[0].masked > 0.02, "{photographs:?}");
 
@@ -161,7 +171,10 @@ fn a_segment_that_is_lost_is_missed() {
         let segments = annotation["segments_info"].as_array_mut().unwrap();
         floors += segments.iter().filter(|s| lost(s)).count();
         if segment.is_none() && segments.iter().any(lost) {
-            segment = segments.iter().find(|s| lost(s)).map(|s| s["id"].as_u64().unwrap() as u32);
+            segment = segments
+                .iter()
+                .find(|s| lost(s))
+                .map(|s| s["id"].as_u64().unwrap() as u32);
             segments.retain(|s| !lost(s));
             let image = read_rgb8(&png).unwrap();
             let [r, g, b, _] = segment.unwrap().to_le_bytes();
@@ -190,9 +203,15 @@ fn wrong_predictions_are_told() {
     let e = message(&package, |v| v["images"][0]["file_name"] = json!("dog.png"));
     assert!(e.contains("image 1: \"dog.png\" is no name of an image"), "{e}");
     let e = message(&package, |v| {
-        let name = v["images"][0]["file_name"].as_str().unwrap().replace("_frame_", "_frame_7");
+        let name = v["images"][0]["file_name"]
+            .as_str()
+            .unwrap()
+            .replace("_frame_", "_frame_7");
         let name = name.replace("7equirectangular", "7");
-        v["images"].as_array_mut().unwrap().push(json!({"id": 999, "file_name": name}));
+        v["images"]
+            .as_array_mut()
+            .unwrap()
+            .push(json!({"id": 999, "file_name": name}));
         let more = json!({"image_id": 999, "file_name": "more.png", "segments_info": []});
         v["annotations"].as_array_mut().unwrap().push(more);
     });
@@ -212,18 +231,32 @@ fn wrong_predictions_are_told() {
     assert!(e.contains("missing field `annotations`"), "{e}");
 
     let value: Value = read_json(&package.join("panoptic.json")).unwrap();
-    let png = package.join("panoptic").join(value["annotations"][0]["file_name"].as_str().unwrap());
+    let png = package
+        .join("panoptic")
+        .join(value["annotations"][0]["file_name"].as_str().unwrap());
     let small = Raster::from_vec(2, 1, vec![[0; 3]; 2]);
     fs::write(&png, encode_rgb8(&small, Content::Labels, Compression::Balanced)).unwrap();
     let e = panoptic(&package, |_| ()).unwrap_err().to_string();
     assert!(e.contains("2 × 1 pixels, and the data set's image has 96 × 48"), "{e}");
     fs::copy(package.join("panoptic.json"), package.join("extra.json")).unwrap();
     fs::create_dir(package.join("extra")).unwrap();
-    assert!(panoptic(&package, |_| ()).unwrap_err().to_string().contains("has more than one"));
+    assert!(
+        panoptic(&package, |_| ())
+            .unwrap_err()
+            .to_string()
+            .contains("has more than one")
+    );
     fs::remove_dir_all(package.join("extra")).unwrap();
     fs::remove_dir_all(package.join("panoptic")).unwrap();
-    assert!(panoptic(&package, |_| ()).unwrap_err().to_string().contains("has no such file"));
-    let e = panoptic(&package.join("panoptic.json"), |_| ()).unwrap_err().to_string();
+    assert!(
+        panoptic(&package, |_| ())
+            .unwrap_err()
+            .to_string()
+            .contains("has no such file")
+    );
+    let e = panoptic(&package.join("panoptic.json"), |_| ())
+        .unwrap_err()
+        .to_string();
     assert!(e.contains("panoptic: missing"), "{e}");
 
     // With another list of stuff, segments are others.

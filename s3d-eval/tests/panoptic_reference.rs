@@ -35,10 +35,16 @@ fn panopticapi_gives_the_same() {
     for ((name, images), theirs) in cases.iter().zip(numbers.values()) {
         let mut sum = PanopticCounts::new(CLASSES);
         for [truth, found] in images {
-            let segments =
-                |side: &Side| side.1.iter().map(|&(id, class)| Segment { id, class }).collect::<Vec<_>>();
+            let segments = |side: &Side| {
+                side.1
+                    .iter()
+                    .map(|&(id, class)| Segment { id, class })
+                    .collect::<Vec<_>>()
+            };
             let mut counts = PanopticCounts::new(CLASSES);
-            counts.add(&truth.0, &segments(truth), &found.0, &segments(found)).unwrap();
+            counts
+                .add(&truth.0, &segments(truth), &found.0, &segments(found))
+                .unwrap();
             sum.add_counts(&counts);
         }
         let classes = sum.classes();

@@ -22,7 +22,11 @@ fn data_set() -> &'static Path {
         let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
         let scenes = [1, 5].map(|area| {
             let folder = dir.join(format!("scan {area}"));
-            let scene = Building::demo().build().unwrap().write_scan(&folder, &scan, || true).unwrap();
+            let scene = Building::demo()
+                .build()
+                .unwrap()
+                .write_scan(&folder, &scan, || true)
+                .unwrap();
             let text = fs::read_to_string(&scene).unwrap();
             fs::write(&scene, text.replacen("area = 1", &format!("area = {area}"), 1)).unwrap();
             // A location is in one area.
@@ -43,7 +47,11 @@ fn data_set() -> &'static Path {
             ..ExportOptions::default()
         };
         let out = dir.join("data set");
-        Export::new(scenes).options(options).run(&out, &Context::default()).unwrap().unwrap();
+        Export::new(scenes)
+            .options(options)
+            .run(&out, &Context::default())
+            .unwrap()
+            .unwrap();
         let profiles = [Profile::Mmdet3d, Profile::Pointcept];
         profile(&out, &profiles, &ProfileOptions::default(), &Context::default()).unwrap();
         out
@@ -55,7 +63,12 @@ fn rooms() -> BTreeMap<String, (Vec<i64>, Vec<i64>)> {
     let arrays = data_set().join("profiles/mmdet3d/s3dis_data");
     let numbers = |path: &Path| -> Vec<i64> {
         let bytes = fs::read(path).unwrap();
-        bytes[128..].as_chunks().0.iter().map(|number| i64::from_le_bytes(*number)).collect()
+        bytes[128..]
+            .as_chunks()
+            .0
+            .iter()
+            .map(|number| i64::from_le_bytes(*number))
+            .collect()
     };
     let mut rooms = BTreeMap::new();
     for entry in fs::read_dir(&arrays).unwrap() {
@@ -94,7 +107,8 @@ fn floats(shape: &[u64], numbers: impl IntoIterator<Item = f32>) -> Vec<u8> {
 fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) {
     let mut zip = ZipWriter::new(fs::File::create(path).unwrap());
     for (name, bytes) in arrays {
-        zip.start_file(format!("{name}.npy"), SimpleFileOptions::default()).unwrap();
+        zip.start_file(format!("{name}.npy"), SimpleFileOptions::default())
+            .unwrap();
         zip.write_all(bytes).unwrap();
     }
     zip.finish().unwrap();
@@ -200,13 +214,17 @@ fn write_instances(dir: &Path, form: usize) {
     for (room, (classes, instances)) in rooms() {
         let (n, k) = (classes.len(), instances.iter().max().copied().unwrap() as usize);
         let ids: Vec<i64> = instances.iter().map(|id| id - 1).collect();
-        let of_instance: Vec<i64> =
-            (0..k).map(|id| classes[ids.iter().position(|i| *i == id as i64).unwrap()]).collect();
+        let of_instance: Vec<i64> = (0..k)
+            .map(|id| classes[ids.iter().position(|i| *i == id as i64).unwrap()])
+            .collect();
         let scores = floats(&[k as u64], (0..k).map(|id| id as f32 / k as f32));
-        let by_point: Vec<u8> =
-            ids.iter().flat_map(|id| (0..k).map(move |k| u8::from(*id == k as i64))).collect();
-        let one_by_one: Vec<u8> =
-            (0..k).flat_map(|k| ids.iter().map(move |id| u8::from(*id == k as i64))).collect();
+        let by_point: Vec<u8> = ids
+            .iter()
+            .flat_map(|id| (0..k).map(move |k| u8::from(*id == k as i64)))
+            .collect();
+        let one_by_one: Vec<u8> = (0..k)
+            .flat_map(|k| ids.iter().map(move |id| u8::from(*id == k as i64)))
+            .collect();
         let shape = |a: usize, b: usize| [a as u64, b as u64];
         let of_instance = integers(&of_instance);
         let arrays = match form {
@@ -294,7 +312,9 @@ fn what_is_wrong_with_predictions_is_told_with_the_file() {
         let dir = tempfile::tempdir().unwrap();
         write_classes(dir.path());
         prepare(dir.path());
-        eval(protocol, dir.path(), &EvalOptions::default()).unwrap_err().to_string()
+        eval(protocol, dir.path(), &EvalOptions::default())
+            .unwrap_err()
+            .to_string()
     };
     let file = format!("{room}.npy");
     let written =
@@ -365,7 +385,9 @@ fn what_is_wrong_with_instances_is_told_with_the_file() {
         let dir = tempfile::tempdir().unwrap();
         write_instances(dir.path(), 2);
         npz(&dir.path().join(format!("{room}.npz")), &arrays);
-        let message = eval(protocol, dir.path(), &EvalOptions::default()).unwrap_err().to_string();
+        let message = eval(protocol, dir.path(), &EvalOptions::default())
+            .unwrap_err()
+            .to_string();
         assert!(message.contains(words) && message.contains(room), "{words}: {message}");
     }
 }

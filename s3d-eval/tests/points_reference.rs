@@ -33,7 +33,10 @@ fn points<const N: usize>(runs: &Value) -> Vec<[i64; N]> {
 }
 
 fn truth(room: &Value) -> Vec<(i64, i64)> {
-    points::<2>(&room["truth"]).into_iter().map(|[class, instance]| (class, instance)).collect()
+    points::<2>(&room["truth"])
+        .into_iter()
+        .map(|[class, instance]| (class, instance))
+        .collect()
 }
 
 /// Equal to 1e-12, relatively; `null` is NaN.
@@ -110,8 +113,11 @@ fn average_precision_of_instances_as_pointcept() {
                     let class = mask["class"].as_u64().unwrap() as usize;
                     Mask { class, score: mask["score"].as_f64().unwrap(), inside }
                 };
-                let masks: Vec<Mask<'_>> =
-                    predicted.iter().zip(inside.iter().map(Vec::as_slice)).map(mask).collect();
+                let masks: Vec<Mask<'_>> = predicted
+                    .iter()
+                    .zip(inside.iter().map(Vec::as_slice))
+                    .map(mask)
+                    .collect();
                 let (truth, predicted) = instances_of_masks(&truth, &masks);
                 InstanceMatches::new(&truth, &predicted, CLASSES)
             })

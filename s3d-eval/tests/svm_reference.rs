@@ -35,14 +35,19 @@ fn cases() -> Vec<Case> {
 
 #[test]
 fn objectives_are_those_of_scikit_learn_to_six_digits() {
-    for (case, loss) in
-        cases().iter().flat_map(|case| [Loss::Hinge, Loss::SquaredHinge].map(move |loss| (case, loss)))
+    for (case, loss) in cases()
+        .iter()
+        .flat_map(|case| [Loss::Hinge, Loss::SquaredHinge].map(move |loss| (case, loss)))
     {
         let rows = case.rows();
         let options = SvmOptions { loss, tolerance: 1e-10, max_passes: 1_000_000, seed: 3 };
         let machine = train(&rows, &case.positive, &case.costs, &options);
         let ours = objective(&machine, &rows, &case.positive, &case.costs, loss);
-        let theirs = if loss == Loss::Hinge { case.hinge } else { case.squared_hinge };
+        let theirs = if loss == Loss::Hinge {
+            case.hinge
+        } else {
+            case.squared_hinge
+        };
         assert!((ours - theirs).abs() <= 1e-6 * theirs, "{loss:?}: {ours}, scikit-learn {theirs}");
         // That no machine is better near by.
         for column in 0..rows.width() {
@@ -65,7 +70,12 @@ fn the_seed_decides_the_way_and_not_the_end() {
     assert_eq!(machine(1, 3), machine(1, 3));
     assert_ne!(machine(1, 3), machine(2, 3));
     let [one, other] = [1, 2].map(|seed| machine(seed, 1_000_000));
-    let distance = one.weights.iter().zip(&other.weights).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let distance = one
+        .weights
+        .iter()
+        .zip(&other.weights)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
     assert!(distance < 1e-6, "{distance}");
 }
 
@@ -79,7 +89,12 @@ fn examples_without_cost_and_columns_left_out_do_not_count() {
     let some = train(&all, &case.positive, &costs, &options);
     let part = all.select(0..half, &[]);
     let alone = train(&part, &case.positive[..half], &costs[..half], &options);
-    assert!(some.weights.iter().zip(&alone.weights).all(|(a, b)| (a - b).abs() < 1e-6));
+    assert!(
+        some.weights
+            .iter()
+            .zip(&alone.weights)
+            .all(|(a, b)| (a - b).abs() < 1e-6)
+    );
     let masked = all.select(0..all.len(), std::slice::from_ref(&(2..5)));
     let without = train(&masked, &case.positive, &case.costs, &options);
     assert_eq!(without.weights[2..5], [0.0; 3]);

@@ -15,7 +15,9 @@ fn footprint(c: &mut Criterion) {
     let shuffled: Vec<Vec3> = (0..n).map(|_| vec3(coordinate(), coordinate(), 0.0)).collect();
     let mut in_order = shuffled.clone();
     in_order.sort_by(|a, b| {
-        ((a.x * 20.0) as i32, a.y).partial_cmp(&((b.x * 20.0) as i32, b.y)).expect("numbers")
+        ((a.x * 20.0) as i32, a.y)
+            .partial_cmp(&((b.x * 20.0) as i32, b.y))
+            .expect("numbers")
     });
     let collect = |points: &[Vec3]| {
         let mut builder = FootprintBuilder::new(FootprintOptions::default());

@@ -22,7 +22,10 @@ fn vote(c: &mut Criterion) {
     let points = 1_000_000;
     let mut group = c.benchmark_group("nearest");
     group.throughput(Throughput::Elements(points)).sample_size(10);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a thread pool");
     let meshes = [40, 125, 400].map(|n| ("", ground(n)));
     for (of, mesh) in meshes.into_iter().chain([("scan, ", scan_like(300_000, 1))]) {
         let faces = NearestFaces::new(&mesh);

@@ -36,7 +36,9 @@ fn add_textures(parts: &mut MeshParts, count: u32, side: u32) {
         let pixels = (0..side * side).map(|i| [i as u8, (i >> 8) as u8, (i >> 16) as u8 ^ texture as u8]);
         let image = Raster::from_vec(side, side, pixels.collect());
         let name = format!("ground {texture}");
-        parts.materials.push(Material { name: name.clone(), color: [0; 3], texture: Some(texture) });
+        parts
+            .materials
+            .push(Material { name: name.clone(), color: [0; 3], texture: Some(texture) });
         parts.textures.push(Texture { name, image, wrap: Default::default() });
     }
 }
@@ -68,7 +70,9 @@ fn ground_of_patches() -> TriMesh {
     for patch in 0..patches {
         let place = place(patch) % (PATCHES * PATCHES);
         let corner = vec2((place % PATCHES) as f32, (place / PATCHES) as f32);
-        parts.uvs.extend(vertices.iter().map(|uv| (corner + *uv / PATCH as f32) / PATCHES as f32));
+        parts
+            .uvs
+            .extend(vertices.iter().map(|uv| (corner + *uv / PATCH as f32) / PATCHES as f32));
     }
     for cell in 0..CELLS * CELLS {
         let (i, j) = (cell / CELLS, cell % CELLS);
@@ -86,7 +90,11 @@ fn ground_of_patches() -> TriMesh {
 fn sample(c: &mut Criterion) {
     let textured = textured_ground();
     let mut parts = textured.clone().into_parts();
-    parts.colors = parts.positions.iter().map(|p: &Vec3| [p.x as u8, p.y as u8, 9]).collect();
+    parts.colors = parts
+        .positions
+        .iter()
+        .map(|p: &Vec3| [p.x as u8, p.y as u8, 9])
+        .collect();
     parts.face_uvs.clear();
     let vertex_colors = TriMesh::new(parts).expect("a valid mesh");
     let scan = scan_like(300_000, 1);
@@ -103,7 +111,10 @@ fn sample(c: &mut Criterion) {
     ] {
         let sampler = SurfaceSampler::new(mesh, Density::Total(points), 1);
         for threads in [1, 0] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a thread pool");
             let name = format!("{what}, {} threads", pool.current_num_threads());
             let mut cloud = PointCloud::default();
             group.bench_function(name, |b| {

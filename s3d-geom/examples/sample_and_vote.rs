@@ -45,7 +45,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         .collect();
     let mut votes = Vec::new();
     NearestFaces::new(&mesh).nearest_many(&measured, &mut votes);
-    let right = votes.iter().zip(&cloud.faces).filter(|(vote, face)| vote.face == **face).count();
+    let right = votes
+        .iter()
+        .zip(&cloud.faces)
+        .filter(|(vote, face)| vote.face == **face)
+        .count();
 
     let mut footprint = FootprintBuilder::new(FootprintOptions::default());
     measured.iter().for_each(|&p| footprint.add(p));

@@ -53,7 +53,11 @@ impl Aabb {
 
     /// Length, width and height; zero on each axis if empty.
     pub fn size(&self) -> Vec3 {
-        if self.is_empty() { Vec3::ZERO } else { self.max - self.min }
+        if self.is_empty() {
+            Vec3::ZERO
+        } else {
+            self.max - self.min
+        }
     }
 
     /// The point in the middle. Not a number if empty.

@@ -87,7 +87,9 @@ pub fn cuboid(min: Vec3, max: Vec3) -> MeshParts {
             parts.uvs.push([vec2(p.y, p.z), vec2(p.x, p.z), vec2(p.x, p.y)][axis]);
         }
         parts.faces.extend([[a, c, b], [a, d, c]]);
-        parts.face_uvs.extend([[first, first + 2, first + 1], [first, first + 3, first + 2]]);
+        parts
+            .face_uvs
+            .extend([[first, first + 2, first + 1], [first, first + 3, first + 2]]);
     }
     parts
 }
@@ -117,13 +119,19 @@ pub fn cylinder(base: Vec3, radius_m: f32, height_m: f32, sides: u32) -> MeshPar
             parts.positions.extend([foot, foot + Vec3::Z * height_m]);
         }
         let along = i as f32 * step_rad * radius_m;
-        parts.uvs.extend([spoke + radius_m, vec2(along, 0.0), vec2(along, height_m)]);
+        parts
+            .uvs
+            .extend([spoke + radius_m, vec2(along, 0.0), vec2(along, height_m)]);
     }
     for i in 0..sides {
         let [a, b] = [i, (i + 1) % sides].map(|k| 2 + 2 * k);
         let [ta, tb] = [i, i + 1].map(|k| 1 + 3 * k);
-        parts.faces.extend([[0, b, a], [1, a + 1, b + 1], [a, b, b + 1], [a, b + 1, a + 1]]);
-        parts.face_uvs.extend([[0, tb, ta], [0, ta, tb], [ta + 1, tb + 1, tb + 2], [ta + 1, tb + 2, ta + 2]]);
+        parts
+            .faces
+            .extend([[0, b, a], [1, a + 1, b + 1], [a, b, b + 1], [a, b + 1, a + 1]]);
+        parts
+            .face_uvs
+            .extend([[0, tb, ta], [0, ta, tb], [ta + 1, tb + 1, tb + 2], [ta + 1, tb + 2, ta + 2]]);
     }
     parts
 }
@@ -137,7 +145,11 @@ mod tests {
     /// The volume that the faces enclose, positive if their fronts are outside.
     fn volume(parts: &MeshParts) -> f64 {
         let p = |v: u32| parts.positions[v as usize].as_dvec3();
-        parts.faces.iter().map(|&[a, b, c]| p(a).dot(p(b).cross(p(c))) / 6.0).sum()
+        parts
+            .faces
+            .iter()
+            .map(|&[a, b, c]| p(a).dot(p(b).cross(p(c))) / 6.0)
+            .sum()
     }
 
     /// How many edges are not run through once in each direction.

@@ -88,8 +88,12 @@ impl Cells {
         };
         let mut used = vec![false; mesh.positions().len()];
         mesh.faces().iter().flatten().for_each(|v| used[*v as usize] = true);
-        let of_vertex: Vec<Option<u64>> =
-            mesh.positions().par_iter().zip(&used).map(|(p, used)| used.then(|| number(p))).collect();
+        let of_vertex: Vec<Option<u64>> = mesh
+            .positions()
+            .par_iter()
+            .zip(&used)
+            .map(|(p, used)| used.then(|| number(p)))
+            .collect();
         let mut numbers: Vec<u64> = of_vertex.iter().flatten().copied().collect();
         numbers.par_sort_unstable();
         numbers.dedup();
@@ -271,8 +275,12 @@ mod tests {
         let mesh = TriMesh::new(MeshParts::merge([sheet, speck])).unwrap();
         let small = simplify(&mesh, 1000).unwrap();
         let kept = TriMesh::from_faces(small.positions, small.faces).unwrap();
-        let up = (0..kept.faces().len() as u32).filter(|f| kept.normal(*f).z > 0.99).count();
-        let down = (0..kept.faces().len() as u32).filter(|f| kept.normal(*f).z < -0.99).count();
+        let up = (0..kept.faces().len() as u32)
+            .filter(|f| kept.normal(*f).z > 0.99)
+            .count();
+        let down = (0..kept.faces().len() as u32)
+            .filter(|f| kept.normal(*f).z < -0.99)
+            .count();
         assert_eq!((up, up + down), (down, kept.faces().len()));
         assert_eq!(small.vertex_of.last(), Some(&crate::NO_INDEX));
     }

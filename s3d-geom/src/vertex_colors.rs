@@ -96,7 +96,11 @@ impl<'m> VertexColors<'m> {
         assert_eq!(cloud.positions.len(), cloud.colors.len(), "one colour a point");
         let mesh = self.nearest_faces.mesh();
         self.points += cloud.len() as u64;
-        for (points, colors) in cloud.positions.chunks(CHUNK_POINTS).zip(cloud.colors.chunks(CHUNK_POINTS)) {
+        for (points, colors) in cloud
+            .positions
+            .chunks(CHUNK_POINTS)
+            .zip(cloud.colors.chunks(CHUNK_POINTS))
+        {
             self.nearest_faces.nearest_many(points, &mut self.nearest);
             for (nearest, color) in self.nearest.iter().zip(colors) {
                 if nearest.distance_m > FAR_M {
@@ -113,7 +117,9 @@ impl<'m> VertexColors<'m> {
                     let weight = (ONE * share).round() as u64;
                     let sums = &mut self.sums[self.group_of_vertex[vertex as usize] as usize];
                     let counted = [color[0], color[1], color[2], 1].map(u64::from);
-                    sums.iter_mut().zip(counted).for_each(|(sum, value)| *sum += weight * value);
+                    sums.iter_mut()
+                        .zip(counted)
+                        .for_each(|(sum, value)| *sum += weight * value);
                 }
             }
         }
@@ -127,7 +133,10 @@ impl<'m> VertexColors<'m> {
         let area_without = |colors: &[Option<[u8; 3]>]| -> f64 {
             let faces = (0u32..).zip(mesh.faces());
             let is_without = |group: &u32| colors[*group as usize].is_none();
-            faces.filter(|(_, face)| groups(face).iter().any(is_without)).map(|(f, _)| mesh.area(f)).sum()
+            faces
+                .filter(|(_, face)| groups(face).iter().any(is_without))
+                .map(|(f, _)| mesh.area(f))
+                .sum()
         };
         let unseen_m2 = area_without(&colors);
         if unseen_m2 > 0.0 {
@@ -162,7 +171,8 @@ fn groups(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
     let mut normals = vec![Vec3::ZERO; mesh.positions().len()];
     for (f, face) in (0u32..).zip(mesh.faces()) {
         let [a, b, c] = mesh.triangle(f);
-        face.iter().for_each(|vertex| normals[*vertex as usize] += (b - a).cross(c - a));
+        face.iter()
+            .for_each(|vertex| normals[*vertex as usize] += (b - a).cross(c - a));
     }
     // Adding 0 makes −0 the same place.
     let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
@@ -216,7 +226,9 @@ impl<'f> FacesAround<'f> {
         faces.iter().flatten().for_each(|group| first[*group as usize + 1] += 1);
         (1..first.len()).for_each(|i| first[i] += first[i - 1]);
         let (mut next, mut around) = (first.clone(), vec![0; 3 * faces.len()]);
-        for (face, group) in (0u32..).zip(faces).flat_map(|(face, groups)| groups.map(|group| (face, group)))
+        for (face, group) in (0u32..)
+            .zip(faces)
+            .flat_map(|(face, groups)| groups.map(|group| (face, group)))
         {
             around[next[group as usize]] = face;
             next[group as usize] += 1;
@@ -243,7 +255,9 @@ fn spread(colors: &mut [Option<[u8; 3]>], around: &FacesAround<'_>) {
         let color =
             |group: &u32| plain_mean(around.corners(*group).filter_map(|other| colors[other as usize]));
         let found: Vec<Option<[u8; 3]>> = ring.iter().map(color).collect();
-        ring.iter().zip(&found).for_each(|(group, color)| colors[*group as usize] = *color);
+        ring.iter()
+            .zip(&found)
+            .for_each(|(group, color)| colors[*group as usize] = *color);
         let next = ring.iter().flat_map(|group| around.corners(*group));
         let mut next: Vec<u32> = next.filter(|other| is_without(colors, *other)).collect();
         next.sort_unstable();
@@ -273,7 +287,11 @@ fn barycentric([a, b, c]: [DVec3; 3], point: DVec3) -> [f64; 3] {
     let share = |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(normal).max(0.0);
     let shares = [share(b, c), share(c, a), share(a, b)];
     let sum: f64 = shares.iter().sum();
-    if sum > 0.0 { shares.map(|s| s / sum) } else { [1.0 / 3.0; 3] }
+    if sum > 0.0 {
+        shares.map(|s| s / sum)
+    } else {
+        [1.0 / 3.0; 3]
+    }
 }
 
 #[cfg(test)]

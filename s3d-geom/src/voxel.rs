@@ -81,7 +81,10 @@ fn cell_between(planes: &Planes, point: Vec3) -> usize {
         if p[0] == p[VoxelGrid::SIDE] {
             return 0;
         }
-        p[1..VoxelGrid::SIDE].iter().map(|&plane| usize::from(point[axis] >= plane)).sum::<usize>()
+        p[1..VoxelGrid::SIDE]
+            .iter()
+            .map(|&plane| usize::from(point[axis] >= plane))
+            .sum::<usize>()
     };
     (layer(0) * VoxelGrid::SIDE + layer(1)) * VoxelGrid::SIDE + layer(2)
 }
@@ -175,7 +178,11 @@ mod as_data {
         type Error = &'static str;
 
         fn try_from(VoxelGrid { bbox }: VoxelGrid) -> Result<Self, &'static str> {
-            if bbox.is_empty() { Err("voxels of an empty box") } else { Ok(Self { bbox }) }
+            if bbox.is_empty() {
+                Err("voxels of an empty box")
+            } else {
+                Ok(Self { bbox })
+            }
         }
     }
 
@@ -264,7 +271,11 @@ mod tests {
         let coordinate = prop_oneof![-5.0..5.0f32, 1000.0..1000.0006f32, Just(3.0f32), -1e30..1e30f32];
         let axis = move || prop::collection::vec(coordinate.clone(), 1..200);
         (axis(), axis(), axis()).prop_map(|(x, y, z)| {
-            x.iter().zip(&y).zip(&z).map(|((&x, &y), &z)| vec3(x, y, z)).collect::<Vec<_>>()
+            x.iter()
+                .zip(&y)
+                .zip(&z)
+                .map(|((&x, &y), &z)| vec3(x, y, z))
+                .collect::<Vec<_>>()
         })
     }
 

@@ -58,14 +58,19 @@ fn a_mesh_without_such_faces_is_as_it_was() {
 fn around(mesh: &TriMesh, points: u64, off: f32) -> Vec<Vec3> {
     let mut cloud = PointCloud::default();
     SurfaceSampler::new(mesh, Density::Total(points), 3).sample(0..points, &mut cloud);
-    let moved = cloud.positions.iter().zip(&cloud.faces).enumerate().map(|(i, (&p, &face))| {
-        let p = p + mesh.normal(face) * (off * ((i % 5) as f32 - 2.0));
-        match i {
-            _ if i % 101 == 100 => Vec3::NAN,
-            _ if i % 37 == 36 => p * 3.0 - 5.0,
-            _ => p,
-        }
-    });
+    let moved = cloud
+        .positions
+        .iter()
+        .zip(&cloud.faces)
+        .enumerate()
+        .map(|(i, (&p, &face))| {
+            let p = p + mesh.normal(face) * (off * ((i % 5) as f32 - 2.0));
+            match i {
+                _ if i % 101 == 100 => Vec3::NAN,
+                _ if i % 37 == 36 => p * 3.0 - 5.0,
+                _ => p,
+            }
+        });
     moved.collect()
 }
 

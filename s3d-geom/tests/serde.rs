@@ -24,7 +24,9 @@ fn any_f64() -> impl Strategy<Value = f64> {
 }
 
 fn any_vec3() -> impl Strategy<Value = Vec3> {
-    any::<[f32; 3]>().prop_map(Vec3::from_array).prop_filter("JSON has no other", |v| v.is_finite())
+    any::<[f32; 3]>()
+        .prop_map(Vec3::from_array)
+        .prop_filter("JSON has no other", |v| v.is_finite())
 }
 
 fn any_ring() -> impl Strategy<Value = Vec<DVec2>> {

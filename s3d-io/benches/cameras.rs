@@ -82,13 +82,17 @@ fn write_all(dir: &Path) -> Vec<(&'static str, PathBuf)> {
     fs::write(at("images.txt"), text).unwrap();
     fs::write(at("images.bin"), binary).unwrap();
     fs::write(at("transforms.json"), format!("{{\"frames\": [{}]}}", frames.join(",\n"))).unwrap();
-    ["cameras.csv", "images.txt", "images.bin", "transforms.json", "poses"].map(|n| (n, at(n))).into()
+    ["cameras.csv", "images.txt", "images.bin", "transforms.json", "poses"]
+        .map(|n| (n, at(n)))
+        .into()
 }
 
 fn cameras(c: &mut Criterion) {
     let dir = tempfile::tempdir().unwrap();
     let mut group = c.benchmark_group("cameras");
-    group.throughput(Throughput::Elements(u64::from(LOCATIONS))).sample_size(10);
+    group
+        .throughput(Throughput::Elements(u64::from(LOCATIONS)))
+        .sample_size(10);
     for (name, path) in write_all(dir.path()) {
         let read = || read_scan_locations(black_box(&path), &DAffine3::IDENTITY).unwrap();
         assert_eq!(read().len(), LOCATIONS as usize);

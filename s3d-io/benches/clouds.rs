@@ -24,7 +24,9 @@ struct Point {
 fn points() -> Vec<Point> {
     let mut state = 7u64;
     let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     let point = |_| {
@@ -117,7 +119,9 @@ fn write_e57(dir: &Path, points: &[Point]) -> PathBuf {
     use e57::{Record, RecordDataType, RecordName, RecordValue};
     let path = dir.join("scan.e57");
     let mut writer = e57::E57Writer::from_file(&path, "{0}").unwrap();
-    writer.register_extension(e57::Extension::new("ext", "http://www.example.com")).unwrap();
+    writer
+        .register_extension(e57::Extension::new("ext", "http://www.example.com"))
+        .unwrap();
     let own = |name: &str, max| Record {
         name: RecordName::Unknown { namespace: "ext".into(), name: name.into() },
         data_type: RecordDataType::Integer { min: 0, max },
@@ -162,8 +166,10 @@ fn write_scannet(dir: &Path, points: &[Point]) -> PathBuf {
     let folder = dir.join("scene0000_00");
     std::fs::create_dir(&folder).unwrap();
     std::fs::rename(write_ply(dir, points, false), folder.join("scene0000_00_vh_clean_2.ply")).unwrap();
-    let segments: Vec<String> =
-        points.iter().map(|p| (u32::from(p.class) * 25 + u32::from(p.instance)).to_string()).collect();
+    let segments: Vec<String> = points
+        .iter()
+        .map(|p| (u32::from(p.class) * 25 + u32::from(p.instance)).to_string())
+        .collect();
     let segs = format!("{{\"sceneId\": \"scene0000_00\", \"segIndices\": [{}]}}", segments.join(","));
     std::fs::write(folder.join("scene0000_00_vh_clean_2.0.010000.segs.json"), segs).unwrap();
     let groups: Vec<String> = (0..200)
@@ -194,7 +200,9 @@ fn clouds(c: &mut Criterion) {
         write_las(dir.path(), &points, "cloud.laz"),
         write_e57(dir.path(), &points),
     ];
-    let classes = (0..72).map(|k: usize| (k.to_string(), Some(Class::S3DIS[k % 8]))).collect();
+    let classes = (0..72)
+        .map(|k: usize| (k.to_string(), Some(Class::S3DIS[k % 8])))
+        .collect();
     let room = Some("office_1".parse().unwrap());
     let memory = AnnotationOptions { classes, room, ..AnnotationOptions::default() };
     let spool = AnnotationOptions { points_in_memory: 0, ..memory.clone() };

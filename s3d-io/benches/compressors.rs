@@ -104,8 +104,9 @@ impl Way {
             (Library::ZlibRs, &[1, 2, 3, 4, 6]),
             (Library::Libdeflate, &[1, 2, 3, 4, 6]),
         ];
-        let libraries =
-            levels.iter().flat_map(|(library, levels)| levels.iter().map(|level| (*library, *level)));
+        let libraries = levels
+            .iter()
+            .flat_map(|(library, levels)| levels.iter().map(|level| (*library, *level)));
         let mut ways = Vec::new();
         for (library, level) in libraries {
             let filters = match image {
@@ -228,7 +229,9 @@ fn png_file(width: u32, height: u32, (color, depth, pixel): Format, bytes: &[u8]
                 Library::Fdeflate => png::DeflateCompression::FdeflateUltraFast,
                 _ => png::DeflateCompression::Level(way.level),
             });
-            let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(bytes));
+            let written = encoder
+                .write_header()
+                .and_then(|mut writer| writer.write_image_data(bytes));
             written.expect("memory takes any bytes");
             return file;
         }
@@ -256,7 +259,11 @@ fn exr_file(image: &Raster<[f16; 3]>) -> usize {
     let size = (image.width() as usize, image.height() as usize);
     let layer = Layer::new(size, LayerAttributes::default(), encoding, SpecificChannels::rgb(at));
     let mut file = std::io::Cursor::new(Vec::new());
-    Image::from_layer(layer).write().non_parallel().to_buffered(&mut file).expect("memory takes any bytes");
+    Image::from_layer(layer)
+        .write()
+        .non_parallel()
+        .to_buffered(&mut file)
+        .expect("memory takes any bytes");
     file.into_inner().len()
 }
 
@@ -329,8 +336,11 @@ fn choices<'a>(
     let (smallest, fastest) = (ways.iter().min_by(by_size)?, ways.iter().min_by(by_time)?);
     let small = (LIKE_OURS * own.bytes).max(1.02 * smallest.1.bytes);
     let small = ways.iter().filter(|(_, cost)| cost.bytes <= small).min_by(by_time)?;
-    let fast =
-        ways.iter().filter(|(_, cost)| cost.ms <= LIKE_OURS * own.ms).min_by(by_size).unwrap_or(fastest);
+    let fast = ways
+        .iter()
+        .filter(|(_, cost)| cost.ms <= LIKE_OURS * own.ms)
+        .min_by(by_size)
+        .unwrap_or(fastest);
     Some([*small, *fast, *fastest])
 }
 
@@ -374,7 +384,11 @@ fn report(title: &str, images: &[Vec<Image>], rounds: usize) -> [Total; LIBRARIE
                 continue;
             };
             add(&mut total.own, own);
-            total.theirs.iter_mut().zip(&chosen).for_each(|(sum, (_, cost))| add(sum, *cost));
+            total
+                .theirs
+                .iter_mut()
+                .zip(&chosen)
+                .for_each(|(sum, (_, cost))| add(sum, *cost));
             let cell = |(way, cost): (Way, Cost)| {
                 format!("{:.1} ({:.2}), {}", cost.ms, cost.bytes / own.bytes, way.name())
             };
@@ -406,7 +420,9 @@ fn report_filters(images: &[Vec<Image>], rounds: usize) {
             };
             let compress = |filtered: &[u8]| {
                 let mut out = Vec::new();
-                Deflater::new(search).expect("searches are in range").zlib(filtered, None, &mut out);
+                Deflater::new(search)
+                    .expect("searches are in range")
+                    .zlib(filtered, None, &mut out);
                 out.len()
             };
             let filtered = filter(&bytes, line, pixel, by).expect("whole lines");
@@ -447,7 +463,9 @@ fn idat(file: &[u8]) -> Vec<u8> {
 fn print_totals(title: &str, totals: &[Total; LIBRARIES.len()]) {
     println!(
         "\n| {title} | ours: ms, kB | {} |",
-        CHOICES.map(|choice| format!("{choice}: ms (size), ours saves")).join(" | ")
+        CHOICES
+            .map(|choice| format!("{choice}: ms (size), ours saves"))
+            .join(" | ")
     );
     println!("|---|---|---|---|---|");
     let all = totals[LIBRARIES.len() - 1].own.bytes;
@@ -475,9 +493,11 @@ fn read(path: &Path, modality: &str) -> Image {
         "rgb" => rgb(Content::Photo),
         "depth" => Image::Depth(read_gray16(path).expect("an image of an export")),
         "normal" => rgb(Content::Normals),
-        "global_xyz" => {
-            Image::Coordinates(read_xyz(path).expect("an image of an export").map(|p| p.map(f16::from_f32)))
-        }
+        "global_xyz" => Image::Coordinates(
+            read_xyz(path)
+                .expect("an image of an export")
+                .map(|p| p.map(f16::from_f32)),
+        ),
         _ => rgb(Content::Labels),
     }
 }
@@ -489,7 +509,9 @@ fn spread(folder: &Path, count: usize) -> (Vec<Vec<Image>>, usize) {
         let files = files(&folder.join(modality));
         n = files.len();
         let count = count.min(n);
-        (0..count).map(|i| read(&files[(2 * i + 1) * n / (2 * count)], modality)).collect()
+        (0..count)
+            .map(|i| read(&files[(2 * i + 1) * n / (2 * count)], modality))
+            .collect()
     });
     (images.into(), n)
 }
@@ -509,7 +531,10 @@ fn generated() -> Vec<Vec<Image>> {
 }
 
 fn number(variable: &str, default: usize) -> usize {
-    std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+    std::env::var(variable)
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(default)
 }
 
 fn main() {
@@ -521,8 +546,10 @@ fn main() {
         report_filters(&images, rounds);
         return;
     };
-    let area =
-        files(&export).into_iter().find(|p| p.join("data/rgb").is_dir()).expect("an area of an export");
+    let area = files(&export)
+        .into_iter()
+        .find(|p| p.join("data/rgb").is_dir())
+        .expect("an area of an export");
     let (views, kept) = spread(&area.join("data"), number("S3D_VIEWS", 6));
     let (panoramas, locations) = spread(&area.join("pano"), 1);
     let images = views;

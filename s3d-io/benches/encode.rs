@@ -52,7 +52,10 @@ fn encode(c: &mut Criterion) {
         group.throughput(Throughput::Bytes(bytes as u64));
         group.bench_function(format!("view/{compression}"), |b| {
             b.iter(|| {
-                of_a_view.iter().map(|(_, _, encode)| black_box(encode(compression)).len()).sum::<usize>()
+                of_a_view
+                    .iter()
+                    .map(|(_, _, encode)| black_box(encode(compression)).len())
+                    .sum::<usize>()
             });
         });
     }
@@ -62,8 +65,9 @@ fn encode(c: &mut Criterion) {
 /// Points a second into the room's and the instance's file.
 fn s3dis(c: &mut Criterion) {
     let n = 200_000;
-    let positions: Vec<Vec3> =
-        (0..n).map(|i| vec3(noise(i, 1) * 20.0, noise(i, 2) * 20.0, noise(i, 3) * 2.0)).collect();
+    let positions: Vec<Vec3> = (0..n)
+        .map(|i| vec3(noise(i, 1) * 20.0, noise(i, 2) * 20.0, noise(i, 3) * 2.0))
+        .collect();
     let colors: Vec<[u8; 3]> = (0..n).map(|i| [i as u8, (i >> 8) as u8, 200]).collect();
     let mut group = c.benchmark_group("s3dis");
     group.sample_size(20).throughput(Throughput::Elements(u64::from(n)));
@@ -95,7 +99,9 @@ fn obj(c: &mut Criterion) {
     let names: Vec<String> = (0..50).map(|i| format!("chair_{i}_office_5_1")).collect();
     let labels: Vec<u32> = (0..mesh.faces().len() as u32).map(|f| f / 97 % 50).collect();
     let mut group = c.benchmark_group("obj");
-    group.sample_size(10).throughput(Throughput::Elements(labels.len() as u64));
+    group
+        .sample_size(10)
+        .throughput(Throughput::Elements(labels.len() as u64));
     group.bench_function("semantic_obj", |b| {
         let dir = tempfile::tempdir().expect("a temporary folder");
         b.iter(|| write_semantic_obj(dir.path(), &mesh, &labels, &names).expect("the files"));
@@ -127,8 +133,9 @@ fn ply(c: &mut Criterion) {
 
 /// Points a second into `instances.json` and `instances.npz`, 100 instances of 10,000.
 fn instances(c: &mut Criterion) {
-    let points: Vec<Vec3> =
-        (0..10_000u32).map(|i| vec3((i % 97) as f32, (i % 89) as f32, (i % 83) as f32) * 0.01).collect();
+    let points: Vec<Vec3> = (0..10_000u32)
+        .map(|i| vec3((i % 97) as f32, (i % 89) as f32, (i % 83) as f32) * 0.01)
+        .collect();
     let bbox = Aabb::from_points(points.iter().copied());
     let mut group = c.benchmark_group("instances");
     group.sample_size(10).throughput(Throughput::Elements(1_000_000));

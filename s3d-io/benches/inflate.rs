@@ -51,11 +51,16 @@ fn views(export: &Path, modality: &str) -> Vec<Vec<u8>> {
         files.sort();
         files
     };
-    let area = files(export).into_iter().find(|p| p.join("data/rgb").is_dir()).expect("an area of an export");
+    let area = files(export)
+        .into_iter()
+        .find(|p| p.join("data/rgb").is_dir())
+        .expect("an area of an export");
     let views = files(&area.join("data").join(modality));
     let n = VIEWS.min(views.len());
     let spread = (0..n).map(|i| &views[(2 * i + 1) * views.len() / (2 * n)]);
-    spread.map(|view| std::fs::read(view).expect("an image of an export")).collect()
+    spread
+        .map(|view| std::fs::read(view).expect("an image of an export"))
+        .collect()
 }
 
 fn inflate(c: &mut Criterion) {
@@ -69,14 +74,20 @@ fn inflate(c: &mut Criterion) {
         ("semantic", rgb8(&room.labels, Content::Labels)),
     ];
     for (modality, file) in generated {
-        let files = export.as_ref().map_or_else(|| vec![file], |export| views(export.as_ref(), modality));
+        let files = export
+            .as_ref()
+            .map_or_else(|| vec![file], |export| views(export.as_ref(), modality));
         let streams: Vec<_> = files.iter().map(|file| stream(file)).collect();
         let mut out = vec![0; streams.iter().map(|(_, len)| *len).max().unwrap_or(0)];
         let mut group = c.benchmark_group(format!("inflate/{modality}"));
         group.throughput(Throughput::Bytes(streams.iter().map(|(_, len)| *len as u64).sum()));
         let mut bench = |name: &str, one: &mut dyn FnMut(&[u8], &mut [u8])| {
             group.bench_function(name, |b| {
-                b.iter(|| streams.iter().for_each(|(stream, len)| one(stream, black_box(&mut out[..*len]))));
+                b.iter(|| {
+                    streams
+                        .iter()
+                        .for_each(|(stream, len)| one(stream, black_box(&mut out[..*len])))
+                });
             });
         };
         let mut inflater = Inflater::default();

@@ -19,7 +19,9 @@ fn cloud() -> PointCloud {
         (state >> 8) as f32 / 16_777_216.0
     };
     for _ in 0..POINTS {
-        cloud.positions.push(vec3(random(), random(), random()) * vec3(4.0, 0.1, 3.0) + Vec3::splat(7.0));
+        cloud
+            .positions
+            .push(vec3(random(), random(), random()) * vec3(4.0, 0.1, 3.0) + Vec3::splat(7.0));
         cloud.colors.push([(255.0 * random()) as u8; 3]);
     }
     cloud
@@ -29,7 +31,8 @@ fn write(path: &Path, cloud: &PointCloud) {
     let mut mat = MatWriter::create(path, "Area_1").unwrap();
     mat.room("office_1", 0).unwrap();
     for i in 1..=OBJECTS {
-        mat.object(&format!("wall_{i}"), &format!("wall_{i}_office_1_1")).unwrap();
+        mat.object(&format!("wall_{i}"), &format!("wall_{i}_office_1_1"))
+            .unwrap();
         mat.append(&cloud.positions, &cloud.colors).unwrap();
     }
     mat.finish().unwrap();

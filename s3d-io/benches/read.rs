@@ -21,7 +21,10 @@ struct Numbers(u64);
 
 impl Numbers {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 }
@@ -103,7 +106,11 @@ fn write_glb(dir: &Path, n: usize) -> PathBuf {
 /// a face.
 fn write_ply(dir: &Path, n: usize, encoding: &str, labels: bool) -> PathBuf {
     let mut random = Numbers(7);
-    let columns = if labels { "property int category_id\nproperty int object_id\n" } else { "" };
+    let columns = if labels {
+        "property int category_id\nproperty int object_id\n"
+    } else {
+        ""
+    };
     let mut file = format!(
         "ply\nformat {encoding} 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
          property float z\n\

@@ -38,8 +38,22 @@ fn main() -> ExitCode {
     );
     println!("  size       {:.3} × {:.3} × {:.3} m, Z up", size.x, size.y, size.z);
     println!("  area       {:.3} m²", mesh.total_area());
-    println!("  colours    {}", if parts.colors.is_empty() { "none at vertices" } else { "at vertices" });
-    println!("  normals    {}", if parts.face_normals.is_empty() { "none" } else { "at corners" });
+    println!(
+        "  colours    {}",
+        if parts.colors.is_empty() {
+            "none at vertices"
+        } else {
+            "at vertices"
+        }
+    );
+    println!(
+        "  normals    {}",
+        if parts.face_normals.is_empty() {
+            "none"
+        } else {
+            "at corners"
+        }
+    );
     let textured = mesh.materials().iter().filter(|m| m.texture.is_some()).count();
     println!("  materials  {}, {textured} of them textured", mesh.materials().len());
     for (texture, file) in mesh.textures().iter().zip(&file.texture_files) {

@@ -20,7 +20,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let Some(name) = args.first() else {
         return Err("usage: near_and_sample MESH|scan_like:FACES [y|z] [POINTS] [FOLDER]".into());
     };
-    let up = if args.get(1).is_some_and(|up| up == "z") { UpAxis::Z } else { UpAxis::Y };
+    let up = if args.get(1).is_some_and(|up| up == "z") {
+        UpAxis::Z
+    } else {
+        UpAxis::Y
+    };
     let points: u64 = args.get(2).map_or(Ok(1_000_000), |n| n.parse())?;
     let mesh = match name.strip_prefix("scan_like:") {
         Some(faces) => scan_like(faces.parse()?, 1),

@@ -43,8 +43,11 @@ fn main() -> ExitCode {
 
 /// `folder` is the one above the domains' folders: `area_1/data`.
 fn convert(folder: &Path, name: &ImageName, output: &Path) -> Result<usize> {
-    let path =
-        |domain: Domain| folder.join(domain.folder()).join(ImageName { domain, ..name.clone() }.to_string());
+    let path = |domain: Domain| {
+        folder
+            .join(domain.folder())
+            .join(ImageName { domain, ..name.clone() }.to_string())
+    };
     let colors = read_rgb8(&path(Domain::Rgb))?;
     let semantic = read_rgb8(&path(Domain::Semantic))?;
     let xyz = read_xyz(&path(Domain::GlobalXyz))?;

@@ -49,7 +49,10 @@ impl Bounds {
     }
 
     pub(crate) fn distance_m(&self, other: &Self) -> f64 {
-        (self.min - other.max).max(other.min - self.max).max(DVec3::ZERO).length()
+        (self.min - other.max)
+            .max(other.min - self.max)
+            .max(DVec3::ZERO)
+            .length()
     }
 }
 

@@ -12,14 +12,19 @@ use std::path::{Path, PathBuf};
 const CLASSES: [Class; 3] = [Class::FLOOR, Class::WALL, Class::CHAIR];
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/clouds").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures/clouds")
+        .join(name)
 }
 
 fn options() -> AnnotationOptions {
     let classes = [("2", Class::FLOOR), ("6", Class::WALL), ("19", Class::CHAIR)];
     AnnotationOptions {
         room: Some("office_1".parse().unwrap()),
-        classes: classes.into_iter().map(|(key, class)| (key.to_owned(), Some(class))).collect(),
+        classes: classes
+            .into_iter()
+            .map(|(key, class)| (key.to_owned(), Some(class)))
+            .collect(),
         ..AnnotationOptions::default()
     }
 }
@@ -33,7 +38,9 @@ fn expected(offset: DVec3) -> BTreeMap<(usize, u32), PointCloud> {
     let mut all: BTreeMap<(usize, u32), PointCloud> = BTreeMap::new();
     for i in 0..60u8 {
         let f = f32::from(i);
-        let cloud = all.entry((CLASSES[usize::from(i % 3)].index(), u32::from(i / 15) + 1)).or_default();
+        let cloud = all
+            .entry((CLASSES[usize::from(i % 3)].index(), u32::from(i / 15) + 1))
+            .or_default();
         let position = vec3(0.25 * f, -0.5 * f, 0.125 * f32::from(i % 7));
         cloud.positions.push((position.as_dvec3() - offset).as_vec3());
         cloud.colors.push([i, 2 * i, 255 - i]);
@@ -110,7 +117,12 @@ fn words_and_numbers_mean_what_the_taxonomy_says() {
         assert_eq!(found.taxonomy, options.taxonomy);
         assert_eq!(found.rooms[0].room.to_string(), "bedroom_1");
         let classes: BTreeSet<Class> = found.rooms[0].instances.iter().map(|i| i.class).collect();
-        Ok::<_, String>(classes.into_iter().map(|c| (c.name(), c.s3dis().name())).collect::<Vec<_>>())
+        Ok::<_, String>(
+            classes
+                .into_iter()
+                .map(|c| (c.name(), c.s3dis().name()))
+                .collect::<Vec<_>>(),
+        )
     };
     // "floor", "wall" and "office chair"; S3DIS has its words from a table of the reader.
     let words = [("wall", "wall"), ("floor", "floor"), ("chair", "chair")];
@@ -281,7 +293,9 @@ fn files_that_are_cut_short_are_errors() {
 fn damaged_files_are_errors_or_other_points() {
     let mut state = 7u64;
     let mut next = |n: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % n
     };
     for path in all().iter().filter(|p| p.is_file()) {
@@ -290,7 +304,11 @@ fn damaged_files_are_errors_or_other_points() {
             let mut damaged = bytes.clone();
             // Half of the damage is in the header, where it does most.
             for _ in 0..1 + turn % 4 {
-                let end = if turn % 2 == 0 { bytes.len().min(400) } else { bytes.len() };
+                let end = if turn % 2 == 0 {
+                    bytes.len().min(400)
+                } else {
+                    bytes.len()
+                };
                 damaged[next(end)] = [0, 1, 0x7f, 0xff][next(4)];
             }
             open_damaged(path, &damaged, &format!("{} turn {turn}", path.display()));
@@ -303,7 +321,9 @@ fn what_is_no_annotation_says_what_is_read() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("points.xyz");
     std::fs::write(&path, "1 2 3").unwrap();
-    let message = Annotations::open(&[path], &AnnotationOptions::default()).unwrap_err().to_string();
+    let message = Annotations::open(&[path], &AnnotationOptions::default())
+        .unwrap_err()
+        .to_string();
     assert!(
         message.contains("points.xyz: is no kind of annotations") && message.contains(".laz"),
         "{message}"
@@ -336,7 +356,11 @@ fn headers_that_miscount_their_records_do_not_hide_the_points() {
             let read = Annotations::from_reader(std::io::Cursor::new(bad), Path::new(name), &options());
             let found = read.unwrap_or_else(|e| panic!("{e}: {at} {bytes:?}"));
             assert_eq!(contents(&found, "office_1"), expected(DVec3::ZERO), "{name}");
-            let there = if at == 100 { format!("and {records} are there") } else { "where none are".into() };
+            let there = if at == 100 {
+                format!("and {records} are there")
+            } else {
+                "where none are".into()
+            };
             assert!(found.warnings.len() == 1 && found.warnings[0].contains(&there), "{:?}", found.warnings);
         }
     }

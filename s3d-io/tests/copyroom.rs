@@ -57,7 +57,11 @@ fn the_parts_of_the_scan_fit_together() {
     }
     assert_eq!((all.len(), instances.len()), (147_961, 147_961));
     // The points lie on the mesh, give or take their noise.
-    assert!(all.positions.iter().all(|p| p.cmpgt(room.min - 0.02).all() && p.cmplt(room.max + 0.02).all()));
+    assert!(
+        all.positions
+            .iter()
+            .all(|p| p.cmpgt(room.min - 0.02).all() && p.cmplt(room.max + 0.02).all())
+    );
 }
 
 /// tobj alone, cut into 1,163 models, has the same triangles in the same order, but for those left out.
@@ -76,15 +80,23 @@ fn the_mesh_is_what_tobj_reads() {
         let [a, b, c] = [t[0].0, t[1].0, t[2].0].map(|p| Vec3::from_array(p).as_dvec3());
         (b - a).cross(c - a) != DVec3::ZERO
     };
-    let all: Vec<_> =
-        models.iter().flat_map(|m| (0..m.mesh.indices.len()).map(move |i| corner(&m.mesh, i))).collect();
+    let all: Vec<_> = models
+        .iter()
+        .flat_map(|m| (0..m.mesh.indices.len()).map(move |i| corner(&m.mesh, i)))
+        .collect();
     let mut seen = BTreeSet::new();
     let is_new = |t: &&[([f32; 3], [f32; 2])]| {
         let mut corners = [t[0].0, t[1].0, t[2].0].map(|p| p.map(f32::to_bits));
         corners.sort_unstable();
         seen.insert(corners)
     };
-    let expected: Vec<_> = all.chunks(3).filter(has_area).filter(is_new).flatten().copied().collect();
+    let expected: Vec<_> = all
+        .chunks(3)
+        .filter(has_area)
+        .filter(is_new)
+        .flatten()
+        .copied()
+        .collect();
     let parts = mesh.parts();
     let found = parts.faces.iter().flatten().zip(parts.face_uvs.iter().flatten());
     let found: Vec<_> = found

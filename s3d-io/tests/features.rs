@@ -43,7 +43,10 @@ fn annotations_of_other_formats_name_their_feature() {
     use s3d_io::cloud::Annotations;
     let folder = tempfile::tempdir().unwrap();
     let named = [("a.las", "las"), ("a.LAZ", "las"), ("a.e57", "e57"), ("a.npz", "npy"), ("a.mat", "mat")];
-    for (name, feature) in named.into_iter().chain([("a.ply", "ply"), ("b.aggregation.json", "scannet")]) {
+    for (name, feature) in named
+        .into_iter()
+        .chain([("a.ply", "ply"), ("b.aggregation.json", "scannet")])
+    {
         let path = folder.path().join(name);
         fs::write(&path, "").unwrap();
         let message = Annotations::open(&[path], &Default::default()).unwrap_err().to_string();

@@ -68,9 +68,16 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     // None, a quarter turn around z, none; as floats and as normalized integers of both sizes.
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let turns = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, half, half], [0.0, 0.0, 0.0, 1.0]];
-    let bytes: Vec<u8> = turns.iter().flatten().map(|v| (v * 127.0).round() as i8 as u8).collect();
-    let shorts: Vec<u8> =
-        turns.iter().flatten().flat_map(|v| ((v * 32767.0).round() as i16).to_le_bytes()).collect();
+    let bytes: Vec<u8> = turns
+        .iter()
+        .flatten()
+        .map(|v| (v * 127.0).round() as i8 as u8)
+        .collect();
+    let shorts: Vec<u8> = turns
+        .iter()
+        .flatten()
+        .flat_map(|v| ((v * 32767.0).round() as i16).to_le_bytes())
+        .collect();
     let normalized = r#", "normalized": true"#;
     for turns in [
         (floats(&turns), 5126, "VEC4", 3, ""),
@@ -79,7 +86,9 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     ] {
         let attributes = r#"{"TRANSLATION": 1, "ROTATION": 2, "SCALE": 3, "_ID": 1}"#;
         let accessors = [triangle(), translations.clone(), turns, scales.clone()];
-        let mesh = read_bytes("a.gltf", gltf(&accessors, &instancing(attributes)).as_bytes()).unwrap().mesh;
+        let mesh = read_bytes("a.gltf", gltf(&accessors, &instancing(attributes)).as_bytes())
+            .unwrap()
+            .mesh;
         assert_eq!(mesh.faces().len(), 3);
         // In the place of the node, which is outermost.
         let expected = [
@@ -131,8 +140,9 @@ fn instances_are_counted_before_there_is_memory_for_them() {
     let node =
         r#"{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 1}}}}"#;
     let rest = format!(r#"{MESH}, "nodes": [{}]"#, vec![node; 1 << 12].join(","));
-    let message =
-        read_bytes("a.gltf", gltf(&[triangle(), places], &rest).as_bytes()).unwrap_err().to_string();
+    let message = read_bytes("a.gltf", gltf(&[triangle(), places], &rest).as_bytes())
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("16777216 are read at most"), "{message}");
 }
 
@@ -156,7 +166,9 @@ fn coarser_levels_and_hidden_nodes_are_left_out() {
         "extensions": {{"KHR_node_visibility": {{"visible": true}}}}}}]"#
     );
     let file = read_bytes("a.gltf", gltf(&[triangle()], &rest).as_bytes()).unwrap();
-    let at: Vec<f32> = (0..file.mesh.faces().len() as u32).map(|f| file.mesh.triangle(f)[0].x).collect();
+    let at: Vec<f32> = (0..file.mesh.faces().len() as u32)
+        .map(|f| file.mesh.triangle(f)[0].x)
+        .collect();
     assert_eq!(at, [0.0, 5.0]);
     let told = file.warnings.join("\n");
     assert!(
@@ -198,7 +210,12 @@ fn extensions_that_have_geometry_are_refused_by_name_wherever_they_are() {
         );
     }
     // With a form without compression beside it, that is read.
-    assert!(read(&primitive("KHR_draco_mesh_compression")).unwrap().warnings.is_empty());
+    assert!(
+        read(&primitive("KHR_draco_mesh_compression"))
+            .unwrap()
+            .warnings
+            .is_empty()
+    );
     let file = read(&primitive("XYZ_thing")).unwrap();
     assert!(file.warnings.concat().contains("not read: XYZ_thing"), "{:?}", file.warnings);
     // Faces without data, whose vertices have some.
@@ -247,7 +264,8 @@ fn odd_but_valid_files_are_read() {
         "{no_type}"
     );
     let both = fault(
-        good.replace(", \"componentType\": 5126", "").replace("\"mesh\": 0", "\"mesh\": 0, \"extras\": 7"),
+        good.replace(", \"componentType\": 5126", "")
+            .replace("\"mesh\": 0", "\"mesh\": 0, \"extras\": 7"),
     );
     assert!(both.contains("missing field `componentType`"), "{both}");
     assert!(fault(with("\"scene\": -1")).contains("expected index"));

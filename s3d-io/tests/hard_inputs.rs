@@ -49,7 +49,10 @@ fn meshes_below(dir: &Path, found: &mut Vec<PathBuf>) {
         let path = entry.unwrap().path();
         if path.is_dir() {
             meshes_below(&path, found);
-        } else if path.extension().is_some_and(|e| ["obj", "gltf", "glb", "ply"].iter().any(|m| e == *m)) {
+        } else if path
+            .extension()
+            .is_some_and(|e| ["obj", "gltf", "glb", "ply"].iter().any(|m| e == *m))
+        {
             found.push(path);
         }
     }
@@ -61,7 +64,12 @@ fn every_file_has_the_outcome_that_its_content_asks_for() {
     let listed: Vec<[&str; 3]> = EXPECTED
         .lines()
         .filter(|l| !l.is_empty() && !l.starts_with('#'))
-        .map(|l| l.split(" | ").collect::<Vec<_>>().try_into().expect("path | outcome | words"))
+        .map(|l| {
+            l.split(" | ")
+                .collect::<Vec<_>>()
+                .try_into()
+                .expect("path | outcome | words")
+        })
         .collect();
     let mut differences = Vec::new();
     for [name, expected, words] in &listed {
@@ -99,7 +107,10 @@ fn files_of_other_formats_under_our_names_are_refused() {
         ["assimp/test/models/PLY/cube_binary.ply", "happly/platonic_shelf.ply", "pngsuite/png/basn2c16.png"]
     {
         let ply = name.ends_with("ply");
-        for ending in ["obj", "gltf", "glb", "ply"].into_iter().filter(|e| !(ply && *e == "ply")) {
+        for ending in ["obj", "gltf", "glb", "ply"]
+            .into_iter()
+            .filter(|e| !(ply && *e == "ply"))
+        {
             let path = dir.path().join(format!("x.{ending}"));
             std::fs::copy(folder.join(name), &path).unwrap();
             let (found, texts) = outcome(&path);

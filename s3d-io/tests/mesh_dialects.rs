@@ -59,7 +59,8 @@ impl Gltf {
             self.data.push(0);
         }
         let (at, length) = (self.data.len(), bytes.len());
-        self.views.push(format!(r#"{{"buffer": 0, "byteOffset": {at}, "byteLength": {length}}}"#));
+        self.views
+            .push(format!(r#"{{"buffer": 0, "byteOffset": {at}, "byteLength": {length}}}"#));
         self.data.extend(bytes);
         self.views.len() - 1
     }
@@ -134,7 +135,11 @@ fn sparse_and_quantized_positions() {
     // All corners at the origin, but for three that are told apart.
     let mut f = Gltf::default();
     let places = f.view(&[1, 2, 3]);
-    let values: Vec<u8> = CORNERS[1..].iter().flat_map(|c| c.to_array()).flat_map(f32::to_le_bytes).collect();
+    let values: Vec<u8> = CORNERS[1..]
+        .iter()
+        .flat_map(|c| c.to_array())
+        .flat_map(f32::to_le_bytes)
+        .collect();
     let values = f.view(&values);
     f.accessors.push(format!(
         r#"{{"componentType": 5126, "type": "VEC3", "count": 4, "sparse": {{"count": 3,
@@ -150,7 +155,10 @@ fn sparse_and_quantized_positions() {
     {
         let mut f = Gltf::default();
         let size = if component == 5120 { 1 } else { 2 };
-        let numbers = CORNERS.iter().flat_map(|c| [c.x, c.y, c.z, 0.0]).map(|v| v as i32 * whole);
+        let numbers = CORNERS
+            .iter()
+            .flat_map(|c| [c.x, c.y, c.z, 0.0])
+            .map(|v| v as i32 * whole);
         let bytes: Vec<u8> = numbers.flat_map(|n| n.to_le_bytes()[..size].to_vec()).collect();
         let p = f.accessor(&bytes, "VEC3", component, 4, &format!(r#", "normalized": {normalized}"#));
         f.views[0] =
@@ -189,8 +197,9 @@ fn nested_and_mirroring_nodes_and_instances() {
         ))
         .unwrap();
     let mesh = &file.mesh;
-    let lows: Vec<Vec3> =
-        [0, 2, 4, 6].map(|f| mesh.triangle(f).into_iter().reduce(Vec3::min).unwrap()).to_vec();
+    let lows: Vec<Vec3> = [0, 2, 4, 6]
+        .map(|f| mesh.triangle(f).into_iter().reduce(Vec3::min).unwrap())
+        .to_vec();
     assert_eq!(
         lows,
         [vec3(10.0, 0.0, 0.0), vec3(-1.0, 0.0, 0.0), vec3(29.0, -1.0, 0.0), vec3(0.0, 0.0, 9.0)]
@@ -210,7 +219,9 @@ fn vertex_colours_of_every_type() {
         for component in [5121u32, 5123, 5126] {
             let mut f = Gltf::default();
             let (p, i) = (f.corners(), f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, ""));
-            let numbers = linear.iter().flat_map(|c| [c[0], c[1], c[2], 0.25].into_iter().take(width));
+            let numbers = linear
+                .iter()
+                .flat_map(|c| [c[0], c[1], c[2], 0.25].into_iter().take(width));
             let bytes: Vec<u8> = numbers
                 .flat_map(|v| match component {
                     5121 => vec![(v * 255.0).round() as u8],
@@ -218,7 +229,11 @@ fn vertex_colours_of_every_type() {
                     _ => v.to_le_bytes().to_vec(),
                 })
                 .collect();
-            let more = if component == 5126 { "" } else { r#", "normalized": true"# };
+            let more = if component == 5126 {
+                ""
+            } else {
+                r#", "normalized": true"#
+            };
             let c = f.accessor(&bytes, kind, component, 4, more);
             let file =
                 f.mesh(&format!(r#"{{"attributes": {{"POSITION": {p}, "COLOR_0": {c}}}, "indices": {i}}}"#));

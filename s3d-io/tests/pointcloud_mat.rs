@@ -8,14 +8,18 @@ use s3d_io::cloud::{MatArea, MatWriter};
 use std::path::{Path, PathBuf};
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/pointcloud_mat").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures/pointcloud_mat")
+        .join(name)
 }
 
 /// The points that the fixtures' script makes.
 fn expected(at: Vec3, n: usize) -> PointCloud {
     let mut cloud = PointCloud::default();
     for i in 0..n {
-        cloud.positions.push(at + vec3((i % 4) as f32, (i / 4) as f32, i as f32 / 8.0));
+        cloud
+            .positions
+            .push(at + vec3((i % 4) as f32, (i / 4) as f32, i as f32 / 8.0));
         cloud.colors.push([i as u8, (2 * i) as u8, 255 - i as u8]);
     }
     cloud
@@ -135,7 +139,10 @@ fn a_point_that_is_not_finite_leaves_no_file() {
     let mut mat = MatWriter::create(&dir.path().join("pointcloud.mat"), "Area_1").unwrap();
     mat.room("office_1", 0).unwrap();
     mat.object("chair_1", "chair_1_office_1_1").unwrap();
-    let message = mat.append(&[vec3(0.0, f32::NAN, 0.0)], &[[0; 3]]).unwrap_err().to_string();
+    let message = mat
+        .append(&[vec3(0.0, f32::NAN, 0.0)], &[[0; 3]])
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("pointcloud.mat: a point of chair_1 at [0, NaN, 0]"), "{message}");
     drop(mat);
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
@@ -145,7 +152,9 @@ fn a_point_that_is_not_finite_leaves_no_file() {
 #[should_panic(expected = "the object chair_1 has no room")]
 fn an_object_without_a_room_is_a_callers_mistake() {
     let dir = tempfile::tempdir().unwrap();
-    let _ = MatWriter::create(&dir.path().join("a.mat"), "Area_1").unwrap().object("chair_1", "");
+    let _ = MatWriter::create(&dir.path().join("a.mat"), "Area_1")
+        .unwrap()
+        .object("chair_1", "");
 }
 
 #[test]
@@ -180,7 +189,12 @@ fn a_field_that_is_missing_is_named() {
     let path = dir.path().join("pointcloud.mat");
     let single = std::fs::read(fixture("single.mat")).unwrap();
     let mut without = single.clone();
-    for at in single.windows(8).enumerate().filter(|(_, w)| w == b"points\0\0").map(|(at, _)| at) {
+    for at in single
+        .windows(8)
+        .enumerate()
+        .filter(|(_, w)| w == b"points\0\0")
+        .map(|(at, _)| at)
+    {
         without[at..at + 6].copy_from_slice(b"pointy");
     }
     std::fs::write(&path, without).unwrap();
@@ -196,7 +210,9 @@ fn damaged_files_never_panic() {
     let path = dir.path().join("pointcloud.mat");
     let mut state = 1u64;
     let mut random = |below: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % below
     };
     let (mut read, mut refused) = (0, 0);

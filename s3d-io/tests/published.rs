@@ -32,7 +32,9 @@ fn pose(layout: &Layout, uuid: &str, n: f64, frame: Frame, room: &str) {
     let name = room.rsplit_once('_').unwrap().0;
     let path = layout.image_path(3, uuid, name, frame, Domain::Pose);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    PoseFile::new(&camera, &original, uuid, room, frame).write(&path).unwrap();
+    PoseFile::new(&camera, &original, uuid, room, frame)
+        .write(&path)
+        .unwrap();
 }
 
 fn area(dir: &Path) {
@@ -89,12 +91,19 @@ fn an_area_can_be_moved() {
     let found = PublishedArea::open_with(&dir.path().join("area_5b"), &options).unwrap();
     assert_eq!(found.area, 5);
     let moved = &found.locations[0].location.pose;
-    assert!(moved.location.abs_diff_eq(world_from_area.transform_point3(original(4.0).location), 1e-12));
+    assert!(
+        moved
+            .location
+            .abs_diff_eq(world_from_area.transform_point3(original(4.0).location), 1e-12)
+    );
     let turned = DQuat::from_rotation_z(1.0) * original(4.0).forward();
     assert!(moved.forward().abs_diff_eq(turned, 1e-12));
     let read = found.read_mesh().unwrap();
     for (is, was) in read.file.mesh.positions().iter().zip(mesh().positions()) {
-        assert!(is.as_dvec3().abs_diff_eq(world_from_area.transform_point3(was.as_dvec3()), 1e-5));
+        assert!(
+            is.as_dvec3()
+                .abs_diff_eq(world_from_area.transform_point3(was.as_dvec3()), 1e-5)
+        );
     }
     assert_eq!(read.label_of_face, [0, 0, 1, 1, NO_INDEX]);
     assert!(found.locations.iter().all(|l| l.location.pose.location != DVec3::ZERO));
@@ -114,7 +123,13 @@ fn faces_in_another_order_are_matched() {
     let read = PublishedArea::open(&folder).unwrap().read_mesh().unwrap();
     assert_eq!(read.label_of_face, [0, 0, 1, 1, NO_INDEX]);
     assert_eq!(read.labels[0].to_string(), NAMES[1]);
-    assert!(read.file.warnings.last().unwrap().contains("matched by their corners, 0 without"));
+    assert!(
+        read.file
+            .warnings
+            .last()
+            .unwrap()
+            .contains("matched by their corners, 0 without")
+    );
 }
 
 #[test]
@@ -125,7 +140,12 @@ fn what_is_missing_is_named() {
     // Without labels it is an area like any other.
     fs::remove_file(folder.join("3d/semantic.obj")).unwrap();
     let found = PublishedArea::open(&folder).unwrap();
-    assert!(found.warnings.iter().any(|w| w.contains("has no 3d/semantic.obj, so that there are no labels")));
+    assert!(
+        found
+            .warnings
+            .iter()
+            .any(|w| w.contains("has no 3d/semantic.obj, so that there are no labels"))
+    );
     let mesh = found.read_mesh().unwrap();
     assert!(mesh.labels.is_empty() && mesh.label_of_face.is_empty() && mesh.file.mesh.faces().len() == 5);
     fs::remove_file(folder.join("3d/rgb.obj")).unwrap();
@@ -134,8 +154,9 @@ fn what_is_missing_is_named() {
     let dir = tempfile::tempdir().unwrap();
     area(dir.path());
     let folder = dir.path().join("area_3");
-    let pose =
-        folder.join("pano/pose").join(format!("camera_{B}_hallway_1_frame_equirectangular_domain_pose.json"));
+    let pose = folder
+        .join("pano/pose")
+        .join(format!("camera_{B}_hallway_1_frame_equirectangular_domain_pose.json"));
     fs::write(&pose, "{\"camera_uuid\": 1}").unwrap();
     let message = PublishedArea::open(&folder).unwrap_err().to_string();
     assert!(message.contains("_hallway_1_") && message.contains("line 1"), "{message}");
@@ -157,10 +178,18 @@ fn labels_of_another_mesh_are_refused() {
     let folder = dir.path().join("area_3");
     let other = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Z], vec![[0, 1, 2]]).unwrap();
     s3d_io::mesh::write_semantic_obj(&folder.join("3d"), &other, &[1], &NAMES.map(str::to_owned)).unwrap();
-    let message = PublishedArea::open(&folder).unwrap().read_mesh().unwrap_err().to_string();
+    let message = PublishedArea::open(&folder)
+        .unwrap()
+        .read_mesh()
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("5 of the 5 faces") && message.contains("semantic.obj"), "{message}");
     s3d_io::mesh::write_semantic_obj(&folder.join("3d"), &mesh(), &[0; 5], &NAMES.map(str::to_owned))
         .unwrap();
-    let message = PublishedArea::open(&folder).unwrap().read_mesh().unwrap_err().to_string();
+    let message = PublishedArea::open(&folder)
+        .unwrap()
+        .read_mesh()
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("no material of a face is a label"), "{message}");
 }

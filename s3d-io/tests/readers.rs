@@ -108,7 +108,10 @@ fn points_are_written_to_and_read_from_memory() {
     let mut reader = LabelledPoints::new(Cursor::new(bytes), Path::new("p.ply")).unwrap();
     assert!(reader.read(10, &mut points).unwrap());
     assert_eq!(points.iter().map(|p| p.label).collect::<Vec<_>>(), [7, 8, 9]);
-    let short = PlyPointWriter::new(Vec::new(), Path::new("p.ply"), 3).unwrap().into_inner().unwrap_err();
+    let short = PlyPointWriter::new(Vec::new(), Path::new("p.ply"), 3)
+        .unwrap()
+        .into_inner()
+        .unwrap_err();
     assert!(short.to_string().starts_with("p.ply: 3 points were promised"), "{short}");
 
     let path = folder.path().join("a.npy");
@@ -121,7 +124,13 @@ fn points_are_written_to_and_read_from_memory() {
     let mut cloud = PointCloud::default();
     while reader.read_chunk(1, &mut cloud).unwrap() > 0 {}
     assert_eq!((cloud.len(), reader.skipped()), (2, 1));
-    assert!(reader.first_skipped().unwrap().to_string().starts_with("chair_1.txt, line 2"));
+    assert!(
+        reader
+            .first_skipped()
+            .unwrap()
+            .to_string()
+            .starts_with("chair_1.txt, line 2")
+    );
 }
 
 #[test]

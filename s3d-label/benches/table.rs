@@ -18,7 +18,9 @@ fn labels(count: u32) -> Vec<Label> {
     }
     let mut state = 3u64;
     for i in (1..labels.len()).rev() {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         labels.swap(i, (state >> 33) as usize % (i + 1));
     }
     labels

@@ -14,12 +14,17 @@ fn print_table<const N: usize>(names: [&str; N], areas: &[(u32, Vec<u64>)], tota
         let cells: String = areas.iter().map(|(_, counts)| format!("{:8}", counts[i])).collect();
         println!("{name:14}{cells}{:8}", total[i]);
     }
-    let sums: String = areas.iter().map(|(_, counts)| format!("{:8}", counts.iter().sum::<u64>())).collect();
+    let sums: String = areas
+        .iter()
+        .map(|(_, counts)| format!("{:8}", counts.iter().sum::<u64>()))
+        .collect();
     println!("{:14}{sums}{:8}\n", "total", total.iter().sum::<u64>());
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args_os().nth(1).ok_or("usage: label_statistics path/to/semantic_labels.json")?;
+    let path = std::env::args_os()
+        .nth(1)
+        .ok_or("usage: label_statistics path/to/semantic_labels.json")?;
     let names: Vec<String> = serde_json::from_str(&std::fs::read_to_string(path)?)?;
     let table = LabelTable::from_names(&names)?;
     let (classes, rooms) = (ClassCounts::from_table(&table), RoomCounts::from_table(&table));

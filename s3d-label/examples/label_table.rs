@@ -14,7 +14,9 @@ fn instances(folder: &Path) -> std::io::Result<Vec<(Class, u32)>> {
     for file in std::fs::read_dir(folder)? {
         let path = file?.path();
         let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-        let words = stem.rsplit_once('_').map(|(class, number)| (class.parse::<Class>(), number.parse()));
+        let words = stem
+            .rsplit_once('_')
+            .map(|(class, number)| (class.parse::<Class>(), number.parse()));
         match words {
             Some((Ok(class), Ok(number))) => found.push((class, number)),
             Some((Err(unknown), _)) => eprintln!("{}: {unknown}", path.display()),
@@ -27,15 +29,23 @@ fn instances(folder: &Path) -> std::io::Result<Vec<(Class, u32)>> {
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).ok_or("usage: label_table path/to/Area_1")?;
     let folder = Path::new(&folder);
-    let area = folder.file_name().and_then(|name| name.to_str()).and_then(|name| name.strip_prefix("Area_"));
+    let area = folder
+        .file_name()
+        .and_then(|name| name.to_str())
+        .and_then(|name| name.strip_prefix("Area_"));
     // The halves of area 5 are one area in labels.
-    let area = area.map(|number| number.trim_end_matches(['a', 'b'])).and_then(|number| number.parse().ok());
+    let area = area
+        .map(|number| number.trim_end_matches(['a', 'b']))
+        .and_then(|number| number.parse().ok());
     let area = area.ok_or("the folder must be called Area_ and a number")?;
 
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
-        let room = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.parse::<Room>().ok());
+        let room = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .and_then(|name| name.parse::<Room>().ok());
         if let Some(room) = room {
             let of_room = instances(&path.join("Annotations"))?;
             found.extend(of_room.into_iter().map(|(class, number)| (room, class, number)));

@@ -84,7 +84,10 @@ impl Class {
     /// Which class of S3DIS it counts as, where only these will do: for loaders of S3DIS, and for what is a
     /// floor or a wall. [`Class::CLUTTER`] if it is like none of the others.
     pub fn s3dis(self) -> Self {
-        Self::S3DIS.get(usize::from(self.s3dis)).copied().unwrap_or(Self::CLUTTER)
+        Self::S3DIS
+            .get(usize::from(self.s3dis))
+            .copied()
+            .unwrap_or(Self::CLUTTER)
     }
 }
 
@@ -106,7 +109,10 @@ impl FromStr for Class {
     /// The class of S3DIS that is spelled `word`, to the letter.
     fn from_str(word: &str) -> Result<Self, UnknownClass> {
         let unknown = || UnknownClass { word: word.to_owned(), classes: names(&Self::S3DIS) };
-        Self::S3DIS.into_iter().find(|class| *class.name == word).ok_or_else(unknown)
+        Self::S3DIS
+            .into_iter()
+            .find(|class| *class.name == word)
+            .ok_or_else(unknown)
     }
 }
 

@@ -46,7 +46,11 @@ mod tests {
         let colors: HashSet<[u8; 3]> = (0..20_000).map(pretty_color).collect();
         assert_eq!(colors.len(), 20_000);
         // Neither missing pixels' black nor the marks of missing pixels in other images.
-        assert!((0..200_000).map(pretty_color).all(|c| c.iter().copied().max() >= Some(128)));
+        assert!(
+            (0..200_000)
+                .map(pretty_color)
+                .all(|c| c.iter().copied().max() >= Some(128))
+        );
         assert_eq!(pretty_color(0), [128; 3]);
     }
 

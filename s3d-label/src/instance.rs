@@ -41,7 +41,9 @@ impl InstanceSummary {
         points: impl IntoIterator<Item = Vec3>,
     ) -> Option<Self> {
         #[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
-        let label = table.get(id).unwrap_or_else(|| panic!("label {id} of a table of {}", table.len()));
+        let label = table
+            .get(id)
+            .unwrap_or_else(|| panic!("label {id} of a table of {}", table.len()));
         let mut count = 0;
         let bbox = Aabb::from_points(points.into_iter().inspect(|_| count += 1));
         (count > 0).then(|| Self {

@@ -123,8 +123,9 @@ impl Taxonomy {
                 word: word.to_owned(),
             })
         };
-        let class =
-            self.class(class).map_err(|source| LabelError::Class { name: name.to_owned(), source })?;
+        let class = self
+            .class(class)
+            .map_err(|source| LabelError::Class { name: name.to_owned(), source })?;
         let instance = number("instance", instance)?;
         let room_type = self
             .room_type(room_type)

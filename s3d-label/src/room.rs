@@ -134,7 +134,9 @@ impl Ord for RoomType {
     fn cmp(&self, other: &Self) -> Ordering {
         let letters = |t: &Self| t.name.bytes().map(|b| b.to_ascii_lowercase());
         let rest = |t: &Self| (t.name, t.index, t.s3dis);
-        letters(self).cmp(letters(other)).then_with(|| rest(self).cmp(&rest(other)))
+        letters(self)
+            .cmp(letters(other))
+            .then_with(|| rest(self).cmp(&rest(other)))
     }
 }
 
@@ -167,10 +169,14 @@ impl FromStr for RoomType {
 
 /// The type of `types` that is spelled `word`, to the letter.
 pub(crate) fn find_type(types: &[RoomType], word: &str) -> Result<RoomType, UnknownRoomType> {
-    types.iter().copied().find(|t| *t.name == word).ok_or_else(|| UnknownRoomType {
-        word: word.to_owned(),
-        types: types.iter().map(|t| *t.name).collect::<Vec<_>>().join(" "),
-    })
+    types
+        .iter()
+        .copied()
+        .find(|t| *t.name == word)
+        .ok_or_else(|| UnknownRoomType {
+            word: word.to_owned(),
+            types: types.iter().map(|t| *t.name).collect::<Vec<_>>().join(" "),
+        })
 }
 
 impl fmt::Display for Room {

@@ -85,6 +85,8 @@ impl Serialize for LabelTable {
 
 impl<'de> Deserialize<'de> for LabelTable {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        taxonomy().table_from_names(&Vec::<String>::deserialize(deserializer)?).map_err(D::Error::custom)
+        taxonomy()
+            .table_from_names(&Vec::<String>::deserialize(deserializer)?)
+            .map_err(D::Error::custom)
     }
 }

@@ -87,7 +87,12 @@ impl RoomCounts {
 }
 
 fn of(areas: &[(u32, Vec<u64>)], area: u32, column: usize) -> u64 {
-    areas.iter().find(|(a, _)| *a == area).and_then(|(_, counts)| counts.get(column)).copied().unwrap_or(0)
+    areas
+        .iter()
+        .find(|(a, _)| *a == area)
+        .and_then(|(_, counts)| counts.get(column))
+        .copied()
+        .unwrap_or(0)
 }
 
 fn total(areas: &[(u32, Vec<u64>)]) -> Vec<u64> {

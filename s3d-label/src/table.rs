@@ -160,7 +160,10 @@ impl Taxonomy {
     /// another taxonomy.
     pub fn table(&self, labels: impl IntoIterator<Item = Label>) -> Result<LabelTable, TableError> {
         let mut labels: Vec<Label> = labels.into_iter().collect();
-        if let Some(&label) = labels.iter().find(|l| l.instance == 0 || l.room.number == 0 || l.area == 0) {
+        if let Some(&label) = labels
+            .iter()
+            .find(|l| l.instance == 0 || l.room.number == 0 || l.area == 0)
+        {
             return Err(TableError::Zero { label });
         }
         let is_ours = |l: &Label| {
@@ -214,7 +217,11 @@ impl Taxonomy {
 impl LabelTable {
     fn checked_count(self) -> Result<Self, TableError> {
         let count = self.len();
-        if count <= MAX_LABELS { Ok(self) } else { Err(TableError::TooMany { count }) }
+        if count <= MAX_LABELS {
+            Ok(self)
+        } else {
+            Err(TableError::TooMany { count })
+        }
     }
 
     /// The index of `label`, `None` if it is not in the table.
@@ -239,12 +246,17 @@ impl LabelTable {
 
     /// All names, each at its index: the content of `semantic_labels.json`.
     pub fn names(&self) -> Vec<String> {
-        std::iter::once(NULL_NAME.to_owned()).chain(self.labels.iter().map(Label::to_string)).collect()
+        std::iter::once(NULL_NAME.to_owned())
+            .chain(self.labels.iter().map(Label::to_string))
+            .collect()
     }
 
     /// All labels with their indices, in order; without the null label.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (LabelId, &Label)> {
-        self.labels.iter().enumerate().map(|(i, label)| (LabelId(i as u32 + 1), label))
+        self.labels
+            .iter()
+            .enumerate()
+            .map(|(i, label)| (LabelId(i as u32 + 1), label))
     }
 
     /// Number of entries, the null label included: at least 1.
@@ -289,7 +301,9 @@ mod tests {
         let mut items = items.to_vec();
         let mut state = 1u64;
         for i in (1..items.len()).rev() {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             items.swap(i, (state >> 33) as usize % (i + 1));
         }
         items

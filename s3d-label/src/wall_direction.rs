@@ -33,11 +33,18 @@ pub fn wall_directions_deg(
     for (face, label) in (0u32..).zip(label_of_face) {
         if let Some(label) = table.get(*label) {
             let room = rooms.entry(label.room).or_default();
-            let faces = if label.class.s3dis() == Class::WALL { &mut room.walls } else { &mut room.others };
+            let faces = if label.class.s3dis() == Class::WALL {
+                &mut room.walls
+            } else {
+                &mut room.others
+            };
             faces.push((mesh.normal(face), mesh.area(face)));
         }
     }
-    rooms.into_iter().map(|(room, faces)| (room, faces.direction_deg())).collect()
+    rooms
+        .into_iter()
+        .map(|(room, faces)| (room, faces.direction_deg()))
+        .collect()
 }
 
 /// Normals and areas of a room's faces.
@@ -50,7 +57,9 @@ struct Faces {
 impl Faces {
     fn direction_deg(self) -> u32 {
         let of = |faces: Vec<(Vec3, f64)>| dominant_wall_direction_deg(faces.into_iter());
-        of(self.walls).or_else(|| of(self.others)).map_or(0, |deg| deg.round() as u32 % 90)
+        of(self.walls)
+            .or_else(|| of(self.others))
+            .map_or(0, |deg| deg.round() as u32 % 90)
     }
 }
 
@@ -67,7 +76,10 @@ mod tests {
         let upright = |deg: f32| Quat::from_rotation_z(deg.to_radians()) * Quat::from_rotation_x(1.570_796_4);
         let turns = [upright(30.0), upright(70.0), upright(70.0), Quat::IDENTITY];
         let square = [Vec3::ZERO, Vec3::X, Vec3::ONE.with_z(0.0), Vec3::Y];
-        let positions = turns.iter().flat_map(|turn| square.map(|corner| *turn * corner)).collect();
+        let positions = turns
+            .iter()
+            .flat_map(|turn| square.map(|corner| *turn * corner))
+            .collect();
         let faces = (0..4u32).flat_map(|i| [[0, 1, 2], [0, 2, 3]].map(|face| face.map(|v| 4 * i + v)));
         let mesh = TriMesh::from_faces(positions, faces.collect()).unwrap();
         let of = |names: [&str; 4]| {

@@ -26,7 +26,9 @@ fn the_table_is_rebuilt_index_by_index_from_its_labels_shuffled() {
     let mut labels = labels(&names);
     let mut state = 7u64;
     for i in (1..labels.len()).rev() {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         labels.swap(i, (state >> 33) as usize % (i + 1));
     }
     assert_ne!(labels[0].to_string(), names[1]);

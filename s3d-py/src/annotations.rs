@@ -37,7 +37,9 @@ impl Reading {
             Ok((name, class.transpose()?))
         };
         let classes = self.classes.into_iter().map(meant).collect::<PyResult<_>>()?;
-        let room = self.room.map(|room| taxonomy.room(&room).map_err(|e| usage(format!("room: {e}"))));
+        let room = self
+            .room
+            .map(|room| taxonomy.room(&room).map_err(|e| usage(format!("room: {e}"))));
         Ok(AnnotationOptions {
             classes,
             room: room.transpose()?,

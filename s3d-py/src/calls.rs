@@ -57,7 +57,11 @@ pub(crate) fn verify(
 ) -> PyResult<Verified> {
     let report = watched(py, threads, &sink, |ctx| s3d_dataset::verify(&root, &VerifyOptions { full }, ctx))?;
     let text = report.to_string();
-    let faults = report.faults.into_iter().map(|f| (f.topic, f.kind, f.count, f.first)).collect();
+    let faults = report
+        .faults
+        .into_iter()
+        .map(|f| (f.topic, f.kind, f.count, f.first))
+        .collect();
     Ok((faults, report.notes, report.files, report.checks, report.unread, text))
 }
 
@@ -85,7 +89,9 @@ pub(crate) fn evaluate(
     threads: Option<usize>,
     sink: Py<PyAny>,
 ) -> PyResult<Answer> {
-    let protocol: Protocol = protocol.parse().map_err(|e: s3d_eval::UnknownProtocol| usage(e.to_string()))?;
+    let protocol: Protocol = protocol
+        .parse()
+        .map_err(|e: s3d_eval::UnknownProtocol| usage(e.to_string()))?;
     let mut options = EvalOptions::default();
     options.variant = how.variant;
     options.folds = match &*how.folds {
@@ -98,8 +104,10 @@ pub(crate) fn evaluate(
     options.bootstrap = how.bootstrap;
     options.seed = how.seed;
     options.median_scale = how.median_scale;
-    options.images =
-        how.images.map(|word| word.parse().map_err(|e| crate::error::exception(&e))).transpose()?;
+    options.images = how
+        .images
+        .map(|word| word.parse().map_err(|e| crate::error::exception(&e)))
+        .transpose()?;
     options.classes = how.classes;
     options.stuff = how.stuff.map(ClassList);
     let evaluation =
@@ -123,7 +131,9 @@ pub(crate) fn compare(
 
 #[pyfunction]
 pub(crate) fn statistics(py: Python<'_>, root: PathBuf) -> PyResult<Answer> {
-    let made = py.detach(|| s3d_dataset::statistics(&root)).map_err(|e| crate::error::exception(&e))?;
+    let made = py
+        .detach(|| s3d_dataset::statistics(&root))
+        .map_err(|e| crate::error::exception(&e))?;
     Ok((json(&made)?, made.to_markdown()))
 }
 
@@ -184,7 +194,8 @@ pub(crate) struct Packed {
 
 /// The value of a word that may be missing.
 fn word<T: std::str::FromStr<Err: ToString>>(word: Option<String>) -> PyResult<Option<T>> {
-    word.map(|word| word.parse().map_err(|e: T::Err| usage(e.to_string()))).transpose()
+    word.map(|word| word.parse().map_err(|e: T::Err| usage(e.to_string())))
+        .transpose()
 }
 
 /// Makes the package, and returns where it is.
@@ -203,7 +214,10 @@ pub(crate) fn pack(
         classes => classes.join(","),
     });
     let modalities = how.modalities.map(|words| {
-        words.into_iter().map(|modality| crate::dataset::domain(&modality)).collect::<PyResult<Vec<_>>>()
+        words
+            .into_iter()
+            .map(|modality| crate::dataset::domain(&modality))
+            .collect::<PyResult<Vec<_>>>()
     });
     let options = PackOptions {
         output: how.output,

@@ -202,7 +202,9 @@ impl DataSet {
     /// Width and height, pixels.
     fn size(&self, py: Python<'_>, image: usize) -> PyResult<(u32, u32)> {
         let image = self.image(image)?;
-        let size = py.detach(|| image.size(self.data.layout())).map_err(|e| exception(&e.into()))?;
+        let size = py
+            .detach(|| image.size(self.data.layout()))
+            .map_err(|e| exception(&e.into()))?;
         size.ok_or_else(|| usage(format!("{} has no PNG file that tells its size", image.stem())))
     }
 
@@ -295,7 +297,10 @@ impl DataSet {
         threads: Option<usize>,
         sink: Py<PyAny>,
     ) -> PyResult<Vec<Vec<f64>>> {
-        let images = images.into_iter().map(|image| self.image(image)).collect::<PyResult<Vec<_>>>()?;
+        let images = images
+            .into_iter()
+            .map(|image| self.image(image))
+            .collect::<PyResult<Vec<_>>>()?;
         let count = self.data.taxonomy().map_or(0, |taxonomy| taxonomy.classes().len());
         watched(py, threads, &sink, |ctx| {
             let progress = ctx.progress("counting classes", "images", images.len() as u64);
@@ -309,7 +314,10 @@ impl DataSet {
                     let places = classes.pixels().iter().filter_map(|class| usize::try_from(*class).ok());
                     places.for_each(|place| counts[place] += 1);
                     progress.add(1);
-                    Ok(counts.iter().map(|count| *count as f64 / classes.len() as f64).collect())
+                    Ok(counts
+                        .iter()
+                        .map(|count| *count as f64 / classes.len() as f64)
+                        .collect())
                 },
             )
         })
@@ -353,7 +361,10 @@ impl DataSet {
     fn classes_of_pixels(&self, image: &DatasetImage) -> Result<Raster<i16>> {
         let path = image.path(self.data.layout(), Domain::Semantic);
         let indices = self.rgb8(image, Domain::Semantic)?.map(label_index);
-        let beyond = indices.pixels().iter().find(|index| **index >= self.class_of_label.len() as i32);
+        let beyond = indices
+            .pixels()
+            .iter()
+            .find(|index| **index >= self.class_of_label.len() as i32);
         if let Some(index) = beyond {
             let count = self.class_of_label.len();
             let message = format!("holds the label index {index}, and the table has {count} labels");
@@ -364,7 +375,9 @@ impl DataSet {
 }
 
 pub(crate) fn domain(modality: &str) -> PyResult<Domain> {
-    modality.parse().map_err(|e: s3d_io::dataset::UnknownDomain| usage(e.to_string()))
+    modality
+        .parse()
+        .map_err(|e: s3d_io::dataset::UnknownDomain| usage(e.to_string()))
 }
 
 /// The index that a colour stands for, −1 where nothing is seen.

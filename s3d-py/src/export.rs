@@ -51,7 +51,10 @@ pub(crate) fn export(
 ) -> PyResult<Option<String>> {
     let mut options: ExportOptions = serde_json::from_str(options).map_err(|e| usage(e.to_string()))?;
     let conditions = Condition::ALL.map(|condition| condition.to_string()).join(", ");
-    options.allow = allow.iter().map(|word| parsed("allow", word, &conditions)).collect::<PyResult<_>>()?;
+    options.allow = allow
+        .iter()
+        .map(|word| parsed("allow", word, &conditions))
+        .collect::<PyResult<_>>()?;
     let sources = match scenes {
         Scenes::Paths(paths) => SceneSource::list(paths, None, None),
         Scenes::Areas(areas) => areas.iter().map(source).collect::<PyResult<_>>()?,
@@ -64,7 +67,11 @@ pub(crate) fn export(
 
 fn source(area: &Area<'_>) -> PyResult<SceneSource> {
     let mesh = &area.mesh.get().file;
-    let annotations = area.labels.as_ref().map(|labels| annotations(mesh, area.area, labels)).transpose()?;
+    let annotations = area
+        .labels
+        .as_ref()
+        .map(|labels| annotations(mesh, area.area, labels))
+        .transpose()?;
     let location = |(uuid, pose): &(String, [[f64; 4]; 4])| {
         let pose = Pose::from_opencv(*pose).map_err(|e| usage(format!("location {uuid}: {e}")))?;
         Ok(ScanLocation { uuid: uuid.clone(), pose, line: 0 })

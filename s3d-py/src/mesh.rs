@@ -24,7 +24,8 @@ pub(crate) struct Mesh {
 
 /// A word that means something, or an error that says which do.
 pub(crate) fn parsed<T: std::str::FromStr>(what: &str, word: &str, choices: &str) -> PyResult<T> {
-    word.parse().map_err(|_| usage(format!("{what}={word:?}: must be one of {choices}")))
+    word.parse()
+        .map_err(|_| usage(format!("{what}={word:?}: must be one of {choices}")))
 }
 
 type Rows<'py, T> = Bound<'py, PyArray2<T>>;
@@ -42,7 +43,9 @@ impl Mesh {
         sink: Py<PyAny>,
     ) -> PyResult<Self> {
         let up: UpAxis = parsed("up", up, "y, z")?;
-        let units = units.map(|word| parsed::<LengthUnit>("units", word, "m, cm, mm, ft, in")).transpose()?;
+        let units = units
+            .map(|word| parsed::<LengthUnit>("units", word, "m, cm, mm, ft, in"))
+            .transpose()?;
         let origin = if near { MeshOrigin::Near } else { MeshOrigin::OfFile };
         let options = MeshOptions { origin, units, ..MeshOptions::default() };
         let file = watched(py, None, &sink, |ctx| {
@@ -68,7 +71,9 @@ impl Mesh {
         vertex_normals: Option<PyReadonlyArray2<'_, f32>>,
     ) -> PyResult<Self> {
         let faces = arrays::from_rows::<u32, 3>("faces", &faces)?;
-        let normals = vertex_normals.map(|n| arrays::points("vertex_normals", &n)).transpose()?;
+        let normals = vertex_normals
+            .map(|n| arrays::points("vertex_normals", &n))
+            .transpose()?;
         let uvs = uv.map(|uv| arrays::from_rows::<f32, 2>("uv", &uv)).transpose()?;
         let textures = textures.iter().enumerate().map(texture).collect::<PyResult<Vec<_>>>()?;
         let face_materials = match texture_of_face {
@@ -83,7 +88,10 @@ impl Mesh {
                 .transpose()?
                 .unwrap_or_default(),
             uvs: bytemuck::cast_vec::<[f32; 2], Vec2>(uvs.unwrap_or_default()),
-            face_uvs: face_uv.map(|f| arrays::from_rows("face_uv", &f)).transpose()?.unwrap_or_default(),
+            face_uvs: face_uv
+                .map(|f| arrays::from_rows("face_uv", &f))
+                .transpose()?
+                .unwrap_or_default(),
             face_normals: if normals.is_some() { faces.clone() } else { Vec::new() },
             normals: normals.unwrap_or_default(),
             materials: (0..textures.len() as u32).map(material).collect(),
@@ -113,7 +121,9 @@ impl Mesh {
     #[getter]
     fn vertex_colors<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Rows<'py, u8>>> {
         let is_there = !slf.get().mesh().parts().colors.is_empty();
-        is_there.then(|| arrays::view(slf, |mesh| &mesh.parts().colors)).transpose()
+        is_there
+            .then(|| arrays::view(slf, |mesh| &mesh.parts().colors))
+            .transpose()
     }
 
     #[getter]
@@ -126,7 +136,9 @@ impl Mesh {
     #[getter]
     fn face_uv<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Rows<'py, u32>>> {
         let is_there = !slf.get().mesh().parts().face_uvs.is_empty();
-        is_there.then(|| arrays::view(slf, |mesh| &mesh.parts().face_uvs)).transpose()
+        is_there
+            .then(|| arrays::view(slf, |mesh| &mesh.parts().face_uvs))
+            .transpose()
     }
 
     /// Of each face its texture, u32's maximum for none.
@@ -145,7 +157,9 @@ impl Mesh {
     fn textures<'py>(slf: &Bound<'py, Self>) -> PyResult<Vec<(String, Bound<'py, PyArray3<u8>>)>> {
         let show = |(number, texture): (usize, &Texture)| {
             let rows = arrays::view(slf, |mesh| {
-                mesh.textures().get(number).map_or(&[], |texture| texture.image.pixels())
+                mesh.textures()
+                    .get(number)
+                    .map_or(&[], |texture| texture.image.pixels())
             })?;
             let size = [texture.image.height() as usize, texture.image.width() as usize, 3];
             Ok((texture.name.clone(), rows.reshape(size)?))

@@ -126,9 +126,18 @@ pub(crate) fn fill<'py>(
     if within.is_nan() || within < 0.0 {
         return Err(usage(format!("within={within}: must be metres, from 0")));
     }
-    let none_is_null =
-        |(k, label): (usize, &i64)| if *label == -1 { Ok(LabelId::NULL) } else { label_id((k, label)) };
-    let mut ids = labels.iter().enumerate().map(none_is_null).collect::<PyResult<Vec<_>>>()?;
+    let none_is_null = |(k, label): (usize, &i64)| {
+        if *label == -1 {
+            Ok(LabelId::NULL)
+        } else {
+            label_id((k, label))
+        }
+    };
+    let mut ids = labels
+        .iter()
+        .enumerate()
+        .map(none_is_null)
+        .collect::<PyResult<Vec<_>>>()?;
     crate::work::detached(py, None, || fill_labels(mesh.mesh(), &mut ids, within))?;
     Ok(PyArray1::from_iter(py, ids.iter().map(|id| id.0 as i32 - 1)))
 }

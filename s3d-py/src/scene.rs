@@ -87,7 +87,9 @@ impl Scene {
             // Depth and faces are the hits themselves, and so the last to be made.
             let mut words: Vec<&str> = modalities.iter().map(String::as_str).collect();
             words.sort_by_key(|word| (*word == "depth" && !*stored) || *word == "face");
-            let made = words.iter().map(|word| (*word, self.draw(word, &mut hits, &camera, &request)));
+            let made = words
+                .iter()
+                .map(|word| (*word, self.draw(word, &mut hits, &camera, &request)));
             made.collect::<Vec<_>>()
         });
         let dict = PyDict::new(py);
@@ -114,8 +116,11 @@ impl Scene {
         let Some(&first) = origins.first() else { return Err(usage("origins: there are none")) };
         let hits: (Vec<f64>, Vec<i32>) = detached(py, threads, || {
             let ray = |(k, direction): (usize, &_)| {
-                let origin =
-                    if origins.len() == 1 { first } else { origins.get(k).copied().unwrap_or(first) };
+                let origin = if origins.len() == 1 {
+                    first
+                } else {
+                    origins.get(k).copied().unwrap_or(first)
+                };
                 cast_ray(self.tree(), origin, *direction)
                     .map_or((f64::NAN, -1), |hit| (hit.t, hit.face as i32))
             };
@@ -136,7 +141,10 @@ impl Scene {
     ) -> PyResult<Vec<(String, [[f64; 4]; 4])>> {
         let options = PlaceOptions { see, apart_m: apart, seed };
         let placed = watched(py, threads, &sink, |ctx| place_cameras(self.tree(), &options, ctx))?;
-        Ok(placed.into_iter().map(|place| (place.uuid, arrays::world_from_opencv(&place.pose))).collect())
+        Ok(placed
+            .into_iter()
+            .map(|place| (place.uuid, arrays::world_from_opencv(&place.pose)))
+            .collect())
     }
 }
 

@@ -23,7 +23,8 @@ static POOL: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
 fn pool(threads: Option<usize>) -> PyResult<Arc<rayon::ThreadPool>> {
     let start = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.map(Arc::new).map_err(|e| fault(format!("threads cannot be started: {e}")))
+        pool.map(Arc::new)
+            .map_err(|e| fault(format!("threads cannot be started: {e}")))
     };
     if let Some(threads) = threads {
         return start(threads);
@@ -62,7 +63,9 @@ pub(crate) fn watched<T: Send>(
         let pool = pool(threads)?;
         let (told, news) = channel();
         let cancel = Cancel::default();
-        let context = Context::default().cancelled_by(cancel.clone()).observed_by(observer(told));
+        let context = Context::default()
+            .cancelled_by(cancel.clone())
+            .observed_by(observer(told));
         let (outcome, raised) = thread::scope(|scope| {
             let work = scope.spawn(move || pool.install(move || call(&context)));
             let raised = wait(&news, sink, &cancel, || work.is_finished());
@@ -110,7 +113,11 @@ fn wait(
     loop {
         let (batch, ended) = next_batch(news);
         Python::attach(|py| {
-            let told = if raised.is_none() { tell(py, sink, batch, cancel) } else { Ok(()) };
+            let told = if raised.is_none() {
+                tell(py, sink, batch, cancel)
+            } else {
+                Ok(())
+            };
             if let Err(error) = told.and_then(|()| py.check_signals()) {
                 cancel.cancel();
                 raised.get_or_insert(error);

@@ -18,7 +18,9 @@ fn views() -> Vec<Camera> {
     let level = Pose::level(dvec3(3.0, 2.5, 1.5), 0.13);
     let view =
         |k: u32| level.turned(f64::from(k) * std::f64::consts::TAU / 12.0, [0.0, -0.2, 0.1][k as usize % 3]);
-    (0..12).map(|k| Camera::perspective(view(k), 75f64.to_radians(), 1080, 1080)).collect()
+    (0..12)
+        .map(|k| Camera::perspective(view(k), 75f64.to_radians(), 1080, 1080))
+        .collect()
 }
 
 fn bench(c: &mut Criterion, group: &str, size: usize, mesh: &TriMesh) {
@@ -43,7 +45,10 @@ fn rooms(c: &mut Criterion) {
 }
 
 fn faces(c: &mut Criterion) {
-    let most = std::env::var("S3D_BENCH_FACES").ok().and_then(|n| n.parse().ok()).unwrap_or(3_000_000);
+    let most = std::env::var("S3D_BENCH_FACES")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(3_000_000);
     for faces in [30_000, 100_000, 300_000, 1_000_000, 3_000_000, 10_000_000] {
         if faces <= most {
             bench(c, "faces", faces, &scan_like_rooms(3, faces, 1));

@@ -68,8 +68,10 @@ fn pictures(c: &mut Criterion) {
     assert!(whole.coverage() == 1.0 && holes.coverage() < 1.0);
     let views = common::views(pose.location, 1080);
     for (what, cameras) in [("9 views", views), ("panorama", vec![Camera::equirectangular(pose, 4096)])] {
-        let shots: Vec<(Camera, Hits)> =
-            cameras.into_iter().map(|camera| (camera, s3d_render::cast(&scene, &camera))).collect();
+        let shots: Vec<(Camera, Hits)> = cameras
+            .into_iter()
+            .map(|camera| (camera, s3d_render::cast(&scene, &camera)))
+            .collect();
         group.throughput(Throughput::Elements(shots.iter().map(|(_, hits)| hits.face.len() as u64).sum()));
         let mut out = Raster::filled(1, 1, [0; 3]);
         let filter = TextureFilter::default();

@@ -21,8 +21,10 @@ fn shade(c: &mut Criterion) {
         let pretty: Vec<[u8; 3]> = index.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
         let panorama = Camera::equirectangular(Pose::level(location, 0.4), 4096);
         for (what, cameras) in [("9 views", common::views(location, 1080)), ("panorama", vec![panorama])] {
-            let shots: Vec<(Camera, Hits)> =
-                cameras.into_iter().map(|camera| (camera, s3d_render::cast(&scene, &camera))).collect();
+            let shots: Vec<(Camera, Hits)> = cameras
+                .into_iter()
+                .map(|camera| (camera, s3d_render::cast(&scene, &camera)))
+                .collect();
             group
                 .throughput(Throughput::Elements(shots.iter().map(|(_, hits)| hits.face.len() as u64).sum()));
             let mut bench = |channel: &str, shade: &mut dyn FnMut(&Camera, &Hits)| {

@@ -18,7 +18,9 @@ use std::time::Instant;
 
 #[allow(clippy::print_stdout)]
 fn main() -> Result<(), Box<dyn Error>> {
-    let name = std::env::args().nth(1).ok_or("usage: cast_images scan-like|copyroom|office|fine-textures")?;
+    let name = std::env::args()
+        .nth(1)
+        .ok_or("usage: cast_images scan-like|copyroom|office|fine-textures")?;
     let (mesh, location) = common::shaded_scene(&name).ok_or_else(|| format!("no scene {name} here"))?;
     let scene = Scene::new(&mesh);
     let panorama = Camera::equirectangular(Pose::level(location, 0.0), 2048);

@@ -21,7 +21,9 @@ use std::time::Instant;
 
 #[allow(clippy::print_stdout)]
 fn main() -> Result<(), Box<dyn Error>> {
-    let name = std::env::args().nth(1).ok_or("usage: view_images scan-like|copyroom|office|fine-textures")?;
+    let name = std::env::args()
+        .nth(1)
+        .ok_or("usage: view_images scan-like|copyroom|office|fine-textures")?;
     let (mesh, location) = common::shaded_scene(&name).ok_or_else(|| format!("no scene {name} here"))?;
     let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
     let index: Vec<u32> = (0..mesh.faces().len() as u32).collect();
@@ -35,8 +37,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         color_of_face: &color,
     };
     let views = common::views(location, 1080);
-    let shots: Vec<(Camera, Hits)> =
-        views.into_iter().map(|camera| (camera, cast(&scene, &camera))).collect();
+    let shots: Vec<(Camera, Hits)> = views
+        .into_iter()
+        .map(|camera| (camera, cast(&scene, &camera)))
+        .collect();
     let mut images = ViewImages::default();
     for line in std::io::stdin().lines() {
         line?;

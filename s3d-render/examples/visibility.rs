@@ -149,7 +149,10 @@ fn round(scene: &Scene<'_>, cameras: &[Camera], threads: usize) -> Result<Rates,
         work();
     });
     let (wall, user) = (wall.elapsed().as_secs_f64(), user_seconds()? - user);
-    let rays: f64 = cameras.iter().map(|c| f64::from(c.width) * f64::from(c.height) * 1e-6).sum();
+    let rays: f64 = cameras
+        .iter()
+        .map(|c| f64::from(c.width) * f64::from(c.height) * 1e-6)
+        .sum();
     Ok(Rates { core: rays / user, wall: rays / wall })
 }
 
@@ -158,7 +161,11 @@ fn user_seconds() -> Result<f64, Box<dyn Error>> {
     let stat = std::fs::read_to_string("/proc/self/stat")?;
     // After the name in parentheses, utime is field 14 of the line, in ticks of 10 ms.
     let fields = stat.rsplit_once(')').ok_or("no name in /proc/self/stat")?.1;
-    let ticks: u64 = fields.split_whitespace().nth(11).ok_or("no utime in /proc/self/stat")?.parse()?;
+    let ticks: u64 = fields
+        .split_whitespace()
+        .nth(11)
+        .ok_or("no utime in /proc/self/stat")?
+        .parse()?;
     Ok(ticks as f64 / 100.0)
 }
 
@@ -203,7 +210,11 @@ fn dump(folder: &Path, scene: &Scene<'_>, views: &[Camera], panorama: &Camera) -
 
     let mut caster = Caster::new(scene);
     for (k, camera) in views.iter().chain([panorama]).enumerate() {
-        let name = if k < views.len() { format!("view_{k:02}") } else { "pano".to_owned() };
+        let name = if k < views.len() {
+            format!("view_{k:02}")
+        } else {
+            "pano".to_owned()
+        };
         let hits = caster.cast(camera);
         let faces = hits.face.pixels().iter().flat_map(|f| f.to_le_bytes());
         let depths = hits.depth.pixels().iter().flat_map(|d| d.to_le_bytes());

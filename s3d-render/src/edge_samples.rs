@@ -64,7 +64,12 @@ pub fn sample_edges(
         shown: Vec::with_capacity(9),
     };
     let width = camera.width as usize;
-    for (pixel, color) in image.pixels_mut().iter_mut().enumerate().filter(|(pixel, _)| edges[*pixel]) {
+    for (pixel, color) in image
+        .pixels_mut()
+        .iter_mut()
+        .enumerate()
+        .filter(|(pixel, _)| edges[*pixel])
+    {
         *color = sampler.color((pixel % width) as u32, (pixel / width) as u32, *color);
     }
 }
@@ -76,7 +81,10 @@ fn places(samples: u32) -> Vec<DVec2> {
     let mut columns: Vec<u32> = (0..samples).collect();
     columns.sort_by(|a, b| turn(*a).total_cmp(&turn(*b)));
     let middle = |k: u32| (f64::from(k) + 0.5) / f64::from(samples);
-    (0..samples).zip(columns).map(|(row, column)| dvec2(middle(column), middle(row))).collect()
+    (0..samples)
+        .zip(columns)
+        .map(|(row, column)| dvec2(middle(column), middle(row)))
+        .collect()
 }
 
 /// How many pairs of faces are remembered, a power of two: neighbours meet in many pixels.
@@ -133,7 +141,10 @@ impl Edges<'_> {
                 }
             }
         }
-        edges.iter_mut().zip(faces).for_each(|(edge, face)| *edge &= *face != NO_FACE);
+        edges
+            .iter_mut()
+            .zip(faces)
+            .for_each(|(edge, face)| *edge &= *face != NO_FACE);
         edges
     }
 
@@ -175,7 +186,11 @@ fn meeting(mesh: &TriMesh, f: u32, g: u32) -> Meeting {
         return Meeting::Edge;
     }
     let (a, b) = (mesh.triangle(f), mesh.triangle(g));
-    if a.iter().any(|corner| b.contains(corner)) { Meeting::Smooth } else { Meeting::Parallel }
+    if a.iter().any(|corner| b.contains(corner)) {
+        Meeting::Smooth
+    } else {
+        Meeting::Parallel
+    }
 }
 
 /// A face before the camera, ready to be met by many rays.
@@ -196,7 +211,11 @@ impl Front {
     /// exactly.
     fn distance(&self, direction: DVec3) -> Option<f64> {
         let is_inside = self.sides.iter().all(|side| side.dot(direction) >= 0.0);
-        if is_inside { self.plane.distance(direction) } else { None }
+        if is_inside {
+            self.plane.distance(direction)
+        } else {
+            None
+        }
     }
 }
 
@@ -282,7 +301,8 @@ impl Sampler<'_, '_> {
         let hit =
             |(face, front): &(u32, Option<Front>)| front.as_ref()?.distance(direction).map(|t| (*face, t));
         let hits = self.near.iter().filter_map(hit);
-        hits.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(face, _)| face)
+        hits.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
+            .map(|(face, _)| face)
     }
 }
 
@@ -359,7 +379,13 @@ mod tests {
         assert!(before > 80.0 && worst < 20.0 && between > 30, "{before} {worst} {between}");
         // What shows nothing stays, and what shows something is not black.
         let seen = |face: &u32| *face != NO_FACE;
-        assert!(image.pixels().iter().zip(hits.face.pixels()).all(|(c, f)| (*c != [0; 3]) == seen(f)));
+        assert!(
+            image
+                .pixels()
+                .iter()
+                .zip(hits.face.pixels())
+                .all(|(c, f)| (*c != [0; 3]) == seen(f))
+        );
     }
 
     #[test]
@@ -370,12 +396,20 @@ mod tests {
             Camera::equirectangular(pose(), 128),
         ] {
             let (plain, image, hits) = images(&camera, 4);
-            let differs = plain.pixels().iter().zip(image.pixels()).filter(|(a, b)| a != b).count();
+            let differs = plain
+                .pixels()
+                .iter()
+                .zip(image.pixels())
+                .filter(|(a, b)| a != b)
+                .count();
             assert!(differs > 10, "{differs}");
             for (x, y) in (1..camera.width - 1).flat_map(|x| (1..camera.height - 1).map(move |y| (x, y))) {
                 let face = hits.face.at(x, y);
                 let around = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
-                if around.iter().all(|(u, v)| hits.face.at(*u, *v) / 2 == face / 2 && face != NO_FACE) {
+                if around
+                    .iter()
+                    .all(|(u, v)| hits.face.at(*u, *v) / 2 == face / 2 && face != NO_FACE)
+                {
                     assert_eq!(plain.at(x, y), image.at(x, y));
                 }
             }

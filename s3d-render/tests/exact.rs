@@ -258,7 +258,9 @@ fn an_image_may_be_as_thin_as_it_likes() {
     let thin = Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 1e-3, 1, 70_000);
     assert_eq!(check(&mesh, &thin, 1), Ok(()));
     assert!(
-        Caster::new(&Scene::new(&mesh)).cast(&thin).face.pixels()[67_100..68_900].iter().all(|&f| f >= 100)
+        Caster::new(&Scene::new(&mesh)).cast(&thin).face.pixels()[67_100..68_900]
+            .iter()
+            .all(|&f| f >= 100)
     );
     let wide = Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 2.0, 70_000, 1);
     assert_eq!(check(&scan_like(2000, 5), &wide, 1), Ok(()));

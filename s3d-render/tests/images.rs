@@ -16,7 +16,9 @@ fn same(fast: &Hits, exact: &Hits, what: &str) {
         .zip(fast.depth.pixels().iter().zip(exact.depth.pixels()));
     // Depth may be rounded the other way.
     let close = |s: f32, t: f32| (i64::from(s.to_bits()) - i64::from(t.to_bits())).abs() <= 1;
-    let differ = pixels.enumerate().find(|(_, ((f, g), (s, t)))| f != g || !close(**s, **t));
+    let differ = pixels
+        .enumerate()
+        .find(|(_, ((f, g), (s, t)))| f != g || !close(**s, **t));
     assert!(differ.is_none(), "{what}: the first pixel that differs is {differ:?}");
 }
 
@@ -117,7 +119,10 @@ fn coplanar_faces_and_layers_closer_than_rounding() {
     for y in [2.0, 2.0, 2.000_001, 2.000_01, 2.000_04, 2.001, 1.999_999_9] {
         corners.extend([vec3(-1.0, y, -1.0), vec3(1.0, y, -0.9), vec3(0.1, y, 1.0)]);
     }
-    let faces = (0..corners.len() as u32 / 3).rev().map(|f| [3 * f, 3 * f + 2, 3 * f + 1]).collect();
+    let faces = (0..corners.len() as u32 / 3)
+        .rev()
+        .map(|f| [3 * f, 3 * f + 2, 3 * f + 1])
+        .collect();
     let mesh = TriMesh::from_faces(corners, faces).unwrap();
     check(&mesh, &odd_cameras(dvec3(0.1, 0.3, 0.2)), 1);
     check(&mesh, &around(dvec3(0.1, 0.3, 0.2), 64), 1);

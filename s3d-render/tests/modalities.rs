@@ -71,7 +71,12 @@ fn a_wall_ahead_has_one_depth_and_the_papers_normal() {
     // Right and left walls face left and right; the floor faces up (green is down), the ceiling down.
     for (w, expected) in [(4, [0, 128, 128]), (5, [255, 128, 128]), (0, [128, 0, 128]), (1, [128, 255, 128])]
     {
-        let k = hits.face.pixels().iter().position(|&f| wall(w)(f)).expect("every wall but one is in sight");
+        let k = hits
+            .face
+            .pixels()
+            .iter()
+            .position(|&f| wall(w)(f))
+            .expect("every wall but one is in sight");
         assert_eq!(normal.pixels()[k], expected, "wall {w}");
     }
     assert!(!hits.face.pixels().iter().any(|&f| wall(3)(f)), "what lies behind is not seen");
@@ -122,7 +127,9 @@ fn coordinates_project_back_to_their_pixels() {
             for x in 0..camera.width {
                 let p = Vec3::from(xyz.at(x, y)).as_dvec3();
                 let (pixel, depth) = camera.project(p).unwrap();
-                let off = (pixel.x - f64::from(x) - 0.5).abs().max((pixel.y - f64::from(y) - 0.5).abs());
+                let off = (pixel.x - f64::from(x) - 0.5)
+                    .abs()
+                    .max((pixel.y - f64::from(y) - 0.5).abs());
                 assert!(off < 1e-3, "{pixel} for ({x}, {y})");
                 assert!((depth - f64::from(hits.depth.at(x, y))).abs() < 1e-5);
                 // On a wall, to the rounding of f32; to that of half floats.
@@ -337,7 +344,13 @@ fn a_magnified_texture_is_bilinear() {
 }
 
 fn checker(size: u32) -> Raster<[u8; 3]> {
-    let pixel = |k: u32| if (k % size + k / size).is_multiple_of(2) { [255; 3] } else { [0; 3] };
+    let pixel = |k: u32| {
+        if (k % size + k / size).is_multiple_of(2) {
+            [255; 3]
+        } else {
+            [0; 3]
+        }
+    };
     Raster::from_vec(size, size, (0..size * size).map(pixel).collect())
 }
 
@@ -361,7 +374,13 @@ fn a_distant_checkerboard_is_grey() {
 fn a_floor_seen_at_an_angle_keeps_what_runs_along_it() {
     // Stripes that run away from the camera, 4 pixels of the texture each: at a grazing angle plain mipmaps
     // blur them.
-    let pixel = |k: u32| if (k % 512 / 4).is_multiple_of(2) { [250; 3] } else { [10; 3] };
+    let pixel = |k: u32| {
+        if (k % 512 / 4).is_multiple_of(2) {
+            [250; 3]
+        } else {
+            [10; 3]
+        }
+    };
     let mesh = textured(Raster::from_vec(512, 512, (0..512 * 512).map(pixel).collect()), Wrap::Clamp);
     let pose = Pose::level(dvec3(0.0, -1.9, 0.25), 0.0);
     let camera = Camera::perspective(pose, 50f64.to_radians(), 400, 400);
@@ -371,8 +390,10 @@ fn a_floor_seen_at_an_angle_keeps_what_runs_along_it() {
     let contrast = |max_taps: u32| {
         let filter = s3d_render::TextureFilter { max_taps };
         let image = s3d_render::rgb_image_with(&scene, &mip_maps, &hits, &camera, &filter);
-        let row: Vec<u8> =
-            (120..280).filter(|&x| hits.face.at(x, 235) < 2).map(|x| image.at(x, 235)[0]).collect();
+        let row: Vec<u8> = (120..280)
+            .filter(|&x| hits.face.at(x, 235) < 2)
+            .map(|x| image.at(x, 235)[0])
+            .collect();
         assert!(row.len() > 100);
         row.iter().max().unwrap() - row.iter().min().unwrap()
     };
@@ -493,7 +514,10 @@ fn rgb_is_what_single_pixels_give() {
 #[test]
 fn colours_of_corners_are_what_single_pixels_give() {
     let mut parts = room_parts();
-    parts.colors = (0..24u32).map(|k| (k * 0x35_79_13).to_le_bytes()).map(|[r, g, b, _]| [r, g, b]).collect();
+    parts.colors = (0..24u32)
+        .map(|k| (k * 0x35_79_13).to_le_bytes())
+        .map(|[r, g, b, _]| [r, g, b])
+        .collect();
     let mesh = TriMesh::new(parts).unwrap();
     for camera in all_kinds(EYE) {
         close(&mesh, &camera, 8);
@@ -540,7 +564,11 @@ fn images_are_what_single_pixels_give() {
             let (face, t) = (hits.face.pixels()[k], f64::from(hits.depth.pixels()[k]));
             assert_eq!(depth.pixels()[k], (t * 512.0 + 0.5) as u16);
             let p = camera.pose.location + rays.at(i, j) * t;
-            let p = if t.is_finite() { p.as_vec3().to_array() } else { [0.0; 3] };
+            let p = if t.is_finite() {
+                p.as_vec3().to_array()
+            } else {
+                [0.0; 3]
+            };
             assert_eq!(xyz.pixels()[k], p, "({i}, {j})");
             assert_eq!(half.pixels()[k], p.map(half::f16::from_f32), "({i}, {j})");
             if face == NO_FACE {

@@ -187,6 +187,8 @@ fn write_picture(
     let read = Images::read(data, &pair.other, table, widths, (reader, faults))?;
     let Some(images) = read else { return Ok(None) };
     let path = pair.other.path(data.layout(), Domain::Rgb);
-    let (picture, _) = images.picture(|_| None).map_err(|e| FileError::format(&path, e.to_string()))?;
+    let (picture, _) = images
+        .picture(|_| None)
+        .map_err(|e| FileError::format(&path, e.to_string()))?;
     Ok(Some(scripts.write(&format!("other_{number}"), &picture)?))
 }

@@ -43,14 +43,18 @@ pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomEntry
     for &area in data.areas() {
         let path = data.layout().rooms_json(area);
         let found: Vec<Room> = json(data, &path, faults)?.unwrap_or_default();
-        let instances = faults.keep(data.layout().root(), data.instances(area))?.unwrap_or_default();
+        let instances = faults
+            .keep(data.layout().root(), data.instances(area))?
+            .unwrap_or_default();
         let mut heights: BTreeMap<String, [f32; 2]> = BTreeMap::new();
         for InstanceEntry { room, bbox: [_, _, low, _, _, high], .. } in instances {
             let range = heights.entry(room).or_insert([low, high]);
             *range = [range[0].min(low), range[1].max(high)];
         }
         rooms.extend(found.into_iter().map(|Room { room: name, floor_m2, outline }| {
-            let rings = outline.into_iter().flat_map(|p| std::iter::once(p.outer).chain(p.holes));
+            let rings = outline
+                .into_iter()
+                .flat_map(|p| std::iter::once(p.outer).chain(p.holes));
             let millimetres = |ring: Vec<[f64; 2]>| ring.iter().map(|p| p.map(|c| rounded(c, 3))).collect();
             let heights = heights.get(&name).map(|range| range.map(|z| rounded(z.into(), 3)));
             RoomEntry { area, name, floor_m2, heights, outline: rings.map(millimetres).collect() }
@@ -88,7 +92,10 @@ pub(crate) fn areas(data: &DataSet) -> Result<Vec<Value>> {
 
 pub(crate) fn classes(data: &DataSet) -> Vec<ClassEntry> {
     let of = |t: &s3d_label::Taxonomy| {
-        t.classes().iter().map(|c| ClassEntry { name: c.name(), color: t.color(*c) }).collect()
+        t.classes()
+            .iter()
+            .map(|c| ClassEntry { name: c.name(), color: t.color(*c) })
+            .collect()
     };
     data.taxonomy().map(of).unwrap_or_default()
 }

@@ -153,7 +153,10 @@ impl<'a> Content<'a> {
                 images.push(image);
             }
         }
-        content.locations = rooms.into_iter().map(|((area, uuid), room)| (area, uuid, room)).collect();
+        content.locations = rooms
+            .into_iter()
+            .map(|((area, uuid), room)| (area, uuid, room))
+            .collect();
         for image in images {
             match image.frame {
                 Frame::View(_) => {
@@ -176,15 +179,24 @@ impl<'a> Content<'a> {
     }
 
     fn location_of(&self, area: u32, uuid: &str) -> Option<usize> {
-        self.locations.binary_search_by(|(a, u, _)| (*a, u.as_str()).cmp(&(area, uuid))).ok()
+        self.locations
+            .binary_search_by(|(a, u, _)| (*a, u.as_str()).cmp(&(area, uuid)))
+            .ok()
     }
 
     /// Where its images are shown, by area, scan location, room and frame.
     pub(crate) fn shown(&self) -> BTreeMap<(u32, String, String, Frame), Shown> {
         let panoramas = self.panoramas.iter().map(|(i, image)| (image, Shown::Panorama(*i)));
-        let views = self.views.iter().zip(&self.pictures).map(|(image, i)| (image, Shown::Picture(*i)));
+        let views = self
+            .views
+            .iter()
+            .zip(&self.pictures)
+            .map(|(image, i)| (image, Shown::Picture(*i)));
         let key = |image: &DatasetImage| (image.area, image.uuid.clone(), image.room.clone(), image.frame);
-        panoramas.chain(views).map(|(image, shown)| (key(image), shown)).collect()
+        panoramas
+            .chain(views)
+            .map(|(image, shown)| (key(image), shown))
+            .collect()
     }
 
     /// Writes the meshes and pictures, area by area.
@@ -226,12 +238,16 @@ impl<'a> Content<'a> {
         let mut jobs: Vec<Job<'_>> = panoramas.map(|(i, image)| Job::Panorama(*i, image)).collect();
         let first = self.views.partition_point(|view| view.area < area);
         let of_area = self.views.get(first..).unwrap_or_default();
-        let of_area = of_area.get(..of_area.partition_point(|view| view.area == area)).unwrap_or_default();
+        let of_area = of_area
+            .get(..of_area.partition_point(|view| view.area == area))
+            .unwrap_or_default();
         let first = self.pictures.get(first).map_or(0, |picture| picture / THUMBS_PER_FILE);
         let chunks = of_area.chunks(THUMBS_PER_FILE).enumerate();
         jobs.extend(chunks.map(|(i, images)| Job::Views(first + i, images)));
         let (of_panorama, of_view) = (options.of_panoramas(), options.of_views());
-        let scene = mesh.filter(|mesh| mesh.faces().len() < FACES_OF_PICTURES).map(Scene::new);
+        let scene = mesh
+            .filter(|mesh| mesh.faces().len() < FACES_OF_PICTURES)
+            .map(Scene::new);
         let results = map_in_order(
             ctx,
             &jobs,
@@ -344,7 +360,12 @@ impl<'a> Content<'a> {
                 *sum = Surface { faces: sum.faces + faces, m2: sum.m2 + m2 };
             }
         }
-        for seen in made.panoramas.iter().chain(&made.views).filter_map(|made| made.seen.as_ref()) {
+        for seen in made
+            .panoramas
+            .iter()
+            .chain(&made.views)
+            .filter_map(|made| made.seen.as_ref())
+        {
             pixels_unlabelled += seen.pixels_unlabelled;
             for (class, pixels) in &seen.pixels_by_class {
                 if let Some(sum) = pixels_by_class.get_mut(*class) {
@@ -404,7 +425,9 @@ impl<'a> Content<'a> {
         let mut entries: Vec<LocationEntry> = self.locations.iter().map(entry).collect();
         // A location without a panorama stands where its views do.
         for (image, made) in self.views.iter().zip(&made.views) {
-            let entry = self.location_of(image.area, &image.uuid).and_then(|i| entries.get_mut(i));
+            let entry = self
+                .location_of(image.area, &image.uuid)
+                .and_then(|i| entries.get_mut(i));
             if let (Some(entry), Some(located)) = (entry, &made.located) {
                 (entry.position, entry.azimuth_rad) = (Some(located.original.0), Some(located.original.1));
             }
@@ -466,7 +489,9 @@ impl<'a> Content<'a> {
                 seen: made.seen.clone(),
                 ..ViewEntry::default()
             };
-            let record = kept.get(&(image.area, image.uuid.as_str(), frame)).filter(|_| !is_photograph);
+            let record = kept
+                .get(&(image.area, image.uuid.as_str(), frame))
+                .filter(|_| !is_photograph);
             entries.push(match record {
                 Some((view, place)) => of_record(entry, view, *place),
                 None => entry,
@@ -474,7 +499,9 @@ impl<'a> Content<'a> {
         }
         for (area, view, place) in dropped {
             let location = self.location_of(area, &view.camera_uuid);
-            let room = location.and_then(|i| self.locations.get(i)).and_then(|(.., room)| room.clone());
+            let room = location
+                .and_then(|i| self.locations.get(i))
+                .and_then(|(.., room)| room.clone());
             let entry = ViewEntry { area, location, room: room.unwrap_or_default(), ..ViewEntry::default() };
             entries.push(of_record(entry, view, place));
         }

@@ -39,18 +39,27 @@ impl Faults {
 
     /// Adds those that another thread has found.
     pub(crate) fn extend(&mut self, others: Vec<Fault>) {
-        others.into_iter().for_each(|Fault { path, message }| self.add(path, &message));
+        others
+            .into_iter()
+            .for_each(|Fault { path, message }| self.add(path, &message));
     }
 
     pub(crate) fn into_vec(self) -> Vec<Fault> {
-        self.0.into_iter().map(|(path, message)| Fault { path, message }).collect()
+        self.0
+            .into_iter()
+            .map(|(path, message)| Fault { path, message })
+            .collect()
     }
 }
 
 /// How a file is called below the data set's folder.
 pub(crate) fn name(root: &Path, path: &Path) -> String {
     let below = path.strip_prefix(root).unwrap_or(path);
-    below.iter().map(|part| part.to_string_lossy()).collect::<Vec<_>>().join("/")
+    below
+        .iter()
+        .map(|part| part.to_string_lossy())
+        .collect::<Vec<_>>()
+        .join("/")
 }
 
 #[cfg(test)]

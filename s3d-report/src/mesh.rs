@@ -118,14 +118,21 @@ pub(crate) fn write(
         bytes.push(scripts.write(&format!("faces_{area}"), &face_votes(votes))?);
     }
     let labels = votes.as_ref().map_or(&[][..], |votes| &votes.label);
-    let surfaces = table.map(|table| surface_by_class(mesh, labels, table)).unwrap_or_default();
+    let surfaces = table
+        .map(|table| surface_by_class(mesh, labels, table))
+        .unwrap_or_default();
     let instances = faults.keep(root, data.instances(area))?.unwrap_or_default();
-    let boxes: Vec<BoxEntry> =
-        instances.into_iter().map(|i| BoxEntry { label: i.label_index, r#box: i.bbox }).collect();
+    let boxes: Vec<BoxEntry> = instances
+        .into_iter()
+        .map(|i| BoxEntry { label: i.label_index, r#box: i.bbox })
+        .collect();
     if !boxes.is_empty() {
         bytes.push(scripts.write(&format!("boxes_{area}"), &boxes)?);
     }
-    let materials = mesh.materials().iter().map(|m| MaterialEntry { color: m.color, texture: m.texture });
+    let materials = mesh
+        .materials()
+        .iter()
+        .map(|m| MaterialEntry { color: m.color, texture: m.texture });
     let bounds = mesh.aabb();
     let entry = MeshEntry {
         area,
@@ -166,7 +173,9 @@ fn vote_spread(mesh: &TriMesh, votes: &FaceVoteColumns) -> VoteSpread {
     for (face, (all, (first, second))) in (0..).zip(counts) {
         let m2 = mesh.area(face);
         // The bin of 2^k + 1 to 2^(k + 1) votes is k + 2.
-        let bin = all.checked_sub(1).map_or(0, |less| (u32::BITS - less.leading_zeros()) as usize + 1);
+        let bin = all
+            .checked_sub(1)
+            .map_or(0, |less| (u32::BITS - less.leading_zeros()) as usize + 1);
         if spread.votes.len() <= bin {
             spread.votes.resize(bin + 1, Surface::default());
         }
@@ -174,7 +183,9 @@ fn vote_spread(mesh: &TriMesh, votes: &FaceVoteColumns) -> VoteSpread {
             bin.add(m2);
         }
         let lead = u64::from(first.saturating_sub(*second));
-        let part = (10 * lead).checked_div(u64::from(*all)).map(|part| part.min(9) as usize);
+        let part = (10 * lead)
+            .checked_div(u64::from(*all))
+            .map(|part| part.min(9) as usize);
         if let Some(bin) = part.and_then(|part| spread.margin.get_mut(part)) {
             bin.add(m2);
         }
@@ -195,7 +206,9 @@ fn mean_colors(mesh: &TriMesh, vertex_of: &[u32], vertices: usize) -> Vec<[u8; 3
             *count += 1;
         }
     }
-    sums.into_iter().map(|(sum, n)| sum.map(|sum| ((sum + n / 2) / n.max(1)) as u8)).collect()
+    sums.into_iter()
+        .map(|(sum, n)| sum.map(|sum| ((sum + n / 2) / n.max(1)) as u8))
+        .collect()
 }
 
 /// Steps of 16 bits from the least to the greatest of some numbers, axis by axis.
@@ -208,12 +221,17 @@ impl<const N: usize> Steps<N> {
     fn of(values: &[[f64; N]]) -> Self {
         let (mut least, mut most) = ([f64::INFINITY; N], [f64::NEG_INFINITY; N]);
         for value in values {
-            least.iter_mut().zip(value).for_each(|(least, v)| *least = least.min(*v));
+            least
+                .iter_mut()
+                .zip(value)
+                .for_each(|(least, v)| *least = least.min(*v));
             most.iter_mut().zip(value).for_each(|(most, v)| *most = most.max(*v));
         }
         let origin = least.map(|v| rounded(v, 9));
         let mut step = most;
-        step.iter_mut().zip(origin).for_each(|(step, v)| *step = (*step - v) / 65_535.0);
+        step.iter_mut()
+            .zip(origin)
+            .for_each(|(step, v)| *step = (*step - v) / 65_535.0);
         Self { origin, step }
     }
 
@@ -222,7 +240,9 @@ impl<const N: usize> Steps<N> {
             true => ((value - origin) / step).round() as u16,
             false => 0,
         };
-        let steps = values.iter().flat_map(|v| v.iter().zip(&self.origin).zip(&self.step).map(axis));
+        let steps = values
+            .iter()
+            .flat_map(|v| v.iter().zip(&self.origin).zip(&self.step).map(axis));
         packed(steps, u16::to_le_bytes)
     }
 }
@@ -241,7 +261,10 @@ impl Shown<'_> {
 
     fn material_of(&self, i: usize) -> usize {
         let none = self.mesh.materials().len();
-        self.mesh.material_of(self.original(i)).map_or(none, |material| material as usize).min(MATERIALS - 1)
+        self.mesh
+            .material_of(self.original(i))
+            .map_or(none, |material| material as usize)
+            .min(MATERIALS - 1)
     }
 
     fn part(&self, faces: &[usize]) -> Part {

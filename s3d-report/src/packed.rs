@@ -20,7 +20,10 @@ pub(crate) fn packed<T, const N: usize>(
     let bytes: Vec<u8> = numbers.into_iter().flat_map(bytes).collect();
     let mut stream = ZlibEncoder::new(Vec::new(), Compression::default());
     // Nothing fails in memory.
-    let stream = stream.write_all(&bytes).and_then(|()| stream.finish()).unwrap_or_default();
+    let stream = stream
+        .write_all(&bytes)
+        .and_then(|()| stream.finish())
+        .unwrap_or_default();
     BASE64_STANDARD.encode(stream)
 }
 

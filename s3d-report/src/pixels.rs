@@ -82,11 +82,15 @@ impl Images {
     ) -> Result<Option<Self>> {
         let mut files = Files { data, image, size: None, reader, faults };
         let mut no_color = None;
-        let rgb = files.colors(Domain::Rgb, widths.rgb, MISSING_COLOR)?.map(|(rgb, missing)| {
-            no_color = Some(missing);
-            rgb
-        });
-        let normal = files.colors(Domain::Normal, widths.lossless, MISSING_NORMAL)?.map(|(normal, _)| normal);
+        let rgb = files
+            .colors(Domain::Rgb, widths.rgb, MISSING_COLOR)?
+            .map(|(rgb, missing)| {
+                no_color = Some(missing);
+                rgb
+            });
+        let normal = files
+            .colors(Domain::Normal, widths.lossless, MISSING_NORMAL)?
+            .map(|(normal, _)| normal);
         let (mut label, mut counted) = (None, None);
         if let Some(Labels { image, counts, path }) = files.labels(widths.lossless, table)? {
             label = Some(image);
@@ -97,14 +101,20 @@ impl Images {
             }
         }
         let mut no_depth = None;
-        let depth = files.depth(widths.lossless, counted.is_none())?.map(|(depth, missing)| {
-            no_depth = missing;
-            depth
-        });
+        let depth = files
+            .depth(widths.lossless, counted.is_none())?
+            .map(|(depth, missing)| {
+                no_depth = missing;
+                depth
+            });
         let all_gone = rgb.is_none() && normal.is_none() && label.is_none() && depth.is_none();
         let Some(size) = files.size.filter(|_| !all_gone) else { return Ok(None) };
         // Depth misses what is beyond its range; labels do not.
-        let missing = counted.as_ref().map(|counted| counted.missing).or(no_depth).or(no_color);
+        let missing = counted
+            .as_ref()
+            .map(|counted| counted.missing)
+            .or(no_depth)
+            .or(no_color);
         let seen = shares(size, counted, missing);
         Ok(Some(Self { size, seen, widths, rgb, normal, label, depth }))
     }
@@ -118,7 +128,11 @@ impl Images {
         let size = shown_size(self.size, self.widths.lossless);
         // Of the smaller image: means of means.
         let small = |width, rgb: &Raster<_>| mean(rgb, shown_size(self.size, width), Some(MISSING_COLOR));
-        let thumb = self.widths.thumb.zip(self.rgb.as_ref()).map(|(width, rgb)| small(width, rgb));
+        let thumb = self
+            .widths
+            .thumb
+            .zip(self.rgb.as_ref())
+            .map(|(width, rgb)| small(width, rgb));
         let jpeg = |image: Option<&Raster<[u8; 3]>>| image.map(jpeg_url).transpose();
         let depth = |depth: &Raster<u16>| png_url(&depth.map(|v| pack(u32::from(v))), Content::Photo);
         let picture = Picture {
@@ -207,7 +221,9 @@ impl Files<'_> {
             lines.for_each(|line| {
                 nearest.line(line, u16::from_be_bytes);
                 let is_missing = |sample: &&[u8; 2]| u16::from_be_bytes(**sample) == MISSING_DEPTH;
-                missing.iter_mut().for_each(|n| *n += line.iter().filter(is_missing).count() as u64);
+                missing
+                    .iter_mut()
+                    .for_each(|n| *n += line.iter().filter(is_missing).count() as u64);
             });
             (nearest.finish(), missing)
         })?;
@@ -301,7 +317,10 @@ struct Counted {
 fn shares([width, height]: [u32; 2], counted: Option<Counted>, missing: Option<u64>) -> Shares {
     let pixels = (u64::from(width) * u64::from(height)) as f64;
     let share = |count: u64| rounded(count as f64 / pixels, 4);
-    let classes = counted.iter().flat_map(|c| &c.by_class).map(|(class, n)| (*class, share(*n)));
+    let classes = counted
+        .iter()
+        .flat_map(|c| &c.by_class)
+        .map(|(class, n)| (*class, share(*n)));
     Shares {
         coverage: missing.map(|missing| rounded(1.0 - missing as f64 / pixels, 4)),
         unlabelled: counted.as_ref().map(|c| share(c.unlabelled)),

@@ -19,7 +19,14 @@ pub(crate) fn shown_size(size: [u32; 2], width: u32) -> [u32; 2] {
     let stride = ((size[0] + width / 2) / width).max(1);
     let even = size[0] / stride;
     let is_even = size.iter().all(|side| side % stride == 0);
-    reduced_size(size, if is_even && 8 * even.abs_diff(width) <= width { even } else { width })
+    reduced_size(
+        size,
+        if is_even && 8 * even.abs_diff(width) <= width {
+            even
+        } else {
+            width
+        },
+    )
 }
 
 /// The pixel of an axis of `from` pixels that pixel `i` of `to` shows: the one in which its centre lies.
@@ -49,7 +56,12 @@ impl<T: Copy> Nearest<T> {
     pub(crate) fn line<P: Copy>(&mut self, line: &[P], value: impl Fn(P) -> T) {
         let next = (self.pixels.len() / self.columns.len().max(1)) as u32;
         if next < self.size[1] && self.y == source_pixel(next, self.height, self.size[1]) {
-            self.pixels.extend(self.columns.iter().filter_map(|x| line.get(*x)).map(|pixel| value(*pixel)));
+            self.pixels.extend(
+                self.columns
+                    .iter()
+                    .filter_map(|x| line.get(*x))
+                    .map(|pixel| value(*pixel)),
+            );
         }
         self.y += 1;
     }
@@ -163,7 +175,11 @@ struct Divisor {
 impl Divisor {
     /// By at most so many.
     fn new(most: u64) -> Self {
-        Self { inverse: (0..=most.min(u64::from(FEW - 1))).map(|n| (1 << 32) / n.max(1) + 1).collect() }
+        Self {
+            inverse: (0..=most.min(u64::from(FEW - 1)))
+                .map(|n| (1 << 32) / n.max(1) + 1)
+                .collect(),
+        }
     }
 
     /// The mean of so many pixels, from the sums of their channels.
@@ -381,7 +397,11 @@ mod tests {
             let seen: Vec<[u8; 3]> = inside.filter(|pixel| Some(*pixel) != missing).collect();
             let n = seen.len() as u32;
             let sum = |c: usize| seen.iter().map(|pixel| u32::from(pixel[c])).sum::<u32>();
-            if n == 0 { missing.unwrap() } else { [0, 1, 2].map(|c| ((sum(c) + n / 2) / n) as u8) }
+            if n == 0 {
+                missing.unwrap()
+            } else {
+                [0, 1, 2].map(|c| ((sum(c) + n / 2) / n) as u8)
+            }
         };
         Raster::from_vec(w, h, (0..h).flat_map(|j| (0..w).map(move |i| pixel(i, j))).collect())
     }
@@ -409,7 +429,11 @@ mod tests {
                 let pixels = (0..w * h).map(|_| [byte(), byte(), byte()].map(|v| (u32::from(v) % few) as u8));
                 let mut image = Raster::from_vec(w, h, pixels.collect());
                 // A part of it is missing.
-                image.pixels_mut().iter_mut().step_by(5).for_each(|pixel| *pixel = [255; 3]);
+                image
+                    .pixels_mut()
+                    .iter_mut()
+                    .step_by(5)
+                    .for_each(|pixel| *pixel = [255; 3]);
                 for missing in [None, Some([0; 3]), Some([255; 3]), Some([1, 0, 1])] {
                     let mut lines = Mean::new([w, h], size, missing);
                     image.rows().for_each(|line| lines.line(line));

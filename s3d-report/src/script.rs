@@ -51,7 +51,11 @@ impl Scripts {
         match self {
             Self::Files(folder) => {
                 let is_packed = text.len() > long;
-                let text = if is_packed { packed(text.into_bytes(), u8::to_le_bytes) } else { text };
+                let text = if is_packed {
+                    packed(text.into_bytes(), u8::to_le_bytes)
+                } else {
+                    text
+                };
                 let [key, text] = [key, &text].map(|text| serde_json::to_string(text).map_err(failed));
                 let is_packed = if is_packed { ",true" } else { "" };
                 let script = format!("s3dReport({},{}{is_packed});\n", key?, text?);
@@ -102,14 +106,20 @@ mod tests {
         let hostile = "</script><!--\"'\\\n\u{2028}";
         Scripts::Files(dir.path().to_owned()).write("index", &hostile).unwrap();
         let script = std::fs::read_to_string(dir.path().join("data/index.js")).unwrap();
-        let text = script.strip_prefix("s3dReport(\"index\",").unwrap().strip_suffix(");\n").unwrap();
+        let text = script
+            .strip_prefix("s3dReport(\"index\",")
+            .unwrap()
+            .strip_suffix(");\n")
+            .unwrap();
         let json: String = serde_json::from_str(text).unwrap();
         assert_eq!(serde_json::from_str::<String>(&json).unwrap(), hostile);
 
         let page = Scripts::Page(Mutex::default());
         page.write("index", &hostile).unwrap();
         let element = page.into_elements().next().unwrap();
-        let text = element.strip_prefix("<script type=\"application/json\" data-key=\"index\">").unwrap();
+        let text = element
+            .strip_prefix("<script type=\"application/json\" data-key=\"index\">")
+            .unwrap();
         let text = text.strip_suffix("</script>\n").unwrap();
         assert!(!text.contains('<'));
         assert_eq!(serde_json::from_str::<String>(text).unwrap(), hostile);
@@ -125,8 +135,11 @@ mod tests {
         let bytes = scripts.write_list("index", &list).unwrap();
         assert!(bytes < plain / 100, "{bytes} of {plain}");
         let script = std::fs::read_to_string(dir.path().join("data/index.js")).unwrap();
-        let text =
-            script.strip_prefix("s3dReport(\"index\",\"").unwrap().strip_suffix("\",true);\n").unwrap();
+        let text = script
+            .strip_prefix("s3dReport(\"index\",\"")
+            .unwrap()
+            .strip_suffix("\",true);\n")
+            .unwrap();
         let stream = BASE64_STANDARD.decode(text).unwrap();
         let read: Vec<String> = serde_json::from_reader(ZlibDecoder::new(&*stream)).unwrap();
         assert_eq!(read, list);

@@ -45,8 +45,10 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
     let selection = Selection::default();
     let mut ranked: Vec<(usize, Place)> = Vec::with_capacity(views.len());
     for members in pools.into_values() {
-        let mut members: Vec<(usize, u32, &ViewRecord)> =
-            members.into_iter().filter_map(|i| views.get(i).map(|(area, view)| (i, *area, *view))).collect();
+        let mut members: Vec<(usize, u32, &ViewRecord)> = members
+            .into_iter()
+            .filter_map(|i| views.get(i).map(|(area, view)| (i, *area, *view)))
+            .collect();
         // Of equal entropies the one that is named first counts as the higher, as in the selection.
         let name = |(_, area, v): &(usize, u32, &ViewRecord)| (*area, v.camera_uuid.clone(), v.candidate);
         members.sort_by_cached_key(name);

@@ -239,7 +239,9 @@ impl Place {
                 let (before, program) = PAGE.split_once(DATA).unwrap_or((PAGE, ""));
                 write_whole(file.path(), |page| {
                     page.write_all(before.as_bytes())?;
-                    scripts.into_elements().try_for_each(|element| page.write_all(element.as_bytes()))?;
+                    scripts
+                        .into_elements()
+                        .try_for_each(|element| page.write_all(element.as_bytes()))?;
                     page.write_all(program.as_bytes())
                 })?;
                 file.finish()?;

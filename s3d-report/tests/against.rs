@@ -72,7 +72,11 @@ fn altered(out: &Path, to: &Path) -> (u32, u32) {
             let path = image.path(&layout, domain);
             let mut pixels = read_rgb8(&path).unwrap();
             for pixel in &mut pixels.pixels_mut()[..7] {
-                *pixel = if domain == Domain::Rgb { pixel.map(|c| c ^ 1) } else { [0, 0, chair as u8] };
+                *pixel = if domain == Domain::Rgb {
+                    pixel.map(|c| c ^ 1)
+                } else {
+                    [0, 0, chair as u8]
+                };
             }
             write_rgb8(&path, &pixels, Content::Photo, Compression::Fast).unwrap();
         }
@@ -100,7 +104,8 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
 
     // Any number of threads, the same bytes.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    one.install(|| report_against(&out, &other, &again, &SMALL, &ctx)).unwrap();
+    one.install(|| report_against(&out, &other, &again, &SMALL, &ctx))
+        .unwrap();
     assert!(files(&again) == written);
     // The page of the data set alone has the same files; its index says that there is no other.
     for (path, bytes) in files(&plain) {
@@ -123,7 +128,12 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
 
     // Two images differ in what is shown: a panorama and a view.
     let pretty = comparison["modalities"].as_array().unwrap().iter();
-    assert_eq!(pretty.filter(|of| of["modality"] == "semantic_pretty" && of["changed"] == 1).count(), 1);
+    assert_eq!(
+        pretty
+            .filter(|of| of["modality"] == "semantic_pretty" && of["changed"] == 1)
+            .count(),
+        1
+    );
     let pictures = compared["pictures"].as_array().unwrap();
     assert_eq!((pictures.len(), &compared["faults"]), (2, &json!([])));
     let layout = Layout::new(&other);
@@ -144,7 +154,11 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
         assert_ne!(picture["label"], own["label"]);
         assert!(picture["face"].is_null());
         // Not reduced, the labels are those of the file.
-        let image = if entry["pano"].is_null() { images.first() } else { images.last() };
+        let image = if entry["pano"].is_null() {
+            images.first()
+        } else {
+            images.last()
+        };
         let image = image.unwrap();
         let file = read_rgb8(&image.path(&layout, Domain::Semantic)).unwrap();
         let own_file = read_rgb8(&image.path(&Layout::new(&out), Domain::Semantic)).unwrap();
@@ -152,7 +166,10 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
         for (a, b) in own_file.pixels().iter().zip(file.pixels()).filter(|(a, b)| a != b) {
             let class = |[r, g, b]: [u8; 3]| match [r, g, b] {
                 [13, 13, 13] => "<nothing>",
-                _ => names[u32::from_be_bytes([0, r, g, b]) as usize].split('_').next().unwrap(),
+                _ => names[u32::from_be_bytes([0, r, g, b]) as usize]
+                    .split('_')
+                    .next()
+                    .unwrap(),
             };
             *counted.entry([class(*a), class(*b)]).or_default() += 1;
         }
@@ -171,7 +188,12 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
     let (face, a, b) = (unpacked(&changed["face"]), unpacked(&changed["a"]), unpacked(&changed["b"]));
     let data = DataSet::open(&out).unwrap();
     let votes = data.face_votes(1).unwrap().unwrap();
-    let of = |label: u32| (0..).zip(&votes.label).filter(move |(_, l)| **l == label).map(|(f, _)| f);
+    let of = |label: u32| {
+        (0..)
+            .zip(&votes.label)
+            .filter(move |(_, l)| **l == label)
+            .map(|(f, _)| f)
+    };
     let (chairs, none): (Vec<u32>, Vec<u32>) = (of(chair).collect(), of(0).collect());
     assert!(chairs.len() > 10 && none.len() > 10);
     let mut all = [&chairs[..], &none].concat();
@@ -216,8 +238,10 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
     }
     let mut counted: Vec<(u32, usize)> = patches.iter().map(|(_, label, faces)| (*label, *faces)).collect();
     let number = |patch: &Value, of: &str| patch[of].as_u64().unwrap();
-    let mut found: Vec<(u32, usize)> =
-        told.iter().map(|patch| (number(patch, "a") as u32, number(patch, "faces") as usize)).collect();
+    let mut found: Vec<(u32, usize)> = told
+        .iter()
+        .map(|patch| (number(patch, "a") as u32, number(patch, "faces") as usize))
+        .collect();
     counted.sort_unstable();
     found.sort_unstable();
     assert_eq!(found, counted);

@@ -80,7 +80,9 @@ impl Own {
         }
         assert!(seen > count / 2, "{seen} of {count} pixels see something");
         // Colours are means, as good as JPEG has them.
-        let rgb = image::load_from_memory(&url_bytes(&picture["rgb"], "jpeg")).unwrap().to_rgb8();
+        let rgb = image::load_from_memory(&url_bytes(&picture["rgb"], "jpeg"))
+            .unwrap()
+            .to_rgb8();
         let mean = |pixels: &mut dyn Iterator<Item = [u8; 3]>| {
             let (mut sum, mut count) = ([0.0; 3], 0.0);
             for pixel in pixels {
@@ -159,8 +161,12 @@ fn pictures_are_the_data_sets_own() {
         let label = decode_rgb8(&data.read(&path).unwrap(), &path).unwrap();
         pixels += label.pixels().iter().filter(|p| **p != [13; 3]).count() as u64;
     }
-    let by_class =
-        index["pixels_by_class"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).sum::<u64>();
+    let by_class = index["pixels_by_class"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|n| n.as_u64().unwrap())
+        .sum::<u64>();
     assert_eq!(by_class + index["pixels_unlabelled"].as_u64().unwrap(), pixels);
     let rooms = index["rooms"].as_array().unwrap();
     assert_eq!(rooms.len(), 4);
@@ -232,7 +238,9 @@ fn what_is_missing_or_damaged_is_told_and_the_rest_is_shown() {
     assert_eq!(told, expected);
     assert_eq!(context.warnings(), 3);
     assert!(
-        made.faults.iter().all(|fault| !fault.message.is_empty() && !fault.message.contains("data set/"))
+        made.faults
+            .iter()
+            .all(|fault| !fault.message.is_empty() && !fault.message.contains("data set/"))
     );
     let missing = DataSet::open(&out).unwrap().missing(&context).unwrap();
     // What is only seen when it is read has its size.
@@ -244,13 +252,20 @@ fn what_is_missing_or_damaged_is_told_and_the_rest_is_shown() {
     let index = value(&to, "index");
     assert_eq!(index["faults"].as_array().unwrap().len(), 3);
     assert!(index["rooms"].as_array().unwrap().is_empty());
-    let at = index["locations"].as_array().unwrap().iter().position(|l| l["uuid"] == panorama.uuid).unwrap();
+    let at = index["locations"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .position(|l| l["uuid"] == panorama.uuid)
+        .unwrap();
     let picture = value(&to, &format!("pano_{at}"));
     assert!(picture["depth"].is_null() && picture["rgb"].is_string() && picture["label"].is_string());
 
     // Without its list of files nothing can be held against anything.
     fs::remove_file(out.join("files.csv")).unwrap();
-    let e = report(&out, &dir.path().join("none"), &SMALL, &context).unwrap_err().to_string();
+    let e = report(&out, &dir.path().join("none"), &SMALL, &context)
+        .unwrap_err()
+        .to_string();
     assert!(e.contains("files.csv") && !dir.path().join("none").exists(), "{e}");
 }
 
@@ -277,12 +292,14 @@ fn an_export_that_did_not_finish_is_shown_as_far_as_it_is() {
     // Ended when two scan locations have their images.
     let cancel = Cancel::default();
     let (theirs, done) = (cancel.clone(), AtomicU32::new(0));
-    let context = Context::default().cancelled_by(cancel).observed_by(move |event: &Event<'_>| {
-        let is_location = matches!(event, Event::UnitFinished { unit: UnitKind::Location, .. });
-        if is_location && done.fetch_add(1, Ordering::Relaxed) == 1 {
-            theirs.cancel();
-        }
-    });
+    let context = Context::default()
+        .cancelled_by(cancel)
+        .observed_by(move |event: &Event<'_>| {
+            let is_location = matches!(event, Event::UnitFinished { unit: UnitKind::Location, .. });
+            if is_location && done.fetch_add(1, Ordering::Relaxed) == 1 {
+                theirs.cancel();
+            }
+        });
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert!(matches!(one.install(|| export.run(&out, &context)), Err(Error::Cancelled)));
     let to = dir.path().join("report");
@@ -292,19 +309,28 @@ fn an_export_that_did_not_finish_is_shown_as_far_as_it_is() {
     assert!(context.warnings() > 0);
     let index = value(&to, "index");
     let missing = index["data_set"]["missing_yet"].as_array().unwrap();
-    assert!(missing.iter().any(|m| m == "area 1: 4 scan locations have no images yet"), "{missing:?}");
+    assert!(
+        missing
+            .iter()
+            .any(|m| m == "area 1: 4 scan locations have no images yet"),
+        "{missing:?}"
+    );
     assert!(index["rooms"].as_array().unwrap().len() == 4 && index["views"].as_array().unwrap().len() > 2);
     assert!(value(&to, "pano_0")["rgb"].is_string());
 
     // Once it has gone on, nothing is missing.
     export.run(&out, &Context::default()).unwrap().unwrap();
     assert_eq!(
-        report(&out, &to, &ReportOptions { overwrite: true, ..SMALL }, &context).unwrap().panoramas,
+        report(&out, &to, &ReportOptions { overwrite: true, ..SMALL }, &context)
+            .unwrap()
+            .panoramas,
         6
     );
     assert!(value(&to, "index")["data_set"]["missing_yet"].is_null());
     let nothing = dir.path().join("nothing");
-    let e = report(&nothing, &dir.path().join("none"), &SMALL, &context).unwrap_err().to_string();
+    let e = report(&nothing, &dir.path().join("none"), &SMALL, &context)
+        .unwrap_err()
+        .to_string();
     assert!(e.contains("manifest.json"), "{e}");
 }
 
@@ -330,7 +356,9 @@ fn one_file_has_all_of_it() {
     }
     assert_eq!(found, fs::read_dir(folder.join("data")).unwrap().count());
 
-    let again = report(&out, &file, &single, &Context::default()).unwrap_err().to_string();
+    let again = report(&out, &file, &single, &Context::default())
+        .unwrap_err()
+        .to_string();
     assert!(again.contains("--overwrite"), "{again}");
     made(&out, &file, &ReportOptions { overwrite: true, ..single.clone() });
     assert_eq!(fs::read_to_string(&file).unwrap(), page);
@@ -357,10 +385,19 @@ fn what_verify_finds_is_told_if_it_is_asked() {
     assert!(good["checks"].as_u64().unwrap() > 1000 && good["faults"].as_array().unwrap().is_empty());
 
     let data = DataSet::open(&out).unwrap();
-    let image = data.images(1).into_iter().find(|image| image.frame == Frame::View(0)).unwrap();
+    let image = data
+        .images(1)
+        .into_iter()
+        .find(|image| image.frame == Frame::View(0))
+        .unwrap();
     let path = image.relative_path(Domain::Normal);
     fs::write(out.join(&path), b"no image").unwrap();
     let found = verified("bad");
     let faults = found["faults"].as_array().unwrap();
-    assert!(faults.iter().any(|group| group["first"][0][0] == *path && group["count"] == 1), "{found}");
+    assert!(
+        faults
+            .iter()
+            .any(|group| group["first"][0][0] == *path && group["count"] == 1),
+        "{found}"
+    );
 }

@@ -149,9 +149,16 @@ fn faces_have_their_places_textures_and_votes_and_pictures_show_them() {
         }
     }
     let table = data.labels().unwrap().unwrap();
-    let chair = index["classes"].as_array().unwrap().iter().position(|c| c["name"] == "chair").unwrap();
+    let chair = index["classes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .position(|c| c["name"] == "chair")
+        .unwrap();
     let is_chair = |face: &u32| {
-        table.class_of(LabelId(votes.label[*face as usize])).is_some_and(|class| class.name() == "chair")
+        table
+            .class_of(LabelId(votes.label[*face as usize]))
+            .is_some_and(|class| class.name() == "chair")
     };
     let chairs: Vec<u32> = (0..mesh.faces().len() as u32).filter(is_chair).collect();
     let m2: f64 = chairs.iter().map(|face| mesh.area(*face)).sum();
@@ -237,7 +244,15 @@ fn the_spread_of_votes_is_that_of_the_faces() {
     }
     assert_eq!(sum, votes.total.iter().filter(|all| **all > 0).count());
     // More than one part has faces, so that no two can be exchanged.
-    assert!(spread["margin"].as_array().unwrap().iter().filter(|part| part["faces"] != 0).count() > 2);
+    assert!(
+        spread["margin"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|part| part["faces"] != 0)
+            .count()
+            > 2
+    );
 }
 
 #[test]

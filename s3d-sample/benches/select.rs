@@ -9,7 +9,9 @@ use std::hint::black_box;
 fn histograms(count: usize) -> Vec<[u64; 13]> {
     let mut state = 5u64;
     let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         state >> 40
     };
     (0..count)
@@ -29,8 +31,9 @@ fn bench(c: &mut Criterion) {
     for locations in [1usize, 200, 1413] {
         let histograms = histograms(locations * 72);
         let scores: Vec<f64> = histograms.iter().map(|h| entropy(h)).collect();
-        let uuids: Vec<String> =
-            (0..locations as u64).map(|i| format!("{:032x}", i * 0x9e37_79b9_7f4a)).collect();
+        let uuids: Vec<String> = (0..locations as u64)
+            .map(|i| format!("{:032x}", i * 0x9e37_79b9_7f4a))
+            .collect();
         let items: Vec<PoolItem<'_>> = (0..scores.len())
             .map(|i| PoolItem {
                 area: (i / 72 % 6) as u32 + 1,

@@ -8,7 +8,9 @@ fn bench(c: &mut Criterion) {
     let mut group = c.benchmark_group("view");
     let dist = ViewDistribution::default();
     for locations in [1u64, 100] {
-        let uuids: Vec<String> = (0..locations).map(|i| format!("{:032x}", i * 0x9e37_79b9_7f4a)).collect();
+        let uuids: Vec<String> = (0..locations)
+            .map(|i| format!("{:032x}", i * 0x9e37_79b9_7f4a))
+            .collect();
         group.throughput(Throughput::Elements(locations * u64::from(CANDIDATES_PER_LOCATION)));
         group.bench_with_input(BenchmarkId::new("draw", locations), &uuids, |b, uuids| {
             b.iter(|| {

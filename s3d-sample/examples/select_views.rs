@@ -13,16 +13,22 @@ fn item(line: &str) -> Result<PoolItem<'_>, Box<dyn Error>> {
     let [area, location, view, counts @ ..] = words.as_slice() else {
         return Err("expected area,location,view and 13 counts".into());
     };
-    let counts = counts.iter().map(|count| count.parse()).collect::<Result<Vec<u64>, _>>()?;
-    let histogram: [u64; 13] =
-        counts.try_into().map_err(|counts: Vec<u64>| format!("{} counts instead of 13", counts.len()))?;
+    let counts = counts
+        .iter()
+        .map(|count| count.parse())
+        .collect::<Result<Vec<u64>, _>>()?;
+    let histogram: [u64; 13] = counts
+        .try_into()
+        .map_err(|counts: Vec<u64>| format!("{} counts instead of 13", counts.len()))?;
     Ok(PoolItem { area: area.parse()?, location, view: view.parse()?, score: entropy(&histogram) })
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
-    let pool: Pool =
-        args.next().ok_or("usage: select_views dataset|area|location [SEED] < counts.csv")?.parse()?;
+    let pool: Pool = args
+        .next()
+        .ok_or("usage: select_views dataset|area|location [SEED] < counts.csv")?
+        .parse()?;
     let seed = args.next().map_or(Ok(0), |word| word.parse())?;
 
     let mut text = String::new();

@@ -28,8 +28,13 @@ const PUBLISHED: [(u32, &[u32], &[u32]); 3] =
 /// assert_eq!((&folds[0].train[..], &folds[0].test[..]), (&[1][..], &[5][..]));
 /// ```
 pub fn folds(present_areas: &[u32]) -> Vec<Fold> {
-    let present =
-        |areas: &[u32]| areas.iter().copied().filter(|a| present_areas.contains(a)).collect::<Vec<_>>();
+    let present = |areas: &[u32]| {
+        areas
+            .iter()
+            .copied()
+            .filter(|a| present_areas.contains(a))
+            .collect::<Vec<_>>()
+    };
     PUBLISHED
         .iter()
         .map(|&(number, train, test)| Fold { number, train: present(train), test: present(test) })

@@ -90,7 +90,10 @@ impl PoolItem<'_> {
 pub fn select_pooled(items: &[PoolItem<'_>], pool: Pool, options: &Selection, seed: u64) -> Vec<bool> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     order.sort_unstable_by(|&a, &b| items[a].name().cmp(&items[b].name()));
-    if let Some(pair) = order.windows(2).find(|pair| items[pair[0]].name() == items[pair[1]].name()) {
+    if let Some(pair) = order
+        .windows(2)
+        .find(|pair| items[pair[0]].name() == items[pair[1]].name())
+    {
         let (area, location, view) = items[pair[0]].name();
         panic!("view {view} of location {location} in area {area} is there twice");
     }
@@ -149,7 +152,10 @@ mod tests {
         let items = items();
         let options = Selection::default();
         let kept = |pool, range: std::ops::Range<usize>| {
-            select_pooled(&items, pool, &options, 1)[range].iter().filter(|&&s| s).count()
+            select_pooled(&items, pool, &options, 1)[range]
+                .iter()
+                .filter(|&&s| s)
+                .count()
         };
         assert_eq!(kept(Pool::Dataset, 0..720), 522);
         assert_eq!((kept(Pool::Area, 0..360), kept(Pool::Area, 360..720)), (261, 261));

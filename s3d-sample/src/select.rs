@@ -64,7 +64,11 @@ impl Selection {
         let shares = [discard, keep, half_of_rest, discard + keep];
         // Shares such as 0.15 and 0.85 may sum to a little more than 1.
         let ok = shares.iter().all(|share| (0.0..=1.0 + SLACK).contains(share));
-        if ok { Ok(()) } else { Err(SelectionError { discard, keep, half_of_rest }) }
+        if ok {
+            Ok(())
+        } else {
+            Err(SelectionError { discard, keep, half_of_rest })
+        }
     }
 
     /// The share of a pool that stays in all: 0.725 by default.
@@ -220,7 +224,10 @@ mod tests {
             if draw == 0 {
                 return taken.iter().for_each(|&i| out[i] += p);
             }
-            let left: f64 = (0..weights.len()).filter(|i| !taken.contains(i)).map(|i| weights[i]).sum();
+            let left: f64 = (0..weights.len())
+                .filter(|i| !taken.contains(i))
+                .map(|i| weights[i])
+                .sum();
             for i in 0..weights.len() {
                 if !taken.contains(&i) {
                     taken.push(i);
@@ -240,8 +247,10 @@ mod tests {
         let mut scores = vec![2.0; 12];
         scores.extend([1.9, 1.4, 0.9, 0.4, 0.1]);
         scores.extend([0.0; 3]);
-        let weights: Vec<f64> =
-            scores[12..17].iter().map(|e| f64::exp(-(e / 2.0 - 1.0f64).powi(2) / 0.5)).collect();
+        let weights: Vec<f64> = scores[12..17]
+            .iter()
+            .map(|e| f64::exp(-(e / 2.0 - 1.0f64).powi(2) / 0.5))
+            .collect();
         let expected = inclusion(&weights, 3);
         let seeds = 20_000;
         let mut counts = [0u32; 5];

@@ -24,7 +24,9 @@ pub(crate) fn stream(purpose: [u8; 4], seed: u64, name: &str, number: u32) -> Ch
 fn fnv1a_128(bytes: &[u8]) -> u128 {
     const OFFSET_BASIS: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = (1 << 88) + 0x13b;
-    bytes.iter().fold(OFFSET_BASIS, |hash, &byte| (hash ^ u128::from(byte)).wrapping_mul(PRIME))
+    bytes
+        .iter()
+        .fold(OFFSET_BASIS, |hash, &byte| (hash ^ u128::from(byte)).wrapping_mul(PRIME))
 }
 
 /// Uniform in [0, 1): the upper 53 bits of the next 64, as a fraction.

@@ -78,7 +78,11 @@ impl ViewDistribution {
             }
         }
         let (min, max) = (self.fov_min_deg, self.fov_max_deg);
-        if min > 0.0 && min <= max && max < 180.0 { Ok(()) } else { Err(DistributionError::Fov { min, max }) }
+        if min > 0.0 && min <= max && max < 180.0 {
+            Ok(())
+        } else {
+            Err(DistributionError::Fov { min, max })
+        }
     }
 }
 
@@ -148,7 +152,11 @@ fn half_normal_within(rng: &mut ChaCha8Rng, sigma: f64, range: f64) -> f64 {
             // empty one.
             let x = range * uniform(rng);
             let density = libm::exp(-0.5 * (x / sigma) * (x / sigma));
-            if uniform_above_zero(rng) <= density { x } else { f64::INFINITY }
+            if uniform_above_zero(rng) <= density {
+                x
+            } else {
+                f64::INFINITY
+            }
         } else {
             sigma * normal(rng).abs()
         };
@@ -191,7 +199,9 @@ mod tests {
     }
 
     fn draws(dist: &ViewDistribution, seed: u64) -> Vec<View> {
-        (0..DRAWS).map(|i| draw_view(dist, seed, "8eb9955b866b4b5f74abb1071416c628", i)).collect()
+        (0..DRAWS)
+            .map(|i| draw_view(dist, seed, "8eb9955b866b4b5f74abb1071416c628", i))
+            .collect()
     }
 
     #[test]
@@ -256,8 +266,9 @@ mod tests {
         };
         let here: Vec<[f64; 3]> = draws(&dist, 1).iter().map(ranks).collect();
         let next_seed: Vec<[f64; 3]> = draws(&dist, 2).iter().map(ranks).collect();
-        let next_place: Vec<[f64; 3]> =
-            (0..DRAWS).map(|i| ranks(&draw_view(&dist, 1, "8eb9955b866b4b5f74abb1071416c629", i))).collect();
+        let next_place: Vec<[f64; 3]> = (0..DRAWS)
+            .map(|i| ranks(&draw_view(&dist, 1, "8eb9955b866b4b5f74abb1071416c629", i)))
+            .collect();
         for a in 0..3 {
             for b in 0..3 {
                 let with = |other: &[[f64; 3]]| chi_square(here.iter().zip(other).map(|(x, y)| (x[a], y[b])));
@@ -310,13 +321,16 @@ mod tests {
         let default = ViewDistribution::default();
         assert_eq!(default.check(), Ok(()));
         for sigma in [-1.0, f64::NAN, f64::INFINITY, 361.0] {
-            let error = ViewDistribution { pitch_sigma_deg: sigma, ..default }.check().unwrap_err();
+            let error = ViewDistribution { pitch_sigma_deg: sigma, ..default }
+                .check()
+                .unwrap_err();
             assert!(error.to_string().starts_with(&format!("pitch_sigma_deg is {sigma}:")), "{error}");
             assert!(ViewDistribution { fov_sigma_deg: sigma, ..default }.check().is_err());
         }
         for (min, max) in [(0.0, 75.0), (76.0, 75.0), (10.0, 180.0), (f64::NAN, 75.0), (10.0, f64::NAN)] {
-            let error =
-                ViewDistribution { fov_min_deg: min, fov_max_deg: max, ..default }.check().unwrap_err();
+            let error = ViewDistribution { fov_min_deg: min, fov_max_deg: max, ..default }
+                .check()
+                .unwrap_err();
             assert!(error.to_string().contains(&format!("{min} to {max}")), "{error}");
         }
     }

@@ -11,8 +11,10 @@ use std::path::Path;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
-    let folder =
-        args.next().filter(|f| !f.starts_with('-')).ok_or("usage: large_scene FOLDER [--points N] …")?;
+    let folder = args
+        .next()
+        .filter(|f| !f.starts_with('-'))
+        .ok_or("usage: large_scene FOLDER [--points N] …")?;
     let mut scan = LargeScan::default();
     while let Some(key) = args.next() {
         let value = args.next().ok_or_else(|| format!("{key} wants a value"))?;

@@ -23,7 +23,11 @@ pub struct RangeError {
 /// A number as it was written: most come as `f32`.
 fn short(value: f64) -> String {
     let single = value as f32;
-    if f64::from(single) == value { single.to_string() } else { value.to_string() }
+    if f64::from(single) == value {
+        single.to_string()
+    } else {
+        value.to_string()
+    }
 }
 
 impl RangeError {

@@ -47,7 +47,10 @@ pub struct Scan<'a> {
 
 impl fmt::Debug for Scan<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Scan").field("options", &self.options).field("rest", &self.rest).finish()
+        f.debug_struct("Scan")
+            .field("options", &self.options)
+            .field("rest", &self.rest)
+            .finish()
     }
 }
 
@@ -136,12 +139,14 @@ impl Scan<'_> {
             let mut memory = sight.memory();
             for (i, at) in (chunk * CHUNK..).zip(at) {
                 let (p, face, [chance, noise]) = (drawn.positions[i], drawn.faces[i], chances[i]);
-                *at = sight.measures((p, face), mesh.normal(face), chance, &mut memory).map(|location| {
-                    let ray = p - location;
-                    // Half as much close by, as much at 5 m.
-                    let noise_m = self.options.noise_m * (0.5 + 0.1 * ray.length());
-                    p + ray.normalize() * (2.0 * noise - 1.0) * noise_m
-                });
+                *at = sight
+                    .measures((p, face), mesh.normal(face), chance, &mut memory)
+                    .map(|location| {
+                        let ray = p - location;
+                        // Half as much close by, as much at 5 m.
+                        let noise_m = self.options.noise_m * (0.5 + 0.1 * ray.length());
+                        p + ray.normalize() * (2.0 * noise - 1.0) * noise_m
+                    });
             }
         });
         let mut cloud = PointCloud::default();
@@ -153,7 +158,9 @@ impl Scan<'_> {
             }
         }
         let mut memory = sight.memory();
-        let mut seen = faces.iter().filter_map(|&f| Some((sight.seen_place(mesh, f, &mut memory)?, f)));
+        let mut seen = faces
+            .iter()
+            .filter_map(|&f| Some((sight.seen_place(mesh, f, &mut memory)?, f)));
         if cloud.is_empty()
             && let Some((p, face)) = seen.next()
         {

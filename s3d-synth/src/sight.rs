@@ -116,7 +116,11 @@ impl Sight {
         let end = 1.0 - SLACK_M / direction.length();
         let ray = Ray::new(origin.into(), direction.into(), 0.0, end);
         let hider = &mut memory.0[location];
-        if self.triangles.get(*hider as usize).is_some_and(|t| t.intersect(&ray) < end) {
+        if self
+            .triangles
+            .get(*hider as usize)
+            .is_some_and(|t| t.intersect(&ray) < end)
+        {
             return false;
         }
         self.bvh.ray_traverse_miss(ray, |ray, k| {
@@ -137,7 +141,11 @@ impl Sight {
         chance: f32,
         memory: &mut Memory,
     ) -> Option<Vec3> {
-        let share = if self.is_glass[face as usize] { self.options.glass } else { 1.0 };
+        let share = if self.is_glass[face as usize] {
+            self.options.glass
+        } else {
+            1.0
+        };
         let patch = (p / PATCH_M).floor().as_ivec3();
         let in_hole = hash(patch.x as u32, (patch.y as u32).wrapping_add(patch.z as u32 * 7919), 101);
         if chance >= share || in_hole < self.options.holes {
@@ -173,8 +181,11 @@ impl Sight {
         let toward =
             |near: f32, k: usize| std::array::from_fn(|i| if i == k { 1.0 - 2.0 * near } else { near });
         let places = [[1.0 / 3.0; 3]].into_iter();
-        let places =
-            places.chain([0.1, 0.48, 0.02].into_iter().flat_map(|near| [0, 1, 2].map(|k| toward(near, k))));
+        let places = places.chain(
+            [0.1, 0.48, 0.02]
+                .into_iter()
+                .flat_map(|near| [0, 1, 2].map(|k| toward(near, k))),
+        );
         places.map(|[u, v, w]: [f32; 3]| a * u + b * v + c * w).find(|&p| {
             (0..self.locations.len())
                 .any(|k| self.weight(self.locations[k], p, n) > 0.0 && self.is_free(k, p, memory))
@@ -243,7 +254,9 @@ impl AnnotatedScene {
             ..MeshParts::default()
         };
         let corners = |list: &[[u32; 3]]| {
-            kept.iter().filter_map(|&f| list.get(f as usize).copied()).collect::<Vec<_>>()
+            kept.iter()
+                .filter_map(|&f| list.get(f as usize).copied())
+                .collect::<Vec<_>>()
         };
         (parts.faces, parts.positions) = compacted(corners(&old.faces), &old.positions);
         (parts.face_uvs, parts.uvs) = compacted(corners(&old.face_uvs), &old.uvs);

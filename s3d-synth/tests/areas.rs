@@ -16,8 +16,11 @@ fn options(number: u32, seed: u64) -> BuildingOptions {
 }
 
 fn area(number: u32) -> &'static Building {
-    static AREAS: LazyLock<Vec<Building>> =
-        LazyLock::new(|| (1..=6).map(|number| Building::generate(&options(number, 1)).unwrap()).collect());
+    static AREAS: LazyLock<Vec<Building>> = LazyLock::new(|| {
+        (1..=6)
+            .map(|number| Building::generate(&options(number, 1)).unwrap())
+            .collect()
+    });
     &AREAS[number as usize - 1]
 }
 
@@ -33,7 +36,11 @@ fn planned(building: &Building) -> Vec<(Room, Class)> {
         all.extend([(plan.room, Class::WALL); 4]);
         all.extend(plan.lamps.iter().map(|_| (plan.room, Class::CLUTTER)));
         all.extend(plan.items.iter().map(|item| (plan.room, item.class())));
-        all.extend(plan.openings.iter().filter_map(|o| Some((plan.room, o.filling.class()?))));
+        all.extend(
+            plan.openings
+                .iter()
+                .filter_map(|o| Some((plan.room, o.filling.class()?))),
+        );
     }
     all
 }
@@ -124,7 +131,10 @@ fn instances_a_room_are_about_as_frequent_as_published() {
 }
 
 fn sizes(numbers: &[u32], size: impl Fn(&Thing) -> Option<[f32; 3]>) -> Vec<[f32; 3]> {
-    let items = numbers.iter().flat_map(|&number| &area(number).rooms).flat_map(|plan| &plan.items);
+    let items = numbers
+        .iter()
+        .flat_map(|&number| &area(number).rooms)
+        .flat_map(|plan| &plan.items);
     let things = items.filter_map(|item| match item {
         s3d_synth::building::Item::Standing { thing, .. } => size(thing),
         _ => None,
@@ -181,7 +191,9 @@ fn buildings_differ_in_the_shape_of_things_and_areas_of_one_do_not() {
 
 #[test]
 fn doors_stand_open_at_many_angles_or_are_shut() {
-    let openings = (1..=6).flat_map(|number| &area(number).rooms).flat_map(|plan| &plan.openings);
+    let openings = (1..=6)
+        .flat_map(|number| &area(number).rooms)
+        .flat_map(|plan| &plan.openings);
     let angles: Vec<f32> = openings
         .filter_map(|o| match o.filling {
             Filling::Leaf { open_deg, .. } => Some(open_deg),
@@ -206,7 +218,14 @@ fn a_generated_area_is_whole() {
         .scene
         .locations
         .iter()
-        .map(|location| area(3).rooms.iter().find(|plan| plan.contains(location.position)).unwrap().room)
+        .map(|location| {
+            area(3)
+                .rooms
+                .iter()
+                .find(|plan| plan.contains(location.position))
+                .unwrap()
+                .room
+        })
         .collect();
     assert_eq!(rooms.len(), area(3).rooms.len());
     for location in seen.scene.locations.iter().step_by(9) {
@@ -286,7 +305,9 @@ fn points_are_where_a_location_sees_them() {
     // The back of a bookcase is gone, its front is not.
     let backs = |scene: &AnnotatedScene| {
         let faces = 0..scene.mesh.faces().len() as u32;
-        faces.filter(|&f| scene.mesh.normal(f).z < -0.9 && scene.mesh.triangle(f)[0].z < 0.1).count()
+        faces
+            .filter(|&f| scene.mesh.normal(f).z < -0.9 && scene.mesh.triangle(f)[0].z < 0.1)
+            .count()
     };
     assert!(backs(&seen) < backs(&whole));
 

@@ -17,7 +17,12 @@ fn names_are_those_of_the_data_set_and_every_instance_has_faces() {
     let used: BTreeSet<_> = SEEN.scene.instances.iter().map(|i| i.class).collect();
     assert_eq!(used, BTreeSet::from(Class::S3DIS));
     let rooms: BTreeSet<_> = SEEN.scene.instances.iter().map(|i| i.room.to_string()).collect();
-    assert!(rooms.iter().eq(["conferenceRoom_1", "hallway_1", "lounge_1", "office_1"]), "{rooms:?}");
+    assert!(
+        rooms
+            .iter()
+            .eq(["conferenceRoom_1", "hallway_1", "lounge_1", "office_1"]),
+        "{rooms:?}"
+    );
 }
 
 #[test]
@@ -39,8 +44,16 @@ fn it_is_what_it_always_was() {
     let parts = SEEN.scene.mesh.parts();
     let mut digest = 0xcbf2_9ce4_8422_2325_u64;
     let mut add = |x: u64| digest = (digest ^ x).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
-    parts.positions.iter().flat_map(|p| p.to_array()).for_each(|x| add(u64::from(x.to_bits())));
-    parts.uvs.iter().flat_map(|p| p.to_array()).for_each(|x| add(u64::from(x.to_bits())));
+    parts
+        .positions
+        .iter()
+        .flat_map(|p| p.to_array())
+        .for_each(|x| add(u64::from(x.to_bits())));
+    parts
+        .uvs
+        .iter()
+        .flat_map(|p| p.to_array())
+        .for_each(|x| add(u64::from(x.to_bits())));
     for indices in [&parts.faces, &parts.face_uvs] {
         indices.iter().flatten().for_each(|&i| add(u64::from(i)));
     }
@@ -50,7 +63,11 @@ fn it_is_what_it_always_was() {
         texture.image.pixels().iter().flatten().for_each(|&c| add(u64::from(c)));
     }
     for material in &parts.materials {
-        material.name.bytes().chain(material.color).for_each(|b| add(u64::from(b)));
+        material
+            .name
+            .bytes()
+            .chain(material.color)
+            .for_each(|b| add(u64::from(b)));
     }
     SEEN.scene.instance_of_face.iter().for_each(|&i| add(u64::from(i)));
     assert_eq!(digest, 0x0525_cc88_e880_5f73, "{digest:#x}");
@@ -73,7 +90,10 @@ fn locations_stand_free_each_in_one_room() {
     assert_eq!(rooms.len(), 4);
     let mut taken = BTreeSet::new();
     for l in &SEEN.scene.locations {
-        let inside: Vec<_> = rooms.iter().filter(|(_, room)| room.contains(l.position.as_vec3())).collect();
+        let inside: Vec<_> = rooms
+            .iter()
+            .filter(|(_, room)| room.contains(l.position.as_vec3()))
+            .collect();
         assert_eq!(inside.len(), 1, "{}", l.position);
         taken.insert(*inside[0].0);
         let clearance = SEEN.clearance(l.position);
@@ -106,7 +126,11 @@ fn doors_let_one_see_from_room_to_room() {
     let rooms = SEEN.rooms();
     let mut seen = BTreeSet::new();
     for l in &SEEN.scene.locations {
-        let own = *rooms.iter().find(|(_, room)| room.contains(l.position.as_vec3())).unwrap().0;
+        let own = *rooms
+            .iter()
+            .find(|(_, room)| room.contains(l.position.as_vec3()))
+            .unwrap()
+            .0;
         // Between knee and head, where doors are.
         for d in directions(1500).filter(|d| d.z.abs() < 0.15) {
             if let Some((face, _)) = SEEN.first_hit(l.position, d) {

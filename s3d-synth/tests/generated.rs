@@ -82,7 +82,9 @@ fn check(options: &BuildingOptions) {
     // Every planned thing is annotated, and nothing else is.
     let mut annotated = BTreeMap::new();
     for instance in &seen.scene.instances {
-        *annotated.entry((instance.room.to_string(), instance.class)).or_insert(0) += 1;
+        *annotated
+            .entry((instance.room.to_string(), instance.class))
+            .or_insert(0) += 1;
     }
     assert_eq!(annotated, planned(&building));
 
@@ -176,7 +178,11 @@ fn full_rooms_have_what_their_type_has() {
             let rooms = vec![room.clone()];
             let options = BuildingOptions { rooms, seed, ..BuildingOptions::default() };
             let building = Building::generate(&options).unwrap();
-            let found = building.rooms[0].items.iter().filter(|item| item.class() == class).count();
+            let found = building.rooms[0]
+                .items
+                .iter()
+                .filter(|item| item.class() == class)
+                .count();
             assert!(found >= least, "{found} of {class} in {room_type:?}, seed {seed}");
         }
     };

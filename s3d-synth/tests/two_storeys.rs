@@ -43,7 +43,9 @@ fn stairs_lead_from_one_floor_to_the_other() {
         risers += u32::from(next - z > 0.1);
         assert_eq!(class == Class::FLOOR, risers == 0 || risers == 16);
         // Free above a head.
-        let up = seen.first_hit(DVec3::new(0.6, 1.0 + 0.07 * f64::from(k), next + 0.1), DVec3::Z).unwrap();
+        let up = seen
+            .first_hit(DVec3::new(0.6, 1.0 + 0.07 * f64::from(k), next + 0.1), DVec3::Z)
+            .unwrap();
         assert!(up.1 > 1.85, "{up:?} at {next}");
         z = next;
     }

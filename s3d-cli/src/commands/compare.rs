@@ -39,6 +39,10 @@ pub(crate) fn run(args: CompareArgs) -> Outcome<()> {
     if comparison.is_equal() {
         return Ok(());
     }
-    let unread = if comparison.unread.is_empty() { "" } else { ", or could not be compared" };
+    let unread = if comparison.unread.is_empty() {
+        ""
+    } else {
+        ", or could not be compared"
+    };
     Err(Failure::Answer(format!("the data sets differ{unread}")))
 }

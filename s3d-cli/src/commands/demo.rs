@@ -76,8 +76,11 @@ pub(crate) struct SizeArgs {
 impl DemoArgs {
     fn export_options(&self) -> ExportOptions {
         let SizeArgs { views, size, pano_width, seed, points_per_m2, compression } = self.options;
-        let (small_views, small_size, small_width, few) =
-            if self.areas.is_some() { (4, 256, 1024, 400.0) } else { (24, 540, 2048, 2500.0) };
+        let (small_views, small_size, small_width, few) = if self.areas.is_some() {
+            (4, 256, 1024, 400.0)
+        } else {
+            (24, 540, 2048, 2500.0)
+        };
         let all = ExportOptions {
             views: views.unwrap_or(small_views),
             size: size.unwrap_or(small_size),
@@ -87,7 +90,11 @@ impl DemoArgs {
             compression,
             ..ExportOptions::default()
         };
-        if self.no_images { ExportOptions { views: 0, modalities: Vec::new(), ..all } } else { all }
+        if self.no_images {
+            ExportOptions { views: 0, modalities: Vec::new(), ..all }
+        } else {
+            all
+        }
     }
 }
 
@@ -102,12 +109,17 @@ struct Scene {
 impl Scene {
     /// What it is called in messages.
     fn name(&self) -> String {
-        self.area.map_or("the built-in scene".to_owned(), |area| format!("the generated area {area}"))
+        self.area
+            .map_or("the built-in scene".to_owned(), |area| format!("the generated area {area}"))
     }
 
     /// Whether its folder may be written again.
     fn is_ours(&self) -> bool {
-        if self.area.is_some() { is_area_scan(&self.folder) } else { is_demo_scan(&self.folder) }
+        if self.area.is_some() {
+            is_area_scan(&self.folder)
+        } else {
+            is_demo_scan(&self.folder)
+        }
     }
 
     fn write(&self, folder: &Path, options: &ExportOptions, cancel: &Cancel) -> Result<PathBuf> {
@@ -116,7 +128,9 @@ impl Scene {
             None => (Building::demo().build().map_err(wrong)?, ScanOptions::default()),
             Some(area) => {
                 let building = BuildingOptions::area(area, options.seed).map_err(BuildingError::from);
-                let building = building.and_then(|options| Building::generate(&options)).map_err(wrong)?;
+                let building = building
+                    .and_then(|options| Building::generate(&options))
+                    .map_err(wrong)?;
                 let sight = SightOptions::default();
                 let seen = building.build().and_then(|scene| scene.seen(&sight)).map_err(wrong)?;
                 let scan = ScanOptions {
@@ -129,11 +143,13 @@ impl Scene {
                 (seen, scan)
             }
         };
-        scene.write_scan(folder, &scan, || !cancel.is_cancelled()).map_err(|e| match e {
-            ScanError::File(e) => e.into(),
-            ScanError::Cancelled => Error::Cancelled,
-            other => Error::Input(other.to_string()),
-        })
+        scene
+            .write_scan(folder, &scan, || !cancel.is_cancelled())
+            .map_err(|e| match e {
+                ScanError::File(e) => e.into(),
+                ScanError::Cancelled => Error::Cancelled,
+                other => Error::Input(other.to_string()),
+            })
     }
 }
 

@@ -146,7 +146,11 @@ impl From<OptionArgs> for ExportOptions {
             modalities: args.modalities,
             keep_all: args.keep_all,
             only: args.only,
-            normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
+            normals: if args.smooth_normals {
+                Normals::Smooth
+            } else {
+                Normals::Flat
+            },
             rgb_samples: args.rgb_samples,
             compression: args.compression,
             xyz,

@@ -29,7 +29,9 @@ fn on_threads<T: Send>(threads: Threads, call: impl FnOnce(&Context) -> Result<T
         .num_threads(threads.threads.map_or(0, usize::from))
         .build()
         .map_err(|e| FileError::io("threads".as_ref(), "start", io::Error::other(e)))?;
-    let context = Context::default().cancelled_by(stop::cancel()).observed_by(console::observe);
+    let context = Context::default()
+        .cancelled_by(stop::cancel())
+        .observed_by(console::observe);
     Ok(pool.install(|| call(&context))?)
 }
 

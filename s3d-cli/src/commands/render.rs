@@ -85,7 +85,11 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
     let options = RenderOptions {
         up: args.mesh.up,
         units: args.mesh.units,
-        normals: if args.smooth_normals { Normals::Smooth } else { Normals::Flat },
+        normals: if args.smooth_normals {
+            Normals::Smooth
+        } else {
+            Normals::Flat
+        },
         rgb_samples: args.rgb_samples,
         compression: args.compression,
         overwrite: args.overwrite,

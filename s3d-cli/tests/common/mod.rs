@@ -13,7 +13,10 @@ use std::process::{Command, Output};
 
 /// Runs `s3d` with these arguments.
 pub(crate) fn s3d(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_s3d")).args(args).output().expect("the binary starts")
+    Command::new(env!("CARGO_BIN_EXE_s3d"))
+        .args(args)
+        .output()
+        .expect("the binary starts")
 }
 
 /// Runs `s3d`, which must succeed; returns what it logged.
@@ -90,7 +93,11 @@ pub(crate) fn write_scan(dir: &Path, area: u32) -> PathBuf {
     for (name, points) in annotations {
         fs::write(folder.join(format!("{name}.txt")), points).unwrap();
     }
-    let (a, b) = if area == 1 { (UUID_A.to_owned(), UUID_B.to_owned()) } else { uuids_of(area) };
+    let (a, b) = if area == 1 {
+        (UUID_A.to_owned(), UUID_B.to_owned())
+    } else {
+        uuids_of(area)
+    };
     fs::write(
         dir.join("cameras.csv"),
         format!("{a},2.0,1.2,1.5,0,0,0,1\n{b},3.0,0.8,1.4,0,0,0.5,0.8660254\n"),
@@ -138,8 +145,9 @@ pub(crate) fn list_files(out: &Path) {
         !path.starts_with("scan") && at != layout.manifest() && at != layout.file_list()
     };
     let paths = files(out).into_keys().filter(ours);
-    let records: Vec<FileRecord> =
-        paths.map(|path| FileRecord::of_file(out, &out.join(path)).unwrap()).collect();
+    let records: Vec<FileRecord> = paths
+        .map(|path| FileRecord::of_file(out, &out.join(path)).unwrap())
+        .collect();
     let (_, sum) = write_file_list(&layout.file_list(), &records).unwrap();
     let bytes: u64 = records.iter().map(|r| r.bytes).sum();
     let mut manifest: serde_json::Value =

@@ -120,7 +120,10 @@ pub(crate) fn run(args: &[&str]) -> (Option<i32>, String) {
 
 pub(crate) fn wait(command: &mut Command) -> (Option<i32>, String) {
     let mut log = tempfile::tempfile().unwrap();
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(log.try_clone().unwrap());
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(log.try_clone().unwrap());
     let started = Instant::now();
     let mut child = loop {
         match command.spawn() {

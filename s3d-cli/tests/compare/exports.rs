@@ -81,7 +81,9 @@ pub(crate) fn copy_to(of: &Path, name: &str) -> (TempDir, PathBuf) {
     for path in files(of).into_keys() {
         let to = out.join(&path);
         create_dir(to.parent().unwrap()).unwrap();
-        fs::hard_link(of.join(&path), &to).or_else(|_| fs::copy(of.join(&path), &to).map(drop)).unwrap();
+        fs::hard_link(of.join(&path), &to)
+            .or_else(|_| fs::copy(of.join(&path), &to).map(drop))
+            .unwrap();
     }
     (dir, out)
 }
@@ -97,7 +99,10 @@ pub(crate) fn altered(of: &Path, alter: impl Fn(&Path)) -> (TempDir, PathBuf) {
 /// The first view of a data set, or the first panorama.
 pub(crate) fn first(out: &Path, is_panorama: bool) -> DatasetImage {
     let images = dataset_images(&Layout::new(out), 1).unwrap();
-    images.into_iter().find(|image| (image.frame == Frame::Panorama) == is_panorama).unwrap()
+    images
+        .into_iter()
+        .find(|image| (image.frame == Frame::Panorama) == is_panorama)
+        .unwrap()
 }
 
 /// Its file of a modality.

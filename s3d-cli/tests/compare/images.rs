@@ -140,7 +140,8 @@ fn another_seed_keeps_other_views() {
     };
     let named = |list: &Value| -> BTreeSet<(String, u64)> {
         let all = list.as_array().unwrap().iter();
-        all.map(|v| (v["uuid"].as_str().unwrap().into(), v["candidate"].as_u64().unwrap())).collect()
+        all.map(|v| (v["uuid"].as_str().unwrap().into(), v["candidate"].as_u64().unwrap()))
+            .collect()
     };
     let (in_a, in_b) = (kept(&a), kept(&b));
     let (answer, json, code) = compare(&a, &b);

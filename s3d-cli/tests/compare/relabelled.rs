@@ -78,7 +78,10 @@ fn faces(out: &Path) -> Vec<([[f64; 3]; 3], String)> {
 /// By Heron's formula.
 fn area(corners: [[f64; 3]; 3]) -> f64 {
     let side = |i: usize, j: usize| -> f64 {
-        (0..3).map(|k| (corners[i][k] - corners[j][k]).powi(2)).sum::<f64>().sqrt()
+        (0..3)
+            .map(|k| (corners[i][k] - corners[j][k]).powi(2))
+            .sum::<f64>()
+            .sqrt()
     };
     let (a, b, c) = (side(0, 1), side(1, 2), side(2, 0));
     let s = (a + b + c) / 2.0;
@@ -139,7 +142,11 @@ fn a_chair_that_became_a_table_is_told_by_faces_surface_and_pixels() {
         names.iter().filter(|name| !others.contains(name)).cloned().collect()
     };
     let listed = |list: &Value| -> BTreeSet<String> {
-        list.as_array().unwrap().iter().map(|name| name.as_str().unwrap().to_owned()).collect()
+        list.as_array()
+            .unwrap()
+            .iter()
+            .map(|name| name.as_str().unwrap().to_owned())
+            .collect()
     };
     let (gone, added) = (alone(&names_a, &names_b), alone(&names_b, &names_a));
     assert_eq!((listed(&labels["gone"]), listed(&labels["added"])), (gone, added));
@@ -167,10 +174,14 @@ fn a_chair_that_became_a_table_is_told_by_faces_surface_and_pixels() {
     assert_eq!(area["faces_changed"], labels["changed"]["faces"]);
 
     // Of each instance, what it lost and gained. First come the two that changed class.
-    let of_both = all.iter().filter(|((one, other), _)| class(one) == "chair" && class(other) == "table");
+    let of_both = all
+        .iter()
+        .filter(|((one, other), _)| class(one) == "chair" && class(other) == "table");
     let ((chair, table_name), _) = of_both.max_by_key(|(_, counts)| counts.0).unwrap();
     assert!(chair.contains("_conferenceRoom_1_") && table_name.contains("_conferenceRoom_1_"));
-    let first: Vec<&str> = (0..2).map(|i| labels["instances"][i]["name"].as_str().unwrap()).collect();
+    let first: Vec<&str> = (0..2)
+        .map(|i| labels["instances"][i]["name"].as_str().unwrap())
+        .collect();
     assert!(first.contains(&&**chair) && first.contains(&&**table_name), "{first:?} {chair} {table_name}");
     let instances = labels["instances"].as_array().unwrap();
     for of in instances {
@@ -182,7 +193,9 @@ fn a_chair_that_became_a_table_is_told_by_faces_surface_and_pixels() {
         is(&of["class_changed"], sum(own.map(|(_, counts)| counts)));
     }
     let changed: BTreeSet<&str> = all.keys().flat_map(|(one, other)| [&**one, &**other]).collect();
-    let changed = changed.into_iter().filter(|name| *name != NULL_NAME && *name != "nothing");
+    let changed = changed
+        .into_iter()
+        .filter(|name| *name != NULL_NAME && *name != "nothing");
     assert_eq!(instances.len(), changed.count().min(50));
 
     let semantic = entry(&json["modalities"], "modality", "semantic");
@@ -190,7 +203,9 @@ fn a_chair_that_became_a_table_is_told_by_faces_surface_and_pixels() {
     let input = &json["inputs"][0];
     assert_eq!((count(&json["inputs"]), &input["path"]), (1, &"Area_1/".into()));
     let begins = |words: &[&str]| {
-        answer.lines().any(|line| line.split_whitespace().take(words.len()).eq(words.iter().copied()))
+        answer
+            .lines()
+            .any(|line| line.split_whitespace().take(words.len()).eq(words.iter().copied()))
     };
     assert!(
         begins(&["chair", "table", &table.0.to_string()]) && begins(&["chair", "another", "chair"]),
@@ -202,7 +217,10 @@ fn a_chair_that_became_a_table_is_told_by_faces_surface_and_pixels() {
     let (_, back, _) = compare(&b, &a);
     assert_eq!(back["labels"]["gone"], labels["added"]);
     let pair = back["labels"]["matrix"].as_array().unwrap();
-    let pair = pair.iter().find(|pair| pair["a"] == "table" && pair["b"] == "chair").unwrap();
+    let pair = pair
+        .iter()
+        .find(|pair| pair["a"] == "table" && pair["b"] == "chair")
+        .unwrap();
     is(pair, table);
 }
 

@@ -20,7 +20,8 @@ fn flip(path: &Path) {
 fn unread(json: &serde_json::Value) -> Vec<(String, String)> {
     let all = json["unread"].as_array().unwrap().iter();
     let word = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
-    all.map(|of| (word(&of["side"]) + ":" + &word(&of["path"]), word(&of["message"]))).collect()
+    all.map(|of| (word(&of["side"]) + ":" + &word(&of["path"]), word(&of["message"])))
+        .collect()
 }
 
 #[test]
@@ -88,7 +89,9 @@ fn what_no_data_set_holds_is_named() {
         let content = s3d_io::image::Content::Labels;
         let bytes = s3d_io::image::encode_rgb8(&image, content, s3d_io::image::Compression::Fast);
         write_bytes(&out.join(semantic), &bytes).unwrap();
-        let text = fs::read_to_string(out.join(mesh)).unwrap().replace("table_1", "throne_1");
+        let text = fs::read_to_string(out.join(mesh))
+            .unwrap()
+            .replace("table_1", "throne_1");
         write_bytes(&out.join(mesh), text.as_bytes()).unwrap();
         write_bytes(&out.join(pose), b"{}").unwrap();
     });

@@ -108,7 +108,9 @@ impl Template {
 
 /// Runs a command in a folder, and kills it after a while if it is not done by then.
 fn run(folder: &Path, command: &str, delay: Option<Duration>) -> ExitStatus {
-    let words = command.split(' ').flat_map(|word| if word == "SMALL" { SMALL.to_vec() } else { vec![word] });
+    let words = command
+        .split(' ')
+        .flat_map(|word| if word == "SMALL" { SMALL.to_vec() } else { vec![word] });
     let mut child = Command::new(env!("CARGO_BIN_EXE_s3d"))
         .args(words)
         .current_dir(folder)
@@ -130,7 +132,8 @@ fn run(folder: &Path, command: &str, delay: Option<Duration>) -> ExitStatus {
 
 /// What a process keeps for itself while it is not done.
 fn is_working(path: &Path) -> bool {
-    path.components().any(|name| name.as_os_str().to_str().is_some_and(|name| name.starts_with(".s3d")))
+    path.components()
+        .any(|name| name.as_os_str().to_str().is_some_and(|name| name.starts_with(".s3d")))
 }
 
 /// Every process that makes a plan keeps a journal of its own in it.
@@ -162,7 +165,9 @@ fn assert_nothing_by_halves(folder: &Path, before: &Files, whole: &Files, comman
         if command.contains(&format!(" {name}")) && out.join("manifest.json").exists() {
             let said = common::s3d(&["verify", text(&out)]);
             let report = String::from_utf8_lossy(&said.stdout).into_owned();
-            let told = ["half changed", "did not finish"].iter().any(|words| report.contains(words));
+            let told = ["half changed", "did not finish"]
+                .iter()
+                .any(|words| report.contains(words));
             assert!(said.status.success() || told, "{command}: {report}");
         }
     }

@@ -25,7 +25,12 @@ const SMALL: [&str; 10] =
 /// may be busy.
 fn folder() -> TempDir {
     let memory = Path::new("/dev/shm");
-    if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap()
+    if memory.is_dir() {
+        tempfile::tempdir_in(memory)
+    } else {
+        tempfile::tempdir()
+    }
+    .unwrap()
 }
 
 /// An export of one area with depth in millimetres, made once.
@@ -135,7 +140,9 @@ fn refuse<'a>(out: &Path, readers: impl IntoIterator<Item = &'a &'a [&'a str]>, 
 
 /// The readers of these commands.
 fn readers<'a>(of: &'a [&'a str]) -> impl Iterator<Item = &'a &'static [&'static str]> {
-    READERS.iter().filter(move |args| of.iter().any(|word| args.contains(word)))
+    READERS
+        .iter()
+        .filter(move |args| of.iter().any(|word| args.contains(word)))
 }
 
 fn json(path: &Path) -> Value {
@@ -144,7 +151,9 @@ fn json(path: &Path) -> Value {
 
 /// The first file below a folder whose path ends so.
 fn first(out: &Path, folder: &str, ending: &str) -> String {
-    let found = files(&out.join(folder)).into_keys().find(|path| text(path).ends_with(ending));
+    let found = files(&out.join(folder))
+        .into_keys()
+        .find(|path| text(path).ends_with(ending));
     format!("{folder}/{}", text(&found.unwrap_or_else(|| panic!("no {ending} in {folder}"))))
 }
 
@@ -200,8 +209,11 @@ fn what_is_wrong_in_a_manifest_is_told_by_all_alike() {
         let told = told.unwrap_or_else(|| panic!("verify should tell of {words:?}: {report}"));
         // Reports and errors have the line of a file in other places.
         let message = told.split_once(": ").unwrap().1;
-        let message =
-            if message.starts_with("line ") { message.split_once(": ").unwrap().1 } else { message };
+        let message = if message.starts_with("line ") {
+            message.split_once(": ").unwrap().1
+        } else {
+            message
+        };
         refuse(&out, readers(&["stats", "xyz", "profile", "pack", "compare"]), &["manifest.json", message]);
     }
 }
@@ -324,7 +336,12 @@ fn pipes_and_files_without_end_stop_nobody_and_take_no_memory() {
             } else {
                 // A few bytes and a hole of twelve gigabytes.
                 write_bytes(&path, &bytes).unwrap();
-                File::options().write(true).open(&path).unwrap().set_len(12 << 30).unwrap();
+                File::options()
+                    .write(true)
+                    .open(&path)
+                    .unwrap()
+                    .set_len(12 << 30)
+                    .unwrap();
             }
             for args in READERS {
                 let said = run(&out, args);

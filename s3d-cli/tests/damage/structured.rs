@@ -48,10 +48,13 @@ fn put(path: &Path, bytes: &[u8]) {
 /// The numbers, texts and flags of a document, by their places.
 fn leaves(value: &Value, place: &str, out: &mut Vec<String>) {
     match value {
-        Value::Object(map) => map.iter().for_each(|(key, v)| leaves(v, &format!("{place}/{key}"), out)),
-        Value::Array(all) => {
-            all.iter().enumerate().for_each(|(i, v)| leaves(v, &format!("{place}/{i}"), out))
-        }
+        Value::Object(map) => map
+            .iter()
+            .for_each(|(key, v)| leaves(v, &format!("{place}/{key}"), out)),
+        Value::Array(all) => all
+            .iter()
+            .enumerate()
+            .for_each(|(i, v)| leaves(v, &format!("{place}/{i}"), out)),
         _ => out.push(place.to_owned()),
     }
 }
@@ -119,11 +122,16 @@ fn damage(out: &Path, random: &mut Random) -> String {
             "replaced by another"
         }
         _ => {
-            let json: Vec<&PathBuf> =
-                all.iter().filter(|p| p.extension().is_some_and(|e| e == "json")).collect();
+            let json: Vec<&PathBuf> = all
+                .iter()
+                .filter(|p| p.extension().is_some_and(|e| e == "json"))
+                .collect();
             // Of the manifest nothing but its content tells.
-            let name =
-                if random.below(3) > 0 { Path::new("manifest.json") } else { json[random.below(json.len())] };
+            let name = if random.below(3) > 0 {
+                Path::new("manifest.json")
+            } else {
+                json[random.below(json.len())]
+            };
             return format!("{} of {} changed", change_value(&out.join(name), random), name.display());
         }
     };
@@ -141,7 +149,9 @@ fn what_matters(out: &Path) -> (Option<Value>, Vec<(PathBuf, Vec<u8>)>) {
     }
     // A copy beside the tables is somebody's own.
     let ours = |path: &PathBuf| path.components().count() > 1 || export().join(path).exists();
-    let files = files(out).into_iter().filter(|(path, _)| ours(path) && path != Path::new("manifest.json"));
+    let files = files(out)
+        .into_iter()
+        .filter(|(path, _)| ours(path) && path != Path::new("manifest.json"));
     (manifest, files.collect())
 }
 

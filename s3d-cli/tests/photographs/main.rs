@@ -105,9 +105,15 @@ fn a_fisheyes_photographs_of_a_colmap_model_become_smaller_views() {
     let layout = Layout::new(&out);
     let all = dataset_images(&layout, 1).unwrap();
     assert!(all.len() > 10 && all.iter().all(|image| image.domains.len() == Domain::PUBLISHED.len()));
-    for image in all.iter().filter(|image| !records.iter().any(|r| r.camera_uuid == image.uuid)) {
+    for image in all
+        .iter()
+        .filter(|image| !records.iter().any(|r| r.camera_uuid == image.uuid))
+    {
         fs::remove_file(image.path(&layout, Domain::Pose)).unwrap();
-        image.domains.iter().for_each(|domain| drop(fs::remove_file(image.path(&layout, *domain))));
+        image
+            .domains
+            .iter()
+            .for_each(|domain| drop(fs::remove_file(image.path(&layout, *domain))));
     }
     let off = registered(&out);
     assert!(off.len() > 10 && off[off.len() / 2] < 0.1 && off[off.len() - 1] < 0.3, "{off:?}");
@@ -183,7 +189,9 @@ fn what_is_wrong_with_photographs_is_said_before_anything_is_written() {
     with(&|list| list["w"] = json!(400));
     project.fails(&["images/0.png", "320 × 240 pixels", "its camera is for 400 × 240"]);
     with(&|list| {
-        ["fl_x", "fl_y"].iter().for_each(|key| drop(list.as_object_mut().unwrap().remove(*key)));
+        ["fl_x", "fl_y"]
+            .iter()
+            .for_each(|key| drop(list.as_object_mut().unwrap().remove(*key)));
     });
     project.fails(&[
         "images/0.png",
@@ -199,10 +207,18 @@ fn what_is_wrong_with_photographs_is_said_before_anything_is_written() {
     with(&|list| (0..4).for_each(|i| list["frames"][i]["transform_matrix"][2][3] = json!(60.0)));
     with(&|list| list["cx"] = json!(1000.0));
     project.fails(&["the principal point (1000, 117.5) lies outside of the photograph of 320 × 240"]);
-    with(&|list| ["w", "h"].iter().zip([240, 320]).for_each(|(key, side)| list[*key] = json!(side)));
+    with(&|list| {
+        ["w", "h"]
+            .iter()
+            .zip([240, 320])
+            .for_each(|(key, side)| list[*key] = json!(side))
+    });
     project.fails(&["images/0.png", "320 × 240 pixels, and its camera is for 240 × 320"]);
     with(&|list| {
-        ["w", "h", "cx", "cy"].iter().zip([240, 320, 120, 160]).for_each(|(key, v)| list[*key] = json!(v));
+        ["w", "h", "cx", "cy"]
+            .iter()
+            .zip([240, 320, 120, 160])
+            .for_each(|(key, v)| list[*key] = json!(v));
     });
     turn(&project.at("images/0.png"), 6);
     project.fails(&["stored with 320 × 240 pixels", "EXIF orientation 6", "for 240 × 320: store it upright"]);
@@ -237,7 +253,9 @@ fn a_scannet_folder_is_taken_with_the_poses_that_it_knows() {
     let pinhole = PhotoLens::Straight(Lens::new(SIZE, FOCAL, CENTER, [0.0; 5]).unwrap());
     let k = [[FOCAL.x, 0.0, CENTER.x], [0.0, FOCAL.y, CENTER.y], [0.0, 0.0, 1.0]];
     let lines = |rows: &[&[f64]]| -> String {
-        rows.iter().map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(" ") + "\n").collect()
+        rows.iter()
+            .map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(" ") + "\n")
+            .collect()
     };
     project.write("scan/intrinsic/intrinsic_color.txt", &lines(&[&k[0], &k[1], &k[2]]));
     for (i, pose) in poses().iter().take(3).enumerate() {
@@ -256,13 +274,26 @@ fn a_scannet_folder_is_taken_with_the_poses_that_it_knows() {
     // A pinhole's photograph is its view, pixel by pixel.
     let (view, photo) =
         (read_rgb8(&first_of(&out, "0")).unwrap(), read_rgb8(&project.at("scan/color/0.png")).unwrap());
-    assert!(view.pixels().iter().zip(photo.pixels()).all(|(a, b)| *a == b.map(|v| v.max(1))));
-    assert!(photographs(&out).iter().all(|r| r.masked == 0.0 && r.agreement.unwrap() > 0.6));
+    assert!(
+        view.pixels()
+            .iter()
+            .zip(photo.pixels())
+            .all(|(a, b)| *a == b.map(|v| v.max(1)))
+    );
+    assert!(
+        photographs(&out)
+            .iter()
+            .all(|r| r.masked == 0.0 && r.agreement.unwrap() > 0.6)
+    );
 }
 
 /// The colours of the view of the photograph of this name.
 fn first_of(out: &Path, name: &str) -> PathBuf {
-    let uuid = photographs(out).into_iter().find(|r| r.name == name).unwrap().camera_uuid;
+    let uuid = photographs(out)
+        .into_iter()
+        .find(|r| r.name == name)
+        .unwrap()
+        .camera_uuid;
     let folder = out.join("area_1/data/rgb");
     let names = files(&folder).into_keys();
     folder.join(names.into_iter().find(|p| p.to_string_lossy().contains(&uuid)).unwrap())
@@ -342,11 +373,17 @@ fn packages_know_photographs_and_their_masks() {
     let table = project.at("images.parquet");
     s3d_ok(&["pack", text(&out), "--to", "parquet", "-o", text(&table)]);
     let bytes = fs::read(&table).unwrap();
-    assert!(bytes.windows(14).any(|w| w == b"images/3.png\0\0" || w.starts_with(b"images/3.png")));
+    assert!(
+        bytes
+            .windows(14)
+            .any(|w| w == b"images/3.png\0\0" || w.starts_with(b"images/3.png"))
+    );
     // Coordinates that are made again are those of the photographs' own cameras, but for steps of depth.
     let layout = Layout::new(&out);
     let all = dataset_images(&layout, 1).unwrap();
-    let of_photographs = all.iter().filter(|image| records.iter().any(|r| r.camera_uuid == image.uuid));
+    let of_photographs = all
+        .iter()
+        .filter(|image| records.iter().any(|r| r.camera_uuid == image.uuid));
     let paths: Vec<PathBuf> = of_photographs.map(|i| i.path(&layout, Domain::GlobalXyz)).collect();
     let world = || paths.iter().map(|path| read_xyz(path).unwrap()).collect::<Vec<_>>();
     let before = world();
@@ -378,7 +415,11 @@ fn packages_know_photographs_and_their_masks() {
     s3d_ok(&[&["export", text(&out.join("area_1")), "-o", text(&again)][..], &small].concat());
     let poses = files(&again.join("area_1/pano/pose"));
     assert!(!poses.is_empty());
-    assert!(poses.keys().all(|p| records.iter().all(|r| !p.to_string_lossy().contains(&r.camera_uuid))));
+    assert!(
+        poses
+            .keys()
+            .all(|p| records.iter().all(|r| !p.to_string_lossy().contains(&r.camera_uuid)))
+    );
 }
 
 /// COCO's images are void where a view lies outside of its photograph, whatever the mesh shows there.
@@ -398,7 +439,10 @@ fn coco_is_void_outside_of_a_photograph() {
     for image in all {
         let read = |domain| read_rgb8(&image.path(&layout, domain)).unwrap();
         let (color, label) = (read(Domain::Rgb), read(Domain::Semantic));
-        let packed = files(&place).into_keys().find(|p| text(p).contains(&image.uuid)).unwrap();
+        let packed = files(&place)
+            .into_keys()
+            .find(|p| text(p).contains(&image.uuid))
+            .unwrap();
         let panoptic = read_rgb8(&place.join(packed)).unwrap();
         let pixels = color.pixels().iter().zip(label.pixels()).zip(panoptic.pixels());
         let (mut outside, mut labelled) = (0, 0);
@@ -425,8 +469,10 @@ fn samples_at_edges_change_colours_alone() {
     let four = export("four", &["--rgb-samples", "4"]);
     let differs = |path: &PathBuf| one[path] != four[path];
     let is_rgb = |path: &Path| path.components().any(|part| part.as_os_str() == "rgb");
-    let images: Vec<&PathBuf> =
-        one.keys().filter(|p| p.starts_with("area_1/data") || p.starts_with("area_1/pano")).collect();
+    let images: Vec<&PathBuf> = one
+        .keys()
+        .filter(|p| p.starts_with("area_1/data") || p.starts_with("area_1/pano"))
+        .collect();
     let is_panorama = |path: &Path| is_rgb(path) && path.starts_with("area_1/pano");
     assert!(images.iter().filter(|p| is_panorama(p)).all(|p| differs(p)), "every panorama has edges");
     assert!(images.iter().filter(|p| !is_rgb(p)).all(|p| !differs(p)));

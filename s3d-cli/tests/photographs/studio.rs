@@ -124,7 +124,10 @@ impl Project {
         static TAKEN: OnceLock<Vec<Raster<[u8; 3]>>> = OnceLock::new();
         let project = Self::new(rest);
         let taken = TAKEN.get_or_init(|| poses().iter().map(|pose| take(pose, &radial())).collect());
-        taken.iter().enumerate().for_each(|(i, image)| write(&project.at(&format!("images/{i}.png")), image));
+        taken
+            .iter()
+            .enumerate()
+            .for_each(|(i, image)| write(&project.at(&format!("images/{i}.png")), image));
         project.write("transforms.json", &transforms(&poses()).to_string());
         project
     }
@@ -222,7 +225,11 @@ pub(crate) fn registered(out: &Path) -> Vec<f64> {
         let camera = Camera::from_k_rt(pose.camera_k_matrix, pose.camera_rt_matrix, w, h).unwrap();
         let hits = cast(&scene, &camera);
         let (depth, expected) = (read_gray16(&path("depth")).unwrap(), depth_image(&hits));
-        let off = depth.pixels().iter().zip(expected.pixels()).filter(|(a, b)| a.abs_diff(**b) > 1);
+        let off = depth
+            .pixels()
+            .iter()
+            .zip(expected.pixels())
+            .filter(|(a, b)| a.abs_diff(**b) > 1);
         // A pose from its matrix is off in the last digits: at silhouettes that shows.
         assert!(off.count() * 1000 < depth.len());
         all.extend(displacements(&photo, &smooth(&scene, &mip_maps, &camera)));

@@ -62,7 +62,11 @@ fn of_area(
     let is_labelled = sides.both().iter().all(|(_, data)| data.taxonomy().is_some());
     if !is_labelled {
         let [a, b] = [Side::A, Side::B].map(|side| sides.of(side).layout().rgb_obj(area));
-        return Ok(if sides.are_same(&a, &b) { Geometry::Same } else { Geometry::Unlabelled });
+        return Ok(if sides.are_same(&a, &b) {
+            Geometry::Same
+        } else {
+            Geometry::Unlabelled
+        });
     }
     // Materials are labels, and named in the mesh itself.
     if sides.are_same(&a, &b) {
@@ -94,12 +98,25 @@ fn of_area(
 /// The largest patches of changed faces, those of another class first.
 fn patches(mesh: &TriMesh, names: &Names, changes: &[FaceChange]) -> Vec<ChangedPatch> {
     let faces: Vec<(u32, (u32, u32))> = changes.iter().map(|of| (of.face, (of.a, of.b))).collect();
-    let center = |face: u32| mesh.triangle(face).map(|corner| corner.as_dvec3()).iter().sum::<DVec3>() / 3.0;
+    let center = |face: u32| {
+        mesh.triangle(face)
+            .map(|corner| corner.as_dvec3())
+            .iter()
+            .sum::<DVec3>()
+            / 3.0
+    };
     let patch = |places: Vec<usize>| {
-        let of_patch: Vec<FaceChange> =
-            places.into_iter().filter_map(|place| changes.get(place)).copied().collect();
+        let of_patch: Vec<FaceChange> = places
+            .into_iter()
+            .filter_map(|place| changes.get(place))
+            .copied()
+            .collect();
         let m2: f64 = of_patch.iter().map(|of| mesh.area(of.face)).sum();
-        let middle = of_patch.iter().map(|of| mesh.area(of.face) * center(of.face)).sum::<DVec3>() / m2;
+        let middle = of_patch
+            .iter()
+            .map(|of| mesh.area(of.face) * center(of.face))
+            .sum::<DVec3>()
+            / m2;
         let away = |of: &&FaceChange| center(of.face).distance_squared(middle);
         let nearest = of_patch.iter().min_by(|x, y| away(x).total_cmp(&away(y)))?;
         let (FaceChange { face, a, b }, faces) = (*nearest, of_patch.len() as u64);
@@ -126,9 +143,15 @@ fn labelled_mesh(sides: &Sides, side: Side, names: &Names, area: u32) -> Result<
             FileError::format(&path, message)
         })
     };
-    let numbers: Vec<u32> =
-        mesh.materials().iter().map(|m| number(&m.name)).collect::<Result<_, FileError>>()?;
-    let of = |face| mesh.material_of(face).map_or(NULL, |material| numbers[material as usize]);
+    let numbers: Vec<u32> = mesh
+        .materials()
+        .iter()
+        .map(|m| number(&m.name))
+        .collect::<Result<_, FileError>>()?;
+    let of = |face| {
+        mesh.material_of(face)
+            .map_or(NULL, |material| numbers[material as usize])
+    };
     let label_of_face = (0..mesh.faces().len() as u32).map(of).collect();
     Ok(Labelled { mesh, label_of_face })
 }

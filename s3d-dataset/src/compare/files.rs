@@ -28,7 +28,11 @@ pub(crate) fn check(sides: &Sides, full: bool, ctx: &Context) -> Result<()> {
         || (),
         |(), (side, record)| {
             let root = sides.of(*side).layout().root();
-            let checked = if full { record.check(root) } else { record.check_size(root) };
+            let checked = if full {
+                record.check(root)
+            } else {
+                record.check_size(root)
+            };
             sides.keep(*side, checked.map_err(Error::from))?;
             progress.add(1);
             Ok(())
@@ -56,7 +60,10 @@ pub(crate) fn changes(sides: &Sides) -> Vec<FileKindChanges> {
             kind.first.push(path.to_owned());
         }
     }
-    kinds.into_iter().map(|(kind, changes)| FileKindChanges { kind, ..changes }).collect()
+    kinds
+        .into_iter()
+        .map(|(kind, changes)| FileKindChanges { kind, ..changes })
+        .collect()
 }
 
 /// The kind of a file: `data/rgb` of an area, a folder or a file of the data set.
@@ -108,7 +115,11 @@ fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
     let options = serde_json::to_value(data.options());
     let failed = |e: serde_json::Error| FileError::format(&data.layout().manifest(), e.to_string());
     if let Value::Object(options) = options.map_err(failed)? {
-        all.extend(options.into_iter().map(|(name, value)| (format!("options.{name}"), value)));
+        all.extend(
+            options
+                .into_iter()
+                .map(|(name, value)| (format!("options.{name}"), value)),
+        );
     }
     for entry in &manifest.areas {
         let area = entry.area;
@@ -124,8 +135,11 @@ fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
 /// The checksums of files and folders of the input.
 fn inputs(data: &DataSet) -> BTreeMap<(u32, String), String> {
     let areas = &data.0.manifest.areas;
-    let of = areas.iter().flat_map(|entry| entry.inputs.iter().map(move |input| (entry.area, input)));
-    of.map(|(area, input)| ((area, input.path.clone()), input.xxh3_128.to_string())).collect()
+    let of = areas
+        .iter()
+        .flat_map(|entry| entry.inputs.iter().map(move |input| (entry.area, input)));
+    of.map(|(area, input)| ((area, input.path.clone()), input.xxh3_128.to_string()))
+        .collect()
 }
 
 #[cfg(test)]

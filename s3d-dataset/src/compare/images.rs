@@ -93,7 +93,9 @@ pub(crate) fn compare_all(
     };
     let mut sums = [Sums::default(); Domain::ALL.len()];
     for ((key, pair), outcome) in jobs.iter().zip(outcomes) {
-        let classes = names.map(|names| names.classes_of_image(&outcome.pairs)).unwrap_or_default();
+        let classes = names
+            .map(|names| names.classes_of_image(&outcome.pairs))
+            .unwrap_or_default();
         for (labels, counts) in outcome.pairs {
             *pairs.entry(labels).or_default() += counts;
         }
@@ -106,7 +108,9 @@ pub(crate) fn compare_all(
     for (modality, sums) in images.modalities.iter_mut().zip(&sums) {
         modality.pixels = sums.changes();
     }
-    images.modalities.retain(|of| of.modality != Domain::Pose.folder() && *of != empty(of.modality));
+    images
+        .modalities
+        .retain(|of| of.modality != Domain::Pose.folder() && *of != empty(of.modality));
     images.poses.sort();
     images.sort();
     Ok(images)
@@ -171,7 +175,8 @@ impl Images {
     fn sort(&mut self) {
         let order = |of: &ImageChange| Domain::ALL.iter().position(|d| d.folder() == of.modality);
         let share = |of: &ImageChange| of.pixels.pixels_changed as f64 / of.pixels.pixels as f64;
-        self.changed.sort_by(|a, b| order(a).cmp(&order(b)).then(share(b).total_cmp(&share(a))));
+        self.changed
+            .sort_by(|a, b| order(a).cmp(&order(b)).then(share(b).total_cmp(&share(a))));
     }
 }
 
@@ -233,7 +238,11 @@ impl Work<'_> {
             return Ok((PoseFound::None, SameCamera::Unread));
         };
         let moved = Moved::between(&pose_a, &pose_b);
-        let camera = if moved.is_same_camera() { SameCamera::Yes } else { SameCamera::No };
+        let camera = if moved.is_same_camera() {
+            SameCamera::Yes
+        } else {
+            SameCamera::No
+        };
         Ok((PoseFound::Moved(moved), camera))
     }
 
@@ -281,7 +290,8 @@ impl Work<'_> {
             Ok(None) => Ok(Found::OtherForm),
             Err((side, message)) => {
                 let path = if side == Side::A { &path_a } else { &path_b };
-                self.sides.keep::<()>(side, Err(FileError::format(path, message).into()))?;
+                self.sides
+                    .keep::<()>(side, Err(FileError::format(path, message).into()))?;
                 Ok(Found::Unread)
             }
         }
@@ -292,7 +302,9 @@ impl Work<'_> {
         match domain {
             Domain::SemanticClass => {
                 let [a, b] = [&self.sides.a, &self.sides.b].map(|data| data.0.taxonomy.classes());
-                a.iter().map(|class| class.name()).eq(b.iter().map(|class| class.name()))
+                a.iter()
+                    .map(|class| class.name())
+                    .eq(b.iter().map(|class| class.name()))
             }
             Domain::Semantic => self.names.is_none_or(Names::have_same_indices),
             _ => true,

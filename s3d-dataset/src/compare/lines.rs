@@ -6,7 +6,12 @@ pub(crate) struct Lines(String);
 
 impl Lines {
     pub(crate) fn add(&mut self, line: impl AsRef<str>) {
-        self.0.extend(line.as_ref().trim_end().chars().map(|c| if is_odd(c) { '\u{fffd}' } else { c }));
+        self.0.extend(
+            line.as_ref()
+                .trim_end()
+                .chars()
+                .map(|c| if is_odd(c) { '\u{fffd}' } else { c }),
+        );
         self.0.push('\n');
     }
 
@@ -73,7 +78,11 @@ pub(crate) fn significant(value: f64) -> String {
 /// A share of a hundred.
 pub(crate) fn percent(part: u64, of: u64) -> String {
     let share = 100.0 * part as f64 / of as f64;
-    if share > 0.0 && share < 0.01 { "<0.01 %".to_owned() } else { format!("{share:.2} %") }
+    if share > 0.0 && share < 0.01 {
+        "<0.01 %".to_owned()
+    } else {
+        format!("{share:.2} %")
+    }
 }
 
 /// 1,234,567.

@@ -84,8 +84,12 @@ fn notes(sides: &Sides, images: &Images) -> Vec<String> {
     let mut notes = Vec::new();
     for (side, other) in [(&sides.a, &sides.b), (&sides.b, &sides.a)] {
         let name = |data: &_| if std::ptr::eq(data, &sides.a) { "A" } else { "B" };
-        let alone: Vec<String> =
-            side.areas().iter().filter(|area| !other.areas().contains(area)).map(u32::to_string).collect();
+        let alone: Vec<String> = side
+            .areas()
+            .iter()
+            .filter(|area| !other.areas().contains(area))
+            .map(u32::to_string)
+            .collect();
         if !alone.is_empty() {
             notes.push(format!("only {} has area {}", name(side), alone.join(", ")));
         }
@@ -100,7 +104,12 @@ fn notes(sides: &Sides, images: &Images) -> Vec<String> {
         notes.push(format!("classes are those of {a} in A and of {b} in B; they were compared by name"));
     }
     let forms = [sides.a.options().conventions(), sides.b.options().conventions()];
-    let has = |domain| images.modalities.iter().any(|of| of.modality == domain && of.other_form > 0);
+    let has = |domain| {
+        images
+            .modalities
+            .iter()
+            .any(|of| of.modality == domain && of.other_form > 0)
+    };
     if has(Domain::Depth.folder()) && forms[0].depth_units != forms[1].depth_units {
         let [a, b] = forms.map(|form| form.depth_units);
         notes.push(format!("depth is in units of {a} in A and {b} in B; its pixels were not compared"));

@@ -112,7 +112,12 @@ impl Names {
     }
 
     fn has(&self, side: Side, number: u32) -> bool {
-        number == NULL || self.of_side(side).classes.get(number as usize).is_some_and(Option::is_some)
+        number == NULL
+            || self
+                .of_side(side)
+                .classes
+                .get(number as usize)
+                .is_some_and(Option::is_some)
     }
 
     /// The class of what has a number in a data set.
@@ -136,10 +141,14 @@ impl Names {
     pub(crate) fn classes_of_image(&self, pairs: &LabelPairs) -> Vec<ClassPixels> {
         let mut by_class: BTreeMap<(&'static str, &'static str), u64> = BTreeMap::new();
         for (&(a, b), counts) in pairs {
-            *by_class.entry((self.class(Side::A, a), self.class(Side::B, b))).or_default() += counts.pixels;
+            *by_class
+                .entry((self.class(Side::A, a), self.class(Side::B, b)))
+                .or_default() += counts.pixels;
         }
-        let mut all: Vec<ClassPixels> =
-            by_class.into_iter().map(|((a, b), pixels)| ClassPixels { a, b, pixels }).collect();
+        let mut all: Vec<ClassPixels> = by_class
+            .into_iter()
+            .map(|((a, b), pixels)| ClassPixels { a, b, pixels })
+            .collect();
         // Sorts are stable: of equal ones the first by name.
         all.sort_by_key(|pair| Reverse(pair.pixels));
         all.truncate(MAX_PAIRS);
@@ -166,7 +175,11 @@ impl Names {
             let (class_a, class_b) = (self.class(Side::A, a), self.class(Side::B, b));
             changes.changed += counts;
             *matrix.entry((class_a, class_b)).or_default() += counts;
-            let of_class = if class_a == class_b { LabelCounts::default() } else { counts };
+            let of_class = if class_a == class_b {
+                LabelCounts::default()
+            } else {
+                counts
+            };
             changes.class_changed += of_class;
             for (number, is_lost) in [(a, true), (b, false)] {
                 if number == NULL || number == MISSING {
@@ -181,9 +194,14 @@ impl Names {
                 of.class_changed += of_class;
             }
         }
-        changes.matrix = matrix.into_iter().map(|((a, b), counts)| ClassPair { a, b, counts }).collect();
+        changes.matrix = matrix
+            .into_iter()
+            .map(|((a, b), counts)| ClassPair { a, b, counts })
+            .collect();
         // Sorts are stable: of equal ones the first by name.
-        changes.matrix.sort_by_key(|pair| (pair.a == pair.b, Reverse(size(&pair.counts))));
+        changes
+            .matrix
+            .sort_by_key(|pair| (pair.a == pair.b, Reverse(size(&pair.counts))));
         changes.instances = instances
             .into_iter()
             .map(|(n, change)| InstanceChange { name: self.names[n as usize].clone(), ..change })

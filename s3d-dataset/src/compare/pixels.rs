@@ -199,7 +199,10 @@ mod tests {
         let taxonomy = Taxonomy::s3dis();
         let meaning =
             Meaning { depth_units: DepthUnits::Per512, names: None, taxonomies: [&taxonomy, &taxonomy] };
-        compare((&a, &b), domain, &meaning, &mut LabelPairs::new()).unwrap().unwrap().changes()
+        compare((&a, &b), domain, &meaning, &mut LabelPairs::new())
+            .unwrap()
+            .unwrap()
+            .changes()
     }
 
     fn color(pixels: &[[u8; 3]]) -> Pixels {

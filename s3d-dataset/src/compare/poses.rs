@@ -33,7 +33,11 @@ impl Moved {
             // One of them is no rotation and translation.
             _ => degrees = 180.0,
         }
-        let k = a.camera_k_matrix.as_flattened().iter().zip(b.camera_k_matrix.as_flattened());
+        let k = a
+            .camera_k_matrix
+            .as_flattened()
+            .iter()
+            .zip(b.camera_k_matrix.as_flattened());
         let k_px = k.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
         Self { m, degrees, k_px }
     }
@@ -75,7 +79,9 @@ impl PoseChanges {
     pub(crate) fn sort(&mut self) {
         let k = |of: &PoseChange| of.k_px.unwrap_or(0.0);
         self.moved.sort_by(|a, b| {
-            b.m.total_cmp(&a.m).then(b.degrees.total_cmp(&a.degrees)).then(k(b).total_cmp(&k(a)))
+            b.m.total_cmp(&a.m)
+                .then(b.degrees.total_cmp(&a.degrees))
+                .then(k(b).total_cmp(&k(a)))
         });
     }
 }

@@ -86,13 +86,19 @@ impl Sides {
     /// The files that could not be compared, by side and path.
     pub(crate) fn into_unread(self) -> Vec<UnreadFile> {
         let unread = self.unread.into_inner().unwrap_or_else(PoisonError::into_inner);
-        unread.into_iter().map(|((side, path), message)| UnreadFile { side, path, message }).collect()
+        unread
+            .into_iter()
+            .map(|((side, path), message)| UnreadFile { side, path, message })
+            .collect()
     }
 }
 
 /// The records of a data set by path.
 pub(crate) fn records(data: &Dataset) -> BTreeMap<&str, &FileRecord> {
-    data.files.records().map(|record| (record.path.as_str(), record)).collect()
+    data.files
+        .records()
+        .map(|record| (record.path.as_str(), record))
+        .collect()
 }
 
 pub(crate) fn have_same_bytes(a: &FileRecord, b: &FileRecord) -> bool {

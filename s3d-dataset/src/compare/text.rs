@@ -53,11 +53,15 @@ impl ModalityChanges {
 
 impl Comparison {
     fn made(&self, text: &mut Lines) {
-        let settings = self.settings.iter().map(|of| [of.name.clone(), words(&of.a), words(&of.b)]);
+        let settings = self
+            .settings
+            .iter()
+            .map(|of| [of.name.clone(), words(&of.a), words(&of.b)]);
         let mut rows: Vec<[String; 3]> = settings.collect();
         for of in self.inputs.iter().take(MAX_ROWS) {
             let sum = |sum: &Option<String>| {
-                sum.as_ref().map_or("none".to_owned(), |sum| sum.chars().take(MAX_DIGITS).collect())
+                sum.as_ref()
+                    .map_or("none".to_owned(), |sum| sum.chars().take(MAX_DIGITS).collect())
             };
             rows.push([format!("area {}: {}", of.area, of.path), sum(&of.a), sum(&of.b)]);
         }
@@ -89,14 +93,22 @@ impl Comparison {
             let [faces, m2, pixels] = cells(of);
             // Faces that nobody could compare are not none.
             let by_face = self.areas.iter().any(|of| of.geometry == Geometry::Same);
-            let surface = if by_face { format!("{faces} faces of {m2} m², ") } else { String::new() };
+            let surface = if by_face {
+                format!("{faces} faces of {m2} m², ")
+            } else {
+                String::new()
+            };
             format!("  {what}: {surface}{pixels} pixels")
         };
         text.add(total("another label", changed));
         text.add(total("another class", class_changed));
         let row = |pair: &ClassPair| {
             let [faces, m2, pixels] = cells(&pair.counts);
-            let class_b = if pair.a == pair.b { format!("another {}", pair.b) } else { pair.b.to_owned() };
+            let class_b = if pair.a == pair.b {
+                format!("another {}", pair.b)
+            } else {
+                pair.b.to_owned()
+            };
             [pair.a.to_owned(), class_b, faces, m2, pixels]
         };
         let rows: Vec<_> = matrix.iter().take(MAX_ROWS).map(row).collect();
@@ -167,7 +179,10 @@ impl Comparison {
             let share = percent(of.pixels.pixels_changed, of.pixels.pixels);
             [of.modality.to_owned(), share, of.a.clone()]
         };
-        let first = self.images.chunk_by(|a, b| a.modality == b.modality).filter_map(|of| of.first());
+        let first = self
+            .images
+            .chunk_by(|a, b| a.modality == b.modality)
+            .filter_map(|of| of.first());
         text.table(["most changed", "pixels", "image"], &first.map(row).collect::<Vec<_>>(), 3);
     }
 
@@ -213,7 +228,10 @@ impl Comparison {
 }
 
 fn about(text: &mut Lines, name: &str, of: &ComparedSet) {
-    let taxonomy = of.taxonomy.as_ref().map_or("no labels".to_owned(), |name| format!("classes of {name}"));
+    let taxonomy = of
+        .taxonomy
+        .as_ref()
+        .map_or("no labels".to_owned(), |name| format!("classes of {name}"));
     let (files, megabytes) = (grouped(of.files), significant(of.bytes as f64 / 1e6));
     let ComparedSet { folder, version, .. } = of;
     text.add(format!("{name}: {folder} (s3d {version}, {taxonomy}, {files} files, {megabytes} MB)"));

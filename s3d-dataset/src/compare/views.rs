@@ -56,7 +56,10 @@ fn listed(sides: &Sides, side: Side, area: u32) -> Result<Listed> {
     }
     let views = sides.keep(side, data.views(area))?;
     let photographs = sides.keep(side, data.photographs(area))?.unwrap_or_default();
-    let photographs = photographs.into_iter().map(|record| (record.camera_uuid.clone(), record)).collect();
+    let photographs = photographs
+        .into_iter()
+        .map(|record| (record.camera_uuid.clone(), record))
+        .collect();
     Ok(Listed { views, photographs })
 }
 
@@ -96,7 +99,10 @@ pub(crate) fn compare(sides: &Sides) -> Result<Views> {
         }
         let [locations_a, locations_b] = both.map(|(side, listed)| locations(sides, side, listed, area));
         let named = |uuids: &BTreeSet<String>, others: &BTreeSet<String>| -> Vec<LocationName> {
-            uuids.difference(others).map(|uuid| LocationName { area, uuid: uuid.clone() }).collect()
+            uuids
+                .difference(others)
+                .map(|uuid| LocationName { area, uuid: uuid.clone() })
+                .collect()
         };
         let [photos_a, photos_b] = [&a, &b].map(|of| of.photographs.keys().cloned().collect());
         let changes = &mut views.changes;
@@ -110,7 +116,9 @@ pub(crate) fn compare(sides: &Sides) -> Result<Views> {
 
 /// The candidates of kept views, by location and the number in their files' names.
 fn candidates(views: &[ViewRecord]) -> BTreeMap<(&str, u32), u32> {
-    let kept = views.iter().filter_map(|v| Some(((v.camera_uuid.as_str(), v.frame_num?), v.candidate)));
+    let kept = views
+        .iter()
+        .filter_map(|v| Some(((v.camera_uuid.as_str(), v.frame_num?), v.candidate)));
     kept.collect()
 }
 
@@ -118,7 +126,9 @@ fn candidates(views: &[ViewRecord]) -> BTreeMap<(&str, u32), u32> {
 fn locations(sides: &Sides, side: Side, listed: &Listed, area: u32) -> BTreeSet<String> {
     let of_views = listed.views.iter().flatten().map(|view| view.camera_uuid.clone());
     let images = sides.of(side).images(area).into_iter();
-    let of_images = images.map(|image| image.uuid).filter(|uuid| !listed.photographs.contains_key(uuid));
+    let of_images = images
+        .map(|image| image.uuid)
+        .filter(|uuid| !listed.photographs.contains_key(uuid));
     of_views.chain(of_images).collect()
 }
 
@@ -129,15 +139,20 @@ impl Views {
         let kept = |views: &'_ [ViewRecord]| views.iter().filter(|v| v.frame_num.is_some()).count() as u64;
         fn by_name(views: &[ViewRecord]) -> Kept<'_> {
             let kept = views.iter().filter(|view| view.frame_num.is_some());
-            kept.map(|view| ((view.camera_uuid.as_str(), view.candidate), view)).collect()
+            kept.map(|view| ((view.camera_uuid.as_str(), view.candidate), view))
+                .collect()
         }
         let changes = &mut self.changes;
         changes.kept_a += kept(a);
         changes.kept_b += kept(b);
         let (a, b) = (by_name(a), by_name(b));
         let name = |(uuid, candidate): (&str, u32)| ViewName { area, uuid: uuid.to_owned(), candidate };
-        changes.lost.extend(a.keys().filter(|key| !b.contains_key(*key)).map(|key| name(*key)));
-        changes.gained.extend(b.keys().filter(|key| !a.contains_key(*key)).map(|key| name(*key)));
+        changes
+            .lost
+            .extend(a.keys().filter(|key| !b.contains_key(*key)).map(|key| name(*key)));
+        changes
+            .gained
+            .extend(b.keys().filter(|key| !a.contains_key(*key)).map(|key| name(*key)));
         let angles = |view: &ViewRecord| [view.yaw_rad, view.pitch_rad, view.fov_rad];
         for (key, view) in a {
             if b.get(&key).is_some_and(|other| angles(view) != angles(other)) {

@@ -211,7 +211,10 @@ pub(crate) fn label_area(
         mesh_box: file.mesh.aabb(),
         mesh_area_m2: file.mesh.total_area(),
         faces_left_out: file.mesh.report().zero_area_faces + file.repeated_faces,
-        warnings: warnings.iter().map(|w| area.with_short_names(w, &file.companions)).collect(),
+        warnings: warnings
+            .iter()
+            .map(|w| area.with_short_names(w, &file.companions))
+            .collect(),
     };
     let write = || -> Result<()> {
         plan.write(&common.cache_of(number))?;
@@ -255,7 +258,9 @@ pub(crate) fn label_doubts(area: &AreaInput, annotated: &Annotated, table: &Labe
 /// Tells the journal of an area's labels, if it does not know of them: their files are another's work.
 pub(crate) fn know_labels(area: &AreaInput, plan: &AreaPlan, common: &Common<'_>) {
     if !common.journal.finished().has(&Unit::Labels(area.number)) {
-        common.journal.know(Done::Labels(labels_done(area, plan, common.options, Vec::new())));
+        common
+            .journal
+            .know(Done::Labels(labels_done(area, plan, common.options, Vec::new())));
     }
 }
 
@@ -279,7 +284,11 @@ pub(crate) fn take_from_plan(area: &AreaInput, from: &Plan, common: &Common<'_>)
             continue;
         }
         let scores = from.scores(number, &location.uuid)?;
-        if is_ours(&unit) { journal.write(scores)? } else { journal.know(scores) }
+        if is_ours(&unit) {
+            journal.write(scores)?
+        } else {
+            journal.know(scores)
+        }
     }
     Ok(plan)
 }
@@ -410,7 +419,10 @@ fn write_colored_mesh(dir: &Path, file: &MeshFile, compression: Compression) -> 
         .iter()
         .zip(&file.texture_files)
         .map(|(texture, found)| {
-            let stem = Path::new(&texture.name).file_stem().unwrap_or_default().to_string_lossy();
+            let stem = Path::new(&texture.name)
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy();
             match found {
                 Some(f) => (format!("{stem}.{}", f.extension), Cow::Borrowed(&f.bytes[..])),
                 None => {
@@ -482,10 +494,15 @@ pub(crate) fn render_area(
     let mut is_filled = Vec::new();
     if !annotated.filled.is_empty() {
         is_filled.resize(label_of_face.len(), false);
-        annotated.filled.iter().for_each(|face| is_filled[*face as usize] = true);
+        annotated
+            .filled
+            .iter()
+            .for_each(|face| is_filled[*face as usize] = true);
     }
-    let chosen: Vec<bool> =
-        locations.iter().map(|l| todo.contains(&Unit::Location(number, l.uuid.clone()))).collect();
+    let chosen: Vec<bool> = locations
+        .iter()
+        .map(|l| todo.contains(&Unit::Location(number, l.uuid.clone())))
+        .collect();
     let finish_location = |written: WrittenLocation| {
         let WrittenLocation { location, tally, files, started } = written;
         let uuid = &locations[location].uuid;

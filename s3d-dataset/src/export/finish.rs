@@ -112,8 +112,9 @@ pub(crate) fn finish(
             ));
         }
         let mut unlabelled = labels.entry.unlabelled;
-        if let Some(of) =
-            unlabelled.as_mut().filter(|_| request.options.modalities.contains(&Domain::Semantic))
+        if let Some(of) = unlabelled
+            .as_mut()
+            .filter(|_| request.options.modalities.contains(&Domain::Semantic))
         {
             of.without_label.pixels = Some(pixels.pixels_unlabelled);
             of.without_votes.pixels = Some(pixels.pixels_unlabelled + pixels.pixels_filled);
@@ -138,7 +139,9 @@ pub(crate) fn finish(
     }
     // A merge makes none for images that no shard has.
     for &domain in &request.options.modalities {
-        for (area, frame) in areas.iter().flat_map(|area| [(*area, Frame::Panorama), (*area, Frame::View(0))])
+        for (area, frame) in areas
+            .iter()
+            .flat_map(|area| [(*area, Frame::Panorama), (*area, Frame::View(0))])
         {
             create_dir(&layout.image_dir(area, frame, domain))?;
         }
@@ -204,7 +207,12 @@ fn write_profiles(
 /// The files of a data set that no unit wrote.
 fn table_files(layout: &Layout, areas: &[u32]) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = areas.iter().map(|area| layout.views_json(*area)).collect();
-    files.extend(areas.iter().map(|area| layout.frames_json(*area)).filter(|path| path.is_file()));
+    files.extend(
+        areas
+            .iter()
+            .map(|area| layout.frames_json(*area))
+            .filter(|path| path.is_file()),
+    );
     for entry in layout.entries(&[]) {
         if entry == layout.manifest() || entry == layout.file_list() {
             continue;

@@ -133,8 +133,12 @@ fn write_shots(
         buffers: ImageBuffers::default(),
     };
     let photographs = job.photographs.iter().map(Work::Photograph);
-    let works: Vec<Work<'_>> =
-        assets.map(Work::Assets).into_iter().chain(shots.iter().map(Work::Shot)).chain(photographs).collect();
+    let works: Vec<Work<'_>> = assets
+        .map(Work::Assets)
+        .into_iter()
+        .chain(shots.iter().map(Work::Shot))
+        .chain(photographs)
+        .collect();
     for_each_in_order(ctx, &works, memory, |memory, work| match work {
         Work::Assets(assets) => assets(),
         Work::Photograph(shot) => {
@@ -198,7 +202,11 @@ impl OpenLocation {
         self.started = Some(self.started.map_or(started, |first| first.min(started)));
         self.tally.files += shot.files.len() as u64;
         self.tally.bytes += shot.files.iter().map(|f| f.bytes).sum::<u64>();
-        let kind = if frame == Frame::Panorama { &mut self.tally.panoramas } else { &mut self.tally.views };
+        let kind = if frame == Frame::Panorama {
+            &mut self.tally.panoramas
+        } else {
+            &mut self.tally.views
+        };
         *kind += ImageTally { images: 1, ..shot.tally };
         self.files.extend(shot.files);
     }
@@ -243,6 +251,10 @@ pub(crate) fn count(job: &ImageJob<'_>, images: &[Image], hits: &Hits, buffers: 
         pixels: hits.face.len() as u64,
         pixels_missing: faces.iter().filter(|face| **face == NO_FACE).count() as u64,
         pixels_unlabelled: buffers.unlabelled,
-        pixels_filled: if counts_filled { faces.iter().filter(is_filled).count() as u64 } else { 0 },
+        pixels_filled: if counts_filled {
+            faces.iter().filter(is_filled).count() as u64
+        } else {
+            0
+        },
     }
 }

@@ -126,7 +126,11 @@ impl<'a> Job<'a> {
             Some(plan) => Inputs::open_planned(scenes, placing, lenient, plan.table()?)?,
             None => Inputs::open(scenes, placing, lenient)?,
         };
-        let options = if inputs.are_labelled() { options.clone() } else { options.without_labels()? };
+        let options = if inputs.are_labelled() {
+            options.clone()
+        } else {
+            options.without_labels()?
+        };
         let options = &options;
         check_only(&inputs, &options.only)?;
         output::check_inputs(layout, &inputs)?;
@@ -291,8 +295,10 @@ impl<'a> Job<'a> {
         let missing = missing_units(&self.request, &common.journal.finished());
         let Labelled { single, areas } = labelled;
         for ((area, plan), pictures) in self.inputs.areas.iter().zip(areas).zip(&self.pictures) {
-            let todo: BTreeSet<&Unit> =
-                missing.iter().filter(|unit| unit.area() == area.number && (common.is_ours)(unit)).collect();
+            let todo: BTreeSet<&Unit> = missing
+                .iter()
+                .filter(|unit| unit.area() == area.number && (common.is_ours)(unit))
+                .collect();
             let Some(plan) = plan.as_ref().filter(|_| !todo.is_empty()) else { continue };
             let render = |prepared: &PreparedMesh<'_>| {
                 area::render_area(area, prepared, plan, pictures.as_ref(), common, candidates, &todo)
@@ -343,8 +349,16 @@ fn check_only(inputs: &Inputs, only: &[String]) -> Result<()> {
     if inputs.areas.iter().any(|a| matches!(a.cameras, Cameras::Placed(_))) {
         return Ok(());
     }
-    let locations = inputs.areas.iter().flat_map(|a| a.cameras.listed()).map(|l| l.uuid.as_str());
-    let photographs = inputs.areas.iter().flat_map(|a| &a.photographs.all).map(|p| p.uuid.as_str());
+    let locations = inputs
+        .areas
+        .iter()
+        .flat_map(|a| a.cameras.listed())
+        .map(|l| l.uuid.as_str());
+    let photographs = inputs
+        .areas
+        .iter()
+        .flat_map(|a| &a.photographs.all)
+        .map(|p| p.uuid.as_str());
     only_known(locations.chain(photographs), only)
 }
 

@@ -128,7 +128,11 @@ pub(crate) fn unlabelled_share(
                 let face = faces.at(x, y);
                 if face != NO_FACE {
                     seen += latitude.cos();
-                    unlabelled += if label_of_face[face as usize].is_null() { latitude.cos() } else { 0.0 };
+                    unlabelled += if label_of_face[face as usize].is_null() {
+                        latitude.cos()
+                    } else {
+                        0.0
+                    };
                 }
             }
         }
@@ -162,7 +166,10 @@ pub(crate) fn locate(
     match &area.cameras {
         Cameras::Listed(locations, told) => {
             let is_known = |room: &Room| annotated.rooms.iter().any(|r| r.room == *room);
-            let rooms = locations.iter().zip(told).map(|(l, told)| told.filter(is_known).or_else(|| room(l)));
+            let rooms = locations
+                .iter()
+                .zip(told)
+                .map(|(l, told)| told.filter(is_known).or_else(|| room(l)));
             Ok(Located { locations: locations.clone(), rooms: rooms.collect(), surface_seen: None })
         }
         Cameras::Placed(Placing::Apart(distance_m)) if area.is_labelled => {

@@ -21,7 +21,11 @@ pub(crate) const NO_CLASS: u8 = MAX_CLASSES as u8;
 
 /// The place of each label's class in the taxonomy, or [`NO_CLASS`].
 pub(crate) fn classes_of_labels(table: &LabelTable) -> Vec<u8> {
-    let class = |index| table.class_of(LabelId(index)).map_or(NO_CLASS, |class| class.index() as u8);
+    let class = |index| {
+        table
+            .class_of(LabelId(index))
+            .map_or(NO_CLASS, |class| class.index() as u8)
+    };
     (0..table.len() as u32).map(class).collect()
 }
 
@@ -162,7 +166,9 @@ impl Channels<'_> {
         }
         if !large {
             let files = images.par_iter().with_max_len(1);
-            done = files.map(|&image| each(image, self.file(image, buffers))).collect::<Result<_, E>>()?;
+            done = files
+                .map(|&image| each(image, self.file(image, buffers)))
+                .collect::<Result<_, E>>()?;
         }
         buffers.unlabelled = unlabelled;
         Ok(done)
@@ -178,7 +184,11 @@ impl Channels<'_> {
         buffers: &mut ImageBuffers,
     ) {
         let large = hits.face.len() > ImageBuffers::MAX_PIXELS;
-        buffers.made = if large { Modalities::default() } else { self.together(images) };
+        buffers.made = if large {
+            Modalities::default()
+        } else {
+            self.together(images)
+        };
         if buffers.made != Modalities::default() {
             let shading = Shading {
                 scene: self.scene,
@@ -200,7 +210,10 @@ impl Channels<'_> {
         Modalities {
             rgb: wants(Image::Rgb) && self.pictures.is_none(),
             depth: wants(Image::Depth) && depth_units == DepthUnits::Per512,
-            faces: flat && [Image::Normal, Image::Semantic, Image::SemanticPretty].into_iter().all(wants),
+            faces: flat
+                && [Image::Normal, Image::Semantic, Image::SemanticPretty]
+                    .into_iter()
+                    .all(wants),
             xyz: wants(Image::GlobalXyz) && xyz != XyzType::Float,
         }
     }

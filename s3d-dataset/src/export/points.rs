@@ -69,8 +69,9 @@ pub(crate) fn write_points(
     for (room, runs) in rooms {
         // A room that no point was drawn in stands nowhere in the tree: loaders stop at one without
         // annotations.
-        let has_points =
-            runs.iter().any(|r| sampler.points_before(r.faces.start) < sampler.points_before(r.faces.end));
+        let has_points = runs
+            .iter()
+            .any(|r| sampler.points_before(r.faces.start) < sampler.points_before(r.faces.end));
         let room = room.filter(|_| has_points);
         in_tree.extend(room);
         let mut files = room.map(|room| tree.room(&room.to_string())).transpose()?;
@@ -118,8 +119,9 @@ fn runs(faces: &[u32], label_of_face: &[LabelId], place: &Places) -> Vec<(Option
     let mut start = 0;
     for run in faces.chunk_by(|a, b| label_of_face[*a as usize] == label_of_face[*b as usize]) {
         let label = label_of_face[run[0] as usize];
-        let (room, number_in_room) =
-            place.get(&label).map_or((None, 0), |(room, number)| (Some(*room), *number));
+        let (room, number_in_room) = place
+            .get(&label)
+            .map_or((None, 0), |(room, number)| (Some(*room), *number));
         let run = Run { faces: start..start + run.len(), label, number_in_room };
         start = run.faces.end;
         match rooms.last_mut() {

@@ -54,7 +54,12 @@ mod tests {
         assert_eq!(bring(&record, &from, &to).unwrap(), None);
         assert_eq!(fs::read(to.join("a/b")).unwrap(), b"content");
         fs::write(from.join("a/b"), b"contenu").unwrap();
-        assert!(bring(&record, &from, &to).unwrap().unwrap().contains("a/b: is damaged: other content"));
+        assert!(
+            bring(&record, &from, &to)
+                .unwrap()
+                .unwrap()
+                .contains("a/b: is damaged: other content")
+        );
         fs::remove_file(from.join("a/b")).unwrap();
         assert!(bring(&record, &from, &to).unwrap().unwrap().starts_with("a/b: "));
         // Between file systems it is copied.

@@ -70,12 +70,16 @@ impl Kinds {
             return Self::Classes(class_of_face, table.taxonomy().classes().len());
         }
         let steps = [-1.0, 0.0, 1.0];
-        let all = steps.iter().flat_map(|x| steps.iter().flat_map(move |y| steps.map(|z| vec3(*x, *y, z))));
+        let all = steps
+            .iter()
+            .flat_map(|x| steps.iter().flat_map(move |y| steps.map(|z| vec3(*x, *y, z))));
         let directions: Vec<Vec3> = all.filter_map(Vec3::try_normalize).collect();
         let nearest = |face: u32| {
             let normal = mesh.normal(face);
             let cosines = directions.iter().map(|d| d.dot(normal));
-            let best = cosines.enumerate().max_by(|(i, a), (j, b)| a.total_cmp(b).then(j.cmp(i)));
+            let best = cosines
+                .enumerate()
+                .max_by(|(i, a), (j, b)| a.total_cmp(b).then(j.cmp(i)));
             best.map_or(0, |(index, _)| index as u8)
         };
         Self::Directions((0..mesh.faces().len() as u32).into_par_iter().map(nearest).collect())
@@ -133,7 +137,10 @@ fn draw(
             yaw_rad,
             pitch_rad,
             fov_rad,
-            entropy: entropies.and_then(|e| e.get(candidate as usize)).copied().unwrap_or(0.0),
+            entropy: entropies
+                .and_then(|e| e.get(candidate as usize))
+                .copied()
+                .unwrap_or(0.0),
             frame_num: None,
         }
     };
@@ -156,7 +163,9 @@ pub(crate) fn score_area(
         candidates.extend(draw(scoring.area, index, &location.uuid, scoring.views, scoring.seed, None));
     }
     if scoring.views == 0 {
-        return locations.iter().try_for_each(|location| each(&location.uuid, Vec::new()));
+        return locations
+            .iter()
+            .try_for_each(|location| each(&location.uuid, Vec::new()));
     }
     let left: Vec<AtomicU32> = locations.iter().map(|_| AtomicU32::new(scoring.views)).collect();
     let progress = ctx.progress("scoring", "views", candidates.len() as u64);

@@ -62,7 +62,10 @@ pub fn map_in_order<T: Sync, S, R: Send + Sync>(
         let _ = result.set(work(state, item)?);
         Ok(())
     })?;
-    Ok(results.into_iter().map(|r| r.into_inner().expect("every item was done")).collect())
+    Ok(results
+        .into_iter()
+        .map(|r| r.into_inner().expect("every item was done"))
+        .collect())
 }
 
 #[cfg(test)]
@@ -95,7 +98,11 @@ mod tests {
             &items,
             || (),
             |(), i| {
-                if *i == 7 { Err(Error::Input(format!("item {i}"))) } else { Ok(()) }
+                if *i == 7 {
+                    Err(Error::Input(format!("item {i}")))
+                } else {
+                    Ok(())
+                }
             },
         );
         assert_eq!(e.unwrap_err().to_string(), "item 7");

@@ -46,10 +46,13 @@ pub fn data_set_info(folder: &Path, ctx: &Context) -> Result<DataSetInfo> {
     let layout = Layout::new(folder);
     let Dataset { manifest, taxonomy, .. } = Dataset::open(&layout)?;
     let of_areas = manifest.areas.iter();
-    let unlabelled = of_areas.clone().filter_map(|area| area.unlabelled).reduce(|mut sum, area| {
-        sum += area;
-        sum
-    });
+    let unlabelled = of_areas
+        .clone()
+        .filter_map(|area| area.unlabelled)
+        .reduce(|mut sum, area| {
+            sum += area;
+            sum
+        });
     let area = |number: &u32| info(layout.area_dir(*number), &InfoOptions::default(), ctx);
     let list = manifest.files.as_ref();
     Ok(DataSetInfo {

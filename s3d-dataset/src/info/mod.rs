@@ -136,7 +136,9 @@ pub struct LocationInfo {
 /// exported; [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context) -> Result<SceneInfo> {
     let InfoOptions { place_cameras, see, seed, lenient } = *options;
-    let placing = ExportOptions { place_cameras, see, ..ExportOptions::default() }.canonical()?.placing();
+    let placing = ExportOptions { place_cameras, see, ..ExportOptions::default() }
+        .canonical()?
+        .placing();
     let inputs = Inputs::open(&[scene.into()], placing, lenient)?;
     let area = &inputs.areas[0];
     let file = area.read_mesh()?;
@@ -234,7 +236,9 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
 fn rooms(area: &AreaInput, annotated: &Annotated) -> Vec<RoomInfo> {
     let rooms = annotated.rooms.iter().zip(&area.rooms).map(|(surveyed, room)| {
         let mut instances: BTreeMap<Class, u32> = BTreeMap::new();
-        room.instances.iter().for_each(|i| *instances.entry(i.label.class).or_default() += 1);
+        room.instances
+            .iter()
+            .for_each(|i| *instances.entry(i.label.class).or_default() += 1);
         RoomInfo {
             room: surveyed.room,
             points: surveyed.points,
@@ -249,7 +253,10 @@ fn rooms(area: &AreaInput, annotated: &Annotated) -> Vec<RoomInfo> {
 impl MeshInfo {
     fn of(file: &MeshFile) -> Self {
         let mesh = &file.mesh;
-        let textures = mesh.textures().iter().map(|t| (t.name.clone(), t.image.width(), t.image.height()));
+        let textures = mesh
+            .textures()
+            .iter()
+            .map(|t| (t.name.clone(), t.image.width(), t.image.height()));
         Self {
             faces: mesh.faces().len(),
             vertices: mesh.positions().len(),
@@ -303,7 +310,11 @@ impl fmt::Display for SceneInfo {
             writeln!(f, "  {seen}")?;
         }
         writeln!(f, "\nan export with the default options: {}", self.estimate)?;
-        let verdict = if self.doubts.is_empty() { "nothing looks wrong" } else { "what looks wrong:" };
+        let verdict = if self.doubts.is_empty() {
+            "nothing looks wrong"
+        } else {
+            "what looks wrong:"
+        };
         writeln!(f, "\n{verdict}")?;
         self.doubts.iter().try_for_each(|doubt| writeln!(f, "  {doubt}"))
     }
@@ -329,7 +340,9 @@ impl fmt::Display for MeshInfo {
         if self.offset_m != [0.0; 3] {
             writeln!(f, "  less offset_m = {:?}, as are points and scan locations", self.offset_m)?;
         }
-        self.textures.iter().try_for_each(|(name, width, height)| writeln!(f, "  {name} {width} × {height}"))
+        self.textures
+            .iter()
+            .try_for_each(|(name, width, height)| writeln!(f, "  {name} {width} × {height}"))
     }
 }
 

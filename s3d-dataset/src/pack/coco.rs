@@ -44,7 +44,9 @@ pub(super) fn pack(
     let folder = destination.path().join(FOLDER);
     for image in &source.images {
         let below = image.relative_path(Domain::Rgb);
-        Path::new(&below).parent().map_or(Ok(()), |parent| create_dir(&folder.join(parent)))?;
+        Path::new(&below)
+            .parent()
+            .map_or(Ok(()), |parent| create_dir(&folder.join(parent)))?;
     }
     let progress = ctx.progress("packing", "images", source.images.len() as u64);
     let numbered: Vec<(u32, &DatasetImage)> = (1..).zip(&source.images).collect();
@@ -59,7 +61,9 @@ pub(super) fn pack(
             if source.photograph(image).is_some_and(|p| p.masked > 0.0) {
                 let color = source.rgb8(image, Domain::Rgb)?;
                 let pairs = semantic.pixels_mut().iter_mut().zip(color.pixels());
-                pairs.filter(|(_, color)| **color == [0; 3]).for_each(|(label, _)| *label = MISSING_INDEX);
+                pairs
+                    .filter(|(_, color)| **color == [0; 3])
+                    .for_each(|(label, _)| *label = MISSING_INDEX);
             }
             let (panoptic, segments) = coco_panoptic(&semantic, &table, &stuff).map_err(|e| {
                 FileError::format(&path, format!("{e} in {}", source.layout.labels_json().display()))
@@ -91,6 +95,11 @@ pub(super) fn pack(
 pub(super) fn stuff(options: &SpecificOptions, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
     match &options.stuff {
         Some(list) => list.classes(taxonomy),
-        None => Ok(taxonomy.classes().iter().copied().filter(|class| taxonomy.is_stuff(*class)).collect()),
+        None => Ok(taxonomy
+            .classes()
+            .iter()
+            .copied()
+            .filter(|class| taxonomy.is_stuff(*class))
+            .collect()),
     }
 }

@@ -48,12 +48,20 @@ pub(super) fn pack(
         )?;
         let points = area_points(source, area, options.points)?;
         let (model, dir) = (ColmapModel::new(&models, &points), folder.join("sparse").join("0"));
-        if options.binary { model.write_binary(&dir) } else { model.write_text(&dir) }?;
+        if options.binary {
+            model.write_binary(&dir)
+        } else {
+            model.write_text(&dir)
+        }?;
         let images = if options.copy_images {
             format!("area_{area}/images")
         } else {
             let folder = source.layout.image_dir(area, first.frame, Domain::Rgb);
-            let below = folder.strip_prefix(source.layout.root()).unwrap_or(&folder).display().to_string();
+            let below = folder
+                .strip_prefix(source.layout.root())
+                .unwrap_or(&folder)
+                .display()
+                .to_string();
             format!("{below} of the data set")
         };
         notes.push(format!("the model area_{area}/sparse/0 is of the images in {images}"));

@@ -135,7 +135,10 @@ mod tests {
         fs::create_dir_all(&place).unwrap();
         fs::write(place.join("chapter_1.tex"), "").unwrap();
         let fails = |place: &Path| {
-            Destination::begin(&Context::default(), place, &root, true).err().unwrap().to_string()
+            Destination::begin(&Context::default(), place, &root, true)
+                .err()
+                .unwrap()
+                .to_string()
         };
         assert!(fails(&place).contains("holds chapter_1.tex, and was not written by s3d pack"));
         assert!(fails(&place.join("chapter_1.tex")).contains("cannot use as the package's folder"));

@@ -197,7 +197,11 @@ impl<'a> Job<'a> {
 fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
     let convert = |v: &u16| {
         let mm = (f64::from(*v) * (1000.0 / units_per_m)).round();
-        if *v == MISSING_DEPTH || mm > f64::from(u16::MAX) { 0 } else { mm as u16 }
+        if *v == MISSING_DEPTH || mm > f64::from(u16::MAX) {
+            0
+        } else {
+            mm as u16
+        }
     };
     Raster::from_vec(depth.width(), depth.height(), depth.pixels().iter().map(convert).collect())
 }

@@ -274,9 +274,20 @@ mod tests {
         assert!("wall,".parse::<ClassList>().is_err());
         let grass: ClassList = "wall,grass".parse().unwrap();
         let e = grass.classes(&Taxonomy::s3dis()).unwrap_err();
-        assert!(e.to_string().contains("--stuff: \"grass\" is no class; the classes are ceiling"), "{e}");
+        assert!(
+            e.to_string()
+                .contains("--stuff: \"grass\" is no class; the classes are ceiling"),
+            "{e}"
+        );
         let beds: ClassList = "bed,wall".parse().unwrap();
         let nyu40 = Taxonomy::built_in("nyu40").unwrap();
-        assert_eq!(beds.classes(&nyu40).unwrap().iter().map(|c| c.index()).collect::<Vec<_>>(), [0, 3]);
+        assert_eq!(
+            beds.classes(&nyu40)
+                .unwrap()
+                .iter()
+                .map(|c| c.index())
+                .collect::<Vec<_>>(),
+            [0, 3]
+        );
     }
 }

@@ -66,11 +66,19 @@ impl Source {
         });
         check_images_complete(&layout, &images)?;
         if images.is_empty() {
-            let what = if which == PackedImages::All { "images".to_owned() } else { which.to_string() };
+            let what = if which == PackedImages::All {
+                "images".to_owned()
+            } else {
+                which.to_string()
+            };
             return Err(Error::Input(format!("{}: the data set has no {what} to pack", root.display())));
         }
         let of_image = |image: &DatasetImage| -> Vec<PathBuf> {
-            image.domains.iter().map(|domain| image.path(&layout, *domain)).collect()
+            image
+                .domains
+                .iter()
+                .map(|domain| image.path(&layout, *domain))
+                .collect()
         };
         let needed: BTreeSet<PathBuf> = images.iter().flat_map(of_image).collect();
         files.require(ctx, |path| needed.contains(path))?;
@@ -196,7 +204,9 @@ impl Source {
             return Ok(None);
         }
         let path = self.layout.labels_json();
-        let table = self.taxonomy.table_from_names(&read_labels(self.files.checked(&path)?)?);
+        let table = self
+            .taxonomy
+            .table_from_names(&read_labels(self.files.checked(&path)?)?);
         Ok(Some(table.map_err(|e| FileError::format(&path, e.to_string()))?))
     }
 }

@@ -39,10 +39,15 @@ pub(super) fn pack(
         }
         None => Domain::ALL.to_vec(),
     };
-    let meta: Vec<(String, Vec<u8>)> =
-        source.tables()?.into_iter().map(|(name, bytes)| (format!("{META}/{name}"), bytes)).collect();
-    let meta_bytes: u64 =
-        meta.iter().map(|(name, bytes)| TarWriter::entry_bytes(name, bytes.len() as u64)).sum();
+    let meta: Vec<(String, Vec<u8>)> = source
+        .tables()?
+        .into_iter()
+        .map(|(name, bytes)| (format!("{META}/{name}"), bytes))
+        .collect();
+    let meta_bytes: u64 = meta
+        .iter()
+        .map(|(name, bytes)| TarWriter::entry_bytes(name, bytes.len() as u64))
+        .sum();
     let most = ShardLimits::default();
     let max_bytes = options.max_size.map_or(most.max_bytes, |mb| u64::from(mb) * 1_000_000);
     let mut shards = Vec::new();
@@ -91,7 +96,10 @@ pub(super) fn pack(
         },
     )?;
     write_shard_index(&destination.path().join("shards.json"), "s3d", &entries)?;
-    let mut notes: Vec<String> = names.iter().map(|n| format!("webdataset.WebDataset(\"{n}\")")).collect();
+    let mut notes: Vec<String> = names
+        .iter()
+        .map(|n| format!("webdataset.WebDataset(\"{n}\")"))
+        .collect();
     notes.push(
         "a sample's key is area_N/camera_UUID_ROOM_frame_J, its fields are rgb.png, depth.png, normals.png, \
          … pose.json; the number of samples of each shard is in shards.json"
@@ -117,8 +125,10 @@ fn series<'a>(source: &'a Source, options: &SpecificOptions) -> Vec<(String, Vec
     }
     let mut series = Vec::new();
     for area in &source.areas {
-        let (panoramas, views): (Vec<_>, Vec<_>) =
-            source.of_area(*area).into_iter().partition(|image| image.frame == Frame::Panorama);
+        let (panoramas, views): (Vec<_>, Vec<_>) = source
+            .of_area(*area)
+            .into_iter()
+            .partition(|image| image.frame == Frame::Panorama);
         series.push((format!("area_{area}_views"), views));
         series.push((format!("area_{area}_panoramas"), panoramas));
     }
@@ -131,7 +141,10 @@ fn shuffle(images: &mut [&DatasetImage], seed: u64) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut drawn: Vec<(u64, &DatasetImage)> = images.iter().map(|i| (random.next_u64(), *i)).collect();
     drawn.sort_by_key(|(number, _)| *number);
-    images.iter_mut().zip(drawn).for_each(|(place, (_, image))| *place = image);
+    images
+        .iter_mut()
+        .zip(drawn)
+        .for_each(|(place, (_, image))| *place = image);
 }
 
 /// The domains of an image's sample.

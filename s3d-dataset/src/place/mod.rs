@@ -265,7 +265,11 @@ mod tests {
         let label_of_face: Vec<LabelId> = classes
             .iter()
             .map(|&c| {
-                if c == Class::FLOOR && !has_floor { LabelId::NULL } else { table.id_of(&label(c)).unwrap() }
+                if c == Class::FLOOR && !has_floor {
+                    LabelId::NULL
+                } else {
+                    table.id_of(&label(c)).unwrap()
+                }
             })
             .collect();
         let mut builder = FootprintBuilder::new(FootprintOptions::default());
@@ -322,7 +326,9 @@ mod tests {
         parts
             .positions
             .extend([[4., 0., 0.], [7., 0., 0.], [7., 3., 0.], [4., 3., 0.]].map(Vec3::from_array));
-        parts.faces.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        parts
+            .faces
+            .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
         let mesh = TriMesh::new(parts).unwrap();
         let scene = Scene::new(&mesh);
         let places: Vec<[f64; 3]> = (0..60)

@@ -71,7 +71,10 @@ pub fn profile(
 
 fn add(ctx: &Context, data: &Dataset, wanted: &[Profile], overwrite: bool, call: &str) -> Result<()> {
     let layout = &data.layout;
-    let dirs: Vec<PathBuf> = wanted.iter().map(|profile| layout.profile_dir(profile.name())).collect();
+    let dirs: Vec<PathBuf> = wanted
+        .iter()
+        .map(|profile| layout.profile_dir(profile.name()))
+        .collect();
     if let Some(dir) = dirs.iter().find(|dir| dir.exists() && !overwrite) {
         return Err(Error::Usage(format!("{} is there already: replace it with --overwrite", dir.display())));
     }
@@ -83,7 +86,8 @@ fn add(ctx: &Context, data: &Dataset, wanted: &[Profile], overwrite: bool, call:
     }
     let areas = &data.manifest.area_numbers;
     let trees: Vec<PathBuf> = areas.iter().map(|area| layout.s3dis_area_dir(*area)).collect();
-    data.files.require(ctx, |path| trees.iter().any(|tree| path.starts_with(tree)))?;
+    data.files
+        .require(ctx, |path| trees.iter().any(|tree| path.starts_with(tree)))?;
     let change = Change::begin(layout)?;
     let staged = change.staged();
     write(&Source { ctx, layout, files: &data.files, taxonomy: &data.taxonomy }, staged, areas, wanted)?;
@@ -94,8 +98,11 @@ fn add(ctx: &Context, data: &Dataset, wanted: &[Profile], overwrite: bool, call:
     let changed = listing::records(ctx, staged, &files)?;
     let mut manifest = Manifest::read(layout)?;
     manifest.add_profiles(wanted);
-    let is_gone =
-        |path: &str| wanted.iter().any(|profile| path.starts_with(&format!("profiles/{}/", profile.name())));
+    let is_gone = |path: &str| {
+        wanted
+            .iter()
+            .any(|profile| path.starts_with(&format!("profiles/{}/", profile.name())))
+    };
     listing::write_changed(data, &mut manifest, changed, is_gone, staged)?;
     change.commit(call, &dirs)
 }
@@ -120,7 +127,9 @@ pub(crate) fn write(source: &Source<'_>, staged: &Layout, areas: &[u32], profile
             Profile::Pointcept => pointcept::write(source, &dir, areas, &rooms)?,
         }
         let place = source.layout.profile_dir(profile.name());
-        source.ctx.info(format_args!("{}: {} rooms for {profile}", place.display(), rooms.len()));
+        source
+            .ctx
+            .info(format_args!("{}: {} rooms for {profile}", place.display(), rooms.len()));
     }
     Ok(())
 }
@@ -140,7 +149,9 @@ impl Source<'_> {
         let from = self.files.checked(from)?;
         match fs::hard_link(from, to) {
             Ok(()) => Ok(()),
-            Err(_) => fs::copy(from, to).map(drop).map_err(|e| FileError::io(to, "copy to", e).into()),
+            Err(_) => fs::copy(from, to)
+                .map(drop)
+                .map_err(|e| FileError::io(to, "copy to", e).into()),
         }
     }
 }

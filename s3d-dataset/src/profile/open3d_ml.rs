@@ -24,7 +24,11 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Resu
     let dir = dir.join("original_pkl");
     create_dir(&dir)?;
     for_each_room(source.ctx, rooms, |room| {
-        let boxes = room.instances.iter().map(|i| OrientedBox::of(source, i)).collect::<Result<Vec<_>>>()?;
+        let boxes = room
+            .instances
+            .iter()
+            .map(|i| OrientedBox::of(source, i))
+            .collect::<Result<Vec<_>>>()?;
         let mut pickle = Pickle::create(&dir.join(format!("{}.pkl", room.stem())))?;
         pickle.list(|pickle| {
             pickle.begin_array(boxes.iter().map(|b| b.points).sum(), 7)?;
@@ -92,7 +96,11 @@ impl OrientedBox {
         let mean = sum / points.max(1) as f64;
         let n = points as f64;
         let (xx, xy, yy) = (xx - n * mean.x * mean.x, xy - n * mean.x * mean.y, yy - n * mean.y * mean.y);
-        let yaw_rad = if points > 1 { 0.5 * libm::atan2(2.0 * xy, xx - yy) } else { 0.0 };
+        let yaw_rad = if points > 1 {
+            0.5 * libm::atan2(2.0 * xy, xx - yy)
+        } else {
+            0.0
+        };
         let (sin, cos) = libm::sincos(yaw_rad);
         let axes = DMat2::from_cols(dvec2(cos, sin), dvec2(-sin, cos));
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);

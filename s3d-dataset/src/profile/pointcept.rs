@@ -61,11 +61,17 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, areas: &[u32], rooms: &[Tre
 
 /// The angle of each room, as it is written.
 fn read_angles(source: &Source<'_>, area: u32) -> Result<BTreeMap<String, String>> {
-    let path = source.layout.s3dis_area_dir(area).join(format!("Area_{area}_alignmentAngle.txt"));
+    let path = source
+        .layout
+        .s3dis_area_dir(area)
+        .join(format!("Area_{area}_alignmentAngle.txt"));
     let text = String::from_utf8(source.files.read_bytes(&path)?)
         .map_err(|_| FileError::format(&path, "is no text in UTF-8"))?;
     let lines = text.lines().filter(|line| !line.starts_with('#'));
-    Ok(lines.filter_map(|l| l.split_once(' ')).map(|(room, deg)| (room.into(), deg.into())).collect())
+    Ok(lines
+        .filter_map(|l| l.split_once(' '))
+        .map(|(room, deg)| (room.into(), deg.into()))
+        .collect())
 }
 
 fn write_room(source: &Source<'_>, dir: &Path, room: &TreeRoom) -> Result<()> {
@@ -89,7 +95,11 @@ fn write_room(source: &Source<'_>, dir: &Path, room: &TreeRoom) -> Result<()> {
 /// The mesh of an area with its materials and textures, where the preprocessing looks for it.
 fn link_mesh(source: &Source<'_>, area: u32, raw: &Path) -> Result<()> {
     let from = source.layout.mesh_dir(area);
-    let name = if area == 5 { "Area_5a".to_owned() } else { format!("Area_{area}") };
+    let name = if area == 5 {
+        "Area_5a".to_owned()
+    } else {
+        format!("Area_{area}")
+    };
     let to = raw.join(name).join("3d");
     create_dir(&to)?;
     let textures = from.join("rgb_textures");

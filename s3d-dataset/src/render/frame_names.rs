@@ -23,7 +23,10 @@ pub(super) fn frame_names(cameras: &[PosedCamera]) -> Vec<String> {
         return short;
     }
     let mut names = UniqueNames::default();
-    cameras.iter().map(|camera| names.add(&stem(camera.name.trim_start_matches("./")))).collect()
+    cameras
+        .iter()
+        .map(|camera| names.add(&stem(camera.name.trim_start_matches("./"))))
+        .collect()
 }
 
 #[cfg(test)]

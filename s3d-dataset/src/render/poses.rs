@@ -122,7 +122,9 @@ pub fn render_poses(
     let file = s3d_io::mesh::read_mesh_with(mesh, options.render.up, &near)?;
     ctx.warn_each(&file.warnings);
     // What is written is in the frame of the mesh as it was read.
-    frames.iter_mut().for_each(|frame| frame.camera.pose.location -= file.offset_m);
+    frames
+        .iter_mut()
+        .for_each(|frame| frame.camera.pose.location -= file.offset_m);
     let world_offset_m = (file.offset_m != DVec3::ZERO).then(|| file.offset_m.to_array());
     if let Some(offset_m) = world_offset_m {
         ctx.info(format_args!(
@@ -147,7 +149,10 @@ pub fn render_poses(
         generator: GENERATOR,
         camera_model: if is_panorama { "EQUIRECTANGULAR" } else { "OPENCV" },
         world_offset_m,
-        frames: frames.iter().map(|f| ListedFrame { name: f.name, frame: listed(f) }).collect(),
+        frames: frames
+            .iter()
+            .map(|f| ListedFrame { name: f.name, frame: listed(f) })
+            .collect(),
     };
     write_json(&staging.path().join(CAMERAS), &transforms)?;
     staging.place_folder(output, is_ours(output))?;

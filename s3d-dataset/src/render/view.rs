@@ -120,8 +120,11 @@ pub fn render(
         _ => "global_xyz.exr",
     };
     let names = IMAGES.into_iter().map(name_of).chain(["faces.png", "camera.json"]);
-    let refuse =
-        |overwrite| names.clone().try_for_each(|name| refuse_existing(&output.join(name), overwrite));
+    let refuse = |overwrite| {
+        names
+            .clone()
+            .try_for_each(|name| refuse_existing(&output.join(name), overwrite))
+    };
     // For what is made of several files, all of them or none.
     let whole = Path::new("render");
     if !Staging::is_left(output, whole) {

@@ -122,7 +122,9 @@ pub(crate) fn photograph_cost(camera: &Camera) -> u64 {
 
 /// The cost of an area's meshes and points.
 pub(crate) fn assets_cost(faces: u64, points: u64) -> u64 {
-    NS_PER_FACE.saturating_mul(faces).saturating_add(NS_PER_POINT.saturating_mul(points))
+    NS_PER_FACE
+        .saturating_mul(faces)
+        .saturating_add(NS_PER_POINT.saturating_mul(points))
 }
 
 /// Who does which units, among a number of shards: kept in the folder in which they work, so that a merge can
@@ -154,13 +156,21 @@ impl Assignment {
 
     /// The units of a shard.
     pub(crate) fn own(&self, number: u32) -> BTreeSet<Unit> {
-        self.units.iter().filter(|(_, of)| *of == number).map(|(unit, _)| unit.clone()).collect()
+        self.units
+            .iter()
+            .filter(|(_, of)| *of == number)
+            .map(|(unit, _)| unit.clone())
+            .collect()
     }
 
     /// The numbers of the shards that have some of these units, ascending.
     pub(crate) fn shards_of(&self, units: &[Unit]) -> BTreeSet<u32> {
         let wanted: BTreeSet<&Unit> = units.iter().collect();
-        self.units.iter().filter(|(unit, _)| wanted.contains(unit)).map(|(_, number)| *number).collect()
+        self.units
+            .iter()
+            .filter(|(unit, _)| wanted.contains(unit))
+            .map(|(_, number)| *number)
+            .collect()
     }
 
     /// Writes it into the folder of an unfinished export.
@@ -196,7 +206,10 @@ mod tests {
 
     fn loads(costs: &[u64], assigned: &[u32], shards: u32) -> Vec<u64> {
         let mut loads = vec![0; shards as usize];
-        costs.iter().zip(assigned).for_each(|(cost, shard)| loads[*shard as usize - 1] += cost);
+        costs
+            .iter()
+            .zip(assigned)
+            .for_each(|(cost, shard)| loads[*shard as usize - 1] += cost);
         loads
     }
 

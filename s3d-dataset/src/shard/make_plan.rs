@@ -73,7 +73,11 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         there.iter().for_each(|done| journal.know(done.clone()));
         let position_of = |uuid: &str| -> Option<usize> {
             let finished = journal.finished();
-            finished.labels(number)?.locations.iter().position(|other| other == uuid)
+            finished
+                .labels(number)?
+                .locations
+                .iter()
+                .position(|other| other == uuid)
         };
         let is_ours = |unit: &Unit| match unit {
             Unit::Scores(_, uuid) => position_of(uuid).is_some_and(|position| part.takes(position)),

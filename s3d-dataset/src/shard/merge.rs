@@ -64,9 +64,18 @@ pub fn merge(
     // either.
     let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
         folders.iter().partition(|folder| is_same(folder, layout.root()));
-    let _locks = apart.into_iter().map(|folder| lock(ctx, folder)).collect::<Result<Vec<_>>>()?;
-    let own_lock = inside.into_iter().map(|folder| lock(ctx, folder)).collect::<Result<Vec<_>>>()?;
-    let parts = folders.iter().map(|folder| Part::read(ctx, folder)).collect::<Result<Vec<Part>>>()?;
+    let _locks = apart
+        .into_iter()
+        .map(|folder| lock(ctx, folder))
+        .collect::<Result<Vec<_>>>()?;
+    let own_lock = inside
+        .into_iter()
+        .map(|folder| lock(ctx, folder))
+        .collect::<Result<Vec<_>>>()?;
+    let parts = folders
+        .iter()
+        .map(|folder| Part::read(ctx, folder))
+        .collect::<Result<Vec<Part>>>()?;
     drop(own_lock);
     let Some(first) = parts.first() else {
         return Err(Error::Usage("there is no shard to merge".to_owned()));
@@ -75,7 +84,10 @@ pub fn merge(
     refuse_mixed(&parts)?;
     refuse_other_version(first)?;
     let mut all = Finished::default();
-    parts.iter().flat_map(|part| part.finished.iter()).for_each(|done| all.insert(done.clone()));
+    parts
+        .iter()
+        .flat_map(|part| part.finished.iter())
+        .for_each(|done| all.insert(done.clone()));
     let missing = missing_units(request, &all);
     if !missing.is_empty() {
         return Err(told_missing(&parts, &missing, "is missing"));
@@ -144,7 +156,9 @@ fn is_done(folders: &[PathBuf], layout: &Layout) -> Result<bool> {
 /// The label table, from the first that has it whole: a shard that was killed early has none, nor has an
 /// export that was begun without shards.
 fn label_list(parts: &[Part]) -> Result<LabelList> {
-    let found = parts.iter().find_map(|part| LabelList::read(&LabelList::path(&part.layout)).ok());
+    let found = parts
+        .iter()
+        .find_map(|part| LabelList::read(&LabelList::path(&part.layout)).ok());
     found.ok_or_else(|| {
         Error::Input(
             "none of the folders has the label table: run any of the shards again, and merge then".to_owned(),
@@ -223,7 +237,12 @@ fn refuse_mixed(parts: &[Part]) -> Result<()> {
                 "{} and {} are shards of different calls: {} (\"there\" is {}, \"now\" is {})",
                 first.layout.root().display(),
                 other.layout.root().display(),
-                differences.iter().take(MAX_NAMED).cloned().collect::<Vec<_>>().join("; "),
+                differences
+                    .iter()
+                    .take(MAX_NAMED)
+                    .cloned()
+                    .collect::<Vec<_>>()
+                    .join("; "),
                 first.layout.root().display(),
                 other.layout.root().display()
             )));
@@ -259,14 +278,24 @@ fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
     // By number of shards, which of them are to be run.
     let mut shards: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
     for assignment in parts.iter().flat_map(|part| &part.assignments) {
-        shards.entry(assignment.shards()).or_default().extend(assignment.shards_of(missing));
+        shards
+            .entry(assignment.shards())
+            .or_default()
+            .extend(assignment.shards_of(missing));
     }
-    let calls = shards.into_iter().filter(|(_, numbers)| !numbers.is_empty()).map(|(of, numbers)| {
-        let calls: Vec<String> = numbers.iter().map(|i| format!("--shard {i}/{of}")).collect();
-        calls.join(", ")
-    });
+    let calls = shards
+        .into_iter()
+        .filter(|(_, numbers)| !numbers.is_empty())
+        .map(|(of, numbers)| {
+            let calls: Vec<String> = numbers.iter().map(|i| format!("--shard {i}/{of}")).collect();
+            calls.join(", ")
+        });
     let calls: Vec<String> = calls.collect();
-    let calls = if calls.is_empty() { "every shard".to_owned() } else { calls.join(", or ") };
+    let calls = if calls.is_empty() {
+        "every shard".to_owned()
+    } else {
+        calls.join(", or ")
+    };
     Error::Input(format!("{}{more} {what}: run again {calls}, and merge then", named.join(", ")))
 }
 
@@ -280,10 +309,17 @@ fn gather(
 ) -> Result<()> {
     let ctx = account.ctx;
     let started = Instant::now();
-    let units: Vec<Unit> =
-        all.iter().map(Done::unit).filter(|u| !session.journal.finished().has(u)).collect();
+    let units: Vec<Unit> = all
+        .iter()
+        .map(Done::unit)
+        .filter(|u| !session.journal.finished().has(u))
+        .collect();
     let tally: UnitTally = units.iter().filter_map(|unit| all.get(unit)).map(Done::tally).sum();
-    let files: usize = units.iter().filter_map(|unit| all.get(unit)).map(|done| done.files().len()).sum();
+    let files: usize = units
+        .iter()
+        .filter_map(|unit| all.get(unit))
+        .map(|done| done.files().len())
+        .sum();
     let progress = ctx.progress("merging", "files", files as u64);
     let faults: Mutex<Vec<(Unit, String)>> = Mutex::new(Vec::new());
     for_each_in_order(
@@ -295,8 +331,10 @@ fn gather(
             for part in parts {
                 // OUT's own were looked at when the merge began, and this one is not among those that are
                 // whole.
-                let Some(done) =
-                    part.finished.get(unit).filter(|_| !is_same(part.layout.root(), layout.root()))
+                let Some(done) = part
+                    .finished
+                    .get(unit)
+                    .filter(|_| !is_same(part.layout.root(), layout.root()))
                 else {
                     continue;
                 };
@@ -311,7 +349,10 @@ fn gather(
                 }
             }
             let fault = fault.unwrap_or_else(|| format!("{}: {unit} is damaged", layout.root().display()));
-            faults.lock().unwrap_or_else(PoisonError::into_inner).push((unit.clone(), fault));
+            faults
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push((unit.clone(), fault));
             Ok(())
         },
     )?;

@@ -81,8 +81,11 @@ impl Job<'_> {
         let cache = layout.work_dir();
         LabelList::of(&self.inputs.table).write(&LabelList::path(layout))?;
         let positions: BTreeMap<u32, usize> = self.request.numbers().into_iter().zip(0..).collect();
-        let labels_are_ours =
-            |unit: &Unit| positions.get(&unit.area()).is_some_and(|position| shard.takes(*position));
+        let labels_are_ours = |unit: &Unit| {
+            positions
+                .get(&unit.area())
+                .is_some_and(|position| shard.takes(*position))
+        };
         // With a plan every shard writes down its share of the scores, for the merge; else every one has made
         // them all.
         let is_ours = |unit: &Unit| match unit {
@@ -122,7 +125,12 @@ impl Job<'_> {
             }
         }
         for area in &self.inputs.areas {
-            for photograph in area.photographs.all.iter().filter(|p| is_chosen(&self.request, &p.uuid)) {
+            for photograph in area
+                .photographs
+                .all
+                .iter()
+                .filter(|p| is_chosen(&self.request, &p.uuid))
+            {
                 let cost = photograph_cost(&photograph.camera);
                 units.push((Unit::Photograph(area.number, photograph.uuid.clone()), cost));
             }

@@ -117,7 +117,10 @@ impl Plan {
 
     /// Brings the files of an area's labels into a data set.
     pub(crate) fn bring_labels(&self, area: u32, to: &Layout) -> Result<Vec<FileRecord>> {
-        let files = self.finished.labels(area).map_or(Vec::new(), |labels| labels.files.clone());
+        let files = self
+            .finished
+            .labels(area)
+            .map_or(Vec::new(), |labels| labels.files.clone());
         for record in &files {
             if let Some(fault) = bring(record, self.layout.root(), to.root())? {
                 return Err(Error::Input(format!(

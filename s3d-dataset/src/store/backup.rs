@@ -64,7 +64,10 @@ fn children(folder: &Path) -> Result<Vec<PathBuf>> {
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
         entries => {
             let entries = entries.map_err(failed)?;
-            Ok(entries.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>().map_err(failed)?)
+            Ok(entries
+                .map(|e| e.map(|e| e.path()))
+                .collect::<Result<_, _>>()
+                .map_err(failed)?)
         }
     }
 }
@@ -139,7 +142,11 @@ pub(super) fn rename(from: &Path, to: &Path) -> Result<()> {
 }
 
 pub(super) fn remove(path: &Path) -> Result<()> {
-    let gone = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    let gone = if path.is_dir() {
+        fs::remove_dir_all(path)
+    } else {
+        fs::remove_file(path)
+    };
     match gone {
         Err(e) if e.kind() != ErrorKind::NotFound => Err(FileError::io(path, "remove", e).into()),
         _ => Ok(()),

@@ -118,7 +118,10 @@ fn complete(layout: &Layout) -> Result<()> {
     }
     let (folders, files) = entries(staged.root())?;
     let place = |from: &Path| from.strip_prefix(staged.root()).map(|below| root.join(below)).ok();
-    folders.iter().filter_map(|from| place(from)).try_for_each(|to| create_dir(&to))?;
+    folders
+        .iter()
+        .filter_map(|from| place(from))
+        .try_for_each(|to| create_dir(&to))?;
     // The manifest last, and before it the list of which it has the checksum.
     let last = [staged.file_list(), staged.manifest()];
     let first = files.iter().filter(|file| !last.contains(file));
@@ -217,7 +220,11 @@ mod tests {
         let expected =
             ["area_1/c", "area_1/data/b", "files.csv", "manifest.json", "mine.txt", "profiles/pointnet/a"];
         assert_eq!(names, expected);
-        assert!(whole.iter().all(|(path, text)| (text == "old") == path.ends_with("mine.txt")));
+        assert!(
+            whole
+                .iter()
+                .all(|(path, text)| (text == "old") == path.ends_with("mine.txt"))
+        );
         type Step<'s> = &'s dyn Fn(&Path, &Path);
         let steps: [Step<'_>; 5] = [
             &|root, _| fs::remove_file(root.join("profiles/pointnet/gone")).unwrap(),

@@ -251,15 +251,21 @@ impl Finished {
     /// What is known of an area's photographs whose views are there, in their order.
     pub(crate) fn photographs(&self, area: u32) -> impl Iterator<Item = &PhotographDone> {
         let uuids = self.labels(area).map_or(&[][..], |labels| &labels.photographs);
-        uuids.iter().filter_map(move |uuid| match self.units.get(&Unit::Photograph(area, uuid.clone())) {
-            Some(Done::Photograph(done)) => Some(done),
-            _ => None,
-        })
+        uuids
+            .iter()
+            .filter_map(move |uuid| match self.units.get(&Unit::Photograph(area, uuid.clone())) {
+                Some(Done::Photograph(done)) => Some(done),
+                _ => None,
+            })
     }
 
     /// How many scan locations some areas have, as far as these are labelled.
     pub(crate) fn count_locations(&self, areas: &[u32]) -> usize {
-        areas.iter().filter_map(|area| self.labels(*area)).map(|labels| labels.locations.len()).sum()
+        areas
+            .iter()
+            .filter_map(|area| self.labels(*area))
+            .map(|labels| labels.locations.len())
+            .sum()
     }
 
     /// What is written in the journals of an export, lines that are torn left out. Nothing of it is checked
@@ -332,16 +338,23 @@ impl Journal {
         let dir = layout.journal_dir();
         create_dir(&dir)?;
         let failed = |e| FileError::io(&dir, "write in", e);
-        let named = tempfile::Builder::new().prefix("").suffix(".jsonl").rand_bytes(12).tempfile_in(&dir);
+        let named = tempfile::Builder::new()
+            .prefix("")
+            .suffix(".jsonl")
+            .rand_bytes(12)
+            .tempfile_in(&dir);
         let (file, path) = named.map_err(failed)?.keep().map_err(|e| failed(e.error))?;
         Ok(Self { path, file: Mutex::new(file), finished: Mutex::new(finished) })
     }
 
     /// Writes down that a unit is done. Its files must be there under their names.
     pub(crate) fn write(&self, done: Done) -> Result<()> {
-        let line = done.to_line().map_err(|e| FileError::format(&self.path, e.to_string()))?;
+        let line = done
+            .to_line()
+            .map_err(|e| FileError::format(&self.path, e.to_string()))?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.write_all(line.as_bytes()).map_err(|e| FileError::io(&self.path, "write", e))?;
+        file.write_all(line.as_bytes())
+            .map_err(|e| FileError::io(&self.path, "write", e))?;
         drop(file);
         self.finished().insert(done);
         Ok(())
@@ -406,8 +419,10 @@ mod tests {
             Finished::read(&Context::default(), &layout).unwrap().units.len()
         };
         for cut in 0..whole.len() {
-            let expected =
-                1 + whole[..cut].split(|b| *b == b'\n').filter(|l| Done::from_line(l).is_some()).count();
+            let expected = 1 + whole[..cut]
+                .split(|b| *b == b'\n')
+                .filter(|l| Done::from_line(l).is_some())
+                .count();
             assert_eq!(lines(&whole[..cut]), expected);
             let mut flipped = whole.clone();
             flipped[cut] ^= 4;

@@ -34,7 +34,12 @@ impl Lock {
         let path = layout.lock();
         loop {
             create_dir(&layout.work_dir())?;
-            let opened = File::options().create(true).truncate(false).write(true).read(true).open(&path);
+            let opened = File::options()
+                .create(true)
+                .truncate(false)
+                .write(true)
+                .read(true)
+                .open(&path);
             let file = match opened {
                 // Whoever had it was just done, and took the folder away.
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound => continue,
@@ -126,7 +131,9 @@ mod tests {
         let shared = [(); 2].map(|()| Lock::take(&Context::default(), &layout, Sharing::Shards).unwrap());
         assert!(Lock::take(&Context::default(), &layout, Sharing::Alone).is_err());
         drop(shared);
-        Lock::take(&Context::default(), &layout, Sharing::Alone).unwrap().abandon();
+        Lock::take(&Context::default(), &layout, Sharing::Alone)
+            .unwrap()
+            .abandon();
         assert!(!layout.work_dir().exists());
         let lock = Lock::take(&Context::default(), &layout, Sharing::Alone).unwrap();
         fs::write(layout.request(), "{}").unwrap();

@@ -175,7 +175,9 @@ pub(crate) fn begun_by_other_version(layout: &Layout) -> Result<Option<String>> 
         version: String,
     }
     let of: Option<Of> = if_there(read_json(&layout.request()))?;
-    Ok(of.map(|of| of.version).filter(|version| version != env!("CARGO_PKG_VERSION")))
+    Ok(of
+        .map(|of| of.version)
+        .filter(|version| version != env!("CARGO_PKG_VERSION")))
 }
 
 /// How an export begins.
@@ -347,7 +349,12 @@ fn refuse(layout: &Layout, found: &Found, overwrite: bool) -> Result<()> {
     if overwrite || differences.is_empty() {
         return Ok(());
     }
-    let mut named = differences.iter().take(MAX_NAMED).cloned().collect::<Vec<_>>().join("; ");
+    let mut named = differences
+        .iter()
+        .take(MAX_NAMED)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join("; ");
     if differences.len() > MAX_NAMED {
         named += &format!("; and {} more", differences.len() - MAX_NAMED);
     }
@@ -431,10 +438,17 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
     };
     let faults = if exactly {
         let files: Vec<_> = records.iter().collect();
-        crate::tables::listing::faults(ctx, layout, &files)?.into_iter().map(|(_, fault)| fault).collect()
+        crate::tables::listing::faults(ctx, layout, &files)?
+            .into_iter()
+            .map(|(_, fault)| fault)
+            .collect()
     } else {
         let wrong = |r: &&s3d_io::dataset::FileRecord| r.check_size(layout.root()).is_err();
-        records.iter().filter(wrong).map(|r| r.path.clone()).collect::<Vec<String>>()
+        records
+            .iter()
+            .filter(wrong)
+            .map(|r| r.path.clone())
+            .collect::<Vec<String>>()
     };
     let Some(first) = faults.first() else { return Ok(true) };
     if exactly {
@@ -456,7 +470,11 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
 /// Refuses what is in the way of the data set that is asked for, unless it is of one of these areas, which is
 /// ours.
 fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Result<()> {
-    let ours = if areas.is_empty() { Vec::new() } else { layout.entries(areas) };
+    let ours = if areas.is_empty() {
+        Vec::new()
+    } else {
+        layout.entries(areas)
+    };
     for path in layout.entries(&request.numbers()) {
         if path.exists() && !ours.contains(&path) {
             return Err(Error::Usage(format!(

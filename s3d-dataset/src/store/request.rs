@@ -68,8 +68,12 @@ fn option_differences(there: &ExportOptions, now: &ExportOptions) -> Vec<String>
     // What has its default may not be stored.
     let names: BTreeSet<&String> = there.keys().chain(now.keys()).collect();
     let value = |of: &serde_json::Map<String, Value>, name: &str| of.get(name).cloned().unwrap_or_default();
-    let both = names.into_iter().map(|name| (name, value(&there, name), value(&now, name)));
-    both.filter(|(_, a, b)| a != b).map(|(name, a, b)| difference(&flag(name), &a, &b)).collect()
+    let both = names
+        .into_iter()
+        .map(|name| (name, value(&there, name), value(&now, name)));
+    both.filter(|(_, a, b)| a != b)
+        .map(|(name, a, b)| difference(&flag(name), &a, &b))
+        .collect()
 }
 
 /// The option on the command line that a key stands for.
@@ -125,7 +129,9 @@ impl Request {
     /// What is known of a file or folder of an area's input, by its name.
     pub(crate) fn input(&self, area: u32, name: &str) -> Option<&InputRecord> {
         let area = self.areas.iter().find(|a| a.area == area)?;
-        area.inputs.iter().find(|i| i.path.strip_suffix('/').unwrap_or(&i.path) == name)
+        area.inputs
+            .iter()
+            .find(|i| i.path.strip_suffix('/').unwrap_or(&i.path) == name)
     }
 
     /// The same request with nothing asked for but labels and scores: what a plan is made for.
@@ -198,7 +204,9 @@ impl RequestedArea {
         let by_path = |inputs: &[InputRecord]| -> BTreeMap<String, Vec<(u64, Checksum)>> {
             let mut map: BTreeMap<String, Vec<(u64, Checksum)>> = BTreeMap::new();
             for input in inputs {
-                map.entry(input.path.clone()).or_default().push((input.bytes, input.xxh3_128));
+                map.entry(input.path.clone())
+                    .or_default()
+                    .push((input.bytes, input.xxh3_128));
             }
             map
         };

@@ -102,7 +102,13 @@ impl Staging {
         let moved = if replaced {
             fs::rename(place, &old)
         } else {
-            fs::remove_dir(place).or_else(|e| if e.kind() == ErrorKind::NotFound { Ok(()) } else { Err(e) })
+            fs::remove_dir(place).or_else(|e| {
+                if e.kind() == ErrorKind::NotFound {
+                    Ok(())
+                } else {
+                    Err(e)
+                }
+            })
         };
         if let Err(e) = moved.and_then(|()| fs::rename(&self.new, place)) {
             if old.exists() {
@@ -235,7 +241,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join("a"), "old").unwrap();
         let staging = begin(dir.path());
-        ["a", "b"].iter().for_each(|name| fs::write(staging.path().join(name), "new").unwrap());
+        ["a", "b"]
+            .iter()
+            .for_each(|name| fs::write(staging.path().join(name), "new").unwrap());
         staging.place_files(dir.path()).unwrap();
         for name in ["a", "b"] {
             assert_eq!(fs::read_to_string(dir.path().join(name)).unwrap(), "new");

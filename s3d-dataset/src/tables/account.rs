@@ -49,7 +49,8 @@ impl<'c> Account<'c> {
     ) {
         self.state().tally += *tally;
         let seconds = thousandths(started.elapsed().as_secs_f64());
-        self.ctx.tell(&Event::UnitFinished { unit, area, location, tally, seconds });
+        self.ctx
+            .tell(&Event::UnitFinished { unit, area, location, tally, seconds });
     }
 
     /// Units that an earlier run finished were checked and are taken as they are.
@@ -83,7 +84,10 @@ impl<'c> Account<'c> {
             candidate_views,
             unlabelled,
             warnings: self.ctx.warnings() - self.warnings_before,
-            stage_seconds: stage_seconds.into_iter().map(|(stage, s)| (stage, thousandths(s))).collect(),
+            stage_seconds: stage_seconds
+                .into_iter()
+                .map(|(stage, s)| (stage, thousandths(s)))
+                .collect(),
             seconds: thousandths(self.started.elapsed().as_secs_f64()),
         };
         self.ctx.tell(&Event::Summary(&summary));
@@ -106,7 +110,9 @@ impl StageTimer<'_> {
         let Self { account, stage, area, started } = self;
         let seconds = started.elapsed().as_secs_f64();
         *account.state().stage_seconds.entry(stage).or_default() += seconds;
-        account.ctx.tell(&Event::StageFinished { stage, area, seconds: thousandths(seconds) });
+        account
+            .ctx
+            .tell(&Event::StageFinished { stage, area, seconds: thousandths(seconds) });
     }
 }
 

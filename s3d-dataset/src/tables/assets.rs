@@ -61,7 +61,10 @@ mod tests {
     fn the_schema_of_manifests_knows_all_modalities_and_profiles() {
         let schema: serde_json::Value = serde_json::from_str(MANIFEST_SCHEMA).unwrap();
         let words = |option: &str| {
-            schema["properties"]["options"]["properties"][option]["items"]["enum"].as_array().unwrap().clone()
+            schema["properties"]["options"]["properties"][option]["items"]["enum"]
+                .as_array()
+                .unwrap()
+                .clone()
         };
         assert_eq!(words("modalities"), Domain::ALL.map(Domain::folder));
         assert_eq!(words("profiles"), Profile::ALL.map(Profile::name));

@@ -98,7 +98,10 @@ pub(crate) struct Listed {
 impl Listed {
     /// Those of these records.
     pub(crate) fn of(root: &Path, records: impl IntoIterator<Item = FileRecord>) -> Self {
-        let records = records.into_iter().map(|record| (record.path.clone(), record)).collect();
+        let records = records
+            .into_iter()
+            .map(|record| (record.path.clone(), record))
+            .collect();
         Self { root: root.to_owned(), records }
     }
 
@@ -184,7 +187,10 @@ impl Listed {
     pub(crate) fn images(&self, layout: &Layout, area: u32) -> Vec<DatasetImage> {
         let mut found: BTreeMap<_, Vec<Domain>> = BTreeMap::new();
         for path in self.below(&layout.area_dir(area)) {
-            let name = path.file_name().and_then(|name| name.to_str()).and_then(ImageName::parse);
+            let name = path
+                .file_name()
+                .and_then(|name| name.to_str())
+                .and_then(ImageName::parse);
             let Some(ImageName { uuid, room, frame, domain }) = name else { continue };
             if path.parent() == Some(&*layout.image_dir(area, frame, domain)) {
                 found.entry((uuid, room, frame)).or_default().push(domain);

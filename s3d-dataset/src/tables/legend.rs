@@ -43,7 +43,11 @@ fn picture(taxonomy: &Taxonomy) -> Raster<[u8; 3]> {
     let longest = lines.iter().map(String::len).max().unwrap_or(0);
     let width = LINE + 8 * DOT * (longest + 1);
     let mut pixels = vec![[255; 3]; width * LINE * lines.len()];
-    for ((line, class), rows) in lines.iter().zip(taxonomy.classes()).zip(pixels.chunks_mut(width * LINE)) {
+    for ((line, class), rows) in lines
+        .iter()
+        .zip(taxonomy.classes())
+        .zip(pixels.chunks_mut(width * LINE))
+    {
         let margin = (LINE - SQUARE) / 2;
         for row in rows.chunks_mut(width).skip(margin).take(SQUARE) {
             row[margin..margin + SQUARE].fill(taxonomy.color(*class));

@@ -98,7 +98,10 @@ pub(crate) fn faults(ctx: &Context, layout: &Layout, files: &[&FileRecord]) -> R
         || (),
         |(), (index, record)| {
             if let Some(fault) = record.fault(layout.root()) {
-                faults.lock().unwrap_or_else(PoisonError::into_inner).push((*index, fault));
+                faults
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .push((*index, fault));
             }
             progress.add(1);
             Ok(())
@@ -131,8 +134,10 @@ pub(crate) fn write_changed(
     staged: &Layout,
 ) -> Result<()> {
     let kept = data.files.records().filter(|record| !is_gone(&record.path)).cloned();
-    let all: BTreeMap<String, FileRecord> =
-        kept.chain(changed).map(|record| (record.path.clone(), record)).collect();
+    let all: BTreeMap<String, FileRecord> = kept
+        .chain(changed)
+        .map(|record| (record.path.clone(), record))
+        .collect();
     let all: Vec<FileRecord> = all.into_values().collect();
     manifest.files = Some(write(staged, &all)?);
     manifest.write(staged)

@@ -319,7 +319,12 @@ impl Manifest {
         if numbers.is_empty() || numbers.contains(&0) || numbers.len() != self.area_numbers.len() {
             return Some(format!("area_numbers {:?} are no numbers of areas", self.area_numbers));
         }
-        if !self.areas.iter().map(|area| area.area).eq(self.area_numbers.iter().copied()) {
+        if !self
+            .areas
+            .iter()
+            .map(|area| area.area)
+            .eq(self.area_numbers.iter().copied())
+        {
             let told: Vec<u32> = self.areas.iter().map(|area| area.area).collect();
             return Some(format!("area_numbers {:?}, and areas tells of {told:?}", self.area_numbers));
         }
@@ -367,7 +372,10 @@ impl Manifest {
     /// The domains that every image has, in their order.
     pub(crate) fn domains(&self) -> Vec<Domain> {
         let made_later = |d: &Domain| *d == Domain::GlobalXyz && self.is_xyz_from_depth();
-        Domain::ALL.into_iter().filter(|d| self.options.modalities.contains(d) || made_later(d)).collect()
+        Domain::ALL
+            .into_iter()
+            .filter(|d| self.options.modalities.contains(d) || made_later(d))
+            .collect()
     }
 
     /// Whether its world coordinates were made by `s3d xyz`.

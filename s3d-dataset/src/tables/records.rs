@@ -255,7 +255,9 @@ pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: 
     };
     let of = |areas: &[u32]| -> Vec<(String, String)> {
         let listed = pairs.iter().filter(|(area, _)| areas.contains(area));
-        listed.map(|(a, name)| (path(*a, name, Domain::Rgb), path(*a, name, Domain::Depth))).collect()
+        listed
+            .map(|(a, name)| (path(*a, name, Domain::Rgb), path(*a, name, Domain::Depth)))
+            .collect()
     };
     s3d_io::dataset::write_image_list(&layout.list_of_all(), &of(areas))?;
     for fold in folds {

@@ -93,9 +93,15 @@ pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
     let areas = &data.manifest.area_numbers;
     let folders: Vec<PathBuf> = areas.iter().map(|area| layout.area_dir(*area)).collect();
     // Images are counted, and not read.
-    data.files.require(&Context::default(), |path| folders.iter().any(|area| path.starts_with(area)))?;
+    data.files
+        .require(&Context::default(), |path| folders.iter().any(|area| path.starts_with(area)))?;
     Statistics::count(layout, areas, data.label_taxonomy(), |path, whole| {
-        if whole { data.files.checked(path) } else { data.files.sized(path) }.map(drop)
+        if whole {
+            data.files.checked(path)
+        } else {
+            data.files.sized(path)
+        }
+        .map(drop)
     })
 }
 
@@ -115,7 +121,9 @@ impl Statistics {
             let read = taxonomy.table_from_names(&read_labels(&path)?);
             table = Some(read.map_err(|e| FileError::format(&path, e.to_string()))?);
         }
-        let areas = areas.iter().map(|n| AreaStatistics::count(layout, *n, table.as_ref(), &check));
+        let areas = areas
+            .iter()
+            .map(|n| AreaStatistics::count(layout, *n, table.as_ref(), &check));
         Ok(Self { areas: areas.collect::<Result<_>>()?, taxonomy: taxonomy.cloned().unwrap_or_default() })
     }
 
@@ -219,7 +227,9 @@ impl Statistics {
 type Row<'a> = (&'a str, &'a dyn Fn(&AreaStatistics) -> f64);
 
 fn rows_of<'a, F: Fn(&AreaStatistics) -> f64>(rows: &'a [(&'static str, F)]) -> Vec<Row<'a>> {
-    rows.iter().map(|(name, f)| (*name, f as &dyn Fn(&AreaStatistics) -> f64)).collect()
+    rows.iter()
+        .map(|(name, f)| (*name, f as &dyn Fn(&AreaStatistics) -> f64))
+        .collect()
 }
 
 impl AreaStatistics {
@@ -229,8 +239,14 @@ impl AreaStatistics {
         table: Option<&LabelTable>,
         check: impl Fn(&Path, bool) -> Result<(), FileError>,
     ) -> Result<Self> {
-        let labels = table.map(|table| LabelStatistics::count(layout, area, table, &check)).transpose()?;
-        let mesh = if labels.is_some() { layout.semantic_obj(area) } else { layout.rgb_obj(area) };
+        let labels = table
+            .map(|table| LabelStatistics::count(layout, area, table, &check))
+            .transpose()?;
+        let mesh = if labels.is_some() {
+            layout.semantic_obj(area)
+        } else {
+            layout.rgb_obj(area)
+        };
         check(&layout.point_cloud(area), false)?;
         check(&mesh, true)?;
         Ok(Self {
@@ -266,7 +282,10 @@ impl LabelStatistics {
                 .room(&record.room)
                 .map_err(|e| FileError::format(&layout.rooms_json(area), e.to_string()))?;
             tally.add_room(room.room_type, record.floor_m2);
-            room.room_type.s3dis().into_iter().for_each(|t| as_s3dis.add_room(t, record.floor_m2));
+            room.room_type
+                .s3dis()
+                .into_iter()
+                .for_each(|t| as_s3dis.add_room(t, record.floor_m2));
         }
         let as_s3dis = Some(as_s3dis).filter(|_| !taxonomy.is_s3dis());
         Ok(Self { floor_m2: rooms.iter().map(|r| r.floor_m2).sum(), tally, as_s3dis })
@@ -278,7 +297,10 @@ impl LabelTally {
     fn of_none(classes: &[Class], types: &[RoomType]) -> Self {
         Self {
             instances_per_class: classes.iter().map(|class| (class.name(), 0)).collect(),
-            rooms_per_type: types.iter().map(|t| (t.name(), RoomTypeStatistics::default())).collect(),
+            rooms_per_type: types
+                .iter()
+                .map(|t| (t.name(), RoomTypeStatistics::default()))
+                .collect(),
         }
     }
 

@@ -69,7 +69,9 @@ impl AddAssign for Surface {
     fn add_assign(&mut self, other: Self) {
         self.faces += other.faces;
         self.m2 += other.m2;
-        self.pixels = self.pixels.map_or(other.pixels, |sum| Some(sum + other.pixels.unwrap_or(0)));
+        self.pixels = self
+            .pixels
+            .map_or(other.pixels, |sum| Some(sum + other.pixels.unwrap_or(0)));
     }
 }
 
@@ -149,8 +151,11 @@ impl Summary {
             ),
             format!("{} files, {}", tally.files, size(tally.bytes)),
         ];
-        let stages: Vec<String> =
-            self.stage_seconds.iter().map(|(stage, s)| format!("{} {s:.1} s", stage.name())).collect();
+        let stages: Vec<String> = self
+            .stage_seconds
+            .iter()
+            .map(|(stage, s)| format!("{} {s:.1} s", stage.name()))
+            .collect();
         if !stages.is_empty() {
             lines.push(format!("{} (meshes and points are written beside the images)", stages.join(", ")));
         }
@@ -237,7 +242,11 @@ pub(crate) fn size(bytes: u64) -> String {
     for unit in ["bytes", "kB", "MB", "GB"] {
         // What would be rounded up to 1000 is of the next unit.
         if value < 999.95 {
-            return if unit == "bytes" { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") };
+            return if unit == "bytes" {
+                format!("{bytes} bytes")
+            } else {
+                format!("{value:.1} {unit}")
+            };
         }
         value /= 1000.0;
     }

@@ -28,9 +28,17 @@ impl Dataset {
         let first = listing::records(ctx, layout, &[first, vec![layout.conventions()]].concat())?;
         let of_units = finished.iter().flat_map(|done| done.files().iter().cloned());
         let files = Listed::of(layout.root(), of_units.chain(first));
-        manifest.areas = request.numbers().into_iter().filter_map(|area| entry(&finished, area)).collect();
+        manifest.areas = request
+            .numbers()
+            .into_iter()
+            .filter_map(|area| entry(&finished, area))
+            .collect();
         let photographs = |area| finished.photographs(area).map(|done| done.record.clone()).collect();
-        let photographs = request.numbers().into_iter().map(|area| (area, photographs(area))).collect();
+        let photographs = request
+            .numbers()
+            .into_iter()
+            .map(|area| (area, photographs(area)))
+            .collect();
         let taxonomy = manifest.read_taxonomy(layout, |_| Ok(()))?;
         let unfinished = Unfinished { photographs, missing: sentences(&request, &finished) };
         let unfinished = Some(unfinished);

@@ -115,8 +115,11 @@ impl Estimate {
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let minutes = self.core_seconds / 60.0;
-        let time =
-            if minutes < 1.0 { "less than a minute".to_owned() } else { format!("{minutes:.0} minutes") };
+        let time = if minutes < 1.0 {
+            "less than a minute".to_owned()
+        } else {
+            format!("{minutes:.0} minutes")
+        };
         write!(f, "about {:.0} files, {}, {time} of one core", self.files, Bytes(self.bytes))
     }
 }
@@ -158,7 +161,10 @@ pub(crate) fn size_findings(mesh: &TriMesh, points_per_m2: f64) -> Result<Vec<Fi
     if points > MOST_POINTS {
         return Err(Error::Input(text));
     }
-    Ok((points > MANY_POINTS).then(|| Finding::new(Condition::Size, true, text)).into_iter().collect())
+    Ok((points > MANY_POINTS)
+        .then(|| Finding::new(Condition::Size, true, text))
+        .into_iter()
+        .collect())
 }
 
 /// Refuses exactly so many bytes where the disk of `folder` has not the space.
@@ -173,15 +179,25 @@ pub(crate) fn check_space(bytes: f64, folder: &Path) -> Result<()> {
 /// depends on what they show: what stops is less space than half of what is expected.
 pub(crate) fn space_findings(bytes: f64, folder: &Path) -> Vec<Finding> {
     let lack = lack_of_space(bytes, folder);
-    lack.map(|(free, text)| Finding::new(Condition::Size, bytes > 2.0 * free, text)).into_iter().collect()
+    lack.map(|(free, text)| Finding::new(Condition::Size, bytes > 2.0 * free, text))
+        .into_iter()
+        .collect()
 }
 
 /// The free bytes on the disk of `folder`, which need not be there yet, and a sentence, if there are fewer
 /// than `bytes`. Nothing where the system does not tell.
 fn lack_of_space(bytes: f64, folder: &Path) -> Option<(f64, String)> {
-    let named =
-        |folder: &Path| if folder.as_os_str().is_empty() { Path::new(".") } else { folder }.to_owned();
-    let free = folder.ancestors().find_map(|folder| fs4::available_space(named(folder)).ok())? as f64;
+    let named = |folder: &Path| {
+        if folder.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            folder
+        }
+        .to_owned()
+    };
+    let free = folder
+        .ancestors()
+        .find_map(|folder| fs4::available_space(named(folder)).ok())? as f64;
     let text = format!(
         "about {} are to be written, and {} are free at {}: make room, choose another folder, or write less",
         Bytes(bytes),

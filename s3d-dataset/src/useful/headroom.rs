@@ -140,7 +140,12 @@ mod tests {
         let house = storeys(Building::two_storeys());
         assert_eq!(house.len(), 2, "{house:?}");
         assert!(house[0].z_m.abs() < 0.05 && (2.4..3.5).contains(&house[1].z_m), "{house:?}");
-        assert!(house.iter().all(|storey| (2.2..3.5).contains(&storey.height_m.unwrap())), "{house:?}");
+        assert!(
+            house
+                .iter()
+                .all(|storey| (2.2..3.5).contains(&storey.height_m.unwrap())),
+            "{house:?}"
+        );
         assert!(house[0].to_string().contains(" m² at z = 0.00 m, 2."), "{}", house[0]);
     }
 }

@@ -86,7 +86,10 @@ impl FromStr for Condition {
 
     fn from_str(name: &str) -> Result<Self, String> {
         let names = Self::ALL.map(Self::name).join(", ");
-        Self::ALL.into_iter().find(|c| c.name() == name).ok_or_else(|| format!("must be one of {names}"))
+        Self::ALL
+            .into_iter()
+            .find(|c| c.name() == name)
+            .ok_or_else(|| format!("must be one of {names}"))
     }
 }
 

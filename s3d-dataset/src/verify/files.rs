@@ -97,8 +97,11 @@ impl Files {
                 "files.csv does not name it".to_owned()
             });
         }
-        let mut left: Vec<&FileRecord> =
-            listed.values().filter(|(_, seen)| !seen.load(Ordering::Relaxed)).map(|(r, _)| r).collect();
+        let mut left: Vec<&FileRecord> = listed
+            .values()
+            .filter(|(_, seen)| !seen.load(Ordering::Relaxed))
+            .map(|(r, _)| r)
+            .collect();
         // The largest first, so that no thread is left with one at the end.
         left.sort_by_key(|r| std::cmp::Reverse(r.bytes));
         let progress = ctx.progress("reading", "files", left.len() as u64);
@@ -146,7 +149,9 @@ fn all_files(layout: &Layout, areas: &[u32], report: &Report) -> Vec<PathBuf> {
 fn is_in_images(layout: &Layout, areas: &[u32], path: &Path) -> bool {
     areas.iter().any(|a| {
         [Frame::Panorama, Frame::View(0)].into_iter().any(|frame| {
-            Domain::ALL.into_iter().any(|d| path.parent() == Some(&*layout.image_dir(*a, frame, d)))
+            Domain::ALL
+                .into_iter()
+                .any(|d| path.parent() == Some(&*layout.image_dir(*a, frame, d)))
         })
     })
 }
@@ -165,7 +170,11 @@ pub(crate) fn walk(folder: &Path, report: &Report) -> Vec<PathBuf> {
         };
         for entry in entries.flatten() {
             let path = entry.path();
-            if entry.file_type().is_ok_and(|t| t.is_dir()) { folders.push(path) } else { files.push(path) }
+            if entry.file_type().is_ok_and(|t| t.is_dir()) {
+                folders.push(path)
+            } else {
+                files.push(path)
+            }
         }
     }
     files.sort();

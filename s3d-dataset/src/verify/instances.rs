@@ -58,8 +58,14 @@ pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &La
         checks.check(arrays.bbox.iter().eq(entries.iter().map(|e| &e.bbox)), || {
             "its boxes are not those of instances.json".to_owned()
         });
-        let same = arrays.voxel_occupancy.iter().eq(entries.iter().flat_map(|e| &e.voxel_occupancy))
-            && arrays.points_per_voxel.iter().eq(entries.iter().flat_map(|e| &e.points_per_voxel));
+        let same = arrays
+            .voxel_occupancy
+            .iter()
+            .eq(entries.iter().flat_map(|e| &e.voxel_occupancy))
+            && arrays
+                .points_per_voxel
+                .iter()
+                .eq(entries.iter().flat_map(|e| &e.points_per_voxel));
         checks.check(same, || "its voxels are not those of instances.json".to_owned());
     }
     if let Some(arrays) = &arrays {
@@ -73,7 +79,9 @@ fn label(name: &str, index: u32, labels: &Labels, checks: &OfFile<'_>) {
         format!(
             "{name} has the index {index}, where semantic_labels.json has {}{}",
             labels.name_of(index),
-            labels.index_of(name).map_or(String::new(), |i| format!(", and {name} at {i}"))
+            labels
+                .index_of(name)
+                .map_or(String::new(), |i| format!(", and {name} at {i}"))
         )
     });
 }
@@ -85,8 +93,9 @@ fn members(arrays: &InstanceArrays, path: &Path, report: &Report) {
     let each = |i: usize, members: &[u32]| {
         seen.clear();
         seen.resize(members.len(), false);
-        let once =
-            members.iter().all(|&m| seen.get_mut(m as usize).is_some_and(|s| !std::mem::replace(s, true)));
+        let once = members
+            .iter()
+            .all(|&m| seen.get_mut(m as usize).is_some_and(|s| !std::mem::replace(s, true)));
         checks.check(once, || {
             format!("point_index of {} names a point twice, or one that is not there", arrays.labels[i])
         });

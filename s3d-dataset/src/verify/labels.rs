@@ -51,12 +51,19 @@ impl Labels {
         checks.check(names.len() == manifest.labels_padded_to(), || {
             format!("{} entries, and the manifest tells of {}", names.len(), manifest.labels_padded_to())
         });
-        let count = names.iter().rposition(|name| name != NULL_NAME).map_or(1, |last| last + 1);
+        let count = names
+            .iter()
+            .rposition(|name| name != NULL_NAME)
+            .map_or(1, |last| last + 1);
         names.truncate(count);
         checks.check(count == manifest.labels, || {
             format!("{count} labels, the null label included, and the manifest tells of {}", manifest.labels)
         });
-        let indices = names.iter().enumerate().map(|(i, name)| (name.clone(), i as u32)).collect();
+        let indices = names
+            .iter()
+            .enumerate()
+            .map(|(i, name)| (name.clone(), i as u32))
+            .collect();
         let pretty = (0..names.len() as u32).map(pretty_color).collect();
         let class = |name: &String| match taxonomy.parse_name(name) {
             Ok(Some(label)) => label.class.index() as u8,
@@ -78,7 +85,11 @@ impl Labels {
 
     /// The name of the class at a place of the taxonomy.
     pub(crate) fn class_name(&self, place: u8) -> String {
-        let name = self.taxonomy.classes().get(usize::from(place)).map_or("no class", |class| class.name());
+        let name = self
+            .taxonomy
+            .classes()
+            .get(usize::from(place))
+            .map_or("no class", |class| class.name());
         format!("{place} ({name})")
     }
 

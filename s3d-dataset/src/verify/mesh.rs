@@ -182,7 +182,11 @@ fn check_votes(
         if let Some(within_m) = fill_m.filter(|_| won) {
             fill_labels(&file.mesh, &mut filled, within_m);
         }
-        let odd = filled.iter().zip(label_of_face).filter(|(filled, label)| filled.0 != **label).count();
+        let odd = filled
+            .iter()
+            .zip(label_of_face)
+            .filter(|(filled, label)| filled.0 != **label)
+            .count();
         report.check(!won || odd == 0, VOTES, &path, || {
             format!("{odd} faces have other labels than votes and filling give them")
         });
@@ -223,8 +227,15 @@ fn check_votes(
     is("with votes", votes.total.faces_voted, per_label.iter().sum::<u64>() - others);
     // Rooms of other areas may bear the same name: they have no face here.
     let mut manifest: BTreeMap<String, u64> = BTreeMap::new();
-    votes.rooms.iter().for_each(|r| *manifest.entry(r.name.clone()).or_default() += r.faces_voted);
-    for room in rooms.keys().chain(manifest.keys()).collect::<std::collections::BTreeSet<_>>() {
+    votes
+        .rooms
+        .iter()
+        .for_each(|r| *manifest.entry(r.name.clone()).or_default() += r.faces_voted);
+    for room in rooms
+        .keys()
+        .chain(manifest.keys())
+        .collect::<std::collections::BTreeSet<_>>()
+    {
         let of = |map: &BTreeMap<String, u64>| map.get(room).copied().unwrap_or(0);
         is(&format!("of {room}"), of(&manifest), of(&rooms));
     }

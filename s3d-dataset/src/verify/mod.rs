@@ -104,7 +104,9 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
     };
     let mut all = Vec::new();
     for &area in &manifest.area_numbers {
-        let images = report.ok(Topic::Images, dataset_images(layout, area)).unwrap_or_default();
+        let images = report
+            .ok(Topic::Images, dataset_images(layout, area))
+            .unwrap_or_default();
         check_area(&common, area, &images)?;
         all.extend(images);
     }
@@ -132,7 +134,13 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     };
     let scene = Scene::new(&mesh.file.mesh);
     let textures = MipMaps::new(&mesh.file.mesh);
-    let pretty = |label: &u32| if *label == NOT_IN_TABLE { [0; 3] } else { pretty_color(*label) };
+    let pretty = |label: &u32| {
+        if *label == NOT_IN_TABLE {
+            [0; 3]
+        } else {
+            pretty_color(*label)
+        }
+    };
     let pretty_of_face: Vec<[u8; 3]> = mesh.label_of_face.iter().map(pretty).collect();
     let class = |label: &u32| labels.classes.get(*label as usize).copied().unwrap_or(NO_CLASS);
     let class_of_face: Vec<u8> = mesh.label_of_face.iter().map(class).collect();
@@ -234,7 +242,9 @@ fn check_images(
         unlabelled: &unlabelled,
     };
     let progress = ctx.progress("verifying", "images", images.len() as u64);
-    let works: Vec<Work> = std::iter::once(Work::Points).chain((0..images.len()).map(Work::Image)).collect();
+    let works: Vec<Work> = std::iter::once(Work::Points)
+        .chain((0..images.len()).map(Work::Image))
+        .collect();
     for_each_in_order(
         ctx,
         &works,
@@ -303,8 +313,11 @@ fn diagnose_mismatches(
         || (),
         |(), &i| {
             let (o, image) = (&mismatches[i], &images[mismatches[i].image]);
-            let guess =
-                if chosen[i] { images::diagnosis::diagnose(reference, images, cameras, o) } else { None };
+            let guess = if chosen[i] {
+                images::diagnosis::diagnose(reference, images, cameras, o)
+            } else {
+                None
+            };
             let mut sentence = o.difference.sentence("what the mesh shows there");
             if let Some(guess) = &guess {
                 sentence += &format!("; {guess}");
@@ -321,8 +334,10 @@ fn diagnose_mismatches(
     for (image, guesses) in guesses.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let image = &images[image];
         let rgb_from_mesh = reference.rgb_from_mesh && photographs.of(image).is_none();
-        let files =
-            image.domains.iter().filter(|d| **d != Domain::Pose && (rgb_from_mesh || **d != Domain::Rgb));
+        let files = image
+            .domains
+            .iter()
+            .filter(|d| **d != Domain::Pose && (rgb_from_mesh || **d != Domain::Rgb));
         if let Some(Some(first)) = guesses.first()
             && guesses.len() == files.count()
             && guesses.iter().all(|g| g.as_ref() == Some(first))

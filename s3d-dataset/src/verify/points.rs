@@ -54,7 +54,9 @@ pub(crate) fn check(
         }
         at += chunk.len() as u64;
         if let Some(forms) = &mut forms {
-            chunk.chunk_by(|a, b| a.label == b.label).for_each(|run| forms.meet(run));
+            chunk
+                .chunk_by(|a, b| a.label == b.label)
+                .for_each(|run| forms.meet(run));
         }
     }
     report.check(faults == 0, POINTS, &path, || {
@@ -130,13 +132,19 @@ struct Reader {
 
 impl<'a> Forms<'a> {
     fn open(layout: &'a Layout, area: u32, labels: &'a Labels, report: &'a Report) -> Self {
-        let numbers: Vec<Number> =
-            report.read(Topic::Points, &layout.instance_numbers_json(area), read_json).unwrap_or_default();
+        let numbers: Vec<Number> = report
+            .read(Topic::Points, &layout.instance_numbers_json(area), read_json)
+            .unwrap_or_default();
         let file = |n: &Number| format!("{}_{}.txt", n.class, n.number_in_room);
-        let places = numbers.iter().map(|n| (n.label.clone(), (n.room.clone(), file(n)))).collect();
+        let places = numbers
+            .iter()
+            .map(|n| (n.label.clone(), (n.room.clone(), file(n))))
+            .collect();
         let mat = report.read(Topic::Points, &layout.point_cloud_mat(area), MatArea::open);
         let objects = mat.into_iter().flat_map(|m| m.rooms).flat_map(|r| r.objects);
-        let objects = objects.map(|o| (o.global_name.clone().unwrap_or_else(|| o.name.clone()), o)).collect();
+        let objects = objects
+            .map(|o| (o.global_name.clone().unwrap_or_else(|| o.name.clone()), o))
+            .collect();
         Self {
             layout,
             area,
@@ -162,17 +170,23 @@ impl<'a> Forms<'a> {
         if label != self.label {
             self.begin(label);
         }
-        for reader in [self.instance.as_mut(), self.room.as_mut().map(|(_, r)| r)].into_iter().flatten() {
+        for reader in [self.instance.as_mut(), self.room.as_mut().map(|(_, r)| r)]
+            .into_iter()
+            .flatten()
+        {
             reader.compare(run, self.report);
         }
         let end = self.object_at + run.len();
         let same = self.object.positions.get(self.object_at..end).is_some_and(|positions| {
             let colors = &self.object.colors[self.object_at..end];
-            run.iter().zip(positions.iter().zip(colors)).all(|(p, (q, c))| near(p, *q, *c))
+            run.iter()
+                .zip(positions.iter().zip(colors))
+                .all(|(p, (q, c))| near(p, *q, *c))
         });
-        self.report.check(same, FORMS, &self.layout.point_cloud_mat(self.area), || {
-            format!("the points of {} are not those of pointcloud.ply", self.labels.name_of(label))
-        });
+        self.report
+            .check(same, FORMS, &self.layout.point_cloud_mat(self.area), || {
+                format!("the points of {} are not those of pointcloud.ply", self.labels.name_of(label))
+            });
         self.object_at = end;
     }
 
@@ -204,10 +218,11 @@ impl<'a> Forms<'a> {
             reader.end(self.report);
         }
         let left = self.object.len() == self.object_at;
-        self.report.check(left, FORMS, &self.layout.point_cloud_mat(self.area), || {
-            let name = self.labels.name_of(self.label);
-            format!("{} has {} points, and {} in pointcloud.ply", name, self.object.len(), self.object_at)
-        });
+        self.report
+            .check(left, FORMS, &self.layout.point_cloud_mat(self.area), || {
+                let name = self.labels.name_of(self.label);
+                format!("{} has {} points, and {} in pointcloud.ply", name, self.object.len(), self.object_at)
+            });
         self.object.clear();
         self.object_at = 0;
     }
@@ -219,9 +234,10 @@ impl<'a> Forms<'a> {
         }
         for path in super::files::walk(&self.layout.s3dis_area_dir(self.area), self.report) {
             let is_list = path.to_string_lossy().ends_with("_alignmentAngle.txt");
-            self.report.check(is_list || self.met.contains(&path), FORMS, &path, || {
-                "its points are not in pointcloud.ply".to_owned()
-            });
+            self.report
+                .check(is_list || self.met.contains(&path), FORMS, &path, || {
+                    "its points are not in pointcloud.ply".to_owned()
+                });
         }
     }
 }

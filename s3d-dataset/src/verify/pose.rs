@@ -145,7 +145,10 @@ fn looks_like(rotation: DMat3, expected: DMat3) -> &'static str {
         (flip * expected, ": it is in Blender's axes (y up, looking along −z) instead of OpenCV's"),
         ((flip * expected).transpose(), ": it is camera → world in Blender's axes"),
     ];
-    guesses.into_iter().find(|(guess, _)| close(rotation, *guess)).map_or("", |(_, words)| words)
+    guesses
+        .into_iter()
+        .find(|(guess, _)| close(rotation, *guess))
+        .map_or("", |(_, words)| words)
 }
 
 fn angles(file: &PoseFile, checks: &OfFile<'_>) {
@@ -154,7 +157,11 @@ fn angles(file: &PoseFile, checks: &OfFile<'_>) {
         (rotation(file.rotation_from_original_to_point), rotation(file.camera_original_rotation));
     let last = rotation(file.final_camera_rotation);
     checks.check(close(between * original, last), || {
-        let why = if close(original * between, last) { ": the product is in the other order" } else { "" };
+        let why = if close(original * between, last) {
+            ": the product is in the other order"
+        } else {
+            ""
+        };
         format!(
             "final_camera_rotation is not rotation_from_original_to_point after camera_original_rotation{why}"
         )
@@ -227,9 +234,17 @@ pub(crate) fn check_draw(pose: &CheckedPose, draw: Option<&ViewRecord>, path: &P
     let original = file.original();
     let (yaw, pitch) = draw.map_or((0.0, 0.0), |d| (d.yaw_rad, d.pitch_rad));
     let (expected, found) = (original.turned(yaw, pitch).world_from_camera, file.pose().world_from_camera);
-    let what = if draw.is_some() { "as views.json drew it" } else { "the scanner's own, as a panorama's is" };
+    let what = if draw.is_some() {
+        "as views.json drew it"
+    } else {
+        "the scanner's own, as a panorama's is"
+    };
     checks.check(close(expected, found), || {
-        let transposed = if close(expected.transpose(), found) { ": it is transposed" } else { "" };
+        let transposed = if close(expected.transpose(), found) {
+            ": it is transposed"
+        } else {
+            ""
+        };
         let angles = euler_from_rotation(expected).to_array();
         format!(
             "final_camera_rotation {:?} is not {what} ({angles:?}){transposed}",
@@ -289,8 +304,10 @@ mod tests {
             let (r, t) = parts_of_matrix(file);
             let (r, t) = change(r, t);
             let r = r.transpose();
-            for (row, (of, t)) in
-                file.camera_rt_matrix.iter_mut().zip([r.x_axis, r.y_axis, r.z_axis].iter().zip(t.to_array()))
+            for (row, (of, t)) in file
+                .camera_rt_matrix
+                .iter_mut()
+                .zip([r.x_axis, r.y_axis, r.z_axis].iter().zip(t.to_array()))
             {
                 *row = [of.x, of.y, of.z, t];
             }

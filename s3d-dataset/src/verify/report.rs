@@ -157,9 +157,15 @@ impl Report {
         {
             // Of what is damaged it may be told what it looks like.
             let is_small = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() <= SMALL);
-            return if is_small { Ok(()) } else { record.check_size(&self.root) };
+            return if is_small {
+                Ok(())
+            } else {
+                record.check_size(&self.root)
+            };
         }
-        let size = std::fs::metadata(path).map_err(|e| FileError::io(path, "read", e))?.len();
+        let size = std::fs::metadata(path)
+            .map_err(|e| FileError::io(path, "read", e))?
+            .len();
         if size > sizes.most {
             return Err(FileError::format(path, format!("{size} bytes, more than the data set has")));
         }
@@ -171,7 +177,9 @@ impl Report {
         let listed = self.sizes.get().and_then(|sizes| sizes.listed.as_ref());
         let records = listed.into_iter().flat_map(BTreeMap::values);
         let paths = records.map(|record| record.path_in(&self.root));
-        paths.filter(|path| chosen(path)).try_for_each(|path| self.check_size(&path))
+        paths
+            .filter(|path| chosen(path))
+            .try_for_each(|path| self.check_size(&path))
     }
 
     /// What `read` gives of a file; what cannot be read is a fault of the file.

@@ -121,8 +121,10 @@ pub(crate) fn rooms(
             let twice = |p: [f64; 2], q: [f64; 2]| (p[0] - x) * (q[1] - y) - (q[0] - x) * (p[1] - y);
             ring.windows(2).map(|w| 0.5 * twice(w[0], w[1])).sum::<f64>()
         };
-        let inside =
-            r.outline.iter().map(|o| area_of(&o.outer) + o.holes.iter().map(|h| area_of(h)).sum::<f64>());
+        let inside = r
+            .outline
+            .iter()
+            .map(|o| area_of(&o.outer) + o.holes.iter().map(|h| area_of(h)).sum::<f64>());
         let inside: f64 = inside.sum();
         checks.check((inside - r.floor_m2).abs() <= 1e-6 * (1.0 + inside), || {
             format!("{}: floor_m2 is {}, and the outline holds {inside}", r.room, r.floor_m2)
@@ -170,8 +172,11 @@ pub(crate) fn splits(layout: &Layout, manifest: &Manifest, images: &[DatasetImag
         let checks = report.of(SPLITS, path);
         let pair =
             |i: &DatasetImage| format!("{} {}", i.relative_path(Domain::Rgb), i.relative_path(Domain::Depth));
-        let mut left: BTreeSet<String> =
-            images.iter().filter(|i| is_listed(i) && areas.contains(&i.area)).map(pair).collect();
+        let mut left: BTreeSet<String> = images
+            .iter()
+            .filter(|i| is_listed(i) && areas.contains(&i.area))
+            .map(pair)
+            .collect();
         for (n, line) in (1..).zip(text.lines()) {
             checks.check(left.remove(line), || {
                 let missing = line.split(' ').find(|name| !layout.root().join(name).is_file());
@@ -227,7 +232,11 @@ pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) 
     if let Some(text) = report.read(Topic::Tables, &path, read_text) {
         let expected = counted.to_markdown();
         report.check(text == expected, STATISTICS, &path, || {
-            let pair = text.lines().zip(expected.lines()).find(|(a, b)| a != b).unwrap_or_default();
+            let pair = text
+                .lines()
+                .zip(expected.lines())
+                .find(|(a, b)| a != b)
+                .unwrap_or_default();
             format!("not what is counted from the files: {:?} for {:?}", pair.0, pair.1)
         });
     }
@@ -237,10 +246,15 @@ pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) 
 fn differ(found: &Value, expected: &Value, place: &str, out: &mut Vec<String>) {
     match (found, expected) {
         (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
-            a.iter().zip(b.values()).for_each(|((key, a), b)| differ(a, b, &format!("{place}/{key}"), out));
+            a.iter()
+                .zip(b.values())
+                .for_each(|((key, a), b)| differ(a, b, &format!("{place}/{key}"), out));
         }
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
-            a.iter().zip(b).enumerate().for_each(|(i, (a, b))| differ(a, b, &format!("{place}/{i}"), out));
+            a.iter()
+                .zip(b)
+                .enumerate()
+                .for_each(|(i, (a, b))| differ(a, b, &format!("{place}/{i}"), out));
         }
         _ if found == expected => {}
         _ => out.push(format!("{place} is {found}, counted are {expected}")),

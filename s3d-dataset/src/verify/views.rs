@@ -68,7 +68,11 @@ impl Views {
         area: u32,
         uuid: &'a str,
     ) -> impl Iterator<Item = &'a ViewRecord> {
-        self.by_area.get(&area).into_iter().flatten().filter(move |r| r.camera_uuid == uuid)
+        self.by_area
+            .get(&area)
+            .into_iter()
+            .flatten()
+            .filter(move |r| r.camera_uuid == uuid)
     }
 
     /// How many candidates the first location of an area has; `None` if there is none.
@@ -102,7 +106,11 @@ impl Views {
 
     fn check_selection(&self, layout: &Layout, manifest: &Manifest, report: &Report) {
         let mut candidates = Vec::new();
-        for (&area, records) in manifest.area_numbers.iter().filter_map(|a| self.by_area.get_key_value(a)) {
+        for (&area, records) in manifest
+            .area_numbers
+            .iter()
+            .filter_map(|a| self.by_area.get_key_value(a))
+        {
             let mut location = 0;
             for (i, r) in records.iter().enumerate() {
                 location += usize::from(i > 0 && records[i - 1].camera_uuid != r.camera_uuid);
@@ -120,7 +128,11 @@ impl Views {
             }
         }
         select(&mut candidates, manifest.options.pool, manifest.options.keep_all, manifest.seed);
-        let found = manifest.area_numbers.iter().filter_map(|a| self.by_area.get(a)).flatten();
+        let found = manifest
+            .area_numbers
+            .iter()
+            .filter_map(|a| self.by_area.get(a))
+            .flatten();
         for (c, r) in candidates.iter().zip(found) {
             report.check(c.frame_num == r.frame_num, DRAWS, &layout.views_json(c.area), || {
                 format!(
@@ -143,7 +155,10 @@ impl Views {
     ) {
         let mut locations: BTreeMap<u32, BTreeSet<&str>> = BTreeMap::new();
         for (area, records) in &self.by_area {
-            locations.entry(*area).or_default().extend(records.iter().map(|r| r.camera_uuid.as_str()));
+            locations
+                .entry(*area)
+                .or_default()
+                .extend(records.iter().map(|r| r.camera_uuid.as_str()));
         }
         let mut there = BTreeSet::new();
         let (mut panoramas, mut views): (BTreeMap<u32, u64>, BTreeMap<u32, u64>) = Default::default();
@@ -169,7 +184,11 @@ impl Views {
             report.check(first, THERE, &path, || {
                 "another room has an image of this number and location".to_owned()
             });
-            let count = if image.frame == Frame::Panorama { &mut panoramas } else { &mut views };
+            let count = if image.frame == Frame::Panorama {
+                &mut panoramas
+            } else {
+                &mut views
+            };
             *count.entry(image.area).or_default() += 1;
         }
         if manifest.domains().is_empty() {
@@ -191,7 +210,9 @@ impl Views {
         for (area, uuid, number) in self.kept.keys().filter(|(_, uuid, _)| manifest.is_chosen(uuid)) {
             missing(*area, uuid, Frame::View(*number));
         }
-        photographs.cameras().for_each(|(area, uuid)| missing(area, uuid, Frame::View(0)));
+        photographs
+            .cameras()
+            .for_each(|(area, uuid)| missing(area, uuid, Frame::View(0)));
         for area in &manifest.areas {
             let path = layout.manifest();
             let checks = report.of((Topic::Manifest, "counts"), &path);

@@ -37,7 +37,10 @@ pub(crate) fn scene_of(mesh_at: impl Fn(Vec3) -> Vec3, points_at: impl Fn(Vec3) 
     let instances = classes.iter().enumerate().map(|(i, &class)| {
         let [a, b, _, d] = quads[i].map(corner);
         let at = |u: u32, v: u32| points_at(a + (b - a) * (u as f32 / 20.0) + (d - a) * (v as f32 / 20.0));
-        let positions = (0..=20).flat_map(|u| (0..=20).map(move |v| (u, v))).map(|(u, v)| at(u, v)).collect();
+        let positions = (0..=20)
+            .flat_map(|u| (0..=20).map(move |v| (u, v)))
+            .map(|(u, v)| at(u, v))
+            .collect();
         let points = PointCloud { positions, ..PointCloud::default() };
         let number = if class == Class::WALL { i as u32 - 1 } else { 1 };
         AnnotatedPoints { room: "office_1".parse().unwrap(), class, number, points }

@@ -213,7 +213,11 @@ impl<'a> Decoder<'a> {
                     }
                 }
                 if entry.is_special() {
-                    ends = if entry.is_end() { Ok(true) } else { Err(Error::damaged(NO_CODE)) };
+                    ends = if entry.is_end() {
+                        Ok(true)
+                    } else {
+                        Err(Error::damaged(NO_CODE))
+                    };
                     break;
                 }
             }
@@ -266,7 +270,11 @@ impl<'a> Decoder<'a> {
         }
         if entry.is_special() {
             self.consume(entry.bits())?;
-            return if entry.is_end() { Ok(true) } else { Err(Error::damaged(NO_CODE)) };
+            return if entry.is_end() {
+                Ok(true)
+            } else {
+                Err(Error::damaged(NO_CODE))
+            };
         }
         let length = self.value(entry)?;
         let entry = self.entry(distances, DISTANCE_BITS)?;

@@ -100,7 +100,15 @@ impl Entry {
 
     /// The same behind a code of so many bits.
     fn behind(self, code: u32) -> Self {
-        Self(self.0 + code + if self.0 & (LITERAL | END | NONE) == 0 { code << 8 } else { 0 })
+        Self(
+            self.0
+                + code
+                + if self.0 & (LITERAL | END | NONE) == 0 {
+                    code << 8
+                } else {
+                    0
+                },
+        )
     }
 
     fn second_table(first: usize, bits: u32, index: u32) -> Self {
@@ -189,7 +197,9 @@ impl<const N: usize> Table<N> {
     pub(super) fn build(&mut self, lengths: &[u8]) -> Result<(), Error> {
         self.is_fixed = false;
         let mut counts = [0u32; LONGEST + 1];
-        lengths.iter().for_each(|length| counts[usize::from(*length) & LONGEST] += 1);
+        lengths
+            .iter()
+            .for_each(|length| counts[usize::from(*length) & LONGEST] += 1);
         counts[0] = 0;
         // How many codes of each length are left over by shorter ones.
         let mut left = 1i64;
@@ -258,7 +268,9 @@ impl<const N: usize> Table<N> {
                 }
                 // The next code: one is added at its last bit, which is the highest here.
                 let zeros = code ^ ((1 << length) - 1);
-                code = zeros.checked_ilog2().map_or(0, |bit| code & ((1 << bit) - 1) | 1 << bit);
+                code = zeros
+                    .checked_ilog2()
+                    .map_or(0, |bit| code & ((1 << bit) - 1) | 1 << bit);
             }
         }
         if self.alphabet == Alphabet::Litlen {

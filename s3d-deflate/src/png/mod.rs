@@ -133,9 +133,10 @@ impl Kernel for Filtering<'_> {
             };
             match filter {
                 Filter::None => out.copy_from_slice(here),
-                Filter::Up => {
-                    out.iter_mut().zip(here.iter().zip(above)).for_each(|(o, (h, a))| *o = h.wrapping_sub(*a))
-                }
+                Filter::Up => out
+                    .iter_mut()
+                    .zip(here.iter().zip(above))
+                    .for_each(|(o, (h, a))| *o = h.wrapping_sub(*a)),
                 Filter::Paeth => paeth(here, above, pixel, out),
             }
             above = here;
@@ -165,7 +166,11 @@ fn expected(left: u8, above: u8, corner: u8) -> u8 {
     let (from_left, from_above) = (distance(above, corner), distance(left, corner));
     // Where both lie on one side of the corner, it is at least as far as each of them.
     let is_far = (above >= corner) == (left >= corner);
-    let from_corner = if is_far { u8::MAX } else { distance(from_left, from_above) };
+    let from_corner = if is_far {
+        u8::MAX
+    } else {
+        distance(from_left, from_above)
+    };
     let least = from_left.min(from_above).min(from_corner);
     let nearer = if from_above == least { above } else { corner };
     if from_left == least { left } else { nearer }
@@ -192,7 +197,11 @@ mod tests {
             let plane = i16::from(left) + i16::from(above) - i16::from(corner);
             let far = |byte: u8| (plane - i16::from(byte)).abs();
             let nearer = if far(above) <= far(corner) { above } else { corner };
-            if far(left) <= far(above) && far(left) <= far(corner) { left } else { nearer }
+            if far(left) <= far(above) && far(left) <= far(corner) {
+                left
+            } else {
+                nearer
+            }
         };
         for [left, above] in (0..=u16::MAX).map(u16::to_le_bytes) {
             let other = (0..=u8::MAX).find(|&c| expected(left, above, c) != plain(left, above, c));

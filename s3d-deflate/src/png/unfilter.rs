@@ -70,7 +70,10 @@ fn single(line: &mut [u8], above: &[u8], pixel: usize) {
     let left = |line: &[u8], i: usize| i.checked_sub(pixel).map_or(0, |i| line[i]);
     match number {
         1 => (pixel..line.len()).for_each(|i| line[i] = line[i].wrapping_add(line[i - pixel])),
-        2 => line.iter_mut().zip(above).for_each(|(here, above)| *here = here.wrapping_add(*above)),
+        2 => line
+            .iter_mut()
+            .zip(above)
+            .for_each(|(here, above)| *here = here.wrapping_add(*above)),
         3 => (0..line.len()).for_each(|i| {
             line[i] = line[i].wrapping_add(((u16::from(left(line, i)) + u16::from(above[i])) / 2) as u8);
         }),

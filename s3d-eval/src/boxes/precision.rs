@@ -45,8 +45,10 @@ impl ClassScore {
 /// The means of average precision and recall over classes: by [`Rule::Mmdetection3d`] over those that are not
 /// absent, and NaN if one of these is only detected; by [`Rule::Open3dMl`] over all.
 pub fn mean(scores: &[ClassScore], rule: Rule) -> (f64, f64) {
-    let counted: Vec<_> =
-        scores.iter().filter(|score| rule == Rule::Open3dMl || !score.is_absent()).collect();
+    let counted: Vec<_> = scores
+        .iter()
+        .filter(|score| rule == Rule::Open3dMl || !score.is_absent())
+        .collect();
     let of = |value: fn(&ClassScore) -> f64| {
         counted.iter().map(|score| value(score)).sum::<f64>() / counted.len() as f64
     };
@@ -70,16 +72,24 @@ fn area(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
         *precision = largest;
     }
     // Recall grows by as much with each hit. The sum of none is −0.
-    let of_hits = precisions.iter().filter(|(hit, _)| *hit).map(|(_, precision)| precision);
+    let of_hits = precisions
+        .iter()
+        .filter(|(hit, _)| *hit)
+        .map(|(_, precision)| precision);
     (0.0 + of_hits.sum::<f64>()) / truth as f64
 }
 
 /// Open3D-ML's mean of sampled precision.
 fn sampled(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
-    let of_hits: Vec<f64> =
-        judged.iter().filter(|(_, verdict)| *verdict == Verdict::True).map(|(score, _)| *score).collect();
-    let mut precisions: Vec<f64> =
-        thresholds(&of_hits, truth).into_iter().map(|threshold| precision_from(judged, threshold)).collect();
+    let of_hits: Vec<f64> = judged
+        .iter()
+        .filter(|(_, verdict)| *verdict == Verdict::True)
+        .map(|(score, _)| *score)
+        .collect();
+    let mut precisions: Vec<f64> = thresholds(&of_hits, truth)
+        .into_iter()
+        .map(|threshold| precision_from(judged, threshold))
+        .collect();
     let mut largest = 0.0f64;
     for precision in precisions.iter_mut().rev() {
         largest = largest.max(*precision);
@@ -130,7 +140,11 @@ mod tests {
             'f' => Verdict::False,
             _ => Verdict::Void,
         };
-        pattern.chars().enumerate().map(|(i, c)| (1.0 - 0.001 * i as f64, verdict(c))).collect()
+        pattern
+            .chars()
+            .enumerate()
+            .map(|(i, c)| (1.0 - 0.001 * i as f64, verdict(c)))
+            .collect()
     }
 
     #[test]
@@ -153,7 +167,10 @@ mod tests {
         assert_eq!(sampled(80, &judged(&"t".repeat(80))), 1.0);
         // Of 80 hits, false ones between the later 40: sampled are hit 1, and every eighth.
         let half = "t".repeat(40) + &"ft".repeat(40);
-        let later: f64 = [48, 56, 64, 72, 80].map(|h| f64::from(h) / f64::from(2 * h - 40)).iter().sum();
+        let later: f64 = [48, 56, 64, 72, 80]
+            .map(|h| f64::from(h) / f64::from(2 * h - 40))
+            .iter()
+            .sum();
         assert!((sampled(80, &judged(&half)) - (6.0 + later) / 11.0).abs() < 1e-15);
     }
 }

@@ -56,7 +56,11 @@ const FORMS: &str = "detections are a JSON file with a list of boxes, a folder o
 
 impl Predictions {
     pub(super) fn read(task: &Task<'_>, classes: &Classes, rooms: &[Room]) -> Result<Self> {
-        let places = rooms.iter().enumerate().map(|(i, room)| ((room.area, room.name.as_str()), i)).collect();
+        let places = rooms
+            .iter()
+            .enumerate()
+            .map(|(i, room)| ((room.area, room.name.as_str()), i))
+            .collect();
         let mut reader = Reader {
             task,
             classes,
@@ -92,7 +96,9 @@ fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>)> {
         return Ok((vec![path.to_owned()], Vec::new()));
     }
     let list = |dir: &Path| -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-        Ok(entries(dir)?.into_iter().partition(|p| p.extension().is_some_and(|e| e == "json") && p.is_file()))
+        Ok(entries(dir)?
+            .into_iter()
+            .partition(|p| p.extension().is_some_and(|e| e == "json") && p.is_file()))
     };
     let (mut found, mut others) = list(path)?;
     // Inferencers write into this folder of the one that they are told.
@@ -102,8 +108,13 @@ fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>)> {
         others.retain(|other| *other != below);
         (found, others) = (more, [others, beside].concat());
     }
-    let names = others.iter().map(|p| p.strip_prefix(path).unwrap_or(p).display().to_string()).collect();
-    let pickle = others.iter().find(|p| p.extension().is_some_and(|e| e == "pkl" || e == "pickle"));
+    let names = others
+        .iter()
+        .map(|p| p.strip_prefix(path).unwrap_or(p).display().to_string())
+        .collect();
+    let pickle = others
+        .iter()
+        .find(|p| p.extension().is_some_and(|e| e == "pkl" || e == "pickle"));
     match (found.is_empty(), pickle) {
         (false, _) => Ok((found, names)),
         (true, Some(pickle)) => Err(FileError::format(

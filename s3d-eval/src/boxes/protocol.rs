@@ -50,7 +50,11 @@ struct OfClass {
 
 /// The boxes of rooms against detections.
 pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
-    let rule = if task.variant == "open3d-ml" { Rule::Open3dMl } else { Rule::Mmdetection3d };
+    let rule = if task.variant == "open3d-ml" {
+        Rule::Open3dMl
+    } else {
+        Rule::Mmdetection3d
+    };
     let classes = Classes::new(task)?;
     let rooms = rooms(task, &classes)?;
     let Predictions { of_rooms, mut notes } = Predictions::read(task, &classes, &rooms)?;
@@ -62,10 +66,17 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
         || (),
         |(), (room, found)| {
             let of_class = |class: &Class| {
-                let truth: Vec<Bbox> =
-                    room.boxes.iter().filter(|(c, _)| c == class).map(|(_, bbox)| *bbox).collect();
-                let found: Vec<Found> =
-                    found.iter().filter(|(_, c, _)| c == class).map(|(s, _, bbox)| (*s, *bbox)).collect();
+                let truth: Vec<Bbox> = room
+                    .boxes
+                    .iter()
+                    .filter(|(c, _)| c == class)
+                    .map(|(_, bbox)| *bbox)
+                    .collect();
+                let found: Vec<Found> = found
+                    .iter()
+                    .filter(|(_, c, _)| c == class)
+                    .map(|(s, _, bbox)| (*s, *bbox))
+                    .collect();
                 let verdicts = verdicts(&truth, &found, &THRESHOLDS, rule);
                 let judged = found.iter().map(|(score, _)| *score).zip(verdicts).collect();
                 OfClass { truth: truth.len() as u64, judged }
@@ -81,7 +92,11 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
         Rule::Open3dMl => vec![COLUMNS[0], COLUMNS[2]],
     };
     let tables = tables(task, &columns, &judged, |rooms| rows(rooms, &classes.list, rule));
-    let of_rule = if rule == Rule::Mmdetection3d { &MMDETECTION3D[..] } else { &OPEN3D_ML };
+    let of_rule = if rule == Rule::Mmdetection3d {
+        &MMDETECTION3D[..]
+    } else {
+        &OPEN3D_ML
+    };
     let truth = format!(
         "Truth: the boxes along the world axes of each instance's annotated points (instances.json), of \
          {}.{}",
@@ -116,7 +131,9 @@ fn invented(folds: &[Fold], rooms: &[(usize, Vec<OfClass>)], classes: &[Class]) 
             let of_class = of_fold.clone().map(|of| &of[*class]);
             of_class.clone().all(|of| of.truth == 0) && of_class.clone().any(|of| !of.judged.is_empty())
         };
-        let names = (0..classes.len()).filter(is_invented).map(|class| classes[class].name());
+        let names = (0..classes.len())
+            .filter(is_invented)
+            .map(|class| classes[class].name());
         names.map(|name| format!("{name} in {}", fold.name)).collect::<Vec<_>>()
     };
     let names: Vec<String> = folds.iter().enumerate().flat_map(in_fold).collect();
@@ -130,22 +147,32 @@ fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
     let of_class = |class: usize, threshold: usize| {
         let of_rooms = rooms.iter().map(|room| &room[class]);
         let truth = of_rooms.clone().map(|of| of.truth).sum();
-        let mut judged: Vec<(f64, Verdict)> =
-            of_rooms.flat_map(|of| of.judged.iter().map(|(s, verdicts)| (*s, verdicts[threshold]))).collect();
+        let mut judged: Vec<(f64, Verdict)> = of_rooms
+            .flat_map(|of| of.judged.iter().map(|(s, verdicts)| (*s, verdicts[threshold])))
+            .collect();
         ClassScore::new(truth, &mut judged, rule)
     };
-    let scores: Vec<[ClassScore; 2]> =
-        (0..classes.len()).map(|class| [0, 1].map(|threshold| of_class(class, threshold))).collect();
+    let scores: Vec<[ClassScore; 2]> = (0..classes.len())
+        .map(|class| [0, 1].map(|threshold| of_class(class, threshold)))
+        .collect();
     let columns = |pairs: [(f64, f64); 2]| match rule {
         Rule::Mmdetection3d => pairs.into_iter().flat_map(|(ap, recall)| [ap, recall]).collect(),
         Rule::Open3dMl => pairs.into_iter().map(|(ap, _)| ap).collect::<Vec<f64>>(),
     };
     let of_row = |of: &[ClassScore; 2]| columns(of.map(|score| (score.ap, score.recall)));
-    let mut rows: Rows =
-        classes.iter().zip(&scores).map(|(class, of)| (class.name().to_owned(), of_row(of))).collect();
+    let mut rows: Rows = classes
+        .iter()
+        .zip(&scores)
+        .map(|(class, of)| (class.name().to_owned(), of_row(of)))
+        .collect();
     let mean_of = |wanted: &dyn Fn(Class) -> bool| {
         let chosen = |threshold: usize| -> Vec<ClassScore> {
-            classes.iter().zip(&scores).filter(|(c, _)| wanted(**c)).map(|(_, of)| of[threshold]).collect()
+            classes
+                .iter()
+                .zip(&scores)
+                .filter(|(c, _)| wanted(**c))
+                .map(|(_, of)| of[threshold])
+                .collect()
         };
         columns([0, 1].map(|threshold| mean(&chosen(threshold), rule)))
     };

@@ -25,7 +25,10 @@ fn greedy(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdic
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by(|a, b| found[*b].0.total_cmp(&found[*a].0));
     for d in order {
-        let ious = truth.iter().map(|t| iou(&found[d].1, t, Rule::Mmdetection3d)).enumerate();
+        let ious = truth
+            .iter()
+            .map(|t| iou(&found[d].1, t, Rule::Mmdetection3d))
+            .enumerate();
         let best = ious.reduce(|best, next| if next.1 > best.1 { next } else { best });
         let Some((at, largest)) = best else { continue };
         for ((verdict, taken), threshold) in verdicts[d].iter_mut().zip(&mut taken).zip(thresholds) {
@@ -44,7 +47,11 @@ fn best_of_boxes(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec
     let mut is_best = vec![false; found.len()];
     for of_box in &ious {
         let best = of_box.iter().enumerate().reduce(|best, next| {
-            if next.1 > best.1 || (next.1.is_nan() && !best.1.is_nan()) { next } else { best }
+            if next.1 > best.1 || (next.1.is_nan() && !best.1.is_nan()) {
+                next
+            } else {
+                best
+            }
         });
         best.into_iter().for_each(|(d, _)| is_best[d] = true);
     }
@@ -52,9 +59,15 @@ fn best_of_boxes(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec
         if ious.iter().any(|of_box| of_box[d] >= threshold) {
             return if is_best[d] { Verdict::True } else { Verdict::False };
         }
-        if ious.iter().any(|of_box| of_box[d].is_nan()) { Verdict::Void } else { Verdict::False }
+        if ious.iter().any(|of_box| of_box[d].is_nan()) {
+            Verdict::Void
+        } else {
+            Verdict::False
+        }
     };
-    (0..found.len()).map(|d| thresholds.iter().map(|threshold| verdict(d, *threshold)).collect()).collect()
+    (0..found.len())
+        .map(|d| thresholds.iter().map(|threshold| verdict(d, *threshold)).collect())
+        .collect()
 }
 
 #[cfg(test)]

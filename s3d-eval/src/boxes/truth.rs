@@ -24,12 +24,17 @@ impl Classes {
             return Err(Error::Input(message));
         };
         let Some(names) = &task.options.classes else {
-            let list = Class::S3DIS.into_iter().filter(|class| *class != Class::CLUTTER).collect();
+            let list = Class::S3DIS
+                .into_iter()
+                .filter(|class| *class != Class::CLUTTER)
+                .collect();
             return Ok(Self { taxonomy, list, as_s3dis: true });
         };
         let mut list = Vec::new();
         for name in names {
-            let class = taxonomy.class(name).map_err(|e| Error::Usage(format!("--classes: {e}")))?;
+            let class = taxonomy
+                .class(name)
+                .map_err(|e| Error::Usage(format!("--classes: {e}")))?;
             if list.contains(&class) {
                 return Err(Error::Usage(format!("--classes: {class} is there twice")));
             }
@@ -52,7 +57,11 @@ impl Classes {
 
     /// The names of those that are detected.
     pub(super) fn names(&self) -> String {
-        self.list.iter().map(|class| class.name()).collect::<Vec<_>>().join(", ")
+        self.list
+            .iter()
+            .map(|class| class.name())
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 }
 
@@ -71,13 +80,20 @@ pub(super) struct Room {
 /// The rooms of all folds, by fold, area, and type and number.
 pub(super) fn rooms(task: &Task<'_>, classes: &Classes) -> Result<Vec<Room>> {
     let mut rooms = Vec::new();
-    for (fold, area) in task.folds.iter().enumerate().flat_map(|(i, f)| f.areas.iter().map(move |a| (i, *a)))
+    for (fold, area) in task
+        .folds
+        .iter()
+        .enumerate()
+        .flat_map(|(i, f)| f.areas.iter().map(move |a| (i, *a)))
     {
         let path = task.data.layout().instances_json(area);
         let mut of_area = BTreeMap::new();
         for instance in task.data.instances(area)? {
             let wrong = |message: String| FileError::format(&path, format!("{}: {message}", instance.label));
-            let key = classes.taxonomy.room(&instance.room).map_err(|e| wrong(e.to_string()))?;
+            let key = classes
+                .taxonomy
+                .room(&instance.room)
+                .map_err(|e| wrong(e.to_string()))?;
             let class = classes.named(&instance.class).map_err(wrong)?;
             let bbox = instance.bbox.map(f64::from);
             let room = of_area.entry(key).or_insert_with(|| Room {
@@ -87,7 +103,10 @@ pub(super) fn rooms(task: &Task<'_>, classes: &Classes) -> Result<Vec<Room>> {
                 boxes: Vec::new(),
                 corner: [f64::INFINITY; 3],
             });
-            room.corner.iter_mut().zip(bbox).for_each(|(least, v)| *least = least.min(v));
+            room.corner
+                .iter_mut()
+                .zip(bbox)
+                .for_each(|(least, v)| *least = least.min(v));
             if classes.list.contains(&class) {
                 room.boxes.push((class, bbox));
             }

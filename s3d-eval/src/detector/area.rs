@@ -87,7 +87,9 @@ impl Area {
         let mut elements = Vec::new();
         let path = data.layout().instances_json(number);
         for entry in data.instances(number)? {
-            let class = taxonomy.class(&entry.class).map_err(|e| FileError::format(&path, e.to_string()))?;
+            let class = taxonomy
+                .class(&entry.class)
+                .map_err(|e| FileError::format(&path, e.to_string()))?;
             if let Some(class) = CLASSES.iter().position(|c| *c == class.s3dis()) {
                 let [x0, y0, z0, x1, y1, z1] = entry.bbox;
                 let bbox = Aabb { min: Vec3::new(x0, y0, z0), max: Vec3::new(x1, y1, z1) };

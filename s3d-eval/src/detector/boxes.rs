@@ -16,7 +16,11 @@ pub fn iou(a: &Aabb, b: &Aabb) -> f64 {
 pub(crate) fn iou_1d(a: [f32; 2], b: [f32; 2]) -> f32 {
     let shared = (a[1].min(b[1]) - a[0].max(b[0])).max(0.0);
     let union = (a[1] - a[0]) + (b[1] - b[0]) - shared;
-    if union > 0.0 { shared / union } else { f32::from(u8::from(a == b)) }
+    if union > 0.0 {
+        shared / union
+    } else {
+        f32::from(u8::from(a == b))
+    }
 }
 
 /// Greedy non-maximum suppression: indices of the boxes that stay, the highest score first (ties: the lower

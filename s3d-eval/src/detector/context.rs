@@ -61,7 +61,11 @@ fn term(a: &Node, b: &Node) -> Option<usize> {
         1
     } else if beside < 0.0 && gap.z >= 0.0 {
         // One above the other; of two of a class it does not matter which.
-        if b.bbox.min.z >= a.bbox.max.z || a.class == b.class { 2 } else { 3 }
+        if b.bbox.min.z >= a.bbox.max.z || a.class == b.class {
+            2
+        } else {
+            3
+        }
     } else if apart < 0.15 {
         4
     } else if apart < 0.5 {
@@ -86,7 +90,9 @@ impl<'a> Graph<'a> {
         let near = (0..nodes.len())
             .map(|i| {
                 let others = (0..nodes.len()).filter(|&j| j != i);
-                others.filter_map(|j| term(&nodes[i], &nodes[j]).map(|t| (j, t))).collect()
+                others
+                    .filter_map(|j| term(&nodes[i], &nodes[j]).map(|t| (j, t)))
+                    .collect()
             })
             .collect();
         Self { nodes, near }
@@ -114,8 +120,12 @@ impl Context {
     }
 
     fn infer_with(&self, graph: &Graph<'_>, more: impl Fn(usize) -> f64) -> (Vec<bool>, Vec<f64>) {
-        let mut gains: Vec<f64> =
-            graph.nodes.iter().enumerate().map(|(i, n)| self.unary_of(n) + more(i)).collect();
+        let mut gains: Vec<f64> = graph
+            .nodes
+            .iter()
+            .enumerate()
+            .map(|(i, n)| self.unary_of(n) + more(i))
+            .collect();
         let mut on = vec![false; gains.len()];
         loop {
             let off = (0..gains.len()).filter(|&i| !on[i]);
@@ -123,7 +133,9 @@ impl Context {
             match best {
                 Some(i) if gains[i] > 0.0 => {
                     on[i] = true;
-                    graph.near[i].iter().for_each(|&(j, term)| gains[j] += self.pairwise[term]);
+                    graph.near[i]
+                        .iter()
+                        .for_each(|&(j, term)| gains[j] += self.pairwise[term]);
                 }
                 _ => break,
             }
@@ -220,7 +232,10 @@ mod tests {
     fn random_case(seed: u64) -> (Context, Vec<Node>) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut context = Context::default();
-        context.pairwise.iter_mut().for_each(|w| *w = rng.random_range(-0.6..0.3));
+        context
+            .pairwise
+            .iter_mut()
+            .for_each(|w| *w = rng.random_range(-0.6..0.3));
         let nodes = (0..9).map(|_| {
             let (class, score) = (rng.random_range(0..COUNT), rng.random_range(-1.0..1.5));
             node(class, score, rng.random_range(0.0..4.0), rng.random_range(0.0..1.5))
@@ -241,8 +256,11 @@ mod tests {
             share += if most > 0.0 { value / most } else { 1.0 };
             // A gain is what the value changes by.
             for (i, gain) in gains.iter().enumerate() {
-                let set =
-                    |state| (0..nodes.len()).map(|j| if i == j { state } else { on[j] }).collect::<Vec<_>>();
+                let set = |state| {
+                    (0..nodes.len())
+                        .map(|j| if i == j { state } else { on[j] })
+                        .collect::<Vec<_>>()
+                };
                 let change = context.value(&nodes, &set(true)) - context.value(&nodes, &set(false));
                 assert!((change - gain).abs() < 1e-9);
             }

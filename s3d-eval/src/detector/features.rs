@@ -116,7 +116,9 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
     let palette = Palette::new(b, index.shades_within(&grown).map(|(s, shade)| (s.position, shade)));
     let own = palette.own();
     for (s, shade) in index.shades_within(&grown) {
-        let at = ((s.position - grown.min) * scale).as_uvec3().min(glam::UVec3::splat(SIDE as u32 - 1));
+        let at = ((s.position - grown.min) * scale)
+            .as_uvec3()
+            .min(glam::UVec3::splat(SIDE as u32 - 1));
         let cell = &mut cells[(at.x as usize * SIDE + at.y as usize) * SIDE + at.z as usize];
         cell.count += 1.0;
         cell.normal += s.normal.abs();
@@ -136,7 +138,10 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
         out[CELL_COLOR.start + 3 * i..][..3].copy_from_slice(&color.to_array());
         out[OWN.start + i] = cell.own / cell.count;
     }
-    let shares = palette.inside_and_around().into_iter().chain(palette.layers.map(|layer| share(&layer)));
+    let shares = palette
+        .inside_and_around()
+        .into_iter()
+        .chain(palette.layers.map(|layer| share(&layer)));
     for (out, share) in out[SHARES].iter_mut().zip(shares.flatten()) {
         *out = SHARE_WEIGHT * share;
     }

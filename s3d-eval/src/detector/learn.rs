@@ -96,8 +96,12 @@ pub fn learn(
         spaces.par_iter().zip(proposals).map(of_space).unzip();
     let mut truth = SparseRows::new(FEATURES);
     truths.iter().for_each(|rows| truth.append(rows));
-    let elements =
-        || spaces.iter().enumerate().flat_map(|(i, s)| s.space.elements.iter().map(move |e| (i, e)));
+    let elements = || {
+        spaces
+            .iter()
+            .enumerate()
+            .flat_map(|(i, s)| s.space.elements.iter().map(move |e| (i, e)))
+    };
     let source = Source {
         spaces,
         proposals,
@@ -107,7 +111,10 @@ pub fn learn(
         space_of_truth: elements().map(|(i, _)| i).collect(),
         seed,
     };
-    let first: Vec<Pool> = (0..CLASSES.len()).into_par_iter().map(|class| source.first_pool(class)).collect();
+    let first: Vec<Pool> = (0..CLASSES.len())
+        .into_par_iter()
+        .map(|class| source.first_pool(class))
+        .collect();
     let progress = ctx.progress("learning", "machines", (variants.len() * (ROUNDS + 3)) as u64);
     let mut learnt = Vec::new();
     for &variant in variants {
@@ -142,7 +149,10 @@ impl Source<'_> {
         for (space, proposals) in self.proposals.iter().enumerate() {
             let of_class = |i: &usize| proposals[*i].0.class == class;
             let those = |which: &dyn Fn(f64) -> bool| -> Vec<usize> {
-                (0..proposals.len()).filter(of_class).filter(|i| which(proposals[*i].1)).collect()
+                (0..proposals.len())
+                    .filter(of_class)
+                    .filter(|i| which(proposals[*i].1))
+                    .collect()
             };
             let mut some = those(&|overlap| overlap < NEGATIVE_IOU);
             some.shuffle(&mut rng);
@@ -150,8 +160,10 @@ impl Source<'_> {
             let mut all = those(&|overlap| overlap >= POSITIVE_IOU);
             all.truncate(POSITIVES);
             all.append(&mut some);
-            pool.rows.append(&self.described[space].select(all.iter().copied(), &[]));
-            pool.positive.extend(all.iter().map(|i| proposals[*i].1 >= POSITIVE_IOU));
+            pool.rows
+                .append(&self.described[space].select(all.iter().copied(), &[]));
+            pool.positive
+                .extend(all.iter().map(|i| proposals[*i].1 >= POSITIVE_IOU));
             pool.space.resize(pool.positive.len(), space);
         }
         pool
@@ -254,21 +266,28 @@ pub fn score(
 ) -> Vec<Vec<f64>> {
     let rows = describe_all(prepared, proposals.iter().map(|p| &p.bbox));
     let of = |machines: &&[Option<Linear>]| {
-        proposals.iter().enumerate().map(|(i, p)| score_of(machines, p, rows.row(i))).collect()
+        proposals
+            .iter()
+            .enumerate()
+            .map(|(i, p)| score_of(machines, p, rows.row(i)))
+            .collect()
     };
     machines.iter().map(of).collect()
 }
 
 fn score_of(machines: &[Option<Linear>], p: &Proposal, row: SparseRow<'_>) -> f64 {
-    machines[p.class].as_ref().map_or(f64::NEG_INFINITY, |machine| machine.score(row))
+    machines[p.class]
+        .as_ref()
+        .map_or(f64::NEG_INFINITY, |machine| machine.score(row))
 }
 
 /// What stays of scored proposals after non-maximum suppression: class by class, the highest score first.
 pub fn elements(proposals: &[Proposal], scores: &[f64]) -> Vec<Node> {
     let mut nodes = Vec::new();
     for class in 0..CLASSES.len() {
-        let of_class: Vec<usize> =
-            (0..proposals.len()).filter(|&i| proposals[i].class == class && scores[i].is_finite()).collect();
+        let of_class: Vec<usize> = (0..proposals.len())
+            .filter(|&i| proposals[i].class == class && scores[i].is_finite())
+            .collect();
         let boxes: Vec<_> = of_class.iter().map(|&i| proposals[i].bbox).collect();
         let of: Vec<f64> = of_class.iter().map(|&i| scores[i]).collect();
         let stay = suppress(&boxes, &of, SAME_ELEMENT).into_iter().take(NODES);

@@ -176,7 +176,11 @@ impl Model {
                 ));
             }
         }
-        if self.machines.is_empty() { Some("no machines".to_owned()) } else { None }
+        if self.machines.is_empty() {
+            Some("no machines".to_owned())
+        } else {
+            None
+        }
     }
 
     /// The elements of a space by each of the model's machines, from proposals of [`Proposer::propose`].
@@ -202,6 +206,9 @@ impl Model {
 /// found and all.
 pub fn recalled(prepared: &Prepared<'_>, proposals: &[Proposal], class: usize, threshold: f64) -> [usize; 2] {
     let of_class = || proposals.iter().filter(|p| p.class == class);
-    let found = prepared.truth(class).filter(|b| of_class().any(|p| iou(b, &p.bbox) > threshold)).count();
+    let found = prepared
+        .truth(class)
+        .filter(|b| of_class().any(|p| iou(b, &p.bbox) > threshold))
+        .count();
     [found, prepared.truth(class).count()]
 }

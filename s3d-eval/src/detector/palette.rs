@@ -58,7 +58,10 @@ impl Shade {
     }
 
     fn weighed(self, weights: &Shares) -> f32 {
-        self.0.iter().map(|&(entry, share)| weights[usize::from(entry)] * f32::from(share)).sum::<f32>()
+        self.0
+            .iter()
+            .map(|&(entry, share)| weights[usize::from(entry)] * f32::from(share))
+            .sum::<f32>()
             / 255.0
     }
 }
@@ -174,7 +177,11 @@ fn total(shares: &Shares) -> f32 {
 /// Scaled to a sum of 1; 0 if there is nothing.
 pub fn share(shares: &Shares) -> Shares {
     let total = total(shares);
-    if total > 0.0 { shares.map(|s| s / total) } else { *shares }
+    if total > 0.0 {
+        shares.map(|s| s / total)
+    } else {
+        *shares
+    }
 }
 
 #[cfg(test)]

@@ -77,7 +77,9 @@ impl Space {
         let most = |surfels: &mut dyn Iterator<Item = &Surfel>| {
             let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
             surfels.for_each(|s| *counts.entry(s.room).or_default() += 1);
-            counts.into_iter().reduce(|best, next| if next.1 > best.1 { next } else { best })
+            counts
+                .into_iter()
+                .reduce(|best, next| if next.1 > best.1 { next } else { best })
         };
         let grown = Aabb { min: b.min - 0.02, max: b.max + 0.02 };
         let room = most(&mut self.index.within(&grown)).or_else(|| most(&mut self.index.surfels().iter()));
@@ -163,7 +165,9 @@ fn home(element: &Aabb, boxes: &[Aabb], spaces: &[Space]) -> Option<usize> {
         spaces[i].index.within(&spaces[i].frame.to_frame(&grown)).count()
     };
     let counts = (0..spaces.len()).map(|i| (i, inside(i))).filter(|(_, n)| *n > 0);
-    counts.reduce(|best, next| if next.1 > best.1 { next } else { best }).map(|(i, _)| i)
+    counts
+        .reduce(|best, next| if next.1 > best.1 { next } else { best })
+        .map(|(i, _)| i)
 }
 
 fn spun(p: Vec3, degrees: f64) -> Vec3 {
@@ -178,6 +182,8 @@ fn spun_box(b: &Aabb, degrees: f64) -> Aabb {
     }
     let corners = [(b.min.x, b.min.y), (b.max.x, b.min.y), (b.min.x, b.max.y), (b.max.x, b.max.y)];
     Aabb::from_points(
-        corners.iter().flat_map(|&(x, y)| [b.min.z, b.max.z].map(|z| spun(vec3(x, y, z), degrees))),
+        corners
+            .iter()
+            .flat_map(|&(x, y)| [b.min.z, b.max.z].map(|z| spun(vec3(x, y, z), degrees))),
     )
 }

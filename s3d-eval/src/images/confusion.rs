@@ -41,18 +41,25 @@ impl Confusion {
     /// If it has another number of classes.
     pub fn add(&mut self, other: &Self) {
         assert_eq!(self.classes, other.classes, "the same classes");
-        self.counts.iter_mut().zip(&other.counts).for_each(|(sum, count)| *sum += count);
+        self.counts
+            .iter_mut()
+            .zip(&other.counts)
+            .for_each(|(sum, count)| *sum += count);
     }
 
     /// The places that are not 0, and their counts: little of one image.
     pub(super) fn counted(&self) -> Vec<(u32, u32)> {
         let there = (0u32..).zip(&self.counts).filter(|(_, count)| **count > 0);
-        there.map(|(at, count)| (at, u32::try_from(*count).unwrap_or(u32::MAX))).collect()
+        there
+            .map(|(at, count)| (at, u32::try_from(*count).unwrap_or(u32::MAX)))
+            .collect()
     }
 
     /// Adds what [`Confusion::counted`] gave.
     pub(super) fn add_counted(&mut self, counted: &[(u32, u32)]) {
-        counted.iter().for_each(|(at, count)| self.counts[*at as usize] += u64::from(*count));
+        counted
+            .iter()
+            .for_each(|(at, count)| self.counts[*at as usize] += u64::from(*count));
     }
 
     /// How many pixels were counted.
@@ -65,8 +72,9 @@ impl Confusion {
     /// missed. Source: HoHoNet, `test_sem.py`, "Summarize".
     pub fn scores(&self) -> ClassScores {
         let of = |truth: usize, prediction: usize| self.counts[truth * self.classes + prediction];
-        let there: Vec<usize> =
-            (0..self.classes).filter(|&truth| (0..self.classes).any(|p| of(truth, p) > 0)).collect();
+        let there: Vec<usize> = (0..self.classes)
+            .filter(|&truth| (0..self.classes).any(|p| of(truth, p) > 0))
+            .collect();
         let mut scores = ClassScores {
             iou: vec![f64::NAN; self.classes],
             accuracy: vec![f64::NAN; self.classes],

@@ -104,7 +104,9 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
 fn mean(units: &[&DepthScores]) -> Vec<f64> {
     let there = units.iter().filter(|scores| scores.pixels > 0);
     let mut sums = [0.0; DEPTH_COLUMNS.len()];
-    there.clone().for_each(|scores| sums.iter_mut().zip(scores.values).for_each(|(sum, v)| *sum += v));
+    there
+        .clone()
+        .for_each(|scores| sums.iter_mut().zip(scores.values).for_each(|(sum, v)| *sum += v));
     let count = there.count() as f64;
     sums.map(|sum| sum / count).to_vec()
 }
@@ -121,7 +123,11 @@ fn both(
     let image = read::gray16(task.data, &predicted.image, Domain::Depth)?;
     let places = Places::new([image.width(), image.height()], nearest);
     let metres = |value: u16, missing: f64| units.metres(value).unwrap_or(missing);
-    let truth: Vec<f64> = places.sample(image.pixels()).into_iter().map(|value| metres(value, 0.0)).collect();
+    let truth: Vec<f64> = places
+        .sample(image.pixels())
+        .into_iter()
+        .map(|value| metres(value, 0.0))
+        .collect();
     let file = &predicted.file;
     let (size, prediction) = if read::is_png(file) {
         let image = read_gray16(file)?;
@@ -137,8 +143,11 @@ fn both(
         |(truth, prediction): (&f64, &f64)| *truth > 0.0 && *truth <= farthest && !prediction.is_finite();
     if let Some(at) = truth.iter().zip(&prediction).position(wrong) {
         let [x, y] = places.place(size, at);
-        let found =
-            if read::is_png(file) { "65535 (missing)".to_owned() } else { prediction[at].to_string() };
+        let found = if read::is_png(file) {
+            "65535 (missing)".to_owned()
+        } else {
+            prediction[at].to_string()
+        };
         let message = format!("has {found} in column {x}, row {y}, which is evaluated: predict every pixel");
         return Err(FileError::format(file, message).into());
     }

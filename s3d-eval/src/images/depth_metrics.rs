@@ -55,9 +55,13 @@ pub fn hohonet_depth(truth: &[f64], prediction: &[f64]) -> DepthScores {
 /// If the slices are not of one length.
 pub fn unifuse_depth(truth: &[f64], prediction: &[f64], median_scale: bool) -> DepthScores {
     assert_eq!(truth.len(), prediction.len(), "a prediction a pixel");
-    let valid = truth.iter().zip(prediction).filter(|(truth, _)| **truth > 0.0 && **truth <= FARTHEST);
-    let mut pairs: Vec<[f64; 2]> =
-        valid.map(|(t, p)| [t.max(0.1), if *p < 0.1 { 0.1 } else { *p }]).collect();
+    let valid = truth
+        .iter()
+        .zip(prediction)
+        .filter(|(truth, _)| **truth > 0.0 && **truth <= FARTHEST);
+    let mut pairs: Vec<[f64; 2]> = valid
+        .map(|(t, p)| [t.max(0.1), if *p < 0.1 { 0.1 } else { *p }])
+        .collect();
     let mut replaced = 0;
     for [truth, prediction] in &mut pairs {
         if *prediction > FARTHEST {
@@ -85,7 +89,11 @@ fn scores(pairs: impl Iterator<Item = [f64; 2]>) -> DepthScores {
         let error = (truth - prediction).abs();
         let square = error * error;
         // The larger of both quotients, as division rounds monotonically, or NaN.
-        let ratio = if truth > prediction { truth / prediction } else { prediction / truth };
+        let ratio = if truth > prediction {
+            truth / prediction
+        } else {
+            prediction / truth
+        };
         let (relative, of_logs) = (error / truth, libm::log10(ratio));
         let terms = [error, relative, square / truth, square, of_logs * of_logs, of_logs];
         sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);

@@ -58,7 +58,9 @@ impl Lanczos {
             let lines = wide.chunks_exact(self.width).skip(taps.start);
             for ((high, low), line) in taps.high.iter().zip(&taps.low).zip(lines) {
                 let weight = (i32::from(*high) << LOW_BITS) + i32::from(*low);
-                sums.iter_mut().zip(line).for_each(|(sum, pixel)| *sum += weight * i32::from(*pixel));
+                sums.iter_mut()
+                    .zip(line)
+                    .for_each(|(sum, pixel)| *sum += weight * i32::from(*pixel));
             }
             out.extend(sums.iter().map(|sum| (sum >> BITS).clamp(0, 255) as u8));
         }
@@ -103,20 +105,26 @@ fn taps(from: u32, to: u32, at: u32) -> Taps {
     let middle = (f64::from(at) + 0.5) * scale;
     let start = (middle - REACH * coarse + 0.5).max(0.0) as u32;
     let end = ((middle + REACH * coarse + 0.5) as u32).min(from);
-    let weights: Vec<f64> =
-        (start..end).map(|i| lanczos((f64::from(i) - middle + 0.5) * (1.0 / coarse))).collect();
+    let weights: Vec<f64> = (start..end)
+        .map(|i| lanczos((f64::from(i) - middle + 0.5) * (1.0 / coarse)))
+        .collect();
     let total: f64 = weights.iter().sum();
     let fixed = weights.iter().map(|weight| {
         let weight = if total == 0.0 { *weight } else { weight / total } * f64::from(1 << BITS);
         (weight + if weight < 0.0 { -0.5 } else { 0.5 }) as i32
     });
-    let (high, low) =
-        fixed.map(|weight| ((weight >> LOW_BITS) as i16, (weight & ((1 << LOW_BITS) - 1)) as i16)).unzip();
+    let (high, low) = fixed
+        .map(|weight| ((weight >> LOW_BITS) as i16, (weight & ((1 << LOW_BITS) - 1)) as i16))
+        .unzip();
     Taps { start: start as usize, high, low }
 }
 
 /// sinc(x) · sinc(x/3) within 3 of 0.
 fn lanczos(x: f64) -> f64 {
     let sinc = |x: f64| if x == 0.0 { 1.0 } else { libm::sin(x * PI) / (x * PI) };
-    if (-REACH..REACH).contains(&x) { sinc(x) * sinc(x / REACH) } else { 0.0 }
+    if (-REACH..REACH).contains(&x) {
+        sinc(x) * sinc(x / REACH)
+    } else {
+        0.0
+    }
 }

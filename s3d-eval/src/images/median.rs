@@ -29,10 +29,21 @@ impl Medians {
 
     /// The second pass, which must be shown the cosines of the same angles.
     pub(super) fn search(self) -> Search {
-        let folds: Vec<Vec<u64>> =
-            self.0.into_iter().map(|m| m.into_inner().unwrap_or_else(PoisonError::into_inner)).collect();
-        let all = (0..STEPS).map(|at| folds.iter().map(|counts| counts[at]).sum()).collect();
-        Search(folds.into_iter().chain([all]).map(|counts| Group::of(&counts)).collect())
+        let folds: Vec<Vec<u64>> = self
+            .0
+            .into_iter()
+            .map(|m| m.into_inner().unwrap_or_else(PoisonError::into_inner))
+            .collect();
+        let all = (0..STEPS)
+            .map(|at| folds.iter().map(|counts| counts[at]).sum())
+            .collect();
+        Search(
+            folds
+                .into_iter()
+                .chain([all])
+                .map(|counts| Group::of(&counts))
+                .collect(),
+        )
     }
 }
 
@@ -82,8 +93,9 @@ impl Search {
     pub(super) fn look(&self, fold: usize, cosines: &[f64]) {
         for group in [fold, self.0.len() - 1].into_iter().filter_map(|at| self.0.get(at)) {
             let near = cosines.iter().filter(|cosine| group.cosines.contains(cosine));
-            let inside =
-                near.map(|cosine| degrees(*cosine)).filter(|angle| group.steps.contains(&step(*angle)));
+            let inside = near
+                .map(|cosine| degrees(*cosine))
+                .filter(|angle| group.steps.contains(&step(*angle)));
             let mut inside: Vec<u64> = inside.map(f64::to_bits).collect();
             inside.sort_unstable();
             let mut counts = group.angles.lock().unwrap_or_else(PoisonError::into_inner);

@@ -70,7 +70,9 @@ fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     let score = |units: &[&(u64, Option<[f64; 5]>)]| {
         let there = units.iter().filter_map(|unit| unit.1);
         let mut sums = [0.0; 5];
-        there.clone().for_each(|scores| sums.iter_mut().zip(scores).for_each(|(sum, v)| *sum += v));
+        there
+            .clone()
+            .for_each(|scores| sums.iter_mut().zip(scores).for_each(|(sum, v)| *sum += v));
         let count = there.count() as f64;
         vec![("mean".to_owned(), sums.map(|sum| sum / count).to_vec())]
     };
@@ -96,7 +98,9 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         medians.count(predicted.fold, angles);
         let mut steps = vec![0; if with_intervals { STEPS } else { 0 }];
         if with_intervals {
-            angles.iter().for_each(|angle| steps[((angle * 5.0) as usize).min(STEPS - 1)] += 1);
+            angles
+                .iter()
+                .for_each(|angle| steps[((angle * 5.0) as usize).min(STEPS - 1)] += 1);
         }
         progress.add(1);
         Ok((predicted.fold, (AngleSums::of(angles), steps)))
@@ -123,7 +127,9 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         vec![("all pixels".to_owned(), scores.collect())]
     };
     let below = DSINE_LIMITS.map(|limit| format!("< {limit}° (%)"));
-    let columns = ["mean (°)", "median (°)", "RMSE (°)"].into_iter().chain(below.iter().map(String::as_str));
+    let columns = ["mean (°)", "median (°)", "RMSE (°)"]
+        .into_iter()
+        .chain(below.iter().map(String::as_str));
     let mut made = tables(task, &columns.collect::<Vec<_>>(), &units, score);
     // Those of steps are for intervals.
     for (table, median) in made.iter_mut().zip(of_tables(&medians)) {
@@ -174,7 +180,11 @@ fn cosines(
         let message = format!("has {what} in column {x}, row {y}, which is evaluated");
         Err(FileError::format(file, message).into())
     };
-    let truth = image.pixels().iter().enumerate().filter(|(_, pixel)| **pixel != MISSING);
+    let truth = image
+        .pixels()
+        .iter()
+        .enumerate()
+        .filter(|(_, pixel)| **pixel != MISSING);
     found.clear();
     found.reserve(image.len());
     if read::is_png(file) {

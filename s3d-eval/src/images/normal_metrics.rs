@@ -63,7 +63,10 @@ impl AngleSums {
         for &angle in angles {
             sums.sum += angle;
             sums.squares += angle * angle;
-            sums.below.iter_mut().zip(DSINE_LIMITS).for_each(|(n, limit)| *n += u64::from(angle < limit));
+            sums.below
+                .iter_mut()
+                .zip(DSINE_LIMITS)
+                .for_each(|(n, limit)| *n += u64::from(angle < limit));
         }
         sums
     }
@@ -99,5 +102,9 @@ pub fn omnidata_scores(angles: &mut [f64]) -> Option<[f64; 5]> {
 pub fn median_of_angles(values: &mut [f64]) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     let (below, &mut high, _) = values.select_nth_unstable_by(values.len() / 2, f64::total_cmp);
-    Some(if last % 2 == 0 { high } else { (below.iter().copied().fold(f64::MIN, f64::max) + high) / 2.0 })
+    Some(if last % 2 == 0 {
+        high
+    } else {
+        (below.iter().copied().fold(f64::MIN, f64::max) + high) / 2.0
+    })
 }

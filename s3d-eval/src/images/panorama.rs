@@ -28,7 +28,13 @@ impl PanoramaClasses {
         assert_eq!([rgb.width(), rgb.height()], size, "images of one size");
         let columns = pillow_nearest(size[0], PANORAMA[0]);
         let rows = pillow_nearest(size[1], PANORAMA[1]);
-        let of_index = |[r, g, b]: [u8; 3]| if r == 0 { class(u16::from_be_bytes([g, b])) } else { None };
+        let of_index = |[r, g, b]: [u8; 3]| {
+            if r == 0 {
+                class(u16::from_be_bytes([g, b]))
+            } else {
+                None
+            }
+        };
         let mut classes: Vec<Option<u8>> = rows
             .iter()
             .flat_map(|&row| {
@@ -40,10 +46,15 @@ impl PanoramaClasses {
         let lanczos = Lanczos::new(size, PANORAMA);
         let green = lanczos.channel(rgb, 1);
         let width = PANORAMA[0] as usize;
-        for (at, class) in
-            classes.iter_mut().enumerate().filter(|(at, class)| class.is_some() && green[*at] == 0)
+        for (at, class) in classes
+            .iter_mut()
+            .enumerate()
+            .filter(|(at, class)| class.is_some() && green[*at] == 0)
         {
-            if [0, 2].into_iter().all(|channel| lanczos.pixel(rgb, channel, at % width, at / width) == 0) {
+            if [0, 2]
+                .into_iter()
+                .all(|channel| lanczos.pixel(rgb, channel, at % width, at / width) == 0)
+            {
                 *class = None;
             }
         }

@@ -105,7 +105,12 @@ pub(super) fn find(task: &Task<'_>, wanted: &Wanted<'_>) -> Result<Matched> {
     let kind = kind_of(wanted, &of_kinds)?;
     images.tested.retain(|(_, image, _)| ImageKind::of(image.frame) == kind);
     if images.tested.is_empty() {
-        let nouns: Vec<&str> = wanted.besides.iter().chain([&wanted.domain]).map(|d| d.folder()).collect();
+        let nouns: Vec<&str> = wanted
+            .besides
+            .iter()
+            .chain([&wanted.domain])
+            .map(|d| d.folder())
+            .collect();
         let message =
             format!("the areas that are tested have no {kind} with images of {}", nouns.join(" and "));
         return Err(Error::Input(message));
@@ -171,10 +176,17 @@ impl Images {
         for &area in task.data.areas() {
             let fold = task.folds.iter().position(|fold| fold.areas.contains(&area));
             for image in task.data.images(area) {
-                if !wanted.besides.iter().chain([&wanted.domain]).all(|domain| image.has(*domain)) {
+                if !wanted
+                    .besides
+                    .iter()
+                    .chain([&wanted.domain])
+                    .all(|domain| image.has(*domain))
+                {
                     continue;
                 }
-                images.names.insert(image.stem(), (area, fold.map(|_| images.tested.len())));
+                images
+                    .names
+                    .insert(image.stem(), (area, fold.map(|_| images.tested.len())));
                 images.tested.extend(fold.map(|fold| (fold, image, None)));
             }
         }
@@ -184,7 +196,9 @@ impl Images {
     /// The place of the image that a file predicts; `None` if its area is not tested.
     fn named(&self, path: &Path, area: Option<u32>, wanted: &Wanted<'_>) -> Result<Option<usize>> {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        let (stem, domain) = name.split_once("_domain_").map_or((&*name, None), |(s, d)| (s, Some(d)));
+        let (stem, domain) = name
+            .split_once("_domain_")
+            .map_or((&*name, None), |(s, d)| (s, Some(d)));
         let wrong = |message: String| Err(FileError::format(path, message).into());
         let fitting = [wanted.domain.suffix(), wanted.domain.folder(), "rgb"];
         if let Some(other) = domain.filter(|domain| !fitting.contains(domain)) {

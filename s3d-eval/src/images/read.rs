@@ -24,7 +24,8 @@ pub(super) fn gray16(data: &DataSet, image: &DatasetImage, domain: Domain) -> Re
 
 /// Whether a file is an image, and no array.
 pub(super) fn is_png(file: &Path) -> bool {
-    file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"))
+    file.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("png"))
 }
 
 /// Refuses a prediction whose width and height are none of `sizes`.
@@ -32,7 +33,10 @@ pub(super) fn check_size(file: &Path, found: [u32; 2], sizes: &[[u32; 2]]) -> Re
     if sizes.contains(&found) {
         return Ok(());
     }
-    let due: Vec<String> = sizes.iter().map(|[width, height]| format!("{width} × {height}")).collect();
+    let due: Vec<String> = sizes
+        .iter()
+        .map(|[width, height]| format!("{width} × {height}"))
+        .collect();
     let message = format!("is {} × {} pixels, and should be {}", found[0], found[1], due.join(" or "));
     Err(FileError::format(file, message).into())
 }
@@ -40,7 +44,10 @@ pub(super) fn check_size(file: &Path, found: [u32; 2], sizes: &[[u32; 2]]) -> Re
 /// Width, height and the floats of an NPY or NPZ file, row by row, `channels` a pixel; the size must be one
 /// of `sizes`.
 pub(super) fn floats(file: &Path, sizes: &[[u32; 2]], channels: u64) -> Result<([u32; 2], Vec<f64>)> {
-    if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy")) {
+    if file
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
+    {
         return floats_of(NpyArray::open(file)?, file, sizes, channels);
     }
     let mut archive = NpzArchive::open(file)?;
@@ -62,7 +69,11 @@ fn floats_of<R: Read>(
     let wrong = |message: String| Err(FileError::format(file, message).into());
     // A batch of one image, and a single channel, are sides of 1.
     let shape: Vec<u64> = array.shape().iter().copied().filter(|side| *side != 1).collect();
-    let (of_pixel, form) = if channels == 1 { (&[][..], "H × W") } else { (&[channels][..], "H × W × 3") };
+    let (of_pixel, form) = if channels == 1 {
+        (&[][..], "H × W")
+    } else {
+        (&[channels][..], "H × W × 3")
+    };
     let [height, width] = match shape.split_at_checked(2) {
         Some((&[height, width], rest)) if rest == of_pixel => [height, width],
         _ => return wrong(format!("is an array of the shape {:?}: save one of {form}", array.shape())),
@@ -117,6 +128,10 @@ impl Places {
     /// Column and row in a prediction of this size of a pixel that is evaluated.
     pub(super) fn place(&self, size: [u32; 2], at: usize) -> [u32; 2] {
         let [x, y] = [at % PANORAMA[0] as usize, at / PANORAMA[0] as usize];
-        if size == PANORAMA { [x as u32, y as u32] } else { [self.columns[x], self.rows[y]] }
+        if size == PANORAMA {
+            [x as u32, y as u32]
+        } else {
+            [self.columns[x], self.rows[y]]
+        }
     }
 }

@@ -123,15 +123,17 @@ fn compare(truth: &Truth, file: &Path, meaning: &[u8], count: usize) -> Result<C
     read::check_size(file, size, &places.sizes())?;
     let numbers = places.sample_prediction(size, image.into_vec());
     let class = |number: &u8| meaning.get(usize::from(*number)).copied().unwrap_or(u8::MAX);
-    classes.compare(&numbers.iter().map(class).collect::<Vec<_>>(), count).map_err(|at| {
-        let [x, y] = places.place(size, at);
-        let message = format!(
-            "has {} in column {x}, row {y}, which is evaluated: numbers of classes are below {}",
-            numbers[at],
-            meaning.len(),
-        );
-        FileError::format(file, message).into()
-    })
+    classes
+        .compare(&numbers.iter().map(class).collect::<Vec<_>>(), count)
+        .map_err(|at| {
+            let [x, y] = places.place(size, at);
+            let message = format!(
+                "has {} in column {x}, row {y}, which is evaluated: numbers of classes are below {}",
+                numbers[at],
+                meaning.len(),
+            );
+            FileError::format(file, message).into()
+        })
 }
 
 /// The class that each number of predictions means: those of a file, a line a class, or the taxonomy's order.
@@ -143,7 +145,9 @@ fn meaning(path: &Path, taxonomy: &Taxonomy) -> Result<Vec<u8>> {
     let text = fs::read_to_string(path).map_err(|e| FileError::io(path, "read", e))?;
     let mut meaning: Vec<u8> = Vec::new();
     for (line, name) in (1..).zip(text.lines()) {
-        let class = taxonomy.class(name.trim()).map_err(|e| FileError::line(path, line, e.to_string()))?;
+        let class = taxonomy
+            .class(name.trim())
+            .map_err(|e| FileError::line(path, line, e.to_string()))?;
         if meaning.contains(&(class.index() as u8)) {
             return Err(FileError::line(path, line, format!("{class} stands there twice")).into());
         }

@@ -111,8 +111,11 @@ impl ClassCounts {
 
 /// The means of the scores of these classes, those that are absent left out; NaN if all are.
 pub fn mean<'a>(classes: impl IntoIterator<Item = &'a ClassCounts>) -> PanopticScore {
-    let scores: Vec<PanopticScore> =
-        classes.into_iter().filter(|class| !class.is_absent()).map(ClassCounts::score).collect();
+    let scores: Vec<PanopticScore> = classes
+        .into_iter()
+        .filter(|class| !class.is_absent())
+        .map(ClassCounts::score)
+        .collect();
     let of = |value: fn(&PanopticScore) -> f64| scores.iter().map(value).sum::<f64>() / scores.len() as f64;
     PanopticScore { pq: of(|s| s.pq), sq: of(|s| s.sq), rq: of(|s| s.rq) }
 }
@@ -144,7 +147,10 @@ impl PanopticCounts {
     /// If it has another number of classes.
     pub fn add_counts(&mut self, other: &Self) {
         assert_eq!(self.0.len(), other.0.len(), "the same classes");
-        self.0.iter_mut().zip(&other.0).for_each(|(sum, counts)| sum.add(counts));
+        self.0
+            .iter_mut()
+            .zip(&other.0)
+            .for_each(|(sum, counts)| sum.add(counts));
     }
 
     /// Counts an image. `truth` and `predicted` are the numbers of its pixels' segments, 0 where there is
@@ -170,8 +176,10 @@ impl PanopticCounts {
         let classes = self.0.len();
         let truth = sized(segments, classes, shared.iter().map(|((truth, _), n)| (*truth, *n)))?;
         let found = sized(found, classes, shared.iter().map(|((_, id), n)| (*id, *n)))?;
-        let void: BTreeMap<u32, u64> =
-            shared.range((VOID, 0)..=(VOID, u32::MAX)).map(|((_, id), n)| (*id, *n)).collect();
+        let void: BTreeMap<u32, u64> = shared
+            .range((VOID, 0)..=(VOID, u32::MAX))
+            .map(|((_, id), n)| (*id, *n))
+            .collect();
         let void_of = |id: u32| void.get(&id).copied().unwrap_or(0);
         let (mut of_truth, mut of_found) = (BTreeSet::new(), BTreeSet::new());
         for ((true_id, id), both) in &shared {
@@ -201,7 +209,11 @@ fn shared(truth: &[u32], predicted: &[u32]) -> BTreeMap<(u32, u32), u64> {
     let mut at = 0;
     // Neighbours are mostly alike.
     while let (Some(a), Some(b)) = (truth.get(at), predicted.get(at)) {
-        let same = truth[at..].iter().zip(&predicted[at..]).take_while(|pair| *pair == (a, b)).count();
+        let same = truth[at..]
+            .iter()
+            .zip(&predicted[at..])
+            .take_while(|pair| *pair == (a, b))
+            .count();
         *counts.entry((*a, *b)).or_default() += same as u64;
         at += same;
     }
@@ -228,7 +240,9 @@ fn sized(
     }
     let mut unlisted: BTreeMap<u32, u64> = BTreeMap::new();
     for (id, count) in pixels.filter(|(id, _)| *id != VOID) {
-        *sized.get_mut(&id).map_or_else(|| unlisted.entry(id).or_default(), |(_, area)| area) += count;
+        *sized
+            .get_mut(&id)
+            .map_or_else(|| unlisted.entry(id).or_default(), |(_, area)| area) += count;
     }
     if let Some((id, pixels)) = unlisted.pop_first() {
         return Err(SegmentFault::Unlisted { id, pixels });
@@ -250,7 +264,11 @@ mod tests {
     fn counted(truth: &[u32], segments: &[(u32, usize)], predicted: &[u32], class: usize) -> Vec<[u64; 3]> {
         let mut counts = PanopticCounts::new(2);
         counts.add(truth, &of(segments), predicted, &of(&[(5, class)])).unwrap();
-        counts.classes().iter().map(|c| [c.matched, c.invented, c.missed]).collect()
+        counts
+            .classes()
+            .iter()
+            .map(|c| [c.matched, c.invented, c.missed])
+            .collect()
     }
 
     #[test]
@@ -268,7 +286,9 @@ mod tests {
     #[test]
     fn means_leave_out_absent_classes() {
         let mut counts = PanopticCounts::new(3);
-        counts.add(&[1, 1, 2, 2], &of(&[(1, 0), (2, 1)]), &[1, 1, 3, 0], &of(&[(1, 0), (3, 0)])).unwrap();
+        counts
+            .add(&[1, 1, 2, 2], &of(&[(1, 0), (2, 1)]), &[1, 1, 3, 0], &of(&[(1, 0), (3, 0)]))
+            .unwrap();
         let scores: Vec<_> = counts.classes().iter().map(ClassCounts::score).collect();
         assert_eq!((scores[0].pq, scores[0].sq, scores[0].rq), (2.0 / 3.0, 1.0, 2.0 / 3.0));
         assert_eq!((scores[1].pq, scores[1].sq), (0.0, 0.0));

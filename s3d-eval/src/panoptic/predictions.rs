@@ -147,8 +147,11 @@ fn check_categories(categories: &[Category], taxonomy: &Taxonomy, stuff: &[Class
             ));
         }
         if isthing.is_some_and(|is| (is == 0) != stuff.contains(class)) {
-            let [here, there] =
-                if stuff.contains(class) { ["a thing", "stuff"] } else { ["stuff", "a thing"] };
+            let [here, there] = if stuff.contains(class) {
+                ["a thing", "stuff"]
+            } else {
+                ["stuff", "a thing"]
+            };
             return Err(format!(
                 "{name} is {here}, and by the taxonomy of the data set {there}, unless --stuff says otherwise"
             ));

@@ -73,7 +73,10 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     if let Some((first, count)) = predictions.unlisted {
         notes.push(format!("{count} images that are not listed were passed over, as {first}."));
     }
-    let panoramas = images.iter().filter(|(_, image, _)| image.frame == Frame::Panorama).count() as u64;
+    let panoramas = images
+        .iter()
+        .filter(|(_, image, _)| image.frame == Frame::Panorama)
+        .count() as u64;
     let counted = [("panoramas", panoramas), ("views", images.len() as u64 - panoramas)];
     let mut evaluation = task.evaluation(&definition, counted, tables);
     evaluation.notes = notes;
@@ -88,7 +91,11 @@ fn images(task: &Task<'_>, predictions: &mut Predictions) -> Result<(Vec<Job>, V
     let mut there = Vec::new();
     for (fold, areas) in task.folds.iter().enumerate() {
         let of_areas = areas.areas.iter().flat_map(|area| task.data.images(*area));
-        there.extend(of_areas.filter(|image| image.has(Domain::Semantic)).map(|image| (fold, image)));
+        there.extend(
+            of_areas
+                .filter(|image| image.has(Domain::Semantic))
+                .map(|image| (fold, image)),
+        );
     }
     let is_panorama = |image: &DatasetImage| image.frame == Frame::Panorama;
     let (mut jobs, mut missing) = (Vec::new(), Vec::new());
@@ -110,7 +117,10 @@ fn images(task: &Task<'_>, predictions: &mut Predictions) -> Result<(Vec<Job>, V
         )));
     }
     let others = task.data.areas().iter().flat_map(|area| task.data.images(*area));
-    let known: BTreeSet<_> = others.filter(|image| image.has(Domain::Semantic)).map(|i| key(&i)).collect();
+    let known: BTreeSet<_> = others
+        .filter(|image| image.has(Domain::Semantic))
+        .map(|i| key(&i))
+        .collect();
     if let Some((_, predicted)) = predictions.of_images.iter().find(|(key, _)| !known.contains(key)) {
         let png = predicted.png.display();
         return Err(wrong(format!("the data set has no semantic image for {png}")));
@@ -133,7 +143,12 @@ impl<'a> Truth<'a> {
         let taxonomy = table.taxonomy();
         let stuff = match &task.options.stuff {
             Some(list) => list.classes(taxonomy)?,
-            None => taxonomy.classes().iter().copied().filter(|class| taxonomy.is_stuff(*class)).collect(),
+            None => taxonomy
+                .classes()
+                .iter()
+                .copied()
+                .filter(|class| taxonomy.is_stuff(*class))
+                .collect(),
         };
         let mut masked = BTreeSet::new();
         for area in task.folds.iter().flat_map(|fold| &fold.areas) {
@@ -153,7 +168,9 @@ impl<'a> Truth<'a> {
         if image.frame == Frame::View(0) && self.masked.contains(&(image.area, image.uuid.clone())) {
             let color = read(Domain::Rgb)?;
             let pairs = semantic.pixels_mut().iter_mut().zip(color.pixels());
-            pairs.filter(|(_, color)| **color == [0; 3]).for_each(|(label, _)| *label = MISSING);
+            pairs
+                .filter(|(_, color)| **color == [0; 3])
+                .for_each(|(label, _)| *label = MISSING);
         }
         Ok(semantic)
     }
@@ -195,7 +212,11 @@ impl<'a> Truth<'a> {
             return Err(wrong(format!("{width} × {height} pixels, and the data set's image has {w} × {h}")));
         }
         let ids = |image: &Raster<[u8; 3]>| -> Vec<u32> {
-            image.pixels().iter().map(|[r, g, b]| u32::from_le_bytes([*r, *g, *b, 0])).collect()
+            image
+                .pixels()
+                .iter()
+                .map(|[r, g, b]| u32::from_le_bytes([*r, *g, *b, 0]))
+                .collect()
         };
         let mut counts = PanopticCounts::new(taxonomy.classes().len());
         counts
@@ -211,7 +232,10 @@ fn rows(images: &[&PanopticCounts], classes: &[Class], stuff: &[Class]) -> Rows 
     images.iter().for_each(|counts| sum.add_counts(counts));
     let row = |name: &str, score: PanopticScore| (name.to_owned(), vec![score.pq, score.sq, score.rq]);
     let counts = classes.iter().zip(sum.classes());
-    let mut rows: Rows = counts.clone().map(|(class, of)| row(class.name(), of.score())).collect();
+    let mut rows: Rows = counts
+        .clone()
+        .map(|(class, of)| row(class.name(), of.score()))
+        .collect();
     let of_kind = |is_stuff: bool| {
         let of = counts.clone().filter(|(class, _)| stuff.contains(class) == is_stuff);
         mean(of.map(|(_, counts)| counts).collect::<Vec<&ClassCounts>>())

@@ -72,8 +72,11 @@ pub fn coverage(rooms: &[&RoomCoverage]) -> Vec<CoverageScores> {
         let rooms: Vec<&ClassCoverage> = rooms.iter().filter_map(|room| room.0.get(class)).collect();
         let sum = |count: fn(&ClassCoverage) -> u64| rooms.iter().map(|room| count(room)).sum::<u64>() as f64;
         let mean = |score: fn(&ClassCoverage) -> f64| {
-            let scores: Vec<f64> =
-                rooms.iter().filter(|room| room.truth > 0).map(|room| score(room)).collect();
+            let scores: Vec<f64> = rooms
+                .iter()
+                .filter(|room| room.truth > 0)
+                .map(|room| score(room))
+                .collect();
             scores.iter().sum::<f64>() / scores.len() as f64
         };
         let right = sum(|room| room.right);

@@ -15,7 +15,12 @@ const LISTED: usize = 5;
 pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<(Vec<PathBuf>, Vec<String>)> {
     let mut known: BTreeSet<(u32, String)> = BTreeSet::new();
     for area in task.data.areas() {
-        known.extend(task.data.tree_rooms(*area)?.into_iter().map(|room| (room.area, room.name)));
+        known.extend(
+            task.data
+                .tree_rooms(*area)?
+                .into_iter()
+                .map(|room| (room.area, room.name)),
+        );
     }
     let (mut found, mut others) = (BTreeMap::<(u32, String), PathBuf>::new(), Vec::new());
     for path in files(task.predictions)? {
@@ -34,7 +39,12 @@ pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<
     }
     let key = |room: &Room| (room.tree.area, room.tree.name.clone());
     let paths: Vec<Option<PathBuf>> = rooms.iter().map(|room| found.remove(&key(room))).collect();
-    let missing: Vec<&Room> = rooms.iter().zip(&paths).filter(|(_, p)| p.is_none()).map(|(r, _)| r).collect();
+    let missing: Vec<&Room> = rooms
+        .iter()
+        .zip(&paths)
+        .filter(|(_, p)| p.is_none())
+        .map(|(r, _)| r)
+        .collect();
     if let Some(first) = missing.first() {
         let tree = &first.tree;
         let names: Vec<String> = missing.iter().map(|room| room.name()).collect();

@@ -178,7 +178,8 @@ impl<'a> Prediction<'a> {
             rest = later;
             let points: Vec<(i64, i64)> = labels.iter().copied().zip(now.iter().copied()).collect();
             runs.split(&points, |at, part| {
-                part.iter().for_each(|(class, instance)| segments.add(Some(at), *class, *instance));
+                part.iter()
+                    .for_each(|(class, instance)| segments.add(Some(at), *class, *instance));
             });
         }
     }
@@ -228,7 +229,10 @@ fn masks_by_point(
         runs.split(&rows, |at, part| {
             let mut counts = vec![0u64; instances];
             for row in part {
-                counts.iter_mut().zip(*row).for_each(|(count, inside)| *count += u64::from(*inside != 0.0));
+                counts
+                    .iter_mut()
+                    .zip(*row)
+                    .for_each(|(count, inside)| *count += u64::from(*inside != 0.0));
             }
             for (overlaps, points) in shared.iter_mut().zip(counts).filter(|(_, points)| *points > 0) {
                 count(overlaps, at, points);

@@ -106,7 +106,10 @@ pub(super) fn for_each_run(
     ctx: &Context,
     each: impl FnMut(&TrueInstance, &[i64]),
 ) -> Result<()> {
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz")) {
+    if path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("npz"))
+    {
         let mut archive = NpzArchive::open(path)?;
         let name = match archive.names() {
             [only] => only.clone(),

@@ -37,7 +37,9 @@ impl PredictedInstance {
         truth: &'a [TrueInstance],
     ) -> impl Iterator<Item = (usize, u64, f64)> + 'a {
         self.overlaps.iter().filter_map(|(at, common)| {
-            let instance = truth.get(*at).filter(|instance| instance.class == self.class && *common > 0)?;
+            let instance = truth
+                .get(*at)
+                .filter(|instance| instance.class == self.class && *common > 0)?;
             let union = (instance.points + self.points).saturating_sub(*common);
             Some((*at, *common, *common as f64 / union as f64))
         })
@@ -65,7 +67,11 @@ pub fn instances_of_masks(
     let (instances, places) = true_instances(truth);
     let predicted = masks.iter().map(|mask| {
         let (mut points, mut void, mut overlaps) = (0, 0, Vec::new());
-        let inside = truth.iter().zip(&places).zip(mask.inside).filter(|(_, inside)| **inside);
+        let inside = truth
+            .iter()
+            .zip(&places)
+            .zip(mask.inside)
+            .filter(|(_, inside)| **inside);
         for (((class, _), place), _) in inside {
             points += 1;
             void += u64::from(*class < 0);
@@ -105,7 +111,10 @@ fn true_instances(truth: &[(i64, i64)]) -> (Vec<TrueInstance>, Vec<Option<usize>
             instances.push(TrueInstance { class, points });
         }
     }
-    let of_points = truth.iter().map(|(_, instance)| places.get(instance).copied()).collect();
+    let of_points = truth
+        .iter()
+        .map(|(_, instance)| places.get(instance).copied())
+        .collect();
     (instances, of_points)
 }
 
@@ -137,8 +146,10 @@ impl Segments {
     pub(super) fn finish(self) -> Vec<PredictedInstance> {
         let segment = |(classes, overlaps): (BTreeMap<usize, u64>, _)| {
             let most = classes.values().max().copied();
-            let class =
-                classes.iter().find(|(_, points)| Some(**points) == most).map_or(0, |(class, _)| *class);
+            let class = classes
+                .iter()
+                .find(|(_, points)| Some(**points) == most)
+                .map_or(0, |(class, _)| *class);
             let points = classes.values().sum();
             PredictedInstance { class, score: 0.0, points, void: 0, overlaps: merged(overlaps) }
         };

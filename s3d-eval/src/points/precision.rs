@@ -14,7 +14,13 @@ const THRESHOLDS: usize = 10;
 /// The IoU thresholds: .5 to .9 in steps of .05, as numpy's `arange` rounds them, and .25.
 fn thresholds() -> [f64; THRESHOLDS] {
     let step = (0.5 + 0.05) - 0.5;
-    std::array::from_fn(|i| if i + 1 < THRESHOLDS { 0.5 + i as f64 * step } else { 0.25 })
+    std::array::from_fn(|i| {
+        if i + 1 < THRESHOLDS {
+            0.5 + i as f64 * step
+        } else {
+            0.25
+        }
+    })
 }
 
 /// The true and predicted instances of a room, matched by IoU, class by class.
@@ -46,7 +52,9 @@ impl InstanceMatches {
         // Where the true instances that count stand among those of their class.
         let mut places = Vec::with_capacity(truth.len());
         for instance in truth {
-            let class = matches.get_mut(instance.class).filter(|_| instance.points >= LEAST_POINTS);
+            let class = matches
+                .get_mut(instance.class)
+                .filter(|_| instance.points >= LEAST_POINTS);
             places.push(class.map(|class| {
                 class.truth.push(Vec::new());
                 class.truth.len() - 1
@@ -57,13 +65,20 @@ impl InstanceMatches {
             let (mut best_iou, mut ignored) = (0.0f64, instance.void);
             for (at, common, iou) in instance.of_its_class(truth) {
                 best_iou = best_iou.max(iou);
-                match places.get(at).copied().flatten().and_then(|place| class.truth.get_mut(place)) {
+                match places
+                    .get(at)
+                    .copied()
+                    .flatten()
+                    .and_then(|place| class.truth.get_mut(place))
+                {
                     Some(candidates) => candidates.push((class.predicted.len(), iou)),
                     None => ignored += common,
                 }
             }
             let ignored = ignored as f64 / instance.points as f64;
-            class.predicted.push(Candidate { score: instance.score, best_iou, ignored });
+            class
+                .predicted
+                .push(Candidate { score: instance.score, best_iou, ignored });
         }
         Self(matches)
     }
@@ -81,8 +96,9 @@ pub struct InstanceAp {
 /// The average precision over rooms, of as many classes each.
 pub fn instance_ap(rooms: &[&InstanceMatches]) -> InstanceAp {
     let classes = rooms.iter().map(|room| room.0.len()).max().unwrap_or(0);
-    let at: Vec<[f64; THRESHOLDS]> =
-        (0..classes).map(|class| thresholds().map(|threshold| class_ap(rooms, class, threshold))).collect();
+    let at: Vec<[f64; THRESHOLDS]> = (0..classes)
+        .map(|class| thresholds().map(|threshold| class_ap(rooms, class, threshold)))
+        .collect();
     let strict = |ap: &[f64; THRESHOLDS]| ap.iter().take(THRESHOLDS - 1).copied().collect::<Vec<f64>>();
     let three = |ap: &[f64; THRESHOLDS]| [nan_mean(strict(ap)), ap[0], ap[THRESHOLDS - 1]];
     let by_class: Vec<[f64; 3]> = at.iter().map(three).collect();
@@ -143,7 +159,12 @@ impl ClassMatches {
             }
         }
         let is_wrong = |c: &&Candidate| c.best_iou <= threshold && c.ignored <= threshold;
-        found.extend(self.predicted.iter().filter(is_wrong).map(|candidate| (candidate.score, false)));
+        found.extend(
+            self.predicted
+                .iter()
+                .filter(is_wrong)
+                .map(|candidate| (candidate.score, false)),
+        );
         missed
     }
 }
@@ -167,7 +188,11 @@ fn area(mut found: Vec<(f64, bool)>, missed: u64) -> f64 {
     let before = recall.first().into_iter().chain(&recall);
     let after = recall.iter().skip(1).chain([&0.0]);
     let widths = before.zip(after).map(|(before, after)| 0.5 * before - 0.5 * after);
-    precision.iter().zip(widths).map(|(precision, width)| precision * width).sum()
+    precision
+        .iter()
+        .zip(widths)
+        .map(|(precision, width)| precision * width)
+        .sum()
 }
 
 #[cfg(test)]

@@ -70,7 +70,10 @@ fn rows<const N: usize>(
     others: impl IntoIterator<Item = (&'static str, [f64; N])>,
 ) -> Rows {
     let classes = Class::S3DIS.into_iter().map(Class::name).zip(classes);
-    classes.chain(others).map(|(name, scores)| (name.to_owned(), scores.to_vec())).collect()
+    classes
+        .chain(others)
+        .map(|(name, scores)| (name.to_owned(), scores.to_vec()))
+        .collect()
 }
 
 /// Semantic segmentation of points.
@@ -96,7 +99,11 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
     };
     let tables = tables(task, &["IoU", "accuracy"], &counted.rooms, |rooms| {
         let scores = SemanticCounts::sum(CLASSES, rooms.iter().copied()).scores(absent);
-        let classes = scores.iou.iter().zip(&scores.accuracy).map(|(iou, accuracy)| [*iou, *accuracy]);
+        let classes = scores
+            .iou
+            .iter()
+            .zip(&scores.accuracy)
+            .map(|(iou, accuracy)| [*iou, *accuracy]);
         let mean = [scores.mean_iou, scores.mean_accuracy];
         rows(classes, [("mean", mean), ("overall", [f64::NAN, scores.overall_accuracy])])
     });

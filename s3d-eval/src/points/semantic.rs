@@ -59,7 +59,9 @@ impl SemanticCounts {
     pub(super) fn add_run(&mut self, class: usize, predicted: &[i64]) {
         let before = self.predicted.get(class).copied().unwrap_or(0);
         for label in predicted {
-            if let Some(count) = usize::try_from(*label).ok().and_then(|label| self.predicted.get_mut(label))
+            if let Some(count) = usize::try_from(*label)
+                .ok()
+                .and_then(|label| self.predicted.get_mut(label))
             {
                 *count += 1;
             }
@@ -93,8 +95,14 @@ impl SemanticCounts {
         };
         let both = || self.intersection.iter().copied();
         let sides = self.truth.iter().zip(&self.predicted);
-        let iou: Vec<f64> = both().zip(sides).map(|(both, (t, p))| share(both, t + p - both)).collect();
-        let accuracy: Vec<f64> = both().zip(&self.truth).map(|(both, truth)| share(both, *truth)).collect();
+        let iou: Vec<f64> = both()
+            .zip(sides)
+            .map(|(both, (t, p))| share(both, t + p - both))
+            .collect();
+        let accuracy: Vec<f64> = both()
+            .zip(&self.truth)
+            .map(|(both, truth)| share(both, *truth))
+            .collect();
         SemanticScores {
             mean_iou: nan_mean(iou.iter().copied()),
             mean_accuracy: nan_mean(accuracy.iter().copied()),

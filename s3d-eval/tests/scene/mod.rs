@@ -24,7 +24,11 @@ static OUT: LazyLock<PathBuf> = LazyLock::new(|| {
     let options =
         ExportOptions { views: 2, size: 48, pano_width: 96, points_per_m2: 5.0, ..ExportOptions::default() };
     let out = folder.join("data set");
-    Export::new(scenes).options(options).run(&out, &Context::default()).unwrap().unwrap();
+    Export::new(scenes)
+        .options(options)
+        .run(&out, &Context::default())
+        .unwrap()
+        .unwrap();
     out
 });
 

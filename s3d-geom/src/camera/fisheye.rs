@@ -49,7 +49,10 @@ impl FisheyeLens {
             return None;
         }
         let angles = (1..=STEPS).map(|k| PI * f64::from(k) / f64::from(STEPS));
-        let last = angles.take_while(|angle| slope(distortion, *angle) > 0.0).last().unwrap_or(0.0);
+        let last = angles
+            .take_while(|angle| slope(distortion, *angle) > 0.0)
+            .last()
+            .unwrap_or(0.0);
         let lens = Self { size, focal_px, center_px, distortion, last: (last, bent(distortion, last)) };
         let middle = dvec2(f64::from(size[0]), f64::from(size[1])) * 0.5;
         lens.direction(middle).is_some().then_some(lens)
@@ -109,7 +112,11 @@ impl FisheyeLens {
                 low = angle;
             }
             let newton = angle - error / slope(self.distortion, angle);
-            angle = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            angle = if newton > low && newton < high {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
         }
         let (sin, cos) = libm::sincos(angle);
         let outwards = if distance > 0.0 { goal / distance } else { DVec2::ZERO };
@@ -144,7 +151,11 @@ mod tests {
         let lens = lens([0.03, -0.012, 0.004, -0.0006]).unwrap();
         let pixel = lens.project(dvec3(0.9, -0.7, 0.8)).unwrap();
         assert!(pixel.abs_diff_eq(PIXEL, 1e-9), "{pixel}");
-        assert!(lens.project(dvec3(0.9, -0.7, 0.8) * 7.0).unwrap().abs_diff_eq(PIXEL, 1e-9));
+        assert!(
+            lens.project(dvec3(0.9, -0.7, 0.8) * 7.0)
+                .unwrap()
+                .abs_diff_eq(PIXEL, 1e-9)
+        );
     }
     const PIXEL: DVec2 = DVec2::new(553.2941891413759, 58.270442405667865);
 

@@ -67,7 +67,9 @@ impl Lens {
             last_r2 = s;
         }
         let lens = Self { size, focal_px, center_px, distortion, last_r2 };
-        lens.direction(dvec2(f64::from(size[0]), f64::from(size[1])) * 0.5).is_some().then_some(lens)
+        lens.direction(dvec2(f64::from(size[0]), f64::from(size[1])) * 0.5)
+            .is_some()
+            .then_some(lens)
     }
 
     /// Width of the picture in pixels.

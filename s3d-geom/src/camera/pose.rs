@@ -77,7 +77,11 @@ impl Pose {
         // The rows are the camera's axes in the world.
         let pose = Self::from_axes(DVec3::ZERO, x, -y, -z)?;
         let location = -(pose.opencv_from_world().transpose() * shift);
-        if location.is_finite() { Ok(Self { location, ..pose }) } else { Err(CameraError::NotFinite) }
+        if location.is_finite() {
+            Ok(Self { location, ..pose })
+        } else {
+            Err(CameraError::NotFinite)
+        }
     }
 
     /// The pose of an OpenCV camera (x right, y down, z forward), from camera → world, 4 × 4, row by row.
@@ -232,7 +236,11 @@ fn columns(rows: [[f64; 4]; 4]) -> Result<[DVec3; 4], CameraError> {
     const LAST: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
     let column = |j: usize| rows.map(|row| row[j]);
     if rows[3] != LAST {
-        return Err(if column(3) == LAST { CameraError::Transposed } else { CameraError::LastRow });
+        return Err(if column(3) == LAST {
+            CameraError::Transposed
+        } else {
+            CameraError::LastRow
+        });
     }
     Ok([0, 1, 2, 3].map(|j| dvec3(rows[0][j], rows[1][j], rows[2][j])))
 }
@@ -326,7 +334,9 @@ mod tests {
         assert_eq!(with(|rows| rows[1][1] += 0.1), CameraError::Sheared);
         assert_eq!(with(|rows| *rows = [[0.0; 4], [0.0; 4], [0.0; 4], rows[3]]), CameraError::Sheared);
         let times = |rows: &mut [[f64; 4]; 4], by: [f64; 3]| {
-            rows[..3].iter_mut().for_each(|row| (0..3).for_each(|k| row[k] *= by[k]));
+            rows[..3]
+                .iter_mut()
+                .for_each(|row| (0..3).for_each(|k| row[k] *= by[k]));
         };
         let mut rows = good;
         times(&mut rows, [1.0, 1.0, -1.0]);

@@ -27,7 +27,8 @@ impl MeshParts {
                 .into_iter()
                 .map(|m| Material { texture: m.texture.map(|t| shifted(t, textures)), ..m }),
         );
-        self.faces.extend(other.faces.into_iter().map(|f| f.map(|v| shifted(v, vertices))));
+        self.faces
+            .extend(other.faces.into_iter().map(|f| f.map(|v| shifted(v, vertices))));
         let corners = |offset| move |f: [u32; 3]| f.map(|i| shifted(i, offset));
         append_column(&mut self.face_uvs, other.face_uvs, faces, [NO_INDEX; 3], corners(uvs));
         append_column(&mut self.face_normals, other.face_normals, faces, [NO_INDEX; 3], corners(normals));
@@ -88,7 +89,11 @@ impl TriMesh {
 }
 
 fn shifted(index: u32, offset: usize) -> u32 {
-    if index == NO_INDEX { NO_INDEX } else { index + offset as u32 }
+    if index == NO_INDEX {
+        NO_INDEX
+    } else {
+        index + offset as u32
+    }
 }
 
 fn append_column<T: Clone>(

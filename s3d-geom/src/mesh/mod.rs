@@ -333,7 +333,11 @@ impl TriMesh {
     /// Index of the material of face `face`, if it has one.
     #[inline]
     pub fn material_of(&self, face: u32) -> Option<u32> {
-        self.parts.face_materials.get(face as usize).copied().filter(|&m| m != NO_INDEX)
+        self.parts
+            .face_materials
+            .get(face as usize)
+            .copied()
+            .filter(|&m| m != NO_INDEX)
     }
 
     /// Where face `face` takes its colour from: its texture if it has one and coordinates to look it up, else
@@ -356,7 +360,11 @@ impl TriMesh {
     /// The normals at the corners of face `face`, if the mesh has them.
     #[inline]
     pub fn corner_normals(&self, face: u32) -> Option<[Vec3; 3]> {
-        let corners = self.parts.face_normals.get(face as usize).filter(|c| **c != [NO_INDEX; 3])?;
+        let corners = self
+            .parts
+            .face_normals
+            .get(face as usize)
+            .filter(|c| **c != [NO_INDEX; 3])?;
         Some(corners.map(|i| self.parts.normals[i as usize]))
     }
 
@@ -377,7 +385,13 @@ impl TriMesh {
 
     /// The box of all faces.
     pub fn aabb(&self) -> Aabb {
-        Aabb::from_points(self.parts.faces.iter().flatten().map(|&v| self.parts.positions[v as usize]))
+        Aabb::from_points(
+            self.parts
+                .faces
+                .iter()
+                .flatten()
+                .map(|&v| self.parts.positions[v as usize]),
+        )
     }
 }
 
@@ -421,8 +435,9 @@ mod tests {
         parts.faces = vec![[0, 1, 2], [1, 1, 2], [0, 2, 3]];
         parts.face_materials = vec![0, 1, 2];
         parts.face_tags = vec![7, 8, 9];
-        parts.materials =
-            ["a", "b", "c"].map(|name| Material { name: name.into(), color: [9; 3], texture: None }).to_vec();
+        parts.materials = ["a", "b", "c"]
+            .map(|name| Material { name: name.into(), color: [9; 3], texture: None })
+            .to_vec();
         let mut m = TriMesh::new(parts).unwrap();
         assert_eq!((m.take_face_tags(), m.take_face_tags()), (vec![7, 9], vec![]));
         assert_eq!(m.report().zero_area_faces, 1);

@@ -11,15 +11,18 @@ impl TriMesh {
     #[must_use]
     pub fn without_repeated_faces(self) -> (Self, usize) {
         let count = self.faces().len();
-        let mut by_hash: Vec<(u64, u32)> =
-            (0..count as u32).into_par_iter().map(|f| (hash(corners(&self, f)), f)).collect();
+        let mut by_hash: Vec<(u64, u32)> = (0..count as u32)
+            .into_par_iter()
+            .map(|f| (hash(corners(&self, f)), f))
+            .collect();
         by_hash.par_sort_unstable();
         let mut keep = vec![true; count];
         for group in by_hash.chunk_by(|a, b| a.0 == b.0) {
             // Almost always one face. Others are repeated if their corners are, whatever their hashes say.
             for (i, &(_, face)) in group.iter().enumerate() {
-                keep[face as usize] =
-                    !group[..i].iter().any(|&(_, first)| corners(&self, first) == corners(&self, face));
+                keep[face as usize] = !group[..i]
+                    .iter()
+                    .any(|&(_, first)| corners(&self, first) == corners(&self, face));
             }
         }
         let repeated = keep.iter().filter(|k| !**k).count();
@@ -46,8 +49,11 @@ fn corners(mesh: &TriMesh, face: u32) -> [[u32; 3]; 3] {
 }
 
 fn hash(corners: [[u32; 3]; 3]) -> u64 {
-    let mix =
-        |hash: u64, part: &u32| (hash ^ u64::from(*part)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+    let mix = |hash: u64, part: &u32| {
+        (hash ^ u64::from(*part))
+            .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+            .rotate_left(29)
+    };
     corners.as_flattened().iter().fold(0, mix)
 }
 
@@ -64,8 +70,9 @@ mod tests {
         let mut parts = MeshParts { positions, faces, ..MeshParts::default() };
         parts.face_materials = vec![0, 1, 2, 3, 4];
         parts.face_tags = vec![10, 11, 12, 13, 14];
-        parts.materials =
-            (0..5).map(|i| crate::Material { name: i.to_string(), color: [i; 3], texture: None }).collect();
+        parts.materials = (0..5)
+            .map(|i| crate::Material { name: i.to_string(), color: [i; 3], texture: None })
+            .collect();
         let (mut mesh, repeated) = TriMesh::new(parts).unwrap().without_repeated_faces();
         assert_eq!(repeated, 2);
         assert_eq!(mesh.faces(), [[0, 1, 2], [0, 1, 3], [1, 2, 3]]);

@@ -20,12 +20,17 @@ pub(crate) fn along_a_curve(points: &[Vec3], order: &mut Vec<u64>) {
     assert!(points.len() <= MOST_POINTS, "{} points", points.len());
     let bounds = Aabb::from_points(points.iter().copied().filter(|p| p.is_finite()));
     let size = bounds.size().max_element();
-    let scale = if size.is_finite() && size > 0.0 { LAST_CELL / size } else { 0.0 };
+    let scale = if size.is_finite() && size > 0.0 {
+        LAST_CELL / size
+    } else {
+        0.0
+    };
     order.clear();
     order.extend(points.iter().zip(0..).map(|(&point, at)| {
         // The conversion takes what is not finite to some number in range.
-        let [x, y, z] =
-            ((point - bounds.min) * scale).to_array().map(|c| spread(c.clamp(0.0, LAST_CELL) as u16));
+        let [x, y, z] = ((point - bounds.min) * scale)
+            .to_array()
+            .map(|c| spread(c.clamp(0.0, LAST_CELL) as u16));
         (x | y << 1 | z << 2) << 20 | at
     }));
     order.par_sort_unstable();
@@ -59,8 +64,10 @@ mod tests {
     #[test]
     fn neighbours_follow_each_other() {
         // A floor of 64 × 64 points, 1 m apart, shuffled.
-        let points: Vec<Vec3> =
-            (0..4096).map(|i| i * 1657 % 4096).map(|i| vec3((i % 64) as f32, (i / 64) as f32, 3.0)).collect();
+        let points: Vec<Vec3> = (0..4096)
+            .map(|i| i * 1657 % 4096)
+            .map(|i| vec3((i % 64) as f32, (i / 64) as f32, 3.0))
+            .collect();
         let length = |order: &mut dyn Iterator<Item = usize>| -> f32 {
             let way: Vec<Vec3> = order.map(|at| points[at]).collect();
             way.windows(2).map(|w| w[0].distance(w[1])).sum()

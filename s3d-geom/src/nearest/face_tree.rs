@@ -93,7 +93,9 @@ impl FaceTree {
         let triangle = |face: u32| (face, SortedTriangle::new(mesh.triangle(face)));
         let leaf = |members: Vec<_>| Triangles8::new(&members);
         let leaves = leaves.par_iter().with_min_len(LEAVES_OF_TASK);
-        tree.leaves = leaves.map(|&of| leaf(faces_of(&bvh, of).map(triangle).collect())).collect();
+        tree.leaves = leaves
+            .map(|&of| leaf(faces_of(&bvh, of).map(triangle).collect()))
+            .collect();
         tree
     }
 
@@ -394,10 +396,14 @@ fn nodes_from(bvh: &Bvh2, node: usize) -> impl Iterator<Item = (usize, &Bvh2Node
 }
 
 fn faces_of(bvh: &Bvh2, node: usize) -> impl Iterator<Item = u32> {
-    nodes_from(bvh, node).filter(|(_, node)| node.is_leaf()).flat_map(|(_, leaf)| {
-        let first = leaf.first_index as usize;
-        bvh.primitive_indices[first..first + leaf.prim_count as usize].iter().copied()
-    })
+    nodes_from(bvh, node)
+        .filter(|(_, node)| node.is_leaf())
+        .flat_map(|(_, leaf)| {
+            let first = leaf.first_index as usize;
+            bvh.primitive_indices[first..first + leaf.prim_count as usize]
+                .iter()
+                .copied()
+        })
 }
 
 /// How many faces are below each node.
@@ -407,7 +413,11 @@ fn faces_below(bvh: &Bvh2) -> Vec<usize> {
     for at in order.into_iter().rev() {
         let node = &bvh.nodes[at];
         let first = node.first_index as usize;
-        sizes[at] = if node.is_leaf() { node.prim_count as usize } else { sizes[first] + sizes[first + 1] };
+        sizes[at] = if node.is_leaf() {
+            node.prim_count as usize
+        } else {
+            sizes[first] + sizes[first + 1]
+        };
     }
     sizes
 }
@@ -419,7 +429,11 @@ const LARGEST_COORDINATE: f32 = 1e15;
 fn build_bvh(mesh: &TriMesh) -> Bvh2 {
     let bounds = mesh.aabb();
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
-    let scale = if largest > LARGEST_COORDINATE { LARGEST_COORDINATE / largest } else { 1.0 };
+    let scale = if largest > LARGEST_COORDINATE {
+        LARGEST_COORDINATE / largest
+    } else {
+        1.0
+    };
     let triangles: Vec<Triangle> = (0..mesh.faces().len() as u32)
         .map(|face| {
             let [v0, v1, v2] = mesh.triangle(face).map(|p| Vec3A::from(p * scale));
@@ -436,7 +450,9 @@ fn build_bvh(mesh: &TriMesh) -> Bvh2 {
     if scale != 1.0 {
         for node in bvh.nodes.iter_mut().filter(|node| node.is_leaf()) {
             let members = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-            let corners = bvh.primitive_indices[members].iter().flat_map(|&face| mesh.triangle(face));
+            let corners = bvh.primitive_indices[members]
+                .iter()
+                .flat_map(|&face| mesh.triangle(face));
             let bounds = Aabb::from_points(corners);
             node.set_aabb(obvhs::aabb::Aabb::new(bounds.min.into(), bounds.max.into()));
         }

@@ -113,9 +113,12 @@ impl<'m> NearestFaces<'m> {
         let mut found = vec![Nearest::none(Vec3::ZERO); points.len().min(MOST_POINTS)];
         for (points, out) in points.chunks(MOST_POINTS).zip(out.chunks_mut(MOST_POINTS)) {
             along_a_curve(points, &mut order);
-            order.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK)).for_each(|(order, out)| {
-                wide::run(Lookup { tree: &self.tree, points, order, out });
-            });
+            order
+                .par_chunks(CHUNK)
+                .zip(found.par_chunks_mut(CHUNK))
+                .for_each(|(order, out)| {
+                    wide::run(Lookup { tree: &self.tree, points, order, out });
+                });
             for (&at, nearest) in order.iter().zip(&found) {
                 out[at as usize] = *nearest;
             }
@@ -234,7 +237,9 @@ mod tests {
             move |t| {
                 let snap = |p: Vec3| lattice.map_or(p, |step| (p / step).round() * step);
                 let positions: Vec<Vec3> = t.into_iter().flatten().map(snap).collect();
-                let faces = (0..positions.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+                let faces = (0..positions.len() as u32 / 3)
+                    .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
+                    .collect();
                 TriMesh::from_faces(positions, faces).ok()
             },
         )
@@ -301,7 +306,9 @@ mod tests {
     /// Points around `from`, up to `spread` off on each axis.
     fn points_at(from: Vec3, spread: f32, n: u32) -> Vec<Vec3> {
         let off = |i: u32, k: u32| ((i * k) % 101) as f32 / 50.0 - 1.0;
-        (0..n).map(|i| from + spread * vec3(off(i, 7), off(i, 31), off(i, 57))).collect()
+        (0..n)
+            .map(|i| from + spread * vec3(off(i, 7), off(i, 31), off(i, 57)))
+            .collect()
     }
 
     #[test]
@@ -327,7 +334,10 @@ mod tests {
     #[test]
     fn a_mesh_far_from_the_origin_finds_the_same() {
         let mut parts = grid(20, 2.0, |x, y| x * y * 0.01).into_parts();
-        parts.positions.iter_mut().for_each(|p| *p += vec3(500_000.0, 5_400_000.0, 300.0));
+        parts
+            .positions
+            .iter_mut()
+            .for_each(|p| *p += vec3(500_000.0, 5_400_000.0, 300.0));
         let mesh = TriMesh::new(parts).unwrap();
         check(&mesh, &points_at(Vec3::ZERO, 10.0, 40));
         check(&mesh, &points_at(mesh.aabb().center(), 30.0, 40));
@@ -453,8 +463,9 @@ mod tests {
     fn the_number_of_threads_changes_nothing() {
         let m = grid(30, 0.1, |x, y| x * y);
         let faces = NearestFaces::new(&m);
-        let points: Vec<Vec3> =
-            (0..5000).map(|i| vec3((i % 71) as f32, (i % 97) as f32, 2.0) * 0.04).collect();
+        let points: Vec<Vec3> = (0..5000)
+            .map(|i| vec3((i % 71) as f32, (i % 97) as f32, 2.0) * 0.04)
+            .collect();
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let mut out = Vec::new();
@@ -468,14 +479,19 @@ mod tests {
     fn around(mesh: &TriMesh, points: u64, off: f32) -> Vec<Vec3> {
         let mut cloud = crate::PointCloud::default();
         crate::SurfaceSampler::new(mesh, crate::Density::Total(points), 3).sample(0..points, &mut cloud);
-        let moved = cloud.positions.iter().zip(&cloud.faces).enumerate().map(|(i, (&p, &face))| {
-            let p = p + mesh.normal(face) * (off * ((i % 5) as f32 - 2.0));
-            match i {
-                _ if i % 101 == 100 => Vec3::NAN,
-                _ if i % 37 == 36 => p * 3.0 - 5.0,
-                _ => p,
-            }
-        });
+        let moved = cloud
+            .positions
+            .iter()
+            .zip(&cloud.faces)
+            .enumerate()
+            .map(|(i, (&p, &face))| {
+                let p = p + mesh.normal(face) * (off * ((i % 5) as f32 - 2.0));
+                match i {
+                    _ if i % 101 == 100 => Vec3::NAN,
+                    _ if i % 37 == 36 => p * 3.0 - 5.0,
+                    _ => p,
+                }
+            });
         moved.collect()
     }
 

@@ -87,7 +87,9 @@ impl Triangles8 {
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> SortedTriangle {
         SortedTriangle::from_sorted(
-            self.corners.each_ref().map(|[x, y, z]| Vec3A::new(x[lane], y[lane], z[lane])),
+            self.corners
+                .each_ref()
+                .map(|[x, y, z]| Vec3A::new(x[lane], y[lane], z[lane])),
         )
     }
 

@@ -173,7 +173,10 @@ impl Footprint {
 
     /// How far the place (x, y) is from the floor, in metres: 0 on it, infinite if there is none.
     pub fn distance(&self, x: f64, y: f64) -> f64 {
-        self.polygons.iter().map(|p| p.distance(dvec2(x, y))).fold(f64::INFINITY, f64::min)
+        self.polygons
+            .iter()
+            .map(|p| p.distance(dvec2(x, y)))
+            .fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -199,8 +202,10 @@ fn alpha_shape(points: &[Vec2], alpha: f64) -> Footprint {
         return Footprint::default();
     };
     let mut part_of: Vec<Option<usize>> = vec![None; delaunay.num_all_faces()];
-    let is_floor: Vec<bool> =
-        delaunay.all_faces().map(|f| f.as_inner().is_some_and(|f| circumradius(f) <= alpha)).collect();
+    let is_floor: Vec<bool> = delaunay
+        .all_faces()
+        .map(|f| f.as_inner().is_some_and(|f| circumradius(f) <= alpha))
+        .collect();
 
     let mut parts = 0;
     for start in delaunay.inner_faces() {
@@ -212,7 +217,11 @@ fn alpha_shape(points: &[Vec2], alpha: f64) -> Footprint {
             if part_of[face.index()].replace(parts).is_none() {
                 let neighbors = face.adjacent_edges().map(|edge| edge.rev().face());
                 let on_floor = neighbors.into_iter().filter(|f| is_floor[f.index()]);
-                todo.extend(on_floor.filter_map(|f| f.as_inner()).filter(|f| part_of[f.index()].is_none()));
+                todo.extend(
+                    on_floor
+                        .filter_map(|f| f.as_inner())
+                        .filter(|f| part_of[f.index()].is_none()),
+                );
             }
         }
         parts += 1;

@@ -109,7 +109,11 @@ impl Polygon {
             // An edge without length has no t, but its end.
             (point - a - if t.is_nan() { DVec2::ZERO } else { edge * t }).length_squared()
         };
-        self.rings().flat_map(edges).map(squared).fold(f64::INFINITY, f64::min).sqrt()
+        self.rings()
+            .flat_map(edges)
+            .map(squared)
+            .fold(f64::INFINITY, f64::min)
+            .sqrt()
     }
 
     /// Cuts the polygon into counter-clockwise triangles whose corners are its own: indices into the outer
@@ -169,10 +173,16 @@ pub fn triangulate_face(corners: &[Vec3]) -> Result<Vec<[u32; 3]>, PolygonError>
     let up = if right.cross(up).dot(normal) < 0.0 { -up } else { up };
     let flat: Vec<DVec2> = local.iter().map(|p| DVec2::new(p.dot(right), p.dot(up))).collect();
     if let &[a, b, c, d] = flat.as_slice()
-        && [(a, b, c), (b, c, d), (c, d, a), (d, a, b)].iter().all(|(p, q, r)| (q - p).perp_dot(r - q) > 0.0)
+        && [(a, b, c), (b, c, d), (c, d, a), (d, a, b)]
+            .iter()
+            .all(|(p, q, r)| (q - p).perp_dot(r - q) > 0.0)
     {
         let short = local[0].distance_squared(local[2]) <= local[1].distance_squared(local[3]);
-        return Ok(if short { vec![[0, 1, 2], [0, 2, 3]] } else { vec![[0, 1, 3], [1, 2, 3]] });
+        return Ok(if short {
+            vec![[0, 1, 2], [0, 2, 3]]
+        } else {
+            vec![[0, 1, 3], [1, 2, 3]]
+        });
     }
     triangulate_rings(&flat, std::slice::from_ref(&(0..flat.len())), signed_area(&flat))
 }
@@ -235,8 +245,11 @@ fn triangulate_rings(
         }
     }
     borders.sort_unstable();
-    let borders: Vec<[usize; 2]> =
-        borders.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1).map(|same| same[0]).collect();
+    let borders: Vec<[usize; 2]> = borders
+        .chunk_by(|a, b| a == b)
+        .filter(|same| same.len() % 2 == 1)
+        .map(|same| same[0])
+        .collect();
 
     // From the outer face inwards, a border at a time.
     let mut inside: Vec<Option<bool>> = vec![None; cdt.num_all_faces()];
@@ -271,7 +284,9 @@ fn triangulate_rings(
         return Err(PolygonError::ZeroArea);
     }
     // Rings that turn over, or holes that are not inside, cover more than their area.
-    let extent = points.iter().fold(0.0, |e: f64, p| e.max((p - points[0]).abs().max_element()));
+    let extent = points
+        .iter()
+        .fold(0.0, |e: f64, p| e.max((p - points[0]).abs().max_element()));
     if (covered - area).abs() > 1e-9 * extent * extent {
         return Err(PolygonError::Overlap);
     }
@@ -295,7 +310,9 @@ mod tests {
     }
 
     fn lifted(ring: &[DVec2], world_from_plane: DMat3) -> Vec<Vec3> {
-        ring.iter().map(|p| (world_from_plane * dvec3(p.x, p.y, 0.4)).as_vec3()).collect()
+        ring.iter()
+            .map(|p| (world_from_plane * dvec3(p.x, p.y, 0.4)).as_vec3())
+            .collect()
     }
 
     fn triangle_area(corners: &[Vec3], [a, b, c]: [u32; 3]) -> DVec3 {
@@ -351,7 +368,9 @@ mod tests {
     fn a_face_has_so_many_corners_at_most() {
         let circle = |n: usize| -> Vec<Vec3> {
             let angle = |i: usize| i as f32 / n as f32 * std::f32::consts::TAU;
-            (0..n).map(|i| vec3(9.0 * angle(i).cos(), 9.0 * angle(i).sin(), 1.0)).collect()
+            (0..n)
+                .map(|i| vec3(9.0 * angle(i).cos(), 9.0 * angle(i).sin(), 1.0))
+                .collect()
         };
         assert_eq!(triangulate_face(&circle(MOST_CORNERS)).unwrap().len(), MOST_CORNERS - 2);
         let corners = MOST_CORNERS + 1;

@@ -187,7 +187,10 @@ impl Work for Draw<'_> {
         let mut patch = None;
         let mut awaited = Vec::with_capacity(BLOCK);
         let mut i = first;
-        let blocks = positions.chunks_mut(BLOCK).zip(colors.chunks_mut(BLOCK)).zip(faces.chunks_mut(BLOCK));
+        let blocks = positions
+            .chunks_mut(BLOCK)
+            .zip(colors.chunks_mut(BLOCK))
+            .zip(faces.chunks_mut(BLOCK));
         for ((positions, colors), faces) in blocks {
             for (k, ((point, color), face)) in positions.iter_mut().zip(&mut *colors).zip(faces).enumerate() {
                 let place = place(&mut rng, i);
@@ -273,8 +276,9 @@ mod tests {
         let cloud = draw(&sampler);
         let mut counts = vec![0.0; 17];
         cloud.faces.iter().for_each(|&f| counts[f as usize] += 1.0);
-        let expected: Vec<f64> =
-            (0..17).map(|f| mesh.area(f) / mesh.total_area() * cloud.len() as f64).collect();
+        let expected: Vec<f64> = (0..17)
+            .map(|f| mesh.area(f) / mesh.total_area() * cloud.len() as f64)
+            .collect();
         for (c, e) in counts.iter().zip(&expected) {
             assert!((c - e).abs() < 2.0, "{c} points where {e} were due");
         }
@@ -348,7 +352,11 @@ mod tests {
         let mesh = fan(9);
         let sampler = SurfaceSampler::new(&mesh, Density::Total(50_000), 11);
         let with = |threads| {
-            rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| draw(&sampler))
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap()
+                .install(|| draw(&sampler))
         };
         assert_eq!(with(1), with(2));
     }

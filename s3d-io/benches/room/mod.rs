@@ -44,8 +44,9 @@ fn uneven(u: f32, v: f32) -> (f32, [f32; 2]) {
 fn room() -> Raster<Seen> {
     let eye = vec3(3.1, 0.7, 1.5);
     let corner = vec3(6.0, 5.0, 3.0);
-    let balls: Vec<(Vec3, f32)> =
-        (0..24).map(|i| (vec3(0.5 + 0.24 * i as f32, 2.0 + (i * 7 % 12) as f32 * 0.25, 0.3), 0.3)).collect();
+    let balls: Vec<(Vec3, f32)> = (0..24)
+        .map(|i| (vec3(0.5 + 0.24 * i as f32, 2.0 + (i * 7 % 12) as f32 * 0.25, 0.3), 0.3))
+        .collect();
     let pixel = |x: u32, y: u32| {
         let (a, b) = ((x as f32 + 0.5) / SIZE as f32 - 0.5, (y as f32 + 0.5) / SIZE as f32 - 0.5);
         let d = vec3(1.3 * a + 0.2, 1.0 - 0.2 * a, -1.3 * b - 0.1);

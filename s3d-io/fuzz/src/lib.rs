@@ -92,7 +92,11 @@ pub fn start(name: &str) {
     fs::create_dir_all(&dir).expect("the folder can be made");
     // A pixel of a compressed image may take an eighth of a bit; a byte of deflated numbers becomes a
     // thousand.
-    let per_byte = if matches!(name, "texture" | "gltf" | "png" | "exr") { 32 << 10 } else { 4 << 10 };
+    let per_byte = if matches!(name, "texture" | "gltf" | "png" | "exr") {
+        32 << 10
+    } else {
+        4 << 10
+    };
     let target = Target { feed, dir, base: 256 << 20, per_byte };
     assert!(TARGET.set(target).is_ok(), "started twice");
 }

@@ -248,7 +248,9 @@ mod tests {
             ["a.jpg", "c d.png", "a.jpg", "7"]
         );
         // Half a point is no picture either.
-        let message = read_text(Path::new("i"), format!("{a}1.5 2.5 -1 3\n").as_bytes()).err().unwrap();
+        let message = read_text(Path::new("i"), format!("{a}1.5 2.5 -1 3\n").as_bytes())
+            .err()
+            .unwrap();
         assert!(message.to_string().contains("line 2: `1.5 2.5 -1 3`: a picture is"), "{message}");
     }
 
@@ -282,7 +284,9 @@ mod tests {
             ("2 0 0 0 0 0 0 0 1 a.jpg\n", "line 4: the quaternion"),
             ("2 1 0 0 0 0 inf 0 1 a.jpg\n", "line 4: a number"),
         ] {
-            let e = read_text(Path::new("images.txt"), (good.clone() + more).as_bytes()).err().unwrap();
+            let e = read_text(Path::new("images.txt"), (good.clone() + more).as_bytes())
+                .err()
+                .unwrap();
             assert!(e.to_string().contains(words), "{e}");
         }
         let bytes = binary(&[some_pose(0.0), some_pose(1.0)]);
@@ -292,6 +296,12 @@ mod tests {
         }
         let mut lying = bytes.clone();
         lying[..8].copy_from_slice(&u64::MAX.to_le_bytes());
-        assert!(read_binary(Path::new("i"), &lying).err().unwrap().to_string().contains("picture 3"));
+        assert!(
+            read_binary(Path::new("i"), &lying)
+                .err()
+                .unwrap()
+                .to_string()
+                .contains("picture 3")
+        );
     }
 }

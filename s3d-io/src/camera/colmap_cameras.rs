@@ -35,8 +35,11 @@ pub(crate) fn read_beside(images: &Path) -> Result<(PathBuf, HashMap<u32, Intrin
     let is_binary = images.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"));
     let path = images.with_file_name(if is_binary { "cameras.bin" } else { "cameras.txt" });
     let bytes = read_file(&path)?;
-    let cameras =
-        if is_binary { read_binary(&path, &bytes) } else { read_text(&path, &text_of(&bytes, &path)?) }?;
+    let cameras = if is_binary {
+        read_binary(&path, &bytes)
+    } else {
+        read_text(&path, &text_of(&bytes, &path)?)
+    }?;
     Ok((path, cameras))
 }
 
@@ -56,7 +59,10 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
         let whole = |word: &str| word.parse::<u32>().map_err(|_| fault(format!("{word:?}: {FORM}")));
         let (id, size) = (whole(id)?, [whole(width)?, whole(height)?]);
         let numbers: Vec<f64> = words
-            .map(|word| word.parse().map_err(|_| fault(format!("{word:?} is no number: {FORM}"))))
+            .map(|word| {
+                word.parse()
+                    .map_err(|_| fault(format!("{word:?} is no number: {FORM}")))
+            })
             .collect::<Result<_>>()?;
         let intrinsics = intrinsics(model, size, &numbers).map_err(fault)?;
         if cameras.insert(id, intrinsics).is_some() {
@@ -169,8 +175,12 @@ mod tests {
             let model = MODELS.iter().position(|(name, _)| *name == words[1]).unwrap();
             bytes.extend(words[0].parse::<u32>().unwrap().to_le_bytes());
             bytes.extend((model as u32).to_le_bytes());
-            words[2..4].iter().for_each(|w| bytes.extend(w.parse::<u64>().unwrap().to_le_bytes()));
-            words[4..].iter().for_each(|w| bytes.extend(w.parse::<f64>().unwrap().to_le_bytes()));
+            words[2..4]
+                .iter()
+                .for_each(|w| bytes.extend(w.parse::<u64>().unwrap().to_le_bytes()));
+            words[4..]
+                .iter()
+                .for_each(|w| bytes.extend(w.parse::<f64>().unwrap().to_le_bytes()));
         }
         bytes
     }
@@ -208,12 +218,16 @@ mod tests {
             ("9 PINHOLE 640 480 500 510 320 240", "line 2: there is a camera 9 already"),
         ] {
             let text = format!("9 SIMPLE_PINHOLE 640 480 500 320 240\n{line}\n");
-            let e = read_text(Path::new("cameras.txt"), text.as_bytes()).unwrap_err().to_string();
+            let e = read_text(Path::new("cameras.txt"), text.as_bytes())
+                .unwrap_err()
+                .to_string();
             assert!(e.contains(words), "{e}");
         }
         let bytes = binary(ALL);
         for length in [0, 9, 30, bytes.len() - 1] {
-            let e = read_binary(Path::new("cameras.bin"), &bytes[..length]).unwrap_err().to_string();
+            let e = read_binary(Path::new("cameras.bin"), &bytes[..length])
+                .unwrap_err()
+                .to_string();
             assert!(e.contains("cut off"), "{e}");
         }
         let mut odd = bytes;

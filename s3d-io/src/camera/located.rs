@@ -49,7 +49,9 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<PosedCamera>) -> Result<Ve
                 locations.push(ScanLocation { uuid, pose: pose.leveled(), line });
             }
             Some(&first) => {
-                let distance = locations.get(first).map_or(0.0, |first| first.pose.location.distance(at));
+                let distance = locations
+                    .get(first)
+                    .map_or(0.0, |first| first.pose.location.distance(at));
                 if distance > SAME_PLACE_M {
                     let message = format!(
                         "{}: uuid {uuid} is another picture's too, which was taken {distance:.3} m away",
@@ -87,7 +89,9 @@ pub(crate) fn pose_from_opencv(location: DVec3, right: DVec3, down: DVec3, forwa
 
 /// The rotation of a quaternion x y z w of any length.
 pub(crate) fn rotation(xyzw: [f64; 4]) -> std::result::Result<DQuat, String> {
-    let q = DVec4::from_array(xyzw).try_normalize().ok_or("the quaternion has no length")?;
+    let q = DVec4::from_array(xyzw)
+        .try_normalize()
+        .ok_or("the quaternion has no length")?;
     Ok(DQuat::from_vec4(q))
 }
 
@@ -128,7 +132,12 @@ mod tests {
         assert_eq!(locations.len(), 2);
         assert_eq!(locations[1].uuid, hex);
         assert!(locations.iter().all(|l| l.pose.up().abs_diff_eq(DVec3::Z, 1e-12)));
-        assert!(locations[0].pose.forward().abs_diff_eq(dvec3(-libm::sin(0.3), libm::cos(0.3), 0.0), 1e-12));
+        assert!(
+            locations[0]
+                .pose
+                .forward()
+                .abs_diff_eq(dvec3(-libm::sin(0.3), libm::cos(0.3), 0.0), 1e-12)
+        );
     }
 
     #[test]

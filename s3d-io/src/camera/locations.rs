@@ -32,7 +32,9 @@ const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a
 /// in it.
 pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocation>> {
     let turned = |mut pictures: Vec<PosedCamera>| {
-        pictures.iter_mut().for_each(|p| p.pose = moved(&p.pose, world_from_file));
+        pictures
+            .iter_mut()
+            .for_each(|p| p.pose = moved(&p.pose, world_from_file));
         pictures
     };
     if path.is_dir() {
@@ -50,7 +52,9 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
             return Err(Error::unsupported(path, format!("holds no scan locations: {FORMS}")));
         }
         let mut locations = read_matterport_locations(path)?;
-        locations.iter_mut().for_each(|l| l.pose = moved(&l.pose, world_from_file));
+        locations
+            .iter_mut()
+            .for_each(|l| l.pose = moved(&l.pose, world_from_file));
         // They have no lines.
         locations.iter_mut().for_each(|l| l.line = 0);
         return Ok(locations);
@@ -62,7 +66,9 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
         return located::locations_of(path, turned(nerfstudio::read(path)?));
     }
     let mut locations = read_cameras(path)?;
-    locations.iter_mut().for_each(|l| l.pose = moved(&l.pose, world_from_file));
+    locations
+        .iter_mut()
+        .for_each(|l| l.pose = moved(&l.pose, world_from_file));
     Ok(locations)
 }
 
@@ -157,6 +163,10 @@ mod tests {
         assert!(location.pose.location.abs_diff_eq(dvec3(10.0, 2.0, 1.0), 1e-12), "{:?}", location.pose);
         assert!(location.pose.forward().abs_diff_eq(DVec3::Y, 1e-12));
         let turned = moved(&Pose::level(DVec3::ZERO, 0.0), &DAffine3::from_quat(DQuat::from_rotation_z(0.5)));
-        assert!(turned.forward().abs_diff_eq(Pose::level(DVec3::ZERO, 0.5).forward(), 1e-12));
+        assert!(
+            turned
+                .forward()
+                .abs_diff_eq(Pose::level(DVec3::ZERO, 0.5).forward(), 1e-12)
+        );
     }
 }

@@ -85,10 +85,17 @@ impl PictureFolder {
         let mut files = BTreeMap::new();
         let mut folders = Vec::new();
         for entry in list(path)? {
-            if entry.is_dir() { folders.push(entry) } else { remember(&mut files, entry) }
+            if entry.is_dir() {
+                folders.push(entry)
+            } else {
+                remember(&mut files, entry)
+            }
         }
         for folder in folders {
-            list(&folder)?.into_iter().filter(|e| !e.is_dir()).for_each(|e| remember(&mut files, e));
+            list(&folder)?
+                .into_iter()
+                .filter(|e| !e.is_dir())
+                .for_each(|e| remember(&mut files, e));
         }
         Ok(Self { path: path.to_owned(), files })
     }
@@ -103,7 +110,10 @@ impl PictureFolder {
     }
 
     fn picture(&self, stem: &str) -> Option<PathBuf> {
-        ["jpg", "jpeg", "png"].iter().find_map(|e| self.find(&format!("{stem}.{e}"))).cloned()
+        ["jpg", "jpeg", "png"]
+            .iter()
+            .find_map(|e| self.find(&format!("{stem}.{e}")))
+            .cloned()
     }
 
     /// The locations that have a level capture's pose, by name: 32 lower-case hexadecimal digits.
@@ -123,7 +133,11 @@ impl PictureFolder {
         let found: [Option<PathBuf>; 6] = std::array::from_fn(|k| self.picture(&stem(k)));
         let missing = found.iter().enumerate().filter(|(_, path)| path.is_none());
         let missing: Vec<String> = missing.map(|(k, _)| format!("{}.jpg", stem(k))).collect();
-        if missing.is_empty() { Ok(found.map(Option::unwrap_or_default)) } else { Err(missing.join(", ")) }
+        if missing.is_empty() {
+            Ok(found.map(Option::unwrap_or_default))
+        } else {
+            Err(missing.join(", "))
+        }
     }
 
     /// A location's equirectangular photograph: `{uuid}.jpg` or `.png`, or as the data set was published,
@@ -131,7 +145,10 @@ impl PictureFolder {
     pub fn panorama(&self, uuid: &str) -> std::result::Result<PathBuf, String> {
         let published = || {
             let from = format!("camera_{uuid}_");
-            let names = self.files.range(from.clone()..).take_while(|(name, _)| name.starts_with(&from));
+            let names = self
+                .files
+                .range(from.clone()..)
+                .take_while(|(name, _)| name.starts_with(&from));
             let mut ours = names.filter(|(name, _)| name.contains("_frame_equirectangular_domain_rgb."));
             ours.next().map(|(_, path)| path.clone())
         };
@@ -414,7 +431,10 @@ mod tests {
         }
         fs::write(folder.0.path().join("p.txt"), [0xff, 0xff]).unwrap();
         assert!(
-            read_capture_pose(&folder.0.path().join("p.txt")).unwrap_err().to_string().contains("no text")
+            read_capture_pose(&folder.0.path().join("p.txt"))
+                .unwrap_err()
+                .to_string()
+                .contains("no text")
         );
     }
 
@@ -429,7 +449,9 @@ mod tests {
         );
         // OpenCV's projectPoints of (0.4, −0.3, 1.1) with these numbers.
         assert!(
-            lens.project(dvec3(0.4, -0.3, 1.1)).unwrap().abs_diff_eq(DVec2::new(OPENCV[0], OPENCV[1]), 1e-9)
+            lens.project(dvec3(0.4, -0.3, 1.1))
+                .unwrap()
+                .abs_diff_eq(DVec2::new(OPENCV[0], OPENCV[1]), 1e-9)
         );
         for (from, to, words) in [
             (" 0.03", "", "10 numbers"),
@@ -439,8 +461,9 @@ mod tests {
             ("1075.72", "0", "no lens: fx 0"),
             ("0.001", "x", "line 1: \"x\""),
         ] {
-            let message =
-                read_intrinsics(&folder.text("i.txt", &good.replacen(from, to, 1))).unwrap_err().to_string();
+            let message = read_intrinsics(&folder.text("i.txt", &good.replacen(from, to, 1)))
+                .unwrap_err()
+                .to_string();
             assert!(message.contains(words) && message.contains("i.txt"), "{to}: {message}");
         }
     }

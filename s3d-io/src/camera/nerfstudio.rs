@@ -119,7 +119,10 @@ fn at_frame(path: &Path, i: usize, name: &str, message: &str) -> Error {
 
 /// A matrix of 4 × 4 numbers, or of 3 × 4 without its last row.
 fn square(rows: &[Vec<f64>]) -> std::result::Result<[[f64; 4]; 4], String> {
-    let full = rows.iter().map(|row| <[f64; 4]>::try_from(row.as_slice()).ok()).collect::<Option<Vec<_>>>();
+    let full = rows
+        .iter()
+        .map(|row| <[f64; 4]>::try_from(row.as_slice()).ok())
+        .collect::<Option<Vec<_>>>();
     match full.as_deref() {
         Some(&[x, y, z]) => Ok([x, y, z, [0.0, 0.0, 0.0, 1.0]]),
         Some(&[x, y, z, w]) => Ok([x, y, z, w]),
@@ -193,7 +196,11 @@ impl CameraKeys {
             size.zip(angle).map(|(size, angle)| 0.5 * size / libm::tan(0.5 * angle))
         };
         let angles = [self.camera_angle_x, self.camera_angle_y];
-        if let Some(angle) = angles.into_iter().flatten().find(|angle| !(*angle > 0.0 && *angle < PI)) {
+        if let Some(angle) = angles
+            .into_iter()
+            .flatten()
+            .find(|angle| !(*angle > 0.0 && *angle < PI))
+        {
             return Err(format!("an angle of view of {angle} rad: it must be between 0 and π"));
         }
         let fx = self.fl_x.or_else(|| of_angle(self.w, self.camera_angle_x));
@@ -272,7 +279,13 @@ mod tests {
             let message = read_text(&document(matrix)).err().unwrap().to_string();
             assert!(message.contains(words), "{matrix}: {message}");
         }
-        assert!(read_text("{}").err().unwrap().to_string().contains("missing field `frames`"));
+        assert!(
+            read_text("{}")
+                .err()
+                .unwrap()
+                .to_string()
+                .contains("missing field `frames`")
+        );
     }
 
     #[test]

@@ -40,7 +40,9 @@ pub fn decode_picture(bytes: Vec<u8>, name: &Path) -> Result<Raster<[u8; 3]>> {
 /// As [`read_picture`].
 pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
     let file = BufReader::new(open_file(path)?);
-    let reader = ImageReader::new(file).with_guessed_format().map_err(|e| Error::io(path, "read", e))?;
+    let reader = ImageReader::new(file)
+        .with_guessed_format()
+        .map_err(|e| Error::io(path, "read", e))?;
     let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
     let size = guarded(|| reader.into_dimensions()).ok_or_else(|| failed("its header is damaged"))?;
     size.map_err(|e| failed(&e.to_string()))
@@ -54,7 +56,9 @@ pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
 /// As [`read_picture`].
 pub fn read_picture_turn(path: &Path) -> Result<u8> {
     let file = BufReader::new(open_file(path)?);
-    let reader = ImageReader::new(file).with_guessed_format().map_err(|e| Error::io(path, "read", e))?;
+    let reader = ImageReader::new(file)
+        .with_guessed_format()
+        .map_err(|e| Error::io(path, "read", e))?;
     let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
     let turn =
         guarded(|| reader.into_decoder()?.orientation()).ok_or_else(|| failed("its header is damaged"))?;
@@ -72,7 +76,8 @@ pub fn check_picture(path: &Path) -> Result<(u32, u32)> {
     let mut file = open_file(path)?;
     let length = file.metadata().map_err(failed)?.len();
     let mut tail = Vec::new();
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL))).map_err(failed)?;
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))
+        .map_err(failed)?;
     file.read_to_end(&mut tail).map_err(failed)?;
     // The last chunk of a PNG, the last mark of a JPEG.
     let has_end = tail.windows(4).any(|w| w == b"IEND") || tail.windows(2).any(|w| w == b"\xff\xd9");
@@ -115,7 +120,12 @@ mod tests {
         image.save_with_format(&path, ImageFormat::Png).unwrap();
         assert_eq!(read_picture_turn(&path).unwrap(), 1);
         std::fs::write(&path, b"none").unwrap();
-        assert!(read_picture_turn(&path).unwrap_err().to_string().contains("no picture that can be read"));
+        assert!(
+            read_picture_turn(&path)
+                .unwrap_err()
+                .to_string()
+                .contains("no picture that can be read")
+        );
     }
 
     #[test]

@@ -59,7 +59,11 @@ pub enum Distortion {
 impl Distortion {
     /// OpenCV's numbers; nothing if all are 0.
     pub(crate) fn opencv(numbers: [f64; 5]) -> Self {
-        if numbers == [0.0; 5] { Self::None } else { Self::OpenCv(numbers) }
+        if numbers == [0.0; 5] {
+            Self::None
+        } else {
+            Self::OpenCv(numbers)
+        }
     }
 }
 
@@ -238,7 +242,11 @@ impl PosedCamera {
             _ => return Err(IntrinsicsError::NoSize),
         };
         let [width, height] = size;
-        if width == 0 || height == 0 { Err(CameraError::NoPixels { width, height }.into()) } else { Ok(size) }
+        if width == 0 || height == 0 {
+            Err(CameraError::NoPixels { width, height }.into())
+        } else {
+            Ok(size)
+        }
     }
 
     /// Whether a lens bends its picture, which its [`camera`](Self::camera) does not.
@@ -343,6 +351,12 @@ mod tests {
         assert_eq!(panorama.camera(&none), Err(size));
         panorama.size = Some([64, 32]);
         panorama.pose = panorama.pose.turned(0.0, 0.1);
-        assert!(panorama.camera(&none).unwrap_err().to_string().contains("tilted by 5.7°"));
+        assert!(
+            panorama
+                .camera(&none)
+                .unwrap_err()
+                .to_string()
+                .contains("tilted by 5.7°")
+        );
     }
 }

@@ -56,11 +56,18 @@ struct ReadList {
 /// in it.
 pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<PosedCameras> {
     let ReadList { mut cameras, untracked, files, named: file } = read(path)?;
-    cameras.iter_mut().for_each(|camera| camera.pose = moved(&camera.pose, world_from_file));
-    cameras.iter().try_for_each(|camera| located::check_place(&file, camera))?;
+    cameras
+        .iter_mut()
+        .for_each(|camera| camera.pose = moved(&camera.pose, world_from_file));
+    cameras
+        .iter()
+        .try_for_each(|camera| located::check_place(&file, camera))?;
     if cameras.is_empty() {
-        let but =
-            if untracked > 0 { format!(" but {untracked} poses that are not known") } else { String::new() };
+        let but = if untracked > 0 {
+            format!(" but {untracked} poses that are not known")
+        } else {
+            String::new()
+        };
         return Err(Error::format(&file, format!("lists no camera{but}: {FORMS}")));
     }
     Ok(PosedCameras { cameras, untracked, files })
@@ -102,8 +109,14 @@ fn read(path: &Path) -> Result<ReadList> {
         let bytes = read_file(path)?;
         let text = text_of(&bytes, path)?;
         let mut lines = text.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
-        let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#")).unwrap_or_default();
-        if first.contains(&b',') { table::read_rows(path, &bytes)? } else { tum::read(path, &text)? }
+        let first = lines
+            .find(|line| !line.is_empty() && !line.starts_with(b"#"))
+            .unwrap_or_default();
+        if first.contains(&b',') {
+            table::read_rows(path, &bytes)?
+        } else {
+            tum::read(path, &text)?
+        }
     };
     Ok(known(cameras, files))
 }

@@ -42,7 +42,11 @@ pub(crate) fn find(dir: &Path) -> Result<Option<(PathBuf, NumberedFiles)>> {
 /// them as not known: they hold −∞; and the files that were read.
 pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera>, usize, Vec<PathBuf>)> {
     let intrinsics = scan.join("intrinsic").join("intrinsic_color.txt");
-    let optics = if intrinsics.exists() { Some(optics(&intrinsics)?) } else { None };
+    let optics = if intrinsics.exists() {
+        Some(optics(&intrinsics)?)
+    } else {
+        None
+    };
     let (mut cameras, mut untracked) = (Vec::new(), 0);
     let mut read: Vec<PathBuf> = optics.iter().map(|_| intrinsics.clone()).collect();
     for (number, path) in files {
@@ -60,20 +64,29 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
     // All pictures of a scan are of one size.
     if let Some(picture) = cameras.iter().find_map(|camera| camera.picture.as_deref()) {
         let (width, height) = read_picture_size(picture)?;
-        cameras.iter_mut().for_each(|camera| camera.size = Some([width, height]));
+        cameras
+            .iter_mut()
+            .for_each(|camera| camera.size = Some([width, height]));
     }
     Ok((cameras, untracked, read))
 }
 
 /// Whether a matrix holds an infinity or no number.
 fn is_unknown(bytes: &[u8]) -> bool {
-    let words = bytes.split(u8::is_ascii_whitespace).filter_map(|word| std::str::from_utf8(word).ok());
-    words.filter_map(|word| word.parse::<f64>().ok()).any(|number| !number.is_finite())
+    let words = bytes
+        .split(u8::is_ascii_whitespace)
+        .filter_map(|word| std::str::from_utf8(word).ok());
+    words
+        .filter_map(|word| word.parse::<f64>().ok())
+        .any(|number| !number.is_finite())
 }
 
 /// K in the upper left of a 4 × 4 or 3 × 3 matrix.
 fn optics(path: &Path) -> Result<Optics> {
-    let numbers: Vec<f64> = numbers(&read_file(path)?, path)?.into_iter().map(|(_, number)| number).collect();
+    let numbers: Vec<f64> = numbers(&read_file(path)?, path)?
+        .into_iter()
+        .map(|(_, number)| number)
+        .collect();
     let (fx, cx, fy, cy) = match *numbers.as_slice() {
         [fx, 0.0, cx, _, 0.0, fy, cy, _, 0.0, 0.0, 1.0, ..] if numbers.len() == 16 => (fx, cx, fy, cy),
         [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] => (fx, cx, fy, cy),
@@ -101,7 +114,9 @@ mod tests {
     fn scan() -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
-        ["pose", "intrinsic", "color"].iter().for_each(|name| fs::create_dir(at(name)).unwrap());
+        ["pose", "intrinsic", "color"]
+            .iter()
+            .for_each(|name| fs::create_dir(at(name)).unwrap());
         fs::write(at("pose/10.txt"), "1 0 0 4\n0 0 1 5\n0 -1 0 1.5\n0 0 0 1\n").unwrap();
         fs::write(at("pose/2.txt"), "1 0 0 4\n0 -1 0 5\n0 0 -1 1.5\n0 0 0 1\n").unwrap();
         fs::write(at("pose/3.txt"), "-inf -inf -inf -inf\n".repeat(4)).unwrap();

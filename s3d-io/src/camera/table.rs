@@ -71,7 +71,13 @@ pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
     let rows = read_rows(path, bytes)?;
     let written: Vec<String> = rows
         .iter()
-        .map(|row| row.name.chars().filter(|&c| c != '-').map(|c| c.to_ascii_lowercase()).collect())
+        .map(|row| {
+            row.name
+                .chars()
+                .filter(|&c| c != '-')
+                .map(|c| c.to_ascii_lowercase())
+                .collect()
+        })
         .collect();
     let uuids = written.iter().filter(|name| is_uuid(name)).count();
     if let (true, Some((row, _))) = (uuids > 0, rows.iter().zip(&written).find(|(_, name)| !is_uuid(name))) {
@@ -107,7 +113,9 @@ pub(crate) fn read_rows(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
             Some(header) => header,
             None => {
                 let is_name = |field: &[u8]| {
-                    [&b"uuid"[..], b"name", b"x"].iter().any(|n| field.eq_ignore_ascii_case(n))
+                    [&b"uuid"[..], b"name", b"x"]
+                        .iter()
+                        .any(|n| field.eq_ignore_ascii_case(n))
                 };
                 if record.iter().any(is_name) {
                     let read = Header::new(&record).map_err(|message| Error::line(path, line, message))?;
@@ -143,7 +151,10 @@ fn fields(text: &[u8]) -> csv::Result<ByteRecord> {
         return Ok(text.split(|b| *b == b',').map(<[u8]>::trim_ascii).collect());
     }
     let mut record = ByteRecord::new();
-    let mut reader = ReaderBuilder::new().has_headers(false).trim(Trim::All).from_reader(text);
+    let mut reader = ReaderBuilder::new()
+        .has_headers(false)
+        .trim(Trim::All)
+        .from_reader(text);
     reader.read_byte_record(&mut record)?;
     Ok(record)
 }
@@ -176,8 +187,10 @@ impl Header {
 
     fn new(record: &ByteRecord) -> std::result::Result<Self, String> {
         const FORM: &str = "uuid or name, x,y,z, and qx,qy,qz,qw or look_x,look_y,look_z or yaw,pitch";
-        let columns: Vec<String> =
-            record.iter().map(|field| String::from_utf8_lossy(field).to_ascii_lowercase()).collect();
+        let columns: Vec<String> = record
+            .iter()
+            .map(|field| String::from_utf8_lossy(field).to_ascii_lowercase())
+            .collect();
         let find = |name: &str| columns.iter().position(|column| column == name);
         let needed = |name: &str| {
             find(name).ok_or_else(|| format!("the header has no column {name}; it needs {FORM}"))
@@ -185,8 +198,10 @@ impl Header {
         let name = find("uuid").map_or_else(|| find("name").ok_or(()), Ok);
         let name = name.map_err(|()| format!("the header has no column uuid or name; it needs {FORM}"))?;
         let place = [needed("x")?, needed("y")?, needed("z")?];
-        let kinds: Vec<&&[&str]> =
-            TURNS.iter().filter(|names| names.iter().any(|n| find(n).is_some())).collect();
+        let kinds: Vec<&&[&str]> = TURNS
+            .iter()
+            .filter(|names| names.iter().any(|n| find(n).is_some()))
+            .collect();
         let turn = match kinds.as_slice() {
             [["qx", ..]] => Turn::Quaternion([needed("qx")?, needed("qy")?, needed("qz")?, needed("qw")?]),
             [["look_x", ..]] => Turn::Target([needed("look_x")?, needed("look_y")?, needed("look_z")?]),
@@ -195,8 +210,11 @@ impl Header {
             _ => return Err(format!("the header says twice how cameras are turned; it needs {FORM}")),
         };
         let known = |column: &str| {
-            let all =
-                COLUMNS.iter().chain(["name"].iter()).chain(TURNS.iter().copied().flatten()).chain(&CAMERA);
+            let all = COLUMNS
+                .iter()
+                .chain(["name"].iter())
+                .chain(TURNS.iter().copied().flatten())
+                .chain(&CAMERA);
             all.into_iter().any(|name| *name == column)
         };
         for (i, column) in columns.iter().enumerate() {
@@ -260,7 +278,11 @@ impl Row<'_> {
                 let target = self.vector(columns)?;
                 // Straight up or down the top of the image is north, as that of a heading of 0 is.
                 let flat = (target - at).truncate().length() < 1e-9 * (target - at).length();
-                let up = if flat { DVec3::Y * (at.z - target.z).signum() } else { DVec3::Z };
+                let up = if flat {
+                    DVec3::Y * (at.z - target.z).signum()
+                } else {
+                    DVec3::Z
+                };
                 Pose::look_at(at, target, up).map_err(|e| e.to_string())?
             }
             Turn::Heading { yaw, pitch } => {
@@ -342,7 +364,9 @@ mod tests {
         let named = read("scan_0,1,2,3,0,0,0,1\nroom 2/left,4,5,6,0,0,0,1\n").unwrap();
         assert_eq!(named[0].uuid, uuid_from_name("scan_0"));
         assert!(named.iter().all(|l| is_uuid(&l.uuid)) && named[0].uuid != named[1].uuid);
-        let twice = read("scan_0,1,2,3,0,0,0,1\nscan_0,4,5,6,0,0,0,1\n").unwrap_err().to_string();
+        let twice = read("scan_0,1,2,3,0,0,0,1\nscan_0,4,5,6,0,0,0,1\n")
+            .unwrap_err()
+            .to_string();
         assert!(twice.contains("location scan_0 is on line 1 already"), "{twice}");
         let nameless = read("scan_0,1,2,3,0,0,0,1\n,4,5,6,0,0,0,1\n").unwrap_err().to_string();
         assert!(nameless.contains("line 2: the location has no name"), "{nameless}");
@@ -356,7 +380,12 @@ mod tests {
         // As a camera at heading 0 that is tilted down, and up.
         for (location, pitch_deg) in [(&look[1], -90f64), (&look[2], 90.0)] {
             let tilted = Pose::level(DVec3::ZERO, 0.0).turned(0.0, pitch_deg.to_radians());
-            assert!(location.pose.world_from_camera.abs_diff_eq(tilted.world_from_camera, 1e-12));
+            assert!(
+                location
+                    .pose
+                    .world_from_camera
+                    .abs_diff_eq(tilted.world_from_camera, 1e-12)
+            );
         }
         let yaw = read("name,x,y,z,yaw,pitch\na,1,2,3,90,-30\n").unwrap();
         let expected = Pose::level(dvec3(1.0, 2.0, 3.0), 90f64.to_radians()).turned(0.0, -30f64.to_radians());
@@ -431,7 +460,12 @@ mod tests {
             let message = read(&(good.clone() + &text)).unwrap_err().to_string();
             assert!(message.contains(words), "{message}");
         }
-        assert!(read("uuid,x,y,z,qx,qy,qz,w\n").unwrap_err().to_string().contains("no column qw"));
+        assert!(
+            read("uuid,x,y,z,qx,qy,qz,w\n")
+                .unwrap_err()
+                .to_string()
+                .contains("no column qw")
+        );
         for empty in ["", "# nothing\n", "uuid,x,y,z,qx,qy,qz,qw\n"] {
             assert!(read(empty).unwrap_err().to_string().contains("no scan location"));
         }

@@ -22,8 +22,10 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
         }
         let fault = |message: String| Error::line(path, line, message);
         let form = || fault(format!("{}: {FORM}", quote(text)));
-        let words: Vec<&str> =
-            std::str::from_utf8(text).map_err(|_| form())?.split_ascii_whitespace().collect();
+        let words: Vec<&str> = std::str::from_utf8(text)
+            .map_err(|_| form())?
+            .split_ascii_whitespace()
+            .collect();
         let [name, numbers @ ..] = words.as_slice() else { return Err(form()) };
         let numbers: Option<Vec<f64>> = numbers.iter().map(|word| word.parse().ok()).collect();
         let is_time = name.parse::<f64>().is_ok_and(f64::is_finite);
@@ -59,7 +61,12 @@ mod tests {
         assert_eq!(names, ["1305031098.6659", "1305031098.6758"]);
         assert_eq!((cameras[0].line, cameras[0].pose.location), (3, dvec3(1.3563, 0.6305, 1.638)));
         let level = Pose::level(cameras[0].pose.location, 0.0);
-        assert!(cameras[0].pose.world_from_camera.abs_diff_eq(level.world_from_camera, 1e-7));
+        assert!(
+            cameras[0]
+                .pose
+                .world_from_camera
+                .abs_diff_eq(level.world_from_camera, 1e-7)
+        );
         assert!(cameras[1].pose.forward().abs_diff_eq(DVec3::Y, 1e-12), "{}", cameras[1].pose.forward());
         assert!(cameras[1].pose.right().abs_diff_eq(-DVec3::Z, 1e-12), "{}", cameras[1].pose.right());
     }
@@ -70,7 +77,12 @@ mod tests {
         let q = DQuat::from_mat3(&pose.opencv_from_world().transpose());
         let text = format!("0.5 1 -2 1.5 {} {} {} {}", q.x, q.y, q.z, q.w);
         let read = read(Path::new("t"), text.as_bytes()).unwrap();
-        assert!(read[0].pose.world_from_camera.abs_diff_eq(pose.world_from_camera, 1e-12));
+        assert!(
+            read[0]
+                .pose
+                .world_from_camera
+                .abs_diff_eq(pose.world_from_camera, 1e-12)
+        );
     }
 
     #[test]

@@ -185,6 +185,10 @@ impl AnnotatedInstance {
     /// Where its points are, for messages: the file, and which instance in it if it holds several.
     pub fn source(&self) -> String {
         let (path, part) = (self.path().display(), self.points.part());
-        if part.is_empty() { path.to_string() } else { format!("{path}, {part}") }
+        if part.is_empty() {
+            path.to_string()
+        } else {
+            format!("{path}, {part}")
+        }
     }
 }

@@ -130,7 +130,10 @@ impl<'a> Scan<'a> {
             let q = cloud.transform.clone().unwrap_or_default().rotation;
             return Err(Error::format(path, format!("has a scan whose pose has no rotation: {q:?}")));
         }
-        let room = cloud.name.clone().filter(|name| name.parse::<s3d_label::Room>().is_ok());
+        let room = cloud
+            .name
+            .clone()
+            .filter(|name| name.parse::<s3d_label::Room>().is_ok());
         Ok(Self {
             prototype,
             columns,
@@ -151,7 +154,9 @@ impl<'a> Scan<'a> {
     /// A number of a point; not a number if there is none.
     fn float(&self, values: &RawValues, i: usize) -> f64 {
         let value = values.get(i).zip(self.prototype.get(i));
-        value.and_then(|(value, record)| value.to_f64(&record.data_type).ok()).unwrap_or(f64::NAN)
+        value
+            .and_then(|(value, record)| value.to_f64(&record.data_type).ok())
+            .unwrap_or(f64::NAN)
     }
 
     fn value(&self, values: &RawValues, i: usize) -> Value<'static> {
@@ -273,14 +278,19 @@ impl Cloud for E57Cloud<'_> {
 
 /// The box of all scans at their places, if each says where its points are.
 fn bounds_of(scans: &[PointCloud]) -> Option<Bounds> {
-    scans.iter().filter(|scan| scan.records > 0).try_fold(Bounds::EMPTY, |all, scan| {
-        let b = scan.cartesian_bounds.as_ref()?;
-        let [x, y, z] = [[b.x_min?, b.x_max?], [b.y_min?, b.y_max?], [b.z_min?, b.z_max?]];
-        let (rotation, translation) = pose_of(scan);
-        let corners =
-            x.into_iter().flat_map(|x| y.map(|y| (x, y))).flat_map(|(x, y)| z.map(|z| dvec3(x, y, z)));
-        Some(all.union(Bounds::of(corners.map(|p| rotation.normalize() * p + translation))))
-    })
+    scans
+        .iter()
+        .filter(|scan| scan.records > 0)
+        .try_fold(Bounds::EMPTY, |all, scan| {
+            let b = scan.cartesian_bounds.as_ref()?;
+            let [x, y, z] = [[b.x_min?, b.x_max?], [b.y_min?, b.y_max?], [b.z_min?, b.z_max?]];
+            let (rotation, translation) = pose_of(scan);
+            let corners = x
+                .into_iter()
+                .flat_map(|x| y.map(|y| (x, y)))
+                .flat_map(|(x, y)| z.map(|z| dvec3(x, y, z)));
+            Some(all.union(Bounds::of(corners.map(|p| rotation.normalize() * p + translation))))
+        })
 }
 
 /// Turn, of any length, and place of a scan.

@@ -97,7 +97,10 @@ fn fitting_offset(points: Bounds, mesh: Bounds) -> DVec3 {
         let (exact, room) = (exact[axis], room[axis]);
         let steps = [1e6, 1e5, 1e4, 1e3, 1e2, 1e1, 1.0];
         let round = |step: f64| (exact / step).round() * step;
-        let found = steps.into_iter().map(round).find(|rounded| (rounded - exact).abs() <= room);
+        let found = steps
+            .into_iter()
+            .map(round)
+            .find(|rounded| (rounded - exact).abs() <= room);
         // Adding 0 turns −0 into 0.
         found.unwrap_or((exact * 1e3).round() / 1e3) + 0.0
     }))

@@ -120,8 +120,10 @@ impl PointBlocks for BlocksInMemory<'_> {
         let end = self.next.saturating_add(points).min(positions.len());
         let range = self.next..end;
         // The lengths were compared when the points were taken.
-        out.positions.extend_from_slice(positions.get(range.clone()).unwrap_or_default());
-        out.colors.extend_from_slice(colors.get(range.clone()).unwrap_or_default());
+        out.positions
+            .extend_from_slice(positions.get(range.clone()).unwrap_or_default());
+        out.colors
+            .extend_from_slice(colors.get(range.clone()).unwrap_or_default());
         out.faces.extend_from_slice(faces.get(range).unwrap_or_default());
         self.next = end;
         Ok(end < positions.len())

@@ -86,7 +86,9 @@ fn of_numbers(
                 continue;
             }
             let class = class_tags.number(class).ok_or_else(too_many)?;
-            let instance = instances.map_or(NO_LABEL, |column| column[face as usize]).max(NO_INSTANCE);
+            let instance = instances
+                .map_or(NO_LABEL, |column| column[face as usize])
+                .max(NO_INSTANCE);
             let group = *index.entry((room, class, instance)).or_insert_with(|| {
                 groups.push(Group { room, class, instance, file: source, points: 0 });
                 groups.len() as u32 - 1
@@ -155,15 +157,26 @@ mod tests {
                 let _ = writeln!(
                     ply,
                     "{}",
-                    if of_vertices { format!(" {class} {instance}") } else { String::new() }
+                    if of_vertices {
+                        format!(" {class} {instance}")
+                    } else {
+                        String::new()
+                    }
                 );
             }
         }
         for (i, (class, instance)) in labels.iter().enumerate() {
             let c = 4 * i;
             let _ = write!(ply, "4 {c} {} {} {}", c + 1, c + 2, c + 3);
-            let _ =
-                writeln!(ply, "{}", if of_vertices { String::new() } else { format!(" {class} {instance}") });
+            let _ = writeln!(
+                ply,
+                "{}",
+                if of_vertices {
+                    String::new()
+                } else {
+                    format!(" {class} {instance}")
+                }
+            );
         }
         ply
     }
@@ -239,14 +252,17 @@ mod tests {
         let path = dir.path().join("scan.ply");
         let message = |text: &str, options: &AnnotationOptions| {
             fs::write(&path, text).unwrap();
-            Annotations::of_mesh(&read_mesh(&path, UpAxis::Z).unwrap(), options).unwrap_err().to_string()
+            Annotations::of_mesh(&read_mesh(&path, UpAxis::Z).unwrap(), options)
+                .unwrap_err()
+                .to_string()
         };
         let good = strip(&[(2, 1), (9, 1)], false);
         assert!(message(&good, &options()).contains('9'));
         let no_room = AnnotationOptions { room: None, ..options() };
         assert!(message(&strip(&[(2, 1)], false), &no_room).contains("room"));
-        let plain =
-            strip(&[(2, 1)], false).replace("int label", "int foo").replace("int instance", "int bar");
+        let plain = strip(&[(2, 1)], false)
+            .replace("int label", "int foo")
+            .replace("int instance", "int bar");
         assert!(message(&plain, &options()).contains("came without labels"));
         let objects = strip(&[(2, 1)], false).replace("int label", "int foo");
         assert!(message(&objects, &options()).contains("none of classes"));

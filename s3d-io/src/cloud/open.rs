@@ -67,7 +67,9 @@ impl Annotations {
                 all.join(Self::from_tree(path, options)?)?;
             } else if is_mat(path) {
                 let area = Self::mat(Source::file(path), options)?;
-                let gap = options.mesh_bounds.and_then(|mesh| area.frame_gap(options.offset_m, mesh));
+                let gap = options
+                    .mesh_bounds
+                    .and_then(|mesh| area.frame_gap(options.offset_m, mesh));
                 if let Some(gap) = gap {
                     return Err(refusal(path, &gap));
                 }
@@ -183,8 +185,12 @@ impl Annotations {
             },
         )?;
         if let Some(mesh) = options.mesh_bounds {
-            let files: Vec<&Path> =
-                tree.rooms.iter().flat_map(|r| &r.instances).map(|i| i.path.as_path()).collect();
+            let files: Vec<&Path> = tree
+                .rooms
+                .iter()
+                .flat_map(|r| &r.instances)
+                .map(|i| i.path.as_path())
+                .collect();
             refuse_far_tree(dir, &files, offset_m, mesh)?;
         }
         let rooms = tree.rooms.into_iter().map(|room| AnnotatedRoom {
@@ -247,7 +253,11 @@ fn bounds_of(cloud: &PointCloud, offset_m: DVec3) -> [DVec3; 2] {
 /// The reader of a cloud, by the file's name.
 fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn Cloud + 'a>> {
     let what = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
     if what.is_dir() || name.ends_with(".aggregation.json") {
         #[cfg(feature = "scannet")]
         return Ok(Box::new(crate::cloud::scannet::ScannetCloud::open(path)?));
@@ -264,7 +274,11 @@ fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn
 )]
 fn table(source: Source, options: &AnnotationOptions) -> Result<Box<dyn Cloud + '_>> {
     let path = source.name().to_owned();
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
     match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
         #[cfg(feature = "ply")]
         "ply" => Ok(Box::new(crate::cloud::ply::read::PlyCloud::new(source, options))),
@@ -334,7 +348,11 @@ impl InstancePoints for TextPoints {
     }
 
     fn copy_to(&self) -> Option<PathBuf> {
-        Some(self.spool_dir.as_ref().map_or_else(std::env::temp_dir, |dir| (**dir).clone()))
+        Some(
+            self.spool_dir
+                .as_ref()
+                .map_or_else(std::env::temp_dir, |dir| (**dir).clone()),
+        )
     }
 }
 
@@ -397,7 +415,10 @@ mod tests {
     fn lines_that_are_skipped_are_counted_with_the_first_place() {
         let a = tree(&[("WC_1/Annotations/wall_1.txt", "1 2 3 4 5 6\n1 2 3\x10 4 5 6\nx\n1 1 1 1 1 1\n")]);
         let strict = open(&[&a], &AnnotationOptions::default()).unwrap();
-        let message = strict.rooms[0].instances[0].read(&mut PointCloud::default()).unwrap_err().to_string();
+        let message = strict.rooms[0].instances[0]
+            .read(&mut PointCloud::default())
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("wall_1.txt, line 2"), "{message}");
         let skip = AnnotationOptions { on_fault: OnFault::Skip, ..AnnotationOptions::default() };
         let lenient = open(&[&a], &skip).unwrap();

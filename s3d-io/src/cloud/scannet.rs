@@ -198,7 +198,8 @@ impl ScannetCloud {
             })?;
         let segments_name = name_of(&segments);
         let mesh = longest(&dir, |name| {
-            name.strip_suffix(".ply").is_some_and(|stem| segments_name.starts_with(stem))
+            name.strip_suffix(".ply")
+                .is_some_and(|stem| segments_name.starts_with(stem))
         })
         .ok_or_else(|| {
             let stem = segments_name.split(".").next().unwrap_or_default();
@@ -210,15 +211,20 @@ impl ScannetCloud {
 
 /// The only file with such a name.
 fn sole(dir: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
-    let mut all =
-        std::fs::read_dir(dir).ok()?.filter_map(|e| Some(e.ok()?.path())).filter(|p| fits(&name_of(p)));
+    let mut all = std::fs::read_dir(dir)
+        .ok()?
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|p| fits(&name_of(p)));
     let first = all.next()?;
     all.next().is_none().then_some(first)
 }
 
 /// The file with the longest such name.
 fn longest(dir: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
-    let all = std::fs::read_dir(dir).ok()?.filter_map(|e| Some(e.ok()?.path())).filter(|p| fits(&name_of(p)));
+    let all = std::fs::read_dir(dir)
+        .ok()?
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|p| fits(&name_of(p)));
     all.max_by_key(|p| (name_of(p).len(), name_of(p)))
 }
 
@@ -233,7 +239,10 @@ impl Cloud for ScannetCloud {
 
     fn class_of(&self, tag: &Tag) -> Option<Class> {
         let Tag::Name(name) = tag else { return None };
-        CATEGORIES.iter().find(|(_, names)| names.contains(&name.as_str())).map(|(class, _)| *class)
+        CATEGORIES
+            .iter()
+            .find(|(_, names)| names.contains(&name.as_str()))
+            .map(|(class, _)| *class)
     }
 
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {

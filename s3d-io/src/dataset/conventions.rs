@@ -101,7 +101,9 @@ impl FromStr for XyzType {
     type Err = UnknownWord;
 
     fn from_str(word: &str) -> std::result::Result<Self, UnknownWord> {
-        let found = [Self::Half, Self::Float, Self::None].into_iter().find(|t| t.name() == word);
+        let found = [Self::Half, Self::Float, Self::None]
+            .into_iter()
+            .find(|t| t.name() == word);
         found.ok_or_else(|| UnknownWord { word: word.to_owned(), valid: "half, float and none" })
     }
 }
@@ -141,8 +143,10 @@ impl Conventions {
     /// [`Error::Io`].
     pub fn write(&self, path: &Path, offsets: &WorldOffsets) -> Result<u64> {
         let mut json = self.to_json();
-        if let Some(world) =
-            json.get_mut("world").and_then(Value::as_object_mut).filter(|_| !offsets.is_empty())
+        if let Some(world) = json
+            .get_mut("world")
+            .and_then(Value::as_object_mut)
+            .filter(|_| !offsets.is_empty())
         {
             world.insert("offset_m".to_owned(), json!(offsets));
             world.insert("frame_of_scan".to_owned(), json!("world + offset_m of the area, in f64"));
@@ -276,7 +280,11 @@ pub fn read_conventions(path: &Path) -> Result<Conventions> {
             format!("normals in {:?} axes are not known: paper and opencv are", file.normal.axes),
         )
     })?;
-    let xyz = file.global_xyz.kind.parse().map_err(|e: UnknownWord| Error::format(path, e.to_string()))?;
+    let xyz = file
+        .global_xyz
+        .kind
+        .parse()
+        .map_err(|e: UnknownWord| Error::format(path, e.to_string()))?;
     Ok(Conventions { depth_units, normal_axes, xyz })
 }
 

@@ -76,7 +76,9 @@ pub fn write_face_votes(path: &Path, columns: &FaceVoteColumns) -> Result<u64> {
         archive.array("farthest_m", "<f4", &[faces as u64], farthest)?;
         archive.finish()
     };
-    write(AtomicFile::create(path)?).map_err(|e| Error::io(path, "write", e))?.commit()
+    write(AtomicFile::create(path)?)
+        .map_err(|e| Error::io(path, "write", e))?
+        .commit()
 }
 
 /// Reads what [`write_face_votes`] wrote.

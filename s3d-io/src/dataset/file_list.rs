@@ -61,7 +61,11 @@ impl FileRecord {
     pub fn check_size(&self, root: &Path) -> Result<()> {
         let path = self.path_in(root);
         let found = regular_size(&path)?;
-        if found == self.bytes { Ok(()) } else { Err(self.other_size(&path, found)) }
+        if found == self.bytes {
+            Ok(())
+        } else {
+            Err(self.other_size(&path, found))
+        }
     }
 
     /// Whether the file in the data set in `root` is the one that was recorded. It is read, unless its size
@@ -115,7 +119,11 @@ impl FileRecord {
         if bytes != self.bytes {
             return Err(self.other_size(path, bytes));
         }
-        if sum == self.xxh3_128 { Ok(()) } else { Err(Error::format(path, self.other_content(sum))) }
+        if sum == self.xxh3_128 {
+            Ok(())
+        } else {
+            Err(Error::format(path, self.other_content(sum)))
+        }
     }
 
     fn other_size(&self, path: &Path, found: u64) -> Error {
@@ -239,9 +247,15 @@ pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileR
     for number in 1u64.. {
         let fault = |message: String| Err(Error::line(path, number, message));
         line.clear();
-        let read = Read::take(&mut lines, LONGEST_LINE).read_until(b'\n', &mut line).map_err(failed)?;
+        let read = Read::take(&mut lines, LONGEST_LINE)
+            .read_until(b'\n', &mut line)
+            .map_err(failed)?;
         if read == 0 {
-            return if number == 1 { fault("is empty".to_owned()) } else { Ok(records) };
+            return if number == 1 {
+                fault("is empty".to_owned())
+            } else {
+                Ok(records)
+            };
         }
         let Some(text) = line.strip_suffix(b"\n") else {
             return fault("is cut off: it does not end with a line feed".to_owned());
@@ -259,7 +273,10 @@ pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileR
             Ok(record) => record,
             Err(message) => return fault(message),
         };
-        if records.last().is_some_and(|last| last.path.as_bytes() >= record.path.as_bytes()) {
+        if records
+            .last()
+            .is_some_and(|last| last.path.as_bytes() >= record.path.as_bytes())
+        {
             return fault(format!("{:?} does not sort behind the path before it", record.path));
         }
         // Two names that a file system without upper and lower case takes for one.
@@ -288,7 +305,9 @@ fn parse_line(text: &str) -> std::result::Result<FileRecord, String> {
     check_path(path)?;
     let size: Option<u64> = bytes.parse().ok().filter(|size: &u64| size.to_string() == bytes);
     let size = size.ok_or_else(|| format!("{bytes:?} is no number of bytes"))?;
-    let xxh3_128 = sum.parse().map_err(|e: crate::fs::checksum::BadChecksum| e.to_string())?;
+    let xxh3_128 = sum
+        .parse()
+        .map_err(|e: crate::fs::checksum::BadChecksum| e.to_string())?;
     Ok(FileRecord { path: path.to_owned(), bytes: size, xxh3_128 })
 }
 
@@ -321,7 +340,10 @@ mod tests {
         assert_eq!(read_file_list(&path).unwrap(), []);
         records.push(record("Z", b""));
         assert!(
-            write_file_list(&path, &records).unwrap_err().to_string().contains("\"Z\" would be in it twice")
+            write_file_list(&path, &records)
+                .unwrap_err()
+                .to_string()
+                .contains("\"Z\" would be in it twice")
         );
         assert!(write_file_list(&path, &[record("../x", b"")]).is_err());
     }
@@ -339,7 +361,10 @@ mod tests {
         assert_eq!((record.fault(root), record.read(root).unwrap()), (None, b"content".to_vec()));
         let pieces = || {
             let mut all = Vec::new();
-            record.open(root)?.read_to_end(&mut all).map_err(|e| Error::io(&path, "read", e))?;
+            record
+                .open(root)?
+                .read_to_end(&mut all)
+                .map_err(|e| Error::io(&path, "read", e))?;
             Ok(all)
         };
         assert_eq!(pieces().unwrap(), b"content");
@@ -404,7 +429,12 @@ mod tests {
             assert!(message.contains(words) && message.contains("files.csv"), "{text:?}: {message}");
         }
         write_bytes(&path, b"path,bytes,xxh3_128\n\xff,0,0\n").unwrap();
-        assert!(read_file_list(&path).unwrap_err().to_string().contains("line 2: is no text"));
+        assert!(
+            read_file_list(&path)
+                .unwrap_err()
+                .to_string()
+                .contains("line 2: is no text")
+        );
         assert!(matches!(read_file_list(&dir.path().join("gone")), Err(Error::Io { .. })));
     }
 }

@@ -77,7 +77,10 @@ pub fn dataset_images(layout: &Layout, area: u32) -> Result<Vec<DatasetImage>> {
                 let file_name = entry.map_err(|e| Error::io(&folder, "read", e))?.file_name();
                 let Some(name) = file_name.to_str().and_then(ImageName::parse) else { continue };
                 if name.domain == domain && name.frame.folder() == kind.folder() {
-                    found.entry((name.uuid, name.room, name.frame)).or_default().push(domain);
+                    found
+                        .entry((name.uuid, name.room, name.frame))
+                        .or_default()
+                        .push(domain);
                 }
             }
         }
@@ -103,7 +106,9 @@ pub fn check_images_complete(layout: &Layout, images: &[DatasetImage]) -> Result
         });
     }
     for image in images {
-        let missing = domains.get(&kind(image)).and_then(|all| all.iter().find(|d| !image.has(**d)));
+        let missing = domains
+            .get(&kind(image))
+            .and_then(|all| all.iter().find(|d| !image.has(**d)));
         if let Some((missing, there)) = missing.zip(image.domains.first()) {
             let path = image.path(layout, *missing);
             let there = image.relative_path(*there);
@@ -187,7 +192,9 @@ pub fn read_photographs(path: &Path) -> Result<Vec<PhotographRecord>> {
 pub fn read_png_size(path: &Path) -> Result<(u32, u32)> {
     let mut head = Vec::with_capacity(24);
     let file = open_file(path)?;
-    file.take(24).read_to_end(&mut head).map_err(|e| Error::io(path, "read", e))?;
+    file.take(24)
+        .read_to_end(&mut head)
+        .map_err(|e| Error::io(path, "read", e))?;
     let Ok(head) = <[u8; 24]>::try_from(head) else {
         return Err(Error::format(path, "the PNG file ends too early"));
     };
@@ -285,7 +292,12 @@ mod tests {
         let records = read_photographs(&path).unwrap();
         assert_eq!((records[0].agreement, records[0].chance, records[0].masked), (Some(0.5), None, 0.25));
         write_bytes(&path, text.replace("\"a\"", "\"../a\"").as_bytes()).unwrap();
-        assert!(read_photographs(&path).unwrap_err().to_string().contains("\"../a\" is no uuid"));
+        assert!(
+            read_photographs(&path)
+                .unwrap_err()
+                .to_string()
+                .contains("\"../a\" is no uuid")
+        );
     }
 
     #[test]
@@ -298,6 +310,11 @@ mod tests {
         let views = read_views(&path).unwrap();
         assert_eq!((views[0].candidate, views[0].frame_num, views[0].yaw_rad), (3, None, 1.5));
         write_bytes(&path, text.replace("\"candidate\": 3,", "").as_bytes()).unwrap();
-        assert!(read_views(&path).unwrap_err().to_string().contains("missing field `candidate`"));
+        assert!(
+            read_views(&path)
+                .unwrap_err()
+                .to_string()
+                .contains("missing field `candidate`")
+        );
     }
 }

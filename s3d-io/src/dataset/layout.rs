@@ -63,7 +63,9 @@ impl<'de> Deserialize<'de> for Frame {
             }
             fn visit_u64<E: de::Error>(self, number: u64) -> Result<Frame, E> {
                 let small = u32::try_from(number);
-                small.map(Frame::View).map_err(|_| E::invalid_value(de::Unexpected::Unsigned(number), &self))
+                small
+                    .map(Frame::View)
+                    .map_err(|_| E::invalid_value(de::Unexpected::Unsigned(number), &self))
             }
             fn visit_str<E: de::Error>(self, word: &str) -> Result<Frame, E> {
                 parse_frame(word).ok_or_else(|| E::invalid_value(de::Unexpected::Str(word), &self))
@@ -78,7 +80,11 @@ fn parse_frame(word: &str) -> Option<Frame> {
         return Some(Frame::Panorama);
     }
     let digits = word.bytes().all(|b| b.is_ascii_digit()) && (word == "0" || !word.starts_with('0'));
-    if digits { word.parse().ok().map(Frame::View) } else { None }
+    if digits {
+        word.parse().ok().map(Frame::View)
+    } else {
+        None
+    }
 }
 
 /// Whether `uuid` can stand in file names: 1 to 64 ASCII letters, digits and hyphens, and nowhere "rgb".
@@ -183,8 +189,10 @@ impl Layout {
     /// What a data set of these areas has in its folder: the folders of the areas and of their S3DIS trees,
     /// and its tables; the manifest last. Anything else there is somebody else's.
     pub fn entries(&self, areas: &[u32]) -> Vec<PathBuf> {
-        let mut entries: Vec<PathBuf> =
-            areas.iter().flat_map(|a| [self.area_dir(*a), self.s3dis_area_dir(*a)]).collect();
+        let mut entries: Vec<PathBuf> = areas
+            .iter()
+            .flat_map(|a| [self.area_dir(*a), self.s3dis_area_dir(*a)])
+            .collect();
         entries.extend([self.labels_json(), self.taxonomy_json(), self.utils_py()]);
         entries.extend([self.class_legend_csv(), self.class_legend_png()]);
         entries.extend([self.pose_schema(), self.manifest_schema()]);
@@ -355,7 +363,8 @@ impl Layout {
 
     /// `splits/fold_1_train.txt` or `splits/fold_1_test.txt`: the panoramas of one side of a fold.
     pub fn list_of_fold(&self, fold: u32, train: bool) -> PathBuf {
-        self.lists_dir().join(format!("fold_{fold}_{}.txt", if train { "train" } else { "test" }))
+        self.lists_dir()
+            .join(format!("fold_{fold}_{}.txt", if train { "train" } else { "test" }))
     }
 
     /// `splits/all.txt`: all panoramas.
@@ -480,7 +489,11 @@ mod tests {
         }
         assert!(!is_valid_uuid("a_b") && !is_valid_uuid("aRgb1") && is_valid_uuid("5c29-59c3"));
         assert!(is_valid_uuid(&"5".repeat(64)) && !is_valid_uuid(&"5".repeat(65)));
-        assert!(["", "..", "a/b", "a\\b", "a\0", "/", "ä"].iter().all(|uuid| !is_valid_uuid(uuid)));
+        assert!(
+            ["", "..", "a/b", "a\\b", "a\0", "/", "ä"]
+                .iter()
+                .all(|uuid| !is_valid_uuid(uuid))
+        );
         assert!(!is_valid_room("office") && !is_valid_room("open_space_1") && is_valid_room("WC_1"));
     }
 
@@ -498,8 +511,9 @@ mod tests {
             assert_eq!(rgb.matches("rgb").count(), 2);
             for other in Domain::ALL.into_iter().filter(|&d| d != Domain::Rgb) {
                 assert!(!path(other).contains("rgb"));
-                let swapped =
-                    rgb.replace("rgb", other.folder()).replace(".png", &format!(".{}", other.extension()));
+                let swapped = rgb
+                    .replace("rgb", other.folder())
+                    .replace(".png", &format!(".{}", other.extension()));
                 let expected = path(other).replace(
                     &format!("_domain_{}.", other.suffix()),
                     &format!("_domain_{}.", other.folder()),

@@ -154,7 +154,10 @@ mod tests {
             assert_eq!(bytes[extra..].starts_with(&[1, 0, 16, 0, 3, 0, 0, 0]), is_large);
             let mut zip = zip::ZipArchive::new(io::Cursor::new(bytes)).unwrap();
             let mut text = String::new();
-            zip.by_name("point_index.npy").unwrap().read_to_string(&mut text).unwrap();
+            zip.by_name("point_index.npy")
+                .unwrap()
+                .read_to_string(&mut text)
+                .unwrap();
             assert_eq!(text, "abc");
         }
     }

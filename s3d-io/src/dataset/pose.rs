@@ -252,7 +252,12 @@ mod tests {
             assert_eq!(read_pose(&path).unwrap(), moved);
             file.write(&path).unwrap();
             assert_eq!(read_pose(&path).unwrap(), file);
-            assert!((file.pose().world_from_camera - camera.pose.world_from_camera).col(0).length() < 1e-12);
+            assert!(
+                (file.pose().world_from_camera - camera.pose.world_from_camera)
+                    .col(0)
+                    .length()
+                    < 1e-12
+            );
 
             let text = std::fs::read_to_string(&path).unwrap();
             let places: Vec<_> = [
@@ -272,7 +277,11 @@ mod tests {
             .map(|key| text.find(&format!("\"{key}\":")).unwrap())
             .to_vec();
             assert!(places.is_sorted());
-            let frame_num = if frame == Frame::Panorama { "\"equirectangular\"" } else { "3" };
+            let frame_num = if frame == Frame::Panorama {
+                "\"equirectangular\""
+            } else {
+                "3"
+            };
             assert!(text.contains(&format!("\"frame_num\":{frame_num},\"room\":\"WC_1_4\"")));
             assert!(!text.contains("-0.0,") && !text.contains("rgb"));
         }
@@ -293,7 +302,9 @@ mod tests {
             ("-15.914589881896973]]", "-15.914589881896973], [1, 0, 0, 1]]", "camera_rt_matrix has 4 rows"),
             ("41,", "-41,", "expected a frame number"),
         ] {
-            let e = serde_json::from_str::<PoseFile>(&GENUINE.replace(from, to)).unwrap_err().to_string();
+            let e = serde_json::from_str::<PoseFile>(&GENUINE.replace(from, to))
+                .unwrap_err()
+                .to_string();
             assert!(e.contains(message), "{e}");
         }
     }

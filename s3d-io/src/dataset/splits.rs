@@ -47,7 +47,11 @@ pub fn read_splits(path: &Path) -> Result<Vec<Split>> {
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
 pub fn write_image_list(path: &Path, pairs: &[(String, String)]) -> Result<u64> {
-    write_whole(path, |w| pairs.iter().try_for_each(|(color, depth)| writeln!(w, "{color} {depth}")))
+    write_whole(path, |w| {
+        pairs
+            .iter()
+            .try_for_each(|(color, depth)| writeln!(w, "{color} {depth}"))
+    })
 }
 
 #[cfg(test)]
@@ -80,6 +84,11 @@ mod tests {
         let json: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
         assert_eq!(json["folds"][1]["test_areas"], serde_json::json!([2, 4]));
         write_bytes(&path, b"{\"folds\": [{\"fold\": 1}]}").unwrap();
-        assert!(read_splits(&path).unwrap_err().to_string().contains("missing field `train_areas`"));
+        assert!(
+            read_splits(&path)
+                .unwrap_err()
+                .to_string()
+                .contains("missing field `train_areas`")
+        );
     }
 }

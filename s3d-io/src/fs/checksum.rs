@@ -45,7 +45,9 @@ pub struct ChecksumOfParts {
 
 impl fmt::Debug for ChecksumOfParts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("ChecksumOfParts").field("bytes", &self.bytes).finish_non_exhaustive()
+        f.debug_struct("ChecksumOfParts")
+            .field("bytes", &self.bytes)
+            .finish_non_exhaustive()
     }
 }
 
@@ -98,7 +100,11 @@ impl FromStr for Checksum {
 
     fn from_str(text: &str) -> std::result::Result<Self, BadChecksum> {
         let digits = text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
-        let value = if digits { u128::from_str_radix(text, 16).ok() } else { None };
+        let value = if digits {
+            u128::from_str_radix(text, 16).ok()
+        } else {
+            None
+        };
         value.map(Self).ok_or_else(|| BadChecksum { text: text.to_owned() })
     }
 }
@@ -138,8 +144,9 @@ mod tests {
 
     #[test]
     fn pieces_and_files_have_the_checksum_of_the_whole() {
-        let bytes: Vec<u8> =
-            (0..3 * BUFFER as u32 + 17).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+        let bytes: Vec<u8> = (0..3 * BUFFER as u32 + 17)
+            .map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8)
+            .collect();
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("file");
         write_bytes(&path, &bytes).unwrap();

@@ -124,7 +124,9 @@ impl<R: Read> Utf8Reader<R> {
             let at_end = read? == 0;
             // The first half of a character that takes two waits for the second, as does half of a number.
             let mut whole = self.waiting.len() & !1;
-            let last = whole.checked_sub(2).and_then(|at| self.waiting.get(at..)?.first_chunk());
+            let last = whole
+                .checked_sub(2)
+                .and_then(|at| self.waiting.get(at..)?.first_chunk());
             if !at_end && last.is_some_and(|pair| (0xd800..0xdc00).contains(&unit(*pair))) {
                 whole -= 2;
             }

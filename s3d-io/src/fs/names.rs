@@ -10,7 +10,13 @@ const MAX_NAME: usize = 128;
 /// Windows keeps for a device (`con.png`) gets a `_` in front; a long one is cut before its ending. Empty if
 /// nothing is left of `name`.
 pub fn portable_file_name(name: &str) -> String {
-    let safe = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_') { c } else { '_' };
+    let safe = |c: char| {
+        if c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_') {
+            c
+        } else {
+            '_'
+        }
+    };
     let clean: String = name.chars().map(safe).collect();
     // Windows drops dots at the end.
     let clean = clean.trim_matches('.');
@@ -18,9 +24,17 @@ pub fn portable_file_name(name: &str) -> String {
     let numbered = device.strip_prefix("com").or(device.strip_prefix("lpt"));
     let is_device = matches!(device.as_str(), "con" | "prn" | "aux" | "nul")
         || numbered.is_some_and(|n| n.len() == 1 && n.bytes().all(|b| b.is_ascii_digit()));
-    let clean = if is_device { format!("_{clean}") } else { clean.to_owned() };
-    let (stem, ending) =
-        clean.split_at(clean.rfind('.').filter(|at| clean.len() - at <= 8).unwrap_or(clean.len()));
+    let clean = if is_device {
+        format!("_{clean}")
+    } else {
+        clean.to_owned()
+    };
+    let (stem, ending) = clean.split_at(
+        clean
+            .rfind('.')
+            .filter(|at| clean.len() - at <= 8)
+            .unwrap_or(clean.len()),
+    );
     let stem = stem.get(..MAX_NAME - ending.len()).unwrap_or(stem);
     format!("{stem}{ending}")
 }

@@ -62,7 +62,12 @@ mod tests {
             assert!(error.to_string().contains("is a folder, not a file"), "{error}");
         }
         let device = if cfg!(unix) { "/dev/null" } else { "nul" };
-        assert!(read_file(Path::new(device)).unwrap_err().to_string().contains("is a pipe or a device"));
+        assert!(
+            read_file(Path::new(device))
+                .unwrap_err()
+                .to_string()
+                .contains("is a pipe or a device")
+        );
         assert!(matches!(open_file(&dir.path().join("gone")), Err(Error::Io { .. })));
     }
     /// Each of these would wait for somebody to write into the pipe.
@@ -71,7 +76,13 @@ mod tests {
     fn a_pipe_is_refused_at_once() {
         let dir = tempfile::tempdir().unwrap();
         let pipe = dir.path().join("pipe");
-        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
         let readers: [fn(&Path) -> Result<()>; 2] =
             [|path| read_file(path).map(drop), |path| open_file(path).map(drop)];
         for read in readers {

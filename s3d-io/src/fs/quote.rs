@@ -7,8 +7,11 @@ const LONGEST: usize = 60;
 pub(crate) fn quote(text: &[u8]) -> String {
     // A line may be megabytes long: four bytes a character are enough to fill the quotation.
     let head = String::from_utf8_lossy(text.get(..4 * LONGEST + 4).unwrap_or(text));
-    let mut quoted: String =
-        head.chars().take(LONGEST).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    let mut quoted: String = head
+        .chars()
+        .take(LONGEST)
+        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
+        .collect();
     if head.chars().count() > LONGEST || text.len() > 4 * LONGEST + 4 {
         quoted.push('…');
     }

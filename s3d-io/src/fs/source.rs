@@ -54,8 +54,10 @@ impl Source {
             }
             Some(reader) => {
                 let mut bytes = Bytes::Shared { reader: Arc::clone(reader), at: 0 };
-                let size =
-                    bytes.seek(SeekFrom::End(0)).and_then(|n| bytes.rewind().map(|()| n)).map_err(io)?;
+                let size = bytes
+                    .seek(SeekFrom::End(0))
+                    .and_then(|n| bytes.rewind().map(|()| n))
+                    .map_err(io)?;
                 Ok((bytes, size))
             }
         }

@@ -72,7 +72,9 @@ impl SyncAhead {
         let Self { root, open, thread } = self;
         drop(open);
         let Some(thread) = thread else { return Ok(()) };
-        let ended = thread.join().unwrap_or_else(|_| Err(io::Error::other("the thread that syncs panicked")));
+        let ended = thread
+            .join()
+            .unwrap_or_else(|_| Err(io::Error::other("the thread that syncs panicked")));
         ended.map_err(|e| Error::io(&root, "bring to the disk", e))
     }
 }
@@ -104,7 +106,11 @@ fn sync_content(path: &Path) -> Result<()> {
         no_file => no_file,
     })?;
     // Windows syncs through handles that may write alone.
-    let opened = if cfg!(windows) { File::options().write(true).open(path) } else { File::open(path) };
+    let opened = if cfg!(windows) {
+        File::options().write(true).open(path)
+    } else {
+        File::open(path)
+    };
     let synced = opened.and_then(|file| file.sync_all());
     synced.map_err(|e| Error::io(path, "bring to the disk", e))
 }
@@ -145,7 +151,9 @@ mod tests {
         let path = dir.path().join("a.txt");
         write_bytes(&path, b"a").unwrap();
         sync_data_set(dir.path(), std::slice::from_ref(&path)).unwrap();
-        let message = sync_data_set(&dir.path().join("gone"), &[path]).unwrap_err().to_string();
+        let message = sync_data_set(&dir.path().join("gone"), &[path])
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("gone: cannot bring to the disk"), "{message}");
     }
 

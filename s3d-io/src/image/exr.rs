@@ -138,7 +138,9 @@ impl BlockCompressor {
         width: usize,
         to_le_bytes: impl Fn(T) -> [u8; N],
     ) -> Vec<u8> {
-        self.block.set(pixels, width, to_le_bytes).expect("whole rows of samples of two or four bytes");
+        self.block
+            .set(pixels, width, to_le_bytes)
+            .expect("whole rows of samples of two or four bytes");
         let bytes = self.block.differences();
         self.compressed.clear();
         self.deflater.zlib(bytes, Some(bytes.len() / 2), &mut self.compressed);
@@ -315,7 +317,11 @@ mod tests {
         let size = (image.width() as usize, image.height() as usize);
         let layer = Layer::new(size, LayerAttributes::default(), encoding, SpecificChannels::rgb(at));
         let mut file = Cursor::new(Vec::new());
-        Image::from_layer(layer).write().non_parallel().to_buffered(&mut file).unwrap();
+        Image::from_layer(layer)
+            .write()
+            .non_parallel()
+            .to_buffered(&mut file)
+            .unwrap();
         file.into_inner()
     }
 
@@ -323,7 +329,11 @@ mod tests {
     fn room(width: u32, height: u32) -> Raster<[f32; 3]> {
         let pixel = |i: u32| {
             let (x, y) = ((i % width) as f32 / width as f32, (i / width) as f32 / height as f32);
-            if y < 0.5 { [4.0 * x - 2.0, 3.0, 2.8 - 3.0 * y] } else { [x / y, 1.5 / y, 0.0] }
+            if y < 0.5 {
+                [4.0 * x - 2.0, 3.0, 2.8 - 3.0 * y]
+            } else {
+                [x / y, 1.5 / y, 0.0]
+            }
         };
         Raster::from_vec(width, height, (0..width * height).map(pixel).collect())
     }

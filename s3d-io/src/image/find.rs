@@ -5,7 +5,11 @@ use std::path::{Path, PathBuf};
 /// `name` as a path below `folder`, with either slash.
 pub(crate) fn resolve(folder: &Path, name: &str) -> PathBuf {
     let as_written = folder.join(name);
-    if as_written.is_file() { as_written } else { folder.join(name.replace('\\', "/")) }
+    if as_written.is_file() {
+        as_written
+    } else {
+        folder.join(name.replace('\\', "/"))
+    }
 }
 
 /// Where the image `name` is: below the library's folder, below the OBJ file's, or, as other machines' paths

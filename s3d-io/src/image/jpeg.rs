@@ -131,7 +131,9 @@ mod tests {
             let n = (n ^ n >> 13).wrapping_mul(1_274_126_177);
             Rgb([(n >> 8) as u8, (n >> 16) as u8, (n >> 24) as u8])
         });
-        DynamicImage::from(image).write_to(&mut Cursor::new(&mut bytes), ImageFormat::Jpeg).unwrap();
+        DynamicImage::from(image)
+            .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Jpeg)
+            .unwrap();
         bytes
     }
 

@@ -175,7 +175,9 @@ pub(crate) struct Together {
 impl Together {
     /// Adds a texture, before there is memory for it; a sentence if that makes too many.
     pub(crate) fn add(&mut self, width: u32, height: u32) -> std::result::Result<(), String> {
-        self.pixels = self.pixels.saturating_add(u64::from(width).saturating_mul(u64::from(height)));
+        self.pixels = self
+            .pixels
+            .saturating_add(u64::from(width).saturating_mul(u64::from(height)));
         self.textures = self.textures.saturating_add(1);
         if self.pixels <= MAX_PIXELS_TOGETHER {
             return Ok(());
@@ -274,7 +276,12 @@ pub(crate) mod tests {
         for _ in 0..2048 {
             together.add(2048, 2048).unwrap();
         }
-        assert!(together.add(1, 1).unwrap_err().starts_with("is the texture that makes 2049 of them"));
+        assert!(
+            together
+                .add(1, 1)
+                .unwrap_err()
+                .starts_with("is the texture that makes 2049 of them")
+        );
         assert!(Together { pixels: u64::MAX, textures: 1 }.add(9, 9).is_err());
     }
 
@@ -288,7 +295,12 @@ pub(crate) mod tests {
     fn a_folder_is_no_file() {
         let dir = tempfile::tempdir().unwrap();
         assert!(read_file(dir.path()).unwrap_err().to_string().contains("is a folder"));
-        assert!(read_file(&dir.path().join("gone")).unwrap_err().to_string().contains("cannot read"));
+        assert!(
+            read_file(&dir.path().join("gone"))
+                .unwrap_err()
+                .to_string()
+                .contains("cannot read")
+        );
     }
 
     #[test]

@@ -115,7 +115,10 @@ impl MeshFile {
     /// If there is no such source.
     #[expect(clippy::indexing_slicing, reason = "another source is a caller's mistake: see Panics")]
     pub fn faces_of(&self, source: usize) -> Range<u32> {
-        let end = self.sources.get(source + 1).map_or(self.mesh.faces().len() as u32, |next| next.first_face);
+        let end = self
+            .sources
+            .get(source + 1)
+            .map_or(self.mesh.faces().len() as u32, |next| next.first_face);
         self.sources[source].first_face..end
     }
 
@@ -131,7 +134,8 @@ impl MeshFile {
         self.repeated_faces += repeated;
         if repeated > 0 {
             let n = count(repeated, "face");
-            self.warnings.push(format!("{n} left out: earlier faces have the same corners"));
+            self.warnings
+                .push(format!("{n} left out: earlier faces have the same corners"));
         }
         (self, tags)
     }
@@ -219,7 +223,10 @@ impl std::str::FromStr for LengthUnit {
     type Err = &'static str;
 
     fn from_str(word: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|unit| unit.name() == word).ok_or("must be m, cm, mm, ft or in")
+        Self::ALL
+            .into_iter()
+            .find(|unit| unit.name() == word)
+            .ok_or("must be m, cm, mm, ft or in")
     }
 }
 

@@ -59,7 +59,10 @@ pub fn read_meshes_with(paths: &[PathBuf], up: UpAxis, options: &MeshOptions) ->
 fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
     let sizes =
         |m: &TriMesh| [m.positions().len(), m.parts().uvs.len(), m.parts().normals.len(), m.faces().len()];
-    let together = sizes(&joined.mesh).into_iter().zip(sizes(&next.mesh)).map(|(a, b)| a + b);
+    let together = sizes(&joined.mesh)
+        .into_iter()
+        .zip(sizes(&next.mesh))
+        .map(|(a, b)| a + b);
     if together.max() >= Some(NO_INDEX as usize) {
         let path = next.sources.first().map_or(Path::new(""), |s| &s.path);
         let message = "makes more vertices or faces than 32 bits count, with the meshes before it; cut the \
@@ -98,7 +101,11 @@ type Labelled<'a> = (Option<MeshLabels>, &'a TriMesh);
 fn joined_labels(a: Labelled<'_>, b: Labelled<'_>) -> MeshLabels {
     let of_faces =
         |labels: &Option<MeshLabels>| labels.as_ref().is_some_and(|l| l.element() == LabelElement::Face);
-    let element = if of_faces(&a.0) || of_faces(&b.0) { LabelElement::Face } else { LabelElement::Vertex };
+    let element = if of_faces(&a.0) || of_faces(&b.0) {
+        LabelElement::Face
+    } else {
+        LabelElement::Vertex
+    };
     let columns = |(labels, mesh): Labelled<'_>| {
         let (n, labels) = match element {
             LabelElement::Face => (mesh.faces().len(), labels.map(|l| l.into_faces(mesh))),
@@ -245,8 +252,18 @@ mod tests {
         fs::write(&path, labelled_faces().replace("3 0 2 3 5 50", "3 2 1 0 5 50")).unwrap();
         let file = read_meshes(std::slice::from_ref(&path), UpAxis::Z).unwrap();
         assert_eq!(file.warnings, ["1 face left out: earlier faces have the same corners"]);
-        assert!(read_meshes(&[], UpAxis::Z).unwrap_err().to_string().contains("at least one mesh"));
+        assert!(
+            read_meshes(&[], UpAxis::Z)
+                .unwrap_err()
+                .to_string()
+                .contains("at least one mesh")
+        );
         let gone = dir.path().join("gone.obj");
-        assert!(read_meshes(&[path, gone], UpAxis::Z).unwrap_err().to_string().contains("gone.obj"));
+        assert!(
+            read_meshes(&[path, gone], UpAxis::Z)
+                .unwrap_err()
+                .to_string()
+                .contains("gone.obj")
+        );
     }
 }

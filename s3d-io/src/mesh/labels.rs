@@ -176,7 +176,9 @@ impl MeshLabels {
 }
 
 fn picked<T: Copy>(values: &[T], tags: &[u32], missing: T) -> Vec<T> {
-    tags.iter().map(|&tag| values.get(tag as usize).copied().unwrap_or(missing)).collect()
+    tags.iter()
+        .map(|&tag| values.get(tag as usize).copied().unwrap_or(missing))
+        .collect()
 }
 
 /// Names of properties that hold classes, in the order in which they are looked for; case is no matter.

@@ -29,7 +29,11 @@ pub enum MeshOrigin {
 impl MeshOrigin {
     /// What is subtracted from a mesh that comes behind others, from which `offset_m` was.
     pub(crate) fn behind(offset_m: DVec3) -> Self {
-        if offset_m == DVec3::ZERO { Self::OfFile } else { Self::At(offset_m) }
+        if offset_m == DVec3::ZERO {
+            Self::OfFile
+        } else {
+            Self::At(offset_m)
+        }
     }
 
     /// Whether positions that may be as large as `largest_m` are needed in `f64`.
@@ -71,7 +75,8 @@ impl FileFrame {
     /// What is subtracted from positions, metres in the world's axes, of a mesh whose faces have these
     /// corners in the file's unit.
     pub(crate) fn offset_m(self, corners: impl IntoIterator<Item = DVec3>) -> DVec3 {
-        self.origin.offset_m(corners.into_iter().map(|corner| corner * self.unit.metres()))
+        self.origin
+            .offset_m(corners.into_iter().map(|corner| corner * self.unit.metres()))
     }
 
     /// An offset in the file's unit.
@@ -94,12 +99,21 @@ fn found(bounds: Bounds) -> DVec3 {
     }
     // Adding 0 turns −0 into 0.
     let offset = (bounds.center() / ROUND_M).round() * ROUND_M + DVec3::ZERO;
-    if 2.0 * bounds.minus(offset).farthest_m() <= bounds.farthest_m() { offset } else { DVec3::ZERO }
+    if 2.0 * bounds.minus(offset).farthest_m() <= bounds.farthest_m() {
+        offset
+    } else {
+        DVec3::ZERO
+    }
 }
 
 /// The largest number among coordinates that are numbers.
 pub(crate) fn largest(positions: &[Vec3]) -> f64 {
-    f64::from(positions.iter().flat_map(|p| p.to_array()).fold(0.0f32, |largest, v| largest.max(v.abs())))
+    f64::from(
+        positions
+            .iter()
+            .flat_map(|p| p.to_array())
+            .fold(0.0f32, |largest, v| largest.max(v.abs())),
+    )
 }
 
 impl UpAxis {

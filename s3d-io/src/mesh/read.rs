@@ -60,7 +60,11 @@ fn read<R: Read>(
     up: UpAxis,
     options: &MeshOptions,
 ) -> Result<MeshFile> {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let ending = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
     let file: Result<MeshFile> = match ending.as_str() {
         #[cfg(feature = "obj")]
         "obj" => crate::mesh::obj::read::read_bytes(whole(open, path)?, path, up, options),

@@ -342,8 +342,12 @@ mod tests {
         let json: serde_json::Value = crate::fs::json::read_json(&path).unwrap();
         assert_eq!(json["images"][0]["file_name"], json["annotations"][0]["file_name"]);
         assert_eq!(json["annotations"][0]["segments_info"][0]["bbox"], serde_json::json!([0, 1, 4, 2]));
-        let things: Vec<u64> =
-            json["categories"].as_array().unwrap().iter().map(|c| c["isthing"].as_u64().unwrap()).collect();
+        let things: Vec<u64> = json["categories"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|c| c["isthing"].as_u64().unwrap())
+            .collect();
         assert_eq!(things, [1, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
         assert_eq!(
             (&json["categories"][8]["name"], &json["categories"][8]["id"]),

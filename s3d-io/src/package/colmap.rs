@@ -274,8 +274,11 @@ mod tests {
     #[test]
     fn text_and_binary_hold_the_same() {
         let dir = tempfile::tempdir().unwrap();
-        let images: Vec<ColmapImage> =
-            cameras().iter().enumerate().map(|(i, c)| image(c, &format!("camera_{i}.png"))).collect();
+        let images: Vec<ColmapImage> = cameras()
+            .iter()
+            .enumerate()
+            .map(|(i, c)| image(c, &format!("camera_{i}.png")))
+            .collect();
         let points = points();
         let model = ColmapModel::new(&images, &points);
         model.write_text(dir.path()).unwrap();
@@ -283,7 +286,9 @@ mod tests {
         let lines = |name: &str| -> Vec<Vec<String>> {
             let text = std::fs::read_to_string(dir.path().join(name)).unwrap();
             let lines = text.lines().filter(|l| !l.starts_with('#'));
-            lines.map(|l| l.split_whitespace().map(str::to_owned).collect()).collect()
+            lines
+                .map(|l| l.split_whitespace().map(str::to_owned).collect())
+                .collect()
         };
         let bytes = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
         let f = |b: &[u8], at: usize| f64::from_le_bytes(b[at..at + 8].try_into().unwrap());

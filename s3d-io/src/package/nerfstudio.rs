@@ -139,7 +139,10 @@ pub fn write_nerfstudio(
 
 fn is_finite(frame: &NerfstudioFrame) -> bool {
     let numbers = [frame.fl_x, frame.fl_y, frame.cx, frame.cy];
-    numbers.iter().chain(frame.transform_matrix.as_flattened()).all(|v| v.is_finite())
+    numbers
+        .iter()
+        .chain(frame.transform_matrix.as_flattened())
+        .all(|v| v.is_finite())
 }
 
 #[cfg(test)]
@@ -170,7 +173,9 @@ mod tests {
             dvec3(a, b, -1.0)
         };
         let rows = frame.transform_matrix;
-        DMat4::from_cols_array_2d(&rows).transpose().transform_vector3(direction)
+        DMat4::from_cols_array_2d(&rows)
+            .transpose()
+            .transform_vector3(direction)
     }
 
     proptest! {

@@ -229,15 +229,18 @@ fn write_column(
     match column {
         Column::Int(values) => {
             let (there, values) = split(values);
-            out.typed::<Int32Type>().write_batch(&values, levels(&there).as_deref(), None)?;
+            out.typed::<Int32Type>()
+                .write_batch(&values, levels(&there).as_deref(), None)?;
         }
         Column::Float(values) => {
             let (there, values) = split(values);
-            out.typed::<DoubleType>().write_batch(&values, levels(&there).as_deref(), None)?;
+            out.typed::<DoubleType>()
+                .write_batch(&values, levels(&there).as_deref(), None)?;
         }
         Column::Text(values) => {
             let (there, values) = split(values);
-            out.typed::<ByteArrayType>().write_batch(&values, levels(&there).as_deref(), None)?;
+            out.typed::<ByteArrayType>()
+                .write_batch(&values, levels(&there).as_deref(), None)?;
         }
         Column::List(lists) => {
             // Definition 0: no list, 1: an empty one, 2: an element. Repetition 0 begins a list.
@@ -245,11 +248,16 @@ fn write_column(
             for list in lists {
                 let list_definition = i16::from(list.is_some());
                 let list = list.unwrap_or_default();
-                definition.extend(if list.is_empty() { vec![list_definition] } else { vec![2; list.len()] });
+                definition.extend(if list.is_empty() {
+                    vec![list_definition]
+                } else {
+                    vec![2; list.len()]
+                });
                 repetition.extend((0..list.len().max(1)).map(|i| i16::from(i > 0)));
                 values.extend(list);
             }
-            out.typed::<DoubleType>().write_batch(&values, Some(&definition), Some(&repetition))?;
+            out.typed::<DoubleType>()
+                .write_batch(&values, Some(&definition), Some(&repetition))?;
         }
     }
     Ok(())
@@ -308,7 +316,10 @@ mod tests {
     }
 
     fn field<'a>((names, rows): &'a (Vec<String>, Vec<Row>), i: usize, name: &str) -> &'a Field {
-        let at = names.iter().position(|n| n == name).unwrap_or_else(|| panic!("no column {name}"));
+        let at = names
+            .iter()
+            .position(|n| n == name)
+            .unwrap_or_else(|| panic!("no column {name}"));
         rows[i].get_column_iter().nth(at).unwrap().1
     }
 
@@ -360,8 +371,9 @@ mod tests {
     #[test]
     fn many_rows_are_in_several_groups_and_the_bytes_are_the_same() {
         let dir = tempfile::tempdir().unwrap();
-        let rows: Vec<ImageRow> =
-            (0..GROUP as u32 + 10).map(|i| if i % 7 == 0 { bare() } else { row(i) }).collect();
+        let rows: Vec<ImageRow> = (0..GROUP as u32 + 10)
+            .map(|i| if i % 7 == 0 { bare() } else { row(i) })
+            .collect();
         let (a, b) = (dir.path().join("a.parquet"), dir.path().join("b.parquet"));
         write_image_index(&a, &Class::S3DIS, &rows).unwrap();
         write_image_index(&b, &Class::S3DIS, &rows).unwrap();

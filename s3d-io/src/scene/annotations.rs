@@ -50,7 +50,11 @@ impl AnnotationTable {
     /// How they are read.
     pub(crate) fn options(&self, taxonomy: &Taxonomy) -> std::result::Result<AnnotationOptions, String> {
         let room: Option<Room> = match &self.room {
-            Some(name) => Some(taxonomy.room_of_word(name).map_err(|e| format!("annotations.room: {e}"))?),
+            Some(name) => Some(
+                taxonomy
+                    .room_of_word(name)
+                    .map_err(|e| format!("annotations.room: {e}"))?,
+            ),
             None => None,
         };
         let mut classes = BTreeMap::new();
@@ -60,8 +64,9 @@ impl AnnotationTable {
                 word => match taxonomy.meaning(word) {
                     Some(meant) => meant,
                     None => {
-                        let unknown =
-                            taxonomy.class(word).map_err(|e| format!("annotations.classes.{key:?}: {e}"));
+                        let unknown = taxonomy
+                            .class(word)
+                            .map_err(|e| format!("annotations.classes.{key:?}: {e}"));
                         Some(unknown?)
                     }
                 },

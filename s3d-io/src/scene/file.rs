@@ -243,8 +243,9 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
     if published.is_some() && document.taxonomy.is_some() {
         return Err(fault("[published] brings a taxonomy: leave out the key".into()));
     }
-    let (taxonomy, taxonomy_file) =
-        document.taxonomy.map_or(Ok((Taxonomy::s3dis(), None)), |entry| entry.taxonomy(path))?;
+    let (taxonomy, taxonomy_file) = document
+        .taxonomy
+        .map_or(Ok((Taxonomy::s3dis(), None)), |entry| entry.taxonomy(path))?;
     let is_labelled = published.is_some() || document.annotations.is_some();
     let (mut mesh, mut annotations) = (Vec::new(), Vec::new());
     let (mut up, mut annotation_options) = (UpAxis::Y, AnnotationOptions::default());
@@ -262,8 +263,10 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         };
         if let Some(labels) = &document.annotations {
             let (key, written) = labels.paths().map_err(fault)?;
-            annotations =
-                written.iter().map(|written| found(key, written, "", Path::exists)).collect::<Result<_>>()?;
+            annotations = written
+                .iter()
+                .map(|written| found(key, written, "", Path::exists))
+                .collect::<Result<_>>()?;
             annotation_options = labels.options(&taxonomy).map_err(fault)?;
             annotations_have_offset = labels.has_offset();
         }
@@ -340,7 +343,12 @@ mod tests {
             return Ok(scene);
         }
         assert_eq!(scene.mesh[0], dir.path().join("a.obj"));
-        assert!(scene.annotations.first().is_none_or(|path| *path == dir.path().join("Area_2")));
+        assert!(
+            scene
+                .annotations
+                .first()
+                .is_none_or(|path| *path == dir.path().join("Area_2"))
+        );
         if let Some(CameraSource::Listed { path, .. }) = &scene.cameras {
             assert_eq!(*path, dir.path().join("c.csv"));
         }
@@ -415,7 +423,11 @@ mod tests {
     fn colours_come_from_the_texture_or_from_pictures() {
         let pictures = |rgb: &str| {
             let plain = rgb.starts_with("rgb");
-            let text = if plain { format!("{rgb}\n{GOOD}") } else { format!("{GOOD}{rgb}\n") };
+            let text = if plain {
+                format!("{rgb}\n{GOOD}")
+            } else {
+                format!("{GOOD}{rgb}\n")
+            };
             let mut pictures = read(&text).unwrap().pictures;
             if let Some(source) = &mut pictures {
                 source.path = source.path.file_name().unwrap().into();
@@ -447,8 +459,11 @@ mod tests {
             ("[rgb]\nsource = \"texture\"\npath = \"raw\"", "has no path"),
             ("[rgb]\nsource = \"panorama\"\npath = \"raw\"\nyaw_deg = nan", "rgb.yaw_deg = NaN"),
         ] {
-            let text =
-                if rgb.starts_with("rgb") { format!("{rgb}\n{GOOD}") } else { format!("{GOOD}{rgb}\n") };
+            let text = if rgb.starts_with("rgb") {
+                format!("{rgb}\n{GOOD}")
+            } else {
+                format!("{GOOD}{rgb}\n")
+            };
             let message = read(&text).unwrap_err().to_string();
             assert!(message.contains(words), "{rgb}: {message}");
         }
@@ -510,7 +525,12 @@ mod tests {
     fn meshes_come_in_several_files_and_with_labels() {
         let several = GOOD.replace("path = \"a.obj\"", "paths = [\"a.obj\", \"c.csv\"]");
         assert_eq!(read(&several).unwrap().mesh.len(), 2);
-        assert!(read(&GOOD.replace("path = \"Area_2\"", "mesh = true")).unwrap().annotations.is_empty());
+        assert!(
+            read(&GOOD.replace("path = \"Area_2\"", "mesh = true"))
+                .unwrap()
+                .annotations
+                .is_empty()
+        );
         let unlabelled = read(&GOOD.replace("[annotations]\npath = \"Area_2\"\n", "")).unwrap();
         assert!(!unlabelled.is_labelled && read(GOOD).unwrap().is_labelled);
         for (from, to, words) in [

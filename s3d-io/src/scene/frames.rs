@@ -72,7 +72,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join("a.obj"), "").unwrap();
         fs::write(dir.path().join("c.csv"), "").unwrap();
-        ["raw", "photos"].iter().for_each(|name| fs::create_dir(dir.path().join(name)).unwrap());
+        ["raw", "photos"]
+            .iter()
+            .for_each(|name| fs::create_dir(dir.path().join(name)).unwrap());
         let text = format!("area = 2\n[mesh]\npath = \"a.obj\"\n[frames]\n{table}");
         parse_scene(&text, &dir.path().join("scene.toml")).map(|scene| scene.frames.unwrap())
     }

@@ -189,8 +189,11 @@ impl PublishedArea {
         let semantic = read_mesh(path, self.up)?.mesh;
         let fault = |message: String| Error::format(path, message);
 
-        let parsed: Vec<Option<Label>> =
-            semantic.materials().iter().map(|m| self.taxonomy.parse_name(&m.name).ok().flatten()).collect();
+        let parsed: Vec<Option<Label>> = semantic
+            .materials()
+            .iter()
+            .map(|m| self.taxonomy.parse_name(&m.name).ok().flatten())
+            .collect();
         let other = |f: u32| semantic.material_of(f).and_then(|m| *parsed.get(m as usize)?);
         let mut labels = Vec::new();
         let mut places: HashMap<Label, u32> = HashMap::new();
@@ -212,8 +215,9 @@ impl PublishedArea {
             for f in 0..semantic.faces().len() as u32 {
                 by_corners.entry(corners(semantic.triangle(f))).or_insert(other(f));
             }
-            let found: Vec<Option<Option<Label>>> =
-                (0..n).map(|f| by_corners.get(&corners(file.mesh.triangle(f))).copied()).collect();
+            let found: Vec<Option<Option<Label>>> = (0..n)
+                .map(|f| by_corners.get(&corners(file.mesh.triangle(f))).copied())
+                .collect();
             let missing = found.iter().filter(|f| f.is_none()).count();
             if 2 * missing > found.len() {
                 return Err(fault(format!(
@@ -276,7 +280,12 @@ fn area_of(path: &Path) -> Option<u32> {
     let path = std::fs::canonicalize(path).ok()?;
     let name = path.file_name()?.to_str()?.to_ascii_lowercase();
     let number = name.strip_prefix("area_")?;
-    number.strip_suffix(['a', 'b']).unwrap_or(number).parse().ok().filter(|n| *n > 0)
+    number
+        .strip_suffix(['a', 'b'])
+        .unwrap_or(number)
+        .parse()
+        .ok()
+        .filter(|n| *n > 0)
 }
 
 /// Whether two faces are the same, but for what two ways of writing their numbers differ in.

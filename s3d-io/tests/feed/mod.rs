@@ -89,7 +89,10 @@ fn numbered() -> AnnotationOptions {
         [("2", Some(Class::FLOOR)), ("6", Some(Class::WALL)), ("19", Some(Class::CHAIR)), ("1", None)];
     AnnotationOptions {
         room: Some("office_1".parse().expect("a room")),
-        classes: classes.into_iter().map(|(key, class)| (key.to_owned(), class)).collect(),
+        classes: classes
+            .into_iter()
+            .map(|(key, class)| (key.to_owned(), class))
+            .collect(),
         unknown_as_clutter: true,
         ..AnnotationOptions::default()
     }
@@ -141,7 +144,11 @@ fn texture(dir: &Path, data: &[u8]) {
 
 /// Binary glTF and the JSON form by what the bytes begin with.
 fn gltf(dir: &Path, data: &[u8]) {
-    let name = if data.starts_with(b"glTF") { "mesh.glb" } else { "mesh.gltf" };
+    let name = if data.starts_with(b"glTF") {
+        "mesh.glb"
+    } else {
+        "mesh.gltf"
+    };
     check_mesh(dir, near(&file(dir, name, data), UpAxis::Y));
 }
 
@@ -178,7 +185,11 @@ fn cameras(dir: &Path, data: &[u8]) {
     let name = ["cameras.csv", "images.txt", "images.bin", "transforms.json"][usize::from(which)];
     let path = file(dir, name, data);
     if let Some(found) = check(dir, read_scan_locations(&path, &DAffine3::IDENTITY)) {
-        assert!(found.iter().all(|l| is_valid_uuid(&l.uuid) && l.pose.location.is_finite()));
+        assert!(
+            found
+                .iter()
+                .all(|l| is_valid_uuid(&l.uuid) && l.pose.location.is_finite())
+        );
     }
 }
 
@@ -199,7 +210,9 @@ fn posed_cameras(dir: &Path, data: &[u8]) {
         }
         2 => {
             let mut image = vec![1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0];
-            [1f64, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0].iter().for_each(|v| image.extend(v.to_le_bytes()));
+            [1f64, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+                .iter()
+                .for_each(|v| image.extend(v.to_le_bytes()));
             image.extend([1, 0, 0, 0, b'a', 0, 0, 0, 0, 0, 0, 0, 0, 0]);
             file(dir, "cameras.bin", data);
             file(dir, "images.bin", &image)
@@ -290,17 +303,30 @@ fn scene(dir: &Path, data: &[u8]) {
 
 /// A taxonomy as TOML and as JSON: one that is read is written, and read again as itself.
 fn taxonomy(dir: &Path, data: &[u8]) {
-    let name = if data.starts_with(b"{") { "classes.json" } else { "classes.toml" };
+    let name = if data.starts_with(b"{") {
+        "classes.json"
+    } else {
+        "classes.toml"
+    };
     let Some(found) = check(dir, read_taxonomy(&file(dir, name, data))) else { return };
     let again = dir.join("taxonomy.json");
     write_taxonomy_json(&again, &found).expect("what was read can be written");
     assert!(read_taxonomy_json(&again).is_ok_and(|read| read == found), "another taxonomy comes back");
-    assert!(found.classes().iter().all(|class| found.class(class.name()) == Ok(*class)));
+    assert!(
+        found
+            .classes()
+            .iter()
+            .all(|class| found.class(class.name()) == Ok(*class))
+    );
 }
 
 /// An array, or an archive of arrays, by what the bytes begin with.
 fn npy(dir: &Path, data: &[u8]) {
-    let name = if data.starts_with(b"PK") { "cloud.npz" } else { "cloud.npy" };
+    let name = if data.starts_with(b"PK") {
+        "cloud.npz"
+    } else {
+        "cloud.npy"
+    };
     let path = file(dir, name, data);
     annotations(dir, &path);
     if let Ok(array) = NpyArray::open(&path) {
@@ -329,7 +355,9 @@ fn las(dir: &Path, data: &[u8]) {
 /// The checksums of pages are made right, so that what is in them is looked at.
 fn e57(dir: &Path, data: &[u8]) {
     let mut data = data.to_vec();
-    let page = data.get(40..48).map_or(0, |b| b.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b)));
+    let page = data
+        .get(40..48)
+        .map_or(0, |b| b.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b)));
     let page = if (64..=1 << 20).contains(&page) { page } else { 1024 };
     for page in data.chunks_exact_mut(page) {
         let (content, sum) = page.split_at_mut(page.len() - 4);

@@ -51,7 +51,8 @@ fn table(name: &str, text: &str) -> TaxonomyDefinition {
             ("-", _) => all.aliases.extend(aliases.map(|word| (word, String::new()))),
             ("*", _) => all.clutter = counts_as,
             (_, "room") => {
-                all.rooms.push(RoomTypeDefinition { name, aliases: aliases.collect(), counts_as });
+                all.rooms
+                    .push(RoomTypeDefinition { name, aliases: aliases.collect(), counts_as });
             }
             _ => all.classes.push(ClassDefinition {
                 name,
@@ -71,11 +72,17 @@ fn table(name: &str, text: &str) -> TaxonomyDefinition {
 
 /// Of NYU's classes those that ScanNet's benchmark has. What the others are called means no class, as there.
 fn scannet20(nyu40: &TaxonomyDefinition, scannet200: &TaxonomyDefinition) -> TaxonomyDefinition {
-    let (classes, others): (Vec<_>, Vec<_>) =
-        nyu40.classes.iter().cloned().partition(|class| class.id.is_some_and(|id| SCANNET20.contains(&id)));
+    let (classes, others): (Vec<_>, Vec<_>) = nyu40
+        .classes
+        .iter()
+        .cloned()
+        .partition(|class| class.id.is_some_and(|id| SCANNET20.contains(&id)));
     let mut aliases = nyu40.aliases.clone();
     for other in others {
-        let words = [other.name].into_iter().chain(other.aliases).chain(other.id.map(|id| id.to_string()));
+        let words = [other.name]
+            .into_iter()
+            .chain(other.aliases)
+            .chain(other.id.map(|id| id.to_string()));
         aliases.extend(words.map(|word| (word, String::new())));
     }
     TaxonomyDefinition {

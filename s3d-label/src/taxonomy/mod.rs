@@ -132,7 +132,13 @@ impl Taxonomy {
     /// # Errors
     /// [`UnknownClass`].
     pub fn class(&self, name: &str) -> Result<Class, UnknownClass> {
-        let found = self.0.words.get(name).copied().flatten().filter(|class| class.name() == name);
+        let found = self
+            .0
+            .words
+            .get(name)
+            .copied()
+            .flatten()
+            .filter(|class| class.name() == name);
         found.ok_or_else(|| UnknownClass { word: name.to_owned(), classes: names(self.classes()) })
     }
 
@@ -180,7 +186,8 @@ impl Taxonomy {
             let room_type = *self.0.room_words.get(alias)?;
             self.room(&format!("{room_type}_{number}")).ok()
         };
-        self.room(word).or_else(|e| word.rsplit_once('_').and_then(by_alias).ok_or(e))
+        self.room(word)
+            .or_else(|e| word.rsplit_once('_').and_then(by_alias).ok_or(e))
     }
 
     /// As [`Taxonomy::parse_name`], but the null label is an error.

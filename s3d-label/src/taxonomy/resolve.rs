@@ -86,7 +86,10 @@ impl Taxonomy {
 
         let clutter = match &definition.clutter {
             Some(word) => Some(named(word, "clutter".to_owned())?),
-            None => classes.iter().copied().find(|class| class.name() == Class::CLUTTER.name()),
+            None => classes
+                .iter()
+                .copied()
+                .find(|class| class.name() == Class::CLUTTER.name()),
         };
         definition.clutter = clutter.map(|class| class.name().to_owned());
 
@@ -148,7 +151,9 @@ fn resolve_classes(entries: &mut [ClassDefinition]) -> Result<Vec<Class>, Taxono
         let s3dis = s3dis.unwrap_or(Class::CLUTTER.index() as u8);
         let class = Class::new(index, s3dis, intern(name));
         let is_shell = [Class::CEILING, Class::FLOOR, Class::WALL].contains(&class.s3dis());
-        entry.kind.get_or_insert(if is_shell { Kind::Stuff } else { Kind::Thing });
+        entry
+            .kind
+            .get_or_insert(if is_shell { Kind::Stuff } else { Kind::Thing });
         entry.counts_as.get_or_insert_with(|| class.s3dis().name().to_owned());
         if entry.color.is_none() {
             entry.color = free.by_ref().map(pretty_color).find(|color| used.insert(*color));
@@ -173,8 +178,13 @@ fn resolve_room_types(entries: &mut [RoomTypeDefinition]) -> Result<Vec<RoomType
 fn check_name(what: &'static str, place: usize, name: &str) -> Result<(), TaxonomyError> {
     let is_room = what == ROOM_TYPE;
     // In the names of images a room ends where digits begin.
-    let plain =
-        name.bytes().all(|b| if is_room { b.is_ascii_alphabetic() } else { b.is_ascii_alphanumeric() });
+    let plain = name.bytes().all(|b| {
+        if is_room {
+            b.is_ascii_alphabetic()
+        } else {
+            b.is_ascii_alphanumeric()
+        }
+    });
     let starts = name.bytes().next().is_some_and(|b| b.is_ascii_alphabetic());
     let lower = name.to_ascii_lowercase();
     // "unknown" stands in names where no room is known; loaders look for "rgb" in paths.
@@ -206,9 +216,17 @@ fn counts_as_s3dis(
     counts_as: &[Option<String>],
     s3dis: &[&str],
 ) -> Result<Vec<Option<u8>>, TaxonomyError> {
-    let place_of = |name: &str| (0u8..).zip(s3dis).find(|(_, word)| **word == name).map(|(place, _)| place);
-    let entries: BTreeMap<&str, Option<&str>> =
-        names.iter().map(String::as_str).zip(counts_as.iter().map(Option::as_deref)).collect();
+    let place_of = |name: &str| {
+        (0u8..)
+            .zip(s3dis)
+            .find(|(_, word)| **word == name)
+            .map(|(place, _)| place)
+    };
+    let entries: BTreeMap<&str, Option<&str>> = names
+        .iter()
+        .map(String::as_str)
+        .zip(counts_as.iter().map(Option::as_deref))
+        .collect();
     let follow = |start: &str| {
         let mut way = vec![start.to_owned()];
         let mut name = start;

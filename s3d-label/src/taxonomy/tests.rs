@@ -42,13 +42,22 @@ fn all_that_are_built_in_can_be_made_and_made_again() {
             assert_eq!(taxonomy.meaning_of_number(taxonomy.id(*class).into()), by_number);
         }
         // The 11 types of S3DIS are in all of them, so that a scene can name a room without thinking of this.
-        assert!(RoomType::S3DIS.iter().all(|t| taxonomy.room_type(t.name()).unwrap().s3dis() == Some(*t)));
+        assert!(
+            RoomType::S3DIS
+                .iter()
+                .all(|t| taxonomy.room_type(t.name()).unwrap().s3dis() == Some(*t))
+        );
     }
     assert_eq!(Taxonomy::built_in("coco"), None);
     let s3dis = Taxonomy::default();
     assert_eq!((s3dis.classes(), s3dis.room_types()), (&Class::S3DIS[..], &RoomType::S3DIS[..]));
     assert!(s3dis.classes().iter().all(|c| s3dis.id(*c) as usize == c.index() + 1));
-    assert!(s3dis.classes().iter().all(|c| s3dis.color(*c) == crate::pretty_color(c.index() as u32 + 1)));
+    assert!(
+        s3dis
+            .classes()
+            .iter()
+            .all(|c| s3dis.color(*c) == crate::pretty_color(c.index() as u32 + 1))
+    );
 }
 
 #[test]
@@ -83,8 +92,9 @@ fn what_is_left_out_is_filled_in() {
     let mut definition =
         of(vec![class("bed"), class("wall"), counts_as("deskLamp", "lamp"), counts_as("lamp", "board")]);
     definition.classes[0].color = Some(crate::pretty_color(2));
-    definition.aliases =
-        [("rug", ""), ("cot", "bed"), ("9", "bed")].map(|(a, b)| (a.to_owned(), b.to_owned())).into();
+    definition.aliases = [("rug", ""), ("cot", "bed"), ("9", "bed")]
+        .map(|(a, b)| (a.to_owned(), b.to_owned()))
+        .into();
     let taxonomy = Taxonomy::new(definition).unwrap();
     let seen: Vec<_> = taxonomy
         .classes()
@@ -130,7 +140,9 @@ fn labels_sort_as_their_names_do() {
         "showerRod_1_office_1_1",
         "shower2_1_office_1_1",
     ];
-    let table = taxonomy.table(names.iter().map(|n| taxonomy.label(n).unwrap())).unwrap();
+    let table = taxonomy
+        .table(names.iter().map(|n| taxonomy.label(n).unwrap()))
+        .unwrap();
     let mut sorted = names;
     sorted.sort_unstable();
     assert_eq!(table.names()[1..], sorted);
@@ -142,7 +154,12 @@ fn labels_of_another_taxonomy_make_no_table() {
     // Both have a wall, but at other places.
     for label in ["beam_1_office_1_1", "wall_1_office_1_1"] {
         let table = Taxonomy::built_in("scannet20").unwrap().table([label.parse().unwrap()]);
-        assert!(table.unwrap_err().to_string().starts_with(&format!("{label} is no label of scannet20")));
+        assert!(
+            table
+                .unwrap_err()
+                .to_string()
+                .starts_with(&format!("{label} is no label of scannet20"))
+        );
     }
 }
 

@@ -26,7 +26,11 @@ impl Corners {
     pub(crate) fn faces_at(&self, position: Vec3) -> impl Iterator<Item = u32> {
         let key = key(position);
         let start = self.faces.partition_point(|(k, _)| *k < key);
-        self.faces.iter().skip(start).take_while(move |(k, _)| *k == key).map(|(_, face)| *face)
+        self.faces
+            .iter()
+            .skip(start)
+            .take_while(move |(k, _)| *k == key)
+            .map(|(_, face)| *face)
     }
 }
 

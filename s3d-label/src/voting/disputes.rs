@@ -111,8 +111,10 @@ fn patches(mesh: &TriMesh, disputed: &[Disputed]) -> Vec<DisputedPatch> {
     let members = |places: Vec<usize>| -> Vec<&Disputed> {
         places.into_iter().filter_map(|place| disputed.get(place)).collect()
     };
-    let mut patches: Vec<DisputedPatch> =
-        face_patches(mesh, &faces).into_iter().map(|places| patch(mesh, &members(places))).collect();
+    let mut patches: Vec<DisputedPatch> = face_patches(mesh, &faces)
+        .into_iter()
+        .map(|places| patch(mesh, &members(places)))
+        .collect();
     patches.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
     patches
 }
@@ -174,9 +176,17 @@ mod tests {
         vote(4, 1, 1);
         vote(7, 3, 1);
         let disputes = Disputes::of(&mesh, &FaceLabels::new(votes), &table);
-        let classes: Vec<_> = disputes.classes.iter().map(|d| (d.classes, d.faces, d.area_m2)).collect();
+        let classes: Vec<_> = disputes
+            .classes
+            .iter()
+            .map(|d| (d.classes, d.faces, d.area_m2))
+            .collect();
         assert_eq!(classes, [([Class::WALL, Class::CHAIR], 8, 4.0), ([Class::CHAIR, Class::CHAIR], 2, 1.0)]);
-        let patches: Vec<_> = disputes.patches.iter().map(|p| (p.labels.map(|l| l.0), p.faces)).collect();
+        let patches: Vec<_> = disputes
+            .patches
+            .iter()
+            .map(|p| (p.labels.map(|l| l.0), p.faces))
+            .collect();
         assert_eq!(patches, [([3, 1], 6), ([1, 2], 2), ([1, 3], 2)]);
         let largest = &disputes.patches[0];
         assert!(largest.center.abs_diff_eq(dvec3(1.5, 0.5, 0.0), 1e-12) && largest.area_m2 == 3.0);

@@ -56,7 +56,9 @@ impl FaceLabels {
     /// How the vote for a face went: winner, runner-up, distances. `None` if nobody voted for the face, and
     /// if there is no such face.
     pub fn votes_of(&self, face: u32) -> Option<FaceVotes> {
-        ((face as usize) < self.len()).then(|| self.votes.of_face(face)).flatten()
+        ((face as usize) < self.len())
+            .then(|| self.votes.of_face(face))
+            .flatten()
     }
 
     /// The same of each face, in their order.

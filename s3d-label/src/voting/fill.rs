@@ -62,7 +62,9 @@ pub fn fill_labels(mesh: &TriMesh, label_of_face: &mut [LabelId], within_m: f64)
 }
 
 fn faces_with(label_of_face: &[LabelId], null: bool) -> impl Iterator<Item = (u32, LabelId)> {
-    (0u32..).zip(label_of_face.iter().copied()).filter(move |(_, label)| label.is_null() == null)
+    (0u32..)
+        .zip(label_of_face.iter().copied())
+        .filter(move |(_, label)| label.is_null() == null)
 }
 
 fn middle(mesh: &TriMesh, face: u32) -> DVec3 {
@@ -162,8 +164,10 @@ fn across_gaps(
     within_m: f64,
 ) -> Vec<(u32, LabelId)> {
     let unlabelled = faces_with(label_of_face, true).map(|(face, _)| face);
-    let left: Vec<(u32, DVec3)> =
-        unlabelled.filter(|face| !reached.contains(face)).map(|face| (face, middle(mesh, face))).collect();
+    let left: Vec<(u32, DVec3)> = unlabelled
+        .filter(|face| !reached.contains(face))
+        .map(|face| (face, middle(mesh, face)))
+        .collect();
     // A hierarchy of all faces would be large: one of those is enough that have something left near them.
     let cell_m = within_m.max(0.01);
     let cell = |p: DVec3| (p / cell_m).floor().as_i64vec3();
@@ -177,10 +181,13 @@ fn across_gaps(
             || (min.x..=max.x)
                 .any(|x| (min.y..=max.y).any(|y| (min.z..=max.z).any(|z| cells.contains(&(x, y, z).into()))))
     };
-    let labelled: Vec<(u32, LabelId)> =
-        faces_with(label_of_face, false).filter(|(face, _)| !left.is_empty() && is_near(*face)).collect();
+    let labelled: Vec<(u32, LabelId)> = faces_with(label_of_face, false)
+        .filter(|(face, _)| !left.is_empty() && is_near(*face))
+        .collect();
     let positions: Vec<Vec3> = labelled.iter().flat_map(|(face, _)| mesh.triangle(*face)).collect();
-    let faces = (0..labelled.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let faces = (0..labelled.len() as u32)
+        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+        .collect();
     // Every face has an area, since they are those of a mesh; without one there is nothing to be near to.
     let Ok(part) = TriMesh::from_faces(positions, faces) else { return Vec::new() };
     let mut nearest = Vec::new();
@@ -213,7 +220,9 @@ mod tests {
     }
 
     fn mesh_of(triangles: &[[Vec3; 3]]) -> TriMesh {
-        let faces = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let faces = (0..triangles.len() as u32)
+            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+            .collect();
         TriMesh::from_faces(triangles.concat(), faces).unwrap()
     }
 
@@ -288,7 +297,10 @@ mod tests {
         let start = |l: &LabelId| (if l.is_null() { f64::INFINITY } else { 0.0 }, *l);
         let mut ways: Vec<(f64, LabelId)> = labels.iter().map(start).collect();
         let mut pairs = Vec::new();
-        for (a, b) in (0..count).flat_map(|a| (0..count).map(move |b| (a, b))).filter(|(a, b)| a != b) {
+        for (a, b) in (0..count)
+            .flat_map(|a| (0..count).map(move |b| (a, b)))
+            .filter(|(a, b)| a != b)
+        {
             for (edge, forwards, at) in edges(mesh, a) {
                 for (other, other_forwards, _) in edges(mesh, b) {
                     let cos = normal(mesh, a).dot(normal(mesh, b));
@@ -302,7 +314,11 @@ mod tests {
         for _ in 0..count {
             for &(a, b, at) in &pairs {
                 let (so_far, label) = ways[a];
-                let first = if labels[a].is_null() { at.distance(middle(mesh, a as u32)) } else { 0.0 };
+                let first = if labels[a].is_null() {
+                    at.distance(middle(mesh, a as u32))
+                } else {
+                    0.0
+                };
                 let way = (so_far + first + at.distance(middle(mesh, b as u32)), label);
                 if way < ways[b] {
                     ways[b] = way;

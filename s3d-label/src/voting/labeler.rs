@@ -115,7 +115,9 @@ impl<'m> Labeler<'m> {
         check_label(label)?;
         for points in points.chunks(CHUNK_POINTS) {
             self.nearest_faces.nearest_many(points, &mut self.nearest);
-            self.nearest.iter().for_each(|n| self.votes.add(n.face, label, n.distance_m));
+            self.nearest
+                .iter()
+                .for_each(|n| self.votes.add(n.face, label, n.distance_m));
         }
         Ok(())
     }
@@ -153,7 +155,9 @@ impl<'m> Labeler<'m> {
     pub fn add_vertices(&mut self, vertices: &[Vec3], label: LabelId) -> Result<(), VoteError> {
         check_points(vertices)?;
         check_label(label)?;
-        let corners = self.corners.get_or_insert_with(|| Corners::new(self.nearest_faces.mesh()));
+        let corners = self
+            .corners
+            .get_or_insert_with(|| Corners::new(self.nearest_faces.mesh()));
         for vertices in vertices.chunks(CHUNK_POINTS) {
             self.others.clear();
             for vertex in vertices {
@@ -167,7 +171,9 @@ impl<'m> Labeler<'m> {
                 }
             }
             self.nearest_faces.nearest_many(&self.others, &mut self.nearest);
-            self.nearest.iter().for_each(|n| self.votes.add(n.face, label, n.distance_m));
+            self.nearest
+                .iter()
+                .for_each(|n| self.votes.add(n.face, label, n.distance_m));
         }
         Ok(())
     }
@@ -256,7 +262,9 @@ mod tests {
         prop::collection::vec([corner(), corner(), corner()], 1..25).prop_filter_map("no area", |triangles| {
             let at = |(x, y, z): (i8, i8, i8)| vec3(f32::from(x), f32::from(y), f32::from(z));
             let positions: Vec<Vec3> = triangles.into_iter().flatten().map(at).collect();
-            let faces = (0..positions.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+            let faces = (0..positions.len() as u32 / 3)
+                .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
+                .collect();
             TriMesh::from_faces(positions, faces).ok()
         })
     }
@@ -279,7 +287,8 @@ mod tests {
         let of_face = |face: u32| {
             let here: Vec<_> = voters.iter().filter(|(_, f, _)| *f == face).collect();
             let mut counts: BTreeMap<LabelId, u64> = BTreeMap::new();
-            here.iter().for_each(|(label, ..)| *counts.entry(*label).or_default() += 1);
+            here.iter()
+                .for_each(|(label, ..)| *counts.entry(*label).or_default() += 1);
             let mut ranking: Vec<(LabelId, u64)> = counts.into_iter().collect();
             // Stable: equal ones stay in the order of their labels.
             ranking.sort_by_key(|(_, votes)| std::cmp::Reverse(*votes));
@@ -304,7 +313,11 @@ mod tests {
     }
 
     fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap()
+            .install(work)
     }
 
     proptest! {

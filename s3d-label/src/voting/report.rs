@@ -29,7 +29,11 @@ pub struct VoteRow {
 impl VoteRow {
     /// Votes a face, over the faces with a vote; 0 if there is none.
     pub fn mean_votes_per_face(&self) -> f64 {
-        if self.faces == 0 { 0.0 } else { self.face_votes as f64 / self.faces as f64 }
+        if self.faces == 0 {
+            0.0
+        } else {
+            self.face_votes as f64 / self.faces as f64
+        }
     }
 
     fn add_face(&mut self, face: &FaceVotes) {
@@ -94,8 +98,12 @@ impl VoteReport {
         }
         let mut total = VoteRow::default();
         let mut rooms: BTreeMap<(u32, Room), VoteRow> = BTreeMap::new();
-        let mut classes: Vec<(Class, VoteRow)> =
-            table.taxonomy().classes().iter().map(|class| (*class, VoteRow::default())).collect();
+        let mut classes: Vec<(Class, VoteRow)> = table
+            .taxonomy()
+            .classes()
+            .iter()
+            .map(|class| (*class, VoteRow::default()))
+            .collect();
         for (id, label) in table.iter() {
             let tally = votes.points_of(id);
             let room = rooms.entry((label.area, label.room)).or_default();
@@ -137,7 +145,11 @@ mod as_data {
         deserializer: D,
     ) -> Result<Vec<(Class, VoteRow)>, D::Error> {
         let rows = Vec::<(Class, VoteRow)>::deserialize(deserializer)?;
-        if rows.iter().map(|(class, _)| class).eq(crate::serde_names::taxonomy().classes()) {
+        if rows
+            .iter()
+            .map(|(class, _)| class)
+            .eq(crate::serde_names::taxonomy().classes())
+        {
             Ok(rows)
         } else {
             Err(D::Error::custom("the classes of a report are not in their order"))
@@ -191,7 +203,11 @@ mod tests {
         assert_eq!(report.total, total);
         assert_eq!(report.total.mean_votes_per_face(), 4.8);
         assert_eq!(
-            report.rooms.iter().map(|(area, room, _)| format!("{area} {room}")).collect::<Vec<_>>(),
+            report
+                .rooms
+                .iter()
+                .map(|(area, room, _)| format!("{area} {room}"))
+                .collect::<Vec<_>>(),
             ["1 office_1", "1 office_2", "2 WC_1"]
         );
         // Faces 0, 1 (table) and 4 (chair) lie in office_1; the points of its three labels voted anywhere.

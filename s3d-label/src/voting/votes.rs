@@ -164,7 +164,9 @@ impl Votes {
         let of_face = &mut self.faces[face as usize];
         of_face.farthest_m = of_face.farthest_m.max(distance_m);
         // A cast takes what is too large for a u64 to the largest one.
-        of_face.sum_nm = of_face.sum_nm.saturating_add((f64::from(distance_m) * 1e9 + 0.5) as u64);
+        of_face.sum_nm = of_face
+            .sum_nm
+            .saturating_add((f64::from(distance_m) * 1e9 + 0.5) as u64);
         self.count(face, label, 1);
     }
 
@@ -282,7 +284,11 @@ impl Votes {
             }
         }
         let Face { farthest_m, sum_nm, .. } = self.faces[face as usize];
-        let mean_m = if sum_nm == u64::MAX { f64::INFINITY } else { sum_nm as f64 / total as f64 * 1e-9 };
+        let mean_m = if sum_nm == u64::MAX {
+            f64::INFINITY
+        } else {
+            sum_nm as f64 / total as f64 * 1e-9
+        };
         (total > 0).then_some(FaceVotes {
             label: first.1,
             votes: first.0,
@@ -310,7 +316,11 @@ mod as_data {
     /// Formats other than JSON have numbers that are none.
     pub(super) fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
         let number = f32::deserialize(deserializer)?;
-        if number.is_nan() { Err(D::Error::custom("a distance that is not a number")) } else { Ok(number) }
+        if number.is_nan() {
+            Err(D::Error::custom("a distance that is not a number"))
+        } else {
+            Ok(number)
+        }
     }
 }
 
@@ -328,7 +338,10 @@ mod tests {
         }
         let most = |labels: &BTreeMap<u32, u64>| {
             let most = labels.values().copied().max()?;
-            labels.iter().find(|(_, count)| **count == most).map(|(label, _)| *label)
+            labels
+                .iter()
+                .find(|(_, count)| **count == most)
+                .map(|(label, _)| *label)
         };
         counts.iter().map(|labels| LabelId(most(labels).unwrap_or(0))).collect()
     }

@@ -34,12 +34,16 @@ pub fn read_obj(path: &Path) -> TriMesh {
             _ => {}
         }
     }
-    let picture = std::fs::read_to_string(path.with_extension("mtl")).ok().and_then(|text| {
-        let line = text.lines().find(|l| l.trim_start().starts_with("map_Kd"))?;
-        Some(path.with_file_name(line.split_whitespace().nth(1)?))
-    });
+    let picture = std::fs::read_to_string(path.with_extension("mtl"))
+        .ok()
+        .and_then(|text| {
+            let line = text.lines().find(|l| l.trim_start().starts_with("map_Kd"))?;
+            Some(path.with_file_name(line.split_whitespace().nth(1)?))
+        });
     if let Some(picture) = picture {
-        let image = image::open(&picture).unwrap_or_else(|e| panic!("{}: {e}", picture.display())).to_rgb8();
+        let image = image::open(&picture)
+            .unwrap_or_else(|e| panic!("{}: {e}", picture.display()))
+            .to_rgb8();
         let (width, height) = image.dimensions();
         let image = Raster::from_vec(width, height, image.pixels().map(|p| p.0).collect());
         parts.textures = vec![Texture { name: "picture".into(), image, wrap: Default::default() }];

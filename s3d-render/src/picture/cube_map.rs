@@ -206,7 +206,10 @@ impl CubeMap {
             let mut colors = Raster::filled(width, width, [0u8; 3]);
             let mut mask = Raster::filled(width, width, 0u8);
             let band = width as usize * BAND as usize;
-            let bands = colors.pixels_mut().par_chunks_mut(band).zip(mask.pixels_mut().par_chunks_mut(band));
+            let bands = colors
+                .pixels_mut()
+                .par_chunks_mut(band)
+                .zip(mask.pixels_mut().par_chunks_mut(band));
             bands.enumerate().for_each(|(k, (colors, seen))| {
                 let first_row = k as u32 * BAND;
                 paint(Band { face, first_row, width: width as usize, colors, seen });
@@ -219,8 +222,10 @@ impl CubeMap {
                 fill_unseen(face, &seen.mask);
             }
         });
-        let reductions =
-            faces.iter().map(|face| std::iter::successors(halved(face), halved).collect()).collect();
+        let reductions = faces
+            .iter()
+            .map(|face| std::iter::successors(halved(face), halved).collect())
+            .collect();
         let faces = faces
             .into_iter()
             .map(|image| Texture { name: String::new(), image, wrap: [Wrap::Clamp; 2] })
@@ -249,8 +254,17 @@ impl CubeMap {
 
     /// The number of bytes that it takes.
     pub fn bytes(&self) -> usize {
-        let colors = self.faces.iter().map(|f| &f.image).chain(self.reductions.iter().flatten());
-        let seen = self.seen.iter().flatten().map(|seen| seen.mask.len() + seen.whole.len()).sum::<usize>();
+        let colors = self
+            .faces
+            .iter()
+            .map(|f| &f.image)
+            .chain(self.reductions.iter().flatten());
+        let seen = self
+            .seen
+            .iter()
+            .flatten()
+            .map(|seen| seen.mask.len() + seen.whole.len())
+            .sum::<usize>();
         3 * colors.map(Raster::len).sum::<usize>() + seen
     }
 
@@ -278,7 +292,12 @@ impl CubeMap {
     pub(crate) fn texels(&self) -> impl Iterator<Item = ([u8; 3], u8)> {
         self.faces.iter().enumerate().flat_map(move |(face, texture)| {
             let seen = move |k| self.seen[face].as_ref().map_or(255, |seen| seen.mask.pixels()[k]);
-            texture.image.pixels().iter().enumerate().map(move |(k, color)| (*color, seen(k)))
+            texture
+                .image
+                .pixels()
+                .iter()
+                .enumerate()
+                .map(move |(k, color)| (*color, seen(k)))
         })
     }
 

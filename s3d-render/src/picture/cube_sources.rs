@@ -59,7 +59,11 @@ impl CubeMap {
         let [_, right, back, left, front, _] = pictures;
         let pictures = [&turned[0], right, back, left, front, &turned[1]];
         let size = Self::fitting_size(f64::from(size.unwrap_or(n)));
-        let source = if size < n { SourceMipMap::new } else { SourceMipMap::without_reductions };
+        let source = if size < n {
+            SourceMipMap::new
+        } else {
+            SourceMipMap::without_reductions
+        };
         let mip_maps = pictures.map(|p| source(p.clone(), [Wrap::Clamp; 2]));
         let (width, step) = (f64::from(n), f64::from(n) / f64::from(size));
         let color = |d| {

@@ -43,7 +43,11 @@ impl CubeMap {
         let size = Self::fitting_size(size.map_or(f64::from(photo.width()) * (1.25 / PI), f64::from));
         let photo = Photograph::new(photo, yaw_rad, pose, size);
         let levels = photo.mip_map.levels();
-        if levels.is_usable() { photo.in_lanes(&levels, level()) } else { photo.pixel_by_pixel() }
+        if levels.is_usable() {
+            photo.in_lanes(&levels, level())
+        } else {
+            photo.pixel_by_pixel()
+        }
     }
 }
 
@@ -82,7 +86,8 @@ impl Photograph {
         // A circle of latitude shortens towards the pole, where a pixel sees many columns.
         let around = (angle / flat).min(TAU) / TAU * w;
         let along = angle / d.length() / PI * h;
-        self.mip_map.sample(place * dvec2(w, h), dvec2(around, 0.0), dvec2(0.0, along), &AT_POLES)
+        self.mip_map
+            .sample(place * dvec2(w, h), dvec2(around, 0.0), dvec2(0.0, along), &AT_POLES)
     }
 
     /// One pixel after another: for photographs so large that the lanes' numbers would not do, and what

@@ -66,7 +66,13 @@ fn half_of(w: u32, h: u32, color: impl Fn(usize) -> [f32; 4]) -> Raster<[f32; 4]
 /// What an image at half the size has at pixel (x, y) of the full one: three quarters of the pixel that
 /// covers it, a quarter of the next one on its side, in either direction.
 fn between(half: &Raster<[f32; 4]>, x: u32, y: u32) -> [f32; 4] {
-    let next = |i: u32, n: u32| if i % 2 == 1 { (i / 2 + 1).min(n - 1) } else { (i / 2).saturating_sub(1) };
+    let next = |i: u32, n: u32| {
+        if i % 2 == 1 {
+            (i / 2 + 1).min(n - 1)
+        } else {
+            (i / 2).saturating_sub(1)
+        }
+    };
     let (x0, x1, y0, y1) = (x / 2, next(x, half.width()), y / 2, next(y, half.height()));
     let corners = [half.at(x0, y0), half.at(x1, y0), half.at(x0, y1), half.at(x1, y1)];
     let mut color = [0.0; 4];
@@ -87,7 +93,9 @@ mod tests {
         let seen = Raster::from_vec(
             16,
             4,
-            (0..64).map(|k| if (4..12).contains(&(k % 16)) { 0 } else { 255 }).collect(),
+            (0..64)
+                .map(|k| if (4..12).contains(&(k % 16)) { 0 } else { 255 })
+                .collect(),
         );
         let mut image =
             Raster::from_vec(16, 4, (0..64).map(|k| if k % 16 < 8 { [10; 3] } else { [110; 3] }).collect());

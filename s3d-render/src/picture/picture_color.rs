@@ -74,7 +74,12 @@ pub fn picture_image_into(
     }
     // The mesh where it shows.
     let mut face = hits.face.clone();
-    for (face, _) in face.pixels_mut().iter_mut().zip(shown.pixels()).filter(|(_, shown)| **shown == 255) {
+    for (face, _) in face
+        .pixels_mut()
+        .iter_mut()
+        .zip(shown.pixels())
+        .filter(|(_, shown)| **shown == 255)
+    {
         *face = NO_FACE;
     }
     let mut mesh = Raster::filled(0, 0, [0; 3]);
@@ -92,7 +97,11 @@ fn mixed(picture: [u8; 3], mesh: [u8; 3], shown: u8) -> [u8; 3] {
     let color: [u8; 3] = std::array::from_fn(|k| {
         ((u32::from(picture[k]) * shown + u32::from(mesh[k]) * (255 - shown) + 127) / 255) as u8
     });
-    if color == [0; 3] && (picture, mesh) != ([0; 3], [0; 3]) { [1; 3] } else { color }
+    if color == [0; 3] && (picture, mesh) != ([0; 3], [0; 3]) {
+        [1; 3]
+    } else {
+        color
+    }
 }
 
 struct PictureKernel<'a> {
@@ -155,7 +164,10 @@ impl CubeRays {
             std::array::from_fn(|k| {
                 // The last column again beyond the end, so that the padding has a direction too.
                 let last = all.last().map_or(0.0, |c| c[k]);
-                all.iter().map(|c| c[k]).chain(std::iter::repeat_n(last, 2 * LANES)).collect()
+                all.iter()
+                    .map(|c| c[k])
+                    .chain(std::iter::repeat_n(last, 2 * LANES))
+                    .collect()
             })
         };
         match camera.rays() {
@@ -245,7 +257,11 @@ fn on_face<L: ShadeLanes>(l: L, face: usize, v: &[L::F; 3]) -> [L::F; 3] {
     let FaceAxes { right, down, forward } = AXES[face];
     let mut out = *v;
     for (to, (axis, sign)) in out.iter_mut().zip([right, down, forward]) {
-        *to = if sign < 0 { l.sub(l.splat(0.0), v[axis]) } else { v[axis] };
+        *to = if sign < 0 {
+            l.sub(l.splat(0.0), v[axis])
+        } else {
+            v[axis]
+        };
     }
     out
 }

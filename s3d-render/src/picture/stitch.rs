@@ -97,11 +97,16 @@ struct Stitch {
 impl Stitch {
     fn new(captures: Vec<Capture>, pose: &Pose, scene: Option<&Scene<'_>>, options: &StitchOptions) -> Self {
         assert!(!captures.is_empty(), "a cube map needs captures");
-        let sharpest = captures.iter().map(|c| c.lens.focal_px().max_element()).fold(0.0, f64::max);
+        let sharpest = captures
+            .iter()
+            .map(|c| c.lens.focal_px().max_element())
+            .fold(0.0, f64::max);
         let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
         let world_from_frame = pose.opencv_from_world().transpose();
-        let views: Vec<PreparedCapture> =
-            captures.into_par_iter().map(|c| PreparedCapture::new(c, pose, scene)).collect();
+        let views: Vec<PreparedCapture> = captures
+            .into_par_iter()
+            .map(|c| PreparedCapture::new(c, pose, scene))
+            .collect();
         let gains = if options.gains && views.len() > 1 {
             let depths = SceneDepths::new(pose, GAIN_SIZE, scene);
             gains(&views, GAIN_SIZE, &depths, world_from_frame)
@@ -114,7 +119,8 @@ impl Stitch {
 
     fn lanes(&self) -> Vec<LaneCapture<'_>> {
         let each = self.views.iter().zip(&self.gains);
-        each.map(|(view, gain)| view.in_lanes(self.world_from_frame, *gain)).collect()
+        each.map(|(view, gain)| view.in_lanes(self.world_from_frame, *gain))
+            .collect()
     }
 
     fn in_lanes(&self, captures: &[LaneCapture<'_>], level: Level) -> CubeMap {
@@ -147,7 +153,12 @@ struct SceneDepths(Option<Vec<Raster<f32>>>);
 
 impl SceneDepths {
     fn new(pose: &Pose, size: u32, scene: Option<&Scene<'_>>) -> Self {
-        let depths = |scene| face_cameras(pose, size).par_iter().map(|c| cast(scene, c).depth).collect();
+        let depths = |scene| {
+            face_cameras(pose, size)
+                .par_iter()
+                .map(|c| cast(scene, c).depth)
+                .collect()
+        };
         Self(scene.map(depths))
     }
 
@@ -238,7 +249,11 @@ impl PreparedCapture {
         let step = ray.direction.length() * 2.0 / f64::from(ray.size) / ray.direction.length_squared();
         let along = self.lens.focal_px() * (step * length_2.sqrt() / v.z);
         let size = dvec2(f64::from(self.lens.width()), f64::from(self.lens.height()));
-        let border = if ray.whole { 0.5 * along.max(DVec2::ONE) } else { DVec2::splat(0.5) };
+        let border = if ray.whole {
+            0.5 * along.max(DVec2::ONE)
+        } else {
+            DVec2::splat(0.5)
+        };
         if !(pixel.cmpgt(border) & pixel.cmplt(size - border)).all() {
             return None;
         }
@@ -248,7 +263,9 @@ impl PreparedCapture {
         // 1 in the middle of the picture and 0 at its border, along either axis.
         let inner = 1.0 - (2.0 * pixel / size - 1.0) * (2.0 * pixel / size - 1.0);
         let weight = inner.x * inner.y;
-        let color = self.picture.sample(pixel, DVec2::X * along.x, DVec2::Y * along.y, &Default::default());
+        let color = self
+            .picture
+            .sample(pixel, DVec2::X * along.x, DVec2::Y * along.y, &Default::default());
         Some((color, (weight * weight) as f32))
     }
 
@@ -291,8 +308,11 @@ fn gains(views: &[PreparedCapture], size: u32, rays: &SceneDepths, world_from_fr
     });
     for seen in colors {
         let telling = |c: &[f32; 3]| c.iter().all(|v| TELLING.contains(v));
-        let seen: Vec<(usize, [f32; 3])> =
-            seen.into_iter().enumerate().filter_map(|(i, c)| Some((i, c.filter(telling)?))).collect();
+        let seen: Vec<(usize, [f32; 3])> = seen
+            .into_iter()
+            .enumerate()
+            .filter_map(|(i, c)| Some((i, c.filter(telling)?)))
+            .collect();
         for &(i, color) in &seen {
             for &(j, _) in seen.iter().filter(|(j, _)| *j != i) {
                 let (count, sum) = &mut sums[i * n + j];
@@ -425,7 +445,10 @@ mod tests {
         let gray = |k: usize, _: DVec3| [120.0 * exposure(k), 100.0, 90.0 * exposure(k + 3)];
         let spread = |gains: bool| {
             let cube = stitch(captures(gray), &pose(), None, &StitchOptions { gains, size: Some(64) });
-            let seen = directions().map(|d| sample(&cube, d)).filter(|s| s.1 == 255).map(|s| s.0[0]);
+            let seen = directions()
+                .map(|d| sample(&cube, d))
+                .filter(|s| s.1 == 255)
+                .map(|s| s.0[0]);
             let (low, high) = seen.fold((255.0f32, 0.0f32), |(l, h), c| (l.min(c), h.max(c)));
             high - low
         };

@@ -125,7 +125,13 @@ mod tests {
         let lens = PhotoLens::Straight(Lens::new(size, f, c, [0.0; 5]).unwrap());
         let noise = photo(size, |p| [(p.x * 37.0) as u8, (p.y * 91.0) as u8, (p.x * p.y) as u8]);
         let image = undistort(&noise, &lens, &camera(f, c, 61, 47));
-        assert!(image.pixels().iter().zip(noise.pixels()).all(|(a, b)| *a == b.map(|v| v.max(1))));
+        assert!(
+            image
+                .pixels()
+                .iter()
+                .zip(noise.pixels())
+                .all(|(a, b)| *a == b.map(|v| v.max(1)))
+        );
     }
 
     /// Every pixel against the formulas of OpenCV, written out again: those of projectPoints, and of the

@@ -224,9 +224,21 @@ impl FaceBatch {
             let wide = if trusted { DrawKind::Wide as u32 } else { kind };
             let wide = if right - left < (2 * LANES) as f64 { wide } else { kind };
             let kind = if small { kind } else { wide };
-            let kind = if bottom - top < MAX_ROWS as f64 { kind } else { DrawKind::Large as u32 };
-            let kind = if low(length) > SHORT { kind } else { DrawKind::InSpace as u32 };
-            let kind = if area.abs() > 1e-4 { kind } else { DrawKind::InSpace as u32 };
+            let kind = if bottom - top < MAX_ROWS as f64 {
+                kind
+            } else {
+                DrawKind::Large as u32
+            };
+            let kind = if low(length) > SHORT {
+                kind
+            } else {
+                DrawKind::InSpace as u32
+            };
+            let kind = if area.abs() > 1e-4 {
+                kind
+            } else {
+                DrawKind::InSpace as u32
+            };
             let kind = if left <= right { kind } else { DrawKind::Nothing as u32 };
             let kind = if top <= bottom { kind } else { DrawKind::Nothing as u32 };
             kinds[i] = if low(q) > 0.0 { kind } else { DrawKind::InSpace as u32 };

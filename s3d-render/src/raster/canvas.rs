@@ -63,7 +63,11 @@ pub(crate) fn part_of_tile(tile_row: usize, top: usize, bottom: usize) -> (usize
 #[inline(always)]
 pub(crate) fn half_of_tile(tile_column: usize, left: usize, right: usize) -> (usize, bool) {
     let (first, middle) = (tile_column * TILE, tile_column * TILE + TILE / 2);
-    if left >= middle { (middle, true) } else { (first, right < middle) }
+    if left >= middle {
+        (middle, true)
+    } else {
+        (first, right < middle)
+    }
 }
 
 /// A pixel that may see a face.
@@ -291,7 +295,8 @@ impl Canvas {
                     bound += chunk.inverse_t_error;
                 }
                 let pixel = (chunk.row + k) * self.pitch + chunk.column + lane;
-                self.doubts.push(Doubt { pixel: pixel as u32, slot: chunk.slot, inverse_t: bound });
+                self.doubts
+                    .push(Doubt { pixel: pixel as u32, slot: chunk.slot, inverse_t: bound });
             }
         }
     }
@@ -312,7 +317,12 @@ impl Canvas {
             let best = self.inverse_t[pixel];
             let reach = best.to_bits() as i32 - CLOSE_ULPS;
             slots.clear();
-            slots.extend(group.iter().filter(|d| d.inverse_t.to_bits() as i32 > reach).map(|d| d.slot));
+            slots.extend(
+                group
+                    .iter()
+                    .filter(|d| d.inverse_t.to_bits() as i32 > reach)
+                    .map(|d| d.slot),
+            );
             if slots.is_empty() {
                 continue;
             }

@@ -142,5 +142,9 @@ pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
 #[inline(always)]
 fn along<L: RasterLanes, const PANORAMA: bool>(l: L, f: &Linear, (u, v): (L::F, L::F)) -> L::F {
     let sum = l.add(l.mul(l.splat(f.across), u), l.splat(f.at));
-    if PANORAMA { l.add(l.mul(l.splat(f.bend), v), sum) } else { sum }
+    if PANORAMA {
+        l.add(l.mul(l.splat(f.bend), v), sum)
+    } else {
+        sum
+    }
 }

@@ -172,7 +172,11 @@ impl PanoramaTiles<'_> {
                 for tile_column in bounds.left / TILE..=bounds.right / TILE {
                     let (column, narrow) = half_of_tile(tile_column, bounds.left, bounds.right);
                     let mut chunk = grid.chunk(planes, (column, row), &reach, slot);
-                    if chunk.edges.iter().any(|e| reach.range(e).1 < -2.0 * chunk.edge_error - 1e-6) {
+                    if chunk
+                        .edges
+                        .iter()
+                        .any(|e| reach.range(e).1 < -2.0 * chunk.edge_error - 1e-6)
+                    {
                         continue;
                     }
                     if poor {

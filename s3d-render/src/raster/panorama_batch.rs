@@ -175,7 +175,11 @@ impl PanoramaBatch {
             let (left, right) = (max(columns.0, 0.0), min(columns.1, last_column));
             let top = max((rows.0 - 0.01).ceil(), 0.0);
             let bottom = min((rows.1 + 0.01).floor(), last_row);
-            let seen = if left <= right { Shown::InBounds as u32 } else { Shown::Nothing as u32 };
+            let seen = if left <= right {
+                Shown::InBounds as u32
+            } else {
+                Shown::Nothing as u32
+            };
             let seen = if top <= bottom { seen } else { Shown::Nothing as u32 };
             shown[i] = if wide < WIDE { seen } else { Shown::Wide as u32 };
             (lefts[i], rights[i], tops[i], bottoms[i]) = (left, right, top, bottom);
@@ -272,16 +276,36 @@ impl PanoramaBatch {
 
             let trusted = error < TRUSTED * lowest;
             let half = columns[i] <= (LANES / 2) as f32;
-            let kind = if half { DrawKind::Narrow as u32 } else { DrawKind::Small as u32 };
+            let kind = if half {
+                DrawKind::Narrow as u32
+            } else {
+                DrawKind::Small as u32
+            };
             let wide = columns[i] <= (2 * LANES) as f32;
-            let wide = if wide { DrawKind::Wide as u32 } else { DrawKind::Large as u32 };
+            let wide = if wide {
+                DrawKind::Wide as u32
+            } else {
+                DrawKind::Large as u32
+            };
             let kind = if columns[i] <= LANES as f32 { kind } else { wide };
             let careful = columns[i] <= LANES as f32;
-            let careful = if careful { DrawKind::Careful as u32 } else { DrawKind::Large as u32 };
+            let careful = if careful {
+                DrawKind::Careful as u32
+            } else {
+                DrawKind::Large as u32
+            };
             let kind = if trusted { kind } else { careful };
-            let kind = if rows[i] <= MAX_ROWS as f32 { kind } else { DrawKind::Large as u32 };
+            let kind = if rows[i] <= MAX_ROWS as f32 {
+                kind
+            } else {
+                DrawKind::Large as u32
+            };
             let kind = if off < FIRM { kind } else { DrawKind::InSpace as u32 };
-            let kind = if offset.abs() > 1e-6 * size { kind } else { DrawKind::InSpace as u32 };
+            let kind = if offset.abs() > 1e-6 * size {
+                kind
+            } else {
+                DrawKind::InSpace as u32
+            };
             kinds[i] = if wides[i] == 0 { kind } else { DrawKind::InSpace as u32 };
 
             (offs[i], edge_errors[i], inverse_t_errors[i]) = (edge_off, edge_error, error);

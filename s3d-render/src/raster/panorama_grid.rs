@@ -269,7 +269,11 @@ pub(crate) fn turn_of(y: f32, x: f32) -> f32 {
     let t = small / if large > 0.0 { large } else { 1.0 };
     let s = t * t;
     let angle = t * (0.999_866 + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1))));
-    let angle = if wide < high { std::f32::consts::FRAC_PI_2 - angle } else { angle };
+    let angle = if wide < high {
+        std::f32::consts::FRAC_PI_2 - angle
+    } else {
+        angle
+    };
     let angle = if x < 0.0 { std::f32::consts::PI - angle } else { angle };
     if y < 0.0 { -angle } else { angle }
 }

@@ -240,7 +240,11 @@ impl<'a> Pinhole<'a> {
             let z_next = self.ahead.dot(next);
             let near = |z: f64, p: DVec3| z.abs() <= 1e-12 * p.abs().element_sum();
             if (z > 0.0) != (z_next > 0.0) || near(z, p) || near(z_next, next) {
-                let s = if z == z_next { 0.5 } else { (z / (z - z_next)).clamp(0.0, 1.0) };
+                let s = if z == z_next {
+                    0.5
+                } else {
+                    (z / (z - z_next)).clamp(0.0, 1.0)
+                };
                 let at = p + (next - p) * s;
                 let slack = 1e-9 * (size + next.abs().element_sum());
                 for (range, axis) in [(&mut x, self.across), (&mut y, self.down)] {
@@ -415,7 +419,8 @@ impl ProjectionRaster for Pinhole<'_> {
     #[inline(always)]
     fn draw<L: RasterLanes>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>) {
         self.project(cluster.corners);
-        self.batch.set_up(cluster.faces, &self.projected, self.width as f64, self.height as f64);
+        self.batch
+            .set_up(cluster.faces, &self.projected, self.width as f64, self.height as f64);
         let batch = &*self.batch;
         let enter = |canvas: &mut Canvas, i: usize| {
             canvas.enter(DrawnFace::new(batch.inverse_t(i), cluster.ids[i], false))

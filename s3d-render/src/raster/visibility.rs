@@ -176,7 +176,11 @@ pub fn cast_ray_by_ray(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits 
 /// How many samples there are along `size` pixels.
 fn samples(size: u32, stride: u32) -> u32 {
     assert!(stride > 0, "a stride of 0 pixels");
-    if stride / 2 < size { (size - 1 - stride / 2) / stride + 1 } else { 0 }
+    if stride / 2 < size {
+        (size - 1 - stride / 2) / stride + 1
+    } else {
+        0
+    }
 }
 
 fn strided(size: u32, stride: u32) -> Vec<u32> {

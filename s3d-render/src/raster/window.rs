@@ -45,7 +45,8 @@ impl<'a> Pixels<'a> {
 
     /// The direction of a sample's ray, as single rays have it.
     pub(crate) fn direction(&self, column: usize, row: usize) -> DVec3 {
-        self.rays.at(self.column + self.stride * column as u32, self.row + self.stride * row as u32)
+        self.rays
+            .at(self.column + self.stride * column as u32, self.row + self.stride * row as u32)
     }
 }
 

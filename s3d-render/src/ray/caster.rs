@@ -55,7 +55,13 @@ fn is_ray(origin: DVec3, direction: DVec3) -> bool {
 
 /// Finite even where a component is 0, so that no 0 · ∞ arises.
 fn inverse(direction: DVec3) -> DVec3 {
-    direction.map(|d| if d.abs() < 1e-290 { 1e290f64.copysign(d) } else { d.recip() })
+    direction.map(|d| {
+        if d.abs() < 1e-290 {
+            1e290f64.copysign(d)
+        } else {
+            d.recip()
+        }
+    })
 }
 
 /// The hits that may still be the nearest.
@@ -81,7 +87,11 @@ impl Nearest {
     }
 
     pub(crate) fn hit(&self) -> Option<Hit> {
-        self.candidates.iter().filter(|h| h.t <= self.reach()).min_by_key(|h| h.face).copied()
+        self.candidates
+            .iter()
+            .filter(|h| h.t <= self.reach())
+            .min_by_key(|h| h.face)
+            .copied()
     }
 }
 
@@ -203,10 +213,16 @@ impl<'s, 'm> RayCaster<'s, 'm> {
                 }
             };
             let [left, right] = [first, first + 1].map(|node| {
-                self.enter(node, inverse).filter(|t| *t <= end * (1.0 + SLACK)).map(|t| (t, node))
+                self.enter(node, inverse)
+                    .filter(|t| *t <= end * (1.0 + SLACK))
+                    .map(|t| (t, node))
             });
             // The nearer one is looked into first.
-            let (near, far) = if right < left && right.is_some() { (right, left) } else { (left, right) };
+            let (near, far) = if right < left && right.is_some() {
+                (right, left)
+            } else {
+                (left, right)
+            };
             self.stack.extend(far);
             self.stack.extend(near);
         }
@@ -288,7 +304,9 @@ mod tests {
                 let [a, b] = [at(ring, sector), at(ring, sector + 1)];
                 let [c, d] = [at(ring + 1, sector), at(ring + 1, sector + 1)];
                 faces.extend(
-                    [[a, b, d], [a, d, c]].into_iter().filter(|[a, b, c]| a != b && b != c && a != c),
+                    [[a, b, d], [a, d, c]]
+                        .into_iter()
+                        .filter(|[a, b, c]| a != b && b != c && a != c),
                 );
             }
         }

@@ -53,7 +53,9 @@ impl Cone {
 
     /// The multiple of `d`, which the cone contains, that lies on the face: above 0.
     pub(crate) fn distance(&self, d: DVec3) -> f64 {
-        self.plane.distance(d).unwrap_or_else(|| self.distance_between_corners(d))
+        self.plane
+            .distance(d)
+            .unwrap_or_else(|| self.distance_between_corners(d))
     }
 
     /// The face seen edge-on: the plane says little there, so weigh the corners' distances.
@@ -84,7 +86,11 @@ pub(crate) fn side(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let quick = a.dot(b.cross(c));
     // Six products of three factors: the rounding error is below 24 · 2⁻⁵³ times the largest.
     let bound = 3e-15 * a.abs().max_element() * b.abs().max_element() * c.abs().max_element();
-    if quick.abs() > bound { quick } else { exact_side(a, b, c) }
+    if quick.abs() > bound {
+        quick
+    } else {
+        exact_side(a, b, c)
+    }
 }
 
 #[cold]

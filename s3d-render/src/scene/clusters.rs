@@ -64,7 +64,9 @@ impl Clusters {
             clusters.nodes[to].content = match tree.nodes[from as usize].content {
                 Content::Children(first) if counts[from as usize] > MAX_FACES as u32 => {
                     let child = clusters.nodes.len();
-                    clusters.nodes.extend_from_slice(&tree.nodes[first as usize..first as usize + 2]);
+                    clusters
+                        .nodes
+                        .extend_from_slice(&tree.nodes[first as usize..first as usize + 2]);
                     stack.extend([(first + 1, child + 1), (first, child)]);
                     Content::Children(child as u32)
                 }
@@ -77,7 +79,10 @@ impl Clusters {
 
     /// Those of several blocks as one.
     pub(crate) fn join(top: &Top, parts: Vec<Self>) -> Self {
-        let nodes: Vec<_> = parts.iter().map(|part| (&part.nodes[..], part.starts.len() - 1)).collect();
+        let nodes: Vec<_> = parts
+            .iter()
+            .map(|part| (&part.nodes[..], part.starts.len() - 1))
+            .collect();
         let mut joined = Self {
             nodes: top.join(&nodes),
             starts: Vec::with_capacity(parts.iter().map(|part| part.starts.len()).sum()),
@@ -87,10 +92,12 @@ impl Clusters {
         };
         for part in &parts {
             let (faces, packets) = (joined.faces.len() as u32, joined.corners.len() as u32);
-            joined.starts.extend(part.starts[..part.starts.len() - 1].iter().map(|start| ClusterStart {
-                first_face: start.first_face + faces,
-                first_packet: start.first_packet + packets,
-            }));
+            joined
+                .starts
+                .extend(part.starts[..part.starts.len() - 1].iter().map(|start| ClusterStart {
+                    first_face: start.first_face + faces,
+                    first_packet: start.first_packet + packets,
+                }));
             joined.corners.extend_from_slice(&part.corners);
             joined.faces.extend_from_slice(&part.faces);
             joined.ids.extend_from_slice(&part.ids);

@@ -59,14 +59,20 @@ pub(crate) struct FaceTree {
 impl FaceTree {
     /// Builds a tree over some faces, at least one.
     pub(crate) fn new(mesh: &TriMesh, faces: &[u32]) -> Self {
-        let boxes: Vec<Aabb> =
-            faces.iter().map(|&face| Aabb::from_points(&mesh.triangle(face).map(Into::into))).collect();
+        let boxes: Vec<Aabb> = faces
+            .iter()
+            .map(|&face| Aabb::from_points(&mesh.triangle(face).map(Into::into)))
+            .collect();
         // Small leaves: a face costs more than a box here.
         let bvh = build(&boxes, 4);
         let node = |node: &obvhs::bvh2::node::Bvh2Node| {
             let first = node.first_index;
             let count = node.prim_count as u8;
-            let content = if count > 0 { Content::Leaf { first, count } } else { Content::Children(first) };
+            let content = if count > 0 {
+                Content::Leaf { first, count }
+            } else {
+                Content::Children(first)
+            };
             Node::new(node.aabb(), content)
         };
         Self {
@@ -93,7 +99,9 @@ pub(crate) struct Top(Bvh2);
 
 impl Top {
     pub(crate) fn new(roots: impl Iterator<Item = Node>) -> Self {
-        let boxes: Vec<Aabb> = roots.map(|root| Aabb::new(root.min().into(), root.max().into())).collect();
+        let boxes: Vec<Aabb> = roots
+            .map(|root| Aabb::new(root.min().into(), root.max().into()))
+            .collect();
         Self(build(&boxes, 1))
     }
 

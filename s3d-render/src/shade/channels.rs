@@ -191,7 +191,11 @@ pub fn normal_vectors(
             // The same side and the same arithmetic as in the image of bytes.
             let [a, b, c] = scene.mesh().triangle(face).map(|p| p.as_dvec3());
             let normal = (b - a).cross(c - a).normalize();
-            vector(if normal.dot(a - camera.pose.location) > 0.0 { -normal } else { normal })
+            vector(if normal.dot(a - camera.pose.location) > 0.0 {
+                -normal
+            } else {
+                normal
+            })
         })
     })
 }
@@ -226,12 +230,18 @@ fn smooth_normals<T: Copy>(
 fn smooth_normal(patch: &Patch, corners: Option<[Vec3; 3]>, d: DVec3) -> DVec3 {
     let (flat, away) = patch.normal_towards(d);
     let Some(corners) = corners else { return flat };
-    let sum: DVec3 = corners.iter().zip(patch.weights(d)).map(|(n, w)| n.as_dvec3() * w).sum();
+    let sum: DVec3 = corners
+        .iter()
+        .zip(patch.weights(d))
+        .map(|(n, w)| n.as_dvec3() * w)
+        .sum();
     // Corner normals follow the winding, which the flat normal shows.
     let sum = if away { -sum } else { sum };
     // One that points away is bent until it is edge-on.
     let beyond = sum.dot(d).max(0.0);
-    (sum - d * (beyond / d.length_squared())).try_normalize().unwrap_or(flat)
+    (sum - d * (beyond / d.length_squared()))
+        .try_normalize()
+        .unwrap_or(flat)
 }
 
 /// ⌊127.5 + 127.5 n + ½⌋ a channel.
@@ -308,8 +318,17 @@ pub fn byte_per_face_image(hits: &Hits, byte_of_face: &[u8], missing: u8) -> Ras
 /// As [`byte_per_face_image`].
 pub fn byte_per_face_image_into(hits: &Hits, byte_of_face: &[u8], missing: u8, out: &mut Raster<u8>) {
     fit(out, &hits.face, 0);
-    let byte = |face: u32| if face == NO_FACE { missing } else { byte_of_face[face as usize] };
-    out.pixels_mut().iter_mut().zip(hits.face.pixels()).for_each(|(out, face)| *out = byte(*face));
+    let byte = |face: u32| {
+        if face == NO_FACE {
+            missing
+        } else {
+            byte_of_face[face as usize]
+        }
+    };
+    out.pixels_mut()
+        .iter_mut()
+        .zip(hits.face.pixels())
+        .for_each(|(out, face)| *out = byte(*face));
 }
 
 /// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.

@@ -117,7 +117,11 @@ fn colored(scene: &Scene<'_>, levels: &[MipLevels<'_>], face: u32) -> FaceColors
             // In pixels of the full size, to the right and downwards.
             let x = uvs.map(|uv| f64::from(uv.x) * w);
             let y = uvs.map(|uv| (1.0 - f64::from(uv.y)) * h);
-            let source = if levels.is_usable() { ColorSource::Texture(index) } else { ColorSource::PerPixel };
+            let source = if levels.is_usable() {
+                ColorSource::Texture(index)
+            } else {
+                ColorSource::PerPixel
+            };
             (source, [x, y, [0.0; 3]], levels.wraps())
         }
         FaceColor::Corners(colors) => {
@@ -191,7 +195,13 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
         Self {
             lanes,
             scene,
-            levels: scene.mesh().textures().iter().enumerate().map(|(k, t)| mip_maps.levels(k, t)).collect(),
+            levels: scene
+                .mesh()
+                .textures()
+                .iter()
+                .enumerate()
+                .map(|(k, t)| mip_maps.levels(k, t))
+                .collect(),
             origin: camera.pose.location,
             max_taps: filter.max_taps,
             batch: AnchorBatch::new(),
@@ -251,7 +261,8 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
             let (source, values, wraps) = colored(self.scene, &self.levels, face);
             sources[k] = source;
             let at = (at as usize % self.row.width, first_row + at as usize / self.row.width);
-            self.batch.put(k, self.scene.mesh().triangle(face), values, wraps, grid, at);
+            self.batch
+                .put(k, self.scene.mesh().triangle(face), values, wraps, grid, at);
         }
         let (anchors, fastest) = self.batch.anchors::<PANORAMA>(self.origin);
         for k in 0..count {

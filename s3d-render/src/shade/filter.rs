@@ -182,7 +182,11 @@ impl<'a> MipLevels<'a> {
         most: u32,
     ) -> L::ColorSum {
         let [x, y] = pair(l, &footprints.at, i);
-        let taps = if maybe == 0 { None } else { self.taps(l, footprints, i, maybe, most) };
+        let taps = if maybe == 0 {
+            None
+        } else {
+            self.taps(l, footprints, i, maybe, most)
+        };
         match taps {
             None => self.magnified(l, x, y, these),
             Some(taps) => self.filtered(l, x, y, &taps, these),

@@ -117,7 +117,10 @@ pub(crate) fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
 fn even_halved(image: &Raster<[u8; 3]>) -> Raster<[u8; 3]> {
     let (w, h) = (image.width() as usize, image.height() as usize);
     let mut half = Raster::filled(w as u32 / 2, h as u32 / 2, [0u8; 3]);
-    let rows = half.pixels_mut().par_chunks_mut(w / 2).zip(image.pixels().par_chunks(2 * w));
+    let rows = half
+        .pixels_mut()
+        .par_chunks_mut(w / 2)
+        .zip(image.pixels().par_chunks(2 * w));
     rows.for_each(|(to, from)| {
         let (upper, lower) = from.split_at(w);
         let upper = upper.as_chunks::<2>().0;
@@ -248,7 +251,11 @@ fn axes(x: Vec2, y: Vec2) -> (Vec2, f32) {
     let root = (half * half + b * b).sqrt();
     let long = (mean + root).sqrt();
     // Of the two ways to write the axis of the larger eigenvalue, the one that does not cancel.
-    let axis = if half >= 0.0 { Vec2::new(root + half, b) } else { Vec2::new(b, root - half) };
+    let axis = if half >= 0.0 {
+        Vec2::new(root + half, b)
+    } else {
+        Vec2::new(b, root - half)
+    };
     let axis = axis.try_normalize().unwrap_or(Vec2::X);
     (axis * long, x.perp_dot(y).abs() / long)
 }

@@ -120,7 +120,9 @@ impl RayTable {
     pub(crate) fn new(camera: &Camera) -> Self {
         let (mut columns, rows): (Vec<DVec3>, Vec<DVec3>) = match camera.rays() {
             Rays::Perspective { x_step, y_step, origin } => (
-                (0..camera.width).map(|i| origin + x_step * (f64::from(i) + 0.5)).collect(),
+                (0..camera.width)
+                    .map(|i| origin + x_step * (f64::from(i) + 0.5))
+                    .collect(),
                 (0..camera.height).map(|j| y_step * (f64::from(j) + 0.5)).collect(),
             ),
             Rays::Equirectangular { columns, rows } => (

@@ -62,7 +62,9 @@ impl Spans {
         for (row, faces) in faces.chunks(self.width.max(1)).enumerate() {
             add_starts(lanes, faces, row * self.width, &mut self.starts);
         }
-        let forgotten = self.table.number(lanes, mesh, faces, &self.starts, &mut self.numbers, &mut self.new);
+        let forgotten = self
+            .table
+            .number(lanes, mesh, faces, &self.starts, &mut self.numbers, &mut self.new);
         self.starts.push(faces.len() as u32);
         self.cut();
         forgotten
@@ -88,7 +90,9 @@ impl Spans {
             pieces.extend([start, start + PIECE].map(|start| Piece { start, number }));
             if end - start > 2 * PIECE {
                 pieces.extend(
-                    (start + 2 * PIECE..end).step_by(PIECE as usize).map(|start| Piece { start, number }),
+                    (start + 2 * PIECE..end)
+                        .step_by(PIECE as usize)
+                        .map(|start| Piece { start, number }),
                 );
             } else {
                 pieces.truncate(at + 1 + usize::from(end - start > PIECE));
@@ -118,7 +122,11 @@ impl Spans {
         if let Some(mesh) = mesh
             && first.is_multiple_of(PREFETCHED)
         {
-            let from = if first == 0 { 0 } else { (first + PREFETCHED).min(new.len()) };
+            let from = if first == 0 {
+                0
+            } else {
+                (first + PREFETCHED).min(new.len())
+            };
             NewFace::prefetch::<COLORS>(&new[from..(first + 2 * PREFETCHED).min(new.len())], lanes, mesh);
         }
         let count = (new.len() - first).min(LANES);
@@ -137,7 +145,9 @@ fn add_starts(lanes: impl ShadeLanes, values: &[u32], from: usize, starts: &mut 
     starts.resize(first + values.len() + 4 * LANES, from as u32);
     let (mut at, mut count) = (1, first + 1);
     while let Some(window) = values.get(at - 1..).and_then(<[u32]>::first_chunk::<{ 4 * LANES + 1 }>)
-        && let Some(to) = starts.get_mut(count..).and_then(<[u32]>::first_chunk_mut::<{ 4 * LANES }>)
+        && let Some(to) = starts
+            .get_mut(count..)
+            .and_then(<[u32]>::first_chunk_mut::<{ 4 * LANES }>)
     {
         let mut some = 0;
         for first in [0, 2 * LANES] {
@@ -151,7 +161,11 @@ fn add_starts(lanes: impl ShadeLanes, values: &[u32], from: usize, starts: &mut 
         at += 4 * LANES;
     }
     starts.truncate(count);
-    starts.extend((at..values.len()).filter(|&k| values[k] != values[k - 1]).map(|k| (from + k) as u32));
+    starts.extend(
+        (at..values.len())
+            .filter(|&k| values[k] != values[k - 1])
+            .map(|k| (from + k) as u32),
+    );
 }
 
 #[cfg(test)]

@@ -25,6 +25,10 @@ impl TexelWrap {
     #[inline(always)]
     pub(crate) fn sign_and_shift(self, value: f64) -> (f64, f64) {
         let turn = (value / self.divisor).floor() * self.period;
-        if value - turn > self.half { (-1.0, turn + self.period) } else { (1.0, -turn) }
+        if value - turn > self.half {
+            (-1.0, turn + self.period)
+        } else {
+            (1.0, -turn)
+        }
     }
 }

@@ -109,7 +109,11 @@ pub(crate) struct RowGroup<'a> {
 /// The function of a [`DrawnFace`] in a row: at + across·u + bend·v.
 #[inline(always)]
 pub(crate) fn along<const PANORAMA: bool>([a, b, c]: [f64; 3], line: &RowGroup<'_>) -> [f64; 3] {
-    if PANORAMA { [c * line.rise, a * line.level, b * line.level] } else { [a + c * line.rise, b, 0.0] }
+    if PANORAMA {
+        [c * line.rise, a * line.level, b * line.level]
+    } else {
+        [a + c * line.rise, b, 0.0]
+    }
 }
 
 /// Plain arrays of eight, for any processor: the compiler uses the registers that every processor of the

@@ -104,7 +104,11 @@ impl RasterLanes for Wide512 {
             // Mostly there is one face, in a panorama one or two. (Perspective views with small faces are
             // faster if their pairs count as a mixture.)
             let these = _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(slots[0] as i32));
-            let other = if PANORAMA { slots[these.trailing_ones() as usize % LANES] } else { slots[0] };
+            let other = if PANORAMA {
+                slots[these.trailing_ones() as usize % LANES]
+            } else {
+                slots[0]
+            };
             if these | _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(other as i32)) != u16::MAX {
                 return resolve_by_fours::<PANORAMA>(slots, line, drawn, faces, depths);
             }

@@ -146,7 +146,8 @@ impl<W: Width> ShadeLanes for Eight<W> {
             let x = _mm256_broadcastsi128_si256(_mm256_castsi256_si128(parts));
             let right = _mm256_mulhrs_epi16(rows, x);
             let left = _mm256_sub_epi16(rows, right);
-            self.0.corners(_mm256_unpacklo_epi16(left, right), _mm256_unpackhi_epi16(left, right))
+            self.0
+                .corners(_mm256_unpacklo_epi16(left, right), _mm256_unpackhi_epi16(left, right))
         }
     }
     #[inline(always)]

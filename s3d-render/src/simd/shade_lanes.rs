@@ -121,7 +121,11 @@ impl<'a> Texels<'a> {
     /// Of rows of `stride` bytes.
     pub(crate) fn new(bytes: &'a [u8], stride: i32) -> Self {
         let len = i32::try_from(bytes.len()).unwrap_or(0);
-        let end = if stride < 0 { 0 } else { i64::from(len) - i64::from(stride) - 7 };
+        let end = if stride < 0 {
+            0
+        } else {
+            i64::from(len) - i64::from(stride) - 7
+        };
         Self { bytes, stride, end: end.max(0) as u32 }
     }
 
@@ -227,7 +231,13 @@ impl ShadeLanes for Plain {
     }
     #[inline(always)]
     fn select_by_sign(self, of: Eight, negative: Eight, positive: Eight) -> Eight {
-        each(|k| if of[k].is_sign_negative() { negative[k] } else { positive[k] })
+        each(|k| {
+            if of[k].is_sign_negative() {
+                negative[k]
+            } else {
+                positive[k]
+            }
+        })
     }
     #[inline(always)]
     fn select(self, these: u32, yes: Eight, no: Eight) -> Eight {
@@ -261,7 +271,9 @@ impl ShadeLanes for Plain {
     fn fixed(self, values: Eight) -> [i32; LANES] {
         // The smallest number that does not fit.
         const END: f32 = 2_147_483_648.0;
-        values.map(|v| v * 32768.0).map(|v| if v < END { v as i32 } else { i32::MIN })
+        values
+            .map(|v| v * 32768.0)
+            .map(|v| if v < END { v as i32 } else { i32::MIN })
     }
     #[inline(always)]
     fn add_fixed(self, a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
@@ -399,8 +411,16 @@ impl ShadeLanes for Plain {
         let EightRays { column, row, depths, place } = *rays;
         *to = std::array::from_fn(|k| {
             let (axis, depth) = (k % 3, depths[k / 3]);
-            let direction = if PANORAMA { column[k] * row[axis] } else { column[k] + row[axis] };
-            if depth.is_finite() { (place[axis] + direction * f64::from(depth)) as f32 } else { 0.0 }
+            let direction = if PANORAMA {
+                column[k] * row[axis]
+            } else {
+                column[k] + row[axis]
+            };
+            if depth.is_finite() {
+                (place[axis] + direction * f64::from(depth)) as f32
+            } else {
+                0.0
+            }
         });
     }
     #[inline]

@@ -298,8 +298,11 @@ impl Width for Avx512 {
             for k in 0..3 {
                 let depths = _mm512_permutexvar_pd(_mm512_loadu_si512(DEPTHS[k].as_ptr().cast()), all);
                 let (column, row) = (load(column, 8 * k), load(row, AXES[k]));
-                let direction =
-                    if PANORAMA { _mm512_mul_pd(column, row) } else { _mm512_add_pd(column, row) };
+                let direction = if PANORAMA {
+                    _mm512_mul_pd(column, row)
+                } else {
+                    _mm512_add_pd(column, row)
+                };
                 let point = _mm512_add_pd(load(place, AXES[k]), _mm512_mul_pd(direction, depths));
                 let seen = !_mm512_fpclass_pd_mask::<MISSING>(depths);
                 points[k] = _mm512_maskz_cvtpd_ps(seen, point);
@@ -382,7 +385,11 @@ fn points_by_fours<const PANORAMA: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
         ];
         for k in 0..3 {
             let (column, row) = (load(column, 3 * half + k), load(row, k));
-            let direction = if PANORAMA { _mm256_mul_pd(column, row) } else { _mm256_add_pd(column, row) };
+            let direction = if PANORAMA {
+                _mm256_mul_pd(column, row)
+            } else {
+                _mm256_add_pd(column, row)
+            };
             let point = _mm256_add_pd(load(place, k), _mm256_mul_pd(direction, times[k]));
             out[3 * half + k] = _mm_and_ps(_mm256_cvtpd_ps(point), masks[k]);
         }

@@ -17,18 +17,27 @@ use std::path::{Path, PathBuf};
 /// An export that takes little time, of the built-in scene.
 pub(crate) fn data_set(folder: &Path, labelled: bool) -> PathBuf {
     let out = folder.join("data set");
-    export(folder, labelled).run(&out, &Context::default()).unwrap().unwrap();
+    export(folder, labelled)
+        .run(&out, &Context::default())
+        .unwrap()
+        .unwrap();
     out
 }
 
 /// That export, not yet made.
 pub(crate) fn export(folder: &Path, labelled: bool) -> Export {
     let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
-    let scene = Building::demo().build().unwrap().write_scan(&folder.join("scan"), &scan, || true).unwrap();
+    let scene = Building::demo()
+        .build()
+        .unwrap()
+        .write_scan(&folder.join("scan"), &scan, || true)
+        .unwrap();
     if !labelled {
         let text = fs::read_to_string(&scene).unwrap();
         let (before, rest) = text.split_once("[annotations]").unwrap();
-        let after = rest.split_once("\n[").map_or(String::new(), |(_, after)| format!("[{after}"));
+        let after = rest
+            .split_once("\n[")
+            .map_or(String::new(), |(_, after)| format!("[{after}"));
         fs::write(&scene, format!("{before}{after}")).unwrap();
     }
     let options =
@@ -46,7 +55,11 @@ pub(crate) fn value(report: &Path, key: &str) -> Value {
 
 /// The bytes of a `data:` URL.
 pub(crate) fn url_bytes(url: &Value, kind: &str) -> Vec<u8> {
-    let base64 = url.as_str().unwrap().strip_prefix(&format!("data:image/{kind};base64,")).unwrap();
+    let base64 = url
+        .as_str()
+        .unwrap()
+        .strip_prefix(&format!("data:image/{kind};base64,"))
+        .unwrap();
     BASE64_STANDARD.decode(base64).unwrap()
 }
 

@@ -102,9 +102,17 @@ impl RoomPlan {
 
     fn check_opening(&self, opening: &Opening) -> Result<(), BuildingError> {
         let Opening { wall, span: [from, to], heights: [low, high], filling } = *opening;
-        let (start, end) = if wall.along_x() { (self.low.x, self.high.x) } else { (self.low.y, self.high.y) };
+        let (start, end) = if wall.along_x() {
+            (self.low.x, self.high.x)
+        } else {
+            (self.low.y, self.high.y)
+        };
         // Under a slanted ceiling walls are upright up to the knee only.
-        let top = if self.heights_m[0] == self.heights_m[1] { self.top() } else { KNEE_M };
+        let top = if self.heights_m[0] == self.heights_m[1] {
+            self.top()
+        } else {
+            KNEE_M
+        };
         let is_door = !filling.is_window();
         // Bars and linings need room.
         let fits = from >= start
@@ -167,7 +175,10 @@ impl Item {
         let far = [-FARTHEST_M, FARTHEST_M];
         match self {
             Self::Standing { thing, position, yaw_deg } => {
-                position.to_array().into_iter().try_for_each(|p| range(p, far, "the place of a thing"))?;
+                position
+                    .to_array()
+                    .into_iter()
+                    .try_for_each(|p| range(p, far, "the place of a thing"))?;
                 range(*yaw_deg, [-1e4, 1e4], "the turn of a thing")?;
                 thing.check(range)
             }
@@ -244,9 +255,9 @@ impl Thing {
             Self::Picture { width_m, heights_m, .. } => hanging(width_m, heights_m, "a picture"),
             Self::WallScreen { width_m, heights_m } => hanging(width_m, heights_m, "a screen"),
             Self::Plant { height_m, .. } => range(height_m, [0.3, 5.0], "the height of a plant"),
-            Self::Carton { size_m } => {
-                size_m.into_iter().try_for_each(|m| range(m, [0.02, LARGE_M], "the side of a box"))
-            }
+            Self::Carton { size_m } => size_m
+                .into_iter()
+                .try_for_each(|m| range(m, [0.02, LARGE_M], "the side of a box")),
             Self::Stairs { width_m, steps, tread_m, riser_m } => {
                 range(width_m, [0.3, LARGE_M], "the width of stairs")?;
                 range(steps as f32, [1.0, 100.0], "the steps of stairs")?;

@@ -97,8 +97,13 @@ impl Builder {
 
     /// From here on every face belongs to a new instance of `class` in this room.
     pub(crate) fn begin(&mut self, class: Class) {
-        let number = 1 + self.instances.iter().filter(|i| i.class == class && i.room == self.room).count();
-        self.instances.push(Instance { class, number: number as u32, room: self.room });
+        let number = 1 + self
+            .instances
+            .iter()
+            .filter(|i| i.class == class && i.room == self.room)
+            .count();
+        self.instances
+            .push(Instance { class, number: number as u32, room: self.room });
     }
 
     /// Runs `build` in a frame with its origin at `origin`, turned by `yaw_deg` counter-clockwise seen from
@@ -134,7 +139,8 @@ impl Builder {
                 self.panel(indices.map(|i| corners[i]), look);
             }
         }
-        self.light.block(Aabb::from_points(corners.map(|p| self.frame.apply(p))));
+        self.light
+            .block(Aabb::from_points(corners.map(|p| self.frame.apply(p))));
     }
 
     /// A four-sided surface, its corners counter-clockwise seen from the front, from the texture's bottom
@@ -180,7 +186,9 @@ impl Builder {
                 face_uvs: vec![[0, 1, 2]],
                 ..MeshParts::default()
             };
-            let lit = self.light.open((apex + a + b) / 3.0, (a - apex).cross(b - apex).normalize());
+            let lit = self
+                .light
+                .open((apex + a + b) / 3.0, (a - apex).cross(b - apex).normalize());
             self.add(parts, look, lit);
         }
     }
@@ -235,7 +243,9 @@ impl Builder {
         let first = self.parts.materials.iter().position(|m| m.texture == Some(texture));
         let material = first.unwrap_or_else(|| {
             let name = self.parts.textures[texture as usize].name.clone();
-            self.parts.materials.push(Material { name, color: [255; 3], texture: Some(texture) });
+            self.parts
+                .materials
+                .push(Material { name, color: [255; 3], texture: Some(texture) });
             self.parts.materials.len() - 1
         });
         self.push(parts, material as u32);
@@ -290,13 +300,17 @@ impl Builder {
     fn push(&mut self, mut parts: MeshParts, material: u32) {
         parts.positions.iter_mut().for_each(|p| p.z += self.floor_m);
         // Onto a lattice of 61 µm: what touches by design then touches in the last bit, also after `finish`.
-        parts.positions.iter_mut().for_each(|p| *p = (*p * 16384.0).round() / 16384.0);
+        parts
+            .positions
+            .iter_mut()
+            .for_each(|p| *p = (*p * 16384.0).round() / 16384.0);
         self.parts.append(parts);
         let n = self.parts.faces.len();
         self.parts.face_materials.resize(self.instance_of_face.len(), material);
         self.parts.face_materials.resize(n, material);
         // Something was begun before anything is added.
-        self.instance_of_face.resize(n, self.instances.len().saturating_sub(1) as u32);
+        self.instance_of_face
+            .resize(n, self.instances.len().saturating_sub(1) as u32);
     }
 
     /// The corners of what was added since there were `first` of them, in building coordinates.
@@ -326,5 +340,7 @@ impl Builder {
 /// The corners of a level polygon around `center`, counter-clockwise seen from above.
 fn ring(center: Vec3, radius: f32, sides: u32) -> Vec<Vec3> {
     let step = std::f32::consts::TAU / sides as f32;
-    (0..sides).map(|i| center + (Vec2::from_angle(i as f32 * step) * radius).extend(0.0)).collect()
+    (0..sides)
+        .map(|i| center + (Vec2::from_angle(i as f32 * step) * radius).extend(0.0))
+        .collect()
 }

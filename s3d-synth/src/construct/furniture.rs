@@ -62,7 +62,11 @@ pub(super) fn office_chair(b: &mut Builder, fabric: Look) {
         let (x0, x1) = (side * 0.29 - 0.025, side * 0.29 + 0.025);
         b.cuboid([x0, -0.12, 0.66], [x1, 0.16, 0.69], BLACK, &[]);
         b.cuboid([x0 + 0.01, 0.0, 0.47], [x1 - 0.01, 0.04, 0.66], BLACK, &[Top, Bottom]);
-        let (from, to) = if side < 0.0 { (x0 + 0.01, -0.2) } else { (0.2, x1 - 0.01) };
+        let (from, to) = if side < 0.0 {
+            (x0 + 0.01, -0.2)
+        } else {
+            (0.2, x1 - 0.01)
+        };
         b.cuboid([from, 0.0, 0.455], [to, 0.04, 0.47], BLACK, &[]);
     }
 }
@@ -112,7 +116,11 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
     // The part of the back's front above the base, and its ends above the arms.
     b.panel([[-half, 0.3], [half, 0.3], [half, 0.82], [-half, 0.82]].map(|[x, z]| vec3(x, 0.24, z)), fabric);
     for side in [-1.0, 1.0] {
-        let (x0, x1) = if side < 0.0 { (-half - 0.16, -half) } else { (half, half + 0.16) };
+        let (x0, x1) = if side < 0.0 {
+            (-half - 0.16, -half)
+        } else {
+            (half, half + 0.16)
+        };
         b.cuboid([x0, -0.42, 0.1], [x1, 0.44, 0.6], fabric, &[]);
         let x = side * half;
         let mut end = [[0.24, 0.6], [0.44, 0.6], [0.44, 0.82], [0.24, 0.82]].map(|[y, z]| vec3(x, y, z));

@@ -39,7 +39,11 @@ impl Light {
     pub(crate) fn open(&self, p: Vec3, n: Vec3) -> f32 {
         // The floor throws light back to the ceiling, but not to the undersides of tables.
         let height = (p.z / self.height_m.max(0.1)).min(1.0);
-        let ambient = if n.z < -0.5 { 0.46 + 0.42 * height * height } else { 0.74 + 0.04 * n.z };
+        let ambient = if n.z < -0.5 {
+            0.46 + 0.42 * height * height
+        } else {
+            0.74 + 0.04 * n.z
+        };
         let lamps: f32 = self
             .lamps
             .iter()
@@ -52,7 +56,11 @@ impl Light {
             .sum();
         // Bright places brighten less than they should, as in a photograph.
         let sum = ambient + lamps;
-        if sum < 0.9 { sum } else { 0.9 + (sum - 0.9) / (1.0 + 2.0 * (sum - 0.9)) }
+        if sum < 0.9 {
+            sum
+        } else {
+            0.9 + (sum - 0.9) / (1.0 + 2.0 * (sum - 0.9))
+        }
     }
 
     /// As [`Light::open`], darkened by what stands close.

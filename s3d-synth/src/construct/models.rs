@@ -120,7 +120,11 @@ pub(super) fn seat(
     }
     b.cuboid([-x, -y, pad], [x, y, seat], fabric, &[]);
     // The back leans by a twelfth of its height, off the seat by a gap but for block seats.
-    let from = if base == SeatBase::Block { seat + 0.002 } else { seat + 0.1 };
+    let from = if base == SeatBase::Block {
+        seat + 0.002
+    } else {
+        seat + 0.1
+    };
     let (thick, lean) = (if base == SeatBase::Block { 0.12 } else { 0.05 }, (back - from) / 12.0);
     let ring =
         |y: f32, z: f32| [vec3(-x, y, z), vec3(x, y, z), vec3(x, y + thick, z), vec3(-x, y + thick, z)];
@@ -134,7 +138,11 @@ pub(super) fn seat(
     if has_arms {
         let top = seat + 0.22;
         for side in [-1.0, 1.0] {
-            let (x0, x1) = if side < 0.0 { (-x - 0.05, -x - 0.005) } else { (x + 0.005, x + 0.05) };
+            let (x0, x1) = if side < 0.0 {
+                (-x - 0.05, -x - 0.005)
+            } else {
+                (x + 0.005, x + 0.05)
+            };
             if base == SeatBase::Block {
                 b.cuboid([x0, -y, 0.02], [x1, y, top], fabric, &[]);
             } else {
@@ -172,7 +180,11 @@ pub(super) fn couch(
     }
     if has_arms {
         for side in [-1.0, 1.0] {
-            let (x0, x1) = if side < 0.0 { (-x - 0.14, -x - 0.002) } else { (x + 0.002, x + 0.14) };
+            let (x0, x1) = if side < 0.0 {
+                (-x - 0.14, -x - 0.002)
+            } else {
+                (x + 0.002, x + 0.14)
+            };
             b.cuboid([x0, -y, 0.04], [x1, y, 0.6_f32.min(height - 0.02)], fabric, &[]);
         }
     }

@@ -112,13 +112,21 @@ pub(crate) fn model_leaf(
     wood: Look,
     shut: bool,
 ) {
-    let (w, h) = if shut { (width, height) } else { (width - 0.02, height - 0.02) };
+    let (w, h) = if shut {
+        (width, height)
+    } else {
+        (width - 0.02, height - 0.02)
+    };
     let low = if shut { 0.0 } else { 0.01 };
     let all = [Side::Left, Side::Right, Side::Top, Side::Bottom, Side::Back];
     b.cuboid([0.0, -0.04, low], [w, 0.0, h], wood, if shut { &all } else { &[] });
     let sides = if shut { 1 } else { 2 };
     for side in 0..sides {
-        let (origin, yaw) = if side == 0 { (vec3(0.0, -0.04, 0.0), 0.0) } else { (vec3(w, 0.0, 0.0), 180.0) };
+        let (origin, yaw) = if side == 0 {
+            (vec3(0.0, -0.04, 0.0), 0.0)
+        } else {
+            (vec3(w, 0.0, 0.0), 180.0)
+        };
         let hang = if side == 0 { w - 0.08 } else { 0.15 };
         b.place(origin, yaw, |b| {
             let mut raised = |z: [f32; 2], out: f32, look: Look| {

@@ -48,7 +48,11 @@ impl RoomPlan {
                     beam(b, from, to, *half_width_m, *depth_m, *look);
                 }
             }
-            if !b.positions_since(first).iter().all(|p| p.cmpge(low).all() && p.cmple(high).all()) {
+            if !b
+                .positions_since(first)
+                .iter()
+                .all(|p| p.cmpge(low).all() && p.cmple(high).all())
+            {
                 return Err(BuildingError::Outside { room: self.room, what: "item", index });
             }
         }
@@ -81,15 +85,22 @@ impl RoomPlan {
     fn fill(&self, b: &mut Builder) {
         for o in &self.openings {
             let [a, c] = o.span;
-            let left = if matches!(o.wall, Wall::South | Wall::East) { c } else { a };
+            let left = if matches!(o.wall, Wall::South | Wall::East) {
+                c
+            } else {
+                a
+            };
             let width = c - a;
             self.at_wall(b, o.wall, left, |b| match o.filling {
                 Filling::Window => window(b, width, o.heights),
                 Filling::Door { thickness_m, hinge_left, open_deg } => {
                     doorway(b, width, o.heights[1], thickness_m);
                     // The leaf opens into the room; its thickness lies on the side away from the opening.
-                    let (x, yaw, y) =
-                        if hinge_left { (0.0, -open_deg, 0.0) } else { (width, 180.0 + open_deg, 0.04) };
+                    let (x, yaw, y) = if hinge_left {
+                        (0.0, -open_deg, 0.0)
+                    } else {
+                        (width, 180.0 + open_deg, 0.04)
+                    };
                     b.place(vec3(x, -0.03, 0.0), yaw, |b| {
                         b.place(vec3(0.0, y, 0.0), 0.0, |b| leaf(b, width, o.heights[1]));
                     });
@@ -197,10 +208,19 @@ impl RoomPlan {
         let mut offsets = [0; 4];
         for (k, wall) in Wall::ALL.into_iter().enumerate() {
             offsets[k] = first;
-            let start = self
-                .on_wall(wall, if matches!(wall, Wall::South | Wall::East) { f32::MAX } else { f32::MIN });
+            let start = self.on_wall(
+                wall,
+                if matches!(wall, Wall::South | Wall::East) {
+                    f32::MAX
+                } else {
+                    f32::MIN
+                },
+            );
             let start = start.clamp(self.low, self.high);
-            let paint = self.accent.filter(|(w, _)| *w == wall).map_or(self.paint, |(_, paint)| paint);
+            let paint = self
+                .accent
+                .filter(|(w, _)| *w == wall)
+                .map_or(self.paint, |(_, paint)| paint);
             let band = bake(b.light(), [columns[k], rows], |u, v| {
                 let (along, up) = (u * self.length(wall), (1.0 - v) * top);
                 let p = (start + wall.right() * along).extend(up);

@@ -262,7 +262,11 @@ fn stairs(b: &mut Builder, width: f32, steps: u32, tread: f32, riser: f32) {
     for step in 0..steps {
         let [y0, y1] = [step, step + 1].map(|n| n as f32 * tread);
         let [z0, z1] = [step, step + 1].map(|n| n as f32 * riser);
-        let omit: &[Side] = if step + 1 == steps { &[Bottom, Front] } else { &[Bottom, Front, Back] };
+        let omit: &[Side] = if step + 1 == steps {
+            &[Bottom, Front]
+        } else {
+            &[Bottom, Front, Back]
+        };
         b.cuboid([-x, y0, 0.0], [x, y1, z1], CONCRETE, omit);
         b.panel([[-x, z0], [x, z0], [x, z1], [-x, z1]].map(|[x, z]| vec3(x, y0, z)), CONCRETE);
     }

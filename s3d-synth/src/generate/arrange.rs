@@ -74,7 +74,11 @@ fn arrange_storey(
         })
         .collect();
     let deepest = |side: usize| {
-        let depths = rooms.iter().zip(&places).filter(|(_, place)| place.0 == side).map(|(r, _)| r.size_m[1]);
+        let depths = rooms
+            .iter()
+            .zip(&places)
+            .filter(|(_, place)| place.0 == side)
+            .map(|(r, _)| r.size_m[1]);
         depths.fold(0f32, f32::max)
     };
     let south = deepest(0) + wall_m;

@@ -125,7 +125,10 @@ pub(super) fn furnish(
     // First, so that every room has one. Where furniture is as dense as in published rooms, the others find a
     // place between it.
     let find = |space: &mut Space, rng: &mut ChaCha8Rng| {
-        let by_wall = options.models.as_ref().and_then(|_| space.find_stand_at_wall(rng, STAND_M));
+        let by_wall = options
+            .models
+            .as_ref()
+            .and_then(|_| space.find_stand_at_wall(rng, STAND_M));
         by_wall.or_else(|| space.find_stand(rng, STAND_M))
     };
     let first = if options.models.is_some() { 1 } else { locations };
@@ -200,7 +203,8 @@ pub(super) fn add_radiators(room: &mut RoomPlan, space: &mut Space, windows: &[(
         let (middle, width_m) = (0.5 * (from + to), (to - from - 0.1).clamp(0.4, 1.3));
         let span = [middle - 0.5 * width_m, middle + 0.5 * width_m];
         if space.take_at_wall(wall, span, 0.14, false) {
-            room.items.push(Item::on_wall(wall, middle, Thing::Radiator { width_m }));
+            room.items
+                .push(Item::on_wall(wall, middle, Thing::Radiator { width_m }));
         }
     }
 }
@@ -219,7 +223,9 @@ pub(super) fn place(
     let frame_look = pick(rng, &style.frames);
     let mut hang = |rng: &mut ChaCha8Rng, width: f32, depth: f32, thing: Thing| {
         let place = space.find_on_wall(rng, width, depth);
-        place.map(|(wall, along)| vec![Item::on_wall(wall, along, thing)]).unwrap_or_default()
+        place
+            .map(|(wall, along)| vec![Item::on_wall(wall, along, thing)])
+            .unwrap_or_default()
     };
     match group {
         Group::Board => {
@@ -242,7 +248,9 @@ pub(super) fn place(
         Group::Workplace => {
             let width = between(rng, 1.4, 1.8);
             let found = space.find_at_wall(rng, [width, 1.56], false);
-            found.map(|f| workplace(&f, width, [fabric, glaze], rng)).unwrap_or_default()
+            found
+                .map(|f| workplace(&f, width, [fabric, glaze], rng))
+                .unwrap_or_default()
         }
         Group::MeetingTable => {
             // As many seats as fit.
@@ -252,30 +260,40 @@ pub(super) fn place(
                 let length = 0.9 * seats as f32 + 0.3;
                 space.find(rng, [length + 1.6, 1.2 + 1.6]).map(|frame| (frame, seats))
             });
-            found.map(|(f, seats)| meeting_table(&f, seats, [wood, fabric, glaze], rng)).unwrap_or_default()
+            found
+                .map(|(f, seats)| meeting_table(&f, seats, [wood, fabric, glaze], rng))
+                .unwrap_or_default()
         }
         Group::SofaCorner => {
             let seats = rng.random_range(2..=3);
             let found = space.find_at_wall(rng, [0.66 * seats as f32 + 0.36, 0.94], false);
             let cushion = pick(rng, &style.fabrics);
             let sofa = Thing::Sofa { seats, fabric, cushion };
-            found.map(|f| vec![f.put([0.0, -0.46, 0.0], 0.0, sofa)]).unwrap_or_default()
+            found
+                .map(|f| vec![f.put([0.0, -0.46, 0.0], 0.0, sofa)])
+                .unwrap_or_default()
         }
         Group::CoffeeTable => coffee_table(space, wood, glaze, rng),
         Group::BarTable => {
             let found = space.find(rng, [1.9, 1.9]);
-            found.map(|f| bar_table(&f, [wood, fabric, glaze], rng)).unwrap_or_default()
+            found
+                .map(|f| bar_table(&f, [wood, fabric, glaze], rng))
+                .unwrap_or_default()
         }
         Group::Bookcase { most_shelves } => {
             let (width_m, shelves) = (between(rng, 0.8, 1.2), rng.random_range(2..=most_shelves));
             // Two shelves reach a window's sill already.
             let found = space.find_at_wall(rng, [width_m, 0.32], true);
             let bookcase = Thing::Bookcase { width_m, shelves, wood, seed: rng.random() };
-            found.map(|f| vec![f.put([0.0, -0.16, 0.0], 0.0, bookcase)]).unwrap_or_default()
+            found
+                .map(|f| vec![f.put([0.0, -0.16, 0.0], 0.0, bookcase)])
+                .unwrap_or_default()
         }
         Group::Copier => {
             let found = space.find_at_wall(rng, [0.7, 0.68], true);
-            found.map(|f| vec![f.put([0.0, -0.33, 0.0], 0.0, Thing::Copier)]).unwrap_or_default()
+            found
+                .map(|f| vec![f.put([0.0, -0.33, 0.0], 0.0, Thing::Copier)])
+                .unwrap_or_default()
         }
         Group::Chairs => {
             let count = rng.random_range(2..=3);
@@ -284,7 +302,9 @@ pub(super) fn place(
             let chair = |f: &Frame, k: u32| {
                 f.put([0.6 * (k as f32 + 0.5) - 0.5 * width, -0.33, 0.0], 0.0, Thing::Chair(fabric))
             };
-            found.map(|f| (0..count).map(|k| chair(&f, k)).collect()).unwrap_or_default()
+            found
+                .map(|f| (0..count).map(|k| chair(&f, k)).collect())
+                .unwrap_or_default()
         }
         Group::Carton => {
             let found = space.find_at_wall(rng, [0.64, 0.64], false);
@@ -306,7 +326,9 @@ pub(super) fn place(
 fn alone(space: &mut Space, rng: &mut ChaCha8Rng, width: f32, thing: Thing) -> Vec<Item> {
     let found = space.find_at_wall(rng, [width, width], false);
     let yaw = between(rng, 0.0, 360.0);
-    found.map(|f| vec![f.put([0.0, -0.5 * width, 0.0], yaw, thing)]).unwrap_or_default()
+    found
+        .map(|f| vec![f.put([0.0, -0.5 * width, 0.0], yaw, thing)])
+        .unwrap_or_default()
 }
 
 fn workplace(f: &Frame, width_m: f32, [fabric, glaze]: [Look; 2], rng: &mut ChaCha8Rng) -> Vec<Item> {

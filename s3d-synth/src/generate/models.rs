@@ -91,20 +91,28 @@ impl Models {
                 range.iter().try_for_each(|&m| check(m, allowed, what))?;
             }
         }
-        let lowest =
-            options.rooms.iter().flat_map(|room| room.heights_m).fold(options.hallway_height_m, f32::min);
+        let lowest = options
+            .rooms
+            .iter()
+            .flat_map(|room| room.heights_m)
+            .fold(options.hallway_height_m, f32::min);
         // Boards hang above the highest sofa.
         let board = f64::from(lowest - self.couch_m[2][1] - 0.2);
         for (range, allowed) in self.board_m.iter().zip([[0.4, 5.0], [0.4, board]]) {
-            range.iter().try_for_each(|&m| check(m, allowed, "the size of boards"))?;
+            range
+                .iter()
+                .try_for_each(|&m| check(m, allowed, "the size of boards"))?;
         }
         let most = options.hallway_width_m - 0.2;
         check(self.door_m[0], [0.7, f64::from(most.min(1.1))], "the width of doorways")?;
         check(self.door_m[1], [1.9, 2.1], "the height of doorways")?;
         check(self.window_m[0], [0.3, 1.2], "the lower edge of windows")?;
         // Where a ceiling is slanted, openings end below the slant.
-        let top =
-            if options.rooms.iter().all(|r| r.heights_m[0] == r.heights_m[1]) { lowest - 0.1 } else { 2.1 };
+        let top = if options.rooms.iter().all(|r| r.heights_m[0] == r.heights_m[1]) {
+            lowest - 0.1
+        } else {
+            2.1
+        };
         check(self.window_m[1], [1.9, f64::from(top)], "the upper edge of windows")?;
         for panes in self.panes.iter().flatten() {
             check(*panes as f32, [1.0, 3.0], "the panes of a window")?;

@@ -89,8 +89,10 @@ const DRAWN: [(RoomType, [[f32; 2]; 2]); 11] = [
 impl RoomOptions {
     /// A furnished room of a common size for its type, with windows and one scan location.
     pub fn new(room_type: RoomType) -> Self {
-        let [[x0, x1], [y0, y1]] =
-            DRAWN.iter().find(|(t, _)| *t == room_type).map_or([[4.0; 2]; 2], |(_, sizes)| *sizes);
+        let [[x0, x1], [y0, y1]] = DRAWN
+            .iter()
+            .find(|(t, _)| *t == room_type)
+            .map_or([[4.0; 2]; 2], |(_, sizes)| *sizes);
         Self::sized(room_type, [0.5 * (x0 + x1), 0.5 * (y0 + y1)])
     }
 
@@ -148,7 +150,10 @@ impl BuildingOptions {
         RangeError::check(self.hallway_height_m, HEIGHTS, || words("the height of hallways"))?;
         RangeError::check(self.wall_m, [0.1, 1.0], || words("the thickness of walls"))?;
         let with_models = self.models.is_some();
-        self.rooms.iter().enumerate().try_for_each(|(index, room)| room.check(index, with_models))?;
+        self.rooms
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, room)| room.check(index, with_models))?;
         if let FloorPlan::Wings { wings, hallways, courtyard_m } = self.plan {
             if !with_models {
                 return Err(BuildingError::EmptyStyle { what: "models, which wings need" });

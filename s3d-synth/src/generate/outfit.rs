@@ -191,19 +191,24 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, models: &Models, rng: &
     let is_free = |x: f32, beams: &[f32]| {
         x - half_width_m > low.x + 0.1
             && x + half_width_m < high.x - 0.1
-            && lamps.iter().all(|l| (l[0] - x).abs() > 0.5 * l[2] + half_width_m + 0.05)
+            && lamps
+                .iter()
+                .all(|l| (l[0] - x).abs() > 0.5 * l[2] + half_width_m + 0.05)
             && beams.iter().all(|other| (other - x).abs() > 2.0 * half_width_m + 0.3)
     };
     let mut beams: Vec<f32> = Vec::new();
     if lowest >= 2.5 {
         for _ in 0..drawn(models.beams * share, rng) {
-            let found = (0..30).map(|_| between(rng, low.x, high.x)).find(|&x| is_free(x, &beams));
+            let found = (0..30)
+                .map(|_| between(rng, low.x, high.x))
+                .find(|&x| is_free(x, &beams));
             beams.extend(found);
         }
     }
     for &x in &beams {
         let (from, to) = (vec2(x, low.y), vec2(x, high.y));
-        room.items.push(Item::Beam(Beam { from, to, half_width_m, depth_m, look: CONCRETE }));
+        room.items
+            .push(Item::Beam(Beam { from, to, half_width_m, depth_m, look: CONCRETE }));
     }
     // Under a slanted ceiling a column would not meet it.
     if room.heights_m[0] != room.heights_m[1] {
@@ -223,7 +228,8 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, models: &Models, rng: &
         if under_lamp && !wall.along_x() {
             continue;
         }
-        room.items.push(Item::on_wall(wall, along, Thing::Column { width_m, depth_m: out_m, height_m }));
+        room.items
+            .push(Item::on_wall(wall, along, Thing::Column { width_m, depth_m: out_m, height_m }));
     }
 }
 
@@ -240,20 +246,32 @@ impl Outfitter<'_> {
     /// A piece where there is space for it, or nothing.
     fn place(&self, piece: Piece, space: &mut Space, rng: &mut ChaCha8Rng) -> Vec<Item> {
         let (models, style) = (self.models, self.style);
-        let woods = if matches!(piece, Shelves) { &models.shelf_looks } else { &models.table_looks };
-        let fabrics = if matches!(piece, Couch) { &models.couch_looks } else { &models.seat_looks };
+        let woods = if matches!(piece, Shelves) {
+            &models.shelf_looks
+        } else {
+            &models.table_looks
+        };
+        let fabrics = if matches!(piece, Couch) {
+            &models.couch_looks
+        } else {
+            &models.seat_looks
+        };
         let (wood, fabric) = (pick(rng, woods), pick(rng, fabrics));
         match piece {
             Desk => {
                 let size = sized(&models.table_m, rng);
                 let found = space.find_at_wall(rng, [size[0] + 0.02, size[1] + 2.0 * CHAIR_M + 0.06], false);
-                found.map(|f| self.desk(&f, size, [wood, fabric], rng)).unwrap_or_default()
+                found
+                    .map(|f| self.desk(&f, size, [wood, fabric], rng))
+                    .unwrap_or_default()
             }
             Meeting => self.meeting(space, [wood, fabric], rng),
             Cafe => {
                 let side = between(rng, 0.7, 0.95);
                 let found = space.find(rng, [side + 4.0 * CHAIR_M; 2]);
-                found.map(|f| self.cafe(&f, side, [wood, fabric], rng)).unwrap_or_default()
+                found
+                    .map(|f| self.cafe(&f, side, [wood, fabric], rng))
+                    .unwrap_or_default()
             }
             SideTable => {
                 let size = [between(rng, 0.6, 1.1), between(rng, 0.5, 0.7), between(rng, 0.55, 0.78)];
@@ -278,27 +296,35 @@ impl Outfitter<'_> {
                 let width = size_m[0] * seats as f32 + if has_arms { 0.28 } else { 0.0 };
                 let found = space.find_at_wall(rng, [width, size_m[1] + 0.03], false);
                 let couch = Thing::Couch { seats, size_m, has_arms, fabric };
-                found.map(|f| vec![f.put([0.0, -0.5 * size_m[1], 0.0], 0.0, couch)]).unwrap_or_default()
+                found
+                    .map(|f| vec![f.put([0.0, -0.5 * size_m[1], 0.0], 0.0, couch)])
+                    .unwrap_or_default()
             }
             Shelves => {
                 let size_m = sized(&models.shelf_m, rng);
                 let found = space.find_at_wall(rng, [size_m[0], size_m[1] + 0.03], true);
                 let front = pick(rng, &models.shelves);
                 let shelves = Thing::Shelves { front, size_m, wood, seed: rng.random() };
-                found.map(|f| vec![f.put([0.0, -0.5 * size_m[1], 0.0], 0.0, shelves)]).unwrap_or_default()
+                found
+                    .map(|f| vec![f.put([0.0, -0.5 * size_m[1], 0.0], 0.0, shelves)])
+                    .unwrap_or_default()
             }
             Chair => {
                 let (chair, _) = models.seat(fabric, rng);
                 let found = space.find_at_wall(rng, [2.0 * CHAIR_M; 2], false);
                 let yaw = between(rng, -25.0, 25.0);
-                found.map(|f| vec![f.put([0.0, -CHAIR_M, 0.0], yaw, chair)]).unwrap_or_default()
+                found
+                    .map(|f| vec![f.put([0.0, -CHAIR_M, 0.0], yaw, chair)])
+                    .unwrap_or_default()
             }
             Board => {
                 let (board, width) = models.board((pick(rng, &style.boards), pick(rng, &style.frames)), rng);
                 // A bookcase in the corner does not reach it.
                 let free = width + 2.0 * (models.shelf_m[1][1] + 0.06);
                 let found = space.find_on_wall(rng, free, 0.0);
-                found.map(|(wall, along)| vec![Item::on_wall(wall, along, board)]).unwrap_or_default()
+                found
+                    .map(|(wall, along)| vec![Item::on_wall(wall, along, board)])
+                    .unwrap_or_default()
             }
             Rows => self.rows(space, fabric, rng),
             Stalls => {
@@ -359,8 +385,16 @@ impl Outfitter<'_> {
             (Thing::DeskLamp, [0.5 * width - 0.12, -0.2, top], 0.4),
         ] {
             if rng.random_bool(chance) {
-                let yaw = if thing == Thing::Papers { between(rng, -20.0, 20.0) } else { on_left };
-                let yaw = if thing == Thing::DeskLamp { between(rng, -30.0, 30.0) } else { yaw };
+                let yaw = if thing == Thing::Papers {
+                    between(rng, -20.0, 20.0)
+                } else {
+                    on_left
+                };
+                let yaw = if thing == Thing::DeskLamp {
+                    between(rng, -30.0, 30.0)
+                } else {
+                    yaw
+                };
                 items.push(f.put(at, yaw, thing));
             }
         }

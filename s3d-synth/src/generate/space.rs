@@ -93,7 +93,11 @@ impl Space {
     }
 
     fn ends(&self, wall: Wall) -> [f32; 2] {
-        if wall.along_x() { [self.low.x, self.high.x] } else { [self.low.y, self.high.y] }
+        if wall.along_x() {
+            [self.low.x, self.high.x]
+        } else {
+            [self.low.y, self.high.y]
+        }
     }
 
     fn is_free(&self, [low, high]: Rect) -> bool {
@@ -180,7 +184,12 @@ impl Space {
     pub(super) fn find(&mut self, rng: &mut ChaCha8Rng, size: [f32; 2]) -> Option<Frame> {
         (0..TRIES).find_map(|_| {
             let turned = rng.random_bool(0.5);
-            let half = 0.5 * if turned { vec2(size[1], size[0]) } else { Vec2::from_array(size) };
+            let half = 0.5
+                * if turned {
+                    vec2(size[1], size[0])
+                } else {
+                    Vec2::from_array(size)
+                };
             let [from, to] = [self.low + half + GAP_M, self.high - half - GAP_M];
             let origin = vec2(between(rng, from.x, to.x), between(rng, from.y, to.y));
             let rect = [origin - half, origin + half];

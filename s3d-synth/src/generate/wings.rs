@@ -52,7 +52,11 @@ pub(super) fn arrange_wings(
     let planner = Planner { options, models, rooms };
     let wall_m = options.wall_m;
     let has_cross = wings > 1;
-    let start = if has_cross { options.hallway_width_m + wall_m } else { 0.0 };
+    let start = if has_cross {
+        options.hallway_width_m + wall_m
+    } else {
+        0.0
+    };
     let wings = planner.deal(wings, start);
     // The hallways that are not the cross hallway's, as many as possible in each wing.
     let left = hallways as usize - if has_cross { wings.len() } else { 0 };
@@ -91,7 +95,9 @@ pub(super) fn arrange_wings(
 impl Planner<'_> {
     /// Each room goes to the row that is shortest so far.
     fn deal(&self, wings: u32, start: f32) -> Vec<Wing> {
-        let mut all: Vec<Wing> = (0..wings).map(|_| Wing { ends: [start; 2], ..Wing::default() }).collect();
+        let mut all: Vec<Wing> = (0..wings)
+            .map(|_| Wing { ends: [start; 2], ..Wing::default() })
+            .collect();
         for (index, room) in self.rooms.iter().enumerate() {
             let rows = (0..all.len()).flat_map(|w| [(w, 0), (w, 1)]);
             let shortest = rows.min_by(|a, b| all[a.0].ends[a.1].total_cmp(&all[b.0].ends[b.1]));
@@ -113,7 +119,11 @@ impl Planner<'_> {
         let (depth_m, hinge_left) = (0.5 * self.options.wall_m, rng.random());
         let angle = between(rng, 60.0, 107.0);
         let leaf = |open_deg| Filling::Leaf { model, look, depth_m, hinge_left, open_deg };
-        let sides = if shut { [leaf(0.0); 2] } else { [leaf(angle), Filling::Frame { depth_m }] };
+        let sides = if shut {
+            [leaf(0.0); 2]
+        } else {
+            [leaf(angle), Filling::Frame { depth_m }]
+        };
         Doorway { span: [at, at + models.door_m[0]], sides }
     }
 
@@ -146,8 +156,9 @@ impl Planner<'_> {
         let end = (wing.ends[0].max(wing.ends[1]) - wall_m).max(start + SHORTEST_M);
         let cuts = self.cuts(wing, [start, end], pieces);
         let mut doors: Vec<Opening> = Vec::new();
-        for (row, (inner, outer)) in
-            [(Wall::North, Wall::South), (Wall::South, Wall::North)].into_iter().enumerate()
+        for (row, (inner, outer)) in [(Wall::North, Wall::South), (Wall::South, Wall::North)]
+            .into_iter()
+            .enumerate()
         {
             for &(index, span) in &wing.rows[row] {
                 let room = &self.rooms[index];
@@ -237,7 +248,11 @@ impl Planner<'_> {
             let mut openings: Vec<Opening> =
                 entry.iter().map(|door| self.opening(Wall::East, door, 0)).collect();
             let is_last = k + 1 == wings.len();
-            let to = if is_last { *top } else { top + 0.5 * (courtyard_m - wall_m) };
+            let to = if is_last {
+                *top
+            } else {
+                top + 0.5 * (courtyard_m - wall_m)
+            };
             openings.push(match before.take() {
                 Some(door) => self.opening(Wall::South, &door, 1),
                 None => self.end(Wall::South, 0.5 * width, rng),
@@ -264,8 +279,10 @@ impl Planner<'_> {
                 to - from >= self.models.door_m[0]
             })
         };
-        let places: Vec<f32> =
-            rooms().map(|[_, to]| to + 0.5 * self.options.wall_m).filter(|&cut| has_place(cut)).collect();
+        let places: Vec<f32> = rooms()
+            .map(|[_, to]| to + 0.5 * self.options.wall_m)
+            .filter(|&cut| has_place(cut))
+            .collect();
         let mut cuts: Vec<f32> = Vec::new();
         for k in 1..pieces {
             let wanted = start + (end - start) * k as f32 / pieces as f32;
@@ -287,7 +304,12 @@ impl Planner<'_> {
         let mut best = [0.0; 2];
         let mut start = from + BESIDE_DOOR_M;
         let end = to - BESIDE_DOOR_M;
-        for cut in cuts.iter().copied().filter(|cut| *cut > from && *cut < to).chain([f32::MAX]) {
+        for cut in cuts
+            .iter()
+            .copied()
+            .filter(|cut| *cut > from && *cut < to)
+            .chain([f32::MAX])
+        {
             let stop = end.min(cut - keep);
             if stop - start > best[1] - best[0] {
                 best = [start, stop];

@@ -84,7 +84,14 @@ impl FloorFinish {
                 } else {
                     base
                 };
-                tint(color, if edge < 0.025 { -34.0 } else { 6.0 * (hash(i as u32, j as u32, 87) - 0.5) })
+                tint(
+                    color,
+                    if edge < 0.025 {
+                        -34.0
+                    } else {
+                        6.0 * (hash(i as u32, j as u32, 87) - 0.5)
+                    },
+                )
             }
         }
     }

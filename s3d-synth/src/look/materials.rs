@@ -92,7 +92,11 @@ impl Look {
     }
 
     pub(crate) fn wrap(self) -> Wrap {
-        if matches!(self, Look::Fitted(_)) { Wrap::Clamp } else { Wrap::Repeat }
+        if matches!(self, Look::Fitted(_)) {
+            Wrap::Clamp
+        } else {
+            Wrap::Repeat
+        }
     }
 
     /// Texture coordinates at the far corner of a surface of `size` metres.

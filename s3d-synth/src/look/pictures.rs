@@ -252,7 +252,11 @@ pub(crate) fn landscape() -> Raster<[u8; 3]> {
         {
             let ridge = base - rise * (fractal(x / 110.0 + 7.0 * k as f32, 0.3, 64, 33 + k as u32) - 0.25);
             let rock = 34.0 * (fractal(x / 14.0, y / 14.0, 64, 36) - 0.5);
-            let snow = if k == 0 && y < ridge + 16.0 + 0.5 * rock { 70.0 } else { 0.0 };
+            let snow = if k == 0 && y < ridge + 16.0 + 0.5 * rock {
+                70.0
+            } else {
+                0.0
+            };
             color = mix(color, tint(tone, rock + snow), smooth((y - ridge) / 2.0 + 0.5));
         }
         if y > 172.0 {
@@ -310,7 +314,11 @@ pub(crate) fn chart() -> Raster<[u8; 3]> {
     for bar in 0..7u32 {
         let x = 28.0 + 38.0 * bar as f32;
         let height = 22.0 + 12.0 * bar as f32 + 10.0 * hash(bar, 0, 73);
-        let color = if bar == 6 { [246.0, 178.0, 70.0] } else { [110.0, 178.0, 232.0] };
+        let color = if bar == 6 {
+            [246.0, 178.0, 70.0]
+        } else {
+            [110.0, 178.0, 232.0]
+        };
         c.rect([x, 164.0 - height], [x + 24.0, 164.0], color);
     }
     c.line(&[[20.0, 164.0], [304.0, 164.0]], [0.0; 2], 1.0, 2.0, [220.0, 228.0, 240.0]);
@@ -325,7 +333,11 @@ pub(crate) fn keyboard() -> Raster<[u8; 3]> {
         let space = row == 4 && (50.0..112.0).contains(&x);
         let gap = y.rem_euclid(12.0) < 2.0 || (!space && (x + shift).rem_euclid(12.0) < 2.0);
         let outside = !(3.0..177.0).contains(&x) || !(1.0..58.0).contains(&y);
-        if gap || outside { [50.0, 52.0, 58.0] } else { [96.0, 100.0, 108.0] }
+        if gap || outside {
+            [50.0, 52.0, 58.0]
+        } else {
+            [96.0, 100.0, 108.0]
+        }
     })
 }
 

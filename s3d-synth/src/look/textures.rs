@@ -101,7 +101,11 @@ impl Pattern {
             Pattern::Cardboard => cardboard(),
             Pattern::Books => books(),
             Pattern::Concrete => image(256, 256, |x, y| {
-                let spots = if value(x / 5.0, y / 5.0, 51, 8) > 0.86 { -16.0 } else { 0.0 };
+                let spots = if value(x / 5.0, y / 5.0, 51, 8) > 0.86 {
+                    -16.0
+                } else {
+                    0.0
+                };
                 tint([186.0, 184.0, 178.0], 26.0 * (fractal(x / 64.0, y / 64.0, 4, 7) - 0.5) + spots)
             }),
             Pattern::Door => door(),
@@ -170,7 +174,11 @@ fn wood(wood: &Wood) -> Raster<[u8; 3]> {
 
 fn fabric(color: [f32; 3]) -> Raster<[u8; 3]> {
     image(128, 128, |x, y| {
-        let weave = if (x as u32 / 2 + y as u32 / 2).is_multiple_of(2) { 7.0 } else { -7.0 };
+        let weave = if (x as u32 / 2 + y as u32 / 2).is_multiple_of(2) {
+            7.0
+        } else {
+            -7.0
+        };
         let fleck = 14.0 * (hash(x as u32, y as u32, 5) - 0.5);
         tint(color, weave + fleck + 18.0 * (fractal(x / 32.0, y / 32.0, 4, 9) - 0.5))
     })
@@ -181,7 +189,11 @@ fn cardboard() -> Raster<[u8; 3]> {
         // A strip of tape along the middle, flutes under the paper.
         let tape = (y - 64.0).abs() < 8.0;
         let flute = if (x as u32 % 6) < 2 { -5.0 } else { 2.0 };
-        let base = if tape { [206.0, 178.0, 128.0] } else { [184.0, 144.0, 98.0] };
+        let base = if tape {
+            [206.0, 178.0, 128.0]
+        } else {
+            [184.0, 144.0, 98.0]
+        };
         tint(base, flute + 10.0 * (fractal(x / 32.0, y / 32.0, 4, 3) - 0.5))
     })
 }
@@ -220,7 +232,11 @@ fn books() -> Raster<[u8; 3]> {
             && y < band_top + 16.0 + 60.0 * hash(k, 4, 77)
             && (across - 0.5).abs() < 0.16
             && hash(0, y as u32 / 4, k) > 0.25;
-        let ink = if cover[0] > 190.0 { [70.0, 60.0, 60.0] } else { [236.0, 222.0, 170.0] };
+        let ink = if cover[0] > 190.0 {
+            [70.0, 60.0, 60.0]
+        } else {
+            [236.0, 222.0, 170.0]
+        };
         let color = if in_band || in_title { ink } else { cover };
         tint(color.map(|c| c * round), 8.0 * (hash(x as u32, y as u32, 6) - 0.5))
     })

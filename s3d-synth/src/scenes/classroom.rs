@@ -59,7 +59,11 @@ impl Builder {
                 let (s, t) = (i as f32 / nu as f32, j as f32 / nv as f32);
                 let p = origin + u * s + v * t;
                 let inner = i > 0 && j > 0 && i < nu && j < nv;
-                let noise = if inner { noise(p) * 0.05 * self.cell.min(0.1) } else { 0.0 };
+                let noise = if inner {
+                    noise(p) * 0.05 * self.cell.min(0.1)
+                } else {
+                    0.0
+                };
                 self.parts.positions.push(p + normal * noise);
                 self.parts.uvs.push(vec2(s * u.length(), t * v.length()) * 0.5);
             }

@@ -31,7 +31,11 @@ pub fn furnished_room(seed: u64) -> TriMesh {
                 let top = rng.random_range(0.68..0.76);
                 let legs = [low, vec2(high.x - 0.05, low.y), high - 0.05, vec2(low.x, high.y - 0.05)];
                 let legs = legs.map(|p| cuboid(p.extend(0.005), (p + 0.05).extend(top)));
-                MeshParts::merge([cuboid(low.extend(top), high.extend(top + 0.03))].into_iter().chain(legs))
+                MeshParts::merge(
+                    [cuboid(low.extend(top), high.extend(top + 0.03))]
+                        .into_iter()
+                        .chain(legs),
+                )
             }
             1 => cuboid(low.extend(0.005), high.extend(rng.random_range(0.8..1.9))),
             _ => cylinder(((low + high) * 0.5).extend(0.005), 0.5 * extent.y, rng.random_range(0.4..1.0), 24),

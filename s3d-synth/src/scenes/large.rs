@@ -230,13 +230,16 @@ impl Rooms {
             let sides = [(at + h, u, v), (at, u, h), (at + u, v, h), (at + u + v, -u, h), (at + v, -v, h)];
             self.add(class, thing as u32 / 3 + 1, &sides);
         }
-        self.rooms.push(RoomBox { origin: o, size, things: first..self.things.len() });
+        self.rooms
+            .push(RoomBox { origin: o, size, things: first..self.things.len() });
     }
 
     fn add(&mut self, class: usize, number: u32, surfaces: &[(Vec3, Vec3, Vec3)]) {
         let first = self.surfaces.len();
-        self.surfaces.extend(surfaces.iter().map(|&(origin, u, v)| Surface { origin, u, v }));
-        self.things.push(Thing { class, number, surfaces: first..self.surfaces.len() });
+        self.surfaces
+            .extend(surfaces.iter().map(|&(origin, u, v)| Surface { origin, u, v }));
+        self.things
+            .push(Thing { class, number, surfaces: first..self.surfaces.len() });
     }
 
     /// The rows and columns of squares that a surface is cut into so that all have `faces` triangles
@@ -286,7 +289,11 @@ impl Rooms {
                     let (s, t) = (i as f32 / *n as f32, j as f32 / *m as f32);
                     // Inner corners lie off the plane, as in a scan.
                     let is_inner = i > 0 && i < *n && j > 0 && j < *m;
-                    let off = if is_inner { 0.01 * (unit(hash(first + i * (m + 1) + j)) - 0.5) } else { 0.0 };
+                    let off = if is_inner {
+                        0.01 * (unit(hash(first + i * (m + 1) + j)) - 0.5)
+                    } else {
+                        0.0
+                    };
                     let p = surface.origin + surface.u * s + surface.v * t + normal * off;
                     writeln!(obj, "v {:.4} {:.4} {:.4}\nvt {s:.5} {t:.5}", p.x, p.y, p.z)?;
                 }
@@ -431,8 +438,11 @@ fn npy_header(points: u64) -> Vec<u8> {
     let columns =
         [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "|u1"), ("green", "|u1"), ("blue", "|u1")];
     let labels = [("class", "|u1"), ("instance", "<u2"), ("room", "<u2")];
-    let fields: Vec<String> =
-        columns.iter().chain(&labels).map(|(name, kind)| format!("('{name}', '{kind}')")).collect();
+    let fields: Vec<String> = columns
+        .iter()
+        .chain(&labels)
+        .map(|(name, kind)| format!("('{name}', '{kind}')"))
+        .collect();
     let mut text =
         format!("{{'descr': [{}], 'fortran_order': False, 'shape': ({points},), }}", fields.join(", "));
     // The header ends in a line feed, and what follows starts at a multiple of 64.

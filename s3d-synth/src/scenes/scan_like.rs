@@ -88,7 +88,11 @@ fn tidy_scan(rooms: u32, cell: f32, rng: &mut ChaCha8Rng) -> MeshParts {
             let extent =
                 vec3(rng.random_range(0.3..1.2), rng.random_range(0.3..1.0), rng.random_range(0.2..2.0));
             let along = rng.random_range(0.05..size.y - extent.y - 0.05);
-            let across = if rng.random_bool(0.5) { 0.05 } else { size.x - 0.05 - extent.x };
+            let across = if rng.random_bool(0.5) {
+                0.05
+            } else {
+                size.x - 0.05 - extent.x
+            };
             let foot = low + vec3(across, along, 0.01);
             let mut item = shell(foot, foot + extent, cells(extent), |_, _| true);
             item.flip();
@@ -156,11 +160,16 @@ mod tests {
                 let [a, b, c] = m.triangle(f);
                 f64::from(a.distance(b).max(b.distance(c)).max(c.distance(a)))
             };
-            let slivers =
-                (0..m.faces().len() as u32).filter(|&f| m.area(f) < 0.01 * longest(f) * longest(f)).count();
+            let slivers = (0..m.faces().len() as u32)
+                .filter(|&f| m.area(f) < 0.01 * longest(f) * longest(f))
+                .count();
             assert!(slivers * 100 > faces, "{slivers}");
             let free = DVec3::new(3.0, 2.5, 1.5);
-            let nearest = m.positions().iter().map(|p| p.as_dvec3().distance(free)).fold(f64::MAX, f64::min);
+            let nearest = m
+                .positions()
+                .iter()
+                .map(|p| p.as_dvec3().distance(free))
+                .fold(f64::MAX, f64::min);
             assert!(nearest > 1.0, "{nearest}");
         }
     }

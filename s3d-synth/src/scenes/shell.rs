@@ -17,7 +17,11 @@ pub(super) fn shell(min: Vec3, max: Vec3, cells: [u32; 3], keep: impl Fn(usize, 
     let coordinate = |axis: usize, i: u32| {
         // The ends exactly, so that a box touches what it should touch.
         let n = cells[axis];
-        if i == n { max[axis] } else { min[axis] + (max[axis] - min[axis]) * (i as f32 / n as f32) }
+        if i == n {
+            max[axis]
+        } else {
+            min[axis] + (max[axis] - min[axis]) * (i as f32 / n as f32)
+        }
     };
     let strides = [1, cells[0] as usize + 1, (cells[0] as usize + 1) * (cells[1] as usize + 1)];
     let mut vertex_of = vec![NO_INDEX; strides[2] * (cells[2] as usize + 1)];
@@ -106,9 +110,14 @@ pub(super) mod tests {
     }
 
     pub(in crate::scenes) fn digest(mesh: &TriMesh) -> u64 {
-        let bits = mesh.positions().iter().flat_map(|p| p.to_array()).map(|x| u64::from(x.to_bits()));
+        let bits = mesh
+            .positions()
+            .iter()
+            .flat_map(|p| p.to_array())
+            .map(|x| u64::from(x.to_bits()));
         let indices = mesh.faces().iter().flatten().map(|&v| u64::from(v));
-        bits.chain(indices).fold(0xcbf2_9ce4_8422_2325, |h: u64, x| (h ^ x).wrapping_mul(0x0100_0000_01b3))
+        bits.chain(indices)
+            .fold(0xcbf2_9ce4_8422_2325, |h: u64, x| (h ^ x).wrapping_mul(0x0100_0000_01b3))
     }
 
     #[test]
@@ -117,7 +126,9 @@ pub(super) mod tests {
         assert_eq!(open_edges(&parts), 0);
         let room = TriMesh::new(parts).unwrap();
         assert_eq!((room.faces().len(), room.aabb().to_array()), (104, [0.0, 0.0, 0.0, 4.0, 3.0, 2.5]));
-        let upward = (0..104).filter(|&f| room.normal(f) == Vec3::Z).map(|f| room.material_of(f));
+        let upward = (0..104)
+            .filter(|&f| room.normal(f) == Vec3::Z)
+            .map(|f| room.material_of(f));
         assert_eq!(upward.collect::<Vec<_>>(), [Some(0); 24]);
     }
 }

@@ -41,7 +41,10 @@ impl Seen {
 
     /// The first face that the ray from `o` along the unit vector `d` meets, and how far away.
     pub fn first_hit(&self, o: DVec3, d: DVec3) -> Option<(u32, f64)> {
-        let hits = self.faces().zip(&self.triangles).filter_map(|(f, t)| meets(o, d, t).map(|t| (f, t)));
+        let hits = self
+            .faces()
+            .zip(&self.triangles)
+            .filter_map(|(f, t)| meets(o, d, t).map(|t| (f, t)));
         hits.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
@@ -76,7 +79,11 @@ impl Seen {
         let rooms = self.rooms();
         for f in self.faces() {
             let (instance, room) = (self.instance_of(f), rooms[&self.instance_of(f).room]);
-            let deep = if matches!(instance.class, Class::WINDOW | Class::DOOR) { 0.161 } else { 2e-3 };
+            let deep = if matches!(instance.class, Class::WINDOW | Class::DOOR) {
+                0.161
+            } else {
+                2e-3
+            };
             let room = Aabb { min: room.min - deep, max: room.max + deep };
             for p in self.scene.mesh.triangle(f) {
                 assert!(room.contains(p), "{instance:?} at {p}");
@@ -123,7 +130,10 @@ impl Seen {
             let axis = n.abs().max_position();
             let flat = t.map(|p| dvec2(p[(axis + 1) % 3], p[(axis + 2) % 3]));
             let key = [n.x * 500.0, n.y * 500.0, n.z * 500.0, n.dot(t[0]) * 1000.0];
-            planes.entry(key.map(|x| (x + 0.25).round() as i64)).or_default().push((f, flat));
+            planes
+                .entry(key.map(|x| (x + 0.25).round() as i64))
+                .or_default()
+                .push((f, flat));
         }
         // Apart by a line along an edge of one of them, but for what corners move onto the builder's lattice.
         let apart = |a: &[DVec2; 3], b: &[DVec2; 3]| {
@@ -144,7 +154,9 @@ impl Seen {
                     // Far from the origin a plane's place in the key is rough.
                     let n = self.scene.mesh.normal(*f).as_dvec3();
                     let first = self.triangles[*f as usize][0];
-                    let level = self.triangles[*g as usize].iter().all(|p| n.dot(p - first).abs() < 2e-3);
+                    let level = self.triangles[*g as usize]
+                        .iter()
+                        .all(|p| n.dot(p - first).abs() < 2e-3);
                     // Parts of one thing may touch: what is between them nobody sees.
                     let opposite = n.dot(self.scene.mesh.normal(*g).as_dvec3()) < 0.0;
                     let of = &self.scene.instance_of_face;
@@ -152,7 +164,9 @@ impl Seen {
                     if level && !touches && !apart(a, b) && !apart(b, a) {
                         let pair =
                             [self.instance_of(*f), self.instance_of(*g)].map(|i| (i.class, i.number, i.room));
-                        overlaps.entry(pair).or_insert([*f, *g].map(|face| self.scene.mesh.triangle(face)));
+                        overlaps
+                            .entry(pair)
+                            .or_insert([*f, *g].map(|face| self.scene.mesh.triangle(face)));
                     }
                 }
             }

@@ -153,7 +153,13 @@ fn table(args: &TableArgs) -> Outcome<()> {
         let options = args.learning.options();
         let areas = read(&args.dataset, &[], options.spaces, context)?;
         let of_seed = |seed| cross_validate(&areas, &TrainOptions { seed, ..options.clone() }, context);
-        (0..args.seeds).map(|i| of_seed(options.seed.wrapping_add(i))).collect::<Result<Vec<_>>>()
+        (0..args.seeds)
+            .map(|i| of_seed(options.seed.wrapping_add(i)))
+            .collect::<Result<Vec<_>>>()
     })?;
-    print(&if args.json { s3d_eval::detector::table::json(&tables) } else { markdown(&tables) })
+    print(&if args.json {
+        s3d_eval::detector::table::json(&tables)
+    } else {
+        markdown(&tables)
+    })
 }

@@ -49,7 +49,11 @@ impl Cameras {
             (None, Some(CameraSource::Placed { distance_m })) => placed(Placing::Apart(*distance_m)),
             (None, Some(CameraSource::Listed { path, world_from_file })) => {
                 let moved = DAffine3::from_translation(-offset_m) * *world_from_file;
-                let world_from_file = if offset_m == DVec3::ZERO { world_from_file } else { &moved };
+                let world_from_file = if offset_m == DVec3::ZERO {
+                    world_from_file
+                } else {
+                    &moved
+                };
                 let locations = s3d_io::camera::read_scan_locations(path, world_from_file)?;
                 let rooms = vec![None; locations.len()];
                 Some((Self::Listed(locations, rooms), path.clone()))
@@ -68,12 +72,20 @@ impl Cameras {
 
     /// How far apart they are placed, metres, if they are placed so.
     pub(crate) fn distance_m(&self) -> Option<f64> {
-        if let Self::Placed(Placing::Apart(distance_m)) = self { Some(*distance_m) } else { None }
+        if let Self::Placed(Placing::Apart(distance_m)) = self {
+            Some(*distance_m)
+        } else {
+            None
+        }
     }
 
     /// Which share of the surface they are to see, if they are placed so.
     pub(crate) fn share(&self) -> Option<f64> {
-        if let Self::Placed(Placing::Seeing(share)) = self { Some(*share) } else { None }
+        if let Self::Placed(Placing::Seeing(share)) = self {
+            Some(*share)
+        } else {
+            None
+        }
     }
 
     /// How many there are, or about how many places are on so many m² of floor: those that keep a distance

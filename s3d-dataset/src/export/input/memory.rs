@@ -79,7 +79,11 @@ impl SceneSource {
 
 /// Whether a path is that of a mesh, by its ending.
 fn is_mesh(path: &Path) -> bool {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let ending = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
     ["obj", "gltf", "glb", "ply"].contains(&ending.as_str())
 }
 
@@ -203,7 +207,8 @@ fn add<T, const N: usize, const M: usize>(
     let mut block = Vec::with_capacity(N * M * column.len().min(1 << 12));
     for part in column.chunks(1 << 12) {
         block.clear();
-        part.iter().for_each(|element| block.extend_from_slice(bytes(element).as_flattened()));
+        part.iter()
+            .for_each(|element| block.extend_from_slice(bytes(element).as_flattened()));
         sum.add(&block);
     }
 }

@@ -43,13 +43,18 @@ impl MeshSource {
     pub(crate) fn describe(&self) -> String {
         match self {
             Self::Published(area) => area.mesh.display().to_string(),
-            Self::Memory(file) => {
-                file.sources.first().map_or_else(String::new, |s| s.path.display().to_string())
-            }
+            Self::Memory(file) => file
+                .sources
+                .first()
+                .map_or_else(String::new, |s| s.path.display().to_string()),
             Self::Files { paths, .. } => {
                 let more = paths.len() - 1;
                 let first = paths[0].display();
-                if more == 0 { first.to_string() } else { format!("{first} and {more} more") }
+                if more == 0 {
+                    first.to_string()
+                } else {
+                    format!("{first} and {more} more")
+                }
             }
         }
     }

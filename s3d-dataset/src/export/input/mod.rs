@@ -288,8 +288,14 @@ impl AreaInput {
             notes,
             warnings,
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
-            files: files_of(&scene).into_iter().chain(photographs.files().cloned()).collect(),
-            sources: files_of(&scene).into_iter().chain(photographs.by_folder().into_keys()).collect(),
+            files: files_of(&scene)
+                .into_iter()
+                .chain(photographs.files().cloned())
+                .collect(),
+            sources: files_of(&scene)
+                .into_iter()
+                .chain(photographs.by_folder().into_keys())
+                .collect(),
             annotations: scene.annotations,
             records: Vec::new(),
             photographs,
@@ -307,10 +313,16 @@ impl AreaInput {
         asked: Option<Placing>,
         opened: Opened,
     ) -> Result<Self> {
-        let ending =
-            |path: &Path| path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let ending = |path: &Path| {
+            path.extension()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .to_ascii_lowercase()
+        };
         // By glTF's definition +Y points up, and the unit is the metre.
-        let first = paths.first().filter(|path| !["gltf", "glb"].contains(&ending(path).as_str()));
+        let first = paths
+            .first()
+            .filter(|path| !["gltf", "glb"].contains(&ending(path).as_str()));
         let first = match first.filter(|_| up.is_none() || units.is_none()) {
             Some(path) => {
                 let options = MeshOptions { origin: MeshOrigin::Near, units, ..MeshOptions::default() };
@@ -318,11 +330,18 @@ impl AreaInput {
             }
             None => None,
         };
-        let guess = first.as_ref().filter(|_| up.is_none()).map(|file| UpGuess::of(&file.mesh));
+        let guess = first
+            .as_ref()
+            .filter(|_| up.is_none())
+            .map(|file| UpGuess::of(&file.mesh));
         let up = up.or(guess.map(|guess| guess.up())).unwrap_or(UpAxis::Y);
-        let unsaid = first.as_ref().filter(|file| units.is_none() && file.unit_said.is_none());
+        let unsaid = first
+            .as_ref()
+            .filter(|file| units.is_none() && file.unit_said.is_none());
         let unit_guess = unsaid.map(|file| UnitGuess::of(&file.mesh, up));
-        let units = units.or(unit_guess.map(|guess| guess.unit()).filter(|unit| *unit != LengthUnit::Metre));
+        let units = units.or(unit_guess
+            .map(|guess| guess.unit())
+            .filter(|unit| *unit != LengthUnit::Metre));
         drop(first);
         let scene = SceneFile { units, ..SceneFile::of_meshes(paths.to_vec(), up) };
         let mut text = format!("area = {}\n[mesh]\nup = {:?}\n", scene.area, up.name());
@@ -361,7 +380,11 @@ impl AreaInput {
             mesh_file: Some(Arc::clone(&scene.mesh)),
             pictures: None,
             is_labelled: scene.annotations.is_some(),
-            taxonomy: scene.annotations.as_ref().map(|a| a.taxonomy.clone()).unwrap_or_default(),
+            taxonomy: scene
+                .annotations
+                .as_ref()
+                .map(|a| a.taxonomy.clone())
+                .unwrap_or_default(),
             rooms,
             cameras,
             cameras_path: name.clone(),
@@ -408,8 +431,10 @@ impl AreaInput {
             None => asked.map(|placing| (Cameras::Placed(placing), folder.to_owned())),
         };
         let (cameras, cameras_path) = listed.unwrap_or_else(|| {
-            let (locations, rooms) =
-                std::mem::take(&mut area.locations).into_iter().map(|l| (l.location, l.room)).unzip();
+            let (locations, rooms) = std::mem::take(&mut area.locations)
+                .into_iter()
+                .map(|l| (l.location, l.room))
+                .unzip();
             (Cameras::Listed(locations, rooms), folder.to_owned())
         });
         let mut files = vec![folder.to_owned()];
@@ -461,7 +486,9 @@ impl AreaInput {
 
     /// The mesh, read again if it is not in memory.
     pub(crate) fn read_mesh(&self) -> Result<Arc<MeshFile>> {
-        self.mesh_file.as_ref().map_or_else(|| self.source.read(), |file| Ok(Arc::clone(file)))
+        self.mesh_file
+            .as_ref()
+            .map_or_else(|| self.source.read(), |file| Ok(Arc::clone(file)))
     }
 
     /// About how much an export of it writes. Where locations are placed, a fifth of the mesh counts as
@@ -494,7 +521,10 @@ impl AreaInput {
 
     /// What was odd in mesh, annotations and photographs, a sentence each.
     pub(crate) fn doubts<'a>(&'a self, file: &'a MeshFile) -> impl Iterator<Item = &'a String> {
-        self.warnings.iter().chain(&self.photographs.warnings).chain(&file.warnings)
+        self.warnings
+            .iter()
+            .chain(&self.photographs.warnings)
+            .chain(&file.warnings)
     }
 
     /// A sentence about this area with its files named as the manifest names them, which is the same wherever
@@ -539,7 +569,14 @@ fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Photographs> {
 /// What a scene file names, and itself.
 fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
     let mut files = vec![scene.path.clone()];
-    files.extend(scene.mesh.iter().chain(&scene.annotations).chain(&scene.published).cloned());
+    files.extend(
+        scene
+            .mesh
+            .iter()
+            .chain(&scene.annotations)
+            .chain(&scene.published)
+            .cloned(),
+    );
     if let Some(CameraSource::Listed { path, .. }) = &scene.cameras {
         files.push(path.clone());
     }

@@ -9,8 +9,12 @@ use std::collections::BTreeMap;
 /// The table of all labels. That of a published data set is kept whole if it has them all, so that an index
 /// means the same in its images and in ours; else it is made of the labels at hand.
 pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
-    let labels: Vec<Label> =
-        areas.iter().flat_map(|a| &a.rooms).flat_map(|r| &r.instances).map(|i| i.label).collect();
+    let labels: Vec<Label> = areas
+        .iter()
+        .flat_map(|a| &a.rooms)
+        .flat_map(|r| &r.instances)
+        .map(|i| i.label)
+        .collect();
     for area in areas.iter_mut() {
         let Some(path) = area.published_labels().cloned() else { continue };
         let names = s3d_io::dataset::read_labels(&path)?;
@@ -21,7 +25,9 @@ pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
                  it",
                 path.display()
             )),
-            Err(e) => area.warnings.push(format!("{}: {e}; the table is made anew", path.display())),
+            Err(e) => area
+                .warnings
+                .push(format!("{}: {e}; the table is made anew", path.display())),
         }
     }
     let taxonomy = areas.first().map(|area| area.taxonomy.clone()).unwrap_or_default();
@@ -30,9 +36,15 @@ pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
 
 /// Gives every instance, whose numbers run per room, its number in the area.
 pub(super) fn number(area: u32, annotations: Annotations) -> Result<Vec<RoomInput>, NumberingError> {
-    let keys = annotations.rooms.iter().flat_map(|r| r.instances.iter().map(|i| (r.room, i.class, i.number)));
+    let keys = annotations
+        .rooms
+        .iter()
+        .flat_map(|r| r.instances.iter().map(|i| (r.room, i.class, i.number)));
     let numbered = number_area(area, keys)?;
-    let labels = numbered.into_iter().map(|n| ((n.room, n.class, n.number_in_room), n.label)).collect();
+    let labels = numbered
+        .into_iter()
+        .map(|n| ((n.room, n.class, n.number_in_room), n.label))
+        .collect();
     Ok(named(annotations, &labels))
 }
 
@@ -44,7 +56,11 @@ pub(super) fn published_numbers(labels: &[Label], annotations: Annotations) -> V
     sorted.dedup();
     let mut names: BTreeMap<(Room, Class, u32), Label> = BTreeMap::new();
     for same in sorted.chunk_by(|a, b| (a.room, a.class) == (b.room, b.class)) {
-        names.extend((1..).zip(same).map(|(number, label)| ((label.room, label.class, number), *label)));
+        names.extend(
+            (1..)
+                .zip(same)
+                .map(|(number, label)| ((label.room, label.class, number), *label)),
+        );
     }
     named(annotations, &names)
 }
@@ -65,7 +81,9 @@ fn named(annotations: Annotations, labels: &BTreeMap<(Room, Class, u32), Label>)
                 .collect(),
         })
         .collect();
-    rooms.iter_mut().for_each(|r| r.instances.sort_by_key(|i| (i.label.class, i.number_in_room)));
+    rooms
+        .iter_mut()
+        .for_each(|r| r.instances.sort_by_key(|i| (i.label.class, i.number_in_room)));
     rooms.sort_by_key(|r| r.room);
     rooms
 }

@@ -164,9 +164,11 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
         }
         match candidates.iter().find_map(|path| with_ending(path)) {
             Some(path) => found.push(path),
-            None => {
-                missing.push(candidates.first().map_or_else(String::new, |path| path.display().to_string()))
-            }
+            None => missing.push(
+                candidates
+                    .first()
+                    .map_or_else(String::new, |path| path.display().to_string()),
+            ),
         }
     }
     if missing.is_empty() {
@@ -194,7 +196,9 @@ fn with_ending(path: &Path) -> Option<PathBuf> {
         name.push(ending);
         PathBuf::from(name)
     };
-    std::iter::once(path.to_owned()).chain(ENDINGS.map(longer)).find(|path| path.is_file())
+    std::iter::once(path.to_owned())
+        .chain(ENDINGS.map(longer))
+        .find(|path| path.is_file())
 }
 
 /// A photograph with its lens and the camera of its view, and how it asks to be turned.
@@ -264,7 +268,10 @@ mod tests {
             line: 0,
         };
         let chosen = |every, max| -> Vec<String> {
-            choose((0..10).map(camera).collect(), &source(every, max)).into_iter().map(|c| c.name).collect()
+            choose((0..10).map(camera).collect(), &source(every, max))
+                .into_iter()
+                .map(|c| c.name)
+                .collect()
         };
         assert_eq!(chosen(1, None).len(), 10);
         assert_eq!(chosen(4, None), ["0", "4", "8"]);

@@ -62,7 +62,11 @@ impl Pictures {
         let (mut found, mut missing, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
         for location in area.cameras.listed() {
             let uuid = &location.uuid;
-            let of_location = if is_asked(location) { Some(find(&folder, source.kind, uuid)?) } else { None };
+            let of_location = if is_asked(location) {
+                Some(find(&folder, source.kind, uuid)?)
+            } else {
+                None
+            };
             found.push(match of_location {
                 Some(Ok(mut pictures)) => {
                     pictures.check()?;
@@ -171,7 +175,9 @@ fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Send + Sy
 }
 
 fn read_all(paths: &[PathBuf]) -> Result<Vec<Raster<[u8; 3]>>> {
-    Ok(in_parallel(paths, |path| read_picture(path)).into_iter().collect::<s3d_io::Result<_>>()?)
+    Ok(in_parallel(paths, |path| read_picture(path))
+        .into_iter()
+        .collect::<s3d_io::Result<_>>()?)
 }
 
 /// The pictures of a location, or the names of those that are missing.
@@ -190,7 +196,9 @@ impl Found {
     /// Takes the poses of captures, which are in the frame of the mesh's file, to where the mesh is.
     fn subtract(&mut self, offset_m: DVec3) {
         if let Self::Captures(captures) = self {
-            captures.iter_mut().for_each(|capture| capture.pose.location -= offset_m);
+            captures
+                .iter_mut()
+                .for_each(|capture| capture.pose.location -= offset_m);
         }
     }
 

@@ -22,8 +22,11 @@ pub(crate) fn requested_areas(
     companions: &[Vec<PathBuf>],
     known: Option<&Request>,
 ) -> Result<Vec<RequestedArea>> {
-    let paths: Vec<Vec<PathBuf>> =
-        areas.iter().zip(companions).map(|(area, besides)| [&area.sources[..], besides].concat()).collect();
+    let paths: Vec<Vec<PathBuf>> = areas
+        .iter()
+        .zip(companions)
+        .map(|(area, besides)| [&area.sources[..], besides].concat())
+        .collect();
     // The files of each path: itself, or what is in it; and what a plan knows of the path.
     let mut files: Vec<Vec<Vec<PathBuf>>> = Vec::new();
     let mut taken: BTreeMap<(u32, &Path), InputRecord> = BTreeMap::new();
@@ -87,7 +90,9 @@ pub(crate) fn requested_areas(
             place_cameras: area.cameras.distance_m(),
             see: area.cameras.share(),
             offset_m: area.frame.offset(),
-            inputs: inputs.chain(area.records.iter().cloned().map(Ok)).collect::<Result<_>>()?,
+            inputs: inputs
+                .chain(area.records.iter().cloned().map(Ok))
+                .collect::<Result<_>>()?,
         });
     }
     Ok(requested)
@@ -97,7 +102,9 @@ pub(crate) fn requested_areas(
 fn total_bytes(files: &[PathBuf]) -> Result<u64> {
     let mut total = 0;
     for file in files {
-        total += std::fs::metadata(file).map_err(|e| FileError::io(file, "read", e))?.len();
+        total += std::fs::metadata(file)
+            .map_err(|e| FileError::io(file, "read", e))?
+            .len();
     }
     Ok(total)
 }
@@ -112,7 +119,9 @@ fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<BTreeMap<&'a Pa
         || (),
         |(), path| {
             let sum = checksum_of_file(path)?;
-            sums.lock().unwrap_or_else(PoisonError::into_inner).insert(path.as_path(), sum);
+            sums.lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .insert(path.as_path(), sum);
             progress.add(1);
             Ok(())
         },
@@ -125,7 +134,11 @@ pub(super) fn name_of(scene: &Path, path: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     match path.strip_prefix(folder) {
         Ok(below) if below.is_relative() && below.components().next().is_some() => slashed(below),
-        _ => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+        _ => path
+            .file_name()
+            .unwrap_or(path.as_os_str())
+            .to_string_lossy()
+            .into_owned(),
     }
 }
 
@@ -134,7 +147,10 @@ fn below(folder: &Path, file: &Path) -> String {
 }
 
 fn slashed(path: &Path) -> String {
-    path.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join("/")
+    path.iter()
+        .map(|name| name.to_string_lossy())
+        .collect::<Vec<_>>()
+        .join("/")
 }
 
 #[cfg(test)]

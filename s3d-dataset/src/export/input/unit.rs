@@ -27,7 +27,8 @@ impl UnitGuess {
     /// may be a hall of 8 metres.
     pub(super) fn unit(self) -> LengthUnit {
         let fits = |unit: &LengthUnit| {
-            self.height.is_some_and(|height| HEIGHTS_M.contains(&(height * unit.metres())))
+            self.height
+                .is_some_and(|height| HEIGHTS_M.contains(&(height * unit.metres())))
         };
         // Of what is as high as a room in centimetres and in inches, the lower room is the likelier.
         [LengthUnit::Millimetre, LengthUnit::Centimetre, LengthUnit::Inch]

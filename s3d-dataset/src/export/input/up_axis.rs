@@ -29,7 +29,11 @@ impl UpGuess {
     }
 
     pub(super) fn up(self) -> UpAxis {
-        if self.level[0] >= self.level[1] { UpAxis::Y } else { UpAxis::Z }
+        if self.level[0] >= self.level[1] {
+            UpAxis::Y
+        } else {
+            UpAxis::Z
+        }
     }
 
     /// What was guessed and why.

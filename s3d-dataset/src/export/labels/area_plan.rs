@@ -88,7 +88,10 @@ impl AreaPlan {
     pub(crate) fn write(&self, folder: &Path) -> Result<()> {
         create_dir(folder)?;
         let mut label_of_face: Vec<u32> = self.annotated.label_of_face.iter().map(|l| l.0).collect();
-        self.annotated.filled.iter().for_each(|&face| label_of_face[face as usize] |= FILLED);
+        self.annotated
+            .filled
+            .iter()
+            .for_each(|&face| label_of_face[face as usize] |= FILLED);
         let bytes: Vec<u8> = label_of_face.iter().flat_map(|l| l.to_le_bytes()).collect();
         let mut array = NpyWriter::create(&labels_file(folder), "<u4", &[label_of_face.len() as u64])?;
         array.put(&bytes)?;
@@ -176,7 +179,10 @@ mod locations_as_data {
         deserializer: D,
     ) -> Result<Vec<ScanLocation>, D::Error> {
         let locations = Vec::<(String, Pose, u64)>::deserialize(deserializer)?;
-        Ok(locations.into_iter().map(|(uuid, pose, line)| ScanLocation { uuid, pose, line }).collect())
+        Ok(locations
+            .into_iter()
+            .map(|(uuid, pose, line)| ScanLocation { uuid, pose, line })
+            .collect())
     }
 }
 
@@ -217,7 +223,11 @@ mod tests {
     fn any_box() -> impl Strategy<Value = Aabb> {
         let corner = || any::<[f32; 3]>().prop_filter("finite", |v| v.iter().all(|v| v.is_finite()));
         (any::<bool>(), corner(), corner()).prop_map(|(empty, a, b)| {
-            if empty { Aabb::EMPTY } else { Aabb::from_points([a, b].map(Vec3::from_array)) }
+            if empty {
+                Aabb::EMPTY
+            } else {
+                Aabb::from_points([a, b].map(Vec3::from_array))
+            }
         })
     }
 
@@ -319,8 +329,12 @@ mod tests {
         plan.annotated.filled = vec![0, 99];
         plan.write(dir.path()).unwrap();
         assert!(AreaPlan::is_in(dir.path()) && AreaPlan::read(dir.path(), 3).is_ok());
-        let refusal =
-            |area| AreaPlan::read(dir.path(), area).err().map(|e| e.to_string()).unwrap_or_default();
+        let refusal = |area| {
+            AreaPlan::read(dir.path(), area)
+                .err()
+                .map(|e| e.to_string())
+                .unwrap_or_default()
+        };
         assert!(refusal(4).contains("is area 3, not area 4"), "{}", refusal(4));
         let labels = labels_file(dir.path());
         let whole = std::fs::read(&labels).unwrap();
@@ -341,19 +355,25 @@ mod tests {
         let mut plan = any_plan().new_tree(&mut runner).unwrap().current();
         plan.locations[0].uuid = "../../elsewhere".into();
         plan.write(dir.path()).unwrap();
-        let e = AreaPlan::read(dir.path(), 3).err().map(|e| e.to_string()).unwrap_or_default();
+        let e = AreaPlan::read(dir.path(), 3)
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default();
         assert!(e.contains("\"../../elsewhere\" is no uuid"), "{e}");
     }
 
     /// The paths of all values within `value`, itself included.
     fn paths(value: &serde_json::Value, path: &str) -> Vec<String> {
         let inner: Vec<String> = match value {
-            serde_json::Value::Array(list) => {
-                list.iter().enumerate().flat_map(|(i, v)| paths(v, &format!("{path}/{i}"))).collect()
-            }
-            serde_json::Value::Object(map) => {
-                map.iter().flat_map(|(key, v)| paths(v, &format!("{path}/{key}"))).collect()
-            }
+            serde_json::Value::Array(list) => list
+                .iter()
+                .enumerate()
+                .flat_map(|(i, v)| paths(v, &format!("{path}/{i}")))
+                .collect(),
+            serde_json::Value::Object(map) => map
+                .iter()
+                .flat_map(|(key, v)| paths(v, &format!("{path}/{key}")))
+                .collect(),
             _ => Vec::new(),
         };
         [vec![path.to_owned()], inner].concat()
@@ -363,7 +383,12 @@ mod tests {
     fn values_of_another_kind_are_refused_wherever_they_stand() {
         let dir = tempfile::tempdir().unwrap();
         let mut runner = proptest::test_runner::TestRunner::deterministic();
-        any_plan().new_tree(&mut runner).unwrap().current().write(dir.path()).unwrap();
+        any_plan()
+            .new_tree(&mut runner)
+            .unwrap()
+            .current()
+            .write(dir.path())
+            .unwrap();
         let text = std::fs::read_to_string(area_file(dir.path())).unwrap();
         let whole: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
         let paths = paths(&whole, "");
@@ -386,7 +411,12 @@ mod tests {
         plan.write(dir.path()).unwrap();
         let text = std::fs::read_to_string(area_file(dir.path())).unwrap();
         let mut file: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
-        let refusal = || AreaPlan::read(dir.path(), 3).err().map(|e| e.to_string()).unwrap_or_default();
+        let refusal = || {
+            AreaPlan::read(dir.path(), 3)
+                .err()
+                .map(|e| e.to_string())
+                .unwrap_or_default()
+        };
         assert_eq!(refusal(), "");
         file["plan"]["names"][0]["room"] = "kitchen_1".into();
         write_checked(&area_file(dir.path()), &file).unwrap();

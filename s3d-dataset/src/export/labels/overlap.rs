@@ -15,7 +15,11 @@ pub(crate) fn overlap_doubts(rooms: &[SurveyedRoom]) -> Vec<String> {
     let mut doubts = Vec::new();
     for (i, a) in rooms.iter().enumerate() {
         for b in rooms.iter().skip(i + 1) {
-            let (small, large) = if a.footprint.area_m2 <= b.footprint.area_m2 { (a, b) } else { (b, a) };
+            let (small, large) = if a.footprint.area_m2 <= b.footprint.area_m2 {
+                (a, b)
+            } else {
+                (b, a)
+            };
             let share = shared(small, large);
             if share > MUCH {
                 doubts.push(format!(

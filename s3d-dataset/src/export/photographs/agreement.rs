@@ -73,7 +73,9 @@ impl Agreement {
     fn between(photo: &[f64], mesh: &[f64], size: [usize; 2], valid: &[bool]) -> Self {
         let away = (DISPLACED * size[0].max(size[1]) as f64).round() as isize;
         let steps = [-1isize, 0, 1];
-        let ring = steps.iter().flat_map(|x| steps.iter().map(move |y| (x * away, y * away)));
+        let ring = steps
+            .iter()
+            .flat_map(|x| steps.iter().map(move |y| (x * away, y * away)));
         let displaced: Vec<f64> = ring
             .filter(|by| *by != (0, 0))
             .filter_map(|by| correlation(photo, mesh, size, valid, by))
@@ -104,7 +106,11 @@ fn edges(values: &[f64], size: [usize; 2], valid: &[bool]) -> Vec<f64> {
     let found = at_inner(size, |i| {
         let [left, right, up, down] = around(i, size[0]);
         let known = [i, left, right, up, down].iter().all(|k| valid[*k]);
-        if known { length(values[right] - values[left], values[down] - values[up]) } else { 0.0 }
+        if known {
+            length(values[right] - values[left], values[down] - values[up])
+        } else {
+            0.0
+        }
     });
     softened(&found, size)
 }
@@ -138,7 +144,12 @@ fn length(x: f64, y: f64) -> f64 {
 /// `of` at each pixel that has four neighbours, 0 at the border.
 fn at_inner([width, height]: [usize; 2], of: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut found = vec![0.0; width * height];
-    for (y, row) in found.chunks_mut(width.max(1)).enumerate().skip(1).take(height.saturating_sub(2)) {
+    for (y, row) in found
+        .chunks_mut(width.max(1))
+        .enumerate()
+        .skip(1)
+        .take(height.saturating_sub(2))
+    {
         let inner = row.iter_mut().enumerate().skip(1).take(width.saturating_sub(2));
         inner.for_each(|(x, edge)| *edge = of(y * width + x));
     }
@@ -190,8 +201,15 @@ fn correlation(
     let n = count as f64;
     let covariance = squares.z - sums[0] * sums[1] / n;
     let variances = [squares.x - sums[0] * sums[0] / n, squares.y - sums[1] * sums[1] / n];
-    let is_flat = variances.iter().zip([squares.x, squares.y]).any(|(v, s)| *v <= 1e-9 * s);
-    if count < FEWEST || is_flat { None } else { Some(covariance / (variances[0] * variances[1]).sqrt()) }
+    let is_flat = variances
+        .iter()
+        .zip([squares.x, squares.y])
+        .any(|(v, s)| *v <= 1e-9 * s);
+    if count < FEWEST || is_flat {
+        None
+    } else {
+        Some(covariance / (variances[0] * variances[1]).sqrt())
+    }
 }
 
 #[cfg(test)]
@@ -212,7 +230,9 @@ mod tests {
         let itself = correlation(&noise, &noise, size, &valid, (0, 0)).unwrap();
         assert!((itself - 1.0).abs() < 1e-9, "{itself}");
         assert!(correlation(&noise, &noise, size, &valid, (7, 3)).unwrap().abs() < 0.1);
-        let shifted: Vec<f64> = (0..2400).map(|i| if i % 60 >= 7 { noise[i - 7] } else { 0.0 }).collect();
+        let shifted: Vec<f64> = (0..2400)
+            .map(|i| if i % 60 >= 7 { noise[i - 7] } else { 0.0 })
+            .collect();
         assert!((correlation(&noise, &shifted, size, &valid, (7, 0)).unwrap() - 1.0).abs() < 1e-9);
         assert_eq!(correlation(&noise, &vec![0.5; 2400], size, &valid, (0, 0)), None);
         let few: Vec<bool> = (0..2400).map(|i| i < FEWEST - 1).collect();

@@ -137,7 +137,10 @@ pub(crate) fn doubts(area: u32, records: &[&PhotographRecord]) -> Vec<String> {
 /// Whether views show little of their photographs.
 fn mask_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
     let count = records.iter().filter(|r| r.masked > 0.5).count();
-    let worst = records.iter().max_by(|a, b| a.masked.total_cmp(&b.masked)).filter(|_| count > 0)?;
+    let worst = records
+        .iter()
+        .max_by(|a, b| a.masked.total_cmp(&b.masked))
+        .filter(|_| count > 0)?;
     Some(format!(
         "area {area}: {count} of {} photographs fill less than half of their views, {} {:.0} %: are focal \
          lengths and \
@@ -166,7 +169,11 @@ fn agreement_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
         ));
     }
     let bad: Vec<&(f64, f64, &str)> = known.iter().filter(|(a, c, _)| Agreement::is_chance(*a, *c)).collect();
-    let named: Vec<String> = bad.iter().take(3).map(|(a, _, name)| format!("{name} ({a:.2})")).collect();
+    let named: Vec<String> = bad
+        .iter()
+        .take(3)
+        .map(|(a, _, name)| format!("{name} ({a:.2})"))
+        .collect();
     if bad.is_empty() {
         return None;
     }
@@ -198,8 +205,11 @@ mod tests {
             chance: Some(0.1),
         };
         let of = |scores: &[Option<f64>]| {
-            let records: Vec<_> =
-                scores.iter().zip(1..).map(|(s, i)| record(&format!("{i}.jpg"), *s)).collect();
+            let records: Vec<_> = scores
+                .iter()
+                .zip(1..)
+                .map(|(s, i)| record(&format!("{i}.jpg"), *s))
+                .collect();
             doubts(3, &records.iter().collect::<Vec<_>>())
         };
         assert!(of(&[]).is_empty() && of(&[None]).is_empty() && of(&[Some(0.5), Some(0.4), None]).is_empty());

@@ -40,8 +40,12 @@ pub(super) fn greedy(lists: &[Vec<u32>], weights: &[u64], samples: usize, share:
     let enough = (share * visible as f64).ceil() as usize;
     let mut times = vec![0u8; samples];
     let (mut chosen, mut seen) = (Vec::new(), 0);
-    let mut heap: BinaryHeap<(u64, Reverse<usize>)> =
-        lists.iter().zip(weights).enumerate().map(|(i, (l, w))| (l.len() as u64 * w, Reverse(i))).collect();
+    let mut heap: BinaryHeap<(u64, Reverse<usize>)> = lists
+        .iter()
+        .zip(weights)
+        .enumerate()
+        .map(|(i, (l, w))| (l.len() as u64 * w, Reverse(i)))
+        .collect();
     while seen < enough
         && let Some((old, Reverse(place))) = heap.pop()
     {

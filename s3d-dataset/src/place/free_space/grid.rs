@@ -100,8 +100,10 @@ impl Grid {
 
     /// Where the lines meet some faces, none of them upright; layers of one floor are one foot, the highest.
     pub(super) fn feet(&self, mesh: &TriMesh, faces: &[u32]) -> Vec<Foot> {
-        let mut all: Vec<(u64, f64)> =
-            faces.par_iter().flat_map_iter(|&face| self.meetings(mesh.triangle(face))).collect();
+        let mut all: Vec<(u64, f64)> = faces
+            .par_iter()
+            .flat_map_iter(|&face| self.meetings(mesh.triangle(face)))
+            .collect();
         all.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut feet: Vec<Foot> = Vec::new();
         for (column, z) in all {
@@ -132,7 +134,11 @@ impl Grid {
             let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
             for (p, q) in [(a, b), (b, c), (c, a)] {
                 if (p.x - x) * (q.x - x) <= 0.0 {
-                    let t = if p.x == q.x { [0.0, 1.0] } else { [(x - p.x) / (q.x - p.x); 2] };
+                    let t = if p.x == q.x {
+                        [0.0, 1.0]
+                    } else {
+                        [(x - p.x) / (q.x - p.x); 2]
+                    };
                     for y in t.map(|t| p.y + (q.y - p.y) * t) {
                         (from, to) = (from.min(y), to.max(y));
                     }
@@ -142,11 +148,13 @@ impl Grid {
             (from.max(low.y) - 1e-6).ceil().max(0.0) as u64..=(to.min(high.y) + 1e-6).floor().max(0.0) as u64
         };
         let rows = low.x.ceil().max(0.0) as u64..=high.x.floor().max(0.0) as u64;
-        rows.flat_map(move |i| row(i).map(move |j| (i, j))).filter_map(move |(i, j)| {
-            let (x, y) = (i as f64, j as f64);
-            let [wa, wb, wc] = [cross(b, c, x, y), cross(c, a, x, y), cross(a, b, x, y)].map(|w| w / area);
-            let is_in = wa >= 0.0 && wb >= 0.0 && wc >= 0.0;
-            is_in.then(|| (grid.column(i, j), grid.origin.z + wa * a.z + wb * b.z + wc * c.z))
-        })
+        rows.flat_map(move |i| row(i).map(move |j| (i, j)))
+            .filter_map(move |(i, j)| {
+                let (x, y) = (i as f64, j as f64);
+                let [wa, wb, wc] =
+                    [cross(b, c, x, y), cross(c, a, x, y), cross(a, b, x, y)].map(|w| w / area);
+                let is_in = wa >= 0.0 && wb >= 0.0 && wc >= 0.0;
+                is_in.then(|| (grid.column(i, j), grid.origin.z + wa * a.z + wb * b.z + wc * c.z))
+            })
     }
 }

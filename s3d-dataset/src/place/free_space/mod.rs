@@ -193,8 +193,10 @@ fn pattern(
     let (wide, narrow): (Vec<usize>, Vec<usize>) = (0..places.len()).partition(|&i| places[i].is_wide());
     let is_near =
         |a: usize, b: usize| eyes[a].distance(eyes[b]) < distance_m && sees(scene, eyes[a], eyes[b]);
-    let mut offered: Vec<usize> =
-        narrow.into_par_iter().filter(|&a| !wide.iter().any(|&b| is_near(a, b))).collect();
+    let mut offered: Vec<usize> = narrow
+        .into_par_iter()
+        .filter(|&a| !wide.iter().any(|&b| is_near(a, b)))
+        .collect();
     offered.extend(wide);
     offered.sort_unstable();
     let points: Vec<[f64; 3]> = offered.iter().map(|&i| eyes[i].to_array()).collect();

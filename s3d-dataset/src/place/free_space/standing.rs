@@ -121,7 +121,10 @@ impl Ground {
             .into_par_iter()
             .filter(|&face| facing.normal(mesh, face).z > LEVEL)
             .collect();
-        let m2: f64 = up.iter().map(|&f| mesh.area(f) * f64::from(mesh.normal(f).z.abs())).sum();
+        let m2: f64 = up
+            .iter()
+            .map(|&f| mesh.area(f) * f64::from(mesh.normal(f).z.abs()))
+            .sum();
         let grid = Grid::new(mesh, m2)?;
         ctx.check()?;
         let mut feet = grid.feet(mesh, &up);
@@ -194,7 +197,11 @@ impl Ground {
             let is_furniture = tally.drops as f64 > DROP_SHARE * tally.rim as f64 && m2 < LARGEST_TABLE_M2;
             m2 >= SMALLEST_M2 && !is_furniture
         };
-        let floors: Vec<u32> = tallies.iter().filter(|(_, t)| is_floor(t)).map(|(&first, _)| first).collect();
+        let floors: Vec<u32> = tallies
+            .iter()
+            .filter(|(_, t)| is_floor(t))
+            .map(|(&first, _)| first)
+            .collect();
         let mut walkable = 0;
         for a in 0..self.feet.len() {
             self.feet[a].walkable &= floors.binary_search(&self.component[a]).is_ok();
@@ -299,7 +306,9 @@ impl Ground {
 
     /// Feet on the lines at some sides of a foot.
     fn neighbours<'a>(&'a self, a: usize, sides: &'a [Side]) -> impl Iterator<Item = (Side, usize)> + 'a {
-        sides.iter().flat_map(move |&side| self.beside(a, side).map(move |b| (side, b)))
+        sides
+            .iter()
+            .flat_map(move |&side| self.beside(a, side).map(move |b| (side, b)))
     }
 
     /// Feet on the line at one side of a foot.
@@ -345,15 +354,18 @@ fn room_around(grid: &Grid, nearest: &NearestFaces<'_>, feet: &mut [Foot]) {
     let mut found = Vec::new();
     let mut measure = |feet: &mut [Foot], height: f64, least: f32| {
         let asked: Vec<usize> = (0..feet.len()).filter(|&i| feet[i].walkable).collect();
-        let points: Vec<Vec3> =
-            asked.iter().map(|&i| (grid.at(&feet[i]) + height * DVec3::Z).as_vec3()).collect();
+        let points: Vec<Vec3> = asked
+            .iter()
+            .map(|&i| (grid.at(&feet[i]) + height * DVec3::Z).as_vec3())
+            .collect();
         nearest.nearest_many(&points, &mut found);
         for (&i, n) in asked.iter().zip(&found) {
             feet[i].clearance_m = feet[i].clearance_m.min(n.distance_m);
             feet[i].walkable = n.distance_m >= least;
         }
     };
-    feet.iter_mut().for_each(|f| (f.walkable, f.clearance_m) = (f.has_headroom, CLEARANCE_M));
+    feet.iter_mut()
+        .for_each(|f| (f.walkable, f.clearance_m) = (f.has_headroom, CLEARANCE_M));
     measure(feet, HEIGHT_M, BODY_M);
     measure(feet, HIP_M, BODY_M);
     measure(feet, KNEE_M, 0.0);

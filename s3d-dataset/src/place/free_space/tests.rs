@@ -25,7 +25,9 @@ impl Quads {
     fn add(&mut self, corners: [[f32; 3]; 4]) {
         let first = self.0.positions.len() as u32;
         self.0.positions.extend(corners.map(Vec3::from_array));
-        self.0.faces.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        self.0
+            .faces
+            .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
 
     /// The sides of a box: down, up, −y, +x, +y, −x; fronts outside, or inside.
@@ -293,7 +295,13 @@ fn a_mesh_of_any_measures_ends() {
         let parts = TriMesh::new(room.0).unwrap();
         let found = place(&parts, SHARE);
         match is_long {
-            true => assert!(found.map(|f| f.floor).unwrap_err().to_string().contains("`units` right")),
+            true => assert!(
+                found
+                    .map(|f| f.floor)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("`units` right")
+            ),
             false => assert!(!found.unwrap().locations.is_empty()),
         }
     }
@@ -337,7 +345,9 @@ fn the_number_of_threads_changes_nothing() {
     let mesh = furnished();
     let with = |threads, distance_m| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let found = pool.install(|| place(&mesh, FreeSpaceOptions { distance_m, ..SHARE })).unwrap();
+        let found = pool
+            .install(|| place(&mesh, FreeSpaceOptions { distance_m, ..SHARE }))
+            .unwrap();
         format!("{found:?}")
     };
     for distance_m in [None, Some(1.0)] {

@@ -175,7 +175,13 @@ fn explained(
             return 0.0;
         }
     }
-    let share = |k: usize| if counts[k] == 0 { 1.0 } else { right[k] as f64 / counts[k] as f64 };
+    let share = |k: usize| {
+        if counts[k] == 0 {
+            1.0
+        } else {
+            right[k] as f64 / counts[k] as f64
+        }
+    };
     share(0).min(share(1))
 }
 
@@ -197,7 +203,11 @@ fn other_table(reference: &Reference<'_>, sample: &[Probe]) -> Option<String> {
     let mut meanings: std::collections::BTreeMap<u32, std::collections::BTreeMap<u32, u32>> =
         Default::default();
     for probe in sample {
-        *meanings.entry(index(probe.found)).or_default().entry(index(probe.expected)).or_default() += 1;
+        *meanings
+            .entry(index(probe.found))
+            .or_default()
+            .entry(index(probe.expected))
+            .or_default() += 1;
     }
     let (mut best, mut all, mut labels) = (0, 0, std::collections::BTreeSet::new());
     let mut example = None;
@@ -286,14 +296,24 @@ fn changes(domain: Domain, panorama: bool, all: &mut Vec<Suspect>) {
                     DepthUnits::Per512 => DepthUnits::Millimetres,
                     DepthUnits::Millimetres => DepthUnits::Per512,
                 };
-                let other = seen.hit.map_or(65_535.0, |h| (h.t * units.per_m() + 0.5).floor().min(65_535.0));
+                let other = seen
+                    .hit
+                    .map_or(65_535.0, |h| (h.t * units.per_m() + 0.5).floor().min(65_535.0));
                 [if d == f64::from(MISSING_DEPTH) { d } else { other }, 0.0, 0.0]
             });
             of("its bytes are swapped", |_, [d, ..]| [f64::from((d as u16).swap_bytes()), 0.0, 0.0]);
             if !panorama {
                 of("it is the distance instead of the depth along the optical axis", |seen, [d, ..]| {
                     let length = seen.direction.length();
-                    [if d == f64::from(MISSING_DEPTH) { d } else { (d * length).min(65_535.0) }, 0.0, 0.0]
+                    [
+                        if d == f64::from(MISSING_DEPTH) {
+                            d
+                        } else {
+                            (d * length).min(65_535.0)
+                        },
+                        0.0,
+                        0.0,
+                    ]
                 });
             }
             of("what is missing in it is 0", |_, [d, ..]| {

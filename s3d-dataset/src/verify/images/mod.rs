@@ -146,7 +146,10 @@ impl ImageCheck<'_> {
             if draw.is_some() || image.frame == Frame::Panorama {
                 pose::check_draw(pose, draw, &path, report);
             }
-            self.cameras.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, pose.camera));
+            self.cameras
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .push((index, pose.camera));
         }
         let cast = match (&pose, &mut memory.caster) {
             (Some(pose), Some(caster)) => {
@@ -299,10 +302,20 @@ impl ImageFiles<'_> {
     fn photograph(&self, record: &PhotographRecord, pixels: &Pixels, path: &Path, memory: &Scratch<'_>) {
         let report = self.check.report;
         let share = |count: usize| count as f64 / f64::from(record.width) / f64::from(record.height);
-        let masked = pixels.missing(Domain::Rgb).into_iter().filter(|missing| *missing).count();
+        let masked = pixels
+            .missing(Domain::Rgb)
+            .into_iter()
+            .filter(|missing| *missing)
+            .count();
         check_share("the masked share", (record.masked, share(masked)), record, path, report);
         if self.cast {
-            let seen = memory.hits.face.pixels().iter().filter(|face| **face != NO_FACE).count();
+            let seen = memory
+                .hits
+                .face
+                .pixels()
+                .iter()
+                .filter(|face| **face != NO_FACE)
+                .count();
             check_share("the seen share", (record.seen, share(seen)), record, path, report);
         }
     }
@@ -325,11 +338,23 @@ impl ImageFiles<'_> {
         // Too far for a depth is no fault.
         let wrong = |(m, e): (&bool, &bool)| if domain == Domain::Depth { *e && !*m } else { m != e };
         let mut pairs = missing.iter().zip(&expected);
-        let first = if missing == expected { None } else { pairs.clone().position(wrong) };
-        let count = if first.is_some() { pairs.by_ref().filter(|p| wrong(*p)).count() } else { 0 };
+        let first = if missing == expected {
+            None
+        } else {
+            pairs.clone().position(wrong)
+        };
+        let count = if first.is_some() {
+            pairs.by_ref().filter(|p| wrong(*p)).count()
+        } else {
+            0
+        };
         self.check.report.check(first.is_none(), NOTHING, path, || {
             let (at, width) = (first.unwrap_or_default() as u32, pixels.size().0);
-            let says = if missing[at as usize] { "is missing, and is not" } else { "is not missing, and is" };
+            let says = if missing[at as usize] {
+                "is missing, and is not"
+            } else {
+                "is not missing, and is"
+            };
             format!(
                 "{count} pixels disagree with {other} on what is seen; the first, ({}, {}), {says} there",
                 at % width,
@@ -375,7 +400,11 @@ impl ImageFiles<'_> {
     fn pretty(&self, colors: &Raster<[u8; 3]>, path: &Path, memory: &Scratch<'_>) {
         let (Some(labels), Some(indices)) = (self.check.labels, self.semantic(memory)) else { return };
         let expected = |[r, g, b]: [u8; 3]| {
-            labels.pretty.get(u32::from_be_bytes([0, r, g, b]) as usize).copied().unwrap_or([0; 3])
+            labels
+                .pretty
+                .get(u32::from_be_bytes([0, r, g, b]) as usize)
+                .copied()
+                .unwrap_or([0; 3])
         };
         let same = |c: [u8; 3], i: [u8; 3]| c == expected(i);
         let text = |c| format!("{c:?}");
@@ -389,12 +418,18 @@ impl ImageFiles<'_> {
     /// Classes are those of the indices, and their colours those of the taxonomy.
     fn classes(&self, places: &Raster<u8>, colors: &[[u8; 3]], path: &Path, memory: &Scratch<'_>) {
         let Some(labels) = self.check.labels else { return };
-        self.check.report.check(colors == palette(&labels.taxonomy), CLASSES, path, || {
-            format!("its palette has not the colours of {}", labels.taxonomy.name())
-        });
+        self.check
+            .report
+            .check(colors == palette(&labels.taxonomy), CLASSES, path, || {
+                format!("its palette has not the colours of {}", labels.taxonomy.name())
+            });
         let Some(indices) = self.semantic(memory) else { return };
         let expected = |[r, g, b]: [u8; 3]| {
-            labels.classes.get(u32::from_be_bytes([0, r, g, b]) as usize).copied().unwrap_or(NO_CLASS)
+            labels
+                .classes
+                .get(u32::from_be_bytes([0, r, g, b]) as usize)
+                .copied()
+                .unwrap_or(NO_CLASS)
         };
         let same = |c: u8, i: [u8; 3]| c == expected(i);
         let text = |c: u8| labels.class_name(c);
@@ -442,8 +477,9 @@ impl ImageFiles<'_> {
         }
         self.check.report.check(count == 0, COORDINATES, path, || {
             let (x, y) = first.unwrap_or_default();
-            let seen =
-                units.metres(depth.at(x, y)).map(|m| (origin + rays.at(x, y) * m).as_vec3().to_array());
+            let seen = units
+                .metres(depth.at(x, y))
+                .map(|m| (origin + rays.at(x, y) * m).as_vec3().to_array());
             let expected = seen.map_or("nothing".to_owned(), |p| format!("{p:?}"));
             format!(
                 "{count} of {} pixels are not where depth and pose put them; the first is ({x}, {y}): {:?} \
@@ -496,7 +532,11 @@ impl ImageFiles<'_> {
             && (pose.is_consistent || difference.count as f64 >= SLACK * difference.of as f64)
         {
             let mismatch = Mismatch { image: self.index, domain, difference, camera: pose.camera };
-            self.check.mismatches.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(mismatch);
+            self.check
+                .mismatches
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .push(mismatch);
         }
         Some(pixels)
     }

@@ -91,7 +91,9 @@ impl Pixels {
     /// As [`Opened::new`].
     pub(crate) fn read(domain: Domain, path: &Path) -> Result<Self> {
         let (bytes, mut reader) = (read_file(path)?, PngReader::default());
-        Ok(Opened::new(domain, &bytes, path, &mut reader)?.into_pixels().in_floats())
+        Ok(Opened::new(domain, &bytes, path, &mut reader)?
+            .into_pixels()
+            .in_floats())
     }
 
     /// As if they were drawn.
@@ -166,7 +168,10 @@ fn equal_to(pixels: &[[u8; 3]], color @ [r, g, b]: [u8; 3]) -> Vec<bool> {
             .zip(next)
             .fold(0, |any, (x, (y, z))| any | u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b));
         if somewhere != 0 {
-            equal.iter_mut().zip(part).for_each(|(equal, pixel)| *equal = *pixel == color);
+            equal
+                .iter_mut()
+                .zip(part)
+                .for_each(|(equal, pixel)| *equal = *pixel == color);
         }
     }
     equal
@@ -221,7 +226,11 @@ impl Difference {
     pub(crate) fn sentence(&self, what: &str) -> String {
         let Self { count, of, first: (x, y), found, expected } = self;
         let percent = 100.0 * *count as f64 / *of as f64;
-        let percent = if percent < 0.1 { "less than 0.1".to_owned() } else { format!("{percent:.1}") };
+        let percent = if percent < 0.1 {
+            "less than 0.1".to_owned()
+        } else {
+            format!("{percent:.1}")
+        };
         format!(
             "{count} of {of} pixels ({percent} %) are not {what}; the first is ({x}, {y}): {found}, should \
              be {expected}"

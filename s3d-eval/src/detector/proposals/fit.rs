@@ -104,7 +104,9 @@ fn densest(surfels: &[&Surfel], grown: &Aabb, axis: usize, length: f32) -> Optio
     // A plane may lie on the border of two bins.
     let low = grown.min[axis] + (best as f32 - 0.5) * BIN_M;
     let high = low + (bins + 1) as f32 * BIN_M;
-    let within = surfels.iter().filter(|s| s.position[axis] >= low && s.position[axis] <= high);
+    let within = surfels
+        .iter()
+        .filter(|s| s.position[axis] >= low && s.position[axis] <= high);
     let ends = within.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
     if ends.is_empty() {
         return None;
@@ -142,9 +144,15 @@ fn shortest(surfels: &[&Surfel], grown: &Aabb, axis: usize, share: f32) -> Optio
     }
     let [start, end] = best?;
     let (low, high) = (grown.min[axis] + start as f32 * BIN_M, grown.min[axis] + (end + 1) as f32 * BIN_M);
-    let within = surfels.iter().filter(|s| s.position[axis] >= low && s.position[axis] <= high);
+    let within = surfels
+        .iter()
+        .filter(|s| s.position[axis] >= low && s.position[axis] <= high);
     let ends = within.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
-    if ends.is_empty() { None } else { Some([ends.min[axis], ends.max[axis]]) }
+    if ends.is_empty() {
+        None
+    } else {
+        Some([ends.min[axis], ends.max[axis]])
+    }
 }
 
 /// The longest run of bins that surfels reach into, to the ends of what these stand for. Of equal ones the
@@ -159,7 +167,9 @@ fn run(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Option<[f32; 2]> {
     let mut best: Option<[usize; 2]> = None;
     let mut now: Option<[usize; 2]> = None;
     for at in (0..covered.len()).filter(|&i| covered[i]) {
-        let start = now.filter(|[_, end]| at - end <= GAP_BINS + 1).map_or(at, |[start, _]| start);
+        let start = now
+            .filter(|[_, end]| at - end <= GAP_BINS + 1)
+            .map_or(at, |[start, _]| start);
         now = Some([start, at]);
         if best.is_none_or(|[a, b]| at - start > b - a) {
             best = now;
@@ -167,9 +177,15 @@ fn run(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Option<[f32; 2]> {
     }
     let [start, end] = best?;
     let (low, high) = (grown.min[axis] + start as f32 * BIN_M, grown.min[axis] + (end + 1) as f32 * BIN_M);
-    let within = surfels.iter().filter(|s| s.position[axis] >= low && s.position[axis] <= high);
+    let within = surfels
+        .iter()
+        .filter(|s| s.position[axis] >= low && s.position[axis] <= high);
     let ends = within.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
-    if ends.is_empty() { None } else { Some([ends.min[axis], ends.max[axis]]) }
+    if ends.is_empty() {
+        None
+    } else {
+        Some([ends.min[axis], ends.max[axis]])
+    }
 }
 
 /// The interval from a plane's near side to the end of what lies before it, at most `layer` off it. The plane
@@ -184,8 +200,13 @@ fn front(index: &Index, surfels: &[&Surfel], grown: &Aabb, axis: usize, layer: f
         let off = s.position[axis] - plane;
         (OF_PLANE_M..=layer).contains(&off.abs()).then_some(off)
     };
-    let above = surfels.iter().filter_map(|s| off(&s)).fold(0i64, |sum, off| sum + off.signum() as i64);
-    let before = surfels.iter().filter(|s| off(s).is_some_and(|o| (o > 0.0) == (above > 0)));
+    let above = surfels
+        .iter()
+        .filter_map(|s| off(&s))
+        .fold(0i64, |sum, off| sum + off.signum() as i64);
+    let before = surfels
+        .iter()
+        .filter(|s| off(s).is_some_and(|o| (o > 0.0) == (above > 0)));
     let ends = before.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
     if above == 0 || ends.is_empty() {
         return None;
@@ -283,8 +304,12 @@ mod tests {
         let found = fit(&index, &window, truth.size(), fits).unwrap();
         assert!(crate::detector::boxes::iou(&found, &truth) > 0.85, "{found:?} {fits:?}");
         // A run ends where there is a gap.
-        let line =
-            |x: f32| index.surfels().iter().find(|s| s.position.z == 0.0 && (s.position.x - x).abs() < 0.03);
+        let line = |x: f32| {
+            index
+                .surfels()
+                .iter()
+                .find(|s| s.position.z == 0.0 && (s.position.x - x).abs() < 0.03)
+        };
         let some: Vec<&Surfel> = [0.1, 0.15, 0.2, 0.4, 0.45].into_iter().filter_map(line).collect();
         let found = run(&some, &Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 0).unwrap();
         assert!((found[1] - found[0] - 0.14).abs() < 0.02 && found[1] < 0.3, "{found:?}");

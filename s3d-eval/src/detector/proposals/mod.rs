@@ -43,7 +43,11 @@ impl<'a> Prepared<'a> {
 
     /// The boxes of a class.
     pub fn truth(&self, class: usize) -> impl Iterator<Item = &Aabb> {
-        self.space.elements.iter().filter(move |e| e.class == class).map(|e| &e.bbox)
+        self.space
+            .elements
+            .iter()
+            .filter(move |e| e.class == class)
+            .map(|e| &e.bbox)
     }
 }
 
@@ -108,8 +112,11 @@ impl Proposer {
     pub fn train(spaces: &[Prepared<'_>], seed: u64, ctx: &Context) -> Result<Self> {
         let mut sizes = Vec::new();
         for class in 0..CLASSES.len() {
-            let boxes: Vec<(usize, Aabb)> =
-                spaces.iter().enumerate().flat_map(|(i, s)| s.truth(class).map(move |b| (i, *b))).collect();
+            let boxes: Vec<(usize, Aabb)> = spaces
+                .iter()
+                .enumerate()
+                .flat_map(|(i, s)| s.truth(class).map(move |b| (i, *b)))
+                .collect();
             let all: Vec<Vec3> = boxes.iter().map(|(_, b)| b.size()).collect();
             let (centers, of) = cluster_sizes(&all, seed ^ class as u64);
             for (cluster, size) in centers.into_iter().enumerate() {
@@ -140,7 +147,9 @@ impl Proposer {
             }
             let boxes: Vec<Aabb> = windows.iter().map(|(w, _, _)| w.bbox()).collect();
             let scores: Vec<f64> = windows.iter().map(|(_, s, _)| f64::from(*s)).collect();
-            let kept = suppress(&boxes, &scores, SAME_WINDOW).into_iter().take(2 * BEST_OF_CLASS);
+            let kept = suppress(&boxes, &scores, SAME_WINDOW)
+                .into_iter()
+                .take(2 * BEST_OF_CLASS);
             let fitted = kept.filter_map(|i| {
                 let (_, score, size) = windows[i];
                 let bbox = fit::fit(&prepared.space.index, &boxes[i], Vec3::from(size.size_m), size.fits)?;
@@ -180,7 +189,9 @@ fn learn_size(
         examples.push((&prepared.space.index, window.bbox(), *bbox));
     }
     let is_none = |prepared: &Prepared<'_>, w: &Window| {
-        prepared.truth(class).all(|b| iou(&loosened(b), &w.bbox()) < NEGATIVE_IOU)
+        prepared
+            .truth(class)
+            .all(|b| iou(&loosened(b), &w.bbox()) < NEGATIVE_IOU)
     };
     for _ in 0..NEGATIVES {
         let prepared = &spaces[rng.random_range(0..spaces.len())];
@@ -221,6 +232,9 @@ fn train_windows(rows: &SparseRows, positive: &[bool], seed: u64) -> Linear {
     let count = positive.iter().filter(|p| **p).count().max(1);
     // Both sides weigh alike.
     let weight = (positive.len() - count) as f64 / count as f64;
-    let costs: Vec<f64> = positive.iter().map(|p| if *p { 0.1 * weight.max(1.0) } else { 0.1 }).collect();
+    let costs: Vec<f64> = positive
+        .iter()
+        .map(|p| if *p { 0.1 * weight.max(1.0) } else { 0.1 })
+        .collect();
     train(rows, positive, &costs, &SvmOptions { max_passes: 60, seed, ..SvmOptions::default() })
 }

@@ -32,7 +32,9 @@ pub fn cluster_sizes(sizes: &[Vec3], seed: u64) -> (Vec<Vec3>, Vec<usize>) {
         sizes.iter().zip(of).map(|(s, &c)| cover(*s, centers[c])).sum::<f64>()
     };
     let most = all.iter().map(covered).fold(0.0, f64::max);
-    all.into_iter().find(|clusters| covered(clusters) >= ENOUGH * most).unwrap_or_default()
+    all.into_iter()
+        .find(|clusters| covered(clusters) >= ENOUGH * most)
+        .unwrap_or_default()
 }
 
 fn k_means(sizes: &[Vec3], k: usize, seed: u64) -> (Vec<Vec3>, Vec<usize>) {
@@ -40,7 +42,12 @@ fn k_means(sizes: &[Vec3], k: usize, seed: u64) -> (Vec<Vec3>, Vec<usize>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut centers: Vec<Vec3> = Vec::new();
     while centers.len() < k.min(points.len()) {
-        let far = |p: &Vec3| centers.iter().map(|c| f64::from(c.distance_squared(*p))).fold(1e9, f64::min);
+        let far = |p: &Vec3| {
+            centers
+                .iter()
+                .map(|c| f64::from(c.distance_squared(*p)))
+                .fold(1e9, f64::min)
+        };
         let weights: Vec<f64> = points.iter().map(far).collect();
         let total: f64 = weights.iter().sum();
         if total <= 0.0 {
@@ -59,15 +66,24 @@ fn k_means(sizes: &[Vec3], k: usize, seed: u64) -> (Vec<Vec3>, Vec<usize>) {
             *of = nearest(&centers, *p);
         }
         for (c, center) in centers.iter_mut().enumerate() {
-            let members: Vec<Vec3> =
-                points.iter().zip(&of).filter(|(_, o)| **o == c).map(|(p, _)| *p).collect();
+            let members: Vec<Vec3> = points
+                .iter()
+                .zip(&of)
+                .filter(|(_, o)| **o == c)
+                .map(|(p, _)| *p)
+                .collect();
             if !members.is_empty() {
                 *center = members.iter().sum::<Vec3>() / members.len() as f32;
             }
         }
     }
     let medians = (0..centers.len()).map(|c| {
-        let members: Vec<Vec3> = sizes.iter().zip(&of).filter(|(_, o)| **o == c).map(|(s, _)| *s).collect();
+        let members: Vec<Vec3> = sizes
+            .iter()
+            .zip(&of)
+            .filter(|(_, o)| **o == c)
+            .map(|(s, _)| *s)
+            .collect();
         let median = |axis: usize| {
             let mut values: Vec<f32> = members.iter().map(|s| s[axis]).collect();
             values.sort_by(f32::total_cmp);

@@ -45,7 +45,11 @@ impl Window {
 
 /// The size in cells of windows for things of a size: two cells at least, no more than the space has.
 pub fn window_cells(size: Vec3, volumes: &Volumes) -> IVec3 {
-    (size / STEP_M).round().as_ivec3().max(IVec3::splat(2)).min(volumes.cells.max(IVec3::splat(2)))
+    (size / STEP_M)
+        .round()
+        .as_ivec3()
+        .max(IVec3::splat(2))
+        .min(volumes.cells.max(IVec3::splat(2)))
 }
 
 /// The least and the largest corner of windows of a size: they reach out of the space by one cell at most.
@@ -174,7 +178,10 @@ fn score_map(volumes: &Volumes, machine: &Linear, cells: IVec3, least: IVec3, co
         for &(direction, [x, y, z], weight) in &weights {
             debug_assert!(volumes.holds(corner + ivec3(x, y, z)));
             let run = volumes.run(direction, [corner.x + x, corner.y + y, corner.z + z], nx);
-            scores.iter_mut().zip(run).for_each(|(score, &sum)| *score += weight * sum);
+            scores
+                .iter_mut()
+                .zip(run)
+                .for_each(|(score, &sum)| *score += weight * sum);
         }
     }
     scores
@@ -198,7 +205,9 @@ mod tests {
             })
             .collect();
         let volumes = Volumes::new(&surfels, vec3(2.3, 1.6, 1.9));
-        let weights = (0..WINDOW_FEATURES).map(|i| f64::from(i as u32 * 37 % 101) / 50.0 - 1.0).collect();
+        let weights = (0..WINDOW_FEATURES)
+            .map(|i| f64::from(i as u32 * 37 % 101) / 50.0 - 1.0)
+            .collect();
         let machine = Linear { weights, bias: 0.25 };
         for cells in [ivec3(5, 4, 3), ivec3(2, 16, 19), ivec3(23, 2, 2)] {
             let [least, last] = reach(&volumes, cells);
@@ -209,7 +218,11 @@ mod tests {
                     for x in least.x..=last.x {
                         let row = window_features(&volumes, &Window { corner: ivec3(x, y, z), cells });
                         let plain = machine.bias
-                            + row.iter().zip(&machine.weights).map(|(&v, w)| f64::from(v) * w).sum::<f64>();
+                            + row
+                                .iter()
+                                .zip(&machine.weights)
+                                .map(|(&v, w)| f64::from(v) * w)
+                                .sum::<f64>();
                         assert!(
                             (f64::from(scores[i]) - plain).abs() < 2e-3,
                             "{x} {y} {z}: {} {plain}",

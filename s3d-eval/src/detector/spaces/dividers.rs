@@ -37,9 +37,11 @@ pub fn find_dividers(surfels: &[Surfel]) -> Dividers {
 }
 
 fn dividers_along(axis: usize, surfels: &[Surfel]) -> Vec<Divider> {
-    let ends = surfels.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], s| {
-        [least.min(s.position[axis]), most.max(s.position[axis])]
-    });
+    let ends = surfels
+        .iter()
+        .fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], s| {
+            [least.min(s.position[axis]), most.max(s.position[axis])]
+        });
     if surfels.is_empty() {
         return Vec::new();
     }

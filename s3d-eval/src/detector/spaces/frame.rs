@@ -71,7 +71,9 @@ pub fn canonical_frames(bounds: &[Aabb]) -> Vec<Frame> {
     let sides: Vec<Vec<(usize, u8, f32)>> = (0..bounds.len())
         .map(|i| {
             let others = (0..bounds.len()).filter(|&j| j != i);
-            others.filter_map(|j| side(&bounds[i], &bounds[j]).map(|(turns, m)| (j, turns, m))).collect()
+            others
+                .filter_map(|j| side(&bounds[i], &bounds[j]).map(|(turns, m)| (j, turns, m)))
+                .collect()
         })
         .collect();
     let frame = |(bounds, near): (&Aabb, &Vec<(usize, u8, f32)>)| {

@@ -45,7 +45,11 @@ pub fn merge_cells(surfels: &[Surfel], dividers: &Dividers) -> (Vec<u32>, u32) {
     for axis in 0..2 {
         for (number, divider) in dividers.axes[axis].iter().enumerate() {
             for (across, columns) in faces(axis, divider, surfels, dividers).into_iter().enumerate() {
-                let before = if axis == 0 { across * width + number } else { number * width + across };
+                let before = if axis == 0 {
+                    across * width + number
+                } else {
+                    number * width + across
+                };
                 let after = before + if axis == 0 { 1 } else { width };
                 if counts[before] > 0 && counts[after] > 0 && is_open(&columns) {
                     groups.join(before, after);
@@ -97,8 +101,9 @@ fn number_spaces(groups: &[(usize, Aabb)]) -> (Vec<u32>, u32) {
 fn faces(axis: usize, divider: &Divider, surfels: &[Surfel], dividers: &Dividers) -> Vec<Vec<Column>> {
     let cuts = &dividers.axes[1 - axis];
     let mut faces: Vec<(f32, Vec<Column>)> = Vec::new();
-    let near =
-        surfels.iter().filter(|s| (s.position[axis] - divider.at).abs() <= 0.5 * divider.gap + LAYER_M);
+    let near = surfels
+        .iter()
+        .filter(|s| (s.position[axis] - divider.at).abs() <= 0.5 * divider.gap + LAYER_M);
     let least = near.clone().map(|s| s.position[1 - axis]).fold(f32::INFINITY, f32::min);
     let overhead = near.clone().map(|s| s.position.z).fold(f32::INFINITY, f32::min) + OVERHEAD_M;
     faces.push((least, Vec::new()));

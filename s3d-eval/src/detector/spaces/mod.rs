@@ -26,7 +26,11 @@ pub fn building_angle_deg(surfels: &[Surfel]) -> f64 {
         sine += libm::sin(angle);
         cosine += libm::cos(angle);
     }
-    if sine == 0.0 && cosine == 0.0 { 0.0 } else { libm::atan2(sine, cosine).to_degrees() / 4.0 }
+    if sine == 0.0 && cosine == 0.0 {
+        0.0
+    } else {
+        libm::atan2(sine, cosine).to_degrees() / 4.0
+    }
 }
 
 /// The spaces of an area, in whose axes its walls stand.

@@ -10,7 +10,9 @@ use std::collections::BTreeMap;
 pub fn adjusted_rand_index(a: &[u32], b: &[u32]) -> f64 {
     assert_eq!(a.len(), b.len(), "partitions of the same things");
     let mut pairs: BTreeMap<(u32, u32), u64> = BTreeMap::new();
-    a.iter().zip(b).for_each(|(&a, &b)| *pairs.entry((a, b)).or_default() += 1);
+    a.iter()
+        .zip(b)
+        .for_each(|(&a, &b)| *pairs.entry((a, b)).or_default() += 1);
     let (mut of_a, mut of_b): (BTreeMap<u32, u64>, BTreeMap<u32, u64>) = Default::default();
     for (&(a, b), &n) in &pairs {
         *of_a.entry(a).or_default() += n;
@@ -22,7 +24,11 @@ pub fn adjusted_rand_index(a: &[u32], b: &[u32]) -> f64 {
     let (of_a, of_b) = (together(&of_a), together(&of_b));
     let by_chance = of_a * of_b / choose(a.len() as u64).max(1.0);
     let most = 0.5 * (of_a + of_b);
-    if most == by_chance { 1.0 } else { (both - by_chance) / (most - by_chance) }
+    if most == by_chance {
+        1.0
+    } else {
+        (both - by_chance) / (most - by_chance)
+    }
 }
 
 #[cfg(test)]

@@ -98,6 +98,11 @@ mod tests {
             let plain = index.surfels().iter().filter(|s| b.contains(s.position)).count();
             assert_eq!(index.within(&b).count(), plain, "{b:?}");
         }
-        assert_eq!(Index::new(Vec::new()).within(&Aabb { min: Vec3::ZERO, max: Vec3::ONE }).count(), 0);
+        assert_eq!(
+            Index::new(Vec::new())
+                .within(&Aabb { min: Vec3::ZERO, max: Vec3::ONE })
+                .count(),
+            0
+        );
     }
 }

@@ -158,7 +158,11 @@ fn least_direction([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> (DVec3, f64) {
         }
     }
     let least = (0..3).fold(0, |least, i| if a[i][i] < a[least][least] { i } else { least });
-    let share = if trace > 0.0 { (a[least][least] / trace).clamp(0.0, 1.0 / 3.0) } else { 0.0 };
+    let share = if trace > 0.0 {
+        (a[least][least] / trace).clamp(0.0, 1.0 / 3.0)
+    } else {
+        0.0
+    };
     (DVec3::new(v[0][least], v[1][least], v[2][least]), share)
 }
 
@@ -197,7 +201,12 @@ mod tests {
         let surfels = surfels_of(&cloud(edge.collect()), 0);
         let at_edge = |s: &&Surfel| s.position.x + s.position.z < 0.06;
         assert!(surfels.iter().filter(at_edge).all(|s| s.curvature > 0.05));
-        assert!(surfels.iter().filter(|s| s.position.x > 0.2).all(|s| s.normal.z.abs() > 0.999));
+        assert!(
+            surfels
+                .iter()
+                .filter(|s| s.position.x > 0.2)
+                .all(|s| s.normal.z.abs() > 0.999)
+        );
         let two = surfels_of(&cloud(vec![vec3(-3.0, 0.0, 0.0), vec3(7.0, 1.0, 2.0)]), 5);
         assert_eq!((two.len(), two[1].room), (2, 5));
         assert!(surfels_of(&PointCloud::default(), 0).is_empty());

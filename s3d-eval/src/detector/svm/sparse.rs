@@ -91,7 +91,11 @@ impl SparseRows {
 
 /// The product of a row and a dense vector.
 pub fn dot((columns, values): SparseRow<'_>, dense: &[f64]) -> f64 {
-    columns.iter().zip(values).map(|(&c, &v)| dense[usize::from(c)] * f64::from(v)).sum()
+    columns
+        .iter()
+        .zip(values)
+        .map(|(&c, &v)| dense[usize::from(c)] * f64::from(v))
+        .sum()
 }
 
 #[cfg(test)]

@@ -85,7 +85,9 @@ pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Contex
         ));
         let model = Model::train(&spaces, options, ctx)?;
         let rows = test(&model, &testing, ctx)?;
-        let told = rows.iter().filter_map(|row| Some(format!("{} {:.1}", row.name, row.overall()?)));
+        let told = rows
+            .iter()
+            .filter_map(|row| Some(format!("{} {:.1}", row.name, row.overall()?)));
         ctx.info(format_args!("fold {}: AP in %: {}", fold.number, told.collect::<Vec<_>>().join(", ")));
         table.rows_of_fold(rows);
     }
@@ -112,16 +114,27 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
         for (key, boxes) in of_space {
             found.entry(key).or_default().extend(boxes);
         }
-        for (sum, more) in recalls.iter_mut().flatten().flatten().zip(recall.iter().flatten().flatten()) {
+        for (sum, more) in recalls
+            .iter_mut()
+            .flatten()
+            .flatten()
+            .zip(recall.iter().flatten().flatten())
+        {
             *sum += more;
         }
     }
-    let names = model.machines.iter().map(|m| m.variant.name()).chain([NO_CONTEXT, TRUE_BOXES, RANDOM]);
+    let names = model
+        .machines
+        .iter()
+        .map(|m| m.variant.name())
+        .chain([NO_CONTEXT, TRUE_BOXES, RANDOM]);
     let rows = names.filter(|name| found.keys().any(|(n, _)| n == name)).map(|name| {
         let of = |threshold: f64| {
             let classes = (0..CLASSES.len()).map(|class| {
                 let elements = areas.iter().flat_map(|a| a.elements.iter().map(|e| (a.number, e)));
-                let truth = elements.filter(|(_, e)| e.class == class).map(|(a, e)| ((a, e.room), e.bbox));
+                let truth = elements
+                    .filter(|(_, e)| e.class == class)
+                    .map(|(a, e)| ((a, e.room), e.bbox));
                 let boxes = found.get(&(name.to_owned(), class)).map_or(&[][..], |f| f);
                 average_precision(boxes, &truth.collect::<Vec<_>>(), threshold)
             });
@@ -130,7 +143,13 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
         Row { name: name.to_owned(), ap: THRESHOLDS.map(of) }
     });
     let mut rows: Vec<Row> = rows.collect();
-    let share = |[found, all]: [usize; 2]| if all == 0 { None } else { Some(found as f64 / all as f64) };
+    let share = |[found, all]: [usize; 2]| {
+        if all == 0 {
+            None
+        } else {
+            Some(found as f64 / all as f64)
+        }
+    };
     let of = |t: usize| recalls.iter().map(|r| share(r[t])).collect();
     rows.push(Row { name: RECALL.to_owned(), ap: [of(0), of(1)] });
     Ok(rows)

@@ -102,7 +102,11 @@ pub fn markdown(tables: &[Table]) -> String {
             [&classes[..STRUCTURAL], &["**mean**"], &classes[STRUCTURAL..], &["**mean**", "**overall**"]];
         let _ = writeln!(out, "| | {} |", columns.concat().join(" | "));
         let _ = writeln!(out, "|---|{}", "--:|".repeat(CLASSES.len() + 3));
-        let names = tables.first().map_or(&[][..], |t| &t.rows[..]).iter().map(|(name, _)| name);
+        let names = tables
+            .first()
+            .map_or(&[][..], |t| &t.rows[..])
+            .iter()
+            .map(|(name, _)| name);
         for name in names {
             let of_seeds: Vec<_> = tables.iter().filter_map(|t| t.numbers(name, threshold)).collect();
             let cell = |column: usize| {

@@ -68,7 +68,9 @@ impl<R: Read> Read for Mended<R> {
         let read = buffer.get_mut(..n).unwrap_or_default();
         for (place, bytes) in &self.mends {
             for (place, byte) in (*place..).zip(bytes) {
-                let here = place.checked_sub(self.at).and_then(|i| read.get_mut(usize::try_from(i).ok()?));
+                let here = place
+                    .checked_sub(self.at)
+                    .and_then(|i| read.get_mut(usize::try_from(i).ok()?));
                 here.into_iter().for_each(|here| *here = *byte);
             }
         }

@@ -65,9 +65,9 @@ impl Dimension {
 
     fn value(&self, record: &[u8]) -> Value<'static> {
         match self {
-            Self::Classification { at, mask } => {
-                record.get(*at).map_or(Value::None, |byte| Value::Whole(i64::from(byte & mask)))
-            }
+            Self::Classification { at, mask } => record
+                .get(*at)
+                .map_or(Value::None, |byte| Value::Whole(i64::from(byte & mask))),
             Self::Plain { field, scale, offset } => {
                 let mut text = String::new();
                 match field.value(record, &mut text) {
@@ -93,7 +93,11 @@ impl<'a> LasCloud<'a> {
         let (file, size) = self.source.open()?;
         let mut source = BufReader::new(file);
         let mut head = Vec::new();
-        source.by_ref().take(375).read_to_end(&mut head).map_err(|e| Error::io(path, "read", e))?;
+        source
+            .by_ref()
+            .take(375)
+            .read_to_end(&mut head)
+            .map_err(|e| Error::io(path, "read", e))?;
         let (header, header_1_4) = (head.first_chunk::<227>(), head.first_chunk::<375>());
         let Some(header) = header.filter(|h| h.starts_with(b"LASF")) else {
             return Err(Error::format(path, "is no LAS file: it does not begin with LASF and a header"));
@@ -129,10 +133,14 @@ impl<'a> LasCloud<'a> {
         {
             let start = number_at(header, 235).map_or(0, u64::from_le_bytes);
             let mut record = [0; 60];
-            let read = source.seek(SeekFrom::Start(start)).and_then(|_| source.read_exact(&mut record));
+            let read = source
+                .seek(SeekFrom::Start(start))
+                .and_then(|_| source.read_exact(&mut record));
             let length = number_at(&record, 20).map_or(0, u64::from_le_bytes);
-            let is_inside =
-                start.checked_add(60).and_then(|n| n.checked_add(length)).is_some_and(|n| n <= size);
+            let is_inside = start
+                .checked_add(60)
+                .and_then(|n| n.checked_add(length))
+                .is_some_and(|n| n <= size);
             let is_behind = is_compressed || end.is_some_and(|end| end <= start);
             if start > 0 && (read.is_err() || !is_inside || !is_behind) {
                 notes.push(format!(
@@ -176,7 +184,10 @@ impl<'a> LasCloud<'a> {
         ];
         let mut at = usize::from(format.len().saturating_sub(format.extra_bytes));
         let end = usize::from(format.len());
-        for vlr in header.all_vlrs().filter(|v| v.user_id.starts_with("LASF_Spec") && v.record_id == 4) {
+        for vlr in header
+            .all_vlrs()
+            .filter(|v| v.user_id.starts_with("LASF_Spec") && v.record_id == 4)
+        {
             for extra in vlr.data.as_chunks::<192>().0 {
                 let name = extra[4..36].split(|b| *b == 0).next().unwrap_or_default();
                 let name = String::from_utf8_lossy(name).into_owned();
@@ -227,7 +238,9 @@ impl<'a> LasCloud<'a> {
         usual: &[&str],
     ) -> Result<Option<Dimension>> {
         let Some(name) = asked else {
-            let found = usual.iter().find_map(|u| all.iter().find(|(n, _)| n.eq_ignore_ascii_case(u)));
+            let found = usual
+                .iter()
+                .find_map(|u| all.iter().find(|(n, _)| n.eq_ignore_ascii_case(u)));
             return Ok(found.map(|(_, d)| d.clone()));
         };
         match all.iter().find(|(n, _)| n == name) {
@@ -328,7 +341,10 @@ impl Cloud for LasCloud<'_> {
         reading.claims(Bounds { min, max });
         let count = header.number_of_points();
         let mut data = las::PointDataBuilder::new().for_header(&header).build();
-        let at_once = BATCH_BYTES.checked_div(u64::from(format.len())).unwrap_or(1).clamp(1, BATCH);
+        let at_once = BATCH_BYTES
+            .checked_div(u64::from(format.len()))
+            .unwrap_or(1)
+            .clamp(1, BATCH);
         let (mut done, mut withheld) = (0u64, 0u64);
         while let Some(left) = count.checked_sub(done).filter(|left| *left > 0) {
             let n = at_once.min(left);
@@ -341,7 +357,9 @@ impl Cloud for LasCloud<'_> {
             }
             for record in data.raw_bytes().chunks_exact(data.record_len()) {
                 done = done.saturating_add(1);
-                let flags = record.get(15).map_or(0, |f| if format.is_extended { *f } else { f >> 5 });
+                let flags = record
+                    .get(15)
+                    .map_or(0, |f| if format.is_extended { *f } else { f >> 5 });
                 if flags & WITHHELD != 0 {
                     withheld = withheld.saturating_add(1);
                     continue;

@@ -69,7 +69,8 @@ impl Annotations {
         let mut others: Vec<(Class, MatObject)> = Vec::new();
         for object in found.objects {
             if object.len == 0 {
-                self.warnings.push(format!("{}: {}: has no points, left out", path.display(), object.part()));
+                self.warnings
+                    .push(format!("{}: {}: has no points, left out", path.display(), object.part()));
                 continue;
             }
             match named(&object.name, options) {
@@ -89,7 +90,8 @@ impl Annotations {
             let last = objects.range((class, 0)..=(class, u32::MAX)).next_back();
             let number = last.map_or(0, |((_, n), _)| *n) + 1;
             let part = object.part();
-            self.warnings.push(format!("{}: {part} is taken for {class}_{number}", path.display()));
+            self.warnings
+                .push(format!("{}: {part} is taken for {class}_{number}", path.display()));
             objects.insert((class, number), object);
         }
         let (offset_m, on_fault) = (options.offset_m, options.on_fault);
@@ -100,7 +102,8 @@ impl Annotations {
             })
             .collect();
         if instances.is_empty() {
-            self.warnings.push(format!("{}: {room}: has no object with points, left out", path.display()));
+            self.warnings
+                .push(format!("{}: {room}: has no object with points, left out", path.display()));
             return Ok(None);
         }
         Ok(Some(AnnotatedRoom { room, instances }))
@@ -118,9 +121,12 @@ impl Annotations {
 
 /// Class and number of "chair_3".
 fn named(name: &str, options: &AnnotationOptions) -> std::result::Result<Named, String> {
-    let digits =
-        name.rsplit_once('_').filter(|(_, n)| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
-    let number = digits.and_then(|(_, n)| n.parse().ok()).filter(|&n: &u32| n > 0 && n < u32::MAX);
+    let digits = name
+        .rsplit_once('_')
+        .filter(|(_, n)| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let number = digits
+        .and_then(|(_, n)| n.parse().ok())
+        .filter(|&n: &u32| n > 0 && n < u32::MAX);
     let (Some((word, _)), Some(number)) = (digits, number) else {
         let name = quote(name.as_bytes());
         return Err(format!("{name} names no instance: a name is CLASS_N, with N from 1, as in chair_3"));
@@ -182,12 +188,17 @@ mod tests {
     use std::path::PathBuf;
 
     fn fixture(name: &str) -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/pointcloud_mat").join(name)
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/fixtures/pointcloud_mat")
+            .join(name)
     }
 
     fn names(annotations: &Annotations) -> Vec<String> {
         let of = |r: &AnnotatedRoom| -> Vec<String> {
-            r.instances.iter().map(|i| format!("{} {}_{}", r.room, i.class, i.number)).collect()
+            r.instances
+                .iter()
+                .map(|i| format!("{} {}_{}", r.room, i.class, i.number))
+                .collect()
         };
         annotations.rooms.iter().flat_map(of).collect()
     }
@@ -213,7 +224,9 @@ mod tests {
     #[test]
     fn odd_names_stop_or_are_left_out() {
         let path = [fixture("cells.mat")];
-        let message = Annotations::open(&path, &AnnotationOptions::default()).unwrap_err().to_string();
+        let message = Annotations::open(&path, &AnnotationOptions::default())
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("hallway_2, stairs_1: \"stairs\" is no class"), "{message}");
         let skip = AnnotationOptions { on_fault: OnFault::Skip, ..Default::default() };
         let found = Annotations::open(&path, &skip).unwrap();
@@ -231,7 +244,9 @@ mod tests {
     #[test]
     fn options_of_clouds_are_refused() {
         let options = AnnotationOptions { class_column: Some("label".into()), ..Default::default() };
-        let message = Annotations::open(&[fixture("area.mat")], &options).unwrap_err().to_string();
+        let message = Annotations::open(&[fixture("area.mat")], &options)
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("are for clouds"), "{message}");
     }
 }

@@ -134,7 +134,10 @@ impl MatObject {
         }
         let place = |what| format!("{}, {what}", self.part);
         let positions = self.file.triples(self.points, &place("points"))?;
-        let colors = self.colors.map(|at| self.file.triples(at, &place("RGB_color"))).transpose()?;
+        let colors = self
+            .colors
+            .map(|at| self.file.triples(at, &place("RGB_color")))
+            .transpose()?;
         let n = positions.len();
         let counts = [Some(n), colors.as_ref().map(Triples::len)];
         if let Some(other) = counts.into_iter().flatten().find(|count| *count as u64 != self.len) {
@@ -214,7 +217,9 @@ impl MatFile {
             (Some(area), true) => Ok(area),
             (last, _) => {
                 let n = areas.iter().chain(&last).count();
-                Err(self.hdf5.fault(format!("holds {n} areas: save each in a file of its own")))
+                Err(self
+                    .hdf5
+                    .fault(format!("holds {n} areas: save each in a file of its own")))
             }
         }
     }
@@ -243,7 +248,8 @@ impl MatFile {
         let object = self.hdf5.object(points)?;
         let len = match self.array(&object, &format!("{place}.points"))? {
             Some(array) => axes_of_triples(&array.dims).map(|(n, _)| n).ok_or_else(|| {
-                self.hdf5.fault(format!("{place}.points: is {}, and not N x 3", size(&array.dims)))
+                self.hdf5
+                    .fault(format!("{place}.points: is {}, and not N x 3", size(&array.dims)))
             })?,
             None => 0,
         };
@@ -354,13 +360,19 @@ impl MatFile {
             let text = match array.kind {
                 Kind::Integer { size: 1, .. } | Kind::Text { .. } => String::from_utf8(data).ok(),
                 Kind::Integer { size: 2, big_endian, .. } => {
-                    let unit = if big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+                    let unit = if big_endian {
+                        u16::from_be_bytes
+                    } else {
+                        u16::from_le_bytes
+                    };
                     let units: Vec<u16> = data.as_chunks().0.iter().map(|b| unit(*b)).collect();
                     String::from_utf16(&units).ok()
                 }
                 Kind::Integer { size, big_endian, .. } if size > 0 => {
                     let codes = data.chunks_exact(size).map(|b| bits(b, big_endian));
-                    codes.map(|code| u32::try_from(code).ok().and_then(char::from_u32)).collect()
+                    codes
+                        .map(|code| u32::try_from(code).ok().and_then(char::from_u32))
+                        .collect()
                 }
                 _ => None,
             };
@@ -389,11 +401,15 @@ impl MatFile {
             return Ok(Triples { data: Vec::new(), kind: Kind::Other { size: 1 }, n: 0, is_by_column: true });
         };
         if !matches!(array.kind, Kind::Integer { .. } | Kind::Float { .. }) {
-            return Err(self.hdf5.fault(format!("{place}: holds something else than real numbers")));
+            return Err(self
+                .hdf5
+                .fault(format!("{place}: holds something else than real numbers")));
         }
         let axes = axes_of_triples(&array.dims).and_then(|(n, by)| Some((usize::try_from(n).ok()?, by)));
         let Some((n, is_by_column)) = axes else {
-            return Err(self.hdf5.fault(format!("{place}: is {}, and not N x 3", size(&array.dims))));
+            return Err(self
+                .hdf5
+                .fault(format!("{place}: is {}, and not N x 3", size(&array.dims))));
         };
         let data = self.hdf5.data(&array)?;
         Ok(Triples { data, kind: array.kind, n, is_by_column })
@@ -442,7 +458,11 @@ fn axes_of_triples(dims: &[u64]) -> Option<(u64, bool)> {
 /// The extents of an array as MATLAB tells them.
 fn size(dims: &[u64]) -> String {
     let dims: Vec<String> = dims.iter().rev().map(u64::to_string).collect();
-    if dims.is_empty() { "a single value".to_owned() } else { dims.join(" x ") }
+    if dims.is_empty() {
+        "a single value".to_owned()
+    } else {
+        dims.join(" x ")
+    }
 }
 
 /// A field that a struct must have.
@@ -480,5 +500,9 @@ fn bits(bytes: &[u8], big_endian: bool) -> u64 {
 
 fn bits_behind(start: u64, bytes: &[u8], big_endian: bool) -> u64 {
     let push = |n: u64, b: &u8| n << 8 | u64::from(*b);
-    if big_endian { bytes.iter().fold(start, push) } else { bytes.iter().rev().fold(start, push) }
+    if big_endian {
+        bytes.iter().fold(start, push)
+    } else {
+        bytes.iter().rev().fold(start, push)
+    }
 }

@@ -201,7 +201,11 @@ impl<W: Write + Seek> MatWriter<W> {
         let area = self.hdf5.group(members, &[class("struct"), fields])?;
         let mut root = vec![("Area".to_owned(), area)];
         if !self.referenced.is_empty() {
-            let referenced = self.referenced.iter().enumerate().map(|(i, address)| (letters(i), *address));
+            let referenced = self
+                .referenced
+                .iter()
+                .enumerate()
+                .map(|(i, address)| (letters(i), *address));
             root.push(("#refs#".to_owned(), self.hdf5.group(referenced, &[])?));
         }
         self.hdf5.finish(root)
@@ -216,7 +220,9 @@ impl<W: Write + Seek> MatWriter<W> {
         let color = pretty_color(self.rooms.len() as u32 + 1).map(|c| f64::from(c) / 255.0);
         let name = self.text(&name)?;
         let angle = [f64::from(angle).to_le_bytes()];
-        let angle = self.hdf5.dataset(Kind::F64, &[1, 1], &[class("double")], angle.into_iter())?;
+        let angle = self
+            .hdf5
+            .dataset(Kind::F64, &[1, 1], &[class("double")], angle.into_iter())?;
         let color = color.into_iter().map(f64::to_le_bytes);
         let color = self.hdf5.dataset(Kind::F64, &[3, 1], &[class("double")], color)?;
         let objects = self.structs(OBJECT_FIELDS, &objects, self.object_fields.clone())?;
@@ -243,14 +249,17 @@ impl<W: Write + Seek> MatWriter<W> {
 
         let bbox = voxels.grid.bbox.to_array().into_iter().map(f32::to_le_bytes);
         let bbox = self.hdf5.dataset(Kind::F32, &[6, 1], &single, bbox)?;
-        let boxes: Vec<[f32; 6]> =
-            (0..VoxelGrid::CELLS).map(|cell| voxels.grid.voxel_aabb(cell).to_array()).collect();
+        let boxes: Vec<[f32; 6]> = (0..VoxelGrid::CELLS)
+            .map(|cell| voxels.grid.voxel_aabb(cell).to_array())
+            .collect();
         let column = |i: usize| boxes.iter().map(move |b| b[i].to_le_bytes());
         let cells = VoxelGrid::CELLS as u64;
         let boxes = (0..6).flat_map(column);
         let boxes = self.hdf5.dataset(Kind::F32, &[6, cells], &single, boxes)?;
         let occupied = voxels.occupancy().map(|o| [u8::from(o)]).into_iter();
-        let occupied = self.hdf5.dataset(Kind::Unsigned(1), &[1, cells], &[class("uint8")], occupied)?;
+        let occupied = self
+            .hdf5
+            .dataset(Kind::Unsigned(1), &[1, cells], &[class("uint8")], occupied)?;
         let members = self.members(&voxels)?;
         // The large ones keep their memory for the next object.
         (self.positions, self.colors) = (positions, colors);
@@ -289,7 +298,8 @@ impl<W: Write + Seek> MatWriter<W> {
             *slot = address.to_le_bytes();
         }
         let dims = [1, VoxelGrid::CELLS as u64];
-        self.hdf5.dataset(Kind::Reference, &dims, &[class("cell")], cells.into_iter())
+        self.hdf5
+            .dataset(Kind::Reference, &dims, &[class("cell")], cells.into_iter())
     }
 
     /// Writes an array of structs, 1 × `values`.
@@ -306,13 +316,17 @@ impl<W: Write + Seek> MatWriter<W> {
                 let attributes = [class("struct"), Attribute::flag("MATLAB_empty"), fields];
                 return self.hdf5.dataset(Kind::Unsigned(8), &[2], &attributes, size);
             }
-            [one] => members.iter_mut().zip(one).for_each(|(member, address)| member.1 = *address),
+            [one] => members
+                .iter_mut()
+                .zip(one)
+                .for_each(|(member, address)| member.1 = *address),
             _ => {
                 for (i, (_, member)) in members.iter_mut().enumerate() {
                     self.referenced.extend(values.iter().map(|v| v[i]));
                     let addresses = values.iter().map(|v| v[i].to_le_bytes());
                     *member =
-                        self.hdf5.dataset(Kind::Reference, &[values.len() as u64, 1], &[], addresses)?;
+                        self.hdf5
+                            .dataset(Kind::Reference, &[values.len() as u64, 1], &[], addresses)?;
                 }
             }
         }
@@ -322,7 +336,8 @@ impl<W: Write + Seek> MatWriter<W> {
     fn text(&mut self, text: &str) -> Result<u64> {
         let units: Vec<[u8; 2]> = text.encode_utf16().map(u16::to_le_bytes).collect();
         let attributes = [class("char"), Attribute::number("MATLAB_int_decode", 2)];
-        self.hdf5.dataset(Kind::Unsigned(2), &[units.len() as u64, 1], &attributes, units.into_iter())
+        self.hdf5
+            .dataset(Kind::Unsigned(2), &[units.len() as u64, 1], &attributes, units.into_iter())
     }
 }
 

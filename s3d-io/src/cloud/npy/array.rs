@@ -215,8 +215,10 @@ impl NpzArchive {
         if zip.len() > MOST_ARRAYS {
             return Err(Error::format(path, format!("holds {} arrays", zip.len())));
         }
-        let names =
-            zip.file_names().flatten().filter_map(|name| name.strip_suffix(".npy").map(str::to_owned));
+        let names = zip
+            .file_names()
+            .flatten()
+            .filter_map(|name| name.strip_suffix(".npy").map(str::to_owned));
         let mut names: Vec<String> = names.collect();
         names.sort();
         Ok(Self { path: path.to_owned(), zip, names })
@@ -300,7 +302,12 @@ mod tests {
         ] {
             let bytes = npy(kind, "(2,)", "False", &data);
             assert_eq!(floats(&bytes).unwrap(), [1.0, -2.0]);
-            assert!(integers(&bytes).unwrap_err().to_string().contains("astype(numpy.int64)"));
+            assert!(
+                integers(&bytes)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("astype(numpy.int64)")
+            );
         }
         let beyond = npy("<u8", "(1,)", "False", &u64::MAX.to_le_bytes());
         assert!(integers(&beyond).unwrap_err().to_string().contains("beyond"));

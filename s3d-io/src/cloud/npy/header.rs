@@ -104,7 +104,9 @@ pub(super) fn read_text(path: &Path, source: &mut impl Read) -> Result<String> {
         2 | 3 => 4,
         other => return Err(Error::format(path, format!("is of NPY version {other}; 1 to 3 are read"))),
     };
-    source.read_exact(length.get_mut(..digits).unwrap_or_default()).map_err(short)?;
+    source
+        .read_exact(length.get_mut(..digits).unwrap_or_default())
+        .map_err(short)?;
     let length = u32::from_le_bytes(length) as usize;
     if length > LONGEST_HEADER {
         return Err(Error::format(path, format!("claims a header of {length} bytes")));
@@ -150,7 +152,9 @@ pub(super) fn parse(text: &str) -> std::result::Result<Header, Refused> {
     };
     let value = |key: &str| {
         let entry = entries.iter().rfind(|(k, _)| k == key);
-        entry.map(|(_, value)| value).ok_or_else(|| bad(&format!("missing key '{key}'")))
+        entry
+            .map(|(_, value)| value)
+            .ok_or_else(|| bad(&format!("missing key '{key}'")))
     };
     let shape = sides(value("shape")?)?;
     let count = shape.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
@@ -171,7 +175,11 @@ pub(super) fn parse(text: &str) -> std::result::Result<Header, Refused> {
 /// The numbers of a tuple.
 fn sides(tuple: &Literal) -> std::result::Result<Vec<u64>, Refused> {
     let number = |side: &Literal| if let Literal::Number(n) = side { Some(*n) } else { None };
-    let numbers = if let Literal::List(sides) = tuple { sides.iter().map(number).collect() } else { None };
+    let numbers = if let Literal::List(sides) = tuple {
+        sides.iter().map(number).collect()
+    } else {
+        None
+    };
     numbers.ok_or_else(|| bad("a shape is no tuple of whole numbers"))
 }
 
@@ -184,7 +192,11 @@ fn field(field: &Literal) -> std::result::Result<(String, Vec<u64>, Stored), Ref
         [name, kind, shape] => (name, kind, sides(shape)?),
         _ => return Err(no_field()),
     };
-    let name = if let Literal::List(titled) = name { titled.last() } else { Some(name) };
+    let name = if let Literal::List(titled) = name {
+        titled.last()
+    } else {
+        Some(name)
+    };
     match (name, kind) {
         (Some(Literal::Text(name)), Literal::Text(kind)) => Ok((name.clone(), shape, stored(kind)?)),
         (Some(Literal::Text(name)), Literal::List(_)) => {
@@ -293,7 +305,11 @@ mod tests {
              'fortran_order': False, 'shape': (7,), }   \n",
         )
         .unwrap();
-        let fields: Vec<_> = h.fields.iter().map(|f| (f.name.as_str(), f.at, f.kind, f.big_endian)).collect();
+        let fields: Vec<_> = h
+            .fields
+            .iter()
+            .map(|f| (f.name.as_str(), f.at, f.kind, f.big_endian))
+            .collect();
         assert_eq!(
             fields,
             [
@@ -363,7 +379,9 @@ mod tests {
         let text = format!("{{'descr': [('{name}', '<f4')], 'fortran_order': False, 'shape': (3,)}}");
         assert_eq!(header(&text).unwrap().fields[0].name, name);
         let claims = b"\x93NUMPY\x02\x00\xff\xff\xff\xff";
-        let e = NpyHeader::read(Path::new("a.npy"), &mut &claims[..]).unwrap_err().to_string();
+        let e = NpyHeader::read(Path::new("a.npy"), &mut &claims[..])
+            .unwrap_err()
+            .to_string();
         assert!(e.contains("claims a header of 4294967295 bytes"), "{e}");
     }
 

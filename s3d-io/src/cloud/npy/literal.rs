@@ -64,7 +64,9 @@ impl Parser<'_> {
             Some('0'..='9') => self.number().map(Literal::Number),
             Some('(') => self.list("(", ")", |parser| parser.value(inner)).map(Literal::List),
             Some('[') => self.list("[", "]", |parser| parser.value(inner)).map(Literal::List),
-            Some('{') => self.list("{", "}", |parser| parser.entry(inner)).map(Literal::Dictionary),
+            Some('{') => self
+                .list("{", "}", |parser| parser.entry(inner))
+                .map(Literal::Dictionary),
             _ if self.has("True") => Ok(Literal::Bool(true)),
             _ if self.has("False") => Ok(Literal::Bool(false)),
             _ => Err("could not parse"),

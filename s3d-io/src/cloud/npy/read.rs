@@ -32,7 +32,10 @@ impl<'a> NpyCloud<'a> {
     }
 
     fn is_npz(&self) -> bool {
-        self.source.name().extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+        self.source
+            .name()
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("npz"))
     }
 
     fn file(&self) -> Result<BufReader<Bytes>> {
@@ -147,8 +150,11 @@ impl<'a> NpyCloud<'a> {
         let (mut fields, mut stride) = (Vec::new(), 0);
         for (stem, header, _) in &arrays {
             for field in &header.fields {
-                let name =
-                    if header.is_structured { field.name.clone() } else { format!("{stem}{}", field.name) };
+                let name = if header.is_structured {
+                    field.name.clone()
+                } else {
+                    format!("{stem}{}", field.name)
+                };
                 fields.push(Field { name, at: field.at.saturating_add(stride), ..field.clone() });
             }
             stride = header.stride.saturating_add(stride);
@@ -197,6 +203,10 @@ impl Cloud for NpyCloud<'_> {
     }
 
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-        if self.is_npz() { self.read_npz(colors, reading) } else { self.read_npy(colors, reading) }
+        if self.is_npz() {
+            self.read_npz(colors, reading)
+        } else {
+            self.read_npy(colors, reading)
+        }
     }
 }

@@ -59,11 +59,15 @@ impl<W: Write> NpyWriter<W> {
     /// If `kind` is no type with a size of one digit, or the array has more bytes than 64 bits can count.
     #[expect(clippy::expect_used, reason = "a caller's mistake: see Panics")]
     pub fn new(mut file: W, name: &Path, kind: &str, shape: &[u64]) -> Result<Self> {
-        let size =
-            kind.chars().last().and_then(|c| c.to_digit(10)).expect("a type ends with its size in bytes");
+        let size = kind
+            .chars()
+            .last()
+            .and_then(|c| c.to_digit(10))
+            .expect("a type ends with its size in bytes");
         let bytes = shape.iter().try_fold(u64::from(size), |n, side| n.checked_mul(*side));
         let promised = bytes.expect("an array that 64 bits can count");
-        file.write_all(&npy_header(kind, shape)).map_err(|e| Error::io(name, "write", e))?;
+        file.write_all(&npy_header(kind, shape))
+            .map_err(|e| Error::io(name, "write", e))?;
         Ok(Self { file, name: name.to_owned(), promised, written: 0 })
     }
 
@@ -73,7 +77,9 @@ impl<W: Write> NpyWriter<W> {
     /// [`Error::Io`].
     pub fn put(&mut self, bytes: &[u8]) -> Result<()> {
         self.written += bytes.len() as u64;
-        self.file.write_all(bytes).map_err(|e| Error::io(&self.name, "write", e))
+        self.file
+            .write_all(bytes)
+            .map_err(|e| Error::io(&self.name, "write", e))
     }
 
     /// What the array was written to, complete.
@@ -114,7 +120,9 @@ mod tests {
         let mut array = NpyWriter::create(&path, "<f8", &[1000, 7]).unwrap();
         let values: Vec<f64> = (0..7000).map(|i| f64::from(i) * 0.001 - 2.0).collect();
         for piece in values.chunks(999) {
-            array.put(&piece.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>()).unwrap();
+            array
+                .put(&piece.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>())
+                .unwrap();
         }
         array.finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();
@@ -123,14 +131,23 @@ mod tests {
         assert_eq!(read.into_vec::<f64>().unwrap(), values);
         NpyWriter::create(&path, "<i8", &[0]).unwrap().finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();
-        assert!(npyz::NpyFile::new(&bytes[..]).unwrap().into_vec::<i64>().unwrap().is_empty());
+        assert!(
+            npyz::NpyFile::new(&bytes[..])
+                .unwrap()
+                .into_vec::<i64>()
+                .unwrap()
+                .is_empty()
+        );
     }
 
     #[test]
     fn npyz_writes_other_bytes() {
         use npyz::WriterBuilder;
         let mut bytes = Vec::new();
-        let writer = npyz::WriteOptions::new().default_dtype().shape(&[2, 3]).writer(&mut bytes);
+        let writer = npyz::WriteOptions::new()
+            .default_dtype()
+            .shape(&[2, 3])
+            .writer(&mut bytes);
         let mut writer = writer.begin_nd().unwrap();
         writer.extend([0.0f64; 6]).unwrap();
         writer.finish().unwrap();

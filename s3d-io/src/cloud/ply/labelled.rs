@@ -54,7 +54,10 @@ impl<R: Read + Seek> LabelledPoints<R> {
     pub fn new(mut reader: R, name: &Path) -> Result<Self> {
         let path = name;
         let io = |e| Error::io(path, "read", e);
-        let bytes = reader.seek(SeekFrom::End(0)).and_then(|n| reader.rewind().map(|()| n)).map_err(io)?;
+        let bytes = reader
+            .seek(SeekFrom::End(0))
+            .and_then(|n| reader.rewind().map(|()| n))
+            .map_err(io)?;
         let mut file = BufReader::with_capacity(1 << 18, reader);
         let (mut count, mut properties, mut header) = (None, Vec::new(), 0u64);
         let mut line = Vec::new();
@@ -79,7 +82,9 @@ impl<R: Read + Seek> LabelledPoints<R> {
             }
         }
         let count = count.filter(|_| properties == PROPERTIES).ok_or_else(other)?;
-        let expected = count.checked_mul(POINT_BYTES as u64).and_then(|b| b.checked_add(header));
+        let expected = count
+            .checked_mul(POINT_BYTES as u64)
+            .and_then(|b| b.checked_add(header));
         if expected != Some(bytes) {
             return Err(Error::format(path, format!("{count} points do not fill its {bytes} bytes")));
         }
@@ -101,7 +106,9 @@ impl<R: Read + Seek> LabelledPoints<R> {
         let n = self.left.min(most as u64);
         let mut bytes = [0; POINT_BYTES];
         for _ in 0..n {
-            self.file.read_exact(&mut bytes).map_err(|e| Error::io(&self.path, "read", e))?;
+            self.file
+                .read_exact(&mut bytes)
+                .map_err(|e| Error::io(&self.path, "read", e))?;
             let [x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3, r, g, b, l0, l1, l2, l3, f0, f1, f2, f3] =
                 bytes;
             let [x, y, z] = [[x0, x1, x2, x3], [y0, y1, y2, y3], [z0, z1, z2, z3]].map(f32::from_le_bytes);
@@ -134,7 +141,9 @@ mod tests {
             faces: (0..n).rev().collect(),
         };
         let mut writer = PlyPointWriter::create(&path, u64::from(n)).unwrap();
-        writer.append(&cloud, &(0..n).map(|i| 100 * i).collect::<Vec<_>>()).unwrap();
+        writer
+            .append(&cloud, &(0..n).map(|i| 100 * i).collect::<Vec<_>>())
+            .unwrap();
         writer.finish().unwrap();
         let mut points = LabelledPoints::open(&path).unwrap();
         assert_eq!(points.count(), 10);

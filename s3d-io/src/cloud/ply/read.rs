@@ -82,7 +82,12 @@ impl Cloud for PlyCloud<'_> {
             .collect();
         let c = Columns::choose(path, &names, self.options)?;
         let others = [Some(c.class), c.instance, c.room].into_iter().flatten();
-        reader.want(c.position.into_iter().chain(c.color.into_iter().flatten()).chain(others));
+        reader.want(
+            c.position
+                .into_iter()
+                .chain(c.color.into_iter().flatten())
+                .chain(others),
+        );
         let mut batch = PlyBatch::default();
         while reader.read_batch(&mut batch)? {
             let [x, y, z] = c.position.map(|p| batch.scalars(p));

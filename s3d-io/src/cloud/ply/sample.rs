@@ -38,7 +38,10 @@ pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
     let size = file.metadata().map_err(io)?.len();
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let header = read_header(path, &mut reader)?;
-    let needed = header.count.checked_mul(header.stride as u64).and_then(|b| b.checked_add(header.bytes));
+    let needed = header
+        .count
+        .checked_mul(header.stride as u64)
+        .and_then(|b| b.checked_add(header.bytes));
     if needed.is_none_or(|needed| needed > size) {
         return Err(Error::format(
             path,
@@ -61,14 +64,21 @@ pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
         reader.seek_relative(skipped.cast_signed()).map_err(io)?;
         reader.read_exact(&mut point).map_err(io)?;
         at = i.saturating_add(1);
-        let float = |o: usize| point.get(o..).and_then(<[u8]>::first_chunk).map(|b| f32::from_le_bytes(*b));
+        let float = |o: usize| {
+            point
+                .get(o..)
+                .and_then(<[u8]>::first_chunk)
+                .map(|b| f32::from_le_bytes(*b))
+        };
         let position = header.position.map(|o| float(o).unwrap_or(f32::NAN));
         if !position.iter().all(|c| c.is_finite()) {
             return Err(Error::format(path, format!("point {i} (counted from 0) is at {position:?}")));
         }
         cloud.positions.push(Vec3::from_array(position));
         let byte = |o: usize| point.get(o).copied().unwrap_or(0);
-        cloud.colors.push(header.color.map_or([0; 3], |offsets| offsets.map(byte)));
+        cloud
+            .colors
+            .push(header.color.map_or([0; 3], |offsets| offsets.map(byte)));
     }
     Ok(cloud)
 }
@@ -78,8 +88,11 @@ pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
 fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
     // u128, as counts may be anything.
     let [k, parts, count] = [k, parts, count].map(u128::from);
-    let middle =
-        k.saturating_mul(2).saturating_add(1).saturating_mul(count).checked_div(parts.saturating_mul(2));
+    let middle = k
+        .saturating_mul(2)
+        .saturating_add(1)
+        .saturating_mul(count)
+        .checked_div(parts.saturating_mul(2));
     middle.and_then(|i| u64::try_from(i).ok()).unwrap_or(0)
 }
 
@@ -130,8 +143,10 @@ fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
     let mut columns: Vec<(String, String, usize)> = Vec::new();
     loop {
         let mut line = Vec::new();
-        let read =
-            reader.take(MAX_HEADER).read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
+        let read = reader
+            .take(MAX_HEADER)
+            .read_until(b'\n', &mut line)
+            .map_err(|e| Error::io(path, "read", e))?;
         bytes = bytes.saturating_add(read as u64);
         number = number.saturating_add(1);
         let text = String::from_utf8_lossy(&line);
@@ -151,7 +166,10 @@ fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
             }
             ["element", "vertex", n] if count.is_none() => {
                 in_vertex = true;
-                count = Some(n.parse().map_err(|_| wrong(format!("\"{n}\" is no number of points")))?);
+                count = Some(
+                    n.parse()
+                        .map_err(|_| wrong(format!("\"{n}\" is no number of points")))?,
+                );
             }
             ["element", ..] if count.is_none() => {
                 return Err(wrong("another element stands before the points".into()));
@@ -176,8 +194,12 @@ fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
         }
     }
     let find = |names: [&str; 3], kinds: [&str; 2]| -> Option<[usize; 3]> {
-        let at =
-            |name: &str| columns.iter().find(|c| c.0 == name && kinds.contains(&c.1.as_str())).map(|c| c.2);
+        let at = |name: &str| {
+            columns
+                .iter()
+                .find(|c| c.0 == name && kinds.contains(&c.1.as_str()))
+                .map(|c| c.2)
+        };
         Some([at(names[0])?, at(names[1])?, at(names[2])?])
     };
     let position = find(["x", "y", "z"], ["float", "float32"]);
@@ -283,6 +305,11 @@ mod tests {
         let mut bytes = head(little, &format!("element vertex 1\n{xyz}")).into_bytes();
         [1f32, f32::NAN, 2.0].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
         write_bytes(&path, &bytes).unwrap();
-        assert!(read_point_sample(&path, 10).unwrap_err().to_string().contains("point 0 (counted from 0)"));
+        assert!(
+            read_point_sample(&path, 10)
+                .unwrap_err()
+                .to_string()
+                .contains("point 0 (counted from 0)")
+        );
     }
 }

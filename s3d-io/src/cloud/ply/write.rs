@@ -93,7 +93,8 @@ impl<W: Write> PlyPointWriter<W> {
              property uint face\n\
              end_header\n"
         );
-        file.write_all(header.as_bytes()).map_err(|e| Error::io(name, "write", e))?;
+        file.write_all(header.as_bytes())
+            .map_err(|e| Error::io(name, "write", e))?;
         let name = name.to_owned();
         Ok(Self { file, name, promised: count, written: 0, buffer: Vec::with_capacity(BATCH * POINT_BYTES) })
     }
@@ -121,7 +122,9 @@ impl<W: Write> PlyPointWriter<W> {
         for first in (0..n).step_by(BATCH) {
             self.buffer.clear();
             put_points(&mut self.buffer, cloud, labels, first..n.min(first + BATCH));
-            self.file.write_all(&self.buffer).map_err(|e| Error::io(&self.name, "write", e))?;
+            self.file
+                .write_all(&self.buffer)
+                .map_err(|e| Error::io(&self.name, "write", e))?;
         }
         self.written += n as u64;
         Ok(())

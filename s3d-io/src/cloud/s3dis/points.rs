@@ -239,8 +239,10 @@ pub fn read_points(path: &Path, out: &mut PointCloud) -> Result<()> {
 /// Whole lines, cut into parts of whole lines.
 fn pieces(mut lines: &[u8]) -> impl Iterator<Item = &[u8]> {
     std::iter::from_fn(move || {
-        let end =
-            lines.get(PIECE..).and_then(|rest| memchr(b'\n', rest)).map_or(lines.len(), |at| PIECE + at + 1);
+        let end = lines
+            .get(PIECE..)
+            .and_then(|rest| memchr(b'\n', rest))
+            .map_or(lines.len(), |at| PIECE + at + 1);
         let (piece, rest) = lines.split_at_checked(end)?;
         lines = rest;
         (!piece.is_empty()).then_some(piece)
@@ -280,7 +282,11 @@ fn parse_point(line: &[u8], offset_m: DVec3) -> std::result::Result<Option<(Vec3
         return Err(format!("not a point `x y z r g b`: {than}{} fields", n.min(6)));
     }
     let coordinate = |word: &[u8], offset_m: f64| -> std::result::Result<f32, String> {
-        let value = if offset_m == 0.0 { number(word) } else { less(word, offset_m) };
+        let value = if offset_m == 0.0 {
+            number(word)
+        } else {
+            less(word, offset_m)
+        };
         match value {
             Some(v) if v.is_finite() => Ok(v),
             Some(_) => Err(format!("the coordinate {} is not finite", quote(word))),
@@ -347,7 +353,13 @@ mod tests {
         let mut reader = reader;
         while reader.read_chunk(usize::MAX, &mut cloud).unwrap() > 0 {}
         assert_eq!(cloud.positions, [vec3(0.125, 0.0625, 0.5)]);
-        assert!(reader.first_skipped().unwrap().to_string().contains("`inf` is not finite"));
+        assert!(
+            reader
+                .first_skipped()
+                .unwrap()
+                .to_string()
+                .contains("`inf` is not finite")
+        );
     }
 
     #[test]
@@ -364,7 +376,9 @@ mod tests {
             (b"1 2 3 4 NaN 6", "the colour `NaN`"),
             (b"x y z r g b", "line 3: the coordinate `x`"),
         ] {
-            let message = read(&[b"0 0 0 0 0 0\n\n", text, b"\n"].concat()).unwrap_err().to_string();
+            let message = read(&[b"0 0 0 0 0 0\n\n", text, b"\n"].concat())
+                .unwrap_err()
+                .to_string();
             assert!(message.contains(words) && message.contains("wall_1.txt, line 3"), "{message}");
         }
     }
@@ -388,7 +402,9 @@ mod tests {
         let path = dir.path().join("a.txt");
         // Three blocks, so that lines lie across their borders.
         let n = 3 * BLOCK / 30;
-        let text: String = (0..n).map(|i| format!("{i}.125 -{i}.5 1.000 1 2 {}\n\n", i % 256)).collect();
+        let text: String = (0..n)
+            .map(|i| format!("{i}.125 -{i}.5 1.000 1 2 {}\n\n", i % 256))
+            .collect();
         assert!(text.len() > 2 * BLOCK);
         fs::write(&path, &text).unwrap();
         let (mut reader, mut all, mut piece) =
@@ -417,7 +433,13 @@ mod tests {
         let n = 5 * BLOCK / 20;
         // In the first piece, in one between, in a later block.
         for bad in [3, 2 * PIECE / 20, n - 7] {
-            let line = |i| if i == bad { "x\n".to_owned() } else { format!("{i}.5 0 1 2 3 4\n\n") };
+            let line = |i| {
+                if i == bad {
+                    "x\n".to_owned()
+                } else {
+                    format!("{i}.5 0 1 2 3 4\n\n")
+                }
+            };
             fs::write(&path, (0..n).map(line).collect::<String>()).unwrap();
             // Each line but the bad one is followed by an empty one.
             let words = format!("line {}: not a point", 2 * bad + 1);

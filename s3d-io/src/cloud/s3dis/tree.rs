@@ -92,7 +92,8 @@ impl AnnotationTree {
                     Err(e) => tree.fault(e, options)?,
                 }
             } else if !name_of(&path).ends_with("_alignmentAngle.txt") {
-                tree.warnings.push(format!("{}: not a room's folder, left out", path.display()));
+                tree.warnings
+                    .push(format!("{}: not a room's folder, left out", path.display()));
             }
         }
         if tree.rooms.is_empty() {
@@ -126,7 +127,8 @@ impl AnnotationTree {
         for path in entries(&annotations)? {
             let is_text = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("txt"));
             if !is_text || path.is_dir() {
-                self.warnings.push(format!("{}: not a file of points, left out", path.display()));
+                self.warnings
+                    .push(format!("{}: not a file of points, left out", path.display()));
                 continue;
             }
             let found = match instance_of(&path, options) {
@@ -153,7 +155,8 @@ impl AnnotationTree {
             let last = instances.range((class, 0)..=(class, u32::MAX)).next_back();
             let number = last.map_or(0, |((_, n), _)| *n) + 1;
             let name = quote(name_of(&path).as_bytes());
-            self.warnings.push(format!("{}: {name} is taken for {class}_{number}", path.display()));
+            self.warnings
+                .push(format!("{}: {name} is taken for {class}_{number}", path.display()));
             instances.insert((class, number), path);
         }
         if instances.is_empty() {
@@ -178,9 +181,12 @@ enum Named {
 
 fn instance_of(path: &Path, options: &TreeOptions) -> Result<Named> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let digits =
-        stem.rsplit_once('_').filter(|(_, n)| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
-    let number = digits.and_then(|(_, n)| n.parse().ok()).filter(|&n: &u32| n > 0 && n < u32::MAX);
+    let digits = stem
+        .rsplit_once('_')
+        .filter(|(_, n)| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let number = digits
+        .and_then(|(_, n)| n.parse().ok())
+        .filter(|&n: &u32| n > 0 && n < u32::MAX);
     let (Some((word, _)), Some(number)) = (digits, number) else {
         let mut message =
             "names no instance: a name is CLASS_N.txt, with N from 1, as in chair_3.txt".to_owned();
@@ -263,7 +269,10 @@ mod tests {
 
     fn names(tree: &AnnotationTree) -> Vec<String> {
         let instances = |r: &RoomFiles| -> Vec<String> {
-            r.instances.iter().map(|i| format!("{} {}_{}", r.room, i.class, i.number)).collect()
+            r.instances
+                .iter()
+                .map(|i| format!("{} {}_{}", r.room, i.class, i.number))
+                .collect()
         };
         tree.rooms.iter().flat_map(instances).collect()
     }
@@ -293,7 +302,11 @@ mod tests {
         ];
         assert_eq!(names(&tree), expected);
         assert_eq!(tree.warnings.len(), 2, "{:?}", tree.warnings);
-        assert!(tree.rooms[0].instances[0].path.ends_with("office_9/Annotations/ceiling_1.txt"));
+        assert!(
+            tree.rooms[0].instances[0]
+                .path
+                .ends_with("office_9/Annotations/ceiling_1.txt")
+        );
     }
 
     #[test]
@@ -321,7 +334,12 @@ mod tests {
             assert!(tree.warnings[0].contains(words) && tree.warnings[0].ends_with("left out"));
         }
         let dir = area(&["notes.md"]);
-        assert!(AnnotationTree::open(dir.path()).unwrap_err().to_string().contains("no annotated room"));
+        assert!(
+            AnnotationTree::open(dir.path())
+                .unwrap_err()
+                .to_string()
+                .contains("no annotated room")
+        );
         assert!(matches!(AnnotationTree::open(&dir.path().join("gone")), Err(Error::Io { .. })));
     }
 

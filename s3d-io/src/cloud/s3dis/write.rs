@@ -53,7 +53,9 @@ impl S3disAreaWriter {
         write_whole(&self.dir.join(format!("{area}_alignmentAngle.txt")), |w| {
             writeln!(w, "## Global alignment angle per disjoint space in {area} ##")?;
             writeln!(w, "## Disjoint Space Name Global Alignment Angle ##")?;
-            rooms.iter().try_for_each(|(room, degrees)| writeln!(w, "{room} {degrees}"))
+            rooms
+                .iter()
+                .try_for_each(|(room, degrees)| writeln!(w, "{room} {degrees}"))
         })
     }
 }
@@ -317,7 +319,8 @@ mod tests {
         let room_file = dir.path().join("Area_1/office_1/office_1.txt");
         assert!(!room_file.exists());
         assert_eq!(room.finish().unwrap(), 10_002);
-        area.alignment(&[("office_1".into(), 90), ("hallway_2".into(), 0)]).unwrap();
+        area.alignment(&[("office_1".into(), 90), ("hallway_2".into(), 0)])
+            .unwrap();
 
         let read = |path: PathBuf| std::fs::read_to_string(path).unwrap();
         let chair = read(dir.path().join("Area_1/office_1/Annotations/chair_1.txt"));
@@ -342,7 +345,9 @@ mod tests {
         let area = S3disAreaWriter::create(dir.path()).unwrap();
         let mut room = area.room("WC_1").unwrap();
         let mut door = room.instance("door", 1).unwrap();
-        let e = door.append(&[Vec3::ONE, vec3(0.0, f32::NAN, 0.0)], &[[0; 3]; 2]).unwrap_err();
+        let e = door
+            .append(&[Vec3::ONE, vec3(0.0, f32::NAN, 0.0)], &[[0; 3]; 2])
+            .unwrap_err();
         assert!(e.path().ends_with("WC_1/Annotations/door_1.txt") && e.to_string().contains("NaN"), "{e}");
         drop(door);
         drop(room);

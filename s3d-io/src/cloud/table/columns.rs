@@ -87,7 +87,9 @@ impl Columns {
                 let at = |i: usize| find(names, &format!("{array}[{i}]"));
                 Some([at(0)?, at(1)?, at(2)?])
             };
-            sets.iter().find_map(of_set).or_else(|| arrays.iter().find_map(of_array))
+            sets.iter()
+                .find_map(of_set)
+                .or_else(|| arrays.iter().find_map(of_array))
         };
         let position = three(&POSITIONS, &POSITION_ARRAYS).ok_or_else(|| {
             Error::format(path, format!("has no columns of coordinates, such as x y z; {}", there()))
@@ -109,7 +111,11 @@ impl Columns {
             Some(name) => Some(named("instance", name)?),
             None => usual(&INSTANCES).filter(|i| *i != class),
         };
-        let room = options.room_column.as_ref().map(|name| named("rooms", name)).transpose()?;
+        let room = options
+            .room_column
+            .as_ref()
+            .map(|name| named("rooms", name))
+            .transpose()?;
         Ok(Self { position, color: three(&COLORS, &COLOR_ARRAYS), class, instance, room })
     }
 }
@@ -164,7 +170,9 @@ mod tests {
             let message = choose(names, &options).unwrap_err().to_string();
             assert!(message.contains(words), "{message}");
         }
-        let message = choose("x y z nx", &AnnotationOptions::default()).unwrap_err().to_string();
+        let message = choose("x y z nx", &AnnotationOptions::default())
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("no column of classes; its columns are x y z nx."), "{message}");
     }
 }

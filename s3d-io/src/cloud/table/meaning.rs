@@ -82,12 +82,20 @@ impl Meaning {
                 }
                 None => {
                     unknown_classes.add(tag.key(), group);
-                    if options.unknown_as_clutter { options.taxonomy.clutter() } else { None }
+                    if options.unknown_as_clutter {
+                        options.taxonomy.clutter()
+                    } else {
+                        None
+                    }
                 }
             };
             // Unlabelled points need no room.
             if room.is_none() && class.is_some() {
-                let key = if group.room == NO_TAG { None } else { rooms.get(group.room).map(Tag::key) };
+                let key = if group.room == NO_TAG {
+                    None
+                } else {
+                    rooms.get(group.room).map(Tag::key)
+                };
                 unknown_rooms.add(key.unwrap_or_default(), group);
             }
             let tag = (group.instance != NO_INSTANCE).then(|| tag.clone());
@@ -140,7 +148,13 @@ fn class_of(cloud: &dyn Cloud, options: &AnnotationOptions, tag: &Tag) -> Option
         Tag::Number(number) => options.taxonomy.meaning_of_number(*number),
     };
     // What formats know of themselves is told in classes of S3DIS.
-    meant.or_else(|| if options.taxonomy.is_s3dis() { cloud.class_of(tag).map(Some) } else { None })
+    meant.or_else(|| {
+        if options.taxonomy.is_s3dis() {
+            cloud.class_of(tag).map(Some)
+        } else {
+            None
+        }
+    })
 }
 
 /// The room that a tag means.
@@ -172,8 +186,11 @@ impl Unknown {
         let mut rows: Vec<_> = self.0.iter().collect();
         // Numbers in their order, before names.
         rows.sort_by_key(|(key, _)| (key.parse::<i64>().unwrap_or(i64::MAX), (*key).clone()));
-        let mut items: Vec<String> =
-            rows.iter().take(LISTED).map(|(key, (n, _))| format!("{key:?} ({n} points)")).collect();
+        let mut items: Vec<String> = rows
+            .iter()
+            .take(LISTED)
+            .map(|(key, (n, _))| format!("{key:?} ({n} points)"))
+            .collect();
         if rows.len() > LISTED {
             items.push(format!("and {} more", rows.len() - LISTED));
         }
@@ -208,7 +225,10 @@ impl Unknown {
             } else {
                 format!("the {} of {}", taxonomy.classes().len(), taxonomy.name())
             };
-            let example = taxonomy.classes().get(Class::CHAIR.index()).or(taxonomy.classes().first());
+            let example = taxonomy
+                .classes()
+                .get(Class::CHAIR.index())
+                .or(taxonomy.classes().first());
             let example = example.map_or("chair", |class| class.name());
             return Err(Error::format(
                 path,

@@ -60,7 +60,9 @@ pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> R
         // What is wrong with the first record says why there is none.
         let path = clouds.first().map_or(Path::new(""), |cloud| cloud.path());
         let of = format!("{}: ", path.display());
-        let why = warnings.first().map_or_else(String::new, |why| format!(": {}", why.replace(&of, "")));
+        let why = warnings
+            .first()
+            .map_or_else(String::new, |why| format!(": {}", why.replace(&of, "")));
         return Err(Error::format(path, format!("holds no point that can be used{why}")));
     }
     let meaning = Meaning::new(clouds, options, &gathered.groups, &classes, &rooms, &mut warnings)?;
@@ -392,7 +394,10 @@ mod tests {
     }
 
     fn names(annotations: &Annotations) -> Vec<(String, Vec<f32>)> {
-        contents(annotations).into_iter().map(|(name, x, _)| (name, x)).collect()
+        contents(annotations)
+            .into_iter()
+            .map(|(name, x, _)| (name, x))
+            .collect()
     }
 
     #[test]
@@ -531,9 +536,13 @@ mod tests {
     #[test]
     fn a_column_of_something_else_is_noticed() {
         let rows: Vec<TestRow> = (0..10_001).map(|i| (i, 0, 0)).collect();
-        let message = read(&[TestCloud::new("a.las", &rows)], &options()).unwrap_err().to_string();
+        let message = read(&[TestCloud::new("a.las", &rows)], &options())
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("more than 10000 different classes"), "{message}");
-        let message = read(&[TestCloud::new("a.las", &[(0, 0, 0)])], &options()).unwrap_err().to_string();
+        let message = read(&[TestCloud::new("a.las", &[(0, 0, 0)])], &options())
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("no annotated point"), "{message}");
     }
 
@@ -542,7 +551,9 @@ mod tests {
         let rows: Vec<TestRow> = (0..=MAX_GROUPS as i64).map(|i| (1, i, 0)).collect();
         let enough = TestCloud::new("a.las", &rows[1..]);
         assert_eq!(read(&[enough], &options()).unwrap().rooms[0].instances.len(), MAX_GROUPS);
-        let message = read(&[TestCloud::new("a.las", &rows)], &options()).unwrap_err().to_string();
+        let message = read(&[TestCloud::new("a.las", &rows)], &options())
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("a.las: tells of more than 1000000 instances"), "{message}");
     }
 
@@ -559,7 +570,10 @@ mod tests {
                     continue;
                 };
                 let of = if *instance < 0 { -1 } else { *class };
-                lists.entry((room, meant, (*instance).max(-1), of)).or_default().push(i as f32);
+                lists
+                    .entry((room, meant, (*instance).max(-1), of))
+                    .or_default()
+                    .push(i as f32);
             }
         }
         let mut numbers: BTreeMap<(Room, Class), u32> = BTreeMap::new();

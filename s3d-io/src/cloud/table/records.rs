@@ -84,7 +84,11 @@ impl Field {
         macro_rules! number {
             ($t:ty, $form:path, $to:ty) => {{
                 let bytes = *self.start(record)?.first_chunk()?;
-                let v = if self.big_endian { <$t>::from_be_bytes(bytes) } else { <$t>::from_le_bytes(bytes) };
+                let v = if self.big_endian {
+                    <$t>::from_be_bytes(bytes)
+                } else {
+                    <$t>::from_le_bytes(bytes)
+                };
                 $form(<$to>::from(v))
             }};
         }
@@ -98,7 +102,11 @@ impl Field {
             Kind::I64 => number!(i64, Number::Whole, i64),
             Kind::U64 => {
                 let bytes = *self.start(record)?.first_chunk()?;
-                let v = if self.big_endian { u64::from_be_bytes(bytes) } else { u64::from_le_bytes(bytes) };
+                let v = if self.big_endian {
+                    u64::from_be_bytes(bytes)
+                } else {
+                    u64::from_le_bytes(bytes)
+                };
                 // Beyond, it is no number of anything: as a float it will be refused.
                 i64::try_from(v).map_or(Number::Float(v as f64), Number::Whole)
             }
@@ -130,7 +138,11 @@ impl Field {
             }
             Kind::Utf32(_) => {
                 for c in written.unwrap_or_default().as_chunks::<4>().0 {
-                    let code = if self.big_endian { u32::from_be_bytes(*c) } else { u32::from_le_bytes(*c) };
+                    let code = if self.big_endian {
+                        u32::from_be_bytes(*c)
+                    } else {
+                        u32::from_le_bytes(*c)
+                    };
                     if code == 0 {
                         break;
                     }
@@ -243,7 +255,9 @@ impl Table {
             position: dvec3(x, y, z),
             color: rgb,
             class: self.fields[c.class].value(record, class),
-            instance: c.instance.map_or(Value::None, |i| self.fields[i].value(record, instance)),
+            instance: c
+                .instance
+                .map_or(Value::None, |i| self.fields[i].value(record, instance)),
             room: c.room.map_or(Value::None, |i| self.fields[i].value(record, room)),
         };
         reading.push(number, &row)?;

@@ -52,7 +52,9 @@ impl FlatStore {
                 out.colors.extend_from_slice(&colors[range]);
                 Ok(())
             }
-            Self::Spool(spool) => spool.read(start, count, out).map_err(|e| Error::io(&spool.dir, READ, e)),
+            Self::Spool(spool) => spool
+                .read(start, count, out)
+                .map_err(|e| Error::io(&spool.dir, READ, e)),
         }
     }
 }
@@ -131,7 +133,9 @@ impl SpoolWriter {
         }
         place.waiting.extend_from_slice(&color);
         if place.waiting.len() >= self.most {
-            place.write(&mut self.file).map_err(|e| Error::io(&self.dir, WRITE, e))?;
+            place
+                .write(&mut self.file)
+                .map_err(|e| Error::io(&self.dir, WRITE, e))?;
         }
         Ok(true)
     }
@@ -139,7 +143,9 @@ impl SpoolWriter {
     /// The points, to be read; `None` if fewer came than were promised.
     pub(crate) fn finish(mut self) -> Result<Option<FlatStore>> {
         for place in &mut self.places {
-            place.write(&mut self.file).map_err(|e| Error::io(&self.dir, WRITE, e))?;
+            place
+                .write(&mut self.file)
+                .map_err(|e| Error::io(&self.dir, WRITE, e))?;
         }
         let complete = self.places.iter().all(|place| place.left == 0);
         Ok(complete.then(|| FlatStore::Spool(Spool { file: Mutex::new(self.file), dir: self.dir })))
@@ -175,8 +181,20 @@ mod tests {
         let store = writer.finish().unwrap().unwrap();
         let mut cloud = PointCloud::default();
         store.read(40_000, 20_000, &mut cloud).unwrap();
-        assert!(cloud.positions.iter().enumerate().all(|(k, p)| *p == Vec3::splat((3 * k + 2) as f32)));
-        assert!(cloud.colors.iter().enumerate().all(|(k, c)| *c == [(3 * k + 2) as u8; 3]));
+        assert!(
+            cloud
+                .positions
+                .iter()
+                .enumerate()
+                .all(|(k, p)| *p == Vec3::splat((3 * k + 2) as f32))
+        );
+        assert!(
+            cloud
+                .colors
+                .iter()
+                .enumerate()
+                .all(|(k, c)| *c == [(3 * k + 2) as u8; 3])
+        );
         cloud.clear();
         store.read(0, 40_000, &mut cloud).unwrap();
         assert_eq!(cloud.positions[39_999], Vec3::splat(59_998.0));

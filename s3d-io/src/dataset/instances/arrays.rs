@@ -62,7 +62,11 @@ pub fn read_instance_arrays_from(reader: impl Read + Seek, name: &Path) -> Resul
 
     let units = numbers(&names, u32::from_le_bytes);
     let text = |units: &[u32]| -> String {
-        units.iter().take_while(|u| **u != 0).map(|u| char::from_u32(*u).unwrap_or('\u{fffd}')).collect()
+        units
+            .iter()
+            .take_while(|u| **u != 0)
+            .map(|u| char::from_u32(*u).unwrap_or('\u{fffd}'))
+            .collect()
     };
     let labels: Vec<String> = units.chunks_exact(width(names.len())).map(text).collect();
     if labels.len() != n {
@@ -117,7 +121,11 @@ pub fn read_instance_members_from(
         let size = (end - start).saturating_mul(4);
         bytes.clear();
         // Memory grows as bytes arrive, whatever is claimed.
-        values.by_ref().take(size).read_to_end(&mut bytes).map_err(|e| damaged(path, name, &e))?;
+        values
+            .by_ref()
+            .take(size)
+            .read_to_end(&mut bytes)
+            .map_err(|e| damaged(path, name, &e))?;
         if bytes.len() as u64 != size {
             return Err(Error::format(path, format!("the array {name:?} ends too early")));
         }
@@ -168,8 +176,18 @@ mod tests {
             assert!(e.contains(words), "{e}");
         }
         assert_eq!(arrays.bbox[1], entries[1].bbox);
-        assert!(arrays.points_per_voxel.iter().eq(entries.iter().flat_map(|e| &e.points_per_voxel)));
-        assert!(arrays.voxel_occupancy.iter().eq(entries.iter().flat_map(|e| &e.voxel_occupancy)));
+        assert!(
+            arrays
+                .points_per_voxel
+                .iter()
+                .eq(entries.iter().flat_map(|e| &e.points_per_voxel))
+        );
+        assert!(
+            arrays
+                .voxel_occupancy
+                .iter()
+                .eq(entries.iter().flat_map(|e| &e.voxel_occupancy))
+        );
 
         let good = std::fs::read(&npz).unwrap();
         let at = good.windows(4).position(|w| w == 0.9f32.to_le_bytes()).unwrap();
@@ -179,6 +197,11 @@ mod tests {
         let e = read_instance_arrays(&npz).unwrap_err().to_string();
         assert!(e.contains("i.npz") && e.contains("\"bbox\" is damaged"), "{e}");
         std::fs::write(&npz, &good[..good.len() / 2]).unwrap();
-        assert!(read_instance_arrays(&npz).unwrap_err().to_string().contains("no readable archive"));
+        assert!(
+            read_instance_arrays(&npz)
+                .unwrap_err()
+                .to_string()
+                .contains("no readable archive")
+        );
     }
 }

@@ -87,7 +87,10 @@ impl InstanceWriter {
     /// # Errors
     /// [`Error::Io`].
     pub fn create(json: &Path, npz: &Path) -> Result<Self> {
-        let folder = npz.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = npz
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
         let spool = tempfile::tempfile_in(folder).map_err(|e| Error::io(npz, "write", e))?;
         Ok(Self::new(AtomicFile::create(json)?, AtomicFile::create(npz)?, npz, spool))
     }
@@ -155,7 +158,10 @@ impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
     /// Appends indices of points.
     fn put(&mut self, members: &[u32]) -> Result<()> {
         let failed = |e| Error::io(&self.name, "write", e);
-        members.iter().try_for_each(|m| self.point_index.write_all(&m.to_le_bytes())).map_err(failed)
+        members
+            .iter()
+            .try_for_each(|m| self.point_index.write_all(&m.to_le_bytes()))
+            .map_err(failed)
     }
 
     /// Appends the indices of points that are not in memory, and returns how many are in each voxel.
@@ -230,7 +236,12 @@ fn write_arrays<N: Write + Seek>(file: N, entries: &[InstanceEntry], spool: File
     let n = entries.len() as u64;
 
     // Text of a fixed width, UTF-32, padded with zeros: numpy's own form, which needs no pickle.
-    let width = entries.iter().map(|e| e.label.chars().count()).max().unwrap_or(0).max(1);
+    let width = entries
+        .iter()
+        .map(|e| e.label.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(1);
     let label = |e: &InstanceEntry| {
         let mut units: Vec<u32> = e.label.chars().map(u32::from).collect();
         units.resize(width, 0);
@@ -322,7 +333,9 @@ mod tests {
     fn write(dir: &Path) -> Vec<InstanceEntry> {
         let (json, npz) = (dir.join("instances.json"), dir.join("instances.npz"));
         let mut writer = InstanceWriter::create(&json, &npz).unwrap();
-        writer.push(&record("chair_3_office_5_1"), &mut &chair_points()[..]).unwrap();
+        writer
+            .push(&record("chair_3_office_5_1"), &mut &chair_points()[..])
+            .unwrap();
         writer.push(&record("wall_1_WC_2_1"), &mut &[WALL.min][..]).unwrap();
         let bytes = writer.finish().unwrap();
         let size = |path: &Path| std::fs::metadata(path).unwrap().len();
@@ -342,7 +355,12 @@ mod tests {
         assert_eq!(chair.bbox, [0.1, -2.0, 0.0, 1.5, -1.25, 0.9]);
         let counts = &chair.points_per_voxel;
         assert_eq!((counts[0], counts[7], counts[215], counts.iter().sum::<u32>()), (2, 1, 2, 5));
-        assert!(counts.iter().zip(&chair.voxel_occupancy).all(|(&n, &o)| o == u8::from(n > 0)));
+        assert!(
+            counts
+                .iter()
+                .zip(&chair.voxel_occupancy)
+                .all(|(&n, &o)| o == u8::from(n > 0))
+        );
     }
 
     #[test]
@@ -352,7 +370,9 @@ mod tests {
         let archive = io::Cursor::new(Vec::new());
         let spool = tempfile::tempfile().unwrap();
         let mut writer = InstanceWriter::new(Vec::new(), archive, Path::new("instances.npz"), spool);
-        writer.push(&record("chair_3_office_5_1"), &mut OnDisk(&chair_points())).unwrap();
+        writer
+            .push(&record("chair_3_office_5_1"), &mut OnDisk(&chair_points()))
+            .unwrap();
         writer.push(&record("wall_1_WC_2_1"), &mut &[WALL.min][..]).unwrap();
         let (json, npz) = writer.into_inner().unwrap();
         assert!(json == std::fs::read(dir.path().join("instances.json")).unwrap());
@@ -368,7 +388,10 @@ mod tests {
         let mut zip = zip::ZipArchive::new(file).unwrap();
         let mut array = |name: &str| {
             let mut bytes = Vec::new();
-            zip.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+            zip.by_name(&format!("{name}.npy"))
+                .unwrap()
+                .read_to_end(&mut bytes)
+                .unwrap();
             bytes
         };
         fn read<T: npyz::Deserialize>(bytes: &[u8]) -> (Vec<u64>, Vec<T>) {
@@ -407,8 +430,9 @@ mod tests {
 
     #[test]
     fn points_on_the_disk_give_the_same_bytes() {
-        let points: Vec<Vec3> =
-            (0..70_000).map(|i| vec3((i % 251) as f32, (i % 13) as f32, (i / 9000) as f32)).collect();
+        let points: Vec<Vec3> = (0..70_000)
+            .map(|i| vec3((i % 251) as f32, (i % 13) as f32, (i / 9000) as f32))
+            .collect();
         let bbox = Aabb::from_points(points.iter().copied());
         let written = |on_disk: bool| {
             let dir = tempfile::tempdir().unwrap();
@@ -421,7 +445,9 @@ mod tests {
                     false => writer.push(&record, &mut &points[..]).unwrap(),
                 }
             }
-            writer.push(&record("chair_3_office_5_1"), &mut &chair_points()[..]).unwrap();
+            writer
+                .push(&record("chair_3_office_5_1"), &mut &chair_points()[..])
+                .unwrap();
             writer.finish().unwrap();
             [json, npz].map(|path| std::fs::read(path).unwrap())
         };
@@ -450,7 +476,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let mut writer =
             InstanceWriter::create(&dir.path().join("i.json"), &dir.path().join("i.npz")).unwrap();
-        let message = writer.push(&record("wall_1_WC_2_1"), &mut Claimed(1 << 32)).unwrap_err().to_string();
+        let message = writer
+            .push(&record("wall_1_WC_2_1"), &mut Claimed(1 << 32))
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("wall_1_WC_2_1 has 4294967296 points"), "{message}");
         assert!(message.contains("i.npz") && message.ends_with("annotate it in parts"), "{message}");
     }

@@ -79,7 +79,12 @@ pub fn read_gray16(path: &Path) -> Result<Raster<u16>> {
         Opened::Large(file, size) => {
             let (width, height, bytes, _) =
                 decode(file, size, path, ColorType::Grayscale, BitDepth::Sixteen)?;
-            let values = bytes.as_chunks().0.iter().map(|&pair| u16::from_be_bytes(pair)).collect();
+            let values = bytes
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&pair| u16::from_be_bytes(pair))
+                .collect();
             Ok(Raster::from_vec(width, height, values))
         }
     }

@@ -84,7 +84,12 @@ pub fn encode_palette8(image: &Raster<u8>, palette: &[[u8; 3]], compression: Com
 /// If it has no pixel.
 pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
     let mut bytes = vec![0; 2 * image.len()];
-    bytes.as_chunks_mut().0.iter_mut().zip(image.pixels()).for_each(|(pair, v)| *pair = v.to_be_bytes());
+    bytes
+        .as_chunks_mut()
+        .0
+        .iter_mut()
+        .zip(image.pixels())
+        .for_each(|(pair, v)| *pair = v.to_be_bytes());
     let line = 1 + 2 * image.width() as usize;
     let balanced = Search::depth(line);
     let small = Search { hash_bytes: 6, ..Search::thorough(line, 2) };
@@ -122,16 +127,27 @@ fn encode(width: u32, height: u32, format: Format<'_>, bytes: &[u8], plans: &[(F
     let compress = |bytes: &[u8], (by, search): (Filter, Search)| {
         let mut out = Vec::with_capacity(bytes.len() / 4 + 1024);
         let filtered = filter(bytes, line, format.pixel, by).expect("whole lines");
-        Deflater::new(search).expect("searches are in range").zlib(&filtered, None, &mut out);
+        Deflater::new(search)
+            .expect("searches are in range")
+            .zlib(&filtered, None, &mut out);
         out
     };
     let plan = if let [plan] = plans {
         *plan
     } else {
-        let of = if bytes.len() <= FEW_LINES * line { SAMPLE.0 } else { SAMPLE.1 };
-        let bands = bytes.chunks(of * line).map(|band| &band[..band.len().min(SAMPLE.0 * line)]);
+        let of = if bytes.len() <= FEW_LINES * line {
+            SAMPLE.0
+        } else {
+            SAMPLE.1
+        };
+        let bands = bytes
+            .chunks(of * line)
+            .map(|band| &band[..band.len().min(SAMPLE.0 * line)]);
         let sample = bands.collect::<Vec<_>>().concat();
-        *plans.iter().min_by_key(|plan| compress(&sample, **plan).len()).expect("there is a plan")
+        *plans
+            .iter()
+            .min_by_key(|plan| compress(&sample, **plan).len())
+            .expect("there is a plan")
     };
     let compressed = compress(bytes, plan);
 
@@ -144,7 +160,9 @@ fn encode(width: u32, height: u32, format: Format<'_>, bytes: &[u8], plans: &[(F
     }
     let written = encoder.write_header().and_then(|mut writer| {
         // A chunk's length has 31 bits.
-        compressed.chunks(1 << 30).try_for_each(|piece| writer.write_chunk(png::chunk::IDAT, piece))?;
+        compressed
+            .chunks(1 << 30)
+            .try_for_each(|piece| writer.write_chunk(png::chunk::IDAT, piece))?;
         writer.finish()
     });
     written.expect("memory takes any bytes");

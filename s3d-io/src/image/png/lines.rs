@@ -149,7 +149,9 @@ impl<const N: usize> PngLines<'_, N> {
     pub fn for_each(self, mut each: impl FnMut(&[[u8; N]])) {
         let line = N * self.width as usize;
         if !self.is_filtered {
-            self.lines.chunks_exact(line.max(1)).for_each(|line| each(line.as_chunks().0));
+            self.lines
+                .chunks_exact(line.max(1))
+                .for_each(|line| each(line.as_chunks().0));
             return;
         }
         let mut above: Option<&[u8]> = None;
@@ -210,7 +212,9 @@ impl PngLines<'_, 2> {
             && lines.all(|(filtered, samples)| {
                 std::mem::swap(&mut line, &mut above);
                 let bytes = line.as_chunks_mut().0.iter_mut();
-                bytes.zip(samples).for_each(|(bytes, sample)| *bytes = sample.to_be_bytes());
+                bytes
+                    .zip(samples)
+                    .for_each(|(bytes, sample)| *bytes = sample.to_be_bytes());
                 is_filtered(filtered, &line, &above, 2)
             })
     }

@@ -56,7 +56,9 @@ fn lines_longer_than_a_repetition_reaches_come_back() {
         let image = Raster::from_vec(
             width,
             height,
-            (0..width * height).map(|i| [(i % 251) as u8, (i / 7) as u8, 3]).collect(),
+            (0..width * height)
+                .map(|i| [(i % 251) as u8, (i / 7) as u8, 3])
+                .collect(),
         );
         let gray = image.map(|[a, b, _]| u16::from_be_bytes([b, a]));
         for compression in Compression::ALL {
@@ -291,7 +293,11 @@ fn files_of_other_programs_are_read() {
     let mut encoder = png::Encoder::new(&mut file, w, h);
     encoder.set_color(ColorType::Rgb);
     encoder.set_filter(png::Filter::Adaptive);
-    encoder.write_header().unwrap().write_image_data(image.pixels().as_flattened()).unwrap();
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(image.pixels().as_flattened())
+        .unwrap();
     assert_eq!(decode_rgb8(&file, Path::new("a.png")).unwrap(), image);
     let at = file.windows(4).position(|name| name == b"IDAT").unwrap();
     let len = u32::from_be_bytes(file[at - 4..at].try_into().unwrap()) as usize;

@@ -73,7 +73,11 @@ impl GltfDocument {
     pub(crate) fn read_colors(&self, index: Index<Accessor>, who: &str) -> Result<Vec<[f32; 3]>> {
         match self.checked(index, who)?.1 {
             3 => self.read_vectors(index, who),
-            4 => Ok(self.read_vectors(index, who)?.into_iter().map(|[r, g, b, _]| [r, g, b]).collect()),
+            4 => Ok(self
+                .read_vectors(index, who)?
+                .into_iter()
+                .map(|[r, g, b, _]| [r, g, b])
+                .collect()),
             width => Err(self.fail(format!("{who}: accessor {index} has {width} numbers a colour"))),
         }
     }
@@ -86,12 +90,12 @@ impl GltfDocument {
         }
         let zeros = || vec![0; accessor.count()];
         match accessor.data_type() {
-            DataType::U8 if width == 1 => {
-                Ok(self.iter(&accessor).map_or_else(zeros, |all| all.map(u8::into).collect()))
-            }
-            DataType::U16 if width == 1 => {
-                Ok(self.iter(&accessor).map_or_else(zeros, |all| all.map(u16::into).collect()))
-            }
+            DataType::U8 if width == 1 => Ok(self
+                .iter(&accessor)
+                .map_or_else(zeros, |all| all.map(u8::into).collect())),
+            DataType::U16 if width == 1 => Ok(self
+                .iter(&accessor)
+                .map_or_else(zeros, |all| all.map(u16::into).collect())),
             DataType::U32 if width == 1 => Ok(self.iter(&accessor).map_or_else(zeros, Iterator::collect)),
             _ => Err(self.fail(format!("{who}: accessor {index} does not hold single unsigned integers"))),
         }
@@ -129,8 +133,15 @@ impl GltfDocument {
             let (bytes, stride) =
                 self.range(at.buffer_view, at.byte_offset.0, changes, size_of_place, &name)?;
             let mut least = 0;
-            for place in bytes.chunks(stride).take(usize::try_from(changes).unwrap_or(usize::MAX)) {
-                let place = place.iter().take(size_of_place).rev().fold(0u64, |n, b| n << 8 | u64::from(*b));
+            for place in bytes
+                .chunks(stride)
+                .take(usize::try_from(changes).unwrap_or(usize::MAX))
+            {
+                let place = place
+                    .iter()
+                    .take(size_of_place)
+                    .rev()
+                    .fold(0u64, |n, b| n << 8 | u64::from(*b));
                 if place >= count {
                     return Err(self.fail(format!("{name}: sparse index {place} of {count} elements")));
                 }
@@ -157,12 +168,17 @@ impl GltfDocument {
         name: &str,
     ) -> Result<(&[u8], usize)> {
         let bytes = self.view(view, name)?;
-        let stride = self.get(view, name, "buffer view")?.byte_stride.map_or(0, |stride| stride.0);
+        let stride = self
+            .get(view, name, "buffer view")?
+            .byte_stride
+            .map_or(0, |stride| stride.0);
         let stride = if stride == 0 { size } else { stride };
         let Some(before_last) = count.checked_sub(1) else { return Ok((&[], stride)) };
         let inside = || {
-            let end =
-                before_last.checked_mul(stride as u64)?.checked_add(offset)?.checked_add(size as u64)?;
+            let end = before_last
+                .checked_mul(stride as u64)?
+                .checked_add(offset)?
+                .checked_add(size as u64)?;
             let bytes = bytes.get(usize::try_from(offset).ok()?..)?;
             (end <= offset.checked_add(bytes.len() as u64)? && stride >= size).then_some(bytes)
         };
@@ -204,7 +220,10 @@ mod tests {
     }
 
     fn vectors(view: &str, accessor: &str) -> std::result::Result<Vec<[f32; 2]>, String> {
-        document(view, accessor).1.read_vectors(Index::new(0), "who").map_err(|e| e.to_string())
+        document(view, accessor)
+            .1
+            .read_vectors(Index::new(0), "who")
+            .map_err(|e| e.to_string())
     }
 
     #[test]
@@ -297,10 +316,20 @@ mod tests {
         assert!(vectors("", a).unwrap_err().contains("unknown type"));
         let a = r#"{"bufferView": 0, "componentType": 5126, "type": "SCALAR", "count": 1}"#;
         let (_dir, document) = document("", a);
-        assert!(document.read_indices(Index::new(0), "who").unwrap_err().to_string().contains("unsigned"));
+        assert!(
+            document
+                .read_indices(Index::new(0), "who")
+                .unwrap_err()
+                .to_string()
+                .contains("unsigned")
+        );
         let a = r#"{"bufferView": 0, "componentType": 5121, "type": "VEC2", "count": 0}"#;
         assert!(vectors("", a).unwrap().is_empty());
         let a = r#"{"bufferView": 7, "componentType": 5121, "type": "VEC2", "count": 1}"#;
-        assert!(vectors("", a).unwrap_err().contains("buffer view 7, which is not there"));
+        assert!(
+            vectors("", a)
+                .unwrap_err()
+                .contains("buffer view 7, which is not there")
+        );
     }
 }

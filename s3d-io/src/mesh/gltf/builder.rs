@@ -78,7 +78,10 @@ impl<'a> Builder<'a> {
                     instances.len()
                 )));
             }
-            colored |= mesh.primitives.iter().any(|p| color_accessor(p).is_some() && !is_textured(p, looks));
+            colored |= mesh
+                .primitives
+                .iter()
+                .any(|p| color_accessor(p).is_some() && !is_textured(p, looks));
         }
         let (parts, uv_starts, notes) = Default::default();
         Ok(Self { document, looks, up, offset, colored, parts, uv_starts, notes })
@@ -98,7 +101,10 @@ impl<'a> Builder<'a> {
     /// Adds the triangles of an instance.
     pub(crate) fn add(&mut self, instance: &Instance) -> Result<()> {
         let mesh = self.document.get(instance.mesh, "a node", "mesh")?;
-        let name = mesh.name.as_ref().map_or_else(String::new, |n| format!(" {}", quote(n.as_bytes())));
+        let name = mesh
+            .name
+            .as_ref()
+            .map_or_else(String::new, |n| format!(" {}", quote(n.as_bytes())));
         let mut shared = Shared::default();
         self.notes.skinned += usize::from(instance.skinned);
         for (p, primitive) in mesh.primitives.iter().enumerate() {
@@ -153,7 +159,9 @@ impl<'a> Builder<'a> {
         let is_finite = |v: u32| moved.get(v as usize).is_some_and(|p| p.is_finite());
         if let Some(&bad) = corners.iter().find(|&&v| !is_finite(v)) {
             let position = vertices.get(bad as usize).map_or(Vec3::NAN, |v| Vec3::from_array(*v));
-            return Err(self.document.fail(format!("{who}: vertex {bad} is not finite: {position}")));
+            return Err(self
+                .document
+                .fail(format!("{who}: vertex {bad} is not finite: {position}")));
         }
         let uv_start = self.uv_start(p, vertices.len(), who)?;
         let normal_start = self.normal_start(instance, p, vertices.len(), who, shared)?;
@@ -227,12 +235,17 @@ impl<'a> Builder<'a> {
                 }
                 // Without a material the vertices' colours stand alone.
                 let base = if material.is_some() { base } else { [1.0; 3] };
-                colors.into_iter().map(|c| [c[0] * base[0], c[1] * base[1], c[2] * base[2]]).collect()
+                colors
+                    .into_iter()
+                    .map(|c| [c[0] * base[0], c[1] * base[1], c[2] * base[2]])
+                    .collect()
             }
             None => vec![base; vertices.len()],
         };
         if self.colored {
-            self.parts.colors.extend(multiplied.into_iter().map(|c: [f32; 3]| c.map(srgb_from_linear)));
+            self.parts
+                .colors
+                .extend(multiplied.into_iter().map(|c: [f32; 3]| c.map(srgb_from_linear)));
         }
         shared.vertices.insert(key, start);
         Ok(start)
@@ -244,8 +257,12 @@ impl<'a> Builder<'a> {
         let Some(material) = p.material.map(|m| m.value()).filter(|_| is_textured(p, self.looks)) else {
             return Ok(None);
         };
-        let mapping =
-            self.looks.mappings.get(material).copied().ok_or_else(|| no_material(self.document, who))?;
+        let mapping = self
+            .looks
+            .mappings
+            .get(material)
+            .copied()
+            .ok_or_else(|| no_material(self.document, who))?;
         let Some(&accessor) = p.attributes.get(&Checked::Valid(Semantic::TexCoords(mapping.set))) else {
             self.notes.no_uvs += 1;
             return Ok(None);
@@ -257,7 +274,9 @@ impl<'a> Builder<'a> {
         }
         let uvs: Vec<[f32; 2]> = self.document.read_vectors(accessor, &format!("{who}, {what}"))?;
         let start = self.next_start(self.parts.uvs.len(), uvs.len())?;
-        self.parts.uvs.extend(uvs.into_iter().map(|uv| mapping.apply(Vec2::from_array(uv))));
+        self.parts
+            .uvs
+            .extend(uvs.into_iter().map(|uv| mapping.apply(Vec2::from_array(uv))));
         self.uv_starts.insert((accessor.value(), material), start);
         Ok(Some(start))
     }
@@ -297,13 +316,17 @@ impl<'a> Builder<'a> {
         if n == vertices as u64 {
             return Ok(());
         }
-        Err(self.document.fail(format!("{who}: {n} elements of {what} for {vertices} vertices")))
+        Err(self
+            .document
+            .fail(format!("{who}: {n} elements of {what} for {vertices} vertices")))
     }
 
     fn next_start(&self, length: usize, more: usize) -> Result<u32> {
         match u32::try_from(length + more) {
             Ok(end) if end < NO_INDEX => Ok(length as u32),
-            _ => Err(self.document.fail("has more vertices than 32 bits count; cut the scan into parts")),
+            _ => Err(self
+                .document
+                .fail("has more vertices than 32 bits count; cut the scan into parts")),
         }
     }
 
@@ -348,7 +371,9 @@ fn color_accessor(p: &Primitive) -> Option<Index<Accessor>> {
 }
 
 fn is_textured(p: &Primitive, looks: &GltfLooks) -> bool {
-    p.material.and_then(|m| looks.materials.get(m.value())).is_some_and(|m| m.texture.is_some())
+    p.material
+        .and_then(|m| looks.materials.get(m.value()))
+        .is_some_and(|m| m.texture.is_some())
 }
 
 /// Every material that a primitive names was looked up before: this is for the next who calls the builder.

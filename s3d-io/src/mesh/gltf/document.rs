@@ -62,7 +62,11 @@ fn exact_nodes(root: &json::Root, text: &[u8]) -> Vec<ExactNode> {
         place.is_some_and(|place| place.iter().any(|v| v.abs() > 1000.0))
     };
     let read = || serde_json::from_slice(text).map_or_else(|_| Vec::new(), |all: Nodes| all.nodes);
-    if root.nodes.iter().any(is_far) { read() } else { Vec::new() }
+    if root.nodes.iter().any(is_far) {
+        read()
+    } else {
+        Vec::new()
+    }
 }
 
 impl GltfDocument {
@@ -74,8 +78,11 @@ impl GltfDocument {
     /// Reads a `.gltf` or `.glb` file, told apart by its content, and its buffers, which lie beside `path`.
     pub(crate) fn read(bytes: Vec<u8>, path: &Path) -> Result<Self> {
         let mut bytes = into_utf8(bytes);
-        let (text, blob) =
-            if bytes.starts_with(b"glTF") { split_glb(path, &bytes)? } else { (&bytes[..], None) };
+        let (text, blob) = if bytes.starts_with(b"glTF") {
+            split_glb(path, &bytes)?
+        } else {
+            (&bytes[..], None)
+        };
         let is_text = blob.is_none() && !bytes.starts_with(b"glTF");
         let json_error = |e: serde_json::Error| match is_text {
             true if e.line() > 0 => Error::line(path, e.line() as u64, format!("is no valid glTF 2.0: {e}")),
@@ -148,14 +155,16 @@ impl GltfDocument {
         let buffer = self.buffer(view.buffer.value()).unwrap_or_default();
         let start = view.byte_offset.map_or(0, |o| o.0);
         let range = usize::try_from(start).ok().zip(start.checked_add(view.byte_length.0));
-        range.and_then(|(start, end)| buffer.get(start..usize::try_from(end).ok()?)).ok_or_else(|| {
-            self.fail(format!(
-                "buffer view {index} takes {} bytes from {start}, but buffer {} has {}",
-                view.byte_length.0,
-                view.buffer,
-                buffer.len()
-            ))
-        })
+        range
+            .and_then(|(start, end)| buffer.get(start..usize::try_from(end).ok()?))
+            .ok_or_else(|| {
+                self.fail(format!(
+                    "buffer view {index} takes {} bytes from {start}, but buffer {} has {}",
+                    view.byte_length.0,
+                    view.buffer,
+                    buffer.len()
+                ))
+            })
     }
 
     /// The encoded bytes of an image, and a name for it.
@@ -173,9 +182,10 @@ impl GltfDocument {
             (None, None) => format!("image_{image}"),
         };
         let bytes = match (json.buffer_view, &json.uri) {
-            (Some(view), _) => {
-                self.view(view, &format!("image {image}")).map(<[u8]>::to_vec).map_err(|e| e.to_string())
-            }
+            (Some(view), _) => self
+                .view(view, &format!("image {image}"))
+                .map(<[u8]>::to_vec)
+                .map_err(|e| e.to_string()),
             (None, Some(uri)) => self.resource(uri),
             (None, None) => Err("has neither a URI nor a buffer view".into()),
         };
@@ -194,8 +204,11 @@ impl GltfDocument {
                 (None, Some(blob)) => blob,
                 (None, _) => {
                     // What an extension compresses may have a buffer that is not there.
-                    let meshopt =
-                        self.root().extensions_used.iter().find(|e| e.ends_with("_meshopt_compression"));
+                    let meshopt = self
+                        .root()
+                        .extensions_used
+                        .iter()
+                        .find(|e| e.ends_with("_meshopt_compression"));
                     let why = meshopt.map_or_else(String::new, |e| {
                         format!(": its data are in the extension {e}, which is not read; {}", way_out(e))
                     });
@@ -229,8 +242,13 @@ impl GltfDocument {
     pub(crate) fn companions(&self) -> Vec<PathBuf> {
         let buffers = self.root().buffers.iter().filter_map(|b| b.uri.as_deref());
         let images = self.root().images.iter().filter_map(|i| i.uri.as_deref());
-        let files = buffers.chain(images).filter(|uri| !uri.starts_with("data:") && !uri.contains("://"));
-        files.map(|uri| self.beside(uri)).filter(|path| path.is_file()).collect()
+        let files = buffers
+            .chain(images)
+            .filter(|uri| !uri.starts_with("data:") && !uri.contains("://"));
+        files
+            .map(|uri| self.beside(uri))
+            .filter(|path| path.is_file())
+            .collect()
     }
 
     /// What a URI stands for: data in itself, or a file beside this one.
@@ -261,7 +279,9 @@ impl GltfDocument {
 /// Whether a buffer only stands for what an extension has compressed.
 fn is_fallback(buffer: &json::Buffer) -> bool {
     let extensions = buffer.extensions.iter().flat_map(|e| &e.others);
-    extensions.into_iter().any(|(_, extension)| extension.get("fallback") == Some(&true.into()))
+    extensions
+        .into_iter()
+        .any(|(_, extension)| extension.get("fallback") == Some(&true.into()))
 }
 
 /// The JSON, or what is needed of it if the crate's types do not fit all of it.
@@ -273,7 +293,11 @@ fn root_of(text: &[u8]) -> std::result::Result<json::Root, serde_json::Error> {
         json::Root::from_slice(needed(document).to_string().as_bytes()).map_err(|second| {
             let (known, fault) = (without_place(&first), without_place(&second));
             // The first error has the place of the fault in the file, the second one in our text.
-            if known == fault { first } else { serde::de::Error::custom(fault) }
+            if known == fault {
+                first
+            } else {
+                serde::de::Error::custom(fault)
+            }
         })
     })
 }
@@ -375,7 +399,11 @@ fn percent_decode(text: &str) -> Cow<'_, str> {
     while let Some((&byte, after)) = rest.split_first() {
         let escaped = Some(after).filter(|_| byte == b'%').and_then(escape);
         out.push(escaped.unwrap_or(byte));
-        rest = if escaped.is_some() { after.get(2..).unwrap_or_default() } else { after };
+        rest = if escaped.is_some() {
+            after.get(2..).unwrap_or_default()
+        } else {
+            after
+        };
     }
     String::from_utf8(out).map_or(Cow::Borrowed(text), Cow::Owned)
 }
@@ -461,7 +489,12 @@ mod tests {
             let message = open("a.glb", &whole[..length]).unwrap_err().to_string();
             assert!(message.contains("cut off") || message.contains("JSON chunk"), "{length}: {message}");
         }
-        assert!(open("a.glb", &glb(1, "{}", &[])).unwrap_err().to_string().contains("glTF 1.0"));
+        assert!(
+            open("a.glb", &glb(1, "{}", &[]))
+                .unwrap_err()
+                .to_string()
+                .contains("glTF 1.0")
+        );
         let buffer = |b: &str| {
             error(&format!(r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 9, {b}}}]}}"#))
         };

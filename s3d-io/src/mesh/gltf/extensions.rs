@@ -96,7 +96,10 @@ pub(crate) fn check_required(path: &Path, required: &[String]) -> Result<()> {
 
 /// What to do about an extension that is not read.
 pub(crate) fn way_out(extension: &str) -> &'static str {
-    WAYS_OUT.iter().find(|(name, _)| *name == extension).map_or("export without it", |(_, way)| *way)
+    WAYS_OUT
+        .iter()
+        .find(|(name, _)| *name == extension)
+        .map_or("export without it", |(_, way)| *way)
 }
 
 impl GltfDocument {

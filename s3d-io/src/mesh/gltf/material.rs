@@ -126,9 +126,15 @@ impl GltfLooks {
             }
             let index = *known.entry(*key).or_insert_with(|| {
                 let factor = key.factor_bits.map(f32::from_bits);
-                let wrap = key.wrap.map(|w| WRAPS.get(usize::from(w)).copied().unwrap_or(Wrap::Repeat));
+                let wrap = key
+                    .wrap
+                    .map(|w| WRAPS.get(usize::from(w)).copied().unwrap_or(Wrap::Repeat));
                 let plain = factor == [1.0; 3];
-                let image = if plain { loaded.image.clone() } else { multiplied(&loaded.image, factor) };
+                let image = if plain {
+                    loaded.image.clone()
+                } else {
+                    multiplied(&loaded.image, factor)
+                };
                 looks.textures.push(Texture { name: name.clone(), image, wrap });
                 looks.files.push(plain.then(|| loaded.file.clone()));
                 (looks.textures.len() - 1) as u32
@@ -143,7 +149,10 @@ impl GltfLooks {
 /// readers that know the extension prefer.
 fn base_color(material: &json::Material) -> ([f32; 3], Option<&texture::Info>) {
     let metallic = &material.pbr_metallic_roughness;
-    let variant = material.extensions.as_ref().and_then(|e| e.pbr_specular_glossiness.as_ref());
+    let variant = material
+        .extensions
+        .as_ref()
+        .and_then(|e| e.pbr_specular_glossiness.as_ref());
     let (factor, info) = match variant {
         Some(v) => (v.diffuse_factor.0, v.diffuse_texture.as_ref()),
         None => (metallic.base_color_factor.0, metallic.base_color_texture.as_ref()),
@@ -166,7 +175,10 @@ fn texture_key(
     index: Index<json::Texture>,
     factor: [f32; 3],
 ) -> Result<TextureKey, String> {
-    let texture = document.root().get(index).ok_or_else(|| format!("texture {index} is not there"))?;
+    let texture = document
+        .root()
+        .get(index)
+        .ok_or_else(|| format!("texture {index} is not there"))?;
     if texture.source.value() == u32::MAX as usize {
         let only = texture.extensions.iter().flat_map(|e| e.others.keys()).next();
         let only = only.map_or_else(String::new, |name| {
@@ -175,7 +187,12 @@ fn texture_key(
         return Err(format!("texture {index} has no PNG or JPEG image{only}"));
     }
     let sampler = match texture.sampler {
-        Some(s) => Some(document.root().get(s).ok_or_else(|| format!("sampler {s} is not there"))?),
+        Some(s) => Some(
+            document
+                .root()
+                .get(s)
+                .ok_or_else(|| format!("sampler {s} is not there"))?,
+        ),
         None => None,
     };
     let wrap = sampler.map_or([0; 2], |s| [s.wrap_s, s.wrap_t].map(wrap_number));
@@ -205,14 +222,21 @@ fn multiplied(image: &Raster<[u8; 3]>, factor: [f32; 3]) -> Raster<[u8; 3]> {
 /// A byte of sRGB from light, 0 to 1; what is no number is black. Source: IEC 61966-2-1.
 pub(crate) fn srgb_from_linear(light: f32) -> u8 {
     let light = f64::from(light.clamp(0.0, 1.0));
-    let encoded =
-        if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * libm::pow(light, 1.0 / 2.4) - 0.055 };
+    let encoded = if light <= 0.003_130_8 {
+        12.92 * light
+    } else {
+        1.055 * libm::pow(light, 1.0 / 2.4) - 0.055
+    };
     (encoded * 255.0).round() as u8
 }
 
 fn linear_from_srgb(byte: u8) -> f32 {
     let encoded = f64::from(byte) / 255.0;
-    (if encoded <= 0.040_45 { encoded / 12.92 } else { libm::pow((encoded + 0.055) / 1.055, 2.4) }) as f32
+    (if encoded <= 0.040_45 {
+        encoded / 12.92
+    } else {
+        libm::pow((encoded + 0.055) / 1.055, 2.4)
+    }) as f32
 }
 
 /// The colour of a material that the file does not describe: [`DEFAULT_COLOR`], linear.

@@ -27,7 +27,12 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
     let instances = instances(&document, Precision::OfFile, &mut warnings)?;
     let mut used = vec![false; document.root().materials.len()];
     for instance in &instances {
-        for (p, primitive) in document.get(instance.mesh, "a node", "mesh")?.primitives.iter().enumerate() {
+        for (p, primitive) in document
+            .get(instance.mesh, "a node", "mesh")?
+            .primitives
+            .iter()
+            .enumerate()
+        {
             if let Some(material) = primitive.material {
                 document.get(material, &format!("mesh {}, primitive {p}", instance.mesh), "material")?;
                 used.get_mut(material.value()).into_iter().for_each(|used| *used = true);
@@ -54,7 +59,11 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
     let parts = builder.finish(&mut warnings);
     if parts.faces.is_empty() {
         let what = if instances.is_empty() { "mesh" } else { "triangle" };
-        let why = if warnings.is_empty() { String::new() } else { format!(": {}", warnings.join("; ")) };
+        let why = if warnings.is_empty() {
+            String::new()
+        } else {
+            format!(": {}", warnings.join("; "))
+        };
         return Err(document.fail(format!("has no {what} in its scene{why}")));
     }
     let parts = MeshParts { materials: looks.materials, textures: looks.textures, ..parts };
@@ -92,8 +101,13 @@ mod tests {
             let (offset, length) = (self.data.len(), bytes.len());
             self.data.extend(bytes);
             let view = self.views.len();
-            self.views.push(format!(r#"{{"buffer": 0, "byteOffset": {offset}, "byteLength": {length}}}"#));
-            let normalized = if kind == "VEC3" && component == 5121 { r#", "normalized": true"# } else { "" };
+            self.views
+                .push(format!(r#"{{"buffer": 0, "byteOffset": {offset}, "byteLength": {length}}}"#));
+            let normalized = if kind == "VEC3" && component == 5121 {
+                r#", "normalized": true"#
+            } else {
+                ""
+            };
             self.accessors.push(format!(
                 r#"{{"bufferView": {view}, "componentType": {component}, "type": "{kind}",
                 "count": {count}{normalized}}}"#
@@ -379,7 +393,8 @@ mod tests {
     #[test]
     fn vertices_that_only_an_extension_has_are_refused_by_its_name() {
         let mut f = Fixture::default();
-        f.accessors.push(r#"{"componentType": 5126, "type": "VEC3", "count": 3}"#.into());
+        f.accessors
+            .push(r#"{"componentType": 5126, "type": "VEC3", "count": 3}"#.into());
         let message = f.error(
             r#""meshes": [{"primitives": [{"attributes": {"POSITION": 0},
             "extensions": {"KHR_draco_mesh_compression": {}}}]}],

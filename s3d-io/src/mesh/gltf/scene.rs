@@ -47,11 +47,17 @@ pub(crate) fn instances(
     // A tree holds each node once; one that comes twice would make a circle, or instances without end.
     let mut visited = vec![false; root.nodes.len()];
     let mut checked = vec![false; root.meshes.len()];
-    let mut stack: Vec<(Index<Node>, DMat4)> =
-        roots(document)?.into_iter().rev().map(|n| (n, DMat4::IDENTITY)).collect();
+    let mut stack: Vec<(Index<Node>, DMat4)> = roots(document)?
+        .into_iter()
+        .rev()
+        .map(|n| (n, DMat4::IDENTITY))
+        .collect();
     while let Some((index, world_from_parent)) = stack.pop() {
         let node = document.get(index, "the scene", "node")?;
-        if visited.get_mut(index.value()).is_none_or(|visited| std::mem::replace(visited, true)) {
+        if visited
+            .get_mut(index.value())
+            .is_none_or(|visited| std::mem::replace(visited, true))
+        {
             return Err(document.fail(format!("node {index} is in the scene twice; nodes must form a tree")));
         }
         if coarse.contains(&index.value()) {
@@ -64,7 +70,9 @@ pub(crate) fn instances(
         }
         let others = node.extensions.as_ref().map(|e| &e.others);
         document.check_extensions(others, &format!("node {index}"), &mut unknown)?;
-        let place = document.exact_place(index.value()).filter(|_| precision == Precision::Exact);
+        let place = document
+            .exact_place(index.value())
+            .filter(|_| precision == Precision::Exact);
         let world_from_node = world_from_parent
             * parent_from_node(node, place).ok_or_else(|| {
                 document.fail(format!("node {index} has a transform that is not finite or turns by no angle"))
@@ -83,7 +91,13 @@ pub(crate) fn instances(
             }
             placed.push((Instance { mesh, world_from_node, skinned: node.skin.is_some() }, many));
         }
-        stack.extend(node.children.iter().flatten().rev().map(|&child| (child, world_from_node)));
+        stack.extend(
+            node.children
+                .iter()
+                .flatten()
+                .rev()
+                .map(|&child| (child, world_from_node)),
+        );
     }
     let mut instances = Vec::new();
     for (first, many) in placed {
@@ -126,7 +140,11 @@ fn roots(document: &GltfDocument) -> Result<Vec<Index<Node>>> {
             *flag = true;
         }
     }
-    Ok((0..).zip(is_child).filter(|(_, is_child)| !is_child).map(|(n, _)| Index::new(n)).collect())
+    Ok((0..)
+        .zip(is_child)
+        .filter(|(_, is_child)| !is_child)
+        .map(|(n, _)| Index::new(n))
+        .collect())
 }
 
 /// Checks the extensions of a mesh, once.
@@ -137,7 +155,10 @@ fn check_mesh(
     unknown: &mut Vec<String>,
 ) -> Result<()> {
     let mesh = document.get(index, "a node", "mesh")?;
-    if checked.get_mut(index.value()).is_none_or(|checked| std::mem::replace(checked, true)) {
+    if checked
+        .get_mut(index.value())
+        .is_none_or(|checked| std::mem::replace(checked, true))
+    {
         return Ok(());
     }
     let who = format!("mesh {index}");
@@ -155,7 +176,9 @@ fn extension<'a>(node: &'a Node, name: &str) -> Option<&'a Value> {
 
 /// A number of the JSON that is an index, however it is written.
 fn index_of(value: &Value) -> Option<u32> {
-    let number = value.as_u64().or_else(|| value.as_f64().filter(|v| v.fract() == 0.0).map(|v| v as u64))?;
+    let number = value
+        .as_u64()
+        .or_else(|| value.as_f64().filter(|v| v.fract() == 0.0).map(|v| v as u64))?;
     u32::try_from(number).ok()
 }
 
@@ -163,7 +186,11 @@ fn index_of(value: &Value) -> Option<u32> {
 fn coarser_levels(nodes: &[Node]) -> HashSet<usize> {
     let ids = nodes.iter().enumerate().flat_map(|(n, node)| {
         let ids = extension(node, "MSFT_lod").and_then(|lod| lod.get("ids")?.as_array());
-        ids.into_iter().flatten().filter_map(index_of).map(|id| id as usize).filter(move |id| *id != n)
+        ids.into_iter()
+            .flatten()
+            .filter_map(index_of)
+            .map(|id| id as usize)
+            .filter(move |id| *id != n)
     });
     ids.collect()
 }

@@ -115,7 +115,12 @@ pub(crate) fn needed(document: Value) -> Value {
         _ => Map::new(),
     };
     root.insert("asset".to_owned(), json!({"version": "2.0"}));
-    for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+    for scene in root
+        .get_mut("scenes")
+        .and_then(Value::as_array_mut)
+        .into_iter()
+        .flatten()
+    {
         if let Value::Object(scene) = scene {
             scene.entry("nodes").or_insert_with(|| json!([]));
         }
@@ -151,7 +156,9 @@ fn whole(value: Value) -> Value {
     match value {
         Value::Number(number) => {
             // All whole numbers up to 2^53 are exact. The sign of -0.0 is kept.
-            let float = number.as_f64().filter(|v| number.is_f64() && v.fract() == 0.0 && v.abs() < 9e15);
+            let float = number
+                .as_f64()
+                .filter(|v| number.is_f64() && v.fract() == 0.0 && v.abs() < 9e15);
             match float {
                 Some(v) if v > 0.0 || v == 0.0 && v.is_sign_positive() => Number::from(v as u64).into(),
                 Some(v) if v < 0.0 => Number::from(v as i64).into(),

@@ -26,7 +26,9 @@ pub(crate) fn fault(path: &Path, bytes: &[u8], said: &str) -> Error {
 }
 
 fn count(line: &Line<'_>, counts: &mut [u64; 3]) {
-    let column = [&b"v"[..], b"vt", b"vn"].iter().position(|keyword| *keyword == line.keyword().0);
+    let column = [&b"v"[..], b"vt", b"vn"]
+        .iter()
+        .position(|keyword| *keyword == line.keyword().0);
     if let Some(count) = column.and_then(|column| counts.get_mut(column)) {
         *count += 1;
     }
@@ -56,7 +58,10 @@ fn check(line: &Line<'_>, so_far: [u64; 3], counts: [u64; 3]) -> Result<(), Why>
 
 /// The error for the vertex `vertex`, from 0, whose position is not finite.
 pub(crate) fn vertex_error(path: &Path, bytes: &[u8], vertex: u32, position: Vec3) -> Error {
-    match logical_lines(bytes).filter(|line| line.keyword().0 == b"v").nth(vertex as usize) {
+    match logical_lines(bytes)
+        .filter(|line| line.keyword().0 == b"v")
+        .nth(vertex as usize)
+    {
         Some(line) => {
             let message = format!("a face uses a vertex that is not finite: {}", quote(&line.text));
             Error::line(path, line.number, message)
@@ -92,7 +97,11 @@ mod tests {
         let text = b"v 0 0 0\nvn 0 0 1\nv nan 0 0\n";
         let message = vertex_error(Path::new("a.obj"), text, 1, Vec3::NAN).to_string();
         assert!(message.starts_with("a.obj, line 3") && message.contains("`v nan 0 0`"), "{message}");
-        assert!(vertex_error(Path::new("a.obj"), text, 7, Vec3::NAN).to_string().contains("vertex 8"));
+        assert!(
+            vertex_error(Path::new("a.obj"), text, 7, Vec3::NAN)
+                .to_string()
+                .contains("vertex 8")
+        );
     }
 
     #[test]

@@ -23,7 +23,11 @@ impl Line<'_> {
     /// The word with which it starts, and what follows.
     #[inline]
     pub(crate) fn keyword(&self) -> (&[u8], &[u8]) {
-        let end = self.text.iter().position(u8::is_ascii_whitespace).unwrap_or(self.text.len());
+        let end = self
+            .text
+            .iter()
+            .position(u8::is_ascii_whitespace)
+            .unwrap_or(self.text.len());
         self.text.split_at_checked(end).unwrap_or_default()
     }
 }
@@ -71,7 +75,10 @@ pub(crate) fn read_text(path: &Path) -> Result<Vec<u8>> {
 /// Lines that end in CR alone end in LF then.
 pub(crate) fn end_lines_in_lf(bytes: &mut [u8]) {
     if memchr(b'\n', bytes).is_none() {
-        bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+        bytes
+            .iter_mut()
+            .filter(|byte| **byte == b'\r')
+            .for_each(|byte| *byte = b'\n');
     }
 }
 
@@ -86,7 +93,10 @@ pub(crate) fn after<'a>(line: &'a [u8], word: &[u8]) -> &'a [u8] {
 pub(crate) fn next_word<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
     let line = rest.get(start..)?;
-    let end = line.iter().position(|&b| b.is_ascii_whitespace() || b == b'#').unwrap_or(line.len());
+    let end = line
+        .iter()
+        .position(|&b| b.is_ascii_whitespace() || b == b'#')
+        .unwrap_or(line.len());
     let (word, after) = line.split_at_checked(end)?;
     *rest = if after.first() == Some(&b'#') { &[] } else { after };
     (!word.is_empty()).then_some(word)
@@ -107,7 +117,11 @@ pub(crate) fn text(bytes: &[u8]) -> String {
 
 /// The finite number that a word spells.
 pub(crate) fn parse_f32(word: &[u8]) -> Option<f32> {
-    std::str::from_utf8(word).ok()?.parse().ok().filter(|v: &f32| v.is_finite())
+    std::str::from_utf8(word)
+        .ok()?
+        .parse()
+        .ok()
+        .filter(|v: &f32| v.is_finite())
 }
 
 #[cfg(test)]
@@ -117,7 +131,9 @@ mod tests {
     fn all(bytes: &[u8]) -> Vec<(u64, String)> {
         let mut bytes = bytes.to_vec();
         end_lines_in_lf(&mut bytes);
-        logical_lines(&bytes).map(|line| (line.number, text(&line.text))).collect()
+        logical_lines(&bytes)
+            .map(|line| (line.number, text(&line.text)))
+            .collect()
     }
 
     #[test]

@@ -47,7 +47,9 @@ impl ObjLooks {
         for name in &names.materials {
             let found = library.get(name.as_str());
             let color = found.map_or(DEFAULT_COLOR, |f| f.material.color);
-            looks.materials.push(Material { name: name.clone(), color, texture: None });
+            looks
+                .materials
+                .push(Material { name: name.clone(), color, texture: None });
             let mut map = None;
             if let Some((f, m)) = found.and_then(|f| Some((f, f.material.map.as_ref()?))) {
                 match find_image(&m.file, f.library.parent().unwrap_or(folder), folder) {
@@ -99,8 +101,10 @@ impl ObjLooks {
     ) -> Result<()> {
         for ((at, loaded), image) in read_textures(wanted)?.into_iter().enumerate().zip(wanted) {
             let users = maps.iter().enumerate().filter_map(|(m, map)| Some((m, (*map)?)));
-            let users: Vec<(usize, [Wrap; 2])> =
-                users.filter(|(_, (i, _))| *i == at).map(|(m, (_, wrap))| (m, wrap)).collect();
+            let users: Vec<(usize, [Wrap; 2])> = users
+                .filter(|(_, (i, _))| *i == at)
+                .map(|(m, (_, wrap))| (m, wrap))
+                .collect();
             let mut texture = match loaded {
                 Ok(texture) => texture,
                 Err(why) => {
@@ -132,7 +136,8 @@ impl ObjLooks {
                     (texture.image.clone(), texture.file.bytes.clone())
                 };
                 self.textures.push(Texture { name: name.clone(), image: pixels, wrap });
-                self.files.push(Some(TextureFile { extension: texture.file.extension, bytes: file }));
+                self.files
+                    .push(Some(TextureFile { extension: texture.file.extension, bytes: file }));
                 wraps.remove(0);
             }
         }
@@ -218,11 +223,17 @@ mod tests {
         ];
         let file = read_with(&obj, &files);
         let mesh = &file.mesh;
-        let textures: Vec<_> =
-            mesh.textures().iter().map(|t| (t.name.as_str(), t.wrap[0], t.image.len())).collect();
+        let textures: Vec<_> = mesh
+            .textures()
+            .iter()
+            .map(|t| (t.name.as_str(), t.wrap[0], t.image.len()))
+            .collect();
         assert_eq!(textures, [("two words.png", Wrap::Clamp, 2), ("two words.png", Wrap::Repeat, 2)]);
-        let read: Vec<&str> =
-            file.companions.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+        let read: Vec<&str> = file
+            .companions
+            .iter()
+            .map(|path| path.file_name().unwrap().to_str().unwrap())
+            .collect();
         assert_eq!(read, ["lib.mtl", "other.mtl", "two words.png", "bad.png"]);
         let kept = TextureFile { extension: "png", bytes: png.clone() };
         assert_eq!(file.texture_files, [Some(kept.clone()), Some(kept)]);

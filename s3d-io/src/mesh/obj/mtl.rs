@@ -86,7 +86,9 @@ pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
 /// Two words, for u and v.
 fn parse_wrap(rest: &[u8]) -> Option<[Wrap; 2]> {
     let wrap = |word: &[u8]| {
-        [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp].into_iter().find(|w| wrap_name(*w).as_bytes() == word)
+        [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp]
+            .into_iter()
+            .find(|w| wrap_name(*w).as_bytes() == word)
     };
     let mut words = words(rest);
     Some([wrap(words.next()?)?, wrap(words.next()?)?])
@@ -138,7 +140,10 @@ fn parse_map(mut rest: &[u8], line: u64) -> (Option<MtlMap>, Option<&[u8]>) {
         }
         rest = behind;
     }
-    let name = rest.strip_prefix(b"\"").and_then(|r| r.strip_suffix(b"\"")).unwrap_or(rest);
+    let name = rest
+        .strip_prefix(b"\"")
+        .and_then(|r| r.strip_suffix(b"\""))
+        .unwrap_or(rest);
     ((!name.is_empty()).then(|| MtlMap { file: text(name), wrap: [wrap; 2], line }), ignored)
 }
 

@@ -8,13 +8,17 @@ pub(crate) fn clean_file_name(name: &str) -> String {
     while let Some(at) = name.to_ascii_lowercase().find("rgb") {
         name.replace_range(at..at + 3, "color");
     }
-    Some(portable_file_name(&name)).filter(|name| !name.is_empty()).unwrap_or_else(|| "texture".into())
+    Some(portable_file_name(&name))
+        .filter(|name| !name.is_empty())
+        .unwrap_or_else(|| "texture".into())
 }
 
 /// A material name without white space, which ends it in many readers.
 pub(crate) fn clean_material_name(name: &str) -> String {
-    let clean: String =
-        name.chars().map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c }).collect();
+    let clean: String = name
+        .chars()
+        .map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c })
+        .collect();
     if clean.is_empty() { "material".into() } else { clean }
 }
 

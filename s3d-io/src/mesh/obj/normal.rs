@@ -84,7 +84,11 @@ impl<'a> NormalObj<'a> {
             return None;
         }
         let every_or_none = obj.colored == 0 || obj.colored == obj.counts[0];
-        if every_or_none { Some(obj) } else { Self::scan(bytes, true) }
+        if every_or_none {
+            Some(obj)
+        } else {
+            Self::scan(bytes, true)
+        }
     }
 
     /// Vertices without a colour get one that is not finite if `fill_colors`.
@@ -216,7 +220,9 @@ impl<'a> NormalObj<'a> {
             let part = |index: u64| if index == 0 { String::new() } else { index.to_string() };
             line += &format!(" {v}/{}/{}", part(vt), part(vn));
         }
-        let corners = line.strip_prefix('f').and_then(|rest| Corners::plain(rest.as_bytes()))?;
+        let corners = line
+            .strip_prefix('f')
+            .and_then(|rest| Corners::plain(rest.as_bytes()))?;
         Some((corners, Some(line)))
     }
 

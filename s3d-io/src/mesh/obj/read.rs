@@ -52,7 +52,9 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
     let faces = Triangles::new(&obj, &columns)
         .map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
     let polygons_triangulated = faces.polygons;
-    let refused = faces.refused.map(|(face, why, n)| (face_line(&bytes, face).unwrap_or(0), why, n));
+    let refused = faces
+        .refused
+        .map(|(face, why, n)| (face_line(&bytes, face).unwrap_or(0), why, n));
     if faces.triangles.is_empty() {
         let reason = refused.map_or_else(String::new, |(line, why, _)| format!(", as on line {line}: {why}"));
         return Err(Error::format(path, format!("has no face that can be used{reason}")));
@@ -72,7 +74,11 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         colors,
         uvs: columns.uvs,
         face_uvs: faces.uvs,
-        normals: columns.normals.into_iter().map(|n| up.world_from_file(n / n.length())).collect(),
+        normals: columns
+            .normals
+            .into_iter()
+            .map(|n| up.world_from_file(n / n.length()))
+            .collect(),
         face_normals: faces.normals,
         materials: looks.materials,
         face_materials: faces.materials,
@@ -144,7 +150,13 @@ impl Columns {
         let columns = Self {
             positions: triples(&mesh.positions).map(Vec3::from_array).collect(),
             colors: triples(&mesh.vertex_color).collect(),
-            uvs: mesh.texcoords.as_chunks().0.iter().map(|uv| Vec2::from_array(*uv)).collect(),
+            uvs: mesh
+                .texcoords
+                .as_chunks()
+                .0
+                .iter()
+                .map(|uv| Vec2::from_array(*uv))
+                .collect(),
             normals: triples(&mesh.normals).map(Vec3::from_array).collect(),
             corners: corners.map(|column| behind(column, vertices)),
             arities: behind(mesh.face_arities, faces),
@@ -154,8 +166,16 @@ impl Columns {
         if columns.colors.len() != expected {
             return Err(tobj::LoadError::ColorParseError);
         }
-        let finite = columns.colors.iter().filter(|color| color.iter().all(|c| c.is_finite())).count();
-        if finite as u64 != obj.colored { Err(tobj::LoadError::ColorParseError) } else { Ok(columns) }
+        let finite = columns
+            .colors
+            .iter()
+            .filter(|color| color.iter().all(|c| c.is_finite()))
+            .count();
+        if finite as u64 != obj.colored {
+            Err(tobj::LoadError::ColorParseError)
+        } else {
+            Ok(columns)
+        }
     }
 }
 
@@ -426,8 +446,11 @@ mod tests {
         // A vertex that no face uses may be anything but malformed.
         assert!(read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan nan nan\nf 1 2 3\n").is_ok());
         assert!(
-            read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan 0\nf 1/1 2/1 3/1\n").unwrap().mesh.parts().face_uvs
-                [0]
+            read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan 0\nf 1/1 2/1 3/1\n")
+                .unwrap()
+                .mesh
+                .parts()
+                .face_uvs[0]
                 == [NO_INDEX; 3]
         );
     }

@@ -91,7 +91,11 @@ pub(crate) fn corner(corner: &[u8], counts: [u64; 3]) -> Result<[u64; 3], Why> {
         let written = std::str::from_utf8(part).ok().and_then(|part| part.parse::<i64>().ok());
         let written = written.ok_or_else(|| format!("the index {} is no whole number", quote(part)))?;
         // More values than 63 bits count are in no file.
-        let absolute = if written < 0 { count as i64 + written + 1 } else { written };
+        let absolute = if written < 0 {
+            count as i64 + written + 1
+        } else {
+            written
+        };
         if absolute < 1 {
             return Err(out_of_range(column, written, count));
         }

@@ -71,30 +71,42 @@ impl<'a> RgbObj<'a> {
         let (given, count) = (textures.len(), mesh.textures().len());
         assert!(given == 0 || given == count, "{given} image files for {count} textures");
         let mut files = UniqueNames::default();
-        let texture_files = mesh.textures().iter().enumerate().map(|(i, texture)| match textures.get(i) {
-            Some(given) => files.add(&clean_file_name(given.name)),
-            None => {
-                let stem = Path::new(&texture.name).file_stem();
-                let name = stem.map_or("texture".into(), |s| s.to_string_lossy());
-                files.add(&format!("{}.png", clean_file_name(&name)))
-            }
-        });
+        let texture_files = mesh
+            .textures()
+            .iter()
+            .enumerate()
+            .map(|(i, texture)| match textures.get(i) {
+                Some(given) => files.add(&clean_file_name(given.name)),
+                None => {
+                    let stem = Path::new(&texture.name).file_stem();
+                    let name = stem.map_or("texture".into(), |s| s.to_string_lossy());
+                    files.add(&format!("{}.png", clean_file_name(&name)))
+                }
+            });
         let texture_files = texture_files.collect();
         let mut names = UniqueNames::default();
-        let materials = mesh.materials().iter().map(|m| names.add(&clean_material_name(&m.name))).collect();
+        let materials = mesh
+            .materials()
+            .iter()
+            .map(|m| names.add(&clean_material_name(&m.name)))
+            .collect();
         Self { mesh, given: textures, texture_files, materials, default: names.add("default") }
     }
 
     /// The textures: their file names in the folder `rgb_textures`, and the bytes of each, made when they are
     /// asked for.
     pub fn textures(&self) -> impl Iterator<Item = (&str, Cow<'_, [u8]>)> {
-        self.texture_files.iter().zip(self.mesh.textures()).enumerate().map(|(i, (file, texture))| {
-            let bytes = match self.given.get(i) {
-                Some(given) => Cow::Borrowed(given.bytes),
-                None => Cow::Owned(encode_rgb8(&texture.image, Content::Photo, Compression::default())),
-            };
-            (file.as_str(), bytes)
-        })
+        self.texture_files
+            .iter()
+            .zip(self.mesh.textures())
+            .enumerate()
+            .map(|(i, (file, texture))| {
+                let bytes = match self.given.get(i) {
+                    Some(given) => Cow::Borrowed(given.bytes),
+                    None => Cow::Owned(encode_rgb8(&texture.image, Content::Photo, Compression::default())),
+                };
+                (file.as_str(), bytes)
+            })
     }
 
     /// Writes the content of `rgb.mtl`.
@@ -112,7 +124,11 @@ impl<'a> RgbObj<'a> {
             write_material(w, name, material.color, texture)?;
         }
         let all_have_one = (0..self.mesh.faces().len() as u32).all(|f| self.mesh.material_of(f).is_some());
-        if all_have_one { Ok(()) } else { write_material(w, &self.default, DEFAULT_COLOR, None) }
+        if all_have_one {
+            Ok(())
+        } else {
+            write_material(w, &self.default, DEFAULT_COLOR, None)
+        }
     }
 
     /// Writes the content of `rgb.obj`, which names `rgb.mtl` as its library.
@@ -327,7 +343,9 @@ fn clamped_textures(mesh: &TriMesh) -> Vec<bool> {
     let parts = mesh.parts();
     let mut clamped = vec![false; parts.textures.len()];
     for (f, corners) in parts.face_uvs.iter().enumerate().filter(|(_, c)| **c != [NO_INDEX; 3]) {
-        let texture = mesh.material_of(f as u32).and_then(|m| mesh.materials()[m as usize].texture);
+        let texture = mesh
+            .material_of(f as u32)
+            .and_then(|m| mesh.materials()[m as usize].texture);
         if let Some(t) = texture.filter(|&t| parts.textures[t as usize].wrap == [Wrap::Clamp; 2]) {
             let inside = |&i: &u32| {
                 let uv = parts.uvs[i as usize];
@@ -455,7 +473,10 @@ mod tests {
         let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("f ")).collect();
         assert_eq!(lines, ["f 1/1/1 2/2/1 3/4/2", "f 1//2 3//1 4//1", "f 4/4 2/1 1/1"]);
 
-        let names: Vec<&str> = faces.iter().map(|f| materials[f.material.unwrap()].name.as_str()).collect();
+        let names: Vec<&str> = faces
+            .iter()
+            .map(|f| materials[f.material.unwrap()].name.as_str())
+            .collect();
         assert_eq!(names, ["wall_paint_2", "material", "wall_paint"]);
         let all: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
         assert_eq!(all, ["wall_paint", "wall_paint_2", "material"]);
@@ -470,7 +491,10 @@ mod tests {
         }
         let files =
             ["rgb.obj", "rgb.mtl", "rgb_textures/Scan.png", "rgb_textures/scan_2.png"].map(PathBuf::from);
-        let size: u64 = files.iter().map(|f| std::fs::metadata(dir.path().join(f)).unwrap().len()).sum();
+        let size: u64 = files
+            .iter()
+            .map(|f| std::fs::metadata(dir.path().join(f)).unwrap().len())
+            .sum();
         assert_eq!(bytes, size);
     }
 
@@ -553,7 +577,10 @@ mod tests {
         write_semantic_obj(dir.path(), &mesh, &[3, 0, 1], &names).unwrap();
         let (faces, materials) = read(&dir.path().join("semantic.obj"));
         check_faces(&mesh, &faces);
-        let of_face: Vec<&str> = faces.iter().map(|f| materials[f.material.unwrap()].name.as_str()).collect();
+        let of_face: Vec<&str> = faces
+            .iter()
+            .map(|f| materials[f.material.unwrap()].name.as_str())
+            .collect();
         assert_eq!(of_face, [&names[3], &names[0], &names[1]]);
         assert_eq!(materials.len(), 3);
         for material in &materials {

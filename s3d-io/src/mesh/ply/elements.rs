@@ -386,7 +386,12 @@ mod tests {
     }
 
     fn bytes(big: bool) -> Vec<u8> {
-        let mut out = header(if big { "binary_big_endian" } else { "binary_little_endian" }).into_bytes();
+        let mut out = header(if big {
+            "binary_big_endian"
+        } else {
+            "binary_little_endian"
+        })
+        .into_bytes();
         let mut put = |le: &[u8]| {
             let mut le = le.to_vec();
             if big {
@@ -461,8 +466,9 @@ mod tests {
 
     #[test]
     fn all_encodings_say_the_same() {
-        let mut expected: Vec<String> =
-            (0..3).map(|r| format!("a {r}: {}", ROWS[r].map(|v| v.to_string()).join(" "))).collect();
+        let mut expected: Vec<String> = (0..3)
+            .map(|r| format!("a {r}: {}", ROWS[r].map(|v| v.to_string()).join(" ")))
+            .collect();
         expected.extend(["b 0: [-3.0, 4.0] 7 []".to_owned(), "b 1: [] 8 [0.1]".to_owned()]);
         assert_eq!(all(ascii().as_bytes(), |_| true).unwrap(), expected);
         assert_eq!(all(&bytes(false), |_| true).unwrap(), expected);
@@ -530,11 +536,19 @@ mod tests {
         let negative =
             b"ply\nformat binary_little_endian 1.0\nelement v 1\nproperty list char int l\nend_header\n\xff";
         assert!(
-            all(negative, |_| true).unwrap_err().to_string().contains("v 0: the list l has a length of -1")
+            all(negative, |_| true)
+                .unwrap_err()
+                .to_string()
+                .contains("v 0: the list l has a length of -1")
         );
         let huge = b"ply\nformat binary_little_endian 1.0\nelement v 1\nproperty list uint int l\n\
                      end_header\n\xff\xff\xff\xff";
-        assert!(all(huge, |_| true).unwrap_err().to_string().contains("4294967295 entries"));
+        assert!(
+            all(huge, |_| true)
+                .unwrap_err()
+                .to_string()
+                .contains("4294967295 entries")
+        );
         assert!(all(huge, |_| false).unwrap_err().to_string().contains("cut off"));
     }
 

@@ -67,9 +67,9 @@ impl PlyFaces {
                     let fits = uvs.len() == 2 * polygon.len();
                     out.odd_uvs += usize::from(!fits && !uvs.is_empty());
                     match fits {
-                        true => {
-                            out.uvs.extend(uvs.as_chunks().0.iter().map(|&[u, v]| vec2(u as f32, v as f32)))
-                        }
+                        true => out
+                            .uvs
+                            .extend(uvs.as_chunks().0.iter().map(|&[u, v]| vec2(u as f32, v as f32))),
                         false => out.uvs.extend(polygon.iter().map(|_| Vec2::NAN)),
                     }
                 }
@@ -81,7 +81,13 @@ impl PlyFaces {
                 ));
             }
             if let Some(texture) = texture {
-                let number = |&n: &f64| if n >= 0.0 && n < f64::from(NO_INDEX) { n as u32 } else { NO_INDEX };
+                let number = |&n: &f64| {
+                    if n >= 0.0 && n < f64::from(NO_INDEX) {
+                        n as u32
+                    } else {
+                        NO_INDEX
+                    }
+                };
                 out.textures.extend(batch.scalars(texture).iter().map(number));
             }
             if let Some(labels) = labels.as_deref_mut() {
@@ -133,7 +139,8 @@ impl PlyFaces {
                         && b != c
                         && c != a
                     {
-                        self.corners.extend(if strip.len() % 2 == 1 { [a, b, c] } else { [b, a, c] });
+                        self.corners
+                            .extend(if strip.len() % 2 == 1 { [a, b, c] } else { [b, a, c] });
                         self.sizes.push(3);
                     }
                 }
@@ -173,7 +180,9 @@ impl PlyFaces {
                 _ => {
                     points.clear();
                     points.extend(
-                        corners.iter().map(|&c| positions.get(c as usize).copied().unwrap_or(Vec3::NAN)),
+                        corners
+                            .iter()
+                            .map(|&c| positions.get(c as usize).copied().unwrap_or(Vec3::NAN)),
                     );
                     match triangulate_face(&points) {
                         Ok(cut) => {
@@ -198,7 +207,9 @@ impl PlyFaces {
         let uvs = std::mem::take(&mut self.uvs);
         let here = |corner: u32| uvs.get(corner as usize).is_some_and(|uv| !uv.is_nan());
         let indices = triangles.corners.iter();
-        let indices = indices.map(|&c| if c.iter().all(|&c| here(c)) { c } else { [NO_INDEX; 3] }).collect();
+        let indices = indices
+            .map(|&c| if c.iter().all(|&c| here(c)) { c } else { [NO_INDEX; 3] })
+            .collect();
         Some((uvs, indices))
     }
 
@@ -232,7 +243,11 @@ pub(crate) struct PlyTriangles {
 
 /// The place of the list of corners: by its name, or the only list of integers.
 fn corner_list(path: &Path, element: &PlyElement) -> Result<usize> {
-    let mut lists = element.properties.iter().enumerate().filter(|(_, p)| p.is_list() && p.kind.is_integer());
+    let mut lists = element
+        .properties
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| p.is_list() && p.kind.is_integer());
     let only = lists.next().filter(|_| lists.next().is_none()).map(|(place, _)| place);
     element.find_list(&CORNERS).or(only).ok_or_else(|| {
         let names: Vec<&str> = element.properties.iter().map(|p| p.name.as_str()).collect();

@@ -129,20 +129,26 @@ impl PlyElement {
     /// The place among the properties of the first of `names` that is one, upper and lower case being the
     /// same. A name earlier in `names` goes before one later.
     pub(crate) fn find(&self, names: &[&str]) -> Option<usize> {
-        names.iter().find_map(|name| self.properties.iter().position(|p| p.name.eq_ignore_ascii_case(name)))
+        names
+            .iter()
+            .find_map(|name| self.properties.iter().position(|p| p.name.eq_ignore_ascii_case(name)))
     }
 
     /// As [`PlyElement::find`], among the properties that are single numbers.
     pub(crate) fn find_scalar(&self, names: &[&str]) -> Option<usize> {
         names.iter().find_map(|name| {
-            self.properties.iter().position(|p| !p.is_list() && p.name.eq_ignore_ascii_case(name))
+            self.properties
+                .iter()
+                .position(|p| !p.is_list() && p.name.eq_ignore_ascii_case(name))
         })
     }
 
     /// As [`PlyElement::find`], among the properties that are lists.
     pub(crate) fn find_list(&self, names: &[&str]) -> Option<usize> {
         names.iter().find_map(|name| {
-            self.properties.iter().position(|p| p.is_list() && p.name.eq_ignore_ascii_case(name))
+            self.properties
+                .iter()
+                .position(|p| p.is_list() && p.name.eq_ignore_ascii_case(name))
         })
     }
 
@@ -193,7 +199,9 @@ impl PlyHeader {
         };
         let mut encoding = None;
         // The last piece has no end.
-        let pieces = head.split_inclusive(|&b| b == line_end).filter(|piece| piece.ends_with(&[line_end]));
+        let pieces = head
+            .split_inclusive(|&b| b == line_end)
+            .filter(|piece| piece.ends_with(&[line_end]));
         for piece in pieces {
             let line = piece.trim_ascii();
             header.bytes = header.bytes.saturating_add(piece.len());
@@ -210,7 +218,9 @@ impl PlyHeader {
                 ("", _) => {}
                 ("ply", []) if header.lines == 1 => {}
                 ("comment" | "obj_info", _) => {
-                    header.comments.push(text.strip_prefix(keyword).unwrap_or(&text).trim().to_owned());
+                    header
+                        .comments
+                        .push(text.strip_prefix(keyword).unwrap_or(&text).trim().to_owned());
                 }
                 ("format", [name, ..]) => {
                     encoding = Some(match *name {
@@ -254,7 +264,10 @@ impl PlyHeader {
 
     /// The element `name` and its place.
     pub(crate) fn element(&self, name: &str) -> Option<(usize, &PlyElement)> {
-        self.elements.iter().enumerate().find(|(_, e)| e.name.eq_ignore_ascii_case(name))
+        self.elements
+            .iter()
+            .enumerate()
+            .find(|(_, e)| e.name.eq_ignore_ascii_case(name))
     }
 }
 

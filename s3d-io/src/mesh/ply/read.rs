@@ -49,8 +49,9 @@ pub(crate) fn read(
     let mut done = [false; 3];
     while let Some(element) = reader.next_element()? {
         let belongs = |l: &&mut PlyLabels, to: LabelElement| l.element == to;
-        let known =
-            ["vertex", "face", "tristrips"].iter().position(|name| element.name.eq_ignore_ascii_case(name));
+        let known = ["vertex", "face", "tristrips"]
+            .iter()
+            .position(|name| element.name.eq_ignore_ascii_case(name));
         // Of two elements with one name the first counts, as for the header.
         let is_first = |k: &usize| done.get_mut(*k).is_some_and(|done| !std::mem::replace(done, true));
         match known.filter(is_first) {
@@ -80,8 +81,9 @@ pub(crate) fn read(
         let n = count(faces.odd_uvs, "face");
         warnings.push(format!("texture coordinates of {n} left out: not two numbers a corner"));
     }
-    let has_face_colors =
-        header.element("face").is_some_and(|(_, e)| e.find(&["red", "diffuse_red"]).is_some());
+    let has_face_colors = header
+        .element("face")
+        .is_some_and(|(_, e)| e.find(&["red", "diffuse_red"]).is_some());
     if has_face_colors && vertices.colors.is_empty() {
         warnings.push("colours of faces are not read; colours of vertices or a texture are".into());
     }
@@ -119,10 +121,17 @@ pub(crate) fn read(
 }
 
 fn no_faces(header: &PlyHeader, vertices: u64) -> String {
-    let others: Vec<&str> =
-        header.elements.iter().map(|e| e.name.as_str()).filter(|n| *n != "vertex").collect();
-    let others =
-        if others.is_empty() { String::new() } else { format!(" and the elements {}", others.join(", ")) };
+    let others: Vec<&str> = header
+        .elements
+        .iter()
+        .map(|e| e.name.as_str())
+        .filter(|n| *n != "vertex")
+        .collect();
+    let others = if others.is_empty() {
+        String::new()
+    } else {
+        format!(" and the elements {}", others.join(", "))
+    };
     let n = count(vertices as usize, "vertex");
     format!(
         "has no face, only {n}{others}; a mesh is needed: mesh the points first, or give the file as \
@@ -169,7 +178,9 @@ impl Looks {
         let folder = path.parent().unwrap_or(Path::new(""));
         let names = header.comments.iter().filter_map(|comment| {
             let (keyword, name) = comment.split_once(char::is_whitespace)?;
-            keyword.eq_ignore_ascii_case("TextureFile").then(|| name.trim().to_owned())
+            keyword
+                .eq_ignore_ascii_case("TextureFile")
+                .then(|| name.trim().to_owned())
         });
         let mut looks = Self::default();
         let mut wanted: Vec<PathBuf> = Vec::new();
@@ -196,12 +207,17 @@ impl Looks {
             match loaded {
                 Ok(loaded) => {
                     let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                    for (slot, _) in
-                        looks.by_comment.iter_mut().zip(&places).filter(|(_, place)| **place == at)
+                    for (slot, _) in looks
+                        .by_comment
+                        .iter_mut()
+                        .zip(&places)
+                        .filter(|(_, place)| **place == at)
                     {
                         slot.1 = Some(looks.textures.len() as u32);
                     }
-                    looks.textures.push(Texture { name, image: loaded.image, wrap: [Wrap::Repeat; 2] });
+                    looks
+                        .textures
+                        .push(Texture { name, image: loaded.image, wrap: [Wrap::Repeat; 2] });
                     looks.files.push(Some(loaded.file));
                 }
                 Err(why) => warnings
@@ -468,7 +484,9 @@ mod tests {
         let file = read_with(&elements, rows, &ask(None, Some("part"))).unwrap();
         assert_eq!(numbers(&file), (LabelElement::Face, [None, column("part", &[20, 21])]));
         // No element has both.
-        let message = read_with(&elements, rows, &ask(Some("label"), Some("part"))).unwrap_err().to_string();
+        let message = read_with(&elements, rows, &ask(Some("label"), Some("part")))
+            .unwrap_err()
+            .to_string();
         assert!(
             message.contains(
                 "no column of labels \"label\", \"part\" among the properties of its faces or of its vertices"

@@ -74,7 +74,11 @@ impl<'r> Source<'r> {
         if self.bytes().len() < n && !self.need(n)? {
             return Err(Fault::End);
         }
-        let taken = self.buffer.get(self.start..).and_then(|bytes| bytes.get(..n)).ok_or(Fault::End)?;
+        let taken = self
+            .buffer
+            .get(self.start..)
+            .and_then(|bytes| bytes.get(..n))
+            .ok_or(Fault::End)?;
         self.start = self.start.saturating_add(n);
         Ok(taken)
     }
@@ -177,7 +181,11 @@ pub(crate) fn number(b: &[u8], kind: PlyType, big: bool) -> f64 {
     macro_rules! one {
         ($type:ty) => {{
             let bytes = b.first_chunk().copied().unwrap_or_default();
-            f64::from(if big { <$type>::from_be_bytes(bytes) } else { <$type>::from_le_bytes(bytes) })
+            f64::from(if big {
+                <$type>::from_be_bytes(bytes)
+            } else {
+                <$type>::from_le_bytes(bytes)
+            })
         }};
     }
     match kind {
@@ -204,7 +212,9 @@ pub(crate) fn parse_f64(word: &[u8]) -> Option<f64> {
         return Some(if negative { -value } else { value });
     }
     let text = std::str::from_utf8(word).ok()?;
-    text.parse().ok().or_else(|| written.to_ascii_lowercase().starts_with(b"nan(").then_some(f64::NAN))
+    text.parse()
+        .ok()
+        .or_else(|| written.to_ascii_lowercase().starts_with(b"nan(").then_some(f64::NAN))
 }
 
 /// A plain decimal fraction whose digits `f64` holds exactly, as nearly all are: the quotient of two exact

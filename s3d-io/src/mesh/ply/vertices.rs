@@ -57,7 +57,10 @@ impl PlyVertices {
         };
         let (normal, color, uv) =
             (places(element, &NORMALS), places(element, &COLORS), places(element, &UVS));
-        let wanted = xyz.into_iter().chain(normal.into_iter().flatten()).chain(color.into_iter().flatten());
+        let wanted = xyz
+            .into_iter()
+            .chain(normal.into_iter().flatten())
+            .chain(color.into_iter().flatten());
         let wanted = wanted.chain(uv.into_iter().flatten());
         reader.want(wanted.chain(labels.iter().flat_map(|l| l.properties())));
 
@@ -70,12 +73,16 @@ impl PlyVertices {
             let is_far =
                 || frame.needs_exact(vectors(&batch, xyz).fold(0.0, |m, v| m.max(v.abs().max_element())));
             if !out.exact.is_empty() || out.positions.is_empty() && is_far() {
-                out.exact.extend(vectors(&batch, xyz).map(|v| up.exact_world_from_file(v)));
+                out.exact
+                    .extend(vectors(&batch, xyz).map(|v| up.exact_world_from_file(v)));
             }
-            out.positions.extend(vectors(&batch, xyz).map(|v| up.world_from_file(v.as_vec3())));
+            out.positions
+                .extend(vectors(&batch, xyz).map(|v| up.world_from_file(v.as_vec3())));
             if let Some(places) = normal {
                 out.normals.extend(
-                    vectors(&batch, places).map(|n| n.as_vec3()).map(|n| up.world_from_file(n / n.length())),
+                    vectors(&batch, places)
+                        .map(|n| n.as_vec3())
+                        .map(|n| up.world_from_file(n / n.length())),
                 );
             }
             if let Some([u, v]) = uv {
@@ -102,7 +109,10 @@ impl PlyVertices {
         }
         let offset_m = frame.offset_m(corners.iter().filter_map(|&v| exact.get(v as usize).copied()));
         if offset_m != DVec3::ZERO {
-            self.positions = exact.into_iter().map(|p| (p - frame.in_units(offset_m)).as_vec3()).collect();
+            self.positions = exact
+                .into_iter()
+                .map(|p| (p - frame.in_units(offset_m)).as_vec3())
+                .collect();
         }
         offset_m
     }

@@ -65,7 +65,11 @@ impl TarWriter {
     fn fill(&mut self, bytes: &[u8]) -> Result<()> {
         self.file.put(bytes)?;
         let rest = bytes.len() as u64 % BLOCK;
-        if rest == 0 { Ok(()) } else { self.file.put(&[0; BLOCK as usize][rest as usize..]) }
+        if rest == 0 {
+            Ok(())
+        } else {
+            self.file.put(&[0; BLOCK as usize][rest as usize..])
+        }
     }
 
     /// Ends the archive, gives it its name, and returns its size in bytes.
@@ -83,7 +87,11 @@ impl TarWriter {
     /// The bytes that a file of this name and size takes in an archive.
     pub fn entry_bytes(name: &str, size: u64) -> u64 {
         let records = pax_records(name, size).len() as u64;
-        let extended = if records == 0 { 0 } else { BLOCK + records.next_multiple_of(BLOCK) };
+        let extended = if records == 0 {
+            0
+        } else {
+            BLOCK + records.next_multiple_of(BLOCK)
+        };
         extended + BLOCK + size.next_multiple_of(BLOCK)
     }
 }
@@ -115,8 +123,9 @@ fn split_name(name: &str) -> Option<(&str, &str)> {
     if name.len() <= 100 {
         return Some(("", name));
     }
-    let mut slashes =
-        name.match_indices('/').filter_map(|(at, _)| Some((name.get(..at)?, name.get(at + 1..)?)));
+    let mut slashes = name
+        .match_indices('/')
+        .filter_map(|(at, _)| Some((name.get(..at)?, name.get(at + 1..)?)));
     slashes.find(|(folders, rest)| folders.len() <= 155 && (1..=100).contains(&rest.len()))
 }
 
@@ -125,8 +134,9 @@ fn header(name: &str, size: u64, kind: u8) -> [u8; BLOCK as usize] {
     let mut block = [0; BLOCK as usize];
     let mut put = |at: usize, bytes: &[u8]| block[at..at + bytes.len()].copy_from_slice(bytes);
     // What does not fit stands in the extended header; its beginning is here for programs that read none.
-    let beginning =
-        name.split_at_checked(name.floor_char_boundary(100)).map_or("", |(beginning, _)| beginning);
+    let beginning = name
+        .split_at_checked(name.floor_char_boundary(100))
+        .map_or("", |(beginning, _)| beginning);
     let (folders, rest) = split_name(name).unwrap_or(("", beginning));
     put(0, rest.as_bytes());
     put(100, b"0000644\0");
@@ -239,6 +249,8 @@ mod tests {
     #[should_panic(expected = "a file's name")]
     fn an_absolute_name_is_a_mistake() {
         let dir = tempfile::tempdir().unwrap();
-        let _ = TarWriter::create(&dir.path().join("a.tar")).unwrap().append("/etc/x", b"");
+        let _ = TarWriter::create(&dir.path().join("a.tar"))
+            .unwrap()
+            .append("/etc/x", b"");
     }
 }

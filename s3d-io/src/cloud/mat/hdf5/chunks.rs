@@ -32,7 +32,10 @@ pub(super) fn read(
 ) -> Result<Vec<u8>> {
     let damaged = || file.fault(format!("an array of {:?} in chunks of {chunk:?} is damaged", dataset.dims));
     let element = dataset.kind.size();
-    let chunk_bytes = chunk.iter().try_fold(element as u64, |n, d| n.checked_mul(*d)).ok_or_else(damaged)?;
+    let chunk_bytes = chunk
+        .iter()
+        .try_fold(element as u64, |n, d| n.checked_mul(*d))
+        .ok_or_else(damaged)?;
     if chunk.len() != dataset.dims.len() || chunk_bytes == 0 {
         return Err(damaged());
     }
@@ -43,7 +46,11 @@ pub(super) fn read(
     }
     let chunks = list(file, tree, chunk.len())?;
     // Before anything is allocated: the chunks must be able to fill the array.
-    let needed = dataset.dims.iter().zip(chunk).try_fold(1u64, |n, (d, c)| n.checked_mul(d.div_ceil(*c)));
+    let needed = dataset
+        .dims
+        .iter()
+        .zip(chunk)
+        .try_fold(1u64, |n, (d, c)| n.checked_mul(d.div_ceil(*c)));
     if needed.is_none_or(|n| n > chunks.len() as u64) {
         return Err(file.fault(format!(
             "an array of {:?} has only {} of its chunks",
@@ -56,12 +63,20 @@ pub(super) fn read(
     if stored > file.len() {
         return Err(damaged());
     }
-    let most = if dataset.filters.contains(&Filter::Deflate) { MAX_DEFLATE } else { 1 };
-    if chunks.iter().any(|c| chunk_bytes > most.saturating_mul(u64::from(c.stored)).saturating_add(64)) {
+    let most = if dataset.filters.contains(&Filter::Deflate) {
+        MAX_DEFLATE
+    } else {
+        1
+    };
+    if chunks
+        .iter()
+        .any(|c| chunk_bytes > most.saturating_mul(u64::from(c.stored)).saturating_add(64))
+    {
         return Err(damaged());
     }
-    let size =
-        usize::try_from(bytes).ok().filter(|_| bytes <= chunk_bytes.saturating_mul(chunks.len() as u64));
+    let size = usize::try_from(bytes)
+        .ok()
+        .filter(|_| bytes <= chunk_bytes.saturating_mul(chunks.len() as u64));
     let mut data = vec![0; size.ok_or_else(damaged)?];
     for piece in &chunks {
         let stored = file.bytes(piece.address, u64::from(piece.stored))?;
@@ -81,12 +96,19 @@ fn list(file: &Hdf5File, tree: u64, axes: usize) -> Result<Vec<Chunk>> {
     let key_bytes = axes.checked_add(2).and_then(|n| n.checked_mul(8)).ok_or_else(damaged)?;
     let entry_bytes = key_bytes.checked_add(8).ok_or_else(damaged)?;
     let mut chunks = Vec::new();
-    let mut nodes = if tree == UNDEFINED { Vec::new() } else { vec![(tree, MAX_LEVELS)] };
+    let mut nodes = if tree == UNDEFINED {
+        Vec::new()
+    } else {
+        vec![(tree, MAX_LEVELS)]
+    };
     let mut left = file.len() / 8;
     while let Some((address, below)) = nodes.pop() {
         let head: [u8; 24] = file.array(address)?;
         let (level, count) = (head[5], u16::from_le_bytes([head[6], head[7]]));
-        left = left.checked_sub(1).and_then(|n| n.checked_sub(count.into())).ok_or_else(damaged)?;
+        left = left
+            .checked_sub(1)
+            .and_then(|n| n.checked_sub(count.into()))
+            .ok_or_else(damaged)?;
         if !head.starts_with(b"TREE\x01") || level >= below {
             return Err(damaged());
         }
@@ -162,9 +184,16 @@ fn place(
     }
     // How many of the chunk's elements are in the array, along each axis.
     let within = |((e, d), o): ((&u64, &u64), &u64)| Some(*e.min(&d.checked_sub(*o)?));
-    let inside = extents.iter().zip(dims).zip(offset).map(within).collect::<Option<Vec<u64>>>()?;
+    let inside = extents
+        .iter()
+        .zip(dims)
+        .zip(offset)
+        .map(within)
+        .collect::<Option<Vec<u64>>>()?;
     // Elements of the last axis lie in a row.
-    let run = usize::try_from(inside.last().copied().unwrap_or(1)).ok()?.checked_mul(element)?;
+    let run = usize::try_from(inside.last().copied().unwrap_or(1))
+        .ok()?
+        .checked_mul(element)?;
     let (mut at, first) = (vec![0u64; dims.len()], vec![0; dims.len()]);
     loop {
         let index = |start: &[u64], dims: &[u64]| {

@@ -48,7 +48,10 @@ pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(St
                 let (Some(name), Some(object)) = (entry.number(8), entry.number(8)) else {
                     return Err(damaged());
                 };
-                let name = usize::try_from(name).ok().and_then(|at| names.get(at..)).ok_or_else(damaged)?;
+                let name = usize::try_from(name)
+                    .ok()
+                    .and_then(|at| names.get(at..))
+                    .ok_or_else(damaged)?;
                 found.push((String::from_utf8_lossy(until_zero(name)).into_owned(), object));
                 left = left.checked_sub(1).ok_or_else(damaged)?;
             }
@@ -62,7 +65,12 @@ pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(St
         let body = file.bytes(behind(32)?, count.saturating_mul(16))?;
         let children: Vec<[u8; 8]> = body.as_chunks().0.iter().step_by(2).copied().collect();
         // The last first, as they are taken from the end.
-        nodes.extend(children.into_iter().rev().map(|child| (u64::from_le_bytes(child), level)));
+        nodes.extend(
+            children
+                .into_iter()
+                .rev()
+                .map(|child| (u64::from_le_bytes(child), level)),
+        );
     }
     Ok(Some(found))
 }

@@ -91,7 +91,11 @@ pub(super) fn filters(body: &[u8]) -> Option<Vec<Filter>> {
         let name = if version == 1 || id >= 256 { m.size(2)? } else { 0 };
         let (_flags, values) = (m.number(2)?, m.size(2)?.checked_mul(4)?);
         for bytes in [name, values] {
-            m.take(if version == 1 { bytes.checked_next_multiple_of(8)? } else { bytes })?;
+            m.take(if version == 1 {
+                bytes.checked_next_multiple_of(8)?
+            } else {
+                bytes
+            })?;
         }
         filters.push(match id {
             1 => Filter::Deflate,
@@ -112,7 +116,11 @@ pub(super) fn link(body: &[u8]) -> Option<Option<(String, u64)>> {
     m.take(if flags & 0x10 != 0 { 1 } else { 0 })?;
     let length = m.size(1 << (flags & 3))?;
     let name = String::from_utf8_lossy(m.take(length)?).into_owned();
-    if is_hard { Some(Some((name, m.number(8)?))) } else { Some(None) }
+    if is_hard {
+        Some(Some((name, m.number(8)?)))
+    } else {
+        Some(None)
+    }
 }
 
 /// Whether a group in the new form has its members in a heap.
@@ -134,7 +142,11 @@ pub(super) fn attribute(body: &[u8]) -> Option<(String, AttributeValue)> {
     }
     m.take(usize::from(version == 3))?;
     let mut part = |size: usize| {
-        let padded = if version == 1 { size.checked_next_multiple_of(8)? } else { size };
+        let padded = if version == 1 {
+            size.checked_next_multiple_of(8)?
+        } else {
+            size
+        };
         m.take(padded)?.get(..size)
     };
     let (name, kind, space) = (part(sizes[0])?, part(sizes[1])?, part(sizes[2])?);

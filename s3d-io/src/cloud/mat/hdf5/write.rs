@@ -124,7 +124,9 @@ pub(crate) struct Hdf5Writer<W> {
 impl<W: Write + Seek> Hdf5Writer<W> {
     /// Starts the file. `user_block` stands before all: 512 bytes, or twice as many, or twice again…
     pub(crate) fn new(mut file: W, name: &Path, user_block: &[u8]) -> Result<Self> {
-        let written = file.write_all(user_block).and_then(|()| file.write_all(&[0; SUPERBLOCK]));
+        let written = file
+            .write_all(user_block)
+            .and_then(|()| file.write_all(&[0; SUPERBLOCK]));
         written.map_err(|e| Error::io(name, "write", e))?;
         let name = name.to_owned();
         Ok(Self { file, name, at: SUPERBLOCK as u64, user_block: user_block.len() as u64 })
@@ -231,14 +233,20 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         }
         block.extend(entry(0, root));
         debug_assert_eq!(block.len(), SUPERBLOCK);
-        let placed =
-            self.file.seek(SeekFrom::Start(self.user_block)).and_then(|_| self.file.write_all(&block));
-        placed.and_then(|()| self.file.flush()).map_err(|e| Error::io(&self.name, "write", e))?;
+        let placed = self
+            .file
+            .seek(SeekFrom::Start(self.user_block))
+            .and_then(|_| self.file.write_all(&block));
+        placed
+            .and_then(|()| self.file.flush())
+            .map_err(|e| Error::io(&self.name, "write", e))?;
         Ok(self.file)
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
-        self.file.write_all(bytes).map_err(|e| Error::io(&self.name, "write", e))?;
+        self.file
+            .write_all(bytes)
+            .map_err(|e| Error::io(&self.name, "write", e))?;
         self.at += bytes.len() as u64;
         Ok(())
     }
