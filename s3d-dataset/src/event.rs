@@ -1,6 +1,7 @@
 //! What an observer is told while a call runs.
 
-use crate::tables::summary::{Summary, UnitTally};
+use crate::stage::Stage;
+use crate::summary::{Summary, UnitTally};
 use serde::Serialize;
 use std::fmt;
 
@@ -121,45 +122,6 @@ pub enum UnitKind {
     /// The meshes and points of an area.
     #[serde(rename = "rest")]
     Assets,
-}
-
-/// A stage of an export. Meshes and points are written beside the images, by one of the threads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-#[non_exhaustive]
-pub enum Stage {
-    /// Inputs are read and checked.
-    Load,
-    /// Points vote for faces.
-    Label,
-    /// Candidate views are drawn and scored.
-    Score,
-    /// Images are rendered and written.
-    Render,
-    /// Meshes are written.
-    Meshes,
-    /// Points are sampled and written.
-    Points,
-    /// Of shards: their files come into one folder.
-    Merge,
-    /// What is made of all areas together.
-    Tables,
-}
-
-impl Stage {
-    /// Its name in logs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Load => "load",
-            Self::Label => "label",
-            Self::Score => "score",
-            Self::Render => "render",
-            Self::Meshes => "meshes",
-            Self::Points => "points",
-            Self::Merge => "merge",
-            Self::Tables => "tables",
-        }
-    }
 }
 
 impl fmt::Display for UnitKind {

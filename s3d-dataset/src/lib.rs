@@ -42,6 +42,7 @@
 // What a file holds must not make it panic; loops index by what was checked.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
+mod account;
 mod compare;
 mod context;
 mod error;
@@ -50,14 +51,17 @@ mod export;
 mod info;
 mod options;
 mod pack;
+mod parallel;
 mod place;
 mod profile;
 mod reader;
+mod record;
 mod render;
 mod sample;
-mod shard;
+mod stage;
 mod store;
-mod tables;
+mod summary;
+mod survey;
 mod useful;
 mod verify;
 mod xyz;
@@ -71,34 +75,36 @@ pub use compare::comparison::{
 pub use compare::{CompareOptions, compare};
 pub use context::{Cancel, Context, Observer, Progress};
 pub use error::{Error, Result};
-pub use event::{Event, Level, Stage, Task, UnitKind};
+pub use event::{Event, Level, Task, UnitKind};
 pub use export::Export;
 pub use export::input::memory::{MemoryScene, SceneSource, SharedScene};
-pub use export::work::map_in_order;
+pub use export::shard::assignment::Shard;
+pub use export::shard::make_plan::plan;
+pub use export::shard::merge::merge;
 pub use info::{
     DataSetInfo, InfoOptions, LocationInfo, MeshInfo, RoomInfo, SceneInfo, data_set_info, info, is_data_set,
 };
+pub use options::condition::Condition;
+pub use options::profile::Profile;
 pub use options::{ExportOptions, PadLabels, canonical_uuid};
 pub use pack::{
     ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions, pack,
 };
+pub use parallel::map_in_order;
 pub use place::{PlaceOptions, place_cameras};
-pub use profile::loader::Profile;
 pub use profile::room::{TreeInstance, TreeRoom};
 pub use profile::{ProfileOptions, profile};
-pub use reader::DataSet;
-pub use render::{PosesOptions, RenderOptions, RenderedPoses, render, render_poses};
-pub use sample::{SampleOptions, sample};
-pub use shard::assignment::Shard;
-pub use shard::make_plan::plan;
-pub use shard::merge::merge;
-pub use store::new_file::NewFile;
-pub use store::new_folder::{FolderKind, NewFolder, beside, check_apart};
-pub use tables::statistics::{
+pub use record::data_set::DataSet;
+pub use record::statistics::{
     AreaStatistics, LabelStatistics, LabelTally, RoomTypeStatistics, Statistics, statistics,
 };
-pub use tables::summary::{ImageTally, Summary, Surface, UnitTally, Unlabelled, ViewTally};
-pub use useful::{Condition, Estimate, Storey};
+pub use render::{PosesOptions, RenderOptions, RenderedPoses, render, render_poses};
+pub use sample::{SampleOptions, sample};
+pub use stage::Stage;
+pub use store::new_file::NewFile;
+pub use store::new_folder::{FolderKind, NewFolder, beside, check_apart};
+pub use summary::{ImageTally, Summary, Surface, UnitTally, Unlabelled, ViewTally};
+pub use useful::{Estimate, Storey};
 pub use verify::{FaultGroup, VerifyOptions, VerifyReport, verify};
 pub use xyz::{XyzOptions, xyz};
 

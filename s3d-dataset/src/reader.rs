@@ -4,13 +4,13 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::options::ExportOptions;
 use crate::profile::room::{TreeInstance, TreeRoom, rooms_of};
-use crate::tables::dataset::Dataset;
+use crate::record::data_set::DataSet;
 use memchr::memchr_iter;
 use s3d_geom::Camera;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, PhotographRecord, PoseFile,
-    ViewRecord, read_face_votes, read_instances, read_labels, read_pose, read_views,
+    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, PoseFile, ViewRecord,
+    read_face_votes, read_instances, read_labels, read_pose, read_views,
 };
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_label::{LabelTable, Taxonomy};
@@ -19,29 +19,13 @@ use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-/// A complete data set, to be read. Whatever is read of it is held against its list of files: sizes before a
-/// file is opened, checksums of what is read as a whole. Files that the list does not name are refused.
-///
-/// ```no_run
-/// use s3d_dataset::DataSet;
-/// use s3d_dataset::s3d_io::dataset::Domain;
-///
-/// let data = DataSet::open("dataset".as_ref())?;
-/// for image in data.images(data.areas()[0]) {
-///     let png = data.read(&image.path(data.layout(), Domain::Rgb))?;
-///     println!("{}: {} bytes", image.stem(), png.len());
-/// }
-/// # Ok::<(), s3d_dataset::Error>(())
-/// ```
-pub struct DataSet(pub(crate) Dataset);
-
 impl DataSet {
     /// Opens the data set in a folder: its manifest, its list of files and its conventions, which must agree.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File) with the one that does not, or if the export did not finish.
     pub fn open(folder: &Path) -> Result<Self> {
-        Dataset::open(&Layout::new(folder)).map(Self)
+        Self::open_in(&Layout::new(folder))
     }
 
     /// The same, of an export that did not finish, too: what is there of it so far. [`DataSet::missing_yet`]
@@ -50,38 +34,37 @@ impl DataSet {
     /// # Errors
     /// As [`DataSet::open`].
     pub fn open_as_far_as_it_is(folder: &Path, ctx: &Context) -> Result<Self> {
-        Dataset::open_as_far_as_it_is(ctx, &Layout::new(folder)).map(Self)
+        Self::open_unfinished_in(ctx, &Layout::new(folder))
     }
 
     /// What an export that did not finish lacks, a sentence each; `None` if it is complete.
     pub fn missing_yet(&self) -> Option<&[String]> {
-        self.0.unfinished.as_ref().map(|unfinished| &*unfinished.missing)
+        self.unfinished.as_ref().map(|unfinished| &*unfinished.missing)
     }
 
     /// Where its files lie.
     pub fn layout(&self) -> &Layout {
-        &self.0.layout
+        &self.layout
     }
 
     /// The version of s3d that made it.
     pub fn version(&self) -> &str {
-        &self.0.manifest.version
+        &self.manifest.version
     }
 
     /// The seed that it was made with.
     pub fn seed(&self) -> u64 {
-        self.0.manifest.seed
+        self.manifest.seed
     }
 
     /// The options that it was made with, but for the seed.
     pub fn options(&self) -> &ExportOptions {
-        &self.0.manifest.options
+        &self.manifest.options
     }
 
     /// How many files it has, all but `manifest.json` and `files.csv`, and their bytes.
     pub fn size(&self) -> (u64, u64) {
-        self.0
-            .manifest
+        self.manifest
             .files
             .as_ref()
             .map_or((0, 0), |list| (list.count, list.bytes))
@@ -89,17 +72,17 @@ impl DataSet {
 
     /// The numbers of its areas.
     pub fn areas(&self) -> &[u32] {
-        &self.0.manifest.area_numbers
+        &self.manifest.area_numbers
     }
 
     /// What the manifest tells of its areas: the entries of `areas`, which serialize as they stand there.
     pub fn area_entries(&self) -> impl Iterator<Item = impl Serialize + use<'_>> {
-        self.0.manifest.areas.iter()
+        self.manifest.areas.iter()
     }
 
     /// The classes and types of rooms of its labels; `None` if it has no labels.
     pub fn taxonomy(&self) -> Option<&Taxonomy> {
-        self.0.label_taxonomy()
+        self.manifest.is_labelled().then_some(&self.taxonomy)
     }
 
     /// Its labels; `None` if it has none.
@@ -109,7 +92,7 @@ impl DataSet {
     pub fn labels(&self) -> Result<Option<LabelTable>> {
         let Some(taxonomy) = self.taxonomy() else { return Ok(None) };
         let path = self.layout().labels_json();
-        let table = taxonomy.table_from_names(&read_labels(self.0.files.checked(&path)?)?);
+        let table = taxonomy.table_from_names(&read_labels(self.files.checked(&path)?)?);
         Ok(Some(table.map_err(|e| FileError::format(&path, e.to_string()))?))
     }
 
@@ -125,12 +108,12 @@ impl DataSet {
         if !self.names(&path) {
             return Ok(None);
         }
-        for other in self.0.files.below(&folder) {
+        for other in self.files.below(&folder) {
             if other == materials || other.starts_with(&textures) {
-                self.0.files.checked(&other)?;
+                self.files.checked(&other)?;
             }
         }
-        let file = read_mesh(self.0.files.checked(&path)?, UpAxis::Y)?;
+        let file = read_mesh(self.files.checked(&path)?, UpAxis::Y)?;
         self.fits(area, &path, file.mesh.faces().len())?;
         Ok(Some(file))
     }
@@ -145,14 +128,14 @@ impl DataSet {
         if !self.names(&path) {
             return Ok(None);
         }
-        let votes = read_face_votes(self.0.files.checked(&path)?)?;
+        let votes = read_face_votes(self.files.checked(&path)?)?;
         self.fits(area, &path, votes.label.len())?;
         Ok(Some(votes))
     }
 
     /// Refuses a file that tells of another number of faces than the manifest.
     fn fits(&self, area: u32, path: &Path, faces: usize) -> Result<()> {
-        match self.0.manifest.area(area) {
+        match self.manifest.area(area) {
             Some(entry) if entry.faces != faces => {
                 let message = format!("{faces} faces, and the manifest tells of {}", entry.faces);
                 Err(FileError::format(path, message).into())
@@ -180,7 +163,7 @@ impl DataSet {
     /// [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn point_count(&self, instance: &TreeInstance, ctx: &Context) -> Result<u64> {
         let path = &instance.path;
-        let mut file = self.0.files.open(path)?;
+        let mut file = self.files.open(path)?;
         let (mut block, mut lines) = (vec![0; 1 << 18], 0);
         loop {
             ctx.check()?;
@@ -205,12 +188,12 @@ impl DataSet {
         if !self.names(&path) {
             return Ok(Vec::new());
         }
-        Ok(read_instances(self.0.files.checked(&path)?)?)
+        Ok(read_instances(self.files.checked(&path)?)?)
     }
 
     /// The images of an area, by scan location and room, views by number and the panorama last.
     pub fn images(&self, area: u32) -> Vec<DatasetImage> {
-        self.0.files.images(self.layout(), area)
+        self.files.images(self.layout(), area)
     }
 
     /// Every candidate view of an area, kept or dropped; none if they are not listed yet.
@@ -219,18 +202,10 @@ impl DataSet {
     /// [`Error::File`](crate::Error::File).
     pub fn views(&self, area: u32) -> Result<Vec<ViewRecord>> {
         let path = self.layout().views_json(area);
-        if self.0.unfinished.is_some() && !self.names(&path) {
+        if self.unfinished.is_some() && !self.names(&path) {
             return Ok(Vec::new());
         }
-        Ok(read_views(self.0.files.checked(&path)?)?)
-    }
-
-    /// The photographs of an area that became views.
-    ///
-    /// # Errors
-    /// [`Error::File`](crate::Error::File).
-    pub fn photographs(&self, area: u32) -> Result<Vec<PhotographRecord>> {
-        self.0.photographs(area)
+        Ok(read_views(self.files.checked(&path)?)?)
     }
 
     /// The pose of an image.
@@ -238,7 +213,7 @@ impl DataSet {
     /// # Errors
     /// [`Error::File`](crate::Error::File).
     pub fn pose(&self, image: &DatasetImage) -> Result<PoseFile> {
-        Ok(read_pose(self.0.files.checked(&image.path(self.layout(), Domain::Pose))?)?)
+        Ok(read_pose(self.files.checked(&image.path(self.layout(), Domain::Pose))?)?)
     }
 
     /// The camera of an image of so many pixels, of which `pose` is the pose: a panorama, or the pinhole that
@@ -262,7 +237,7 @@ impl DataSet {
 
     /// Whether the list of files names this path.
     pub fn names(&self, path: &Path) -> bool {
-        self.0.files.bytes(path).is_ok()
+        self.files.bytes(path).is_ok()
     }
 
     /// The content of a file.
@@ -270,7 +245,7 @@ impl DataSet {
     /// # Errors
     /// [`Error::File`](crate::Error::File) if it is missing or damaged, or the list does not name it.
     pub fn read(&self, path: &Path) -> Result<Vec<u8>> {
-        Ok(self.0.files.read_bytes(path)?)
+        Ok(self.files.read_bytes(path)?)
     }
 
     /// The files that are gone or of another size than was written: paths below the data set's folder, and
@@ -279,7 +254,7 @@ impl DataSet {
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled); [`Error::Temporary`](crate::Error::Temporary).
     pub fn missing(&self, ctx: &Context) -> Result<BTreeMap<String, String>> {
-        let faults = self.0.files.faults(ctx, |_| true)?;
+        let faults = self.files.faults(ctx, |_| true)?;
         Ok(faults.into_iter().map(|(path, e)| (path, e.message())).collect())
     }
 }

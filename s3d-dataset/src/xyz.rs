@@ -2,12 +2,12 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::work::for_each_in_order;
+use crate::parallel::for_each_in_order;
+use crate::record::data_set::{DataSet, Listed};
+use crate::record::listing;
+use crate::record::manifest::Manifest;
 use crate::store::change::Change;
 use crate::store::lock::Lock;
-use crate::tables::dataset::{Dataset, Listed};
-use crate::tables::listing;
-use crate::tables::manifest::Manifest;
 use half::f16;
 use s3d_geom::{Camera, Raster};
 use s3d_io::Error as FileError;
@@ -52,7 +52,7 @@ pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Res
     let call = format!("s3d xyz --type {} --compression {}", options.xyz, options.compression);
     // Nobody may replace the data set meanwhile.
     Lock::during(ctx, layout, |completed| {
-        let data = Dataset::open(layout)?;
+        let data = DataSet::open_in(layout)?;
         let works = works(&data)?;
         if completed.as_ref() == Some(&call) {
             ctx.info(format_args!(
@@ -75,7 +75,7 @@ struct Work {
 }
 
 /// The images that have depth and pose, by area.
-fn works(data: &Dataset) -> Result<Vec<Work>> {
+fn works(data: &DataSet) -> Result<Vec<Work>> {
     let mut works = Vec::new();
     for area in &data.manifest.area_numbers {
         let photographs = data.photographs(*area)?;
@@ -91,7 +91,7 @@ fn works(data: &Dataset) -> Result<Vec<Work>> {
     Ok(works)
 }
 
-fn make(ctx: &Context, data: &Dataset, works: &[Work], args: &XyzOptions, call: &str) -> Result<usize> {
+fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: &str) -> Result<usize> {
     let layout = &data.layout;
     if works.is_empty() {
         return Err(FileError::format(layout.root(), "no image with both depth and pose: export them").into());

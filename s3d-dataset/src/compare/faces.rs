@@ -31,7 +31,7 @@ pub(crate) fn compare(
     let mut all = Vec::new();
     for area in areas {
         ctx.check()?;
-        let faces = |side| sides.of(side).0.manifest.area(area).map(|entry| entry.faces as u64);
+        let faces = |side| sides.of(side).manifest.area(area).map(|entry| entry.faces as u64);
         let mut changes = AreaChanges {
             area,
             faces_a: faces(Side::A),
@@ -133,7 +133,7 @@ fn patches(mesh: &TriMesh, names: &Names, changes: &[FaceChange]) -> Vec<Changed
 
 /// Reads `semantic.obj`.
 fn labelled_mesh(sides: &Sides, side: Side, names: &Names, area: u32) -> Result<Labelled> {
-    let data = &sides.of(side).0;
+    let data = sides.of(side);
     let path = data.layout.semantic_obj(area);
     data.files.checked(&path.with_extension("mtl"))?;
     let mesh = read_mesh(data.files.checked(&path)?, UpAxis::Y)?.mesh;

@@ -4,8 +4,8 @@ use super::comparison::{FileKindChanges, InputChange, SettingChange, Side};
 use super::sides::{Sides, have_same_bytes, records};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::work::for_each_in_order;
-use crate::reader::DataSet;
+use crate::parallel::for_each_in_order;
+use crate::record::data_set::DataSet;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::FileRecord;
 use serde_json::Value;
@@ -18,7 +18,7 @@ const MAX_NAMES: usize = 20;
 /// checksum.
 pub(crate) fn check(sides: &Sides, full: bool, ctx: &Context) -> Result<()> {
     let of = |(side, data): (Side, &'_ DataSet)| -> Vec<(Side, FileRecord)> {
-        data.0.files.records().map(|record| (side, record.clone())).collect()
+        data.files.records().map(|record| (side, record.clone())).collect()
     };
     let all: Vec<(Side, FileRecord)> = sides.both().into_iter().flat_map(of).collect();
     let progress = ctx.progress("checking", "files", all.len() as u64);
@@ -42,7 +42,7 @@ pub(crate) fn check(sides: &Sides, full: bool, ctx: &Context) -> Result<()> {
 
 /// The files of both, by kind. Lists are compared; no file is opened.
 pub(crate) fn changes(sides: &Sides) -> Vec<FileKindChanges> {
-    let (a, b) = (records(&sides.a.0), records(&sides.b.0));
+    let (a, b) = (records(&sides.a), records(&sides.b));
     let paths: BTreeSet<&str> = a.keys().chain(b.keys()).copied().collect();
     let mut kinds: BTreeMap<String, FileKindChanges> = BTreeMap::new();
     for path in paths {
@@ -105,7 +105,7 @@ pub(crate) fn made(sides: &Sides) -> Result<(Vec<SettingChange>, Vec<InputChange
 
 /// What made a data set, by key of its manifest.
 fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
-    let manifest = &data.0.manifest;
+    let manifest = &data.manifest;
     let mut all = BTreeMap::new();
     all.insert("version".to_owned(), Value::from(data.version()));
     all.insert("seed".to_owned(), Value::from(data.seed()));
@@ -134,7 +134,7 @@ fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
 
 /// The checksums of files and folders of the input.
 fn inputs(data: &DataSet) -> BTreeMap<(u32, String), String> {
-    let areas = &data.0.manifest.areas;
+    let areas = &data.manifest.areas;
     let of = areas
         .iter()
         .flat_map(|entry| entry.inputs.iter().map(move |input| (entry.area, input)));

@@ -8,7 +8,7 @@ use super::sides::Sides;
 use super::views::{FoundImage, ImageKey, Views};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::work::map_in_order;
+use crate::parallel::map_in_order;
 use crate::verify::images::pixels::Pixels;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, PoseFile};
@@ -269,7 +269,7 @@ impl Work<'_> {
             SameCamera::Unread => return Ok(Found::Unread),
         }
         let read = |side: Side, path: &PathBuf| {
-            let files = &self.sides.of(side).0.files;
+            let files = &self.sides.of(side).files;
             let read = files.checked(path).and_then(|path| Pixels::read(domain, path));
             self.sides.keep(side, read.map_err(Error::from))
         };
@@ -283,7 +283,7 @@ impl Work<'_> {
         let meaning = Meaning {
             depth_units: self.sides.a.options().depth_units,
             names: self.names,
-            taxonomies: [&self.sides.a, &self.sides.b].map(|data| &data.0.taxonomy),
+            taxonomies: [&self.sides.a, &self.sides.b].map(|data| &data.taxonomy),
         };
         match compare((&pixels_a, &pixels_b), domain, &meaning, pairs) {
             Ok(Some(sums)) => Ok(Found::Compared(sums)),
@@ -301,7 +301,7 @@ impl Work<'_> {
     fn means_same(&self, domain: Domain) -> bool {
         match domain {
             Domain::SemanticClass => {
-                let [a, b] = [&self.sides.a, &self.sides.b].map(|data| data.0.taxonomy.classes());
+                let [a, b] = [&self.sides.a, &self.sides.b].map(|data| data.taxonomy.classes());
                 a.iter()
                     .map(|class| class.name())
                     .eq(b.iter().map(|class| class.name()))

@@ -2,8 +2,7 @@
 
 use super::comparison::{ComparedSet, Side, UnreadFile};
 use crate::error::{Error, Result};
-use crate::reader::DataSet;
-use crate::tables::dataset::Dataset;
+use crate::record::data_set::DataSet;
 use s3d_io::dataset::{FileRecord, Layout};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -55,7 +54,7 @@ impl Sides {
 
     /// Whether both lists give these files the same bytes; false if one does not name it.
     pub(crate) fn are_same(&self, a: &Path, b: &Path) -> bool {
-        let [a, b] = [(&self.a, a), (&self.b, b)].map(|(data, path)| data.0.files.record(path));
+        let [a, b] = [(&self.a, a), (&self.b, b)].map(|(data, path)| data.files.record(path));
         a.is_ok_and(|a| b.is_ok_and(|b| have_same_bytes(a, b)))
     }
 
@@ -80,7 +79,7 @@ impl Sides {
 
     /// How a file is called below the data set's folder.
     pub(crate) fn name(&self, side: Side, path: &Path) -> String {
-        self.of(side).0.files.name(path)
+        self.of(side).files.name(path)
     }
 
     /// The files that could not be compared, by side and path.
@@ -94,7 +93,7 @@ impl Sides {
 }
 
 /// The records of a data set by path.
-pub(crate) fn records(data: &Dataset) -> BTreeMap<&str, &FileRecord> {
+pub(crate) fn records(data: &DataSet) -> BTreeMap<&str, &FileRecord> {
     data.files
         .records()
         .map(|record| (record.path.as_str(), record))

@@ -1,29 +1,33 @@
 //! One area of an export: labelled, scored, rendered, with its meshes and points.
 
+use crate::account::Account;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::event::{Stage, UnitKind};
+use crate::event::UnitKind;
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
 use crate::export::input::AreaInput;
 use crate::export::input::pictures::Pictures;
-use crate::export::labels::annotate::{Annotated, annotate, hidden_instances, unannotated};
-use crate::export::labels::area_plan::{AreaPlan, RoomNames};
+use crate::export::labels::annotate::{annotate, hidden_instances, unannotated};
 use crate::export::labels::overlap::overlap_doubts;
-use crate::export::location::{Located, locate, look_around, room_of};
+use crate::export::location::{Located, locate, room_of};
 use crate::export::modality::{Channels, classes_of_labels, palette};
 use crate::export::photographs::{self, WrittenPhotograph, judge_sight};
 use crate::export::points::write_points;
-use crate::export::views::{Candidate, Kinds, Scoring, score_area};
+use crate::export::shard::plan::Plan;
+use crate::export::views::{Kinds, Scoring, score_area};
 use crate::options::ExportOptions;
-use crate::shard::plan::Plan;
-use crate::store::journal::{
+use crate::record::journal::{
     AssetsDone, Done, Journal, LabelsDone, LocationDone, ScoresDone, Unit, tally_of,
 };
-use crate::tables::account::Account;
-use crate::tables::listing;
-use crate::tables::manifest::{AreaEntry, XyzLoss};
-use crate::tables::records;
-use crate::tables::summary::Unlabelled;
+use crate::record::listing;
+use crate::record::manifest::{AreaEntry, XyzLoss};
+use crate::record::tables;
+use crate::stage::Stage;
+use crate::summary::Unlabelled;
+use crate::survey::annotated::Annotated;
+use crate::survey::candidate::Candidate;
+use crate::survey::labelled_area::LabelledArea;
+use crate::survey::outlook::look_around;
 use crate::useful::{Finding, judge, label_findings, mesh_findings, outlook_findings, size_findings};
 use s3d_geom::{Density, NearestFaces, TriMesh};
 use s3d_io::camera::ScanLocation;
@@ -114,15 +118,15 @@ fn label_files(layout: &Layout, area: u32) -> [PathBuf; 6] {
 
 /// An area that was labelled before, if it can be taken as it is: not where the files of its labels are still
 /// to be written.
-pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<AreaPlan> {
+pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<LabelledArea> {
     let ctx = common.account.ctx;
     let unit = Unit::Labels(area);
     let folder = common.cache_of(area);
     let writes = (common.is_ours)(&unit) && !common.journal.finished().has(&unit);
-    if writes || !AreaPlan::is_in(&folder) {
+    if writes || !LabelledArea::is_in(&folder) {
         return None;
     }
-    match common.table.taxonomy().reading(|| AreaPlan::read(&folder, area)) {
+    match common.table.taxonomy().reading(|| LabelledArea::read(&folder, area)) {
         Ok(plan) => Some(plan),
         Err(e) => {
             ctx.warn(format_args!("{e}; the area is labelled again"));
@@ -138,7 +142,7 @@ pub(crate) fn label_area(
     prepared: &PreparedMesh<'_>,
     nearest: NearestFaces<'_>,
     common: Common<'_>,
-) -> Result<AreaPlan> {
+) -> Result<LabelledArea> {
     let Common { table, layout, options, journal, account, is_ours, .. } = common;
     let ctx = &account.ctx.noting();
     let number = area.number;
@@ -171,8 +175,8 @@ pub(crate) fn label_area(
         })?;
         if writes {
             let disputes = Disputes::of(&file.mesh, &votes, table);
-            records::write_votes(layout, number, &annotated, &disputes, table)?;
-            records::write_face_votes(layout, number, &annotated.label_of_face, &votes)?;
+            tables::write_votes(layout, number, &annotated, &disputes, table)?;
+            tables::write_face_votes(layout, number, &annotated.label_of_face, &votes)?;
         }
         annotated
     } else {
@@ -201,10 +205,10 @@ pub(crate) fn label_area(
     let mut warnings: Vec<String> = area.doubts(file).cloned().collect();
     warnings.extend(mesh_doubts(area, &file.mesh, options)?.iter().map(Finding::text));
     warnings.extend(ctx.take_notes());
-    let plan = AreaPlan {
+    let plan = LabelledArea {
         area: number,
         annotated,
-        names: RoomNames::of(&area.rooms),
+        names: area.room_names(),
         locations,
         location_rooms,
         surface_seen,
@@ -224,8 +228,8 @@ pub(crate) fn label_area(
         let mut files = Vec::new();
         if let Some(instances) = instances {
             instances.finish()?;
-            records::write_rooms(layout, number, &plan.annotated)?;
-            records::write_instance_numbers(layout, number, &plan.names)?;
+            tables::write_rooms(layout, number, &plan.annotated)?;
+            tables::write_instance_numbers(layout, number, &plan.names)?;
             files = listing::records(ctx, layout, &paths)?;
         }
         let tally = tally_of(&files);
@@ -256,7 +260,7 @@ pub(crate) fn label_doubts(area: &AreaInput, annotated: &Annotated, table: &Labe
 }
 
 /// Tells the journal of an area's labels, if it does not know of them: their files are another's work.
-pub(crate) fn know_labels(area: &AreaInput, plan: &AreaPlan, common: &Common<'_>) {
+pub(crate) fn know_labels(area: &AreaInput, plan: &LabelledArea, common: &Common<'_>) {
     if !common.journal.finished().has(&Unit::Labels(area.number)) {
         common
             .journal
@@ -265,7 +269,7 @@ pub(crate) fn know_labels(area: &AreaInput, plan: &AreaPlan, common: &Common<'_>
 }
 
 /// Takes an area's labels and scores from a plan: their files if they are ours, and the scores that are.
-pub(crate) fn take_from_plan(area: &AreaInput, from: &Plan, common: &Common<'_>) -> Result<AreaPlan> {
+pub(crate) fn take_from_plan(area: &AreaInput, from: &Plan, common: &Common<'_>) -> Result<LabelledArea> {
     let Common { layout, options, journal, account, is_ours, .. } = *common;
     let started = Instant::now();
     let number = area.number;
@@ -295,7 +299,7 @@ pub(crate) fn take_from_plan(area: &AreaInput, from: &Plan, common: &Common<'_>)
 
 fn labels_done(
     area: &AreaInput,
-    plan: &AreaPlan,
+    plan: &LabelledArea,
     options: &ExportOptions,
     files: Vec<FileRecord>,
 ) -> LabelsDone {
@@ -305,7 +309,7 @@ fn labels_done(
 }
 
 /// The locations of an area whose candidates are ours to score and are not scored yet.
-fn unscored<'p>(plan: &'p AreaPlan, common: &Common<'_>) -> Vec<&'p ScanLocation> {
+fn unscored<'p>(plan: &'p LabelledArea, common: &Common<'_>) -> Vec<&'p ScanLocation> {
     let unit = |l: &ScanLocation| Unit::Scores(plan.area, l.uuid.clone());
     let mut todo: Vec<&ScanLocation> = {
         let finished = common.journal.finished();
@@ -317,12 +321,12 @@ fn unscored<'p>(plan: &'p AreaPlan, common: &Common<'_>) -> Vec<&'p ScanLocation
 }
 
 /// Whether something of an area is still to be scored.
-pub(crate) fn is_unscored(plan: &AreaPlan, common: &Common<'_>) -> bool {
+pub(crate) fn is_unscored(plan: &LabelledArea, common: &Common<'_>) -> bool {
     !unscored(plan, common).is_empty()
 }
 
 /// Scores the candidates of those locations of an area that are ours and not scored yet.
-pub(crate) fn score(plan: &AreaPlan, prepared: &PreparedMesh<'_>, common: Common<'_>) -> Result<()> {
+pub(crate) fn score(plan: &LabelledArea, prepared: &PreparedMesh<'_>, common: Common<'_>) -> Result<()> {
     let ctx = common.account.ctx;
     let Common { table, options, journal, account, .. } = common;
     let number = plan.area;
@@ -349,7 +353,7 @@ pub(crate) fn score(plan: &AreaPlan, prepared: &PreparedMesh<'_>, common: Common
 }
 
 /// Refuses labels of another mesh.
-fn check_faces(plan: &AreaPlan, prepared: &PreparedMesh<'_>) -> Result<()> {
+fn check_faces(plan: &LabelledArea, prepared: &PreparedMesh<'_>) -> Result<()> {
     let (labels, faces) = (plan.annotated.label_of_face.len(), prepared.file.mesh.faces().len());
     if labels == faces {
         return Ok(());
@@ -358,7 +362,7 @@ fn check_faces(plan: &AreaPlan, prepared: &PreparedMesh<'_>) -> Result<()> {
 }
 
 /// What the manifest tells of an area that is labelled.
-fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> AreaEntry {
+fn area_entry(area: &AreaInput, plan: &LabelledArea, options: &ExportOptions) -> AreaEntry {
     AreaEntry {
         area: area.number,
         faces: plan.annotated.label_of_face.len(),
@@ -383,7 +387,12 @@ fn area_entry(area: &AreaInput, plan: &AreaPlan, options: &ExportOptions) -> Are
 }
 
 /// Writes an area's meshes and points, all but its images.
-fn write_area_assets(area: &AreaInput, file: &MeshFile, plan: &AreaPlan, common: Common<'_>) -> Result<()> {
+fn write_area_assets(
+    area: &AreaInput,
+    file: &MeshFile,
+    plan: &LabelledArea,
+    common: Common<'_>,
+) -> Result<()> {
     let ctx = common.account.ctx;
     let Common { table, layout, options, journal, account, .. } = common;
     let (number, started) = (area.number, Instant::now());
@@ -469,7 +478,7 @@ fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
 pub(crate) fn render_area(
     area: &AreaInput,
     prepared: &PreparedMesh<'_>,
-    plan: &AreaPlan,
+    plan: &LabelledArea,
     pictures: Option<&Pictures>,
     common: Common<'_>,
     candidates: &[Candidate],
@@ -477,7 +486,7 @@ pub(crate) fn render_area(
 ) -> Result<()> {
     let ctx = common.account.ctx;
     let Common { layout, options, journal, account, .. } = common;
-    let AreaPlan { annotated, locations, location_rooms, .. } = plan;
+    let LabelledArea { annotated, locations, location_rooms, .. } = plan;
     let PreparedMesh { file, scene } = prepared;
     let number = area.number;
     check_faces(plan, prepared)?;

@@ -6,14 +6,15 @@ use crate::error::{Error, Result};
 use crate::export::photographs::doubts;
 use crate::export::views::select_requested;
 use crate::profile::{self};
-use crate::store::journal::{Finished, Unit};
-use crate::store::request::Request;
-use crate::tables::dataset::Listed;
-use crate::tables::listing;
-use crate::tables::manifest::{AreaEntry, Manifest};
-use crate::tables::records;
-use crate::tables::statistics::Statistics;
-use crate::tables::summary::{UnitTally, Unlabelled, ViewTally};
+use crate::record::data_set::Listed;
+use crate::record::journal::Finished;
+use crate::record::listing;
+use crate::record::manifest::{AreaEntry, Manifest};
+use crate::record::missing::missing_units;
+use crate::record::request::Request;
+use crate::record::statistics::Statistics;
+use crate::record::tables;
+use crate::summary::{UnitTally, Unlabelled, ViewTally};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FileRecord, Frame, Layout, PhotographRecord};
 use s3d_io::fs::{SyncAhead, create_dir, sync_data_set, sync_file, write_json};
@@ -34,35 +35,6 @@ pub(crate) struct Totals {
     /// What became of the candidate views.
     pub(crate) views: ViewTally,
     pub(crate) unlabelled: Option<Unlabelled>,
-}
-
-/// The units that are still to be done of a request, as far as they are known: those of an area's locations
-/// only once its labels are done.
-pub(crate) fn missing_units(request: &Request, finished: &Finished) -> Vec<Unit> {
-    let mut missing = Vec::new();
-    for area in request.numbers() {
-        let Some(labels) = finished.labels(area) else {
-            missing.push(Unit::Labels(area));
-            continue;
-        };
-        for uuid in &labels.locations {
-            missing.push(Unit::Scores(area, uuid.clone()));
-            if is_chosen(request, uuid) {
-                missing.push(Unit::Location(area, uuid.clone()));
-            }
-        }
-        let photographs = labels.photographs.iter().filter(|uuid| is_chosen(request, uuid));
-        missing.extend(photographs.map(|uuid| Unit::Photograph(area, uuid.clone())));
-        missing.push(Unit::Assets(area));
-    }
-    missing.retain(|unit| !finished.has(unit));
-    missing
-}
-
-/// Whether a location's images are asked for.
-pub(crate) fn is_chosen(request: &Request, uuid: &str) -> bool {
-    let only = &request.options.only;
-    only.is_empty() || only.iter().any(|o| o == uuid)
 }
 
 /// Writes the tables, the list of files and, when all of it is on the disk, the manifest that says that the
@@ -90,7 +62,7 @@ pub(crate) fn finish(
     let mut all_unlabelled: Option<Unlabelled> = None;
     for requested in &request.areas {
         let area = requested.area;
-        records::write_views(layout, area, &candidates)?;
+        tables::write_views(layout, area, &candidates)?;
         let Some(labels) = finished.labels(area) else { continue };
         let photographs: Vec<&PhotographRecord> =
             finished.photographs(area).map(|done| &done.record).collect();
@@ -148,8 +120,8 @@ pub(crate) fn finish(
     }
     ctx.check()?;
     let folds = folds(&areas);
-    records::write_splits(layout, &folds)?;
-    records::write_lists(ctx, layout, &areas, &folds)?;
+    tables::write_splits(layout, &folds)?;
+    tables::write_lists(ctx, layout, &areas, &folds)?;
     let taxonomy = manifest.read_taxonomy(layout, |_| Ok(()))?;
     write_profiles(ctx, layout, request, &areas, &files, &taxonomy)?;
     let of_labels = Some(&taxonomy).filter(|_| manifest.is_labelled());

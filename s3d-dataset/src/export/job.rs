@@ -1,26 +1,28 @@
 //! The work of an export: units of labels, scores, images and assets, done where they are not done yet.
 
+use crate::account::Account;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::event::Stage;
 use crate::export::area::{self, Common, PreparedMesh, mesh_doubts};
-use crate::export::finish::{Totals, finish, missing_units};
+use crate::export::finish::{Totals, finish};
 use crate::export::input::cameras::Cameras;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::requested::requested_areas;
 use crate::export::input::{AreaInput, Inputs};
-use crate::export::labels::area_plan::AreaPlan;
-use crate::export::views::{Candidate, select_requested};
+use crate::export::shard::plan::Plan;
+use crate::export::views::select_requested;
 use crate::options::ExportOptions;
-use crate::shard::plan::Plan;
-use crate::store::journal::{Journal, Unit};
+use crate::record::assets;
+use crate::record::journal::{Journal, Unit};
+use crate::record::manifest::Manifest;
+use crate::record::missing::missing_units;
+use crate::record::request::Request;
+use crate::stage::Stage;
 use crate::store::output::{self, Begin};
-use crate::store::request::Request;
-use crate::tables::account::Account;
-use crate::tables::assets;
-use crate::tables::manifest::Manifest;
-use crate::tables::summary::Summary;
+use crate::summary::Summary;
+use crate::survey::candidate::Candidate;
+use crate::survey::labelled_area::LabelledArea;
 use crate::useful::{Estimate, judge, space_findings};
 use s3d_geom::NearestFaces;
 use s3d_io::dataset::{Domain, Layout};
@@ -58,7 +60,7 @@ pub(crate) struct Job<'a> {
 /// What is known after labelling: by area, unless all of it was done before.
 pub(crate) struct Labelled<'j> {
     single: Option<PreparedMesh<'j>>,
-    pub(crate) areas: Vec<Option<AreaPlan>>,
+    pub(crate) areas: Vec<Option<LabelledArea>>,
 }
 
 /// Which areas are labelled.
@@ -133,7 +135,7 @@ impl<'a> Job<'a> {
         };
         let options = &options;
         check_only(&inputs, &options.only)?;
-        output::check_inputs(layout, &inputs)?;
+        output::check_inputs(layout, inputs.numbers(), inputs.areas.iter().flat_map(|area| &area.files))?;
         check_label_count(inputs.table.len() - 1)?;
         let mut pictures = Vec::new();
         for area in &inputs.areas {
@@ -240,7 +242,7 @@ impl<'a> Job<'a> {
         area: &AreaInput,
         common: Common<'_>,
         single: &mut Option<PreparedMesh<'j>>,
-    ) -> Result<AreaPlan> {
+    ) -> Result<LabelledArea> {
         let before = area::labelled_before(area.number, &common);
         if let Some(plan) = &before {
             area::know_labels(area, plan, &common);

@@ -3,7 +3,7 @@
 
 use crate::context::{Context, Progress};
 use crate::error::Result;
-use crate::export::labels::area_plan::AreaPlan;
+use crate::survey::labelled_area::LabelledArea;
 use glam::DVec3;
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::cloud::{MatWriter, PlyPointWriter, S3disAreaWriter};
@@ -25,7 +25,7 @@ pub(crate) fn write_points(
     ctx: &Context,
     layout: &Layout,
     mesh: &TriMesh,
-    plan: &AreaPlan,
+    plan: &LabelledArea,
     table: &LabelTable,
     (density, seed): (Density, u64),
     offset_m: DVec3,

@@ -2,49 +2,20 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::work::for_each_in_order;
-use crate::store::journal::Finished;
-use crate::store::request::Request;
-use crate::tables::summary::ViewTally;
+use crate::parallel::for_each_in_order;
+use crate::record::journal::Finished;
+use crate::record::request::Request;
+use crate::summary::ViewTally;
+use crate::survey::candidate::Candidate;
 use glam::{Vec3, vec3};
 use rayon::prelude::*;
-use s3d_geom::{Camera, TriMesh};
+use s3d_geom::TriMesh;
 use s3d_io::camera::ScanLocation;
 use s3d_label::{LabelId, LabelTable, MAX_CLASSES};
 use s3d_render::{Caster, Hits, NO_FACE, Scene};
 use s3d_sample::{Pool, PoolItem, Selection, View, ViewDistribution, draw_view, entropy, select_pooled};
-use serde::Serialize;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
-
-/// A candidate view of a scan location.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct Candidate {
-    /// Number of its area.
-    #[serde(skip)]
-    pub(crate) area: u32,
-    /// Index of its location in the area's camera table.
-    #[serde(skip)]
-    pub(crate) location: usize,
-    pub(crate) camera_uuid: String,
-    /// From 0: what its draw is keyed by.
-    pub(crate) candidate: u32,
-    pub(crate) yaw_rad: f64,
-    pub(crate) pitch_rad: f64,
-    pub(crate) fov_rad: f64,
-    /// Shannon entropy of what its pixels show ([`Kinds`]), nats.
-    pub(crate) entropy: f64,
-    /// The number in its files' names, if it is kept: kept views of a location count from 0.
-    pub(crate) frame_num: Option<u32>,
-}
-
-impl Candidate {
-    /// The camera that takes it, `size` × `size` pixels.
-    pub(crate) fn camera(&self, location: &ScanLocation, size: u32) -> Camera {
-        let pose = location.pose.turned(self.yaw_rad, self.pitch_rad);
-        Camera::perspective(pose, self.fov_rad, size, size)
-    }
-}
 
 /// What a view shows in a pixel, by the pixel's face: views are scored by the entropy of it.
 pub(crate) enum Kinds {
@@ -273,8 +244,8 @@ pub(crate) fn select(candidates: &mut [Candidate], pool: Pool, keep_all: bool, s
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::journal::{Done, LabelsDone, ScoresDone};
-    use crate::store::request::tests::request;
+    use crate::record::journal::{Done, LabelsDone, ScoresDone};
+    use crate::record::request::tests::request;
     use s3d_geom::Raster;
 
     #[test]

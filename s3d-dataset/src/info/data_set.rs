@@ -3,8 +3,8 @@
 use super::{InfoOptions, SceneInfo, info};
 use crate::context::Context;
 use crate::error::Result;
-use crate::tables::dataset::Dataset;
-use crate::tables::summary::{Surface, Unlabelled, size};
+use crate::record::data_set::DataSet;
+use crate::summary::{Surface, Unlabelled, size};
 use s3d_io::dataset::Layout;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,7 @@ pub struct DataSetInfo {
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn data_set_info(folder: &Path, ctx: &Context) -> Result<DataSetInfo> {
     let layout = Layout::new(folder);
-    let Dataset { manifest, taxonomy, .. } = Dataset::open(&layout)?;
+    let DataSet { manifest, taxonomy, .. } = DataSet::open_in(&layout)?;
     let of_areas = manifest.areas.iter();
     let unlabelled = of_areas
         .clone()

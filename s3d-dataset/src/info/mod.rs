@@ -11,9 +11,11 @@ use crate::export::finish::MUCH_UNLABELLED;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::{AreaInput, Inputs};
-use crate::export::labels::annotate::{Annotated, annotate, unannotated};
-use crate::export::location::{Located, locate, look_around, room_name, unlabelled_share};
+use crate::export::labels::annotate::{annotate, unannotated};
+use crate::export::location::{Located, locate, room_name};
 use crate::options::ExportOptions;
+use crate::survey::annotated::Annotated;
+use crate::survey::outlook::{look_around, unlabelled_share};
 use crate::useful::{
     Estimate, Finding, Headroom, Storey, label_findings, mesh_findings, outlook_findings, size_findings,
     stops_any,

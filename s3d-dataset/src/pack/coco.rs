@@ -5,7 +5,7 @@ use super::options::SpecificOptions;
 use super::source::Source;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::work::map_in_order;
+use crate::parallel::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
 use s3d_io::fs::{create_dir, write_bytes};

@@ -6,7 +6,7 @@ use super::options::SpecificOptions;
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::work::map_in_order;
+use crate::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::create_dir;
 use s3d_io::package::{ColmapImage, ColmapModel};

@@ -7,7 +7,7 @@ use super::options::{DepthFiles, SpecificOptions};
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::work::map_in_order;
+use crate::parallel::map_in_order;
 use crate::store::new_folder::resolved;
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;

@@ -3,7 +3,7 @@
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::work::map_in_order;
+use crate::parallel::map_in_order;
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, ViewRecord};

@@ -3,7 +3,7 @@
 use super::options::PackedImages;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::tables::dataset::{Dataset, Listed};
+use crate::record::data_set::{DataSet, Listed};
 use s3d_geom::{PointCloud, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
@@ -38,13 +38,13 @@ pub(crate) struct Source {
 impl Source {
     /// Opens the complete data set in `root`.
     pub(crate) fn open(ctx: &Context, root: &Path, areas: &[u32], which: PackedImages) -> Result<Self> {
-        let data = Dataset::open(&Layout::new(root))?;
+        let data = DataSet::open_in(&Layout::new(root))?;
         let mut photographs = BTreeMap::new();
         for &area in &data.manifest.area_numbers {
             let of_area = data.photographs(area)?.into_iter();
             photographs.extend(of_area.map(|record| ((area, record.camera_uuid.clone()), record)));
         }
-        let Dataset { layout, manifest, files, taxonomy, .. } = data;
+        let DataSet { layout, manifest, files, taxonomy, .. } = data;
         let there = &manifest.area_numbers;
         if let Some(area) = areas.iter().find(|a| !there.contains(a)) {
             let there: Vec<String> = there.iter().map(u32::to_string).collect();

@@ -5,7 +5,7 @@ use super::options::{ShardPrefix, SpecificOptions};
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::work::map_in_order;
+use crate::parallel::map_in_order;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use s3d_io::dataset::{DatasetImage, Domain, Frame};

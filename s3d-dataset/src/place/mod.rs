@@ -5,10 +5,10 @@ pub(crate) mod free_space;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::input::cameras::SHARE;
-use crate::export::labels::annotate::SurveyedRoom;
-use crate::export::location::{LOW_COVERAGE, Outlook};
 use crate::options::ExportOptions;
+use crate::options::placing::SHARE;
+use crate::survey::annotated::SurveyedRoom;
+use crate::survey::outlook::{LOW_COVERAGE, Outlook};
 use glam::{DVec3, Vec3, dvec3};
 use s3d_geom::{Density, NearestFaces, PointCloud, Pose, SurfaceSampler, TriMesh};
 use s3d_io::camera::{ScanLocation, uuid_from_name};

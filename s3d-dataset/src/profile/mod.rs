@@ -4,7 +4,6 @@
 //! text files piece by piece; what is in memory does not grow with a room.
 
 mod arrays;
-pub(crate) mod loader;
 mod open3d_ml;
 mod pickle;
 mod pointcept;
@@ -12,13 +11,13 @@ pub(crate) mod room;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::work::for_each_in_order;
+pub(crate) use crate::options::profile::Profile;
+use crate::parallel::for_each_in_order;
+use crate::record::data_set::{DataSet, Listed};
+use crate::record::listing;
+use crate::record::manifest::Manifest;
 use crate::store::change::Change;
 use crate::store::lock::Lock;
-use crate::tables::dataset::{Dataset, Listed};
-use crate::tables::listing;
-use crate::tables::manifest::Manifest;
-pub(crate) use loader::Profile;
 use room::{TreeRoom, rooms_of};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
@@ -65,11 +64,11 @@ pub fn profile(
             ));
             return Ok(());
         }
-        add(ctx, &Dataset::open(layout)?, &wanted, options.overwrite, &call)
+        add(ctx, &DataSet::open_in(layout)?, &wanted, options.overwrite, &call)
     })
 }
 
-fn add(ctx: &Context, data: &Dataset, wanted: &[Profile], overwrite: bool, call: &str) -> Result<()> {
+fn add(ctx: &Context, data: &DataSet, wanted: &[Profile], overwrite: bool, call: &str) -> Result<()> {
     let layout = &data.layout;
     let dirs: Vec<PathBuf> = wanted
         .iter()

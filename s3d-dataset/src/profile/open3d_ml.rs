@@ -128,7 +128,7 @@ impl OrientedBox {
 mod tests {
     use super::*;
     use crate::context::Context;
-    use crate::tables::dataset::Listed;
+    use crate::record::data_set::Listed;
     use s3d_io::dataset::{FileRecord, Layout};
     use s3d_label::Class;
 

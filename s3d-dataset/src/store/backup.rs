@@ -2,9 +2,9 @@
 //! state that has one meaning. The states are those of [`output`](super::output).
 
 use crate::error::{Error, Result};
+use crate::record::manifest::Head;
+use crate::record::request::{begun_by_other_version, read_request};
 use crate::store::change;
-use crate::store::output::{begun_by_other_version, read_request};
-use crate::tables::manifest::Head;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;

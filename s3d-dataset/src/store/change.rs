@@ -7,23 +7,14 @@
 //! the lock completes it.
 
 use crate::error::Result;
+use crate::record::pending_change::{Ready, folder, pending, ready_file};
 use crate::store::backup::{remove, rename};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::{create_dir, read_json, sync_data_set, sync_file, write_json};
-use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-
-/// What `ready` holds.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Ready {
-    /// The call that makes the change, in words: the same words are the same call.
-    call: String,
-    /// Folders that give way as a whole, from the data set's.
-    replaced: Vec<PathBuf>,
-}
 
 /// A change that is being written.
 pub(crate) struct Change {
@@ -31,27 +22,8 @@ pub(crate) struct Change {
     staged: Layout,
 }
 
-fn folder(layout: &Layout) -> PathBuf {
-    layout.work_dir().join("change")
-}
-
-fn ready(layout: &Layout) -> PathBuf {
-    folder(layout).join("ready")
-}
-
 fn staged(layout: &Layout) -> Layout {
     Layout::new(folder(layout).join("new"))
-}
-
-/// The call whose change is not completed, if there is one: the data set is half of the old and half of the
-/// new then.
-pub(crate) fn pending(layout: &Layout) -> Result<Option<String>, FileError> {
-    let path = ready(layout);
-    match fs::symlink_metadata(&path) {
-        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
-        Err(e) => Err(FileError::io(&path, "look for", e)),
-        Ok(_) => read_json::<Ready>(&path).map(|ready| Some(ready.call)),
-    }
 }
 
 /// Completes a change that is ready, and removes one that is not. Returns the call that made the first. The
@@ -106,7 +78,7 @@ impl Drop for Change {
 /// Moves what is there still of a change that is ready to its place. Every step can be made again.
 fn complete(layout: &Layout) -> Result<()> {
     let (staged, root) = (staged(layout), layout.root());
-    let path = ready(layout);
+    let path = ready_file(layout);
     let Ready { replaced, .. } = read_json(&path)?;
     for folder in &replaced {
         let (from, to) = (staged.root().join(folder), root.join(folder));
@@ -242,7 +214,7 @@ mod tests {
         for killed_after in 0..=steps.len() {
             let (_dir, layout, change) = begun();
             let ready = Ready { call: CALL.to_owned(), replaced: vec!["profiles/pointnet".into()] };
-            write_json(&super::ready(&layout), &ready).unwrap();
+            write_json(&ready_file(&layout), &ready).unwrap();
             let new = change.staged().root().to_owned();
             drop(change);
             steps[..killed_after].iter().for_each(|step| step(layout.root(), &new));

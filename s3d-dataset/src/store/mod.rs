@@ -2,13 +2,10 @@
 
 pub(crate) mod backup;
 pub(crate) mod change;
-pub(crate) mod checked;
-pub(crate) mod journal;
 pub(crate) mod lock;
 pub(crate) mod new_file;
 pub(crate) mod new_folder;
 pub(crate) mod output;
-pub(crate) mod request;
 pub(crate) mod staging;
 
 use crate::error::{Error, Result};

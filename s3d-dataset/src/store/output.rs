@@ -14,23 +14,23 @@
 //! | – | – or running | there | the new one had not begun, or failed for good: the earlier one comes back |
 //! | – | running | – | the rest of an export of a version without a journal: nobody's |
 
+use crate::account::Account;
 use crate::context::Context;
 use crate::error::{Error, Result, passes};
-use crate::export::input::Inputs;
+use crate::record::journal::{Done, Finished, Journal};
+use crate::record::listing::remove_parts;
+use crate::record::manifest::{Head, Manifest};
+use crate::record::request::Request;
+use crate::record::request::{begun_by_other_version, read_request};
 use crate::store::backup::{
     BACKUP, MOVING, TRASH, clear, discard, move_entries, recover, remove, rename, restore,
 };
-use crate::store::journal::{Done, Finished, Journal};
 use crate::store::lock::{Lock, Sharing};
-use crate::store::request::Request;
-use crate::tables::account::Account;
-use crate::tables::listing::remove_parts;
-use crate::tables::manifest::{Head, Manifest, if_there};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Layout, read_file_list};
-use s3d_io::fs::{read_json, sync_data_set, sync_file, write_bytes, write_json};
-use serde::Deserialize;
+use s3d_io::fs::{sync_data_set, sync_file, write_bytes, write_json};
 use std::fs;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// How many differences are named in a message.
@@ -85,28 +85,30 @@ pub(crate) fn is_working_name(name: &std::ffi::OsStr) -> bool {
     name == ".s3d" || name.starts_with(".s3d-")
 }
 
-/// Refuses an OUT in which the data set, or an earlier one that it replaces, would lie on its own input, or
-/// in its annotations.
-pub(crate) fn check_inputs(layout: &Layout, inputs: &Inputs) -> Result<()> {
+/// Refuses an OUT in which the data set, or an earlier one that it replaces, would lie on its own input: on one
+/// of the files or folders `inputs` of the areas with these numbers.
+pub(crate) fn check_inputs<'p>(
+    layout: &Layout,
+    mut areas: Vec<u32>,
+    inputs: impl Iterator<Item = &'p PathBuf>,
+) -> Result<()> {
     let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
-    // Those of a data set that is there go, too, if it has other areas.
-    let mut areas = inputs.numbers();
+
+    // The areas of a data set that is there give way too.
     areas.extend(Head::read(&layout.manifest())?.map_or(Vec::new(), |head| head.area_numbers));
     areas.extend(read_request(layout)?.map_or(Vec::new(), |request| request.numbers()));
     let mut entries = Layout::new(&root).entries(&areas);
     entries.push(root.join(BACKUP));
-    for area in &inputs.areas {
-        for path in &area.files {
-            let Ok(input) = fs::canonicalize(path) else { continue };
-            if entries.iter().any(|entry| input.starts_with(entry))
-                || input.is_dir() && root.starts_with(&input)
-            {
-                return Err(Error::Usage(format!(
-                    "{}: the data set would be written over its own input {}: choose another folder",
-                    layout.root().display(),
-                    path.display()
-                )));
-            }
+
+    for path in inputs {
+        let Ok(input) = fs::canonicalize(path) else { continue };
+        if entries.iter().any(|entry| input.starts_with(entry)) || input.is_dir() && root.starts_with(&input)
+        {
+            return Err(Error::Usage(format!(
+                "{}: the data set would be written over its own input {}: choose another folder",
+                layout.root().display(),
+                path.display()
+            )));
         }
     }
     Ok(())
@@ -157,27 +159,6 @@ fn find(layout: &Layout, request: &Request) -> Result<Found> {
         },
         (None, None) => Found::Nothing,
     })
-}
-
-/// The request of an unfinished export, if there is one.
-///
-/// # Errors
-/// It cannot be read now: as [`if_there`].
-pub(crate) fn read_request(layout: &Layout) -> Result<Option<Request>> {
-    if_there(read_json(&layout.request()))
-}
-
-/// The version of s3d that began an unfinished export whose request this one cannot read, for it has other
-/// options.
-pub(crate) fn begun_by_other_version(layout: &Layout) -> Result<Option<String>> {
-    #[derive(Deserialize)]
-    struct Of {
-        version: String,
-    }
-    let of: Option<Of> = if_there(read_json(&layout.request()))?;
-    Ok(of
-        .map(|of| of.version)
-        .filter(|version| version != env!("CARGO_PKG_VERSION")))
 }
 
 /// How an export begins.
@@ -438,7 +419,7 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
     };
     let faults = if exactly {
         let files: Vec<_> = records.iter().collect();
-        crate::tables::listing::faults(ctx, layout, &files)?
+        crate::record::listing::faults(ctx, layout, &files)?
             .into_iter()
             .map(|(_, fault)| fault)
             .collect()

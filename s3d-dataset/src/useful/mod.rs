@@ -13,85 +13,12 @@ pub use headroom::Storey;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::labels::annotate::{Annotated, SurveyedRoom};
-use crate::export::location::{LOW_COVERAGE, Outlook};
-use crate::tables::manifest::half_step;
+use crate::options::condition::Condition;
+use crate::record::manifest::half_step;
+use crate::survey::annotated::{Annotated, SurveyedRoom};
+use crate::survey::outlook::{LOW_COVERAGE, Outlook};
 use s3d_geom::{Aabb, TriMesh};
 use s3d_label::{Class, LabelId, LabelTable, VoteReport};
-use std::fmt;
-use std::str::FromStr;
-
-/// What a data set must be to be of use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum Condition {
-    /// The mesh has colours where RGB images are made from it.
-    Colour,
-    /// Scan locations see the mesh in most directions.
-    Coverage,
-    /// Mesh and annotations lie on each other.
-    Frame,
-    /// Scan locations see the front of faces.
-    InsideOut,
-    /// Faces get labels.
-    Labels,
-    /// There are not many more scan locations than the floor needs.
-    Locations,
-    /// Mesh and rooms are as large as buildings are.
-    Scale,
-    /// The data set fits on the disk.
-    Size,
-    /// Floors and ceilings are level.
-    Up,
-}
-
-impl Condition {
-    /// All of them, by name.
-    pub const ALL: [Self; 9] = [
-        Self::Colour,
-        Self::Coverage,
-        Self::Frame,
-        Self::InsideOut,
-        Self::Labels,
-        Self::Locations,
-        Self::Scale,
-        Self::Size,
-        Self::Up,
-    ];
-
-    /// Its name, as `--allow` takes it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Colour => "colour",
-            Self::Coverage => "coverage",
-            Self::Frame => "frame",
-            Self::InsideOut => "inside-out",
-            Self::Labels => "labels",
-            Self::Locations => "locations",
-            Self::Scale => "scale",
-            Self::Size => "size",
-            Self::Up => "up",
-        }
-    }
-}
-
-impl fmt::Display for Condition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Condition {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let names = Self::ALL.map(Self::name).join(", ");
-        Self::ALL
-            .into_iter()
-            .find(|c| c.name() == name)
-            .ok_or_else(|| format!("must be one of {names}"))
-    }
-}
 
 /// Something that looks wrong.
 #[derive(Clone, Debug, PartialEq)]

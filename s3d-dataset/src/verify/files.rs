@@ -3,9 +3,9 @@
 use super::report::{Report, Topic};
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::work::for_each_in_order;
-use crate::tables::dataset::Listed;
-use crate::tables::manifest::Manifest;
+use crate::parallel::for_each_in_order;
+use crate::record::data_set::Listed;
+use crate::record::manifest::Manifest;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FileRecord, Frame, ImageName, Layout, read_file_list};
 use s3d_io::fs::checksum_of_file;

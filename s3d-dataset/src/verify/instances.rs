@@ -2,7 +2,7 @@
 
 use super::labels::Labels;
 use super::report::{OfFile, Report, Topic};
-use crate::tables::manifest::Manifest;
+use crate::record::manifest::Manifest;
 use s3d_io::dataset::{InstanceArrays, Layout, read_instance_arrays, read_instance_members, read_instances};
 use s3d_io::fs::read_json;
 use serde::Deserialize;

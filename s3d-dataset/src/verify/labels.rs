@@ -2,7 +2,7 @@
 
 use super::report::{Report, Topic};
 use crate::export::modality::NO_CLASS;
-use crate::tables::manifest::Manifest;
+use crate::record::manifest::Manifest;
 use s3d_io::dataset::{Layout, read_labels};
 use s3d_io::image::pretty_color;
 use s3d_label::{NULL_NAME, Taxonomy};

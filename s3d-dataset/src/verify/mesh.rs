@@ -2,8 +2,8 @@
 
 use super::labels::Labels;
 use super::report::{Report, Topic};
-use crate::tables::manifest::{Manifest, XyzLoss};
-use crate::tables::summary::Surface;
+use crate::record::manifest::{Manifest, XyzLoss};
+use crate::summary::Surface;
 use s3d_geom::TriMesh;
 use s3d_io::dataset::{Layout, read_face_votes};
 use s3d_io::fs::read_json;

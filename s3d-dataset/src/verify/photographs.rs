@@ -1,7 +1,7 @@
 //! The list of photographs against the images that are there.
 
 use super::report::{Report, Topic};
-use crate::tables::manifest::Manifest;
+use crate::record::manifest::Manifest;
 use s3d_io::camera::uuid_from_name;
 use s3d_io::dataset::{DatasetImage, Frame, Layout, PhotographRecord, read_photographs};
 use std::collections::BTreeMap;

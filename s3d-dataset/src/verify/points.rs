@@ -3,7 +3,7 @@
 use super::labels::Labels;
 use super::mesh::LabelledMesh;
 use super::report::{Report, Topic};
-use crate::tables::manifest::Manifest;
+use crate::record::manifest::Manifest;
 use s3d_geom::{PointCloud, TriMesh};
 use s3d_io::cloud::{LabelledPoint, LabelledPoints, MatArea, MatObject, PointReader};
 use s3d_io::dataset::Layout;

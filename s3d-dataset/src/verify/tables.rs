@@ -2,10 +2,10 @@
 
 use super::labels::Labels;
 use super::report::{Report, Topic};
-use crate::profile::loader::Profile;
-use crate::tables::assets;
-use crate::tables::manifest::Manifest;
-use crate::tables::statistics::Statistics;
+use crate::options::profile::Profile;
+use crate::record::assets;
+use crate::record::manifest::Manifest;
+use crate::record::statistics::Statistics;
 use s3d_io::dataset::{
     DatasetImage, Domain, Frame, Layout, read_conventions, read_splits, read_world_offsets,
 };

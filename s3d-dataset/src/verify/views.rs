@@ -2,8 +2,9 @@
 
 use super::photographs::Photographs;
 use super::report::{Report, Topic};
-use crate::export::views::{Candidate, select};
-use crate::tables::manifest::Manifest;
+use crate::export::views::select;
+use crate::record::manifest::Manifest;
+use crate::survey::candidate::Candidate;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, ViewRecord, read_views};
 use s3d_sample::{View, ViewDistribution, draw_view};
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,23 +1,12 @@
 //! Where an area is looked at from.
 
 use crate::error::Result;
+use crate::options::placing::{Placing, SHARE};
 use glam::{DAffine3, DVec3};
 use s3d_io::camera::ScanLocation;
 use s3d_io::scene::{CameraSource, SceneFile};
 use s3d_label::Room;
 use std::path::PathBuf;
-
-/// How scan locations are placed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Placing {
-    /// No two of a room nearer to each other than this, metres.
-    Apart(f64),
-    /// As few as see this share of the surface that can be seen at all.
-    Seeing(f64),
-}
-
-/// The share that is asked for where nothing is said.
-pub(crate) const SHARE: f64 = 0.95;
 
 /// Where an area is looked at from.
 pub(crate) enum Cameras {

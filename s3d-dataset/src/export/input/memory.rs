@@ -1,7 +1,7 @@
 //! An area that is not read from files.
 
 use crate::error::{Error, Result};
-use crate::store::request::InputRecord;
+use crate::record::request::InputRecord;
 use s3d_geom::{MeshParts, PointCloud, TriMesh, Wrap};
 use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::Annotations;
@@ -141,7 +141,7 @@ impl SharedScene {
             ));
         }
         for location in &self.locations {
-            if crate::canonical_uuid(&location.uuid).ok().as_deref() != Some(&location.uuid) {
+            if crate::options::canonical_uuid(&location.uuid).ok().as_deref() != Some(&location.uuid) {
                 return refuse(format!("uuid {:?} is not 32 lower-case hexadecimal digits", location.uuid));
             }
         }

@@ -13,7 +13,7 @@ mod up_axis;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::input::cameras::{Cameras, Placing};
+use crate::export::input::cameras::Cameras;
 use crate::export::input::colors::PointColors;
 use crate::export::input::memory::{SceneSource, SharedScene};
 use crate::export::input::mesh::{MeshFrame, MeshSource};
@@ -21,10 +21,12 @@ use crate::export::input::numbering::{label_table, number, published_numbers};
 use crate::export::input::photographs::Photographs;
 use crate::export::input::unit::UnitGuess;
 use crate::export::input::up_axis::UpGuess;
-use crate::export::labels::annotate::SurveyedRoom;
 use crate::options::ExportOptions;
-use crate::store::request::InputRecord;
-use crate::tables::dataset::check_area;
+use crate::options::placing::Placing;
+use crate::record::data_set::check_area;
+use crate::record::request::InputRecord;
+use crate::survey::annotated::SurveyedRoom;
+use crate::survey::room_names::{InstanceName, RoomNames};
 use crate::useful::{Estimate, Finding, count_findings};
 use glam::{DAffine3, DVec3};
 use s3d_geom::{Camera, TriMesh};
@@ -212,6 +214,21 @@ impl Inputs {
 }
 
 impl AreaInput {
+    /// Returns the rooms with the names of their instances.
+    pub(crate) fn room_names(&self) -> Vec<RoomNames> {
+        self.rooms
+            .iter()
+            .map(|room| RoomNames {
+                room: room.room,
+                instances: room
+                    .instances
+                    .iter()
+                    .map(|i| InstanceName { label: i.label, number_in_room: i.number_in_room })
+                    .collect(),
+            })
+            .collect()
+    }
+
     fn open(scene: SceneFile, asked: Option<Placing>, opened: Opened) -> Result<Self> {
         if let Some(folder) = &scene.published {
             let folder = folder.clone();

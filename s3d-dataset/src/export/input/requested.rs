@@ -3,9 +3,9 @@
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::AreaInput;
-use crate::export::work::for_each_in_order;
-use crate::store::request::{InputRecord, Request, RequestedArea};
-use crate::tables::listing::walk;
+use crate::parallel::for_each_in_order;
+use crate::record::listing::walk;
+use crate::record::request::{InputRecord, Request, RequestedArea};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::FileRecord;
 use s3d_io::fs::{Checksum, ChecksumOfParts, checksum_of_file};

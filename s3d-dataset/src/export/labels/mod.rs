@@ -1,5 +1,4 @@
 //! Labels of an area: points vote for faces; what is known then is kept for the rest of the export.
 
 pub(crate) mod annotate;
-pub(crate) mod area_plan;
 pub(crate) mod overlap;

@@ -1,7 +1,7 @@
 //! Rooms that lie in one another, which is nearly always a mistake: an instance in another room's folder, a
 //! room twice.
 
-use crate::export::labels::annotate::SurveyedRoom;
+use crate::survey::annotated::SurveyedRoom;
 use s3d_geom::Aabb;
 
 /// A share of the smaller room's floor, and of the lower one's height, above which it is told. Neighbours

@@ -12,6 +12,7 @@ mod visibility;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::place::HEIGHT_M;
+use crate::survey::surface_seen::SurfaceSeen;
 use cover::Cover;
 use glam::DVec3;
 use grid::{MOST_STEP_M, STEP_M};
@@ -20,9 +21,7 @@ use s3d_geom::{NearestFaces, Pose, TriMesh};
 use s3d_io::camera::{ScanLocation, uuid_from_name};
 use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk_where;
-use serde::{Deserialize, Serialize};
 use standing::{Facing, Ground, Place};
-use std::fmt;
 use visibility::{Enclosure, Surface};
 
 /// One candidate a square of this edge, metres, unless there would be more than [`MOST_CANDIDATES`].
@@ -48,29 +47,6 @@ pub(crate) struct FreeSpaceOptions {
     /// A Poisson-disk pattern of this distance instead, metres.
     pub(crate) distance_m: Option<f64>,
     pub(crate) seed: u64,
-}
-
-/// How much surface is seen, m². A surface is seen where its front is, from 10 m or nearer, not edge-on.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SurfaceSeen {
-    /// All of it.
-    pub(crate) surface_m2: f64,
-    /// By any place at which a location could be.
-    pub(crate) visible_m2: f64,
-    /// By one location or more, by two or more, by three or more.
-    pub(crate) seen_m2: [f64; 3],
-}
-
-impl fmt::Display for SurfaceSeen {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { surface_m2, visible_m2, seen_m2 } = self;
-        let [one, two, three] = seen_m2.map(|m2| 100.0 * m2 / visible_m2);
-        write!(
-            f,
-            "of {visible_m2:.1} m² that can be seen from somewhere ({surface_m2:.1} m² in all), {one:.0} % \
-             is seen by one or more, {two:.0} % by two or more, {three:.0} % by three or more"
-        )
-    }
 }
 
 /// Where a person could be, m² of floor.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::export::location::Outlook;
+use crate::survey::outlook::Outlook;
 use glam::{Vec3, dvec3};
 use s3d_geom::MeshParts;
 use s3d_label::{Class, Room};

@@ -6,7 +6,7 @@ pub(crate) mod rays;
 mod shade;
 
 use crate::export::modality::{Channels, Drawn, Image, ImageBuffers, NO_CLASS, null_pixels, palette};
-use crate::tables::manifest::Manifest;
+use crate::record::manifest::Manifest;
 use crate::verify::files::Files;
 use crate::verify::images::pixels::{Difference, Opened, Pixels};
 use crate::verify::images::rays::{difference, points_of_depth};

@@ -3,9 +3,9 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::labels::annotate::Annotated;
-use crate::export::labels::area_plan::RoomNames;
-use crate::export::views::Candidate;
+use crate::survey::annotated::Annotated;
+use crate::survey::candidate::Candidate;
+use crate::survey::room_names::RoomNames;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FaceVoteColumns, Frame, ImageName, Layout, Split};
 use s3d_io::fs::{create_dir, write_json};

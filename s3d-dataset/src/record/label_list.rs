@@ -1,7 +1,7 @@
 //! The label table as a file, so that no annotation has to be opened to know it.
 
 use crate::error::Result;
-use crate::store::checked::{read_checked, write_checked};
+use crate::record::checked::{read_checked, write_checked};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;

@@ -1,23 +1,25 @@
 //! Shards of an export to one data set: the files of all units linked or copied into one folder, each
 //! checked, and the tables written.
 
+use crate::account::Account;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::event::Stage;
-use crate::export::finish::{finish, missing_units};
+use crate::export::finish::finish;
 use crate::export::job::{Target, summarize};
+use crate::export::shard::assignment::Assignment;
 use crate::export::transfer::bring;
-use crate::export::work::for_each_in_order;
-use crate::shard::assignment::Assignment;
-use crate::store::journal::{Done, Finished, Unit};
+use crate::parallel::for_each_in_order;
+use crate::record::assets;
+use crate::record::journal::{Done, Finished, Unit};
+use crate::record::label_list::LabelList;
+use crate::record::manifest::Manifest;
+use crate::record::missing::missing_units;
+use crate::record::request::Request;
+use crate::record::request::{begun_by_other_version, read_request};
+use crate::stage::Stage;
 use crate::store::lock::{Lock, Sharing};
 use crate::store::output::{self, Begin};
-use crate::store::request::Request;
-use crate::tables::account::Account;
-use crate::tables::assets;
-use crate::tables::label_list::LabelList;
-use crate::tables::manifest::Manifest;
-use crate::tables::summary::{Summary, UnitTally};
+use crate::summary::{Summary, UnitTally};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use std::collections::{BTreeMap, BTreeSet};
@@ -140,12 +142,12 @@ pub fn merge(
 fn is_done(folders: &[PathBuf], layout: &Layout) -> Result<bool> {
     let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
         folders.iter().partition(|folder| is_same(folder, layout.root()));
-    if inside.is_empty() || output::read_request(layout)?.is_some() {
+    if inside.is_empty() || read_request(layout)?.is_some() {
         return Ok(false);
     }
     let Ok(manifest) = Manifest::read(layout) else { return Ok(false) };
     for folder in apart {
-        let of = output::read_request(&Layout::new(folder))?;
+        let of = read_request(&Layout::new(folder))?;
         if !of.is_some_and(|of| manifest.differences(&of).is_empty()) {
             return Ok(false);
         }
@@ -210,8 +212,8 @@ fn lock(ctx: &Context, folder: &Path) -> Result<Option<Lock>> {
 impl Part {
     fn read(ctx: &Context, folder: &Path) -> Result<Self> {
         let layout = Layout::new(folder);
-        let Some(request) = output::read_request(&layout)? else {
-            if let Some(version) = output::begun_by_other_version(&layout)? {
+        let Some(request) = read_request(&layout)? else {
+            if let Some(version) = begun_by_other_version(&layout)? {
                 return Err(other_version(folder, &version));
             }
             let message = if Manifest::read(&layout).is_ok() {

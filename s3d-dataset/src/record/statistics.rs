@@ -2,8 +2,8 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::tables::dataset::Dataset;
-use crate::tables::records::RoomRecord;
+use crate::record::data_set::DataSet;
+use crate::record::tables::RoomRecord;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, Frame, ImageName, Layout, read_labels};
 use s3d_io::fs::{open_file, read_json, write_bytes, write_json};
@@ -89,13 +89,13 @@ pub struct RoomTypeStatistics {
 /// [`Error::File`](crate::Error::File) if there is no complete data set, or a file cannot be read.
 pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
     let layout = &Layout::new(root.into());
-    let data = Dataset::open(layout)?;
+    let data = DataSet::open_in(layout)?;
     let areas = &data.manifest.area_numbers;
     let folders: Vec<PathBuf> = areas.iter().map(|area| layout.area_dir(*area)).collect();
     // Images are counted, and not read.
     data.files
         .require(&Context::default(), |path| folders.iter().any(|area| path.starts_with(area)))?;
-    Statistics::count(layout, areas, data.label_taxonomy(), |path, whole| {
+    Statistics::count(layout, areas, data.taxonomy(), |path, whole| {
         if whole {
             data.files.checked(path)
         } else {

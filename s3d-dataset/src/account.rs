@@ -1,8 +1,9 @@
 //! The account of an export while it runs: what it takes and makes, and who watches.
 
 use crate::context::Context;
-use crate::event::{Event, Stage, UnitKind};
-use crate::tables::summary::{Summary, UnitTally, Unlabelled, ViewTally};
+use crate::event::{Event, UnitKind};
+use crate::stage::Stage;
+use crate::summary::{Summary, UnitTally, Unlabelled, ViewTally};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;

@@ -2,23 +2,23 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::finish::missing_units;
-use crate::store::journal::{Finished, Unit};
-use crate::store::output::read_request;
-use crate::store::request::Request;
-use crate::tables::dataset::{Dataset, Listed, Unfinished};
-use crate::tables::listing;
-use crate::tables::manifest::{AreaEntry, Manifest};
-use crate::tables::summary::UnitTally;
+use crate::record::data_set::{DataSet, Listed, Unfinished};
+use crate::record::journal::{Finished, Unit};
+use crate::record::listing;
+use crate::record::manifest::{AreaEntry, Manifest};
+use crate::record::missing::missing_units;
+use crate::record::request::Request;
+use crate::record::request::read_request;
+use crate::summary::UnitTally;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use std::path::PathBuf;
 
-impl Dataset {
-    /// As [`Dataset::open`], of an export that did not finish, too: of that the files of finished units, as
+impl DataSet {
+    /// As [`DataSet::open`], of an export that did not finish, too: of that the files of finished units, as
     /// its journals tell of them. Tables over all units are not there.
-    pub(crate) fn open_as_far_as_it_is(ctx: &Context, layout: &Layout) -> Result<Self> {
-        let Some(mut manifest) = Manifest::read_running(layout)? else { return Self::open(layout) };
+    pub(crate) fn open_unfinished_in(ctx: &Context, layout: &Layout) -> Result<Self> {
+        let Some(mut manifest) = Manifest::read_running(layout)? else { return Self::open_in(layout) };
         let Some(request) = read_request(layout)? else {
             let message = "the export did not finish, and what it was to be is not known";
             return Err(FileError::format(&layout.manifest(), message).into());

@@ -2,8 +2,8 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::work::for_each_in_order;
-use crate::tables::manifest::{Head, Manifest};
+use crate::parallel::for_each_in_order;
+use crate::record::manifest::{Head, Manifest};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
     CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, PhotographRecord, read_conventions,
@@ -15,8 +15,21 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// A complete data set.
-pub(crate) struct Dataset {
+/// A complete data set, to be read. Whatever is read of it is held against its list of files: sizes before a
+/// file is opened, checksums of what is read as a whole. Files that the list does not name are refused.
+///
+/// ```no_run
+/// use s3d_dataset::DataSet;
+/// use s3d_dataset::s3d_io::dataset::Domain;
+///
+/// let data = DataSet::open("dataset".as_ref())?;
+/// for image in data.images(data.areas()[0]) {
+///     let png = data.read(&image.path(data.layout(), Domain::Rgb))?;
+///     println!("{}: {} bytes", image.stem(), png.len());
+/// }
+/// # Ok::<(), s3d_dataset::Error>(())
+/// ```
+pub struct DataSet {
     pub(crate) layout: Layout,
     pub(crate) manifest: Manifest,
     pub(crate) files: Listed,
@@ -34,13 +47,13 @@ pub(crate) struct Unfinished {
     pub(crate) missing: Vec<String>,
 }
 
-impl Dataset {
+impl DataSet {
     /// Opens the data set of this layout: its manifest, its list of files, and its conventions, which must
     /// agree.
     ///
     /// # Errors
     /// [`Error::File`] with the one that does not.
-    pub(crate) fn open(layout: &Layout) -> Result<Self> {
+    pub(crate) fn open_in(layout: &Layout) -> Result<Self> {
         let manifest = Manifest::read(layout)?;
         let files = Listed::read(layout, &manifest)?;
         let path = layout.conventions();
@@ -52,13 +65,11 @@ impl Dataset {
         Ok(Self { layout: layout.clone(), manifest, files, taxonomy, unfinished: None })
     }
 
-    /// The taxonomy of its labels, if it has some.
-    pub(crate) fn label_taxonomy(&self) -> Option<&Taxonomy> {
-        self.manifest.is_labelled().then_some(&self.taxonomy)
-    }
-
-    /// The photographs of an area.
-    pub(crate) fn photographs(&self, area: u32) -> Result<Vec<PhotographRecord>> {
+    /// The photographs of an area that became views.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn photographs(&self, area: u32) -> Result<Vec<PhotographRecord>> {
         if let Some(unfinished) = &self.unfinished {
             return Ok(unfinished.photographs.get(&area).cloned().unwrap_or_default());
         }
@@ -78,7 +89,7 @@ pub(crate) fn check_area(folder: &Path) -> Result<()> {
     if !Head::read(&layout.manifest())?.is_some_and(|head| head.is_complete()) {
         return Ok(());
     }
-    let Dataset { files, manifest, .. } = Dataset::open(layout)?;
+    let DataSet { files, manifest, .. } = DataSet::open_in(layout)?;
     let mut read: Vec<PathBuf> = Vec::new();
     for part in ["3d", "data/pose", "pano/pose"] {
         read.extend(files.below(&folder.join(part)));

@@ -1,6 +1,6 @@
 //! What an export has made: files, bytes, images, missing pixels, views that were dropped, time per stage.
 
-use crate::event::Stage;
+use crate::stage::Stage;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::iter::Sum;

@@ -1,9 +1,13 @@
 //! What an export is asked for, as plain data.
 
+pub(crate) mod condition;
+pub(crate) mod placing;
+pub(crate) mod profile;
+
 use crate::error::{Error, Result};
-use crate::export::input::cameras::Placing;
-use crate::profile::loader::Profile;
-use crate::useful::Condition;
+use condition::Condition;
+use placing::Placing;
+use profile::Profile;
 use s3d_geom::NormalAxes;
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, PADDED_LABELS, XyzType};
 use s3d_io::image::Compression;

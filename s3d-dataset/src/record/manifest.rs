@@ -1,12 +1,13 @@
 //! `manifest.json`: what made a data set, from what, with which options, and what was lost on the way.
 
-use crate::error::{Result, passes_io};
+use crate::error::Result;
+use crate::options::profile::Profile;
 use crate::options::{ExportOptions, by_name};
-use crate::place::free_space::SurfaceSeen;
-use crate::profile::loader::Profile;
-use crate::store::change;
-use crate::store::request::{InputRecord, Request, RequestedArea};
-use crate::tables::summary::Unlabelled;
+use crate::record::if_there;
+use crate::record::pending_change::pending;
+use crate::record::request::{InputRecord, Request, RequestedArea};
+use crate::summary::Unlabelled;
+use crate::survey::surface_seen::SurfaceSeen;
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType, read_taxonomy_json};
@@ -288,7 +289,7 @@ impl Manifest {
         Self::require(layout)?;
         let path = layout.manifest();
         let fault = |message: String| Err(FileError::format(&path, message));
-        if let Some(what) = change::pending(layout)? {
+        if let Some(what) = pending(layout)? {
             return fault(format!(
                 "the data set is half changed: make the call {what:?} again, and it goes on"
             ));
@@ -419,23 +420,6 @@ impl Manifest {
         self.files = Some(files);
         self.status = COMPLETE.to_owned();
         self.write(layout)
-    }
-}
-
-/// What a file holds; nothing if it is not there, or is none of ours.
-///
-/// # Errors
-/// Those of the disk or the network at this moment, and of permissions: what cannot be read now may be there
-/// all the same, and must not be taken for gone.
-pub(crate) fn if_there<T>(read: s3d_io::Result<T>) -> Result<Option<T>> {
-    match read {
-        Ok(value) => Ok(Some(value)),
-        Err(FileError::Io { path, action, source })
-            if passes_io(&source) || source.kind() == ErrorKind::PermissionDenied =>
-        {
-            Err(FileError::Io { path, action, source }.into())
-        }
-        Err(_) => Ok(None),
     }
 }
 

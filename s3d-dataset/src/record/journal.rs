@@ -7,9 +7,9 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::tables::listing::faults;
-use crate::tables::manifest::AreaEntry;
-use crate::tables::summary::UnitTally;
+use crate::record::listing::faults;
+use crate::record::manifest::AreaEntry;
+use crate::summary::UnitTally;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{FileRecord, Layout, PhotographRecord};
 use s3d_io::fs::{Checksum, create_dir, read_file};
@@ -273,7 +273,7 @@ impl Finished {
     pub(crate) fn read(ctx: &Context, layout: &Layout) -> Result<Self> {
         let mut finished = Self::default();
         let mut torn = 0;
-        for path in crate::tables::listing::walk(&layout.journal_dir())? {
+        for path in crate::record::listing::walk(&layout.journal_dir())? {
             let content = read_file(&path)?;
             for line in content.split(|b| *b == b'\n').filter(|line| !line.is_empty()) {
                 match Done::from_line(line) {

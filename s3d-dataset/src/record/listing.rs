@@ -2,9 +2,9 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::work::for_each_in_order;
-use crate::tables::dataset::Dataset;
-use crate::tables::manifest::{FileList, Manifest};
+use crate::parallel::for_each_in_order;
+use crate::record::data_set::DataSet;
+use crate::record::manifest::{FileList, Manifest};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{FileRecord, Layout, write_file_list};
 use std::collections::BTreeMap;
@@ -127,7 +127,7 @@ pub(crate) fn write(layout: &Layout, records: &[FileRecord]) -> Result<FileList>
 /// Writes `files.csv` and the manifest of a complete data set as they are after a change: the files of
 /// `changed` are new, and all others for which `is_gone` holds are not there any more.
 pub(crate) fn write_changed(
-    data: &Dataset,
+    data: &DataSet,
     manifest: &mut Manifest,
     changed: Vec<FileRecord>,
     is_gone: impl Fn(&str) -> bool,

@@ -7,78 +7,20 @@
 //! write the same bytes.
 
 use crate::error::Result;
-use crate::export::input::RoomInput;
-use crate::export::labels::annotate::Annotated;
-use crate::place::free_space::SurfaceSeen;
-use crate::store::checked::{read_checked, write_checked};
-use s3d_geom::Aabb;
+use crate::record::checked::{read_checked, write_checked};
+use crate::survey::labelled_area::LabelledArea;
 use s3d_io::Error as FileError;
-use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::NpyWriter;
 use s3d_io::dataset::is_valid_uuid;
 use s3d_io::fs::{Checksum, create_dir};
-use s3d_label::{Label, LabelId, Room};
+use s3d_label::LabelId;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Marks the label of a face that nobody voted for. No index is as large.
 const FILLED: u32 = 1 << 31;
 
-/// All that an export needs to know of an area's annotations once it is labelled.
-#[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct AreaPlan {
-    /// Its number, from 1.
-    pub(crate) area: u32,
-    pub(crate) annotated: Annotated,
-    /// The rooms, in the order of their names, each with the names of its instances.
-    pub(crate) names: Vec<RoomNames>,
-    /// The scan locations, listed or placed.
-    #[serde(with = "locations_as_data")]
-    pub(crate) locations: Vec<ScanLocation>,
-    /// The room of each location; none in an area without labels.
-    pub(crate) location_rooms: Vec<Option<Room>>,
-    /// What placed locations see.
-    pub(crate) surface_seen: Option<SurfaceSeen>,
-    /// The box of the mesh.
-    pub(crate) mesh_box: Aabb,
-    /// The area of its faces.
-    pub(crate) mesh_area_m2: f64,
-    /// Faces of its file that the mesh has not.
-    pub(crate) faces_left_out: usize,
-    /// What should be looked at, a sentence each.
-    pub(crate) warnings: Vec<String>,
-}
-
-/// The annotated instances of a room, without their points.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct RoomNames {
-    pub(crate) room: Room,
-    pub(crate) instances: Vec<InstanceName>,
-}
-
-/// What an instance is called.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct InstanceName {
-    /// In the data set.
-    pub(crate) label: Label,
-    /// In its room, among those of its class.
-    pub(crate) number_in_room: u32,
-}
-
-impl RoomNames {
-    /// The names in annotations that are open.
-    pub(crate) fn of(rooms: &[RoomInput]) -> Vec<Self> {
-        let name = |room: &RoomInput| {
-            let instances = room.instances.iter();
-            let instances =
-                instances.map(|i| InstanceName { label: i.label, number_in_room: i.number_in_room });
-            Self { room: room.room, instances: instances.collect() }
-        };
-        rooms.iter().map(name).collect()
-    }
-}
-
-impl AreaPlan {
+impl LabelledArea {
     /// Whether an area was written into `folder`: its files are still to be checked.
     pub(crate) fn is_in(folder: &Path) -> bool {
         area_file(folder).is_file()
@@ -162,40 +104,20 @@ struct AreaFile<P> {
     plan: P,
 }
 
-/// Scan locations as data: a tuple each.
-mod locations_as_data {
-    use s3d_geom::Pose;
-    use s3d_io::camera::ScanLocation;
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub(super) fn serialize<S: Serializer>(
-        locations: &[ScanLocation],
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(locations.iter().map(|l| (&l.uuid, l.pose, l.line)))
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Vec<ScanLocation>, D::Error> {
-        let locations = Vec::<(String, Pose, u64)>::deserialize(deserializer)?;
-        Ok(locations
-            .into_iter()
-            .map(|(uuid, pose, line)| ScanLocation { uuid, pose, line })
-            .collect())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::labels::annotate::{SkippedLines, SurveyedRoom};
-    use crate::tables::summary::{Surface, Unlabelled};
+    use crate::summary::{Surface, Unlabelled};
+    use crate::survey::annotated::Annotated;
+    use crate::survey::annotated::{SkippedLines, SurveyedRoom};
+    use crate::survey::room_names::{InstanceName, RoomNames};
+    use crate::survey::surface_seen::SurfaceSeen;
     use glam::{DMat3, DVec2, DVec3, Vec3};
     use proptest::prelude::*;
     use proptest::strategy::ValueTree;
-    use s3d_geom::{Footprint, Polygon, Pose};
-    use s3d_label::{Class, VoteReport, VoteRow};
+    use s3d_geom::{Aabb, Footprint, Polygon, Pose};
+    use s3d_io::camera::ScanLocation;
+    use s3d_label::{Class, Room, VoteReport, VoteRow};
 
     fn room(name: &str) -> Room {
         name.parse().unwrap()
@@ -242,12 +164,12 @@ mod tests {
             boxes in (any_box(), any_box()),
             far_m in any::<f32>().prop_filter("finite", |v| v.is_finite()),
             count in any::<u32>(),
-        ) -> AreaPlan {
+        ) -> LabelledArea {
             let ring: Vec<DVec2> = ring.into_iter().map(|(x, y)| DVec2::new(x, y)).collect();
             let mut classes = Class::S3DIS.map(|class| (class, row));
             classes[3].1 = class_row;
             let [x, y, z, turn @ ..] = place;
-            AreaPlan {
+            LabelledArea {
                 area: 3,
                 annotated: Annotated {
                     label_of_face: labels.iter().map(|(label, _)| LabelId(*label)).collect(),
@@ -312,7 +234,7 @@ mod tests {
             let dir = tempfile::tempdir().unwrap();
             plan.write(dir.path()).unwrap();
             let first = std::fs::read(area_file(dir.path())).unwrap();
-            let back = AreaPlan::read(dir.path(), 3).unwrap();
+            let back = LabelledArea::read(dir.path(), 3).unwrap();
             // Equal texts mean equal bits.
             prop_assert_eq!(format!("{back:?}"), format!("{plan:?}"));
             back.write(dir.path()).unwrap();
@@ -328,9 +250,9 @@ mod tests {
         plan.annotated.label_of_face = (0..100).map(LabelId).collect();
         plan.annotated.filled = vec![0, 99];
         plan.write(dir.path()).unwrap();
-        assert!(AreaPlan::is_in(dir.path()) && AreaPlan::read(dir.path(), 3).is_ok());
+        assert!(LabelledArea::is_in(dir.path()) && LabelledArea::read(dir.path(), 3).is_ok());
         let refusal = |area| {
-            AreaPlan::read(dir.path(), area)
+            LabelledArea::read(dir.path(), area)
                 .err()
                 .map(|e| e.to_string())
                 .unwrap_or_default()
@@ -355,7 +277,7 @@ mod tests {
         let mut plan = any_plan().new_tree(&mut runner).unwrap().current();
         plan.locations[0].uuid = "../../elsewhere".into();
         plan.write(dir.path()).unwrap();
-        let e = AreaPlan::read(dir.path(), 3)
+        let e = LabelledArea::read(dir.path(), 3)
             .err()
             .map(|e| e.to_string())
             .unwrap_or_default();
@@ -398,7 +320,7 @@ mod tests {
                 let mut file = whole.clone();
                 *file.pointer_mut(&path).unwrap() = odd;
                 write_checked(&area_file(dir.path()), &file).unwrap();
-                assert!(AreaPlan::read(dir.path(), 3).is_err(), "{path}");
+                assert!(LabelledArea::read(dir.path(), 3).is_err(), "{path}");
             }
         }
     }
@@ -412,7 +334,7 @@ mod tests {
         let text = std::fs::read_to_string(area_file(dir.path())).unwrap();
         let mut file: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
         let refusal = || {
-            AreaPlan::read(dir.path(), 3)
+            LabelledArea::read(dir.path(), 3)
                 .err()
                 .map(|e| e.to_string())
                 .unwrap_or_default()

@@ -1,19 +1,19 @@
 //! A plan: labels and scores, made before an export and shared by its shards.
 //!
-//! PLAN holds `plan.jsonl` (what it is for, and the label table), `area_N` (the area as [`AreaPlan`] has it,
+//! PLAN holds `plan.jsonl` (what it is for, and the label table), `area_N` (the area as [`LabelledArea`] has it,
 //! and in `area_N/3d` the files of its labels as the data set has them), and journals of labels and scores in
 //! `.s3d/journal`, a file for each process that worked at it. Processes need not know of one another: each
 //! labels the areas that it scores in, if nobody has, and scores its share of their locations.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::labels::area_plan::AreaPlan;
 use crate::export::transfer::bring;
-use crate::store::checked::read_checked;
-use crate::store::journal::{Done, Finished, Unit};
-use crate::store::request::Request;
+use crate::record::checked::read_checked;
+use crate::record::journal::{Done, Finished, Unit};
+use crate::record::label_list::LabelList;
+use crate::record::request::Request;
 use crate::store::{is_plan, plan_file};
-use crate::tables::label_list::LabelList;
+use crate::survey::labelled_area::LabelledArea;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{FileRecord, Layout};
 use s3d_label::LabelTable;
@@ -89,7 +89,7 @@ impl Plan {
         let mut missing = Vec::new();
         for area in self.file.request.numbers() {
             let labels = self.finished.labels(area);
-            match labels.filter(|_| AreaPlan::is_in(&area_folder(self.layout.root(), area))) {
+            match labels.filter(|_| LabelledArea::is_in(&area_folder(self.layout.root(), area))) {
                 Some(labels) => {
                     missing.extend(labels.locations.iter().map(|uuid| Unit::Scores(area, uuid.clone())));
                 }
@@ -110,9 +110,9 @@ impl Plan {
     }
 
     /// A labelled area.
-    pub(crate) fn area(&self, area: u32) -> Result<AreaPlan> {
+    pub(crate) fn area(&self, area: u32) -> Result<LabelledArea> {
         let taxonomy = self.file.labels.taxonomy(&plan_file(self.layout.root()))?;
-        taxonomy.reading(|| AreaPlan::read(&area_folder(self.layout.root(), area), area))
+        taxonomy.reading(|| LabelledArea::read(&area_folder(self.layout.root(), area), area))
     }
 
     /// Brings the files of an area's labels into a data set.

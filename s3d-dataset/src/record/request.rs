@@ -1,9 +1,11 @@
 //! What decides the bytes of a data set: the version of s3d, the options, the input. Two exports of equal
 //! requests write the same files, so that one can go on where the other was killed.
 
+use crate::error::Result;
 use crate::options::ExportOptions;
-use s3d_io::dataset::WorldOffsets;
-use s3d_io::fs::Checksum;
+use crate::record::if_there;
+use s3d_io::dataset::{Layout, WorldOffsets};
+use s3d_io::fs::{Checksum, read_json};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -229,11 +231,32 @@ impl RequestedArea {
     }
 }
 
+/// The request of an unfinished export, if there is one.
+///
+/// # Errors
+/// It cannot be read now: as [`if_there`].
+pub(crate) fn read_request(layout: &Layout) -> Result<Option<Request>> {
+    if_there(read_json(&layout.request()))
+}
+
+/// The version of s3d that began an unfinished export whose request this one cannot read, for it has other
+/// options.
+pub(crate) fn begun_by_other_version(layout: &Layout) -> Result<Option<String>> {
+    #[derive(Deserialize)]
+    struct Of {
+        version: String,
+    }
+    let of: Option<Of> = if_there(read_json(&layout.request()))?;
+    Ok(of
+        .map(|of| of.version)
+        .filter(|version| version != env!("CARGO_PKG_VERSION")))
+}
+
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
     use crate::options::PadLabels;
-    use crate::profile::loader::Profile;
+    use crate::options::profile::Profile;
     use s3d_io::dataset::{Domain, XyzType};
     use s3d_render::Normals;
     use s3d_sample::Pool;

@@ -1,9 +1,9 @@
 //! Which shard does what: units of work assigned by their cost, the same way in every process.
 
 use crate::error::Result;
-use crate::store::checked::{read_checked, write_checked};
-use crate::store::journal::Unit;
-use crate::tables::listing::walk;
+use crate::record::checked::{read_checked, write_checked};
+use crate::record::journal::Unit;
+use crate::record::listing::walk;
 use s3d_geom::Camera;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;

@@ -1,18 +1,18 @@
 //! Making a plan: areas are labelled, and the candidate views of their locations scored.
 
+use crate::account::Account;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::input::memory::SceneSource;
 use crate::export::job::Job;
+use crate::export::shard::assignment::Shard;
+use crate::export::shard::plan::{PlanFile, read_plan_file, refuse_other};
 use crate::options::ExportOptions;
-use crate::shard::assignment::Shard;
-use crate::shard::plan::{PlanFile, read_plan_file, refuse_other};
-use crate::store::checked::write_checked;
-use crate::store::journal::{Finished, Journal, Unit};
+use crate::record::checked::write_checked;
+use crate::record::journal::{Finished, Journal, Unit};
+use crate::record::label_list::LabelList;
 use crate::store::output;
 use crate::store::plan_file;
-use crate::tables::account::Account;
-use crate::tables::label_list::LabelList;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, Layout};
 use s3d_io::fs::create_dir;

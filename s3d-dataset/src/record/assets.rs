@@ -1,7 +1,7 @@
 //! What a data set tells of itself: conventions, schemas, and a Python module that reads it.
 
 use crate::error::Result;
-use crate::tables::legend;
+use crate::record::legend;
 use s3d_io::dataset::{Conventions, Domain, Layout, WorldOffsets};
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_label::LabelTable;

@@ -1,0 +1,42 @@
+//! The stages of an export, by which time is told.
+
+use serde::Serialize;
+
+/// A stage of an export. Meshes and points are written beside the images, by one of the threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Stage {
+    /// Inputs are read and checked.
+    Load,
+    /// Points vote for faces.
+    Label,
+    /// Candidate views are drawn and scored.
+    Score,
+    /// Images are rendered and written.
+    Render,
+    /// Meshes are written.
+    Meshes,
+    /// Points are sampled and written.
+    Points,
+    /// Of shards: their files come into one folder.
+    Merge,
+    /// What is made of all areas together.
+    Tables,
+}
+
+impl Stage {
+    /// Its name in logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Load => "load",
+            Self::Label => "label",
+            Self::Score => "score",
+            Self::Render => "render",
+            Self::Meshes => "meshes",
+            Self::Points => "points",
+            Self::Merge => "merge",
+            Self::Tables => "tables",
+        }
+    }
+}

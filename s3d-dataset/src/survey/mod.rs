@@ -1,0 +1,8 @@
+//! What is known of an area, as data: labels of faces, rooms, scan locations and what they see, candidate views.
+
+pub(crate) mod annotated;
+pub(crate) mod candidate;
+pub(crate) mod labelled_area;
+pub(crate) mod outlook;
+pub(crate) mod room_names;
+pub(crate) mod surface_seen;

@@ -1,0 +1,138 @@
+//! What scan locations see of a mesh, by solid angle.
+
+use crate::context::Context;
+use crate::error::Result;
+use rayon::prelude::*;
+use s3d_geom::Camera;
+use s3d_io::camera::ScanLocation;
+use s3d_label::LabelId;
+use s3d_render::{NO_FACE, Scene, cast};
+
+/// Width of the small panorama that tells what a location sees.
+const PROBE_WIDTH: u32 = 256;
+
+/// A location that sees less of the mesh than this is told of.
+pub(crate) const LOW_COVERAGE: f64 = 0.5;
+
+/// A location that sees more back sides than this is told of.
+const MANY_BACK_SIDES: f64 = 0.5;
+
+/// A location nearer to a surface than this is told of, in metres.
+const VERY_NEAR_M: f32 = 0.1;
+
+/// What a location sees of the mesh, by solid angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Outlook {
+    /// Share of all directions in which there is a surface.
+    pub(crate) coverage: f64,
+    /// Share of those in which its back side is seen.
+    pub(crate) back_sides: f64,
+    /// The nearest surface seen, metres; infinite if there is none.
+    pub(crate) nearest_m: f32,
+}
+
+impl Outlook {
+    /// Looks around from `location`.
+    pub(crate) fn of(scene: &Scene<'_>, location: &ScanLocation) -> Self {
+        let camera = Camera::equirectangular(location.pose, PROBE_WIDTH);
+        let (hits, rays) = (cast(scene, &camera), camera.rays());
+        let (mut all, mut seen, mut back, mut nearest_m) = (0.0, 0.0, 0.0, f32::INFINITY);
+        for y in 0..camera.height {
+            for x in 0..camera.width {
+                let direction = rays.at(x, y);
+                // A row's pixels cover the sphere in proportion to the cosine of its latitude.
+                let weight = (direction.x * direction.x + direction.y * direction.y).sqrt();
+                all += weight;
+                let face = hits.face.at(x, y);
+                if face == NO_FACE {
+                    continue;
+                }
+                seen += weight;
+                nearest_m = nearest_m.min(hits.depth.at(x, y));
+                if scene.mesh().normal(face).as_dvec3().dot(direction) > 0.0 {
+                    back += weight;
+                }
+            }
+        }
+        Self { coverage: seen / all, back_sides: if seen > 0.0 { back / seen } else { 0.0 }, nearest_m }
+    }
+
+    /// What looks wrong about it, as a sentence for each.
+    pub(crate) fn warnings(&self, location: &ScanLocation) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let name = &location.uuid;
+        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+        if self.coverage == 0.0 {
+            warnings.push(format!(
+                "location {name} sees nothing of the mesh (coverage 0 %): is it in the mesh's frame?"
+            ));
+        } else if self.coverage < LOW_COVERAGE {
+            warnings.push(format!(
+                "location {name} sees the mesh in only part of its panorama (coverage {}): it may stand \
+                 outside, or near a hole",
+                percent(self.coverage)
+            ));
+        }
+        if self.back_sides > MANY_BACK_SIDES {
+            warnings.push(format!(
+                "location {name} sees back sides in {} of what it sees (coverage {}): it may stand inside \
+                 something solid, or the faces are wound the other way",
+                percent(self.back_sides),
+                percent(self.coverage)
+            ));
+        }
+        if self.nearest_m < VERY_NEAR_M {
+            warnings.push(format!(
+                "location {name} is {:.0} mm from a surface (coverage {}): it may stand inside a wall or a \
+                 thing",
+                1000.0 * self.nearest_m,
+                percent(self.coverage)
+            ));
+        }
+        warnings
+    }
+}
+
+/// What each scan location sees.
+pub(crate) fn look_around(
+    ctx: &Context,
+    scene: &Scene<'_>,
+    locations: &[ScanLocation],
+) -> Result<Vec<Outlook>> {
+    let outlooks = locations.par_iter().map(|location| {
+        ctx.check()?;
+        Ok(Outlook::of(scene, location))
+    });
+    outlooks.collect()
+}
+
+/// Of what scan locations see, by solid angle, the share that has no label; nothing if they see nothing.
+pub(crate) fn unlabelled_share(
+    scene: &Scene<'_>,
+    locations: &[ScanLocation],
+    label_of_face: &[LabelId],
+) -> Option<f64> {
+    let seen_and_unlabelled = |location: &ScanLocation| {
+        let camera = Camera::equirectangular(location.pose, PROBE_WIDTH);
+        let faces = cast(scene, &camera).face;
+        let (mut seen, mut unlabelled) = (0.0, 0.0);
+        for y in 0..camera.height {
+            let latitude = (0.5 - (f64::from(y) + 0.5) / f64::from(camera.height)) * std::f64::consts::PI;
+            for x in 0..camera.width {
+                let face = faces.at(x, y);
+                if face != NO_FACE {
+                    seen += latitude.cos();
+                    unlabelled += if label_of_face[face as usize].is_null() {
+                        latitude.cos()
+                    } else {
+                        0.0
+                    };
+                }
+            }
+        }
+        (seen, unlabelled)
+    };
+    let each: Vec<(f64, f64)> = locations.par_iter().map(seen_and_unlabelled).collect();
+    let (seen, unlabelled) = each.iter().fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
+    (seen > 0.0).then(|| unlabelled / seen)
+}
