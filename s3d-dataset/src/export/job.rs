@@ -3,13 +3,15 @@
 use crate::account::Account;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::area::{self, Common, PreparedMesh, mesh_doubts};
+use crate::export::area::{self, Common, PreparedMesh};
 use crate::export::finish::{Totals, finish};
 use crate::export::input::cameras::Cameras;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::requested::requested_areas;
 use crate::export::input::{AreaInput, Inputs};
+use crate::export::labels::label_area::{self, mesh_doubts};
+use crate::export::scoring;
 use crate::export::shard::plan::Plan;
 use crate::export::views::select_requested;
 use crate::options::ExportOptions;
@@ -223,7 +225,7 @@ impl<'a> Job<'a> {
         for area in &self.inputs.areas {
             let plan = match self.plan {
                 _ if !is_needed(area.number) => None,
-                Some(plan) => Some(area::take_from_plan(area, plan, &common)?),
+                Some(plan) => Some(label_area::take_from_plan(area, plan, &common)?),
                 None => Some(self.label_area(area, common, &mut labelled.single)?),
             };
             labelled.areas.push(plan);
@@ -243,22 +245,22 @@ impl<'a> Job<'a> {
         common: Common<'_>,
         single: &mut Option<PreparedMesh<'j>>,
     ) -> Result<LabelledArea> {
-        let before = area::labelled_before(area.number, &common);
+        let before = label_area::labelled_before(area.number, &common);
         if let Some(plan) = &before {
-            area::know_labels(area, plan, &common);
+            label_area::know_labels(area, plan, &common);
         }
         let before = match before {
-            Some(plan) if !area::is_unscored(&plan, &common) => return Ok(plan),
+            Some(plan) if !scoring::is_unscored(&plan, &common) => return Ok(plan),
             before => before,
         };
         let is_labelled = before.is_some();
         let finish = |prepared: &PreparedMesh<'_>, nearest: Option<NearestFaces<'_>>| {
             let plan = match (before, nearest) {
                 (Some(plan), _) => plan,
-                (None, Some(nearest)) => area::label_area(area, prepared, nearest, common)?,
-                (None, None) => area::label_area(area, prepared, prepared.nearest(), common)?,
+                (None, Some(nearest)) => label_area::label_area(area, prepared, nearest, common)?,
+                (None, None) => label_area::label_area(area, prepared, prepared.nearest(), common)?,
             };
-            area::score(&plan, prepared, common)?;
+            scoring::score(&plan, prepared, common)?;
             Ok(plan)
         };
         if let Some(file) = &self.single {

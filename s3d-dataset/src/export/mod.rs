@@ -14,7 +14,9 @@ pub(crate) mod location;
 pub(crate) mod modality;
 pub(crate) mod photographs;
 pub(crate) mod points;
+pub(crate) mod scoring;
 pub(crate) mod shard;
+pub(crate) mod survey;
 pub(crate) mod transfer;
 pub(crate) mod views;
 

@@ -6,20 +6,17 @@ pub use data_set::{DataSetInfo, data_set_info, is_data_set};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::area::label_doubts;
 use crate::export::finish::MUCH_UNLABELLED;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::{AreaInput, Inputs};
-use crate::export::labels::annotate::{annotate, unannotated};
-use crate::export::location::{Located, locate, room_name};
+use crate::export::labels::label_area::label_doubts;
+use crate::export::location::{Located, room_name};
+use crate::export::survey::{Locating, Survey, SurveyOptions, Surveyor, survey};
 use crate::options::ExportOptions;
 use crate::survey::annotated::Annotated;
-use crate::survey::outlook::{look_around, unlabelled_share};
-use crate::useful::{
-    Estimate, Finding, Headroom, Storey, label_findings, mesh_findings, outlook_findings, size_findings,
-    stops_any,
-};
+use crate::survey::outlook::unlabelled_share;
+use crate::useful::{Estimate, Finding, Headroom, Storey, mesh_findings, size_findings, stops_any};
 use s3d_geom::{Aabb, NearestFaces};
 use s3d_io::camera::ScanLocation;
 use s3d_io::mesh::MeshFile;
@@ -144,77 +141,51 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let inputs = Inputs::open(&[scene.into()], placing, lenient)?;
     let area = &inputs.areas[0];
     let file = area.read_mesh()?;
-    let mut doubts: Vec<String> = area.doubts(&file).cloned().collect();
     let mesh = &file.mesh;
-    let nearest = NearestFaces::new(mesh);
-    let annotated = match area.is_labelled {
-        true => annotate(ctx, area, &nearest, &inputs.table, None, |_| Ok(()))?.0,
-        false => unannotated(&nearest, &inputs.table)?,
+    let defaults = if area.is_labelled {
+        ExportOptions::default()
+    } else {
+        ExportOptions::default().without_labels()?
     };
-    let scene = Scene::new(mesh);
-    let pictures = match Pictures::open(area, |_| true) {
-        Ok(pictures) => pictures.map(|pictures| {
-            let summary = pictures.summary();
-            doubts.extend(pictures.warnings);
-            summary
-        }),
-        Err(e) => {
-            doubts.push(e.to_string());
-            None
-        }
-    };
-    let defaults = match area.is_labelled {
-        true => ExportOptions::default(),
-        false => ExportOptions::default().without_labels()?,
-    };
+
+    // What looks wrong before anything is surveyed.
+    let mut doubts: Vec<String> = area.doubts(&file).cloned().collect();
+    let pictures = picture_summary(area, &mut doubts);
     let mut findings = mesh_findings(mesh, area.pictures.is_none());
     findings.extend(size_findings(mesh, defaults.points_per_m2)?);
-    let mut too_many = Vec::new();
+
+    let scene = Scene::new(mesh);
+    let survey_options = SurveyOptions { table: &inputs.table, fill_m: None, seed };
+    let mut surveyor = InfoSurveyor { doubts: &mut doubts, findings: &mut findings };
+    let survey = survey(ctx, area, &scene, NearestFaces::new(mesh), survey_options, &mut surveyor)?;
+    let Survey { annotated, located, outlooks } = survey;
+    let Located { locations, rooms: room_of_location, surface_seen } = located;
+
+    // What looks wrong about the survey.
     if area.is_labelled {
-        findings.extend(label_findings(mesh, &annotated, &inputs.table));
-        too_many = area.count_findings(&annotated.rooms);
+        doubts.extend(unlabelled_doubt(&scene, &locations, &annotated));
     }
-    let located = match stops_any(&too_many) {
-        // They would take hours to place.
-        true => Located::default(),
-        false => match locate(ctx, area, &scene, &nearest, &annotated, &inputs.table, seed) {
-            Ok(located) => located,
-            // An export stops there; what else there is to know is no less true.
-            Err(Error::Input(why)) => {
-                doubts.push(format!("{why}; an export stops here"));
-                Located::default()
-            }
-            Err(other) => return Err(other),
-        },
-    };
-    findings.extend(too_many);
-    let Located { locations: at, rooms: room_of, surface_seen } = located;
-    let outlooks = look_around(ctx, &scene, &at)?;
-    let estimate = match at.len() {
+    doubts.extend(findings.iter().map(Finding::sentence));
+    for (location, outlook) in locations.iter().zip(&outlooks) {
+        doubts.extend(outlook.warnings(location));
+    }
+    doubts.extend(label_doubts(area, &annotated, &inputs.table));
+
+    let estimate = match locations.len() {
         0 => area.estimate(mesh, &defaults),
         count => Estimate::new(mesh.total_area(), count as f64, &defaults),
     };
-    let mut locations = Vec::with_capacity(at.len());
-    if !at.is_empty() {
-        findings.extend(outlook_findings(&outlooks));
-    }
-    if let Some(share) = unlabelled_share(&scene, &at, &annotated.label_of_face)
-        && area.is_labelled
-        && share > MUCH_UNLABELLED
-    {
-        doubts.push(format!(
-            "{:.0} % of what scan locations see has no label: no annotated point is next to it (export \
-             --fill METRES gives it the label of the surface beside it)",
-            100.0 * share
-        ));
-    }
-    doubts.extend(findings.iter().map(Finding::sentence));
-    for ((location, room), outlook) in at.into_iter().zip(room_of).zip(outlooks) {
-        doubts.extend(outlook.warnings(&location));
-        let (coverage, nearest_m) = (outlook.coverage, outlook.nearest_m);
-        locations.push(LocationInfo { location, room, coverage, nearest_m });
-    }
-    doubts.extend(label_doubts(area, &annotated, &inputs.table));
+    let locations = locations
+        .into_iter()
+        .zip(room_of_location)
+        .zip(outlooks)
+        .map(|((location, room), outlook)| LocationInfo {
+            location,
+            room,
+            coverage: outlook.coverage,
+            nearest_m: outlook.nearest_m,
+        })
+        .collect();
     let total = &annotated.report.total;
     Ok(SceneInfo {
         area: area.number,
@@ -232,6 +203,63 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
         surface_seen: surface_seen.map(|seen| seen.to_string()),
         estimate,
         doubts,
+    })
+}
+
+/// What `info` does with the results of a survey: it keeps all that looks wrong, and stops at nothing that an
+/// export would stop at.
+struct InfoSurveyor<'a> {
+    doubts: &'a mut Vec<String>,
+    findings: &'a mut Vec<Finding>,
+}
+
+impl Surveyor for InfoSurveyor<'_> {
+    fn label_findings(&mut self, labels: Vec<Finding>, locations: Vec<Finding>) -> Result<Locating> {
+        // So many locations would take hours to place.
+        let too_many = stops_any(&locations);
+        self.findings.extend(labels);
+        self.findings.extend(locations);
+        Ok(if too_many { Locating::Skipped } else { Locating::Wanted })
+    }
+
+    fn unplaced(&mut self, why: Error) -> Result<()> {
+        // Whatever else there is to know is no less true.
+        let Error::Input(why) = why else { return Err(why) };
+        self.doubts.push(format!("{why}; an export stops here"));
+        Ok(())
+    }
+
+    fn outlook_findings(&mut self, findings: Vec<Finding>) -> Result<()> {
+        self.findings.extend(findings);
+        Ok(())
+    }
+}
+
+/// A sentence on the scanner's pictures that colours come from; `None` if colours are the mesh's own, or the
+/// pictures cannot be used. What looks wrong about them goes to `doubts`.
+fn picture_summary(area: &AreaInput, doubts: &mut Vec<String>) -> Option<String> {
+    match Pictures::open(area, |_| true) {
+        Ok(pictures) => pictures.map(|pictures| {
+            let summary = pictures.summary();
+            doubts.extend(pictures.warnings);
+            summary
+        }),
+        Err(e) => {
+            doubts.push(e.to_string());
+            None
+        }
+    }
+}
+
+/// A sentence on what scan locations see of the unlabelled surface, if it is much.
+fn unlabelled_doubt(scene: &Scene<'_>, locations: &[ScanLocation], annotated: &Annotated) -> Option<String> {
+    let share = unlabelled_share(scene, locations, &annotated.label_of_face)?;
+    (share > MUCH_UNLABELLED).then(|| {
+        format!(
+            "{:.0} % of what scan locations see has no label: no annotated point is next to it (export \
+             --fill METRES gives it the label of the surface beside it)",
+            100.0 * share
+        )
     })
 }
 
