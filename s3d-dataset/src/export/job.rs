@@ -4,13 +4,14 @@ use crate::account::Account;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::area::{self, Common, PreparedMesh};
-use crate::export::finish::{Totals, finish};
+use crate::export::finish::finish;
 use crate::export::input::cameras::Cameras;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::requested::requested_areas;
 use crate::export::input::{AreaInput, Inputs};
 use crate::export::labels::label_area::{self, mesh_doubts};
+use crate::export::run::{Run, Target};
 use crate::export::scoring;
 use crate::export::shard::plan::Plan;
 use crate::export::views::select_requested;
@@ -21,7 +22,8 @@ use crate::record::manifest::Manifest;
 use crate::record::missing::missing_units;
 use crate::record::request::Request;
 use crate::stage::Stage;
-use crate::store::output::{self, Begin};
+use crate::store::lock::Sharing;
+use crate::store::state::OutputState;
 use crate::summary::Summary;
 use crate::survey::candidate::Candidate;
 use crate::survey::labelled_area::LabelledArea;
@@ -33,15 +35,6 @@ use s3d_io::mesh::MeshFile;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
-
-/// What an export writes to.
-pub(crate) struct Target<'a> {
-    pub(crate) layout: Layout,
-    /// Whether OUT may hold something already.
-    pub(crate) overwrite: bool,
-    /// Names in OUT that do not count as something.
-    pub(crate) allowed: Vec<&'a str>,
-}
 
 /// An export whose input is open and checked.
 pub(crate) struct Job<'a> {
@@ -73,7 +66,7 @@ pub(crate) enum Scope {
     All,
 }
 
-/// Turns scenes into a data set; with a plan, labels and scores are taken from there.
+/// Turns scenes into a data set. With a plan, labels and scores are taken from there.
 pub(crate) fn export(
     ctx: &Context,
     scenes: &[SceneSource],
@@ -81,36 +74,26 @@ pub(crate) fn export(
     options: &ExportOptions,
     plan: Option<&Plan>,
 ) -> Result<Option<Summary>> {
-    let account = Account::new(ctx);
-    let layout = &target.layout;
-    output::check(ctx, layout, target.overwrite, &target.allowed)?;
-    let job = Job::open(scenes, layout, options, plan, &account)?;
-    let manifest = job.manifest();
-    if !output::is_begun(layout)? {
+    let run = Run::new(ctx, target);
+    let layout = run.layout();
+    let state = run.look()?;
+    let job = Job::open(scenes, layout, &state, options, plan, &run.account)?;
+    if !state.is_begun() {
         judge(ctx, &space_findings(job.estimate.bytes, layout.root()), &options.allow)?;
     }
-    let session = match output::begin(layout, target.overwrite, &job.request, &manifest, &account)? {
-        Begin::NothingToDo => {
-            ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
-            return Ok(None);
-        }
-        Begin::Session(session) => session,
+
+    let manifest = job.manifest();
+    let Some(session) = run.begin(&state, &job.request, &manifest, Sharing::Alone)? else {
+        return Ok(None);
     };
-    let made = job.run(layout, &session.journal, &account).and_then(|disk| {
-        let tables = account.stage(Stage::Tables, None);
+    let made = job.run(layout, &session.journal, &run.account).and_then(|disk| {
+        let tables = run.account.stage(Stage::Tables, None);
         let made = finish(ctx, layout, &job.request, manifest, &session.journal.finished(), Some(disk))?;
         tables.end();
         Ok(made)
     });
     let made = session.end(ctx, made)?;
-    Ok(Some(summarize(account, layout, &job.request, &made)))
-}
-
-/// Tells what a complete data set holds.
-pub(crate) fn summarize(account: Account<'_>, layout: &Layout, request: &Request, made: &Totals) -> Summary {
-    account.set_files(made.files, made.bytes);
-    let root = layout.root().display().to_string();
-    account.summarize(&root, request.areas.len(), made.locations, made.views, made.unlabelled)
+    Ok(Some(run.finish(&job.request, &made)))
 }
 
 impl<'a> Job<'a> {
@@ -118,6 +101,7 @@ impl<'a> Job<'a> {
     pub(crate) fn open(
         scenes: &[SceneSource],
         layout: &Layout,
+        state: &OutputState,
         options: &ExportOptions,
         plan: Option<&'a Plan>,
         account: &Account<'_>,
@@ -137,7 +121,8 @@ impl<'a> Job<'a> {
         };
         let options = &options;
         check_only(&inputs, &options.only)?;
-        output::check_inputs(layout, inputs.numbers(), inputs.areas.iter().flat_map(|area| &area.files))?;
+        let input_files = inputs.areas.iter().flat_map(|area| &area.files);
+        state.check_inputs(layout, inputs.numbers(), input_files)?;
         check_label_count(inputs.table.len() - 1)?;
         let mut pictures = Vec::new();
         for area in &inputs.areas {

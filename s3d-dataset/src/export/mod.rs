@@ -14,6 +14,7 @@ pub(crate) mod location;
 pub(crate) mod modality;
 pub(crate) mod photographs;
 pub(crate) mod points;
+pub(crate) mod run;
 pub(crate) mod scoring;
 pub(crate) mod shard;
 pub(crate) mod survey;
@@ -26,10 +27,10 @@ use crate::export::shard::assignment::Shard;
 use crate::export::shard::export_shard;
 use crate::export::shard::plan::Plan;
 use crate::options::ExportOptions;
-use crate::store::output;
 use crate::summary::Summary;
 use input::memory::SceneSource;
-use job::{Target, export};
+use job::export;
+use run::{Run, Target};
 use s3d_io::dataset::Layout;
 use std::path::{Path, PathBuf};
 
@@ -90,11 +91,12 @@ impl Export {
     /// # Errors
     /// [`Usage`](crate::Error::Usage) if it holds something else, and is not to be replaced.
     pub fn check_output(&self, output: &Path, ctx: &Context) -> Result<()> {
-        output::check(ctx, &Layout::new(output), self.overwrite, &self.allowed_names())
+        Run::new(ctx, &self.target(output.into())).look().map(drop)
     }
 
-    fn allowed_names(&self) -> Vec<&str> {
-        self.allowed.iter().map(String::as_str).collect()
+    fn target(&self, output: PathBuf) -> Target<'_> {
+        let allowed = self.allowed.iter().map(String::as_str).collect();
+        Target { layout: Layout::new(output), overwrite: self.overwrite, allowed }
     }
 
     /// Makes the data set in the folder `output`, on the threads of the current rayon pool, or goes on with
@@ -111,8 +113,7 @@ impl Export {
     pub fn run(&self, output: impl Into<PathBuf>, ctx: &Context) -> Result<Option<Summary>> {
         let options = self.options.canonical()?;
         let plan = self.plan.as_deref().map(|folder| Plan::open(ctx, folder)).transpose()?;
-        let allowed = self.allowed_names();
-        let target = Target { layout: Layout::new(output.into()), overwrite: self.overwrite, allowed };
+        let target = self.target(output.into());
         match self.shard {
             Some(shard) => export_shard(ctx, &self.scenes, &target, &options, shard, plan.as_ref()),
             None => export(ctx, &self.scenes, &target, &options, plan.as_ref()),

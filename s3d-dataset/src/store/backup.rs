@@ -3,8 +3,9 @@
 
 use crate::error::{Error, Result};
 use crate::record::manifest::Head;
-use crate::record::request::{begun_by_other_version, read_request};
+use crate::record::request::read_request;
 use crate::store::change;
+use crate::store::state::OutputState;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;
@@ -17,8 +18,9 @@ pub(super) const MOVING: &str = ".s3d-previous.part";
 pub(super) const BACKUP: &str = ".s3d-previous";
 pub(super) const TRASH: &str = ".s3d-trash";
 
-/// Brings a folder in which an export was killed to a state that has only one meaning.
-pub(super) fn recover(layout: &Layout) -> Result<()> {
+/// Brings a folder in which an export was killed to a state that has only one meaning. Returns what it holds
+/// then.
+pub(super) fn recover(layout: &Layout) -> Result<OutputState> {
     let inside = |name: &str| layout.root().join(name);
     change::settle(layout)?;
     remove(&inside(TRASH))?;
@@ -31,18 +33,20 @@ pub(super) fn recover(layout: &Layout) -> Result<()> {
         }
         take_back(&moving, layout, head)?;
     }
-    if Head::read(&layout.manifest())?.is_some_and(|head| head.is_complete()) {
+
+    let state = OutputState::read(layout)?;
+    if state.is_complete() {
         clear(layout)?;
         if inside(BACKUP).exists() {
             discard(layout)?;
         }
-    } else if inside(BACKUP).exists()
-        && read_request(layout)?.is_none()
-        && begun_by_other_version(layout)?.is_none()
-    {
-        restore(layout)?;
+        return Ok(state.without_request());
     }
-    Ok(())
+    if inside(BACKUP).exists() && !state.has_request() {
+        restore(layout)?;
+        return OutputState::read(layout);
+    }
+    Ok(state)
 }
 
 /// Removes what an export keeps while it is unfinished, all but the lock.

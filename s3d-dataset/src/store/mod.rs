@@ -7,6 +7,7 @@ pub(crate) mod new_file;
 pub(crate) mod new_folder;
 pub(crate) mod output;
 pub(crate) mod staging;
+pub(crate) mod state;
 
 use crate::error::{Error, Result};
 use s3d_io::Error as FileError;

@@ -19,147 +19,17 @@ use crate::context::Context;
 use crate::error::{Error, Result, passes};
 use crate::record::journal::{Done, Finished, Journal};
 use crate::record::listing::remove_parts;
-use crate::record::manifest::{Head, Manifest};
+use crate::record::manifest::Manifest;
 use crate::record::request::Request;
-use crate::record::request::{begun_by_other_version, read_request};
+use crate::record::request::read_request;
 use crate::store::backup::{
     BACKUP, MOVING, TRASH, clear, discard, move_entries, recover, remove, rename, restore,
 };
 use crate::store::lock::{Lock, Sharing};
-use s3d_io::Error as FileError;
+use crate::store::state::{Holding, OutputState};
 use s3d_io::dataset::{Layout, read_file_list};
 use s3d_io::fs::{sync_data_set, sync_file, write_bytes, write_json};
-use std::fs;
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
-
-/// How many differences are named in a message.
-const MAX_NAMED: usize = 8;
-
-/// Refuses an OUT that holds something of somebody else, unless it may be overwritten or is one of the
-/// `allowed` names; looks only, changes nothing.
-pub(crate) fn check(ctx: &Context, layout: &Layout, overwrite: bool, allowed: &[&str]) -> Result<()> {
-    let root = layout.root();
-    if layout.root_misleads_loaders() {
-        ctx.warn(format_args!(
-            "{}: \"rgb\" in the folder's name misleads loaders that swap it for another modality in whole \
-             paths",
-            root.display()
-        ));
-    }
-    // Its journals would be taken for those of an export.
-    if crate::store::is_plan(root) {
-        return Err(Error::Usage(format!("{} holds a plan: choose another folder", root.display())));
-    }
-    match fs::read_dir(root) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        Err(e) => Err(FileError::io(root, "use as the output folder", e).into()),
-        Ok(entries) => {
-            let head = Head::read(&layout.manifest())?;
-            let is_ours = head.as_ref().is_some_and(Head::is_complete) || read_request(layout)?.is_some();
-            if overwrite || is_ours {
-                return Ok(());
-            }
-            // What an export left that did not finish is nobody's.
-            let begun = head.map_or(Vec::new(), |head| layout.entries(&head.area_numbers));
-            for entry in entries {
-                let path = entry.map_err(|e| FileError::io(root, "read", e))?.path();
-                let name = path.file_name().unwrap_or_default();
-                let ours = begun.iter().any(|b| b.starts_with(&path)) || is_working_name(name);
-                if !ours && !allowed.iter().any(|a| name == *a) {
-                    return Err(Error::Usage(format!(
-                        "{} already holds {}: choose another folder, or write into this one with --overwrite",
-                        root.display(),
-                        name.display()
-                    )));
-                }
-            }
-            Ok(())
-        }
-    }
-}
-
-/// Whether a name in OUT is one of those that an export makes for the time being.
-pub(crate) fn is_working_name(name: &std::ffi::OsStr) -> bool {
-    let name = name.to_string_lossy();
-    name == ".s3d" || name.starts_with(".s3d-")
-}
-
-/// Refuses an OUT in which the data set, or an earlier one that it replaces, would lie on its own input: on one
-/// of the files or folders `inputs` of the areas with these numbers.
-pub(crate) fn check_inputs<'p>(
-    layout: &Layout,
-    mut areas: Vec<u32>,
-    inputs: impl Iterator<Item = &'p PathBuf>,
-) -> Result<()> {
-    let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
-
-    // The areas of a data set that is there give way too.
-    areas.extend(Head::read(&layout.manifest())?.map_or(Vec::new(), |head| head.area_numbers));
-    areas.extend(read_request(layout)?.map_or(Vec::new(), |request| request.numbers()));
-    let mut entries = Layout::new(&root).entries(&areas);
-    entries.push(root.join(BACKUP));
-
-    for path in inputs {
-        let Ok(input) = fs::canonicalize(path) else { continue };
-        if entries.iter().any(|entry| input.starts_with(entry)) || input.is_dir() && root.starts_with(&input)
-        {
-            return Err(Error::Usage(format!(
-                "{}: the data set would be written over its own input {}: choose another folder",
-                layout.root().display(),
-                path.display()
-            )));
-        }
-    }
-    Ok(())
-}
-
-/// Whether an export into OUT has begun, or is complete.
-pub(crate) fn is_begun(layout: &Layout) -> Result<bool> {
-    Ok(Head::read(&layout.manifest())?.is_some() || read_request(layout)?.is_some())
-}
-
-/// What is in OUT.
-#[derive(Debug)]
-enum Found {
-    /// Nothing of ours.
-    Nothing,
-    /// A complete data set, and in what it differs from what is asked for.
-    Complete { differences: Vec<String> },
-    /// An unfinished export of these areas, and in what it differs.
-    Unfinished { areas: Vec<u32>, differences: Vec<String>, failed: bool },
-    /// What is left of an unfinished export that nobody can go on with, of these areas.
-    Leftover { areas: Vec<u32> },
-}
-
-fn find(layout: &Layout, request: &Request) -> Result<Found> {
-    let head = Head::read(&layout.manifest())?;
-    if head.as_ref().is_some_and(Head::is_complete) {
-        let differences = match Manifest::read(layout) {
-            Ok(manifest) => manifest.differences(request),
-            Err(e) if passes(&e) => return Err(e.into()),
-            // Of another version.
-            Err(e) => vec![e.to_string()],
-        };
-        return Ok(Found::Complete { differences });
-    }
-    Ok(match (read_request(layout)?, head) {
-        (Some(begun), _) => Found::Unfinished {
-            areas: begun.numbers(),
-            differences: begun.differences(request),
-            failed: layout.failed().exists(),
-        },
-        (None, Some(head)) => match begun_by_other_version(layout)? {
-            Some(there) => Found::Unfinished {
-                areas: head.area_numbers,
-                differences: vec![format!("version {there} of s3d there, {} now", request.version)],
-                failed: layout.failed().exists(),
-            },
-            None => Found::Leftover { areas: head.area_numbers },
-        },
-        (None, None) => Found::Nothing,
-    })
-}
 
 /// How an export begins.
 pub(crate) enum Begin {
@@ -178,7 +48,8 @@ pub(crate) struct Session {
     pub(crate) journal: Journal,
 }
 
-/// Begins an export into OUT, or goes on with it. `manifest` is written if it begins.
+/// Begins an export into OUT, or goes on with it. `state` is what OUT held before the lock was taken. `manifest`
+/// is written if the export begins.
 ///
 /// # Errors
 /// [`Error::Usage`] if OUT holds a data set or an unfinished export of another request, and `overwrite` is
@@ -186,6 +57,7 @@ pub(crate) struct Session {
 /// into it.
 pub(crate) fn begin(
     layout: &Layout,
+    state: &OutputState,
     overwrite: bool,
     request: &Request,
     manifest: &Manifest,
@@ -196,17 +68,16 @@ pub(crate) fn begin(
     // changed.
     let leftovers = [BACKUP, MOVING, TRASH].map(|name| layout.root().join(name));
     if !leftovers.iter().any(|path| path.exists()) {
-        let found = find(layout, request)?;
-        refuse(layout, &found, overwrite)?;
-        if matches!(&found, Found::Complete { differences } if differences.is_empty())
-            && !layout.work_dir().exists()
-            && is_intact(ctx, layout, overwrite)?
-        {
+        let holding = state.compare(request);
+        holding.refuse(layout, overwrite)?;
+        if holding.is_complete() && !layout.work_dir().exists() && is_intact(ctx, layout, overwrite)? {
             return Ok(Begin::NothingToDo);
         }
     }
     let lock = Lock::take(ctx, layout, Sharing::Alone)?;
-    match begin_locked(layout, overwrite, request, manifest, account) {
+    let begun =
+        recover(layout).and_then(|state| begin_locked(layout, &state, overwrite, request, manifest, account));
+    match begun {
         Ok(Some(finished)) => {
             let journal = Journal::begin(layout, finished)?;
             Ok(Begin::Session(Session { layout: layout.clone(), lock, journal }))
@@ -260,12 +131,12 @@ pub(crate) fn begin_shard(
         }
         match Lock::take(ctx, layout, Sharing::Shards) {
             Ok(lock) => {
-                let found = find(layout, request)?;
-                if let Err(e) = refuse(layout, &found, overwrite) {
+                let holding = OutputState::read(layout)?.compare(request);
+                if let Err(e) = holding.refuse(layout, overwrite) {
                     lock.abandon();
                     return Err(e);
                 }
-                if matches!(&found, Found::Unfinished { differences, .. } if differences.is_empty()) {
+                if holding.is_unfinished() {
                     let journal = Journal::begin(layout, Finished::read(ctx, layout)?)?;
                     return Ok(Begin::Session(Session { layout: layout.clone(), lock, journal }));
                 }
@@ -294,16 +165,14 @@ fn begin_alone(
     request: &Request,
     manifest: &Manifest,
 ) -> Result<bool> {
-    recover(layout)?;
-    match find(layout, request)? {
+    let state = recover(layout)?;
+    if state.compare(request).is_unfinished() {
         // Files that are being written stay: where locks hold on one machine alone, others may be at work.
-        Found::Unfinished { differences, .. } if differences.is_empty() => {
-            remove(&layout.failed())?;
-            manifest.write(layout)?;
-            Ok(true)
-        }
-        _ => Ok(begin_locked(layout, overwrite, request, manifest, &Account::new(ctx))?.is_some()),
+        remove(&layout.failed())?;
+        manifest.write(layout)?;
+        return Ok(true);
     }
+    Ok(begin_locked(layout, &state, overwrite, request, manifest, &Account::new(ctx))?.is_some())
 }
 
 /// What is done of an unfinished export, by what its journals and files tell.
@@ -321,43 +190,19 @@ fn go_on(layout: &Layout, account: &Account<'_>) -> Result<Finished> {
     Ok(finished)
 }
 
-fn refuse(layout: &Layout, found: &Found, overwrite: bool) -> Result<()> {
-    let (what, differences) = match found {
-        Found::Complete { differences } => ("a data set", differences),
-        Found::Unfinished { differences, failed: false, .. } => ("an unfinished export", differences),
-        _ => return Ok(()),
-    };
-    if overwrite || differences.is_empty() {
-        return Ok(());
-    }
-    let mut named = differences
-        .iter()
-        .take(MAX_NAMED)
-        .cloned()
-        .collect::<Vec<_>>()
-        .join("; ");
-    if differences.len() > MAX_NAMED {
-        named += &format!("; and {} more", differences.len() - MAX_NAMED);
-    }
-    Err(Error::Usage(format!(
-        "{} already holds {what} of another call ({named}): choose another folder, or replace it with \
-         --overwrite",
-        layout.root().display()
-    )))
-}
-
-/// Brings OUT to where work can go on, and returns what is done already; `None` if all is.
+/// Brings OUT, which was recovered and holds `state`, to where work can go on. Returns what is done already;
+/// `None` if everything is.
 fn begin_locked(
     layout: &Layout,
+    state: &OutputState,
     overwrite: bool,
     request: &Request,
     manifest: &Manifest,
     account: &Account<'_>,
 ) -> Result<Option<Finished>> {
     let ctx = account.ctx;
-    recover(layout)?;
-    let found = find(layout, request)?;
-    refuse(layout, &found, overwrite)?;
+    let holding = state.compare(request);
+    holding.refuse(layout, overwrite)?;
     // Whatever the state, what a killed process was writing is of no use. The folders of areas are looked at,
     // or removed, below.
     remove_parts(layout.root(), false)?;
@@ -365,11 +210,11 @@ fn begin_locked(
     for folder in layout.shared_dirs() {
         remove_parts(&folder, false)?;
     }
-    match found {
-        Found::Complete { differences } if differences.is_empty() && is_intact(ctx, layout, overwrite)? => {
+    match holding {
+        Holding::Complete { .. } if holding.is_complete() && is_intact(ctx, layout, overwrite)? => {
             return Ok(None);
         }
-        Found::Unfinished { areas, differences, .. } if differences.is_empty() => {
+        Holding::Unfinished { areas, differences, .. } if differences.is_empty() => {
             remove(&layout.failed())?;
             for folder in layout.entries(&areas).iter().filter(|entry| entry.is_dir()) {
                 remove_parts(folder, true)?;
@@ -378,20 +223,19 @@ fn begin_locked(
             manifest.write(layout)?;
             return go_on(layout, account).map(Some);
         }
-        Found::Nothing => {
+        Holding::Nothing => {
             refuse_in_the_way(layout, request, &[])?;
             clear(layout)?;
         }
-        Found::Complete { .. } => {
-            let head = Head::read(&layout.manifest())?;
-            let areas = head.map_or(Vec::new(), |head| head.area_numbers);
+        Holding::Complete { .. } => {
+            let areas = state.areas_of_manifest();
             refuse_in_the_way(layout, request, &areas)?;
             let moving = Layout::new(layout.root().join(MOVING));
             move_entries(layout, &moving, &areas)?;
             rename(moving.root(), &layout.root().join(BACKUP))?;
             sync_data_set(layout.root(), &[])?;
         }
-        Found::Unfinished { areas, .. } | Found::Leftover { areas } => {
+        Holding::Unfinished { areas, .. } | Holding::Leftover { areas } => {
             refuse_in_the_way(layout, request, &areas)?;
             ctx.info(format_args!(
                 "{}: what an earlier export left there is replaced",

@@ -11,8 +11,8 @@ use crate::options::ExportOptions;
 use crate::record::checked::write_checked;
 use crate::record::journal::{Finished, Journal, Unit};
 use crate::record::label_list::LabelList;
-use crate::store::output;
 use crate::store::plan_file;
+use crate::store::state::{OutputState, is_working_name};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, Layout};
 use s3d_io::fs::create_dir;
@@ -51,7 +51,7 @@ pub fn plan<S: Clone + Into<SceneSource>>(
     let layout = Layout::new(folder);
     refuse_foreign(folder)?;
     let scenes: Vec<SceneSource> = scenes.iter().cloned().map(Into::into).collect();
-    let job = Job::open(&scenes, &layout, options, None, &account)?;
+    let job = Job::open(&scenes, &layout, &OutputState::read(&layout)?, options, None, &account)?;
     let path = plan_file(folder);
     if path.exists() {
         let there = read_plan_file(&path)?;
@@ -106,7 +106,7 @@ fn refuse_foreign(folder: &Path) -> Result<()> {
     for entry in entries {
         let name = entry.map_err(|e| FileError::io(folder, "read", e))?.file_name();
         // Another shard may be about to begin.
-        if !output::is_working_name(&name) && !plan_file(folder).exists() {
+        if !is_working_name(&name) && !plan_file(folder).exists() {
             let root = folder.display();
             return Err(Error::Usage(format!(
                 "{root} holds {}, and no plan: choose another folder",

@@ -4,8 +4,8 @@
 use crate::account::Account;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::finish::finish;
-use crate::export::job::{Target, summarize};
+use crate::export::finish::{Totals, finish};
+use crate::export::run::{Run, Target};
 use crate::export::shard::assignment::Assignment;
 use crate::export::transfer::bring;
 use crate::parallel::for_each_in_order;
@@ -18,10 +18,11 @@ use crate::record::request::Request;
 use crate::record::request::{begun_by_other_version, read_request};
 use crate::stage::Stage;
 use crate::store::lock::{Lock, Sharing};
-use crate::store::output::{self, Begin};
+use crate::store::output::Session;
 use crate::summary::{Summary, UnitTally};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
+use s3d_label::LabelTable;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::ErrorKind;
@@ -54,31 +55,17 @@ pub fn merge(
     ctx: &Context,
 ) -> Result<Option<Summary>> {
     let target = Target { layout: Layout::new(output.into()), overwrite, allowed: Vec::new() };
-    let account = Account::new(ctx);
-    let layout = &target.layout;
+    let run = Run::new(ctx, &target);
+    let layout = run.layout();
     let folders = distinct(folders)?;
     if is_done(&folders, layout)? {
-        ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
+        run.tell_complete();
         return Ok(None);
     }
-    let stage = account.stage(Stage::Load, None);
-    // OUT's own lock is taken again when the merge begins in it; until then nobody may be at work there
-    // either.
-    let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
-        folders.iter().partition(|folder| is_same(folder, layout.root()));
-    let _locks = apart
-        .into_iter()
-        .map(|folder| lock(ctx, folder))
-        .collect::<Result<Vec<_>>>()?;
-    let own_lock = inside
-        .into_iter()
-        .map(|folder| lock(ctx, folder))
-        .collect::<Result<Vec<_>>>()?;
-    let parts = folders
-        .iter()
-        .map(|folder| Part::read(ctx, folder))
-        .collect::<Result<Vec<Part>>>()?;
-    drop(own_lock);
+
+    // All shards must be there, of one call, and complete.
+    let loading = run.account.stage(Stage::Load, None);
+    let (_locks, parts) = read_parts(ctx, &folders, layout)?;
     let Some(first) = parts.first() else {
         return Err(Error::Usage("there is no shard to merge".to_owned()));
     };
@@ -86,56 +73,86 @@ pub fn merge(
     refuse_mixed(&parts)?;
     refuse_other_version(first)?;
     let mut all = Finished::default();
-    parts
-        .iter()
-        .flat_map(|part| part.finished.iter())
-        .for_each(|done| all.insert(done.clone()));
+    for done in parts.iter().flat_map(|part| part.finished.iter()) {
+        all.insert(done.clone());
+    }
     let missing = missing_units(request, &all);
     if !missing.is_empty() {
         return Err(told_missing(&parts, &missing, "is missing"));
     }
     let labels = label_list(&parts)?;
-    stage.end();
+    loading.end();
 
-    output::check(ctx, layout, target.overwrite, &target.allowed)?;
+    let state = run.look()?;
     let table = labels.table(&LabelList::path(layout))?;
     let manifest = Manifest::begin(request, &table);
-    let session = match output::begin(layout, target.overwrite, request, &manifest, &account)? {
-        Begin::NothingToDo => {
-            ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
-            return Ok(None);
-        }
-        Begin::Session(session) => session,
+    let Some(session) = run.begin(&state, request, &manifest, Sharing::Alone)? else {
+        return Ok(None);
     };
-    let merged = || {
-        let stage = account.stage(Stage::Merge, None);
-        // Should this OUT be merged again, or gone on with.
+    let merging = Merging { parts: &parts, all: &all, labels: &labels, table: &table, request };
+    let outcome = merging.merge(&run, &session, manifest);
+    let works_in_out = parts.iter().any(|part| is_same(part.layout.root(), layout.root()));
+    let made = match outcome {
+        // The work of the shards in OUT stays.
+        Err(e) if works_in_out => return Err(e),
+        outcome => session.end(ctx, outcome)?,
+    };
+    Ok(Some(run.finish(request, &made)))
+}
+
+/// Reads what shards left in their folders. Returns it with the locks of all folders but OUT: that one's lock is
+/// taken again when the merge begins in it, and until then nobody may be at work there either.
+fn read_parts(ctx: &Context, folders: &[PathBuf], layout: &Layout) -> Result<(Vec<Lock>, Vec<Part>)> {
+    let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        folders.iter().partition(|folder| is_same(folder, layout.root()));
+    let lock_all = |folders: Vec<&PathBuf>| -> Result<Vec<Lock>> {
+        folders
+            .into_iter()
+            .filter_map(|folder| lock(ctx, folder).transpose())
+            .collect()
+    };
+    let locks = lock_all(apart)?;
+    let own_lock = lock_all(inside)?;
+
+    let parts: Result<Vec<Part>> = folders.iter().map(|folder| Part::read(ctx, folder)).collect();
+    drop(own_lock);
+    Ok((locks, parts?))
+}
+
+/// A merge whose shards are all there.
+struct Merging<'a> {
+    parts: &'a [Part],
+    all: &'a Finished,
+    labels: &'a LabelList,
+    table: &'a LabelTable,
+    request: &'a Request,
+}
+
+impl Merging<'_> {
+    /// Brings the files of all units into OUT, and writes the tables.
+    fn merge(&self, run: &Run<'_>, session: &Session, manifest: Manifest) -> Result<Totals> {
+        let Self { parts, all, labels, table, request } = *self;
+        let layout = run.layout();
+
+        let merging = run.account.stage(Stage::Merge, None);
+        // The table is needed should this OUT be merged again, or gone on with.
         labels.write(&LabelList::path(layout))?;
-        gather(layout, &parts, &all, &session, &account)?;
-        stage.end();
-        let stage = account.stage(Stage::Tables, None);
-        let options = &request.options;
-        let padded = manifest.labels_padded_to();
+        gather(layout, parts, all, session, &run.account)?;
+        merging.end();
+
+        let tables = run.account.stage(Stage::Tables, None);
         assets::write(
             layout,
-            &table,
-            &options.modalities,
-            padded,
-            options.conventions(),
+            table,
+            &request.options.modalities,
+            manifest.labels_padded_to(),
+            request.options.conventions(),
             &request.world_offsets(),
         )?;
-        let made = finish(ctx, layout, request, manifest, &session.journal.finished(), None)?;
-        stage.end();
+        let made = finish(run.ctx, layout, request, manifest, &session.journal.finished(), None)?;
+        tables.end();
         Ok(made)
-    };
-    let merged = merged();
-    let works_in_out = parts.iter().any(|part| is_same(part.layout.root(), layout.root()));
-    let made = match merged {
-        // What its shards have done stays.
-        Err(e) if works_in_out => return Err(e),
-        merged => session.end(ctx, merged)?,
-    };
-    Ok(Some(summarize(account, layout, request, &made)))
+    }
 }
 
 /// Whether OUT, one of the folders, holds what they make already: they were merged before.
@@ -306,7 +323,7 @@ fn gather(
     layout: &Layout,
     parts: &[Part],
     all: &Finished,
-    session: &output::Session,
+    session: &Session,
     account: &Account<'_>,
 ) -> Result<()> {
     let ctx = account.ctx;

@@ -10,7 +10,8 @@ use crate::account::Account;
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::memory::SceneSource;
-use crate::export::job::{Job, Labelled, Scope, Target};
+use crate::export::job::{Job, Labelled, Scope};
+use crate::export::run::{Run, Target};
 use crate::export::shard::assignment::{Assignment, Shard, assets_cost, location_cost, photograph_cost};
 use crate::export::shard::plan::Plan;
 use crate::export::views::select_requested;
@@ -18,7 +19,7 @@ use crate::options::ExportOptions;
 use crate::record::journal::{Done, Journal, Unit};
 use crate::record::label_list::LabelList;
 use crate::record::missing::is_chosen;
-use crate::store::output::{self, Begin};
+use crate::store::lock::Sharing;
 use crate::summary::{Summary, UnitTally, ViewTally};
 use crate::survey::candidate::Candidate;
 use s3d_io::dataset::Layout;
@@ -36,27 +37,23 @@ pub(crate) fn export_shard(
     shard: Shard,
     plan: Option<&Plan>,
 ) -> Result<Option<Summary>> {
-    let account = Account::new(ctx);
-    let layout = &target.layout;
-    output::check(ctx, layout, target.overwrite, &target.allowed)?;
-    let job = Job::open(scenes, layout, options, plan, &account)?;
-    let manifest = job.manifest();
-    let session = match output::begin_shard(ctx, layout, target.overwrite, &job.request, &manifest)? {
-        Begin::NothingToDo => {
-            ctx.info(format_args!("{}: the data set is complete; nothing to do", layout.root().display()));
-            return Ok(None);
-        }
-        Begin::Session(session) => session,
-    };
+    let run = Run::new(ctx, target);
+    let layout = run.layout();
     let root = layout.root().display();
-    let Some(views) = job.run_shard(layout, &session.journal, &account, shard)? else {
+    let state = run.look()?;
+    let job = Job::open(scenes, layout, &state, options, plan, &run.account)?;
+    let Some(session) = run.begin(&state, &job.request, &job.manifest(), Sharing::Shards)? else {
+        return Ok(None);
+    };
+
+    let Some(views) = job.run_shard(layout, &session.journal, &run.account, shard)? else {
         ctx.info(format_args!("{root}: shard {shard} was done before; nothing to do"));
         return Ok(None);
     };
     let locations = session.journal.finished().count_locations(&job.request.numbers());
     drop(session);
     ctx.info(format_args!("{root}: shard {shard} is done; when all are, `s3d merge` makes the data set"));
-    Ok(Some(account.summarize(&root.to_string(), job.request.areas.len(), locations, views, None)))
+    Ok(Some(run.summarize(&job.request, locations, views, None)))
 }
 
 impl Job<'_> {

@@ -1,0 +1,254 @@
+//! What an output folder holds, read once, and whether an export may go into it.
+
+use crate::context::Context;
+use crate::error::{Error, Result, passes};
+use crate::record::manifest::{Head, Manifest};
+use crate::record::request::{Request, begun_by_other_version, read_request};
+use crate::store::backup::BACKUP;
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Layout;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// How many differences are named in a message.
+const MAX_NAMED: usize = 8;
+
+/// What an output folder held at the moment that it was read.
+#[derive(Debug)]
+pub(crate) struct OutputState {
+    /// The beginning of its manifest, if it has one of ours.
+    head: Option<Head>,
+    /// The manifest of a complete data set, or why this version of s3d cannot read it.
+    manifest: Option<Result<Manifest, String>>,
+    /// The request of an unfinished export.
+    request: Option<Request>,
+    /// The version of s3d that began an unfinished export whose request this version cannot read.
+    other_version: Option<String>,
+    /// Whether the unfinished export failed for good.
+    failed: bool,
+}
+
+/// What an output folder holds, compared with a request.
+#[derive(Debug)]
+pub(super) enum Holding {
+    /// Nothing of ours.
+    Nothing,
+    /// A complete data set.
+    Complete {
+        /// How its request differs, a sentence each.
+        differences: Vec<String>,
+    },
+    /// An unfinished export.
+    Unfinished {
+        areas: Vec<u32>,
+        /// How its request differs, a sentence each.
+        differences: Vec<String>,
+        failed: bool,
+    },
+    /// The rest of an unfinished export of these areas that nobody can go on with.
+    Leftover { areas: Vec<u32> },
+}
+
+impl OutputState {
+    /// Reads what a folder holds.
+    ///
+    /// # Errors
+    /// If a file cannot be read now, but may be there all the same: see
+    /// [`if_there`](crate::record::if_there).
+    pub(crate) fn read(layout: &Layout) -> Result<Self> {
+        let head = Head::read(&layout.manifest())?;
+        let manifest = if head.as_ref().is_some_and(Head::is_complete) {
+            match Manifest::read(layout) {
+                Ok(manifest) => Some(Ok(manifest)),
+                Err(e) if passes(&e) => return Err(e.into()),
+                // It is of another version, or half changed.
+                Err(e) => Some(Err(e.to_string())),
+            }
+        } else {
+            None
+        };
+
+        let request = read_request(layout)?;
+        let other_version = if request.is_none() {
+            begun_by_other_version(layout)?
+        } else {
+            None
+        };
+        Ok(Self { head, manifest, request, other_version, failed: layout.failed().exists() })
+    }
+
+    /// Whether an export into the folder has begun, or is complete.
+    pub(crate) fn is_begun(&self) -> bool {
+        self.head.is_some() || self.request.is_some()
+    }
+
+    /// Whether the folder holds a complete data set.
+    pub(super) fn is_complete(&self) -> bool {
+        self.manifest.is_some()
+    }
+
+    /// Whether an export was begun that is not complete.
+    pub(super) fn has_request(&self) -> bool {
+        self.request.is_some() || self.other_version.is_some()
+    }
+
+    /// The same after the rest of an export beside a complete data set is cleared away.
+    pub(super) fn without_request(self) -> Self {
+        Self { request: None, other_version: None, failed: false, ..self }
+    }
+
+    /// The areas that its manifest tells of.
+    pub(super) fn areas_of_manifest(&self) -> Vec<u32> {
+        self.head.as_ref().map_or(Vec::new(), |head| head.area_numbers.clone())
+    }
+
+    /// Compares what the folder holds with a request.
+    pub(super) fn compare(&self, request: &Request) -> Holding {
+        if let Some(manifest) = &self.manifest {
+            let differences = match manifest {
+                Ok(manifest) => manifest.differences(request),
+                Err(message) => vec![message.clone()],
+            };
+            return Holding::Complete { differences };
+        }
+        if let Some(begun) = &self.request {
+            return Holding::Unfinished {
+                areas: begun.numbers(),
+                differences: begun.differences(request),
+                failed: self.failed,
+            };
+        }
+        if self.head.is_none() {
+            return Holding::Nothing;
+        }
+        let areas = self.areas_of_manifest();
+        match &self.other_version {
+            Some(there) => Holding::Unfinished {
+                areas,
+                differences: vec![format!("version {there} of s3d there, {} now", request.version)],
+                failed: self.failed,
+            },
+            None => Holding::Leftover { areas },
+        }
+    }
+
+    /// Refuses a folder that holds something that s3d did not write, unless it may be overwritten or its name is
+    /// one of the `allowed`. Changes nothing.
+    pub(crate) fn check(
+        &self,
+        ctx: &Context,
+        layout: &Layout,
+        overwrite: bool,
+        allowed: &[&str],
+    ) -> Result<()> {
+        let root = layout.root();
+        if layout.root_misleads_loaders() {
+            ctx.warn(format_args!(
+                "{}: \"rgb\" in the folder's name misleads loaders that swap it for another modality in whole \
+                 paths",
+                root.display()
+            ));
+        }
+        // Its journals would be taken for those of an export.
+        if crate::store::is_plan(root) {
+            return Err(Error::Usage(format!("{} holds a plan: choose another folder", root.display())));
+        }
+        let entries = match fs::read_dir(root) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+            entries => entries.map_err(|e| FileError::io(root, "use as the output folder", e))?,
+        };
+        if overwrite || self.is_complete() || self.request.is_some() {
+            return Ok(());
+        }
+
+        // An unfinished export without a request left these, and nobody goes on with it.
+        let leftover = layout.entries(&self.areas_of_manifest());
+        let is_leftover = |path: &Path| self.head.is_some() && leftover.iter().any(|b| b.starts_with(path));
+        for entry in entries {
+            let path = entry.map_err(|e| FileError::io(root, "read", e))?.path();
+            let name = path.file_name().unwrap_or_default();
+            if is_leftover(&path) || is_working_name(name) || allowed.iter().any(|a| name == *a) {
+                continue;
+            }
+            return Err(Error::Usage(format!(
+                "{} already holds {}: choose another folder, or write into this one with --overwrite",
+                root.display(),
+                name.display()
+            )));
+        }
+        Ok(())
+    }
+
+    /// Refuses a folder in which the data set, or an earlier one that it replaces, would lie on its own input:
+    /// on one of the files or folders `inputs` of the areas with these numbers.
+    pub(crate) fn check_inputs<'p>(
+        &self,
+        layout: &Layout,
+        mut areas: Vec<u32>,
+        inputs: impl Iterator<Item = &'p PathBuf>,
+    ) -> Result<()> {
+        let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
+
+        // The areas of a data set that is there give way too.
+        areas.extend(self.areas_of_manifest());
+        areas.extend(self.request.as_ref().map_or(Vec::new(), Request::numbers));
+        let mut entries = Layout::new(&root).entries(&areas);
+        entries.push(root.join(BACKUP));
+
+        for path in inputs {
+            let Ok(input) = fs::canonicalize(path) else { continue };
+            let lies_in_output = entries.iter().any(|entry| input.starts_with(entry));
+            if lies_in_output || input.is_dir() && root.starts_with(&input) {
+                return Err(Error::Usage(format!(
+                    "{}: the data set would be written over its own input {}: choose another folder",
+                    layout.root().display(),
+                    path.display()
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Holding {
+    /// Refuses to replace the data set or export of another call, unless that was asked for.
+    pub(super) fn refuse(&self, layout: &Layout, overwrite: bool) -> Result<()> {
+        let (what, differences) = match self {
+            Self::Complete { differences } => ("a data set", differences),
+            Self::Unfinished { differences, failed: false, .. } => ("an unfinished export", differences),
+            Self::Unfinished { .. } | Self::Leftover { .. } | Self::Nothing => return Ok(()),
+        };
+        if overwrite || differences.is_empty() {
+            return Ok(());
+        }
+
+        let named: Vec<&str> = differences.iter().take(MAX_NAMED).map(String::as_str).collect();
+        let more = match differences.len() - named.len() {
+            0 => String::new(),
+            more => format!("; and {more} more"),
+        };
+        Err(Error::Usage(format!(
+            "{} already holds {what} of another call ({}{more}): choose another folder, or replace it with \
+             --overwrite",
+            layout.root().display(),
+            named.join("; ")
+        )))
+    }
+
+    /// Whether this is a complete data set of the same request.
+    pub(super) fn is_complete(&self) -> bool {
+        matches!(self, Self::Complete { differences } if differences.is_empty())
+    }
+
+    /// Whether this is an unfinished export of the same request.
+    pub(super) fn is_unfinished(&self) -> bool {
+        matches!(self, Self::Unfinished { differences, .. } if differences.is_empty())
+    }
+}
+
+/// Whether a name in an output folder is one that an export uses while it works.
+pub(crate) fn is_working_name(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name == ".s3d" || name.starts_with(".s3d-")
+}
