@@ -19,7 +19,6 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 pub mod boxes;
-pub mod detector;
 pub mod images;
 pub mod panoptic;
 pub mod points;

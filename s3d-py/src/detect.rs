@@ -5,9 +5,7 @@ use crate::mesh::parsed;
 use crate::work::watched;
 use pyo3::prelude::*;
 use s3d_dataset::{Context, Error};
-use s3d_eval::detector::model::{Model, TrainOptions};
-use s3d_eval::detector::space::{Space, SpaceSource};
-use s3d_eval::detector::table::cross_validation::{ParsedArea, detect_area, read_areas};
+use s3d_detect::{Model, ParsedArea, Space, SpaceSource, TrainOptions, detect_area, read_areas};
 use std::path::PathBuf;
 
 /// A trained detector.

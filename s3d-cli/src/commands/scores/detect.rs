@@ -6,10 +6,9 @@ use crate::failure::Outcome;
 use crate::values::parsed;
 use clap::{Args, Subcommand, value_parser};
 use s3d_dataset::{Context, DataSet, NewFile, Result};
-use s3d_eval::detector::model::{Model, TrainOptions};
-use s3d_eval::detector::space::{Space, SpaceSource};
-use s3d_eval::detector::table::cross_validation::{ParsedArea, cross_validate, detect_area, read_areas};
-use s3d_eval::detector::table::markdown;
+use s3d_detect::{
+    Model, ParsedArea, Space, SpaceSource, TrainOptions, cross_validate, detect_area, read_areas, table,
+};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -112,7 +111,7 @@ pub(crate) fn run(args: DetectArgs) -> Outcome<()> {
     match args.command {
         Command::Train(args) => train(args),
         Command::Run(args) => find(args),
-        Command::Table(args) => table(&args),
+        Command::Table(args) => print_table(&args),
     }
 }
 
@@ -148,7 +147,7 @@ fn find(args: RunArgs) -> Outcome<()> {
     })
 }
 
-fn table(args: &TableArgs) -> Outcome<()> {
+fn print_table(args: &TableArgs) -> Outcome<()> {
     let tables = on_threads(args.threads, |context| {
         let options = args.learning.options();
         let areas = read(&args.dataset, &[], options.spaces, context)?;
@@ -158,8 +157,8 @@ fn table(args: &TableArgs) -> Outcome<()> {
             .collect::<Result<Vec<_>>>()
     })?;
     print(&if args.json {
-        s3d_eval::detector::table::json(&tables)
+        table::json(&tables)
     } else {
-        markdown(&tables)
+        table::markdown(&tables)
     })
 }

@@ -1,0 +1,113 @@
+//! An area of a data set, as the detector reads it.
+
+use crate::surfel::{Surfel, surfels_of};
+use glam::Vec3;
+use rayon::prelude::*;
+use s3d_dataset::{Context, DataSet, Error, Result};
+use s3d_geom::{Aabb, PointCloud};
+use s3d_io::Error as FileError;
+use s3d_io::cloud::{AnnotationTree, OnFault, PointReader, TreeOptions};
+use s3d_label::Class;
+use std::io::Cursor;
+use std::path::Path;
+
+/// The classes that are detected, in the order of the paper's table: seven structural, five movable.
+pub const CLASSES: [Class; 12] = [
+    Class::CEILING,
+    Class::FLOOR,
+    Class::WALL,
+    Class::BEAM,
+    Class::COLUMN,
+    Class::WINDOW,
+    Class::DOOR,
+    Class::TABLE,
+    Class::CHAIR,
+    Class::SOFA,
+    Class::BOOKCASE,
+    Class::BOARD,
+];
+
+/// How many of [`CLASSES`] are structural.
+pub const STRUCTURAL: usize = 7;
+
+/// An annotated element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Element {
+    /// Its place in [`CLASSES`].
+    pub class: usize,
+    /// The room that it is of: its place in [`Area::rooms`].
+    pub room: u32,
+    /// Its box, in metres.
+    pub bbox: Aabb,
+}
+
+/// The points of an area, thinned, and its annotated elements: world frame, metres, Z up.
+#[derive(Clone, Debug)]
+pub struct Area {
+    /// Its number.
+    pub number: u32,
+    /// Its points, thinned room by room.
+    pub surfels: Vec<Surfel>,
+    /// The names of its rooms.
+    pub rooms: Vec<String>,
+    /// Elements of [`CLASSES`] of `instances.json`.
+    pub elements: Vec<Element>,
+}
+
+impl Area {
+    /// Reads `s3dis/Area_k/ROOM/ROOM.txt` of every room, which has no labels, and the boxes of
+    /// `area_k/3d/instances.json`. Classes of another taxonomy are what they count as.
+    ///
+    /// # Errors
+    /// [`Error::File`] with the file that is missing, damaged or not named by the data set's list;
+    /// [`Error::Input`] if the data set has no labels or not this area; [`Error::Cancelled`].
+    pub fn read(data: &DataSet, number: u32, ctx: &Context) -> Result<Self> {
+        let name = data.layout().root().display();
+        let Some(taxonomy) = data.taxonomy() else {
+            return Err(Error::Input(format!(
+                "{name} has no labels to learn from: give scenes [annotations]"
+            )));
+        };
+        if !data.areas().contains(&number) {
+            return Err(Error::Input(format!("{name} has no area {number}: it has {:?}", data.areas())));
+        }
+        let options = TreeOptions { taxonomy: taxonomy.clone(), ..TreeOptions::default() };
+        let tree = AnnotationTree::open_with(&data.layout().s3dis_area_dir(number), &options)?;
+        let progress = ctx.progress("reading", "rooms", tree.rooms.len() as u64);
+        let rooms = tree.rooms.par_iter().enumerate().map(|(index, room)| {
+            ctx.check()?;
+            let name = room.room.to_string();
+            let surfels =
+                surfels_of(&read_points(data, &room.path.join(format!("{name}.txt")))?, index as u32);
+            progress.add(1);
+            Ok((name, surfels))
+        });
+        let (mut rooms, surfels): (Vec<String>, Vec<Vec<Surfel>>) =
+            rooms.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+        let mut elements = Vec::new();
+        let path = data.layout().instances_json(number);
+        for entry in data.instances(number)? {
+            let class = taxonomy
+                .class(&entry.class)
+                .map_err(|e| FileError::format(&path, e.to_string()))?;
+            if let Some(class) = CLASSES.iter().position(|c| *c == class.s3dis()) {
+                let [x0, y0, z0, x1, y1, z1] = entry.bbox;
+                let bbox = Aabb { min: Vec3::new(x0, y0, z0), max: Vec3::new(x1, y1, z1) };
+                // A room without points is in no tree.
+                let room = rooms.iter().position(|r| *r == entry.room).unwrap_or_else(|| {
+                    rooms.push(entry.room.clone());
+                    rooms.len() - 1
+                });
+                elements.push(Element { class, room: room as u32, bbox });
+            }
+        }
+        Ok(Self { number, surfels: surfels.concat(), rooms, elements })
+    }
+}
+
+fn read_points(data: &DataSet, path: &Path) -> Result<PointCloud> {
+    let mut reader = PointReader::new(Cursor::new(data.read(path)?), path, OnFault::Stop);
+    let mut cloud = PointCloud::default();
+    while reader.read_chunk(1 << 18, &mut cloud)? > 0 {}
+    Ok(cloud)
+}

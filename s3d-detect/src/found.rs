@@ -1,0 +1,54 @@
+//! The elements that a trained model finds in an area.
+
+use crate::area::CLASSES;
+use crate::model::Model;
+use crate::parsed_area::ParsedArea;
+use crate::proposals::Prepared;
+use rayon::prelude::*;
+use s3d_dataset::{Context, Result};
+use serde::{Deserialize, Serialize};
+
+/// An element that was found, in the world: written so, a list of them is what `s3d eval det` reads.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoundBox {
+    /// The number of the area.
+    pub area: u32,
+    /// The room that most of its points are of.
+    pub room: String,
+    /// The name of its class.
+    pub class: String,
+    /// Its score in context.
+    pub score: f64,
+    /// The least corner in metres.
+    pub min: [f32; 3],
+    /// The largest corner in metres.
+    pub max: [f32; 3],
+}
+
+/// What the first of a model's machines finds in an area: by space, then by class, the best first.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn detect_area(model: &Model, area: &ParsedArea, ctx: &Context) -> Result<Vec<FoundBox>> {
+    let progress = ctx.progress("detecting", "spaces", area.spaces.len() as u64);
+    let found = area.spaces.par_iter().map(|space| {
+        ctx.check()?;
+        let prepared = Prepared::new(space);
+        let proposals = model.proposer.propose(&prepared);
+        let detections = model.detect(&prepared, &proposals).swap_remove(0);
+        progress.add(1);
+        let found = detections.iter().map(|d| {
+            let (room, bbox) = (space.room_of(&d.bbox), space.to_world(&d.bbox));
+            FoundBox {
+                area: area.number,
+                room: area.rooms[room as usize].clone(),
+                class: CLASSES[d.class].name().to_owned(),
+                score: d.in_context,
+                min: bbox.min.to_array(),
+                max: bbox.max.to_array(),
+            }
+        });
+        Ok(found.collect::<Vec<_>>())
+    });
+    Ok(found.collect::<Result<Vec<_>>>()?.concat())
+}

@@ -1,0 +1,303 @@
+//! Learns the machines of each class, and the context.
+
+use crate::area::CLASSES;
+use crate::boxes::{iou, suppress};
+use crate::context::{Context as Field, Node};
+use crate::features::{FEATURES, Variant, describe};
+use crate::proposals::{NEGATIVE_IOU, POSITIVE_IOU, Prepared, Proposal};
+use crate::svm::sparse::{SparseRow, SparseRows};
+use crate::svm::{Linear, SvmOptions, train};
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use s3d_dataset::{Context, Result};
+use s3d_geom::Aabb;
+use serde::{Deserialize, Serialize};
+
+/// What an error of a machine costs; of positive examples this times how many negative ones there are for
+/// each, up to a limit.
+const COST: f64 = 0.01;
+const MOST_WEIGHT: f64 = 8.0;
+/// Proposals of a class and a space that are positive and negative examples at first, and that a round adds.
+const POSITIVES: usize = 40;
+const FIRST_NEGATIVES: usize = 10;
+const HARD_NEGATIVES: usize = 15;
+/// Rounds of hard negatives: proposals that score above the negative margin.
+const ROUNDS: usize = 2;
+const MARGIN: f64 = -1.0;
+/// Of boxes of a class that overlap more than this the best stays.
+const SAME_ELEMENT: f64 = 0.25;
+/// Boxes of a class and a space that the context looks at.
+const NODES: usize = 40;
+
+/// The machines of one variant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Machines {
+    /// What they are given.
+    pub variant: Variant,
+    /// By class; `None` for one without an example.
+    pub classes: Vec<Option<Linear>>,
+    /// The terms between boxes.
+    pub context: Field,
+}
+
+/// Examples of a class besides the true boxes.
+#[derive(Clone, Debug)]
+struct Pool {
+    rows: SparseRows,
+    positive: Vec<bool>,
+    /// The space of each row.
+    space: Vec<usize>,
+}
+
+/// What examples are taken from.
+struct Source<'a> {
+    spaces: &'a [Prepared<'a>],
+    /// By space: proposals, and how much each overlaps an element of its class.
+    proposals: &'a [Vec<(Proposal, f64)>],
+    /// Their descriptions: as many variants and rounds look at them, they are made once.
+    described: Vec<SparseRows>,
+    /// The true boxes of all classes: rows, classes, spaces.
+    truth: SparseRows,
+    class_of_truth: Vec<usize>,
+    space_of_truth: Vec<usize>,
+    seed: u64,
+}
+
+/// How much a proposal overlaps an element of its class.
+pub fn overlap(prepared: &Prepared<'_>, p: &Proposal) -> f64 {
+    prepared.truth(p.class).map(|b| iou(b, &p.bbox)).fold(0.0, f64::max)
+}
+
+/// The descriptions of boxes of a space, a row each.
+fn describe_all<'b>(prepared: &Prepared<'_>, boxes: impl Iterator<Item = &'b Aabb>) -> SparseRows {
+    let mut rows = SparseRows::new(FEATURES);
+    boxes.for_each(|b| rows.push(&describe(&prepared.space.index, prepared.space.frame.extent, b)));
+    rows
+}
+
+/// Learns the machines of `variants` from spaces and their proposals. Classes learn on a thread each.
+///
+/// # Errors
+/// [`s3d_dataset::Error::Cancelled`].
+pub fn learn(
+    spaces: &[Prepared<'_>],
+    proposals: &[Vec<(Proposal, f64)>],
+    variants: &[Variant],
+    seed: u64,
+    ctx: &Context,
+) -> Result<Vec<Machines>> {
+    let of_space = |(s, proposals): (&Prepared<'_>, &Vec<(Proposal, f64)>)| {
+        let truth = describe_all(s, s.space.elements.iter().map(|e| &e.bbox));
+        (truth, describe_all(s, proposals.iter().map(|(p, _)| &p.bbox)))
+    };
+    let (truths, described): (Vec<SparseRows>, Vec<SparseRows>) =
+        spaces.par_iter().zip(proposals).map(of_space).unzip();
+    let mut truth = SparseRows::new(FEATURES);
+    truths.iter().for_each(|rows| truth.append(rows));
+    let elements = || {
+        spaces
+            .iter()
+            .enumerate()
+            .flat_map(|(i, s)| s.space.elements.iter().map(move |e| (i, e)))
+    };
+    let source = Source {
+        spaces,
+        proposals,
+        described,
+        truth,
+        class_of_truth: elements().map(|(_, e)| e.class).collect(),
+        space_of_truth: elements().map(|(i, _)| i).collect(),
+        seed,
+    };
+    let first: Vec<Pool> = (0..CLASSES.len())
+        .into_par_iter()
+        .map(|class| source.first_pool(class))
+        .collect();
+    let progress = ctx.progress("learning", "machines", (variants.len() * (ROUNDS + 3)) as u64);
+    let mut learnt = Vec::new();
+    for &variant in variants {
+        let mut pools = first.clone();
+        let mut classes = source.train(&pools, variant, |_| true);
+        progress.add(1);
+        for _ in 0..ROUNDS {
+            ctx.check()?;
+            source.add_hard(&mut pools, &classes, variant);
+            classes = source.train(&pools, variant, |_| true);
+            progress.add(1);
+        }
+        // Scores of spaces that a machine did not learn from, as those that it will be asked about.
+        let mut scored = Vec::new();
+        for half in 0..2 {
+            ctx.check()?;
+            let machines = source.train(&pools, variant, |space| space % 2 != half);
+            let of_half = (0..spaces.len()).into_par_iter().filter(|space| space % 2 == half);
+            scored.extend(of_half.map(|space| source.nodes(space, &machines)).collect::<Vec<_>>());
+            progress.add(1);
+        }
+        learnt.push(Machines { variant, classes, context: Field::train(&scored, seed) });
+    }
+    Ok(learnt)
+}
+
+impl Source<'_> {
+    /// Proposals that overlap an element, and some at random that overlap none.
+    fn first_pool(&self, class: usize) -> Pool {
+        let mut pool = Pool { rows: SparseRows::new(FEATURES), positive: Vec::new(), space: Vec::new() };
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed.wrapping_mul(31).wrapping_add(class as u64));
+        for (space, proposals) in self.proposals.iter().enumerate() {
+            let of_class = |i: &usize| proposals[*i].0.class == class;
+            let those = |which: &dyn Fn(f64) -> bool| -> Vec<usize> {
+                (0..proposals.len())
+                    .filter(of_class)
+                    .filter(|i| which(proposals[*i].1))
+                    .collect()
+            };
+            let mut some = those(&|overlap| overlap < NEGATIVE_IOU);
+            some.shuffle(&mut rng);
+            some.truncate(FIRST_NEGATIVES);
+            let mut all = those(&|overlap| overlap >= POSITIVE_IOU);
+            all.truncate(POSITIVES);
+            all.append(&mut some);
+            pool.rows
+                .append(&self.described[space].select(all.iter().copied(), &[]));
+            pool.positive
+                .extend(all.iter().map(|i| proposals[*i].1 >= POSITIVE_IOU));
+            pool.space.resize(pool.positive.len(), space);
+        }
+        pool
+    }
+
+    /// Trains the machine of each class on examples of some spaces.
+    fn train(
+        &self,
+        pools: &[Pool],
+        variant: Variant,
+        from: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<Option<Linear>> {
+        let without = variant.without();
+        let classes = pools.par_iter().enumerate().map(|(class, pool)| {
+            let truths = (0..self.truth.len()).filter(|&i| from(self.space_of_truth[i]));
+            let pooled = (0..pool.rows.len()).filter(|&i| from(pool.space[i]));
+            let mut rows = self.truth.select(truths.clone(), &without);
+            rows.append(&pool.rows.select(pooled.clone(), &without));
+            let of_truth = truths.map(|i| self.class_of_truth[i] == class);
+            let positive: Vec<bool> = of_truth.chain(pooled.map(|i| pool.positive[i])).collect();
+            let count = positive.iter().filter(|p| **p).count();
+            if count == 0 {
+                return None;
+            }
+            let weight = ((positive.len() - count) as f64 / count as f64).clamp(1.0, MOST_WEIGHT);
+            let costs: Vec<f64> = positive.iter().map(|p| if *p { COST * weight } else { COST }).collect();
+            let seed = self.seed.wrapping_mul(101).wrapping_add(class as u64);
+            let options = SvmOptions { max_passes: 60, seed, ..SvmOptions::default() };
+            Some(train(&rows, &positive, &costs, &options))
+        });
+        classes.collect()
+    }
+
+    /// Adds the negative proposals of each space that score highest above the margin.
+    fn add_hard(&self, pools: &mut [Pool], machines: &[Option<Linear>], variant: Variant) {
+        debug_assert!(Variant::ALL.contains(&variant));
+        let hard: Vec<Vec<(usize, SparseRows)>> = (0..self.spaces.len())
+            .into_par_iter()
+            .map(|space| {
+                let mut found = Vec::new();
+                for (class, machine) in machines.iter().enumerate() {
+                    let Some(machine) = machine else { continue };
+                    let (proposals, rows) = (&self.proposals[space], &self.described[space]);
+                    let mut scores: Vec<(f64, usize)> = (0..rows.len())
+                        .filter(|i| proposals[*i].0.class == class && proposals[*i].1 < NEGATIVE_IOU)
+                        .map(|i| (machine.score(rows.row(i)), i))
+                        .filter(|(score, _)| *score > MARGIN)
+                        .collect();
+                    scores.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                    scores.truncate(HARD_NEGATIVES);
+                    found.push((class, rows.select(scores.into_iter().map(|(_, i)| i), &[])));
+                }
+                found
+            })
+            .collect();
+        for (space, found) in hard.into_iter().enumerate() {
+            for (class, rows) in found {
+                let pool = &mut pools[class];
+                pool.positive.resize(pool.positive.len() + rows.len(), false);
+                pool.space.resize(pool.space.len() + rows.len(), space);
+                pool.rows.append(&rows);
+            }
+        }
+    }
+
+    /// The boxes of a space, scored, and which are elements: of each class the highest first that overlaps
+    /// one which no higher one does.
+    fn nodes(&self, space: usize, machines: &[Option<Linear>]) -> (Vec<Node>, Vec<bool>) {
+        let prepared = &self.spaces[space];
+        let proposals: Vec<Proposal> = self.proposals[space].iter().map(|(p, _)| *p).collect();
+        let score = |(i, p): (usize, &Proposal)| score_of(machines, p, self.described[space].row(i));
+        let scores: Vec<f64> = proposals.iter().enumerate().map(score).collect();
+        let nodes = elements(&proposals, &scores);
+        let mut taken = vec![false; prepared.space.elements.len()];
+        let answers = nodes.iter().map(|n| {
+            let elements = prepared.space.elements.iter().enumerate();
+            let best = elements
+                .filter(|(_, e)| e.class == n.class)
+                .map(|(i, e)| (iou(&e.bbox, &n.bbox), i))
+                .reduce(|best, next| if next.0 > best.0 { next } else { best });
+            match best {
+                Some((overlap, i)) if overlap > POSITIVE_IOU && !taken[i] => {
+                    taken[i] = true;
+                    true
+                }
+                _ => false,
+            }
+        });
+        let answers = answers.collect();
+        (nodes, answers)
+    }
+}
+
+/// The scores of proposals by several machines: by machine, then by proposal. A class without a machine
+/// scores −∞.
+pub fn score(
+    prepared: &Prepared<'_>,
+    proposals: &[Proposal],
+    machines: &[&[Option<Linear>]],
+) -> Vec<Vec<f64>> {
+    let rows = describe_all(prepared, proposals.iter().map(|p| &p.bbox));
+    let of = |machines: &&[Option<Linear>]| {
+        proposals
+            .iter()
+            .enumerate()
+            .map(|(i, p)| score_of(machines, p, rows.row(i)))
+            .collect()
+    };
+    machines.iter().map(of).collect()
+}
+
+fn score_of(machines: &[Option<Linear>], p: &Proposal, row: SparseRow<'_>) -> f64 {
+    machines[p.class]
+        .as_ref()
+        .map_or(f64::NEG_INFINITY, |machine| machine.score(row))
+}
+
+/// What stays of scored proposals after non-maximum suppression: class by class, the highest score first.
+pub fn elements(proposals: &[Proposal], scores: &[f64]) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    for class in 0..CLASSES.len() {
+        let of_class: Vec<usize> = (0..proposals.len())
+            .filter(|&i| proposals[i].class == class && scores[i].is_finite())
+            .collect();
+        let boxes: Vec<_> = of_class.iter().map(|&i| proposals[i].bbox).collect();
+        let of: Vec<f64> = of_class.iter().map(|&i| scores[i]).collect();
+        let stay = suppress(&boxes, &of, SAME_ELEMENT).into_iter().take(NODES);
+        nodes.extend(stay.map(|i| Node { class, score: of[i], bbox: boxes[i] }));
+    }
+    nodes
+}
+
+/// A random score in 0 to 1 for each of `count` boxes.
+pub fn random_scores(count: usize, seed: u64) -> Vec<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..count).map(|_| rng.next_u64() as f64 / u64::MAX as f64).collect()
+}

@@ -1,0 +1,99 @@
+//! The baseline detector of the 2D-3D-S paper (Armeni et al. 2017): elements of twelve classes, found in the
+//! points of an area.
+//!
+//! # From points to spaces
+//!
+//! [`Area::read`] reads the points of an area of a data set, thinned to [surfels](surfel) of 5 cm, and its
+//! annotated elements. [`ParsedArea::new`] finds its [spaces], such as rooms and hallways, without training,
+//! and turns each into a frame of its own. [`read_areas`] does both.
+//!
+//! # From spaces to a model
+//!
+//! [`Model::train`] learns three things from annotated spaces: the [windows](proposals) that may hold an
+//! element; for each class a [linear machine](svm) that scores a box by its [features]; and how neighbours
+//! change a score, the [context]. [`Model::save`] and [`Model::load`] keep a model in a file.
+//!
+//! # From a model to boxes
+//!
+//! [`detect_area`] returns the elements that a model finds in an area, as boxes in the world frame, in metres.
+//! [`cross_validate`] trains and tests over the folds of the paper, scores with [`s3d_eval::boxes`], and
+//! returns a [`table::Table`] in the form of the paper.
+//!
+//! The same data, options and seed give the same bytes for any number of threads. Each module says what is the
+//! paper's and what is chosen here; `docs/detector.md` has the whole of it, with figures.
+//!
+//! # Example
+//!
+//! A model learns from one room with a table, and finds the table of another.
+//!
+//! ```
+//! use glam::vec3;
+//! use s3d_detect::surfel::surfels_of;
+//! use s3d_detect::{
+//!     Area, CLASSES, Context, Element, Model, ParsedArea, SpaceSource, TrainOptions, boxes, detect_area,
+//! };
+//! use s3d_geom::{Aabb, PointCloud};
+//! use s3d_label::Class;
+//!
+//! // A room of 4 × 3 m: points every 2.5 cm on its floor and on a table top of 1.6 × 0.8 m.
+//! let class = CLASSES.iter().position(|c| *c == Class::TABLE).unwrap();
+//! let room = |number: u32, x: f32, y: f32| {
+//!     let table = Aabb { min: vec3(x, y, 0.70), max: vec3(x + 1.6, y + 0.8, 0.72) };
+//!     let floor = Aabb { min: vec3(0.0, 0.0, 0.0), max: vec3(4.0, 3.0, 0.0) };
+//!     let mut cloud = PointCloud::default();
+//!     for sheet in [floor, table] {
+//!         let [columns, rows, _] = (sheet.size() / 0.025).as_uvec3().to_array();
+//!         for (i, j) in (0..=columns).flat_map(|i| (0..=rows).map(move |j| (i, j))) {
+//!             cloud.positions.push(sheet.min + 0.025 * vec3(i as f32, j as f32, 0.0));
+//!             cloud.colors.push([180, 170, 160]);
+//!         }
+//!     }
+//!     let elements = vec![Element { class, room: 0, bbox: table }];
+//!     let area = Area { number, surfels: surfels_of(&cloud, 0), rooms: vec!["office_1".to_owned()], elements };
+//!     ParsedArea::new(area, SpaceSource::Rooms)
+//! };
+//!
+//! let (seen, unseen, context) = (room(1, 1.0, 1.2), room(2, 2.0, 0.5), Context::default());
+//! let spaces: Vec<_> = seen.spaces.iter().collect();
+//! let model = Model::train(&spaces, &TrainOptions::default(), &context)?;
+//! let found = detect_area(&model, &unseen, &context)?;
+//!
+//! let best = &found[0];
+//! assert_eq!((best.class.as_str(), best.room.as_str()), ("table", "office_1"));
+//! let bbox = Aabb { min: best.min.into(), max: best.max.into() };
+//! assert!(boxes::iou(&bbox, &unseen.elements[0].bbox) > 0.5);
+//! # Ok::<(), s3d_detect::Error>(())
+//! ```
+
+// What a file holds must not make it panic.
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
+
+pub mod boxes;
+pub mod context;
+pub mod features;
+pub mod learn;
+pub mod palette;
+pub mod proposals;
+pub mod spaces;
+pub mod surfel;
+pub mod svm;
+pub mod table;
+
+mod area;
+mod found;
+mod model;
+mod parsed_area;
+mod space;
+
+pub use area::{Area, CLASSES, Element, STRUCTURAL};
+pub use found::{FoundBox, detect_area};
+pub use model::{Detection, Model, TrainOptions, recalled};
+pub use parsed_area::{ParsedArea, read_areas};
+pub use s3d_dataset::{Context, Error, Result};
+pub use space::{Space, SpaceSource, UnknownSpaceSource, spaces_of};
+pub use table::cross_validation::cross_validate;
+
+/// The README's example, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,126 @@
+//! Planes in which walls stand, from density histograms.
+
+use crate::surfel::{CELL_M, Surfel};
+
+/// Width of a histogram's bins in metres.
+const BIN_M: f32 = 0.025;
+/// Widths of the gaps that filters look for, in bins: 5 to 50 cm.
+const GAPS: std::ops::RangeInclusive<usize> = 2..=20;
+/// Width of a peak, in bins.
+const PEAK: usize = 2;
+/// What a filter must answer, in m² of wall.
+const LEAST_M2: f64 = 2.0;
+/// Of dividers nearer to each other than this, in metres, the stronger one stays.
+const APART_M: f32 = 0.12;
+
+/// A plane across an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Divider {
+    /// Where it cuts the axis: the middle of the gap, in metres.
+    pub at: f32,
+    /// The gap's width in metres.
+    pub gap: f32,
+    /// What the filter answers, in m².
+    pub response: f64,
+}
+
+/// Dividers across x and y, ascending.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Dividers {
+    /// Across x, then across y.
+    pub axes: [Vec<Divider>; 2],
+}
+
+/// Finds the dividers of an area.
+pub fn find_dividers(surfels: &[Surfel]) -> Dividers {
+    Dividers { axes: [0, 1].map(|axis| dividers_along(axis, surfels)) }
+}
+
+fn dividers_along(axis: usize, surfels: &[Surfel]) -> Vec<Divider> {
+    let ends = surfels
+        .iter()
+        .fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], s| {
+            [least.min(s.position[axis]), most.max(s.position[axis])]
+        });
+    if surfels.is_empty() {
+        return Vec::new();
+    }
+    // Surfels stand for a cell of surface each; the ends have room for a filter.
+    let margin = GAPS.end() + PEAK;
+    let bin = |x: f32| ((x - ends[0]) / BIN_M) as usize + margin;
+    let mut histogram = vec![0.0; bin(ends[1]) + margin + 1];
+    for s in surfels {
+        histogram[bin(s.position[axis])] += f64::from(CELL_M * CELL_M);
+    }
+    let origin = ends[0] - margin as f32 * BIN_M;
+    strongest(&respond(&histogram))
+        .into_iter()
+        .map(|(middle, gap, response)| Divider {
+            at: origin + middle as f32 * 0.5 * BIN_M,
+            gap: gap as f32 * BIN_M,
+            response,
+        })
+        .collect()
+}
+
+/// The filters' answers: for each place, counted in half bins, the widest answer of all gaps and that gap. A
+/// filter answers with the smaller of its two peaks, less the mean density in the gap times a peak's width:
+/// floors and furniture, which are dense everywhere, do not count.
+fn respond(histogram: &[f64]) -> Vec<(f64, usize)> {
+    let mut sums = vec![0.0];
+    for value in histogram {
+        sums.push(sums[sums.len() - 1] + value);
+    }
+    let mut best = vec![(0.0, 0); 2 * histogram.len() + 1];
+    for gap in GAPS {
+        for start in PEAK..histogram.len().saturating_sub(gap + PEAK) {
+            let end = start + gap;
+            let left = sums[start] - sums[start - PEAK];
+            let right = sums[end + PEAK] - sums[end];
+            let between = (sums[end] - sums[start]) / gap as f64 * PEAK as f64;
+            let response = left.min(right) - between;
+            if response > best[start + end].0 {
+                best[start + end] = (response, gap);
+            }
+        }
+    }
+    best
+}
+
+/// Places that answer enough, ascending, each the strongest around: (half bins, gap, response).
+fn strongest(answers: &[(f64, usize)]) -> Vec<(usize, usize, f64)> {
+    let mut order: Vec<usize> = (0..answers.len()).filter(|&i| answers[i].0 >= LEAST_M2).collect();
+    order.sort_by(|&a, &b| answers[b].0.total_cmp(&answers[a].0).then(a.cmp(&b)));
+    let apart = (2.0 * APART_M / BIN_M) as usize;
+    let mut stay: Vec<usize> = Vec::new();
+    for i in order {
+        if stay.iter().all(|s| s.abs_diff(i) >= apart) {
+            stay.push(i);
+        }
+    }
+    stay.sort_unstable();
+    stay.into_iter().map(|i| (i, answers[i].1, answers[i].0)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_layers_answer_and_one_layer_does_not() {
+        let mut histogram = vec![1.0; 100];
+        // A wall of two layers, 6 bins apart; a single layer at 70.
+        (histogram[28], histogram[29]) = (5.0, 5.0);
+        (histogram[36], histogram[37], histogram[70]) = (4.0, 4.0, 9.0);
+        let found = strongest(&respond(&histogram));
+        assert_eq!(found.len(), 1);
+        let (middle, gap, response) = found[0];
+        assert_eq!((middle, gap), (30 + 36, 6));
+        assert!((response - (8.0 - 2.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nothing_has_no_dividers() {
+        assert_eq!(find_dividers(&[]), Dividers::default());
+    }
+}

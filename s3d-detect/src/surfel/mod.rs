@@ -1,0 +1,239 @@
+//! Points, thinned to one surfel a cell: what everything after is made of.
+
+pub mod index;
+pub mod volume;
+
+use glam::{DVec3, Vec3};
+use s3d_geom::{Aabb, PointCloud};
+
+/// Width of a cell in metres: chosen by us, half a step of the sliding windows.
+pub const CELL_M: f32 = 0.05;
+
+/// What the points in a cell tell of the surface there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surfel {
+    /// Their mean.
+    pub position: Vec3,
+    /// The box around them.
+    pub extent: Aabb,
+    /// The direction in which the points of this cell and of the 26 around it vary least, either way.
+    pub normal: Vec3,
+    /// The share of that direction in all their variance, 0 (a plane) to ⅓: Pauly, Gross and Kobbelt's
+    /// surface variation (2002).
+    pub curvature: f32,
+    /// Mean R G B, 0 to 1.
+    pub color: Vec3,
+    /// The room whose points these are: of an area its place in [`Area::rooms`](crate::area::Area::rooms).
+    /// Detections are told by it, and not made with it.
+    pub room: u32,
+}
+
+/// Sums over the points of a cell, about the cell's corner.
+#[derive(Clone, Copy)]
+struct Sums {
+    key: [i32; 3],
+    count: f64,
+    sum: DVec3,
+    /// xx, xy, xz, yy, yz, zz.
+    squares: [f64; 6],
+    color: DVec3,
+    extent: Aabb,
+}
+
+/// Thins the points of a room, which has this number. The surfels are by cell: z, then y, then x. Their order
+/// follows from where the points are, and not from the order of the points, but for the last bits of sums.
+///
+/// # Panics
+/// If the cloud has no colours.
+pub fn surfels_of(points: &PointCloud, room: u32) -> Vec<Surfel> {
+    assert_eq!(points.colors.len(), points.len(), "a colour a point");
+    let key = |p: Vec3| (p / CELL_M).floor().as_ivec3().to_array();
+    let mut order: Vec<([i32; 3], u32)> = Vec::with_capacity(points.len());
+    order.extend(points.positions.iter().zip(0..).map(|(&p, i)| {
+        let [x, y, z] = key(p);
+        ([z, y, x], i)
+    }));
+    order.sort_unstable();
+    let mut cells: Vec<Sums> = Vec::new();
+    for &([z, y, x], i) in &order {
+        let (point, color) = (points.positions[i as usize], points.colors[i as usize]);
+        if cells.last().is_none_or(|c| c.key != [x, y, z]) {
+            cells.push(Sums {
+                key: [x, y, z],
+                count: 0.0,
+                sum: DVec3::ZERO,
+                squares: [0.0; 6],
+                color: DVec3::ZERO,
+                extent: Aabb::EMPTY,
+            });
+        }
+        let Some(cell) = cells.last_mut() else { continue };
+        let p = point.as_dvec3() - corner(cell.key);
+        cell.count += 1.0;
+        cell.sum += p;
+        let products = [p.x * p.x, p.x * p.y, p.x * p.z, p.y * p.y, p.y * p.z, p.z * p.z];
+        cell.squares.iter_mut().zip(products).for_each(|(s, p)| *s += p);
+        cell.color += DVec3::from(color.map(f64::from)) / 255.0;
+        cell.extent = cell.extent.with(point);
+    }
+    with_normals(&cells, room)
+}
+
+fn corner(key: [i32; 3]) -> DVec3 {
+    DVec3::from(key.map(|k| f64::from(k) * f64::from(CELL_M)))
+}
+
+/// Surfels of cells in their order. The 27 cells around one are 9 runs of neighbours along x; where each run
+/// begins only moves on from one cell to the next.
+fn with_normals(cells: &[Sums], room: u32) -> Vec<Surfel> {
+    let order = |k: [i32; 3]| [k[2], k[1], k[0]];
+    let mut starts = [0usize; 9];
+    let mut surfels = Vec::with_capacity(cells.len());
+    for cell in cells {
+        let here = corner(cell.key);
+        let (mut count, mut sum, mut squares) = (0.0, DVec3::ZERO, [0.0; 6]);
+        for (run, start) in starts.iter_mut().enumerate() {
+            let [x, y, z] = cell.key;
+            let (y, z) = (y + run as i32 % 3 - 1, z + run as i32 / 3 - 1);
+            while cells.get(*start).is_some_and(|c| order(c.key) < [z, y, x - 1]) {
+                *start += 1;
+            }
+            for near in cells[*start..].iter().take_while(|c| order(c.key) <= [z, y, x + 1]) {
+                let shift = corner(near.key) - here;
+                // Moments about this cell's corner.
+                let (n, s, d) = (near.count, near.sum, shift);
+                let moved = |i: usize, a: usize, b: usize| {
+                    near.squares[i] + s[a] * d[b] + d[a] * s[b] + n * d[a] * d[b]
+                };
+                let all = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &(a, b))| moved(i, a, b));
+                squares.iter_mut().zip(all).for_each(|(t, v)| *t += v);
+                count += n;
+                sum += s + n * d;
+            }
+        }
+        let mean = sum / count;
+        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+        let mut covariance = [0.0; 6];
+        for (i, (a, b)) in pairs.into_iter().enumerate() {
+            covariance[i] = squares[i] / count - mean[a] * mean[b];
+        }
+        let (normal, curvature) = least_direction(covariance);
+        surfels.push(Surfel {
+            position: (here + cell.sum / cell.count).as_vec3(),
+            extent: cell.extent,
+            normal: normal.as_vec3(),
+            curvature: curvature as f32,
+            color: (cell.color / cell.count).as_vec3(),
+            room,
+        });
+    }
+    surfels
+}
+
+/// The eigenvector of the least eigenvalue of a covariance (xx, xy, xz, yy, yz, zz), and that eigenvalue's
+/// share in their sum: by Jacobi's rotations.
+fn least_direction([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> (DVec3, f64) {
+    let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let trace = xx + yy + zz;
+    for _ in 0..12 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q].abs() <= 1e-15 * trace {
+                continue;
+            }
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            for row in &mut a {
+                (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+            }
+            for k in 0..3 {
+                (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+                (v[k][p], v[k][q]) = (c * v[k][p] - s * v[k][q], s * v[k][p] + c * v[k][q]);
+            }
+        }
+    }
+    let least = (0..3).fold(0, |least, i| if a[i][i] < a[least][least] { i } else { least });
+    let share = if trace > 0.0 {
+        (a[least][least] / trace).clamp(0.0, 1.0 / 3.0)
+    } else {
+        0.0
+    };
+    (DVec3::new(v[0][least], v[1][least], v[2][least]), share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec3;
+
+    fn cloud(positions: Vec<Vec3>) -> PointCloud {
+        let colors = vec![[255, 0, 51]; positions.len()];
+        PointCloud { positions, colors, faces: Vec::new() }
+    }
+
+    #[test]
+    fn a_slanted_plane_has_its_normal_and_no_curvature() {
+        let points = (0..40_000).map(|i| {
+            let (u, v) = ((i % 200) as f32 * 0.01, (i / 200) as f32 * 0.01);
+            vec3(u, v, 3.0 + 0.5 * u)
+        });
+        let surfels = surfels_of(&cloud(points.collect()), 0);
+        let normal = vec3(-0.5, 0.0, 1.0).normalize();
+        assert!(surfels.len() > 1600);
+        for s in &surfels {
+            assert!(s.normal.dot(normal).abs() > 0.999 && s.curvature < 1e-4, "{s:?}");
+            assert!((s.position.z - 3.0 - 0.5 * s.position.x).abs() < 1e-3 && s.extent.contains(s.position));
+            assert!((s.color - vec3(1.0, 0.0, 0.2)).abs().max_element() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn an_edge_is_curved_and_points_off_each_other_are_a_surfel_each() {
+        let edge = (0..10_000).flat_map(|i| {
+            let (u, v) = ((i % 100) as f32 * 0.01, (i / 100) as f32 * 0.01);
+            [vec3(u, v, 0.0), vec3(0.0, v, u)]
+        });
+        let surfels = surfels_of(&cloud(edge.collect()), 0);
+        let at_edge = |s: &&Surfel| s.position.x + s.position.z < 0.06;
+        assert!(surfels.iter().filter(at_edge).all(|s| s.curvature > 0.05));
+        assert!(
+            surfels
+                .iter()
+                .filter(|s| s.position.x > 0.2)
+                .all(|s| s.normal.z.abs() > 0.999)
+        );
+        let two = surfels_of(&cloud(vec![vec3(-3.0, 0.0, 0.0), vec3(7.0, 1.0, 2.0)]), 5);
+        assert_eq!((two.len(), two[1].room), (2, 5));
+        assert!(surfels_of(&PointCloud::default(), 0).is_empty());
+    }
+
+    #[test]
+    fn neighbours_by_runs_are_those_by_search() {
+        let points: Vec<Vec3> = (0..3000u32)
+            .map(|i| {
+                let r = |k: u32| (i.wrapping_mul(k) % 1009) as f32 / 1009.0;
+                vec3(r(7919), r(104_729), 0.4 * r(1_299_709))
+            })
+            .collect();
+        let cloud = cloud(points.clone());
+        for s in surfels_of(&cloud, 0).iter().step_by(97) {
+            let cell = (s.position / CELL_M).floor();
+            let near: Vec<DVec3> = points
+                .iter()
+                .filter(|&&p| ((p / CELL_M).floor() - cell).abs().max_element() < 1.5)
+                .map(|p| p.as_dvec3())
+                .collect();
+            let n = near.len() as f64;
+            let mean = near.iter().sum::<DVec3>() / n;
+            let of = |a: usize, b: usize| near.iter().map(|p| (p - mean)[a] * (p - mean)[b]).sum::<f64>() / n;
+            let expected = least_direction([of(0, 0), of(0, 1), of(0, 2), of(1, 1), of(1, 2), of(2, 2)]);
+            assert!((f64::from(s.curvature) - expected.1).abs() < 1e-6);
+            assert!(s.normal.as_dvec3().dot(expected.0).abs() > 1.0 - 1e-6);
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Trains and tests over the folds of the paper.
+
+use crate::area::CLASSES;
+use crate::features::{FEATURES, Variant, describe};
+use crate::learn::{elements, random_scores};
+use crate::model::{Detection, Model, TrainOptions, recalled};
+use crate::parsed_area::ParsedArea;
+use crate::proposals::Prepared;
+use crate::space::Space;
+use crate::svm::sparse::SparseRows;
+use crate::table::precision::{Scored, average_precision};
+use crate::table::{Row, Table};
+use rayon::prelude::*;
+use s3d_dataset::{Context, Error, Result};
+use s3d_geom::Aabb;
+use std::collections::BTreeMap;
+
+/// What is measured besides, in the order of the table.
+const RANDOM: &str = "Random scores";
+const NO_CONTEXT: &str = "Full model, no context";
+const TRUE_BOXES: &str = "Full model on true boxes";
+const RECALL: &str = "Proposals: recall";
+
+/// Overlaps that average precision is told at.
+pub const THRESHOLDS: [f64; 2] = [0.5, 0.25];
+
+/// Detections in the world, of a class and an area.
+type Found = BTreeMap<(String, usize), Vec<Scored>>;
+
+/// Average precision over the paper's folds, cut down to the areas that are there: the mean of the folds, in
+/// which a class that an area does not have is left out. Options without the full model get it.
+///
+/// # Errors
+/// [`Error::Input`] if the areas make no fold; as [`Model::train`].
+pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Context) -> Result<Table> {
+    let numbers: Vec<u32> = areas.iter().map(|a| a.number).collect();
+    let folds = s3d_sample::folds(&numbers);
+    if folds.is_empty() {
+        let needs = "the published folds need areas of two of 1, 3, 6 / 2, 4 / 5";
+        return Err(Error::Input(format!("areas {numbers:?} make no fold: {needs}")));
+    }
+    let options = &TrainOptions { variants: Variant::ALL.to_vec(), ..options.clone() };
+    let mut table = Table::new(options.seed);
+    table.agreement = areas.iter().map(|a| (a.number, a.agreement)).collect();
+    for fold in folds {
+        let of = |wanted: &[u32]| areas.iter().filter(|a| wanted.contains(&a.number)).collect::<Vec<_>>();
+        let (training, testing) = (of(&fold.train), of(&fold.test));
+        let spaces: Vec<&Space> = training.iter().flat_map(|a| &a.spaces).collect();
+        ctx.info(format_args!(
+            "fold {}: train on areas {:?}, test on {:?}",
+            fold.number, fold.train, fold.test
+        ));
+        let model = Model::train(&spaces, options, ctx)?;
+        let rows = test(&model, &testing, ctx)?;
+        let told = rows
+            .iter()
+            .filter_map(|row| Some(format!("{} {:.1}", row.name, row.overall()?)));
+        ctx.info(format_args!("fold {}: AP in %: {}", fold.number, told.collect::<Vec<_>>().join(", ")));
+        table.rows_of_fold(rows);
+    }
+    Ok(table)
+}
+
+/// Tests a model on areas: a row for each of its machines and each comparison, and of each one AP a class and
+/// threshold.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<Row>> {
+    let spaces: Vec<&Space> = areas.iter().flat_map(|a| &a.spaces).collect();
+    let progress = ctx.progress("testing", "spaces", spaces.len() as u64);
+    let tested = spaces.par_iter().map(|space| {
+        ctx.check()?;
+        let tested = test_space(model, space);
+        progress.add(1);
+        Ok(tested)
+    });
+    let mut found = Found::new();
+    let mut recalls = vec![[[0usize; 2]; 2]; CLASSES.len()];
+    for (of_space, recall) in tested.collect::<Result<Vec<_>>>()? {
+        for (key, boxes) in of_space {
+            found.entry(key).or_default().extend(boxes);
+        }
+        for (sum, more) in recalls
+            .iter_mut()
+            .flatten()
+            .flatten()
+            .zip(recall.iter().flatten().flatten())
+        {
+            *sum += more;
+        }
+    }
+    let names = model
+        .machines
+        .iter()
+        .map(|m| m.variant.name())
+        .chain([NO_CONTEXT, TRUE_BOXES, RANDOM]);
+    let rows = names.filter(|name| found.keys().any(|(n, _)| n == name)).map(|name| {
+        let of = |threshold: f64| {
+            let classes = (0..CLASSES.len()).map(|class| {
+                let elements = areas.iter().flat_map(|a| a.elements.iter().map(|e| (a.number, e)));
+                let truth = elements
+                    .filter(|(_, e)| e.class == class)
+                    .map(|(a, e)| ((a, e.room), e.bbox));
+                let boxes = found.get(&(name.to_owned(), class)).map_or(&[][..], |f| f);
+                average_precision(boxes, &truth.collect::<Vec<_>>(), threshold)
+            });
+            classes.collect()
+        };
+        Row { name: name.to_owned(), ap: THRESHOLDS.map(of) }
+    });
+    let mut rows: Vec<Row> = rows.collect();
+    let share = |[found, all]: [usize; 2]| {
+        if all == 0 {
+            None
+        } else {
+            Some(found as f64 / all as f64)
+        }
+    };
+    let of = |t: usize| recalls.iter().map(|r| share(r[t])).collect();
+    rows.push(Row { name: RECALL.to_owned(), ap: [of(0), of(1)] });
+    Ok(rows)
+}
+
+/// What is found in a space, by row and class, and how many elements its proposals overlap: by class,
+/// threshold.
+fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
+    let prepared = Prepared::new(space);
+    let proposals = model.proposer.propose(&prepared);
+    let mut found = Found::new();
+    let mut put = |name: &str, class: usize, bbox: &Aabb, score: f64| {
+        let scored = Scored { scene: (space.area, space.room_of(bbox)), bbox: space.to_world(bbox), score };
+        found.entry((name.to_owned(), class)).or_default().push(scored);
+    };
+    for (machines, detections) in model.machines.iter().zip(model.detect(&prepared, &proposals)) {
+        for Detection { class, bbox, score, in_context } in detections {
+            put(machines.variant.name(), class, &bbox, in_context);
+            if machines.variant == Variant::Full {
+                put(NO_CONTEXT, class, &bbox, score);
+            }
+        }
+    }
+    let seed = model.seed ^ u64::from(space.area) << 32 ^ u64::from(space.number);
+    for node in elements(&proposals, &random_scores(proposals.len(), seed)) {
+        put(RANDOM, node.class, &node.bbox, node.score);
+    }
+    if let Some(full) = model.machines.iter().find(|m| m.variant == Variant::Full) {
+        for element in &space.elements {
+            let mut row = SparseRows::new(FEATURES);
+            row.push(&describe(&space.index, space.frame.extent, &element.bbox));
+            for (class, machine) in full.classes.iter().enumerate() {
+                if let Some(machine) = machine {
+                    put(TRUE_BOXES, class, &element.bbox, machine.score(row.row(0)));
+                }
+            }
+        }
+    }
+    let recall = |class| THRESHOLDS.map(|threshold| recalled(&prepared, &proposals, class, threshold));
+    (found, (0..CLASSES.len()).map(recall).collect())
+}

@@ -1,0 +1,178 @@
+//! The table of average precision, in the paper's form.
+
+pub mod cross_validation;
+pub mod precision;
+
+use crate::area::{CLASSES, STRUCTURAL};
+use serde::{Deserialize, Serialize};
+use std::fmt::Write;
+
+/// A row of one fold: average precision by threshold and class; `None` for classes that its areas do not
+/// have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What is measured.
+    pub name: String,
+    /// Its numbers.
+    pub ap: Precisions,
+}
+
+impl Row {
+    /// The mean of the classes that are there at IoU .5, in per cent.
+    pub fn overall(&self) -> Option<f64> {
+        mean(self.ap[0].iter().flatten().map(|ap| 100.0 * ap))
+    }
+}
+
+/// Average precision by threshold (IoU .5, then .25), then by class, 0 to 1; `None` for classes that are not
+/// there.
+pub type Precisions = [Vec<Option<f64>>; 2];
+
+/// The rows of all folds, for one seed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// The seed.
+    pub seed: u64,
+    /// By area: the adjusted Rand index of its spaces.
+    pub agreement: Vec<(u32, f64)>,
+    /// By row: its name, and what each fold has.
+    pub rows: Vec<(String, Vec<Precisions>)>,
+}
+
+impl Table {
+    /// Without rows.
+    pub fn new(seed: u64) -> Self {
+        Self { seed, agreement: Vec::new(), rows: Vec::new() }
+    }
+
+    /// Adds the rows of a fold.
+    pub fn rows_of_fold(&mut self, rows: Vec<Row>) {
+        for Row { name, ap } in rows {
+            match self.rows.iter_mut().find(|(n, _)| *n == name) {
+                Some((_, folds)) => folds.push(ap),
+                None => self.rows.push((name, vec![ap])),
+            }
+        }
+    }
+
+    /// A row's numbers at a threshold (0 is IoU .5, 1 is .25): by class the mean of the folds that have it,
+    /// in per cent; and the means of structural, movable and all classes. `None` for a row that there is not.
+    pub fn numbers(&self, name: &str, threshold: usize) -> Option<Vec<Option<f64>>> {
+        let (_, folds) = self.rows.iter().find(|(n, _)| n == name)?;
+        let classes: Vec<Option<f64>> = (0..CLASSES.len())
+            .map(|class| mean(folds.iter().filter_map(|f| f[threshold].get(class).copied().flatten())))
+            .map(|ap| ap.map(|ap| 100.0 * ap))
+            .collect();
+        let (structural, movable) = classes.split_at(STRUCTURAL);
+        let means = [structural, movable, &classes].map(|of| mean(of.iter().flatten().copied()));
+        Some(classes.iter().copied().chain(means).collect())
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, n) = values.fold((0.0, 0), |(sum, n), v| (sum + v, n + 1));
+    if n == 0 { None } else { Some(sum / f64::from(n)) }
+}
+
+/// Mean and standard deviation (n − 1) of numbers; the latter is 0 for one.
+fn spread(values: &[f64]) -> Option<[f64; 2]> {
+    let mean = mean(values.iter().copied())?;
+    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    Some([mean, (squares / (values.len().max(2) - 1) as f64).sqrt()])
+}
+
+/// What every table says about its numbers.
+pub const NOTE: &str = "AP on generated areas tests the implementation and is not comparable with the \
+                        published 49.93, for which the six licensed areas are needed.";
+
+/// Tables of several seeds as JSON, with [`NOTE`]: what each fold has, by row, threshold and class.
+pub fn json(tables: &[Table]) -> String {
+    let classes = CLASSES.map(|c| c.name());
+    format!("{:#}\n", serde_json::json!({ "classes": classes, "note": NOTE, "tables": tables }))
+}
+
+/// Tables of several seeds as Markdown: the paper's columns, means over seeds, and behind the last three
+/// means ± the standard deviation between seeds.
+pub fn markdown(tables: &[Table]) -> String {
+    let mut out = String::new();
+    for (threshold, name) in [".5", ".25"].into_iter().enumerate() {
+        let _ = writeln!(out, "Average precision in % at IoU > {name}; {} seed(s)\n", tables.len());
+        let classes = CLASSES.map(|c| c.name());
+        let columns =
+            [&classes[..STRUCTURAL], &["**mean**"], &classes[STRUCTURAL..], &["**mean**", "**overall**"]];
+        let _ = writeln!(out, "| | {} |", columns.concat().join(" | "));
+        let _ = writeln!(out, "|---|{}", "--:|".repeat(CLASSES.len() + 3));
+        let names = tables
+            .first()
+            .map_or(&[][..], |t| &t.rows[..])
+            .iter()
+            .map(|(name, _)| name);
+        for name in names {
+            let of_seeds: Vec<_> = tables.iter().filter_map(|t| t.numbers(name, threshold)).collect();
+            let cell = |column: usize| {
+                let values: Vec<f64> = of_seeds.iter().filter_map(|n| n[column]).collect();
+                match spread(&values) {
+                    Some([mean, deviation]) if column >= CLASSES.len() && tables.len() > 1 => {
+                        format!("{mean:.2} ± {deviation:.2}")
+                    }
+                    Some([mean, _]) => format!("{mean:.2}"),
+                    None => "–".to_owned(),
+                }
+            };
+            let of = |columns: std::ops::Range<usize>| columns.map(cell).collect::<Vec<_>>();
+            let n = CLASSES.len();
+            let cells = [of(0..STRUCTURAL), of(n..n + 1), of(STRUCTURAL..n), of(n + 1..n + 3)].concat();
+            let _ = writeln!(out, "| {name} | {} |", cells.join(" | "));
+        }
+        out.push('\n');
+    }
+    for (area, ari) in tables.first().map_or(&[][..], |t| &t.agreement) {
+        let _ = writeln!(out, "Spaces of area {area}: adjusted Rand index {ari:.3}");
+    }
+    let _ = writeln!(out, "\n*{NOTE}*");
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_are_of_the_classes_that_are_there() {
+        let mut table = Table::new(1);
+        let row = |first: Option<f64>, last: Option<f64>| {
+            let mut ap = vec![Some(0.5); CLASSES.len()];
+            (ap[0], ap[11]) = (first, last);
+            Row { name: "Full model".to_owned(), ap: [ap.clone(), ap] }
+        };
+        table.rows_of_fold(vec![row(Some(0.2), None)]);
+        table.rows_of_fold(vec![row(Some(0.4), None)]);
+        let numbers = table.numbers("Full model", 0).unwrap();
+        assert!((numbers[0].unwrap() - 30.0).abs() < 1e-9);
+        assert_eq!(numbers[11], None);
+        let near = |i: usize, expected: f64| (numbers[i].unwrap() - expected).abs() < 1e-9;
+        assert!(
+            near(12, (30.0 + 6.0 * 50.0) / 7.0) && near(13, 50.0) && near(14, (30.0 + 10.0 * 50.0) / 11.0)
+        );
+        assert_eq!(table.numbers("No global", 0), None);
+    }
+
+    #[test]
+    fn several_seeds_have_a_spread() {
+        let table = |ap: f64| {
+            let mut table = Table::new(0);
+            let ap = vec![Some(ap); CLASSES.len()];
+            table.rows_of_fold(vec![Row { name: "No color".to_owned(), ap: [ap.clone(), ap] }]);
+            table
+        };
+        let text = markdown(&[table(0.1), table(0.3)]);
+        assert!(
+            text.contains("| **mean** | table |")
+                && text.contains("| bookcase | board | **mean** | **overall** |")
+        );
+        assert!(
+            text.contains("| No color | 20.00 |") && text.contains("| 20.00 ± 14.14 | 20.00 ± 14.14 |\n")
+        );
+        assert!(text.contains(NOTE));
+    }
+}
