@@ -1,6 +1,6 @@
 //! Calls on whole data sets. What they found goes to Python as JSON and text.
 
-use crate::error::{fault, usage};
+use crate::error::{exception, fault, input, usage};
 use crate::mesh::parsed;
 use crate::work::watched;
 use pyo3::prelude::*;
@@ -106,13 +106,28 @@ pub(crate) fn evaluate(
     options.median_scale = how.median_scale;
     options.images = how
         .images
-        .map(|word| word.parse().map_err(|e| crate::error::exception(&e)))
+        .map(|word| {
+            word.parse()
+                .map_err(|e: s3d_eval::UnknownImageKind| usage(e.to_string()))
+        })
         .transpose()?;
     options.classes = how.classes;
     options.stuff = how.stuff.map(ClassList);
-    let evaluation =
-        watched(py, threads, &sink, |ctx| s3d_eval::evaluate(protocol, &truth, &predictions, &options, ctx))?;
+
+    let evaluation = watched(py, threads, &sink, |ctx| {
+        Ok(s3d_eval::evaluate(protocol, &truth, &predictions, &options, ctx))
+    })?;
+    let evaluation = evaluation.map_err(|e| exception_of_evaluation(&e))?;
     Ok((json(&evaluation)?, evaluation.to_markdown()))
+}
+
+/// Returns the exception for an error of the evaluation.
+fn exception_of_evaluation(error: &s3d_eval::Error) -> PyErr {
+    match error {
+        s3d_eval::Error::Dataset(error) => exception(error),
+        error if error.is_usage() => usage(error.to_string()),
+        error => input(error.to_string()),
+    }
 }
 
 #[pyfunction]
